@@ -1,0 +1,1 @@
+"""How the floater moves: equations of motion, integration, equilibria, stability."""

@@ -1,0 +1,1 @@
+"""What field each body makes: closed forms, finite elements, tables."""

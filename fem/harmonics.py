@@ -1,0 +1,131 @@
+"""Solid harmonics and what derivatives do to their coefficients.
+
+Normalisation of W. Dehnen, Comput. Astrophys. Cosmol. 1 (2014) 1: with the regular harmonics Υ_lm and the
+irregular ones Θ_lm,
+
+    1/|r - s| = Σ_lm conj Υ_lm(s) Θ_lm(r),    ∂_z Θ_lm = -Θ_(l+1)m,   (∂_x ± i ∂_y) Θ_lm = ±Θ_(l+1)(m±1),
+    ∂_z Υ_lm = Υ_(l-1)m,   (∂_x ± i ∂_y) Υ_lm = ±Υ_(l-1)(m±1),        Θ_l(-m) = (-1)^m conj Θ_lm.
+
+A real harmonic function outside a sphere is Σ_lm c_lm Θ_lm with c_l(-m) = (-1)^m conj c_lm; only m ≥ 0 is kept.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import heyoka as hy
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import gammaln
+
+from ..geometry.box import Array
+
+Coefficients = NDArray[np.complex128]
+"""c[l, m] for 0 ≤ m ≤ l, as a square array."""
+
+
+def regular(degree: int, x: Array, y: Array, z: Array) -> dict[tuple[int, int], Any]:
+    """Complex regular harmonics Υ_lm, 0 ≤ m ≤ l ≤ degree, at NumPy arrays x, y, z."""
+    found: dict[tuple[int, int], Any] = {(0, 0): np.ones_like(x) + 0j}
+    square = x * x + y * y + z * z
+    for m in range(degree + 1):
+        if m:
+            found[m, m] = -(x + 1j * y) / (2 * m) * found[m - 1, m - 1]
+        for l in range(m + 1, degree + 1):
+            upper = (2 * l - 1) * z * found[l - 1, m]
+            if l - 2 >= m:
+                upper = upper - square * found[l - 2, m]
+            found[l, m] = upper / ((l + m) * (l - m))
+    return found
+
+
+def regular_gradient(harmonics: dict[tuple[int, int], Any], l: int, m: int) -> list[Any]:
+    """Gradient (three complex arrays) of Υ_lm, from a dictionary made by `regular` (m ≥ 0)."""
+
+    def at(n: int, k: int) -> Any:
+        if n < 0 or abs(k) > n:
+            return 0.0
+        return harmonics[n, k] if k >= 0 else (-1) ** k * np.conj(harmonics[n, -k])
+
+    plus, minus = at(l - 1, m + 1), -at(l - 1, m - 1)
+    return [(plus + minus) / 2, (plus - minus) / 2j, at(l - 1, m)]
+
+
+def irregular(
+    degree: int, position: Sequence[hy.expression], orders: Sequence[int] | None = None
+) -> dict[Any, hy.expression]:
+    """Real and imaginary parts of Θ_lm up to `degree`: keys (l, m, "re") and (l, m, "im").
+
+    `position` are three heyoka expressions; `orders` restricts m (all if None).
+    """
+    x, y, z = position
+    inverse = 1.0 / (x * x + y * y + z * z)
+    x, y, z = x * inverse, y * inverse, z * inverse
+    found: dict[Any, hy.expression] = {}
+    re, im = hy.sqrt(inverse), hy.expression(0.0)
+    for m in range(degree + 1):
+        if m:
+            re, im = -(2.0 * m - 1.0) * (x * re - y * im), -(2.0 * m - 1.0) * (x * im + y * re)
+        if orders is not None and m not in orders:
+            continue
+        for part, sectoral in (("re", re), ("im", im)):
+            if part == "im" and m == 0:
+                continue
+            below, here = None, sectoral
+            found[m, m, part] = here
+            for l in range(m + 1, degree + 1):
+                upper = (2.0 * l - 1.0) * z * here
+                if below is not None:
+                    upper = upper - float((l - 1) ** 2 - m * m) * (inverse * below)
+                below, here = here, upper
+                found[l, m, part] = here
+    return found
+
+
+def derivative(coefficients: Coefficients, axis: int) -> Coefficients:
+    """Coefficients of ∂f/∂x_axis of f = Σ c_lm Θ_lm: one degree more."""
+    size = coefficients.shape[0]
+    full = np.zeros((size, 2 * size + 3), complex)  # column m + size + 1, with room for m ± 1
+    zero = size + 1
+    for m in range(size):
+        full[:, zero + m] = coefficients[:, m]
+        if m:
+            full[:, zero - m] = (-1) ** m * np.conj(coefficients[:, m])
+    result = np.zeros((size + 1, size + 1), complex)
+    m = np.arange(size + 1)
+    lower, upper = full[:, zero + m - 1], full[:, zero + m + 1]
+    if axis == 0:
+        result[1:] = (lower - upper) / 2
+    elif axis == 1:
+        result[1:] = (lower + upper) / 2j
+    else:
+        result[1:, :size] = -coefficients
+    return result
+
+
+def real_terms(coefficients: Coefficients) -> dict[Any, float]:
+    """The same function as a sum over real harmonics: {(l, m, part): weight}, zero weights left out."""
+    terms: dict[Any, float] = {}
+    for l, m in zip(*np.nonzero(coefficients), strict=True):
+        c, factor = coefficients[l, m], 1.0 if m == 0 else 2.0
+        if c.real:
+            terms[int(l), int(m), "re"] = factor * float(c.real)
+        if c.imag and m:
+            terms[int(l), int(m), "im"] = -factor * float(c.imag)
+    return terms
+
+
+def field_spectrum(coefficients: Coefficients) -> Array:
+    """Root mean square of |grad f| over the unit sphere, by degree: (L+1,).
+
+    The mean of |Θ_lm|² is (l-m)!(l+m)!/(2l+1), and that of |grad f_l|² is (l+1)(2l+1) times the mean of f_l².
+    """
+    size = len(coefficients)
+    spectrum = np.zeros(size)
+    for l in range(size):
+        m = np.arange(l + 1)
+        weights = np.where(m == 0, 1.0, 2.0) * np.exp(gammaln(l - m + 1) + gammaln(l + m + 1)) / (2 * l + 1)
+        mean_square = float(np.sum(weights * np.abs(coefficients[l, : l + 1]) ** 2))
+        spectrum[l] = np.sqrt((l + 1) * (2 * l + 1) * mean_square)
+    return spectrum

@@ -1,0 +1,121 @@
+"""The field of a multipole expansion about one centre."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any
+
+import heyoka as hy
+import numpy as np
+
+from ..geometry.box import Array, frozen_array
+from ..geometry.magnet import MU_0, Magnet
+from .harmonics import Coefficients, derivative, irregular, real_terms, regular, regular_gradient
+
+FOUR_PI = 4 * np.pi
+
+
+@dataclass(frozen=True, eq=False)
+class MultipoleExpansion:
+    """B = -∇̃ Σ c_lm Θ_lm(r̃), with r̃ = (r - center)/radius and ∇̃ its derivative.
+
+    Parameters
+    ----------
+    center : (3,) m, rotor's frame
+    radius : radius of a sphere about the centre that holds all sources, m; the series converges outside it
+    coefficients : c_lm (T), complex (L+1, L+1), m ≥ 0
+    uncertainty : estimated error of |B| on that sphere by degree (root mean square), T; it may be longer than
+        the expansion, then its tail tells what the expansion leaves out
+    """
+
+    center: Array
+    radius: float
+    coefficients: Coefficients
+    uncertainty: Array = field(default_factory=lambda: np.zeros(0))
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "center", frozen_array(self.center, (3,)))
+        object.__setattr__(self, "uncertainty", frozen_array(self.uncertainty, (len(self.uncertainty),)))
+
+    @property
+    def degree(self) -> int:
+        """Highest degree L."""
+        return len(self.coefficients) - 1
+
+    @property
+    def moment(self) -> Array:
+        """(3,) dipole moment, A m²."""
+        c = self.coefficients[1]
+        return FOUR_PI * self.radius**3 / MU_0 * np.array([-2 * c[1].real, 2 * c[1].imag, c[0].real])
+
+    @cached_property
+    def _components(self) -> tuple[list[dict[Any, float]], list[list[dict[Any, float]]]]:
+        """Real-harmonic weights of B_i and of ∂B_i/∂x̃_j."""
+        potentials = [-derivative(self.coefficients, i) for i in range(3)]
+        gradients = [[real_terms(derivative(p, j)) for j in range(3)] for p in potentials]
+        return [real_terms(p) for p in potentials], gradients
+
+    def expressions(self, position: Sequence[hy.expression]) -> tuple[list[hy.expression], list[list[hy.expression]]]:
+        """B (T) and ∂B_i/∂x_j (T/m) at a position (three expressions, m, rotor's frame)."""
+        scaled = [(position[i] - float(self.center[i])) * (1.0 / self.radius) for i in range(3)]
+        fields, gradients = self._components
+        orders = {key[1] for row in gradients for terms in row for key in terms} | {key[1] for t in fields for key in t}
+        harmonics = irregular(self.degree + 2, scaled, sorted(orders))
+        zero = hy.expression(0.0)
+
+        def combine(terms: dict[Any, float], factor: float) -> hy.expression:
+            return hy.sum([(factor * weight) * harmonics[key] for key, weight in terms.items()]) if terms else zero
+
+        upper = {(i, j): combine(gradients[i][j], 1.0 / self.radius) for i in range(3) for j in range(i, 3)}
+        return (
+            [combine(terms, 1.0) for terms in fields],
+            [[upper[min(i, j), max(i, j)] for j in range(3)] for i in range(3)],
+        )
+
+    def field_error(self, points: Array) -> tuple[Array, Array]:
+        """Estimated absolute errors (n,) of B (T) and of its gradient (T/m) at points (n, 3).
+
+        A degree-l part falls as (radius/r)^(l+2), its largest value over a sphere is at most √(2l+1) times the
+        root mean square, and its gradient is √((l+2)(2l+3)) / r times as large.
+        """
+        degree = np.arange(len(self.uncertainty))
+        distance = np.linalg.norm(points - self.center, axis=1)[:, None]
+        parts = self.uncertainty * np.sqrt(2 * degree + 1) * (self.radius / distance) ** (degree + 2)
+        return parts.sum(axis=1), (parts * np.sqrt((degree + 2) * (2 * degree + 3)) / distance).sum(axis=1)
+
+
+def moments_of_magnetization(
+    points: Array, weights: Array, magnetization: Array, center: Array, radius: float, degree: int
+) -> Coefficients:
+    """Expansion coefficients (T) of a magnetisation given at quadrature points: exact volume functionals.
+
+    q_lm = ∫ M · ∇ conj Υ_lm dV, with `points` (n, 3) m, `weights` (n,) m³ and `magnetization` (n, 3) μ0 M in T.
+    """
+    scaled = (points - center) / radius
+    harmonics = regular(degree, *scaled.T)
+    weighted = (weights / (FOUR_PI * radius**3))[:, None] * magnetization
+    result = np.zeros((degree + 1, degree + 1), complex)
+    for l in range(1, degree + 1):
+        for m in range(l + 1):
+            gradient = regular_gradient(harmonics, l, m)
+            result[l, m] = sum(np.sum(weighted[:, a] * np.conj(gradient[a])) for a in range(3))
+    return result
+
+
+def uniform_moments(magnet: Magnet, degree: int) -> MultipoleExpansion:
+    """Moments up to `degree` of a magnet with exactly its remanent polarisation (μr = 1); degree 1 is the dipole.
+
+    Gauss quadrature of the polynomial ∇Υ_lm is exact, so that the coefficients are good to round-off.
+    """
+    box = magnet.box
+    nodes, weights = np.polynomial.legendre.leggauss(degree // 2 + 1)
+    grid = np.stack(np.meshgrid(nodes, nodes, nodes, indexing="ij"), -1).reshape(-1, 3)
+    volume = (weights[:, None, None] * weights[:, None] * weights).ravel() * box.volume / 8
+    points = box.center + (grid * box.half_edges) @ box.rotation.T
+    polarization = np.broadcast_to(magnet.polarization_in_rotor, points.shape)
+    coefficients = moments_of_magnetization(points, volume, polarization, box.center, box.circumradius, degree)
+    noise = 1e-13 * np.abs(coefficients).max()
+    coefficients[np.abs(coefficients) < noise] = 0.0
+    return MultipoleExpansion(box.center, box.circumradius, coefficients)

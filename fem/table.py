@@ -1,0 +1,124 @@
+"""The rotor's field as a table: where `fem` ends and `dynamics` begins."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Protocol
+
+import heyoka as hy
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..geometry.box import Array
+from ..geometry.magnet import Magnet
+from .compiled import CompiledField, FieldExpressions
+from .cuboid import cuboid_field
+from .multipole import MultipoleExpansion
+
+
+class RangeError(ValueError):
+    """A field was asked for where the table does not know it."""
+
+
+class FieldTable(Protocol):
+    """What the dynamics asks of a rotor's field; a new field model is one class with these members."""
+
+    @property
+    def model(self) -> str:
+        """Name of the model."""
+
+    def expressions(self, position: Sequence[hy.expression]) -> FieldExpressions:
+        """B and its gradient as heyoka expressions of a position (m, rotor's frame)."""
+
+    def evaluate(self, points: ArrayLike) -> tuple[Array, Array]:
+        """B (n, 3) T and ∂B_i/∂x_j (n, 3, 3) T/m at points (n, 3) m in the rotor's frame."""
+
+    def relative_error(self, points: ArrayLike) -> tuple[Array, Array]:
+        """Estimated relative errors (n,) of B and of its gradient."""
+
+
+@dataclass(frozen=True, eq=False)
+class RotorTable:
+    """Closed forms of magnets plus multipole expansions: free of divergence and curl by construction.
+
+    Parameters
+    ----------
+    model : "dipole", "cuboid" or "fem"
+    magnets : the bodies, for the range: the field is known outside them
+    uniform : those whose closed form (μr = 1) is part of the field
+    expansions : what the closed forms leave out, with its uncertainty by degree
+    provenance : how the table was made (versions, mesh, order, seconds); texts and numbers
+    """
+
+    model: str
+    magnets: tuple[Magnet, ...]
+    uniform: tuple[Magnet, ...] = ()
+    expansions: tuple[MultipoleExpansion, ...] = ()
+    provenance: Mapping[str, str | float] = field(default_factory=dict)
+
+    def expressions(self, position: Sequence[hy.expression]) -> FieldExpressions:
+        """B and its gradient as heyoka expressions of a position (m, rotor's frame)."""
+        parts = [_magnet_expressions(magnet, position) for magnet in self.uniform]
+        parts += [expansion.expressions(position) for expansion in self.expansions]
+        return (
+            [hy.sum([b[i] for b, _ in parts]) for i in range(3)],
+            [[hy.sum([g[i][j] for _, g in parts]) for j in range(3)] for i in range(3)],
+        )
+
+    @cached_property
+    def _compiled(self) -> CompiledField:
+        return CompiledField(self.expressions)
+
+    def evaluate(self, points: ArrayLike) -> tuple[Array, Array]:
+        """B (n, 3) T and ∂B_i/∂x_j (n, 3, 3) T/m at points (n, 3) m in the rotor's frame.
+
+        Raises
+        ------
+        RangeError : a point lies in a magnet or where an expansion does not converge
+        """
+        points = np.asarray(points, float).reshape(-1, 3)
+        self._check_range(points)
+        return self._compiled(points)
+
+    def relative_error(self, points: ArrayLike) -> tuple[Array, Array]:
+        """Estimated relative errors (n,) of B and of its gradient (Frobenius norm)."""
+        points = np.asarray(points, float).reshape(-1, 3)
+        b, g = self.evaluate(points)
+        errors = [expansion.field_error(points) for expansion in self.expansions]
+        round_off = 1e-13
+        error_b = sum((e[0] for e in errors), np.zeros(len(points)))
+        error_g = sum((e[1] for e in errors), np.zeros(len(points)))
+        size_b, size_g = np.linalg.norm(b, axis=1), np.linalg.norm(g, axis=(1, 2))
+        tiny = np.finfo(float).tiny
+        return error_b / (size_b + tiny) + round_off, error_g / (size_g + tiny) + round_off
+
+    def _check_range(self, points: Array) -> None:
+        for magnet in self.magnets:
+            _refuse(points, magnet.box.distance(points) < 0, "outside the magnets")
+        for expansion in self.expansions:
+            near = np.linalg.norm(points - expansion.center, axis=1) <= expansion.radius
+            _refuse(points, near, f"farther than {expansion.radius * 1e3:.3f} mm from a magnet's centre")
+
+
+def _refuse(points: Array, bad: Array, rule: str) -> None:
+    if bad.any():
+        where = ", ".join(f"{c * 1e3:.6g}" for c in points[int(np.argmax(bad))])
+        raise RangeError(f"Input points must lie {rule}; instead received a point at ({where}) mm.")
+
+
+def _magnet_expressions(magnet: Magnet, position: Sequence[hy.expression]) -> FieldExpressions:
+    """Closed form of one magnet, turned from its own axes into the rotor's."""
+    axes = magnet.box.rotation
+    shifted = [position[i] - float(magnet.box.center[i]) for i in range(3)]
+    if np.array_equal(axes, np.eye(3)):
+        return cuboid_field(shifted, magnet.box.half_edges, magnet.polarization)
+    body = [hy.sum([float(axes[i, a]) * shifted[i] for i in range(3)]) for a in range(3)]
+    b, g = cuboid_field(body, magnet.box.half_edges, magnet.polarization)
+    field_out = [hy.sum([float(axes[i, a]) * b[a] for a in range(3)]) for i in range(3)]
+    gradient = [
+        [hy.sum([float(axes[i, a] * axes[j, c]) * g[a][c] for a in range(3) for c in range(3)]) for j in range(3)]
+        for i in range(3)
+    ]
+    return field_out, gradient

@@ -1,0 +1,1 @@
+"""What is in the scene: magnets, rotor, floater, plate, scene file, meshes."""
