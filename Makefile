@@ -1,0 +1,56 @@
+# Everything a fresh machine needs is Python >= 3.11 and make. All set-up happens in .venv.
+PYTHON ?= python3
+VENV := .venv
+BIN := $(VENV)/bin
+SOURCES := $(wildcard geometry/* fem/* dynamics/* studies/* scenes/*.toml) pyproject.toml README.md LICENSE
+PACKAGES := -p spinlev.geometry -p spinlev.fem -p spinlev.dynamics -p spinlev.studies
+
+.PHONY: install run test lint types bench docs validate lock clean
+
+install: $(VENV)/installed
+
+$(VENV)/dependencies: requirements.txt
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \
+	  { echo "spinlev needs Python 3.11 or newer; set PYTHON=/path/to/python3.11"; exit 1; }
+	$(PYTHON) -m venv $(VENV)
+	$(BIN)/pip install --quiet --disable-pip-version-check --require-hashes --no-deps -r requirements.txt
+	@touch $@
+
+$(VENV)/installed: $(VENV)/dependencies $(SOURCES)
+	@rm -rf build
+	$(BIN)/pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation --force-reinstall .
+	@rm -rf build *.egg-info
+	@cd $(VENV) && bin/python -c 'import ngsolve, pyvista' || { \
+	  echo "A system library is missing. On Debian or Ubuntu: apt-get install libgl1 libglu1-mesa libegl1 libxrender1"; \
+	  exit 1; }
+	@touch $@
+
+run: install
+	$(BIN)/spinlev run scenes/horizontal.toml
+
+lint: install
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+
+types: install
+	$(BIN)/mypy $(PACKAGES)
+
+test: lint types
+	$(BIN)/pytest -n 2 -m "not slow"
+
+validate: install
+	$(BIN)/pytest -m slow
+
+bench: install
+	$(BIN)/pytest benchmarks --benchmark-columns=min,median,rounds
+
+docs: install
+	$(BIN)/python docs/build.py
+
+# Pin anew (needs pip-tools in the environment that calls it).
+lock:
+	pip-compile --quiet --extra dev --generate-hashes --allow-unsafe --strip-extras --no-emit-index-url \
+	  --no-emit-trusted-host --no-emit-find-links --output-file requirements.txt pyproject.toml
+
+clean:
+	rm -rf $(VENV) build out

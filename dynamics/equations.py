@@ -1,0 +1,152 @@
+"""Equations of motion of the floater, in the frame that turns with the rotor.
+
+With unit length R (the floater's radius) and unit time T (`Scales`), position r, velocity v and spin Ω as seen from
+the laboratory but along the rotor's axes, unit moment m̂ and the rotor's rate W = ωT about z:
+
+    ṙ = v - W × r                         m̂' = (Ω - W) × m̂
+    v̇ = F + g - c v - W × v               Ω̇ = τ - γ Ω⊥ - γ_s Ω∥ - W × Ω
+
+F = (m T²/M R) ∇(m̂·B) and τ = (m T²/I) m̂ × B: exact for a rigidly magnetised sphere.  Without drag and with gravity
+along the axis everything is autonomous, and the Jacobi integral
+
+    J = v²/2 + i Ω²/2 - i (m T²/I) m̂·B - g·r - W·(r × v + i Ω),   i = I/(M R²)   (unit: M R²/T²)
+
+is conserved: the energy less ω times the angular momentum about the axis.  What drag and a horizontal part of gravity
+do in the rotating frame is integrated along as the thirteenth state `work`, so that J - work never changes.
+Every number that a sweep may change is a runtime parameter; only the table's own geometry is compiled in.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import IntEnum, auto
+
+import heyoka as hy
+import numpy as np
+
+from ..fem.table import FieldTable
+from ..geometry.box import Array
+from ..geometry.scene import Scene
+from .state import Scales
+
+Vector = Sequence[hy.expression]
+NAMES = tuple(f"{vector}_{axis}" for vector in ("position", "velocity", "moment", "spin") for axis in "xyz")
+
+
+class Parameter(IntEnum):
+    """Places of the runtime parameters; all are free of units but LENGTH (m) and TORQUE (1/T)."""
+
+    RATE = 0
+    LENGTH = auto()
+    TORQUE = auto()
+    INERTIA = auto()
+    GRAVITY_X = auto()
+    GRAVITY_Y = auto()
+    GRAVITY_Z = auto()
+    LINEAR_DRAG = auto()
+    TILT_DRAG = auto()
+    SPIN_DRAG = auto()
+
+
+@dataclass(frozen=True, eq=False)
+class Equations:
+    """The equations of motion as heyoka expressions.
+
+    Parameters
+    ----------
+    variables : the twelve of the state
+    rates : their derivatives with respect to scaled time
+    jacobi : the Jacobi integral
+    power : its rate of change, by drag and by gravity across the axis
+    """
+
+    variables: Vector
+    rates: Vector
+    jacobi: hy.expression
+    power: hy.expression
+
+
+def parameters(scene: Scene, scales: Scales, frozen_spin: bool = False) -> Array:
+    """Values of the runtime parameters; `frozen_spin` takes the drag off the spin about the moment."""
+    floater, drag, (length, time) = scene.floater, scene.drag, (scales.length, scales.time)
+    values = np.zeros(len(Parameter))
+    values[Parameter.RATE] = scene.angular_velocity * time
+    values[Parameter.LENGTH] = length
+    values[Parameter.TORQUE] = floater.moment * time**2 / floater.inertia
+    values[Parameter.INERTIA] = floater.inertia / (floater.mass * length**2)
+    values[Parameter.GRAVITY_X : Parameter.GRAVITY_Z + 1] = scene.gravity * (time**2 / length)
+    values[Parameter.LINEAR_DRAG] = drag.linear * time / floater.mass
+    values[Parameter.TILT_DRAG] = drag.angular * time / floater.inertia
+    values[Parameter.SPIN_DRAG] = 0.0 if frozen_spin else values[Parameter.TILT_DRAG]
+    return values
+
+
+def equations_of_motion(table: FieldTable, tilted_gravity: bool = False) -> Equations:
+    """Rates of the scaled state in the field of a table.
+
+    Parameters
+    ----------
+    table : the rotor's field
+    tilted_gravity : whether gravity has a part across the axis; it turns in this frame, so that time enters
+    """
+    variables = hy.make_vars(*NAMES)
+    position, velocity, moment, spin = (variables[i : i + 3] for i in (0, 3, 6, 9))
+    length, torque, inertia, linear = (
+        hy.par[p] for p in (Parameter.LENGTH, Parameter.TORQUE, Parameter.INERTIA, Parameter.LINEAR_DRAG)
+    )
+    field, gradient = table.expressions([length * p for p in position])
+    strength = torque * inertia * length
+    force = [strength * dot(moment, [gradient[i][j] for i in range(3)]) for j in range(3)]
+    turn = [torque * component for component in cross(moment, field)]
+    axial, lateral = _gravity(tilted_gravity)
+    push = [lateral[i] - linear * velocity[i] for i in range(3)]
+    brake = _angular_drag(moment, spin)
+    drift = subtract(velocity, turned(position))
+    lag = [spin[0], spin[1], spin[2] - hy.par[Parameter.RATE]]
+    rates = [
+        *drift,
+        *subtract([force[i] + axial[i] + push[i] for i in range(3)], turned(velocity)),
+        *cross(lag, moment),
+        *subtract([turn[i] + brake[i] for i in range(3)], turned(spin)),
+    ]
+    potential = -inertia * torque * dot(moment, field) - axial[2] * position[2]
+    swirl = cross(position, velocity)[2] + inertia * spin[2]
+    jacobi = 0.5 * (dot(velocity, velocity) + inertia * dot(spin, spin)) + potential - hy.par[Parameter.RATE] * swirl
+    return Equations(variables, rates, jacobi, dot(push, drift) + inertia * dot(brake, lag))
+
+
+def _gravity(tilted: bool) -> tuple[Vector, Vector]:
+    """Gravity along the axis and across it, both along the rotor's axes."""
+    zero = hy.expression(0.0)
+    axial = [zero, zero, hy.par[Parameter.GRAVITY_Z]]
+    if not tilted:
+        return axial, [zero, zero, zero]
+    x, y, angle = hy.par[Parameter.GRAVITY_X], hy.par[Parameter.GRAVITY_Y], hy.par[Parameter.RATE] * hy.time
+    return axial, [hy.cos(angle) * x + hy.sin(angle) * y, hy.cos(angle) * y - hy.sin(angle) * x, zero]
+
+
+def _angular_drag(moment: Vector, spin: Vector) -> Vector:
+    tilt, along = hy.par[Parameter.TILT_DRAG], hy.par[Parameter.SPIN_DRAG]
+    excess = (tilt - along) * dot(spin, moment)
+    return [excess * moment[i] - tilt * spin[i] for i in range(3)]
+
+
+def dot(a: Vector, b: Vector) -> hy.expression:
+    """Scalar product of two vectors of expressions."""
+    return hy.sum([a[i] * b[i] for i in range(3)])
+
+
+def cross(a: Vector, b: Vector) -> list[hy.expression]:
+    """Vector product of two vectors of expressions."""
+    return [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+
+
+def turned(vector: Vector) -> list[hy.expression]:
+    """W × vector: what the frame's rotation adds to the rate of a vector fixed in the laboratory."""
+    return [-hy.par[Parameter.RATE] * vector[1], hy.par[Parameter.RATE] * vector[0], hy.expression(0.0)]
+
+
+def subtract(a: Vector, b: Vector) -> list[hy.expression]:
+    """Difference of two vectors of expressions."""
+    return [a[i] - b[i] for i in range(3)]

@@ -1,0 +1,124 @@
+"""A rotor table as one self-describing netCDF file."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from ..geometry.atomic import replacing
+from ..geometry.box import Box
+from ..geometry.magnet import Magnet
+from .multipole import MultipoleExpansion
+from .table import RotorTable
+
+FORMAT = "spinlev rotor table 1"
+
+
+class TableFileError(ValueError):
+    """A table file that is damaged, or is not one."""
+
+
+def save_table(table: RotorTable, path: str | Path) -> None:
+    """Write a table; the file is whole or absent."""
+    dataset = _to_dataset(table)
+    dataset.attrs["content_sha256"] = _digest(dataset)
+    with replacing(path) as temporary:
+        dataset.to_netcdf(temporary, engine="h5netcdf")
+
+
+def load_table(path: str | Path) -> RotorTable:
+    """Read a table.
+
+    Raises
+    ------
+    TableFileError : the file is not a table of this format, or its content is not what was written
+    """
+    try:
+        with xr.open_dataset(path, engine="h5netcdf") as opened:
+            dataset = opened.load()
+    except FileNotFoundError:
+        raise
+    except Exception as error:  # the HDF5 layer raises many kinds on a damaged file
+        raise TableFileError(f"Input {path} must be a readable netCDF file; {error}.") from error
+    attrs = dataset.attrs
+    if attrs.get("format") != FORMAT:
+        raise TableFileError(f"Input {path} must be a '{FORMAT}'; instead received '{attrs.get('format')}'.")
+    if attrs.pop("content_sha256", None) != _digest(dataset):
+        raise TableFileError(f"Input {path} must be as it was written; instead its checksum does not match.")
+    return _from_dataset(dataset)
+
+
+def _to_dataset(table: RotorTable) -> xr.Dataset:
+    magnets, expansions = table.magnets, table.expansions
+    size = max((len(e.coefficients) for e in expansions), default=1)
+    known = max((len(e.uncertainty) for e in expansions), default=1)
+    coefficients = np.zeros((len(expansions), size, size), complex)
+    uncertainty = np.zeros((len(expansions), known))
+    for k, expansion in enumerate(expansions):
+        coefficients[k, : expansion.degree + 1, : expansion.degree + 1] = expansion.coefficients
+        uncertainty[k, : len(expansion.uncertainty)] = expansion.uncertainty
+
+    def stack(rows: list[Any], *shape: int) -> np.ndarray:
+        return np.array(rows, dtype=float).reshape(len(rows), *shape)
+
+    power, axis = ("expansion", "degree", "order"), ("magnet", "axis")
+    variables = {
+        "magnet_size": (axis, stack([m.box.size for m in magnets], 3), "m"),
+        "magnet_center": (axis, stack([m.box.center for m in magnets], 3), "m"),
+        "magnet_rotation": (("magnet", "axis", "body_axis"), stack([m.box.rotation for m in magnets], 3, 3), "1"),
+        "magnet_polarization": (("magnet", "body_axis"), stack([m.polarization for m in magnets], 3), "T"),
+        "magnet_recoil_permeability": (("magnet",), stack([m.recoil_permeability for m in magnets]), "1"),
+        "magnet_closed_form": (("magnet",), stack([any(m is u for u in table.uniform) for m in magnets]), "1"),
+        "expansion_center": (("expansion", "axis"), stack([e.center for e in expansions], 3), "m"),
+        "expansion_radius": (("expansion",), stack([e.radius for e in expansions]), "m"),
+        "expansion_real": (power, coefficients.real, "T"),
+        "expansion_imag": (power, coefficients.imag, "T"),
+        "expansion_uncertainty": (("expansion", "uncertainty_degree"), uncertainty, "T"),
+    }
+    attrs = {
+        "format": FORMAT,
+        "title": "Magnetic field of a rotor: closed forms of cuboids plus solid-harmonic expansions",
+        "model": table.model,
+        "provenance": json.dumps(dict(table.provenance), sort_keys=True),
+    }
+    return xr.Dataset({n: xr.Variable(d, v, {"units": u}) for n, (d, v, u) in variables.items()}, attrs=attrs)
+
+
+def _from_dataset(dataset: xr.Dataset) -> RotorTable:
+    data = {str(name): variable.values for name, variable in dataset.data_vars.items()}
+    magnets = tuple(
+        Magnet(Box(size, center, rotation), polarization, float(permeability))
+        for size, center, rotation, polarization, permeability in zip(
+            *(data[f"magnet_{n}"] for n in ("size", "center", "rotation", "polarization", "recoil_permeability")),
+            strict=True,
+        )
+    )
+    expansions = tuple(
+        MultipoleExpansion(center, float(radius), real + 1j * imag, uncertainty)
+        for center, radius, real, imag, uncertainty in zip(
+            *(data[f"expansion_{n}"] for n in ("center", "radius", "real", "imag", "uncertainty")), strict=True
+        )
+    )
+    return RotorTable(
+        model=dataset.attrs["model"],
+        magnets=magnets,
+        uniform=tuple(m for m, exact in zip(magnets, data["magnet_closed_form"], strict=True) if exact),
+        expansions=expansions,
+        provenance=json.loads(dataset.attrs["provenance"]),
+    )
+
+
+def _digest(dataset: xr.Dataset) -> str:
+    """SHA-256 over the numbers, their names and shapes, and the attributes."""
+    digest = hashlib.sha256()
+    for name in sorted(str(n) for n in dataset.data_vars):
+        values = np.ascontiguousarray(dataset[name].values, dtype="<f8")
+        digest.update(f"{name}{values.shape}".encode() + values.tobytes())
+    attrs = {k: str(v) for k, v in dataset.attrs.items() if k != "content_sha256"}
+    digest.update(json.dumps(attrs, sort_keys=True).encode())
+    return digest.hexdigest()

@@ -1,0 +1,145 @@
+"""The scene file's keys, types and ranges; every key carries its unit."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Discriminator, Field, Tag
+
+Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]
+NotNegative = Annotated[Number, Field(ge=0.0)]
+Positive = Annotated[Number, Field(gt=0.0)]
+Length = Annotated[Positive, Field(ge=1e-3, le=1e6)]
+Coordinate = Annotated[Number, Field(ge=-1e6, le=1e6)]
+Angle = Annotated[Number, Field(ge=-360.0, le=360.0)]
+Polarization = Annotated[Number, Field(ge=-100.0, le=100.0)]
+Remanence = Annotated[NotNegative, Field(le=100.0)]
+Permeability = Annotated[Number, Field(ge=1.0, le=1e6)]
+Vector = Annotated[list[Number], Field(min_length=3, max_length=3)]
+Sizes = Annotated[list[Length], Field(min_length=3, max_length=3)]
+Coordinates = Annotated[list[Coordinate], Field(min_length=3, max_length=3)]
+Angles = Annotated[list[Angle], Field(min_length=3, max_length=3)]
+Polarizations = Annotated[list[Polarization], Field(min_length=3, max_length=3)]
+
+RECOIL_PERMEABILITY = 1.05
+"""Default: sintered NdFeB."""
+
+
+class _Table(BaseModel):
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+
+class _ArticleRotor(_Table):
+    edge_mm: Length
+    remanence_T: Remanence
+    recoil_permeability: Permeability = RECOIL_PERMEABILITY
+
+
+class HorizontalRotor(_ArticleRotor):
+    """One cube, displaced from the axis."""
+
+    configuration: Literal["horizontal"]
+    displacement_mm: Annotated[NotNegative, Field(le=1e6)]
+
+
+class VerticalRotor(_ArticleRotor):
+    """Two cubes, the upper magnetised along the axis."""
+
+    configuration: Literal["vertical"]
+    displacement_mm: Annotated[NotNegative, Field(le=1e6)]
+
+
+class TiltRotor(_ArticleRotor):
+    """One cube, turned about y."""
+
+    configuration: Literal["tilt"]
+    angle_deg: Annotated[Number, Field(ge=-90.0, le=90.0)]
+
+
+class MagnetSection(_Table):
+    """One cuboid of an explicit rotor; its polarisation is along the body's axes and turns with it."""
+
+    size_mm: Sizes
+    center_mm: Coordinates
+    rotation_deg: Angles = [0.0, 0.0, 0.0]
+    polarization_T: Polarizations
+    recoil_permeability: Permeability = RECOIL_PERMEABILITY
+
+
+class ExplicitRotor(_Table):
+    """Any set of cuboids."""
+
+    magnets: Annotated[list[MagnetSection], Field(min_length=1)]
+
+
+def rotor_kind(rotor: Any) -> str | None:
+    """Which of the rotor tables a `[rotor]` table is."""
+    if not isinstance(rotor, dict):
+        return None
+    return "magnets" if "magnets" in rotor else str(rotor.get("configuration"))
+
+
+Rotor = Annotated[
+    Annotated[HorizontalRotor, Tag("horizontal")]
+    | Annotated[VerticalRotor, Tag("vertical")]
+    | Annotated[TiltRotor, Tag("tilt")]
+    | Annotated[ExplicitRotor, Tag("magnets")],
+    Discriminator(rotor_kind),
+]
+
+
+class FloaterSection(_Table):
+    """The floating sphere."""
+
+    diameter_mm: Length
+    remanence_T: Remanence
+    recoil_permeability: Permeability = RECOIL_PERMEABILITY
+    density_kg_m3: Annotated[Positive, Field(le=1e6)]
+    conductivity_S_m: Annotated[NotNegative, Field(le=1e9)] | None = None
+
+
+class LoweringSection(_Table):
+    """The plate's way down."""
+
+    start_s: NotNegative
+    speed_mm_s: Annotated[Positive, Field(le=1e6)]
+    distance_mm: Annotated[NotNegative, Field(le=1e6)]
+
+
+class PlateSection(_Table):
+    """The conducting plate."""
+
+    size_mm: Sizes
+    center_mm: Coordinates
+    rotation_deg: Angles = [0.0, 0.0, 0.0]
+    conductivity_S_m: Annotated[Positive, Field(le=1e9)]
+    lowering: LoweringSection | None = None
+
+
+class DragSection(_Table):
+    """Viscous drag on the floater."""
+
+    linear_N_s_m: NotNegative
+    angular_N_m_s: NotNegative
+
+
+class StartSection(_Table):
+    """Where a simulation begins: an offset from the stable equilibrium, or absolutely."""
+
+    offset_mm: Coordinates | None = None
+    position_mm: Coordinates | None = None
+    velocity_mm_s: Vector | None = None
+    moment: Vector | None = None
+    spin_hz: Vector | None = None
+
+
+class SceneSection(_Table):
+    """The whole file."""
+
+    frequency_hz: Annotated[NotNegative, Field(le=1e6)]
+    gravity_m_s2: Vector = [0.0, 0.0, -9.81]
+    rotor: Rotor
+    floater: FloaterSection
+    plate: PlateSection | None = None
+    drag: DragSection | None = None
+    start: StartSection | None = None
