@@ -42,12 +42,11 @@ def cached_rotor_table(
     does no harm.
     """
     path = cache_folder() / f"rotor-{rotor_key(rotor, model, rtol)}.nc"
-    try:
-        return load_table(path), True
-    except FileNotFoundError:
-        pass
-    except (TableFileError, OSError) as error:
-        report(f"The cached table is damaged and is computed anew: {error}")
+    if path.exists():
+        try:
+            return load_table(path), True
+        except (TableFileError, OSError) as error:
+            report(f"The cached table is damaged and is computed anew: {error}")
     table = rotor_table(rotor, model, rtol)
     try:
         save_table(table, path)

@@ -101,8 +101,8 @@ def cuboid_field(
     field : three values, T
     gradient : 3 × 3 values, [i][j] = ∂B_i/∂x_j, T/m; symmetric and traceless
 
-    Accuracy: round-off, relative to the largest of the 24 terms; next to the cuboid that is 1e-15 of B, and it
-    grows as (distance/size)² because the terms cancel: 1e-12 at a hundred sizes.
+    Accuracy: round-off of the largest terms. The terms cancel as the distance grows, so that it is 1e-15 of B beside
+    the cuboid and grows as (distance/size)²: 1e-12 at a hundred sizes.
     """
     strength = {axis: float(p) / FOUR_PI for axis, p in enumerate(polarization) if p}
     zero = hy.expression(0.0)

@@ -116,16 +116,17 @@ def real_terms(coefficients: Coefficients) -> dict[Any, float]:
     return terms
 
 
-def field_spectrum(coefficients: Coefficients) -> Array:
-    """Root mean square of |grad f| over the unit sphere, by degree: (L+1,).
+def field_sizes(degree: int) -> Array:
+    """Root mean square of |grad Re Θ_lm| (or Im) over the unit sphere, [l, m], times √2 for m > 0; 0 for m > l.
 
-    The mean of |Θ_lm|² is (l-m)!(l+m)!/(2l+1), and that of |grad f_l|² is (l+1)(2l+1) times the mean of f_l².
+    The mean of |Θ_lm|² is (l-m)!(l+m)!/(2l+1), and that of |grad f|² is (l+1)(2l+1) times the mean of f² for a
+    harmonic f of degree l. The size of Σ c_lm Θ_lm is the root of Σ |c_lm|² size_lm².
     """
-    size = len(coefficients)
-    spectrum = np.zeros(size)
-    for l in range(size):
-        m = np.arange(l + 1)
-        weights = np.where(m == 0, 1.0, 2.0) * np.exp(gammaln(l - m + 1) + gammaln(l + m + 1)) / (2 * l + 1)
-        mean_square = float(np.sum(weights * np.abs(coefficients[l, : l + 1]) ** 2))
-        spectrum[l] = np.sqrt((l + 1) * (2 * l + 1) * mean_square)
-    return spectrum
+    l, m = np.meshgrid(np.arange(degree + 1), np.arange(degree + 1), indexing="ij")
+    logarithm = gammaln(np.maximum(l - m, 0) + 1) + gammaln(l + m + 1)
+    return np.where(m <= l, np.sqrt(np.where(m == 0, 1.0, 2.0) * (l + 1.0) * np.exp(logarithm)), 0.0)
+
+
+def field_spectrum(coefficients: Coefficients) -> Array:
+    """Root mean square of |grad f| over the unit sphere, by degree: (L+1,)."""
+    return np.linalg.norm(np.abs(coefficients) * field_sizes(len(coefficients) - 1), axis=1)

@@ -12,7 +12,7 @@ import numpy as np
 
 from ..geometry.box import Array, frozen_array
 from ..geometry.magnet import MU_0, Magnet
-from .harmonics import Coefficients, derivative, irregular, real_terms, regular, regular_gradient
+from .harmonics import Coefficients, derivative, field_sizes, irregular, real_terms, regular, regular_gradient
 
 FOUR_PI = 4 * np.pi
 
@@ -116,6 +116,13 @@ def uniform_moments(magnet: Magnet, degree: int) -> MultipoleExpansion:
     points = box.center + (grid * box.half_edges) @ box.rotation.T
     polarization = np.broadcast_to(magnet.polarization_in_rotor, points.shape)
     coefficients = moments_of_magnetization(points, volume, polarization, box.center, box.circumradius, degree)
-    noise = 1e-13 * np.abs(coefficients).max()
-    coefficients[np.abs(coefficients) < noise] = 0.0
-    return MultipoleExpansion(box.center, box.circumradius, coefficients)
+    return MultipoleExpansion(box.center, box.circumradius, without_noise(coefficients, 1e-15))
+
+
+def without_noise(coefficients: Coefficients, level: float) -> Coefficients:
+    """The coefficients without those whose field at the reference sphere is below `level` of the largest one's.
+
+    What symmetry forbids comes out as round-off; left out, it costs nothing to evaluate.
+    """
+    field = np.abs(coefficients) * field_sizes(len(coefficients) - 1)
+    return np.where(field > level * field.max(initial=0.0), coefficients, 0.0)

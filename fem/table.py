@@ -14,8 +14,8 @@ from numpy.typing import ArrayLike
 from ..geometry.box import Array
 from ..geometry.magnet import Magnet
 from .compiled import CompiledField, FieldExpressions
-from .cuboid import cuboid_field
 from .multipole import MultipoleExpansion
+from .uniform import UniformField
 
 
 class RangeError(ValueError):
@@ -60,16 +60,19 @@ class RotorTable:
 
     def expressions(self, position: Sequence[hy.expression]) -> FieldExpressions:
         """B and its gradient as heyoka expressions of a position (m, rotor's frame)."""
-        parts = [_magnet_expressions(magnet, position) for magnet in self.uniform]
-        parts += [expansion.expressions(position) for expansion in self.expansions]
+        parts = [part.expressions(position) for part in (*self._closed_forms, *self.expansions)]
         return (
             [hy.sum([b[i] for b, _ in parts]) for i in range(3)],
             [[hy.sum([g[i][j] for _, g in parts]) for j in range(3)] for i in range(3)],
         )
 
     @cached_property
-    def _compiled(self) -> CompiledField:
-        return CompiledField(self.expressions)
+    def _closed_forms(self) -> tuple[UniformField, ...]:
+        return tuple(UniformField(magnet) for magnet in self.uniform)
+
+    @cached_property
+    def _compiled_expansions(self) -> tuple[CompiledField, ...]:
+        return tuple(CompiledField(expansion.expressions) for expansion in self.expansions)
 
     def evaluate(self, points: ArrayLike) -> tuple[Array, Array]:
         """B (n, 3) T and ∂B_i/∂x_j (n, 3, 3) T/m at points (n, 3) m in the rotor's frame.
@@ -80,7 +83,9 @@ class RotorTable:
         """
         points = np.asarray(points, float).reshape(-1, 3)
         self._check_range(points)
-        return self._compiled(points)
+        parts = [part.evaluate(points) for part in self._closed_forms]
+        parts += [part(points) for part in self._compiled_expansions]
+        return sum(b for b, _ in parts), sum(g for _, g in parts)
 
     def relative_error(self, points: ArrayLike) -> tuple[Array, Array]:
         """Estimated relative errors (n,) of B and of its gradient (Frobenius norm)."""
@@ -106,19 +111,3 @@ def _refuse(points: Array, bad: Array, rule: str) -> None:
     if bad.any():
         where = ", ".join(f"{c * 1e3:.6g}" for c in points[int(np.argmax(bad))])
         raise RangeError(f"Input points must lie {rule}; instead received a point at ({where}) mm.")
-
-
-def _magnet_expressions(magnet: Magnet, position: Sequence[hy.expression]) -> FieldExpressions:
-    """Closed form of one magnet, turned from its own axes into the rotor's."""
-    axes = magnet.box.rotation
-    shifted = [position[i] - float(magnet.box.center[i]) for i in range(3)]
-    if np.array_equal(axes, np.eye(3)):
-        return cuboid_field(shifted, magnet.box.half_edges, magnet.polarization)
-    body = [hy.sum([float(axes[i, a]) * shifted[i] for i in range(3)]) for a in range(3)]
-    b, g = cuboid_field(body, magnet.box.half_edges, magnet.polarization)
-    field_out = [hy.sum([float(axes[i, a]) * b[a] for a in range(3)]) for i in range(3)]
-    gradient = [
-        [hy.sum([float(axes[i, a] * axes[j, c]) * g[a][c] for a in range(3) for c in range(3)]) for j in range(3)]
-        for i in range(3)
-    ]
-    return field_out, gradient

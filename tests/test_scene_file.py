@@ -1,0 +1,123 @@
+"""Scene files: what loads, and what is said of what does not."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from spinlev.geometry import MU_0, AbsoluteStart, OffsetStart, SceneError, load_scene, parse_scene
+
+SCENES = Path(__file__).parent.parent / "scenes"
+GOOD = (SCENES / "horizontal.toml").read_text()
+
+
+def faults(text):
+    with pytest.raises(SceneError) as caught:
+        parse_scene(text, "s.toml")
+    return caught.value.faults
+
+
+@pytest.mark.parametrize("path", sorted(SCENES.glob("*.toml")), ids=lambda p: p.stem)
+def test_shipped_scenes_load(path):
+    scene = load_scene(path)
+    assert scene.text == path.read_text()
+    assert scene.floater.mass == pytest.approx(8.04e-3, rel=1e-3)  # PHYSICS.md
+    assert scene.floater.inertia == pytest.approx(1.297e-7, rel=1e-3)  # PHYSICS.md
+
+
+def test_units_and_defaults_become_si():
+    scene = load_scene(SCENES / "tilt-over-plate.toml")
+    assert scene.angular_velocity == pytest.approx(2 * np.pi * 130)
+    assert scene.gravity == pytest.approx([0, 0, -9.81])
+    assert scene.plate.box.size == pytest.approx([0.1, 0.24, 0.03])
+    assert [scene.plate.lowering.depth(t) for t in (0.0, 4.0, 99.0)] == pytest.approx([0.0, 0.01, 0.055])
+    assert scene.drag.linear == pytest.approx(2.2e-6, rel=0.01)  # Stokes in air, PHYSICS.md
+    assert scene.drag.angular == pytest.approx(1.2e-10, rel=0.03)
+    assert isinstance(scene.start, OffsetStart)
+
+
+def test_tilt_turns_body_and_magnetisation_towards_plus_z():
+    (magnet,) = load_scene(SCENES / "tilt-over-plate.toml").rotor
+    expected = 1.305 * np.array([np.cos(np.radians(10)), 0, np.sin(np.radians(10))])
+    assert magnet.polarization_in_rotor == pytest.approx(expected, abs=1e-15)
+
+
+def test_vertical_has_a_transverse_and_an_axial_cube():
+    lower, upper = load_scene(SCENES / "vertical-24h.toml").rotor
+    assert lower.polarization_in_rotor == pytest.approx([1.305, 0, 0])
+    assert upper.polarization_in_rotor == pytest.approx([0, 0, 1.305])
+    assert upper.box.center == pytest.approx([0, 0, 0.014])
+    assert lower.moment[0] == pytest.approx(1.305e-6 / MU_0)
+
+
+def test_plate_is_turned_about_the_fixed_x_then_y_then_z_axis():
+    scene = parse_scene(GOOD.replace("[0.0, 90.0, 0.0]", "[90.0, 0.0, 90.0]").replace("35.0, 0.0", "150.0, 0.0"))
+    # x (100 mm) -> x -> y; y (240 mm) -> z -> z; z (30 mm) -> -y -> x
+    assert np.ptp(scene.plate.box.corners, axis=0) == pytest.approx([0.03, 0.1, 0.24])
+
+
+def test_absolute_start():
+    start = '\n[start]\nposition_mm = [1, 0, -40]\nmoment = [0, 3, 4]\nspin_hz = [0, 0, 10]\n'
+    start = parse_scene(GOOD + start).start
+    assert isinstance(start, AbsoluteStart)
+    assert start.position == pytest.approx([1e-3, 0, -0.04])
+    assert start.moment == pytest.approx([0, 0.6, 0.8])
+    assert start.spin == pytest.approx([0, 0, 20 * np.pi])
+    assert start.velocity == pytest.approx([0, 0, 0])
+
+
+def test_all_faults_are_listed_at_once():
+    text = GOOD.replace("frequency_hz", "frequency").replace("edge_mm = 10.0", "edge_mm = -10.0")
+    text = text.replace("conductivity_S_m = 3.5e7", "conductivity_S_m = nan").replace("[35.0, 0.0, -21.0]", "[1.0]")
+    found = faults(text)
+    assert len(found) == 5
+    assert "Input frequency_hz must be given; instead it is missing." in found
+    assert "Input rotor.edge_mm must be at least 0.001; instead received -10.0." in found
+    assert "Input plate.conductivity_S_m must be a finite number; instead received nan." in found
+    assert "Input plate.center_mm must be a list of exactly 3 numbers; instead received [1.0]." in found
+    assert any("did you mean frequency_hz?" in fault for fault in found)
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (("edge_mm = 10.0", "edge_mm = '10'"), "rotor.edge_mm must be a number"),
+        (("edge_mm = 10.0", "edge_mm = true"), "rotor.edge_mm must be a number"),
+        (("edge_mm = 10.0", "edge_mm = inf"), "rotor.edge_mm must be a finite number"),
+        (('"horizontal"', '"sideways"'), "rotor.configuration must be one of"),
+        (("recoil_permeability = 1.05", "recoil_permeability = 0.5"), "at least 1"),
+        (("displacement_mm", "angle_deg"), "rotor.angle_deg must be a known key"),
+        (("density_kg_m3 = 7500.0", ""), "floater.density_kg_m3 must be given"),
+        (("conductivity_S_m = 3.5e7", "conductivity_S_m = 0.0"), "greater than 0"),
+        (("linear_N_s_m = 2.2e-6", "linear_N_s_m = -1"), "drag.linear_N_s_m must be at least 0"),
+        (("[35.0, 0.0, -21.0]", "[20.0, 0.0, -21.0]"), "overlaps magnet 1 by"),
+        (("[drag]", "[start]\nmoment = [1, 0, 0]\n[drag]"), "must come with start.position_mm"),
+        (("[drag]", "[start]\nposition_mm = [0, 0, -9]\n[drag]"), "overlaps rotor magnet 1 by 2.35 mm"),
+        (("[drag]", "[start]\nposition_mm = [16, 0, -21]\n[drag]"), "overlaps the plate by 2.35 mm"),
+        (("[rotor]", "rotor = 3\n[other]"), "must be"),
+    ],
+)
+def test_wrong_scenes_say_what_is_wrong(change, said):
+    found = faults(GOOD.replace(*change, 1))
+    assert any(said in fault for fault in found), found
+
+
+def test_overlapping_magnets_are_reported_with_their_depth():
+    text = (SCENES / "vertical-24h.toml").read_text()
+    assert "overlap by 2.5 mm" in faults(text.replace("14.0", "7.5"))[0]
+    parse_scene(text.replace("14.0", "10.0"))  # touching is allowed
+
+
+@pytest.mark.parametrize("content", [b"not toml", b"\xff\xfe\x00", b""])
+def test_files_that_are_no_scene(tmp_path, content):
+    path = tmp_path / "s.toml"
+    path.write_bytes(content)
+    with pytest.raises(SceneError, match=r"s\.toml"):
+        load_scene(path)
+
+
+def test_missing_file_and_folder(tmp_path):
+    with pytest.raises(SceneError, match="does not exist"):
+        load_scene(tmp_path / "none.toml")
+    with pytest.raises(SceneError, match="readable"):
+        load_scene(tmp_path)
