@@ -15,6 +15,7 @@ harmonics of ψ on the outer sphere. The space outside that sphere is exact (`op
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any, Literal
 
 import ngsolve as ng
@@ -26,11 +27,14 @@ from ..geometry.magnet import Magnet
 from ..geometry.mesh import MagnetMesh
 from .compiled import CompiledField
 from .harmonics import Coefficients
-from .integration_points import volume_points
+from .integration_points import surface_points, volume_points
 from .multipole import moments_of_magnetization, uniform_moments
 from .open_boundary import OpenBoundary
 from .quadrature import edge_graded_gauss
 from .table import RotorTable
+
+GRADED_NODES = 24
+"""Points per axis for the closed part of the magnetisation: moments to 1e-8 of the leading one."""
 
 Formulation = Literal["split", "direct"]
 
@@ -107,8 +111,12 @@ def _add_source(
 
 def remanent_h(magnets: tuple[Magnet, ...], inside: int, points: Array) -> Array:
     """μ0 H (n, 3) T of all magnets with μr = 1, in closed form, at `points` (n, 3) m in magnet number `inside`."""
-    field = CompiledField(RotorTable("cuboid", magnets, uniform=magnets).expressions)(points)[0]
-    return np.asarray(field - magnets[inside].polarization_in_rotor)
+    return np.asarray(_closed_form(magnets)(points)[0] - magnets[inside].polarization_in_rotor)
+
+
+@lru_cache(maxsize=4)
+def _closed_form(magnets: tuple[Magnet, ...]) -> CompiledField:
+    return CompiledField(RotorTable("cuboid", magnets, uniform=magnets).expressions)
 
 
 def _solve_open(stiffness: Any, load: Any, space: Any, boundary: OpenBoundary) -> tuple[Any, int]:
@@ -149,7 +157,8 @@ def magnet_moments(solution: Solution, degree: int) -> tuple[Coefficients, ...]:
     """Coefficients (T) of M in every magnet about its own centre, with radius its circumradius.
 
     The closed part of M, (μr - 1) H0 or J, is integrated apart from the mesh, to round-off; only ∇ψ is a finite-element
-    quantity, so that the error is of the order of (μr - 1)² times the square of the error of ∇ψ.
+    quantity, so that the error is of the order of (μr - 1)² times the square of the error of ∇ψ. Because the harmonics
+    Υ_lm have no Laplacian, ∫ ∇ψ·∇Υ dV over a magnet equals the integral of ψ ∂Υ/∂n over its faces.
     """
     return tuple(_moments(solution, k, magnet, degree) for k, magnet in enumerate(solution.mesh.magnets))
 
@@ -160,15 +169,24 @@ def _moments(solution: Solution, k: int, magnet: Magnet, degree: int) -> Coeffic
     if solution.formulation == "direct":
         closed = uniform_moments(magnet, degree).coefficients
     else:
-        points, weights = edge_graded_gauss(box, degree // 2 + 12)
+        points, weights = edge_graded_gauss(box, GRADED_NODES)
         source = susceptibility * remanent_h(mesh.magnets, k, points)
         closed = moments_of_magnetization(points, weights, source, box.center, box.circumradius, degree)
-    inside = volume_points(mesh.mesh, f"magnet{k}", 2 * solution.order + 2)
-    slope = inside.sample(*(ng.grad(solution.potential)[axis] for axis in range(3)))
-    points, weights = mesh.to_meter(inside.points), inside.weights * mesh.unit**3
-    result = closed
-    for part in np.array_split(np.arange(len(points)), len(points) // 20_000 + 1):
-        result = result - susceptibility * moments_of_magnetization(
-            points[part], weights[part], slope[part], box.center, box.circumradius, degree
-        )
-    return result
+    points, weighted_normals = _faces(solution, k)
+    shape = moments_of_magnetization(
+        points, np.ones(len(points)), weighted_normals, box.center, box.circumradius, degree
+    )
+    return closed - susceptibility * shape
+
+
+def _faces(solution: Solution, k: int) -> tuple[Array, Array]:
+    """Integration points (n, 3) m on the faces of one magnet and ψ n dS there, T m³."""
+    mesh, box = solution.mesh, solution.mesh.magnets[k].box
+    surface = surface_points(mesh.mesh, "faces", 2 * solution.order + 4)
+    points = mesh.to_meter(surface.points)
+    mine = (surface.weights > 0) & (np.abs(box.distance(points)) < 1e-9 * box.circumradius)
+    body = box.to_body(points[mine])
+    axis = np.argmax(np.abs(body) / box.half_edges, axis=1)
+    normals = box.rotation.T[axis] * np.sign(np.take_along_axis(body, axis[:, None], axis=1))
+    potential = surface.sample(solution.potential)[mine, 0]
+    return points[mine], (surface.weights[mine] * potential * mesh.unit**3)[:, None] * normals

@@ -45,6 +45,11 @@ class MultipoleExpansion:
         return len(self.coefficients) - 1
 
     @property
+    def nearest(self) -> float:
+        """Distance from the centre beyond which the series converges, m; a lone dipole or nothing is no series."""
+        return self.radius if self.degree > 1 and self.coefficients.any() else 0.0
+
+    @property
     def moment(self) -> Array:
         """(3,) dipole moment, A m²."""
         c = self.coefficients[1]

@@ -10,13 +10,12 @@ from ..geometry.box import Array, Box
 def edge_graded_gauss(box: Box, nodes: int) -> tuple[Array, Array]:
     """Points (n, 3) m and weights (n,) m³, with `nodes` per axis, all inside the box.
 
-    The substitution x = ∫ (1 - t²)³ dt, normalised, presses the Gauss points towards all faces. The logarithm of the
+    The substitution x = (3 t - t³)/2 presses the Gauss points towards all faces. The logarithm of the
     distance from an edge, as in the field of a magnet, is integrated to 1e-9 by 16 nodes and 1e-12 by 24.
     """
     nodes_1d, weights_1d = np.polynomial.legendre.leggauss(nodes)
     t = nodes_1d
-    place = (35 * t - 35 * t**3 + 21 * t**5 - 5 * t**7) / 16
-    weight = weights_1d * 35 / 16 * (1 - t * t) ** 3
+    place, weight = (3 * t - t**3) / 2, 1.5 * weights_1d * (1 - t * t)
     grid = np.stack(np.meshgrid(place, place, place, indexing="ij"), -1).reshape(-1, 3)
     volume = (weight[:, None, None] * weight[:, None] * weight).ravel() * box.volume / 8
     return box.center + (grid * box.half_edges) @ box.rotation.T, volume

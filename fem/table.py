@@ -9,7 +9,7 @@ from typing import Protocol
 
 import heyoka as hy
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from ..geometry.box import Array
 from ..geometry.magnet import Magnet
@@ -37,6 +37,9 @@ class FieldTable(Protocol):
 
     def relative_error(self, points: ArrayLike) -> tuple[Array, Array]:
         """Estimated relative errors (n,) of B and of its gradient."""
+
+    def in_range(self, points: ArrayLike) -> NDArray[np.bool_]:
+        """Which of the points (n, 3) m lie where the table knows the field: (n,)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,10 +85,19 @@ class RotorTable:
         RangeError : a point lies in a magnet or where an expansion does not converge
         """
         points = np.asarray(points, float).reshape(-1, 3)
-        self._check_range(points)
+        outside = self.in_range(points)
+        if not outside.all():
+            where = ", ".join(f"{c * 1e3:.6g}" for c in points[int(np.argmin(outside))])
+            raise RangeError(
+                f"Input points must lie outside the magnets{self._beyond()}; instead received a point at ({where}) mm."
+            )
         parts = [part.evaluate(points) for part in self._closed_forms]
         parts += [part(points) for part in self._compiled_expansions]
         return sum(b for b, _ in parts), sum(g for _, g in parts)
+
+    def _beyond(self) -> str:
+        nearest = max((expansion.nearest for expansion in self.expansions), default=0.0)
+        return f" and farther than {nearest * 1e3:.4g} mm from their centres" if nearest else ""
 
     def relative_error(self, points: ArrayLike) -> tuple[Array, Array]:
         """Estimated relative errors (n,) of B and of its gradient (Frobenius norm)."""
@@ -99,15 +111,12 @@ class RotorTable:
         tiny = np.finfo(float).tiny
         return error_b / (size_b + tiny) + round_off, error_g / (size_g + tiny) + round_off
 
-    def _check_range(self, points: Array) -> None:
+    def in_range(self, points: ArrayLike) -> NDArray[np.bool_]:
+        """Which of the points (n, 3) m lie outside the magnets and where the expansions converge: (n,)."""
+        points = np.asarray(points, float).reshape(-1, 3)
+        outside = np.ones(len(points), bool)
         for magnet in self.magnets:
-            _refuse(points, magnet.box.distance(points) < 0, "outside the magnets")
+            outside &= magnet.box.distance(points) >= 0
         for expansion in self.expansions:
-            near = np.linalg.norm(points - expansion.center, axis=1) <= expansion.radius
-            _refuse(points, near, f"farther than {expansion.radius * 1e3:.3f} mm from a magnet's centre")
-
-
-def _refuse(points: Array, bad: Array, rule: str) -> None:
-    if bad.any():
-        where = ", ".join(f"{c * 1e3:.6g}" for c in points[int(np.argmax(bad))])
-        raise RangeError(f"Input points must lie {rule}; instead received a point at ({where}) mm.")
+            outside &= np.linalg.norm(points - expansion.center, axis=1) > expansion.nearest
+        return outside

@@ -1,7 +1,8 @@
 """Finite-element meshes of magnets in a ball of air (Netgen and OpenCASCADE).
 
 Lengths inside a mesh are measured in its `unit`, from its `center`, so that coordinates are of order one. The regions
-are `magnet0`, `magnet1`, … and `air`; the surface of the ball is the boundary `outer`.
+are `magnet0`, `magnet1`, … and `air`; the boundaries are `outer`, the surface of the ball, and `faces`, those of all
+magnets.
 """
 
 from __future__ import annotations
@@ -103,6 +104,7 @@ def _generate(solids: list[Any], settings: MeshSettings) -> Any:
     air = occ.Sphere(occ.Pnt(0, 0, 0), settings.ball_radius)
     air.faces.name = "outer"
     for solid in solids:
+        solid.faces.name = "faces"
         air = air - solid
     air.mat("air")
     shape = occ.Glue([*solids, air])

@@ -1,0 +1,34 @@
+"""Rates of the state and their exact derivatives, compiled to machine code for many states in one call."""
+
+from __future__ import annotations
+
+import heyoka as hy
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..fem.table import FieldTable
+from ..geometry.box import Array
+from .equations import equations_of_motion
+
+
+class Rates:
+    """Right-hand side and Jacobian of the autonomous equations of motion (gravity along the axis).
+
+    Parameters
+    ----------
+    table : the rotor's field
+    """
+
+    def __init__(self, table: FieldTable) -> None:
+        equations = equations_of_motion(table)
+        variables = list(equations.variables)
+        tensors = hy.diff_tensors(list(equations.rates), diff_args=variables, diff_order=1)
+        outputs = [*equations.rates, *np.asarray(tensors.jacobian).ravel()]
+        self._function = hy.cfunc(outputs, variables, compact_mode=True)
+
+    def __call__(self, states: ArrayLike, values: Array) -> tuple[Array, Array]:
+        """Rates (n, 12) and their derivatives (n, 12, 12) at scaled `states` (n, 12), with parameter `values`."""
+        states = np.asarray(states, float)
+        pars = np.repeat(values[: self._function.nparams, None], len(states), axis=1)
+        found = self._function(np.ascontiguousarray(states.T), pars=pars).T
+        return found[:, :12], found[:, 12:].reshape(-1, 12, 12)

@@ -1,0 +1,99 @@
+"""What the commands answer, as mappings ready for JSON."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from ..dynamics import Equilibrium, Trajectory
+from ..fem.table import RotorTable
+from ..geometry.box import Array
+from ..geometry.scene import Scene
+
+MILLI = 1e-3
+PLATE_NOT_MODELLED = "The plate's eddy currents are not modelled in this version: the plate is only an obstacle."
+FLOATER_NOT_MODELLED = "The floater's own eddy currents are not modelled in this version."
+
+
+def field_answer(table: RotorTable, points: Array) -> dict[str, Any]:
+    """B, its gradient and their estimated errors at points (n, 3) m."""
+    b, gradient = table.evaluate(points)
+    error, gradient_error = table.relative_error(points)
+    return {
+        "model": table.model,
+        "error_estimate": float(error.max()),
+        "gradient_error_estimate": float(gradient_error.max()),
+        "B_T": b,
+        "dB_T_per_m": gradient,
+        "B_relative_error": error,
+        "dB_relative_error": gradient_error,
+    }
+
+
+def equilibrium_answer(equilibrium: Equilibrium) -> dict[str, Any]:
+    """One synchronous equilibrium."""
+    return {
+        "position_mm": equilibrium.position / MILLI,
+        "position_error_mm": equilibrium.position_error / MILLI,
+        "polar_angle_deg": equilibrium.polar_angle_deg,
+        "lag_deg": equilibrium.lag_deg,
+        "spin": equilibrium.spin,
+        "stable": equilibrium.stable,
+        "growth_per_s": equilibrium.growth_per_s,
+        "growth_error_per_s": equilibrium.growth_error_per_s,
+        "frequencies_hz": equilibrium.frequencies_hz,
+    }
+
+
+def equilibria_answer(table: RotorTable, equilibria: tuple[Equilibrium, ...]) -> dict[str, Any]:
+    """All equilibria; the error estimate is the field's largest relative error at any of them."""
+    places = np.array([e.position for e in equilibria]).reshape(-1, 3)
+    error = float(table.relative_error(places)[0].max()) if len(places) else None
+    return {
+        "model": table.model,
+        "error_estimate": error,
+        "equilibria": [equilibrium_answer(equilibrium) for equilibrium in equilibria],
+    }
+
+
+def flight_answer(table: RotorTable, flight: Trajectory) -> dict[str, Any]:
+    """How a flight went; the error estimate is the field's largest relative error along it."""
+    return {
+        "model": table.model,
+        "error_estimate": float(table.relative_error(flight.rotor.position[:: max(1, len(flight.time) // 500)])[0].max()),
+        "levitated_s": flight.levitated_s,
+        "ended_by": flight.ended_by,
+        "energy_error": flight.energy_error,
+        "realtime_factor": flight.realtime_factor,
+    }
+
+
+def omissions(scene: Scene) -> list[str]:
+    """What is in the scene but not in the computation."""
+    left_out = [PLATE_NOT_MODELLED] if scene.plate else []
+    if scene.floater.conductivity:
+        left_out.append(FLOATER_NOT_MODELLED)
+    return left_out
+
+
+def equilibria_lines(scene: Scene, equilibria: tuple[Equilibrium, ...]) -> list[str]:
+    """The equilibria as a table for a person."""
+    head = f"{'x':>9} {'y':>9} {'z (mm)':>9} {'± mm':>9} {'polar °':>8} {'lag °':>8}  stable   growth (1/s)"
+    lines = [f"Synchronous equilibria at {scene.frequency:g} Hz (rotor's frame): {len(equilibria)}"]
+    lines += [head] if equilibria else []
+    for e in equilibria:
+        x, y, z = e.position / MILLI
+        lines.append(
+            f"{x:9.4f} {y:9.4f} {z:9.4f} {e.position_error / MILLI:9.1e} {e.polar_angle_deg:8.3f} {e.lag_deg:8.3f}"
+            f"  {'yes' if e.stable else 'no ':6} {e.growth_per_s:12.3e}"
+        )
+    return lines
+
+
+def flight_lines(flight: Trajectory) -> list[str]:
+    """How a flight went, for a person."""
+    return [
+        f"Flight of {flight.levitated_s:.4g} s, ended by {flight.ended_by}; violation of the energy ledger and of unit "
+        f"length {flight.energy_error:.1e}; {flight.realtime_factor:.3g} times real time.",
+    ]

@@ -1,0 +1,213 @@
+"""The command line: `spinlev`.
+
+Exit status 0: done; 2: bad input, with one message that says what is allowed; 1: the computation failed.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+import sysconfig
+import time
+import traceback
+from collections.abc import Mapping
+from dataclasses import dataclass
+from importlib.metadata import version
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from cyclopts import App, CycloptsError, Parameter
+
+from ..geometry import SceneError, load_scene
+from .console import InputError, answers_only, note, to_json
+
+FieldModel = Literal["dipole", "cuboid", "fem", "auto"]
+PlateModel = Literal["none", "auto"]
+
+app = App(
+    name="spinlev",
+    version=version("spinlev"),
+    help="Magnetic levitation by rotation: true fields, true motion.",
+    help_format="plaintext",
+)
+
+
+@Parameter(name="*")
+@dataclass(frozen=True)
+class Output:
+    """Where answers go.
+
+    Parameters
+    ----------
+    json : print one JSON object and nothing else on standard output
+    out : folder for the files
+    """
+
+    json: Annotated[bool, Parameter(negative="")] = False
+    out: Path = Path("out")
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What a command says: numbers for a program, lines for a person."""
+
+    values: Mapping[str, Any]
+    lines: tuple[str, ...]
+    json: bool
+
+
+def default_scene() -> Path:
+    """The scene that comes with the program: `horizontal`."""
+    return Path(sysconfig.get_path("data")) / "share" / "spinlev" / "scenes" / "horizontal.toml"
+
+
+@app.command
+def run(
+    scene: Path | None = None,
+    *,
+    model: FieldModel = "auto",
+    plate_model: PlateModel = "auto",
+    duration_s: float = 3.0,
+    rtol: float = 1e-5,
+    output: Output = Output(),  # noqa: B008 - frozen
+) -> Answer:
+    """The main job: fields, tables, equilibria, stability, motion, pictures, result.nc and summary.json.
+
+    Parameters
+    ----------
+    scene : scene file (left out: the one that comes with the program)
+    model : field model of the motion
+    plate_model : plate model
+    duration_s : simulated time, s
+    rtol : relative accuracy asked of the field
+    """
+    from .run import main_job
+
+    _positive("--duration-s", duration_s)
+    _positive("--rtol", rtol)
+    values, lines = main_job(load_scene(scene or default_scene()), model, duration_s, rtol, output.out)
+    return Answer(values, tuple(lines), output.json)
+
+
+@app.command
+def field(
+    scene: Path,
+    *,
+    points: Path,
+    model: FieldModel = "auto",
+    rtol: float = 1e-5,
+    output: Output = Output(),  # noqa: B008
+) -> Answer:
+    """B and its gradient at points in the rotor's frame at t = 0.
+
+    Parameters
+    ----------
+    scene : scene file
+    points : CSV file with the columns x_mm, y_mm, z_mm
+    model : field model
+    rtol : relative accuracy asked of the field
+    """
+    from .points_file import read_points
+    from .single import field_job
+
+    _positive("--rtol", rtol)
+    loaded, places = load_scene(scene), read_points(points)
+    values, lines = field_job(loaded, places, model, rtol, output.out)
+    return Answer(values, tuple(lines), output.json)
+
+
+@app.command
+def equilibria(
+    scene: Path,
+    *,
+    model: FieldModel = "auto",
+    plate_model: PlateModel = "auto",
+    spin: float = 0.0,
+    rtol: float = 1e-5,
+    output: Output = Output(),  # noqa: B008
+) -> Answer:
+    """All synchronous equilibria and their stability.
+
+    Parameters
+    ----------
+    scene : scene file
+    model : field model
+    plate_model : plate model
+    spin : body spin S = Ω·m̂/ω of the floater about its own moment
+    rtol : relative accuracy asked of the field
+    """
+    from .single import equilibria_job
+
+    _positive("--rtol", rtol)
+    if not -1e3 <= spin <= 1e3:
+        raise InputError(f"Input --spin must be between -1000 and 1000; instead received {spin}.")
+    values, lines = equilibria_job(load_scene(scene), model, spin, rtol, output.out)
+    return Answer(values, tuple(lines), output.json)
+
+
+@app.command
+def simulate(
+    scene: Path,
+    *,
+    duration_s: float,
+    model: FieldModel = "auto",
+    plate_model: PlateModel = "auto",
+    rtol: float = 1e-5,
+    output: Output = Output(),  # noqa: B008
+) -> Answer:
+    """The floater's motion: trajectory.nc and how it ended.
+
+    Parameters
+    ----------
+    scene : scene file
+    duration_s : simulated time, s
+    model : field model
+    plate_model : plate model
+    rtol : relative accuracy asked of the field
+    """
+    from .single import simulate_job
+
+    _positive("--duration-s", duration_s)
+    _positive("--rtol", rtol)
+    values, lines = simulate_job(load_scene(scene), model, duration_s, rtol, output.out)
+    return Answer(values, tuple(lines), output.json)
+
+
+def _positive(name: str, value: float) -> None:
+    if not 0 < value < float("inf"):
+        raise InputError(f"Input {name} must be a positive number; instead received {value}.")
+
+
+def main() -> None:
+    """Run the command line and leave with its exit status."""
+    with answers_only() as out:
+        status = _status(sys.argv[1:], out)
+    sys.exit(status)
+
+
+def _status(arguments: list[str], out: Any) -> int:
+    from ..fem import RangeError
+
+    began = time.perf_counter()
+    try:
+        answer = app(arguments, exit_on_error=False, print_error=False, result_action="return_value")
+    except CycloptsError as error:
+        note(f"spinlev: {error}\nTry: spinlev --help")
+        return 2
+    except (SceneError, InputError, RangeError) as error:
+        note(f"spinlev: {error}")
+        return 2
+    except KeyboardInterrupt:
+        note("spinlev: stopped; what was finished is kept.")
+        return 1
+    except Exception as error:  # the last resort: say what and where, without a traceback
+        if "SPINLEV_TRACEBACK" in os.environ:
+            raise
+        frame = traceback.extract_tb(error.__traceback__)[-1]
+        where = f"{Path(frame.filename).parent.name}/{Path(frame.filename).name}:{frame.lineno}"
+        note(f"spinlev: the computation failed at {where}: {type(error).__name__}: {error}")
+        return 1
+    if isinstance(answer, Answer):
+        values = {**answer.values, "seconds": time.perf_counter() - began}
+        print(to_json(values) if answer.json else "\n".join(answer.lines), file=out)
+    return 0

@@ -1,0 +1,72 @@
+"""What a person and what a program sees: messages and progress on standard error, answers on standard output."""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from typing import Any, TextIO
+
+import numpy as np
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
+
+ERRORS = Console(stderr=True, highlight=False, soft_wrap=True)
+
+
+class InputError(ValueError):
+    """What the user gave cannot be used; the message names it, the rule and the value."""
+
+
+def note(text: str) -> None:
+    """A message on standard error."""
+    ERRORS.print(text, markup=False)
+
+
+@contextmanager
+def progress(label: str) -> Iterator[Callable[[float], None]]:
+    """A progress bar on standard error; gives a function that takes the finished fraction."""
+    columns = (TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(), TimeRemainingColumn())
+    with Progress(*columns, console=ERRORS, transient=True) as bar:
+        task = bar.add_task(label, total=1.0)
+        yield lambda fraction: bar.update(task, completed=fraction)
+
+
+@contextmanager
+def answers_only() -> Iterator[TextIO]:
+    """Give the true standard output, while everything else that prints there goes to standard error.
+
+    The numeric libraries print from C++; a program that reads our answer must not see that.
+    """
+    sys.stdout.flush()
+    kept = os.dup(1)
+    os.dup2(2, 1)
+    try:
+        with os.fdopen(os.dup(kept), "w") as stream:
+            yield stream
+    finally:
+        sys.stdout.flush()
+        os.dup2(kept, 1)
+        os.close(kept)
+
+
+def plain(value: Any) -> Any:
+    """The same value in types that JSON knows; what is not finite becomes null."""
+    if isinstance(value, Mapping):
+        return {str(key): plain(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [plain(item) for item in value]
+    if isinstance(value, np.ndarray):
+        return plain(value.tolist())
+    if isinstance(value, np.generic):
+        return plain(value.item())
+    if isinstance(value, float):
+        return value if np.isfinite(value) else None
+    return value
+
+
+def to_json(answer: Mapping[str, Any]) -> str:
+    """One JSON object."""
+    return json.dumps(plain(answer), allow_nan=False, ensure_ascii=False)

@@ -1,0 +1,127 @@
+"""Results as labelled data with units and provenance, in netCDF."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+from datetime import datetime, timezone
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from ..dynamics import Equilibrium, ForceCurve, Trajectory
+from ..fem.table import FieldTable
+from ..geometry.atomic import replacing
+from ..geometry.box import Array
+from ..geometry.scene import Scene
+
+AXIS = ("x", "y", "z")
+LIBRARIES = ("spinlev", "ngsolve", "heyoka", "numpy", "scipy", "xarray")
+
+
+def write_dataset(dataset: xr.Dataset, scene: Scene, path: Path) -> None:
+    """Write a result with its provenance: versions, command, time and the scene's text."""
+    provenance = {f"version_{name}": version(name) for name in LIBRARIES}
+    stamp = datetime.now(timezone.utc).isoformat(timespec="seconds")
+    dataset = dataset.assign_attrs(scene=scene.text, command=" ".join(sys.argv), created=stamp, **provenance)
+    with replacing(path) as temporary:
+        dataset.to_netcdf(temporary, engine="h5netcdf")
+
+
+def variable(dims: Sequence[str], values: Any, units: str, long_name: str) -> xr.Variable:
+    """A variable with its units and a name for an axis label."""
+    return xr.Variable(dims, values, {"units": units, "long_name": long_name})
+
+
+def axis_dataset(tables: dict[str, FieldTable], heights: Array) -> xr.Dataset:
+    """Field of each model on the axis below the rotor, with its estimated relative error; heights (n,) m < 0."""
+    points = np.stack([np.zeros_like(heights), np.zeros_like(heights), heights], axis=1)
+    fields = np.full((len(tables), len(heights), 3), np.nan)
+    errors = np.full((len(tables), len(heights)), np.nan)
+    for k, table in enumerate(tables.values()):
+        known = table.in_range(points)
+        fields[k, known] = table.evaluate(points[known])[0]
+        errors[k, known] = table.relative_error(points[known])[0]
+    return xr.Dataset(
+        {
+            "axis_field": variable(("model", "axis_height", "axis"), fields, "T", "flux density on the axis"),
+            "axis_error": variable(("model", "axis_height"), errors, "1", "estimated relative error of the field"),
+        },
+        coords={
+            "model": list(tables),
+            "axis": list(AXIS),
+            "axis_height": variable(("axis_height",), heights, "m", "height on the axis"),
+        },
+    )
+
+
+def curve_dataset(curves: dict[str, Sequence[ForceCurve]]) -> xr.Dataset:
+    """Axial force along the curves of lateral balance, by model."""
+    rows = [(model, number, curve) for model, found in curves.items() for number, curve in enumerate(found)]
+    sizes = [len(curve.magnetic_force) for _, _, curve in rows]
+
+    def joined(values: list[Array], *shape: int) -> Array:
+        return np.concatenate([np.zeros((0, *shape)), *values])
+
+    return xr.Dataset(
+        {
+            "curve_model": (("curve_point",), np.repeat([m for m, _, _ in rows] or [""], sizes or [0])),
+            "curve_number": (("curve_point",), np.repeat([n for _, n, _ in rows] or [0], sizes or [0])),
+            "curve_position": variable(
+                ("curve_point", "axis"), joined([c.position for _, _, c in rows], 3), "m", "position, rotor's frame"
+            ),
+            "curve_moment": variable(
+                ("curve_point", "axis"), joined([c.moment for _, _, c in rows], 3), "1", "direction of the moment"
+            ),
+            "curve_force": variable(
+                ("curve_point",), joined([c.magnetic_force for _, _, c in rows]), "N", "axial magnetic force"
+            ),
+        },
+        coords={"axis": list(AXIS)},
+    )
+
+
+def equilibria_dataset(found: dict[str, Sequence[Equilibrium]]) -> xr.Dataset:
+    """Equilibria of all models in one list."""
+    rows = [(model, equilibrium) for model, equilibria in found.items() for equilibrium in equilibria]
+
+    def column(name: str, read: Any, units: str, *dims: str) -> xr.Variable:
+        values = np.array([read(e) for _, e in rows], dtype=float)
+        shape = (len(rows), *((3,) if dims else ()))
+        return variable(("equilibrium", *dims), values.reshape(shape), units, name)
+
+    return xr.Dataset(
+        {
+            "equilibrium_model": (("equilibrium",), np.array([model for model, _ in rows], dtype=object).astype(str)),
+            "equilibrium_stable": (("equilibrium",), np.array([int(e.stable) for _, e in rows], dtype="i1")),
+            "equilibrium_position": column("position, rotor's frame", lambda e: e.position, "m", "axis"),
+            "equilibrium_position_error": column("estimated position error", lambda e: e.position_error, "m"),
+            "equilibrium_moment": column("direction of the moment", lambda e: e.state.moment, "1", "axis"),
+            "equilibrium_growth": column("largest growth rate", lambda e: e.growth_per_s, "1/s"),
+        },
+        coords={"axis": list(AXIS)},
+    )
+
+
+def trajectory_dataset(flight: Trajectory) -> xr.Dataset:
+    """A flight in the laboratory frame, with its position in the rotor's frame as well."""
+    lab, rotor = flight.lab, flight.rotor
+    dims = ("time", "axis")
+    return xr.Dataset(
+        {
+            "position": variable(dims, lab.position, "m", "position, laboratory frame"),
+            "velocity": variable(dims, lab.velocity, "m/s", "velocity, laboratory frame"),
+            "moment": variable(dims, lab.moment, "1", "direction of the moment, laboratory frame"),
+            "spin": variable(dims, lab.spin, "rad/s", "angular velocity, laboratory frame"),
+            "position_rotor_frame": variable(dims, rotor.position, "m", "position, rotor's frame"),
+        },
+        coords={"time": variable(("time",), flight.time, "s", "time"), "axis": list(AXIS)},
+        attrs={
+            "ended_by": str(flight.ended_by),
+            "levitated_s": flight.levitated_s,
+            "energy_error": flight.energy_error,
+        },
+    )

@@ -1,0 +1,137 @@
+"""The main job: fields, tables, equilibria, motion, and what the dipole picture gets wrong."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from ..dynamics import Equilibrium, EquilibriumError, Survey, Trajectory, survey
+from ..fem.table import RotorTable
+from ..geometry import SceneError
+from ..geometry.atomic import replacing
+from ..geometry.box import Array
+from ..geometry.overlap import TOUCHING, sphere_overlap
+from ..geometry.scene import Scene
+from .answers import equilibria_answer, equilibria_lines, flight_answer, flight_lines, omissions
+from .console import note, to_json
+from .figures import field_figure, force_figure, save_figure, trajectory_figure
+from .results import axis_dataset, curve_dataset, equilibria_dataset, trajectory_dataset, write_dataset
+from .shelf import Shelf
+from .single import Job, fly
+
+MODELS = ("dipole", "cuboid", "fem")
+DEEPEST = 0.05
+"""The field figure reaches this far below the rotor's origin, m."""
+
+
+def main_job(scene: Scene, model: str, duration: float, rtol: float, out: Path) -> Job:
+    """Compute everything of a scene; writes result.nc, summary.json and the figures.
+
+    What is finished before a failure is kept: a scene without a stable equilibrium still leaves its fields and force
+    curves, then the error goes on to the caller.
+    """
+    shelf = Shelf(scene, rtol)
+    chosen, best = shelf.table(model), shelf.table("auto")
+    tables = {name: shelf.table(name) for name in MODELS}
+    note("Equilibria ...")
+    surveys = {table.model: survey(scene, table) for table in (tables["dipole"], best, chosen)}
+    found = surveys[chosen.model].equilibria
+    _check_plate(scene, found)
+    result = _static_dataset(scene, tables, surveys, best.model)
+    values: dict[str, Any] = {
+        **equilibria_answer(chosen, found),
+        "comparison": comparison(surveys["dipole"], surveys[best.model], best.model),
+        "plate_model": "none",
+        "not_modelled": omissions(scene),
+        "tables_from_cache": shelf.from_cache,
+    }
+    lines = [*equilibria_lines(scene, found), *comparison_lines(values["comparison"]), *values["not_modelled"]]
+    try:
+        flight = fly(scene, chosen, duration, found)
+    except EquilibriumError as error:
+        _write(scene, chosen, result, {**values, "failed": str(error)}, None, out)
+        raise
+    values |= flight_answer(chosen, flight)
+    _write(scene, chosen, result, values, flight, out)
+    return values, [*lines, *flight_lines(flight), f"Results and figures in {out}/"]
+
+
+def comparison(dipole: Survey, best: Survey, name: str) -> Mapping[str, Any] | None:
+    """Levitation distance by the point dipole against the true field, mm; None if either has no stable equilibrium."""
+    pair = [next((e for e in found.equilibria if e.stable), None) for found in (dipole, best)]
+    if pair[0] is None or pair[1] is None:
+        return None
+    distances = [-float(e.position[2]) * 1e3 for e in pair if e]
+    return {
+        "true_model": name,
+        "dipole_distance_mm": distances[0],
+        "true_distance_mm": distances[1],
+        "difference_mm": distances[0] - distances[1],
+        # The dipole's own position error says how wrong its field is, which is what is measured here.
+        "difference_error_mm": pair[1].position_error * 1e3,
+    }
+
+
+def comparison_lines(compared: Mapping[str, Any] | None) -> list[str]:
+    """The same for a person."""
+    if compared is None:
+        return ["Dipole against the true field: not both have a stable equilibrium."]
+    return [
+        f"Levitation distance: dipole {compared['dipole_distance_mm']:.4f} mm, {compared['true_model']} "
+        f"{compared['true_distance_mm']:.4f} mm; the dipole is off by {compared['difference_mm']:+.4f} ± "
+        f"{compared['difference_error_mm']:.1g} mm."
+    ]
+
+
+def _check_plate(scene: Scene, found: tuple[Equilibrium, ...]) -> None:
+    """A plate that leaves the floater no room is a wrong scene."""
+    for equilibrium in found:
+        if scene.plate and equilibrium.stable:
+            depth = sphere_overlap(equilibrium.position, scene.floater.radius, scene.plate.box)
+            if depth > TOUCHING:
+                place = ", ".join(f"{c * 1e3:.3f}" for c in equilibrium.position)
+                raise SceneError(
+                    "scene",
+                    [
+                        f"Input plate must leave room for the floater; instead it overlaps it by {depth * 1e3:.4g} mm "
+                        f"where it levitates, at ({place}) mm; move the plate away."
+                    ],
+                )
+
+
+def _static_dataset(scene: Scene, tables: dict[str, RotorTable], surveys: dict[str, Survey], best: str) -> xr.Dataset:
+    lowest = min(float(corner[2]) for magnet in scene.rotor for corner in magnet.box.corners)
+    heights = np.linspace(min(lowest - scene.floater.radius, -1e-3), min(lowest - 1e-3, -DEEPEST), 200)
+    parts = [
+        axis_dataset(tables, heights),
+        curve_dataset({name: found.curves for name, found in surveys.items()}),
+        equilibria_dataset({name: found.equilibria for name, found in surveys.items()}),
+    ]
+    return xr.merge(parts).assign_attrs(best_model=best, weight_N=scene.floater.mass * float(scene.gravity[2]))
+
+
+def _write(
+    scene: Scene, table: RotorTable, result: xr.Dataset, values: dict[str, Any], flight: Trajectory | None, out: Path
+) -> None:
+    from .picture import scene_picture
+
+    note("Files and figures ...")
+    figures = {"field": field_figure(result), "force": force_figure(result)}
+    if flight:
+        result = xr.merge([result, trajectory_dataset(flight)], combine_attrs="no_conflicts")
+        figures["trajectory"] = trajectory_figure(result)
+        scene_picture(scene, table, *_pose(flight), file=out / "scene.png")
+    write_dataset(result, scene, out / "result.nc")
+    for name, figure in figures.items():
+        save_figure(figure, out / f"{name}.png")
+    with replacing(out / "summary.json") as temporary:
+        temporary.write_text(to_json(values) + "\n")
+
+
+def _pose(flight: Trajectory) -> tuple[Array, Array, Array]:
+    """Where the floater is at the end, how it points, and its path; rotor's frame."""
+    return flight.rotor.position[-1], flight.rotor.moment[-1], flight.rotor.position

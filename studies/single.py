@@ -1,0 +1,83 @@
+"""The commands that answer one question: field, equilibria, simulate."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from ..dynamics import Trajectory, initial_state, simulate, survey
+from ..fem.table import FieldTable
+from ..geometry.atomic import replacing
+from ..geometry.box import Array
+from ..geometry.scene import OffsetStart, Scene
+from .answers import equilibria_answer, equilibria_lines, field_answer, flight_answer, flight_lines, omissions
+from .console import note, progress, to_json
+from .points_file import COLUMNS
+from .results import trajectory_dataset, write_dataset
+from .shelf import Shelf
+
+Job = tuple[Mapping[str, Any], list[str]]
+"""Numbers for a program, lines for a person."""
+
+
+def field_job(scene: Scene, points: Array, model: str, rtol: float, out: Path) -> Job:
+    """B and its gradient at points (n, 3) m; writes field.csv."""
+    shelf = Shelf(scene, rtol)
+    values = field_answer(shelf.table(model), points)
+    header = [*COLUMNS, "Bx_T", "By_T", "Bz_T", *(f"dB{i}_d{j}_T_per_m" for i in "xyz" for j in "xyz"), "B_relative_error"]
+    rows = zip(points * 1e3, values["B_T"], values["dB_T_per_m"].reshape(-1, 9), values["B_relative_error"], strict=True)
+    with replacing(out / "field.csv") as temporary, temporary.open("w", newline="") as stream:
+        writer = csv.writer(stream)
+        writer.writerow(header)
+        writer.writerows([*place, *b, *gradient, error] for place, b, gradient, error in rows)
+    lines = [f"{'x':>9} {'y':>9} {'z':>9} mm {'Bx':>14} {'By':>14} {'Bz':>14} T   relative error"]
+    lines += [
+        f"{x:9.3f} {y:9.3f} {z:9.3f}    {b[0]:14.6e} {b[1]:14.6e} {b[2]:14.6e}     {error:.1e}"
+        for (x, y, z), b, error in zip(points[:20] * 1e3, values["B_T"], values["B_relative_error"], strict=False)
+    ]
+    lines.append(f"Model {values['model']}; {len(points)} points with gradients in {out / 'field.csv'}")
+    return {**values, "tables_from_cache": shelf.from_cache}, lines
+
+
+def equilibria_job(scene: Scene, model: str, spin: float, rtol: float, out: Path) -> Job:
+    """All synchronous equilibria and their stability; writes equilibria.json."""
+    shelf = Shelf(scene, rtol)
+    table = shelf.table(model)
+    found = survey(scene, table, spin).equilibria
+    values = {
+        **equilibria_answer(table, found),
+        "plate_model": "none",
+        "not_modelled": omissions(scene),
+        "tables_from_cache": shelf.from_cache,
+    }
+    with replacing(out / "equilibria.json") as temporary:
+        temporary.write_text(to_json(values) + "\n")
+    return values, [*equilibria_lines(scene, found), *values["not_modelled"]]
+
+
+def simulate_job(scene: Scene, model: str, duration: float, rtol: float, out: Path) -> Job:
+    """The motion; writes trajectory.nc."""
+    shelf = Shelf(scene, rtol)
+    flight = fly(scene, shelf.table(model), duration)
+    values = {
+        **flight_answer(shelf.table(model), flight),
+        "plate_model": "none",
+        "not_modelled": omissions(scene),
+        "trajectory": str(out / "trajectory.nc"),
+        "tables_from_cache": shelf.from_cache,
+    }
+    write_dataset(trajectory_dataset(flight), scene, out / "trajectory.nc")
+    return values, [*flight_lines(flight), *values["not_modelled"], f"Trajectory in {values['trajectory']}"]
+
+
+def fly(scene: Scene, table: FieldTable, duration: float, found: tuple[Any, ...] | None = None) -> Trajectory:
+    """Simulate with a progress bar; `found` are the equilibria if they are known already."""
+    if found is None and isinstance(scene.start, OffsetStart):
+        note("Equilibria ...")
+        found = survey(scene, table).equilibria
+    start = initial_state(scene, found or ())
+    note("Motion ...")
+    with progress("Motion") as advance:
+        return simulate(scene, table, duration, start, advance)

@@ -1,0 +1,166 @@
+"""The command line as a user sees it: keys, files, messages and exit statuses."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+SCENES = Path(__file__).parent.parent / "scenes"
+GOOD = (SCENES / "horizontal.toml").read_text()
+
+
+@pytest.fixture(scope="module")
+def cache(tmp_path_factory):
+    return tmp_path_factory.mktemp("cache")
+
+
+@pytest.fixture
+def spinlev(tmp_path, cache, monkeypatch):
+    """Run the command in an empty folder; gives the exit status, standard output and standard error."""
+    monkeypatch.setenv("SPINLEV_CACHE", str(cache))
+    monkeypatch.setenv("OMP_NUM_THREADS", "1")
+    call = "import sys; from spinlev.studies.cli import main; sys.argv[0] = 'spinlev'; main()"
+
+    def run(*arguments):
+        done = subprocess.run(
+            [sys.executable, "-c", call, *map(str, arguments)], cwd=tmp_path, capture_output=True, text=True, check=False
+        )
+        return done.returncode, done.stdout, done.stderr
+
+    return run
+
+
+def points_file(folder, text="x_mm,y_mm,z_mm\n0,0,-20\n1,2,-30\n"):
+    path = folder / "points.csv"
+    path.write_text(text)
+    return path
+
+
+@pytest.mark.parametrize("model", ["dipole", "cuboid", "fem", "auto"])
+def test_field(spinlev, tmp_path, model):
+    status, out, err = spinlev("field", SCENES / "horizontal.toml", "--points", points_file(tmp_path), "--model", model, "--json")
+    assert status == 0, err
+    answer = json.loads(out)
+    assert {"model", "error_estimate", "seconds", "B_T", "dB_T_per_m", "tables_from_cache"} <= set(answer)
+    assert np.shape(answer["B_T"]) == (2, 3)
+    gradient = np.array(answer["dB_T_per_m"])
+    assert gradient.shape == (2, 3, 3)
+    assert np.abs(np.trace(gradient, axis1=1, axis2=2)).max() < 1e-12 * np.abs(gradient).max()
+    # Below a magnet magnetised along +x the field points along -x, about μ0 m/(4π d³) = 12-13 mT at 20 mm.
+    assert answer["B_T"][0][0] == pytest.approx(-0.0125, rel=0.05)
+    assert 0 < answer["error_estimate"] < {"dipole": 0.2, "cuboid": 0.1}.get(model, 1e-5)
+    assert (tmp_path / "out" / "field.csv").read_text().count("\n") == 3
+
+
+def test_equilibria(spinlev):
+    status, out, err = spinlev("equilibria", SCENES / "vertical-24h.toml", "--model", "cuboid", "--json")
+    assert status == 0, err
+    answer = json.loads(out)
+    keys = {"position_mm", "polar_angle_deg", "lag_deg", "stable", "growth_per_s", "frequencies_hz"}
+    assert all(keys <= set(e) for e in answer["equilibria"])
+    assert any(e["stable"] and 25 < -e["position_mm"][2] < 29 for e in answer["equilibria"])
+    assert answer["model"] == "cuboid"
+
+
+def test_simulate(spinlev, tmp_path):
+    status, out, err = spinlev("simulate", SCENES / "horizontal.toml", "--duration-s", "0.2", "--model", "dipole", "--json")
+    assert status == 0, err
+    answer = json.loads(out)
+    assert answer["ended_by"] == "duration"
+    assert answer["levitated_s"] == pytest.approx(0.2)
+    assert answer["energy_error"] < 1e-10
+    assert answer["realtime_factor"] > 0
+    assert (tmp_path / "out" / "trajectory.nc").exists()
+    assert answer["not_modelled"]  # the scene has a plate
+
+
+def test_run_writes_everything_and_finds_its_table_again(spinlev, tmp_path):
+    status, out, err = spinlev("run", SCENES / "horizontal.toml", "--duration-s", "0.1")
+    assert status == 0, err
+    assert "the dipole is off by" in out
+    made = {path.name for path in (tmp_path / "out").iterdir()}
+    assert made == {"result.nc", "summary.json", "field.png", "force.png", "trajectory.png", "scene.png"}
+    summary = json.loads((tmp_path / "out" / "summary.json").read_text())
+    assert summary["comparison"]["difference_error_mm"] < 0.01 * abs(summary["comparison"]["difference_mm"])
+    status, out, err = spinlev("field", SCENES / "horizontal.toml", "--points", points_file(tmp_path), "--json")
+    assert json.loads(out)["tables_from_cache"] == ["fem"]
+
+
+BAD_SCENES = {
+    "not TOML": "not toml",
+    "unknown key": GOOD + "\nfoo = 1\n",
+    "negative size": GOOD.replace("edge_mm = 10.0", "edge_mm = -10.0"),
+    "NaN": GOOD.replace("frequency_hz = 110.0", "frequency_hz = nan"),
+    "wrong list length": GOOD.replace("[0.0, 0.0, -9.81]", "[0.0, -9.81]"),
+    "overlapping bodies": GOOD.replace("[35.0, 0.0, -21.0]", "[10.0, 0.0, -21.0]"),
+    "floater inside the rotor": GOOD + "\n[start]\nposition_mm = [2.0, 0.0, 0.0]\n",
+    "floater in the plate": GOOD.replace("[35.0, 0.0, -21.0]", "[25.0, 0.0, -21.0]"),
+}
+
+
+@pytest.mark.parametrize("fault", BAD_SCENES)
+def test_wrong_scenes_end_with_status_2_one_message_and_no_file(spinlev, tmp_path, fault):
+    path = tmp_path / "s.toml"
+    path.write_text(BAD_SCENES[fault])
+    status, out, err = spinlev("run", path)
+    assert status == 2, err
+    assert out == ""
+    assert "Traceback" not in err
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (("run", "none.toml"), "none.toml: the scene file does not exist"),
+        (("field", "S", "--points", "none.csv"), "none.csv: the points file does not exist"),
+        (("field", "S", "--points", "P", "--model", "magic"), "magic"),
+        (("field", "S", "--points", "P", "--rtol", "-1"), "--rtol must be a positive number"),
+        (("field", "S"), "--points"),
+        (("simulate", "S", "--duration-s", "nan"), "--duration-s must be a positive number"),
+        (("simulate", "S", "--duration-s", "long"), "long"),
+        (("equilibria", "S", "--spin", "1e9"), "--spin must be between"),
+        (("levitate",), "levitate"),
+        (("run", "S", "--frequency", "3"), "--frequency"),
+    ],
+)
+def test_wrong_command_lines_end_with_status_2(spinlev, tmp_path, arguments, said):
+    names = {"S": SCENES / "horizontal.toml", "P": points_file(tmp_path)}
+    status, out, err = spinlev(*[names.get(a, a) for a in arguments])
+    assert status == 2
+    assert out == ""
+    assert said in err
+    assert "Traceback" not in err
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("", "must have the columns"),
+        ("x,y,z\n0,0,-20\n", "must have the columns"),
+        ("x_mm,y_mm,z_mm\n", "at least one line"),
+        ("x_mm,y_mm,z_mm\n0,0,deep\n", "line 2 must have three finite numbers; instead received 'deep'"),
+        ("x_mm,y_mm,z_mm\n0,0,-20\n0,0,nan\n", "line 3"),
+        ("x_mm,y_mm,z_mm\n0,0\n", "line 2"),
+        ("x_mm,y_mm,z_mm\n2,0,0\n", "outside the magnets"),
+    ],
+)
+def test_wrong_points_end_with_status_2(spinlev, tmp_path, text, said):
+    path = points_file(tmp_path, text)
+    status, out, err = spinlev("field", SCENES / "horizontal.toml", "--points", path, "--model", "cuboid", "--json")
+    assert status == 2
+    assert out == ""
+    assert said in err
+
+
+def test_no_equilibrium_is_a_failed_computation_that_keeps_what_was_finished(spinlev, tmp_path):
+    path = tmp_path / "s.toml"
+    path.write_text(GOOD.replace("frequency_hz = 110.0", "frequency_hz = 30.0"))
+    status, _, err = spinlev("run", path, "--model", "dipole")
+    assert status == 1
+    assert "Traceback" not in err
+    assert (tmp_path / "out" / "force.png").exists()
+    assert "failed" in json.loads((tmp_path / "out" / "summary.json").read_text())
