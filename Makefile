@@ -45,7 +45,8 @@ bench: install
 	$(BIN)/pytest benchmarks --benchmark-columns=min,median,rounds
 
 docs: install
-	$(BIN)/python docs/build.py
+	$(BIN)/sphinx-build --fail-on-warning --quiet -b html docs docs/_build/html
+	@echo docs/_build/html/index.html
 
 # Pin anew (needs pip-tools in the environment that calls it).
 lock:

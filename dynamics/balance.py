@@ -11,13 +11,16 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..geometry.box import Array
 from .equations import Parameter
 from .rates import Rates
 
-LATERAL = np.array([0, 1, 3, 4])
+Indices = NDArray[np.intp]
+LATERAL: Indices = np.array([0, 1, 3, 4])
 """The four balances but the axial force, and the four unknowns but the height."""
+EVERY: Indices = np.arange(5)
 AXIAL = 2
 
 
@@ -94,7 +97,7 @@ def moved(position: Array, moment: Array, step: Array) -> tuple[Array, Array]:
 
 
 def solve(
-    balance: Balance, position: Array, moment: Array, free: Array, iterations: int = 60, reach: float = 0.3
+    balance: Balance, position: Array, moment: Array, free: Indices, iterations: int = 60, reach: float = 0.3
 ) -> tuple[Array, Array, Array]:
     """Newton's method from many starts at once.
 

@@ -47,6 +47,9 @@ class Parameter(IntEnum):
     LINEAR_DRAG = auto()
     TILT_DRAG = auto()
     SPIN_DRAG = auto()
+    LOST_DISTANCE = auto()
+    PLATE_DEPTH = auto()
+    PLATE_SPEED = auto()
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,13 +60,13 @@ class Equations:
     ----------
     variables : the twelve of the state
     rates : their derivatives with respect to scaled time
-    jacobi : the Jacobi integral
+    jacobi : the terms of the Jacobi integral: motion, turning, magnet, weight, swirl
     power : its rate of change, by drag and by gravity across the axis
     """
 
     variables: Vector
     rates: Vector
-    jacobi: hy.expression
+    jacobi: Vector
     power: hy.expression
 
 
@@ -110,9 +113,13 @@ def equations_of_motion(table: FieldTable, tilted_gravity: bool = False) -> Equa
         *cross(lag, moment),
         *subtract([turn[i] + brake[i] for i in range(3)], turned(spin)),
     ]
-    potential = -inertia * torque * dot(moment, field) - axial[2] * position[2]
-    swirl = cross(position, velocity)[2] + inertia * spin[2]
-    jacobi = 0.5 * (dot(velocity, velocity) + inertia * dot(spin, spin)) + potential - hy.par[Parameter.RATE] * swirl
+    jacobi = [
+        0.5 * dot(velocity, velocity),
+        0.5 * inertia * dot(spin, spin),
+        -inertia * torque * dot(moment, field),
+        -axial[2] * position[2],
+        -hy.par[Parameter.RATE] * (cross(position, velocity)[2] + inertia * spin[2]),
+    ]
     return Equations(variables, rates, jacobi, dot(push, drift) + inertia * dot(brake, lag))
 
 

@@ -15,7 +15,6 @@ harmonics of ψ on the outer sphere. The space outside that sphere is exact (`op
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache
 from typing import Any, Literal
 
 import ngsolve as ng
@@ -25,16 +24,11 @@ from scipy.sparse.linalg import LinearOperator, cg
 from ..geometry.box import Array
 from ..geometry.magnet import Magnet
 from ..geometry.mesh import MagnetMesh
-from .compiled import CompiledField
 from .harmonics import Coefficients
 from .integration_points import surface_points, volume_points
 from .multipole import moments_of_magnetization, uniform_moments
 from .open_boundary import OpenBoundary
-from .quadrature import edge_graded_gauss
-from .table import RotorTable
-
-GRADED_NODES = 24
-"""Points per axis for the closed part of the magnetisation: moments to 1e-8 of the leading one."""
+from .remanent import remanent_h, remanent_moments
 
 Formulation = Literal["split", "direct"]
 
@@ -82,7 +76,7 @@ def solve(mesh: MagnetMesh, formulation: Formulation = "split", order: int = 3, 
     permeability = mesh.mesh.MaterialCF(
         {f"magnet{k}": magnet.recoil_permeability for k, magnet in enumerate(mesh.magnets)}, default=1.0
     )
-    boundary = OpenBoundary(mesh.mesh, space, mesh.ball_radius, boundary_degree, 2 * order + 4)
+    boundary = OpenBoundary(mesh.mesh, space, mesh.ball_radius, boundary_degree, order)
     stiffness = ng.BilinearForm(space, symmetric=True, condense=True)
     stiffness += permeability * ng.grad(trial) * ng.grad(test) * ng.dx
     stiffness += boundary.robin * trial * test * ng.ds("outer")
@@ -107,16 +101,6 @@ def _add_source(
     source = (magnet.recoil_permeability - 1) * remanent_h(mesh.magnets, k, mesh.to_meter(points.points))
     for axis in range(3):
         load += points.function(source[:, axis]) * ng.grad(test)[axis] * points.measure
-
-
-def remanent_h(magnets: tuple[Magnet, ...], inside: int, points: Array) -> Array:
-    """μ0 H (n, 3) T of all magnets with μr = 1, in closed form, at `points` (n, 3) m in magnet number `inside`."""
-    return np.asarray(_closed_form(magnets)(points)[0] - magnets[inside].polarization_in_rotor)
-
-
-@lru_cache(maxsize=4)
-def _closed_form(magnets: tuple[Magnet, ...]) -> CompiledField:
-    return CompiledField(RotorTable("cuboid", magnets, uniform=magnets).expressions)
 
 
 def _solve_open(stiffness: Any, load: Any, space: Any, boundary: OpenBoundary) -> tuple[Any, int]:
@@ -169,9 +153,7 @@ def _moments(solution: Solution, k: int, magnet: Magnet, degree: int) -> Coeffic
     if solution.formulation == "direct":
         closed = uniform_moments(magnet, degree).coefficients
     else:
-        points, weights = edge_graded_gauss(box, GRADED_NODES)
-        source = susceptibility * remanent_h(mesh.magnets, k, points)
-        closed = moments_of_magnetization(points, weights, source, box.center, box.circumradius, degree)
+        closed = susceptibility * remanent_moments(mesh.magnets, k, degree)
     points, weighted_normals = _faces(solution, k)
     shape = moments_of_magnetization(
         points, np.ones(len(points)), weighted_normals, box.center, box.circumradius, degree

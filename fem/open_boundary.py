@@ -16,6 +16,8 @@ from .harmonics import Coefficients, regular
 from .integration_points import surface_points
 
 FOUR_PI = 4 * np.pi
+HIGHEST_ORDER = 14
+"""Of the surface quadrature: from 16 on NGSolve 6.2.2608 mixes up the points in the trace matrix."""
 
 
 class OpenBoundary:
@@ -27,14 +29,17 @@ class OpenBoundary:
     space : H1 space of the potential
     radius : of the sphere
     degree : highest degree that is treated exactly; higher ones see the Robin term
-    order : of the surface quadrature
+    order : of the elements
+
+    Attribute `area_error` is the relative error of the area of the meshed sphere, which measures its roundness.
     """
 
     def __init__(self, mesh: Any, space: Any, radius: float, degree: int, order: int) -> None:
-        surface = surface_points(mesh, "outer", order)
+        surface = surface_points(mesh, "outer", min(2 * order + 4, HIGHEST_ORDER))
         trace = surface.weighted_trace(space)
         used = surface.weights > 0
         self.radius, self.degree = radius, degree
+        self.area_error = abs(float(surface.weights.sum()) / (FOUR_PI * radius**2) - 1)
         self.unknowns = np.unique(trace[used].indices)
         harmonics, self._degrees = _orthonormal(degree, surface.points[used])
         self._projection = np.asarray(trace[used][:, self.unknowns].T @ harmonics)

@@ -63,7 +63,8 @@ class RotorTable:
 
     def expressions(self, position: Sequence[hy.expression]) -> FieldExpressions:
         """B and its gradient as heyoka expressions of a position (m, rotor's frame)."""
-        parts = [part.expressions(position) for part in (*self._closed_forms, *self.expansions)]
+        parts = [part.expressions(position) for part in self._closed_forms]
+        parts += [part.expressions(position) for part in self.expansions]
         return (
             [hy.sum([b[i] for b, _ in parts]) for i in range(3)],
             [[hy.sum([g[i][j] for _, g in parts]) for j in range(3)] for i in range(3)],
@@ -93,7 +94,11 @@ class RotorTable:
             )
         parts = [part.evaluate(points) for part in self._closed_forms]
         parts += [part(points) for part in self._compiled_expansions]
-        return sum(b for b, _ in parts), sum(g for _, g in parts)
+        b, g = np.zeros((len(points), 3)), np.zeros((len(points), 3, 3))
+        for field_part, gradient_part in parts:
+            b += field_part
+            g += gradient_part
+        return b, g
 
     def _beyond(self) -> str:
         nearest = max((expansion.nearest for expansion in self.expansions), default=0.0)

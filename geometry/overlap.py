@@ -42,6 +42,7 @@ def turned(box: Box, angle: float) -> Box:
 
 def deepest_overlap_in_a_turn(rotating: Box, fixed: Box) -> float:
     """Largest penetration depth of a box that turns about z into a fixed one, m; negative if always apart."""
+
     def gap(angle: float) -> float:
         return -box_overlap(turned(rotating, angle), fixed)
 
@@ -56,4 +57,3 @@ def overlapping_magnets(magnets: Sequence[Magnet]) -> list[tuple[int, int, float
     """Pairs of magnets that overlap (touching is allowed) with their depth, m."""
     pairs = [(i, j, box_overlap(magnets[i].box, magnets[j].box)) for j in range(len(magnets)) for i in range(j)]
     return [(i, j, depth) for i, j, depth in pairs if depth > TOUCHING]
-

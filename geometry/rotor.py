@@ -4,27 +4,32 @@ from __future__ import annotations
 
 import numpy as np
 
-from .box import Box, rotation_matrix
+from .box import Array, Box, rotation_matrix
 from .magnet import Magnet
+
+X, Z = np.array([1.0, 0.0, 0.0]), np.array([0.0, 0.0, 1.0])
 
 Rotor = tuple[Magnet, ...]
 
 
+def _cube(edge: float, center: Array, polarization: Array, recoil_permeability: float) -> Magnet:
+    return Magnet(Box(np.full(3, edge), center), polarization, recoil_permeability)
+
+
 def horizontal(displacement: float, edge: float, remanence: float, recoil_permeability: float) -> Rotor:
     """One cube magnetised along +x, `displacement` off the axis along +x (SI units)."""
-    box = Box((edge,) * 3, (displacement, 0.0, 0.0))
-    return (Magnet(box, (remanence, 0.0, 0.0), recoil_permeability),)
+    return (_cube(edge, displacement * X, remanence * X, recoil_permeability),)
 
 
 def vertical(displacement: float, edge: float, remanence: float, recoil_permeability: float) -> Rotor:
     """A cube at the origin magnetised along +x and one `displacement` above it along +z (SI units)."""
     return (
-        Magnet(Box((edge,) * 3), (remanence, 0.0, 0.0), recoil_permeability),
-        Magnet(Box((edge,) * 3, (0.0, 0.0, displacement)), (0.0, 0.0, remanence), recoil_permeability),
+        _cube(edge, 0 * X, remanence * X, recoil_permeability),
+        _cube(edge, displacement * Z, remanence * Z, recoil_permeability),
     )
 
 
 def tilt(angle: float, edge: float, remanence: float, recoil_permeability: float) -> Rotor:
     """One cube at the origin, body and magnetisation turned to (cos angle, 0, sin angle); angle in rad."""
-    box = Box((edge,) * 3, rotation=rotation_matrix((0.0, -np.degrees(angle), 0.0)))
-    return (Magnet(box, (remanence, 0.0, 0.0), recoil_permeability),)
+    box = Box(np.full(3, edge), rotation=rotation_matrix((0.0, -np.degrees(angle), 0.0)))
+    return (Magnet(box, remanence * X, recoil_permeability),)

@@ -59,9 +59,10 @@ def equilibria_answer(table: RotorTable, equilibria: tuple[Equilibrium, ...]) ->
 
 def flight_answer(table: RotorTable, flight: Trajectory) -> dict[str, Any]:
     """How a flight went; the error estimate is the field's largest relative error along it."""
+    places = flight.rotor.position[:: max(1, len(flight.time) // 500)]
     return {
         "model": table.model,
-        "error_estimate": float(table.relative_error(flight.rotor.position[:: max(1, len(flight.time) // 500)])[0].max()),
+        "error_estimate": float(table.relative_error(places[table.in_range(places)])[0].max()),
         "levitated_s": flight.levitated_s,
         "ended_by": flight.ended_by,
         "energy_error": flight.energy_error,

@@ -69,7 +69,7 @@ def run(
     plate_model: PlateModel = "auto",
     duration_s: float = 3.0,
     rtol: float = 1e-5,
-    output: Output = Output(),  # noqa: B008 - frozen
+    output: Output = Output(),
 ) -> Answer:
     """The main job: fields, tables, equilibria, stability, motion, pictures, result.nc and summary.json.
 
@@ -96,7 +96,7 @@ def field(
     points: Path,
     model: FieldModel = "auto",
     rtol: float = 1e-5,
-    output: Output = Output(),  # noqa: B008
+    output: Output = Output(),
 ) -> Answer:
     """B and its gradient at points in the rotor's frame at t = 0.
 
@@ -124,7 +124,7 @@ def equilibria(
     plate_model: PlateModel = "auto",
     spin: float = 0.0,
     rtol: float = 1e-5,
-    output: Output = Output(),  # noqa: B008
+    output: Output = Output(),
 ) -> Answer:
     """All synchronous equilibria and their stability.
 
@@ -153,7 +153,7 @@ def simulate(
     model: FieldModel = "auto",
     plate_model: PlateModel = "auto",
     rtol: float = 1e-5,
-    output: Output = Output(),  # noqa: B008
+    output: Output = Output(),
 ) -> Answer:
     """The floater's motion: trajectory.nc and how it ended.
 
@@ -186,6 +186,7 @@ def main() -> None:
 
 
 def _status(arguments: list[str], out: Any) -> int:
+    from ..dynamics import StartError
     from ..fem import RangeError
 
     began = time.perf_counter()
@@ -194,7 +195,7 @@ def _status(arguments: list[str], out: Any) -> int:
     except CycloptsError as error:
         note(f"spinlev: {error}\nTry: spinlev --help")
         return 2
-    except (SceneError, InputError, RangeError) as error:
+    except (SceneError, InputError, RangeError, StartError) as error:
         note(f"spinlev: {error}")
         return 2
     except KeyboardInterrupt:

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pyvista as pv
+from vtkmodules.vtkCommonCore import vtkLogger
 
 from ..fem.table import FieldTable
 from ..geometry.atomic import replacing
@@ -27,6 +28,7 @@ def scene_picture(scene: Scene, table: FieldTable, floater: Array, moment: Array
     path : (n, 3) positions of the flight, m
     file : a PNG
     """
+    vtkLogger.SetStderrVerbosity(vtkLogger.VERBOSITY_ERROR)  # that there is no screen is no news here
     plotter = pv.Plotter(off_screen=True, window_size=(1400, 1100), lighting="three lights")
     plotter.set_background("white")
     for magnet in scene.rotor:
@@ -35,14 +37,16 @@ def scene_picture(scene: Scene, table: FieldTable, floater: Array, moment: Array
     if scene.plate:
         plotter.add_mesh(_box(scene.plate.box), color=METAL, opacity=0.25, show_edges=True)
     radius = scene.floater.radius / MILLI
-    sphere = pv.Sphere(radius, floater / MILLI, theta_resolution=60, phi_resolution=60)
+    sphere = pv.Sphere(radius=radius, center=floater / MILLI, theta_resolution=60, phi_resolution=60)
     plotter.add_mesh(sphere, color=METAL, specular=0.6, opacity=0.6)
     _arrow(plotter, floater / MILLI, moment, radius)
     depth = float(-floater[2]) / MILLI
     _field(plotter, table, depth, radius)
     if len(path) > 1:
         plotter.add_mesh(pv.MultipleLines(path / MILLI), color="#0072B2", line_width=2)
-    plotter.camera_position = [(1.9 * depth + 50, -2.4 * depth - 80, 0.3 * depth), (0, 0, -0.55 * depth), (0, 0, 1)]
+    # Look from the side where no plate stands in the way.
+    side = -1.0 if scene.plate and scene.plate.box.center[0] > 0 else 1.0
+    plotter.camera_position = [(side * (depth + 20), -2.2 * depth - 60, 0.6 * depth), (0, 0, -0.6 * depth), (0, 0, 1)]
     plotter.add_axes()
     with replacing(file) as temporary:
         plotter.screenshot(temporary)
@@ -61,7 +65,9 @@ def _arrow(plotter: pv.Plotter, center: Array, direction: Array, radius: float) 
     length = float(np.linalg.norm(direction))
     if length:
         unit = np.asarray(direction) / length
-        arrow = pv.Arrow(center - 1.5 * radius * unit, unit, scale=3.0 * radius, shaft_radius=0.03, tip_radius=0.09)
+        arrow = pv.Arrow(
+            start=center - 1.5 * radius * unit, direction=unit, scale=3.0 * radius, shaft_radius=0.03, tip_radius=0.09
+        )
         plotter.add_mesh(arrow, color=NORTH)
 
 

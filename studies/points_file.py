@@ -22,7 +22,9 @@ def read_points(path: Path) -> Array:
         with path.open(newline="", encoding="utf-8-sig") as stream:
             rows = list(csv.reader(stream, skipinitialspace=True))
     except FileNotFoundError:
-        raise InputError(f"{path}: the points file does not exist; give a CSV file with {', '.join(COLUMNS)}.") from None
+        raise InputError(
+            f"{path}: the points file does not exist; give a CSV file with {', '.join(COLUMNS)}."
+        ) from None
     except (OSError, UnicodeDecodeError, csv.Error) as error:
         raise InputError(f"{path}: the points file must be a readable CSV text; {error}.") from None
     header = [name.strip() for name in rows[0]] if rows else []

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Sequence
-from datetime import datetime, timezone
+from collections.abc import Mapping, Sequence
+from datetime import UTC, datetime
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -25,7 +25,7 @@ LIBRARIES = ("spinlev", "ngsolve", "heyoka", "numpy", "scipy", "xarray")
 def write_dataset(dataset: xr.Dataset, scene: Scene, path: Path) -> None:
     """Write a result with its provenance: versions, command, time and the scene's text."""
     provenance = {f"version_{name}": version(name) for name in LIBRARIES}
-    stamp = datetime.now(timezone.utc).isoformat(timespec="seconds")
+    stamp = datetime.now(UTC).isoformat(timespec="seconds")
     dataset = dataset.assign_attrs(scene=scene.text, command=" ".join(sys.argv), created=stamp, **provenance)
     with replacing(path) as temporary:
         dataset.to_netcdf(temporary, engine="h5netcdf")
@@ -36,7 +36,7 @@ def variable(dims: Sequence[str], values: Any, units: str, long_name: str) -> xr
     return xr.Variable(dims, values, {"units": units, "long_name": long_name})
 
 
-def axis_dataset(tables: dict[str, FieldTable], heights: Array) -> xr.Dataset:
+def axis_dataset(tables: Mapping[str, FieldTable], heights: Array) -> xr.Dataset:
     """Field of each model on the axis below the rotor, with its estimated relative error; heights (n,) m < 0."""
     points = np.stack([np.zeros_like(heights), np.zeros_like(heights), heights], axis=1)
     fields = np.full((len(tables), len(heights), 3), np.nan)
@@ -58,7 +58,7 @@ def axis_dataset(tables: dict[str, FieldTable], heights: Array) -> xr.Dataset:
     )
 
 
-def curve_dataset(curves: dict[str, Sequence[ForceCurve]]) -> xr.Dataset:
+def curve_dataset(curves: Mapping[str, Sequence[ForceCurve]]) -> xr.Dataset:
     """Axial force along the curves of lateral balance, by model."""
     rows = [(model, number, curve) for model, found in curves.items() for number, curve in enumerate(found)]
     sizes = [len(curve.magnetic_force) for _, _, curve in rows]
@@ -84,7 +84,7 @@ def curve_dataset(curves: dict[str, Sequence[ForceCurve]]) -> xr.Dataset:
     )
 
 
-def equilibria_dataset(found: dict[str, Sequence[Equilibrium]]) -> xr.Dataset:
+def equilibria_dataset(found: Mapping[str, Sequence[Equilibrium]]) -> xr.Dataset:
     """Equilibria of all models in one list."""
     rows = [(model, equilibrium) for model, equilibria in found.items() for equilibrium in equilibria]
 

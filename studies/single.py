@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from ..dynamics import Trajectory, initial_state, simulate, survey
+from ..dynamics import Equilibrium, Trajectory, simulate, survey
 from ..fem.table import FieldTable
 from ..geometry.atomic import replacing
 from ..geometry.box import Array
@@ -26,8 +26,17 @@ def field_job(scene: Scene, points: Array, model: str, rtol: float, out: Path) -
     """B and its gradient at points (n, 3) m; writes field.csv."""
     shelf = Shelf(scene, rtol)
     values = field_answer(shelf.table(model), points)
-    header = [*COLUMNS, "Bx_T", "By_T", "Bz_T", *(f"dB{i}_d{j}_T_per_m" for i in "xyz" for j in "xyz"), "B_relative_error"]
-    rows = zip(points * 1e3, values["B_T"], values["dB_T_per_m"].reshape(-1, 9), values["B_relative_error"], strict=True)
+    header = [
+        *COLUMNS,
+        "Bx_T",
+        "By_T",
+        "Bz_T",
+        *(f"dB{i}_d{j}_T_per_m" for i in "xyz" for j in "xyz"),
+        "B_relative_error",
+    ]
+    rows = zip(
+        points * 1e3, values["B_T"], values["dB_T_per_m"].reshape(-1, 9), values["B_relative_error"], strict=True
+    )
     with replacing(out / "field.csv") as temporary, temporary.open("w", newline="") as stream:
         writer = csv.writer(stream)
         writer.writerow(header)
@@ -72,12 +81,11 @@ def simulate_job(scene: Scene, model: str, duration: float, rtol: float, out: Pa
     return values, [*flight_lines(flight), *values["not_modelled"], f"Trajectory in {values['trajectory']}"]
 
 
-def fly(scene: Scene, table: FieldTable, duration: float, found: tuple[Any, ...] | None = None) -> Trajectory:
+def fly(scene: Scene, table: FieldTable, duration: float, found: tuple[Equilibrium, ...] | None = None) -> Trajectory:
     """Simulate with a progress bar; `found` are the equilibria if they are known already."""
     if found is None and isinstance(scene.start, OffsetStart):
         note("Equilibria ...")
         found = survey(scene, table).equilibria
-    start = initial_state(scene, found or ())
     note("Motion ...")
     with progress("Motion") as advance:
-        return simulate(scene, table, duration, start, advance)
+        return simulate(scene, table, duration, found, progress=advance)

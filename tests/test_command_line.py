@@ -26,7 +26,11 @@ def spinlev(tmp_path, cache, monkeypatch):
 
     def run(*arguments):
         done = subprocess.run(
-            [sys.executable, "-c", call, *map(str, arguments)], cwd=tmp_path, capture_output=True, text=True, check=False
+            [sys.executable, "-c", call, *map(str, arguments)],
+            cwd=tmp_path,
+            capture_output=True,
+            text=True,
+            check=False,
         )
         return done.returncode, done.stdout, done.stderr
 
@@ -41,7 +45,9 @@ def points_file(folder, text="x_mm,y_mm,z_mm\n0,0,-20\n1,2,-30\n"):
 
 @pytest.mark.parametrize("model", ["dipole", "cuboid", "fem", "auto"])
 def test_field(spinlev, tmp_path, model):
-    status, out, err = spinlev("field", SCENES / "horizontal.toml", "--points", points_file(tmp_path), "--model", model, "--json")
+    status, out, err = spinlev(
+        "field", SCENES / "horizontal.toml", "--points", points_file(tmp_path), "--model", model, "--json"
+    )
     assert status == 0, err
     answer = json.loads(out)
     assert {"model", "error_estimate", "seconds", "B_T", "dB_T_per_m", "tables_from_cache"} <= set(answer)
@@ -66,7 +72,9 @@ def test_equilibria(spinlev):
 
 
 def test_simulate(spinlev, tmp_path):
-    status, out, err = spinlev("simulate", SCENES / "horizontal.toml", "--duration-s", "0.2", "--model", "dipole", "--json")
+    status, out, err = spinlev(
+        "simulate", SCENES / "horizontal.toml", "--duration-s", "0.2", "--model", "dipole", "--json"
+    )
     assert status == 0, err
     answer = json.loads(out)
     assert answer["ended_by"] == "duration"

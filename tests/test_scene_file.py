@@ -57,7 +57,7 @@ def test_plate_is_turned_about_the_fixed_x_then_y_then_z_axis():
 
 
 def test_absolute_start():
-    start = '\n[start]\nposition_mm = [1, 0, -40]\nmoment = [0, 3, 4]\nspin_hz = [0, 0, 10]\n'
+    start = "\n[start]\nposition_mm = [1, 0, -40]\nmoment = [0, 3, 4]\nspin_hz = [0, 0, 10]\n"
     start = parse_scene(GOOD + start).start
     assert isinstance(start, AbsoluteStart)
     assert start.position == pytest.approx([1e-3, 0, -0.04])

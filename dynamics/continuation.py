@@ -8,62 +8,19 @@ and K. Georg, Numerical Continuation Methods, 1990, ch. 2 and 6).
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.interpolate import CubicHermiteSpline
 
 from ..geometry.box import Array
 from .balance import AXIAL, LATERAL, Balance, moved, solve, tangent_basis
+from .curve import Curve
+from .search import SearchRange
 
 LONGEST_STEP, SHORTEST_STEP = 0.1, 1e-6
 SHARPEST_TURN = 0.15
 """Steps along a curve (floater radii and rad) and the largest angle between its tangents at their ends (rad)."""
 MOST_STEPS = 5000
-
-
-@dataclass(frozen=True, eq=False)
-class Curve:
-    """Points of one curve, in scaled units.
-
-    Parameters
-    ----------
-    arc : (n,) length along the curve
-    position, moment : (n, 3)
-    tangent : (n, 6) unit direction of the curve: position and moment
-    force : (n,) axial force that is left over, gravity included
-    slope : (n,) its derivative along the curve
-    """
-
-    arc: Array
-    position: Array
-    moment: Array
-    tangent: Array
-    force: Array
-    slope: Array
-
-    def passes(self, position: Array, moment: Array) -> bool:
-        """Whether the curve goes through a point, judged by cubic interpolation at the point's own height."""
-        spline = CubicHermiteSpline(self.arc, self._points, self.tangent)
-        height = CubicHermiteSpline(self.arc, self._points[:, 2] - position[2], self.tangent[:, 2])
-        crossings = height.roots(extrapolate=False)
-        crossings = crossings[np.isfinite(crossings)]
-        if not len(crossings):
-            return False
-        apart = spline(crossings) - np.concatenate([position, moment])
-        return bool(np.min(np.linalg.norm(apart, axis=1)) < 1e-3)
-
-    def balanced(self) -> tuple[Array, Array]:
-        """Estimates (k, 3) of positions and moments where the axial force vanishes as well."""
-        crossings = CubicHermiteSpline(self.arc, self.force, self.slope).roots(extrapolate=False)
-        points = CubicHermiteSpline(self.arc, self._points, self.tangent)(crossings[np.isfinite(crossings)])
-        moment = points[:, 3:]
-        return points[:, :3], moment / np.linalg.norm(moment, axis=1, keepdims=True)
-
-    @property
-    def _points(self) -> Array:
-        return np.concatenate([self.position, self.moment], axis=1)
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,26 +32,25 @@ class _Point:
     slope: float
 
 
-def follow(balance: Balance, position: Array, moment: Array, inside: Callable[[Array], bool]) -> Curve | None:
-    """The curve through a point (3,), (3,) both ways, until it leaves `inside` or closes.
+def follow(balance: Balance, position: Array, moment: Array, where: SearchRange) -> Curve | None:
+    """The curve through a point (3,), (3,) both ways, until it leaves the range or closes.
 
-    `inside` tells whether a position (3,) belongs to the range.  None where no curve can be followed from there, since
-    four balances do not fix it (a field of revolution about the axis).
+    None where four balances do not fix a curve (a field of revolution about the axis).
     """
     start = _point(balance, position, moment, None)
     if start is None:
         return None
-    ahead, closed = _half(balance, start, inside)
+    ahead, closed = _half(balance, start, where)
     if closed:
         return _curve([start, *ahead])
     back = _Point(start.position, start.moment, -start.tangent, start.force, -start.slope)
-    behind, _ = _half(balance, back, inside)
+    behind, _ = _half(balance, back, where)
     reverse = [_Point(p.position, p.moment, -p.tangent, p.force, -p.slope) for p in behind[::-1]]
     points = [*reverse, start, *ahead]
     return _curve(points) if len(points) > 1 else None
 
 
-def _half(balance: Balance, start: _Point, inside: Callable[[Array], bool]) -> tuple[list[_Point], bool]:
+def _half(balance: Balance, start: _Point, where: SearchRange) -> tuple[list[_Point], bool]:
     """Points after `start` along its tangent, the first one outside included, and whether they came back to it."""
     points, step, here = [start], LONGEST_STEP / 4, start
     while len(points) < MOST_STEPS and step > SHORTEST_STEP:
@@ -103,7 +59,7 @@ def _half(balance: Balance, start: _Point, inside: Callable[[Array], bool]) -> t
             step /= 2
             continue
         points.append(new)
-        if not inside(new.position):
+        if new.position not in where:
             break
         travelled, gap = _apart(new, here), _apart(new, start)
         if len(points) > 3 and gap < travelled and new.tangent @ start.tangent > 0.9:
@@ -159,14 +115,14 @@ def _curve(points: list[_Point]) -> Curve:
     return Curve(np.append(0.0, np.cumsum(chords)), position, moment, tangent, force, slope)
 
 
-def all_curves(balance: Balance, starts: tuple[Array, Array], inside: Callable[[Array], bool]) -> list[Curve]:
-    """Every curve that is met from `starts` (positions and moments (n, 3)) at their own heights."""
-    position, moment, step = solve(balance, *starts, LATERAL)
+def all_curves(balance: Balance, where: SearchRange) -> list[Curve]:
+    """Every curve that is met in the range, from its starts at their own heights."""
+    position, moment, step = solve(balance, *where.starts(), LATERAL)
     curves: list[Curve] = []
     for r, m in _distinct(position[step < 1e-8], moment[step < 1e-8]):
-        if not inside(r) or any(curve.passes(r, m) for curve in curves):
+        if r not in where or any(curve.passes(r, m) for curve in curves):
             continue
-        curve = follow(balance, r, m, inside)
+        curve = follow(balance, r, m, where)
         if curve is not None:
             curves.append(curve)
     return curves

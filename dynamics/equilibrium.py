@@ -1,0 +1,89 @@
+"""What is known of a synchronous equilibrium, and of the curve on which it lies."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..geometry.box import Array
+from .state import State
+
+
+class EquilibriumError(RuntimeError):
+    """There is no synchronous equilibrium, or not of the kind that was asked for."""
+
+
+@dataclass(frozen=True, eq=False)
+class Equilibrium:
+    """One synchronous equilibrium, along the rotor's axes.
+
+    Parameters
+    ----------
+    state : position m, velocity m/s, moment direction, spin rad/s
+    spin : body spin s = Ω·m̂/ω
+    residual : largest unbalanced acceleration, as a part of gravity (or of ω²R without gravity)
+    position_error : estimated error of the position, from round-off and from the table's own error, m
+    stable : whether every small motion stays small; with drag, whether it dies out
+    growth_per_s : largest growth rate of a small motion, 1/s
+    growth_error_per_s : what round-off may do to it, 1/s
+    frequencies_hz : (k,) frequencies of the small motions in the rotor's frame
+    """
+
+    state: State
+    spin: float
+    residual: float
+    position_error: float
+    stable: bool
+    growth_per_s: float
+    growth_error_per_s: float
+    frequencies_hz: Array
+
+    @property
+    def position(self) -> Array:
+        """(3,) m."""
+        return self.state.position
+
+    @property
+    def distance(self) -> float:
+        """Distance from the rotor's origin, m."""
+        return float(np.linalg.norm(self.position))
+
+    @property
+    def polar_angle_deg(self) -> float:
+        """Angle between the moment and +z."""
+        x, y, z = self.state.moment
+        return float(np.degrees(np.arctan2(np.hypot(x, y), z)))
+
+    @property
+    def lag_deg(self) -> float:
+        """Angle by which the moment's azimuth is behind the rotor's +x, in (-180, 180]."""
+        x, y = self.state.moment[:2]
+        lag = float(np.degrees(np.arctan2(-y, x)))
+        return 180.0 if lag < -180 + 1e-9 else lag + 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class ForceCurve:
+    """Axial force where everything else is balanced: figure "force against distance".
+
+    Parameters
+    ----------
+    position : (n, 3) m, rotor's frame
+    moment : (n, 3) direction
+    magnetic_force : (n,) along +z, N
+    weight : the force that it has to balance, along +z, N
+    """
+
+    position: Array
+    moment: Array
+    magnetic_force: Array
+    weight: float
+
+
+@dataclass(frozen=True, eq=False)
+class Survey:
+    """Equilibria, the stable ones first and then by distance, and the curves on which they lie."""
+
+    equilibria: tuple[Equilibrium, ...]
+    curves: tuple[ForceCurve, ...]

@@ -1,0 +1,95 @@
+"""A scene's motion compiled to machine code: integrator, events and the ledger of energy."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from time import perf_counter
+
+import heyoka as hy
+import numpy as np
+
+from ..fem.table import FieldTable
+from ..geometry.box import Array
+from ..geometry.scene import Scene
+from .equations import Equations, equations_of_motion, parameters
+from .events import flight_events
+from .state import Scales
+
+TOLERANCE = 1e-16
+"""Of a Taylor step. Measured over 1300 turns: J drifts by 3e-13 at 1e-15, by 1e-14 at 1e-16 with 1 % more steps."""
+PATIENCE = 10.0
+"""Seconds that a faster integrator may take to compile without need."""
+
+
+@dataclass(frozen=True, eq=False)
+class Flight:
+    """A compiled problem: the integrator, what its events mean, and the ledger of energy.
+
+    Parameters
+    ----------
+    integrator : heyoka's, with the twelve states and the work
+    meanings : of the terminal events, by number
+    ledger : compiled terms of the Jacobi integral
+    values : runtime parameters
+    scales : units of the state
+    compile_seconds : time that compilation took
+    """
+
+    integrator: hy.taylor_adaptive
+    meanings: list[str]
+    ledger: hy.cfunc
+    values: Array
+    scales: Scales
+    compile_seconds: float
+
+    def energy_error(self, states: Array) -> float:
+        """Largest relative violation of J - work = constant or of |m̂| = 1 over scaled states (n, 13)."""
+        pars = np.repeat(self.values[: self.ledger.nparams, None], len(states), axis=1)
+        terms = self.ledger(np.ascontiguousarray(states[:, :12].T), pars=pars)
+        books = terms.sum(axis=0) - states[:, 12]
+        largest = float(np.abs(terms[:, 0]).max())
+        scale = abs(books[0]) if abs(books[0]) > 1e-3 * largest else largest
+        length = np.linalg.norm(states[:, 6:9], axis=1)
+        return float(max(np.abs(books - books[0]).max() / scale, np.abs(length - 1).max()))
+
+
+def compile_flight(
+    scene: Scene, table: FieldTable, duration: float, tolerance: float = TOLERANCE, compact: bool | None = None
+) -> Flight:
+    """Compile the motion of a scene in a table's field.
+
+    Parameters
+    ----------
+    scene, table : the problem
+    duration : how long it shall fly, s: it decides how much compilation is worth
+    tolerance : relative error of a step
+    compact : compile loops instead of straight code: sooner ready, two to three times slower; None to choose
+    """
+    started = perf_counter()
+    scales = Scales.of(scene)
+    values = parameters(scene, scales)
+    equations = equations_of_motion(table, bool(np.any(scene.gravity[:2])))
+    events, meanings = flight_events(scene, equations.variables[:3])
+    work = hy.expression("work")
+    if compact is None:
+        compact = not _worth_compiling(equations, scene, duration)
+    integrator = hy.taylor_adaptive(
+        [*zip(equations.variables, equations.rates, strict=True), (work, equations.power)],
+        np.zeros(13),
+        tol=tolerance,
+        compact_mode=compact,
+        t_events=events,
+    )
+    ledger = hy.cfunc(list(equations.jacobi), list(equations.variables), compact_mode=True)
+    return Flight(integrator, meanings, ledger, values, scales, perf_counter() - started)
+
+
+def _worth_compiling(equations: Equations, scene: Scene, duration: float) -> bool:
+    """Whether straight code is soon compiled or saves more time than its compilation takes.
+
+    Measured: it takes about n²/1000 seconds, n being the length of the decomposed rates, and then each of some
+    twelve steps a turn saves n · 0.15 µs.
+    """
+    size = len(hy.cfunc(list(equations.rates), list(equations.variables), compact_mode=True).dc)
+    seconds = size**2 / 1000
+    return seconds < PATIENCE or seconds < 12 * scene.frequency * duration * size * 0.15e-6

@@ -1,0 +1,53 @@
+"""Where equilibria are looked for: the range, and the starts of the search."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+
+from ..geometry.box import Array
+from ..geometry.scene import Scene
+
+
+@dataclass(frozen=True, eq=False)
+class SearchRange:
+    """Positions below the rotor, from contact with it to `farthest`, in floater radii.
+
+    Parameters
+    ----------
+    scene : its rotor and floater
+    farthest : largest depth, and distance from the axis, m
+    """
+
+    scene: Scene
+    farthest: float
+
+    def __contains__(self, position: Array) -> bool:
+        """Whether a scaled position (3,) belongs to the range."""
+        radius = self.scene.floater.radius
+        bound = self.farthest / radius
+        if not -bound <= position[2] <= 0 or np.hypot(position[0], position[1]) > bound:
+            return False
+        return all(magnet.box.distance(position * radius) > radius for magnet in self.scene.rotor)
+
+    def starts(self) -> tuple[Array, Array]:
+        """Scaled positions and moments (n, 3) below the rotor and beside it, in fourteen directions each."""
+        corners = [magnet.box.corners / self.scene.floater.radius for magnet in self.scene.rotor]
+        nearest = 1.0 + max((-c[:, 2].min() for c in corners), default=0.0)
+        beside = 1.0 + np.array([1.0, 1.1, 1.3, 2.0]) * max((np.abs(c[:, :2]).max() for c in corners), default=0.0)
+        below = -np.geomspace(nearest, max(self.farthest / self.scene.floater.radius, nearest), 16)
+        places = np.concatenate(
+            [_rings(below, np.array([0.0, 0.15, 0.7]), 4), _rings(np.array([-0.01, -0.1, -0.4, -0.9]), beside, 8)]
+        )
+        moment = np.array([v for v in product((-1.0, 0.0, 1.0), repeat=3) if sum(map(abs, v)) in (1.0, 3.0)])
+        moment /= np.linalg.norm(moment, axis=1, keepdims=True)
+        return np.repeat(places, len(moment), axis=0), np.tile(moment, (len(places), 1))
+
+
+def _rings(heights: Array, radii: Array, number: int) -> Array:
+    """Points (n, 3) on rings about the axis, `number` on each."""
+    angles = np.arange(number) * (2 * np.pi / number)
+    rings = product(heights, radii)
+    return np.array([(r * np.cos(a), r * np.sin(a), z) for z, r in rings for a in (angles if r else angles[:1])])

@@ -1,0 +1,110 @@
+"""From a scene to a flight: where it starts, and the flight itself."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from ..fem.table import FieldTable
+from ..geometry.box import Array
+from ..geometry.scene import AbsoluteStart, Scene
+from .equilibria import find_equilibria
+from .equilibrium import Equilibrium, EquilibriumError
+from .events import clearance
+from .flight import TOLERANCE, compile_flight
+from .integration import integrate
+from .rates import Rates
+from .state import State
+from .trajectory import Trajectory
+
+FREQUENCY_RATIO, FREQUENCY_TRIALS = 1.08, 9
+"""Steps in which a frequency that works is looked for: up and down by a factor of two."""
+
+
+class StartError(ValueError):
+    """The flight cannot begin where it was asked to."""
+
+
+def simulate(
+    scene: Scene,
+    table: FieldTable,
+    duration: float,
+    equilibria: Sequence[Equilibrium] | None = None,
+    tolerance: float = TOLERANCE,
+    compact: bool | None = None,
+    progress: Callable[[float], None] | None = None,
+) -> Trajectory:
+    """Simulate the flight of a scene's floater for `duration` (s), or until contact or loss.
+
+    Parameters
+    ----------
+    equilibria : of this scene, if they are already known
+    tolerance, compact : see `compile_flight`
+    progress : called with the finished part, 0 to 1, a few times a second
+
+    Raises
+    ------
+    EquilibriumError : the flight shall begin near a stable equilibrium and there is none
+    StartError : it would begin in contact, or `duration` is not positive
+    """
+    if not duration > 0:
+        raise StartError(f"Input duration must be positive; instead received {duration} s.")
+    start = initial_state(scene, table, equilibria)
+    return integrate(scene, compile_flight(scene, table, duration, tolerance, compact), start, duration, progress)
+
+
+def initial_state(scene: Scene, table: FieldTable, equilibria: Sequence[Equilibrium] | None = None) -> State:
+    """State at t = 0, when the rotor's frame is the laboratory's.
+
+    An `OffsetStart` displaces the stable equilibrium in the rotor's frame and keeps the floater at rest in it; among
+    several stable equilibria it takes the nearest.  `equilibria` are found if they are not given.
+
+    Raises
+    ------
+    EquilibriumError : no stable equilibrium to start from; it says why and which frequency has one
+    StartError : the floater would overlap a magnet or the plate
+    """
+    if isinstance(scene.start, AbsoluteStart):
+        start = scene.start
+        state = State(start.position, start.velocity, start.moment / np.linalg.norm(start.moment), start.spin)
+    else:
+        known = find_equilibria(scene, table) if equilibria is None else equilibria
+        stable = [equilibrium for equilibrium in known if equilibrium.stable]
+        if not stable:
+            raise EquilibriumError(_way_out(scene, table, known))
+        state = _displaced(scene, stable[0], scene.start.offset)
+    gap = float(clearance(scene, np.zeros(1), state.position[None])[0])
+    if gap < 0:
+        where = ", ".join(f"{1e3 * c:.6g}" for c in state.position)
+        raise StartError(
+            f"Input start must leave the floater free of the magnets and the plate; instead it begins at ({where}) mm, "
+            f"{-1e3 * gap:.3g} mm inside one of them. Move the plate or the start."
+        )
+    return state
+
+
+def _displaced(scene: Scene, equilibrium: Equilibrium, offset: Array) -> State:
+    position = equilibrium.position + offset
+    velocity = np.cross([0.0, 0.0, scene.angular_velocity], position)
+    return replace(equilibrium.state, position=position, velocity=velocity)
+
+
+def _way_out(scene: Scene, table: FieldTable, equilibria: Sequence[Equilibrium]) -> str:
+    kinds = dict.fromkeys(f"{1e3 * e.distance:.2f} mm (grows e-fold in {1 / e.growth_per_s:.2g} s)" for e in equilibria)
+    found = f"only unstable ones at {', '.join(kinds)}" if kinds else "nor any unstable one below the rotor"
+    other = _levitating_frequency(scene, table)
+    advice = f"About {other:.4g} Hz has one; or give" if other else "None was found within a factor of two; give"
+    return f"At {scene.frequency:g} Hz the floater has no stable equilibrium, {found}. {advice} start.position_mm."
+
+
+def _levitating_frequency(scene: Scene, table: FieldTable) -> float | None:
+    """The nearest tried frequency at which there is a stable equilibrium, Hz."""
+    rates = Rates(table)
+    for step in range(1, FREQUENCY_TRIALS + 1):
+        for ratio in (FREQUENCY_RATIO**step, FREQUENCY_RATIO**-step):
+            frequency = scene.frequency * ratio
+            if any(e.stable for e in find_equilibria(replace(scene, frequency=frequency), table, rates=rates)):
+                return frequency
+    return None

@@ -1,0 +1,46 @@
+"""A simulated flight."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from ..geometry.box import Array
+from .state import State
+
+
+@dataclass(frozen=True, eq=False)
+class Trajectory:
+    """Samples of a flight and how it ended.
+
+    Parameters
+    ----------
+    time : (n,) s, at equal intervals but for the last
+    lab : motion (n, 3) along the laboratory's axes, SI units
+    angular_velocity : of the rotor, rad/s
+    ended_by : "duration", "contact" or "lost"
+    energy_error : largest relative violation of the energy ledger or of |m̂| = 1
+    realtime_factor : simulated seconds per second of integration, compilation left out
+    steps : number of Taylor steps
+    compile_seconds : time spent on compilation (little where heyoka's cache knows the system)
+    interrupted : whether it was stopped by the user before it ended
+    """
+
+    time: Array
+    lab: State
+    angular_velocity: float
+    ended_by: str
+    energy_error: float
+    realtime_factor: float
+    steps: int
+    compile_seconds: float
+    interrupted: bool = False
+
+    @property
+    def levitated_s(self) -> float:
+        """Duration of the flight, s."""
+        return float(self.time[-1])
+
+    @property
+    def rotor(self) -> State:
+        """Motion (n, 3) along the rotor's axes, SI units."""
+        return self.lab.to_rotor(self.angular_velocity * self.time)

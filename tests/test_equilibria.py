@@ -1,0 +1,165 @@
+"""Synchronous equilibria against laboratory-frame physics with magpylib, brute force and published numbers."""
+
+from dataclasses import replace
+
+import magpylib as magpy
+import numpy as np
+import pytest
+from scipy.optimize import least_squares
+from scipy.spatial.transform import Rotation
+
+from spinlev.dynamics.balance import EVERY, Balance, solve
+from spinlev.dynamics.equations import parameters
+from spinlev.dynamics.equilibria import find_equilibria, survey
+from spinlev.dynamics.equilibrium import EquilibriumError
+from spinlev.dynamics.rates import Rates
+from spinlev.dynamics.search import SearchRange
+from spinlev.dynamics.state import Scales
+from spinlev.fem.multipole import uniform_moments
+from spinlev.fem.table import RotorTable
+from spinlev.geometry import rotor
+from spinlev.geometry.scene import Drag, Floater, Scene
+
+FLOATER = Floater(radius=6.35e-3, remanence=1.305, recoil_permeability=1.0, density=7500.0)
+SHAPE = {"edge": 10e-3, "remanence": 1.305, "recoil_permeability": 1.0}
+SCENES = {
+    "horizontal": Scene(110.0, rotor.horizontal(2e-3, **SHAPE), FLOATER, Drag(0.0, 0.0)),
+    "vertical": Scene(80.0, rotor.vertical(14e-3, **SHAPE), FLOATER, Drag(0.0, 0.0)),
+    "tilt": Scene(130.0, rotor.tilt(np.radians(10.0), **SHAPE), FLOATER, Drag(0.0, 0.0)),
+}
+EIGHTH_ORDER = np.array([4 / 5, -1 / 5, 4 / 105, -1 / 280])
+
+
+def table_of(scene, model):
+    if model == "cuboid":
+        return RotorTable(model, scene.rotor, scene.rotor)
+    return RotorTable(model, scene.rotor, (), tuple(uniform_moments(m, 1) for m in scene.rotor))
+
+
+def magpylib_source(scene, model):
+    sources = []
+    for magnet in scene.rotor:
+        if model == "dipole":
+            sources.append(magpy.misc.Dipole(position=magnet.box.center, moment=magnet.moment))
+        else:
+            pose = {"position": magnet.box.center, "orientation": Rotation.from_matrix(magnet.box.rotation)}
+            sources.append(magpy.magnet.Cuboid(dimension=magnet.box.size, polarization=magnet.polarization, **pose))
+    return magpy.Collection(*sources)
+
+
+def unbalanced(scene, source, spin, unknowns):
+    """Force less M dv/dt and torque less dL/dt of a floater that goes round with the rotor, laboratory frame, t = 0.
+
+    `unknowns`: position in mm and the two components of the moment's direction that are free, from its polar angle
+    and azimuth.  Gradient of m·B by central differences of eighth order: 1e-10 with steps of distance/40.
+    """
+    r, (polar, azimuth), omega = unknowns[:3] * 1e-3, unknowns[3:], scene.angular_velocity
+    direction = np.array([np.sin(polar) * np.cos(azimuth), np.sin(polar) * np.sin(azimuth), np.cos(polar)])
+    moment, step = scene.floater.moment * direction, np.linalg.norm(r) / 40
+    offsets = [k * s * step * axis for axis in np.eye(3) for k in (1, 2, 3, 4) for s in (1, -1)]
+    field = source.getB(r + np.array([np.zeros(3), *offsets]))
+    energy = field[1:].reshape(3, 4, 2, 3) @ moment
+    force = (energy[:, :, 0] - energy[:, :, 1]) @ EIGHTH_ORDER / step
+    axis = np.array([0.0, 0.0, 1.0])
+    velocity = omega * np.cross(axis, r)
+    angular_momentum = scene.floater.inertia * omega * (axis + (spin - np.cos(polar)) * direction)
+    centripetal = scene.floater.mass * omega * np.cross(axis, velocity)
+    weight = scene.floater.mass * scene.gravity
+    torque = np.cross(moment, field[0]) - omega * np.cross(axis, angular_momentum)
+    across = [
+        [np.cos(polar) * np.cos(azimuth), np.cos(polar) * np.sin(azimuth), -np.sin(polar)],
+        [-np.sin(azimuth), np.cos(azimuth), 0.0],
+    ]
+    return np.concatenate([(force + weight - centripetal) / 0.08, np.array(across) @ torque / 1e-3])
+
+
+@pytest.mark.parametrize("model", ["dipole", "cuboid"])
+@pytest.mark.parametrize("name", SCENES)
+@pytest.mark.parametrize("spin", [0.0, -0.2])
+def test_equilibria_equal_an_independent_solution(name, model, spin):
+    scene = SCENES[name]
+    found = find_equilibria(scene, table_of(scene, model), spin)
+    assert sum(e.stable for e in found) == 1 and len(found) >= 3
+    source = magpylib_source(scene, model)
+    for equilibrium in found:
+        near = np.array([*equilibrium.position * 1e3, *np.radians([equilibrium.polar_angle_deg, -equilibrium.lag_deg])])
+        start = near + np.array([0.02, -0.03, 0.05, 0.01, 0.01])
+        other = least_squares(
+            lambda u: unbalanced(scene, source, spin, u), start, x_scale=[0.1, 0.1, 1.0, 0.1, 0.1], xtol=3e-16,
+            ftol=3e-16, gtol=3e-16, jac="3-point",
+        )  # fmt: skip
+        np.testing.assert_allclose(other.x[:3], near[:3], atol=1e-6)  # mm
+        np.testing.assert_allclose(other.x[3:], near[3:], atol=1e-6)
+        assert equilibrium.residual < 1e-9 and equilibrium.position_error < 1e-11
+        assert equilibrium.spin == pytest.approx(
+            equilibrium.state.spin @ equilibrium.state.moment / scene.angular_velocity
+        )
+
+
+@pytest.mark.parametrize("name", SCENES)
+@pytest.mark.parametrize("frequency, spin", [(30.0, 0.0), (80.0, -0.5), (110.0, 0.5), (250.0, 0.0)])
+def test_none_is_missed_that_brute_force_finds(name, frequency, spin):
+    scene = replace(SCENES[name], frequency=frequency)
+    table, scales, where = table_of(scene, "dipole"), Scales.of(scene), SearchRange(scene, 0.1)
+    balance, generator, number = Balance(Rates(table), parameters(scene, scales), spin), np.random.default_rng(5), 4000
+    height, across = np.exp(generator.uniform(np.log([[0.5], [0.02]]), np.log([[15.0], [3.0]]), (2, number)))
+    azimuth, moment = generator.uniform(0, 2 * np.pi, number), generator.normal(size=(number, 3))
+    position = np.stack([across * np.cos(azimuth), across * np.sin(azimuth), -height], axis=1)
+    moment /= np.linalg.norm(moment, axis=1, keepdims=True)
+    with np.errstate(all="ignore"):  # many of these starts run away
+        position, _, step = solve(balance, position, moment, EVERY)
+    brute = [r * scales.length for r in position[step < 1e-10] if r in where]
+    found = np.array([e.position for e in find_equilibria(scene, table, spin)])
+    assert brute
+    for r in brute:
+        assert np.linalg.norm(found - r, axis=1).min() < 1e-9
+
+
+PUBLISHED = [  # PHYSICS.md, "the family matters": scene, frequency, body spin, distance in mm of the near equilibrium
+    ("horizontal", 118.0, -0.2, 19.0),
+    ("horizontal", 118.0, 0.0, 20.1),
+    ("horizontal", 118.0, 0.2, 22.1),
+    ("horizontal", 118.0, 0.4, None),
+    ("vertical", 80.0, -0.2, 25.9),
+    ("vertical", 80.0, 0.0, 27.0),
+    ("vertical", 80.0, 0.2, 28.8),
+    ("vertical", 80.0, 0.4, 32.8),
+    ("vertical", 80.0, 0.6, None),
+    ("vertical", 60.0, -0.2, 31.6),
+    ("vertical", 60.0, -0.1, 33.3),
+    ("vertical", 60.0, -0.05, None),
+]
+
+
+@pytest.mark.parametrize("name, frequency, spin, distance", PUBLISHED)
+def test_published_distances_of_the_family(name, frequency, spin, distance):
+    magnets = rotor.horizontal(1.7e-3, **SHAPE) if name == "horizontal" else rotor.vertical(14e-3, **SHAPE)
+    scene = replace(SCENES[name], frequency=frequency, rotor=magnets)
+    stable = [e for e in find_equilibria(scene, table_of(scene, "dipole"), spin) if e.stable]
+    if distance is None:
+        assert not stable
+    else:
+        assert [round(1e3 * e.distance, 1) for e in stable] == [distance]
+
+
+def test_force_curves_carry_the_magnetic_force_and_pass_through_the_equilibria():
+    scene = SCENES["vertical"]
+    table = table_of(scene, "cuboid")
+    result = survey(scene, table)
+    for curve in result.curves:
+        _, gradient = table.evaluate(curve.position)
+        force = scene.floater.moment * np.einsum("ni,niz->nz", curve.moment, gradient)[:, 2]
+        np.testing.assert_allclose(curve.magnetic_force, force, rtol=1e-9, atol=1e-9)
+    points = np.concatenate([curve.position for curve in result.curves])
+    for equilibrium in result.equilibria:  # steps along the curve are at most a tenth of the radius
+        assert np.linalg.norm(points - equilibrium.position, axis=1).min() < 0.1 * FLOATER.radius
+    assert [e.distance for e in result.equilibria] == sorted(e.distance for e in result.equilibria)
+
+
+def test_what_has_no_fixed_point_says_so():
+    scene = SCENES["horizontal"]
+    table = table_of(scene, "dipole")
+    with pytest.raises(EquilibriumError, match="Earnshaw"):
+        find_equilibria(replace(scene, frequency=0.0), table)
+    with pytest.raises(EquilibriumError, match="periodic"):
+        find_equilibria(replace(scene, gravity=np.array([1.0, 0.0, -9.8])), table)
