@@ -40,8 +40,9 @@ def survey(
 
     Returns
     -------
-    Equilibria, the stable ones first, then by distance, accurate to round-off in the table's field: every curve of lateral balance that is met from some four
-    thousand starts is followed, and every zero of the axial force on it is polished.
+    Equilibria, the stable ones first, then by distance, accurate to round-off in the table's field: every curve of
+    lateral balance that is met from some four thousand starts is followed, and every zero of the axial force on it is
+    polished.
 
     Raises
     ------

@@ -9,6 +9,7 @@ import numpy as np
 
 from ..fem.table import FieldTable
 from ..geometry.box import Array
+from ..geometry.input_error import InputError
 from ..geometry.scene import AbsoluteStart, Scene
 from .equilibria import find_equilibria
 from .equilibrium import Equilibrium, EquilibriumError
@@ -23,7 +24,7 @@ FREQUENCY_RATIO, FREQUENCY_TRIALS = 1.08, 9
 """Steps in which a frequency that works is looked for: up and down by a factor of two."""
 
 
-class StartError(ValueError):
+class StartError(InputError):
     """The flight cannot begin where it was asked to."""
 
 

@@ -17,7 +17,7 @@ from .remanent import edge_graded_gauss, remanent_h
 
 
 def magnet_dipoles(mesh: MagnetMesh, formulation: Formulation = "split") -> Array:
-    """∫ M dV (n, 3), in T m³, of every magnet, M as in `magnetostatics`: the whole in `direct`, the correction in `split`.
+    """∫ M dV (n, 3), T m³, of every magnet, M as in `magnetostatics`: the whole (`direct`) or the correction (`split`).
 
     The error falls as the square of that of ∇ψ: about h² with elements of size h at the edges, where ∇ψ is logarithmic.
 

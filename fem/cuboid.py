@@ -20,13 +20,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from itertools import product
+from typing import Any
 
 import heyoka as hy
 import numpy as np
 
 from ..geometry.box import Array
 
-Expression = hy.expression
+Expression = Any
+"""A heyoka expression."""
 SIGNS = (-1, 1)
 FOUR_PI = 4 * np.pi
 
@@ -109,8 +111,8 @@ def cuboid_field(
     if not strength:
         return [zero] * 3, [[zero] * 3 for _ in range(3)]
     corners = _Corners(position, half_edges)
-    second = {(axis, axis): corners.solid_angle(axis) for axis in strength}
-    third = {(0, 1, 2): corners.mixed()}
+    second: dict[tuple[int, ...], Expression] = {(axis, axis): corners.solid_angle(axis) for axis in strength}
+    third: dict[tuple[int, ...], Expression] = {(0, 1, 2): corners.mixed()}
     for a, b in ((0, 1), (0, 2), (1, 2)):
         if a in strength or b in strength:
             second[a, b] = corners.edge_sum(a, b)

@@ -93,8 +93,8 @@ def derivative(coefficients: Coefficients, axis: int) -> Coefficients:
         if m:
             full[:, zero - m] = (-1) ** m * np.conj(coefficients[:, m])
     result = np.zeros((size + 1, size + 1), complex)
-    m = np.arange(size + 1)
-    lower, upper = full[:, zero + m - 1], full[:, zero + m + 1]
+    orders = np.arange(size + 1)
+    lower, upper = full[:, zero + orders - 1], full[:, zero + orders + 1]
     if axis == 0:
         result[1:] = (lower - upper) / 2
     elif axis == 1:
@@ -129,4 +129,4 @@ def field_sizes(degree: int) -> Array:
 
 def field_spectrum(coefficients: Coefficients) -> Array:
     """Root mean square of |grad f| over the unit sphere, by degree: (L+1,)."""
-    return np.linalg.norm(np.abs(coefficients) * field_sizes(len(coefficients) - 1), axis=1)
+    return np.asarray(np.linalg.norm(np.abs(coefficients) * field_sizes(len(coefficients) - 1), axis=1))

@@ -133,7 +133,7 @@ def _solve_open(stiffness: Any, load: Any, space: Any, boundary: OpenBoundary) -
 
 
 def trace_moments(solution: Solution) -> Coefficients:
-    """Coefficients (T) of the outer field of ψ about the mesh's centre, with radius `mesh.unit`, from the outer sphere."""
+    """Coefficients (T) of the outer field of ψ, read from the outer sphere, about its centre; radius `mesh.unit`."""
     return solution.boundary.expansion(solution.potential.vec.FV().NumPy())
 
 

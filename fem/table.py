@@ -12,13 +12,14 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..geometry.box import Array
+from ..geometry.input_error import InputError
 from ..geometry.magnet import Magnet
 from .compiled import CompiledField, FieldExpressions
 from .multipole import MultipoleExpansion
 from .uniform import UniformField
 
 
-class RangeError(ValueError):
+class RangeError(InputError):
     """A field was asked for where the table does not know it."""
 
 

@@ -1,6 +1,7 @@
 """What is in the scene: magnets, rotor, floater, plate, scene file, meshes."""
 
 from .box import Box, rotation_matrix
+from .input_error import InputError
 from .magnet import MU_0, Magnet
 from .rotor import horizontal, tilt, vertical
 from .scene import AbsoluteStart, Drag, Floater, Lowering, OffsetStart, Plate, Scene
@@ -13,6 +14,7 @@ __all__ = [
     "Box",
     "Drag",
     "Floater",
+    "InputError",
     "Lowering",
     "Magnet",
     "OffsetStart",

@@ -10,6 +10,7 @@ from pydantic import BaseModel
 from pydantic_core import ErrorDetails
 
 from . import scene_schema as schema
+from .input_error import InputError
 
 ROTORS: dict[str, type[BaseModel]] = {
     "horizontal": schema.HorizontalRotor,
@@ -39,7 +40,7 @@ RULES = {
 }
 
 
-class SceneError(ValueError):
+class SceneError(InputError):
     """A scene file that cannot be used; `faults` lists everything that is wrong with it."""
 
     def __init__(self, source: str, faults: Sequence[str]) -> None:

@@ -1,6 +1,7 @@
 """The command line: `spinlev`.
 
 Exit status 0: done; 2: bad input, with one message that says what is allowed; 1: the computation failed.
+The numeric libraries are imported once the input has been found good: a wrong scene is answered at once.
 """
 
 from __future__ import annotations
@@ -18,8 +19,9 @@ from typing import Annotated, Any, Literal
 
 from cyclopts import App, CycloptsError, Parameter
 
-from ..geometry import SceneError, load_scene
-from .console import InputError, answers_only, note, to_json
+from ..geometry import InputError, load_scene
+from .console import answers_only, note, to_json
+from .points_file import read_points
 
 FieldModel = Literal["dipole", "cuboid", "fem", "auto"]
 PlateModel = Literal["none", "auto"]
@@ -39,8 +41,10 @@ class Output:
 
     Parameters
     ----------
-    json : print one JSON object and nothing else on standard output
-    out : folder for the files
+    json
+        Print one JSON object and nothing else on standard output.
+    out
+        Folder for the files.
     """
 
     json: Annotated[bool, Parameter(negative="")] = False
@@ -75,17 +79,23 @@ def run(
 
     Parameters
     ----------
-    scene : scene file (left out: the one that comes with the program)
-    model : field model of the motion
-    plate_model : plate model
-    duration_s : simulated time, s
-    rtol : relative accuracy asked of the field
+    scene
+        Scene file (left out: the one that comes with the program).
+    model
+        Field model of the motion.
+    plate_model
+        Plate model.
+    duration_s
+        Simulated time, s.
+    rtol
+        Relative accuracy asked of the field.
     """
-    from .run import main_job
-
     _positive("--duration-s", duration_s)
     _positive("--rtol", rtol)
-    values, lines = main_job(load_scene(scene or default_scene()), model, duration_s, rtol, output.out)
+    loaded = load_scene(scene or default_scene())
+    from .run import main_job
+
+    values, lines = main_job(loaded, model, duration_s, rtol, output.out)
     return Answer(values, tuple(lines), output.json)
 
 
@@ -102,16 +112,19 @@ def field(
 
     Parameters
     ----------
-    scene : scene file
-    points : CSV file with the columns x_mm, y_mm, z_mm
-    model : field model
-    rtol : relative accuracy asked of the field
+    scene
+        Scene file.
+    points
+        CSV file with the columns x_mm, y_mm, z_mm.
+    model
+        Field model.
+    rtol
+        Relative accuracy asked of the field.
     """
-    from .points_file import read_points
-    from .single import field_job
-
     _positive("--rtol", rtol)
     loaded, places = load_scene(scene), read_points(points)
+    from .single import field_job
+
     values, lines = field_job(loaded, places, model, rtol, output.out)
     return Answer(values, tuple(lines), output.json)
 
@@ -130,18 +143,24 @@ def equilibria(
 
     Parameters
     ----------
-    scene : scene file
-    model : field model
-    plate_model : plate model
-    spin : body spin S = Ω·m̂/ω of the floater about its own moment
-    rtol : relative accuracy asked of the field
+    scene
+        Scene file.
+    model
+        Field model.
+    plate_model
+        Plate model.
+    spin
+        Body spin S = Ω·m̂/ω of the floater about its own moment.
+    rtol
+        Relative accuracy asked of the field.
     """
-    from .single import equilibria_job
-
     _positive("--rtol", rtol)
     if not -1e3 <= spin <= 1e3:
         raise InputError(f"Input --spin must be between -1000 and 1000; instead received {spin}.")
-    values, lines = equilibria_job(load_scene(scene), model, spin, rtol, output.out)
+    loaded = load_scene(scene)
+    from .single import equilibria_job
+
+    values, lines = equilibria_job(loaded, model, spin, rtol, output.out)
     return Answer(values, tuple(lines), output.json)
 
 
@@ -159,17 +178,23 @@ def simulate(
 
     Parameters
     ----------
-    scene : scene file
-    duration_s : simulated time, s
-    model : field model
-    plate_model : plate model
-    rtol : relative accuracy asked of the field
+    scene
+        Scene file.
+    duration_s
+        Simulated time, s.
+    model
+        Field model.
+    plate_model
+        Plate model.
+    rtol
+        Relative accuracy asked of the field.
     """
-    from .single import simulate_job
-
     _positive("--duration-s", duration_s)
     _positive("--rtol", rtol)
-    values, lines = simulate_job(load_scene(scene), model, duration_s, rtol, output.out)
+    loaded = load_scene(scene)
+    from .single import simulate_job
+
+    values, lines = simulate_job(loaded, model, duration_s, rtol, output.out)
     return Answer(values, tuple(lines), output.json)
 
 
@@ -186,16 +211,13 @@ def main() -> None:
 
 
 def _status(arguments: list[str], out: Any) -> int:
-    from ..dynamics import StartError
-    from ..fem import RangeError
-
     began = time.perf_counter()
     try:
         answer = app(arguments, exit_on_error=False, print_error=False, result_action="return_value")
     except CycloptsError as error:
         note(f"spinlev: {error}\nTry: spinlev --help")
         return 2
-    except (SceneError, InputError, RangeError, StartError) as error:
+    except InputError as error:
         note(f"spinlev: {error}")
         return 2
     except KeyboardInterrupt:

@@ -16,10 +16,6 @@ from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, T
 ERRORS = Console(stderr=True, highlight=False, soft_wrap=True)
 
 
-class InputError(ValueError):
-    """What the user gave cannot be used; the message names it, the rule and the value."""
-
-
 def note(text: str) -> None:
     """A message on standard error."""
     ERRORS.print(text, markup=False)

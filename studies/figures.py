@@ -72,7 +72,9 @@ def field_figure(result: xr.Dataset) -> Figure:
     true = result["axis_field"].sel(model=reference).values
     for model, color in COLORS.items():
         field = result["axis_field"].sel(model=model).values
-        left.semilogy(distance, 1e3 * np.hypot(field[:, 0], field[:, 1]), DASHES[model], color=color, label=NAMES[model])
+        left.semilogy(
+            distance, 1e3 * np.hypot(field[:, 0], field[:, 1]), DASHES[model], color=color, label=NAMES[model]
+        )
         left.semilogy(distance, 1e3 * np.abs(field[:, 2]), DASHES[model], color=color)
         if model != reference:
             apart = np.linalg.norm(field - true, axis=1) / np.linalg.norm(true, axis=1)

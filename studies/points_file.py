@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from ..geometry.box import Array
-from .console import InputError
+from ..geometry.input_error import InputError
 
 COLUMNS = ("x_mm", "y_mm", "z_mm")
 

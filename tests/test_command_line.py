@@ -105,7 +105,9 @@ BAD_SCENES = {
     "wrong list length": GOOD.replace("[0.0, 0.0, -9.81]", "[0.0, -9.81]"),
     "overlapping bodies": GOOD.replace("[35.0, 0.0, -21.0]", "[10.0, 0.0, -21.0]"),
     "floater inside the rotor": GOOD + "\n[start]\nposition_mm = [2.0, 0.0, 0.0]\n",
-    "floater in the plate": GOOD.replace("[35.0, 0.0, -21.0]", "[25.0, 0.0, -21.0]"),
+    "plate lying with its centre 35 mm below, as the article's text might be read": GOOD.replace(
+        "[35.0, 0.0, -21.0]", "[0.0, 0.0, -35.0]"
+    ).replace("[0.0, 90.0, 0.0]", "[0.0, 0.0, 0.0]"),
 }
 
 

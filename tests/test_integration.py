@@ -32,10 +32,12 @@ def thrown(position, velocity, scene=SCENE, **changes):
 
 def test_energy_and_unit_length_are_kept_for_ten_seconds():
     flight = simulate(SCENE, CUBOID, 10.0, compact=True)
-    assert flight.ended_by == "duration" and flight.levitated_s == pytest.approx(10.0, rel=1e-14)
+    assert flight.ended_by == "duration"
+    assert flight.levitated_s == pytest.approx(10.0, rel=1e-14)
     assert flight.energy_error <= 1e-12
     assert np.abs(np.linalg.norm(flight.lab.moment, axis=1) - 1).max() <= 1e-12
-    assert flight.steps > 0 and len(flight.time) <= 20000
+    assert flight.steps > 0
+    assert len(flight.time) <= 20000
     np.testing.assert_allclose(np.diff(flight.time)[:-1], flight.time[1], rtol=1e-9)
 
 
@@ -87,7 +89,7 @@ def test_plate_beside_is_met_though_it_turns_in_the_rotors_frame():
     np.testing.assert_allclose(flight.lab.position[-1], [65e-3 - RADIUS, 1e-3, -30e-3], atol=1e-12)
 
 
-@pytest.mark.parametrize("start, speed", [(0.02, 0.3), (0.02, 3.0), (10.0, 0.3)], ids=["slow", "fast", "later"])
+@pytest.mark.parametrize(("start", "speed"), [(0.02, 0.3), (0.02, 3.0), (10.0, 0.3)], ids=["slow", "fast", "later"])
 def test_falling_on_a_plate_that_is_lowered(start, speed):
     """Against the roots of the falls' and the plate's quadratic equations."""
     lowering = Lowering(start, speed, 40e-3)
@@ -107,13 +109,16 @@ def test_falling_on_a_plate_that_is_lowered(start, speed):
 def test_progress_rises_to_one_and_an_interrupt_keeps_what_is_finished():
     shares = []
     simulate(thrown((0.0, 0.0, -30e-3), (0.0, 0.0, 0.0)), DIPOLE, 0.05, compact=True, progress=shares.append)
-    assert shares == sorted(shares) and shares[-1] == 1.0
+    assert shares == sorted(shares)
+    assert shares[-1] == 1.0
 
     def interrupt(_):
         raise KeyboardInterrupt
 
     flight = simulate(thrown((0.0, 0.0, -30e-3), (0.0, 0.0, 0.0)), DIPOLE, 0.05, compact=True, progress=interrupt)
-    assert flight.interrupted and 0 < flight.levitated_s < 0.05 and len(flight.time) > 10
+    assert flight.interrupted
+    assert 0 < flight.levitated_s < 0.05
+    assert len(flight.time) > 10
 
 
 def test_start_is_displaced_from_the_stable_equilibrium_and_at_rest_in_the_rotors_frame():

@@ -1,5 +1,6 @@
 """The rotor's field by finite elements: exact solutions, rates, symmetries, published numbers, honest errors."""
 
+import ngsolve as ng
 import numpy as np
 import pytest
 
@@ -59,8 +60,6 @@ def moment_ratio(magnet, coefficients):
 @pytest.mark.parametrize("order", [2, 4, 6])
 def test_open_boundary_recognises_outer_potentials(order):
     """A dipole's potential on the sphere gives the dipole back; the map is exact for every degree it holds."""
-    import ngsolve as ng
-
     mesh = mesh_magnets(rotors(1.05)["horizontal"], MeshSettings(hp_layers=0))
     space = ng.H1(mesh.mesh, order=order)
     potential = ng.GridFunction(space)
@@ -84,14 +83,25 @@ def test_closed_form_inside_has_no_demagnetisation_beyond_a_third(name):
 def test_direct_solution_reproduces_the_closed_form_for_unit_permeability():
     """μr = 1 with finite elements only: the target is 1e-5 of B and of its gradient from 15 to 50 mm."""
     rotor = rotors(1.0)["horizontal"]
-    table = fem_table(rotor, Accuracy(5e-5, 1.7), "direct")  # the estimate is ten times the error
-    exact = rotor_table(rotor, "cuboid")
+    mesh = mesh_magnets(rotor)
+    outer = MultipoleExpansion(mesh.center, mesh.unit, trace_moments(solve(mesh, "direct", 4, boundary_degree=21)))
+    table, exact = RotorTable("fem", rotor, (), (outer,)), rotor_table(rotor, "cuboid")
+    for distance in (0.015, 0.02, 0.03, 0.05):
+        points = rotor[0].box.center + distance * directions()
+        for value, truth in zip(table.evaluate(points), exact.evaluate(points), strict=True):
+            assert relative(value, truth).max() < 1e-5
+
+
+@pytest.mark.slow
+def test_stated_error_of_the_direct_solution_covers_the_true_one():
+    """Down to where only the roundness of the meshed sphere is left (1e-8)."""
+    rotor = rotors(1.0)["horizontal"]
+    table, exact = fem_table(rotor, Accuracy(2e-5, 1.7), "direct"), rotor_table(rotor, "cuboid")
     for distance in (0.015, 0.02, 0.03, 0.05):
         points = rotor[0].box.center + distance * directions()
         for value, truth, error in zip(
             table.evaluate(points), exact.evaluate(points), table.relative_error(points), strict=True
         ):
-            assert relative(value, truth).max() < 1e-5
             assert (relative(value, truth) <= error).all()
 
 
@@ -153,11 +163,11 @@ def test_turned_magnet_gives_the_turned_field():
     straight = Magnet(Box((0.008, 0.01, 0.006)), (1.0, 0.3, 0.2), 1.08)
     turned = Magnet(Box((0.008, 0.01, 0.006), (0.001, 0.002, 0.0), turn), (1.0, 0.3, 0.2), 1.08)
     points = 0.015 * directions(40)
-    before, after = fem_table((straight,), Accuracy(1e-4)), fem_table((turned,), Accuracy(1e-4))
+    before, after = fem_table((straight,), Accuracy(5e-4)), fem_table((turned,), Accuracy(5e-4))
     b, gradient = before.evaluate(points)
     b_turned, gradient_turned = after.evaluate(turned.box.center + points @ turn.T)
-    assert relative(b_turned, b @ turn.T).max() < 2e-5  # two unlike meshes, each far better than asked
-    assert relative(gradient_turned, turn @ gradient @ turn.T).max() < 1e-4
+    assert relative(b_turned, b @ turn.T).max() < 1e-4  # two unlike meshes, each far better than asked
+    assert relative(gradient_turned, turn @ gradient @ turn.T).max() < 5e-4
 
 
 # the stated error
