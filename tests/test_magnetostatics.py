@@ -83,8 +83,8 @@ def test_closed_form_inside_has_no_demagnetisation_beyond_a_third(name):
 def test_direct_solution_reproduces_the_closed_form_for_unit_permeability():
     """μr = 1 with finite elements only: the target is 1e-5 of B and of its gradient from 15 to 50 mm."""
     rotor = rotors(1.0)["horizontal"]
-    mesh = mesh_magnets(rotor)
-    outer = MultipoleExpansion(mesh.center, mesh.unit, trace_moments(solve(mesh, "direct", 4, boundary_degree=21)))
+    mesh = mesh_magnets(rotor, MeshSettings(ball_radius=1.15, magnet_size=0.5, air_size=0.5, hp_layers=0))
+    outer = MultipoleExpansion(mesh.center, mesh.unit, trace_moments(solve(mesh, "direct", 6, boundary_degree=23)))
     table, exact = RotorTable("fem", rotor, (), (outer,)), rotor_table(rotor, "cuboid")
     for distance in (0.015, 0.02, 0.03, 0.05):
         points = rotor[0].box.center + distance * directions()
