@@ -39,7 +39,7 @@ test: lint types
 	$(BIN)/pytest -n 2 -m "not slow"
 
 validate: install
-	$(BIN)/pytest -m slow
+	$(BIN)/pytest -m slow -s
 
 bench: install
 	$(BIN)/pytest benchmarks --benchmark-columns=min,median,rounds

@@ -1,0 +1,75 @@
+"""Speed of the core, each beside a peer in the same run; pytest-benchmark prints the ratios in brackets."""
+
+import magpylib
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from spinlev.dynamics import find_equilibria
+from spinlev.dynamics.flight import compile_flight
+from spinlev.dynamics.integration import integrate
+from spinlev.dynamics.rates import Rates
+from spinlev.dynamics.simulation import initial_state
+from spinlev.fem import RotorTable, uniform_moments
+from spinlev.fem.models import rotor_table
+from spinlev.geometry import load_scene
+
+SCENE = load_scene("scenes/horizontal.toml")
+POINTS = np.random.default_rng(0).uniform(-0.015, 0.015, (100_000, 3)) - [0, 0, 0.03]
+
+
+def peer(rotor):
+    """The same magnets in magpylib."""
+    return magpylib.Collection(
+        *[
+            magpylib.magnet.Cuboid(
+                polarization=m.polarization,
+                dimension=m.box.size,
+                position=m.box.center,
+                orientation=Rotation.from_matrix(m.box.rotation),
+            )
+            for m in rotor
+        ]
+    )
+
+
+@pytest.mark.benchmark(group="100 000 points: B (magpylib) against B and its gradient (tables)")
+@pytest.mark.parametrize("model", ["magpylib B only", "dipole", "cuboid", "moments to 13", "fem"])
+def test_evaluation(benchmark, model):
+    rotor = SCENE.rotor
+    if model == "magpylib B only":
+        magnets = peer(rotor)
+        field = benchmark(lambda: magnets.getB(POINTS))
+    elif model == "moments to 13":
+        table = RotorTable("moments", rotor, (), tuple(uniform_moments(m, 13) for m in rotor))
+        field = benchmark(lambda: table.evaluate(POINTS))[0]
+    else:
+        table = rotor_table(rotor, model)
+        field = benchmark(lambda: table.evaluate(POINTS))[0]
+    assert np.isfinite(field).all()
+
+
+@pytest.mark.benchmark(group="field solve from nothing, by relative accuracy asked")
+@pytest.mark.parametrize("rtol", [1e-3, 1e-4, 1e-5])
+def test_field_solve(benchmark, rtol):
+    table = benchmark.pedantic(rotor_table, (SCENE.rotor, "fem", rtol), rounds=1)
+    assert table.provenance["elements"] > 0
+
+
+@pytest.mark.benchmark(group="all equilibria and their stability, compiled")
+@pytest.mark.parametrize("model", ["dipole", "cuboid", "fem"])
+def test_equilibria(benchmark, model):
+    table = rotor_table(SCENE.rotor, model)
+    rates = Rates(table)
+    found = benchmark.pedantic(lambda: find_equilibria(SCENE, table, rates=rates), rounds=3, warmup_rounds=1)
+    assert any(equilibrium.stable for equilibrium in found)
+
+
+@pytest.mark.benchmark(group="one second of flight at 110 Hz, compiled")
+@pytest.mark.parametrize("model", ["dipole", "cuboid", "fem"])
+def test_flight(benchmark, model):
+    table = rotor_table(SCENE.rotor, model)
+    start = initial_state(SCENE, table)
+    flight = compile_flight(SCENE, table, duration=1.0)
+    trajectory = benchmark.pedantic(lambda: integrate(SCENE, flight, start, 1.0, None), rounds=3, warmup_rounds=1)
+    assert trajectory.ended_by == "duration"
