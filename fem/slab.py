@@ -22,7 +22,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.special import jv
 
 from ..geometry.box import Array
 from ..geometry.magnet import MU_0
@@ -99,7 +98,7 @@ def checked(height: ArrayLike, frequency: ArrayLike) -> tuple[Array, Array]:
 
 
 def wave_numbers(height: Array, aperture: float = np.pi / 4) -> tuple[Array, Array]:
-    """Nodes and weights (..., n), 1/m, for ∫ dk of an integrand with e^{-2 k height}, analytic for |arg k| < aperture."""
+    """Nodes and weights (..., n), 1/m, for ∫ dk of what falls as e^{-2 k height} and is analytic for |arg k| < aperture."""
     count = int(np.ceil((HIGHEST - LOWEST) * DIGITS / (2 * np.pi * aperture))) + 1
     nodes, step = np.linspace(LOWEST, HIGHEST, count, retstep=True)
     k = np.exp(nodes) / height[..., None]
@@ -139,37 +138,3 @@ def reaction_gradient(conductor: PlaneConductor, height: ArrayLike, frequency: A
         pattern[2, a, a] = pattern[a, 2, a] = 0.5
         pattern[a, a, 2] = -0.5
     return MU_0 / (4 * np.pi) * power_integral(conductor, h, f, 3)[..., None, None, None] * pattern
-
-
-def mutual_tensor(
-    conductor: PlaneConductor, points: ArrayLike, source: ArrayLike, frequency: ArrayLike
-) -> ComplexArray:
-    """G (..., 3, 3), T/(A m²): reaction B = G m at `points` (..., 3) to a dipole m at `source` (..., 3), m.
-
-    The face is z = 0.  Shapes broadcast, with `frequency` (Hz) against the leading ones.  Relative error below
-    1e-11 up to a lateral distance of about 20 (z+z'); farther off, the oscillation takes more and more nodes.
-    """
-    points, source = np.broadcast_arrays(np.asarray(points, float), np.asarray(source, float))
-    offset = points - source
-    h, f = checked(np.minimum(points[..., 2], source[..., 2]), frequency)
-    h, distance = np.broadcast_arrays((points[..., 2] + source[..., 2]) / 2, np.hypot(offset[..., 0], offset[..., 1]))
-    aperture = min(np.pi / 4, 0.8 * float(np.min(np.arctan2(2 * h, distance))))
-    h, distance, f = np.broadcast_arrays(h, distance, f)
-    k, weight = wave_numbers(h, aperture)
-    weight = weight * k * k * np.exp(-2 * k * h[..., None]) * conductor.reflection(k, f[..., None])
-    even, first, second = (np.sum(weight * jv(n, k * distance[..., None]), axis=-1) for n in (0, 1, 2))
-    return -MU_0 / (4 * np.pi) * _angular(even, first, second, offset)
-
-
-def _angular(even: ComplexArray, first: ComplexArray, second: ComplexArray, offset: Array) -> ComplexArray:
-    """∂_i ∂'_j of the potential, from its Hankel moments of orders 0, 1 and 2 and the lateral `offset`."""
-    angle = np.arctan2(offset[..., 1], offset[..., 0])
-    result = np.zeros((*even.shape, 3, 3), complex)
-    result[..., 0, 0] = (even - second * np.cos(2 * angle)) / 2
-    result[..., 1, 1] = (even + second * np.cos(2 * angle)) / 2
-    result[..., 0, 1] = result[..., 1, 0] = -second * np.sin(2 * angle) / 2
-    result[..., 2, 2] = even
-    for axis, projection in ((0, np.cos(angle)), (1, np.sin(angle))):
-        result[..., axis, 2] = first * projection
-        result[..., 2, axis] = -first * projection
-    return result

@@ -6,7 +6,8 @@ import mpmath
 import numpy as np
 import pytest
 from spinlev.fem.phasor import mean_force, mean_loss, mean_torque
-from spinlev.fem.slab import Slab, ThinSheet, mutual_tensor, reaction_gradient, reaction_tensor
+from spinlev.fem.slab import Slab, ThinSheet, reaction_gradient, reaction_tensor
+from spinlev.fem.slab_mutual import mutual_tensor
 from spinlev.fem.sliding import drag_tensor, sliding_force
 from spinlev.geometry.magnet import MU_0
 
@@ -113,7 +114,8 @@ def test_lift_is_the_slope_of_the_reactive_energy():
     low, high = (reaction_tensor(PLATE, 0.02 + s, 100.0)[2, 2] for s in (-step, step))
     # moving source and image together: F_z = ½·½ d/dh Re G_zz, the halves from time and from self-interaction
     assert mean_force(reaction_gradient(PLATE, 0.02, 100.0), [0, 0, 1.0])[2] == pytest.approx(
-        (high - low).real / (2 * step) / 4, rel=1e-6  # (step/h)²
+        (high - low).real / (2 * step) / 4,
+        rel=1e-6,  # (step/h)²
     )
 
 
