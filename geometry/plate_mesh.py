@@ -21,7 +21,7 @@ from .magnet import MU_0
 
 @dataclass(frozen=True)
 class MeshRule:
-    """How fine the mesh is.
+    """How fine the mesh is; the defaults suit orders 3 to 5, for which few large cells cost least.
 
     Parameters
     ----------
@@ -32,14 +32,14 @@ class MeshRule:
         inverse cube
     """
 
-    distance_share: float = 0.7
-    skin_share: float = 1.2
-    growth: float = 1.3
+    distance_share: float = 1.2
+    skin_share: float = 2.0
+    growth: float = 1.6
     reach: float = 12.0
 
     def finer(self) -> MeshRule:
-        """The next finer mesh: half of the cell size in the plate."""
-        return MeshRule(self.distance_share / 2, self.skin_share / 2, self.growth / 1.3, self.reach)
+        """The next finer mesh: cells 0.6 times as large, and a slower growth."""
+        return MeshRule(0.6 * self.distance_share, 0.6 * self.skin_share, 0.8 * self.growth, self.reach)
 
 
 def skin_depth(conductivity: float, frequency: float) -> float:
