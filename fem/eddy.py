@@ -27,8 +27,9 @@ from ..geometry.magnet import MU_0
 from .eddy_space import EddySpace, Source
 from .phasor import ComplexArray
 
-RESISTIVE = 1e-4
-"""ωμ0σL² below which the response is resistive: A = iω a1 + ω² a2 with relative error RESISTIVE²."""
+RESISTIVE = 1e-2
+"""ωμ0σL² below which the response is resistive: A = a0 + iω a1, with a0 (charges) and a1 (currents) real and constant.
+The slowest current of a plate decays in less than μ0σL²/100, so that this is exact to RESISTIVE²/1e4 = 1e-8."""
 SILENT = 1e-9
 """Parity parts smaller than this share of the whole source are not solved for."""
 
@@ -85,7 +86,7 @@ def solve_eddy(
 ) -> EddyResponse:
     """Eddy currents of all `sources` at `frequency` (Hz), with one factorisation for each parity class that they touch.
 
-    Any frequency from 0 up is safe: the gauge needs no parameter, and below ωμ0σL² = 1e-4 the resistive limit
+    Any frequency from 0 up is safe: the gauge needs no parameter, and below ωμ0σL² = 1e-2 the resistive limit
     is used, exact to 1e-8.  At high frequency the mesh must resolve the skin depth; `plate` estimates whether it does.
 
     Raises
@@ -107,8 +108,7 @@ def solve_eddy(
             continue
         loads = space.loads(images[number])
         solutions, unknowns = system.solve(parity_class, loads)
-        ratio = frequency / solved
-        scaled = solutions.real * ratio**2 + 1j * solutions.imag * ratio
+        scaled = solutions.real + 1j * solutions.imag * (frequency / solved)
         classes[number] = ClassResponse(images[number], loads, scaled)
         coupling = max(coupling, unknowns)
     return EddyResponse(space, frequency, classes, coupling)
