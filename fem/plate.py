@@ -23,7 +23,6 @@ from .phasor import ComplexArray
 from .sources import UniformField, unit_dipoles
 
 HIGHEST_ORDER = 5
-REFINEMENTS = 3
 LEAST_REDUCTION = 0.2
 """The smallest error reduction from one order to the next that is believed without having seen the next."""
 STALLED = 0.6
@@ -62,7 +61,12 @@ class PlateReaction:
 
 
 def plate_reaction(
-    plate: Plate, positions: ArrayLike, frequency: float, rtol: float = 1e-3, rule: MeshRule | None = None
+    plate: Plate,
+    positions: ArrayLike,
+    frequency: float,
+    rtol: float = 1e-3,
+    rule: MeshRule | None = None,
+    refinements: int = 3,
 ) -> PlateReaction:
     """Reaction tensors of `plate` at `positions` (n, 3), m, and `frequency`, Hz, phasors e^{+iωt}.
 
@@ -72,11 +76,12 @@ def plate_reaction(
     positions : laboratory frame, outside the plate
     rtol : estimated relative error asked of every own tensor
     rule : first mesh
+    refinements : how often the mesh may be refined
 
     Raises
     ------
     ValueError : a position inside the plate, a size, a conductivity or a frequency out of range
-    AccuracyError : `rtol` not reached after three refinements of the mesh
+    AccuracyError : `rtol` not reached after all refinements of the mesh
     """
     places = np.asarray(positions, float).reshape(-1, 3)
     body = plate.box.to_body(places)
@@ -85,7 +90,7 @@ def plate_reaction(
         silent = np.zeros((len(places), 3, len(places), 3), complex)
         return PlateReaction(0.0, places, silent, np.zeros(len(places)), 0, 0, 0)
     best = np.inf
-    for _ in range(REFINEMENTS + 1):
+    for _ in range(refinements + 1):
         response, error = _raise_order(plate, body, frequency, rtol, rule)
         best = min(best, float(error.max()))
         if best <= rtol:
