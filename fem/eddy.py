@@ -16,7 +16,7 @@ Electromagnetism (1998), ch. 8; O. Bíró, Comput. Methods Appl. Mech. Engrg. 16
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import ngsolve
 import numpy as np
@@ -57,12 +57,12 @@ class EddyResponse:
 
     space: EddySpace
     frequency: float
-    classes: dict[int, ClassResponse] = field(default_factory=dict)
-    coupling_unknowns: int = 0
+    classes: dict[int, ClassResponse]
+    coupling_unknowns: int
 
     @property
     def couplings(self) -> ComplexArray:
-        """(sources, sources) ∫ J_j · A_i dV, J (for dipoles of 1 A m²: T/(A m²)); symmetric to the solver's precision."""
+        """(sources, sources) ∫ J_j · A_i dV, J; for dipoles of 1 A m² it is B_i, T. Symmetric to round-off."""
         return self._sum({number: (c.potentials, c.loads) for number, c in self.classes.items()})
 
     def couplings_to(self, receivers: Sequence[Source]) -> ComplexArray:

@@ -73,9 +73,7 @@ def _at(response: EddyResponse, function: ngsolve.CoefficientFunction, points: A
     places = response.space.conductors.mesh(*folded.T)
     outside = places["nr"] < 0
     if outside.any():
-        raise ValueError(
-            f"Input points_m must lie in the meshed box; instead received {points[outside][0].tolist()}."
-        )
+        raise ValueError(f"Input points_m must lie in the meshed box; instead received {points[outside][0].tolist()}.")
     values = function(places)
     return np.asarray(values, complex).reshape(len(folded), -1)
 

@@ -6,7 +6,8 @@ Over a rectangle at normal distance u, with corner offsets v_j, w_k (j, k = ±1)
 
 where Λ = 2 atanh(L/(r1 + r2)) = ∫ ds/r along an edge: no singular lines but the edges themselves.  The attraction
 ∫ r/r³ dV is the difference of it over opposite faces, and the potential ∫ dV/r = ½ Σ_faces (distance) ∫ dS/r.
-O. D. Kellogg, Foundations of Potential Theory (1929), ch. III; W. D. MacMillan, The Theory of the Potential (1930), § 43.
+O. D. Kellogg, Foundations of Potential Theory (1929), ch. III;
+W. D. MacMillan, The Theory of the Potential (1930), § 43.
 """
 
 from __future__ import annotations

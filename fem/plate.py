@@ -57,7 +57,7 @@ class PlateReaction:
     @property
     def tensors(self) -> ComplexArray:
         """G (n, 3, 3), T/(A m²): B = G m at the dipole's own place."""
-        return np.einsum("iaib->iab", self.mutual)
+        return np.asarray(np.einsum("iaib->iab", self.mutual))
 
 
 def plate_reaction(
@@ -108,7 +108,7 @@ def plate_reaction(
 def _raise_order(
     plate: Plate, body: Array, frequency: float, rtol: float, rule: MeshRule
 ) -> tuple[EddyResponse, Array]:
-    """The response of the lowest order that meets `rtol` on one mesh, or of the last that helped, and its error (n,)."""
+    """The response of the lowest order that meets `rtol` on one mesh, or of the last that helped, and its errors."""
     mesh = plate_mesh(plate.box.size, plate.conductivity, body, frequency, rule)
     sources = unit_dipoles(body)
     response = solve_eddy(mesh, 1, frequency, sources)
@@ -129,11 +129,11 @@ def _raise_order(
 def _own(response: EddyResponse) -> ComplexArray:
     couplings = response.couplings
     n = len(couplings) // 3
-    return np.einsum("iaib->iab", couplings.reshape(n, 3, n, 3))
+    return np.asarray(np.einsum("iaib->iab", couplings.reshape(n, 3, n, 3)))
 
 
 def _truncation(response: EddyResponse, reach: float) -> Array:
-    """Error bound (n,) of the own tensors, T/(A m²), from the induced moment and the half edge `reach` of the box, m."""
+    """Error bound (n,) of the own tensors, T/(A m²): induced moment against the box of half edge `reach`, m."""
     induced = response.couplings_to([UniformField(axis) for axis in np.eye(3)])
     moment = np.linalg.norm(induced.reshape(3, -1, 3), axis=(0, 2))
     return np.asarray(MU_0 / (2 * np.pi * reach**3) * moment**2)
@@ -141,4 +141,5 @@ def _truncation(response: EddyResponse, reach: float) -> Array:
 
 def _to_laboratory(couplings: ComplexArray, rotation: Array) -> ComplexArray:
     n = len(couplings) // 3
-    return np.einsum("ca,iajb,db->icjd", rotation, couplings.reshape(n, 3, n, 3), rotation, optimize=True)
+    blocks = couplings.reshape(n, 3, n, 3)
+    return np.asarray(np.einsum("ca,iajb,db->icjd", rotation, blocks, rotation, optimize=True))

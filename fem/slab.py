@@ -98,7 +98,7 @@ def checked(height: ArrayLike, frequency: ArrayLike) -> tuple[Array, Array]:
 
 
 def wave_numbers(height: Array, aperture: float = np.pi / 4) -> tuple[Array, Array]:
-    """Nodes and weights (..., n), 1/m, for ∫ dk of what falls as e^{-2 k height} and is analytic for |arg k| < aperture."""
+    """Nodes and weights (..., n), 1/m, for ∫ dk of e^{-2 k height} times what is analytic for |arg k| < aperture."""
     count = int(np.ceil((HIGHEST - LOWEST) * DIGITS / (2 * np.pi * aperture))) + 1
     nodes, step = np.linspace(LOWEST, HIGHEST, count, retstep=True)
     k = np.exp(nodes) / height[..., None]

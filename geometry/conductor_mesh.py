@@ -33,16 +33,17 @@ class ConductorMesh:
         materials = set(self.mesh.GetMaterials())
         for name, value in self.conductivity.items():
             if name not in materials:
-                raise ValueError(f"Input conductivity must name materials {sorted(materials)}; instead received {name}.")
+                raise ValueError(f"Input conductivity must name one of {sorted(materials)}; instead received {name}.")
             if not value > 0:
                 raise ValueError(f"Input conductivity of {name} must be positive, S/m; instead received {value!r}.")
         if "far" not in self.mesh.GetBoundaries():
-            raise ValueError(f"Input mesh must have a boundary 'far'; instead received {set(self.mesh.GetBoundaries())}.")
+            found = sorted(set(self.mesh.GetBoundaries()))
+            raise ValueError(f"Input mesh must have a boundary 'far'; instead received {found}.")
 
     @property
     def images(self) -> int:
         """Number of mirror images that make up the whole."""
-        return 2 ** len(self.mirrors)
+        return 1 << len(self.mirrors)
 
     @property
     def pattern(self) -> str:

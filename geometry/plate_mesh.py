@@ -8,6 +8,7 @@ faces, against the skin depth δ = (π f μ0 σ)^(-1/2); in air they grow in pro
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -68,10 +69,10 @@ def plate_mesh(
         )
     depth = skin_depth(conductivity, frequency)
     far = rule.reach * 2 * half.max()
-    lines = [
-        graded_partition([0.0, half[a], far], lambda c, a=a: _cell_size(c, a, half, places, depth, rule)) / MILLIMETRE
-        for a in range(3)
-    ]
+    lines = []
+    for axis in range(3):
+        size_along = partial(_cell_size, axis=axis, half=half, places=places, depth=depth, rule=rule)
+        lines.append(graded_partition([0.0, half[axis], far], size_along) / MILLIMETRE)
     mesh = hex_mesh(lines, [Block("plate", np.full(3, -1.0), half / MILLIMETRE)], mirrors=(0, 1, 2))
     return ConductorMesh(mesh, {"plate": conductivity}, mirrors=(0, 1, 2))
 
@@ -86,4 +87,4 @@ def _cell_size(coordinate: Array, axis: int, half: Array, places: Array, depth: 
     above_face = np.maximum(coordinate - edge, 0.0)
     inner = np.minimum(rule.distance_share * distance, edge)
     skin = rule.skin_share * depth + rule.growth * below_face
-    return np.where(coordinate <= edge, np.minimum(inner, skin), inner + rule.growth * above_face)
+    return np.asarray(np.where(coordinate <= edge, np.minimum(inner, skin), inner + rule.growth * above_face))

@@ -10,6 +10,7 @@ K. Fujiwara, T. Nakata, COMPEL 9 (1990) 137-154, doi 10.1108/eb010071.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 from importlib.resources import files
 
 import numpy as np
@@ -51,7 +52,7 @@ class Team7Comparison:
     def deviation(self) -> Array:
         """(17, 4) computed minus measured, in units of the line's peak: the largest measured |B| of that frequency."""
         amplitude = np.hypot(self.measured[:, 0::2], self.measured[:, 1::2]).max(axis=0)
-        return (self.computed - self.measured) / np.repeat(amplitude, 2)
+        return np.asarray((self.computed - self.measured) / np.repeat(amplitude, 2))
 
 
 def team7_mesh(frequency: float, cell: float = 70.0, skin_share: float = 2.0, growth: float = 2.0) -> ConductorMesh:
@@ -59,17 +60,18 @@ def team7_mesh(frequency: float, cell: float = 70.0, skin_share: float = 2.0, gr
     depth = 1e3 * skin_depth(CONDUCTIVITY, frequency)
     lines = []
     for faces in FACES:
-
-        def size(c: Array, faces: Array = faces) -> Array:
-            near = np.abs(c[:, None] - faces).min(axis=1)
-            inside = (c > faces[0]) & (c < faces[-1])
-            return np.where(inside, np.minimum(cell, skin_share * depth + growth * near), cell / 2 + growth * near)
-
+        size = partial(_cell_size, faces=faces, cell=cell, skin=skin_share * depth, growth=growth)
         lines.append(graded_partition([faces[0] - REACH, *faces, faces[-1] + REACH], size))
     lower, upper = np.array([f[0] for f in FACES]), np.array([f[-1] for f in FACES])
     plate = Block("plate", lower, upper)
     hole = Block("air", (18.0, 18.0, 0.0), (126.0, 126.0, 19.0))
     return ConductorMesh(hex_mesh(lines, [plate, hole]), {"plate": CONDUCTIVITY})
+
+
+def _cell_size(coordinate: Array, faces: Array, cell: float, skin: float, growth: float) -> Array:
+    near = np.abs(coordinate[:, None] - faces).min(axis=1)
+    inside = (coordinate > faces[0]) & (coordinate < faces[-1])
+    return np.asarray(np.where(inside, np.minimum(cell, skin + growth * near), cell / 2 + growth * near))
 
 
 def measured_line() -> tuple[Array, Array]:

@@ -11,9 +11,11 @@ from spinlev.fem.parity import Parity
 from spinlev.fem.phasor import mean_loss
 from spinlev.fem.slab import Slab, reaction_tensor
 from spinlev.fem.slab_mutual import mutual_tensor
-from spinlev.fem.sources import Dipole, unit_dipoles
+from spinlev.fem.sources import Dipole, DipoleDerivative, PolarizedCuboid, unit_dipoles
+from spinlev.geometry.box import Box
 from spinlev.geometry.conductor_mesh import ConductorMesh
 from spinlev.geometry.hex_mesh import Block, hex_mesh
+from spinlev.geometry.magnet import MU_0
 from spinlev.geometry.plate_mesh import MeshRule, plate_mesh
 
 SetNumThreads(1)
@@ -40,6 +42,22 @@ def test_couplings_are_reciprocal(response):
 def test_receivers_are_sources(response):
     receivers = response.couplings_to(unit_dipoles(PLACES[:1]))
     assert receivers == pytest.approx(response.couplings[:3], rel=1e-12)
+
+
+def test_derivative_receiver_is_the_derivative_of_the_coupling(response):
+    place, moment, direction, step = PLACES[0], np.array([0.2, 0.5, -1.0]), np.array([0.6, 0.0, 0.8]), 1e-4
+    ends = [Dipole(place + s * step * direction, moment) for s in (2, 1, -1, -2)]
+    difference = np.array([-1, 8, -8, 1]) @ response.couplings_to(ends) / (12 * step)
+    found = response.couplings_to([DipoleDerivative(place, moment, direction)])[0]
+    assert found == pytest.approx(difference, rel=1e-6, abs=1e-7 * abs(found).max())  # (step/h)⁴ ~ 6e-10
+
+
+def test_small_cube_magnet_induces_as_a_dipole(response):
+    """A cube has no l = 3 moment: a 2 mm cube at 20 mm differs from the dipole by (1 mm / 20 mm)⁴ ~ 1e-5."""
+    moment = np.array([1.0, -2.0, 0.5])
+    cube = PolarizedCuboid(Box((2e-3,) * 3, PLACES[0]), moment * MU_0 / 8e-9)
+    found = response.couplings_to([cube])[0]
+    assert found == pytest.approx(moment @ response.couplings[:3], rel=1e-4, abs=1e-5 * abs(found).max())
 
 
 def test_dissipation_is_positive_for_any_moments(response):
@@ -129,7 +147,7 @@ def test_parity_parts_add_up():
         (lambda m: solve_eddy(m, 0, 1.0, unit_dipoles(PLACES)), "Input order must be at least 1"),
         (lambda m: solve_eddy(m, 2, 1.0, []), "Input sources must hold at least one source"),
         (lambda m: ConductorMesh(m.mesh, {"plate": -1.0}), "Input conductivity of plate must be positive"),
-        (lambda m: ConductorMesh(m.mesh, {"copper": 1.0}), "Input conductivity must name materials"),
+        (lambda m: ConductorMesh(m.mesh, {"copper": 1.0}), "Input conductivity must name one of"),
         (lambda m: plate_mesh(SIZE, SIGMA, [(0, 0, 0.01)], 50.0), "Input positions_m must lie outside the plate"),
         (lambda m: plate_mesh((0.1, 0.0, 1), SIGMA, PLACES, 50.0), "Input size_m must be positive"),
     ],

@@ -26,14 +26,15 @@ def gauss_box(half, count=24):
 def curl(potential, points, step=2e-5):
     """Central differences: relative error (step / distance)² ~ 1e-6."""
     jacobian = np.stack([(potential(points + e) - potential(points - e)) / (2 * step) for e in step * np.eye(3)], 1)
-    return np.stack([jacobian[:, (i + 1) % 3, (i + 2) % 3] - jacobian[:, (i + 2) % 3, (i + 1) % 3] for i in range(3)], 1)
+    pairs = [((i + 1) % 3, (i + 2) % 3) for i in range(3)]
+    return np.stack([jacobian[:, a, b] - jacobian[:, b, a] for a, b in pairs], 1)
 
 
 def test_cuboid_integrals_against_quadrature():
     nodes, weights = gauss_box(HALF)
     offset = POINTS[:, None] - nodes
     distance = np.linalg.norm(offset, axis=2)
-    # Gauss with 24 points per axis converges to round-off at these distances; 1e-10 leaves the closed form's cancellation
+    # Gauss with 24 points converges to round-off at these distances; 1e-10 leaves room for cancellation
     assert newton_potential(POINTS, HALF) == pytest.approx((weights / distance).sum(1), rel=1e-10)
     pull = np.einsum("q,pqi,pq->pi", weights, offset, distance**-3)
     assert attraction(POINTS, HALF) == pytest.approx(pull, rel=1e-10, abs=1e-12 * abs(pull).max())
