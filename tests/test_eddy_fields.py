@@ -131,5 +131,5 @@ def test_tetrahedra_and_hexahedra_agree():
     half = 500 * np.array(size)
     tets = occ_mesh({"plate": Conductor(OccBox(Pnt(*-half), Pnt(*half)), SIGMA, 9.0)}, reach=12.0)
     hexes = plate_mesh(size, SIGMA, place, 100.0)
-    tensors = [solve_eddy(mesh, 3, 100.0, unit_dipoles(place)).couplings for mesh in (tets, hexes)]
-    assert abs(tensors[0] - tensors[1]).max() < 5e-3 * abs(tensors[1]).max()  # order 3, cells of the skin depth
+    tensors = [solve_eddy(mesh, 2, 100.0, unit_dipoles(place)).couplings for mesh in (tets, hexes)]
+    assert abs(tensors[0] - tensors[1]).max() < 1e-2 * abs(tensors[1]).max()  # order 2, cells of the skin depth
