@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable, Sequence
 
 import numpy as np
@@ -24,7 +25,7 @@ def graded_partition(breakpoints: Sequence[float], size: SizeFunction) -> Array:
     if np.any(np.diff(breakpoints) <= 0):
         raise ValueError(f"Input breakpoints must increase; instead received {list(breakpoints)}.")
     lines = [float(breakpoints[0])]
-    for start, end in zip(breakpoints[:-1], breakpoints[1:], strict=True):
+    for start, end in itertools.pairwise(breakpoints):
         fine = np.linspace(start, end, SAMPLES)
         density = 1 / size(fine)
         count = np.concatenate([[0.0], np.cumsum((density[1:] + density[:-1]) / 2 * np.diff(fine))])

@@ -25,7 +25,7 @@ from ..geometry.hex_mesh import Block, hex_mesh
 from ..geometry.plate_mesh import skin_depth
 
 CONDUCTIVITY = 3.526e7
-COIL = Racetrack((0.194, 0.100, 0.099), (0.2, 0.2), 0.1, 0.025, 0.05, 2742.0)
+COIL = Racetrack(np.array([0.194, 0.100, 0.099]), (0.2, 0.2), 0.1, 0.025, 0.05, 2742.0)
 FREQUENCIES = (50.0, 200.0)
 FACES = (np.array([0.0, 18.0, 126.0, 294.0]), np.array([0.0, 18.0, 126.0, 294.0]), np.array([0.0, 19.0]))
 """Faces of plate and hole across each axis, mm."""
@@ -64,7 +64,7 @@ def team7_mesh(frequency: float, cell: float = 70.0, skin_share: float = 2.0, gr
         lines.append(graded_partition([faces[0] - REACH, *faces, faces[-1] + REACH], size))
     lower, upper = np.array([f[0] for f in FACES]), np.array([f[-1] for f in FACES])
     plate = Block("plate", lower, upper)
-    hole = Block("air", (18.0, 18.0, 0.0), (126.0, 126.0, 19.0))
+    hole = Block("air", np.array([18.0, 18.0, 0.0]), np.array([126.0, 126.0, 19.0]))
     return ConductorMesh(hex_mesh(lines, [plate, hole]), {"plate": CONDUCTIVITY})
 
 
@@ -86,7 +86,7 @@ def compute_line(frequency: float, x: Array, mesh: ConductorMesh, order: int = 3
     """B_z (n, 2), T, at ωt = 0 and 90° on the line y = 72, z = 34 mm; the reaction by reciprocity."""
     points = np.column_stack([x, np.full_like(x, 0.072), np.full_like(x, 0.034)])
     response = solve_eddy(mesh, order, frequency, [COIL])
-    reaction = response.couplings_to([Dipole(p, (0, 0, 1.0)) for p in points])[:, 0]
+    reaction = response.couplings_to([Dipole(p, np.array([0.0, 0.0, 1.0])) for p in points])[:, 0]
     total = COIL.flux_density(points)[:, 2] + reaction
     return np.column_stack([total.real, -total.imag])
 

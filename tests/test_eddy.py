@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from ngsolve import SetNumThreads
+
 from spinlev.fem.eddy import solve_eddy
 from spinlev.fem.gauge import tree_edges
 from spinlev.fem.parity import Parity
@@ -131,7 +132,8 @@ def test_spanning_tree_counts():
     assert len(tree_edges(edges, np.zeros(5, bool))) == 3
     shrunk = np.array([True, False, False, False, False])
     tree = tree_edges(edges, shrunk)
-    assert len(tree) == 2 and 0 not in tree
+    assert len(tree) == 2
+    assert 0 not in tree
 
 
 def test_parity_parts_add_up():

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from ngsolve import SetNumThreads
+
 from spinlev.fem.phasor import mean_loss
 from spinlev.fem.plate import AccuracyError, plate_reaction
 from spinlev.geometry.box import Box, rotation_matrix

@@ -5,6 +5,7 @@ from __future__ import annotations
 import mpmath
 import numpy as np
 import pytest
+
 from spinlev.fem.phasor import mean_force, mean_loss, mean_torque
 from spinlev.fem.slab import Slab, ThinSheet, reaction_gradient, reaction_tensor
 from spinlev.fem.slab_mutual import mutual_tensor
