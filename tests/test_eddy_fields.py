@@ -76,7 +76,7 @@ def test_current_is_zero_in_air_and_tangential_at_faces(response):
     points = np.column_stack([rng.uniform(-0.04, 0.04, 40), rng.uniform(-0.1, 0.1, 40), np.full(40, 0.0149)])
     current = current_density(response, applied(points), AMPLITUDES, points)
     assert abs(current[:, 2]).max() < 0.05 * abs(current).max()  # div J = 0 and J·n = 0 hold weakly
-    above = [*points, 0, 0, 0.01]
+    above = points + np.array([0.0, 0.0, 0.01])
     assert not current_density(response, applied(above), AMPLITUDES, above).any()
 
 

@@ -79,7 +79,7 @@ def test_racetrack_against_filaments():
         inset = 0.0125 * (1 + q)
         turn = filament(0.1 - inset, 0.05 - inset)
         for s, ws in zip(x, w, strict=True):
-            path = np.column_stack([[*turn, 0.194, 0.1], np.full(len(turn), 0.099 + 0.05 * s)])
+            path = np.column_stack([turn + np.array([0.194, 0.1]), np.full(len(turn), 0.099 + 0.05 * s)])
             offset, step = point - (path + np.roll(path, -1, 0)) / 2, np.roll(path, -1, 0) - path
             biot = np.cross(step, offset) / np.linalg.norm(offset, axis=1)[:, None] ** 3
             total += MU_0 / (4 * np.pi) * 2742.0 * wq * ws / 4 * biot.sum(0)
