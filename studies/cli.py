@@ -91,7 +91,7 @@ def run(
         Relative accuracy asked of the field.
     """
     _positive("--duration-s", duration_s)
-    _positive("--rtol", rtol)
+    _tolerance(rtol)
     loaded = load_scene(scene or default_scene())
     from .run import main_job
 
@@ -121,7 +121,7 @@ def field(
     rtol
         Relative accuracy asked of the field.
     """
-    _positive("--rtol", rtol)
+    _tolerance(rtol)
     loaded, places = load_scene(scene), read_points(points)
     from .single import field_job
 
@@ -154,7 +154,7 @@ def equilibria(
     rtol
         Relative accuracy asked of the field.
     """
-    _positive("--rtol", rtol)
+    _tolerance(rtol)
     if not -1e3 <= spin <= 1e3:
         raise InputError(f"Input --spin must be between -1000 and 1000; instead received {spin}.")
     loaded = load_scene(scene)
@@ -190,7 +190,7 @@ def simulate(
         Relative accuracy asked of the field.
     """
     _positive("--duration-s", duration_s)
-    _positive("--rtol", rtol)
+    _tolerance(rtol)
     loaded = load_scene(scene)
     from .single import simulate_job
 
@@ -201,6 +201,11 @@ def simulate(
 def _positive(name: str, value: float) -> None:
     if not 0 < value < float("inf"):
         raise InputError(f"Input {name} must be a positive number; instead received {value}.")
+
+
+def _tolerance(value: float) -> None:
+    if not 1e-13 <= value < 1:
+        raise InputError(f"Input --rtol must be at least 1e-13 and less than 1; instead received {value}.")
 
 
 def main() -> None:
@@ -220,6 +225,9 @@ def _status(arguments: list[str], out: Any) -> int:
     except InputError as error:
         note(f"spinlev: {error}")
         return 2
+    except OSError as error:
+        note(f"spinlev: the computation failed to write or read {error.filename}: {error.strerror}; see --out.")
+        return 1
     except KeyboardInterrupt:
         note("spinlev: stopped; what was finished is kept.")
         return 1

@@ -15,7 +15,7 @@ from ..geometry import SceneError
 from ..geometry.atomic import replacing
 from ..geometry.box import Array
 from ..geometry.overlap import TOUCHING, sphere_overlap
-from ..geometry.scene import Scene
+from ..geometry.scene import AbsoluteStart, Scene
 from .answers import equilibria_answer, equilibria_lines, flight_answer, flight_lines, omissions
 from .console import note, to_json
 from .figures import field_figure, force_figure, save_figure, trajectory_figure
@@ -37,11 +37,9 @@ def main_job(scene: Scene, model: str, duration: float, rtol: float, out: Path) 
     shelf = Shelf(scene, rtol)
     chosen, best = shelf.table(model), shelf.table("auto")
     tables = {name: shelf.table(name) for name in MODELS}
-    note("Equilibria ...")
-    surveys = {table.model: survey(scene, table) for table in (tables["dipole"], best, chosen)}
+    surveys, failure = _surveys(scene, {table.model: table for table in (tables["dipole"], best, chosen)})
     found = surveys[chosen.model].equilibria
     _check_plate(scene, found)
-    result = _static_dataset(scene, tables, surveys, best.model)
     values: dict[str, Any] = {
         **equilibria_answer(chosen, found),
         "comparison": comparison(surveys["dipole"], surveys[best.model], best.model),
@@ -50,14 +48,31 @@ def main_job(scene: Scene, model: str, duration: float, rtol: float, out: Path) 
         "tables_from_cache": shelf.from_cache,
     }
     lines = [*equilibria_lines(scene, found), *comparison_lines(values["comparison"]), *values["not_modelled"]]
-    try:
-        flight = fly(scene, chosen, duration, found)
-    except EquilibriumError as error:
-        _write(scene, chosen, result, {**values, "failed": str(error)}, None, out)
-        raise
-    values |= flight_answer(chosen, flight)
+    flight = None
+    if failure is None or isinstance(scene.start, AbsoluteStart):
+        try:
+            flight = fly(scene, chosen, duration, found)
+            values |= flight_answer(chosen, flight)
+            lines += flight_lines(flight)
+        except EquilibriumError as error:
+            failure = error
+    if failure:
+        values["failed"] = str(failure)
+        lines.append(str(failure))
+    result = _static_dataset(scene, tables, surveys, best.model)
     _write(scene, chosen, result, values, flight, out)
-    return values, [*lines, *flight_lines(flight), f"Results and figures in {out}/"]
+    if failure and flight is None:
+        raise failure
+    return values, [*lines, f"Results and figures in {out}/"]
+
+
+def _surveys(scene: Scene, tables: Mapping[str, RotorTable]) -> tuple[dict[str, Survey], EquilibriumError | None]:
+    """Equilibria by each table, or empty surveys and the reason why there cannot be any."""
+    note("Equilibria ...")
+    try:
+        return {model: survey(scene, table) for model, table in tables.items()}, None
+    except EquilibriumError as error:
+        return {model: Survey((), ()) for model in tables}, error
 
 
 def comparison(dipole: Survey, best: Survey, name: str) -> Mapping[str, Any] | None:

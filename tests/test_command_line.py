@@ -128,7 +128,7 @@ def test_wrong_scenes_end_with_status_2_one_message_and_no_file(spinlev, tmp_pat
         (("run", "none.toml"), "none.toml: the scene file does not exist"),
         (("field", "S", "--points", "none.csv"), "none.csv: the points file does not exist"),
         (("field", "S", "--points", "P", "--model", "magic"), "magic"),
-        (("field", "S", "--points", "P", "--rtol", "-1"), "--rtol must be a positive number"),
+        (("field", "S", "--points", "P", "--rtol", "-1"), "--rtol must be at least"),
         (("field", "S"), "--points"),
         (("simulate", "S", "--duration-s", "nan"), "--duration-s must be a positive number"),
         (("simulate", "S", "--duration-s", "long"), "long"),
@@ -174,3 +174,18 @@ def test_no_equilibrium_is_a_failed_computation_that_keeps_what_was_finished(spi
     assert "Traceback" not in err
     assert (tmp_path / "out" / "force.png").exists()
     assert "failed" in json.loads((tmp_path / "out" / "summary.json").read_text())
+
+
+def test_a_rotor_at_rest_has_no_equilibrium_but_its_floater_still_falls(spinlev, tmp_path):
+    path = tmp_path / "s.toml"
+    at_rest = GOOD.replace("frequency_hz = 110.0", "frequency_hz = 0.0")
+    path.write_text(at_rest)
+    status, _, err = spinlev("run", path, "--model", "dipole")
+    assert status == 1
+    assert "Earnshaw" in err
+    path.write_text(at_rest + "\n[start]\nposition_mm = [0.0, 0.0, -60.0]\n")
+    status, out, err = spinlev("run", path, "--model", "dipole", "--duration-s", "1", "--json")
+    assert status == 0, err
+    answer = json.loads(out)
+    assert answer["ended_by"] == "lost"
+    assert "Earnshaw" in answer["failed"]
