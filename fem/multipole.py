@@ -52,6 +52,8 @@ class MultipoleExpansion:
     @property
     def moment(self) -> Array:
         """(3,) dipole moment, A m²."""
+        if self.degree < 1:
+            return np.zeros(3)
         c = self.coefficients[1]
         return FOUR_PI * self.radius**3 / MU_0 * np.array([-2 * c[1].real, 2 * c[1].imag, c[0].real])
 

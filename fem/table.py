@@ -101,6 +101,12 @@ class RotorTable:
             g += gradient_part
         return b, g
 
+    @property
+    def moment(self) -> Array:
+        """(3,) dipole moment of the whole rotor, A m²."""
+        parts = [magnet.moment for magnet in self.uniform] + [expansion.moment for expansion in self.expansions]
+        return np.asarray(np.sum(parts, axis=0))
+
     def _beyond(self) -> str:
         nearest = max((expansion.nearest for expansion in self.expansions), default=0.0)
         return f" and farther than {nearest * 1e3:.4g} mm from their centres" if nearest else ""

@@ -198,6 +198,36 @@ def simulate(
     return Answer(values, tuple(lines), output.json)
 
 
+@app.command
+def study(
+    name: str | None = None,
+    *,
+    list: Annotated[bool, Parameter(negative="")] = False,
+    quick: Annotated[bool, Parameter(negative="")] = False,
+    output: Output = Output(),
+) -> Answer:
+    """One study of the catalogue: NAME.nc, NAME.png and what it says.
+
+    Parameters
+    ----------
+    name
+        Name of the study.
+    list
+        Show the catalogue.
+    quick
+        Coarser, in less than a minute.
+    """
+    from .catalogue import CATALOGUE, run_study
+
+    summaries = {key: entry.summary for key, entry in CATALOGUE.items()}
+    if list:
+        return Answer({"studies": summaries}, tuple(f"{k:22} {v}" for k, v in summaries.items()), output.json)
+    if name not in CATALOGUE:
+        raise InputError(f"Input name must be one of {', '.join(CATALOGUE)}; instead received {name}.")
+    lines = run_study(name, quick, output.out)
+    return Answer({"study": name, "report": lines, "result": str(output.out / f"{name}.nc")}, tuple(lines), output.json)
+
+
 def _positive(name: str, value: float) -> None:
     if not 0 < value < float("inf"):
         raise InputError(f"Input {name} must be a positive number; instead received {value}.")

@@ -22,13 +22,16 @@ AXIS = ("x", "y", "z")
 LIBRARIES = ("spinlev", "ngsolve", "heyoka", "numpy", "scipy", "xarray")
 
 
-def write_dataset(dataset: xr.Dataset, scene: Scene, path: Path) -> None:
-    """Write a result with its provenance: versions, command, time and the scene's text."""
+def write_dataset(dataset: xr.Dataset, path: Path, scene: Scene | None = None) -> None:
+    """Write a result with its provenance: versions, command, time and the scene's text if it has one."""
     provenance = {f"version_{name}": version(name) for name in LIBRARIES}
+    if scene:
+        provenance["scene"] = scene.text
     stamp = datetime.now(UTC).isoformat(timespec="seconds")
-    dataset = dataset.assign_attrs(scene=scene.text, command=" ".join(sys.argv), created=stamp, **provenance)
     with replacing(path) as temporary:
-        dataset.to_netcdf(temporary, engine="h5netcdf")
+        dataset.assign_attrs(command=" ".join(sys.argv), created=stamp, **provenance).to_netcdf(
+            temporary, engine="h5netcdf"
+        )
 
 
 def variable(dims: Sequence[str], values: Any, units: str, long_name: str) -> xr.Variable:

@@ -140,7 +140,7 @@ def _write(
         result = xr.merge([result, trajectory_dataset(flight)], combine_attrs="no_conflicts")
         figures["trajectory"] = trajectory_figure(result)
         scene_picture(scene, table, *_pose(flight), file=out / "scene.png")
-    write_dataset(result, scene, out / "result.nc")
+    write_dataset(result, out / "result.nc", scene)
     for name, figure in figures.items():
         save_figure(figure, out / f"{name}.png")
     with replacing(out / "summary.json") as temporary:

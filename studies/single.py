@@ -77,7 +77,7 @@ def simulate_job(scene: Scene, model: str, duration: float, rtol: float, out: Pa
         "trajectory": str(out / "trajectory.nc"),
         "tables_from_cache": shelf.from_cache,
     }
-    write_dataset(trajectory_dataset(flight), scene, out / "trajectory.nc")
+    write_dataset(trajectory_dataset(flight), out / "trajectory.nc", scene)
     return values, [*flight_lines(flight), *values["not_modelled"], f"Trajectory in {values['trajectory']}"]
 
 

@@ -1,0 +1,51 @@
+"""The studies that the program knows, and how one is run."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import xarray as xr
+from matplotlib.figure import Figure
+
+from .dipole_validity import dipole_validity, validity_figure, validity_lines
+from .figures import save_figure
+from .results import write_dataset
+
+
+@dataclass(frozen=True)
+class Study:
+    """One question to the program.
+
+    Parameters
+    ----------
+    summary : what it gives, in a line
+    compute : takes `quick` and returns the labelled result
+    draw : the figure, from the result alone
+    report : what it says, in lines, from the result alone
+    """
+
+    summary: str
+    compute: Callable[[bool], xr.Dataset]
+    draw: Callable[[xr.Dataset], Figure]
+    report: Callable[[xr.Dataset], list[str]]
+
+
+CATALOGUE = {
+    "dipole-validity": Study(
+        "where the dipole and each further model are good to 10, 1, 0.1 and 0.01 %",
+        dipole_validity,
+        validity_figure,
+        validity_lines,
+    ),
+}
+
+
+def run_study(name: str, quick: bool, out: Path) -> list[str]:
+    """Compute a study; writes NAME.nc and NAME.png and returns what it says."""
+    study = CATALOGUE[name]
+    result = study.compute(quick)
+    write_dataset(result, out / f"{name}.nc")
+    save_figure(study.draw(result), out / f"{name}.png")
+    return [*study.report(result), f"Result and figure: {out / name}.nc, {out / name}.png"]
