@@ -11,6 +11,7 @@ A real harmonic function outside a sphere is Σ_lm c_lm Θ_lm with c_l(-m) = (-1
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import Any
 
@@ -50,6 +51,21 @@ def regular_gradient(harmonics: dict[tuple[int, int], Any], l: int, m: int) -> l
 
     plus, minus = at(l - 1, m + 1), -at(l - 1, m - 1)
     return [(plus + minus) / 2, (plus - minus) / 2j, at(l - 1, m)]
+
+
+def irregular_values(degree: int, x: Array, y: Array, z: Array) -> dict[tuple[int, int], Any]:
+    """Complex irregular harmonics Θ_lm, 0 ≤ m ≤ l ≤ degree, at NumPy arrays x, y, z: Υ_lm after an inversion."""
+    square = x * x + y * y + z * z
+    inverted = regular(degree, x / square, y / square, z / square)
+    inverse = 1 / np.sqrt(square)
+    return {(l, m): math.factorial(l - m) * math.factorial(l + m) * inverse * v for (l, m), v in inverted.items()}
+
+
+def irregular_gradient(harmonics: dict[tuple[int, int], Any], l: int, m: int) -> list[Any]:
+    """Gradient (three complex arrays) of Θ_lm, from a dictionary of at least degree l + 1 (m ≥ 0)."""
+    plus = harmonics[l + 1, m + 1]
+    minus = -harmonics[l + 1, m - 1] if m else np.conj(harmonics[l + 1, 1])
+    return [(plus + minus) / 2, (plus - minus) / 2j, -harmonics[l + 1, m]]
 
 
 def irregular(

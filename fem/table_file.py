@@ -25,7 +25,11 @@ class TableFileError(ValueError):
 
 def save_table(table: RotorTable, path: str | Path) -> None:
     """Write a table; the file is whole or absent."""
-    dataset = _to_dataset(table)
+    write_dataset(to_dataset(table), path)
+
+
+def write_dataset(dataset: xr.Dataset, path: str | Path) -> None:
+    """Write a data set with its checksum; the file is whole or absent."""
     dataset.attrs["content_sha256"] = _digest(dataset)
     with replacing(path) as temporary:
         dataset.to_netcdf(temporary, engine="h5netcdf")
@@ -38,6 +42,11 @@ def load_table(path: str | Path) -> RotorTable:
     ------
     TableFileError : the file is not a table of this format, or its content is not what was written
     """
+    return from_dataset(read_dataset(path, FORMAT))
+
+
+def read_dataset(path: str | Path, expected: str) -> xr.Dataset:
+    """Read a data set of the `expected` format and check it; raises TableFileError as `load_table`."""
     try:
         with xr.open_dataset(path, engine="h5netcdf") as opened:
             dataset = opened.load()
@@ -46,14 +55,15 @@ def load_table(path: str | Path) -> RotorTable:
     except Exception as error:  # the HDF5 layer raises many kinds on a damaged file
         raise TableFileError(f"Input {path} must be a readable netCDF file; {error}.") from error
     attrs = dataset.attrs
-    if attrs.get("format") != FORMAT:
-        raise TableFileError(f"Input {path} must be a '{FORMAT}'; instead received '{attrs.get('format')}'.")
+    if attrs.get("format") != expected:
+        raise TableFileError(f"Input {path} must be a '{expected}'; instead received '{attrs.get('format')}'.")
     if attrs.pop("content_sha256", None) != _digest(dataset):
         raise TableFileError(f"Input {path} must be as it was written; instead its checksum does not match.")
-    return _from_dataset(dataset)
+    return dataset
 
 
-def _to_dataset(table: RotorTable) -> xr.Dataset:
+def to_dataset(table: RotorTable) -> xr.Dataset:
+    """All numbers of a table with their units."""
     magnets, expansions = table.magnets, table.expansions
     size = max((len(e.coefficients) for e in expansions), default=1)
     known = max((len(e.uncertainty) for e in expansions), default=1)
@@ -89,7 +99,8 @@ def _to_dataset(table: RotorTable) -> xr.Dataset:
     return xr.Dataset({n: xr.Variable(d, v, {"units": u}) for n, (d, v, u) in variables.items()}, attrs=attrs)
 
 
-def _from_dataset(dataset: xr.Dataset) -> RotorTable:
+def from_dataset(dataset: xr.Dataset) -> RotorTable:
+    """The table of a data set that `to_dataset` made."""
     data = {str(name): variable.values for name, variable in dataset.data_vars.items()}
     magnets = tuple(
         Magnet(Box(size, center, rotation), polarization, float(permeability))

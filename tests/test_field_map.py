@@ -1,0 +1,107 @@
+"""Maps of B from files: what is written in any format is read back, and what is wrong is named."""
+
+import meshio
+import numpy as np
+import pytest
+import xarray as xr
+
+from spinlev.fem import FieldMap, FieldMapError
+from spinlev.fem.field_map_file import read_field_map
+
+AXES = {"x": [-1.0, 1.0], "y": [0.0, 2.0], "z": [-20.0, -18.0, -16.0]}  # mm
+POINTS = np.stack(np.meshgrid(*AXES.values(), indexing="ij"), -1).reshape(-1, 3)
+FIELD = np.random.default_rng(2).normal(size=POINTS.shape)  # mT
+
+
+def assert_same(read, columns=(0, 1, 2)):
+    assert read.points == pytest.approx(POINTS * 1e-3, rel=1e-15)
+    assert read.field[:, columns] == pytest.approx(FIELD[:, columns] * 1e-3, rel=1e-15)
+
+
+def grid(variables):
+    coordinates = {name: (name, values, {"units": "mm"}) for name, values in AXES.items()}
+    return xr.Dataset({n: (d, v, {"units": "mT"}) for n, (d, v) in variables.items()}, coordinates)
+
+
+def test_netcdf_with_a_dimension_of_components(tmp_path):
+    values = FIELD.reshape(2, 2, 3, 3)
+    grid({"B": (("component", "z", "y", "x"), values.transpose(3, 2, 1, 0))}).to_netcdf(tmp_path / "m.nc")
+    assert_same(read_field_map(tmp_path / "m.nc"))
+
+
+def test_netcdf_with_a_list_of_points_and_errors(tmp_path):
+    columns = {f"B{axis}": ("point", FIELD[:, k], {"units": "mT"}) for k, axis in enumerate("xyz")}
+    columns |= {axis: ("point", POINTS[:, k], {"units": "mm"}) for k, axis in enumerate("xyz")}
+    columns["Bz_err"] = ("point", np.full(len(POINTS), 2.0), {"units": "uT"})
+    del columns["Bx"], columns["By"]
+    xr.Dataset(columns).to_netcdf(tmp_path / "m.nc")
+    read = read_field_map(tmp_path / "m.nc")
+    assert_same(read, [2])
+    assert np.isnan(read.field[:, :2]).all()
+    assert read.errors[:, 2] == pytest.approx(2e-6)
+
+
+@pytest.mark.parametrize(("suffix", "format_name"), [("vtu", "vtu"), ("vtk", "vtk"), ("msh", "gmsh")])
+def test_meshes(tmp_path, suffix, format_name):
+    cells = [("vertex", np.arange(len(POINTS))[:, None])]
+    meshio.Mesh(POINTS, cells, point_data={"B": FIELD}).write(tmp_path / f"m.{suffix}", format_name)
+    assert_same(read_field_map(tmp_path / f"m.{suffix}", "mm", "mT"))
+
+
+def test_csv_of_a_probe_of_one_component(tmp_path):
+    rows = [
+        f"{x!r}, {y!r}, {z!r}, {b!r}, 0.01" for (x, y, z), b in zip(POINTS.tolist(), FIELD[:, 2].tolist(), strict=True)
+    ]
+    rows[3] = rows[3].rsplit(",", 2)[0] + ", , "
+    (tmp_path / "m.csv").write_text("x_mm, y_mm, z_mm, Bz_mT, Bz_err_mT\n\n" + "\n".join(rows))
+    read = read_field_map(tmp_path / "m.csv")
+    assert np.isnan(read.field[3]).all()
+    assert read.observations == len(POINTS) - 1
+    seen = np.arange(len(POINTS)) != 3
+    assert read.field[seen, 2] == pytest.approx(FIELD[seen, 2] * 1e-3, rel=1e-15)
+    assert read.errors[seen, 2] == pytest.approx(1e-5)
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("x_mm,y_mm,Bz_T\n1,2,3", "x, y, z and at least one of Bx, By, Bz; instead received x, y, Bz"),
+        ("x_mm,y_mm,z_mm\n1,2,3", "at least one of Bx"),
+        ("", "instead received none"),
+        ("x_in,y_mm,z_mm,Bz_T\n1,2,3,4", "unit of x must be one of m, cm, mm; instead received 'in'"),
+        ("x_mm,y_mm,z_mm,Bz\n1,2,3,4", "at least one of Bx"),
+        ("x_mm,y_mm,z_mm,Bz_Oe\n1,2,3,4", "unit of Bz must be one of T, mT"),
+        ("x_mm,y_mm,z_mm,Bz_T\n1,2,3,4\n1,2,,4", "points must be finite; instead received .* at point 1"),
+        ("x_mm,y_mm,z_mm,Bz_T\n1,2,3,much", "Bz_T in row 1 below the header must be a number or empty; .* 'much'"),
+        ("x_mm,y_mm,z_mm,Bz_T\n1,2,3,inf", "field must be finite, or NaN"),
+        ("x_mm,y_mm,z_mm,Bz_T,Bz_err_T\n1,2,3,4,0", "errors must be positive where the field is observed"),
+    ],
+)
+def test_faults_of_a_csv_are_named(tmp_path, text, message):
+    (tmp_path / "m.csv").write_text(text)
+    with pytest.raises(FieldMapError, match=rf"m\.csv: Input .*{message}"):
+        read_field_map(tmp_path / "m.csv")
+
+
+def test_faults_of_other_files_are_named(tmp_path):
+    with pytest.raises(FieldMapError, match="no such file"):
+        read_field_map(tmp_path / "m.nc")
+    for name, message in (("m.nc", "readable netCDF"), ("m.vtu", "mesh that meshio reads"), ("m.abc", "mesh that")):
+        (tmp_path / name).write_text("nothing")
+        with pytest.raises(FieldMapError, match=message):
+            read_field_map(tmp_path / name)
+    no_units = grid({"Bz": (("x", "y", "z"), FIELD[:, 2].reshape(2, 2, 3))})
+    del no_units["Bz"].attrs["units"]
+    no_units.to_netcdf(tmp_path / "u.nc")
+    with pytest.raises(FieldMapError, match=r"unit of Bz must be one of .*; instead received None"):
+        read_field_map(tmp_path / "u.nc")
+    grid({"B": (("x", "y", "z"), FIELD[:, 2].reshape(2, 2, 3))}).to_netcdf(tmp_path / "b.nc")
+    with pytest.raises(FieldMapError, match="one dimension of three components"):
+        read_field_map(tmp_path / "b.nc")
+    with pytest.raises(FieldMapError, match=r"unit of length_unit must be one of m, cm, mm; instead received 'inch'"):
+        read_field_map(tmp_path / "m.vtu", "inch")
+
+
+def test_shapes_are_checked():
+    with pytest.raises(FieldMapError, match=r"field must have shape \(2, 3\); instead received \(2, 2\)"):
+        FieldMap(np.zeros((2, 3)), np.zeros((2, 2)))
