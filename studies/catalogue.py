@@ -12,6 +12,7 @@ from matplotlib.figure import Figure
 from .dipole_validity import dipole_validity, validity_figure, validity_lines
 from .figures import save_figure
 from .results import write_dataset
+from .speed_accuracy import speed_accuracy, speed_figure, speed_lines
 
 
 @dataclass(frozen=True)
@@ -38,6 +39,12 @@ CATALOGUE = {
         dipole_validity,
         validity_figure,
         validity_lines,
+    ),
+    "speed-accuracy": Study(
+        "error of B and of its gradient against time, unknowns and memory, for every way to the rotor's field",
+        speed_accuracy,
+        speed_figure,
+        speed_lines,
     ),
 }
 

@@ -1,0 +1,219 @@
+"""Speed against error of every way to compute the rotor's field.
+
+Every method runs in a process of its own, so that its time and memory are its own: from nothing (mesh, solution,
+moments, table, compilation) to the field at points. Two problems with a known answer: one cube with μr = 1, whose closed
+form is exact, and with μr = 1.05, where the answer is a finite-element table of far finer tolerance, whose stated error is
+stored beside.
+"""
+
+from __future__ import annotations
+
+import resource
+import time
+import warnings
+from collections.abc import Callable
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass
+from multiprocessing import get_context
+
+import magpylib
+import numpy as np
+import xarray as xr
+from matplotlib.figure import Figure
+
+from ..fem.ladder import AccuracyWarning
+from ..fem.models import rotor_table
+from ..fem.table import FieldTable
+from ..geometry import Magnet, horizontal
+from ..geometry.box import Array
+from .console import note
+from .field_methods import methods
+from .figures import PALETTE, panels, styled
+from .results import variable
+
+DISTANCES = (0.013, 0.015, 0.02, 0.03, 0.05)
+PERMEABILITIES = {"exact": 1.0, "permeable": 1.05}
+TRUTH_TOLERANCE = 1e-9
+TIMED_POINTS = 100_000
+
+
+@dataclass(frozen=True, eq=False)
+class Measured:
+    """One method: field and gradient at the points, and what they cost.
+
+    Parameters
+    ----------
+    field, gradient : (d, n, 3) T and (d, n, 3, 3) T/m
+    stated : (d,) largest error of B that the table states
+    unknowns : degrees of freedom
+    seconds : from nothing to the field at the points, and `cpu_seconds` of the processor
+    memory : what the process grew by, bytes
+    per_point : seconds per point of an evaluation of B and its gradient at many
+    """
+
+    field: Array
+    gradient: Array
+    stated: Array
+    unknowns: int
+    seconds: float
+    cpu_seconds: float
+    memory: float
+    per_point: float
+
+
+def cube(problem: str) -> tuple[Magnet, ...]:
+    """The article's cube at the origin."""
+    return horizontal(0.0, 0.01, 1.305, PERMEABILITIES[problem])
+
+
+def sphere_points(number: int = 200) -> Array:
+    """Points (d, n, 3) m at the distances, all around the cube."""
+    way = np.random.default_rng(5).normal(size=(number, 3))
+    return np.array(DISTANCES)[:, None, None] * way / np.linalg.norm(way, axis=1)[:, None]
+
+
+def measure(name: str, quick: bool) -> Measured:
+    """Run one method of the catalogue; meant for a fresh process."""
+    catalogue = methods(quick)
+    method = catalogue[name]
+    magnets, points = cube(method.problem), sphere_points()
+    memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    began, processor = time.perf_counter(), time.process_time()
+    table, unknowns = method.build(magnets)
+    b, g = table.evaluate(points.reshape(-1, 3))
+    seconds, cpu_seconds = time.perf_counter() - began, time.process_time() - processor
+    grown = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - memory
+    stated = table.relative_error(points.reshape(-1, 3))[0].reshape(points.shape[:2]).max(axis=1)
+    shape = points.shape
+    return Measured(
+        b.reshape(shape), g.reshape(*shape, 3), stated, unknowns, seconds, cpu_seconds, 1024.0 * grown, _pace(table)
+    )
+
+
+def _pace(table: FieldTable) -> float:
+    """Seconds per point of the fastest of five evaluations."""
+    return _fastest(lambda: table.evaluate(_many())) / TIMED_POINTS
+
+
+def _fastest(work: Callable[[], object]) -> float:
+    times = []
+    for _ in range(5):
+        began = time.process_time()
+        work()
+        times.append(time.process_time() - began)
+    return min(times)
+
+
+def _many() -> Array:
+    return np.random.default_rng(0).uniform(-0.015, 0.015, (TIMED_POINTS, 3)) - [0, 0, 0.035]
+
+
+def peer_pace() -> float:
+    """Seconds per point of magpylib's B alone for the same cube."""
+    peer = magpylib.magnet.Cuboid(polarization=(1.305, 0, 0), dimension=(0.01,) * 3)
+    points = _many()
+    peer.getB(points[:10])
+    return _fastest(lambda: peer.getB(points)) / TIMED_POINTS
+
+
+def apart(name: str, quick: bool) -> Measured:
+    """`measure` in a process of its own."""
+    with ProcessPoolExecutor(1, mp_context=get_context("spawn")) as pool:
+        return pool.submit(measure, name, quick).result()
+
+
+def speed_accuracy(quick: bool) -> xr.Dataset:
+    """Errors of B and of its gradient by method and distance, beside time, unknowns and memory."""
+    catalogue = methods(quick)
+    truths = {problem: _truth(problem) for problem in PERMEABILITIES}
+    rows = []
+    for name in catalogue:
+        note(f"  {name} ...")
+        rows.append(apart(name, quick))
+    exact = [truths[method.problem] for method in catalogue.values()]
+    errors = [
+        (_largest(row.field, b, 1), _largest(row.gradient, g, 2)) for row, (b, g, _) in zip(rows, exact, strict=True)
+    ]
+    dims = ("method", "distance")
+    data = {
+        "field_error": variable(dims, np.array([e for e, _ in errors]), "1", "largest relative error of B"),
+        "gradient_error": variable(dims, np.array([e for _, e in errors]), "1", "largest relative error of grad B"),
+        "stated_error": variable(dims, np.array([row.stated for row in rows]), "1", "error of B that is stated"),
+        "truth_error": variable(dims, np.array([own for _, _, own in exact]), "1", "error of the reference itself"),
+    }
+    costs = {
+        "unknowns": ("1", "degrees of freedom"),
+        "seconds": ("s", "time from nothing"),
+        "cpu_seconds": ("s", "processor time from nothing"),
+        "memory": ("B", "memory that it took"),
+        "per_point": ("s", "time of B and its gradient per point"),
+    }
+    for key, (units, label) in costs.items():
+        data[key] = variable(("method",), np.array([float(getattr(row, key)) for row in rows]), units, label)
+    coords = {
+        "method": list(catalogue),
+        "family": (("method",), [method.family for method in catalogue.values()]),
+        "problem": (("method",), [method.problem for method in catalogue.values()]),
+        "distance": variable(("distance",), np.array(DISTANCES), "m", "distance from the cube's centre"),
+    }
+    return xr.Dataset(data, coords, {"magpylib_seconds_per_point": peer_pace()})
+
+
+def _truth(problem: str) -> tuple[Array, Array, Array]:
+    """B, its gradient and the stated relative error (d,) of B at the points."""
+    points = sphere_points()
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", AccuracyWarning)  # its own error is stored, whatever it is
+        table = rotor_table(cube(problem), "auto", TRUTH_TOLERANCE)
+    b, g = table.evaluate(points.reshape(-1, 3))
+    own = table.relative_error(points.reshape(-1, 3))[0].reshape(points.shape[:2]).max(axis=1)
+    return b.reshape(points.shape), g.reshape(*points.shape, 3), own
+
+
+def _largest(values: Array, truth: Array, rank: int) -> Array:
+    """Largest relative error (d,) over the points of each distance."""
+    axes = tuple(range(2, 2 + rank))
+    return np.asarray((np.linalg.norm(values - truth, axis=axes) / np.linalg.norm(truth, axis=axes)).max(axis=1))
+
+
+def speed_lines(result: xr.Dataset) -> list[str]:
+    """The table of the study."""
+    head = " ".join(f"{1e3 * d:4.0f} mm" + " " * 10 for d in result["distance"].values)
+    lines = [
+        f"{'method':26} {'s':>7} {'CPU s':>7} {'unknowns':>9} {'MB':>6} {'ns/pt':>6}  error of B / of its gradient at {head}"
+    ]
+    for name in result["method"].values:
+        row = result.sel(method=name)
+        pairs = zip(row["field_error"].values, row["gradient_error"].values, strict=True)
+        lines.append(
+            f"{name:26} {float(row['seconds']):7.2f} {float(row['cpu_seconds']):7.2f} {int(row['unknowns']):9d} "
+            f"{float(row['memory']) / 1e6:6.0f} {1e9 * float(row['per_point']):6.0f}  "
+            + "  ".join(f"{b:.0e} / {g:.0e}" for b, g in pairs)
+        )
+    pace = 1e9 * result.attrs["magpylib_seconds_per_point"]
+    lines.append(f"magpylib, B alone: {pace:.0f} ns per point")
+    own = result["truth_error"].sel(method=result["problem"] == "permeable").max()
+    return [*lines, f"The reference for μr = 1.05 states an error of at most {float(own):.1e}; for μr = 1 it is exact."]
+
+
+@styled
+def speed_figure(result: xr.Dataset) -> Figure:
+    """Error of B at 20 mm (full) and 13 mm (faint) against the time from nothing, for both problems."""
+    figure, (axes,) = panels(1, 2, (9.0, 4.0))
+    titles = {"exact": "μr = 1 (closed form known)", "permeable": "μr = 1.05"}
+    families = list(dict.fromkeys(result["family"].values.tolist()))
+    for panel, (problem, title) in zip(axes, titles.items(), strict=True):
+        for family, color in zip(families, [*PALETTE, "0.4"], strict=False):
+            rows = result.sel(method=(result["family"] == family) & (result["problem"] == problem))
+            if not rows.sizes["method"]:
+                continue
+            for distance, alpha, label in ((0.02, 1.0, family), (0.013, 0.35, None)):
+                error = np.maximum(rows["field_error"].sel(distance=distance), 1e-16)
+                panel.loglog(rows["cpu_seconds"], error, "o-", ms=4, color=color, alpha=alpha, label=label)
+        own = float(result["truth_error"].sel(method=result["problem"] == problem).sel(distance=0.02).max())
+        panel.axhspan(1e-17, max(own, 1e-16), color="0.9", label="error of the reference")
+        panel.set(xlabel="processor time from nothing (s)", ylabel="relative error of B", title=title)
+        panel.set_ylim(bottom=1e-16)
+        panel.legend()
+    figure.suptitle("20 mm from the cube's centre (faint: 13 mm)", fontsize=9)
+    return figure
