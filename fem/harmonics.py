@@ -40,16 +40,24 @@ def regular(degree: int, x: Array, y: Array, z: Array) -> dict[tuple[int, int], 
     return found
 
 
-def regular_gradient(harmonics: dict[tuple[int, int], Any], l: int, m: int) -> list[Any]:
-    """Gradient (three complex arrays) of Υ_lm, from a dictionary made by `regular` (m ≥ 0)."""
+def weighted_sums(harmonics: dict[tuple[int, int], Any], weights: Array, degree: int) -> Coefficients:
+    """Σ_n weight_n Υ_lm(r_n), [l, m], from a dictionary made by `regular`."""
+    result = np.zeros((degree + 1, degree + 1), complex)
+    for (l, m), values in harmonics.items():
+        result[l, m] = values @ weights
+    return result
 
-    def at(n: int, k: int) -> Any:
-        if n < 0 or abs(k) > n:
-            return 0.0
-        return harmonics[n, k] if k >= 0 else (-1) ** k * np.conj(harmonics[n, -k])
 
-    plus, minus = at(l - 1, m + 1), -at(l - 1, m - 1)
-    return [(plus + minus) / 2, (plus - minus) / 2j, at(l - 1, m)]
+def regular_derivative(sums: Coefficients, axis: int) -> Coefficients:
+    """[l, m] of a linear functional of ∂Υ_lm/∂x_axis, from its values on Υ_lm itself (m ≥ 0); the functional is real."""
+    size = len(sums)
+    full = np.zeros((size, 2 * size + 3), complex)  # column m + size + 1, with room for m ± 1
+    zero, orders = size + 1, np.arange(size)
+    full[:, zero + orders] = sums
+    full[:, zero - orders] = (-1.0) ** orders * np.conj(sums)
+    below = np.vstack([np.zeros((1, full.shape[1])), full[:-1]])
+    plus, minus = below[:, zero + orders + 1], -below[:, zero + orders - 1]
+    return np.asarray(((plus + minus) / 2, (plus - minus) / 2j, below[:, zero + orders])[axis])
 
 
 def irregular(

@@ -12,7 +12,7 @@ import numpy as np
 
 from ..geometry.box import Array, frozen_array
 from ..geometry.magnet import MU_0, Magnet
-from .harmonics import Coefficients, derivative, field_sizes, irregular, real_terms, regular, regular_gradient
+from .harmonics import Coefficients, derivative, field_sizes, irregular, real_terms, regular, regular_derivative, weighted_sums
 
 FOUR_PI = 4 * np.pi
 
@@ -98,15 +98,20 @@ def moments_of_magnetization(
 
     q_lm = ∫ M · ∇ conj Υ_lm dV, with `points` (n, 3) m, `weights` (n,) m³ and `magnetization` (n, 3) μ0 M in T.
     """
-    scaled = (points - center) / radius
-    harmonics = regular(degree, *scaled.T)
+    harmonics = regular(degree, *((points - center) / radius).T)
     weighted = (weights / (FOUR_PI * radius**3))[:, None] * magnetization
-    result = np.zeros((degree + 1, degree + 1), complex)
-    for l in range(1, degree + 1):
-        for m in range(l + 1):
-            gradient = regular_gradient(harmonics, l, m)
-            result[l, m] = sum(np.sum(weighted[:, a] * np.conj(gradient[a])) for a in range(3))
-    return result
+    potentials = [weighted_sums(harmonics, weighted[:, axis], degree) for axis in range(3)]
+    return sum((np.conj(regular_derivative(p, axis)) for axis, p in enumerate(potentials)), np.zeros(1))
+
+
+def curvature_moments(
+    points: Array, weights: Array, matrix: Array, center: Array, radius: float, degree: int
+) -> Coefficients:
+    """Coefficients (T) ∫ w Σ A_ij ∂_ij conj Υ_lm, with `weights` (n,) w in T m⁴ and `matrix` (3, 3) A, symmetric."""
+    harmonics = regular(degree, *((points - center) / radius).T)
+    sums = weighted_sums(harmonics, weights / (FOUR_PI * radius**4), degree)
+    second = [[regular_derivative(regular_derivative(sums, i), j) for j in range(3)] for i in range(3)]
+    return np.asarray(sum(np.conj(matrix[i, j] * second[i][j]) for i in range(3) for j in range(3)))
 
 
 def uniform_moments(magnet: Magnet, degree: int) -> MultipoleExpansion:
