@@ -21,9 +21,8 @@ import numpy as np
 from ..geometry.box import Array
 from ..geometry.magnet import Magnet
 from ..geometry.mesh import MeshSettings
-from ..geometry.pieces import cut_magnets
+from ..geometry.pieces import CONVERGENCE, cut_magnets
 from .accuracy import Accuracy, places
-from .harmonics import Coefficients
 from .multipole import MultipoleExpansion, without_noise
 from .remanent import induced_moments
 from .rotor_solution import Refinement, RotorSolution, solve_rotor
@@ -72,17 +71,14 @@ def fem_table(
     def reaction(order: int) -> RotorSolution:
         return solve_rotor(magnets, rung(order, settings), "split", degree, cut, use_symmetry)
 
-    solution, order, doubt = climb(reaction, lambda c: _field(_expansions(pieces, c), points) / scale, accuracy.rtol / 3)
-    whole = [without_noise(a + b, 1e-15) for a, b in zip(closed, solution.coefficients, strict=True)]
-    kept, dropped = trimmed(_expansions(pieces, whole), points, scale * accuracy.rtol / 3)
-    doubts = {
-        "truncation": _used(dropped),
-        "tail": _used(_tail(_expansions(pieces, whole), points)),
-        "discretisation": _used(_expansions(pieces, doubt)),
-    }
-    table = RotorTable("fem", magnets, magnets, _used(kept), doubts)
+    solution, order, doubt = climb(reaction, points, scale, accuracy.rtol / 3)
+    whole = solution.expansions(
+        [without_noise(a + b, 1e-15) for a, b in zip(closed, solution.coefficients, strict=True)]
+    )
+    kept, dropped = trimmed(whole, points, scale * accuracy.rtol / 3)
+    doubts = {"truncation": used(dropped), "tail": used(tail(whole)), "discretisation": used(doubt)}
+    table = RotorTable("fem", magnets, magnets, used(kept), doubts)
     reached = float(np.max(table.absolute_error(points)[0] / scale))
-    provenance = _provenance(solution, order, settings, reached, time.perf_counter() - start)
     if reached > accuracy.rtol:
         warnings.warn(
             f"The field's estimated error is {reached:.1e}, more than the {accuracy.rtol:.1e} asked for from "
@@ -90,36 +86,35 @@ def fem_table(
             AccuracyWarning,
             stacklevel=2,
         )
-    return replace(table, provenance=provenance)
+    return replace(table, provenance=provenance(solution, order, settings, reached, time.perf_counter() - start))
 
 
 def climb(
-    solve: Callable[[int], RotorSolution],
-    error: Callable[[Sequence[Coefficients]], Array],
-    target: float,
-) -> tuple[RotorSolution, int, list[Coefficients]]:
+    solve: Callable[[int], RotorSolution], points: Array, scale: Array, target: float
+) -> tuple[RotorSolution, int, list[MultipoleExpansion]]:
     """Climb the ladder until the error is below the target.
 
     Parameters
     ----------
     solve : solution at an order
-    error : relative errors at some points that a difference of coefficients makes
+    points, scale : where (n, 3) m the error is looked at, and the field (n,) T to which it is relative
 
     Returns
     -------
-    The last solution, its order, and the estimated error of its coefficients.
+    The last solution, its order, and the estimated error of its field.
     """
     coarse, before = solve(RUNGS[0]), np.inf
     for order in RUNGS[1:]:
         fine = solve(order)
         difference = [b - a for a, b in zip(coarse.coefficients, fine.coefficients, strict=True)]
-        size = float(np.max(error(difference), initial=0.0))
+        field = sum(e.evaluate(points)[0] for e in fine.expansions(difference))
+        size = float(np.max(np.linalg.norm(field, axis=1) / scale))
         rate = FIRST_RATE if np.isinf(before) else min(max(size / before, 0.1) if before else 0.0, SLOWEST_RATE)
         factor = SAFETY * rate / (1 - rate)
         if factor * size <= target:
             break
         coarse, before = fine, size
-    return fine, order, [factor * d for d in difference]
+    return fine, order, fine.expansions([factor * d for d in difference])
 
 
 def _degree(pieces: Sequence[Magnet], points: Array, rtol: float) -> int:
@@ -132,33 +127,25 @@ def _degree(pieces: Sequence[Magnet], points: Array, rtol: float) -> int:
     return int(min(np.ceil(needed), HIGHEST_DEGREE))
 
 
-def _expansions(pieces: Sequence[Magnet], coefficients: Sequence[Coefficients]) -> list[MultipoleExpansion]:
-    return [MultipoleExpansion(p.box.center, p.box.circumradius, c) for p, c in zip(pieces, coefficients, strict=True)]
-
-
-def _used(expansions: Sequence[MultipoleExpansion]) -> tuple[MultipoleExpansion, ...]:
+def used(expansions: Sequence[MultipoleExpansion]) -> tuple[MultipoleExpansion, ...]:
+    """Those of the expansions that are not zero."""
     return tuple(expansion for expansion in expansions if expansion.coefficients.any())
 
 
-def _field(expansions: Sequence[MultipoleExpansion], points: Array) -> Array:
-    """|B| (n,) T of all expansions."""
-    return np.asarray(np.linalg.norm(sum(e.evaluate(points)[0] for e in expansions), axis=1))
-
-
-def _tail(expansions: Sequence[MultipoleExpansion], points: Array) -> list[MultipoleExpansion]:
-    """What lies beyond the highest degree: the last two degrees, continued as a geometric series."""
+def tail(expansions: Sequence[MultipoleExpansion]) -> list[MultipoleExpansion]:
+    """What lies beyond the highest degree: the last two degrees, continued as a geometric series in 1/`CONVERGENCE`²."""
     found = []
     for expansion in expansions:
-        ratio = np.linalg.norm(points - expansion.center, axis=1).min() / expansion.radius
-        last = expansion.coefficients.copy()
+        last = np.array(expansion.coefficients)
         last[:-2] = 0.0
-        found.append(MultipoleExpansion(expansion.center, expansion.radius, last / (ratio**2 - 1)))
+        found.append(MultipoleExpansion(expansion.center, expansion.radius, last / (CONVERGENCE**2 - 1)))
     return found
 
 
-def _provenance(
+def provenance(
     solution: RotorSolution, order: int, settings: MeshSettings, reached: float, seconds: float
 ) -> dict[str, str | float]:
+    """How a table was made."""
     return {
         "solver": "ngsolve " + importlib.metadata.version("ngsolve"),
         "mesher": "netgen-mesher " + importlib.metadata.version("netgen-mesher"),

@@ -14,6 +14,7 @@ from ..geometry.symmetry import find_symmetry, parity_parts
 from .harmonics import Coefficients
 from .magnetostatics import Formulation, assemble, solve
 from .moments import reaction_moments, trace_moments
+from .multipole import MultipoleExpansion
 from .spherical import turned
 
 
@@ -40,17 +41,21 @@ class RotorSolution:
     Parameters
     ----------
     coefficients : c_lm (T), one per piece about its centre in `split`, one about the mesh's in `direct`
+    spheres : centre (3,) m and radius m of every expansion, in the rotor's frame
     mesh : of the part of space that the mirror planes leave, in their frame
-    center : (3,) m, centre of the mesh in the rotor's frame
     unknowns : number of unknowns
     area_error : relative error of the area of the outer sphere
     """
 
     coefficients: tuple[Coefficients, ...]
+    spheres: tuple[tuple[Array, float], ...]
     mesh: MagnetMesh
-    center: Array
     unknowns: int
     area_error: float
+
+    def expansions(self, coefficients: Sequence[Coefficients]) -> list[MultipoleExpansion]:
+        """Expansions about the same spheres with other coefficients."""
+        return [MultipoleExpansion(*sphere, c) for sphere, c in zip(self.spheres, coefficients, strict=True)]
 
 
 def solve_rotor(
@@ -87,11 +92,13 @@ def solve_rotor(
         area_error = solution.boundary.area_error
         part = [trace_moments(solution)] if formulation == "direct" else list(reaction_moments(solution, degree))
         total = [a + b for a, b in zip(total, part, strict=True)] if total else part
-    size = refinement.boundary_degree if formulation == "direct" else degree
-    nothing = [np.zeros((size + 1, size + 1), complex)] * (1 if formulation == "direct" else len(bodies))
+    spheres = tuple((body.box.center, body.box.circumradius) for body in bodies)
+    size = degree
+    if formulation == "direct":
+        spheres, size = ((symmetry.center + symmetry.axes @ mesh.center, mesh.unit),), refinement.boundary_degree
+    nothing = [np.zeros((size + 1, size + 1), complex)] * len(spheres)
     coefficients = tuple(turned(c, symmetry.axes) for c in total or nothing)
-    center = symmetry.center + symmetry.axes @ mesh.center
-    return RotorSolution(coefficients, mesh, center, system.unknowns, area_error)
+    return RotorSolution(coefficients, spheres, mesh, system.unknowns, area_error)
 
 
 def _polarized(magnet: Magnet, polarization: Array) -> Magnet:
