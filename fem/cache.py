@@ -29,7 +29,7 @@ def rotor_key(rotor: tuple[Magnet, ...], model: str, rtol: float) -> str:
     for magnet in rotor:
         for part in (magnet.box.size, magnet.box.center, magnet.box.rotation, magnet.polarization):
             digest.update(np.ascontiguousarray(part + 0.0, dtype="<f8").tobytes())
-        digest.update(np.float64(magnet.recoil_permeability).tobytes())
+        digest.update(np.ascontiguousarray(magnet.permeability_in_rotor + 0.0, dtype="<f8").tobytes())
     return digest.hexdigest()
 
 

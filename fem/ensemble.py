@@ -35,7 +35,7 @@ class Ensemble:
         degree, members = self.coefficients.shape[-1] + 1, len(self.coefficients)
         values = np.zeros((9 * members, len(points)))
         for center, radius, weights in zip(self._centers, self._radii, self._weights, strict=True):
-            harmonics = irregular_values(degree, *((points - center) / radius).T)
+            harmonics = irregular_values(degree, (points - center) / radius)
             rows = np.array([harmonics[l, m] for l in range(degree + 1) for m in range(l + 1)])
             values += weights @ np.concatenate([rows.real, rows.imag])
         squares = np.square(values).reshape(members, 9, -1).mean(axis=0)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -14,7 +15,7 @@ from .field_map import FieldMap, FieldMapError
 from .gridded import GriddedTable
 from .harmonic_basis import HarmonicBasis
 from .harmonic_fit import MARGIN, HarmonicFit, fit_harmonics
-from .harmonics import field_spectrum
+from .harmonics import Coefficients, field_sizes, field_spectrum
 from .multipole import MultipoleExpansion
 from .table import RotorTable
 
@@ -70,10 +71,12 @@ def fit_field_map(
     deviations = np.array([basis.coefficients(member, wide) for member in fit.deviations])
     if field_map.errors is not None:
         deviations *= max(1.0, 1.0 / fit.misfit)
-    expansions = _expansions(basis, fit, field_map, distances)
+    coefficients = basis.coefficients(fit.unknowns, fit.degree)
+    expansions = tuple(MultipoleExpansion(*part) for part in zip(middle, radii, coefficients, strict=True))
+    doubts = {"tail": _left_out(basis, fit, field_map, distances, expansions)}
     provenance = _provenance(basis, fit, field_map, time.perf_counter() - start)
     region = _region(field_map, middle, radii)
-    return GriddedTable(RotorTable("gridded", (), (), expansions, provenance), deviations, region)
+    return GriddedTable(RotorTable("gridded", (), (), expansions, doubts, provenance), deviations, region)
 
 
 def _radii(distances: Array, radius: float | None) -> Array:
@@ -103,26 +106,35 @@ def _default_errors(field_map: FieldMap, distances: Array) -> Array:
     return np.repeat(size / distances[:, None] ** 3, 3, axis=1)
 
 
-def _expansions(
-    basis: HarmonicBasis, fit: HarmonicFit, field_map: FieldMap, distances: Array
+def _left_out(
+    basis: HarmonicBasis,
+    fit: HarmonicFit,
+    field_map: FieldMap,
+    distances: Array,
+    expansions: tuple[MultipoleExpansion, ...],
 ) -> tuple[MultipoleExpansion, ...]:
-    """The fitted expansions; those of a series cut at the basis' end state what may follow.
+    """What may follow a series that was cut at the basis' end, as fields of the size that is to be doubted.
 
     A cut series goes on falling as its last eight degrees did, or is level; and it is as large as held-out residuals
     near the sources say, `EDGE_SAFETY` times, since a grid does not hit the worst places.
     """
-    coefficients = basis.coefficients(fit.unknowns, fit.degree)
-    parts = list(zip(basis.centers, basis.radii, coefficients, strict=True))
     if fit.degree < basis.degree:
-        return tuple(MultipoleExpansion(*part) for part in parts)
-    tails = [MultipoleExpansion(*part, _tail(field_spectrum(part[2]))) for part in parts]
+        return ()
+    tails = [replace(e, coefficients=_zonal(_tail(field_spectrum(e.coefficients)))) for e in expansions]
     near = np.nonzero((distances <= EDGE * distances.min(axis=0)).any(axis=1))[0]
     near = near[:: 1 + len(near) // EDGE_POINTS]
-    predicted = np.sum([tail.field_error(field_map.points[near])[0] for tail in tails], axis=0)
+    predicted = RotorTable("gridded", (), doubts={"tail": tuple(tails)}).absolute_error(field_map.points[near])[0]
     residuals = field_map.field[near] - _held_out_field(basis, fit, field_map.points, near)
     sizes = np.sqrt(np.nansum(residuals**2, axis=1))
     scale = EDGE_SAFETY * float(np.max(sizes / (predicted + np.finfo(float).tiny)))
-    return tuple(MultipoleExpansion(*part, scale * t.uncertainty) for part, t in zip(parts, tails, strict=True))
+    return tuple(replace(tail, coefficients=scale * tail.coefficients) for tail in tails)
+
+
+def _zonal(spectrum: Array) -> Coefficients:
+    """Coefficients of a field with a given root mean square (T) in every degree; which one does not matter."""
+    coefficients = np.zeros((len(spectrum), len(spectrum)), complex)
+    coefficients[:, 0] = spectrum / field_sizes(len(spectrum) - 1)[:, 0]
+    return coefficients
 
 
 def _held_out_field(basis: HarmonicBasis, fit: HarmonicFit, points: Array, chosen: NDArray[np.intp]) -> Array:

@@ -52,7 +52,7 @@ class HarmonicBasis:
             _fill(result, row, m, regular_gradient(harmonics, l, m), sizes[l, m])
         sizes = _sizes(self.degree)
         for k, (center, radius) in enumerate(zip(self.centers, self.radii, strict=True)):
-            harmonics = irregular_values(self.degree + 1, *((points - center) / radius).T)
+            harmonics = irregular_values(self.degree + 1, (points - center) / radius)
             for row, l, m in _terms(self.background_count, self.degree, len(self.centers), k):
                 _fill(result, row, m, irregular_gradient(harmonics, l, m), sizes[l, m])
         return result

@@ -11,7 +11,6 @@ A real harmonic function outside a sphere is Σ_lm c_lm Θ_lm with c_l(-m) = (-1
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from typing import Any
 
@@ -24,6 +23,10 @@ from ..geometry.box import Array
 
 Coefficients = NDArray[np.complex128]
 """c[l, m] for 0 ≤ m ≤ l, as a square array."""
+
+
+CHUNK = 4096
+"""Points at once, so that the harmonics of all degrees fit in memory."""
 
 
 def regular(degree: int, x: Array, y: Array, z: Array) -> dict[tuple[int, int], Any]:
@@ -41,31 +44,24 @@ def regular(degree: int, x: Array, y: Array, z: Array) -> dict[tuple[int, int], 
     return found
 
 
-def regular_gradient(harmonics: dict[tuple[int, int], Any], l: int, m: int) -> list[Any]:
-    """Gradient (three complex arrays) of Υ_lm, from a dictionary made by `regular` (m ≥ 0)."""
-
-    def at(n: int, k: int) -> Any:
-        if n < 0 or abs(k) > n:
-            return 0.0
-        return harmonics[n, k] if k >= 0 else (-1) ** k * np.conj(harmonics[n, -k])
-
-    plus, minus = at(l - 1, m + 1), -at(l - 1, m - 1)
-    return [(plus + minus) / 2, (plus - minus) / 2j, at(l - 1, m)]
+def weighted_sums(harmonics: dict[tuple[int, int], Any], weights: Array, degree: int) -> Coefficients:
+    """Σ_n weight_n Υ_lm(r_n), [l, m], from a dictionary made by `regular`."""
+    result = np.zeros((degree + 1, degree + 1), complex)
+    for (l, m), values in harmonics.items():
+        result[l, m] = values @ weights
+    return result
 
 
-def irregular_values(degree: int, x: Array, y: Array, z: Array) -> dict[tuple[int, int], Any]:
-    """Complex irregular harmonics Θ_lm, 0 ≤ m ≤ l ≤ degree, at NumPy arrays x, y, z: Υ_lm after an inversion."""
-    square = x * x + y * y + z * z
-    inverted = regular(degree, x / square, y / square, z / square)
-    inverse = 1 / np.sqrt(square)
-    return {(l, m): math.factorial(l - m) * math.factorial(l + m) * inverse * v for (l, m), v in inverted.items()}
-
-
-def irregular_gradient(harmonics: dict[tuple[int, int], Any], l: int, m: int) -> list[Any]:
-    """Gradient (three complex arrays) of Θ_lm, from a dictionary of at least degree l + 1 (m ≥ 0)."""
-    plus = harmonics[l + 1, m + 1]
-    minus = -harmonics[l + 1, m - 1] if m else np.conj(harmonics[l + 1, 1])
-    return [(plus + minus) / 2, (plus - minus) / 2j, -harmonics[l + 1, m]]
+def regular_derivative(sums: Coefficients, axis: int) -> Coefficients:
+    """[l, m] of a linear functional of ∂Υ_lm/∂x_axis, from its values on Υ_lm itself (m ≥ 0); the functional is real."""
+    size = len(sums)
+    full = np.zeros((size, 2 * size + 3), complex)  # column m + size + 1, with room for m ± 1
+    zero, orders = size + 1, np.arange(size)
+    full[:, zero + orders] = sums
+    full[:, zero - orders] = (-1.0) ** orders * np.conj(sums)
+    below = np.vstack([np.zeros((1, full.shape[1])), full[:-1]])
+    plus, minus = below[:, zero + orders + 1], -below[:, zero + orders - 1]
+    return np.asarray(((plus + minus) / 2, (plus - minus) / 2j, below[:, zero + orders])[axis])
 
 
 def irregular(
@@ -97,6 +93,47 @@ def irregular(
                 below, here = here, upper
                 found[l, m, part] = here
     return found
+
+
+def irregular_values(degree: int, points: Array) -> dict[tuple[int, int], Any]:
+    """Θ_lm, 0 ≤ m ≤ l ≤ degree, at NumPy points (n, 3), by Θ_lm(r) = (l-m)! (l+m)! Υ_lm(r/r²)/r."""
+    square = np.sum(points**2, axis=1)
+    found = regular(degree, *(points / square[:, None]).T)
+    distance = np.sqrt(square)
+    return {(l, m): np.exp(gammaln(l - m + 1) + gammaln(l + m + 1)) / distance * v for (l, m), v in found.items()}
+
+
+def irregular_gradient(harmonics: dict[tuple[int, int], Any], l: int, m: int) -> list[Any]:
+    """Gradient (three complex arrays) of Θ_lm, from a dictionary made by `irregular_values` up to l + 1 (m ≥ 0)."""
+    plus = harmonics[l + 1, m + 1]
+    minus = harmonics[l + 1, m - 1] if m else -np.conj(harmonics[l + 1, 1])
+    return [(plus - minus) / 2, (plus + minus) / 2j, -harmonics[l + 1, m]]
+
+
+def regular_gradient(harmonics: dict[tuple[int, int], Any], l: int, m: int) -> list[Any]:
+    """Gradient (three complex arrays) of Υ_lm, from a dictionary made by `regular` (m ≥ 0)."""
+
+    def at(n: int, k: int) -> Any:
+        if n < 0 or abs(k) > n:
+            return 0.0
+        return harmonics[n, k] if k >= 0 else (-1) ** k * np.conj(harmonics[n, -k])
+
+    plus, minus = at(l - 1, m + 1), -at(l - 1, m - 1)
+    return [(plus + minus) / 2, (plus - minus) / 2j, at(l - 1, m)]
+
+
+def outer_sums(coefficients: Sequence[Coefficients], points: Array) -> Array:
+    """Σ c_lm Θ_lm (n, k) at points (n, 3), for k arrays c of one size."""
+    stacked = np.stack(coefficients, axis=-1)
+    used = np.nonzero(stacked.any(axis=2))
+    weights = np.where(used[1] == 0, 1.0, 2.0)[:, None] * stacked[used]
+    result = np.zeros((len(points), stacked.shape[2]))
+    for start in range(0, len(points), CHUNK):
+        block = points[start : start + CHUNK]
+        harmonics = irregular_values(len(stacked) - 1, block)
+        values = np.array([harmonics[key] for key in zip(*used, strict=True)]).reshape(-1, len(block))
+        result[start : start + CHUNK] = np.real(values.T @ weights)
+    return result
 
 
 def derivative(coefficients: Coefficients, axis: int) -> Coefficients:

@@ -12,7 +12,6 @@ from typing import Any
 import ngsolve as ng
 import numpy as np
 from ngsolve.comp import IntegrationRuleSpace, IntegrationRuleSpaceSurface
-from scipy.sparse import csr_matrix
 
 from ..geometry.box import Array
 
@@ -45,15 +44,6 @@ class IntegrationPoints:
         result = ng.GridFunction(self.space)
         result.vec.FV().NumPy()[:] = values
         return result
-
-    def weighted_trace(self, trial_space: Any) -> csr_matrix:
-        """Sparse (n, unknowns): value of every shape function at the points, times the weight."""
-        form = ng.BilinearForm(trialspace=trial_space, testspace=self.space)
-        form += trial_space.TrialFunction() * self.space.TestFunction() * self.measure
-        form.Assemble()
-        rows, columns, values = form.mat.COO()
-        shape = (form.mat.height, form.mat.width)
-        return csr_matrix((np.array(values), (np.array(rows), np.array(columns))), shape)
 
 
 def volume_points(mesh: Any, material: str, order: int) -> IntegrationPoints:

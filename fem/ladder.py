@@ -1,7 +1,10 @@
-"""Tables of finite-element fields with a stated error, from a ladder of element orders.
+"""Tables of finite-element fields with a stated error, from a ladder of refinements.
 
-The same mesh is solved with orders p-1 and p. Elements and quadrature are finer at p, and the functionals converge
-fast, so that their difference bounds the error at p. What both share, a sphere that is not quite round, is added.
+From rung to rung the order of the elements, the layers at the edges, the quadrature, the curvature of the outer sphere
+and the degree of its open boundary all grow, and the coefficients of the expansions converge geometrically. The
+difference of two rungs is the error of the lower one; times ρ/(1 - ρ), with ρ the ratio of the last two differences, it
+is that of the upper one, and it is kept as a field: the doubt "discretisation". The closed part of the moments is
+exact; what is cut off the expansions is known and kept as the doubt "truncation".
 """
 
 from __future__ import annotations
@@ -9,191 +12,150 @@ from __future__ import annotations
 import importlib.metadata
 import resource
 import time
-from dataclasses import dataclass
+import warnings
+from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from ..geometry.box import Array
 from ..geometry.magnet import Magnet
-from ..geometry.mesh import MagnetMesh, MeshSettings, mesh_magnets
-from .harmonics import Coefficients, field_spectrum
-from .magnetostatics import Formulation, Solution, magnet_moments, solve, trace_moments
-from .multipole import MultipoleExpansion, uniform_moments
+from ..geometry.mesh import MeshSettings
+from ..geometry.pieces import CONVERGENCE, cut_magnets
+from .accuracy import Accuracy, places
+from .multipole import MultipoleExpansion, without_noise
+from .remanent import induced_moments
+from .rotor_solution import Refinement, RotorSolution, solve_rotor
 from .table import RotorTable
+from .trim import trimmed
 
-ORDERS = range(2, 7)
-SAFETY = 1.5
-"""Factor on the difference of two orders. The true error was 0.06 to 0.5 of it up to degree 8, at most 1.23 at any."""
-BOUNDARY_DEGREE = 8
-"""Degree of the open boundary for `split`: the magnets hardly feel higher ones (below 1e-8 of B)."""
-TAIL = 45
-"""Degree to which uncertainties are continued."""
-
-
-def with_tail(spectrum: Array) -> Array:
-    """Continue a spectrum on the circumscribed sphere up to degree `TAIL`, where corners let it fall but slowly."""
-    return np.concatenate([spectrum, np.full(max(TAIL + 1 - len(spectrum), 0), spectrum[-4:].max())])
+RUNGS = (2, 3, 4, 5, 6, 7, 8)
+"""Orders of the elements."""
+FIRST_RATE = 0.5
+"""Ratio of two differences that is assumed before it is known; 0.1 to 0.3 were measured."""
+SLOWEST_RATE = 0.75
+SAFETY = 2.0
+"""Factor on the extrapolated difference."""
+HIGHEST_DEGREE = 44
 
 
-@dataclass(frozen=True)
-class Accuracy:
-    """What a table must reach.
+class AccuracyWarning(UserWarning):
+    """A table does not reach the accuracy that was asked for."""
 
-    Parameters
-    ----------
-    rtol : error of B relative to its root mean square over the spheres of `nearest`
-    nearest : distance from the centre of an expansion from which on `rtol` holds, in radii of its sphere
-    """
 
-    rtol: float = 1e-5
-    nearest: float = 1.5
-
-    def __post_init__(self) -> None:
-        if not 0 < self.rtol < 1:
-            raise ValueError(f"Input rtol must lie between 0 and 1; instead received {self.rtol}.")
-        if self.nearest <= 1:
-            raise ValueError(f"Input nearest must exceed 1; instead received {self.nearest}.")
-
-    def degree(self, contrast: float) -> int:
-        """Degree where a part of the field that is `contrast` of the whole has fallen below `rtol`; 5 to 31."""
-        needed = np.log(contrast / self.rtol) / np.log(self.nearest) if contrast > 0 else 0.0
-        return int(np.clip(np.ceil(needed), 5, 31))
+def rung(order: int, settings: MeshSettings) -> Refinement:
+    """The refinement that belongs to an order: layers at the edges 1 (orders 2, 3), 2 (to 6), 3 (7, 8)."""
+    layers = 1 if order < 4 else 2 if order < 7 else 3
+    mesh = replace(settings, hp_layers=layers if settings.hp_layers else 0, curve_order=min(order + 1, 8))
+    return Refinement(order, mesh, 2 * order + 2)
 
 
 def fem_table(
     magnets: tuple[Magnet, ...],
     accuracy: Accuracy | None = None,
-    formulation: Formulation = "split",
     settings: MeshSettings | None = None,
+    use_symmetry: bool = True,
 ) -> RotorTable:
-    """Field of magnets with recoil permeability, by finite elements.
+    """Field of magnets with recoil permeability: closed form of the remanence, and expansions of what is added to it.
 
-    Orders from 3 to 6 are tried until the estimated error meets the accuracy; the last table is returned if none does,
-    and its uncertainty says how far it is off. `split` gives one expansion per magnet, of what the permeability adds
-    to the closed form; `direct` one of the whole field about the common centre, without any closed form.
+    Orders from 2 to 8 are tried until the estimated error meets the accuracy. If none does, the last table is returned
+    with an `AccuracyWarning`; its error estimate says how far it is off.
     """
-    accuracy = accuracy or Accuracy()
-    start = time.perf_counter()
-    mesh = mesh_magnets(magnets, settings)
-    direct = formulation == "direct"
-    degree = accuracy.degree(1.0 if direct else max(abs(m.recoil_permeability - 1) for m in magnets))
-    boundary_degree = degree if direct else BOUNDARY_DEGREE
-    spheres = [(center, accuracy.nearest * radius) for center, radius in _spheres(mesh, formulation)]
-    points, allowed = _allowed_error(spheres, magnets, accuracy.rtol)
-    coarse = _moments(solve(mesh, formulation, ORDERS[0], boundary_degree), degree)
-    for order in ORDERS[1:]:
-        solution = solve(mesh, formulation, order, boundary_degree)
-        fine = _moments(solution, degree)
-        errors = [
-            SAFETY * field_spectrum(b - a) + _shared_error(solution, b) for a, b in zip(coarse, fine, strict=True)
-        ]
-        full = _table(mesh, formulation, fine, [with_tail(e) for e in errors])
-        if np.max(_error(full, points)) <= allowed / 2:
-            break
-        coarse = fine
-    kept, left_out = zip(*(_trim(c, allowed / (2 * len(fine)), accuracy.nearest) for c in fine), strict=True)
-    uncertainty = [with_tail(error) + rest for error, rest in zip(errors, left_out, strict=True)]
-    provenance = _provenance(solution, settings or MeshSettings(), time.perf_counter() - start)
-    return _table(mesh, formulation, list(kept), uncertainty, provenance)
+    accuracy, settings, start = accuracy or Accuracy(), settings or MeshSettings(), time.perf_counter()
+    cut = cut_magnets(magnets, accuracy.clearance(magnets))
+    pieces = [piece for whole in cut for piece in whole]
+    points, scale = places(magnets, accuracy.clearance(magnets))
+    degree = _degree(pieces, points, accuracy.rtol)
+    closed = [induced_moments(piece, magnets, degree) for piece in pieces]
 
+    def reaction(order: int) -> RotorSolution:
+        return solve_rotor(magnets, rung(order, settings), "split", degree, cut, use_symmetry)
 
-def _moments(solution: Solution, degree: int) -> list[Coefficients]:
-    if solution.formulation == "direct":
-        return [trace_moments(solution)]
-    return list(magnet_moments(solution, degree))
-
-
-def _shared_error(solution: Solution, coefficients: Coefficients) -> Array:
-    """Spectrum (T) of the error that does not fall with the order: that of R^(l+1) in `direct`, of H0 in `split`."""
-    if solution.formulation == "direct":
-        return solution.boundary.area_error * np.arange(1, len(coefficients) + 1) * field_spectrum(coefficients)
-    return np.full(len(coefficients), 1e-7 * field_spectrum(coefficients).max())
-
-
-def _spheres(mesh: MagnetMesh, formulation: Formulation) -> list[tuple[Array, float]]:
-    """Centre and radius of every expansion, m."""
-    if formulation == "direct":
-        return [(mesh.center, mesh.unit)]
-    return [(magnet.box.center, magnet.box.circumradius) for magnet in mesh.magnets]
-
-
-def _table(
-    mesh: MagnetMesh,
-    formulation: Formulation,
-    coefficients: list[Coefficients],
-    uncertainty: list[Array],
-    provenance: dict[str, str | float] | None = None,
-) -> RotorTable:
-    spheres = _spheres(mesh, formulation)
-    expansions = tuple(
-        MultipoleExpansion(*sphere, c, u) for sphere, c, u in zip(spheres, coefficients, uncertainty, strict=True)
+    solution, order, doubt = climb(reaction, points, scale, accuracy.rtol / 3)
+    whole = solution.expansions(
+        [without_noise(a + b, 1e-15) for a, b in zip(closed, solution.coefficients, strict=True)]
     )
-    uniform = mesh.magnets if formulation == "split" else ()
-    return RotorTable("fem", mesh.magnets, uniform, expansions, provenance or {})
+    kept, dropped = trimmed(whole, points, scale * accuracy.rtol / 3)
+    doubts = {"truncation": used(dropped), "tail": used(tail(whole)), "discretisation": used(doubt)}
+    table = RotorTable("fem", magnets, magnets, used(kept), doubts)
+    reached = float(np.max(table.absolute_error(points)[0] / scale))
+    if reached > accuracy.rtol:
+        warnings.warn(
+            f"The field's estimated error is {reached:.1e}, more than the {accuracy.rtol:.1e} asked for from "
+            f"{accuracy.clearance(magnets) * 1e3:.3g} mm off the magnets' faces on.",
+            AccuracyWarning,
+            stacklevel=2,
+        )
+    return replace(table, provenance=provenance(solution, order, settings, reached, time.perf_counter() - start))
 
 
-def _allowed_error(spheres: list[tuple[Array, float]], magnets: tuple[Magnet, ...], rtol: float) -> tuple[Array, float]:
-    """Points on the spheres (centre, radius), outside each other, and the error of B (T) allowed there.
+def climb(
+    solve: Callable[[int], RotorSolution], points: Array, scale: Array, target: float
+) -> tuple[RotorSolution, int, list[MultipoleExpansion]]:
+    """Climb the ladder until the error is below the target.
 
-    The scale of B is that of the magnets' dipoles, which is right to a few per cent.
+    Parameters
+    ----------
+    solve : solution at an order
+    points, scale : where (n, 3) m the error is looked at, and the field (n,) T to which it is relative
+
+    Returns
+    -------
+    The last solution, its order, and the estimated error of its field.
     """
-    rng = np.random.default_rng(0)
-    directions = rng.normal(size=(400, 3))
-    directions /= np.linalg.norm(directions, axis=1)[:, None]
-    points = np.concatenate([center + radius * directions for center, radius in spheres])
-    outside = np.all([np.linalg.norm(points - c, axis=1) >= (1 - 1e-9) * r for c, r in spheres], axis=0)
-    dipoles = RotorTable("dipole", magnets, (), tuple(uniform_moments(magnet, 1) for magnet in magnets))
-    field = dipoles.evaluate(points[outside])[0]
-    return points[outside], rtol * float(np.sqrt(np.mean(np.sum(field**2, axis=1))))
+    coarse, before = solve(RUNGS[0]), np.inf
+    for order in RUNGS[1:]:
+        fine = solve(order)
+        difference = [b - a for a, b in zip(coarse.coefficients, fine.coefficients, strict=True)]
+        field = sum(e.evaluate(points)[0] for e in fine.expansions(difference))
+        size = float(np.max(np.linalg.norm(field, axis=1) / scale))
+        rate = FIRST_RATE if np.isinf(before) else min(max(size / before, 0.1) if before else 0.0, SLOWEST_RATE)
+        factor = SAFETY * rate / (1 - rate)
+        if factor * size <= target:
+            break
+        coarse, before = fine, size
+    return fine, order, fine.expansions([factor * d for d in difference])
 
 
-def _error(table: RotorTable, points: Array) -> Array:
-    return np.asarray(np.sum([expansion.field_error(points)[0] for expansion in table.expansions], axis=0))
+def _degree(pieces: Sequence[Magnet], points: Array, rtol: float) -> int:
+    """Degree at which what the permeability adds has surely fallen below the tolerance; 5 to `HIGHEST_DEGREE`."""
+    needed = 5.0
+    for piece in pieces:
+        ratio = np.linalg.norm(points - piece.box.center, axis=1).min() / piece.box.circumradius
+        if piece.contrast:
+            needed = max(needed, 4 + np.log(piece.contrast / rtol) / np.log(ratio))
+    return int(min(np.ceil(needed), HIGHEST_DEGREE))
 
 
-def _trim(coefficients: Coefficients, allowed: float, nearest: float) -> tuple[Coefficients, Array]:
-    """The coefficients that matter, and the spectrum of what is left out (extrapolated beyond the last degree).
-
-    The terms that are left out, zeros by symmetry among them, add up to at most `allowed` (T) at `nearest`.
-    """
-    degrees = np.arange(len(coefficients))
-    share = allowed / len(degrees) / (np.sqrt(2 * degrees + 1) * nearest ** -(degrees + 2.0))
-    kept = np.array([_without_smallest(row, l, share[l]) for l, row in enumerate(coefficients)])
-    left_out = with_tail(field_spectrum(coefficients))
-    left_out[: len(degrees)] = field_spectrum(coefficients - kept)
-    degree = max([1, *np.nonzero(kept)[0]])
-    return kept[: degree + 1, : degree + 1], left_out
+def used(expansions: Sequence[MultipoleExpansion]) -> tuple[MultipoleExpansion, ...]:
+    """Those of the expansions that are not zero."""
+    return tuple(expansion for expansion in expansions if expansion.coefficients.any())
 
 
-def _without_smallest(row: Coefficients, degree: int, allowed: float) -> Coefficients:
-    """Coefficients of one degree without the smallest real and imaginary parts, `allowed` (T) in all."""
-    kept = np.zeros_like(row)
-    candidates = [(m, unit) for m in range(degree + 1) for unit in (1.0, 1j)]
-    parts = [((row[m] / unit).real * unit, m) for m, unit in candidates]
-
-    def size(part: tuple[complex, int]) -> float:
-        alone = np.zeros((degree + 1, degree + 1), complex)
-        alone[degree, part[1]] = part[0]
-        return float(field_spectrum(alone)[degree])
-
-    dropped = 0.0
-    for value, m in sorted(parts, key=size):
-        dropped += size((value, m)) ** 2
-        if dropped > allowed**2:
-            kept[m] += value
-    return kept
+def tail(expansions: Sequence[MultipoleExpansion]) -> list[MultipoleExpansion]:
+    """What lies beyond the highest degree: the last two degrees, continued as a geometric series in 1/`CONVERGENCE`²."""
+    found = []
+    for expansion in expansions:
+        last = np.array(expansion.coefficients)
+        last[:-2] = 0.0
+        found.append(MultipoleExpansion(expansion.center, expansion.radius, last / (CONVERGENCE**2 - 1)))
+    return found
 
 
-def _provenance(solution: Solution, settings: MeshSettings, seconds: float) -> dict[str, str | float]:
+def provenance(
+    solution: RotorSolution, order: int, settings: MeshSettings, reached: float, seconds: float
+) -> dict[str, str | float]:
+    """How a table was made."""
     return {
         "solver": "ngsolve " + importlib.metadata.version("ngsolve"),
         "mesher": "netgen-mesher " + importlib.metadata.version("netgen-mesher"),
-        "formulation": solution.formulation,
+        "mirror_planes": len(solution.mesh.planes),
         "elements": solution.mesh.elements,
-        "order": solution.order,
+        "order": order,
         "unknowns": solution.unknowns,
-        "hp_layers": settings.hp_layers,
+        "hp_layers": rung(order, settings).mesh.hp_layers,
         "ball_radius_mm": solution.mesh.ball_radius * solution.mesh.unit * 1e3,
+        "error_estimate": reached,
         "seconds": seconds,
         "peak_memory_MB": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024,
     }

@@ -2,50 +2,58 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable
 
 import numpy as np
 
-from ..geometry.box import Array
 from ..geometry.magnet import Magnet
-from .harmonics import field_spectrum
-from .ladder import Accuracy, fem_table, with_tail
-from .multipole import MultipoleExpansion, uniform_moments
-from .remanent import first_order_moments
+from .accuracy import Accuracy, places
+from .ladder import fem_table
+from .neglected import cuboid_table, dipole_table, moments_table
 from .table import RotorTable
 
-NEGLECTED_DEGREE = 21
-"""Degree up to which the part that a model leaves out is computed; beyond, it is extrapolated."""
+MODELS: dict[str, Callable[[tuple[Magnet, ...], Accuracy], RotorTable]] = {
+    "dipole": dipole_table,
+    "moments": moments_table,
+    "cuboid": cuboid_table,
+    "fem": fem_table,
+}
+"""From the cheapest to the dearest in evaluation."""
 
-FIRST_ORDER_SAFETY = 1.25
-"""The first-order magnetisation of μr ≤ 1.2 is right to a few per cent at low and to χ at high degrees."""
+FEW_MOMENTS = 16
+"""Coefficients per magnet up to which moments are quicker to evaluate than the closed form."""
 
 
-def resolve_model(rotor: tuple[Magnet, ...], model: str) -> tuple[str, str]:
+def resolve_model(
+    rotor: tuple[Magnet, ...], model: str, rtol: float = 1e-5, nearest: float | None = None
+) -> tuple[str, str]:
     """Name of the model that `rotor_table` uses for `model`, and the reason in words.
+
+    `auto` is the cheapest of dipole, moments, closed form and finite elements that meets `rtol` at all distances from
+    the magnets' faces of at least `nearest` (m; None: 0.8 of the largest magnet's edge, if it were a cube).
 
     Raises
     ------
-    ValueError : unknown model
+    ValueError : unknown model, or rtol not between 0 and 1
     """
     if model == "auto":
-        if all(magnet.recoil_permeability == 1 for magnet in rotor):
-            return "cuboid", "every recoil permeability is 1, so that the closed form is exact"
-        return "fem", "a recoil permeability differs from 1"
+        return _cheapest(rotor, Accuracy(rtol, nearest))
     if model not in MODELS:
         raise ValueError(f"Input model must be one of {', '.join([*MODELS, 'auto'])}; instead received {model!r}.")
     return model, "as asked"
 
 
-def rotor_table(rotor: tuple[Magnet, ...], model: str = "auto", rtol: float = 1e-5) -> RotorTable:
+def rotor_table(
+    rotor: tuple[Magnet, ...], model: str = "auto", rtol: float = 1e-5, nearest: float | None = None
+) -> RotorTable:
     """Table of a rotor's field.
 
     Parameters
     ----------
-    model : "dipole" (moments J V/μ0 of the remanence, as in the article), "cuboid" (closed form, μr = 1), "fem"
-        (with recoil permeability and mutual demagnetisation), or "auto": the cheapest that is exact
-    rtol : accuracy of B asked of "fem", from 1.5 circumradii of a magnet's centre on
+    model : "dipole" (moments J V/μ0 of the remanence, as in the article), "moments" (more of them), "cuboid" (closed
+        form, μr = 1), "fem" (with recoil permeability and mutual demagnetisation), or "auto", see `resolve_model`
+    rtol, nearest : relative accuracy of B asked of "fem" and "moments", and the distance from the magnets' faces from
+        which on it holds, m (None: 0.8 of the largest magnet's edge, if it were a cube)
 
     The table states its own error: `RotorTable.relative_error`. That of "dipole" and "cuboid" is their neglected part,
     shape and permeability, computed to first order in μr - 1.
@@ -54,50 +62,26 @@ def rotor_table(rotor: tuple[Magnet, ...], model: str = "auto", rtol: float = 1e
     ------
     ValueError : unknown model, no magnet, or rtol not between 0 and 1
     """
-    name, _ = resolve_model(rotor, model)
+    accuracy = Accuracy(rtol, nearest)
     if not rotor:
         raise ValueError("Input rotor must hold at least one magnet; instead received none.")
-    return MODELS[name](rotor, Accuracy(rtol))
+    name, _ = resolve_model(rotor, model, rtol, nearest)
+    return MODELS[name](rotor, accuracy)
 
 
-def _fem(rotor: tuple[Magnet, ...], accuracy: Accuracy) -> RotorTable:
-    return fem_table(rotor, accuracy)
-
-
-def _dipole(rotor: tuple[Magnet, ...], accuracy: Accuracy) -> RotorTable:
-    start = time.perf_counter()
-    expansions = []
-    for k, magnet in enumerate(rotor):
-        shape = field_spectrum(uniform_moments(magnet, NEGLECTED_DEGREE).coefficients)
-        shape[1] = 0.0
-        dipole = uniform_moments(magnet, 1)
-        neglected = with_tail(shape + _neglected_permeability(rotor, k))
-        expansions.append(MultipoleExpansion(dipole.center, dipole.radius, dipole.coefficients, neglected))
-    return RotorTable("dipole", rotor, (), tuple(expansions), {"seconds": time.perf_counter() - start})
-
-
-def _cuboid(rotor: tuple[Magnet, ...], accuracy: Accuracy) -> RotorTable:
-    start = time.perf_counter()
-    nothing = np.zeros((1, 1), complex)
-    expansions = tuple(
-        MultipoleExpansion(
-            magnet.box.center, magnet.box.circumradius, nothing, with_tail(_neglected_permeability(rotor, k))
-        )
-        for k, magnet in enumerate(rotor)
-        if magnet.recoil_permeability != 1
-    )
-    return RotorTable("cuboid", rotor, rotor, expansions, {"seconds": time.perf_counter() - start})
-
-
-def _neglected_permeability(rotor: tuple[Magnet, ...], k: int) -> Array:
-    """Spectrum (T) on the circumscribed sphere of what the permeability of magnet number k adds."""
-    if rotor[k].recoil_permeability == 1:
-        return np.zeros(NEGLECTED_DEGREE + 1)
-    return FIRST_ORDER_SAFETY * field_spectrum(first_order_moments(rotor, k, NEGLECTED_DEGREE))
-
-
-MODELS: dict[str, Callable[[tuple[Magnet, ...], Accuracy], RotorTable]] = {
-    "dipole": _dipole,
-    "cuboid": _cuboid,
-    "fem": _fem,
-}
+def _cheapest(rotor: tuple[Magnet, ...], accuracy: Accuracy) -> tuple[str, str]:
+    clearance = accuracy.clearance(rotor)
+    points, scale = places(rotor, clearance)
+    where = f"at {clearance * 1e3:.3g} mm from the magnets' faces and beyond, where {accuracy.rtol:.1e} is asked for"
+    cuboid = cuboid_table(rotor, accuracy)
+    permeability = float(np.max(cuboid.absolute_error(points)[0] / scale))
+    if permeability > accuracy.rtol:
+        return "fem", f"leaving out the recoil permeability is wrong by {permeability:.1e} {where}"
+    for table in (dipole_table(rotor, accuracy), moments_table(rotor, accuracy)):
+        error = float(np.max(table.absolute_error(points)[0] / scale))
+        count = sum(np.count_nonzero(expansion.coefficients) for expansion in table.expansions)
+        if error <= accuracy.rtol and count <= FEW_MOMENTS * len(rotor):
+            return table.model, f"with {count} coefficients it is wrong by {error:.1e} {where}"
+    if permeability == 0:
+        return "cuboid", "every recoil permeability is 1, so that the closed form is exact"
+    return "cuboid", f"leaving out the recoil permeability is wrong by only {permeability:.1e} {where}"

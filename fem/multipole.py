@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
@@ -12,7 +12,18 @@ import numpy as np
 
 from ..geometry.box import Array, frozen_array
 from ..geometry.magnet import MU_0, Magnet
-from .harmonics import Coefficients, derivative, field_sizes, irregular, real_terms, regular, regular_gradient
+from .harmonics import (
+    Coefficients,
+    derivative,
+    field_sizes,
+    field_spectrum,
+    irregular,
+    outer_sums,
+    real_terms,
+    regular,
+    regular_derivative,
+    weighted_sums,
+)
 
 FOUR_PI = 4 * np.pi
 
@@ -26,18 +37,14 @@ class MultipoleExpansion:
     center : (3,) m, rotor's frame
     radius : radius of a sphere about the centre that holds all sources, m; the series converges outside it
     coefficients : c_lm (T), complex (L+1, L+1), m ≥ 0
-    uncertainty : estimated error of |B| on that sphere by degree (root mean square), T; it may be longer than
-        the expansion, then its tail tells what the expansion leaves out
     """
 
     center: Array
     radius: float
     coefficients: Coefficients
-    uncertainty: Array = field(default_factory=lambda: np.zeros(0))
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "center", frozen_array(self.center, (3,)))
-        object.__setattr__(self, "uncertainty", frozen_array(self.uncertainty, (len(self.uncertainty),)))
 
     @property
     def degree(self) -> int:
@@ -81,16 +88,23 @@ class MultipoleExpansion:
             [[upper[min(i, j), max(i, j)] for j in range(3)] for i in range(3)],
         )
 
-    def field_error(self, points: Array) -> tuple[Array, Array]:
-        """Estimated absolute errors (n,) of B (T) and of its gradient (T/m) at points (n, 3).
+    def evaluate(self, points: Array) -> tuple[Array, Array]:
+        """B (n, 3) T and ∂B_i/∂x_j (n, 3, 3) T/m at points (n, 3) m, without compilation."""
+        fields = [-derivative(self.coefficients, axis) for axis in range(3)]
+        scaled = (points - self.center) / self.radius
+        slopes = outer_sums([derivative(fields[i], j) / self.radius for i in range(3) for j in range(i, 3)], scaled)
+        return outer_sums(fields, scaled), slopes[:, [[0, 1, 2], [1, 3, 4], [2, 4, 5]]]
 
-        A degree-l part falls as (radius/r)^(l+2), its largest value over a sphere is at most √(2l+1) times the
-        root mean square, and its gradient is √((l+2)(2l+3)) / r times as large.
+    def root_mean_square(self, points: Array) -> tuple[Array, Array]:
+        """Sizes (n,) of B (T) and of its gradient (T/m), as a mean over the spheres on which the points lie.
+
+        A degree-l part falls as (radius/r)^(l+2), and its gradient is √((l+2)(2l+3)) / r times as large.
         """
-        degree = np.arange(len(self.uncertainty))
+        degree = np.arange(self.degree + 1)
         distance = np.linalg.norm(points - self.center, axis=1)[:, None]
-        parts = self.uncertainty * np.sqrt(2 * degree + 1) * (self.radius / distance) ** (degree + 2)
-        return parts.sum(axis=1), (parts * np.sqrt((degree + 2) * (2 * degree + 3)) / distance).sum(axis=1)
+        parts = field_spectrum(self.coefficients) * (self.radius / distance) ** (degree + 2)
+        slopes = parts * np.sqrt((degree + 2) * (2 * degree + 3)) / distance
+        return np.linalg.norm(parts, axis=1), np.linalg.norm(slopes, axis=1)
 
 
 def moments_of_magnetization(
@@ -100,15 +114,20 @@ def moments_of_magnetization(
 
     q_lm = ∫ M · ∇ conj Υ_lm dV, with `points` (n, 3) m, `weights` (n,) m³ and `magnetization` (n, 3) μ0 M in T.
     """
-    scaled = (points - center) / radius
-    harmonics = regular(degree, *scaled.T)
+    harmonics = regular(degree, *((points - center) / radius).T)
     weighted = (weights / (FOUR_PI * radius**3))[:, None] * magnetization
-    result = np.zeros((degree + 1, degree + 1), complex)
-    for l in range(1, degree + 1):
-        for m in range(l + 1):
-            gradient = regular_gradient(harmonics, l, m)
-            result[l, m] = sum(np.sum(weighted[:, a] * np.conj(gradient[a])) for a in range(3))
-    return result
+    potentials = [weighted_sums(harmonics, weighted[:, axis], degree) for axis in range(3)]
+    return sum((np.conj(regular_derivative(p, axis)) for axis, p in enumerate(potentials)), np.zeros(1))
+
+
+def curvature_moments(
+    points: Array, weights: Array, matrix: Array, center: Array, radius: float, degree: int
+) -> Coefficients:
+    """Coefficients (T) ∫ w Σ A_ij ∂_ij conj Υ_lm, with `weights` (n,) w in T m⁴ and `matrix` (3, 3) A, symmetric."""
+    harmonics = regular(degree, *((points - center) / radius).T)
+    sums = weighted_sums(harmonics, weights / (FOUR_PI * radius**4), degree)
+    second = [[regular_derivative(regular_derivative(sums, i), j) for j in range(3)] for i in range(3)]
+    return np.asarray(sum(np.conj(matrix[i, j] * second[i][j]) for i in range(3) for j in range(3)))
 
 
 def uniform_moments(magnet: Magnet, degree: int) -> MultipoleExpansion:

@@ -1,23 +1,21 @@
 """The open space outside a sphere: exact Dirichlet-to-Neumann map by spherical harmonics.
 
 Outside a sphere of radius R a potential of degree l falls as r^-(l+1), so that -∂u/∂r = (l+1)/R u_l. A Robin term 2/R
-is exact for l = 1; what other degrees lack is a matrix of low rank, (l-1)/R on each harmonic up to `degree`.
+is exact for l = 1; what other degrees lack is a matrix of low rank, (l-1)/R on each harmonic up to `degree`. On a part
+of the sphere that mirror planes cut out, only harmonics of the potential's parity take part.
 """
 
 from __future__ import annotations
 
 from typing import Any
 
+import ngsolve as ng
 import numpy as np
-from scipy.special import gammaln
 
 from ..geometry.box import Array
-from .harmonics import Coefficients, regular
+from .harmonics import Coefficients
 from .integration_points import surface_points
-
-FOUR_PI = 4 * np.pi
-HIGHEST_ORDER = 14
-"""Of the surface quadrature: from 16 on NGSolve 6.2.2608 mixes up the points in the trace matrix."""
+from .spherical import FOUR_PI, Keys, orthonormal, orthonormal_keys, outer_coefficients, parity
 
 
 class OpenBoundary:
@@ -30,19 +28,41 @@ class OpenBoundary:
     radius : of the sphere
     degree : highest degree that is treated exactly; higher ones see the Robin term
     order : of the elements
+    planes, signs : mirror planes of the mesh, and whether the potential is even (+1) or odd (-1) there
 
     Attribute `area_error` is the relative error of the area of the meshed sphere, which measures its roundness.
     """
 
-    def __init__(self, mesh: Any, space: Any, radius: float, degree: int, order: int) -> None:
-        surface = surface_points(mesh, "outer", min(2 * order + 4, HIGHEST_ORDER))
-        trace = surface.weighted_trace(space)
+    def __init__(
+        self,
+        mesh: Any,
+        space: Any,
+        radius: float,
+        degree: int,
+        order: int,
+        planes: tuple[int, ...] = (),
+        signs: tuple[int, ...] = (),
+    ) -> None:
+        surface = surface_points(mesh, "outer", 2 * order + 4)
         used = surface.weights > 0
-        self.radius, self.degree = radius, degree
-        self.area_error = abs(float(surface.weights.sum()) / (FOUR_PI * radius**2) - 1)
-        self.unknowns = np.unique(trace[used].indices)
-        harmonics, self._degrees = _orthonormal(degree, surface.points[used])
-        self._projection = np.asarray(trace[used][:, self.unknowns].T @ harmonics)
+        self.radius, self.degree, self.copies = radius, degree, 2 ** len(planes)
+        self.area_error = abs(float(surface.weights.sum()) * self.copies / (FOUR_PI * radius**2) - 1)
+        self.keys: Keys = [
+            key
+            for key in orthonormal_keys(degree)
+            if all(parity(key, axis) == sign for axis, sign in zip(planes, signs, strict=True))
+        ]
+        harmonics = np.zeros((len(used), len(self.keys)))
+        harmonics[used] = orthonormal(self.keys, surface.points[used])
+        self.unknowns = np.nonzero(np.array(space.GetDofs(mesh.Boundaries("outer"))))[0]
+        columns = []
+        for values in harmonics.T:
+            form = ng.LinearForm(space)
+            form += surface.function(values) * space.TestFunction() * surface.measure
+            form.Assemble()
+            columns.append(form.vec.FV().NumPy()[self.unknowns])
+        self._projection = np.stack(columns, axis=1)
+        self._degrees = np.array([l for l, _, _ in self.keys], float)
 
     @property
     def robin(self) -> float:
@@ -51,33 +71,12 @@ class OpenBoundary:
 
     def apply(self, potential: Array) -> Array:
         """What the map adds to the Robin term, as a load vector (unknowns,)."""
-        amplitudes = self._projection.T @ potential[self.unknowns]
+        amplitudes = self.copies * (self._projection.T @ potential[self.unknowns])
         result = np.zeros_like(potential)
         result[self.unknowns] = self._projection @ ((self._degrees - 1) / self.radius**3 * amplitudes)
         return result
 
     def expansion(self, potential: Array) -> Coefficients:
         """Coefficients c_lm of the potential Σ c_lm Θ_lm outside, from its values on the sphere."""
-        amplitudes = iter(self._projection.T @ potential[self.unknowns] / self.radius**2)
-        result = np.zeros((self.degree + 1, self.degree + 1), complex)
-        for l in range(self.degree + 1):
-            for m in range(l + 1):
-                value = next(amplitudes) + (0 if m == 0 else -1j * next(amplitudes))
-                result[l, m] = self.radius ** (l + 1) * (2 * l + 1) / FOUR_PI * value / _norm(l, m)
-        return result
-
-
-def _norm(l: int, m: int) -> float:
-    """Factor that makes Re Υ_lm, and Im Υ_lm if m > 0, orthonormal on the unit sphere."""
-    square = (2 * l + 1) / FOUR_PI * np.exp(gammaln(l - m + 1) + gammaln(l + m + 1))
-    return float(np.sqrt(square if m == 0 else 2 * square))
-
-
-def _orthonormal(degree: int, points: Array) -> tuple[Array, Array]:
-    """Real orthonormal harmonics (n, columns) in the directions of `points` (n, 3), and the degree of each column."""
-    harmonics = regular(degree, *(points / np.linalg.norm(points, axis=1)[:, None]).T)
-    columns, degrees = [], []
-    for (l, m), values in sorted(harmonics.items()):
-        columns += [_norm(l, m) * part for part in ((values.real,) if m == 0 else (values.real, values.imag))]
-        degrees += [l] * (1 if m == 0 else 2)
-    return np.stack(columns, axis=1), np.array(degrees, float)
+        amplitudes = self.copies * (self._projection.T @ potential[self.unknowns]) / self.radius**2
+        return outer_coefficients(amplitudes * self.radius ** (self._degrees + 1), self.keys, self.degree)

@@ -1,59 +1,41 @@
-"""The closed-form field of the remanent polarisation inside the magnets, and its moments.
+"""Moments of the magnetisation that the closed-form field H0 of the remanent polarisation makes in the magnets.
 
-H0 is the field of all magnets with μr = 1. To first order a recoil permeability adds the magnetisation (μr - 1) H0.
+To first order a permeability adds the magnetisation (μ - 1) H0. Its moments are integrals over the faces: with
+H0 = -grad φ and harmonic Υ, ∫ H0·grad Υ dV = -∮ φ ∂Υ/∂n dS, and φ is continuous.
 """
 
 from __future__ import annotations
 
-from functools import lru_cache
+from collections.abc import Sequence
 
 import numpy as np
 
-from ..geometry.box import Array, Box
 from ..geometry.magnet import Magnet
-from .compiled import CompiledField
+from .demagnetization import remanent_potential
 from .harmonics import Coefficients
-from .multipole import moments_of_magnetization
-from .table import RotorTable
-
-NODES = 24
-"""Integration points per axis; degrees up to 31 of a polynomial are far below the error of the logarithms."""
+from .multipole import curvature_moments, moments_of_magnetization
+from .quadrature import enough_nodes, face_rule, volume_rule
 
 
-def remanent_h(magnets: tuple[Magnet, ...], inside: int, points: Array) -> Array:
-    """μ0 H0 (n, 3) T at `points` (n, 3) m in magnet number `inside`, off its edges."""
-    return np.asarray(_closed_form(magnets)(points)[0] - magnets[inside].polarization_in_rotor)
+def induced_moments(body: Magnet, sources: Sequence[Magnet], degree: int) -> Coefficients:
+    """Coefficients (T) of (μ - 1) H0 in a body, about its centre with radius its circumradius.
 
-
-def remanent_moments(magnets: tuple[Magnet, ...], inside: int, degree: int) -> Coefficients:
-    """Coefficients (T) of H0 in magnet number `inside`, about its centre with radius its circumradius.
-
-    Accuracy: 5e-8 of the leading coefficient, from the logarithm of the distance to the edges.
+    Accuracy: round-off for boxes whose axes are parallel or that do not touch.
     """
-    box = magnets[inside].box
-    points, weights = edge_graded_gauss(box, NODES)
-    field = remanent_h(magnets, inside, points)
-    return moments_of_magnetization(points, weights, field, box.center, box.circumradius, degree)
+    box = body.box
+    others = [source.box for source in sources]
+    points, areas = face_rule(box, others, enough_nodes(degree))
+    flux = -remanent_potential(sources, points)[:, None] * areas
+    susceptibility = body.permeability_in_rotor - np.eye(3)
+    sphere = (box.center, box.circumradius)
+    result = moments_of_magnetization(points, np.ones(len(points)), flux @ susceptibility, *sphere, degree)
+    if not body.isotropic:
+        points, weights = volume_rule(box, others, enough_nodes(degree))
+        source = weights * remanent_potential(sources, points)
+        result += curvature_moments(points, source, susceptibility, *sphere, degree)
+    return result
 
 
-def first_order_moments(magnets: tuple[Magnet, ...], inside: int, degree: int) -> Coefficients:
-    """Coefficients (T) of χ H0 / (1 + χ/3), χ = μr - 1: what the permeability adds, to a few per cent of itself."""
-    susceptibility = magnets[inside].recoil_permeability - 1
-    return susceptibility / (1 + susceptibility / 3) * remanent_moments(magnets, inside, degree)
-
-
-def edge_graded_gauss(box: Box, nodes: int) -> tuple[Array, Array]:
-    """Points (n, 3) m and weights (n,) m³ inside the box, pressed towards its faces by x = (3 t - t³)/2.
-
-    The logarithm of the distance from an edge is integrated to about 10 nodes⁻⁶.
-    """
-    t, weights = np.polynomial.legendre.leggauss(nodes)
-    place, weight = (3 * t - t**3) / 2, 1.5 * weights * (1 - t * t)
-    grid = np.stack(np.meshgrid(place, place, place, indexing="ij"), -1).reshape(-1, 3)
-    volume = (weight[:, None, None] * weight[:, None] * weight).ravel() * box.volume / 8
-    return box.center + (grid * box.half_edges) @ box.rotation.T, volume
-
-
-@lru_cache(maxsize=4)
-def _closed_form(magnets: tuple[Magnet, ...]) -> CompiledField:
-    return CompiledField(RotorTable("cuboid", magnets, uniform=magnets).expressions)
+def first_order_moments(body: Magnet, sources: Sequence[Magnet], degree: int) -> Coefficients:
+    """What the permeability of a body adds, to a few per cent of itself: (μ - 1) H0 / (1 + χ/3), χ the largest of μ - 1."""
+    return induced_moments(body, sources, degree) / (1 + body.contrast / 3)

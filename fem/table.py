@@ -18,6 +18,9 @@ from .compiled import CompiledField, FieldExpressions
 from .multipole import MultipoleExpansion
 from .uniform import UniformField
 
+BLUR = 0.5
+"""Share of the root mean square of a doubt that is added to its field."""
+
 
 class RangeError(InputError):
     """A field was asked for where the table does not know it."""
@@ -52,7 +55,8 @@ class RotorTable:
     model : "dipole", "cuboid" or "fem"
     magnets : the bodies, for the range: the field is known outside them
     uniform : those whose closed form (μr = 1) is part of the field
-    expansions : what the closed forms leave out, with its uncertainty by degree
+    expansions : what the closed forms leave out
+    doubts : by cause ("shape", "permeability", "truncation", "discretisation"), the estimated error as a field
     provenance : how the table was made (versions, mesh, order, seconds); texts and numbers
     """
 
@@ -60,6 +64,7 @@ class RotorTable:
     magnets: tuple[Magnet, ...]
     uniform: tuple[Magnet, ...] = ()
     expansions: tuple[MultipoleExpansion, ...] = ()
+    doubts: Mapping[str, tuple[MultipoleExpansion, ...]] = field(default_factory=dict)
     provenance: Mapping[str, str | float] = field(default_factory=dict)
 
     def expressions(self, position: Sequence[hy.expression]) -> FieldExpressions:
@@ -115,13 +120,27 @@ class RotorTable:
         """Estimated relative errors (n,) of B and of its gradient (Frobenius norm)."""
         points = np.asarray(points, float).reshape(-1, 3)
         b, g = self.evaluate(points)
-        errors = [expansion.field_error(points) for expansion in self.expansions]
-        round_off = 1e-13
-        error_b = sum((e[0] for e in errors), np.zeros(len(points)))
-        error_g = sum((e[1] for e in errors), np.zeros(len(points)))
+        error_b, error_g = self.absolute_error(points)
         size_b, size_g = np.linalg.norm(b, axis=1), np.linalg.norm(g, axis=(1, 2))
-        tiny = np.finfo(float).tiny
+        tiny, round_off = np.finfo(float).tiny, 1e-13
         return error_b / (size_b + tiny) + round_off, error_g / (size_g + tiny) + round_off
+
+    def absolute_error(self, points: ArrayLike) -> tuple[Array, Array]:
+        """Estimated errors (n,) of B (T) and of its gradient (T/m).
+
+        The size of each doubt's field there, and a share of its root mean square on spheres about the expansions'
+        centres, because the doubt's own zeros are not those of the error.
+        """
+        points = np.asarray(points, float).reshape(-1, 3)
+        error_b, error_g = np.zeros(len(points)), np.zeros(len(points))
+        for doubts in self.doubts.values():
+            b, g = np.zeros((len(points), 3)), np.zeros((len(points), 3, 3))
+            for doubt in doubts:
+                parts, sizes = doubt.evaluate(points), doubt.root_mean_square(points)
+                b, g = b + parts[0], g + parts[1]
+                error_b, error_g = error_b + BLUR * sizes[0], error_g + BLUR * sizes[1]
+            error_b, error_g = error_b + np.linalg.norm(b, axis=1), error_g + np.linalg.norm(g, axis=(1, 2))
+        return error_b, error_g
 
     def in_range(self, points: ArrayLike) -> NDArray[np.bool_]:
         """Which of the points (n, 3) m lie outside the magnets and where the expansions converge: (n,)."""

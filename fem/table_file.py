@@ -16,7 +16,7 @@ from ..geometry.magnet import Magnet
 from .multipole import MultipoleExpansion
 from .table import RotorTable
 
-FORMAT = "spinlev rotor table 1"
+FORMAT = "spinlev rotor table 2"
 
 
 class TableFileError(ValueError):
@@ -64,36 +64,38 @@ def read_dataset(path: str | Path, expected: str) -> xr.Dataset:
 
 def to_dataset(table: RotorTable) -> xr.Dataset:
     """All numbers of a table with their units."""
-    magnets, expansions = table.magnets, table.expansions
+    magnets, causes = table.magnets, {"field": table.expansions, **table.doubts}
+    expansions = [expansion for group in causes.values() for expansion in group]
     size = max((len(e.coefficients) for e in expansions), default=1)
-    known = max((len(e.uncertainty) for e in expansions), default=1)
     coefficients = np.zeros((len(expansions), size, size), complex)
-    uncertainty = np.zeros((len(expansions), known))
     for k, expansion in enumerate(expansions):
         coefficients[k, : expansion.degree + 1, : expansion.degree + 1] = expansion.coefficients
-        uncertainty[k, : len(expansion.uncertainty)] = expansion.uncertainty
 
     def stack(rows: list[Any], *shape: int) -> np.ndarray:
         return np.array(rows, dtype=float).reshape(len(rows), *shape)
 
     power, axis = ("expansion", "degree", "order"), ("magnet", "axis")
+    across = [m.recoil_permeability if m.isotropic else m.transverse_permeability for m in magnets]
     variables = {
         "magnet_size": (axis, stack([m.box.size for m in magnets], 3), "m"),
         "magnet_center": (axis, stack([m.box.center for m in magnets], 3), "m"),
         "magnet_rotation": (("magnet", "axis", "body_axis"), stack([m.box.rotation for m in magnets], 3, 3), "1"),
         "magnet_polarization": (("magnet", "body_axis"), stack([m.polarization for m in magnets], 3), "T"),
         "magnet_recoil_permeability": (("magnet",), stack([m.recoil_permeability for m in magnets]), "1"),
+        "magnet_transverse_permeability": (("magnet",), stack(across), "1"),
         "magnet_closed_form": (("magnet",), stack([any(m is u for u in table.uniform) for m in magnets]), "1"),
+        "expansion_use": (("expansion",), stack([k for k, group in enumerate(causes.values()) for _ in group]), "1"),
         "expansion_center": (("expansion", "axis"), stack([e.center for e in expansions], 3), "m"),
         "expansion_radius": (("expansion",), stack([e.radius for e in expansions]), "m"),
+        "expansion_degree": (("expansion",), stack([e.degree for e in expansions]), "1"),
         "expansion_real": (power, coefficients.real, "T"),
         "expansion_imag": (power, coefficients.imag, "T"),
-        "expansion_uncertainty": (("expansion", "uncertainty_degree"), uncertainty, "T"),
     }
     attrs = {
         "format": FORMAT,
         "title": "Magnetic field of a rotor: closed forms of cuboids plus solid-harmonic expansions",
         "model": table.model,
+        "expansion_uses": json.dumps(list(causes)),  # "field", and the causes of doubt
         "provenance": json.dumps(dict(table.provenance), sort_keys=True),
     }
     return xr.Dataset({n: xr.Variable(d, v, {"units": u}) for n, (d, v, u) in variables.items()}, attrs=attrs)
@@ -102,24 +104,25 @@ def to_dataset(table: RotorTable) -> xr.Dataset:
 def from_dataset(dataset: xr.Dataset) -> RotorTable:
     """The table of a data set that `to_dataset` made."""
     data = {str(name): variable.values for name, variable in dataset.data_vars.items()}
+    names = ("size", "center", "rotation", "polarization", "recoil_permeability", "transverse_permeability")
     magnets = tuple(
-        Magnet(Box(size, center, rotation), polarization, float(permeability))
-        for size, center, rotation, polarization, permeability in zip(
-            *(data[f"magnet_{n}"] for n in ("size", "center", "rotation", "polarization", "recoil_permeability")),
-            strict=True,
+        Magnet(Box(size, center, rotation), polarization, float(along), float(across))
+        for size, center, rotation, polarization, along, across in zip(
+            *(data[f"magnet_{n}"] for n in names), strict=True
         )
     )
-    expansions = tuple(
-        MultipoleExpansion(center, float(radius), real + 1j * imag, uncertainty)
-        for center, radius, real, imag, uncertainty in zip(
-            *(data[f"expansion_{n}"] for n in ("center", "radius", "real", "imag", "uncertainty")), strict=True
-        )
-    )
+    causes: dict[str, tuple[MultipoleExpansion, ...]] = dict.fromkeys(json.loads(dataset.attrs["expansion_uses"]), ())
+    parts = (data[f"expansion_{n}"] for n in ("use", "center", "radius", "degree", "real", "imag"))
+    for use, center, radius, degree, real, imag in zip(*parts, strict=True):
+        cause, size = list(causes)[int(use)], int(degree) + 1
+        expansion = MultipoleExpansion(center, float(radius), (real + 1j * imag)[:size, :size])
+        causes[cause] = (*causes[cause], expansion)
     return RotorTable(
         model=dataset.attrs["model"],
         magnets=magnets,
         uniform=tuple(m for m, exact in zip(magnets, data["magnet_closed_form"], strict=True) if exact),
-        expansions=expansions,
+        expansions=causes.pop("field"),
+        doubts=causes,
         provenance=json.loads(dataset.attrs["provenance"]),
     )
 

@@ -20,6 +20,11 @@ import numpy as np
 
 from .box import Array, Box, frozen_array
 from .magnet import Magnet
+from .overlap import overlapping_magnets
+
+LARGE = 100.0
+TINY = 1e-7
+"""Lengths in units of the mesh; a gap of a micrometre between centimetres is 1e-4."""
 
 
 @dataclass(frozen=True)
@@ -63,6 +68,7 @@ class MagnetMesh:
     center : (3,) centre of the ball and origin of the mesh's coordinates, m
     unit : length of one unit of the mesh, m: radius of the ball about all magnets
     ball_radius : radius of the ball of air, in units
+    planes : coordinate planes through the centre that cut the ball; only the positive side is meshed
     """
 
     mesh: Any
@@ -70,6 +76,7 @@ class MagnetMesh:
     center: Array
     unit: float
     ball_radius: float
+    planes: tuple[int, ...] = ()
 
     @property
     def elements(self) -> int:
@@ -81,8 +88,19 @@ class MagnetMesh:
         return np.asarray(points * self.unit + self.center)
 
 
-def mesh_magnets(magnets: Sequence[Magnet], settings: MeshSettings | None = None) -> MagnetMesh:
+def mesh_magnets(
+    magnets: Sequence[Magnet],
+    settings: MeshSettings | None = None,
+    planes: tuple[int, ...] = (),
+    edges_of: Sequence[Box] | None = None,
+) -> MagnetMesh:
     """Mesh magnets in a ball of air; they may touch each other.
+
+    Parameters
+    ----------
+    planes : coordinate planes (0: across x, …) that mirror the magnets; only the positive side is meshed. The faces
+        there are the boundaries `plane0`, …
+    edges_of : the boxes at whose edges and corners the field is singular; by default the magnets
 
     Raises
     ------
@@ -92,40 +110,75 @@ def mesh_magnets(magnets: Sequence[Magnet], settings: MeshSettings | None = None
     magnets = tuple(magnets)
     if not magnets:
         raise ValueError("Input magnets must hold at least one magnet; instead received none.")
+    for i, j, depth in overlapping_magnets(magnets):
+        raise ValueError(f"Input magnets must not overlap; instead magnets {i} and {j} do, {depth * 1e3:.3g} mm deep.")
     corners = np.concatenate([magnet.box.corners for magnet in magnets])
     center = (corners.min(axis=0) + corners.max(axis=0)) / 2
     unit = float(np.linalg.norm(corners - center, axis=1).max())
-    solids = [_solid(magnet.box, center, unit) for magnet in magnets]
-    for (i, first), (j, second) in combinations(enumerate(solids), 2):
-        overlap = (first * second).mass
-        if overlap > 1e-9 * min(first.mass, second.mass):
-            volume = overlap * unit**3 * 1e9
-            raise ValueError(f"Input magnets must not overlap; instead magnets {i} and {j} share {volume:.3g} mm³.")
-    for k, (magnet, solid) in enumerate(zip(magnets, solids, strict=True)):
+    kept = _kept_side(planes)
+    solids = []
+    for k, magnet in enumerate(magnets):
+        solid = _solid(magnet.box, center, unit) * kept
         solid.mat(f"magnet{k}")
-        solid.maxh = settings.magnet_size * magnet.box.volume ** (1 / 3) / unit
-    mesh = _generate(solids, settings)
-    return MagnetMesh(mesh, magnets, frozen_array(center, (3,)), unit, settings.ball_radius)
+        solid.maxh = settings.magnet_size * float(np.min(magnet.box.size) * magnet.box.volume ** (1 / 3)) ** 0.5 / unit
+        if solid.solids:
+            solids.append(solid)
+    boxes = [magnet.box for magnet in magnets] if edges_of is None else edges_of
+    scaled = [Box(box.size / unit, (box.center - center) / unit, box.rotation) for box in boxes]
+    mesh = _generate(solids, kept, planes, scaled, settings)
+    return MagnetMesh(mesh, magnets, frozen_array(center, (3,)), unit, settings.ball_radius, planes)
 
 
-def _generate(solids: list[Any], settings: MeshSettings) -> Any:
+def _kept_side(planes: tuple[int, ...]) -> Any:
+    """A box, larger than any ball, on the positive side of the planes."""
+    lower = [0.0 if axis in planes else -LARGE for axis in range(3)]
+    return occ.Box(occ.Pnt(*lower), occ.Pnt(LARGE, LARGE, LARGE))
+
+
+def _generate(
+    solids: list[Any], kept: Any, planes: tuple[int, ...], boxes: Sequence[Box], settings: MeshSettings
+) -> Any:
     air = occ.Sphere(occ.Pnt(0, 0, 0), settings.ball_radius)
     air.faces.name = "outer"
+    air = air * kept
     for solid in solids:
         solid.faces.name = "faces"
         air = air - solid
     air.mat("air")
     shape = occ.Glue([*solids, air])
+    for face in shape.faces:
+        for axis in planes:
+            if abs(face.center[axis]) < TINY:
+                face.name = f"plane{axis}"
     if settings.hp_layers:
-        for solid in shape.solids:
-            if solid.name != "air":
-                for part in (*solid.edges, *solid.vertices):
-                    part.hpref = 1
+        _mark_singular(shape, boxes)
     mesh = ng.Mesh(occ.OCCGeometry(shape).GenerateMesh(maxh=settings.air_size, grading=settings.grading))
     if settings.hp_layers:
         mesh.RefineHP(settings.hp_layers, settings.hp_factor)
     mesh.Curve(settings.curve_order)
     return mesh
+
+
+def _mark_singular(shape: Any, boxes: Sequence[Box]) -> None:
+    """Mark the edges of boxes, and the points where edges of different directions meet, for hp-refinement."""
+    for edge in shape.edges:
+        if _edge_directions(edge.center, boxes):
+            edge.hpref = 1
+    for vertex in shape.vertices:
+        directions = _edge_directions(vertex.p, boxes)
+        if any(abs(first @ second) < 1 - TINY for first, second in combinations(directions, 2)):
+            vertex.hpref = 1
+
+
+def _edge_directions(point: Any, boxes: Sequence[Box]) -> list[Array]:
+    """Directions of the edges of boxes on which a point lies."""
+    found = []
+    for box in boxes:
+        excess = np.abs(box.to_body([point.x, point.y, point.z])) - box.half_edges
+        flush = np.abs(excess) < TINY
+        if excess.max() < TINY and flush.sum() >= 2:
+            found += [box.rotation[:, axis] for axis in range(3) if np.delete(flush, axis).all()]
+    return found
 
 
 def _solid(box: Box, center: Array, unit: float) -> Any:

@@ -1,0 +1,113 @@
+"""The field of a whole rotor at one level of refinement: symmetry, parity parts, moments."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..geometry.box import Array, Box
+from ..geometry.magnet import Magnet
+from ..geometry.mesh import MagnetMesh, MeshSettings, mesh_magnets
+from ..geometry.symmetry import find_symmetry, parity_parts
+from .harmonics import Coefficients
+from .magnetostatics import Formulation, assemble, solve
+from .moments import reaction_moments, trace_moments
+from .multipole import MultipoleExpansion
+from .spherical import turned
+
+
+@dataclass(frozen=True)
+class Refinement:
+    """How fine a solution is.
+
+    Parameters
+    ----------
+    order : of the elements
+    mesh : the mesh's settings
+    boundary_degree : to which the outer boundary is exactly open
+    """
+
+    order: int
+    mesh: MeshSettings
+    boundary_degree: int
+
+
+@dataclass(frozen=True, eq=False)
+class RotorSolution:
+    """Expansions of ψ's field outside, in the rotor's frame.
+
+    Parameters
+    ----------
+    coefficients : c_lm (T), one per piece about its centre in `split`, one about the mesh's in `direct`
+    spheres : centre (3,) m and radius m of every expansion, in the rotor's frame
+    mesh : of the part of space that the mirror planes leave, in their frame
+    unknowns : number of unknowns
+    area_error : relative error of the area of the outer sphere
+    """
+
+    coefficients: tuple[Coefficients, ...]
+    spheres: tuple[tuple[Array, float], ...]
+    mesh: MagnetMesh
+    unknowns: int
+    area_error: float
+
+    def expansions(self, coefficients: Sequence[Coefficients]) -> list[MultipoleExpansion]:
+        """Expansions about the same spheres with other coefficients."""
+        return [MultipoleExpansion(*sphere, c) for sphere, c in zip(self.spheres, coefficients, strict=True)]
+
+
+def solve_rotor(
+    magnets: Sequence[Magnet],
+    refinement: Refinement,
+    formulation: Formulation = "split",
+    degree: int = 1,
+    pieces: Sequence[Sequence[Magnet]] | None = None,
+    use_symmetry: bool = True,
+) -> RotorSolution:
+    """Solve for every parity part of the polarisation and add up.
+
+    Parameters
+    ----------
+    degree : of the moments in `split`, where they are those of -(μ - 1) ∇ψ; in `direct` it is the boundary's
+    pieces : of every magnet, each with its own expansion; by default the magnets
+    use_symmetry : whether to mesh only one side of the mirror planes
+
+    Raises
+    ------
+    ConvergenceError : the iteration for the open boundary stalls
+    """
+    bodies = [piece for whole in pieces for piece in whole] if pieces else list(magnets)
+    symmetry = find_symmetry(magnets)
+    planes = symmetry.planes if use_symmetry else ()
+    seen = [symmetry.to_frame(magnet) for magnet in magnets]
+    mesh = mesh_magnets([symmetry.to_frame(b) for b in bodies], refinement.mesh, planes, [m.box for m in seen])
+    system = assemble(mesh, refinement.order)
+    total: list[Coefficients] = []
+    area_error = 0.0
+    for signs, polarizations in parity_parts(seen, planes):
+        sources = [_polarized(magnet, j) for magnet, j in zip(seen, polarizations, strict=True)]
+        solution = solve(system, sources, formulation, refinement.boundary_degree, signs)
+        area_error = solution.boundary.area_error
+        part = [trace_moments(solution)] if formulation == "direct" else list(reaction_moments(solution, degree))
+        total = [a + b for a, b in zip(total, part, strict=True)] if total else part
+    spheres = tuple((body.box.center, body.box.circumradius) for body in bodies)
+    size = degree
+    if formulation == "direct":
+        spheres, size = ((symmetry.center + symmetry.axes @ mesh.center, mesh.unit),), refinement.boundary_degree
+    nothing = [np.zeros((size + 1, size + 1), complex)] * len(spheres)
+    coefficients = tuple(turned(c, symmetry.axes) for c in total or nothing)
+    return RotorSolution(coefficients, spheres, mesh, system.unknowns, area_error)
+
+
+def _polarized(magnet: Magnet, polarization: Array) -> Magnet:
+    """A magnet of the same shape with another polarisation (3,) T, frame of its box; a source, so without permeability."""
+    box = Box(magnet.box.size, magnet.box.center, magnet.box.rotation)
+    return replace(
+        magnet,
+        box=box,
+        polarization=box.rotation.T @ polarization,
+        recoil_permeability=1.0,
+        transverse_permeability=None,
+    )
