@@ -13,10 +13,6 @@ from ..geometry.box import Array
 FieldExpressions = tuple[list[hy.expression], list[list[hy.expression]]]
 """B_i (T) and ∂B_i/∂x_j (T/m), the latter symmetric."""
 
-SYMMETRIC = np.array([[3, 4, 5], [4, 6, 7], [5, 7, 8]])
-"""Where the entries of a symmetric 3 × 3 matrix lie among the nine outputs."""
-
-
 class CompiledField:
     """B and its gradient at points.
 
@@ -28,10 +24,23 @@ class CompiledField:
     def __init__(self, build: Callable[[Sequence[hy.expression]], FieldExpressions]) -> None:
         variables = hy.make_vars("x", "y", "z")
         field, gradient = build(variables)
-        self._function = hy.cfunc([*field, *(gradient[i][j] for i in range(3) for j in range(i, 3))], variables)
+        symmetric = [gradient[min(i, j)][max(i, j)] for i in range(3) for j in range(3)]
+        self._function = hy.cfunc([*field, *symmetric], variables)
+
+    def rows(self, columns: Array) -> Array:
+        """The three components of B (T) and the nine of its gradient (T/m): (12, n) at `columns` (3, n), m."""
+        return np.asarray(self._function(columns))
 
     def __call__(self, points: ArrayLike) -> tuple[Array, Array]:
         """B (n, 3) in T and ∂B_i/∂x_j (n, 3, 3) in T/m at `points` (n, 3), m."""
-        inputs = np.ascontiguousarray(np.asarray(points, float).reshape(-1, 3).T)
-        values = self._function(inputs)
-        return values[:3].T, np.moveaxis(values[SYMMETRIC], -1, 0)
+        return unpacked(self.rows(as_columns(points)))
+
+
+def as_columns(points: ArrayLike) -> Array:
+    """Points (n, 3) as contiguous (3, n)."""
+    return np.ascontiguousarray(np.asarray(points, float).reshape(-1, 3).T)
+
+
+def unpacked(rows: Array) -> tuple[Array, Array]:
+    """B (n, 3) and its gradient (n, 3, 3) as views of (12, n)."""
+    return rows[:3].T, np.moveaxis(rows[3:].reshape(3, 3, -1), -1, 0)

@@ -19,6 +19,7 @@ Potential Theory (1929), ch. III; for magnets see Z. J. Yang et al., Supercond. 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from itertools import product
 from typing import Any
 
@@ -33,6 +34,27 @@ SIGNS = (-1, 1)
 FOUR_PI = 4 * np.pi
 
 
+@dataclass(frozen=True)
+class _Edge:
+    """An edge of length L seen from a point: r1 + r2, its square less L², and two reciprocals."""
+
+    length: float
+    reach: Expression
+    gap: Expression
+    reciprocal: Expression
+    inverse_ends: Expression
+
+    @property
+    def ratio(self) -> Expression:
+        """L / (r1 + r2)."""
+        return self.length * self.gap * self.reciprocal
+
+    @property
+    def slope(self) -> Expression:
+        """∂Λ/∂u over u, u being a coordinate across the edge."""
+        return -2.0 * self.length * self.inverse_ends * self.reach * self.reach * self.reciprocal
+
+
 class _Corners:
     """Corner vectors and distances of one cuboid seen from one position, shared by all the sums."""
 
@@ -43,48 +65,56 @@ class _Corners:
         self.distance: dict[tuple[int, ...], Expression] = {
             (i, j, k): hy.sqrt(square[0][i] + square[1][j] + square[2][k]) for i, j, k in product(SIGNS, repeat=3)
         }
+        self.inverse = {corner: 1.0 / r for corner, r in self.distance.items()}
 
-    def edges(self, first: int, second: int) -> list[tuple[int, int, Expression, Expression]]:
-        """The four edges parallel to the third axis: their two signs and the distances of both ends."""
+    def edge(self, first: int, second: int, i: int, j: int) -> _Edge:
+        """The edge parallel to the third axis that has the signs i and j across the other two."""
         third = 3 - first - second
-        found = []
-        for i, j in product(SIGNS, repeat=2):
-            ends = []
-            for k in SIGNS:
-                key = [0, 0, 0]
-                key[first], key[second], key[third] = i, j, k
-                ends.append(self.distance[tuple(key)])
-            found.append((i, j, ends[0], ends[1]))
-        return found
+        ends = []
+        for k in SIGNS:
+            key = [0, 0, 0]
+            key[first], key[second], key[third] = i, j, k
+            ends.append(tuple(key))
+        reach, length = self.distance[ends[0]] + self.distance[ends[1]], 2 * self.half_edges[third]
+        gap = reach * reach - length * length
+        return _Edge(length, reach, gap, 1.0 / (reach * gap), self.inverse[ends[0]] * self.inverse[ends[1]])
 
     def solid_angle(self, axis: int) -> Expression:
         """4π T_aa: difference of the solid angles of the two faces across `axis`."""
+        return hy.sum([i * j * self._corner_pair(axis, i, j) for i, j in product(SIGNS, repeat=2)])
+
+    def _corner_pair(self, axis: int, i: int, j: int) -> Expression:
+        """Σ_k k atan2(v w, u r), as the angle of one product of complex numbers."""
         second, third = (axis + 1) % 3, (axis + 2) % 3
-        terms = []
-        for signs, r in self.distance.items():
-            across, v, w = (self.offset[a][signs[a]] for a in (axis, second, third))
-            terms.append(signs[0] * signs[1] * signs[2] * hy.atan2(v * w, across * r))
-        return hy.sum(terms)
+        across, v = self.offset[axis][i], self.offset[second][j]
+        parts = []
+        for k in SIGNS:
+            key = [0, 0, 0]
+            key[axis], key[second], key[third] = i, j, k
+            parts.append((across * self.distance[tuple(key)], v * self.offset[third][k]))
+        (real_before, imaginary_before), (real, imaginary) = parts
+        return hy.atan2(
+            imaginary * real_before - real * imaginary_before, real * real_before + imaginary * imaginary_before
+        )
 
-    def edge_sum(self, first: int, second: int) -> Expression:
-        """4π T_ab for a ≠ b: sum of Λ over the edges parallel to the third axis."""
-        length = 2 * self.half_edges[3 - first - second]
-        return hy.sum([i * j * 2.0 * hy.atanh(length / (r1 + r2)) for i, j, r1, r2 in self.edges(first, second)])
+    def edges(self, first: int, second: int) -> tuple[Expression, Expression, Expression]:
+        """4π T_ab for a ≠ b, Σ_ij ij Λ over the edges parallel to the third axis, and its derivatives along a and b.
 
-    def edge_gradients(self, first: int, second: int) -> tuple[Expression, Expression]:
-        """Derivatives of `edge_sum` along `first` and along `second`."""
-        length = 2 * self.half_edges[3 - first - second]
-        along_first, along_second = [], []
-        for i, j, r1, r2 in self.edges(first, second):
-            reach = r1 + r2
-            slope = (-2.0 * length * i * j) * reach / (r1 * r2 * (reach * reach - length * length))
-            along_first.append(slope * self.offset[first][i])
-            along_second.append(slope * self.offset[second][j])
-        return hy.sum(along_first), hy.sum(along_second)
+        The four Λ become one inverse hyperbolic tangent by its addition theorem.
+        """
+        edges = {(i, j): self.edge(first, second, i, j) for i, j in product(SIGNS, repeat=2)}
+        lower, upper = (_difference((edges[i, 1].ratio, 1.0), (edges[i, -1].ratio, 1.0)) for i in SIGNS)
+        numerator, denominator = _difference(upper, lower)
+        slopes = {signs: signs[0] * signs[1] * edge.slope for signs, edge in edges.items()}
+        return (
+            2.0 * hy.atanh(numerator / denominator),
+            hy.sum([slope * self.offset[first][i] for (i, _), slope in slopes.items()]),
+            hy.sum([slope * self.offset[second][j] for (_, j), slope in slopes.items()]),
+        )
 
     def mixed(self) -> Expression:
         """4π ∂_z T_xy."""
-        return hy.sum([(-float(i * j * k)) / r for (i, j, k), r in self.distance.items()])
+        return hy.sum([-float(i * j * k) * inverse for (i, j, k), inverse in self.inverse.items()])
 
 
 def cuboid_field(
@@ -115,8 +145,7 @@ def cuboid_field(
     third: dict[tuple[int, ...], Expression] = {(0, 1, 2): corners.mixed()}
     for a, b in ((0, 1), (0, 2), (1, 2)):
         if a in strength or b in strength:
-            second[a, b] = corners.edge_sum(a, b)
-            third[a, a, b], third[a, b, b] = corners.edge_gradients(a, b)
+            second[a, b], third[a, a, b], third[a, b, b] = corners.edges(a, b)
     for axis in strength:
         b, c = (other for other in range(3) if other != axis)
         third[axis, axis, axis] = -third[_sorted(axis, b, b)] - third[_sorted(axis, c, c)]
@@ -125,6 +154,11 @@ def cuboid_field(
         [hy.sum([s * third[_sorted(axis, i, j)] for axis, s in strength.items()]) for j in range(3)] for i in range(3)
     ]
     return field, gradient
+
+
+def _difference(a: tuple[Expression, Expression], b: tuple[Expression, Expression]) -> tuple[Expression, Expression]:
+    """Of fractions (numerator, denominator): artanh a - artanh b = artanh of this."""
+    return a[0] * b[1] - b[0] * a[1], a[1] * b[1] - a[0] * b[0]
 
 
 def _sorted(*indices: int) -> tuple[int, ...]:

@@ -14,9 +14,9 @@ from numpy.typing import ArrayLike, NDArray
 from ..geometry.box import Array
 from ..geometry.input_error import InputError
 from ..geometry.magnet import Magnet
-from .compiled import CompiledField, FieldExpressions
+from .compiled import CompiledField, FieldExpressions, as_columns, unpacked
 from .multipole import MultipoleExpansion
-from .uniform import UniformField
+from .uniform import UniformField, squared_distance
 
 BLUR = 0.5
 """Share of the root mean square of a doubt that is added to its field."""
@@ -81,7 +81,12 @@ class RotorTable:
         return tuple(UniformField(magnet) for magnet in self.uniform)
 
     @cached_property
-    def _compiled_expansions(self) -> tuple[CompiledField, ...]:
+    def _near(self) -> CompiledField:
+        return CompiledField(self.expressions)
+
+    @cached_property
+    def _far(self) -> tuple[CompiledField, ...]:
+        """The parts one by one, where the closed forms have to give way to moments."""
         return tuple(CompiledField(expansion.expressions) for expansion in self.expansions)
 
     def evaluate(self, points: ArrayLike) -> tuple[Array, Array]:
@@ -91,20 +96,19 @@ class RotorTable:
         ------
         RangeError : a point lies in a magnet or where an expansion does not converge
         """
-        points = np.asarray(points, float).reshape(-1, 3)
-        outside = self.in_range(points)
+        columns = as_columns(points)
+        outside = self._in_range(columns)
         if not outside.all():
-            where = ", ".join(f"{c * 1e3:.6g}" for c in points[int(np.argmin(outside))])
+            where = ", ".join(f"{c * 1e3:.6g}" for c in columns[:, int(np.argmin(outside))])
             raise RangeError(
                 f"Input points must lie outside the magnets{self._beyond()}; instead received a point at ({where}) mm."
             )
-        parts = [part.evaluate(points) for part in self._closed_forms]
-        parts += [part(points) for part in self._compiled_expansions]
-        b, g = np.zeros((len(points), 3)), np.zeros((len(points), 3, 3))
-        for field_part, gradient_part in parts:
-            b += field_part
-            g += gradient_part
-        return b, g
+        if not any(form.is_far(columns).any() for form in self._closed_forms):
+            return unpacked(self._near.rows(columns))
+        rows = np.zeros((12, columns.shape[1]))
+        for part in (*self._closed_forms, *self._far):
+            rows += part.rows(columns)
+        return unpacked(rows)
 
     @property
     def moment(self) -> Array:
@@ -144,10 +148,14 @@ class RotorTable:
 
     def in_range(self, points: ArrayLike) -> NDArray[np.bool_]:
         """Which of the points (n, 3) m lie outside the magnets and where the expansions converge: (n,)."""
-        points = np.asarray(points, float).reshape(-1, 3)
-        outside = np.ones(len(points), bool)
+        return self._in_range(as_columns(points))
+
+    def _in_range(self, columns: Array) -> NDArray[np.bool_]:
+        outside = np.ones(columns.shape[1], bool)
         for magnet in self.magnets:
-            outside &= magnet.box.distance(points) >= 0
+            near = squared_distance(columns, magnet.box.center) < magnet.box.circumradius**2
+            outside[near] &= magnet.box.distance(columns[:, near].T) >= 0
         for expansion in self.expansions:
-            outside &= np.linalg.norm(points - expansion.center, axis=1) > expansion.nearest
+            if expansion.nearest:
+                outside &= squared_distance(columns, expansion.center) > expansion.nearest**2
         return outside

@@ -7,6 +7,7 @@ from functools import cached_property
 
 import heyoka as hy
 import numpy as np
+from numpy.typing import NDArray
 
 from ..geometry.box import Array
 from ..geometry.magnet import Magnet
@@ -48,15 +49,22 @@ class UniformField:
     def _far(self) -> CompiledField:
         return CompiledField(uniform_moments(self.magnet, FAR_DEGREE).expressions)
 
-    def evaluate(self, points: Array) -> tuple[Array, Array]:
-        """B (n, 3) T and ∂B_i/∂x_j (n, 3, 3) T/m at points (n, 3) m; 1e-13 of B at any distance."""
+    def rows(self, columns: Array) -> Array:
+        """B (T) and its gradient (T/m), (12, n), at `columns` (3, n) m; 1e-13 of B at any distance."""
+        far = self.is_far(columns)
+        found = np.empty((12, columns.shape[1]))
+        for chosen, field in ((~far, self._near), (far, self._far)):
+            if chosen.any():
+                found[:, chosen] = field.rows(np.ascontiguousarray(columns[:, chosen]))
+        return found
+
+    def is_far(self, columns: Array) -> NDArray[np.bool_]:
+        """Which of `columns` (3, n) m are so far away that moments are the more exact: (n,)."""
         box = self.magnet.box
-        far = np.linalg.norm(points - box.center, axis=1) > FAR * box.circumradius
-        if not far.any():
-            return self._near(points)
-        if far.all():
-            return self._far(points)
-        b, g = np.empty((len(points), 3)), np.empty((len(points), 3, 3))
-        b[~far], g[~far] = self._near(points[~far])
-        b[far], g[far] = self._far(points[far])
-        return b, g
+        return squared_distance(columns, box.center) > (FAR * box.circumradius) ** 2
+
+
+def squared_distance(columns: Array, center: Array) -> Array:
+    """Squared distances (n,) m² of `columns` (3, n) m from a point."""
+    x, y, z = columns - center[:, None]
+    return np.asarray(x * x + y * y + z * z)
