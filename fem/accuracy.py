@@ -43,7 +43,8 @@ def places(magnets: tuple[Magnet, ...], clearance: float) -> tuple[Array, Array]
     """Points (n, 3) m at which errors are looked at, and the scale (n,) of B (T) there.
 
     They lie at a distance `clearance` from the magnets and farther out. The scale is that of the magnets' dipoles, which
-    is right to a few per cent, but at least a third of its median at like distances, where fields cancel.
+    is right to a few per cent, but at least a third of its median at like distances, where fields cancel;
+    1 T if nothing is magnetised.
     """
     size = max(float(np.linalg.norm(m.box.corners - magnets[0].box.center, axis=1).max()) for m in magnets)
     directions = np.random.default_rng(0).normal(size=(150, 3))
@@ -55,7 +56,7 @@ def places(magnets: tuple[Magnet, ...], clearance: float) -> tuple[Array, Array]
         outside = np.all([magnet.box.distance(shell) >= offset * (1 - 1e-6) for magnet in magnets], axis=0)
         field = np.linalg.norm(sum(dipole.evaluate(shell[outside])[0] for dipole in dipoles), axis=1)
         points.append(shell[outside])
-        scales.append(np.maximum(field, np.median(field) / 3))
+        scales.append(np.maximum(field, np.median(field) / 3) if field.any() else np.ones(len(field)))
     return np.concatenate(points), np.concatenate(scales)
 
 

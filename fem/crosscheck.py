@@ -13,7 +13,8 @@ from skfem.helpers import dot, grad
 from ..geometry.box import Array
 from ..geometry.mesh import MagnetMesh, to_meshio
 from .magnetostatics import Formulation
-from .remanent import edge_graded_gauss, remanent_h
+from .demagnetization import remanent_field
+from .quadrature import volume_rule
 
 
 def magnet_dipoles(mesh: MagnetMesh, formulation: Formulation = "split") -> Array:
@@ -59,7 +60,7 @@ def _source(mesh: MagnetMesh, k: int, formulation: Formulation, inside: skfem.Ba
     magnet = mesh.magnets[k]
     if formulation == "direct":
         return np.broadcast_to(magnet.polarization_in_rotor[:, None, None], (3, *points.shape[:-1]))
-    field = remanent_h(mesh.magnets, k, mesh.to_meter(points.reshape(-1, 3))).reshape(points.shape)
+    field = remanent_field(mesh.magnets, mesh.to_meter(points.reshape(-1, 3))).reshape(points.shape)
     return (magnet.recoil_permeability - 1) * np.moveaxis(field, -1, 0)
 
 
@@ -69,7 +70,7 @@ def _dipole(mesh: MagnetMesh, k: int, formulation: Formulation, inside: skfem.Ba
     if formulation == "direct":
         closed = magnet.polarization_in_rotor * magnet.box.volume
     else:
-        points, weights = edge_graded_gauss(magnet.box, 24)
-        closed = susceptibility * (weights @ remanent_h(mesh.magnets, k, points))
+        points, weights = volume_rule(magnet.box, [source.box for source in mesh.magnets], 24)
+        closed = susceptibility * (weights @ remanent_field(mesh.magnets, points))
     slope = np.asarray(inside.interpolate(potential).grad)
     return np.asarray(closed - susceptibility * np.sum(slope * inside.dx, axis=(1, 2)) * mesh.unit**3)

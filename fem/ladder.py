@@ -20,13 +20,14 @@ import numpy as np
 
 from ..geometry.box import Array
 from ..geometry.magnet import Magnet
+from ..geometry.gaps import largest_shift
 from ..geometry.mesh import MeshSettings
 from ..geometry.pieces import CONVERGENCE, cut_magnets
 from .accuracy import Accuracy, places
 from .multipole import MultipoleExpansion, without_noise
 from .remanent import induced_moments
 from .rotor_solution import Refinement, RotorSolution, solve_rotor
-from .table import RotorTable
+from .table import KNOWN, RotorTable
 from .trim import trimmed
 
 RUNGS = (2, 3, 4, 5, 6, 7, 8)
@@ -37,6 +38,8 @@ SLOWEST_RATE = 0.75
 SAFETY = 2.0
 """Factor on the extrapolated difference."""
 HIGHEST_DEGREE = 44
+GAP_SAFETY = 10.0
+"""Change of the reaction, relative to gap over edge, that a closed gap makes."""
 
 
 class AccuracyWarning(UserWarning):
@@ -75,8 +78,13 @@ def fem_table(
     whole = solution.expansions(
         [without_noise(a + b, 1e-15) for a, b in zip(closed, solution.coefficients, strict=True)]
     )
-    kept, dropped = trimmed(whole, points, scale * accuracy.rtol / 3)
-    doubts = {"truncation": used(dropped), "tail": used(tail(whole)), "discretisation": used(doubt)}
+    doubts = {"discretisation": used(doubt), "tail": used(tail(whole)), "gap": used(gap_doubt(magnets, solution))}
+    doubts = {cause: parts for cause, parts in doubts.items() if parts}
+    rest = RotorTable("fem", magnets, magnets, (), doubts).absolute_error(points)[0]
+    allowed = 0.99 * np.maximum(scale * accuracy.rtol - rest, scale * accuracy.rtol / 20)
+    kept, dropped = trimmed(whole, points, allowed)
+    if any(part.coefficients.any() for part in dropped):
+        doubts[KNOWN] = used(dropped)
     table = RotorTable("fem", magnets, magnets, used(kept), doubts)
     reached = float(np.max(table.absolute_error(points)[0] / scale))
     if reached > accuracy.rtol:
@@ -140,6 +148,13 @@ def tail(expansions: Sequence[MultipoleExpansion]) -> list[MultipoleExpansion]:
         last[:-2] = 0.0
         found.append(MultipoleExpansion(expansion.center, expansion.radius, last / (CONVERGENCE**2 - 1)))
     return found
+
+
+def gap_doubt(magnets: tuple[Magnet, ...], solution: RotorSolution) -> list[MultipoleExpansion]:
+    """What the gaps that were closed for the mesh change: they are to the magnets as the error to the reaction."""
+    smallest = min(float(magnet.box.size.min()) for magnet in magnets)
+    factor = GAP_SAFETY * largest_shift(magnets) / smallest
+    return solution.expansions([factor * c for c in solution.coefficients])
 
 
 def provenance(

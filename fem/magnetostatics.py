@@ -20,6 +20,7 @@ from typing import Any, Literal
 
 import ngsolve as ng
 import numpy as np
+from netgen.meshing import NgException
 from scipy.sparse.linalg import LinearOperator, cg
 
 from ..geometry.box import Array
@@ -30,6 +31,10 @@ from .integration_points import volume_points
 from .open_boundary import OpenBoundary
 
 Formulation = Literal["split", "direct"]
+
+
+class MeshError(RuntimeError):
+    """The elements of a mesh do not match each other."""
 
 
 class ConvergenceError(RuntimeError):
@@ -78,7 +83,12 @@ class Solution:
 
 
 def assemble(mesh: MagnetMesh, order: int) -> System:
-    """Assemble ∫ ∇v·μ∇ψ with elements of degree `order`."""
+    """Assemble ∫ ∇v·μ∇ψ with elements of degree `order`.
+
+    Raises
+    ------
+    MeshError : layers of elements do not match
+    """
     space = ng.H1(mesh.mesh, order=order)
     trial, test = space.TnT()
     stiffness = ng.BilinearForm(space, symmetric=True, condense=True)
@@ -90,7 +100,10 @@ def assemble(mesh: MagnetMesh, order: int) -> System:
         permeability = mesh.mesh.MaterialCF(tensors, default=ng.Id(3))
     stiffness += (permeability * ng.grad(trial)) * ng.grad(test) * ng.dx
     stiffness += 2 / mesh.ball_radius * trial * test * ng.ds("outer")
-    stiffness.Assemble()
+    try:
+        stiffness.Assemble()
+    except NgException as error:  # netgen refined a face otherwise from either side
+        raise MeshError(str(error)) from error
     return System(mesh, order, space, stiffness)
 
 

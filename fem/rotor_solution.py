@@ -8,11 +8,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..geometry.box import Array, Box
+from ..geometry.gaps import closing_shifts, moved
 from ..geometry.magnet import Magnet
 from ..geometry.mesh import MagnetMesh, MeshSettings, mesh_magnets
 from ..geometry.symmetry import find_symmetry, parity_parts
 from .harmonics import Coefficients
-from .magnetostatics import Formulation, assemble, solve
+from .magnetostatics import Formulation, MeshError, System, assemble, solve
 from .moments import reaction_moments, trace_moments
 from .multipole import MultipoleExpansion
 from .spherical import turned
@@ -71,19 +72,23 @@ def solve_rotor(
     Parameters
     ----------
     degree : of the moments in `split`, where they are those of -(μ - 1) ∇ψ; in `direct` it is the boundary's
-    pieces : of every magnet, each with its own expansion; by default the magnets
+    pieces : of every magnet, each with its own expansion; by default the magnets. Gaps too narrow for elements are closed
     use_symmetry : whether to mesh only one side of the mirror planes
 
     Raises
     ------
     ConvergenceError : the iteration for the open boundary stalls
+    MeshError : no mesh of the magnets fits together
     """
-    bodies = [piece for whole in pieces for piece in whole] if pieces else list(magnets)
-    symmetry = find_symmetry(magnets)
+    cut = pieces or [(magnet,) for magnet in magnets]
+    shifts = closing_shifts(magnets)
+    closed = [moved(magnet, shift) for magnet, shift in zip(magnets, shifts, strict=True)]
+    symmetry = find_symmetry(closed)
     planes = symmetry.planes if use_symmetry else ()
-    seen = [symmetry.to_frame(magnet) for magnet in magnets]
-    mesh = mesh_magnets([symmetry.to_frame(b) for b in bodies], refinement.mesh, planes, [m.box for m in seen])
-    system = assemble(mesh, refinement.order)
+    seen = [symmetry.to_frame(magnet) for magnet in closed]
+    bodies = [piece for whole in cut for piece in whole]
+    meshed = [symmetry.to_frame(moved(p, s)) for whole, s in zip(cut, shifts, strict=True) for p in whole]
+    mesh, system = _meshed_system(meshed, refinement, planes, [magnet.box for magnet in seen])
     total: list[Coefficients] = []
     area_error = 0.0
     for signs, polarizations in parity_parts(seen, planes):
@@ -99,6 +104,19 @@ def solve_rotor(
     nothing = [np.zeros((size + 1, size + 1), complex)] * len(spheres)
     coefficients = tuple(turned(c, symmetry.axes) for c in total or nothing)
     return RotorSolution(coefficients, spheres, mesh, system.unknowns, area_error)
+
+
+def _meshed_system(
+    bodies: list[Magnet], refinement: Refinement, planes: tuple[int, ...], edges_of: list[Box]
+) -> tuple[MagnetMesh, System]:
+    """Mesh and matrix, with fewer layers at the edges where the mesher cannot match them (an edge within a face)."""
+    for layers in range(refinement.mesh.hp_layers, -1, -1):
+        mesh = mesh_magnets(bodies, replace(refinement.mesh, hp_layers=layers), planes, edges_of)
+        try:
+            return mesh, assemble(mesh, refinement.order)
+        except MeshError:
+            continue
+    raise MeshError("The mesh of the magnets does not fit together; change their positions slightly.")
 
 
 def _polarized(magnet: Magnet, polarization: Array) -> Magnet:

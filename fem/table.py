@@ -20,6 +20,8 @@ from .uniform import UniformField, squared_distance
 
 BLUR = 0.5
 """Share of the root mean square of a doubt that is added to its field."""
+KNOWN = "truncation"
+"""What is cut off an expansion is known exactly."""
 
 
 class RangeError(InputError):
@@ -132,18 +134,19 @@ class RotorTable:
     def absolute_error(self, points: ArrayLike) -> tuple[Array, Array]:
         """Estimated errors (n,) of B (T) and of its gradient (T/m).
 
-        The size of each doubt's field there, and a share of its root mean square on spheres about the expansions'
-        centres, because the doubt's own zeros are not those of the error.
+        The size of each doubt's field there and, but for `KNOWN` ones, a share of its root mean square on spheres about
+        the expansions' centres, because the doubt's own zeros are not those of the error.
         """
         points = np.asarray(points, float).reshape(-1, 3)
         error_b, error_g = np.zeros(len(points)), np.zeros(len(points))
-        for doubts in self.doubts.values():
-            b, g = np.zeros((len(points), 3)), np.zeros((len(points), 3, 3))
-            for doubt in doubts:
-                parts, sizes = doubt.evaluate(points), doubt.root_mean_square(points)
-                b, g = b + parts[0], g + parts[1]
-                error_b, error_g = error_b + BLUR * sizes[0], error_g + BLUR * sizes[1]
-            error_b, error_g = error_b + np.linalg.norm(b, axis=1), error_g + np.linalg.norm(g, axis=(1, 2))
+        for cause, doubts in self.doubts.items():
+            blur = 0.0 if cause == KNOWN else BLUR
+            fields = [doubt.evaluate(points) for doubt in doubts]
+            sizes = [doubt.root_mean_square(points) for doubt in doubts]
+            error_b += np.linalg.norm(sum(b for b, _ in fields), axis=1)
+            error_g += np.linalg.norm(sum(g for _, g in fields), axis=(1, 2))
+            error_b += blur * np.linalg.norm([b for b, _ in sizes], axis=0)
+            error_g += blur * np.linalg.norm([g for _, g in sizes], axis=0)
         return error_b, error_g
 
     def in_range(self, points: ArrayLike) -> NDArray[np.bool_]:

@@ -8,15 +8,15 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.optimize import minimize_scalar
 
-from .box import Box, rotation_matrix
+from .box import Array, Box, rotation_matrix
 from .magnet import Magnet
 
 TOUCHING = 1e-9
 """Bodies that overlap by less than this (m) only touch: it is far above round-off and far below any tolerance."""
 
 
-def box_overlap(first: Box, second: Box) -> float:
-    """Penetration depth of two boxes, m: the shortest shift that parts them; negative if they are apart.
+def separation(first: Box, second: Box) -> tuple[float, Array]:
+    """Widest gap (m, negative: shortest shift that parts them) between two boxes, and its direction from the first (3,).
 
     Separating-axis theorem (S. Gottschalk et al., SIGGRAPH 1996): two boxes are apart exactly if one of the
     three axes of either or one of the nine products of their edges parts them.
@@ -26,7 +26,14 @@ def box_overlap(first: Box, second: Box) -> float:
     length = np.linalg.norm(crossed, axis=1)
     axes = np.vstack([a, b, crossed[length > 1e-9] / length[length > 1e-9, None]])
     reach = np.abs(axes @ first.rotation) @ first.half_edges + np.abs(axes @ second.rotation) @ second.half_edges
-    return float(np.min(reach - np.abs(axes @ (second.center - first.center))))
+    along = axes @ (second.center - first.center)
+    best = int(np.argmax(np.abs(along) - reach))
+    return float(np.abs(along[best]) - reach[best]), axes[best] * np.sign(along[best])
+
+
+def box_overlap(first: Box, second: Box) -> float:
+    """Penetration depth of two boxes, m: the shortest shift that parts them; negative if they are apart."""
+    return -separation(first, second)[0]
 
 
 def sphere_overlap(center: ArrayLike, radius: float, box: Box) -> float:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Discriminator, Field, Tag
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Discriminator, Field, Tag
 
 Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]
 NotNegative = Annotated[Number, Field(ge=0.0)]
@@ -15,6 +15,17 @@ Angle = Annotated[Number, Field(ge=-360.0, le=360.0)]
 Polarization = Annotated[Number, Field(ge=-100.0, le=100.0)]
 Remanence = Annotated[NotNegative, Field(le=100.0)]
 Permeability = Annotated[Number, Field(ge=1.0, le=1e6)]
+
+
+def _both_axes(value: Any) -> Any:
+    """One permeability serves along and across the easy axis."""
+    return value if isinstance(value, list) else [value, value]
+
+
+MagnetPermeability = Annotated[
+    list[Permeability], Field(min_length=2, max_length=2), BeforeValidator(_both_axes, json_schema_input_type=float)
+]
+"""Along the easy axis, and across it; a single number for both."""
 Vector = Annotated[list[Number], Field(min_length=3, max_length=3)]
 Sizes = Annotated[list[Length], Field(min_length=3, max_length=3)]
 Coordinates = Annotated[list[Coordinate], Field(min_length=3, max_length=3)]
@@ -32,7 +43,7 @@ class _Table(BaseModel):
 class _ArticleRotor(_Table):
     edge_mm: Length
     remanence_T: Remanence
-    recoil_permeability: Permeability = RECOIL_PERMEABILITY
+    recoil_permeability: MagnetPermeability = [RECOIL_PERMEABILITY] * 2
 
 
 class HorizontalRotor(_ArticleRotor):
@@ -63,7 +74,7 @@ class MagnetSection(_Table):
     center_mm: Coordinates
     rotation_deg: Angles = [0.0, 0.0, 0.0]
     polarization_T: Polarizations
-    recoil_permeability: Permeability = RECOIL_PERMEABILITY
+    recoil_permeability: MagnetPermeability = [RECOIL_PERMEABILITY] * 2
 
 
 class ExplicitRotor(_Table):

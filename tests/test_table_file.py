@@ -16,8 +16,9 @@ POINTS = np.random.default_rng(4).uniform(-0.01, 0.01, (20, 3)) - [0, 0, 0.03]
 @pytest.fixture
 def table():
     correction = uniform_moments(ROTOR[0], 7)
-    correction = MultipoleExpansion(correction.center, correction.radius, correction.coefficients, np.full(9, 1e-7))
-    return RotorTable("fem", ROTOR, ROTOR[1:], (correction, uniform_moments(ROTOR[1], 3)), {"order": 4, "mesh": "a"})
+    doubt = MultipoleExpansion(correction.center, correction.radius, 1e-7 * correction.coefficients)
+    expansions = (correction, uniform_moments(ROTOR[1], 3))
+    return RotorTable("fem", ROTOR, ROTOR[1:], expansions, {"shape": (doubt, doubt)}, {"order": 4, "mesh": "a"})
 
 
 def test_a_table_survives_the_disk_to_the_last_bit(table, tmp_path):
