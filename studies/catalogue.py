@@ -12,7 +12,8 @@ from matplotlib.figure import Figure
 from .dipole_validity import dipole_validity, validity_figure, validity_lines
 from .figures import save_figure
 from .results import write_dataset
-from .speed_accuracy import speed_accuracy, speed_figure, speed_lines
+from .speed_accuracy import speed_accuracy
+from .speed_accuracy_figure import speed_figure, speed_lines
 
 
 @dataclass(frozen=True)

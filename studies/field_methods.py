@@ -9,10 +9,12 @@ from functools import partial
 
 import numpy as np
 
-from ..fem import FieldMap, FieldTable, MultipoleExpansion, RotorTable, fit_field_map, uniform_moments
+from ..fem import FieldMap, FieldTable, RotorTable, fit_field_map, uniform_moments
 from ..fem.crosscheck import magnet_dipoles
 from ..fem.ladder import AccuracyWarning, rung
 from ..fem.models import rotor_table
+from ..fem.multipole import without_noise
+from ..fem.remanent import induced_moments
 from ..fem.rotor_solution import Refinement, solve_rotor
 from ..geometry import Magnet
 from ..geometry.mesh import MeshSettings, mesh_magnets
@@ -51,22 +53,16 @@ def _direct(order: int, magnets: Magnets) -> tuple[FieldTable, int]:
     """Finite elements without any closed form; the outer field from the harmonics on the outer sphere."""
     fine = MeshSettings(ball_radius=1.15, magnet_size=0.5, air_size=0.5, hp_layers=0, curve_order=min(order + 1, 8))
     solution = solve_rotor(magnets, Refinement(order, fine, 4 * order), "direct")
-    outer = MultipoleExpansion(solution.center, solution.mesh.unit, solution.coefficients[0])
-    return RotorTable("fem", magnets, (), (outer,)), solution.unknowns
+    return RotorTable("fem", magnets, (), tuple(solution.expansions(solution.coefficients))), solution.unknowns
 
 
 def _split(order: int, magnets: Magnets) -> tuple[FieldTable, int]:
     """One rung of the ladder: closed form of the remanence plus what the permeability adds."""
-    from ..fem.remanent import induced_moments
-
     degree = 6 + 4 * order
     solution = solve_rotor(magnets, rung(order, MeshSettings()), "split", degree)
     closed = [induced_moments(magnet, magnets, degree) for magnet in magnets]
-    expansions = tuple(
-        MultipoleExpansion(m.box.center, m.box.circumradius, a + b)
-        for m, a, b in zip(magnets, closed, solution.coefficients, strict=True)
-    )
-    return RotorTable("fem", magnets, magnets, expansions), solution.unknowns
+    whole = [without_noise(a + b, 1e-15) for a, b in zip(closed, solution.coefficients, strict=True)]
+    return RotorTable("fem", magnets, magnets, tuple(solution.expansions(whole))), solution.unknowns
 
 
 def _table(rtol: float, magnets: Magnets) -> tuple[FieldTable, int]:
