@@ -96,7 +96,9 @@ def _from_dataset(dataset: xr.Dataset) -> RotorTable:
     names = ("size", "center", "rotation", "polarization", "recoil_permeability", "transverse_permeability")
     magnets = tuple(
         Magnet(Box(size, center, rotation), polarization, float(along), float(across))
-        for size, center, rotation, polarization, along, across in zip(*(data[f"magnet_{n}"] for n in names), strict=True)
+        for size, center, rotation, polarization, along, across in zip(
+            *(data[f"magnet_{n}"] for n in names), strict=True
+        )
     )
     causes: dict[str, tuple[MultipoleExpansion, ...]] = {use: () for use in json.loads(dataset.attrs["expansion_uses"])}
     parts = (data[f"expansion_{n}"] for n in ("use", "center", "radius", "degree", "real", "imag"))
