@@ -18,7 +18,6 @@ from .compiled import CompiledField, FieldExpressions
 from .multipole import MultipoleExpansion
 from .uniform import UniformField
 
-
 BLUR = 0.5
 """Share of the root mean square of a doubt that is added to its field."""
 KNOWN = "truncation"

@@ -100,7 +100,7 @@ def _from_dataset(dataset: xr.Dataset) -> RotorTable:
             *(data[f"magnet_{n}"] for n in names), strict=True
         )
     )
-    causes: dict[str, tuple[MultipoleExpansion, ...]] = {use: () for use in json.loads(dataset.attrs["expansion_uses"])}
+    causes: dict[str, tuple[MultipoleExpansion, ...]] = dict.fromkeys(json.loads(dataset.attrs["expansion_uses"]), ())
     parts = (data[f"expansion_{n}"] for n in ("use", "center", "radius", "degree", "real", "imag"))
     for use, center, radius, degree, real, imag in zip(*parts, strict=True):
         cause, size = list(causes)[int(use)], int(degree) + 1
