@@ -125,7 +125,7 @@ SLOW = {
 
 
 def check(rotor, nearest, order):
-    """The table reaches 1e-5 by its own account, which holds against another mesh, on edges' extensions and far away."""
+    """The table reaches 1e-5 by its own account, which holds against another mesh, near and far."""
     table = fem_table(rotor, Accuracy(1e-5, nearest))
     assert table.provenance["error_estimate"] <= 1e-5
     points, scale = places(rotor, Accuracy(1e-5, nearest).clearance(rotor))
