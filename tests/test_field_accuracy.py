@@ -129,7 +129,7 @@ def check(rotor, nearest, order):
     table = fem_table(rotor, Accuracy(1e-5, nearest))
     assert table.provenance["error_estimate"] <= 1e-5
     points, scale = places(rotor, Accuracy(1e-5, nearest).clearance(rotor))
-    truth = finer(rotor, order, 27, nearest)
+    truth = finer(rotor, order, 33, nearest)
     difference = np.linalg.norm(table.evaluate(points)[0] - truth.evaluate(points)[0], axis=1)
     assert (difference <= table.absolute_error(points)[0] + 1e-13 * scale).all()
     assert (difference <= 1e-5 * scale).all()
