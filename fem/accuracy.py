@@ -42,8 +42,8 @@ class Accuracy:
 def places(magnets: tuple[Magnet, ...], clearance: float) -> tuple[Array, Array]:
     """Points (n, 3) m at which errors are looked at, and the scale (n,) of B (T) there.
 
-    They lie at a distance `clearance` from the magnets and farther out. The scale is that of the magnets' dipoles, which
-    is right to a few per cent, but at least a third of its median at like distances, where fields cancel;
+    They lie at a distance `clearance` from the magnets and farther out. The scale is that of the magnets' dipoles,
+    which is right to a few per cent, but at least a third of its median at like distances, where fields cancel;
     1 T if nothing is magnetised.
     """
     size = max(float(np.linalg.norm(m.box.corners - magnets[0].box.center, axis=1).max()) for m in magnets)

@@ -12,8 +12,8 @@ from skfem.helpers import dot, grad
 
 from ..geometry.box import Array
 from ..geometry.mesh import MagnetMesh, to_meshio
-from .magnetostatics import Formulation
 from .demagnetization import remanent_field
+from .magnetostatics import Formulation
 from .quadrature import volume_rule
 
 

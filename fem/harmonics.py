@@ -53,7 +53,7 @@ def weighted_sums(harmonics: dict[tuple[int, int], Any], weights: Array, degree:
 
 
 def regular_derivative(sums: Coefficients, axis: int) -> Coefficients:
-    """[l, m] of a linear functional of ∂Υ_lm/∂x_axis, from its values on Υ_lm itself (m ≥ 0); the functional is real."""
+    """[l, m] of a real linear functional of ∂Υ_lm/∂x_axis, from its values on Υ_lm itself (m ≥ 0)."""
     size = len(sums)
     full = np.zeros((size, 2 * size + 3), complex)  # column m + size + 1, with room for m ± 1
     zero, orders = size + 1, np.arange(size)

@@ -19,8 +19,8 @@ from dataclasses import replace
 import numpy as np
 
 from ..geometry.box import Array
-from ..geometry.magnet import Magnet
 from ..geometry.gaps import largest_shift
+from ..geometry.magnet import Magnet
 from ..geometry.mesh import MeshSettings
 from ..geometry.pieces import CONVERGENCE, cut_magnets
 from .accuracy import Accuracy, places
@@ -141,7 +141,7 @@ def used(expansions: Sequence[MultipoleExpansion]) -> tuple[MultipoleExpansion, 
 
 
 def tail(expansions: Sequence[MultipoleExpansion]) -> list[MultipoleExpansion]:
-    """What lies beyond the highest degree: the last two degrees, continued as a geometric series in 1/`CONVERGENCE`²."""
+    """What lies beyond the highest degree: the last two degrees, continued as a geometric series."""
     found = []
     for expansion in expansions:
         last = np.array(expansion.coefficients)

@@ -6,6 +6,7 @@ Either moments of the magnetisation about every magnet, or the harmonics of ψ o
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..geometry.box import Array
 from ..geometry.magnet import Magnet
@@ -86,7 +87,7 @@ def _faces(solution: Solution) -> tuple[Array, Array, Array]:
     return mesh.to_meter(surface.points[used]), surface.weights[used], potential
 
 
-def _normals(magnet: Magnet, points: Array) -> tuple[Array, Array]:
+def _normals(magnet: Magnet, points: Array) -> tuple[Array, NDArray[np.bool_]]:
     """Outward normals at those of the points that lie on the faces of a magnet, and which these are (mask)."""
     box = magnet.box
     mine = np.abs(box.distance(points)) < SAME * box.circumradius

@@ -117,7 +117,7 @@ def moments_of_magnetization(
     harmonics = regular(degree, *((points - center) / radius).T)
     weighted = (weights / (FOUR_PI * radius**3))[:, None] * magnetization
     potentials = [weighted_sums(harmonics, weighted[:, axis], degree) for axis in range(3)]
-    return sum((np.conj(regular_derivative(p, axis)) for axis, p in enumerate(potentials)), np.zeros(1))
+    return np.asarray(sum(np.conj(regular_derivative(p, axis)) for axis, p in enumerate(potentials)))
 
 
 def curvature_moments(

@@ -37,5 +37,5 @@ def induced_moments(body: Magnet, sources: Sequence[Magnet], degree: int) -> Coe
 
 
 def first_order_moments(body: Magnet, sources: Sequence[Magnet], degree: int) -> Coefficients:
-    """What the permeability of a body adds, to a few per cent of itself: (μ - 1) H0 / (1 + χ/3), χ the largest of μ - 1."""
+    """What the permeability of a body adds, to a few per cent: (μ - 1) H0 / (1 + χ/3), χ the largest of μ - 1."""
     return induced_moments(body, sources, degree) / (1 + body.contrast / 3)

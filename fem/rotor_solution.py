@@ -67,12 +67,12 @@ def solve_rotor(
     pieces: Sequence[Sequence[Magnet]] | None = None,
     use_symmetry: bool = True,
 ) -> RotorSolution:
-    """Solve for every parity part of the polarisation and add up.
+    """Solve for every parity part of the polarisation and add up; gaps too narrow for elements are closed.
 
     Parameters
     ----------
     degree : of the moments in `split`, where they are those of -(μ - 1) ∇ψ; in `direct` it is the boundary's
-    pieces : of every magnet, each with its own expansion; by default the magnets. Gaps too narrow for elements are closed
+    pieces : of every magnet, each with its own expansion; by default the magnets
     use_symmetry : whether to mesh only one side of the mirror planes
 
     Raises
@@ -120,7 +120,7 @@ def _meshed_system(
 
 
 def _polarized(magnet: Magnet, polarization: Array) -> Magnet:
-    """A magnet of the same shape with another polarisation (3,) T, frame of its box; a source, so without permeability."""
+    """A source of the same shape with another polarisation (3,) T, in the frame of the box's pose."""
     box = Box(magnet.box.size, magnet.box.center, magnet.box.rotation)
     return replace(
         magnet,

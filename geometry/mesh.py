@@ -152,9 +152,9 @@ def _generate(
                 face.name = f"plane{axis}"
     if settings.hp_layers:
         _mark_singular(shape, boxes)
-    mesh = ng.Mesh(occ.OCCGeometry(shape).GenerateMesh(
-        maxh=settings.air_size, grading=settings.grading, parallel_meshing=False
-    ))
+    mesh = ng.Mesh(
+        occ.OCCGeometry(shape).GenerateMesh(maxh=settings.air_size, grading=settings.grading, parallel_meshing=False)
+    )
     if settings.hp_layers:
         mesh.RefineHP(settings.hp_layers, settings.hp_factor)
     mesh.Curve(settings.curve_order)

@@ -16,7 +16,7 @@ TOUCHING = 1e-9
 
 
 def separation(first: Box, second: Box) -> tuple[float, Array]:
-    """Widest gap (m, negative: shortest shift that parts them) between two boxes, and its direction from the first (3,).
+    """Widest gap between two boxes, m (negative: shortest shift that parts them), and its direction (3,).
 
     Separating-axis theorem (S. Gottschalk et al., SIGGRAPH 1996): two boxes are apart exactly if one of the
     three axes of either or one of the nine products of their edges parts them.

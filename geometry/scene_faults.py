@@ -63,6 +63,11 @@ def describe_fault(detail: ErrorDetails) -> str:
             "Input rotor.configuration must be one of 'horizontal', 'vertical', 'tilt' (or rotor.magnets a list of "
             f"magnets); instead received {_shown(configuration)}."
         )
+    if place[-1] == "recoil_permeability" or place[-2:-1] == ["recoil_permeability"]:
+        rule = RULES.get(kind, detail["msg"]).format(**detail.get("ctx", {}))
+        if kind in ("too_short", "too_long"):
+            rule = "a number, or two: along the easy axis and across it"
+        return f"Input {key.removesuffix('[0]')} must be {rule}; instead received {_shown(received)}."
     if kind in ("too_short", "too_long") and place[-1] != "magnets":
         return f"Input {key} must be a list of exactly 3 numbers; instead received {_shown(received)}."
     rule = RULES.get(kind, detail["msg"]).format(**detail.get("ctx", {}))

@@ -110,10 +110,10 @@ def _metres(millimetres: list[float]) -> Array:
 def _rotor(rotor: Rotor) -> tuple[Magnet, ...]:
     if isinstance(rotor, ExplicitRotor):
         return tuple(
-            Magnet(_box(m.size_mm, m.center_mm, m.rotation_deg), np.array(m.polarization_T), m.recoil_permeability)
+            Magnet(_box(m.size_mm, m.center_mm, m.rotation_deg), np.array(m.polarization_T), *m.recoil_permeability)
             for m in rotor.magnets
         )
-    material = (rotor.edge_mm * MILLI, rotor.remanence_T, rotor.recoil_permeability)
+    material = (rotor.edge_mm * MILLI, rotor.remanence_T, *rotor.recoil_permeability)
     if isinstance(rotor, TiltRotor):
         return rotors.tilt(float(np.radians(rotor.angle_deg)), *material)
     build = rotors.horizontal if rotor.configuration == "horizontal" else rotors.vertical

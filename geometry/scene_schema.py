@@ -15,17 +15,6 @@ Angle = Annotated[Number, Field(ge=-360.0, le=360.0)]
 Polarization = Annotated[Number, Field(ge=-100.0, le=100.0)]
 Remanence = Annotated[NotNegative, Field(le=100.0)]
 Permeability = Annotated[Number, Field(ge=1.0, le=1e6)]
-
-
-def _both_axes(value: Any) -> Any:
-    """One permeability serves along and across the easy axis."""
-    return value if isinstance(value, list) else [value, value]
-
-
-MagnetPermeability = Annotated[
-    list[Permeability], Field(min_length=2, max_length=2), BeforeValidator(_both_axes, json_schema_input_type=float)
-]
-"""Along the easy axis, and across it; a single number for both."""
 Vector = Annotated[list[Number], Field(min_length=3, max_length=3)]
 Sizes = Annotated[list[Length], Field(min_length=3, max_length=3)]
 Coordinates = Annotated[list[Coordinate], Field(min_length=3, max_length=3)]
@@ -36,6 +25,17 @@ RECOIL_PERMEABILITY = 1.05
 """Default: sintered NdFeB."""
 
 
+def _both_axes(value: Any) -> Any:
+    """One permeability serves along and across the easy axis."""
+    return value if isinstance(value, list) else [value] * 2
+
+
+MagnetPermeability = Annotated[
+    list[Permeability], Field(min_length=2, max_length=2), BeforeValidator(_both_axes, json_schema_input_type=float)
+]
+"""Along the easy axis, and across it; a single number for both."""
+
+
 class _Table(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid")
 
@@ -43,7 +43,7 @@ class _Table(BaseModel):
 class _ArticleRotor(_Table):
     edge_mm: Length
     remanence_T: Remanence
-    recoil_permeability: MagnetPermeability = [RECOIL_PERMEABILITY] * 2
+    recoil_permeability: MagnetPermeability = [RECOIL_PERMEABILITY, RECOIL_PERMEABILITY]
 
 
 class HorizontalRotor(_ArticleRotor):
@@ -74,7 +74,7 @@ class MagnetSection(_Table):
     center_mm: Coordinates
     rotation_deg: Angles = [0.0, 0.0, 0.0]
     polarization_T: Polarizations
-    recoil_permeability: MagnetPermeability = [RECOIL_PERMEABILITY] * 2
+    recoil_permeability: MagnetPermeability = [RECOIL_PERMEABILITY, RECOIL_PERMEABILITY]
 
 
 class ExplicitRotor(_Table):

@@ -66,6 +66,12 @@ def test_absolute_start():
     assert start.velocity == pytest.approx([0, 0, 0])
 
 
+def test_permeability_may_differ_across_the_easy_axis():
+    (magnet,) = parse_scene(GOOD.replace("recoil_permeability = 1.05", "recoil_permeability = [1.05, 1.15]", 1)).rotor
+    expected = np.diag([1.05, 1.15, 1.15])  # magnetised along x
+    np.testing.assert_allclose(magnet.permeability_in_rotor, expected, atol=1e-15)
+
+
 def test_all_faults_are_listed_at_once():
     text = GOOD.replace("frequency_hz", "frequency").replace("edge_mm = 10.0", "edge_mm = -10.0")
     text = text.replace("conductivity_S_m = 3.5e7", "conductivity_S_m = nan").replace("[35.0, 0.0, -21.0]", "[1.0]")
@@ -86,6 +92,11 @@ def test_all_faults_are_listed_at_once():
         (("edge_mm = 10.0", "edge_mm = inf"), "rotor.edge_mm must be a finite number"),
         (('"horizontal"', '"sideways"'), "rotor.configuration must be one of"),
         (("recoil_permeability = 1.05", "recoil_permeability = 0.5"), "at least 1"),
+        (
+            ("recoil_permeability = 1.05", "recoil_permeability = [1.05, 0.5]"),
+            "recoil_permeability[1] must be at least 1",
+        ),
+        (("recoil_permeability = 1.05", "recoil_permeability = [1.0, 1.0, 1.0]"), "along the easy axis and across it"),
         (("displacement_mm", "angle_deg"), "rotor.angle_deg must be a known key"),
         (("density_kg_m3 = 7500.0", ""), "floater.density_kg_m3 must be given"),
         (("conductivity_S_m = 3.5e7", "conductivity_S_m = 0.0"), "greater than 0"),
