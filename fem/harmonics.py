@@ -25,6 +25,10 @@ Coefficients = NDArray[np.complex128]
 """c[l, m] for 0 ≤ m ≤ l, as a square array."""
 
 
+CHUNK = 4096
+"""Points at once, so that the harmonics of all degrees fit in memory."""
+
+
 def regular(degree: int, x: Array, y: Array, z: Array) -> dict[tuple[int, int], Any]:
     """Complex regular harmonics Υ_lm, 0 ≤ m ≤ l ≤ degree, at NumPy arrays x, y, z."""
     found: dict[tuple[int, int], Any] = {(0, 0): np.ones_like(x) + 0j}
@@ -81,6 +85,35 @@ def irregular(
                 below, here = here, upper
                 found[l, m, part] = here
     return found
+
+
+def irregular_values(degree: int, points: Array) -> dict[tuple[int, int], Any]:
+    """Θ_lm, 0 ≤ m ≤ l ≤ degree, at NumPy points (n, 3), by Θ_lm(r) = (l-m)! (l+m)! Υ_lm(r/r²)/r."""
+    square = np.sum(points**2, axis=1)
+    found = regular(degree, *(points / square[:, None]).T)
+    distance = np.sqrt(square)
+    return {(l, m): np.exp(gammaln(l - m + 1) + gammaln(l + m + 1)) / distance * v for (l, m), v in found.items()}
+
+
+def irregular_gradient(harmonics: dict[tuple[int, int], Any], l: int, m: int) -> list[Any]:
+    """Gradient (three complex arrays) of Θ_lm, from a dictionary made by `irregular_values` up to l + 1 (m ≥ 0)."""
+    plus = harmonics[l + 1, m + 1]
+    minus = harmonics[l + 1, m - 1] if m else -np.conj(harmonics[l + 1, 1])
+    return [(plus - minus) / 2, (plus + minus) / 2j, -harmonics[l + 1, m]]
+
+
+def outer_sums(coefficients: Sequence[Coefficients], points: Array) -> Array:
+    """Σ c_lm Θ_lm (n, k) at points (n, 3), for k arrays c of one size."""
+    stacked = np.stack(coefficients, axis=-1)
+    used = np.nonzero(stacked.any(axis=2))
+    weights = np.where(used[1] == 0, 1.0, 2.0)[:, None] * stacked[used]
+    result = np.zeros((len(points), stacked.shape[2]))
+    for start in range(0, len(points), CHUNK):
+        block = points[start : start + CHUNK]
+        harmonics = irregular_values(len(stacked) - 1, block)
+        values = np.array([harmonics[key] for key in zip(*used, strict=True)]).reshape(-1, len(block))
+        result[start : start + CHUNK] = np.real(values.T @ weights)
+    return result
 
 
 def derivative(coefficients: Coefficients, axis: int) -> Coefficients:
