@@ -18,7 +18,7 @@ from scipy.special import gammaln
 
 from ..geometry.box import Array
 from ..geometry.magnet import MU_0
-from .harmonics import CHUNK, Coefficients, irregular_gradient, irregular_values, regular
+from .harmonics import CHUNK, Coefficients, irregular_values, regular
 
 FOUR_PI = 4 * np.pi
 
@@ -63,16 +63,20 @@ def from_magnetization(points: Array, moments: Array, ball: Ball, degree: int) -
 
     a_lm = (4π radius³)⁻¹ Σ μ0 M dV · ∇̃Θ_lm, exact for these dipoles.
     """
-    result = np.zeros((degree + 1, degree + 1), complex)
+    size = degree + 2
+    keys = [(l, m) for l in range(size) for m in range(l + 1)]
+    sums = np.zeros((3, size, size), complex)
     for start in range(0, len(points), CHUNK):
         chosen = slice(start, start + CHUNK)
         harmonics = irregular_values(degree + 1, (points[chosen] - ball.center) / ball.radius)
-        weighted = moments[chosen].T
-        for l in range(1, degree + 1):
-            for m in range(l + 1):
-                gradient = irregular_gradient(harmonics, l, m)
-                result[l, m] += sum(weighted[a] @ gradient[a] for a in range(3))
-    return result / (FOUR_PI * ball.radius**3)
+        values = np.array([harmonics[key] for key in keys])
+        sums[:, *zip(*keys, strict=True)] += (values.real @ moments[chosen] + 1j * (values.imag @ moments[chosen])).T
+    minus = np.concatenate([-np.conj(sums[:, 1:, 1:2]), sums[:, 1:, :-2]], axis=2)
+    plus = sums[:, 1:, 1:]
+    x, y, z = (plus[0] - minus[0]) / 2, (plus[1] + minus[1]) / 2j, -sums[2, 1:, :-1]
+    total = np.tril(x + y + z)
+    total[0] = 0.0  # a constant potential
+    return np.asarray(total / (FOUR_PI * ball.radius**3))
 
 
 def field_at_center(incident: Coefficients) -> Array:

@@ -106,7 +106,7 @@ def assemble_regions(mesh: Any, permeability: Mapping[str, Array], ball_radius: 
     stiffness.Assemble()
     return PermeableRegions(
         susceptibility={name: mu - np.eye(3) for name, mu in permeability.items()},
-        points={name: volume_points(mesh, name, 2 * order + 2) for name in permeability},
+        points={name: volume_points(mesh, name, 2 * order - 2) for name in permeability},
         space=space,
         stiffness=stiffness,
         inverse=stiffness.mat.Inverse(space.FreeDofs(True), inverse="sparsecholesky"),

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..geometry.box import Array
-from ..geometry.overlap import sphere_overlap
+from ..geometry.overlap import TOUCHING, sphere_overlap
 from ..geometry.scene import Floater
 from .harmonics import Coefficients
 from .local_field import Ball, force, torque
@@ -93,7 +93,7 @@ def two_body(
     ball = Ball(np.asarray(position, float), floater.radius)
     degree = degree or enough_degree(rotor, ball)
     for k, magnet in enumerate(rotor.magnets):
-        if sphere_overlap(ball.center, ball.radius, magnet.box) > 1e-9 * ball.radius:
+        if sphere_overlap(ball.center, ball.radius, magnet.box) > TOUCHING:
             raise TwoBodyError(f"Input position must leave the floater outside the magnets; instead it cuts magnet {k}.")
     own = rotor.own_field(ball, degree)
     permanent = permanent_sources(floater, direction, ball, degree)
