@@ -12,7 +12,6 @@ from ..geometry.box import Array
 from ..geometry.scene import Scene
 from .balance import Balance, moved, solve, tangent_basis
 from .equations import parameters
-from .equilibrium import Equilibrium
 from .rates import Rates
 from .state import Scales
 
@@ -59,13 +58,15 @@ class PerturbedBalance:
         _, moment, step = solve(self.balance, place, guess[None], TILTS)
         return np.asarray(moment[0] if step[0] < 1e-8 else guess)
 
-    def shift(self, equilibrium: Equilibrium, extra: Extra, most: int = 20, tolerance: float = 1e-7) -> Shift:
-        """Follow an equilibrium to where the additional forces put it.
+    def shift(
+        self, position: Array, moment: Array, extra: Extra, most: int = 20, tolerance: float = 1e-7
+    ) -> Shift:
+        """Follow an equilibrium, position (3,) m and moment direction (3,), to where the additional forces put it.
 
         Quasi-Newton from the table's own Jacobian (C. G. Broyden, Math. Comp. 19 (1965) 577), to `tolerance` of the
         floater's radius.
         """
-        position, moment = equilibrium.position / self.scales.length, equilibrium.state.moment
+        position = position / self.scales.length
         inverse = np.linalg.inv(self.balance(position[None], moment[None])[1][0])
         residual = self._residual(position, moment, extra)
         step = -inverse @ residual

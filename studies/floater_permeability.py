@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 
 import numpy as np
 import xarray as xr
@@ -35,7 +36,7 @@ def floater_permeability(scene: Scene, distances: Sequence[float] | None = None,
     Dataset over `distance`: force and torque by part with error, relative difference of the rigid dipole; over `level`
     and `quantity`: the distance from which on the rigid dipole is good to that level; and the levitation shift. The moment
     points as it does in synchronous motion (body spin 0, torques balanced) at that distance, followed from the stable
-    equilibrium; along -x if there is none.
+    equilibrium (along -x if there is none) and held where no balance is near.
     """
     rotors = rotor_ladder(scene.rotor, (2, 3) if quick else (3, 4))
     table = rotor_table(scene.rotor, "auto", 1e-4 if quick else 1e-6)
@@ -89,14 +90,14 @@ def levitation(
 ) -> xr.Dataset:
     """What the rigid dipole misses at the stable equilibrium, and where the equilibrium really is."""
 
-    def added(rotor: RotorResponse, position: Array, moment: Array) -> Wrench:
+    def added(rotor: RotorResponse, position: Array, moment: Array) -> tuple[Array, Array]:
         both = two_body(rotor, floater, position, moment)
-        return both.total - both.rigid
+        extra = both.total - both.rigid
+        return extra.force, extra.torque
 
     both, error = two_body_ladder(rotors, floater, stable.position, stable.state.moment)
     shifts = [
-        balance.shift(stable, lambda r, m, rotor=rotor: _pair(added(rotor, r, m)))  # type: ignore[misc]
-        for rotor in rotors[-2:]
+        balance.shift(stable.position, stable.state.moment, partial(added, rotor)) for rotor in rotors[-2:]
     ]
     return _levitation_dataset(stable, both, error, shifts)
 
@@ -117,10 +118,6 @@ def _levitation_dataset(stable: Equilibrium, both: TwoBody, error: Wrench, shift
         },
         {"axis": list(AXIS)},
     )
-
-
-def _pair(wrench: Wrench) -> tuple[Array, Array]:
-    return wrench.force, wrench.torque
 
 
 def _depths(scene: Scene, number: int) -> Array:
