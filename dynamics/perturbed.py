@@ -58,9 +58,7 @@ class PerturbedBalance:
         _, moment, step = solve(self.balance, place, guess[None], TILTS)
         return np.asarray(moment[0] if step[0] < 1e-8 else guess)
 
-    def shift(
-        self, position: Array, moment: Array, extra: Extra, most: int = 20, tolerance: float = 1e-7
-    ) -> Shift:
+    def shift(self, position: Array, moment: Array, extra: Extra, most: int = 20, tolerance: float = 1e-7) -> Shift:
         """Follow an equilibrium, position (3,) m and moment direction (3,), to where the additional forces put it.
 
         Quasi-Newton from the table's own Jacobian (C. G. Broyden, Math. Comp. 19 (1965) 577), to `tolerance` of the

@@ -60,5 +60,3 @@ def solve_both_bodies(
     )
     sources[:2, :2] += whole
     return Wrench(force(incident, sources, ball), torque(incident, sources, ball))
-
-

@@ -94,7 +94,9 @@ def two_body(
     degree = degree or enough_degree(rotor, ball)
     for k, magnet in enumerate(rotor.magnets):
         if sphere_overlap(ball.center, ball.radius, magnet.box) > TOUCHING:
-            raise TwoBodyError(f"Input position must leave the floater outside the magnets; instead it cuts magnet {k}.")
+            raise TwoBodyError(
+                f"Input position must leave the floater outside the magnets; instead it cuts magnet {k}."
+            )
     own = rotor.own_field(ball, degree)
     permanent = permanent_sources(floater, direction, ball, degree)
     reflected = rotor.answer(permanent, ball, degree)

@@ -53,9 +53,7 @@ def mesh_two_bodies(
     low = np.minimum(corners.min(axis=0), position - radius)
     high = np.maximum(corners.max(axis=0), position + radius)
     center = (low + high) / 2
-    unit = max(
-        float(np.linalg.norm(corners - center, axis=1).max()), float(np.linalg.norm(position - center)) + radius
-    )
+    unit = max(float(np.linalg.norm(corners - center, axis=1).max()), float(np.linalg.norm(position - center)) + radius)
     ball = occ.Sphere(occ.Pnt(*map(float, (position - center) / unit)), radius / unit)
     bodies = {f"magnet{k}": _solid(magnet.box, center, unit) for k, magnet in enumerate(magnets)} | {"floater": ball}
     air = occ.Sphere(occ.Pnt(0, 0, 0), ball_radius)

@@ -63,7 +63,9 @@ def missed(rotors: Sequence[RotorResponse], floater: Floater, places: Array, dir
         ratio = np.linalg.norm(values[:, -1] - values[:, 0], axis=1) / size
         data[quantity] = variable(("distance", "part", "axis"), values, units, f"{quantity} on the floater")
         data[f"{quantity}_error"] = variable(("distance", "axis"), errors, units, f"estimated error of the {quantity}")
-        data[f"{quantity}_missed"] = variable(("distance",), ratio, "1", f"share of the {quantity} that a dipole misses")
+        data[f"{quantity}_missed"] = variable(
+            ("distance",), ratio, "1", f"share of the {quantity} that a dipole misses"
+        )
         data[f"{quantity}_missed_error"] = variable(
             ("distance",), np.linalg.norm(errors, axis=1) / size, "1", f"estimated error of the share of the {quantity}"
         )
@@ -96,9 +98,7 @@ def levitation(
         return extra.force, extra.torque
 
     both, error = two_body_ladder(rotors, floater, stable.position, stable.state.moment)
-    shifts = [
-        balance.shift(stable.position, stable.state.moment, partial(added, rotor)) for rotor in rotors[-2:]
-    ]
+    shifts = [balance.shift(stable.position, stable.state.moment, partial(added, rotor)) for rotor in rotors[-2:]]
     return _levitation_dataset(stable, both, error, shifts)
 
 
@@ -113,7 +113,10 @@ def _levitation_dataset(stable: Equilibrium, both: TwoBody, error: Wrench, shift
             "linear_shift": variable(("axis",), fine.linear, "m", "shift of the equilibrium, linearised"),
             "shift": variable(("axis",), fine.position - stable.position, "m", "shift of the equilibrium"),
             "shift_error": variable(
-                ("axis",), np.abs(fine.position - shifts[0].position) + stable.position_error, "m", "its estimated error"
+                ("axis",),
+                np.abs(fine.position - shifts[0].position) + stable.position_error,
+                "m",
+                "its estimated error",
             ),
         },
         {"axis": list(AXIS)},

@@ -8,6 +8,7 @@ from spinlev.fem.demagnetization import remanent_field
 from spinlev.fem.harmonics import derivative, outer_sums
 from spinlev.fem.local_field import Ball, dipole_sources, field_at_center, force, from_magnetization, moment, torque
 from spinlev.fem.models import rotor_table
+from spinlev.fem.multipole import moments_of_magnetization, uniform_moments
 from spinlev.fem.permeable_sphere import induced_sources, inner_field, permanent_sources
 from spinlev.fem.rotor_response import rotor_ladder
 from spinlev.fem.two_body import TwoBodyError, enough_degree, two_body, two_body_ladder
@@ -97,7 +98,7 @@ def series(permeability, distance, weight, last=400):
     """Σ t_l weight(l) (R/d)^(2l+1) / d^4: fields that a sphere's induced multipoles send back to a dipole."""
     l = np.arange(1, last)
     t = l * (permeability - 1) / (l * (permeability + 1) + 1)
-    return np.sum(t * weight(l) * RADIUS ** (2 * l + 1.0) / distance ** (2 * l + 5.0))
+    return np.sum(t * weight(l) * (RADIUS / distance) ** (2 * l + 1.0)) / distance**4
 
 
 @pytest.mark.parametrize("permeability", [1.05, 5.0, 1000.0])
@@ -176,7 +177,7 @@ def test_both_bodies_solved_at_once_agree(rotors):
 def test_high_permeability_settles_as_well():
     """μr = 3 in both bodies: more terms, and the direct solution still agrees."""
     body = floater(3.0)
-    rotor = rotor_ladder(horizontal(0.002, 0.01, 1.305, 3.0), (4,))[0]
+    rotor = rotor_ladder(horizontal(0.002, 0.01, 1.305, 3.0), (3,))[0]
     both = two_body(rotor, body, PLACE, DIRECTION)
     whole = solve_both_bodies(mesh_two_bodies(rotor.magnets, PLACE, RADIUS, 0.25), body, PLACE, DIRECTION)
     assert both.terms > 5
@@ -189,9 +190,6 @@ def test_action_is_reaction(rotors):
     both = two_body(rotors[0], FLOATER, place, DIRECTION)
     induced = rotors[0].induced_dipoles(both.sources, both.ball)
     ball = Ball(rotors[0].mesh.center, 0.01)
-    # moments of the magnets about the rotor's centre, so that their field is known near them too
-    from spinlev.fem.multipole import moments_of_magnetization, uniform_moments
-
     permeable = [
         moments_of_magnetization(p, np.ones(len(p)), m, ball.center, rotors[0].mesh.unit, 40)
         for p, m in (induced, rotors[0].remanent_dipoles)
@@ -214,14 +212,14 @@ def test_rigid_floater_and_rotor_of_unit_permeability():
     assert np.array_equal(both.total.force, both.rigid.force)
     assert both.terms == 1
     closed = remanent_field(rotor.magnets, PLACE[None])[0]
-    np.testing.assert_allclose(field_at_center(both.incident), closed, rtol=1e-12)
+    np.testing.assert_allclose(field_at_center(both.incident), closed, rtol=0, atol=1e-12 * np.linalg.norm(closed))
 
 
 def test_answers_are_first_order_in_the_susceptibility():
     """Limit μr → 1: what the floater's answer adds is in proportion to (μr - 1)/(μr + 2) but for higher degrees."""
     rotor = rotor_ladder(horizontal(0.002, 0.01, 1.305, 1.0), (2,))[0]
     added = [two_body(rotor, floater(1 + chi), PLACE, DIRECTION).floater_answer.force / chi for chi in (1e-3, 1e-6)]
-    np.testing.assert_allclose(added[0], added[1], rtol=1e-3)
+    np.testing.assert_allclose(added[0], added[1], rtol=0, atol=1e-3 * np.linalg.norm(added[1]))
 
 
 def test_degree_follows_the_nearest_edge(rotors):
