@@ -16,8 +16,7 @@ from .harmonics import derivative, outer_sums
 from .local_field import Ball, dipole_sources, force, from_magnetization, projected, torque
 from .multipole import moments_of_magnetization
 from .permeable_regions import assemble_regions
-from .quadrature import volume_rule
-from .rotor_response import NODES, permeability_tensor
+from .rotor_response import closed_dipoles, permeability_tensor
 from .two_body import Wrench
 
 
@@ -47,14 +46,11 @@ def solve_both_bodies(
     fields = {n: from_floater[n] + from_rotor[n] for n in names} | {"floater": from_rotor["floater"] - polarization / 3}
     induced = regions.magnetization(fields)
     incident = projected(lambda points: remanent_field(mesh.magnets, points), ball, degree)
-    boxes = [magnet.box for magnet in mesh.magnets]
-    for name, box in zip(names, boxes, strict=True):
-        chi = regions.susceptibility[name]
-        rest = weights[name][:, None] * (induced[name] - from_rotor[name] @ chi)
+    for name in names:
+        closed = from_rotor[name] @ regions.susceptibility[name]
+        rest = weights[name][:, None] * (induced[name] - closed)
         incident += from_magnetization(places[name], rest, ball, degree)
-        points, volume = volume_rule(box, boxes, NODES)
-        closed = volume[:, None] * remanent_field(mesh.magnets, points) @ chi
-        incident += from_magnetization(points, closed, ball, degree)
+    incident += from_magnetization(*closed_dipoles(mesh.magnets), ball, degree)
     sources = moments_of_magnetization(
         places["floater"], weights["floater"], induced["floater"], ball.center, ball.radius, degree
     )

@@ -55,7 +55,7 @@ def projected(field: Callable[[Array], Array], ball: Ball, degree: int) -> Coeff
     for (l, m), values in regular(degree, *normals.T).items():
         if l:
             result[l, m] = -(2 * l + 1) / (FOUR_PI * l) * (values @ radial)
-    return result * factorials(degree)
+    return np.asarray(factorials(degree) * result, complex)
 
 
 def from_magnetization(points: Array, moments: Array, ball: Ball, degree: int) -> Coefficients:
@@ -64,13 +64,13 @@ def from_magnetization(points: Array, moments: Array, ball: Ball, degree: int) -
     a_lm = (4π radius³)⁻¹ Σ μ0 M dV · ∇̃Θ_lm, exact for these dipoles.
     """
     size = degree + 2
-    keys = [(l, m) for l in range(size) for m in range(l + 1)]
+    degrees, orders = np.tril_indices(size)
     sums = np.zeros((3, size, size), complex)
     for start in range(0, len(points), CHUNK):
         chosen = slice(start, start + CHUNK)
         harmonics = irregular_values(degree + 1, (points[chosen] - ball.center) / ball.radius)
-        values = np.array([harmonics[key] for key in keys])
-        sums[:, *zip(*keys, strict=True)] += (values.real @ moments[chosen] + 1j * (values.imag @ moments[chosen])).T
+        values = np.array([harmonics[key] for key in zip(degrees, orders, strict=True)])
+        sums[:, degrees, orders] += (values.real @ moments[chosen] + 1j * (values.imag @ moments[chosen])).T
     minus = np.concatenate([-np.conj(sums[:, 1:, 1:2]), sums[:, 1:, :-2]], axis=2)
     plus = sums[:, 1:, 1:]
     x, y, z = (plus[0] - minus[0]) / 2, (plus[1] + minus[1]) / 2j, -sums[2, 1:, :-1]

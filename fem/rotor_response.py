@@ -1,4 +1,4 @@
-"""What a rotor of permeable magnets adds to the field in a ball beside it: by its own remanence and in answer to sources.
+"""The field of a rotor of permeable magnets in a ball beside it: by its own remanence and in answer to sources.
 
 In the magnets H0 is the closed form of the remanent polarisation J (μr = 1) plus the field of the ball's sources. The
 magnetisation (μ - 1)(H0 - ∇ψ) comes from finite elements on a mesh of the magnets alone, which serves every position of
@@ -7,7 +7,7 @@ the ball. Its field in the ball is a volume integral over the magnets, whose err
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -77,11 +77,7 @@ class RotorResponse:
         total = self.regions.magnetization(fields)
         chi = self.regions.susceptibility
         parts = [self._dipoles({name: total[name] - fields[name] @ chi[name] for name in total})]
-        boxes = [magnet.box for magnet in self.magnets]
-        for k, box in enumerate(boxes):
-            points, weights = volume_rule(box, boxes, NODES)
-            field = remanent_field(self.magnets, points)
-            parts.append((points, weights[:, None] * field @ chi[f"magnet{k}"]))
+        parts.append(closed_dipoles(self.magnets))
         return np.concatenate([p for p, _ in parts]), np.concatenate([m for _, m in parts])
 
     @cached_property
@@ -108,6 +104,21 @@ def rotor_response(mesh: MagnetMesh, order: int = 3) -> RotorResponse:
 def permeability_tensor(magnet: Magnet) -> Array:
     """(3, 3) relative permeability of a magnet."""
     return magnet.recoil_permeability * np.eye(3)
+
+
+def closed_dipoles(magnets: Sequence[Magnet]) -> tuple[Array, Array]:
+    """Positions (n, 3) m and μ0 M dV (n, 3) T m³ of the magnetisation (μ - 1) H0 of the remanence's closed form H0.
+
+    The points are graded towards the edges, where H0 has a logarithm.
+    """
+    boxes = [magnet.box for magnet in magnets]
+    points, moments = [], []
+    for magnet in magnets:
+        places, weights = volume_rule(magnet.box, boxes, NODES)
+        field = remanent_field(magnets, places) @ (permeability_tensor(magnet) - np.eye(3))
+        points.append(places)
+        moments.append(weights[:, None] * field)
+    return np.concatenate(points), np.concatenate(moments)
 
 
 def rotor_ladder(

@@ -1,9 +1,9 @@
 """Force and torque between a rotor of permeable magnets and a permeable magnetised sphere: both answer to both.
 
 The sphere turns an incident field a into sources c = p + T a, p its remanence as a dipole and T exact (see
-`permeable_sphere`); the rotor turns sources into an incident field a = a0 + R c, a0 its own and R from finite elements (see
-`rotor_response`). With susceptibilities of a few per cent the series p, TRp, TRTRp, … converges in two or three terms.
-The floater as a rigid dipole is c = p, a = a0.
+`permeable_sphere`); the rotor turns sources into an incident field a = a0 + R c, a0 its own and R from finite elements
+(see `rotor_response`). With susceptibilities of a few per cent the series p, TRp, TRTRp, … converges in two or three
+terms. The floater as a rigid dipole is c = p, a = a0.
 """
 
 from __future__ import annotations
@@ -17,12 +17,12 @@ from ..geometry.box import Array
 from ..geometry.overlap import TOUCHING, sphere_overlap
 from ..geometry.scene import Floater
 from .harmonics import Coefficients
+from .local_degree import enough_degree, singular_ratio
 from .local_field import Ball, force, torque
 from .permeable_sphere import induced_sources, permanent_sources
 from .rotor_response import RotorResponse
 
 MOST_TERMS = 60
-DEGREES = range(6, 41)
 
 
 class TwoBodyError(RuntimeError):
@@ -84,14 +84,14 @@ def two_body(
     degree : highest degree about the floater's centre; None: from the distance of the nearest edge
     rtol : where the series ends, relative to its first term
 
-    Accuracy: that of the rotor's finite elements (see `two_body_error`) and `tail`.
+    Accuracy: that of the rotor's finite elements (see `two_body_ladder`) and `tail`.
 
     Raises
     ------
     TwoBodyError : the bodies overlap, or the series does not converge
     """
     ball = Ball(np.asarray(position, float), floater.radius)
-    degree = degree or enough_degree(rotor, ball)
+    degree = degree or enough_degree(rotor.magnets, ball)
     for k, magnet in enumerate(rotor.magnets):
         if sphere_overlap(ball.center, ball.radius, magnet.box) > TOUCHING:
             raise TwoBodyError(
@@ -119,7 +119,7 @@ def two_body(
         incident=incident,
         sources=sources,
         terms=terms,
-        tail=singular_ratio(rotor, ball) ** (2 * degree),
+        tail=singular_ratio(rotor.magnets, ball) ** (2 * degree),
     )
 
 
@@ -134,30 +134,6 @@ def two_body_ladder(
         np.abs(apart.force) + fine.tail * np.linalg.norm(added.force),
         np.abs(apart.torque) + fine.tail * np.linalg.norm(added.torque),
     )
-
-
-def singular_ratio(rotor: RotorResponse, ball: Ball) -> float:
-    """Radius over the distance of the centre from the nearest edge of a magnet.
-
-    The field is analytic across a face, so that edges alone bound the convergence of its expansion; 1 in contact with an
-    edge.
-    """
-    nearest = min(_edge_distance(magnet.box.to_body(ball.center), magnet.box.half_edges) for magnet in rotor.magnets)
-    return min(ball.radius / nearest, 1.0)
-
-
-def enough_degree(rotor: RotorResponse, ball: Ball, rtol: float = 1e-9) -> int:
-    """Degree l at which ρ^2l, the share of degree l in the force, has fallen below `rtol`; between 6 and 40."""
-    ratio = min(singular_ratio(rotor, ball), 0.99)
-    return int(np.clip(np.ceil(np.log(rtol) / (2 * np.log(ratio))), DEGREES[0], DEGREES[-1]))
-
-
-def _edge_distance(body: Array, half: Array) -> float:
-    """Distance of a point from the edges of a box, both in body axes."""
-    to_faces = np.abs(body) - half
-    along = np.maximum(to_faces, 0.0)
-    squares = [to_faces[(a + 1) % 3] ** 2 + to_faces[(a + 2) % 3] ** 2 + along[a] ** 2 for a in range(3)]
-    return float(np.sqrt(min(squares)))
 
 
 def _wrench(incident: Coefficients, sources: Coefficients, ball: Ball) -> Wrench:

@@ -1,4 +1,4 @@
-"""When is the floater a rigid dipole? Force and torque with and without the answers of floater and rotor to each other."""
+"""When is the floater a rigid dipole? Force and torque with and without the answers of both bodies."""
 
 from __future__ import annotations
 
@@ -34,9 +34,9 @@ def floater_permeability(scene: Scene, distances: Sequence[float] | None = None,
     Returns
     -------
     Dataset over `distance`: force and torque by part with error, relative difference of the rigid dipole; over `level`
-    and `quantity`: the distance from which on the rigid dipole is good to that level; and the levitation shift. The moment
-    points as it does in synchronous motion (body spin 0, torques balanced) at that distance, followed from the stable
-    equilibrium (along -x if there is none) and held where no balance is near.
+    and `quantity`: the distance from which on the rigid dipole is good to that level; and the levitation shift. The
+    moment points as it does in synchronous motion (body spin 0, torques balanced) at that distance, followed from the
+    stable equilibrium (along -x if there is none) and held where no balance is near.
     """
     rotors = rotor_ladder(scene.rotor, (2, 3) if quick else (3, 4))
     table = rotor_table(scene.rotor, "auto", 1e-4 if quick else 1e-6)

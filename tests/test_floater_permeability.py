@@ -39,7 +39,7 @@ def test_parts_make_the_total_but_for_products_of_answers(dataset):
 
 
 def test_force_is_missed_like_the_inverse_cube_of_the_distance(dataset):
-    """Two dipoles: force ∝ d⁻⁴; either answer ∝ d⁻⁷, so that the share falls as d⁻³; 20 % for the shapes' higher degrees."""
+    """Two dipoles: force ∝ d⁻⁴; either answer ∝ d⁻⁷, so the share falls as d⁻³; 20 % for higher degrees."""
     share = dataset["force_missed"].values
     assert share[1] / share[2] == pytest.approx(1.5**3, rel=0.2)
     assert (dataset["force_missed_error"] < 0.01 * dataset["force_missed"].max()).all()

@@ -1,4 +1,4 @@
-"""Rotor and permeable floater: closed forms of the sphere, image series, limits, balance, both bodies meshed at once."""
+"""Rotor and permeable floater: closed forms of the sphere, image series, limits, both bodies meshed at once."""
 
 import numpy as np
 import pytest
@@ -6,12 +6,13 @@ import pytest
 from spinlev.fem.both_bodies import solve_both_bodies
 from spinlev.fem.demagnetization import remanent_field
 from spinlev.fem.harmonics import derivative, outer_sums
+from spinlev.fem.local_degree import enough_degree
 from spinlev.fem.local_field import Ball, dipole_sources, field_at_center, force, from_magnetization, moment, torque
 from spinlev.fem.models import rotor_table
 from spinlev.fem.multipole import moments_of_magnetization, uniform_moments
 from spinlev.fem.permeable_sphere import induced_sources, inner_field, permanent_sources
 from spinlev.fem.rotor_response import rotor_ladder
-from spinlev.fem.two_body import TwoBodyError, enough_degree, two_body, two_body_ladder
+from spinlev.fem.two_body import TwoBodyError, two_body, two_body_ladder
 from spinlev.geometry.magnet import MU_0
 from spinlev.geometry.rotor import horizontal, vertical
 from spinlev.geometry.scene import Floater
@@ -108,7 +109,7 @@ def test_force_between_a_dipole_and_a_permeable_sphere(permeability, distance):
     degree = 60  # (R/d)^(2l) of the nearest is 1e-23 there
     for axis, weight in ((2, lambda l: (l + 1.0) ** 2 * (l + 2)), (0, lambda l: l * (l + 1.0) * (l + 2) / 2)):
         value = 0.7 * np.eye(3)[axis]
-        place = BALL.center + [0, 0, distance]
+        place = BALL.center + np.array([0, 0, distance])
         incident = from_magnetization(place[None], MU_0 * value[None], BALL, degree)
         found = force(incident, induced_sources(incident, permeability), BALL)
         expected = MU_0 * 0.49 / (4 * np.pi) * series(permeability, distance, weight)
@@ -123,7 +124,7 @@ def test_infinite_permeability_has_the_image_of_a_neutral_conductor():
         q = (RADIUS / d) ** 2
         return -MU_0 * value**2 / (8 * np.pi) * RADIUS / d**4 * ((1 + q) / (1 - q) ** 3 - 1)
 
-    place = BALL.center + [0, 0, distance]
+    place = BALL.center + np.array([0, 0, distance])
     incident = from_magnetization(place[None], np.array([[0, 0, MU_0 * value]]), BALL, 70)
     found = force(incident, induced_sources(incident, 1e13), BALL)
     assert found[2] == pytest.approx(energy(distance + 1j * step).imag / step, rel=1e-10)
@@ -185,7 +186,7 @@ def test_high_permeability_settles_as_well():
 
 
 def test_action_is_reaction(rotors):
-    """Stress on a sphere about the rotor against the floater's force, with the fields of all magnetisation summed up."""
+    """Stress on a sphere about the rotor against the floater's force, with the field of all magnetisation."""
     place = np.array([0.001, 0.002, -0.021])
     both = two_body(rotors[0], FLOATER, place, DIRECTION)
     induced = rotors[0].induced_dipoles(both.sources, both.ball)
@@ -223,7 +224,7 @@ def test_answers_are_first_order_in_the_susceptibility():
 
 
 def test_degree_follows_the_nearest_edge(rotors):
-    near, far = (enough_degree(rotors[0], Ball(np.array([0, 0, z]), RADIUS)) for z in (-0.0115, -0.05))
+    near, far = (enough_degree(rotors[0].magnets, Ball(np.array([0, 0, z]), RADIUS)) for z in (-0.0115, -0.05))
     assert far < 10 < 30 < near
 
 
