@@ -69,7 +69,7 @@ def from_magnetization(points: Array, moments: Array, ball: Ball, degree: int) -
     for start in range(0, len(points), CHUNK):
         chosen = slice(start, start + CHUNK)
         harmonics = irregular_values(degree + 1, (points[chosen] - ball.center) / ball.radius)
-        values = np.array([harmonics[key] for key in zip(degrees, orders, strict=True)])
+        values = np.array([harmonics[int(l), int(m)] for l, m in zip(degrees, orders, strict=True)])
         sums[:, degrees, orders] += (values.real @ moments[chosen] + 1j * (values.imag @ moments[chosen])).T
     minus = np.concatenate([-np.conj(sums[:, 1:, 1:2]), sums[:, 1:, :-2]], axis=2)
     plus = sums[:, 1:, 1:]
