@@ -1,0 +1,114 @@
+"""What permeable bodies in a ball of air answer to a given field: one factorised matrix, many fields.
+
+With the given field H0 (sources outside or remanence, in T) and μ0 H = H0 - ∇ψ,
+
+    ∫ ∇v·μ∇ψ = ∫_bodies ∇v·(μ - 1) H0,        μ0 M = (μ - 1)(H0 - ∇ψ),
+
+as in `magnetostatics`, and open space outside the ball. H0 enters and M leaves at integration points.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import ngsolve as ng
+import numpy as np
+from scipy.sparse.linalg import LinearOperator, cg
+
+from ..geometry.box import Array
+from .integration_points import IntegrationPoints, volume_points
+from .magnetostatics import ConvergenceError
+from .open_boundary import OpenBoundary
+
+BOUNDARY_DEGREE = 8
+"""Harmonics up to this degree see an exactly open boundary; higher ones reach the bodies below 1e-8."""
+
+
+@dataclass(frozen=True, eq=False)
+class PermeableRegions:
+    """Bodies, their matrix and its factors; made by `assemble_regions`.
+
+    Parameters
+    ----------
+    susceptibility : (3, 3) μ - 1 of every body by region name
+    points : integration points of every body, in the mesh's coordinates
+    """
+
+    susceptibility: Mapping[str, Array]
+    points: Mapping[str, IntegrationPoints]
+    space: Any
+    stiffness: Any
+    inverse: Any
+    boundary: OpenBoundary
+
+    def magnetization(self, fields: Mapping[str, Array]) -> dict[str, Array]:
+        """μ0 M (n, 3) T at the points of every body, for given fields H0 (n, 3) T there.
+
+        Raises
+        ------
+        ConvergenceError : the iteration for the open boundary stalls
+        """
+        load, test = ng.LinearForm(self.space), self.space.TestFunction()
+        for name, points in self.points.items():
+            source = fields[name] @ self.susceptibility[name]
+            for axis in range(3):
+                load += points.function(source[:, axis]) * ng.grad(test)[axis] * points.measure
+        load.Assemble()
+        slope = ng.grad(self._potential(load))
+        result = {}
+        for name, points in self.points.items():
+            own = points.sample(*(slope[axis] for axis in range(3)))
+            result[name] = (fields[name] - own) @ self.susceptibility[name]
+        return result
+
+    def _potential(self, load: Any) -> Any:
+        """Static condensation, then conjugate gradients for the open boundary on top of the sparse factor."""
+        potential, form = ng.GridFunction(self.space), self.stiffness
+        load.vec.data += form.harmonic_extension_trans * load.vec
+        free = np.array(self.space.FreeDofs(True))
+        source, target = load.vec.CreateVector(), load.vec.CreateVector()
+
+        def multiply(operator: Any, values: Array) -> Array:
+            source.FV().NumPy()[:] = values
+            target.data = operator * source
+            return np.where(free, target.FV().NumPy(), 0.0)
+
+        shape = (self.space.ndof, self.space.ndof)
+        full = LinearOperator(shape, lambda x: multiply(form.mat, x) + self.boundary.apply(x), dtype=float)
+        factor = LinearOperator(shape, lambda x: multiply(self.inverse, x), dtype=float)
+        values, failed = cg(full, np.where(free, load.vec.FV().NumPy(), 0.0), rtol=1e-11, maxiter=100, M=factor)
+        if failed:
+            raise ConvergenceError(f"The open boundary did not converge in {failed} iterations; use a larger ball.")
+        potential.vec.FV().NumPy()[:] = values
+        potential.vec.data += form.harmonic_extension * potential.vec
+        potential.vec.data += form.inner_solve * load.vec
+        return potential
+
+
+def assemble_regions(mesh: Any, permeability: Mapping[str, Array], ball_radius: float, order: int) -> PermeableRegions:
+    """Assemble and factorise with elements of degree `order`.
+
+    Parameters
+    ----------
+    mesh : NGSolve mesh of a ball about the origin with the boundary `outer`
+    permeability : (3, 3) μ by region name; regions not named have μ = 1
+    ball_radius : in the mesh's coordinates
+    """
+    space = ng.H1(mesh, order=order)
+    trial, test = space.TnT()
+    tensors = {name: ng.CF(tuple(map(float, mu.ravel())), dims=(3, 3)) for name, mu in permeability.items()}
+    boundary = OpenBoundary(mesh, space, ball_radius, BOUNDARY_DEGREE, order)
+    stiffness = ng.BilinearForm(space, symmetric=True, condense=True)
+    stiffness += (mesh.MaterialCF(tensors, default=ng.Id(3)) * ng.grad(trial)) * ng.grad(test) * ng.dx
+    stiffness += boundary.robin * trial * test * ng.ds("outer")
+    stiffness.Assemble()
+    return PermeableRegions(
+        susceptibility={name: mu - np.eye(3) for name, mu in permeability.items()},
+        points={name: volume_points(mesh, name, 2 * order - 2) for name in permeability},
+        space=space,
+        stiffness=stiffness,
+        inverse=stiffness.mat.Inverse(space.FreeDofs(True), inverse="sparsecholesky"),
+        boundary=boundary,
+    )
