@@ -25,7 +25,7 @@ class Accuracy:
         if it were a cube
     """
 
-    rtol: float = 1e-5
+    rtol: float = 3e-6
     nearest: float | None = None
 
     def __post_init__(self) -> None:

@@ -13,6 +13,7 @@ from ..geometry.box import Array
 FieldExpressions = tuple[list[hy.expression], list[list[hy.expression]]]
 """B_i (T) and ∂B_i/∂x_j (T/m), the latter symmetric."""
 
+
 class CompiledField:
     """B and its gradient at points.
 

@@ -25,7 +25,7 @@ FEW_MOMENTS = 16
 
 
 def resolve_model(
-    rotor: tuple[Magnet, ...], model: str, rtol: float = 1e-5, nearest: float | None = None
+    rotor: tuple[Magnet, ...], model: str, rtol: float = 3e-6, nearest: float | None = None
 ) -> tuple[str, str]:
     """Name of the model that `rotor_table` uses for `model`, and the reason in words.
 
@@ -44,7 +44,7 @@ def resolve_model(
 
 
 def rotor_table(
-    rotor: tuple[Magnet, ...], model: str = "auto", rtol: float = 1e-5, nearest: float | None = None
+    rotor: tuple[Magnet, ...], model: str = "auto", rtol: float = 3e-6, nearest: float | None = None
 ) -> RotorTable:
     """Table of a rotor's field.
 

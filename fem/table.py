@@ -108,7 +108,9 @@ class RotorTable:
         if not any(form.is_far(columns).any() for form in self._closed_forms):
             return unpacked(self._near.rows(columns))
         rows = np.zeros((12, columns.shape[1]))
-        for part in (*self._closed_forms, *self._far):
+        for form in self._closed_forms:
+            rows += form.rows(columns)
+        for part in self._far:
             rows += part.rows(columns)
         return unpacked(rows)
 
