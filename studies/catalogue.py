@@ -9,11 +9,16 @@ from pathlib import Path
 import xarray as xr
 from matplotlib.figure import Figure
 
+from ..geometry import load_scene
 from .dipole_validity import dipole_validity, validity_figure, validity_lines
 from .figures import save_figure
+from .floater_figure import floater_figure, floater_lines
+from .floater_permeability import floater_permeability
 from .results import write_dataset
+from .shipped_scenes import default_scene
 from .speed_accuracy import speed_accuracy
 from .speed_accuracy_figure import speed_figure, speed_lines
+from .team7_report import team7_figure, team7_lines, team7_study
 
 
 @dataclass(frozen=True)
@@ -46,6 +51,15 @@ CATALOGUE = {
         speed_accuracy,
         speed_figure,
         speed_lines,
+    ),
+    "floater-permeability": Study(
+        "what the rigid dipole misses once rotor and floater magnetise each other, in the default scene",
+        lambda quick: floater_permeability(load_scene(default_scene()), quick=quick),
+        floater_figure,
+        floater_lines,
+    ),
+    "team7": Study(
+        "eddy currents against the measurement of TEAM workshop problem 7", team7_study, team7_figure, team7_lines
     ),
 }
 

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import os
 import sys
-import sysconfig
 import time
 import traceback
 from collections.abc import Mapping
@@ -22,6 +21,7 @@ from cyclopts import App, CycloptsError, Parameter
 from ..geometry import InputError, load_scene
 from .console import answers_only, note, to_json
 from .points_file import read_points
+from .shipped_scenes import default_scene
 
 FieldModel = Literal["dipole", "cuboid", "fem", "auto"]
 PlateModel = Literal["none", "auto"]
@@ -58,11 +58,6 @@ class Answer:
     values: Mapping[str, Any]
     lines: tuple[str, ...]
     json: bool
-
-
-def default_scene() -> Path:
-    """The scene that comes with the program: `horizontal`."""
-    return Path(sysconfig.get_path("data")) / "share" / "spinlev" / "scenes" / "horizontal.toml"
 
 
 @app.command

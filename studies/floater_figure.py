@@ -50,3 +50,21 @@ def _axial(axes: Axes, result: xr.Dataset) -> None:
         values = force.sel(part=part) - (force.sel(part="rigid") if part == "total" else 0.0)
         axes.semilogy(distance, np.abs(values) / weight, "o-", ms=3, color=color, label=label)
     axes.set(xlabel="distance below the rotor (mm)", ylabel="|missed axial force| / weight", title="Missed lift")
+
+
+def floater_lines(result: xr.Dataset) -> list[str]:
+    """From where on the rigid dipole suffices, and what it misses at the stable equilibrium."""
+    lines = ["The rigid dipole suffices for the force / the torque on the floater:"]
+    for level in result["level"].values:
+        reach = [1e3 * float(result["sufficient_from"].sel(quantity=q, level=level)) for q in ("force", "torque")]
+        words = ["beyond the range" if np.isnan(r) else f"from {r:.1f} mm on" for r in reach]
+        lines.append(f"  to {100 * float(level):g} %: {words[0]} / {words[1]}")
+    if "shift" in result:
+        force, error = (float(result[name].sel(axis="z")) for name in ("missed_force", "missed_force_error"))
+        shift, doubt = (1e3 * float(result[name].sel(axis="z")) for name in ("shift", "shift_error"))
+        share = 100 * abs(force) / result.attrs["weight_N"]
+        lines.append(
+            f"At the stable equilibrium it misses {1e3 * force:+.4f} ± {1e3 * error:.1g} mN, {share:.1f} % of the weight: "
+            f"the floater hangs {shift:+.4f} ± {doubt:.1g} mm higher."
+        )
+    return lines
