@@ -64,7 +64,7 @@ def floater_lines(result: xr.Dataset) -> list[str]:
         shift, doubt = (1e3 * float(result[name].sel(axis="z")) for name in ("shift", "shift_error"))
         share = 100 * abs(force) / result.attrs["weight_N"]
         lines.append(
-            f"At the stable equilibrium it misses {1e3 * force:+.4f} ± {1e3 * error:.1g} mN, {share:.1f} % of the weight: "
-            f"the floater hangs {shift:+.4f} ± {doubt:.1g} mm higher."
+            f"At the stable equilibrium it misses {1e3 * force:+.4f} ± {1e3 * error:.1g} mN, {share:.1f} % of the "
+            f"weight: the floater hangs {shift:+.4f} ± {doubt:.1g} mm higher."
         )
     return lines
