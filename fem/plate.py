@@ -105,9 +105,7 @@ def plate_reaction(
     )
 
 
-def raise_order(
-    plate: Plate, body: Array, frequency: float, rtol: float, rule: MeshRule
-) -> tuple[EddyResponse, Array]:
+def raise_order(plate: Plate, body: Array, frequency: float, rtol: float, rule: MeshRule) -> tuple[EddyResponse, Array]:
     """The response of the lowest order that meets `rtol` on one mesh, or of the last that helped, and its errors."""
     mesh = plate_mesh(plate.box.size, plate.conductivity, body, frequency, rule)
     sources = unit_dipoles(body)

@@ -45,9 +45,7 @@ class OrderedBasis:
     def leading(self, energy: float) -> OrderedBasis:
         """The part whose energies exceed a level."""
         n = int(np.sum(self.energies > energy))
-        return OrderedBasis(
-            self.energies[:n], self.fields[:n], self.resistance[:n, :n], self.inductance[:n, :n]
-        )
+        return OrderedBasis(self.energies[:n], self.fields[:n], self.resistance[:n, :n], self.inductance[:n, :n])
 
     def diagonalised(self) -> tuple[Array, Array]:
         """Rates (n,), 1/s, increasing, and the fields (n, width) that belong to them, of unit inductance."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import json
 from pathlib import Path
 from typing import Any
@@ -10,25 +9,20 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from ..geometry.atomic import replacing
 from ..geometry.box import Box
 from ..geometry.magnet import Magnet
 from .multipole import MultipoleExpansion
 from .table import RotorTable
+from .table_store import TableFileError, described, read_checked, write_checked
+
+__all__ = ["FORMAT", "TableFileError", "load_table", "save_table"]
 
 FORMAT = "spinlev rotor table 1"
 
 
-class TableFileError(ValueError):
-    """A table file that is damaged, or is not one."""
-
-
 def save_table(table: RotorTable, path: str | Path) -> None:
     """Write a table; the file is whole or absent."""
-    dataset = _to_dataset(table)
-    dataset.attrs["content_sha256"] = _digest(dataset)
-    with replacing(path) as temporary:
-        dataset.to_netcdf(temporary, engine="h5netcdf")
+    write_checked(_to_dataset(table), path)
 
 
 def load_table(path: str | Path) -> RotorTable:
@@ -38,19 +32,7 @@ def load_table(path: str | Path) -> RotorTable:
     ------
     TableFileError : the file is not a table of this format, or its content is not what was written
     """
-    try:
-        with xr.open_dataset(path, engine="h5netcdf") as opened:
-            dataset = opened.load()
-    except FileNotFoundError:
-        raise
-    except Exception as error:  # the HDF5 layer raises many kinds on a damaged file
-        raise TableFileError(f"Input {path} must be a readable netCDF file; {error}.") from error
-    attrs = dataset.attrs
-    if attrs.get("format") != FORMAT:
-        raise TableFileError(f"Input {path} must be a '{FORMAT}'; instead received '{attrs.get('format')}'.")
-    if attrs.pop("content_sha256", None) != _digest(dataset):
-        raise TableFileError(f"Input {path} must be as it was written; instead its checksum does not match.")
-    return _from_dataset(dataset)
+    return _from_dataset(read_checked(path, FORMAT))
 
 
 def _to_dataset(table: RotorTable) -> xr.Dataset:
@@ -86,7 +68,7 @@ def _to_dataset(table: RotorTable) -> xr.Dataset:
         "model": table.model,
         "provenance": json.dumps(dict(table.provenance), sort_keys=True),
     }
-    return xr.Dataset({n: xr.Variable(d, v, {"units": u}) for n, (d, v, u) in variables.items()}, attrs=attrs)
+    return described(variables, attrs)
 
 
 def _from_dataset(dataset: xr.Dataset) -> RotorTable:
@@ -111,14 +93,3 @@ def _from_dataset(dataset: xr.Dataset) -> RotorTable:
         expansions=expansions,
         provenance=json.loads(dataset.attrs["provenance"]),
     )
-
-
-def _digest(dataset: xr.Dataset) -> str:
-    """SHA-256 over the numbers, their names and shapes, and the attributes."""
-    digest = hashlib.sha256()
-    for name in sorted(str(n) for n in dataset.data_vars):
-        values = np.ascontiguousarray(dataset[name].values, dtype="<f8")
-        digest.update(f"{name}{values.shape}".encode() + values.tobytes())
-    attrs = {k: str(v) for k, v in dataset.attrs.items() if k != "content_sha256"}
-    digest.update(json.dumps(attrs, sort_keys=True).encode())
-    return digest.hexdigest()
