@@ -18,11 +18,12 @@ import heyoka as hy
 import numpy as np
 
 from ..geometry.box import Array, frozen_array
+from .accuracy import AccuracyError
 from .compiled import SYMMETRIC, FieldExpressions
 from .multipole import MultipoleExpansion
 from .plate_region import Region
 
-DEPTHS = (0.15, 0.4, 0.8, 1.4, 2.3, 3.6, 6.0, 10.0, 18.0)
+DEPTHS = (0.0, 0.3, 0.6, 1.0, 1.6, 2.5, 4.0, 6.0, 10.0, 18.0)
 """Depths of the centres behind the surface, in units of the distance between region and plate."""
 SPACING = 2.5
 """Lateral distance of the lines, in the same unit."""
@@ -141,7 +142,7 @@ def fit_multipoles(
 
     Raises
     ------
-    ValueError : not reached with all candidates
+    AccuracyError : not reached with all candidates
     """
     columns = choice.evaluate(points)[0] * point_scale[:, None, None]
     columns = columns.swapaxes(1, 2).reshape(-1, len(choice.kinds))
@@ -156,8 +157,8 @@ def fit_multipoles(
         )
         best = int(np.argmax(gain))
         if gain[best] <= 0:
-            raise ValueError(
-                f"Input rtol must be larger: {len(chosen)} multipoles leave an error of {_worst(rest):.1e}."
+            raise AccuracyError(
+                f"Input rtol must be larger: {len(chosen)} multipoles leave an error of {left:.1e}; or refine the mesh."
             )
         chosen.append(best)
         direction = free[:, best] - basis @ (basis.T @ free[:, best])

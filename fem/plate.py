@@ -18,6 +18,7 @@ from ..geometry.box import Array
 from ..geometry.magnet import MU_0
 from ..geometry.plate_mesh import MeshRule, plate_mesh
 from ..geometry.scene import Plate
+from .accuracy import AccuracyError
 from .eddy import EddyResponse, solve_eddy
 from .phasor import ComplexArray
 from .sources import UniformField, unit_dipoles
@@ -27,10 +28,6 @@ LEAST_REDUCTION = 0.2
 """The smallest error reduction from one order to the next that is believed without having seen the next."""
 STALLED = 0.6
 """A weaker reduction than this says that the mesh is too coarse for its order."""
-
-
-class AccuracyError(ArithmeticError):
-    """A computation did not reach the accuracy asked for."""
 
 
 @dataclass(frozen=True, eq=False)

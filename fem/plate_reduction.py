@@ -18,9 +18,10 @@ from scipy.stats import qmc
 from ..geometry.box import Array
 from ..geometry.plate_mesh import MeshRule
 from ..geometry.scene import Plate
+from .accuracy import AccuracyError
 from .eddy_space import EddySpace, Source
 from .phasor import ComplexArray
-from .plate import AccuracyError, raise_order
+from .plate import raise_order
 from .plate_region import Region
 from .plate_snapshots import Group, SourceModes, group_rows, parity_groups, solve_modes, source_modes
 from .pod import OrderedBasis, ordered_basis

@@ -45,7 +45,7 @@ class RotorShare:
 
     def signals(self, angle: float, depth: float) -> Array:
         """s_i (states,), √J, at a rotor's angle (rad) and a depth of the plate (m)."""
-        factors = np.polynomial.chebyshev.chebvander(self._place(depth), self.series.shape[2] - 1)
+        factors = np.polynomial.chebyshev.chebvander(np.array([self._place(depth)]), self.series.shape[2] - 1)[0]
         return np.asarray(_harmonics(angle, len(self.series)) @ (self.series @ factors))
 
     def _place(self, depth: float) -> float:

@@ -43,7 +43,9 @@ def test_work_of_the_field_is_the_loss_of_the_currents(conductivity):
     # at the surface d(r A)/dr + A = 3 B r / 2 sin θ: the applied field and the outer dipole, continuous with slope
     slope = spherical_in(1, k * RADIUS, derivative=True) * k * RADIUS + 2 * spherical_in(1, k * RADIUS)
     amplitude = 3 * RADIUS / 2 / slope
-    loss = 0.5 * omega**2 * conductivity * 8 * np.pi / 3 * np.sum(w * r**2 * abs(amplitude * spherical_in(1, k * r)) ** 2)
+    loss = (
+        0.5 * omega**2 * conductivity * 8 * np.pi / 3 * np.sum(w * r**2 * abs(amplitude * spherical_in(1, k * r)) ** 2)
+    )
     work = -0.5 * omega * polarizability(RADIUS, conductivity, frequency).imag
     assert work == pytest.approx(loss, rel=1e-10)
 
