@@ -158,7 +158,7 @@ def fit_multipoles(
         best = int(np.argmax(gain))
         if gain[best] <= 0:
             raise AccuracyError(
-                f"Input rtol must be larger: {len(chosen)} multipoles leave an error of {left:.1e}; or refine the mesh."
+                f"Input rtol must be larger: {len(chosen)} multipoles leave {_worst(rest):.1e}; or refine the mesh."
             )
         chosen.append(best)
         direction = free[:, best] - basis @ (basis.T @ free[:, best])
