@@ -3,24 +3,16 @@
 from __future__ import annotations
 
 import hashlib
-import os
 from collections.abc import Callable
 from importlib.metadata import version
-from pathlib import Path
 
 import numpy as np
 
 from ..geometry.magnet import Magnet
 from .models import rotor_table
 from .table import RotorTable
-from .table_file import FORMAT, TableFileError, load_table, save_table
-
-
-def cache_folder() -> Path:
-    """Where tables are kept: $SPINLEV_CACHE, else $XDG_CACHE_HOME/spinlev, else ~/.cache/spinlev."""
-    if folder := os.environ.get("SPINLEV_CACHE"):
-        return Path(folder)
-    return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "spinlev"
+from .table_file import FORMAT, load_table, save_table
+from .table_store import from_cache
 
 
 def rotor_key(rotor: tuple[Magnet, ...], model: str, rtol: float) -> str:
@@ -36,20 +28,11 @@ def rotor_key(rotor: tuple[Magnet, ...], model: str, rtol: float) -> str:
 def cached_rotor_table(
     rotor: tuple[Magnet, ...], model: str, rtol: float, report: Callable[[str], None]
 ) -> tuple[RotorTable, bool]:
-    """A rotor table, from the cache if it is there, and whether it was.
-
-    A damaged entry is reported, computed anew and replaced; a cache that cannot be written is reported and
-    does no harm.
-    """
-    path = cache_folder() / f"rotor-{rotor_key(rotor, model, rtol)}.nc"
-    if path.exists():
-        try:
-            return load_table(path), True
-        except (TableFileError, OSError) as error:
-            report(f"The cached table is damaged and is computed anew: {error}")
-    table = rotor_table(rotor, model, rtol)
-    try:
-        save_table(table, path)
-    except OSError as error:
-        report(f"The table could not be cached: {error}")
-    return table, False
+    """A rotor table, from the cache if it is there, and whether it was."""
+    return from_cache(
+        f"rotor-{rotor_key(rotor, model, rtol)}.nc",
+        load_table,
+        lambda: rotor_table(rotor, model, rtol),
+        save_table,
+        report,
+    )

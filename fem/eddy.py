@@ -99,7 +99,7 @@ def solve_eddy(
         raise ValueError("Input sources must hold at least one source; instead received none.")
     space = space or EddySpace(conductors, order)
     solved = max(frequency, _resistive_frequency(space))
-    system = _System(space, solved)
+    system = FrequencySystem(space, solved)
     images = space.class_images(sources)
     size = np.sqrt(np.einsum("csqa->cs", images**2 * space.weights[:, None]))
     classes, coupling = {}, 0
@@ -120,7 +120,7 @@ def _resistive_frequency(space: EddySpace) -> float:
     return RESISTIVE / (2 * np.pi * MU_0 * conductivity * extent**2)
 
 
-class _System:
+class FrequencySystem:
     """Condensed matrix of one frequency, factorised once for each parity class."""
 
     def __init__(self, space: EddySpace, frequency: float) -> None:

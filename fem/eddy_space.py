@@ -99,6 +99,11 @@ class EddySpace:
             row[:] = form.vec.FV().NumPy() * MILLIMETRE**3
         return found
 
+    def point_values(self, function: ngsolve.GridFunction) -> Array:
+        """(n, 3) values of a real function of this space at the quadrature points."""
+        self._carrier.Interpolate(function, definedon=self.region)
+        return np.stack([c.vec.FV().NumPy() for c in self._carrier.components], axis=1)
+
     def free_unknowns(self, parity_class: Sequence[int], space: ngsolve.FESpace) -> ngsolve.BitArray:
         """Coupling unknowns of one parity class: without odd planes, the far boundary and a spanning tree in air."""
         mesh = self.conductors.mesh

@@ -7,7 +7,8 @@ from pathlib import Path
 import xarray as xr
 
 from .gridded import GriddedTable
-from .table_file import from_dataset, read_dataset, to_dataset, write_dataset
+from .table_file import from_dataset, to_dataset
+from .table_store import read_checked, write_checked
 
 FORMAT = "spinlev gridded table 1"
 
@@ -20,7 +21,7 @@ def save_gridded(table: GriddedTable, path: str | Path) -> None:
     dataset["deviation_imag"] = xr.Variable(dims, table.deviations.imag, {"units": "T"})
     dataset["region"] = xr.Variable(("corner", "axis"), table.region, {"units": "m"})
     dataset.attrs |= {"format": FORMAT, "title": "Solid-harmonic expansions fitted to a map of a magnetic field"}
-    write_dataset(dataset, path)
+    write_checked(dataset, path)
 
 
 def load_gridded(path: str | Path) -> GriddedTable:
@@ -30,6 +31,6 @@ def load_gridded(path: str | Path) -> GriddedTable:
     ------
     TableFileError : the file is not a table of this format, or its content is not what was written
     """
-    dataset = read_dataset(path, FORMAT)
+    dataset = read_checked(path, FORMAT)
     deviations = dataset["deviation_real"].values + 1j * dataset["deviation_imag"].values
     return GriddedTable(from_dataset(dataset), deviations, dataset["region"].values)

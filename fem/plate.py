@@ -18,6 +18,7 @@ from ..geometry.box import Array
 from ..geometry.magnet import MU_0
 from ..geometry.plate_mesh import MeshRule, plate_mesh
 from ..geometry.scene import Plate
+from .accuracy_error import AccuracyError
 from .eddy import EddyResponse, solve_eddy
 from .phasor import ComplexArray
 from .sources import UniformField, unit_dipoles
@@ -27,10 +28,6 @@ LEAST_REDUCTION = 0.2
 """The smallest error reduction from one order to the next that is believed without having seen the next."""
 STALLED = 0.6
 """A weaker reduction than this says that the mesh is too coarse for its order."""
-
-
-class AccuracyError(ArithmeticError):
-    """A computation did not reach the accuracy asked for."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,7 +88,7 @@ def plate_reaction(
         return PlateReaction(0.0, places, silent, np.zeros(len(places)), 0, 0, 0)
     best = np.inf
     for _ in range(refinements + 1):
-        response, error = _raise_order(plate, body, frequency, rtol, rule)
+        response, error = raise_order(plate, body, frequency, rtol, rule)
         best = min(best, float(error.max()))
         if best <= rtol:
             mutual = _to_laboratory(response.couplings, plate.box.rotation)
@@ -105,18 +102,16 @@ def plate_reaction(
     )
 
 
-def _raise_order(
-    plate: Plate, body: Array, frequency: float, rtol: float, rule: MeshRule
-) -> tuple[EddyResponse, Array]:
+def raise_order(plate: Plate, body: Array, frequency: float, rtol: float, rule: MeshRule) -> tuple[EddyResponse, Array]:
     """The response of the lowest order that meets `rtol` on one mesh, or of the last that helped, and its errors."""
     mesh = plate_mesh(plate.box.size, plate.conductivity, body, frequency, rule)
     sources = unit_dipoles(body)
     response = solve_eddy(mesh, 1, frequency, sources)
-    tensors, change = _own(response), np.ones(len(body))
+    tensors, change = own_tensors(response), np.ones(len(body))
     error = change
     for order in range(2, HIGHEST_ORDER + 1):
         response = solve_eddy(mesh, order, frequency, sources)
-        previous, tensors = tensors, _own(response)
+        previous, tensors = tensors, own_tensors(response)
         size = np.linalg.norm(tensors, axis=(1, 2))
         last, change = change, np.linalg.norm(tensors - previous, axis=(1, 2)) / size
         reduction = np.clip(change / last, LEAST_REDUCTION, 1.0)
@@ -126,7 +121,8 @@ def _raise_order(
     return response, error
 
 
-def _own(response: EddyResponse) -> ComplexArray:
+def own_tensors(response: EddyResponse) -> ComplexArray:
+    """G (n, 3, 3), T/(A m²), of a response to `unit_dipoles`, each at its own place."""
     couplings = response.couplings
     n = len(couplings) // 3
     return np.asarray(np.einsum("iaib->iab", couplings.reshape(n, 3, n, 3)))

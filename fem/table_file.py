@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import json
 from pathlib import Path
 from typing import Any
@@ -10,29 +9,20 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from ..geometry.atomic import replacing
 from ..geometry.box import Box
 from ..geometry.magnet import Magnet
 from .multipole import MultipoleExpansion
 from .table import RotorTable
+from .table_store import TableFileError, described, read_checked, write_checked
+
+__all__ = ["FORMAT", "TableFileError", "load_table", "save_table"]
 
 FORMAT = "spinlev rotor table 2"
 
 
-class TableFileError(ValueError):
-    """A table file that is damaged, or is not one."""
-
-
 def save_table(table: RotorTable, path: str | Path) -> None:
     """Write a table; the file is whole or absent."""
-    write_dataset(to_dataset(table), path)
-
-
-def write_dataset(dataset: xr.Dataset, path: str | Path) -> None:
-    """Write a data set with its checksum; the file is whole or absent."""
-    dataset.attrs["content_sha256"] = _digest(dataset)
-    with replacing(path) as temporary:
-        dataset.to_netcdf(temporary, engine="h5netcdf")
+    write_checked(to_dataset(table), path)
 
 
 def load_table(path: str | Path) -> RotorTable:
@@ -42,24 +32,7 @@ def load_table(path: str | Path) -> RotorTable:
     ------
     TableFileError : the file is not a table of this format, or its content is not what was written
     """
-    return from_dataset(read_dataset(path, FORMAT))
-
-
-def read_dataset(path: str | Path, expected: str) -> xr.Dataset:
-    """Read a data set of the `expected` format and check it; raises TableFileError as `load_table`."""
-    try:
-        with xr.open_dataset(path, engine="h5netcdf") as opened:
-            dataset = opened.load()
-    except FileNotFoundError:
-        raise
-    except Exception as error:  # the HDF5 layer raises many kinds on a damaged file
-        raise TableFileError(f"Input {path} must be a readable netCDF file; {error}.") from error
-    attrs = dataset.attrs
-    if attrs.get("format") != expected:
-        raise TableFileError(f"Input {path} must be a '{expected}'; instead received '{attrs.get('format')}'.")
-    if attrs.pop("content_sha256", None) != _digest(dataset):
-        raise TableFileError(f"Input {path} must be as it was written; instead its checksum does not match.")
-    return dataset
+    return from_dataset(read_checked(path, FORMAT))
 
 
 def to_dataset(table: RotorTable) -> xr.Dataset:
@@ -98,7 +71,7 @@ def to_dataset(table: RotorTable) -> xr.Dataset:
         "expansion_uses": json.dumps(list(causes)),  # "field", and the causes of doubt
         "provenance": json.dumps(dict(table.provenance), sort_keys=True),
     }
-    return xr.Dataset({n: xr.Variable(d, v, {"units": u}) for n, (d, v, u) in variables.items()}, attrs=attrs)
+    return described(variables, attrs)
 
 
 def from_dataset(dataset: xr.Dataset) -> RotorTable:
@@ -125,14 +98,3 @@ def from_dataset(dataset: xr.Dataset) -> RotorTable:
         doubts=causes,
         provenance=json.loads(dataset.attrs["provenance"]),
     )
-
-
-def _digest(dataset: xr.Dataset) -> str:
-    """SHA-256 over the numbers, their names and shapes, and the attributes."""
-    digest = hashlib.sha256()
-    for name in sorted(str(n) for n in dataset.data_vars):
-        values = np.ascontiguousarray(dataset[name].values, dtype="<f8")
-        digest.update(f"{name}{values.shape}".encode() + values.tobytes())
-    attrs = {k: str(v) for k, v in dataset.attrs.items() if k != "content_sha256"}
-    digest.update(json.dumps(attrs, sort_keys=True).encode())
-    return digest.hexdigest()

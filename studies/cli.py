@@ -16,15 +16,18 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
+import numpy as np
 from cyclopts import App, CycloptsError, Parameter
 
 from ..geometry import InputError, load_scene
+from ..geometry.box import Array
 from .console import answers_only, note, to_json
 from .points_file import read_points
 from .shipped_scenes import default_scene
 
 FieldModel = Literal["dipole", "cuboid", "fem", "auto"]
 PlateModel = Literal["none", "auto"]
+ReactionModel = Literal["slab", "fem", "reduced", "auto"]
 
 app = App(
     name="spinlev",
@@ -221,6 +224,50 @@ def study(
         raise InputError(f"Input name must be one of {', '.join(CATALOGUE)}; instead received {name}.")
     lines = run_study(name, quick, output.out)
     return Answer({"study": name, "report": lines, "result": str(output.out / f"{name}.nc")}, tuple(lines), output.json)
+
+
+@app.command
+def plate(
+    scene: Path,
+    *,
+    at: str,
+    frequency_hz: float,
+    model: ReactionModel = "auto",
+    rtol: float = 1e-3,
+    output: Output = Output(),
+) -> Answer:
+    """Reaction tensor G of the plate's eddy currents: B = G m at the dipole's own place, phasors e^(+iωt).
+
+    Parameters
+    ----------
+    scene
+        Scene file with a plate.
+    at
+        Place X,Y,Z of the dipole in the laboratory frame, mm.
+    frequency_hz
+        Frequency of the dipole, Hz.
+    model
+        slab (infinite, exact), fem, reduced (a table around the place), or auto.
+    rtol
+        Relative accuracy asked of the tensor.
+    """
+    _positive("--rtol", rtol)
+    place = _three_numbers("--at", at)
+    loaded = load_scene(scene)
+    from .plate_job import plate_job
+
+    values, lines = plate_job(loaded, place * 1e-3, frequency_hz, model, rtol, output.out)
+    return Answer(values, tuple(lines), output.json)
+
+
+def _three_numbers(name: str, text: str) -> Array:
+    try:
+        numbers = np.array([float(part) for part in text.split(",")])
+    except ValueError:
+        numbers = np.zeros(0)
+    if len(numbers) != 3 or not np.all(np.isfinite(numbers)):
+        raise InputError(f"Input {name} must be three numbers X,Y,Z; instead received {text!r}.")
+    return numbers
 
 
 def _positive(name: str, value: float) -> None:

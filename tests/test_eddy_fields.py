@@ -8,14 +8,13 @@ import pytest
 from netgen.occ import Box as OccBox
 from netgen.occ import Pnt, Sphere
 from ngsolve import SetNumThreads
-from scipy.special import spherical_jn
 
 from spinlev.fem.eddy import solve_eddy
 from spinlev.fem.eddy_export import write_vtu
 from spinlev.fem.eddy_fields import current_density, joule_loss, reaction_flux_density
 from spinlev.fem.phasor import mean_loss
 from spinlev.fem.sources import UniformField, unit_dipoles
-from spinlev.geometry.magnet import MU_0
+from spinlev.fem.sphere_eddy import polarizability
 from spinlev.geometry.occ_mesh import Conductor, occ_mesh
 from spinlev.geometry.plate_mesh import MeshRule, plate_mesh
 
@@ -95,20 +94,13 @@ def test_vtu_holds_the_fields(response, tmp_path):
     assert abs(read.point_data["J_real"]).max() > 0
 
 
-def sphere_moment(radius, conductivity, frequency):
-    """Moment per T of a conducting sphere in a uniform field (Landau, Lifshitz, ECM, § 59, problem 1)."""
-    k = np.sqrt(-2j * np.pi * frequency * MU_0 * conductivity)
-    x = k * radius
-    return 2 * np.pi * radius**3 / MU_0 * spherical_jn(2, x) / spherical_jn(0, x)
-
-
 def test_sphere_in_a_uniform_field_on_curved_tetrahedra():
     """μ0 m² of the induced moment is the coupling of the field with itself; R/δ = 1.7."""
     radius, frequency = 0.01, 200.0
     mesh = occ_mesh({"ball": Conductor(Sphere(Pnt(0, 0, 0), 10.0), SIGMA, 8.0)}, reach=8.0)
     sources = [UniformField(axis) for axis in np.eye(3)]
     found = solve_eddy(mesh, 3, frequency, sources).couplings
-    exact = sphere_moment(radius, SIGMA, frequency)
+    exact = polarizability(radius, SIGMA, frequency)
     # the box at 8 R adds about (1/8)³ of the moment's own share
     assert np.diag(found) == pytest.approx(np.full(3, exact), rel=3e-3)
     assert abs(found - np.diag(np.diag(found))).max() < 1e-3 * abs(exact)

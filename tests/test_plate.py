@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 from ngsolve import SetNumThreads
 
+from spinlev.fem.accuracy_error import AccuracyError
 from spinlev.fem.phasor import mean_loss
-from spinlev.fem.plate import AccuracyError, plate_reaction
+from spinlev.fem.plate import plate_reaction
 from spinlev.geometry.box import Box, rotation_matrix
 from spinlev.geometry.plate_mesh import MeshRule
 from spinlev.geometry.scene import Plate

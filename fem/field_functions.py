@@ -1,0 +1,177 @@
+"""Functions of position that are harmonic where the floater is: multipoles at points beyond the region.
+
+Every field function of the plate is a sum over the same few multipoles, B = -∇ Σ c_k Θ_k, each free of divergence
+and curl by construction.  Their centres lie behind the plate's surface, on lines away from the region: near ones
+for what is close to the surface, far ones for the rest.  From many candidates those are taken one by one that lower
+the remaining error most (orthogonal least squares: S. Chen et al., Int. J. Control 50 (1989) 1873), until the fit on
+the surface of the region meets the tolerance; inside, harmonic functions are at most as wrong as there.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import product
+
+import heyoka as hy
+import numpy as np
+
+from ..geometry.box import Array, frozen_array
+from .accuracy_error import AccuracyError
+from .compiled import SYMMETRIC, FieldExpressions
+from .multipole import MultipoleExpansion
+from .plate_region import Region
+
+DEPTHS = (0.0, 0.3, 0.6, 1.0, 1.6, 2.5, 4.0, 6.0, 10.0, 18.0)
+"""Depths of the centres behind the surface, in units of the distance between region and plate."""
+SPACING = 2.5
+"""Lateral distance of the lines, in the same unit."""
+HIGHEST_DEGREE = 4
+INDEPENDENT = 1e-10
+"""Squared part of a multipole that the chosen ones must leave for it to be taken."""
+NOISE = 1e-11
+"""Weights below this share of the largest are what symmetry forbids."""
+
+
+@dataclass(frozen=True, eq=False)
+class Multipoles:
+    """Single multipoles Re Θ_lm and Im Θ_lm of unit strength (T) at given centres.
+
+    Parameters
+    ----------
+    centers : (k, 3) m
+    kinds : (k, 3) whole numbers: degree l, order m, and 0 for the real or 1 for the imaginary part
+    scale : length that makes coordinates free of units, m
+    """
+
+    centers: Array
+    kinds: Array
+    scale: float
+
+    def __post_init__(self) -> None:
+        for name in ("centers", "kinds"):
+            object.__setattr__(self, name, frozen_array(getattr(self, name), (len(self.kinds), 3)))
+
+    def subset(self, numbers: Sequence[int]) -> Multipoles:
+        """Some of them."""
+        return Multipoles(self.centers[list(numbers)], self.kinds[list(numbers)], self.scale)
+
+    @cached_property
+    def _expansions(self) -> list[MultipoleExpansion]:
+        found = []
+        for center, (degree, order, imaginary) in zip(self.centers, self.kinds.astype(int), strict=True):
+            coefficients = np.zeros((degree + 1, degree + 1), complex)
+            coefficients[degree, order] = 1j if imaginary else 1.0
+            found.append(MultipoleExpansion(center, self.scale, coefficients))
+        return found
+
+    def expressions(self, position: Sequence[hy.expression]) -> list[FieldExpressions]:
+        """B (T) and its gradient (T/m) of each as heyoka expressions of a position (m)."""
+        return [expansion.expressions(position) for expansion in self._expansions]
+
+    @cached_property
+    def _compiled(self) -> hy.cfunc_dbl:
+        variables = hy.make_vars("x", "y", "z")
+        outputs: list[hy.expression] = []
+        for field, gradient in self.expressions(variables):
+            outputs += [*field, *(gradient[i][j] for i in range(3) for j in range(i, 3))]
+        return hy.cfunc(outputs, variables, compact_mode=len(outputs) > 2000)
+
+    def evaluate(self, points: Array) -> tuple[Array, Array]:
+        """B (n, k, 3) T and ∂B_i/∂x_j (n, k, 3, 3) T/m at points (n, 3) m."""
+        values = self._compiled(np.ascontiguousarray(points.T)).reshape(len(self.kinds), 9, -1)
+        return np.moveaxis(values[:, :3], -1, 0), np.moveaxis(values[:, SYMMETRIC], -1, 0)
+
+
+def candidates(region: Region, half_edges: Array) -> Multipoles:
+    """Multipoles to choose from for a region beside a plate with these half edges (m), both about the plate's centre.
+
+    Raises
+    ------
+    ValueError : the region touches the plate
+    """
+    of_region, of_plate = region.nearest(half_edges)
+    gap = float(np.linalg.norm(of_region - of_plate))
+    if gap < 1e-9:
+        raise ValueError(
+            f"Input region must be apart from the plate; instead received {region.lower.tolist()} to "
+            f"{region.upper.tolist()} m for half edges {half_edges.tolist()} m."
+        )
+    away = (of_plate - of_region) / gap
+    axis = int(np.argmax(np.abs(away)))
+    lines = []
+    for a in range(3):
+        reach = (region.upper - region.lower)[a] / 2 - gap
+        count = 1 if a == axis else 2 * int(np.ceil(max(reach, 0.0) / (SPACING * gap))) + 1
+        lines.append(region.center[a] + max(reach, 0.0) * np.linspace(-1, 1, count) * (count > 1))
+    lines[axis] = of_plate[[axis]]
+    starts = np.array(list(product(*lines)))
+    centers = np.concatenate([starts + depth * gap * away for depth in DEPTHS])
+    kinds = [(l, m, part) for l in range(HIGHEST_DEGREE + 1) for m in range(l + 1) for part in (0, 1)[: 1 + (m > 0)]]
+    pairs = list(product(centers, kinds))
+    return Multipoles(np.array([p[0] for p in pairs]), np.array([p[1] for p in pairs], float), gap)
+
+
+@dataclass(frozen=True, eq=False)
+class Fit:
+    """Field functions as sums of multipoles.
+
+    Parameters
+    ----------
+    multipoles : the k chosen
+    weights : (functions, k) c_k
+    error : (functions, n, 3) what is left at the points of the fit
+    """
+
+    multipoles: Multipoles
+    weights: Array
+    error: Array
+
+
+def fit_multipoles(
+    choice: Multipoles, points: Array, values: Array, state_scale: Array, point_scale: Array, tolerance: float
+) -> Fit:
+    """Fewest multipoles with which all points meet the tolerance.
+
+    Parameters
+    ----------
+    values : (functions, n, 3) B of each function at `points` (n, 3)
+    state_scale, point_scale : (functions,) and (n,) factors that make errors comparable
+    tolerance : for the norm of the scaled error over functions and components, at every point
+
+    Raises
+    ------
+    AccuracyError : not reached with all candidates
+    """
+    columns = choice.evaluate(points)[0] * point_scale[:, None, None]
+    columns = columns.swapaxes(1, 2).reshape(-1, len(choice.kinds))
+    target = (values * state_scale[:, None, None] * point_scale[:, None]).reshape(len(values), -1).T
+    size = np.linalg.norm(columns, axis=0)
+    free, rest, basis = columns / size, target, np.zeros((len(target), 0))
+    chosen: list[int] = []
+    while _worst(rest) > tolerance:
+        remaining = np.einsum("ij,ij->j", free, free)
+        gain = np.where(
+            remaining > INDEPENDENT, np.sum((free.T @ rest) ** 2, axis=1) / np.maximum(remaining, 1e-300), 0
+        )
+        best = int(np.argmax(gain))
+        if gain[best] <= 0:
+            raise AccuracyError(
+                f"Input rtol must be larger: {len(chosen)} multipoles leave {_worst(rest):.1e}; or refine the mesh."
+            )
+        chosen.append(best)
+        direction = free[:, best] - basis @ (basis.T @ free[:, best])
+        direction = direction / np.linalg.norm(direction)
+        basis = np.column_stack([basis, direction])
+        free = free - np.outer(direction, direction @ free)
+        rest = rest - np.outer(direction, direction @ rest)
+    scaled = np.linalg.lstsq(columns[:, chosen] / size[chosen], target, rcond=None)[0]
+    weights = (scaled / size[chosen][:, None]).T
+    small = np.abs(scaled.T) < NOISE * np.abs(scaled).max(initial=0.0)
+    error = rest.T.reshape(values.shape) / state_scale[:, None, None] / point_scale[:, None]
+    return Fit(choice.subset(chosen), np.where(small, 0.0, weights / state_scale[:, None]), error)
+
+
+def _worst(rest: Array) -> float:
+    return float(np.sqrt(np.max(np.sum((rest**2).reshape(-1, 3, rest.shape[1]), axis=(1, 2)))))

@@ -1,0 +1,99 @@
+"""The table of a plate: the network of its currents, then its field functions."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from importlib.metadata import version
+
+import numpy as np
+
+from ..geometry.box import Array
+from ..geometry.plate_mesh import MeshRule
+from ..geometry.scene import Plate
+from .eddy_space import Source
+from .field_functions import candidates, fit_multipoles
+from .plate_reduction import PlateNetwork, reduce_plate
+from .plate_region import Region
+from .plate_table import PlateErrors, PlateTable
+from .sources import unit_dipoles
+
+FUNCTION_SHARE = 0.15
+"""Share of the tolerance for the field functions."""
+FIT_LEVELS = (1.0, 0.5, 0.25, 0.12)
+"""Errors of the field functions to try, in units of the tolerance: in reaction tensors most of it averages out."""
+
+
+def plate_table(
+    plate: Plate,
+    region: Region,
+    frequencies: tuple[float, float] = (0.5, 250.0),
+    rtol: float = 1e-3,
+    rule: MeshRule | None = None,
+    others: Sequence[Source] = (),
+) -> PlateTable:
+    """Table of `plate` for dipoles in `region` (plate's frame) and frequencies (Hz).
+
+    Parameters
+    ----------
+    rtol : relative accuracy asked of reaction tensors G, Frobenius norm
+    rule : mesh (default by `rtol`)
+    others : sources in the plate's frame whose currents the network must also hold
+
+    Raises
+    ------
+    ValueError : region in the plate, or a parameter out of range
+    AccuracyError : `rtol` not reached
+    """
+    return tabulate(reduce_plate(plate, region, frequencies, rtol, rule, others), rtol)
+
+
+def tabulate(network: PlateNetwork, rtol: float) -> PlateTable:
+    """Field functions of a network as multipoles."""
+    start = time.perf_counter()
+    region, half_edges = network.region, network.plate.box.half_edges
+    points = region.surface(surface_counts(region))
+    values = field_values(network, points)
+    rates = np.concatenate(network.rates)
+    middle = 2 * np.pi * np.sqrt(network.frequencies[0] * network.frequencies[1])
+    state_scale = 1 / np.sqrt(rates + middle)
+    point_scale = 1 / np.sqrt(np.sum((values * state_scale[:, None, None]) ** 2, axis=(0, 2)))
+    ends = [2 * np.pi * f for f in network.frequencies]
+    for level in FIT_LEVELS:
+        choice = candidates(region, half_edges)
+        fit = fit_multipoles(choice, points, values, state_scale, point_scale, level * rtol)
+        worst = max(_tensor_error(values, fit.error, rates, omega) for omega in (*ends, middle))
+        if worst <= FUNCTION_SHARE * rtol:
+            break
+    provenance: dict[str, str | float] = {
+        "ngsolve": version("ngsolve"),
+        "order": float(network.space.order),
+        "cells": float(network.space.conductors.mesh.ne),
+        "solved_hz": ", ".join(f"{f:.6g}" for f in network.solved),
+        "rtol": rtol,
+        "seconds": network.seconds + time.perf_counter() - start,
+    }
+    return PlateTable(
+        network.plate.box.size, network.plate.conductivity, region, network.frequencies, rates,
+        fit.multipoles, fit.weights, PlateErrors(network.mesh_error, network.state_error, worst), provenance,
+    )  # fmt: skip
+
+
+def surface_counts(region: Region) -> tuple[int, int, int]:
+    """Points along each edge of the region: more along the longer ones."""
+    extent = region.upper - region.lower
+    x, y, z = np.clip(np.ceil(13 * np.sqrt(extent / extent.max())), 6, 13).astype(int)
+    return int(x), int(y), int(z)
+
+
+def field_values(network: PlateNetwork, points: Array) -> Array:
+    """b_i (states, n, 3), T/√J, of the finite elements themselves."""
+    couplings = np.concatenate([part.T for part in network.couplings(unit_dipoles(points))])
+    return couplings.reshape(len(couplings), -1, 3)
+
+
+def _tensor_error(values: Array, error: Array, rates: Array, omega: float) -> float:
+    """Largest relative error of reaction tensors from errors of the field functions."""
+    weight = 1 / (rates + 1j * omega)
+    exact, found = (np.einsum("ina,i,inb->nab", b, weight, b, optimize=True) for b in (values, values - error))
+    return float(np.max(np.linalg.norm(found - exact, axis=(1, 2)) / np.linalg.norm(exact, axis=(1, 2))))

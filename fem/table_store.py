@@ -1,0 +1,101 @@
+"""Tables on disk: one self-describing netCDF file with a checksum, and a folder of those computed before."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any, TypeVar
+
+import numpy as np
+import xarray as xr
+
+from ..geometry.atomic import replacing
+
+Variables = Mapping[str, tuple[tuple[str, ...], Any, str]]
+"""Dimensions, values and unit by name."""
+Table = TypeVar("Table")
+
+
+class TableFileError(ValueError):
+    """A table file that is damaged, or is not one."""
+
+
+def described(variables: Variables, attributes: Mapping[str, Any]) -> xr.Dataset:
+    """A dataset in which every variable carries its unit."""
+    return xr.Dataset({n: xr.Variable(d, v, {"units": u}) for n, (d, v, u) in variables.items()}, attrs=attributes)
+
+
+def write_checked(dataset: xr.Dataset, path: str | Path) -> None:
+    """Write a dataset with its checksum; the file is whole or absent."""
+    dataset.attrs["content_sha256"] = _digest(dataset)
+    with replacing(path) as temporary:
+        dataset.to_netcdf(temporary, engine="h5netcdf")
+
+
+def read_checked(path: str | Path, file_format: str) -> xr.Dataset:
+    """Read a dataset of the given format.
+
+    Raises
+    ------
+    TableFileError : the file is not of this format, or its content is not what was written
+    """
+    try:
+        with xr.open_dataset(path, engine="h5netcdf") as opened:
+            dataset = opened.load()
+    except FileNotFoundError:
+        raise
+    except Exception as error:  # the HDF5 layer raises many kinds on a damaged file
+        raise TableFileError(f"Input {path} must be a readable netCDF file; {error}.") from error
+    attrs = dataset.attrs
+    if attrs.get("format") != file_format:
+        raise TableFileError(f"Input {path} must be a '{file_format}'; instead received '{attrs.get('format')}'.")
+    if attrs.pop("content_sha256", None) != _digest(dataset):
+        raise TableFileError(f"Input {path} must be as it was written; instead its checksum does not match.")
+    return dataset
+
+
+def _digest(dataset: xr.Dataset) -> str:
+    """SHA-256 over the numbers, their names and shapes, and the attributes."""
+    digest = hashlib.sha256()
+    for name in sorted(str(n) for n in dataset.data_vars):
+        values = np.ascontiguousarray(dataset[name].values, dtype="<f8")
+        digest.update(f"{name}{values.shape}".encode() + values.tobytes())
+    attrs = {k: str(v) for k, v in dataset.attrs.items() if k != "content_sha256"}
+    digest.update(json.dumps(attrs, sort_keys=True).encode())
+    return digest.hexdigest()
+
+
+def cache_folder() -> Path:
+    """Where tables are kept: $SPINLEV_CACHE, else $XDG_CACHE_HOME/spinlev, else ~/.cache/spinlev."""
+    if folder := os.environ.get("SPINLEV_CACHE"):
+        return Path(folder)
+    return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "spinlev"
+
+
+def from_cache(
+    name: str,
+    load: Callable[[Path], Table],
+    make: Callable[[], Table],
+    save: Callable[[Table, Path], None],
+    report: Callable[[str], None],
+) -> tuple[Table, bool]:
+    """A table, from the cache if it is there under `name`, and whether it was.
+
+    A damaged entry is reported, computed anew and replaced; a cache that cannot be written is reported and
+    does no harm.
+    """
+    path = cache_folder() / name
+    if path.exists():
+        try:
+            return load(path), True
+        except (TableFileError, OSError) as error:
+            report(f"The cached table is damaged and is computed anew: {error}")
+    table = make()
+    try:
+        save(table, path)
+    except OSError as error:
+        report(f"The table could not be cached: {error}")
+    return table, False

@@ -1,0 +1,136 @@
+"""The command `plate`: reaction tensor of the scene's plate at one place and frequency."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..fem.phasor import ComplexArray
+from ..fem.plate import plate_reaction
+from ..fem.plate_region import Region
+from ..fem.plate_table_file import cached_plate_table
+from ..fem.slab import Slab, reaction_tensor
+from ..geometry.atomic import replacing
+from ..geometry.box import Array
+from ..geometry.input_error import InputError
+from ..geometry.scene import Plate, Scene
+from .console import note, to_json
+
+Job = tuple[Mapping[str, Any], list[str]]
+NEARBY = 0.15
+"""Half edge of the region of a reduced table, in units of the place's distance from the plate."""
+LOWEST, HIGHEST = 0.5, 250.0
+"""Frequencies for which a reduced table is made at least, Hz."""
+
+
+@dataclass(frozen=True, eq=False)
+class Answer:
+    """Reaction tensor G (3, 3), T/(A m²), laboratory frame, with its estimated relative error."""
+
+    model: str
+    tensor: ComplexArray
+    error: float
+    from_cache: tuple[str, ...] = ()
+
+
+def plate_job(scene: Scene, place: Array, frequency: float, model: str, rtol: float, out: Path) -> Job:
+    """B = G m at the dipole's own place (3,), m, laboratory frame; writes plate.json."""
+    plate = checked_plate(scene, place, frequency)
+    answer = MODELS[model](plate, place, frequency, rtol)
+    values = {
+        "model": answer.model,
+        "error_estimate": answer.error,
+        "G_T_per_A_m2": {"real": answer.tensor.real, "imag": answer.tensor.imag},
+        "tables_from_cache": list(answer.from_cache),
+    }
+    with replacing(out / "plate.json") as temporary:
+        temporary.write_text(to_json(values) + "\n")
+    lines = [f"Reaction tensor at {frequency:g} Hz, T/(A m²), phasors e^(+iωt), laboratory frame:"]
+    lines += ["  ".join(f"{g.real: .6e} {g.imag:+.6e}i" for g in row) for row in answer.tensor]
+    return values, [*lines, f"Model {answer.model}; estimated relative error {answer.error:.1e}"]
+
+
+def checked_plate(scene: Scene, place: Array, frequency: float) -> Plate:
+    """The scene's plate, once place and frequency are found good.
+
+    Raises
+    ------
+    InputError : no plate in the scene, a frequency out of range, or a place in the plate
+    """
+    if scene.plate is None:
+        raise InputError("Input scene must have a [plate]; instead received none.")
+    if not (np.isfinite(frequency) and frequency >= 0):
+        raise InputError(f"Input --frequency-hz must be finite and not negative; instead received {frequency}.")
+    if not np.all(np.isfinite(place)) or scene.plate.box.distance(place) <= 0:
+        where = ", ".join(f"{c * 1e3:.6g}" for c in place)
+        raise InputError(f"Input --at must lie outside the plate; instead received ({where}) mm.")
+    return scene.plate
+
+
+def _slab(plate: Plate, place: Array, frequency: float, rtol: float) -> Answer:
+    """The plate as infinite along its two longer edges."""
+    body, size = plate.box.to_body(place), plate.box.size
+    normal = int(np.argmin(size))
+    height = abs(body[normal]) - size[normal] / 2
+    if height <= 0:
+        raise InputError(
+            "Input --model slab must have --at over one of the plate's two largest faces; use --model fem."
+        )
+    local = reaction_tensor(Slab(plate.conductivity, size[normal]), height, frequency)
+    along = plate.box.rotation[:, normal]
+    tensor = local[0, 0] * np.eye(3) + (local[2, 2] - local[0, 0]) * np.outer(along, along)
+    lateral = [a for a in range(3) if a != normal]
+    return Answer("slab", tensor, _beyond_edges(body[lateral], size[lateral] / 2, height + size[normal]))
+
+
+def _beyond_edges(place: Array, half: Array, depth: float) -> float:
+    """Share of the source's squared potential, at the far face (`depth` below it), that lies beyond the edges.
+
+    Summed over the dipole's directions it falls as 1/r⁴, whose integral over the plane is π/depth².
+    """
+    nodes, weights = np.polynomial.legendre.leggauss(60)
+    lower, upper = np.arcsinh((-half - place) / depth), np.arcsinh((half - place) / depth)
+    u = (lower + upper)[:, None] / 2 + (upper - lower)[:, None] / 2 * nodes
+    (x, y), (wx, wy) = np.sinh(u), np.cosh(u) * weights * (upper - lower)[:, None] / 2
+    inside = float(wx @ (1 + x[:, None] ** 2 + y**2) ** -2 @ wy)
+    return 1 - inside / np.pi
+
+
+def _fem(plate: Plate, place: Array, frequency: float, rtol: float) -> Answer:
+    note("Eddy currents by finite elements ...")
+    found = plate_reaction(plate, place, frequency, rtol)
+    return Answer("fem", found.tensors[0], float(found.error_estimate[0]))
+
+
+def _reduced(plate: Plate, place: Array, frequency: float, rtol: float) -> Answer:
+    note("Plate table ...")
+    body = plate.box.to_body(place)
+    reach = NEARBY * float(plate.box.distance(place))
+    table, found = cached_plate_table(
+        plate, Region(body - reach, body + reach), (LOWEST, max(HIGHEST, frequency)), rtol, note
+    )
+    turn = plate.box.rotation
+    tensor = turn @ table.reaction_tensor(body, frequency)[0] @ turn.T
+    return Answer("reduced", tensor, table.errors.total, ("plate",) if found else ())
+
+
+def _auto(plate: Plate, place: Array, frequency: float, rtol: float) -> Answer:
+    """The infinite slab where the edges are too far to matter, else finite elements."""
+    body, normal = plate.box.to_body(place), int(np.argmin(plate.box.size))
+    if abs(body[normal]) > plate.box.half_edges[normal]:
+        slab = _slab(plate, place, frequency, rtol)
+        if slab.error <= rtol:
+            return slab
+    return _fem(plate, place, frequency, rtol)
+
+
+MODELS: dict[str, Callable[[Plate, Array, float, float], Answer]] = {
+    "slab": _slab,
+    "fem": _fem,
+    "reduced": _reduced,
+    "auto": _auto,
+}

@@ -1,0 +1,89 @@
+"""`spinlev plate`: what it answers, for which pose, and how it refuses."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from ngsolve import SetNumThreads
+
+from spinlev.geometry import InputError
+from spinlev.geometry.box import Box, rotation_matrix
+from spinlev.geometry.scene import Plate
+from spinlev.studies.cli import app
+from spinlev.studies.plate_job import MODELS
+
+SetNumThreads(1)
+SCENE = "scenes/tilt-over-plate.toml"
+
+
+def ask(tmp_path, *arguments):
+    call = ["plate", SCENE, *arguments, "--out", str(tmp_path)]
+    return app(call, exit_on_error=False, print_error=False, result_action="return_value")
+
+
+def tensor(answer):
+    values = answer.values["G_T_per_A_m2"]
+    return np.array(values["real"]) + 1j * np.array(values["imag"])
+
+
+@pytest.fixture(autouse=True)
+def _at_the_root(monkeypatch, request):
+    monkeypatch.chdir(request.config.rootpath)
+
+
+def test_slab_and_finite_elements_agree_as_far_as_the_slab_claims(tmp_path):
+    """A real plate against an infinite one, 17 mm over the face: within the slab's own estimate."""
+    slab = ask(tmp_path, "--at", "0,0,-20", "--frequency-hz", "100", "--model", "slab")
+    fem = ask(tmp_path, "--at", "0,0,-20", "--frequency-hz", "100", "--model", "fem", "--rtol", "1e-2")
+    assert set(slab.values) == {"model", "error_estimate", "G_T_per_A_m2", "tables_from_cache"}
+    difference = np.linalg.norm(tensor(slab) - tensor(fem)) / np.linalg.norm(tensor(fem))
+    assert difference < slab.values["error_estimate"]
+    assert 0 < fem.values["error_estimate"] <= 1e-2
+    assert (tmp_path / "plate.json").exists()
+
+
+def test_slab_follows_the_pose():
+    """The tensor of a turned plate is the turned tensor, under the face that is nearest."""
+    lying = Plate(Box((0.5, 0.6, 0.03)), 3.5e7)
+    turn = rotation_matrix((20.0, 70.0, 10.0))
+    turned = Plate(Box(lying.box.size, (0.1, 0.2, 0.3), turn), 3.5e7)
+    place = np.array([0.01, 0.02, -0.04])
+    first = MODELS["slab"](lying, place, 50.0, 1e-3)
+    second = MODELS["slab"](turned, turn @ place + turned.box.center, 50.0, 1e-3)
+    size = abs(first.tensor).max()
+    assert abs(second.tensor - turn @ first.tensor @ turn.T).max() < 1e-12 * size
+    assert first.error == pytest.approx(second.error, rel=1e-9)
+
+
+def test_slab_estimate_vanishes_for_a_wide_plate():
+    """Beyond a disc of radius ρ lies depth²/(depth² + ρ²) of it, beyond its square less."""
+    error = MODELS["slab"](Plate(Box((20.0, 20.0, 0.03)), 3.5e7), np.array([0, 0, 0.035]), 50.0, 1e-3).error
+    assert 0 < error < 0.05**2 / 10.0**2
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (("--at", "0,0,-40", "--frequency-hz", "50"), "--at must lie outside the plate"),
+        (("--at", "0,0,-20", "--frequency-hz=-1"), "--frequency-hz must be finite and not negative"),
+        (("--at", "0,0", "--frequency-hz", "50"), "--at must be three numbers"),
+        (("--at", "60,0,-50", "--frequency-hz", "50", "--model", "slab"), "--model slab must have --at over"),
+    ],
+)
+def test_bad_input_is_named(tmp_path, arguments, message):
+    with pytest.raises(InputError, match=message):
+        ask(tmp_path, *arguments)
+
+
+def test_a_scene_without_plate_is_refused(tmp_path):
+    text = Path(SCENE).read_text()
+    (tmp_path / "bare.toml").write_text(text[: text.index("[plate]")])
+    with pytest.raises(InputError, match=r"must have a \[plate\]"):
+        app(
+            ["plate", str(tmp_path / "bare.toml"), "--at", "0,0,-20", "--frequency-hz", "1", "--out", str(tmp_path)],
+            exit_on_error=False,
+            print_error=False,
+            result_action="return_value",
+        )

@@ -1,0 +1,209 @@
+"""The plate as a passive network with harmonic field functions: identities that hold whatever its accuracy."""
+
+from __future__ import annotations
+
+import heyoka as hy
+import numpy as np
+import pytest
+from ngsolve import SetNumThreads
+from scipy.integrate import solve_ivp
+
+from spinlev.fem.phasor import mean_force, mean_loss, mean_torque
+from spinlev.fem.plate_model import field_values, tabulate
+from spinlev.fem.plate_reduction import reduce_plate
+from spinlev.fem.plate_region import Region
+from spinlev.fem.plate_table_file import cached_plate_table, load_plate_table, plate_key, save_plate_table
+from spinlev.fem.rotor_share import in_plate_frame, rotor_share
+from spinlev.fem.table import RangeError
+from spinlev.fem.table_store import TableFileError
+from spinlev.geometry import vertical
+from spinlev.geometry.box import Box
+from spinlev.geometry.plate_mesh import MeshRule
+from spinlev.geometry.scene import Lowering, Plate
+
+SetNumThreads(1)
+PLATE = Plate(Box((0.1, 0.24, 0.03), (0.0, 0.0, -0.055)), 3.5e7, Lowering(0.0, 0.01, 0.02))
+REGION = Region.over_face(PLATE.box.size, (0.016, 0.026), 0.004)
+RTOL = 0.1
+MOMENT = 1.1
+
+
+@pytest.fixture(scope="module")
+def network():
+    return reduce_plate(PLATE, REGION, (5.0, 250.0), RTOL, MeshRule(2.0, 3.0, 3.0))
+
+
+@pytest.fixture(scope="module")
+def table(network):
+    return tabulate(network, RTOL)
+
+
+def places(count, seed=0):
+    return REGION.lower + (REGION.upper - REGION.lower) * np.random.default_rng(seed).random((count, 3))
+
+
+def test_field_functions_are_those_of_the_currents(network, table):
+    """Multipoles against the finite elements' own coupling inside the region: the tolerance of the fit."""
+    points = places(10)
+    exact = field_values(network, points).swapaxes(0, 1)
+    found, _ = table.field_functions(points)
+    scale = np.sqrt(table.rates)[:, None]
+    difference = np.linalg.norm((found - exact) / scale, axis=(1, 2)) / np.linalg.norm(exact / scale, axis=(1, 2))
+    assert difference.max() < RTOL
+
+
+def test_network_is_passive_everywhere(table):
+    """Positive rates; dissipation of any moment at 1000 places and frequencies; reciprocity to round-off."""
+    assert table.rates.min() > 0
+    rng = np.random.default_rng(1)
+    for point, frequency in zip(places(1000, 1), 10 ** rng.uniform(-2, 2.39, 1000), strict=True):
+        tensor = table.reaction_tensor(point, frequency)[0]
+        assert abs(tensor - tensor.T).max() <= 1e-14 * abs(tensor).max()
+        assert np.linalg.eigvalsh(-tensor.imag).min() >= 0
+        assert np.linalg.eigvalsh(-tensor.real).min() >= 0
+
+
+def test_field_functions_are_harmonic_and_their_gradient_exact(table):
+    """Divergence and curl vanish; the gradient is the derivative of b, by differences of order 6: 1e-10."""
+    points, step = places(5), 2e-4
+    _, gradient = table.field_functions(points)
+    size = abs(gradient).max(axis=(2, 3))
+    assert (abs(np.einsum("niaa->ni", gradient)) <= 1e-12 * size).all()
+    assert (abs(gradient - gradient.swapaxes(2, 3)).max(axis=(2, 3)) <= 1e-13 * size).all()
+    weights = {1: 4 / 5, 2: -1 / 5, 3: 4 / 105, 4: -1 / 280}
+    inner = REGION.center + 0.8 * (points - REGION.center)
+    _, gradient = table.field_functions(inner)
+    for axis, unit in enumerate(np.eye(3)):
+        b = {k: table.field_functions(inner + k * step * unit)[0] for k in range(-4, 5)}
+        slope = sum(w * (b[k] - b[-k]) for k, w in weights.items()) / step
+        assert abs(slope - gradient[..., axis]).max() < 1e-10 * abs(gradient).max()
+
+
+def test_reaction_gradient_is_half_the_derivative_of_the_tensor(table):
+    """d(mᵀGm)/dx_l = 2 m_i T_lij m_j, since G is symmetric in its two places."""
+    point, m, step = REGION.center, np.array([0.3, -0.5, 0.8]), 1e-4
+    gradient = table.reaction_gradient(point, 80.0)[0]
+    for axis, unit in enumerate(np.eye(3)):
+        ends = [m @ table.reaction_tensor(point + s * step * unit, 80.0)[0] @ m for s in (-2, -1, 1, 2)]
+        slope = (ends[0] - 8 * ends[1] + 8 * ends[2] - ends[3]) / (12 * step)
+        assert m @ gradient[axis] @ m == pytest.approx(slope / 2, rel=1e-5, abs=1e-6 * abs(gradient).max())
+
+
+def test_expressions_say_what_the_table_says(table):
+    """State by state, and all together as the dynamics uses them: round-off."""
+    position, moment = hy.make_vars("x", "y", "z"), hy.make_vars("u", "v", "w")
+    currents = hy.make_vars(*(f"y_{i}" for i in range(len(table.rates))))
+    signals, (field, gradient) = table.interaction(position, moment, currents)
+    single = [b[i] for b, _ in table.expressions(position) for i in range(3)]
+    outputs = [*signals, *field, *(gradient[i][j] for i in range(3) for j in range(3)), *single]
+    function = hy.cfunc(outputs, [*position, *moment, *currents], compact_mode=True)
+    point, m, y = places(1)[0], np.array([0.2, 0.3, 0.9]), np.random.default_rng(2).normal(size=len(table.rates))
+    values = function(np.concatenate([point, m, y]))
+    b, slope = (part[0] for part in table.field_functions(point))
+    expected = np.concatenate([b @ m, y @ b, np.tensordot(y, slope, 1).ravel(), b.ravel()])
+    assert values == pytest.approx(expected, rel=1e-10, abs=1e-12 * abs(b).max())
+
+
+def flight(table, position, velocity, moment, turning, duration):
+    """States, work on the dipole and loss along a prescribed motion, by an eighth-order method."""
+
+    def rates(t, state):
+        p = state[: len(table.rates)]
+        b, gradient = (part[0] for part in table.field_functions(position(t)))
+        m, spin = moment(t), turning(t)
+        y = p - b @ m
+        force = np.einsum("i,iac,a->c", y, gradient, m)
+        torque = np.cross(m, y @ b)
+        work = force @ velocity(t) + torque @ spin
+        return np.concatenate([-table.rates * y, [work, np.sum(table.rates * y**2)], force, torque])
+
+    start = np.concatenate([table.field_functions(position(0))[0][0] @ moment(0), np.zeros(8)])
+    solution = solve_ivp(rates, (0, duration), start, "DOP853", rtol=1e-12, atol=1e-16, dense_output=True)
+    return solution.y, solution.sol
+
+
+def spinning(omega, angle):
+    return lambda t: (
+        MOMENT * np.array([np.sin(angle) * np.cos(omega * t), np.sin(angle) * np.sin(omega * t), np.cos(angle)])
+    )
+
+
+def test_energy_ledger_closes_in_a_motion_that_spins_bounces_and_lowers(table):
+    """Work on the dipole + stored + dissipated = 0 to 1e-10 of what is dissipated, in the frame of the plate."""
+    omega, bounce = 2 * np.pi * 100, 2 * np.pi * 9
+    moment = spinning(omega, 0.2)
+
+    def place(t):
+        return REGION.center + np.array([1e-3 * np.sin(3 * t), 0, 2e-3 * np.sin(bounce * t) + 0.02 * t])
+
+    def speed(t):
+        return np.array([3e-3 * np.cos(3 * t), 0, 2e-3 * bounce * np.cos(bounce * t) + 0.02])
+
+    states, _ = flight(table, place, speed, moment, lambda t: np.array([0, 0, omega]), 0.1)
+    work, loss = states[len(table.rates) : len(table.rates) + 2, -1]
+    b = table.field_functions(place(0.1))[0][0]
+    stored = 0.5 * np.sum((states[: len(table.rates), -1] - b @ moment(0.1)) ** 2)
+    assert loss > 0
+    assert abs(work + stored + loss) < 1e-10 * loss
+
+
+def test_steady_means_in_time_are_those_of_the_phasors(table):
+    """Torque, force and loss over the last turns against G: after 0.2 s the start has decayed by e^-15 or more."""
+    frequency, angle, point = 100.0, 0.1, places(1, 3)[0]
+    omega, n = 2 * np.pi * frequency, len(table.rates)
+    start = np.ceil(20 / table.rates.min() * frequency) / frequency
+    _, dense = flight(
+        table, lambda t: point, lambda t: np.zeros(3), spinning(omega, angle), lambda t: np.array([0, 0, omega]),
+        start + 1 / frequency,
+    )  # fmt: skip
+    mean = (dense(start + 1 / frequency) - dense(start))[n:] * frequency
+    phasor = MOMENT * np.sin(angle) * np.array([1, -1j, 0])
+    tensor, gradient = table.reaction_tensor(point, frequency)[0], table.reaction_gradient(point, frequency)[0]
+    assert mean[1] == pytest.approx(mean_loss(tensor, phasor, frequency), rel=1e-6)
+    torque, force = mean_torque(tensor, phasor), mean_force(gradient, phasor)
+    assert mean[5:] == pytest.approx(torque, rel=1e-6, abs=1e-6 * np.linalg.norm(torque))
+    assert mean[2:5] == pytest.approx(force, rel=1e-6, abs=1e-6 * np.linalg.norm(force))
+
+
+def test_rotor_share_follows_the_turning_rotor(network):
+    """Series in angle and depth against the rotor itself, where neither was sampled: the estimated error, 1e-3."""
+    rotor = vertical(0.014, 0.01, 1.305, 1.0)
+    share = rotor_share(network, PLATE, rotor, harmonics=4, depths=5)
+    assert share.error < 1e-3
+    angle, depth = 0.7, 0.0123
+    sources = [in_plate_frame(magnet, PLATE, angle, depth) for magnet in rotor]
+    exact = np.concatenate(network.couplings(sources), axis=1).sum(axis=0)
+    assert abs(share.signals(angle, depth) - exact).max() < 2 * share.error * abs(exact).max()
+    variables = hy.make_vars("angle", "depth")
+    expressed = hy.cfunc(share.expressions(*variables), variables, compact_mode=True)([angle, depth])
+    assert expressed == pytest.approx(share.signals(angle, depth), rel=1e-10, abs=1e-13 * abs(exact).max())
+
+
+def test_a_table_survives_the_disk_and_the_cache(table, tmp_path, monkeypatch):
+    save_plate_table(table, tmp_path / "t.nc")
+    read = load_plate_table(tmp_path / "t.nc")
+    points = places(3)
+    assert np.array_equal(read.reaction_tensor(points, 50.0), table.reaction_tensor(points, 50.0))
+    assert (dict(read.provenance), read.errors) == (dict(table.provenance), table.errors)
+    monkeypatch.setenv("SPINLEV_CACHE", str(tmp_path))
+    arguments = (PLATE, REGION, (5.0, 250.0), RTOL)
+    save_plate_table(table, tmp_path / f"plate-{plate_key(*arguments)}.nc")
+    found, cached = cached_plate_table(*arguments, report=pytest.fail)
+    assert cached
+    assert np.array_equal(found.weights, table.weights)
+    (tmp_path / "t.nc").write_bytes(b"no table")
+    with pytest.raises(TableFileError, match="readable netCDF"):
+        load_plate_table(tmp_path / "t.nc")
+
+
+def test_bad_input_is_named(table):
+    with pytest.raises(RangeError, match="Input points must lie between"):
+        table.reaction_tensor([0, 0, 0.1], 50.0)
+    with pytest.raises(RangeError, match="Input frequency_hz must be between 0 and 250"):
+        table.reaction_tensor(REGION.center, -1.0)
+    with pytest.raises(ValueError, match="Input frequencies_hz must be positive and increasing"):
+        reduce_plate(PLATE, REGION, (0.0, 250.0))
+    with pytest.raises(ValueError, match="Input region upper bounds"):
+        Region(np.zeros(3), np.zeros(3))
+    with pytest.raises(ValueError, match="must lie outside the plate"):
+        reduce_plate(PLATE, Region(np.full(3, -0.01), np.full(3, 0.01)))
