@@ -19,7 +19,7 @@ import numpy as np
 
 from ..geometry.box import Array, frozen_array
 from .accuracy_error import AccuracyError
-from .compiled import SYMMETRIC, FieldExpressions
+from .compiled import FieldExpressions
 from .multipole import MultipoleExpansion
 from .plate_region import Region
 
@@ -28,6 +28,8 @@ DEPTHS = (0.0, 0.3, 0.6, 1.0, 1.6, 2.5, 4.0, 6.0, 10.0, 18.0)
 SPACING = 2.5
 """Lateral distance of the lines, in the same unit."""
 HIGHEST_DEGREE = 4
+UNFOLDED = np.array([[3, 4, 5], [4, 6, 7], [5, 7, 8]])
+"""Where the entries of the symmetric gradient lie among the nine outputs of a function."""
 INDEPENDENT = 1e-10
 """Squared part of a multipole that the chosen ones must leave for it to be taken."""
 NOISE = 1e-11
@@ -81,7 +83,7 @@ class Multipoles:
     def evaluate(self, points: Array) -> tuple[Array, Array]:
         """B (n, k, 3) T and ∂B_i/∂x_j (n, k, 3, 3) T/m at points (n, 3) m."""
         values = self._compiled(np.ascontiguousarray(points.T)).reshape(len(self.kinds), 9, -1)
-        return np.moveaxis(values[:, :3], -1, 0), np.moveaxis(values[:, SYMMETRIC], -1, 0)
+        return np.moveaxis(values[:, :3], -1, 0), np.moveaxis(values[:, UNFOLDED], -1, 0)
 
 
 def candidates(region: Region, half_edges: Array) -> Multipoles:
