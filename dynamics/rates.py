@@ -24,7 +24,8 @@ class Rates:
         variables = list(equations.variables)
         tensors = hy.diff_tensors(list(equations.rates), diff_args=variables, diff_order=1)
         outputs = [*equations.rates, *np.asarray(tensors.jacobian).ravel()]
-        self._function = hy.cfunc(outputs, variables, compact_mode=True)
+        # Unoptimised code is compiled three times as fast, and a search is over before faster code would be ready.
+        self._function = hy.cfunc(outputs, variables, compact_mode=True, opt_level=0)
 
     def __call__(self, states: ArrayLike, values: Array) -> tuple[Array, Array]:
         """Rates (n, 12) and their derivatives (n, 12, 12) at scaled `states` (n, 12), with parameter `values`."""
