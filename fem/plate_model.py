@@ -12,7 +12,8 @@ from ..geometry.box import Array
 from ..geometry.plate_mesh import MeshRule
 from ..geometry.scene import Plate
 from .eddy_space import Source
-from .field_functions import candidates, fit_multipoles
+from .field_functions import candidates
+from .harmonic_fit import fit_multipoles
 from .plate_reduction import PlateNetwork, reduce_plate
 from .plate_region import Region
 from .plate_table import PlateErrors, PlateTable
