@@ -19,7 +19,7 @@ from .plate_region import Region
 from .plate_table import PlateErrors, PlateTable
 from .sources import unit_dipoles
 
-FUNCTION_SHARE = 0.15
+FUNCTION_SHARE = 0.1
 """Share of the tolerance for the field functions."""
 FIT_LEVELS = (1.0, 0.5, 0.25, 0.12)
 """Errors of the field functions to try, in units of the tolerance: in reaction tensors most of it averages out."""

@@ -24,8 +24,9 @@ from .plate_region import Region
 from .plate_snapshots import Group, group_rows
 from .plate_training import prepare_training, truncated
 
-MESH_SHARE, STATE_SHARE = 0.6, 0.25
-"""Shares of the tolerance for the finite elements and for the truncated basis; the rest is the field functions'."""
+MESH_SHARE, NETWORK_SHARE = 0.6, 0.9
+"""Shares of the tolerance for the finite elements, and for them and the truncated basis together; the rest is the
+field functions'."""
 MOST_FREQUENCIES = 8
 
 
@@ -77,7 +78,7 @@ def reduce_plate(
 
     Parameters
     ----------
-    rtol : relative accuracy of reaction tensors (Frobenius norm); `MESH_SHARE` + `STATE_SHARE` of it is used here
+    rtol : relative accuracy of reaction tensors (Frobenius norm); `NETWORK_SHARE` of it is used here
     rule : mesh (default by `rtol`)
     others : more sources, in the plate's frame, whose currents the network shall hold: the rotor's
 
@@ -97,6 +98,7 @@ def reduce_plate(
     response, error = raise_order(plate, places, high, MESH_SHARE * rtol, rule)
     if error.max() > MESH_SHARE * rtol:
         raise AccuracyError(f"Input rtol must be at least {error.max() / MESH_SHARE:.1e} for the mesh rule {rule}.")
+    allowed = NETWORK_SHARE * rtol - float(error.max())
     training = prepare_training(response.space, region, rtol, others)
     middle = low**0.25 * high**0.75
     used, tried = [low, middle, high], [np.sqrt(middle * high), np.sqrt(low * middle)]
@@ -105,13 +107,13 @@ def reduce_plate(
     while len(training.reactions) < MOST_FREQUENCIES:
         training.solve(tried[0])
         basis = training.basis(used)
-        if training.error(basis, tried[0]) <= STATE_SHARE * rtol / 2:
+        if training.error(basis, tried[0]) <= allowed / 2:
             break
         used = sorted([*used, tried.pop(0)])
         tried += [float(np.sqrt(used[-1] * used[-2])), float(np.sqrt(used[-2] * used[-3]))]
-    chosen, state_error = truncated(training, basis, STATE_SHARE * rtol)
-    if state_error > STATE_SHARE * rtol:
-        raise AccuracyError(f"Input rtol must be at least {state_error / STATE_SHARE:.1e} for these frequencies.")
+    chosen, state_error = truncated(training, basis, allowed)
+    if state_error > allowed:
+        raise AccuracyError(f"Input rtol must be larger: the states leave {state_error:.1e}, allowed is {allowed:.1e}.")
     diagonal = [part.diagonalised() for part in chosen]
     return PlateNetwork(
         plate, region, frequencies, response.space, tuple(m.group for m in training.modes),
