@@ -2,9 +2,7 @@
 
 Every field function of the plate is a sum over the same few multipoles, B = -∇ Σ c_k Θ_k, each free of divergence
 and curl by construction.  Their centres lie behind the plate's surface, on lines away from the region: near ones
-for what is close to the surface, far ones for the rest.  From many candidates those are taken one by one that lower
-the remaining error most (orthogonal least squares: S. Chen et al., Int. J. Control 50 (1989) 1873), until the fit on
-the surface of the region meets the tolerance; inside, harmonic functions are at most as wrong as there.
+for what is close to the surface, far ones for the rest.
 """
 
 from __future__ import annotations
@@ -18,7 +16,6 @@ import heyoka as hy
 import numpy as np
 
 from ..geometry.box import Array, frozen_array
-from .accuracy_error import AccuracyError
 from .compiled import FieldExpressions
 from .multipole import MultipoleExpansion
 from .plate_region import Region
@@ -30,10 +27,6 @@ SPACING = 2.5
 HIGHEST_DEGREE = 4
 UNFOLDED = np.array([[3, 4, 5], [4, 6, 7], [5, 7, 8]])
 """Where the entries of the symmetric gradient lie among the nine outputs of a function."""
-INDEPENDENT = 1e-10
-"""Squared part of a multipole that the chosen ones must leave for it to be taken."""
-NOISE = 1e-11
-"""Weights below this share of the largest are what symmetry forbids."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,67 +106,3 @@ def candidates(region: Region, half_edges: Array) -> Multipoles:
     kinds = [(l, m, part) for l in range(HIGHEST_DEGREE + 1) for m in range(l + 1) for part in (0, 1)[: 1 + (m > 0)]]
     pairs = list(product(centers, kinds))
     return Multipoles(np.array([p[0] for p in pairs]), np.array([p[1] for p in pairs], float), gap)
-
-
-@dataclass(frozen=True, eq=False)
-class Fit:
-    """Field functions as sums of multipoles.
-
-    Parameters
-    ----------
-    multipoles : the k chosen
-    weights : (functions, k) c_k
-    error : (functions, n, 3) what is left at the points of the fit
-    """
-
-    multipoles: Multipoles
-    weights: Array
-    error: Array
-
-
-def fit_multipoles(
-    choice: Multipoles, points: Array, values: Array, state_scale: Array, point_scale: Array, tolerance: float
-) -> Fit:
-    """Fewest multipoles with which all points meet the tolerance.
-
-    Parameters
-    ----------
-    values : (functions, n, 3) B of each function at `points` (n, 3)
-    state_scale, point_scale : (functions,) and (n,) factors that make errors comparable
-    tolerance : for the norm of the scaled error over functions and components, at every point
-
-    Raises
-    ------
-    AccuracyError : not reached with all candidates
-    """
-    columns = choice.evaluate(points)[0] * point_scale[:, None, None]
-    columns = columns.swapaxes(1, 2).reshape(-1, len(choice.kinds))
-    target = (values * state_scale[:, None, None] * point_scale[:, None]).reshape(len(values), -1).T
-    size = np.linalg.norm(columns, axis=0)
-    free, rest, basis = columns / size, target, np.zeros((len(target), 0))
-    chosen: list[int] = []
-    while _worst(rest) > tolerance:
-        remaining = np.einsum("ij,ij->j", free, free)
-        gain = np.where(
-            remaining > INDEPENDENT, np.sum((free.T @ rest) ** 2, axis=1) / np.maximum(remaining, 1e-300), 0
-        )
-        best = int(np.argmax(gain))
-        if gain[best] <= 0:
-            raise AccuracyError(
-                f"Input rtol must be larger: {len(chosen)} multipoles leave {_worst(rest):.1e}; or refine the mesh."
-            )
-        chosen.append(best)
-        direction = free[:, best] - basis @ (basis.T @ free[:, best])
-        direction = direction / np.linalg.norm(direction)
-        basis = np.column_stack([basis, direction])
-        free = free - np.outer(direction, direction @ free)
-        rest = rest - np.outer(direction, direction @ rest)
-    scaled = np.linalg.lstsq(columns[:, chosen] / size[chosen], target, rcond=None)[0]
-    weights = (scaled / size[chosen][:, None]).T
-    small = np.abs(scaled.T) < NOISE * np.abs(scaled).max(initial=0.0)
-    error = rest.T.reshape(values.shape) / state_scale[:, None, None] / point_scale[:, None]
-    return Fit(choice.subset(chosen), np.where(small, 0.0, weights / state_scale[:, None]), error)
-
-
-def _worst(rest: Array) -> float:
-    return float(np.sqrt(np.max(np.sum((rest**2).reshape(-1, 3, rest.shape[1]), axis=(1, 2)))))

@@ -12,13 +12,14 @@ from ..geometry.box import Array
 from ..geometry.plate_mesh import MeshRule
 from ..geometry.scene import Plate
 from .eddy_space import Source
-from .field_functions import candidates, fit_multipoles
+from .field_functions import candidates
+from .multipole_fit import fit_multipoles
 from .plate_reduction import PlateNetwork, reduce_plate
 from .plate_region import Region
 from .plate_table import PlateErrors, PlateTable
 from .sources import unit_dipoles
 
-FUNCTION_SHARE = 0.15
+FUNCTION_SHARE = 0.1
 """Share of the tolerance for the field functions."""
 FIT_LEVELS = (1.0, 0.5, 0.25, 0.12)
 """Errors of the field functions to try, in units of the tolerance: in reaction tensors most of it averages out."""

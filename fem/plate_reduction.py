@@ -10,28 +10,23 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import qmc
 
 from ..geometry.box import Array
 from ..geometry.plate_mesh import MeshRule
 from ..geometry.scene import Plate
 from .accuracy_error import AccuracyError
 from .eddy_space import EddySpace, Source
-from .phasor import ComplexArray
 from .plate import raise_order
 from .plate_region import Region
-from .plate_snapshots import Group, SourceModes, group_rows, parity_groups, solve_modes, source_modes
-from .pod import OrderedBasis, ordered_basis
-from .sources import unit_dipoles
+from .plate_snapshots import Group, group_rows
+from .plate_training import prepare_training, truncated
 
-MESH_SHARE, STATE_SHARE = 0.6, 0.25
-"""Shares of the tolerance for the finite elements and for the truncated basis; the rest is the field functions'."""
-MODE_SHARE = 1e-3
-"""Squared part of the training sources, in units of the tolerance, that their modes may miss in the mean."""
-PROBES = 6
+MESH_SHARE, NETWORK_SHARE = 0.6, 0.9
+"""Shares of the tolerance for the finite elements, and for them and the truncated basis together; the rest is the
+field functions'."""
 MOST_FREQUENCIES = 8
 
 
@@ -71,52 +66,6 @@ class PlateNetwork:
         return [row @ fields.T for row, fields in zip(rows, self.fields, strict=True)]
 
 
-@dataclass(eq=False)
-class _Training:
-    """What has been solved so far: modes with the probes as their last rows, and reactions by frequency."""
-
-    space: EddySpace
-    modes: list[SourceModes]
-    count: list[int]
-    weights: list[Array]
-    reactions: dict[float, list[ComplexArray]] = field(default_factory=dict)
-
-    def solve(self, frequency: float) -> None:
-        self.reactions[frequency] = solve_modes(self.space, self.modes, frequency)
-
-    def basis(self, frequencies: Sequence[float]) -> list[OrderedBasis]:
-        """Bases of all groups; snapshots count by the reaction at their frequency, to which errors are relative."""
-        size = {f: np.linalg.norm(np.diagonal(self.truth(f), axis1=0, axis2=1)) / f for f in frequencies}
-        return [
-            ordered_basis(
-                modes.rows[:n],
-                [self.reactions[f][k][:n] for f in frequencies],
-                [2 * np.pi * f for f in frequencies],
-                [weight / np.sqrt(size[f]) for f in frequencies],
-            )
-            for k, (modes, n, weight) in enumerate(zip(self.modes, self.count, self.weights, strict=True))
-        ]
-
-    def truth(self, frequency: float) -> ComplexArray:
-        """(probes, probes) couplings of the finite elements."""
-        omega = 2 * np.pi * frequency
-        parts = [
-            -1j * omega * (modes.rows[n:] @ modes.rows[n:].T + modes.rows[n:] @ reaction[n:].T)
-            for modes, n, reaction in zip(self.modes, self.count, self.reactions[frequency], strict=True)
-        ]
-        return np.asarray(sum(parts))
-
-    def error(self, basis: Sequence[OrderedBasis], frequency: float) -> float:
-        """Largest relative error of the probes' own tensors."""
-        parts = [
-            b.couplings(modes.rows[n:], 2 * np.pi * frequency)
-            for b, modes, n in zip(basis, self.modes, self.count, strict=True)
-        ]
-        found = np.asarray(sum(parts))
-        truth = _own(self.truth(frequency))
-        return float(np.max(np.linalg.norm(_own(found) - truth, axis=(1, 2)) / np.linalg.norm(truth, axis=(1, 2))))
-
-
 def reduce_plate(
     plate: Plate,
     region: Region,
@@ -129,7 +78,7 @@ def reduce_plate(
 
     Parameters
     ----------
-    rtol : relative accuracy of reaction tensors (Frobenius norm); `MESH_SHARE` + `STATE_SHARE` of it is used here
+    rtol : relative accuracy of reaction tensors (Frobenius norm); `NETWORK_SHARE` of it is used here
     rule : mesh (default by `rtol`)
     others : more sources, in the plate's frame, whose currents the network shall hold: the rotor's
 
@@ -149,7 +98,8 @@ def reduce_plate(
     response, error = raise_order(plate, places, high, MESH_SHARE * rtol, rule)
     if error.max() > MESH_SHARE * rtol:
         raise AccuracyError(f"Input rtol must be at least {error.max() / MESH_SHARE:.1e} for the mesh rule {rule}.")
-    training = _prepare(response.space, region, rtol, others)
+    allowed = NETWORK_SHARE * rtol - float(error.max())
+    training = prepare_training(response.space, region, rtol, others)
     middle = low**0.25 * high**0.75
     used, tried = [low, middle, high], [np.sqrt(middle * high), np.sqrt(low * middle)]
     for frequency in used:
@@ -157,13 +107,13 @@ def reduce_plate(
     while len(training.reactions) < MOST_FREQUENCIES:
         training.solve(tried[0])
         basis = training.basis(used)
-        if training.error(basis, tried[0]) <= STATE_SHARE * rtol / 2:
+        if training.error(basis, tried[0]) <= allowed / 2:
             break
         used = sorted([*used, tried.pop(0)])
         tried += [float(np.sqrt(used[-1] * used[-2])), float(np.sqrt(used[-2] * used[-3]))]
-    chosen, state_error = _truncated(training, basis, STATE_SHARE * rtol)
-    if state_error > STATE_SHARE * rtol:
-        raise AccuracyError(f"Input rtol must be at least {state_error / STATE_SHARE:.1e} for these frequencies.")
+    chosen, state_error = truncated(training, basis, allowed)
+    if state_error > allowed:
+        raise AccuracyError(f"Input rtol must be larger: the states leave {state_error:.1e}, allowed is {allowed:.1e}.")
     diagonal = [part.diagonalised() for part in chosen]
     return PlateNetwork(
         plate, region, frequencies, response.space, tuple(m.group for m in training.modes),
@@ -171,45 +121,3 @@ def reduce_plate(
         float(error.max()), state_error, tuple(sorted(training.reactions)),
         time.perf_counter() - start,
     )  # fmt: skip
-
-
-def _prepare(space: EddySpace, region: Region, rtol: float, others: Sequence[Source]) -> _Training:
-    extent = region.upper - region.lower
-    counts = np.clip(np.ceil(extent / extent.max() * 6), 3, 6).astype(int)
-    sources = [*unit_dipoles(region.grid((counts[0], counts[1], counts[2]), fold=True)), *others]
-    groups = parity_groups(space.parity, region.mirrors)
-    rows = group_rows(space, groups, sources)
-    power = sum(np.sum(r**2, axis=1) for r in rows)
-    dipoles = len(sources) - len(others)
-    place = np.repeat(power[:dipoles].reshape(-1, 3).sum(axis=1), 3)
-    scale = 1 / np.sqrt(np.concatenate([place, power[dipoles:]]))
-    probes = qmc.scale(qmc.Halton(3, seed=1).random(PROBES), region.lower, region.upper)
-    probes = np.concatenate([region.surface((2, 2, 2), fold=True), probes])
-    tests = group_rows(space, groups, unit_dipoles(probes))
-    found = [source_modes(space, g, r, scale, MODE_SHARE * rtol) for g, r in zip(groups, rows, strict=True)]
-    weights = [np.linalg.norm(modes.amplitudes * scale[:, None], axis=0) for modes in found]
-    with_probes = [modes.with_rows(space, test) for modes, test in zip(found, tests, strict=True)]
-    return _Training(space, with_probes, [len(m.rows) for m in found], weights)
-
-
-def _own(couplings: ComplexArray) -> ComplexArray:
-    n = len(couplings) // 3
-    return np.asarray(np.einsum("iaib->iab", couplings.reshape(n, 3, n, 3)))
-
-
-def _truncated(
-    training: _Training, basis: Sequence[OrderedBasis], tolerance: float
-) -> tuple[list[OrderedBasis], float]:
-    """The fewest leading fields with which all probes at all solved frequencies meet the tolerance; their error."""
-    levels = np.sort(np.concatenate([part.energies for part in basis]))[::-1]
-    low, high = 0, len(levels) - 1
-    while low < high:
-        middle = (low + high) // 2
-        error = _worst(training, [part.leading(levels[middle]) for part in basis])
-        low, high = (low, middle) if error <= tolerance else (middle + 1, high)
-    chosen = [part.leading(levels[low]) for part in basis]
-    return chosen, _worst(training, chosen)
-
-
-def _worst(training: _Training, basis: Sequence[OrderedBasis]) -> float:
-    return max(training.error(basis, frequency) for frequency in training.reactions)

@@ -1,0 +1,110 @@
+"""Training of a plate's network: sources on a grid of the region, probes off it, and the error of a basis for them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from scipy.stats import qmc
+
+from ..geometry.box import Array
+from .eddy_space import EddySpace, Source
+from .phasor import ComplexArray
+from .plate_region import Region
+from .plate_snapshots import SourceModes, group_rows, parity_groups, solve_modes, source_modes
+from .pod import OrderedBasis, ordered_basis
+from .sources import unit_dipoles
+
+MODE_SHARE = 1e-3
+"""Squared part of the training sources, in units of the tolerance, that their modes may miss in the mean."""
+PROBES = 6
+"""Dipoles at places off the grid, beside those at the region's corners."""
+
+
+@dataclass(eq=False)
+class Training:
+    """What has been solved so far: modes with the probes as their last rows, and reactions by frequency."""
+
+    space: EddySpace
+    modes: list[SourceModes]
+    count: list[int]
+    weights: list[Array]
+    reactions: dict[float, list[ComplexArray]] = field(default_factory=dict)
+
+    def solve(self, frequency: float) -> None:
+        """Finite elements for all modes and probes at a frequency, Hz."""
+        self.reactions[frequency] = solve_modes(self.space, self.modes, frequency)
+
+    def basis(self, frequencies: Sequence[float]) -> list[OrderedBasis]:
+        """Bases of all groups; snapshots count by the reaction at their frequency, to which errors are relative."""
+        size = {f: np.linalg.norm(np.diagonal(self.truth(f), axis1=0, axis2=1)) / f for f in frequencies}
+        return [
+            ordered_basis(
+                modes.rows[:n],
+                [self.reactions[f][k][:n] for f in frequencies],
+                [2 * np.pi * f for f in frequencies],
+                [weight / np.sqrt(size[f]) for f in frequencies],
+            )
+            for k, (modes, n, weight) in enumerate(zip(self.modes, self.count, self.weights, strict=True))
+        ]
+
+    def truth(self, frequency: float) -> ComplexArray:
+        """(probes, probes) couplings of the finite elements."""
+        omega = 2 * np.pi * frequency
+        parts = [
+            -1j * omega * (modes.rows[n:] @ modes.rows[n:].T + modes.rows[n:] @ reaction[n:].T)
+            for modes, n, reaction in zip(self.modes, self.count, self.reactions[frequency], strict=True)
+        ]
+        return np.asarray(sum(parts))
+
+    def error(self, basis: Sequence[OrderedBasis], frequency: float) -> float:
+        """Largest relative error of the probes' own tensors."""
+        parts = [
+            b.couplings(modes.rows[n:], 2 * np.pi * frequency)
+            for b, modes, n in zip(basis, self.modes, self.count, strict=True)
+        ]
+        found = np.asarray(sum(parts))
+        truth = _own(self.truth(frequency))
+        return float(np.max(np.linalg.norm(_own(found) - truth, axis=(1, 2)) / np.linalg.norm(truth, axis=(1, 2))))
+
+
+def prepare_training(space: EddySpace, region: Region, rtol: float, others: Sequence[Source]) -> Training:
+    """Modes of dipoles on a grid in `region` and of `others`, with probes; nothing is solved yet."""
+    extent = region.upper - region.lower
+    counts = np.clip(np.ceil(extent / extent.max() * 6), 3, 6).astype(int)
+    sources = [*unit_dipoles(region.grid((counts[0], counts[1], counts[2]), fold=True)), *others]
+    groups = parity_groups(space.parity, region.mirrors)
+    rows = group_rows(space, groups, sources)
+    power = sum(np.sum(r**2, axis=1) for r in rows)
+    dipoles = len(sources) - len(others)
+    place = np.repeat(power[:dipoles].reshape(-1, 3).sum(axis=1), 3)
+    scale = 1 / np.sqrt(np.concatenate([place, power[dipoles:]]))
+    probes = qmc.scale(qmc.Halton(3, seed=1).random(PROBES), region.lower, region.upper)
+    probes = np.concatenate([region.surface((2, 2, 2), fold=True), probes])
+    tests = group_rows(space, groups, unit_dipoles(probes))
+    found = [source_modes(space, g, r, scale, MODE_SHARE * rtol) for g, r in zip(groups, rows, strict=True)]
+    weights = [np.linalg.norm(modes.amplitudes * scale[:, None], axis=0) for modes in found]
+    with_probes = [modes.with_rows(space, test) for modes, test in zip(found, tests, strict=True)]
+    return Training(space, with_probes, [len(m.rows) for m in found], weights)
+
+
+def _own(couplings: ComplexArray) -> ComplexArray:
+    n = len(couplings) // 3
+    return np.asarray(np.einsum("iaib->iab", couplings.reshape(n, 3, n, 3)))
+
+
+def truncated(training: Training, basis: Sequence[OrderedBasis], tolerance: float) -> tuple[list[OrderedBasis], float]:
+    """The fewest leading fields with which all probes at all solved frequencies meet the tolerance; their error."""
+    levels = np.sort(np.concatenate([part.energies for part in basis]))[::-1]
+    low, high = 0, len(levels) - 1
+    while low < high:
+        middle = (low + high) // 2
+        error = _worst(training, [part.leading(levels[middle]) for part in basis])
+        low, high = (low, middle) if error <= tolerance else (middle + 1, high)
+    chosen = [part.leading(levels[low]) for part in basis]
+    return chosen, _worst(training, chosen)
+
+
+def _worst(training: Training, basis: Sequence[OrderedBasis]) -> float:
+    return max(training.error(basis, frequency) for frequency in training.reactions)
