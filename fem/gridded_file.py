@@ -16,7 +16,7 @@ FORMAT = "spinlev gridded table 1"
 def save_gridded(table: GriddedTable, path: str | Path) -> None:
     """Write a table; the file is whole or absent."""
     dataset = to_dataset(table.expansions)
-    dims = ("member", "expansion", "deviation_degree", "deviation_order")
+    dims = ("member", "fitted_expansion", "deviation_degree", "deviation_order")
     dataset["deviation_real"] = xr.Variable(dims, table.deviations.real, {"units": "T"})
     dataset["deviation_imag"] = xr.Variable(dims, table.deviations.imag, {"units": "T"})
     dataset["region"] = xr.Variable(("corner", "axis"), table.region, {"units": "m"})

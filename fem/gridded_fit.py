@@ -73,7 +73,8 @@ def fit_field_map(
         deviations *= max(1.0, 1.0 / fit.misfit)
     coefficients = basis.coefficients(fit.unknowns, fit.degree)
     expansions = tuple(MultipoleExpansion(*part) for part in zip(middle, radii, coefficients, strict=True))
-    doubts = {"tail": _left_out(basis, fit, field_map, distances, expansions)}
+    left_out = _left_out(basis, fit, field_map, distances, expansions)
+    doubts = {"tail": left_out} if left_out else {}
     provenance = _provenance(basis, fit, field_map, time.perf_counter() - start)
     region = _region(field_map, middle, radii)
     return GriddedTable(RotorTable("gridded", (), (), expansions, doubts, provenance), deviations, region)
