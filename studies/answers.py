@@ -13,6 +13,10 @@ from ..geometry.scene import Scene
 
 MILLI = 1e-3
 PLATE_NOT_MODELLED = "The plate's eddy currents are not modelled in this version: the plate is only an obstacle."
+ANSWERS_NOT_MODELLED = (
+    "The floater is a rigid dipole: that rotor and floater magnetise each other is not in the motion "
+    "(0.09 mm of distance in the default scene; see spinlev study floater-permeability)."
+)
 FLOATER_NOT_MODELLED = "The floater's own eddy currents are not modelled in this version."
 
 
@@ -73,6 +77,9 @@ def flight_answer(table: RotorTable, flight: Trajectory) -> dict[str, Any]:
 def omissions(scene: Scene) -> list[str]:
     """What is in the scene but not in the computation."""
     left_out = [PLATE_NOT_MODELLED] if scene.plate else []
+    permeabilities = [scene.floater.recoil_permeability, *(magnet.recoil_permeability for magnet in scene.rotor)]
+    if any(permeability != 1 for permeability in permeabilities):
+        left_out.append(ANSWERS_NOT_MODELLED)
     if scene.floater.conductivity:
         left_out.append(FLOATER_NOT_MODELLED)
     return left_out

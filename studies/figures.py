@@ -32,9 +32,14 @@ STYLE: Any = {
     "figure.constrained_layout.use": True,
 }
 
-NAMES = {"dipole": "point dipole", "cuboid": "cuboid, closed form (μr = 1)", "fem": "finite elements"}
-COLORS = dict(zip(("dipole", "cuboid", "fem"), PALETTE, strict=False))
-DASHES = {"dipole": "--", "cuboid": "-.", "fem": "-"}
+NAMES = {
+    "dipole": "point dipole",
+    "cuboid": "cuboid, closed form (μr = 1)",
+    "fem": "finite elements",
+    "moments": "moments",
+}
+COLORS = dict(zip(("dipole", "cuboid", "fem", "moments"), PALETTE, strict=False))
+DASHES = {"dipole": "--", "cuboid": "-.", "fem": "-", "moments": ":"}
 
 
 Draw = TypeVar("Draw", bound=Callable[..., Figure])
@@ -70,8 +75,8 @@ def field_figure(result: xr.Dataset) -> Figure:
     distance = -1e3 * result["axis_height"].values
     reference = str(result.attrs["best_model"])
     true = result["axis_field"].sel(model=reference).values
-    for model, color in COLORS.items():
-        field = result["axis_field"].sel(model=model).values
+    for model in result["model"].values.tolist():
+        field, color = result["axis_field"].sel(model=model).values, COLORS[model]
         left.semilogy(
             distance, 1e3 * np.hypot(field[:, 0], field[:, 1]), DASHES[model], color=color, label=NAMES[model]
         )

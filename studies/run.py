@@ -35,7 +35,8 @@ def main_job(scene: Scene, model: str, duration: float, rtol: float, out: Path) 
     curves, then the error goes on to the caller.
     """
     shelf = Shelf(scene, rtol)
-    chosen, best = shelf.table(model), shelf.table("auto")
+    exact = "cuboid" if all(magnet.contrast == 0 for magnet in scene.rotor) else "fem"
+    chosen, best = shelf.table(model), shelf.table(exact)
     tables = {name: shelf.table(name) for name in MODELS}
     surveys, failure = _surveys(scene, {table.model: table for table in (tables["dipole"], best, chosen)})
     found = surveys[chosen.model].equilibria
