@@ -230,7 +230,7 @@ def study(
 def plate(
     scene: Path,
     *,
-    at: str,
+    at: Annotated[str, Parameter(allow_leading_hyphen=True)],
     frequency_hz: float,
     model: ReactionModel = "auto",
     rtol: float = 1e-3,

@@ -189,3 +189,10 @@ def test_a_rotor_at_rest_has_no_equilibrium_but_its_floater_still_falls(spinlev,
     answer = json.loads(out)
     assert answer["ended_by"] == "lost"
     assert "Earnshaw" in answer["failed"]
+
+
+def test_plate_takes_a_place_that_begins_with_a_minus(spinlev):
+    scene = SCENES / "tilt-over-plate.toml"
+    status, out, err = spinlev("plate", scene, "--at", "-5,0,-20", "--frequency-hz", "130", "--model", "slab", "--json")
+    assert status == 0, err
+    assert np.shape(json.loads(out)["G_T_per_A_m2"]["imag"]) == (3, 3)
