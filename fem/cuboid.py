@@ -10,7 +10,7 @@ ends are at distances r1 and r2, is 2 atanh(L / (r1 + r2)).  This form has no si
 the edge itself: the lines that extend it need no special case, and far away no digit is lost in it.
 The gradient ∂_k T_ij is symmetric in all its indices and free of trace, so that derivatives of the
 Λ and the sum of ijk/r over the corners give all of it, without any transcendental function.
-Inside the cuboid the same formula gives B = H + J.
+Inside the cuboid the same formula gives μ0 H = B - J.
 
 Formulas: potential of a uniformly charged segment and rectangle, e.g. O. D. Kellogg, Foundations of
 Potential Theory (1929), ch. III; for magnets see Z. J. Yang et al., Supercond. Sci. Technol. 3 (1990) 591.

@@ -15,7 +15,7 @@ MILLI = 1e-3
 PLATE_NOT_MODELLED = "The plate's eddy currents are not modelled in this version: the plate is only an obstacle."
 ANSWERS_NOT_MODELLED = (
     "The floater is a rigid dipole: that rotor and floater magnetise each other is not in the motion "
-    "(0.09 mm of distance in the default scene; see spinlev study floater-permeability)."
+    "(how much that is: spinlev study floater-permeability)."
 )
 FLOATER_NOT_MODELLED = "The floater's own eddy currents are not modelled in this version."
 

@@ -124,3 +124,9 @@ def test_closed_form_and_moments_agree_where_one_takes_over_from_the_other():
     far = CompiledField(uniform_moments(magnet, 17).expressions)(points)
     for closed_form, moments in zip(near, far, strict=True):
         assert np.abs(closed_form - moments).max() < 1e-12 * np.abs(moments).max()
+
+
+def test_inside_a_cube_it_is_the_demagnetising_field():
+    magnet = Magnet(Box((0.01, 0.01, 0.01)), (1.0, 0.0, 0.0))
+    h = CompiledField(UniformField(magnet).expressions)([[0.0, 0.0, 0.0]])[0][0]
+    assert h == pytest.approx([-1 / 3, 0.0, 0.0], abs=1e-15)  # a cube's demagnetising factor at its centre
