@@ -69,7 +69,7 @@ def test_equilibria(benchmark, model):
 @pytest.mark.parametrize("model", ["dipole", "cuboid", "fem"])
 def test_flight(benchmark, model):
     table = rotor_table(SCENE.rotor, model)
-    start = initial_state(SCENE, table)
+    start, _ = initial_state(SCENE, table)
     flight = compile_flight(SCENE, table, duration=1.0)
     trajectory = benchmark.pedantic(lambda: integrate(SCENE, flight, start, 1.0, None), rounds=3, warmup_rounds=1)
     assert trajectory.ended_by == "duration"

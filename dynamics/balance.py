@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..geometry.box import Array
-from .equations import Parameter
 from .rates import Rates
+from .symbols import Parameter
 
 Indices = NDArray[np.intp]
 LATERAL: Indices = np.array([0, 1, 3, 4])

@@ -12,15 +12,14 @@ along the axis everything is autonomous, and the Jacobi integral
     J = v²/2 + i Ω²/2 - i (m T²/I) m̂·B - g·r - W·(r × v + i Ω),   i = I/(M R²)   (unit: M R²/T²)
 
 is conserved: the energy less ω times the angular momentum about the axis.  What drag and a horizontal part of gravity
-do in the rotating frame is integrated along as the thirteenth state `work`, so that J - work never changes.
-Every number that a sweep may change is a runtime parameter; only the table's own geometry is compiled in.
+do in the rotating frame is integrated along as the last state, `work`, so that J - work never changes.
+A plate adds its currents as further states (`memory`) and their energy to J.
+Every number that a sweep may change is a runtime parameter; only the tables' own geometry is compiled in.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
-from enum import IntEnum, auto
 
 import heyoka as hy
 import numpy as np
@@ -28,28 +27,11 @@ import numpy as np
 from ..fem.table import FieldTable
 from ..geometry.box import Array
 from ..geometry.scene import Scene
+from .memory import PlateMemory, memory_terms
 from .state import Scales
+from .symbols import Parameter, Vector, cross, dot, subtract, turned
 
-Vector = Sequence[hy.expression]
 NAMES = tuple(f"{vector}_{axis}" for vector in ("position", "velocity", "moment", "spin") for axis in "xyz")
-
-
-class Parameter(IntEnum):
-    """Places of the runtime parameters; all are free of units but LENGTH (m) and TORQUE (1/T)."""
-
-    RATE = 0
-    LENGTH = auto()
-    TORQUE = auto()
-    INERTIA = auto()
-    GRAVITY_X = auto()
-    GRAVITY_Y = auto()
-    GRAVITY_Z = auto()
-    LINEAR_DRAG = auto()
-    TILT_DRAG = auto()
-    SPIN_DRAG = auto()
-    LOST_DISTANCE = auto()
-    PLATE_DEPTH = auto()
-    PLATE_SPEED = auto()
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,10 +40,10 @@ class Equations:
 
     Parameters
     ----------
-    variables : the twelve of the state
+    variables : the twelve of the floater, then the plate's
     rates : their derivatives with respect to scaled time
-    jacobi : the terms of the Jacobi integral: motion, turning, magnet, weight, swirl
-    power : its rate of change, by drag and by gravity across the axis
+    jacobi : the terms of the Jacobi integral: motion, turning, magnet, weight, swirl, and the plate's energy
+    power : its rate of change, by drag, by gravity across the axis and by the plate
     """
 
     variables: Vector
@@ -73,6 +55,7 @@ class Equations:
 def parameters(scene: Scene, scales: Scales, frozen_spin: bool = False) -> Array:
     """Values of the runtime parameters; `frozen_spin` takes the drag off the spin about the moment."""
     floater, drag, (length, time) = scene.floater, scene.drag, (scales.length, scales.time)
+    root_energy = np.sqrt(floater.mass) * length / time
     values = np.zeros(len(Parameter))
     values[Parameter.RATE] = scene.angular_velocity * time
     values[Parameter.LENGTH] = length
@@ -82,16 +65,22 @@ def parameters(scene: Scene, scales: Scales, frozen_spin: bool = False) -> Array
     values[Parameter.LINEAR_DRAG] = drag.linear * time / floater.mass
     values[Parameter.TILT_DRAG] = drag.angular * time / floater.inertia
     values[Parameter.SPIN_DRAG] = 0.0 if frozen_spin else values[Parameter.TILT_DRAG]
+    values[Parameter.TIME] = time
+    values[Parameter.PLATE_MOMENT] = floater.moment / root_energy
+    values[Parameter.PLATE_SHARE] = 1 / root_energy
     return values
 
 
-def equations_of_motion(table: FieldTable, tilted_gravity: bool = False) -> Equations:
+def equations_of_motion(
+    table: FieldTable, tilted_gravity: bool = False, memory: PlateMemory | None = None
+) -> Equations:
     """Rates of the scaled state in the field of a table.
 
     Parameters
     ----------
     table : the rotor's field
     tilted_gravity : whether gravity has a part across the axis; it turns in this frame, so that time enters
+    memory : the plate's currents, if they are modelled
     """
     variables = hy.make_vars(*NAMES)
     position, velocity, moment, spin = (variables[i : i + 3] for i in (0, 3, 6, 9))
@@ -107,12 +96,6 @@ def equations_of_motion(table: FieldTable, tilted_gravity: bool = False) -> Equa
     brake = _angular_drag(moment, spin)
     drift = subtract(velocity, turned(position))
     lag = [spin[0], spin[1], spin[2] - hy.par[Parameter.RATE]]
-    rates = [
-        *drift,
-        *subtract([force[i] + axial[i] + push[i] for i in range(3)], turned(velocity)),
-        *cross(lag, moment),
-        *subtract([turn[i] + brake[i] for i in range(3)], turned(spin)),
-    ]
     jacobi = [
         0.5 * dot(velocity, velocity),
         0.5 * inertia * dot(spin, spin),
@@ -120,7 +103,24 @@ def equations_of_motion(table: FieldTable, tilted_gravity: bool = False) -> Equa
         -axial[2] * position[2],
         -hy.par[Parameter.RATE] * (cross(position, velocity)[2] + inertia * spin[2]),
     ]
-    return Equations(variables, rates, jacobi, dot(push, drift) + inertia * dot(brake, lag))
+    power = dot(push, drift) + inertia * dot(brake, lag)
+    states: list[hy.expression] = []
+    state_rates: Vector = []
+    if memory is not None:
+        states = [hy.expression(name) for name in memory.names]
+        plate = memory_terms(memory, position, moment, states)
+        force = [a + b for a, b in zip(force, plate.force, strict=True)]
+        turn = [a + b for a, b in zip(turn, plate.torque, strict=True)]
+        state_rates = plate.rates
+        jacobi.append(plate.stored)
+        power = power - plate.loss - plate.drive
+    rates = [
+        *drift,
+        *subtract([force[i] + axial[i] + push[i] for i in range(3)], turned(velocity)),
+        *cross(lag, moment),
+        *subtract([turn[i] + brake[i] for i in range(3)], turned(spin)),
+    ]
+    return Equations([*variables, *states], [*rates, *state_rates], jacobi, power)
 
 
 def _gravity(tilted: bool) -> tuple[Vector, Vector]:
@@ -137,23 +137,3 @@ def _angular_drag(moment: Vector, spin: Vector) -> Vector:
     tilt, along = hy.par[Parameter.TILT_DRAG], hy.par[Parameter.SPIN_DRAG]
     excess = (tilt - along) * dot(spin, moment)
     return [excess * moment[i] - tilt * spin[i] for i in range(3)]
-
-
-def dot(a: Vector, b: Vector) -> hy.expression:
-    """Scalar product of two vectors of expressions."""
-    return hy.sum([a[i] * b[i] for i in range(3)])
-
-
-def cross(a: Vector, b: Vector) -> list[hy.expression]:
-    """Vector product of two vectors of expressions."""
-    return [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
-
-
-def turned(vector: Vector) -> list[hy.expression]:
-    """W × vector: what the frame's rotation adds to the rate of a vector fixed in the laboratory."""
-    return [-hy.par[Parameter.RATE] * vector[1], hy.par[Parameter.RATE] * vector[0], hy.expression(0.0)]
-
-
-def subtract(a: Vector, b: Vector) -> list[hy.expression]:
-    """Difference of two vectors of expressions."""
-    return [a[i] - b[i] for i in range(3)]

@@ -10,33 +10,50 @@ from ..geometry.scene import Scene
 from .balance import EVERY, Balance, solve
 from .continuation import all_curves
 from .curve import Curve
-from .equations import Parameter, parameters
+from .equations import parameters
 from .equilibrium import Equilibrium, EquilibriumError, ForceCurve, Survey
+from .memory import PlateMemory
 from .rates import Rates
 from .search import SearchRange
 from .stability import modes
 from .state import Scales
+from .steady import Shaken
+from .symbols import Parameter
 
 
 def find_equilibria(
-    scene: Scene, table: FieldTable, spin: float = 0.0, farthest: float = 0.1, rates: Rates | None = None
+    scene: Scene,
+    table: FieldTable,
+    spin: float = 0.0,
+    farthest: float = 0.1,
+    rates: Rates | None = None,
+    memory: PlateMemory | None = None,
 ) -> list[Equilibrium]:
     """All synchronous equilibria below the rotor, the stable ones first, then by distance; see `survey`."""
-    return list(survey(scene, table, spin, farthest, rates).equilibria)
+    return list(survey(scene, table, spin, farthest, rates, memory).equilibria)
 
 
 def survey(
-    scene: Scene, table: FieldTable, spin: float = 0.0, farthest: float = 0.1, rates: Rates | None = None
+    scene: Scene,
+    table: FieldTable,
+    spin: float = 0.0,
+    farthest: float = 0.1,
+    rates: Rates | None = None,
+    memory: PlateMemory | None = None,
 ) -> Survey:
     """All synchronous equilibria with z < 0 between contact with the rotor and `farthest`, with their stability.
 
     Parameters
     ----------
-    scene : the scene; its plate is left out
+    scene : the scene
     table : the rotor's field
     spin : body spin s = Ω·m̂/ω, which magnetic torque does not change
     farthest : largest depth, and distance from the axis, m
     rates : `Rates` of the same table, to compile them once for many scenes
+    memory : the plate's currents; left out, the plate is only an obstacle
+
+    With a plate's currents, or gravity across the axis, equilibria are periodic motions, followed from the fixed
+    points without them; those beyond the range of the plate's table stay as they are, without `currents`.
 
     Returns
     -------
@@ -46,11 +63,12 @@ def survey(
 
     Raises
     ------
-    EquilibriumError : the rotor is at rest, or gravity is not along its axis
+    EquilibriumError : the rotor is at rest
     """
     _check(scene)
     scales = Scales.of(scene)
-    balance = Balance(rates or Rates(table), parameters(scene, scales, frozen_spin=True), spin)
+    values, rates = parameters(scene, scales, frozen_spin=True), rates or Rates(table)
+    balance = Balance(rates, values, spin)
     where = SearchRange(scene, farthest)
     curves = all_curves(balance, where)
     guesses = [curve.balanced() for curve in curves]
@@ -58,6 +76,8 @@ def survey(
     moment = np.concatenate([np.zeros((0, 3)), *(m for _, m in guesses)])
     points = _polished(balance, position, moment)
     found = [_equilibrium(table, scales, balance, r, m) for r, m in points if r in where]
+    if memory is not None or np.any(scene.gravity[:2]):
+        found = _shaken(Shaken(scene, rates, values, memory), table, found)
     found.sort(key=lambda equilibrium: (not equilibrium.stable, equilibrium.distance))
     return Survey(tuple(found), tuple(_force_curve(scene, scales, curve) for curve in curves))
 
@@ -68,12 +88,19 @@ def _check(scene: Scene) -> None:
             "At 0 Hz nothing levitates: a magnet has no stable equilibrium in a static field and gravity "
             "(S. Earnshaw, 1842), and no synchronous one without a turning rotor. Give the rotor a frequency."
         )
-    if np.any(scene.gravity[:2]):
-        raise EquilibriumError(
-            f"Gravity {scene.gravity.tolist()} m/s² is not along the rotor's axis, so that the floater's motion is "
-            "periodic in the rotor's frame and no fixed point exists. Put gravity along z, or "
-            "simulate from an absolute start (start.position_mm)."
-        )
+
+
+def _shaken(problem: Shaken, table: FieldTable, found: list[Equilibrium]) -> list[Equilibrium]:
+    """The same equilibria with the plate's currents and the whole gravity."""
+    kept = []
+    for fixed in found:
+        if problem.reaches(fixed.position):
+            force, torque = _field_doubt(table, problem.values, fixed.position)[[0, 4]]
+            moved = problem.equilibrium(fixed, np.array([force] * 3 + [torque] * 3))
+            kept += [] if moved is None else [moved]
+        elif not np.any(problem.scene.gravity[:2]):
+            kept.append(fixed)
+    return kept
 
 
 def _polished(balance: Balance, position: Array, moment: Array) -> list[tuple[Array, Array]]:

@@ -18,6 +18,8 @@ class EquilibriumError(RuntimeError):
 class Equilibrium:
     """One synchronous equilibrium, along the rotor's axes.
 
+    Where a plate or tilted gravity shakes the floater once a turn it is a periodic motion, and `state` its mean.
+
     Parameters
     ----------
     state : position m, velocity m/s, moment direction, spin rad/s
@@ -28,6 +30,9 @@ class Equilibrium:
     growth_per_s : largest growth rate of a small motion, 1/s
     growth_error_per_s : what round-off may do to it, 1/s
     frequencies_hz : (k,) frequencies of the small motions in the rotor's frame
+    turn : (n, 3) the motion at equal intervals of a turn, the first at t = 0; None where it is at rest in this frame
+    currents : (n, k) states of the plate then, √J; None where the plate's currents are not modelled
+    without : the fixed point that it would be without the plate and with gravity along the axis
     """
 
     state: State
@@ -38,6 +43,16 @@ class Equilibrium:
     growth_per_s: float
     growth_error_per_s: float
     frequencies_hz: Array
+    turn: State | None = None
+    currents: Array | None = None
+    without: Equilibrium | None = None
+
+    @property
+    def start(self) -> State:
+        """The state at t = 0."""
+        if self.turn is None:
+            return self.state
+        return State(*(vector[0] for vector in self.turn.vectors))
 
     @property
     def position(self) -> Array:

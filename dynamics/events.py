@@ -11,8 +11,8 @@ import numpy as np
 
 from ..geometry.box import Array, Box
 from ..geometry.scene import Plate, Scene
-from .equations import Parameter, Vector
 from .state import turned_about_z
+from .symbols import Parameter, Vector
 
 CONTACT, LOST = "contact", "lost"
 

@@ -13,6 +13,7 @@ from ..geometry.box import Array
 from ..geometry.scene import Scene
 from .equations import Equations, equations_of_motion, parameters
 from .events import flight_events
+from .memory import PlateMemory
 from .state import Scales
 
 TOLERANCE = 1e-16
@@ -27,7 +28,7 @@ class Flight:
 
     Parameters
     ----------
-    integrator : heyoka's, with the twelve states and the work
+    integrator : heyoka's, with the twelve states of the floater, those of the plate, and the work
     meanings : of the terminal events, by number
     ledger : compiled terms of the Jacobi integral
     values : runtime parameters
@@ -42,11 +43,15 @@ class Flight:
     scales: Scales
     compile_seconds: float
 
-    def energy_error(self, states: Array) -> float:
-        """Largest relative violation of J - work = constant or of |m̂| = 1 over scaled states (n, 13)."""
-        pars = np.repeat(self.values[: self.ledger.nparams, None], len(states), axis=1)
-        terms = self.ledger(np.ascontiguousarray(states[:, :12].T), pars=pars)
-        books = terms.sum(axis=0) - states[:, 12]
+    def terms(self, times: Array, states: Array, values: Array) -> Array:
+        """Terms (k, n) of the Jacobi integral at scaled times (n,), states (n, s) and runtime parameters (n, p)."""
+        pars = np.ascontiguousarray(values[:, : self.ledger.nparams].T)
+        return np.asarray(self.ledger(np.ascontiguousarray(states[:, :-1].T), pars=pars, time=times))
+
+    def energy_error(self, times: Array, states: Array, values: Array) -> float:
+        """Largest relative violation of J - work = constant or of |m̂| = 1; arguments as of `terms`."""
+        terms = self.terms(times, states, values)
+        books = terms.sum(axis=0) - states[:, -1]
         largest = float(np.abs(terms[:, 0]).max())
         scale = abs(books[0]) if abs(books[0]) > 1e-3 * largest else largest
         length = np.linalg.norm(states[:, 6:9], axis=1)
@@ -54,7 +59,12 @@ class Flight:
 
 
 def compile_flight(
-    scene: Scene, table: FieldTable, duration: float, tolerance: float = TOLERANCE, compact: bool | None = None
+    scene: Scene,
+    table: FieldTable,
+    duration: float,
+    tolerance: float = TOLERANCE,
+    compact: bool | None = None,
+    memory: PlateMemory | None = None,
 ) -> Flight:
     """Compile the motion of a scene in a table's field.
 
@@ -64,18 +74,19 @@ def compile_flight(
     duration : how long it shall fly, s: it decides how much compilation is worth
     tolerance : relative error of a step
     compact : compile loops instead of straight code: sooner ready, two to three times slower; None to choose
+    memory : the plate's currents, if they are modelled
     """
     started = perf_counter()
     scales = Scales.of(scene)
     values = parameters(scene, scales)
-    equations = equations_of_motion(table, bool(np.any(scene.gravity[:2])))
+    equations = equations_of_motion(table, bool(np.any(scene.gravity[:2])), memory)
     events, meanings = flight_events(scene, equations.variables[:3])
     work = hy.expression("work")
     if compact is None:
         compact = not _worth_compiling(equations, scene, duration)
     integrator = hy.taylor_adaptive(
         [*zip(equations.variables, equations.rates, strict=True), (work, equations.power)],
-        np.zeros(13),
+        np.zeros(len(equations.variables) + 1),
         tol=tolerance,
         compact_mode=compact,
         t_events=events,

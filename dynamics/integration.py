@@ -14,11 +14,11 @@ import numpy as np
 
 from ..geometry.box import Array
 from ..geometry.scene import Scene
-from .equations import Parameter
-from .events import CONTACT, clearance, plate_legs
+from .events import CONTACT, clearance, plate_depth, plate_legs
 from .flight import Flight
 from .recorder import Recorder
 from .state import State
+from .symbols import Parameter
 from .trajectory import Trajectory
 
 DURATION = "duration"
@@ -42,7 +42,12 @@ class _Log:
 
 
 def integrate(
-    scene: Scene, flight: Flight, start: State, duration: float, progress: Callable[[float], None] | None = None
+    scene: Scene,
+    flight: Flight,
+    start: State,
+    duration: float,
+    progress: Callable[[float], None] | None = None,
+    currents: Array | None = None,
 ) -> Trajectory:
     """Fly from `start` (rotor's frame, t = 0) until `duration` (s), contact or loss.
 
@@ -50,6 +55,7 @@ def integrate(
     ----------
     scene, flight : the problem and its compiled form
     progress : called with the finished part, 0 to 1, a few times a second
+    currents : states of the plate at the start, √J, if the flight has a plate's memory
 
     Accuracy: a step errs by round-off, so that energy and |m̂| drift by about 1e-14 in a thousand turns;
     `Trajectory.energy_error` tells.  A keyboard interrupt returns what is finished.
@@ -59,7 +65,7 @@ def integrate(
     IntegrationError : the state became infinite
     """
     scales = flight.scales
-    values = _begin(flight, start)
+    values = _begin(flight, start, np.zeros(0) if currents is None else currents)
     turn = 1 / abs(scene.frequency) if scene.frequency else np.inf
     interval = min(turn / SAMPLES_PER_TURN, duration / 1000) / scales.time
     recorder, log, began = Recorder(flight.integrator.state, interval, MOST_SAMPLES), _Log(), perf_counter()
@@ -74,7 +80,7 @@ def integrate(
         lab=scales.unpack(recorder.states).to_lab(scene.angular_velocity * time),
         angular_velocity=scene.angular_velocity,
         ended_by=log.ended_by,
-        energy_error=flight.energy_error(recorder.states),
+        energy_error=flight.energy_error(recorder.times, recorder.states, _plate_places(scene, values, recorder.times)),
         realtime_factor=float(time[-1] / seconds),
         steps=log.steps,
         compile_seconds=flight.compile_seconds,
@@ -82,12 +88,23 @@ def integrate(
     )
 
 
-def _begin(flight: Flight, start: State) -> Array:
+def _plate_places(scene: Scene, values: Array, times: Array) -> Array:
+    """Runtime parameters (n, p) at scaled times (n,): where the plate is, as if it stood there."""
+    places = np.tile(values, (len(times), 1))
+    places[:, Parameter.PLATE_SPEED] = 0.0
+    if scene.plate is not None:
+        places[:, Parameter.PLATE_DEPTH] = plate_depth(scene.plate, times * values[Parameter.TIME])
+        places[:, Parameter.PLATE_DEPTH] /= values[Parameter.LENGTH]
+    return places
+
+
+def _begin(flight: Flight, start: State, currents: Array) -> Array:
     """Set the integrator to the start; the runtime parameters with the distance at which the floater is lost."""
     flight.integrator.time = 0.0
-    flight.integrator.state[:] = np.append(flight.scales.pack(start), 0.0)
-    flight.integrator.reset_cooldowns()
     values = flight.values.copy()
+    plate = currents * values[Parameter.PLATE_SHARE]
+    flight.integrator.state[:] = np.concatenate([flight.scales.pack(start), plate, [0.0]])
+    flight.integrator.reset_cooldowns()
     values[Parameter.LOST_DISTANCE] = max(0.1, 2 * float(np.linalg.norm(start.position))) / flight.scales.length
     return values
 

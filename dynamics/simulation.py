@@ -11,15 +11,21 @@ from ..fem.table import FieldTable
 from ..geometry.box import Array
 from ..geometry.input_error import InputError
 from ..geometry.scene import AbsoluteStart, Scene
+from .equations import parameters
 from .equilibria import find_equilibria
 from .equilibrium import Equilibrium, EquilibriumError
 from .events import clearance
 from .flight import TOLERANCE, compile_flight
 from .integration import integrate
+from .memory import PlateMemory
+from .plate_force import PlateForce
 from .rates import Rates
-from .state import State
+from .state import Scales, State
+from .symbols import Parameter
 from .trajectory import Trajectory
 
+PLATE_TOLERANCE = 1e-14
+"""Of a Taylor step with a plate, whose table is known to 1e-4 at best."""
 FREQUENCY_RATIO, FREQUENCY_TRIALS = 1.08, 9
 """Steps in which a frequency that works is looked for: up and down by a factor of two."""
 
@@ -36,6 +42,7 @@ def simulate(
     tolerance: float = TOLERANCE,
     compact: bool | None = None,
     progress: Callable[[float], None] | None = None,
+    memory: PlateMemory | None = None,
 ) -> Trajectory:
     """Simulate the flight of a scene's floater for `duration` (s), or until contact or loss.
 
@@ -44,6 +51,7 @@ def simulate(
     equilibria : of this scene, if they are already known
     tolerance, compact : see `compile_flight`
     progress : called with the finished part, 0 to 1, a few times a second
+    memory : the plate's currents; left out, the plate is only an obstacle
 
     Raises
     ------
@@ -52,30 +60,46 @@ def simulate(
     """
     if not duration > 0:
         raise StartError(f"Input duration must be positive; instead received {duration} s.")
-    start = initial_state(scene, table, equilibria)
-    return integrate(scene, compile_flight(scene, table, duration, tolerance, compact), start, duration, progress)
+    start, currents = initial_state(scene, table, equilibria, memory)
+    if memory is not None:
+        tolerance = max(tolerance, PLATE_TOLERANCE)
+    flight = compile_flight(scene, table, duration, tolerance, compact, memory)
+    return integrate(scene, flight, start, duration, progress, currents)
 
 
-def initial_state(scene: Scene, table: FieldTable, equilibria: Sequence[Equilibrium] | None = None) -> State:
-    """State at t = 0, when the rotor's frame is the laboratory's.
+def initial_state(
+    scene: Scene,
+    table: FieldTable,
+    equilibria: Sequence[Equilibrium] | None = None,
+    memory: PlateMemory | None = None,
+) -> tuple[State, Array]:
+    """State at t = 0, when the rotor's frame is the laboratory's, and the plate's states (k,), √J.
 
     An `OffsetStart` displaces the stable equilibrium in the rotor's frame and keeps the floater at rest in it; among
-    several stable equilibria it takes the nearest.  `equilibria` are found if they are not given.
+    several it takes the nearest; where there is none, one that only the plate's currents make unstable.  An absolute
+    start finds the plate as if the floater had long turned with the rotor there.  `equilibria` are found if they are
+    not given.
 
     Raises
     ------
-    EquilibriumError : no stable equilibrium to start from; it says why and which frequency has one
+    EquilibriumError : no equilibrium to start from; it says why and which frequency has one
     StartError : the floater would overlap a magnet or the plate
     """
+    currents = np.zeros(0)
     if isinstance(scene.start, AbsoluteStart):
         start = scene.start
         state = State(start.position, start.velocity, start.moment / np.linalg.norm(start.moment), start.spin)
+        if memory is not None:
+            scales = Scales.of(scene)
+            plate = PlateForce(memory, parameters(scene, scales))
+            currents = plate.settled(scales.pack(state)) / plate.values[Parameter.PLATE_SHARE]
     else:
-        known = find_equilibria(scene, table) if equilibria is None else equilibria
-        stable = [equilibrium for equilibrium in known if equilibrium.stable]
-        if not stable:
+        known = find_equilibria(scene, table, memory=memory) if equilibria is None else equilibria
+        chosen = starting_point(known)
+        if chosen is None:
             raise EquilibriumError(_way_out(scene, table, known))
-        state = _displaced(scene, stable[0], scene.start.offset)
+        state = _displaced(scene, chosen.start, scene.start.offset)
+        currents = currents if chosen.currents is None else chosen.currents[0]
     gap = float(clearance(scene, np.zeros(1), state.position[None])[0])
     if gap < 0:
         where = ", ".join(f"{1e3 * c:.6g}" for c in state.position)
@@ -83,13 +107,18 @@ def initial_state(scene: Scene, table: FieldTable, equilibria: Sequence[Equilibr
             f"Input start must leave the floater free of the magnets and the plate; instead it begins at ({where}) mm, "
             f"{-1e3 * gap:.3g} mm inside one of them. Move the plate or the start."
         )
-    return state
+    return state, currents
 
 
-def _displaced(scene: Scene, equilibrium: Equilibrium, offset: Array) -> State:
-    position = equilibrium.position + offset
-    velocity = np.cross([0.0, 0.0, scene.angular_velocity], position)
-    return replace(equilibrium.state, position=position, velocity=velocity)
+def starting_point(equilibria: Sequence[Equilibrium]) -> Equilibrium | None:
+    """The nearest stable equilibrium, or else the nearest that is stable without the plate."""
+    stable = [e for e in equilibria if e.stable]
+    return next(iter([*stable, *(e for e in equilibria if e.without and e.without.stable)]), None)
+
+
+def _displaced(scene: Scene, start: State, offset: Array) -> State:
+    turning = np.cross([0.0, 0.0, scene.angular_velocity], offset)
+    return replace(start, position=start.position + offset, velocity=start.velocity + turning)
 
 
 def _way_out(scene: Scene, table: FieldTable, equilibria: Sequence[Equilibrium]) -> str:

@@ -55,7 +55,7 @@ def modes(state: Array, slope: Array) -> Modes:
     state : (12,) scaled equilibrium
     slope : (12, 12) derivatives of its rates, drag along the moment left out
     """
-    tangent, projection = _tangent_space(state)
+    tangent, projection = tangent_space(state)
     matrix = projection @ slope @ tangent
     values, right = np.linalg.eig(matrix)
     left = np.linalg.pinv(right)
@@ -64,7 +64,7 @@ def modes(state: Array, slope: Array) -> Modes:
     return Modes(values, np.minimum(round_off * condition, 1e-6), tangent @ right)
 
 
-def _tangent_space(state: Array) -> tuple[Array, Array]:
+def tangent_space(state: Array) -> tuple[Array, Array]:
     """Ten directions (12, 10) and the projection (10, 12) on their coordinates."""
     moment, spin = state[6:9], state[9:]
     across = tangent_basis(moment[None])[0]

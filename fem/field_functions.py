@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import product
+from itertools import combinations_with_replacement, product
 
 import heyoka as hy
 import numpy as np
@@ -27,6 +27,11 @@ SPACING = 2.5
 HIGHEST_DEGREE = 4
 UNFOLDED = np.array([[3, 4, 5], [4, 6, 7], [5, 7, 8]])
 """Where the entries of the symmetric gradient lie among the nine outputs of a function."""
+_TRIPLES = list(combinations_with_replacement(range(3), 3))
+UNFOLDED_THRICE = np.array(
+    [[[_TRIPLES.index(tuple(sorted((i, j, k)))) for k in range(3)] for j in range(3)] for i in range(3)]
+)
+"""The same for the second derivatives, which are symmetric in all three indices."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,6 +77,21 @@ class Multipoles:
         for field, gradient in self.expressions(variables):
             outputs += [*field, *(gradient[i][j] for i in range(3) for j in range(i, 3))]
         return hy.cfunc(outputs, variables, compact_mode=len(outputs) > 2000)
+
+    @cached_property
+    def _compiled_curvature(self) -> hy.cfunc_dbl:
+        variables = hy.make_vars("x", "y", "z")
+        outputs = [
+            hy.diff(gradient[i][j], variables[k])
+            for _, gradient in self.expressions(variables)
+            for i, j, k in combinations_with_replacement(range(3), 3)
+        ]
+        return hy.cfunc(outputs, variables, compact_mode=True, opt_level=0)
+
+    def curvature(self, points: Array) -> Array:
+        """∂²B_i/∂x_j∂x_k (n, k, 3, 3, 3) T/m² at points (n, 3) m."""
+        values = self._compiled_curvature(np.ascontiguousarray(points.T)).reshape(len(self.kinds), 10, -1)
+        return np.moveaxis(values[:, UNFOLDED_THRICE], -1, 0)
 
     def evaluate(self, points: Array) -> tuple[Array, Array]:
         """B (n, k, 3) T and ∂B_i/∂x_j (n, k, 3, 3) T/m at points (n, 3) m."""

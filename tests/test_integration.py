@@ -122,7 +122,7 @@ def test_progress_rises_to_one_and_an_interrupt_keeps_what_is_finished():
 
 
 def test_start_is_displaced_from_the_stable_equilibrium_and_at_rest_in_the_rotors_frame():
-    state = initial_state(SCENE, DIPOLE)
+    state, _ = initial_state(SCENE, DIPOLE)
     np.testing.assert_allclose(state.position[2] * 1e3, -19.8134 + 0.1, atol=1e-4)
     np.testing.assert_allclose(state.velocity, np.cross([0, 0, SCENE.angular_velocity], state.position), rtol=1e-14)
 
