@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
 from importlib.metadata import version
 
 import numpy as np
@@ -11,12 +10,12 @@ import numpy as np
 from ..geometry.box import Array
 from ..geometry.plate_mesh import MeshRule
 from ..geometry.scene import Plate
-from .eddy_space import Source
 from .field_functions import candidates
 from .multipole_fit import fit_multipoles
 from .plate_reduction import PlateNetwork, reduce_plate
 from .plate_region import Region
 from .plate_table import PlateErrors, PlateTable
+from .plate_training import OtherSources
 from .sources import unit_dipoles
 
 FUNCTION_SHARE = 0.1
@@ -31,7 +30,7 @@ def plate_table(
     frequencies: tuple[float, float] = (0.5, 250.0),
     rtol: float = 1e-3,
     rule: MeshRule | None = None,
-    others: Sequence[Source] = (),
+    others: OtherSources | None = None,
 ) -> PlateTable:
     """Table of `plate` for dipoles in `region` (plate's frame) and frequencies (Hz).
 
@@ -39,7 +38,7 @@ def plate_table(
     ----------
     rtol : relative accuracy asked of reaction tensors G, Frobenius norm
     rule : mesh (default by `rtol`)
-    others : sources in the plate's frame whose currents the network must also hold
+    others : more sources whose currents the network must hold
 
     Raises
     ------
