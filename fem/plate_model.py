@@ -10,6 +10,7 @@ import numpy as np
 from ..geometry.box import Array
 from ..geometry.plate_mesh import MeshRule
 from ..geometry.scene import Plate
+from .accuracy_error import AccuracyError
 from .field_functions import candidates
 from .multipole_fit import fit_multipoles
 from .plate_reduction import PlateNetwork, reduce_plate
@@ -19,9 +20,7 @@ from .plate_training import OtherSources
 from .sources import unit_dipoles
 
 FUNCTION_SHARE = 0.1
-"""Share of the tolerance for the field functions."""
-FIT_LEVELS = (1.0, 0.5, 0.25, 0.12)
-"""Errors of the field functions to try, in units of the tolerance: in reaction tensors most of it averages out."""
+"""Share of the tolerance for the field functions; what the other errors leave of it comes on top."""
 
 
 def plate_table(
@@ -49,22 +48,32 @@ def plate_table(
 
 
 def tabulate(network: PlateNetwork, rtol: float) -> PlateTable:
-    """Field functions of a network as multipoles."""
+    """Field functions of a network as multipoles.
+
+    Raises
+    ------
+    AccuracyError : with them the errors add up to more than `rtol`
+    """
     start = time.perf_counter()
     region, half_edges = network.region, network.plate.box.half_edges
     points = region.surface(surface_counts(region))
     values = field_values(network, points)
     rates = np.concatenate(network.rates)
-    middle = 2 * np.pi * np.sqrt(network.frequencies[0] * network.frequencies[1])
+    low, high = (2 * np.pi * f for f in network.frequencies)
+    middle = np.sqrt(low * high)
     state_scale = 1 / np.sqrt(rates + middle)
     point_scale = 1 / np.sqrt(np.sum((values * state_scale[:, None, None]) ** 2, axis=(0, 2)))
-    ends = [2 * np.pi * f for f in network.frequencies]
-    for level in FIT_LEVELS:
-        choice = candidates(region, half_edges)
-        fit = fit_multipoles(choice, points, values, state_scale, point_scale, level * rtol)
-        worst = max(_tensor_error(values, fit.error, rates, omega) for omega in (*ends, middle))
-        if worst <= FUNCTION_SHARE * rtol:
-            break
+
+    def worst(error: Array) -> float:
+        return max(_tensor_error(values, error, rates, omega) for omega in (low, middle, high))
+
+    choice = candidates(region, half_edges)
+    fit = fit_multipoles(
+        choice, points, values, state_scale, point_scale, rtol, lambda error: worst(error) <= FUNCTION_SHARE * rtol
+    )
+    errors = PlateErrors(network.mesh_error, network.state_error, worst(fit.error))
+    if errors.total > rtol:
+        raise AccuracyError(f"Input rtol must be at least {errors.total:.1e} for this plate and region; {errors}.")
     provenance: dict[str, str | float] = {
         "ngsolve": version("ngsolve"),
         "order": float(network.space.order),
@@ -75,7 +84,7 @@ def tabulate(network: PlateNetwork, rtol: float) -> PlateTable:
     }
     return PlateTable(
         network.plate.box.size, network.plate.conductivity, region, network.frequencies, rates,
-        fit.multipoles, fit.weights, PlateErrors(network.mesh_error, network.state_error, worst), provenance,
+        fit.multipoles, fit.weights, errors, provenance,
     )  # fmt: skip
 
 
