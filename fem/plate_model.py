@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
 from importlib.metadata import version
 
 import numpy as np
@@ -11,18 +10,17 @@ import numpy as np
 from ..geometry.box import Array
 from ..geometry.plate_mesh import MeshRule
 from ..geometry.scene import Plate
-from .eddy_space import Source
+from .accuracy_error import AccuracyError
 from .field_functions import candidates
 from .multipole_fit import fit_multipoles
 from .plate_reduction import PlateNetwork, reduce_plate
 from .plate_region import Region
 from .plate_table import PlateErrors, PlateTable
+from .plate_training import OtherSources
 from .sources import unit_dipoles
 
 FUNCTION_SHARE = 0.1
-"""Share of the tolerance for the field functions."""
-FIT_LEVELS = (1.0, 0.5, 0.25, 0.12)
-"""Errors of the field functions to try, in units of the tolerance: in reaction tensors most of it averages out."""
+"""Share of the tolerance for the field functions; what the other errors leave of it comes on top."""
 
 
 def plate_table(
@@ -31,7 +29,7 @@ def plate_table(
     frequencies: tuple[float, float] = (0.5, 250.0),
     rtol: float = 1e-3,
     rule: MeshRule | None = None,
-    others: Sequence[Source] = (),
+    others: OtherSources | None = None,
 ) -> PlateTable:
     """Table of `plate` for dipoles in `region` (plate's frame) and frequencies (Hz).
 
@@ -39,7 +37,7 @@ def plate_table(
     ----------
     rtol : relative accuracy asked of reaction tensors G, Frobenius norm
     rule : mesh (default by `rtol`)
-    others : sources in the plate's frame whose currents the network must also hold
+    others : more sources whose currents the network must hold
 
     Raises
     ------
@@ -50,22 +48,32 @@ def plate_table(
 
 
 def tabulate(network: PlateNetwork, rtol: float) -> PlateTable:
-    """Field functions of a network as multipoles."""
+    """Field functions of a network as multipoles.
+
+    Raises
+    ------
+    AccuracyError : with them the errors add up to more than `rtol`
+    """
     start = time.perf_counter()
     region, half_edges = network.region, network.plate.box.half_edges
     points = region.surface(surface_counts(region))
     values = field_values(network, points)
     rates = np.concatenate(network.rates)
-    middle = 2 * np.pi * np.sqrt(network.frequencies[0] * network.frequencies[1])
+    low, high = (2 * np.pi * f for f in network.frequencies)
+    middle = np.sqrt(low * high)
     state_scale = 1 / np.sqrt(rates + middle)
     point_scale = 1 / np.sqrt(np.sum((values * state_scale[:, None, None]) ** 2, axis=(0, 2)))
-    ends = [2 * np.pi * f for f in network.frequencies]
-    for level in FIT_LEVELS:
-        choice = candidates(region, half_edges)
-        fit = fit_multipoles(choice, points, values, state_scale, point_scale, level * rtol)
-        worst = max(_tensor_error(values, fit.error, rates, omega) for omega in (*ends, middle))
-        if worst <= FUNCTION_SHARE * rtol:
-            break
+
+    def worst(error: Array) -> float:
+        return max(_tensor_error(values, error, rates, omega) for omega in (low, middle, high))
+
+    choice = candidates(region, half_edges)
+    fit = fit_multipoles(
+        choice, points, values, state_scale, point_scale, rtol, lambda error: worst(error) <= FUNCTION_SHARE * rtol
+    )
+    errors = PlateErrors(network.mesh_error, network.state_error, worst(fit.error))
+    if errors.total > rtol:
+        raise AccuracyError(f"Input rtol must be at least {errors.total:.1e} for this plate and region; {errors}.")
     provenance: dict[str, str | float] = {
         "ngsolve": version("ngsolve"),
         "order": float(network.space.order),
@@ -76,7 +84,7 @@ def tabulate(network: PlateNetwork, rtol: float) -> PlateTable:
     }
     return PlateTable(
         network.plate.box.size, network.plate.conductivity, region, network.frequencies, rates,
-        fit.multipoles, fit.weights, PlateErrors(network.mesh_error, network.state_error, worst), provenance,
+        fit.multipoles, fit.weights, errors, provenance,
     )  # fmt: skip
 
 

@@ -22,7 +22,7 @@ from .eddy_space import EddySpace, Source
 from .plate import raise_order
 from .plate_region import Region
 from .plate_snapshots import Group, group_rows
-from .plate_training import prepare_training, truncated
+from .plate_training import OtherSources, prepare_training, truncated
 
 MESH_SHARE, NETWORK_SHARE = 0.6, 0.9
 """Shares of the tolerance for the finite elements, and for them and the truncated basis together; the rest is the
@@ -72,7 +72,7 @@ def reduce_plate(
     frequencies: tuple[float, float] = (0.5, 250.0),
     rtol: float = 1e-3,
     rule: MeshRule | None = None,
-    others: Sequence[Source] = (),
+    others: OtherSources | None = None,
 ) -> PlateNetwork:
     """The network of a plate for dipoles in `region` and all frequencies between the two (Hz).
 
@@ -80,7 +80,7 @@ def reduce_plate(
     ----------
     rtol : relative accuracy of reaction tensors (Frobenius norm); `NETWORK_SHARE` of it is used here
     rule : mesh (default by `rtol`)
-    others : more sources, in the plate's frame, whose currents the network shall hold: the rotor's
+    others : more sources whose currents the network shall hold: the rotor's
 
     Raises
     ------
@@ -94,7 +94,8 @@ def reduce_plate(
     if not 0 < rtol < 1:
         raise ValueError(f"Input rtol must be between 0 and 1; instead received {rtol}.")
     rule = rule or (MeshRule() if rtol >= 5e-4 else MeshRule(1.0, 1.6, 1.4))
-    places = region.grid((2, 2, 2), fold=True)
+    others = others or OtherSources()
+    places = np.concatenate([region.grid((2, 2, 2), fold=True), others.places])
     response, error = raise_order(plate, places, high, MESH_SHARE * rtol, rule)
     if error.max() > MESH_SHARE * rtol:
         raise AccuracyError(f"Input rtol must be at least {error.max() / MESH_SHARE:.1e} for the mesh rule {rule}.")

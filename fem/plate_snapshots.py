@@ -69,14 +69,14 @@ def group_rows(space: EddySpace, groups: Sequence[Group], sources: Sequence[Sour
 
 @dataclass(frozen=True, eq=False)
 class SourceModes:
-    """Orthonormal combinations of the training sources of one group that matter to the plate.
+    """Orthonormal combinations of the sources of one group that matter to the plate.
 
     Parameters
     ----------
     group : parity classes
     rows : (modes, width) weighted potentials, orthonormal
     loads : (modes, classes, unknowns) their loads
-    amplitudes : (sources, modes) of the training sources
+    amplitudes : (sources, modes) of the sources that the modes were made for
     """
 
     group: Group
@@ -84,12 +84,11 @@ class SourceModes:
     loads: Array
     amplitudes: Array
 
-    def with_rows(self, space: EddySpace, rows: Array) -> SourceModes:
-        """The modes, followed by sources as they are."""
-        loads = row_loads(space, self.group, rows)
-        return SourceModes(
-            self.group, np.concatenate([self.rows, rows]), np.concatenate([self.loads, loads]), self.amplitudes
-        )
+    def extended(self, space: EddySpace, rows: Array, scale: Array, tolerance: float) -> SourceModes:
+        """The modes, and after them those of what they miss of other sources; amplitudes of the other sources."""
+        more = source_modes(space, self.group, rows - rows @ self.rows.T @ self.rows, scale, tolerance)
+        both = np.concatenate([self.rows, more.rows])
+        return SourceModes(self.group, both, np.concatenate([self.loads, more.loads]), rows @ both.T)
 
 
 def row_loads(space: EddySpace, group: Group, rows: Array) -> Array:
@@ -102,7 +101,7 @@ def row_loads(space: EddySpace, group: Group, rows: Array) -> Array:
 def source_modes(space: EddySpace, group: Group, rows: Array, scale: Array, tolerance: float) -> SourceModes:
     """Principal components of potentials (sources, width) weighted by `scale` (sources,).
 
-    What is left out of each weighted row has a squared norm of less than `tolerance` in the mean over sources.
+    What is left out of the weighted rows has a squared norm of less than `tolerance` in the sum over sources.
     """
     weighted = rows * scale[:, None]
     values, vectors = np.linalg.eigh(weighted @ weighted.T)

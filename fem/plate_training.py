@@ -16,82 +16,119 @@ from .plate_snapshots import SourceModes, group_rows, parity_groups, solve_modes
 from .pod import OrderedBasis, ordered_basis
 from .sources import unit_dipoles
 
-MODE_SHARE = 1e-3
-"""Squared part of the training sources, in units of the tolerance, that their modes may miss in the mean."""
+MODE_SHARE, PROBE_SHARE = 1e-3, 1e-5
+"""Squared parts of the training sources and of the probes, in units of the tolerance, that their modes may miss."""
 PROBES = 6
 """Dipoles at places off the grid, beside those at the region's corners."""
 
 
+@dataclass(frozen=True, eq=False)
+class OtherSources:
+    """What drives the plate beside a dipole in the region: the rotor.
+
+    Parameters
+    ----------
+    training : sources in the plate's frame whose currents the network shall hold
+    probes : others of the kind; the field of their currents is asked for in the region
+    places : (n, 3) m, where they are: the mesh must do for dipoles there
+    """
+
+    training: Sequence[Source] = ()
+    probes: Sequence[Source] = ()
+    places: Array = field(default_factory=lambda: np.zeros((0, 3)))
+
+
 @dataclass(eq=False)
 class Training:
-    """What has been solved so far: modes with the probes as their last rows, and reactions by frequency."""
+    """What has been solved so far.
+
+    Parameters
+    ----------
+    space : finite elements
+    modes : by group: first those of the training sources, then more for the probes, whose amplitudes they hold
+    weights : by group, how much each mode of the training sources counts
+    places : of the probes: three dipoles at each, and after them the other sources
+    reactions : of all modes by frequency, Hz
+    """
 
     space: EddySpace
     modes: list[SourceModes]
-    count: list[int]
     weights: list[Array]
+    places: int
     reactions: dict[float, list[ComplexArray]] = field(default_factory=dict)
 
     def solve(self, frequency: float) -> None:
-        """Finite elements for all modes and probes at a frequency, Hz."""
+        """Finite elements for all modes at a frequency, Hz."""
         self.reactions[frequency] = solve_modes(self.space, self.modes, frequency)
 
     def basis(self, frequencies: Sequence[float]) -> list[OrderedBasis]:
         """Bases of all groups; snapshots count by the reaction at their frequency, to which errors are relative."""
-        size = {f: np.linalg.norm(np.diagonal(self.truth(f), axis1=0, axis2=1)) / f for f in frequencies}
+        size = {f: np.linalg.norm(np.diagonal(self.truth(f))[: 3 * self.places]) / f for f in frequencies}
         return [
             ordered_basis(
-                modes.rows[:n],
-                [self.reactions[f][k][:n] for f in frequencies],
+                modes.rows[: len(weight)],
+                [self.reactions[f][k][: len(weight)] for f in frequencies],
                 [2 * np.pi * f for f in frequencies],
                 [weight / np.sqrt(size[f]) for f in frequencies],
             )
-            for k, (modes, n, weight) in enumerate(zip(self.modes, self.count, self.weights, strict=True))
+            for k, (modes, weight) in enumerate(zip(self.modes, self.weights, strict=True))
         ]
 
     def truth(self, frequency: float) -> ComplexArray:
         """(probes, probes) couplings of the finite elements."""
         omega = 2 * np.pi * frequency
         parts = [
-            -1j * omega * (modes.rows[n:] @ modes.rows[n:].T + modes.rows[n:] @ reaction[n:].T)
-            for modes, n, reaction in zip(self.modes, self.count, self.reactions[frequency], strict=True)
+            -1j * omega * modes.amplitudes @ (np.eye(len(modes.rows)) + modes.rows @ reaction.T) @ modes.amplitudes.T
+            for modes, reaction in zip(self.modes, self.reactions[frequency], strict=True)
         ]
         return np.asarray(sum(parts))
 
     def error(self, basis: Sequence[OrderedBasis], frequency: float) -> float:
-        """Largest relative error of the probes' own tensors."""
+        """Largest relative error of the dipoles' own tensors and, at their places, of the other sources' fields."""
         parts = [
-            b.couplings(modes.rows[n:], 2 * np.pi * frequency)
-            for b, modes, n in zip(basis, self.modes, self.count, strict=True)
+            b.couplings(modes.amplitudes @ modes.rows, 2 * np.pi * frequency)
+            for b, modes in zip(basis, self.modes, strict=True)
         ]
-        found = np.asarray(sum(parts))
-        truth = _own(self.truth(frequency))
-        return float(np.max(np.linalg.norm(_own(found) - truth, axis=(1, 2)) / np.linalg.norm(truth, axis=(1, 2))))
+        found, truth = np.asarray(sum(parts)), self.truth(frequency)
+        return max(
+            float(_relative(f, t).max(initial=0.0)) for f, t in zip(self._seen(found), self._seen(truth), strict=True)
+        )
+
+    def _seen(self, couplings: ComplexArray) -> tuple[ComplexArray, ComplexArray]:
+        """Own tensors (places, 9), and fields (other sources, components at all places)."""
+        n = self.places
+        blocks = couplings[: 3 * n, : 3 * n].reshape(n, 3, n, 3)
+        return np.einsum("iaib->iab", blocks).reshape(n, 9), couplings[3 * n :, : 3 * n]
 
 
-def prepare_training(space: EddySpace, region: Region, rtol: float, others: Sequence[Source]) -> Training:
+def prepare_training(space: EddySpace, region: Region, rtol: float, others: OtherSources) -> Training:
     """Modes of dipoles on a grid in `region` and of `others`, with probes; nothing is solved yet."""
     extent = region.upper - region.lower
     counts = np.clip(np.ceil(extent / extent.max() * 6), 3, 6).astype(int)
-    sources = [*unit_dipoles(region.grid((counts[0], counts[1], counts[2]), fold=True)), *others]
+    sources = [*unit_dipoles(region.grid((counts[0], counts[1], counts[2]), fold=True)), *others.training]
     groups = parity_groups(space.parity, region.mirrors)
     rows = group_rows(space, groups, sources)
-    power = sum(np.sum(r**2, axis=1) for r in rows)
-    dipoles = len(sources) - len(others)
-    place = np.repeat(power[:dipoles].reshape(-1, 3).sum(axis=1), 3)
-    scale = 1 / np.sqrt(np.concatenate([place, power[dipoles:]]))
+    scale = _scale(rows, len(others.training))
     probes = qmc.scale(qmc.Halton(3, seed=1).random(PROBES), region.lower, region.upper)
     probes = np.concatenate([region.surface((2, 2, 2), fold=True), probes])
-    tests = group_rows(space, groups, unit_dipoles(probes))
-    found = [source_modes(space, g, r, scale, MODE_SHARE * rtol) for g, r in zip(groups, rows, strict=True)]
-    weights = [np.linalg.norm(modes.amplitudes * scale[:, None], axis=0) for modes in found]
-    with_probes = [modes.with_rows(space, test) for modes, test in zip(found, tests, strict=True)]
-    return Training(space, with_probes, [len(m.rows) for m in found], weights)
+    tests = group_rows(space, groups, [*unit_dipoles(probes), *others.probes])
+    test_scale = _scale(tests, len(others.probes))
+    trained = [source_modes(space, g, r, scale, MODE_SHARE * rtol) for g, r in zip(groups, rows, strict=True)]
+    weights = [np.linalg.norm(modes.amplitudes * scale[:, None], axis=0) for modes in trained]
+    modes = [m.extended(space, t, test_scale, PROBE_SHARE * rtol) for m, t in zip(trained, tests, strict=True)]
+    return Training(space, modes, weights, len(probes))
 
 
-def _own(couplings: ComplexArray) -> ComplexArray:
-    n = len(couplings) // 3
-    return np.asarray(np.einsum("iaib->iab", couplings.reshape(n, 3, n, 3)))
+def _scale(rows: Sequence[Array], others: int) -> Array:
+    """Factors (sources,) that give each place of three dipoles, and each of the last `others` sources, unit power."""
+    power = np.sum([np.sum(part**2, axis=1) for part in rows], axis=0)
+    dipoles = len(power) - others
+    place = np.repeat(power[:dipoles].reshape(-1, 3).sum(axis=1), 3)
+    return np.asarray(1 / np.sqrt(np.concatenate([place, power[dipoles:]])))
+
+
+def _relative(found: ComplexArray, truth: ComplexArray) -> Array:
+    return np.asarray(np.linalg.norm(found - truth, axis=1) / np.linalg.norm(truth, axis=1))
 
 
 def truncated(training: Training, basis: Sequence[OrderedBasis], tolerance: float) -> tuple[list[OrderedBasis], float]:

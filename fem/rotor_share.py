@@ -4,8 +4,15 @@ The rotor turns by the angle φ = ωt about the laboratory's z axis while the pl
 
     s_i(φ, d) = Σ_h [C_hi(d) cos hφ + S_hi(d) sin hφ],
 
-with amplitudes that are Chebyshev series in d.  Magnets are closed-form cuboids, so that all their moments are there.
-Both sums are interpolations at equidistant angles and at Chebyshev points: they converge geometrically.
+with amplitudes that are Chebyshev series in d.  The rotor is its field table, so that all moments are there, and what
+recoil permeability and mutual demagnetisation add.  Both sums are interpolations at equidistant angles and at Chebyshev
+points: they converge geometrically.
+
+Energy.  With the floater's share, s_i = b_i·m + r_i(φ, d), the energy ½ Σ y_i² of the currents changes by
+Σ y_i dp_i/dt - Σ y_i ds_i/dt: the first is minus the loss Σ λ_i y_i², the second is minus the work of the currents on
+whatever makes s_i change.  On the floater they do Σ y_i d(b_i·m)/dt, on the rotor Σ y_i ∂r_i/∂φ per radian, a torque
+that the motor must balance, and Σ y_i ∂r_i/∂d per metre of lowering.  Magnetisation is constant, hence no other work.
+The static interaction of rotor and floater is not in these sums.
 """
 
 from __future__ import annotations
@@ -16,13 +23,16 @@ from dataclasses import dataclass
 import heyoka as hy
 import numpy as np
 
-from ..geometry.box import Array, Box, frozen_array, rotation_matrix
-from ..geometry.magnet import Magnet
+from ..geometry.box import Array, frozen_array
 from ..geometry.scene import Plate
+from .accuracy_error import AccuracyError
+from .eddy_space import Source
 from .plate_reduction import PlateNetwork
-from .sources import PolarizedCuboid
+from .rotor_source import posed_rotor, rotor_parts
+from .table import RotorTable
 
-DOWN = np.array([0.0, 0.0, -1.0])
+MOST_TERMS = 15
+"""Highest number of harmonics, and of points along the way."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,39 +80,49 @@ class RotorShare:
 
 
 def rotor_share(
-    network: PlateNetwork, plate: Plate, rotor: Sequence[Magnet], harmonics: int = 5, depths: int = 8
+    network: PlateNetwork, plate: Plate, rotor: RotorTable, tolerance: float = 1e-4, most: int = MOST_TERMS
 ) -> RotorShare:
     """Signals of a rotor for the pose and the way of `plate`.
 
     Parameters
     ----------
     network : of a plate of the same size and conductivity
-    harmonics : highest multiple of the rotor's frequency
-    depths : number of Chebyshev points along the way; one if the plate stays
+    tolerance : for the estimated error; harmonics and depths are added until it is met
+    most : highest number of either
+
+    Raises
+    ------
+    AccuracyError : the tolerance is not met with the most terms
     """
+    parts = rotor_parts(rotor, plate)
     distance = plate.lowering.distance if plate.lowering else 0.0
-    count, turns = (depths if distance else 1), 2 * harmonics + 1
-    nodes = np.cos(np.pi * (np.arange(count) + 0.5) / count)
+    harmonics, depths = 3, 4 if distance else 1
+    while True:
+        series, samples = _sampled(network, plate, parts, distance, harmonics, depths)
+        size = np.abs(samples).max()
+        turns = float(np.abs(series[-4:]).max() / size)  # of two harmonics: symmetry may forbid one
+        ways = float(np.abs(series[..., -1]).max() / size) if distance else 0.0
+        if max(turns, ways) <= tolerance / 2:
+            return RotorShare(distance, series, turns + ways)
+        if max(harmonics, depths) >= most:
+            raise AccuracyError(f"Input tolerance must be at least {turns + ways:.1e} for this rotor and this way.")
+        harmonics += 2 * (turns > tolerance / 2)
+        depths += 2 * (ways > tolerance / 2)
+
+
+def _sampled(
+    network: PlateNetwork, plate: Plate, parts: Sequence[Source], distance: float, harmonics: int, depths: int
+) -> tuple[Array, Array]:
+    """Series (2H+1, states, depths) through samples (depths, 2H+1, states) at equidistant angles, Chebyshev depths."""
+    turns = 2 * harmonics + 1
+    nodes = np.cos(np.pi * (np.arange(depths) + 0.5) / depths)
     angles = 2 * np.pi * np.arange(turns) / turns
-    sources = [
-        [in_plate_frame(magnet, plate, angle, distance * (1 + node) / 2) for magnet in rotor]
-        for node in nodes for angle in angles
-    ]  # fmt: skip
-    flat = np.concatenate(network.couplings([source for part in sources for source in part]), axis=1)
-    samples = flat.reshape(count, turns, len(rotor), -1).sum(axis=2)
+    ways = distance * (1 + nodes) / 2
+    sources = [posed_rotor(parts, plate, angle, depth) for depth in ways for angle in angles]
+    samples = np.concatenate(network.couplings(sources), axis=1).reshape(depths, turns, -1)
     fourier = np.linalg.inv(np.array([_harmonics(angle, turns) for angle in angles]))
-    chebyshev = np.linalg.inv(np.polynomial.chebyshev.chebvander(nodes, count - 1))
-    series = np.einsum("ha,kn,nas->hsk", fourier, chebyshev, samples, optimize=True)
-    tail = np.abs(series[-2:]).max() + (np.abs(series[..., -1]).max() if count > 1 else 0.0)
-    return RotorShare(distance, series, float(tail / np.abs(samples).max()))
-
-
-def in_plate_frame(magnet: Magnet, plate: Plate, angle: float, depth: float) -> PolarizedCuboid:
-    """A magnet of the rotor turned by `angle` (rad), seen from the plate `depth` (m) below its first place."""
-    turn, frame = rotation_matrix((0.0, 0.0, np.degrees(angle))), plate.box.rotation
-    center = plate.box.to_body(turn @ magnet.box.center - depth * DOWN)
-    box = Box(magnet.box.size, center, frame.T @ turn @ magnet.box.rotation)
-    return PolarizedCuboid(box, frame.T @ turn @ magnet.polarization_in_rotor)
+    chebyshev = np.linalg.inv(np.polynomial.chebyshev.chebvander(nodes, depths - 1))
+    return np.einsum("ha,kn,nas->hsk", fourier, chebyshev, samples, optimize=True), samples
 
 
 def _harmonics(angle: float, count: int) -> Array:

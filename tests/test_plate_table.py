@@ -8,12 +8,14 @@ import pytest
 from ngsolve import SetNumThreads
 from scipy.integrate import solve_ivp
 
+from spinlev.fem.models import rotor_table
 from spinlev.fem.phasor import mean_force, mean_loss, mean_torque
 from spinlev.fem.plate_model import field_values, tabulate
 from spinlev.fem.plate_reduction import reduce_plate
 from spinlev.fem.plate_region import Region
 from spinlev.fem.plate_table_file import cached_plate_table, load_plate_table, plate_key, save_plate_table
-from spinlev.fem.rotor_share import in_plate_frame, rotor_share
+from spinlev.fem.rotor_share import rotor_share
+from spinlev.fem.rotor_source import posed_rotor, rotor_parts
 from spinlev.fem.table import RangeError
 from spinlev.fem.table_store import TableFileError
 from spinlev.geometry import vertical
@@ -167,12 +169,12 @@ def test_steady_means_in_time_are_those_of_the_phasors(table):
 
 def test_rotor_share_follows_the_turning_rotor(network):
     """Series in angle and depth against the rotor itself, where neither was sampled: the estimated error, 1e-3."""
-    rotor = vertical(0.014, 0.01, 1.305, 1.0)
-    share = rotor_share(network, PLATE, rotor, harmonics=4, depths=5)
+    rotor = rotor_table(vertical(0.014, 0.01, 1.305, 1.0), "cuboid")
+    share = rotor_share(network, PLATE, rotor, 1e-3)
     assert share.error < 1e-3
     angle, depth = 0.7, 0.0123
-    sources = [in_plate_frame(magnet, PLATE, angle, depth) for magnet in rotor]
-    exact = np.concatenate(network.couplings(sources), axis=1).sum(axis=0)
+    source = posed_rotor(rotor_parts(rotor, PLATE), PLATE, angle, depth)
+    exact = np.concatenate(network.couplings([source]), axis=1)[0]
     assert abs(share.signals(angle, depth) - exact).max() < 2 * share.error * abs(exact).max()
     variables = hy.make_vars("angle", "depth")
     expressed = hy.cfunc(share.expressions(*variables), variables, compact_mode=True)([angle, depth])
