@@ -1,19 +1,25 @@
 """How the floater moves: equations of motion, integration, equilibria, stability."""
 
-from .equilibria import find_equilibria, survey
+from .equilibria import find_equilibria, survey, with_plate
 from .equilibrium import Equilibrium, EquilibriumError, ForceCurve, Survey
-from .simulation import StartError, initial_state, simulate
+from .memory import PlateMemory
+from .rates import Rates
+from .simulation import StartError, initial_state, simulate, starting_point
 from .trajectory import Trajectory
 
 __all__ = [
     "Equilibrium",
     "EquilibriumError",
     "ForceCurve",
+    "PlateMemory",
+    "Rates",
     "StartError",
     "Survey",
     "Trajectory",
     "find_equilibria",
     "initial_state",
     "simulate",
+    "starting_point",
     "survey",
+    "with_plate",
 ]

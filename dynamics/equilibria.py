@@ -30,7 +30,9 @@ def find_equilibria(
     memory: PlateMemory | None = None,
 ) -> list[Equilibrium]:
     """All synchronous equilibria below the rotor, the stable ones first, then by distance; see `survey`."""
-    return list(survey(scene, table, spin, farthest, rates, memory).equilibria)
+    rates = rates or Rates(table)
+    found = survey(scene, table, spin, farthest, rates)
+    return list((found if memory is None else with_plate(scene, table, found, memory, rates)).equilibria)
 
 
 def survey(
@@ -39,21 +41,18 @@ def survey(
     spin: float = 0.0,
     farthest: float = 0.1,
     rates: Rates | None = None,
-    memory: PlateMemory | None = None,
 ) -> Survey:
     """All synchronous equilibria with z < 0 between contact with the rotor and `farthest`, with their stability.
 
     Parameters
     ----------
-    scene : the scene
+    scene : the scene; its plate is left out
     table : the rotor's field
     spin : body spin s = Ω·m̂/ω, which magnetic torque does not change
     farthest : largest depth, and distance from the axis, m
     rates : `Rates` of the same table, to compile them once for many scenes
-    memory : the plate's currents; left out, the plate is only an obstacle
 
-    With a plate's currents, or gravity across the axis, equilibria are periodic motions, followed from the fixed
-    points without them; those beyond the range of the plate's table stay as they are, without `currents`.
+    With gravity across the axis equilibria are periodic motions, followed from the fixed points without it.
 
     Returns
     -------
@@ -76,10 +75,27 @@ def survey(
     moment = np.concatenate([np.zeros((0, 3)), *(m for _, m in guesses)])
     points = _polished(balance, position, moment)
     found = [_equilibrium(table, scales, balance, r, m) for r, m in points if r in where]
-    if memory is not None or np.any(scene.gravity[:2]):
-        found = _shaken(Shaken(scene, rates, values, memory), table, found)
-    found.sort(key=lambda equilibrium: (not equilibrium.stable, equilibrium.distance))
-    return Survey(tuple(found), tuple(_force_curve(scene, scales, curve) for curve in curves))
+    if np.any(scene.gravity[:2]):
+        found = _shaken(Shaken(scene, rates, values, None), table, found)
+    return Survey(_in_order(found), tuple(_force_curve(scene, scales, curve) for curve in curves))
+
+
+def with_plate(
+    scene: Scene, table: FieldTable, known: Survey, memory: PlateMemory, rates: Rates | None = None
+) -> Survey:
+    """The equilibria of a survey with the plate's currents: periodic motions, followed from the fixed points without.
+
+    Those beyond the range of the plate's table stay as they are, without `currents`; those that the plate undoes, or
+    pushes against a body, are left out.
+    """
+    values = parameters(scene, Scales.of(scene), frozen_spin=True)
+    fixed = [equilibrium.without or equilibrium for equilibrium in known.equilibria]
+    found = _shaken(Shaken(scene, rates or Rates(table), values, memory), table, fixed)
+    return Survey(_in_order(found), known.curves)
+
+
+def _in_order(found: list[Equilibrium]) -> tuple[Equilibrium, ...]:
+    return tuple(sorted(found, key=lambda equilibrium: (not equilibrium.stable, equilibrium.distance)))
 
 
 def _check(scene: Scene) -> None:

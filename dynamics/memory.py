@@ -34,11 +34,13 @@ class PlateMemory:
     plate : pose and way in the laboratory
     table : its currents and their fields, in its own frame
     share : what the turning rotor adds to the signals
+    model : name of the plate's model
     """
 
     plate: Plate
     table: PlateTable
     share: RotorShare
+    model: str = "reduced"
 
     @property
     def error(self) -> float:

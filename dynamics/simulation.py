@@ -14,7 +14,7 @@ from ..geometry.scene import AbsoluteStart, Scene
 from .equations import parameters
 from .equilibria import find_equilibria
 from .equilibrium import Equilibrium, EquilibriumError
-from .events import clearance
+from .events import clearance, plate_depth
 from .flight import TOLERANCE, compile_flight
 from .integration import integrate
 from .memory import PlateMemory
@@ -64,7 +64,14 @@ def simulate(
     if memory is not None:
         tolerance = max(tolerance, PLATE_TOLERANCE)
     flight = compile_flight(scene, table, duration, tolerance, compact, memory)
-    return integrate(scene, flight, start, duration, progress, currents)
+    flown = integrate(scene, flight, start, duration, progress, currents)
+    return flown if memory is None else replace(flown, beyond_plate_table=_beyond(memory, flown))
+
+
+def _beyond(memory: PlateMemory, flown: Trajectory) -> float:
+    """Part of the samples at which the floater is out of the range of the plate's table."""
+    seen = flown.lab.position + plate_depth(memory.plate, flown.time)[:, None] * [0.0, 0.0, 1.0]
+    return float(1 - np.mean(memory.table.in_range(memory.plate.box.to_body(seen))))
 
 
 def initial_state(

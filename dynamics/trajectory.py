@@ -23,6 +23,7 @@ class Trajectory:
     steps : number of Taylor steps
     compile_seconds : time spent on compilation (little where heyoka's cache knows the system)
     interrupted : whether it was stopped by the user before it ended
+    beyond_plate_table : part of the samples at which the floater was out of the range of the plate's table
     """
 
     time: Array
@@ -34,6 +35,7 @@ class Trajectory:
     steps: int
     compile_seconds: float
     interrupted: bool = False
+    beyond_plate_table: float = 0.0
 
     @property
     def levitated_s(self) -> float:

@@ -26,7 +26,7 @@ from .points_file import read_points
 from .shipped_scenes import default_scene
 
 FieldModel = Literal["dipole", "cuboid", "fem", "auto"]
-PlateModel = Literal["none", "auto"]
+PlateModel = Literal["none", "slab", "fem", "reduced", "auto"]
 ReactionModel = Literal["slab", "fem", "reduced", "auto"]
 
 app = App(
@@ -82,7 +82,7 @@ def run(
     model
         Field model of the motion.
     plate_model
-        Plate model.
+        none, slab (infinite), fem or reduced (the network of the finite elements), or auto.
     duration_s
         Simulated time, s.
     rtol
@@ -93,7 +93,7 @@ def run(
     loaded = load_scene(scene or default_scene())
     from .run import main_job
 
-    values, lines = main_job(loaded, model, duration_s, rtol, output.out)
+    values, lines = main_job(loaded, model, plate_model, duration_s, rtol, output.out)
     return Answer(values, tuple(lines), output.json)
 
 
@@ -146,7 +146,7 @@ def equilibria(
     model
         Field model.
     plate_model
-        Plate model.
+        none, slab (infinite), fem or reduced (the network of the finite elements), or auto.
     spin
         Body spin S = Ω·m̂/ω of the floater about its own moment.
     rtol
@@ -158,7 +158,7 @@ def equilibria(
     loaded = load_scene(scene)
     from .single import equilibria_job
 
-    values, lines = equilibria_job(loaded, model, spin, rtol, output.out)
+    values, lines = equilibria_job(loaded, model, plate_model, spin, rtol, output.out)
     return Answer(values, tuple(lines), output.json)
 
 
@@ -183,7 +183,7 @@ def simulate(
     model
         Field model.
     plate_model
-        Plate model.
+        none, slab (infinite), fem or reduced (the network of the finite elements), or auto.
     rtol
         Relative accuracy asked of the field, from 0.8 edges off the magnets on.
     """
@@ -192,7 +192,7 @@ def simulate(
     loaded = load_scene(scene)
     from .single import simulate_job
 
-    values, lines = simulate_job(loaded, model, duration_s, rtol, output.out)
+    values, lines = simulate_job(loaded, model, plate_model, duration_s, rtol, output.out)
     return Answer(values, tuple(lines), output.json)
 
 

@@ -84,10 +84,10 @@ def _slab(plate: Plate, place: Array, frequency: float, rtol: float) -> Answer:
     along = plate.box.rotation[:, normal]
     tensor = local[0, 0] * np.eye(3) + (local[2, 2] - local[0, 0]) * np.outer(along, along)
     lateral = [a for a in range(3) if a != normal]
-    return Answer("slab", tensor, _beyond_edges(body[lateral], size[lateral] / 2, height + size[normal]))
+    return Answer("slab", tensor, beyond_edges(body[lateral], size[lateral] / 2, height + size[normal]))
 
 
-def _beyond_edges(place: Array, half: Array, depth: float) -> float:
+def beyond_edges(place: Array, half: Array, depth: float) -> float:
     """Share of the source's squared potential, at the far face (`depth` below it), that lies beyond the edges.
 
     Summed over the dipole's directions it falls as 1/r⁴, whose integral over the plane is π/depth².

@@ -9,12 +9,10 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from ..dynamics import Equilibrium, EquilibriumError, Survey, Trajectory, survey
+from ..dynamics import EquilibriumError, Survey, Trajectory, survey, with_plate
 from ..fem.table import RotorTable
-from ..geometry import SceneError
 from ..geometry.atomic import replacing
 from ..geometry.box import Array
-from ..geometry.overlap import TOUCHING, sphere_overlap
 from ..geometry.scene import AbsoluteStart, Scene
 from .answers import equilibria_answer, equilibria_lines, flight_answer, flight_lines, omissions
 from .console import note, to_json
@@ -28,32 +26,34 @@ DEEPEST = 0.05
 """The field figure reaches this far below the rotor's origin, m."""
 
 
-def main_job(scene: Scene, model: str, duration: float, rtol: float, out: Path) -> Job:
+def main_job(scene: Scene, model: str, plate_model: str, duration: float, rtol: float, out: Path) -> Job:
     """Compute everything of a scene; writes result.nc, summary.json and the figures.
 
     What is finished before a failure is kept: a scene without a stable equilibrium still leaves its fields and force
     curves, then the error goes on to the caller.
     """
-    shelf = Shelf(scene, rtol)
+    shelf = Shelf(scene, rtol, plate_model)
     exact = "cuboid" if all(magnet.contrast == 0 for magnet in scene.rotor) else "fem"
     chosen, best = shelf.table(model), shelf.table(exact)
     tables = {name: shelf.table(name) for name in MODELS}
     surveys, failure = _surveys(scene, {table.model: table for table in (tables["dipole"], best, chosen)})
+    compared = comparison(surveys["dipole"], surveys[best.model], best.model)
+    memory = shelf.memory(chosen, surveys[chosen.model].equilibria)
+    if memory is not None:
+        surveys[chosen.model] = with_plate(scene, chosen, surveys[chosen.model], memory)
     found = surveys[chosen.model].equilibria
-    _check_plate(scene, found)
     values: dict[str, Any] = {
-        **equilibria_answer(chosen, found),
-        "comparison": comparison(surveys["dipole"], surveys[best.model], best.model),
-        "plate_model": "none",
-        "not_modelled": omissions(scene),
+        **equilibria_answer(chosen, found, memory),
+        "comparison": compared,
+        "not_modelled": omissions(scene, chosen, found, memory),
         "tables_from_cache": shelf.from_cache,
     }
-    lines = [*equilibria_lines(scene, found), *comparison_lines(values["comparison"]), *values["not_modelled"]]
+    lines = [*equilibria_lines(scene, found, memory), *comparison_lines(compared), *values["not_modelled"]]
     flight = None
     if failure is None or isinstance(scene.start, AbsoluteStart):
         try:
-            flight = fly(scene, chosen, duration, found)
-            values |= flight_answer(chosen, flight)
+            flight = fly(scene, chosen, duration, found, memory)
+            values |= flight_answer(chosen, flight, memory)
             lines += flight_lines(flight)
         except EquilibriumError as error:
             failure = error
@@ -101,22 +101,6 @@ def comparison_lines(compared: Mapping[str, Any] | None) -> list[str]:
         f"{compared['true_distance_mm']:.4f} mm; the dipole is off by {compared['difference_mm']:+.4f} ± "
         f"{compared['difference_error_mm']:.1g} mm."
     ]
-
-
-def _check_plate(scene: Scene, found: tuple[Equilibrium, ...]) -> None:
-    """A plate that leaves the floater no room is a wrong scene."""
-    for equilibrium in found:
-        if scene.plate and equilibrium.stable:
-            depth = sphere_overlap(equilibrium.position, scene.floater.radius, scene.plate.box)
-            if depth > TOUCHING:
-                place = ", ".join(f"{c * 1e3:.3f}" for c in equilibrium.position)
-                raise SceneError(
-                    "scene",
-                    [
-                        f"Input plate must leave room for the floater; instead it overlaps it by {depth * 1e3:.4g} mm "
-                        f"where it levitates, at ({place}) mm; move the plate away."
-                    ],
-                )
 
 
 def _static_dataset(scene: Scene, tables: dict[str, RotorTable], surveys: dict[str, Survey], best: str) -> xr.Dataset:

@@ -2,28 +2,36 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
+from ..dynamics import Equilibrium, PlateMemory, starting_point
 from ..fem.cache import cached_rotor_table
 from ..fem.models import resolve_model, rotor_table
 from ..fem.table import RotorTable
-from ..geometry.scene import Scene
+from ..geometry.box import Array
+from ..geometry.scene import AbsoluteStart, Scene
 from .console import note
+from .plate_shelf import check_room, plate_memory, resolve_plate_model
 
 
 @dataclass
 class Shelf:
-    """Rotor tables of a scene by model, each computed once.
+    """Tables of a scene by model, each computed once.
 
     Parameters
     ----------
-    scene : whose rotor
+    scene : whose rotor and plate
     rtol : relative accuracy of B asked of the finite elements
+    plate_model : none, slab, fem, reduced or auto
+    plate_rtol : relative accuracy asked of the plate's reaction
     from_cache : names of the models that were found in the cache
     """
 
     scene: Scene
     rtol: float
+    plate_model: str = "none"
+    plate_rtol: float = 3e-3
     from_cache: list[str] = field(default_factory=list)
     _tables: dict[str, RotorTable] = field(default_factory=dict)
 
@@ -35,6 +43,33 @@ class Shelf:
         if name not in self._tables:
             self._tables[name] = self._made(name)
         return self._tables[name]
+
+    def memory(self, table: RotorTable, without: Sequence[Equilibrium]) -> PlateMemory | None:
+        """The plate in the motion, around where the floater begins; None where no currents are modelled.
+
+        Parameters
+        ----------
+        without : equilibria without the plate
+        """
+        place = self._place(without)
+        if place is not None:
+            check_room(self.scene, place)
+        name, reason = resolve_plate_model(self.scene, self.plate_model, place, self.plate_rtol)
+        if self.scene.plate is not None:
+            note(f"Plate model: {name} ({reason})")
+        if name == "none" or self.scene.plate is None or place is None:
+            return None
+        memory, found = plate_memory(self.scene, self.scene.plate, name, table, place, self.plate_rtol)
+        if found:
+            self.from_cache.append("plate")
+        return memory
+
+    def _place(self, without: Sequence[Equilibrium]) -> Array | None:
+        """Where the floater is while it levitates, (3,) m."""
+        if isinstance(self.scene.start, AbsoluteStart):
+            return self.scene.start.position
+        chosen = starting_point(without) or next(iter(without), None)
+        return None if chosen is None else chosen.position
 
     def _made(self, name: str) -> RotorTable:
         if name != "fem":  # closed forms are quicker to make than to read

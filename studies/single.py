@@ -7,8 +7,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from ..dynamics import Equilibrium, Trajectory, simulate, survey
-from ..fem.table import FieldTable
+from ..dynamics import Equilibrium, PlateMemory, Rates, Survey, Trajectory, simulate, survey, with_plate
+from ..fem.table import RotorTable
 from ..geometry.atomic import replacing
 from ..geometry.box import Array
 from ..geometry.scene import OffsetStart, Scene
@@ -50,30 +50,35 @@ def field_job(scene: Scene, points: Array, model: str, rtol: float, out: Path) -
     return {**values, "tables_from_cache": shelf.from_cache}, lines
 
 
-def equilibria_job(scene: Scene, model: str, spin: float, rtol: float, out: Path) -> Job:
+def equilibria_job(scene: Scene, model: str, plate_model: str, spin: float, rtol: float, out: Path) -> Job:
     """All synchronous equilibria and their stability; writes equilibria.json."""
-    shelf = Shelf(scene, rtol)
+    shelf = Shelf(scene, rtol, plate_model)
     table = shelf.table(model)
-    found = survey(scene, table, spin).equilibria
+    found, memory = surveyed(shelf, table, spin)
     values = {
-        **equilibria_answer(table, found),
-        "plate_model": "none",
-        "not_modelled": omissions(scene),
+        **equilibria_answer(table, found.equilibria, memory),
+        "not_modelled": omissions(scene, table, found.equilibria, memory),
         "tables_from_cache": shelf.from_cache,
     }
     with replacing(out / "equilibria.json") as temporary:
         temporary.write_text(to_json(values) + "\n")
-    return values, [*equilibria_lines(scene, found), *values["not_modelled"]]
+    return values, [*equilibria_lines(scene, found.equilibria, memory), *values["not_modelled"]]
 
 
-def simulate_job(scene: Scene, model: str, duration: float, rtol: float, out: Path) -> Job:
+def simulate_job(scene: Scene, model: str, plate_model: str, duration: float, rtol: float, out: Path) -> Job:
     """The motion; writes trajectory.nc."""
-    shelf = Shelf(scene, rtol)
-    flight = fly(scene, shelf.table(model), duration)
+    shelf = Shelf(scene, rtol, plate_model)
+    table = shelf.table(model)
+    if isinstance(scene.start, OffsetStart):
+        note("Equilibria ...")
+        found, memory = surveyed(shelf, table)
+    else:
+        found, memory = None, shelf.memory(table, ())
+    equilibria = found.equilibria if found else ()
+    flight = fly(scene, table, duration, equilibria, memory)
     values = {
-        **flight_answer(shelf.table(model), flight),
-        "plate_model": "none",
-        "not_modelled": omissions(scene),
+        **flight_answer(table, flight, memory),
+        "not_modelled": omissions(scene, table, equilibria, memory),
         "trajectory": str(out / "trajectory.nc"),
         "tables_from_cache": shelf.from_cache,
     }
@@ -81,11 +86,22 @@ def simulate_job(scene: Scene, model: str, duration: float, rtol: float, out: Pa
     return values, [*flight_lines(flight), *values["not_modelled"], f"Trajectory in {values['trajectory']}"]
 
 
-def fly(scene: Scene, table: FieldTable, duration: float, found: tuple[Equilibrium, ...] | None = None) -> Trajectory:
-    """Simulate with a progress bar; `found` are the equilibria if they are known already."""
-    if found is None and isinstance(scene.start, OffsetStart):
-        note("Equilibria ...")
-        found = survey(scene, table).equilibria
+def surveyed(shelf: Shelf, table: RotorTable, spin: float = 0.0) -> tuple[Survey, PlateMemory | None]:
+    """Equilibria with the plate of the scene, and that plate."""
+    rates = Rates(table)
+    found = survey(shelf.scene, table, spin, rates=rates)
+    memory = shelf.memory(table, found.equilibria)
+    return (found if memory is None else with_plate(shelf.scene, table, found, memory, rates)), memory
+
+
+def fly(
+    scene: Scene,
+    table: RotorTable,
+    duration: float,
+    found: tuple[Equilibrium, ...],
+    memory: PlateMemory | None,
+) -> Trajectory:
+    """Simulate with a progress bar."""
     note("Motion ...")
     with progress("Motion") as advance:
-        return simulate(scene, table, duration, found, progress=advance)
+        return simulate(scene, table, duration, found, progress=advance, memory=memory)

@@ -1,0 +1,105 @@
+"""The plate of a scene as a table: which model, for which region, and from where."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..dynamics import PlateMemory
+from ..fem.driven_plate import reachable_region
+from ..fem.plate_region import Region
+from ..fem.plate_table_file import cached_driven_plate
+from ..fem.table import RotorTable
+from ..geometry import SceneError
+from ..geometry.box import Array
+from ..geometry.magnet import MU_0
+from ..geometry.overlap import TOUCHING, sphere_overlap
+from ..geometry.scene import Plate, Scene
+from .console import note
+from .plate_job import beyond_edges
+
+PLATE_MODELS = ("none", "slab", "fem", "reduced", "auto")
+REACH = 0.003
+"""The floater may move so far from where it begins, along each axis, m."""
+RASTER = 0.001
+"""Bounds of regions are multiples of this, m, so that scenes that differ little share a table."""
+LOWEST, HIGHEST, HARMONICS = 0.5, 250.0, 2.0
+"""Frequencies of a table, Hz, at least; and the multiple of the rotor's that it must hold."""
+NEGLIGIBLE = 1e-6
+"""Part of the floater's weight below which the largest conceivable force of the plate is left out."""
+
+
+def resolve_plate_model(scene: Scene, model: str, place: Array | None, rtol: float) -> tuple[str, str]:
+    """The plate's model in the motion, and the reason in words.
+
+    `auto` is none where even a perfect conductor's image would not be felt, the infinite slab where the edges are too
+    far to matter, and else the reduced network of the finite elements.
+    """
+    plate = scene.plate
+    if plate is None:
+        return "none", "the scene has no plate"
+    if place is None:
+        return "none", "there is no equilibrium around which to make a table"
+    if model == "fem":
+        return "reduced", "in the motion the finite elements enter by their reduced network"
+    if model != "auto":
+        return model, "as asked"
+    gap = float(plate.box.distance(place))
+    mirror = 3 * MU_0 * scene.floater.moment**2 / (32 * np.pi * gap**4)
+    weight = scene.floater.mass * float(np.linalg.norm(scene.gravity) or 9.81)
+    if mirror < NEGLIGIBLE * weight:
+        return "none", f"at {gap * 1e3:.3g} mm the plate pushes with less than {NEGLIGIBLE:.0e} of the weight"
+    body, normal = plate.box.to_body(place), int(np.argmin(plate.box.size))
+    lateral = [axis for axis in range(3) if axis != normal]
+    depth = abs(float(body[normal])) + plate.box.half_edges[normal]
+    if abs(body[normal]) > plate.box.half_edges[normal]:
+        missing = beyond_edges(body[lateral], plate.box.size[lateral] / 2, depth)
+        if missing <= rtol:
+            return "slab", f"only {missing:.1e} of the source lies beyond the plate's edges"
+        return "reduced", f"{missing:.1e} of the source lies beyond the plate's edges, {rtol:.1e} is allowed"
+    return "reduced", "the floater is beside the plate's edge"
+
+
+def plate_memory(
+    scene: Scene, plate: Plate, model: str, table: RotorTable, place: Array, rtol: float
+) -> tuple[PlateMemory, bool]:
+    """The plate's currents for a floater about `place` (3,) m that turns with the rotor; whether they were cached.
+
+    Raises
+    ------
+    InputError : the plate leaves the floater no room
+    """
+    sideways = float(np.hypot(place[0], place[1])) + REACH
+    region = _rastered(reachable_region(plate, [0.0, 0.0, place[2]], [sideways, sideways, REACH], scene.floater.radius))
+    frequencies = (LOWEST, max(HIGHEST, HARMONICS * scene.frequency))
+    note("Plate's currents ...")
+    made, share, found = cached_driven_plate(plate, table, region, frequencies, rtol, note)
+    note("  from the cache." if found else f"  {len(made.rates)} states in {made.provenance['seconds']:.0f} s.")
+    return PlateMemory(plate, made, share, model), found
+
+
+def _rastered(region: Region) -> Region:
+    """The region with bounds on the raster; what is nearly symmetric becomes so, which halves the work."""
+    lower, upper = np.floor(region.lower / RASTER + 1e-6), np.ceil(region.upper / RASTER - 1e-6)
+    for axis in np.flatnonzero((lower < 0) & (upper > 0)):
+        upper[axis] = max(-lower[axis], upper[axis])
+        lower[axis] = -upper[axis]
+    return Region(lower * RASTER, upper * RASTER)
+
+
+def check_room(scene: Scene, place: Array) -> None:
+    """A plate that leaves a floater at `place` (3,) m no room is a wrong scene.
+
+    Raises
+    ------
+    SceneError : it overlaps the floater
+    """
+    depth = sphere_overlap(place, scene.floater.radius, scene.plate.box) if scene.plate else 0.0
+    if depth > TOUCHING:
+        where = ", ".join(f"{c * 1e3:.3f}" for c in place)
+        raise SceneError(
+            "scene",
+            [
+                f"Input plate must leave room for the floater; instead it overlaps it by {depth * 1e3:.4g} mm where it "
+                f"levitates, at ({where}) mm; move the plate away."
+            ],
+        )
