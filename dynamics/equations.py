@@ -13,7 +13,9 @@ along the axis everything is autonomous, and the Jacobi integral
 
 is conserved: the energy less ω times the angular momentum about the axis.  What drag and a horizontal part of gravity
 do in the rotating frame is integrated along as the last state, `work`, so that J - work never changes.
-A plate adds its currents as further states (`memory`) and their energy to J.
+A conducting floater is dragged along by the field that turns past it (`fem.sphere_eddy`): in a uniform field, and
+slowly enough for its skin depth, by the torque -κ [(Ω - W) B² - B B·(Ω - W)].  A plate adds its currents as further
+states (`memory`) and their energy to J.
 Every number that a sweep may change is a runtime parameter; only the tables' own geometry is compiled in.
 """
 
@@ -24,6 +26,7 @@ from dataclasses import dataclass
 import heyoka as hy
 import numpy as np
 
+from ..fem.sphere_eddy import rotating_torque
 from ..fem.table import FieldTable
 from ..geometry.box import Array
 from ..geometry.scene import Scene
@@ -65,6 +68,10 @@ def parameters(scene: Scene, scales: Scales, frozen_spin: bool = False) -> Array
     values[Parameter.LINEAR_DRAG] = drag.linear * time / floater.mass
     values[Parameter.TILT_DRAG] = drag.angular * time / floater.inertia
     values[Parameter.SPIN_DRAG] = 0.0 if frozen_spin else values[Parameter.TILT_DRAG]
+    if floater.conductivity and scene.frequency:
+        turning = float(rotating_torque(floater.radius, floater.conductivity, scene.frequency, 1.0))
+        values[Parameter.TILT_EDDY] = turning / scene.angular_velocity * time / floater.inertia
+        values[Parameter.SPIN_EDDY] = 0.0 if frozen_spin else values[Parameter.TILT_EDDY]
     values[Parameter.TIME] = time
     values[Parameter.PLATE_MOMENT] = floater.moment / root_energy
     values[Parameter.PLATE_SHARE] = 1 / root_energy
@@ -72,7 +79,7 @@ def parameters(scene: Scene, scales: Scales, frozen_spin: bool = False) -> Array
 
 
 def equations_of_motion(
-    table: FieldTable, tilted_gravity: bool = False, memory: PlateMemory | None = None
+    table: FieldTable, tilted_gravity: bool = False, memory: PlateMemory | None = None, conducting: bool = False
 ) -> Equations:
     """Rates of the scaled state in the field of a table.
 
@@ -81,6 +88,7 @@ def equations_of_motion(
     table : the rotor's field
     tilted_gravity : whether gravity has a part across the axis; it turns in this frame, so that time enters
     memory : the plate's currents, if they are modelled
+    conducting : whether the floater has eddy currents of its own
     """
     variables = hy.make_vars(*NAMES)
     position, velocity, moment, spin = (variables[i : i + 3] for i in (0, 3, 6, 9))
@@ -93,9 +101,11 @@ def equations_of_motion(
     turn = [torque * component for component in cross(moment, field)]
     axial, lateral = _gravity(tilted_gravity)
     push = [lateral[i] - linear * velocity[i] for i in range(3)]
-    brake = _angular_drag(moment, spin)
     drift = subtract(velocity, turned(position))
     lag = [spin[0], spin[1], spin[2] - hy.par[Parameter.RATE]]
+    brake = _angular_drag(moment, spin)
+    if conducting:
+        brake = [a + b for a, b in zip(brake, _own_currents(moment, field, lag), strict=True)]
     jacobi = [
         0.5 * dot(velocity, velocity),
         0.5 * inertia * dot(spin, spin),
@@ -137,3 +147,12 @@ def _angular_drag(moment: Vector, spin: Vector) -> Vector:
     tilt, along = hy.par[Parameter.TILT_DRAG], hy.par[Parameter.SPIN_DRAG]
     excess = (tilt - along) * dot(spin, moment)
     return [excess * moment[i] - tilt * spin[i] for i in range(3)]
+
+
+def _own_currents(moment: Vector, field: Vector, lag: Vector) -> Vector:
+    """Acceleration of the spin by the floater's own eddy currents; across the moment and along it."""
+    tilt, along = hy.par[Parameter.TILT_EDDY], hy.par[Parameter.SPIN_EDDY]
+    square, turning = dot(field, field), dot(field, lag)
+    torque = [turning * field[i] - square * lag[i] for i in range(3)]
+    excess = (along - tilt) * dot(torque, moment)
+    return [tilt * torque[i] + excess * moment[i] for i in range(3)]

@@ -30,7 +30,7 @@ def find_equilibria(
     memory: PlateMemory | None = None,
 ) -> list[Equilibrium]:
     """All synchronous equilibria below the rotor, the stable ones first, then by distance; see `survey`."""
-    rates = rates or Rates(table)
+    rates = rates or Rates.of(scene, table)
     found = survey(scene, table, spin, farthest, rates)
     return list((found if memory is None else with_plate(scene, table, found, memory, rates)).equilibria)
 
@@ -66,7 +66,7 @@ def survey(
     """
     _check(scene)
     scales = Scales.of(scene)
-    values, rates = parameters(scene, scales, frozen_spin=True), rates or Rates(table)
+    values, rates = parameters(scene, scales, frozen_spin=True), rates or Rates.of(scene, table)
     balance = Balance(rates, values, spin)
     where = SearchRange(scene, farthest)
     curves = all_curves(balance, where)
@@ -90,7 +90,7 @@ def with_plate(
     """
     values = parameters(scene, Scales.of(scene), frozen_spin=True)
     fixed = [equilibrium.without or equilibrium for equilibrium in known.equilibria]
-    found = _shaken(Shaken(scene, rates or Rates(table), values, memory), table, fixed)
+    found = _shaken(Shaken(scene, rates or Rates.of(scene, table), values, memory), table, fixed)
     return Survey(_in_order(found), known.curves)
 
 

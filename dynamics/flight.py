@@ -79,7 +79,7 @@ def compile_flight(
     started = perf_counter()
     scales = Scales.of(scene)
     values = parameters(scene, scales)
-    equations = equations_of_motion(table, bool(np.any(scene.gravity[:2])), memory)
+    equations = equations_of_motion(table, bool(np.any(scene.gravity[:2])), memory, bool(scene.floater.conductivity))
     events, meanings = flight_events(scene, equations.variables[:3])
     work = hy.expression("work")
     if compact is None:

@@ -50,7 +50,11 @@ class PerturbedBalance:
     def of(cls, scene: Scene, table: FieldTable, spin: float = 0.0) -> PerturbedBalance:
         """The balance in a table's field, for body spin s."""
         scales = Scales.of(scene)
-        return cls(Balance(Rates(table), parameters(scene, scales, frozen_spin=True), spin), scales, scene)
+        return cls(
+            Balance(Rates.of(scene, table), parameters(scene, scales, frozen_spin=True), spin),
+            scales,
+            scene,
+        )
 
     def direction(self, position: Array, guess: Array) -> Array:
         """Moment direction (3,) whose torque is balanced at a place (3,) m; `guess` itself if none is near."""

@@ -8,6 +8,7 @@ from numpy.typing import ArrayLike
 
 from ..fem.table import FieldTable
 from ..geometry.box import Array
+from ..geometry.scene import Scene
 from .equations import equations_of_motion
 
 
@@ -17,15 +18,21 @@ class Rates:
     Parameters
     ----------
     table : the rotor's field
+    conducting : whether the floater has eddy currents of its own
     """
 
-    def __init__(self, table: FieldTable) -> None:
-        equations = equations_of_motion(table)
+    def __init__(self, table: FieldTable, conducting: bool = False) -> None:
+        equations = equations_of_motion(table, conducting=conducting)
         variables = list(equations.variables)
         tensors = hy.diff_tensors(list(equations.rates), diff_args=variables, diff_order=1)
         outputs = [*equations.rates, *np.asarray(tensors.jacobian).ravel()]
         # Unoptimised code is compiled three times as fast, and a search is over before faster code would be ready.
         self._function = hy.cfunc(outputs, variables, compact_mode=True, opt_level=0)
+
+    @classmethod
+    def of(cls, scene: Scene, table: FieldTable) -> Rates:
+        """The rates that a scene needs."""
+        return cls(table, bool(scene.floater.conductivity))
 
     def __call__(self, states: ArrayLike, values: Array) -> tuple[Array, Array]:
         """Rates (n, 12) and their derivatives (n, 12, 12) at scaled `states` (n, 12), with parameter `values`."""

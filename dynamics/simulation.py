@@ -138,7 +138,7 @@ def _way_out(scene: Scene, table: FieldTable, equilibria: Sequence[Equilibrium])
 
 def _levitating_frequency(scene: Scene, table: FieldTable) -> float | None:
     """The nearest tried frequency at which there is a stable equilibrium, Hz."""
-    rates = Rates(table)
+    rates = Rates.of(scene, table)
     for step in range(1, FREQUENCY_TRIALS + 1):
         for ratio in (FREQUENCY_RATIO**step, FREQUENCY_RATIO**-step):
             frequency = scene.frequency * ratio

@@ -11,9 +11,10 @@ Vector = Sequence[hy.expression]
 
 
 class Parameter(IntEnum):
-    """Places of the runtime parameters; free of units but LENGTH (m), TORQUE (1/T), TIME (s) and the plate's last two.
+    """Places of the runtime parameters; free of units but LENGTH (m), TORQUE (1/T), TIME (s) and the last.
 
     PLATE_MOMENT is the floater's moment by the root of the unit of energy (A m²/√J), PLATE_SHARE one by that root.
+    TILT_EDDY and SPIN_EDDY are the floater's own eddy currents, 1/T²: accelerations by unit field and relative turn.
     """
 
     RATE = 0
@@ -32,6 +33,8 @@ class Parameter(IntEnum):
     TIME = auto()
     PLATE_MOMENT = auto()
     PLATE_SHARE = auto()
+    TILT_EDDY = auto()
+    SPIN_EDDY = auto()
 
 
 def dot(a: Vector, b: Vector) -> hy.expression:

@@ -88,7 +88,7 @@ def simulate_job(scene: Scene, model: str, plate_model: str, duration: float, rt
 
 def surveyed(shelf: Shelf, table: RotorTable, spin: float = 0.0) -> tuple[Survey, PlateMemory | None]:
     """Equilibria with the plate of the scene, and that plate."""
-    rates = Rates(table)
+    rates = Rates.of(shelf.scene, table)
     found = survey(shelf.scene, table, spin, rates=rates)
     memory = shelf.memory(table, found.equilibria)
     return (found if memory is None else with_plate(shelf.scene, table, found, memory, rates)), memory
