@@ -1,0 +1,189 @@
+"""The plate in the motion: identities that hold whatever the accuracy of its table, and two ways to the same answer."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from ngsolve import SetNumThreads
+
+from spinlev.dynamics import Survey, find_equilibria, simulate, survey, with_plate
+from spinlev.dynamics.equations import parameters
+from spinlev.dynamics.flight import compile_flight
+from spinlev.dynamics.floquet import floquet_modes
+from spinlev.dynamics.integration import integrate
+from spinlev.dynamics.memory import PlateMemory
+from spinlev.dynamics.orbit import differentiation, periodic_orbit, resampled
+from spinlev.dynamics.plate_force import PlateForce
+from spinlev.dynamics.rates import Rates
+from spinlev.dynamics.state import Scales
+from spinlev.dynamics.symbols import Parameter
+from spinlev.fem.driven_plate import plate_and_rotor_table
+from spinlev.fem.phasor import mean_force, mean_torque
+from spinlev.fem.plate_region import Region
+from spinlev.fem.rotor_share import RotorShare
+from spinlev.fem.table import RotorTable
+from spinlev.geometry import rotor
+from spinlev.geometry.box import Box
+from spinlev.geometry.plate_mesh import MeshRule
+from spinlev.geometry.scene import Drag, Floater, Lowering, OffsetStart, Plate, Scene
+
+SetNumThreads(1)
+FLOATER = Floater(radius=6.35e-3, remanence=1.305, recoil_permeability=1.0, density=7500.0)
+MAGNETS = rotor.horizontal(2e-3, 10e-3, 1.305, 1.0)
+CUBOID = RotorTable("cuboid", MAGNETS, MAGNETS)
+PLATE = Plate(Box((0.1, 0.24, 0.03), (0.01, 0.0, -0.055)), 3.5e7, Lowering(0.1, 0.02, 0.002))
+SCENE = Scene(110.0, MAGNETS, FLOATER, Drag(0.0, 0.0), plate=PLATE, start=OffsetStart(np.zeros(3)))
+VALUES = parameters(SCENE, Scales.of(SCENE), frozen_spin=True)
+
+
+@pytest.fixture(scope="module")
+def memory():
+    """A rough plate off the axis: its table errs by some per cent, its identities do not."""
+    region = Region.over_face(PLATE.box.size, (0.016, 0.026), 0.004)
+    region = Region(region.lower - [0.01, 0, 0], region.upper - [0.01, 0, 0])
+    table, share = plate_and_rotor_table(PLATE, CUBOID, region, (5.0, 250.0), 0.1, MeshRule(2.0, 3.0, 3.0))
+    return PlateMemory(PLATE, table, share)
+
+
+@pytest.fixture(scope="module")
+def rates():
+    return Rates(CUBOID)
+
+
+@pytest.fixture(scope="module")
+def known(rates):
+    return survey(SCENE, CUBOID, rates=rates)
+
+
+@pytest.fixture(scope="module")
+def shaken(known, memory, rates):
+    return with_plate(SCENE, CUBOID, Survey(known.equilibria[:1], ()), memory, rates).equilibria[0]
+
+
+def state_near(equilibrium, count, size=1e-2):
+    state = Scales.of(SCENE).pack(equilibrium.state)
+    return state + size * np.random.default_rng(3).normal(size=(count, 12))
+
+
+def test_derivatives_of_the_plates_forces(memory, known):
+    """Central differences, good to 1e-9 of the largest derivative."""
+    force, rng = PlateForce(memory, VALUES), np.random.default_rng(0)
+    times, states = np.array([0.3, 4.0]), state_near(known.equilibria[0], 2)
+    currents, way, step = rng.normal(size=(2, len(memory.table.rates))), rng.normal(size=(2, 12)), 1e-5
+    heard, ahead, behind = (force(times, states + s * way) for s in (0, step, -step))
+    slope = (ahead.signals - behind.signals) / (2 * step)
+    assert np.abs(slope - np.einsum("nix,nx->ni", heard.by_state, way)).max() < 1e-9 * np.abs(heard.by_state).max()
+    slope = np.einsum("nix,ni->nx", ahead.fields - behind.fields, currents) / (2 * step)
+    pull = np.einsum("nkyx,nk,ny->nx", heard.pull, force.strengths(currents), way)
+    assert np.abs(slope - pull).max() < 1e-8 * np.abs(pull).max()
+
+
+def test_steady_drag_lift_and_torque_are_those_of_the_frequency_domain(memory, known):
+    """A moment that turns in one place, without the rotor's share: mean force and torque of the phasors, 1e-10."""
+    alone = replace(memory, share=RotorShare(0.0, np.zeros((1, len(memory.table.rates), 1)), 0.0))
+    scales, force = Scales.of(SCENE), PlateForce(alone, VALUES)
+    place = np.array([0.0, 0.0, -0.0195])
+    moment = np.array([np.sin(0.4), 0.0, np.cos(0.4)])
+    state, times = np.zeros(12), 2 * np.pi * np.arange(33) / 33
+    state[:3], state[6:9] = place / scales.length, moment
+    heard = force(times, np.tile(state, (33, 1)))
+    currents = np.einsum("iab,bi->ai", force.remembered(33), heard.signals) - heard.signals
+    push = np.einsum("nix,ni->nx", heard.fields, currents).mean(axis=0)
+    found_force = push[2] * FLOATER.mass * scales.length / scales.time**2
+    found_torque = push[5] * FLOATER.inertia / scales.time**2
+    body, turning = PLATE.box.to_body(place), FLOATER.moment * np.sin(0.4) * np.array([1, -1j, 0])
+    tensor = memory.table.reaction_tensor(body, SCENE.frequency)[0]
+    gradient = memory.table.reaction_gradient(body, SCENE.frequency)[0]
+    assert found_torque == pytest.approx(mean_torque(tensor, turning)[2], rel=1e-10)
+    assert found_force == pytest.approx(mean_force(gradient, turning)[2], rel=1e-10)
+    settled = force.settled(state)
+    np.testing.assert_allclose(settled - heard.signals[0], currents[0], atol=1e-12 * np.abs(currents).max())
+
+
+def test_equilibrium_with_a_plate_is_a_periodic_motion(shaken, memory):
+    """Flown for twenty turns it comes back to itself after each, to round-off, and the ledger closes."""
+    assert shaken.currents is not None
+    scene = replace(SCENE, plate=replace(PLATE, lowering=None))
+    flight = compile_flight(scene, CUBOID, 0.2, compact=True, memory=memory)
+    flight.values[:] = VALUES
+    flown = integrate(scene, flight, shaken.start, 20 / scene.frequency, currents=shaken.currents[0])
+    turns = np.isclose(flown.time * scene.frequency, np.round(flown.time * scene.frequency), atol=1e-7)
+    assert turns.sum() == 21
+    assert np.abs(flown.rotor.position[turns] - shaken.start.position).max() < 1e-11
+    assert np.ptp(flown.rotor.position[:, 0]) > 1e-5  # the plate does shake it
+    assert flown.energy_error < 1e-11
+
+
+def test_ledger_closes_while_the_plate_goes_down(shaken, memory):
+    """Work = change of energy + loss in the plate, in free motion after a kick, with the plate lowered meanwhile."""
+    start = replace(shaken.start, velocity=shaken.start.velocity + np.array([0.01, 0.02, 0.0]))
+    flight = compile_flight(SCENE, CUBOID, 0.3, compact=True, memory=memory)
+    flown = integrate(SCENE, flight, start, 0.3, currents=shaken.currents[0])
+    assert flown.ended_by == "duration"
+    assert flown.energy_error < 1e-10
+
+
+def test_multipliers_are_the_growth_of_a_kicked_flight(shaken, memory, rates):
+    """One turn of a small kick, by the integrator, against Floquet's modes: 1e-6 of the kick."""
+    scene, scales = replace(SCENE, plate=replace(PLATE, lowering=None)), Scales.of(SCENE)
+    orbit = periodic_orbit(rates, VALUES, 0.0, PlateForce(memory, VALUES), scales.pack(shaken.state))
+    modes = floquet_modes(orbit)
+    integrator = compile_flight(scene, CUBOID, 0.2, compact=True, memory=memory).integrator
+    middle = np.concatenate([orbit.states[0], orbit.plate[0], [0.0]])
+
+    def after_one_turn(state):
+        integrator.time, integrator.state[:] = 0.0, state
+        integrator.pars[:] = VALUES[: len(integrator.pars)]
+        integrator.propagate_until(2 * np.pi)
+        return integrator.state.copy()
+
+    size, step = len(middle) - 1, 1e-6
+    turn = np.array(
+        [(after_one_turn(middle + step * unit) - after_one_turn(middle - step * unit))[:-1] / (2 * step)
+         for unit in np.eye(size + 1)[:-1]]
+    ).T  # fmt: skip
+    multipliers = np.linalg.eigvals(turn)
+    for rate in modes.eigenvalues:
+        assert np.abs(multipliers - np.exp(2 * np.pi * rate)).min() < 1e-6
+    assert shaken.growth_per_s == pytest.approx(modes.growth / scales.time, abs=1e-6)
+
+
+def test_without_a_plate_multipliers_are_the_eigenvalues(known, rates):
+    """Where nothing shakes, both say the same: 1e-6 of the rotor's rate, frequencies beyond it included."""
+    for equilibrium in known.equilibria[:2]:
+        orbit = periodic_orbit(rates, VALUES, 0.0, None, Scales.of(SCENE).pack(equilibrium.state))
+        modes = floquet_modes(orbit)
+        assert modes.growth / Scales.of(SCENE).time == pytest.approx(equilibrium.growth_per_s, abs=1e-5)
+        found = modes.angular_frequencies / (2 * np.pi * Scales.of(SCENE).time)
+        np.testing.assert_allclose(found, equilibrium.frequencies_hz, rtol=1e-6)
+
+
+def test_gravity_across_the_axis_makes_the_motion_periodic(rates):
+    """Gravity tilted by 2°: the periodic motion that the equilibrium becomes is one of the full simulation."""
+    tilted = 9.81 * np.array([np.sin(0.035), 0.0, -np.cos(0.035)])
+    scene = replace(SCENE, plate=None, gravity=tilted)
+    found = find_equilibria(scene, CUBOID, rates=rates)[0]
+    assert found.stable
+    assert found.turn is not None
+    flight = compile_flight(scene, CUBOID, 0.2, compact=True)
+    flown = integrate(scene, flight, found.start, 10 / scene.frequency)
+    turns = np.isclose(flown.time * scene.frequency, np.round(flown.time * scene.frequency), atol=1e-7)
+    assert np.abs(flown.rotor.position[turns] - found.start.position).max() < 1e-10
+    lab = flown.lab.position.mean(axis=0)
+    assert lab[0] > 5e-5  # it hangs towards where gravity points: 0.34 m/s² against some 10 Hz
+
+
+def test_a_flight_begins_on_the_orbit(known, memory, shaken):
+    flown = simulate(SCENE, CUBOID, 0.02, [shaken], memory=memory)
+    np.testing.assert_allclose(flown.lab.position[0], shaken.start.position, atol=1e-15)
+    assert flown.beyond_plate_table == 0
+    assert flown.energy_error < 1e-9
+
+
+def test_trigonometric_interpolation():
+    times = 2 * np.pi * np.arange(9) / 9
+    wave = np.cos(3 * times) + 0.2 * np.sin(times)
+    np.testing.assert_allclose(differentiation(9) @ wave, -3 * np.sin(3 * times) + 0.2 * np.cos(times), atol=1e-13)
+    finer = 2 * np.pi * np.arange(17) / 17
+    np.testing.assert_allclose(resampled(wave, 17), np.cos(3 * finer) + 0.2 * np.sin(finer), atol=1e-14)
+    assert VALUES[Parameter.SPIN_DRAG] == 0
