@@ -1,5 +1,6 @@
 """How the floater moves: equations of motion, integration, equilibria, stability."""
 
+from .checkpoint import Checkpoint
 from .equilibria import find_equilibria, survey, with_plate
 from .equilibrium import Equilibrium, EquilibriumError, ForceCurve, Survey
 from .memory import PlateMemory
@@ -8,6 +9,7 @@ from .simulation import StartError, initial_state, simulate, starting_point
 from .trajectory import Trajectory
 
 __all__ = [
+    "Checkpoint",
     "Equilibrium",
     "EquilibriumError",
     "ForceCurve",

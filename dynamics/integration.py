@@ -14,6 +14,8 @@ import numpy as np
 
 from ..geometry.box import Array
 from ..geometry.scene import Scene
+from .checkpoint import SECONDS as CHECKPOINT_SECONDS
+from .checkpoint import Checkpoint, Progress
 from .events import CONTACT, clearance, plate_depth, plate_legs
 from .flight import Flight
 from .recorder import Recorder
@@ -22,8 +24,11 @@ from .symbols import Parameter
 from .trajectory import Trajectory
 
 DURATION = "duration"
-PIECE_SECONDS = 0.2
-"""Wall time between two looks at what has been flown, s."""
+PIECE_TURNS, PIECE_SAMPLES = 256, 256
+"""The most turns and samples between two looks at what has been flown.
+
+A step ends where a piece does, so that pieces must not depend on how fast the machine is.
+"""
 MOST_SAMPLES = 20000
 SAMPLES_PER_TURN = 32
 
@@ -48,6 +53,7 @@ def integrate(
     duration: float,
     progress: Callable[[float], None] | None = None,
     currents: Array | None = None,
+    checkpoint: Checkpoint | None = None,
 ) -> Trajectory:
     """Fly from `start` (rotor's frame, t = 0) until `duration` (s), contact or loss.
 
@@ -56,6 +62,7 @@ def integrate(
     scene, flight : the problem and its compiled form
     progress : called with the finished part, 0 to 1, a few times a second
     currents : states of the plate at the start, √J, if the flight has a plate's memory
+    checkpoint : where the flight is kept while it lasts; it goes on from there if there is something
 
     Accuracy: a step errs by round-off, so that energy and |m̂| drift by about 1e-14 in a thousand turns;
     `Trajectory.energy_error` tells.  A keyboard interrupt returns what is finished.
@@ -69,10 +76,16 @@ def integrate(
     turn = 1 / abs(scene.frequency) if scene.frequency else np.inf
     interval = min(turn / SAMPLES_PER_TURN, duration / 1000) / scales.time
     recorder, log, began = Recorder(flight.integrator.state, interval, MOST_SAMPLES), _Log(), perf_counter()
+    known = checkpoint.read() if checkpoint else None
+    if known is not None:
+        values = _restore(flight, recorder, log, known)
+    first = recorder.times[-1]
     try:
-        _fly(scene, flight, values, duration, recorder, log, progress)
+        _fly(scene, flight, values, duration, recorder, log, progress, checkpoint)
     except KeyboardInterrupt:
         log.interrupted = True
+    if checkpoint and not log.interrupted:
+        checkpoint.remove()
     seconds = perf_counter() - began
     time = np.minimum(recorder.times * scales.time, duration)
     return Trajectory(
@@ -81,7 +94,7 @@ def integrate(
         angular_velocity=scene.angular_velocity,
         ended_by=log.ended_by,
         energy_error=flight.energy_error(recorder.times, recorder.states, _plate_places(scene, values, recorder.times)),
-        realtime_factor=float(time[-1] / seconds),
+        realtime_factor=float((recorder.times[-1] - first) * scales.time / seconds),
         steps=log.steps,
         compile_seconds=flight.compile_seconds,
         interrupted=log.interrupted,
@@ -117,15 +130,16 @@ def _fly(
     recorder: Recorder,
     log: _Log,
     progress: Callable[[float], None] | None,
+    checkpoint: Checkpoint | None,
 ) -> None:
-    """Propagate in pieces that take some tenths of a second each, until something ends the flight."""
-    integrator, scales, count = flight.integrator, flight.scales, 64
+    """Propagate in pieces until something ends the flight."""
+    integrator, scales, kept = flight.integrator, flight.scales, perf_counter()
     for end, depth, speed in plate_legs(scene.plate, duration):
         values[Parameter.PLATE_DEPTH] = depth / scales.length
         values[Parameter.PLATE_SPEED] = speed * scales.time / scales.length
         integrator.pars[:] = values[: len(integrator.pars)]
         while integrator.time < end / scales.time:
-            began = perf_counter()
+            count = int(np.clip(PIECE_TURNS * 2 * np.pi / recorder.interval, 1, PIECE_SAMPLES))
             grid = recorder.grid(integrator.time, end / scales.time, count)
             outcome, _, _, steps, _, states = integrator.propagate_grid(grid)
             times, states, log.ended_by = _ending(scene, flight, outcome, grid, states)
@@ -136,7 +150,26 @@ def _fly(
                 progress(min(1.0, times[-1] * scales.time / duration))
             if over:
                 return
-            count = max(8, int(count * np.clip(PIECE_SECONDS / (perf_counter() - began), 0.5, 2.0)))
+            if checkpoint and perf_counter() - kept > CHECKPOINT_SECONDS:
+                checkpoint.write(_progress(flight, values, recorder, log))
+                kept = perf_counter()
+
+
+def _progress(flight: Flight, values: Array, recorder: Recorder, log: _Log) -> Progress:
+    integrator = flight.integrator
+    return Progress(
+        np.array(integrator.dtime), integrator.state.copy(), values, recorder.times, recorder.states,
+        recorder.interval, log.steps,
+    )  # fmt: skip
+
+
+def _restore(flight: Flight, recorder: Recorder, log: _Log, known: Progress) -> Array:
+    """Put everything back to where it was; the runtime parameters."""
+    flight.integrator.dtime = (float(known.time[0]), float(known.time[1]))
+    flight.integrator.state[:] = known.state
+    recorder.times, recorder.states, recorder.interval = known.times, known.states, known.interval
+    log.steps = known.steps
+    return known.values.copy()
 
 
 def _ending(

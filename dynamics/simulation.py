@@ -11,6 +11,7 @@ from ..fem.table import FieldTable
 from ..geometry.box import Array
 from ..geometry.input_error import InputError
 from ..geometry.scene import AbsoluteStart, Scene
+from .checkpoint import Checkpoint
 from .equations import parameters
 from .equilibria import find_equilibria
 from .equilibrium import Equilibrium, EquilibriumError
@@ -43,6 +44,7 @@ def simulate(
     compact: bool | None = None,
     progress: Callable[[float], None] | None = None,
     memory: PlateMemory | None = None,
+    checkpoint: Checkpoint | None = None,
 ) -> Trajectory:
     """Simulate the flight of a scene's floater for `duration` (s), or until contact or loss.
 
@@ -52,6 +54,7 @@ def simulate(
     tolerance, compact : see `compile_flight`
     progress : called with the finished part, 0 to 1, a few times a second
     memory : the plate's currents; left out, the plate is only an obstacle
+    checkpoint : where the flight is kept while it lasts; it goes on from there if there is something
 
     Raises
     ------
@@ -64,7 +67,7 @@ def simulate(
     if memory is not None:
         tolerance = max(tolerance, PLATE_TOLERANCE)
     flight = compile_flight(scene, table, duration, tolerance, compact, memory)
-    flown = integrate(scene, flight, start, duration, progress, currents)
+    flown = integrate(scene, flight, start, duration, progress, currents, checkpoint)
     return flown if memory is None else replace(flown, beyond_plate_table=_beyond(memory, flown))
 
 

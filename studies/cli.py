@@ -170,6 +170,7 @@ def simulate(
     model: FieldModel = "auto",
     plate_model: PlateModel = "auto",
     rtol: float = 3e-6,
+    resume: Annotated[bool, Parameter(negative="")] = False,
     output: Output = Output(),
 ) -> Answer:
     """The floater's motion: trajectory.nc and how it ended.
@@ -186,13 +187,15 @@ def simulate(
         none, slab (infinite), fem or reduced (the network of the finite elements), or auto.
     rtol
         Relative accuracy asked of the field, from 0.8 edges off the magnets on.
+    resume
+        Go on from the checkpoint of the same flight in --out, if one is there.
     """
     _positive("--duration-s", duration_s)
     _tolerance(rtol)
     loaded = load_scene(scene)
     from .single import simulate_job
 
-    values, lines = simulate_job(loaded, model, plate_model, duration_s, rtol, output.out)
+    values, lines = simulate_job(loaded, model, plate_model, duration_s, rtol, output.out, resume)
     return Answer(values, tuple(lines), output.json)
 
 

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import csv
 from collections.abc import Mapping
+from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-from ..dynamics import Equilibrium, PlateMemory, Rates, Survey, Trajectory, simulate, survey, with_plate
+from ..dynamics import Checkpoint, Equilibrium, PlateMemory, Rates, Survey, Trajectory, simulate, survey, with_plate
 from ..fem.table import RotorTable
 from ..geometry.atomic import replacing
 from ..geometry.box import Array
@@ -65,8 +66,16 @@ def equilibria_job(scene: Scene, model: str, plate_model: str, spin: float, rtol
     return values, [*equilibria_lines(scene, found.equilibria, memory), *values["not_modelled"]]
 
 
-def simulate_job(scene: Scene, model: str, plate_model: str, duration: float, rtol: float, out: Path) -> Job:
-    """The motion; writes trajectory.nc."""
+def simulate_job(
+    scene: Scene, model: str, plate_model: str, duration: float, rtol: float, out: Path, resume: bool
+) -> Job:
+    """The motion; writes trajectory.nc, and keeps a checkpoint while it lasts."""
+    identity = to_json([scene.text, model, plate_model, duration, rtol, version("spinlev"), version("heyoka")])
+    checkpoint = Checkpoint(out / "checkpoint.npz", identity)
+    if not resume:
+        checkpoint.remove()
+    elif checkpoint.read() is None:
+        note(f"No checkpoint in {out}: the flight begins at t = 0.")
     shelf = Shelf(scene, rtol, plate_model)
     table = shelf.table(model)
     if isinstance(scene.start, OffsetStart):
@@ -75,7 +84,7 @@ def simulate_job(scene: Scene, model: str, plate_model: str, duration: float, rt
     else:
         found, memory = None, shelf.memory(table, ())
     equilibria = found.equilibria if found else ()
-    flight = fly(scene, table, duration, equilibria, memory)
+    flight = fly(scene, table, duration, equilibria, memory, checkpoint)
     values = {
         **flight_answer(table, flight, memory),
         "not_modelled": omissions(scene, table, equilibria, memory),
@@ -100,8 +109,9 @@ def fly(
     duration: float,
     found: tuple[Equilibrium, ...],
     memory: PlateMemory | None,
+    checkpoint: Checkpoint | None = None,
 ) -> Trajectory:
     """Simulate with a progress bar."""
     note("Motion ...")
     with progress("Motion") as advance:
-        return simulate(scene, table, duration, found, progress=advance, memory=memory)
+        return simulate(scene, table, duration, found, progress=advance, memory=memory, checkpoint=checkpoint)

@@ -1,0 +1,94 @@
+"""A long flight kept on disk while it lasts, so that it can go on where it was stopped, to the last bit.
+
+What determines the rest of a flight is the integrator's state at the end of a piece, its time (two numbers, so that
+it loses nothing over millions of turns) and what has been recorded.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import zipfile
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from ..geometry.atomic import replacing
+from ..geometry.box import Array
+from ..geometry.input_error import InputError
+
+SECONDS = 5.0
+"""Wall time between two checkpoints."""
+
+
+@dataclass(frozen=True, eq=False)
+class Progress:
+    """How far a flight is.
+
+    Parameters
+    ----------
+    time : (2,) scaled time as a sum of two numbers
+    state : of the integrator
+    values : runtime parameters
+    times, states : samples so far
+    interval : of the samples
+    steps : Taylor steps so far
+    """
+
+    time: Array
+    state: Array
+    values: Array
+    times: Array
+    states: Array
+    interval: float
+    steps: int
+
+
+@dataclass(frozen=True)
+class Checkpoint:
+    """The file of a flight.
+
+    Parameters
+    ----------
+    path : where it is
+    identity : everything that the flight depends on, as text; another flight's checkpoint is refused
+    """
+
+    path: Path
+    identity: str
+
+    @property
+    def _key(self) -> str:
+        return hashlib.sha256(self.identity.encode()).hexdigest()
+
+    def write(self, progress: Progress) -> None:
+        """Keep the progress; the file is whole or as it was."""
+        with replacing(self.path) as temporary, temporary.open("wb") as stream:
+            np.savez(stream, key=self._key, **{k: np.asarray(v) for k, v in vars(progress).items()})
+
+    def read(self) -> Progress | None:
+        """What was kept, or None if there is nothing.
+
+        Raises
+        ------
+        InputError : the file is damaged, or belongs to another flight
+        """
+        if not self.path.exists():
+            return None
+        try:
+            with np.load(self.path) as data:
+                content = {name: data[name] for name in data.files}
+            key = str(content.pop("key"))
+            found = Progress(**{**content, "interval": float(content["interval"]), "steps": int(content["steps"])})
+        except (OSError, ValueError, KeyError, TypeError, EOFError, zipfile.BadZipFile) as error:
+            raise InputError(f"Input {self.path} must be a checkpoint; instead it is damaged: delete it.") from error
+        if key != self._key:
+            raise InputError(
+                f"Input {self.path} must be a checkpoint of this flight; instead it was kept by another scene, model, "
+                "duration or version: delete it, choose another --out, or leave out --resume."
+            )
+        return found
+
+    def remove(self) -> None:
+        """The flight is over."""
+        self.path.unlink(missing_ok=True)

@@ -1,0 +1,58 @@
+"""A flight that is stopped and goes on is the flight that was not stopped, to the last bit; bad files are refused."""
+
+import numpy as np
+import pytest
+
+from spinlev.dynamics import Checkpoint, integration, simulate
+from spinlev.fem.multipole import uniform_moments
+from spinlev.fem.table import RotorTable
+from spinlev.geometry import rotor
+from spinlev.geometry.input_error import InputError
+from spinlev.geometry.scene import Drag, Floater, Scene
+
+MAGNETS = rotor.horizontal(2e-3, 10e-3, 1.305, 1.0)
+DIPOLE = RotorTable("dipole", MAGNETS, (), tuple(uniform_moments(m, 1) for m in MAGNETS))
+SCENE = Scene(110.0, MAGNETS, Floater(6.35e-3, 1.305, 1.0, 7500.0), Drag(2.2e-6, 1.2e-10))
+
+
+@pytest.fixture
+def checkpoint(tmp_path, monkeypatch):
+    monkeypatch.setattr(integration, "CHECKPOINT_SECONDS", 0.0)
+    return Checkpoint(tmp_path / "checkpoint.npz", "this flight")
+
+
+def stopped_at(part):
+    def progress(done):
+        if done > part:
+            raise KeyboardInterrupt
+
+    return progress
+
+
+def test_a_stopped_flight_goes_on_to_the_last_bit(checkpoint):
+    whole = simulate(SCENE, DIPOLE, 40.0, compact=True)
+    first = simulate(SCENE, DIPOLE, 40.0, compact=True, progress=stopped_at(0.3), checkpoint=checkpoint)
+    assert first.interrupted
+    assert 0 < first.levitated_s < 20
+    assert checkpoint.path.exists()
+    second = simulate(SCENE, DIPOLE, 40.0, compact=True, checkpoint=checkpoint)
+    assert not checkpoint.path.exists()
+    np.testing.assert_array_equal(second.time, whole.time)
+    for found, exact in zip(second.lab.vectors, whole.lab.vectors, strict=True):
+        np.testing.assert_array_equal(found, exact)
+    assert second.energy_error == whole.energy_error
+
+
+def test_another_flights_checkpoint_is_refused(checkpoint):
+    simulate(SCENE, DIPOLE, 40.0, compact=True, progress=stopped_at(0.1), checkpoint=checkpoint)
+    other = Checkpoint(checkpoint.path, "another flight")
+    with pytest.raises(InputError, match="another scene"):
+        other.read()
+
+
+@pytest.mark.parametrize("damage", [lambda b: b[: len(b) // 2], lambda b: b"", lambda b: b"not an archive"])
+def test_a_damaged_checkpoint_is_reported(checkpoint, damage):
+    simulate(SCENE, DIPOLE, 40.0, compact=True, progress=stopped_at(0.1), checkpoint=checkpoint)
+    checkpoint.path.write_bytes(damage(checkpoint.path.read_bytes()))
+    with pytest.raises(InputError, match="damaged"):
+        checkpoint.read()
