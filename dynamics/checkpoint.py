@@ -76,7 +76,7 @@ class Checkpoint:
         if not self.path.exists():
             return None
         try:
-            with np.load(self.path) as data:
+            with self.path.open("rb") as stream, np.load(stream) as data:
                 content = {name: data[name] for name in data.files}
             key = str(content.pop("key"))
             found = Progress(**{**content, "interval": float(content["interval"]), "steps": int(content["steps"])})

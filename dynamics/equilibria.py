@@ -76,7 +76,7 @@ def survey(
     points = _polished(balance, position, moment)
     found = [_equilibrium(table, scales, balance, r, m) for r, m in points if r in where]
     if np.any(scene.gravity[:2]):
-        found = _shaken(Shaken(scene, rates, values, None), table, found)
+        found = _shaken(Shaken(scene, rates, values, None), found)
     return Survey(_in_order(found), tuple(_force_curve(scene, scales, curve) for curve in curves))
 
 
@@ -90,7 +90,7 @@ def with_plate(
     """
     values = parameters(scene, Scales.of(scene), frozen_spin=True)
     fixed = [equilibrium.without or equilibrium for equilibrium in known.equilibria]
-    found = _shaken(Shaken(scene, rates or Rates.of(scene, table), values, memory), table, fixed)
+    found = _shaken(Shaken(scene, rates or Rates.of(scene, table), values, memory), fixed)
     return Survey(_in_order(found), known.curves)
 
 
@@ -106,13 +106,12 @@ def _check(scene: Scene) -> None:
         )
 
 
-def _shaken(problem: Shaken, table: FieldTable, found: list[Equilibrium]) -> list[Equilibrium]:
+def _shaken(problem: Shaken, found: list[Equilibrium]) -> list[Equilibrium]:
     """The same equilibria with the plate's currents and the whole gravity."""
     kept = []
     for fixed in found:
         if problem.reaches(fixed.position):
-            force, torque = _field_doubt(table, problem.values, fixed.position)[[0, 4]]
-            moved = problem.equilibrium(fixed, np.array([force] * 3 + [torque] * 3))
+            moved = problem.equilibrium(fixed)
             kept += [] if moved is None else [moved]
         elif not np.any(problem.scene.gravity[:2]):
             kept.append(fixed)

@@ -47,13 +47,8 @@ class Shaken:
         around = State(*[np.broadcast_to(position, (16, 3))] * 4).to_lab(np.arange(16) * np.pi / 8).position
         return bool(np.all(self.memory.table.in_range(self.memory.plate.box.to_body(around))))
 
-    def equilibrium(self, fixed: Equilibrium, doubt: Array) -> Equilibrium | None:
-        """What a fixed point becomes; None where it ceases to be, or would touch a body.
-
-        Parameters
-        ----------
-        doubt : (6,) acceleration of position and spin that the rotor's table may be wrong by, scaled
-        """
+    def equilibrium(self, fixed: Equilibrium) -> Equilibrium | None:
+        """What a fixed point becomes; None where it ceases to be, or would touch a body."""
         scales = Scales.of(self.scene)
         orbit = self._followed(scales.pack(fixed.state), fixed.spin)
         if orbit is None:
@@ -66,7 +61,7 @@ class Shaken:
             state=scales.unpack(orbit.mean),
             spin=fixed.spin,
             residual=orbit.error,
-            position_error=self._position_error(orbit, doubt) * scales.length,
+            position_error=self._position_error(orbit, fixed, scales),
             stable=motion.stable,
             growth_per_s=motion.growth / scales.time,
             growth_error_per_s=float(motion.errors.max()) / scales.time,
@@ -94,15 +89,8 @@ class Shaken:
             orbit, done, states = found, part, found.states
         return orbit
 
-    def _position_error(self, orbit: Orbit, doubt: Array) -> float:
-        """From what the tables may be wrong by, and the rigidity of the orbit as a whole."""
-        if self.memory is not None:
-            plate = PlateForce(self.memory, self.values)
-            heard = plate(2 * np.pi * np.arange(len(orbit.states)) / len(orbit.states), orbit.states)
-            push = np.einsum("aix,ai->ax", heard.fields, orbit.plate - heard.signals)
-            doubt = doubt + self.memory.error * np.sqrt(np.mean(push**2, axis=0))
-        slope = orbit.derivatives.mean(axis=0)
-        wrong = np.zeros((len(slope), 6))
-        wrong[[3, 4, 5, 9, 10, 11], range(6)] = doubt
-        answer = np.linalg.lstsq(slope, wrong, rcond=1e-10)[0]
-        return float(np.linalg.norm(np.abs(answer[:3]).sum(axis=1)) + orbit.error)
+    def _position_error(self, orbit: Orbit, fixed: Equilibrium, scales: Scales) -> float:
+        """The fixed point's own, m, and the part of what the plate moves that its table may be wrong by."""
+        moved = np.linalg.norm(orbit.states[:, :3] * scales.length - fixed.position, axis=1).max()
+        wrong = self.memory.error * float(moved) if self.memory else 0.0
+        return fixed.position_error + wrong + orbit.error * scales.length
