@@ -86,7 +86,7 @@ class PlateForce:
         """(states, n, n): the plate's states at n instants of a turn, from its signals at them, all periodic."""
         decay = self.rates[:, None]
         harmonics = np.fft.fft(np.eye(count), axis=0)
-        factors = decay / (decay + 1j * np.fft.fftfreq(count, 1 / count))
+        factors = decay / (decay + 1j * self.values[Parameter.RATE] * np.fft.fftfreq(count, 1 / count))
         return np.fft.ifft(factors[:, :, None] * harmonics, axis=1).real
 
     def settled(self, state: Array, count: int = 33) -> Array:

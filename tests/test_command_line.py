@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 SCENES = Path(__file__).parent.parent / "scenes"
+NO_PLATE = ("--plate-model", "none")
 GOOD = (SCENES / "horizontal.toml").read_text()
 
 
@@ -73,7 +74,7 @@ def test_equilibria(spinlev):
 
 def test_simulate(spinlev, tmp_path):
     status, out, err = spinlev(
-        "simulate", SCENES / "horizontal.toml", "--duration-s", "0.2", "--model", "dipole", "--json"
+        "simulate", SCENES / "horizontal.toml", "--duration-s", "0.2", "--model", "dipole", *NO_PLATE, "--json"
     )
     assert status == 0, err
     answer = json.loads(out)
@@ -86,7 +87,7 @@ def test_simulate(spinlev, tmp_path):
 
 
 def test_run_writes_everything_and_finds_its_table_again(spinlev, tmp_path):
-    status, out, err = spinlev("run", SCENES / "horizontal.toml", "--duration-s", "0.1")
+    status, out, err = spinlev("run", SCENES / "horizontal.toml", "--duration-s", "0.1", *NO_PLATE)
     assert status == 0, err
     assert "the dipole is off by" in out
     made = {path.name for path in (tmp_path / "out").iterdir()}
@@ -169,7 +170,7 @@ def test_wrong_points_end_with_status_2(spinlev, tmp_path, text, said):
 def test_no_equilibrium_is_a_failed_computation_that_keeps_what_was_finished(spinlev, tmp_path):
     path = tmp_path / "s.toml"
     path.write_text(GOOD.replace("frequency_hz = 110.0", "frequency_hz = 30.0"))
-    status, _, err = spinlev("run", path, "--model", "dipole")
+    status, _, err = spinlev("run", path, "--model", "dipole", *NO_PLATE)
     assert status == 1
     assert "Traceback" not in err
     assert (tmp_path / "out" / "force.png").exists()
@@ -180,11 +181,11 @@ def test_a_rotor_at_rest_has_no_equilibrium_but_its_floater_still_falls(spinlev,
     path = tmp_path / "s.toml"
     at_rest = GOOD.replace("frequency_hz = 110.0", "frequency_hz = 0.0")
     path.write_text(at_rest)
-    status, _, err = spinlev("run", path, "--model", "dipole")
+    status, _, err = spinlev("run", path, "--model", "dipole", *NO_PLATE)
     assert status == 1
     assert "Earnshaw" in err
     path.write_text(at_rest + "\n[start]\nposition_mm = [0.0, 0.0, -60.0]\n")
-    status, out, err = spinlev("run", path, "--model", "dipole", "--duration-s", "1", "--json")
+    status, out, err = spinlev("run", path, "--model", "dipole", "--duration-s", "1", *NO_PLATE, "--json")
     assert status == 0, err
     answer = json.loads(out)
     assert answer["ended_by"] == "lost"
