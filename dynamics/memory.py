@@ -84,11 +84,10 @@ def memory_terms(memory: PlateMemory, position: Vector, moment: Vector, states: 
     signals = [_combined(row, heard) + share for row, share in zip(memory.table.weights, shares, strict=True)]
     currents = [p - s for p, s in zip(states, signals, strict=True)]
     weights = [_combined(column, currents) for column in memory.table.weights.T]
-    field = [hy.sum([w * b[i] for w, (b, _) in zip(weights, parts, strict=True)]) for i in range(3)]
-    push = [
-        hy.sum([w * dot(pointing, [g[i][j] for i in range(3)]) for w, (_, g) in zip(weights, parts, strict=True)])
-        for j in range(3)
-    ]
+    pairs = list(zip(weights, parts, strict=True))
+    field = [hy.sum([w * b[i] for w, (b, _) in pairs]) for i in range(3)]
+    slope = {(i, j): hy.sum([w * g[i][j] for w, (_, g) in pairs]) for i in range(3) for j in range(i, 3)}
+    push = [hy.sum([pointing[i] * slope[min(i, j), max(i, j)] for i in range(3)]) for j in range(3)]
     force = [length * strength * f for f in _seen_by_rotor(memory.plate, push)]
     turn = [strength * t for t in cross(moment, _seen_by_rotor(memory.plate, field))]
     decay = [float(rate) * hy.par[Parameter.TIME] * y for rate, y in zip(memory.table.rates, currents, strict=True)]

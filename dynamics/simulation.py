@@ -25,7 +25,7 @@ from .state import Scales, State
 from .symbols import Parameter
 from .trajectory import Trajectory
 
-PLATE_TOLERANCE = 1e-14
+PLATE_TOLERANCE = 1e-13
 """Of a Taylor step with a plate, whose table is known to 1e-4 at best."""
 FREQUENCY_RATIO, FREQUENCY_TRIALS = 1.08, 9
 """Steps in which a frequency that works is looked for: up and down by a factor of two."""

@@ -33,6 +33,8 @@ from .table import RotorTable
 
 MOST_TERMS = 15
 """Highest number of harmonics, and of points along the way."""
+NOISE = 1e-8
+"""Amplitudes below this share of the largest are what symmetry forbids."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,8 +74,9 @@ class RotorShare:
             turns += [hy.cos(float(h) * angle), hy.sin(float(h) * angle)]
         return [
             hy.sum([
-                turn * hy.sum([float(c) * power for c, power in zip(row, powers, strict=False)])
+                turn * hy.sum([float(c) * power for c, power in zip(row, powers, strict=False) if c])
                 for turn, row in zip(turns, self.series[:, state], strict=True)
+                if row.any()
             ])
             for state in range(self.series.shape[1])
         ]  # fmt: skip
@@ -103,11 +106,20 @@ def rotor_share(
         turns = float(np.abs(series[-4:]).max() / size)  # of two harmonics: symmetry may forbid one
         ways = float(np.abs(series[..., -1]).max() / size) if distance else 0.0
         if max(turns, ways) <= tolerance / 2:
-            return RotorShare(distance, series, turns + ways)
+            return _trimmed(distance, series, turns + ways, tolerance / 2, float(size))
         if max(harmonics, depths) >= most:
             raise AccuracyError(f"Input tolerance must be at least {turns + ways:.1e} for this rotor and this way.")
         harmonics += 2 * (turns > tolerance / 2)
         depths += 2 * (ways > tolerance / 2)
+
+
+def _trimmed(distance: float, series: Array, error: float, tolerance: float, size: float) -> RotorShare:
+    """The share without its highest harmonics, whose sum no signal misses by more than the tolerance."""
+    tails = np.cumsum(np.abs(series).sum(axis=2).max(axis=1)[::-1])[::-1] / size
+    kept = max(3, int(np.argmax(np.append(tails, 0.0) <= tolerance)) | 1)
+    part = series[:kept]
+    small = np.abs(part) < NOISE * np.abs(part).max()
+    return RotorShare(distance, np.where(small, 0.0, part), error + float(np.append(tails, [0.0, 0.0])[kept]))
 
 
 def _sampled(
