@@ -3,6 +3,7 @@
 from .checkpoint import Checkpoint
 from .equilibria import find_equilibria, survey, with_plate
 from .equilibrium import Equilibrium, EquilibriumError, ForceCurve, Survey
+from .flight_kind import flight_kind
 from .memory import PlateMemory
 from .rates import Rates
 from .simulation import StartError, initial_state, simulate, starting_point
@@ -19,6 +20,7 @@ __all__ = [
     "Survey",
     "Trajectory",
     "find_equilibria",
+    "flight_kind",
     "initial_state",
     "simulate",
     "starting_point",

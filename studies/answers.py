@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ..dynamics import Equilibrium, PlateMemory, Trajectory
+from ..dynamics import Equilibrium, PlateMemory, Trajectory, flight_kind
 from ..fem.sphere_eddy import rotating_torque
 from ..fem.table import RotorTable
 from ..geometry.box import Array
@@ -90,6 +90,7 @@ def flight_answer(table: RotorTable, flight: Trajectory, memory: PlateMemory | N
         "beyond_plate_table": flight.beyond_plate_table,
         "levitated_s": flight.levitated_s,
         "ended_by": flight.ended_by,
+        "kind": flight_kind(flight),
         "energy_error": flight.energy_error,
         "realtime_factor": flight.realtime_factor,
     }
@@ -151,7 +152,7 @@ def flight_lines(flight: Trajectory) -> list[str]:
     """How a flight went, for a person."""
     beyond = flight.beyond_plate_table
     return [
-        f"Flight of {flight.levitated_s:.4g} s, ended by {flight.ended_by}; violation of the energy ledger and of unit "
-        f"length {flight.energy_error:.1e}; {flight.realtime_factor:.3g} times real time.",
+        f"Flight of {flight.levitated_s:.4g} s ({flight_kind(flight)}), ended by {flight.ended_by}; violation of the "
+        f"energy ledger and of unit length {flight.energy_error:.1e}; {flight.realtime_factor:.3g} times real time.",
         *([f"For {beyond:.1%} of the flight the floater was beyond the range of the plate's table."] if beyond else []),
     ]
