@@ -69,6 +69,7 @@ def run(
     *,
     model: FieldModel = "auto",
     plate_model: PlateModel = "auto",
+    plate_rtol: float = 3e-3,
     duration_s: float = 3.0,
     rtol: float = 3e-6,
     output: Output = Output(),
@@ -83,6 +84,8 @@ def run(
         Field model of the motion.
     plate_model
         none, slab (infinite), fem or reduced (the network of the finite elements), or auto.
+    plate_rtol
+        Relative accuracy asked of the plate's reaction.
     duration_s
         Simulated time, s.
     rtol
@@ -90,10 +93,12 @@ def run(
     """
     _positive("--duration-s", duration_s)
     _tolerance(rtol)
+    _plate_tolerance(plate_rtol)
     loaded = load_scene(scene or default_scene())
     from .run import main_job
+    from .shelf import Tables
 
-    values, lines = main_job(loaded, model, plate_model, duration_s, rtol, output.out)
+    values, lines = main_job(loaded, Tables(model, rtol, plate_model, plate_rtol), duration_s, output.out)
     return Answer(values, tuple(lines), output.json)
 
 
@@ -133,6 +138,7 @@ def equilibria(
     *,
     model: FieldModel = "auto",
     plate_model: PlateModel = "auto",
+    plate_rtol: float = 3e-3,
     spin: float = 0.0,
     rtol: float = 3e-6,
     output: Output = Output(),
@@ -147,18 +153,22 @@ def equilibria(
         Field model.
     plate_model
         none, slab (infinite), fem or reduced (the network of the finite elements), or auto.
+    plate_rtol
+        Relative accuracy asked of the plate's reaction.
     spin
         Body spin S = Ω·m̂/ω of the floater about its own moment.
     rtol
         Relative accuracy asked of the field, from 0.8 edges off the magnets on.
     """
     _tolerance(rtol)
+    _plate_tolerance(plate_rtol)
     if not -1e3 <= spin <= 1e3:
         raise InputError(f"Input --spin must be between -1000 and 1000; instead received {spin}.")
     loaded = load_scene(scene)
+    from .shelf import Tables
     from .single import equilibria_job
 
-    values, lines = equilibria_job(loaded, model, plate_model, spin, rtol, output.out)
+    values, lines = equilibria_job(loaded, Tables(model, rtol, plate_model, plate_rtol), spin, output.out)
     return Answer(values, tuple(lines), output.json)
 
 
@@ -169,6 +179,7 @@ def simulate(
     duration_s: float,
     model: FieldModel = "auto",
     plate_model: PlateModel = "auto",
+    plate_rtol: float = 3e-3,
     rtol: float = 3e-6,
     resume: Annotated[bool, Parameter(negative="")] = False,
     output: Output = Output(),
@@ -185,6 +196,8 @@ def simulate(
         Field model.
     plate_model
         none, slab (infinite), fem or reduced (the network of the finite elements), or auto.
+    plate_rtol
+        Relative accuracy asked of the plate's reaction.
     rtol
         Relative accuracy asked of the field, from 0.8 edges off the magnets on.
     resume
@@ -192,10 +205,12 @@ def simulate(
     """
     _positive("--duration-s", duration_s)
     _tolerance(rtol)
+    _plate_tolerance(plate_rtol)
     loaded = load_scene(scene)
+    from .shelf import Tables
     from .single import simulate_job
 
-    values, lines = simulate_job(loaded, model, plate_model, duration_s, rtol, output.out, resume)
+    values, lines = simulate_job(loaded, Tables(model, rtol, plate_model, plate_rtol), duration_s, output.out, resume)
     return Answer(values, tuple(lines), output.json)
 
 
@@ -281,6 +296,11 @@ def _positive(name: str, value: float) -> None:
 def _tolerance(value: float) -> None:
     if not 1e-13 <= value < 1:
         raise InputError(f"Input --rtol must be at least 1e-13 and less than 1; instead received {value}.")
+
+
+def _plate_tolerance(value: float) -> None:
+    if not 1e-5 <= value <= 0.1:
+        raise InputError(f"Input --plate-rtol must be at least 1e-5 and at most 0.1; instead received {value}.")
 
 
 def main() -> None:

@@ -18,7 +18,7 @@ from .answers import equilibria_answer, equilibria_lines, flight_answer, flight_
 from .console import note, to_json
 from .figures import field_figure, force_figure, save_figure, trajectory_figure
 from .results import axis_dataset, curve_dataset, equilibria_dataset, trajectory_dataset, write_dataset
-from .shelf import Shelf
+from .shelf import Shelf, Tables
 from .single import Job, fly
 
 MODELS = ("dipole", "cuboid", "fem")
@@ -26,15 +26,15 @@ DEEPEST = 0.05
 """The field figure reaches this far below the rotor's origin, m."""
 
 
-def main_job(scene: Scene, model: str, plate_model: str, duration: float, rtol: float, out: Path) -> Job:
+def main_job(scene: Scene, asked: Tables, duration: float, out: Path) -> Job:
     """Compute everything of a scene; writes result.nc, summary.json and the figures.
 
     What is finished before a failure is kept: a scene without a stable equilibrium still leaves its fields and force
     curves, then the error goes on to the caller.
     """
-    shelf = Shelf(scene, rtol, plate_model)
+    shelf = Shelf(scene, asked)
     exact = "cuboid" if all(magnet.contrast == 0 for magnet in scene.rotor) else "fem"
-    chosen, best = shelf.table(model), shelf.table(exact)
+    chosen, best = shelf.table(), shelf.table(exact)
     tables = {name: shelf.table(name) for name in MODELS}
     surveys, failure = _surveys(scene, {table.model: table for table in (tables["dipole"], best, chosen)})
     compared = comparison(surveys["dipole"], surveys[best.model], best.model)

@@ -15,6 +15,24 @@ from .console import note
 from .plate_shelf import check_room, plate_memory, resolve_plate_model
 
 
+@dataclass(frozen=True)
+class Tables:
+    """Which tables are asked for.
+
+    Parameters
+    ----------
+    model : of the rotor's field
+    rtol : relative accuracy of B asked of the finite elements
+    plate_model : none, slab, fem, reduced or auto
+    plate_rtol : relative accuracy asked of the plate's reaction
+    """
+
+    model: str
+    rtol: float
+    plate_model: str = "none"
+    plate_rtol: float = 3e-3
+
+
 @dataclass
 class Shelf:
     """Tables of a scene by model, each computed once.
@@ -22,21 +40,18 @@ class Shelf:
     Parameters
     ----------
     scene : whose rotor and plate
-    rtol : relative accuracy of B asked of the finite elements
-    plate_model : none, slab, fem, reduced or auto
-    plate_rtol : relative accuracy asked of the plate's reaction
+    asked : for which tables
     from_cache : names of the models that were found in the cache
     """
 
     scene: Scene
-    rtol: float
-    plate_model: str = "none"
-    plate_rtol: float = 3e-3
+    asked: Tables
     from_cache: list[str] = field(default_factory=list)
     _tables: dict[str, RotorTable] = field(default_factory=dict)
 
-    def table(self, model: str) -> RotorTable:
-        """The table of a model; `auto` chooses and says why."""
+    def table(self, model: str | None = None) -> RotorTable:
+        """The table of a model, by default the one asked for; `auto` chooses and says why."""
+        model = model or self.asked.model
         name, reason = resolve_model(self.scene.rotor, model)
         if model == "auto" and name not in self._tables:
             note(f"Field model: {name} ({reason})")
@@ -54,12 +69,12 @@ class Shelf:
         place = self._place(without)
         if place is not None:
             check_room(self.scene, place)
-        name, reason = resolve_plate_model(self.scene, self.plate_model, place, self.plate_rtol)
+        name, reason = resolve_plate_model(self.scene, self.asked.plate_model, place, self.asked.plate_rtol)
         if self.scene.plate is not None:
             note(f"Plate model: {name} ({reason})")
         if name == "none" or self.scene.plate is None or place is None:
             return None
-        memory, found = plate_memory(self.scene, self.scene.plate, name, table, place, self.plate_rtol)
+        memory, found = plate_memory(self.scene, self.scene.plate, name, table, place, self.asked.plate_rtol)
         if found:
             self.from_cache.append("plate")
         return memory
@@ -73,9 +88,9 @@ class Shelf:
 
     def _made(self, name: str) -> RotorTable:
         if name != "fem":  # closed forms are quicker to make than to read
-            return rotor_table(self.scene.rotor, name, self.rtol)
+            return rotor_table(self.scene.rotor, name, self.asked.rtol)
         note("Rotor's field by finite elements ...")
-        table, found = cached_rotor_table(self.scene.rotor, name, self.rtol, note)
+        table, found = cached_rotor_table(self.scene.rotor, name, self.asked.rtol, note)
         if found:
             self.from_cache.append(name)
         note("  from the cache." if found else f"  done in {table.provenance['seconds']:.1f} s.")

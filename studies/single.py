@@ -17,7 +17,7 @@ from .answers import equilibria_answer, equilibria_lines, field_answer, flight_a
 from .console import note, progress, to_json
 from .points_file import COLUMNS
 from .results import trajectory_dataset, write_dataset
-from .shelf import Shelf
+from .shelf import Shelf, Tables
 
 Job = tuple[Mapping[str, Any], list[str]]
 """Numbers for a program, lines for a person."""
@@ -25,8 +25,8 @@ Job = tuple[Mapping[str, Any], list[str]]
 
 def field_job(scene: Scene, points: Array, model: str, rtol: float, out: Path) -> Job:
     """B and its gradient at points (n, 3) m; writes field.csv."""
-    shelf = Shelf(scene, rtol)
-    values = field_answer(shelf.table(model), points)
+    shelf = Shelf(scene, Tables(model, rtol))
+    values = field_answer(shelf.table(), points)
     header = [
         *COLUMNS,
         "Bx_T",
@@ -51,10 +51,10 @@ def field_job(scene: Scene, points: Array, model: str, rtol: float, out: Path) -
     return {**values, "tables_from_cache": shelf.from_cache}, lines
 
 
-def equilibria_job(scene: Scene, model: str, plate_model: str, spin: float, rtol: float, out: Path) -> Job:
+def equilibria_job(scene: Scene, asked: Tables, spin: float, out: Path) -> Job:
     """All synchronous equilibria and their stability; writes equilibria.json."""
-    shelf = Shelf(scene, rtol, plate_model)
-    table = shelf.table(model)
+    shelf = Shelf(scene, asked)
+    table = shelf.table()
     found, memory = surveyed(shelf, table, spin)
     values = {
         **equilibria_answer(table, found.equilibria, memory),
@@ -66,18 +66,16 @@ def equilibria_job(scene: Scene, model: str, plate_model: str, spin: float, rtol
     return values, [*equilibria_lines(scene, found.equilibria, memory), *values["not_modelled"]]
 
 
-def simulate_job(
-    scene: Scene, model: str, plate_model: str, duration: float, rtol: float, out: Path, resume: bool
-) -> Job:
+def simulate_job(scene: Scene, asked: Tables, duration: float, out: Path, resume: bool) -> Job:
     """The motion; writes trajectory.nc, and keeps a checkpoint while it lasts."""
-    identity = to_json([scene.text, model, plate_model, duration, rtol, version("spinlev"), version("heyoka")])
+    identity = to_json([scene.text, vars(asked), duration, version("spinlev"), version("heyoka")])
     checkpoint = Checkpoint(out / "checkpoint.npz", identity)
     if not resume:
         checkpoint.remove()
     elif checkpoint.read() is None:
         note(f"No checkpoint in {out}: the flight begins at t = 0.")
-    shelf = Shelf(scene, rtol, plate_model)
-    table = shelf.table(model)
+    shelf = Shelf(scene, asked)
+    table = shelf.table()
     if isinstance(scene.start, OffsetStart):
         note("Equilibria ...")
         found, memory = surveyed(shelf, table)
