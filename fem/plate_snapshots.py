@@ -94,7 +94,7 @@ class SourceModes:
 def row_loads(space: EddySpace, group: Group, rows: Array) -> Array:
     """(n, classes, unknowns) loads of weighted potentials (n, width)."""
     root = np.sqrt(space.weights * space.conductors.images)[:, None]
-    potentials = rows.reshape(len(rows), len(group.classes), -1, 3) / root
+    potentials = rows.reshape(len(rows), len(group.classes), len(space.points), 3) / root
     return np.stack([space.loads(potentials[:, k]) for k in range(len(group.classes))], axis=1)
 
 
@@ -121,7 +121,7 @@ def solve_modes(space: EddySpace, modes: Iterable[SourceModes], frequency: float
         for k, number in enumerate(group_modes.group.classes):
             solutions, _ = system.solve(space.parity.classes[number], group_modes.loads[:, k])
             parts.append(at_points(space, solutions) * root)
-        found.append(np.stack(parts, axis=1).reshape(len(group_modes.rows), -1))
+        found.append(np.stack(parts, axis=1).reshape(group_modes.rows.shape))
     return found
 
 

@@ -23,6 +23,12 @@ from .console import note, to_json
 Job = tuple[Mapping[str, Any], list[str]]
 NEARBY = 0.15
 """Half edge of the region of a reduced table, in units of the place's distance from the plate."""
+NEAREST = 1e-3
+"""Distance of a place from the plate, m: nearer ones are on the face but for round-off, and a dipole is a sphere."""
+FARTHEST = 100.0
+"""The same in units of the largest edge: from much farther, potentials differ over the plate by round-off only."""
+TIGHTEST = 1e-5
+"""Smallest tolerance that the finite elements reach in minutes."""
 LOWEST, HIGHEST = 0.5, 250.0
 """Frequencies for which a reduced table is made at least, Hz."""
 
@@ -40,6 +46,8 @@ class Answer:
 def plate_job(scene: Scene, place: Array, frequency: float, model: str, rtol: float, out: Path) -> Job:
     """B = G m at the dipole's own place (3,), m, laboratory frame; writes plate.json."""
     plate = checked_plate(scene, place, frequency)
+    if not TIGHTEST <= rtol < 1:
+        raise InputError(f"Input --rtol must be at least {TIGHTEST:g} and less than 1; instead received {rtol}.")
     answer = MODELS[model](plate, place, frequency, rtol)
     values = {
         "model": answer.model,
@@ -65,9 +73,14 @@ def checked_plate(scene: Scene, place: Array, frequency: float) -> Plate:
         raise InputError("Input scene must have a [plate]; instead received none.")
     if not (np.isfinite(frequency) and frequency >= 0):
         raise InputError(f"Input --frequency-hz must be finite and not negative; instead received {frequency}.")
-    if not np.all(np.isfinite(place)) or scene.plate.box.distance(place) <= 0:
+    box = scene.plate.box
+    distance, farthest = float(box.distance(place)), FARTHEST * float(box.size.max())
+    if not NEAREST <= distance <= farthest:
         where = ", ".join(f"{c * 1e3:.6g}" for c in place)
-        raise InputError(f"Input --at must lie outside the plate; instead received ({where}) mm.")
+        raise InputError(
+            f"Input --at must lie outside the plate, {NEAREST * 1e3:g} mm to {farthest:.4g} m from it; "
+            f"instead received ({where}) mm."
+        )
     return scene.plate
 
 

@@ -6,10 +6,8 @@ import heyoka as hy
 import numpy as np
 import pytest
 from ngsolve import SetNumThreads
-from scipy.integrate import solve_ivp
 
 from spinlev.fem.models import rotor_table
-from spinlev.fem.phasor import mean_force, mean_loss, mean_torque
 from spinlev.fem.plate_model import field_values, tabulate
 from spinlev.fem.plate_reduction import reduce_plate
 from spinlev.fem.plate_region import Region
@@ -27,7 +25,6 @@ SetNumThreads(1)
 PLATE = Plate(Box((0.1, 0.24, 0.03), (0.0, 0.0, -0.055)), 3.5e7, Lowering(0.0, 0.01, 0.02))
 REGION = Region.over_face(PLATE.box.size, (0.016, 0.026), 0.004)
 RTOL = 0.1
-MOMENT = 1.1
 
 
 @pytest.fixture(scope="module")
@@ -104,67 +101,6 @@ def test_expressions_say_what_the_table_says(table):
     b, slope = (part[0] for part in table.field_functions(point))
     expected = np.concatenate([b @ m, y @ b, np.tensordot(y, slope, 1).ravel(), b.ravel()])
     assert values == pytest.approx(expected, rel=1e-10, abs=1e-12 * abs(b).max())
-
-
-def flight(table, position, velocity, moment, turning, duration):
-    """States, work on the dipole and loss along a prescribed motion, by an eighth-order method."""
-
-    def rates(t, state):
-        p = state[: len(table.rates)]
-        b, gradient = (part[0] for part in table.field_functions(position(t)))
-        m, spin = moment(t), turning(t)
-        y = p - b @ m
-        force = np.einsum("i,iac,a->c", y, gradient, m)
-        torque = np.cross(m, y @ b)
-        work = force @ velocity(t) + torque @ spin
-        return np.concatenate([-table.rates * y, [work, np.sum(table.rates * y**2)], force, torque])
-
-    start = np.concatenate([table.field_functions(position(0))[0][0] @ moment(0), np.zeros(8)])
-    solution = solve_ivp(rates, (0, duration), start, "DOP853", rtol=1e-12, atol=1e-16, dense_output=True)
-    return solution.y, solution.sol
-
-
-def spinning(omega, angle):
-    return lambda t: (
-        MOMENT * np.array([np.sin(angle) * np.cos(omega * t), np.sin(angle) * np.sin(omega * t), np.cos(angle)])
-    )
-
-
-def test_energy_ledger_closes_in_a_motion_that_spins_bounces_and_lowers(table):
-    """Work on the dipole + stored + dissipated = 0 to 1e-10 of what is dissipated, in the frame of the plate."""
-    omega, bounce = 2 * np.pi * 100, 2 * np.pi * 9
-    moment = spinning(omega, 0.2)
-
-    def place(t):
-        return REGION.center + np.array([1e-3 * np.sin(3 * t), 0, 2e-3 * np.sin(bounce * t) + 0.02 * t])
-
-    def speed(t):
-        return np.array([3e-3 * np.cos(3 * t), 0, 2e-3 * bounce * np.cos(bounce * t) + 0.02])
-
-    states, _ = flight(table, place, speed, moment, lambda t: np.array([0, 0, omega]), 0.1)
-    work, loss = states[len(table.rates) : len(table.rates) + 2, -1]
-    b = table.field_functions(place(0.1))[0][0]
-    stored = 0.5 * np.sum((states[: len(table.rates), -1] - b @ moment(0.1)) ** 2)
-    assert loss > 0
-    assert abs(work + stored + loss) < 1e-10 * loss
-
-
-def test_steady_means_in_time_are_those_of_the_phasors(table):
-    """Torque, force and loss over the last turns against G: after 0.2 s the start has decayed by e^-15 or more."""
-    frequency, angle, point = 100.0, 0.1, places(1, 3)[0]
-    omega, n = 2 * np.pi * frequency, len(table.rates)
-    start = np.ceil(20 / table.rates.min() * frequency) / frequency
-    _, dense = flight(
-        table, lambda t: point, lambda t: np.zeros(3), spinning(omega, angle), lambda t: np.array([0, 0, omega]),
-        start + 1 / frequency,
-    )  # fmt: skip
-    mean = (dense(start + 1 / frequency) - dense(start))[n:] * frequency
-    phasor = MOMENT * np.sin(angle) * np.array([1, -1j, 0])
-    tensor, gradient = table.reaction_tensor(point, frequency)[0], table.reaction_gradient(point, frequency)[0]
-    assert mean[1] == pytest.approx(mean_loss(tensor, phasor, frequency), rel=1e-6)
-    torque, force = mean_torque(tensor, phasor), mean_force(gradient, phasor)
-    assert mean[5:] == pytest.approx(torque, rel=1e-6, abs=1e-6 * np.linalg.norm(torque))
-    assert mean[2:5] == pytest.approx(force, rel=1e-6, abs=1e-6 * np.linalg.norm(force))
 
 
 def test_rotor_share_follows_the_turning_rotor(network):

@@ -1,0 +1,175 @@
+"""The memory of a plate in time: energy ledger, phasors as its steady state, and finite elements step by step."""
+
+from __future__ import annotations
+
+import heyoka as hy
+import numpy as np
+import pytest
+from ngsolve import SetNumThreads
+from scipy.integrate import solve_ivp
+
+from spinlev.fem.driven_plate import plate_and_rotor_table
+from spinlev.fem.eddy_time import TimeStepper, work_on
+from spinlev.fem.models import rotor_table
+from spinlev.fem.phasor import mean_force, mean_loss, mean_torque
+from spinlev.fem.plate_model import tabulate
+from spinlev.fem.plate_reduction import reduce_plate
+from spinlev.fem.plate_region import Region
+from spinlev.fem.sources import Dipole, DipoleDerivative, unit_dipoles
+from spinlev.geometry import horizontal
+from spinlev.geometry.box import Box
+from spinlev.geometry.plate_mesh import MeshRule
+from spinlev.geometry.scene import Lowering, Plate
+
+SetNumThreads(1)
+PLATE = Plate(Box((0.1, 0.24, 0.03), (0.0, 0.0, -0.055)), 3.5e7, Lowering(0.0, 0.02, 0.02))
+REGION = Region.over_face(PLATE.box.size, (0.018, 0.026), 0.0015)
+RTOL = 1e-2
+MOMENT = 1.1
+
+
+@pytest.fixture(scope="module")
+def network():
+    return reduce_plate(PLATE, REGION, (2.0, 250.0), RTOL, MeshRule(1.6, 2.5, 2.5))
+
+
+@pytest.fixture(scope="module")
+def table(network):
+    return tabulate(network, RTOL)
+
+
+def flight(table, position, velocity, moment, turning, duration):
+    """States, work on the dipole and loss along a prescribed motion, by an eighth-order method."""
+
+    def rates(t, state):
+        p = state[: len(table.rates)]
+        b, gradient = (part[0] for part in table.field_functions(position(t)))
+        m, spin = moment(t), turning(t)
+        y = p - b @ m
+        force = np.einsum("i,iac,a->c", y, gradient, m)
+        torque = np.cross(m, y @ b)
+        work = force @ velocity(t) + torque @ spin
+        return np.concatenate([-table.rates * y, [work, np.sum(table.rates * y**2)], force, torque])
+
+    start = np.concatenate([table.field_functions(position(0))[0][0] @ moment(0), np.zeros(8)])
+    solution = solve_ivp(rates, (0, duration), start, "DOP853", rtol=1e-12, atol=1e-16, dense_output=True)
+    return solution.y, solution.sol
+
+
+def spinning(omega, angle):
+    return lambda t: (
+        MOMENT * np.array([np.sin(angle) * np.cos(omega * t), np.sin(angle) * np.sin(omega * t), np.cos(angle)])
+    )
+
+
+def test_energy_ledger_closes_in_a_motion_that_spins_bounces_and_lowers(table):
+    """Work on the dipole + stored + dissipated = 0 to 1e-10 of what is dissipated, in the frame of the plate."""
+    omega, bounce = 2 * np.pi * 100, 2 * np.pi * 9
+    moment = spinning(omega, 0.2)
+
+    def place(t):
+        return REGION.center + np.array([1e-3 * np.sin(3 * t), 0, 2e-3 * np.sin(bounce * t) + 0.02 * t])
+
+    def speed(t):
+        return np.array([3e-3 * np.cos(3 * t), 0, 2e-3 * bounce * np.cos(bounce * t) + 0.02])
+
+    states, _ = flight(table, place, speed, moment, lambda t: np.array([0, 0, omega]), 0.1)
+    work, loss = states[len(table.rates) : len(table.rates) + 2, -1]
+    b = table.field_functions(place(0.1))[0][0]
+    stored = 0.5 * np.sum((states[: len(table.rates), -1] - b @ moment(0.1)) ** 2)
+    assert loss > 0
+    assert abs(work + stored + loss) < 1e-10 * loss
+
+
+def test_steady_means_in_time_are_those_of_the_phasors(table):
+    """Torque, force and loss over the last turns against G: after 0.2 s the start has decayed by e^-15 or more."""
+    frequency, angle, point = 100.0, 0.1, REGION.center + np.array([1e-3, -5e-4, 2e-3])
+    omega, n = 2 * np.pi * frequency, len(table.rates)
+    start = np.ceil(20 / table.rates.min() * frequency) / frequency
+    _, dense = flight(
+        table, lambda t: point, lambda t: np.zeros(3), spinning(omega, angle), lambda t: np.array([0, 0, omega]),
+        start + 1 / frequency,
+    )  # fmt: skip
+    mean = (dense(start + 1 / frequency) - dense(start))[n:] * frequency
+    phasor = MOMENT * np.sin(angle) * np.array([1, -1j, 0])
+    tensor, gradient = table.reaction_tensor(point, frequency)[0], table.reaction_gradient(point, frequency)[0]
+    assert mean[1] == pytest.approx(mean_loss(tensor, phasor, frequency), rel=1e-6)
+    torque, force = mean_torque(tensor, phasor), mean_force(gradient, phasor)
+    assert mean[5:] == pytest.approx(torque, rel=1e-6, abs=1e-6 * np.linalg.norm(torque))
+    assert mean[2:5] == pytest.approx(force, rel=1e-6, abs=1e-6 * np.linalg.norm(force))
+
+
+@pytest.mark.slow
+def test_finite_elements_step_by_step_have_the_same_memory(network, table):
+    """Spinning, bouncing, the plate on its way down: force and torque within 1 % of their largest (1e-2 asked).
+
+    Both begin from rest.  The same finite-element space, so that states and field functions alone are compared; 60
+    steps a turn leave some (2π/60)²/10 ~ 1e-3.
+    """
+    omega, bounce, turns = 2 * np.pi * 100, 2 * np.pi * 15, 5
+    step = 2 * np.pi / omega / 60
+    moment = spinning(omega, 0.4)
+
+    def place(t):
+        return REGION.center + np.array([1e-3 * np.sin(80 * t), 5e-4, 2.5e-3 * np.sin(bounce * t) + 0.02 * t - 1e-3])
+
+    def speed(t):
+        return np.array([8e-2 * np.cos(80 * t), 0, 2.5e-3 * bounce * np.cos(bounce * t) + 0.02])
+
+    _, dense = flight(table, place, speed, moment, lambda t: np.array([0, 0, omega]), turns / 100)
+    stepper = TimeStepper(network.space, step)
+
+    def source(t):
+        return Dipole(place(t), moment(t))
+
+    history = list(stepper.march(source, 0.0, 60 * turns))
+    found, exact = [], []
+    for number in range(40, 60 * turns - 2, 37):
+        time = history[number][0]
+        receivers = unit_dipoles(place(time)) + [DipoleDerivative(place(time), moment(time), a) for a in np.eye(3)]
+        reactions = [reaction for _, reaction in history[number - 2 : number + 3]]
+        exact.append(work_on(network.space, receivers, source, time, reactions, step))
+        b, gradient = (part[0] for part in table.field_functions(place(time)))
+        y = dense(time)[: len(table.rates)] - b @ moment(time)
+        found.append(np.concatenate([y @ b, np.einsum("i,iac,a->c", y, gradient, moment(time))]))
+    found, exact = np.array(found), np.array(exact)
+    for part in (slice(0, 3), slice(3, 6)):
+        difference = np.linalg.norm(found[:, part] - exact[:, part], axis=1)
+        size = np.linalg.norm(exact[:, part], axis=1)
+        print(f"\nlargest {difference.max() / size.max():.1e}, of each {(difference / size).max():.1e}")
+        assert difference.max() < 0.01 * size.max()
+
+
+def test_ledger_with_the_rotor_closes():
+    """Rotor turns, floater spins and bounces, plate goes down: three works, energy and loss cancel to 1e-10."""
+    rotor = rotor_table(horizontal(0.002, 0.01, 1.305, 1.0), "cuboid")
+    table, share = plate_and_rotor_table(PLATE, rotor, REGION, (20.0, 250.0), 0.1, MeshRule(1.6, 2.5, 2.5))
+    n, omega, slope = len(table.rates), 2 * np.pi * 100, 0.02
+    variables = hy.make_vars("angle", "depth")
+    signals = share.expressions(*variables)
+    driven = hy.cfunc([*signals, *(hy.diff(s, v) for v in variables for s in signals)], variables, compact_mode=True)
+    moment = spinning(omega, 0.3)
+
+    def state(t, p):
+        depth = slope * t
+        place = REGION.center + np.array([0.0, 1e-3 * np.sin(50 * t), 2e-3 * np.sin(60 * t)]) + [0, 0, depth]
+        b, gradient = (part[0] for part in table.field_functions(place))
+        share, by_angle, by_depth = driven([omega * t, depth]).reshape(3, n)
+        return b, gradient, share, by_angle, by_depth, p - b @ moment(t) - share
+
+    def rates(t, values):
+        b, gradient, _, by_angle, by_depth, y = state(t, values[:n])
+        laboratory = np.array([0.0, 5e-2 * np.cos(50 * t), 0.12 * np.cos(60 * t)])
+        force, torque = np.einsum("i,iac,a->c", y, gradient, moment(t)), np.cross(moment(t), y @ b)
+        floater = force @ laboratory + torque @ [0, 0, omega]
+        lowering = (force[2] + y @ by_depth) * slope
+        return np.concatenate(
+            [-table.rates * y, [floater + y @ by_angle * omega + lowering, np.sum(table.rates * y**2)]]
+        )
+
+    b, _, first, *_ = state(0.0, np.zeros(n))
+    start = np.concatenate([b @ moment(0.0) + first, np.zeros(2)])
+    end = solve_ivp(rates, (0, 0.05), start, "DOP853", rtol=1e-12, atol=1e-16).y[:, -1]
+    stored = 0.5 * np.sum(state(0.05, end[:n])[-1] ** 2)
+    assert end[n + 1] > 0
+    assert abs(end[n] + stored + end[n + 1]) < 1e-10 * end[n + 1]
