@@ -10,10 +10,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from ..geometry.box import Array
 from ..geometry.magnet import Magnet
 from .demagnetization import remanent_potential
 from .harmonics import Coefficients
-from .multipole import curvature_moments, moments_of_magnetization
+from .multipole import curvature_moments, moments_of_magnetization, uniform_moments
 from .quadrature import enough_nodes, face_rule, volume_rule
 
 
@@ -34,6 +35,11 @@ def induced_moments(body: Magnet, sources: Sequence[Magnet], degree: int) -> Coe
         source = weights * remanent_potential(sources, points)
         result += curvature_moments(points, source, susceptibility, *sphere, degree)
     return result
+
+
+def closed_moments(body: Magnet, rest: Array, sources: Sequence[Magnet], degree: int) -> Coefficients:
+    """As `induced_moments`, and those of a uniform polarisation `rest` (3,) T in body axes beside."""
+    return induced_moments(body, sources, degree) + uniform_moments(Magnet(body.box, rest), degree).coefficients
 
 
 def first_order_moments(body: Magnet, sources: Sequence[Magnet], degree: int) -> Coefficients:
