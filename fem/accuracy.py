@@ -61,6 +61,22 @@ def places(magnets: tuple[Magnet, ...], clearance: float) -> tuple[Array, Array]
     return np.concatenate(points), np.concatenate(scales)
 
 
+def guards(magnets: tuple[Magnet, ...], clearance: float) -> tuple[Array, Array]:
+    """Points (n, 3) m nearer to edges and corners than `clearance`, as far from a magnet's centre as its faces' places.
+
+    They see to it that a fit, which need only hold at `places`, does not run wild beside them. With the scale (n,) of B
+    (T) there.
+    """
+    directions = np.random.default_rng(2).normal(size=(150, 3))
+    directions /= np.linalg.norm(directions, axis=1)[:, None]
+    shells = [m.box.center + (clearance + m.box.half_edges.max()) * directions for m in magnets]
+    shell = np.concatenate(shells)
+    gaps = np.min([magnet.box.distance(shell) for magnet in magnets], axis=0)
+    shell = shell[(gaps >= clearance / 2) & (gaps < clearance)]
+    field = np.linalg.norm(sum(uniform_moments(carrier(m), 1).evaluate(shell)[0] for m in magnets), axis=1)
+    return shell, np.maximum(field, np.median(field) / 3) if field.any() else np.ones(len(field))
+
+
 def _offset_surface(box: Box, offset: float, directions: Array) -> Array:
     """Points at a distance from the faces, seen in the given directions from the centre."""
     low, high = np.zeros(len(directions)), np.full(len(directions), offset + box.circumradius)

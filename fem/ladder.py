@@ -23,11 +23,10 @@ from ..geometry.gaps import largest_shift
 from ..geometry.magnet import Magnet
 from ..geometry.mesh import MeshSettings
 from ..geometry.pieces import CONVERGENCE, cut_magnets
-from .accuracy import Accuracy, places
+from .accuracy import Accuracy, guards, places
 from .carrier import carrier
-from .harmonics import Coefficients
+from .closed_part import closed_part
 from .multipole import MultipoleExpansion, without_noise
-from .remanent import closed_moments
 from .rotor_solution import Refinement, RotorSolution, solve_rotor
 from .table import KNOWN, RotorTable
 from .trim import trimmed
@@ -40,6 +39,8 @@ FASTEST_RATE, SLOWEST_RATE = 0.1, 0.75
 SAFETY = 2.0
 """Factor on the extrapolated difference."""
 HIGHEST_DEGREE = 44
+BESIDE = 2.5
+"""How much larger errors may be beside edges and corners, at the same distance from the magnet's centre."""
 GAP_SAFETY = 20.0
 """Change of the reaction, relative to gap over edge, that a closed gap makes; 5 µm between 10 mm cubes need 17."""
 
@@ -72,7 +73,7 @@ def fem_table(
     points, scale = places(magnets, accuracy.clearance(magnets))
     degree = _degree(pieces, points, accuracy.rtol)
     carriers = tuple(carrier(magnet) for magnet in magnets)
-    closed = added_by_closed_form(cut, magnets, carriers, degree)
+    closed, unsure = closed_part(cut, magnets, carriers, degree)
 
     def reaction(order: int) -> RotorSolution:
         return solve_rotor(magnets, rung(order, settings), "split", degree, cut, use_symmetry, carriers)
@@ -81,11 +82,19 @@ def fem_table(
     whole = solution.expansions(
         [without_noise(a + b, 1e-15) for a, b in zip(closed, solution.coefficients, strict=True)]
     )
-    doubts = {"discretisation": used(doubt), "tail": used(tail(whole)), "gap": used(gap_doubt(magnets, solution))}
+    doubts = {
+        "discretisation": used(doubt),
+        "quadrature": used(solution.expansions(unsure)),
+        "tail": used(tail(whole)),
+        "gap": used(gap_doubt(magnets, solution)),
+    }
     doubts = {cause: parts for cause, parts in doubts.items() if parts}
     rest = RotorTable("fem", magnets, carriers, (), doubts).absolute_error(points)[0]
     allowed = 0.99 * np.maximum(scale * accuracy.rtol - rest, scale * accuracy.rtol / 20)
-    kept, dropped = trimmed(whole, points, allowed)
+    beside, scale_beside = guards(magnets, accuracy.clearance(magnets))
+    kept, dropped = trimmed(
+        whole, np.concatenate([points, beside]), np.concatenate([allowed, BESIDE * accuracy.rtol * scale_beside])
+    )
     if any(part.coefficients.any() for part in dropped):
         doubts[KNOWN] = used(dropped)
     table = RotorTable("fem", magnets, carriers, used(kept), doubts)
@@ -98,18 +107,6 @@ def fem_table(
             stacklevel=2,
         )
     return replace(table, provenance=provenance(solution, order, settings, reached, time.perf_counter() - start))
-
-
-def added_by_closed_form(
-    cut: Sequence[Sequence[Magnet]], magnets: Sequence[Magnet], carriers: Sequence[Magnet], degree: int
-) -> list[Coefficients]:
-    """Moments of every piece that need no elements: (μ - 1) H0 + J - J' of the carriers' closed form H0."""
-    rests = [whole.polarization - carried.polarization for whole, carried in zip(magnets, carriers, strict=True)]
-    return [
-        closed_moments(piece, rest, carriers, degree)
-        for pieces, rest in zip(cut, rests, strict=True)
-        for piece in pieces
-    ]
 
 
 def climb(

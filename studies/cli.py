@@ -86,7 +86,7 @@ def run(
     duration_s
         Simulated time, s.
     rtol
-        Relative accuracy asked of the field, from 0.8 edges off the magnets on.
+        Relative accuracy asked of the field wherever the floater can be.
     """
     _positive("--duration-s", duration_s)
     _tolerance(rtol)
@@ -117,7 +117,7 @@ def field(
     model
         Field model.
     rtol
-        Relative accuracy asked of the field, from 0.8 edges off the magnets on.
+        Relative accuracy asked of the field wherever the floater can be.
     """
     _tolerance(rtol)
     loaded, places = load_scene(scene), read_points(points)
@@ -150,7 +150,7 @@ def equilibria(
     spin
         Body spin S = Ω·m̂/ω of the floater about its own moment.
     rtol
-        Relative accuracy asked of the field, from 0.8 edges off the magnets on.
+        Relative accuracy asked of the field wherever the floater can be.
     """
     _tolerance(rtol)
     if not -1e3 <= spin <= 1e3:
@@ -185,7 +185,7 @@ def simulate(
     plate_model
         Plate model.
     rtol
-        Relative accuracy asked of the field, from 0.8 edges off the magnets on.
+        Relative accuracy asked of the field wherever the floater can be.
     """
     _positive("--duration-s", duration_s)
     _tolerance(rtol)

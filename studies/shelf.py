@@ -15,10 +15,12 @@ from .console import note
 class Shelf:
     """Rotor tables of a scene by model, each computed once.
 
+    The accuracy holds wherever the floater can be: its centre comes no nearer to a magnet than its radius.
+
     Parameters
     ----------
     scene : whose rotor
-    rtol : relative accuracy of B asked of the finite elements
+    rtol : relative accuracy of B asked of the field
     from_cache : names of the models that were found in the cache
     """
 
@@ -27,9 +29,14 @@ class Shelf:
     from_cache: list[str] = field(default_factory=list)
     _tables: dict[str, RotorTable] = field(default_factory=dict)
 
+    @property
+    def nearest(self) -> float:
+        """Distance from the magnets' faces from which on the accuracy is asked for, m."""
+        return self.scene.floater.radius
+
     def table(self, model: str) -> RotorTable:
         """The table of a model; `auto` chooses and says why."""
-        name, reason = resolve_model(self.scene.rotor, model)
+        name, reason = resolve_model(self.scene.rotor, model, self.rtol, self.nearest)
         if model == "auto" and name not in self._tables:
             note(f"Field model: {name} ({reason})")
         if name not in self._tables:
@@ -38,9 +45,9 @@ class Shelf:
 
     def _made(self, name: str) -> RotorTable:
         if name != "fem":  # closed forms are quicker to make than to read
-            return rotor_table(self.scene.rotor, name, self.rtol)
+            return rotor_table(self.scene.rotor, name, self.rtol, self.nearest)
         note("Rotor's field by finite elements ...")
-        table, found = cached_rotor_table(self.scene.rotor, name, self.rtol, note)
+        table, found = cached_rotor_table(self.scene.rotor, name, self.rtol, note, self.nearest)
         if found:
             self.from_cache.append(name)
         note("  from the cache." if found else f"  done in {table.provenance['seconds']:.1f} s.")

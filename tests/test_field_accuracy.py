@@ -7,7 +7,8 @@ import pytest
 
 from spinlev.fem.accuracy import Accuracy, places
 from spinlev.fem.carrier import carrier
-from spinlev.fem.ladder import AccuracyWarning, added_by_closed_form, fem_table
+from spinlev.fem.closed_part import added_by_closed_form
+from spinlev.fem.ladder import AccuracyWarning, fem_table
 from spinlev.fem.models import rotor_table
 from spinlev.fem.rotor_solution import Refinement, solve_rotor
 from spinlev.fem.table import RotorTable
