@@ -8,6 +8,7 @@ import numpy as np
 
 from ..geometry.box import Array, Box
 from ..geometry.magnet import Magnet
+from .carrier import carrier
 from .multipole import uniform_moments
 
 OFFSETS = (0.0, 1.0, 3.0, 10.0, 100.0)
@@ -42,14 +43,14 @@ class Accuracy:
 def places(magnets: tuple[Magnet, ...], clearance: float) -> tuple[Array, Array]:
     """Points (n, 3) m at which errors are looked at, and the scale (n,) of B (T) there.
 
-    They lie at a distance `clearance` from the magnets and farther out. The scale is that of the magnets' dipoles,
-    which is right to a few per cent, but at least a third of its median at like distances, where fields cancel;
-    1 T if nothing is magnetised.
+    They lie at a distance `clearance` from the magnets and farther out. The scale is that of the magnets' dipoles with
+    their permeability, which is right to a few per cent, but at least a third of its median at like distances, where
+    fields cancel; 1 T if nothing is magnetised.
     """
     size = max(float(np.linalg.norm(m.box.corners - magnets[0].box.center, axis=1).max()) for m in magnets)
     directions = np.random.default_rng(0).normal(size=(150, 3))
     directions /= np.linalg.norm(directions, axis=1)[:, None]
-    dipoles = [uniform_moments(magnet, 1) for magnet in magnets]
+    dipoles = [uniform_moments(carrier(magnet), 1) for magnet in magnets]
     points, scales = [], []
     for offset in (clearance + factor * size for factor in OFFSETS):
         shell = np.concatenate([_offset_surface(magnet.box, offset, directions) for magnet in magnets])
@@ -58,6 +59,22 @@ def places(magnets: tuple[Magnet, ...], clearance: float) -> tuple[Array, Array]
         points.append(shell[outside])
         scales.append(np.maximum(field, np.median(field) / 3) if field.any() else np.ones(len(field)))
     return np.concatenate(points), np.concatenate(scales)
+
+
+def guards(magnets: tuple[Magnet, ...], clearance: float) -> tuple[Array, Array]:
+    """Points (n, 3) m nearer to edges and corners than `clearance`, as far from a magnet's centre as its faces' places.
+
+    They see to it that a fit, which need only hold at `places`, does not run wild beside them. With the scale (n,) of B
+    (T) there.
+    """
+    directions = np.random.default_rng(2).normal(size=(150, 3))
+    directions /= np.linalg.norm(directions, axis=1)[:, None]
+    shells = [m.box.center + (clearance + m.box.half_edges.max()) * directions for m in magnets]
+    shell = np.concatenate(shells)
+    gaps = np.min([magnet.box.distance(shell) for magnet in magnets], axis=0)
+    shell = shell[(gaps >= clearance / 2) & (gaps < clearance)]
+    field = np.linalg.norm(sum(uniform_moments(carrier(m), 1).evaluate(shell)[0] for m in magnets), axis=1)
+    return shell, np.maximum(field, np.median(field) / 3) if field.any() else np.ones(len(field))
 
 
 def _offset_surface(box: Box, offset: float, directions: Array) -> Array:

@@ -15,9 +15,10 @@ from .table_file import FORMAT, load_table, save_table
 from .table_store import from_cache
 
 
-def rotor_key(rotor: tuple[Magnet, ...], model: str, rtol: float) -> str:
-    """SHA-256 of the magnets, the model, the tolerance, and the programs that compute them."""
-    digest = hashlib.sha256(f"{FORMAT} {version('spinlev')} {version('ngsolve')} {model} {rtol!r}".encode())
+def rotor_key(rotor: tuple[Magnet, ...], model: str, rtol: float, nearest: float | None = None) -> str:
+    """SHA-256 of the magnets, the model, the accuracy asked for and where, and the programs that compute them."""
+    programs = f"{FORMAT} {version('spinlev')} {version('ngsolve')}"
+    digest = hashlib.sha256(f"{programs} {model} {rtol!r} {nearest!r}".encode())
     for magnet in rotor:
         for part in (magnet.box.size, magnet.box.center, magnet.box.rotation, magnet.polarization):
             digest.update(np.ascontiguousarray(part + 0.0, dtype="<f8").tobytes())
@@ -26,13 +27,13 @@ def rotor_key(rotor: tuple[Magnet, ...], model: str, rtol: float) -> str:
 
 
 def cached_rotor_table(
-    rotor: tuple[Magnet, ...], model: str, rtol: float, report: Callable[[str], None]
+    rotor: tuple[Magnet, ...], model: str, rtol: float, report: Callable[[str], None], nearest: float | None = None
 ) -> tuple[RotorTable, bool]:
-    """A rotor table, from the cache if it is there, and whether it was."""
+    """A rotor table, see `rotor_table`, from the cache if it is there, and whether it was."""
     return from_cache(
-        f"rotor-{rotor_key(rotor, model, rtol)}.nc",
+        f"rotor-{rotor_key(rotor, model, rtol, nearest)}.nc",
         load_table,
-        lambda: rotor_table(rotor, model, rtol),
+        lambda: rotor_table(rotor, model, rtol, nearest),
         save_table,
         report,
     )

@@ -8,9 +8,10 @@ from __future__ import annotations
 
 import numpy as np
 import skfem
-from skfem.helpers import dot, grad
+from skfem.helpers import dot, grad, mul
 
 from ..geometry.box import Array
+from ..geometry.magnet import Magnet
 from ..geometry.mesh import MagnetMesh, to_meshio
 from .demagnetization import remanent_field
 from .magnetostatics import Formulation
@@ -32,13 +33,13 @@ def magnet_dipoles(mesh: MagnetMesh, formulation: Formulation = "split") -> Arra
     vertices = (exchange.points - mesh.center) / mesh.unit
     tetrahedra = skfem.MeshTet(vertices.T, exchange.cells_dict["tetra"].T)
     regions = exchange.cell_data_dict["gmsh:physical"]["tetra"]
-    permeability = np.ones(len(regions))
+    permeability = np.tile(np.eye(3), (len(regions), 1, 1))
     for k, magnet in enumerate(mesh.magnets):
-        permeability[regions == exchange.field_data[f"magnet{k}"][0]] = magnet.recoil_permeability
+        permeability[regions == exchange.field_data[f"magnet{k}"][0]] = magnet.permeability_in_rotor
 
     basis = skfem.Basis(tetrahedra, skfem.ElementTetP2(), intorder=6)
-    coefficient = basis.with_element(skfem.ElementTetP0()).interpolate(permeability)
-    stiffness = skfem.BilinearForm(lambda u, v, w: w["mu"] * dot(grad(u), grad(v))).assemble(basis, mu=coefficient)
+    everywhere = np.moveaxis(permeability, 0, -1)[..., None]
+    stiffness = skfem.BilinearForm(lambda u, v, w: dot(mul(everywhere, grad(u)), grad(v))).assemble(basis)
     outer = skfem.FacetBasis(tetrahedra, skfem.ElementTetP2(), intorder=6)
     stiffness += skfem.BilinearForm(lambda u, v, w: 2 / mesh.ball_radius * u * v).assemble(outer)
 
@@ -61,16 +62,21 @@ def _source(mesh: MagnetMesh, k: int, formulation: Formulation, inside: skfem.Ba
     if formulation == "direct":
         return np.broadcast_to(magnet.polarization_in_rotor[:, None, None], (3, *points.shape[:-1]))
     field = remanent_field(mesh.magnets, mesh.to_meter(points.reshape(-1, 3))).reshape(points.shape)
-    return (magnet.recoil_permeability - 1) * np.moveaxis(field, -1, 0)
+    return np.moveaxis(field @ _susceptibility(magnet), -1, 0)
 
 
 def _dipole(mesh: MagnetMesh, k: int, formulation: Formulation, inside: skfem.Basis, potential: Array) -> Array:
     magnet = mesh.magnets[k]
-    susceptibility = magnet.recoil_permeability - 1
+    susceptibility = _susceptibility(magnet)
     if formulation == "direct":
         closed = magnet.polarization_in_rotor * magnet.box.volume
     else:
         points, weights = volume_rule(magnet.box, [source.box for source in mesh.magnets], 24)
-        closed = susceptibility * (weights @ remanent_field(mesh.magnets, points))
+        closed = susceptibility @ (weights @ remanent_field(mesh.magnets, points))
     slope = np.asarray(inside.interpolate(potential).grad)
-    return np.asarray(closed - susceptibility * np.sum(slope * inside.dx, axis=(1, 2)) * mesh.unit**3)
+    return np.asarray(closed - susceptibility @ np.sum(slope * inside.dx, axis=(1, 2)) * mesh.unit**3)
+
+
+def _susceptibility(magnet: Magnet) -> Array:
+    """(3, 3) μ - 1 in the rotor's frame."""
+    return magnet.permeability_in_rotor - np.eye(3)

@@ -31,7 +31,7 @@ def direct_table(magnets: tuple[Magnet, ...], accuracy: Accuracy | None = None) 
     def whole(order: int) -> RotorSolution:
         return solve_rotor(magnets, Refinement(order, rung(order, SETTINGS).mesh, DEGREE), "direct")
 
-    solution, order, doubt = climb(whole, points, scale, accuracy.rtol / 2)
+    solution, order, doubt = climb(whole, points, scale, accuracy.rtol / 2, SETTINGS)
     coefficients = without_noise(solution.coefficients[0], 1e-15)
     expansions = used(solution.expansions([coefficients]))
     # a radius that is wrong by ε, as the meshed sphere's is by half its area error, changes degree l by (l + 1) ε

@@ -23,9 +23,10 @@ from ..geometry.gaps import largest_shift
 from ..geometry.magnet import Magnet
 from ..geometry.mesh import MeshSettings
 from ..geometry.pieces import CONVERGENCE, cut_magnets
-from .accuracy import Accuracy, places
+from .accuracy import Accuracy, guards, places
+from .carrier import carrier
+from .closed_part import closed_part
 from .multipole import MultipoleExpansion, without_noise
-from .remanent import induced_moments
 from .rotor_solution import Refinement, RotorSolution, solve_rotor
 from .table import KNOWN, RotorTable
 from .trim import trimmed
@@ -34,12 +35,14 @@ RUNGS = (2, 3, 4, 5, 6, 7, 8)
 """Orders of the elements."""
 FIRST_RATE = 0.5
 """Ratio of two differences that is assumed before it is known; 0.1 to 0.3 were measured."""
-SLOWEST_RATE = 0.75
+FASTEST_RATE, SLOWEST_RATE = 0.1, 0.75
 SAFETY = 2.0
 """Factor on the extrapolated difference."""
 HIGHEST_DEGREE = 44
-GAP_SAFETY = 10.0
-"""Change of the reaction, relative to gap over edge, that a closed gap makes."""
+BESIDE = 2.5
+"""How much larger errors may be beside edges and corners, at the same distance from the magnet's centre."""
+GAP_SAFETY = 20.0
+"""Change of the reaction, relative to gap over edge, that a closed gap makes; 5 µm between 10 mm cubes need 17."""
 
 
 class AccuracyWarning(UserWarning):
@@ -69,23 +72,32 @@ def fem_table(
     pieces = [piece for whole in cut for piece in whole]
     points, scale = places(magnets, accuracy.clearance(magnets))
     degree = _degree(pieces, points, accuracy.rtol)
-    closed = [induced_moments(piece, magnets, degree) for piece in pieces]
+    carriers = tuple(carrier(magnet) for magnet in magnets)
+    closed, unsure = closed_part(cut, magnets, carriers, degree)
 
     def reaction(order: int) -> RotorSolution:
-        return solve_rotor(magnets, rung(order, settings), "split", degree, cut, use_symmetry)
+        return solve_rotor(magnets, rung(order, settings), "split", degree, cut, use_symmetry, carriers)
 
-    solution, order, doubt = climb(reaction, points, scale, accuracy.rtol / 3)
+    solution, order, doubt = climb(reaction, points, scale, accuracy.rtol / 3, settings)
     whole = solution.expansions(
         [without_noise(a + b, 1e-15) for a, b in zip(closed, solution.coefficients, strict=True)]
     )
-    doubts = {"discretisation": used(doubt), "tail": used(tail(whole)), "gap": used(gap_doubt(magnets, solution))}
+    doubts = {
+        "discretisation": used(doubt),
+        "quadrature": used(solution.expansions(unsure)),
+        "tail": used(tail(whole)),
+        "gap": used(gap_doubt(magnets, solution)),
+    }
     doubts = {cause: parts for cause, parts in doubts.items() if parts}
-    rest = RotorTable("fem", magnets, magnets, (), doubts).absolute_error(points)[0]
+    rest = RotorTable("fem", magnets, carriers, (), doubts).absolute_error(points)[0]
     allowed = 0.99 * np.maximum(scale * accuracy.rtol - rest, scale * accuracy.rtol / 20)
-    kept, dropped = trimmed(whole, points, allowed)
+    beside, scale_beside = guards(magnets, accuracy.clearance(magnets))
+    kept, dropped = trimmed(
+        whole, np.concatenate([points, beside]), np.concatenate([allowed, BESIDE * accuracy.rtol * scale_beside])
+    )
     if any(part.coefficients.any() for part in dropped):
         doubts[KNOWN] = used(dropped)
-    table = RotorTable("fem", magnets, magnets, used(kept), doubts)
+    table = RotorTable("fem", magnets, carriers, used(kept), doubts)
     reached = float(np.max(table.absolute_error(points)[0] / scale))
     if reached > accuracy.rtol:
         warnings.warn(
@@ -98,7 +110,7 @@ def fem_table(
 
 
 def climb(
-    solve: Callable[[int], RotorSolution], points: Array, scale: Array, target: float
+    solve: Callable[[int], RotorSolution], points: Array, scale: Array, target: float, settings: MeshSettings
 ) -> tuple[RotorSolution, int, list[MultipoleExpansion]]:
     """Climb the ladder until the error is below the target.
 
@@ -106,6 +118,7 @@ def climb(
     ----------
     solve : solution at an order
     points, scale : where (n, 3) m the error is looked at, and the field (n,) T to which it is relative
+    settings : of the mesh, as given to `rung`
 
     Returns
     -------
@@ -117,12 +130,20 @@ def climb(
         difference = [b - a for a, b in zip(coarse.coefficients, fine.coefficients, strict=True)]
         field = sum(e.evaluate(points)[0] for e in fine.expansions(difference))
         size = float(np.max(np.linalg.norm(field, axis=1) / scale))
-        rate = FIRST_RATE if np.isinf(before) else min(max(size / before, 0.1) if before else 0.0, SLOWEST_RATE)
+        rate = _rate(size, before, fine.layers == rung(order, settings).mesh.hp_layers)
         factor = SAFETY * rate / (1 - rate)
         if factor * size <= target:
             break
         coarse, before = fine, size
     return fine, order, fine.expansions([factor * d for d in difference])
+
+
+def _rate(size: float, before: float, graded: bool) -> float:
+    """Ratio of the next difference to the last one; with too few layers at edges orders converge slowly later on."""
+    if np.isinf(before):
+        return FIRST_RATE
+    fastest = FASTEST_RATE if graded else FIRST_RATE
+    return min(max(size / before, fastest) if before else 0.0, SLOWEST_RATE)
 
 
 def _degree(pieces: Sequence[Magnet], points: Array, rtol: float) -> int:
@@ -168,7 +189,7 @@ def provenance(
         "elements": solution.mesh.elements,
         "order": order,
         "unknowns": solution.unknowns,
-        "hp_layers": rung(order, settings).mesh.hp_layers,
+        "hp_layers": solution.layers,
         "ball_radius_mm": solution.mesh.ball_radius * solution.mesh.unit * 1e3,
         "error_estimate": reached,
         "seconds": seconds,

@@ -3,7 +3,8 @@
 The unknown is ψ in H1, with μ0 H = H0 - ∇ψ (all in T). Two formulations share the same code:
 
 - `split`: H0 is the closed form of the magnets with μ = 1, and only what their permeability adds is computed,
-      ∫ ∇v·μ∇ψ = ∫_magnets ∇v·(μ - 1) H0,        M = (μ - 1)(H0 - ∇ψ);
+      ∫ ∇v·μ∇ψ = ∫_magnets ∇v·((μ - 1) H0 + J'),        M = (μ - 1)(H0 - ∇ψ) + J',
+  J' being the remanence beyond that of the closed form, if the closed form is not that of all of it;
 - `direct`: no closed form, H0 = 0,
       ∫ ∇v·μ∇ψ = ∫_magnets J·∇v,                   M = J - (μ - 1) ∇ψ.
 
@@ -113,6 +114,7 @@ def solve(
     formulation: Formulation = "split",
     boundary_degree: int = 8,
     signs: tuple[int, ...] = (),
+    rest: Array | None = None,
 ) -> Solution:
     """Solve for the potential.
 
@@ -121,6 +123,7 @@ def solve(
     sources : magnets whose remanent polarisation acts; in `direct` those of the mesh
     boundary_degree : harmonics up to this degree see an exactly open outer boundary
     signs : parity of the potential (+1 or -1) at each of the mesh's planes
+    rest : in `split`, J' (n, 3) T of each of the mesh's magnets; by default none
 
     Raises
     ------
@@ -131,7 +134,8 @@ def solve(
     load = ng.LinearForm(space)
     for name in mesh.mesh.GetMaterials():
         if name != "air":
-            _add_source(load, system, int(name.removeprefix("magnet")), sources, formulation)
+            k = int(name.removeprefix("magnet"))
+            _add_source(load, system, k, sources, formulation, np.zeros(3) if rest is None else rest[k])
     load.Assemble()
     free = space.FreeDofs(True)
     for plane, sign in zip(mesh.planes, signs, strict=True):
@@ -141,16 +145,18 @@ def solve(
     return Solution(system, formulation, tuple(sources), signs, potential, boundary)
 
 
-def _add_source(load: Any, system: System, k: int, sources: Sequence[Magnet], formulation: Formulation) -> None:
+def _add_source(
+    load: Any, system: System, k: int, sources: Sequence[Magnet], formulation: Formulation, rest: Array
+) -> None:
     mesh, name, test = system.mesh, f"magnet{k}", system.space.TestFunction()
     if formulation == "direct":
         load += ng.CF(tuple(map(float, sources[k].polarization_in_rotor))) * ng.grad(test) * ng.dx(name)
         return
     susceptibility = mesh.magnets[k].permeability_in_rotor - np.eye(3)
-    if not susceptibility.any():
+    if not susceptibility.any() and not rest.any():
         return
     points = volume_points(mesh.mesh, name, 2 * system.order + 2)
-    source = remanent_field(sources, mesh.to_meter(points.points)) @ susceptibility
+    source = remanent_field(sources, mesh.to_meter(points.points)) @ susceptibility + rest
     for axis in range(3):
         load += points.function(source[:, axis]) * ng.grad(test)[axis] * points.measure
 

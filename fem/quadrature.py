@@ -3,15 +3,32 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import combinations
 
 import numpy as np
 
 from ..geometry.box import Array, Box
+from ..geometry.overlap import separation
+
+NEAR = 0.1
+"""Gaps below this part of the shortest edge are as contact to a rule."""
 
 
 def enough_nodes(degree: int) -> int:
     """Nodes per panel for solid harmonics up to a degree beside such a field: round-off."""
     return max(20, degree + 6)
+
+
+def oblique_contact(boxes: Sequence[Box]) -> bool:
+    """Whether two boxes that are not parallel (nearly) touch: then kinks run across the panels of the rules."""
+    return any(
+        not _parallel(first, second) and separation(first, second)[0] < NEAR * min(first.size.min(), second.size.min())
+        for first, second in combinations(boxes, 2)
+    )
+
+
+def _parallel(first: Box, second: Box) -> bool:
+    return np.allclose(np.abs(first.rotation.T @ second.rotation).max(axis=0), 1, rtol=0, atol=1e-12)
 
 
 def graded_rule(breaks: Array, nodes: int) -> tuple[Array, Array]:
@@ -33,7 +50,7 @@ def panel_breaks(box: Box, others: Sequence[Box]) -> list[Array]:
         places = {-half, half}
         for other in others:
             body = box.to_body(other.corners)
-            if np.allclose(np.abs(box.rotation.T @ other.rotation).max(axis=0), 1, rtol=0, atol=1e-12):
+            if _parallel(box, other):
                 places |= {place for place in body[:, axis] if abs(place) < half * (1 - 1e-9)}
         ordered = np.array(sorted(places))
         apart = np.concatenate([[True], np.diff(ordered) > 1e-9 * half])

@@ -10,30 +10,39 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from ..geometry.box import Array
 from ..geometry.magnet import Magnet
 from .demagnetization import remanent_potential
 from .harmonics import Coefficients
-from .multipole import curvature_moments, moments_of_magnetization
+from .multipole import curvature_moments, moments_of_magnetization, uniform_moments
 from .quadrature import enough_nodes, face_rule, volume_rule
 
 
-def induced_moments(body: Magnet, sources: Sequence[Magnet], degree: int) -> Coefficients:
+def induced_moments(body: Magnet, sources: Sequence[Magnet], degree: int, nodes: int | None = None) -> Coefficients:
     """Coefficients (T) of (μ - 1) H0 in a body, about its centre with radius its circumradius.
 
-    Accuracy: round-off for boxes whose axes are parallel or that do not touch.
+    Accuracy with the default number of nodes: round-off for boxes whose axes are parallel or that do not touch.
     """
-    box = body.box
+    box, nodes = body.box, nodes or enough_nodes(degree)
     others = [source.box for source in sources]
-    points, areas = face_rule(box, others, enough_nodes(degree))
+    points, areas = face_rule(box, others, nodes)
     flux = -remanent_potential(sources, points)[:, None] * areas
     susceptibility = body.permeability_in_rotor - np.eye(3)
     sphere = (box.center, box.circumradius)
     result = moments_of_magnetization(points, np.ones(len(points)), flux @ susceptibility, *sphere, degree)
     if not body.isotropic:
-        points, weights = volume_rule(box, others, enough_nodes(degree))
+        points, weights = volume_rule(box, others, nodes)
         source = weights * remanent_potential(sources, points)
         result += curvature_moments(points, source, susceptibility, *sphere, degree)
     return result
+
+
+def closed_moments(
+    body: Magnet, rest: Array, sources: Sequence[Magnet], degree: int, nodes: int | None = None
+) -> Coefficients:
+    """As `induced_moments`, and those of a uniform polarisation `rest` (3,) T in body axes beside."""
+    uniform = uniform_moments(Magnet(body.box, rest), degree).coefficients
+    return np.asarray(induced_moments(body, sources, degree, nodes) + uniform)
 
 
 def first_order_moments(body: Magnet, sources: Sequence[Magnet], degree: int) -> Coefficients:

@@ -11,7 +11,7 @@ from ..geometry.box import Array, Box
 from ..geometry.gaps import closing_shifts, moved
 from ..geometry.magnet import Magnet
 from ..geometry.mesh import MagnetMesh, MeshSettings, mesh_magnets
-from ..geometry.symmetry import find_symmetry, parity_parts
+from ..geometry.symmetry import Symmetry, find_symmetry, parity_parts
 from .harmonics import Coefficients
 from .magnetostatics import Formulation, MeshError, System, assemble, solve
 from .moments import reaction_moments, trace_moments
@@ -46,6 +46,7 @@ class RotorSolution:
     mesh : of the part of space that the mirror planes leave, in their frame
     unknowns : number of unknowns
     area_error : relative error of the area of the outer sphere
+    layers : of elements at the edges; fewer than asked for where the mesher cannot match more
     """
 
     coefficients: tuple[Coefficients, ...]
@@ -53,6 +54,7 @@ class RotorSolution:
     mesh: MagnetMesh
     unknowns: int
     area_error: float
+    layers: int
 
     def expansions(self, coefficients: Sequence[Coefficients]) -> list[MultipoleExpansion]:
         """Expansions about the same spheres with other coefficients."""
@@ -66,6 +68,7 @@ def solve_rotor(
     degree: int = 1,
     pieces: Sequence[Sequence[Magnet]] | None = None,
     use_symmetry: bool = True,
+    carriers: Sequence[Magnet] | None = None,
 ) -> RotorSolution:
     """Solve for every parity part of the polarisation and add up; gaps too narrow for elements are closed.
 
@@ -74,6 +77,8 @@ def solve_rotor(
     degree : of the moments in `split`, where they are those of -(μ - 1) ∇ψ; in `direct` it is the boundary's
     pieces : of every magnet, each with its own expansion; by default the magnets
     use_symmetry : whether to mesh only one side of the mirror planes
+    carriers : in `split`, the magnets with μr = 1 whose closed form is split off, each in the place of one of the
+        magnets; by default the magnets' own remanence
 
     Raises
     ------
@@ -88,12 +93,14 @@ def solve_rotor(
     seen = [symmetry.to_frame(magnet) for magnet in closed]
     bodies = [piece for whole in cut for piece in whole]
     meshed = [symmetry.to_frame(moved(p, s)) for whole, s in zip(cut, shifts, strict=True) for p in whole]
-    mesh, system = _meshed_system(meshed, refinement, planes, [magnet.box for magnet in seen])
+    mesh, system, layers = _meshed_system(meshed, refinement, planes, [magnet.box for magnet in seen])
     total: list[Coefficients] = []
     area_error = 0.0
-    for signs, polarizations in parity_parts(seen, planes):
-        sources = [_polarized(magnet, j) for magnet, j in zip(seen, polarizations, strict=True)]
-        solution = solve(system, sources, formulation, refinement.boundary_degree, signs)
+    owners = [k for k, whole in enumerate(cut) for _ in whole]
+    for signs, (own, carried) in parity_parts(seen, planes, _polarizations(magnets, carriers, symmetry)):
+        sources = [_polarized(magnet, j) for magnet, j in zip(seen, carried, strict=True)]
+        rest = (own - carried)[owners]
+        solution = solve(system, sources, formulation, refinement.boundary_degree, signs, rest)
         area_error = solution.boundary.area_error
         part = [trace_moments(solution)] if formulation == "direct" else list(reaction_moments(solution, degree))
         total = [a + b for a, b in zip(total, part, strict=True)] if total else part
@@ -103,20 +110,26 @@ def solve_rotor(
         spheres, size = ((symmetry.center + symmetry.axes @ mesh.center, mesh.unit),), refinement.boundary_degree
     nothing = [np.zeros((size + 1, size + 1), complex)] * len(spheres)
     coefficients = tuple(turned(c, symmetry.axes) for c in total or nothing)
-    return RotorSolution(coefficients, spheres, mesh, system.unknowns, area_error)
+    return RotorSolution(coefficients, spheres, mesh, system.unknowns, area_error, layers)
 
 
 def _meshed_system(
     bodies: list[Magnet], refinement: Refinement, planes: tuple[int, ...], edges_of: list[Box]
-) -> tuple[MagnetMesh, System]:
-    """Mesh and matrix, with fewer layers at the edges where the mesher cannot match them (an edge within a face)."""
+) -> tuple[MagnetMesh, System, int]:
+    """Mesh, matrix, layers at the edges: fewer where the mesher cannot match them (an edge within a face)."""
     for layers in range(refinement.mesh.hp_layers, -1, -1):
         mesh = mesh_magnets(bodies, replace(refinement.mesh, hp_layers=layers), planes, edges_of)
         try:
-            return mesh, assemble(mesh, refinement.order)
+            return mesh, assemble(mesh, refinement.order), layers
         except MeshError:
             continue
     raise MeshError("The mesh of the magnets does not fit together; change their positions slightly.")
+
+
+def _polarizations(magnets: Sequence[Magnet], carriers: Sequence[Magnet] | None, symmetry: Symmetry) -> Array:
+    """(2, n, 3) T in the mirrors' frame: of the magnets and of their carriers."""
+    groups = (magnets, carriers or magnets)
+    return np.array([[magnet.polarization_in_rotor for magnet in group] for group in groups]) @ symmetry.axes
 
 
 def _polarized(magnet: Magnet, polarization: Array) -> Magnet:

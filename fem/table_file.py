@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from ..geometry.box import Box
+from ..geometry.box import Array, Box
 from ..geometry.magnet import Magnet
 from .multipole import MultipoleExpansion
 from .table import RotorTable
@@ -17,7 +17,7 @@ from .table_store import TableFileError, described, read_checked, write_checked
 
 __all__ = ["FORMAT", "TableFileError", "load_table", "save_table"]
 
-FORMAT = "spinlev rotor table 2"
+FORMAT = "spinlev rotor table 3"
 
 
 def save_table(table: RotorTable, path: str | Path) -> None:
@@ -56,7 +56,7 @@ def to_dataset(table: RotorTable) -> xr.Dataset:
         "magnet_polarization": (("magnet", "body_axis"), stack([m.polarization for m in magnets], 3), "T"),
         "magnet_recoil_permeability": (("magnet",), stack([m.recoil_permeability for m in magnets]), "1"),
         "magnet_transverse_permeability": (("magnet",), stack(across), "1"),
-        "magnet_closed_form": (("magnet",), stack([any(m is u for u in table.uniform) for m in magnets]), "1"),
+        "magnet_closed_form": (("magnet", "body_axis"), stack(_closed_forms(table), 3), "T"),
         "expansion_use": (("expansion",), stack([k for k, group in enumerate(causes.values()) for _ in group]), "1"),
         "expansion_center": (("expansion", "axis"), stack([e.center for e in expansions], 3), "m"),
         "expansion_radius": (("expansion",), stack([e.radius for e in expansions]), "m"),
@@ -72,6 +72,12 @@ def to_dataset(table: RotorTable) -> xr.Dataset:
         "provenance": json.dumps(dict(table.provenance), sort_keys=True),
     }
     return described(variables, attrs)
+
+
+def _closed_forms(table: RotorTable) -> list[Array]:
+    """Polarisation (3,) T, in body axes, whose closed form is part of the field, of every magnet."""
+    found = {id(form.box): form.polarization for form in table.uniform}
+    return [found.get(id(magnet.box), np.zeros(3)) for magnet in table.magnets]
 
 
 def from_dataset(dataset: xr.Dataset) -> RotorTable:
@@ -93,7 +99,11 @@ def from_dataset(dataset: xr.Dataset) -> RotorTable:
     return RotorTable(
         model=dataset.attrs["model"],
         magnets=magnets,
-        uniform=tuple(m for m, exact in zip(magnets, data["magnet_closed_form"], strict=True) if exact),
+        uniform=tuple(
+            m if np.array_equal(m.polarization, j) else Magnet(m.box, j)
+            for m, j in zip(magnets, data["magnet_closed_form"], strict=True)
+            if j.any()
+        ),
         expansions=causes.pop("field"),
         doubts=causes,
         provenance=json.loads(dataset.attrs["provenance"]),

@@ -12,14 +12,19 @@ from .multipole import MultipoleExpansion
 
 Part = tuple[int, int, int, complex]
 """Number of the expansion, l, m, and the real or imaginary part of the coefficient."""
+MOST = 300
+"""Coefficients up to which a fit is worth its time."""
+ROUNDS = 6
+"""Of reweighting in a fit."""
 
 
 def trimmed(
     expansions: Sequence[MultipoleExpansion], points: Array, allowed: Array
 ) -> tuple[list[MultipoleExpansion], list[MultipoleExpansion]]:
-    """The coefficients that matter, and those left out: together they make at most `allowed` (n,) T at points (n, 3) m.
+    """The coefficients that matter, and what they leave out: at most `allowed` (n,) T at points (n, 3) m.
 
-    The smallest ones are left out first, as many as the field of all of them allows.
+    The smallest ones are left out first. Those that stay are fitted to the whole field (weighted least squares), and
+    stand in for what is missing: about half as many do then.
     """
     parts = [
         (k, int(l), int(m), part)
@@ -32,14 +37,46 @@ def trimmed(
         return list(expansions), [_with(e, [], 0) for e in expansions]
     fields = np.concatenate([_fields(e, [p for p in parts if p[0] == k], points) for k, e in enumerate(expansions)])
     fields /= allowed[:, None]
-    order = np.argsort(np.linalg.norm(fields, axis=2).max(axis=1))
-    together = np.linalg.norm(np.cumsum(fields[order], axis=0), axis=2).max(axis=1)
-    count = int(np.argmax(together > 1)) if (together > 1).any() else len(order)
-    dropped, kept = [parts[k] for k in order[:count]], [parts[k] for k in order[count:]]
+    order = np.argsort(-np.linalg.norm(fields, axis=2).max(axis=1))
+    factors = _fewest(fields[order])
+    kept = [(k, l, m, c * f) for (k, l, m, c), f in zip((parts[i] for i in order), factors, strict=False)]
+    missing = [(k, l, m, -c) for k, l, m, c in kept] + parts
     return (
         [_with(e, kept, k) for k, e in enumerate(expansions)],
-        [_with(e, dropped, k) for k, e in enumerate(expansions)],
+        [_with(e, missing, k) for k, e in enumerate(expansions)],
     )
+
+
+def _fewest(fields: Array) -> Array:
+    """Factors of the first few of the fields (k, n, 3), with which they make the sum of all to 1 at every point."""
+    total = fields.sum(axis=0)
+    left_out = np.linalg.norm(total - np.cumsum(fields, axis=0), axis=2).max(axis=1)
+    too_few, enough = -1, 0 if np.linalg.norm(total, axis=1).max() <= 1 else int(np.argmax(left_out <= 1)) + 1
+    factors = np.ones(enough)
+    if enough > MOST:
+        return factors
+    while enough - too_few > 1:
+        count = (enough + too_few) // 2
+        found = _fitted(fields[:count], total)
+        if found is None:
+            too_few = count
+        else:
+            factors, enough = found, count
+    return factors
+
+
+def _fitted(fields: Array, total: Array) -> Array | None:
+    """Factors (k,) with which the fields make the total to 1 at every point; None if none were found."""
+    columns, weights = fields.reshape(len(fields), -1).T, np.ones(len(total))
+    for _ in range(ROUNDS):
+        rows = np.repeat(weights, 3)
+        factors = np.linalg.lstsq(columns * rows[:, None], total.ravel() * rows, rcond=None)[0]
+        error = np.linalg.norm(total - (columns @ factors).reshape(total.shape), axis=1)
+        if error.max() <= 1:
+            return np.asarray(factors)
+        weights *= np.sqrt(0.3 + error / error.max())  # towards equal largest errors
+        weights /= weights.mean()
+    return None
 
 
 def _fields(expansion: MultipoleExpansion, parts: list[Part], points: Array) -> Array:

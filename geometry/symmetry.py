@@ -17,6 +17,9 @@ from .magnet import Magnet
 
 SAME = 1e-9
 """Positions that differ by less than this part of the bodies' size are the same."""
+NARROW_SIDE = 0.04
+"""A plane in a gap is left out if corners lie nearer to it than this part of the shortest edge: elements at the plane
+would be larger than their distance from the edges, whose singularity is resolved only where elements touch them."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,7 +54,15 @@ def _symmetry_along(magnets: Sequence[Magnet], axes: Array) -> Symmetry:
     middle = axes @ ((corners.min(axis=0) + corners.max(axis=0)) / 2)
     symmetry = Symmetry(middle, axes, ())
     seen = [symmetry.to_frame(magnet) for magnet in magnets]
-    return replace(symmetry, planes=tuple(axis for axis in range(3) if mirror_images(seen, axis) is not None))
+    mirrors = (axis for axis in range(3) if mirror_images(seen, axis) is not None)
+    return replace(symmetry, planes=tuple(axis for axis in mirrors if not _in_narrow_gap(seen, axis)))
+
+
+def _in_narrow_gap(magnets: Sequence[Magnet], axis: int) -> bool:
+    """Whether the plane across a coordinate axis runs close by a corner of a body, but not through it."""
+    heights = np.abs([magnet.box.corners[:, axis] for magnet in magnets])
+    shortest = min(float(magnet.box.size.min()) for magnet in magnets)
+    return bool(np.any((heights > SAME * shortest) & (heights < NARROW_SIDE * shortest)))
 
 
 def mirror_images(magnets: Sequence[Magnet], axis: int) -> list[int] | None:
@@ -80,20 +91,27 @@ def _mirrored(magnet: Magnet, other: Magnet, axis: int) -> bool:
     return bool(np.allclose(permeability, other.permeability_in_rotor, rtol=0, atol=1e-12))
 
 
-def parity_parts(magnets: Sequence[Magnet], planes: tuple[int, ...]) -> list[tuple[tuple[int, ...], Array]]:
+def parity_parts(
+    magnets: Sequence[Magnet], planes: tuple[int, ...], polarizations: Array | None = None
+) -> list[tuple[tuple[int, ...], Array]]:
     """Parts of the polarisation that are even (+1) or odd (-1) at each coordinate plane, those that are zero left out.
+
+    Parameters
+    ----------
+    polarizations : (..., n, 3) T, one or several sets; by default those of the magnets
 
     Returns
     -------
-    Pairs of the signs, one per plane, and the polarisations (n, 3), T. The potential has the same signs.
+    Pairs of the signs, one per plane, and the polarisations (..., n, 3), T. The potential has the same signs.
     """
-    whole = np.array([magnet.polarization_in_rotor for magnet in magnets])
+    own = np.array([magnet.polarization_in_rotor for magnet in magnets])
+    whole = own if polarizations is None else polarizations
     images = {axis: mirror_images(magnets, axis) for axis in planes}
     parts = []
     for signs in product((1, -1), repeat=len(planes)):
         part = whole
         for axis, sign in zip(planes, signs, strict=True):
-            part = (part + sign * part[images[axis]] * mirror(axis)) / 2
+            part = (part + sign * part[..., images[axis], :] * mirror(axis)) / 2
         if np.abs(part).max() > 1e-14 * np.abs(whole).max():
             parts.append((signs, part))
     return parts

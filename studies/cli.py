@@ -89,7 +89,7 @@ def run(
     duration_s
         Simulated time, s.
     rtol
-        Relative accuracy asked of the field, from 0.8 edges off the magnets on.
+        Relative accuracy asked of the field wherever the floater can be.
     """
     _positive("--duration-s", duration_s)
     _tolerance(rtol)
@@ -122,7 +122,7 @@ def field(
     model
         Field model.
     rtol
-        Relative accuracy asked of the field, from 0.8 edges off the magnets on.
+        Relative accuracy asked of the field wherever the floater can be.
     """
     _tolerance(rtol)
     loaded, places = load_scene(scene), read_points(points)
@@ -158,7 +158,7 @@ def equilibria(
     spin
         Body spin S = Ω·m̂/ω of the floater about its own moment.
     rtol
-        Relative accuracy asked of the field, from 0.8 edges off the magnets on.
+        Relative accuracy asked of the field wherever the floater can be.
     """
     _tolerance(rtol)
     _plate_tolerance(plate_rtol)
@@ -199,7 +199,7 @@ def simulate(
     plate_rtol
         Relative accuracy asked of the plate's reaction.
     rtol
-        Relative accuracy asked of the field, from 0.8 edges off the magnets on.
+        Relative accuracy asked of the field wherever the floater can be.
     resume
         Go on from the checkpoint of the same flight in --out, if one is there.
     """

@@ -10,11 +10,12 @@ from functools import partial
 import numpy as np
 
 from ..fem import FieldMap, FieldTable, RotorTable, fit_field_map, uniform_moments
+from ..fem.carrier import carrier
+from ..fem.closed_part import added_by_closed_form
 from ..fem.crosscheck import magnet_dipoles
 from ..fem.ladder import AccuracyWarning, rung
 from ..fem.models import rotor_table
 from ..fem.multipole import without_noise
-from ..fem.remanent import induced_moments
 from ..fem.rotor_solution import Refinement, solve_rotor
 from ..geometry import Magnet
 from ..geometry.mesh import MeshSettings, mesh_magnets
@@ -59,10 +60,11 @@ def _direct(order: int, magnets: Magnets) -> tuple[FieldTable, int]:
 def _split(order: int, magnets: Magnets) -> tuple[FieldTable, int]:
     """One rung of the ladder: closed form of the remanence plus what the permeability adds."""
     degree = 6 + 4 * order
-    solution = solve_rotor(magnets, rung(order, MeshSettings()), "split", degree)
-    closed = [induced_moments(magnet, magnets, degree) for magnet in magnets]
+    carriers = tuple(carrier(magnet) for magnet in magnets)
+    solution = solve_rotor(magnets, rung(order, MeshSettings()), "split", degree, carriers=carriers)
+    closed = added_by_closed_form([(magnet,) for magnet in magnets], magnets, carriers, degree)
     whole = [without_noise(a + b, 1e-15) for a, b in zip(closed, solution.coefficients, strict=True)]
-    return RotorTable("fem", magnets, magnets, tuple(solution.expansions(whole))), solution.unknowns
+    return RotorTable("fem", magnets, carriers, tuple(solution.expansions(whole))), solution.unknowns
 
 
 def _table(rtol: float, magnets: Magnets) -> tuple[FieldTable, int]:

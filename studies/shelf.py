@@ -37,6 +37,8 @@ class Tables:
 class Shelf:
     """Tables of a scene by model, each computed once.
 
+    The accuracy holds wherever the floater can be: its centre comes no nearer to a magnet than its radius.
+
     Parameters
     ----------
     scene : whose rotor and plate
@@ -49,10 +51,15 @@ class Shelf:
     from_cache: list[str] = field(default_factory=list)
     _tables: dict[str, RotorTable] = field(default_factory=dict)
 
+    @property
+    def nearest(self) -> float:
+        """Distance from the magnets' faces from which on the accuracy is asked for, m."""
+        return self.scene.floater.radius
+
     def table(self, model: str | None = None) -> RotorTable:
         """The table of a model, by default the one asked for; `auto` chooses and says why."""
         model = model or self.asked.model
-        name, reason = resolve_model(self.scene.rotor, model)
+        name, reason = resolve_model(self.scene.rotor, model, self.asked.rtol, self.nearest)
         if model == "auto" and name not in self._tables:
             note(f"Field model: {name} ({reason})")
         if name not in self._tables:
@@ -88,9 +95,15 @@ class Shelf:
 
     def _made(self, name: str) -> RotorTable:
         if name != "fem":  # closed forms are quicker to make than to read
+<<<<<<< HEAD
             return rotor_table(self.scene.rotor, name, self.asked.rtol)
         note("Rotor's field by finite elements ...")
         table, found = cached_rotor_table(self.scene.rotor, name, self.asked.rtol, note)
+=======
+            return rotor_table(self.scene.rotor, name, self.asked.rtol, self.nearest)
+        note("Rotor's field by finite elements ...")
+        table, found = cached_rotor_table(self.scene.rotor, name, self.asked.rtol, note, self.nearest)
+>>>>>>> w3
         if found:
             self.from_cache.append(name)
         note("  from the cache." if found else f"  done in {table.provenance['seconds']:.1f} s.")
