@@ -95,15 +95,9 @@ class Shelf:
 
     def _made(self, name: str) -> RotorTable:
         if name != "fem":  # closed forms are quicker to make than to read
-<<<<<<< HEAD
-            return rotor_table(self.scene.rotor, name, self.asked.rtol)
-        note("Rotor's field by finite elements ...")
-        table, found = cached_rotor_table(self.scene.rotor, name, self.asked.rtol, note)
-=======
             return rotor_table(self.scene.rotor, name, self.asked.rtol, self.nearest)
         note("Rotor's field by finite elements ...")
         table, found = cached_rotor_table(self.scene.rotor, name, self.asked.rtol, note, self.nearest)
->>>>>>> w3
         if found:
             self.from_cache.append(name)
         note("  from the cache." if found else f"  done in {table.provenance['seconds']:.1f} s.")
