@@ -16,9 +16,8 @@ import numpy as np
 from ..geometry.atomic import replacing
 from ..geometry.box import Array
 from ..geometry.input_error import InputError
-
-SECONDS = 5.0
-"""Wall time between two checkpoints."""
+from .flight import Flight
+from .recorder import Recorder
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,6 +41,22 @@ class Progress:
     states: Array
     interval: float
     steps: int
+
+    @classmethod
+    def of(cls, flight: Flight, values: Array, recorder: Recorder, steps: int) -> Progress:
+        """Where a flight is now."""
+        integrator = flight.integrator
+        return cls(
+            np.array(integrator.dtime), integrator.state.copy(), values, recorder.times, recorder.states,
+            recorder.interval, steps,
+        )  # fmt: skip
+
+    def restore(self, flight: Flight, recorder: Recorder) -> tuple[Array, int]:
+        """Put everything back to where it was; the runtime parameters and the steps so far."""
+        flight.integrator.dtime = (float(self.time[0]), float(self.time[1]))
+        flight.integrator.state[:] = self.state
+        recorder.times, recorder.states, recorder.interval = self.times, self.states, self.interval
+        return self.values.copy(), self.steps
 
 
 @dataclass(frozen=True)

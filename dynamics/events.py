@@ -78,3 +78,13 @@ def plate_legs(plate: Plate | None, duration: float) -> list[tuple[float, float,
         (duration, lowering.distance, 0.0),
     ]
     return [(min(end, duration), depth, speed) for end, depth, speed in legs]
+
+
+def plate_places(scene: Scene, values: Array, times: Array) -> Array:
+    """Runtime parameters (n, p) at scaled times (n,): where the plate is, as if it stood there."""
+    places = np.tile(values, (len(times), 1))
+    places[:, Parameter.PLATE_SPEED] = 0.0
+    if scene.plate is not None:
+        places[:, Parameter.PLATE_DEPTH] = plate_depth(scene.plate, times * values[Parameter.TIME])
+        places[:, Parameter.PLATE_DEPTH] /= values[Parameter.LENGTH]
+    return places

@@ -14,9 +14,8 @@ import numpy as np
 
 from ..geometry.box import Array
 from ..geometry.scene import Scene
-from .checkpoint import SECONDS as CHECKPOINT_SECONDS
 from .checkpoint import Checkpoint, Progress
-from .events import CONTACT, clearance, plate_depth, plate_legs
+from .events import CONTACT, clearance, plate_legs, plate_places
 from .flight import Flight
 from .recorder import Recorder
 from .state import State
@@ -29,6 +28,8 @@ PIECE_TURNS, PIECE_SAMPLES = 256, 256
 
 A step ends where a piece does, so that pieces must not depend on how fast the machine is.
 """
+CHECKPOINT_SECONDS = 5.0
+"""Wall time between two checkpoints."""
 MOST_SAMPLES = 20000
 SAMPLES_PER_TURN = 32
 
@@ -78,7 +79,7 @@ def integrate(
     recorder, log, began = Recorder(flight.integrator.state, interval, MOST_SAMPLES), _Log(), perf_counter()
     known = checkpoint.read() if checkpoint else None
     if known is not None:
-        values = _restore(flight, recorder, log, known)
+        values, log.steps = known.restore(flight, recorder)
     first = recorder.times[-1]
     try:
         _fly(scene, flight, values, duration, recorder, log, progress, checkpoint)
@@ -93,22 +94,12 @@ def integrate(
         lab=scales.unpack(recorder.states).to_lab(scene.angular_velocity * time),
         angular_velocity=scene.angular_velocity,
         ended_by=log.ended_by,
-        energy_error=flight.energy_error(recorder.times, recorder.states, _plate_places(scene, values, recorder.times)),
+        energy_error=flight.energy_error(recorder.times, recorder.states, plate_places(scene, values, recorder.times)),
         realtime_factor=float((recorder.times[-1] - first) * scales.time / seconds),
         steps=log.steps,
         compile_seconds=flight.compile_seconds,
         interrupted=log.interrupted,
     )
-
-
-def _plate_places(scene: Scene, values: Array, times: Array) -> Array:
-    """Runtime parameters (n, p) at scaled times (n,): where the plate is, as if it stood there."""
-    places = np.tile(values, (len(times), 1))
-    places[:, Parameter.PLATE_SPEED] = 0.0
-    if scene.plate is not None:
-        places[:, Parameter.PLATE_DEPTH] = plate_depth(scene.plate, times * values[Parameter.TIME])
-        places[:, Parameter.PLATE_DEPTH] /= values[Parameter.LENGTH]
-    return places
 
 
 def _begin(flight: Flight, start: State, currents: Array) -> Array:
@@ -151,25 +142,8 @@ def _fly(
             if over:
                 return
             if checkpoint and perf_counter() - kept > CHECKPOINT_SECONDS:
-                checkpoint.write(_progress(flight, values, recorder, log))
+                checkpoint.write(Progress.of(flight, values, recorder, log.steps))
                 kept = perf_counter()
-
-
-def _progress(flight: Flight, values: Array, recorder: Recorder, log: _Log) -> Progress:
-    integrator = flight.integrator
-    return Progress(
-        np.array(integrator.dtime), integrator.state.copy(), values, recorder.times, recorder.states,
-        recorder.interval, log.steps,
-    )  # fmt: skip
-
-
-def _restore(flight: Flight, recorder: Recorder, log: _Log, known: Progress) -> Array:
-    """Put everything back to where it was; the runtime parameters."""
-    flight.integrator.dtime = (float(known.time[0]), float(known.time[1]))
-    flight.integrator.state[:] = known.state
-    recorder.times, recorder.states, recorder.interval = known.times, known.states, known.interval
-    log.steps = known.steps
-    return known.values.copy()
 
 
 def _ending(
