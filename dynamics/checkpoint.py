@@ -79,7 +79,7 @@ class Checkpoint:
     def write(self, progress: Progress) -> None:
         """Keep the progress; the file is whole or as it was."""
         with replacing(self.path) as temporary, temporary.open("wb") as stream:
-            np.savez(stream, key=self._key, **{k: np.asarray(v) for k, v in vars(progress).items()})
+            np.savez(stream, allow_pickle=False, key=np.array(self._key), **vars(progress))
 
     def read(self) -> Progress | None:
         """What was kept, or None if there is nothing.

@@ -98,7 +98,9 @@ class PlateForce:
     def _shares(self, times: Array) -> Array:
         angles = self.values[Parameter.RATE] * times
         share, depth = self.memory.share, self._depth
-        return self.values[Parameter.PLATE_SHARE] * np.array([share.signals(float(a), depth) for a in angles])
+        return np.asarray(
+            self.values[Parameter.PLATE_SHARE] * np.array([share.signals(float(a), depth) for a in angles])
+        )
 
     @property
     def _depth(self) -> float:

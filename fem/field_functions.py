@@ -29,7 +29,10 @@ UNFOLDED = np.array([[3, 4, 5], [4, 6, 7], [5, 7, 8]])
 """Where the entries of the symmetric gradient lie among the nine outputs of a function."""
 _TRIPLES = list(combinations_with_replacement(range(3), 3))
 UNFOLDED_THRICE = np.array(
-    [[[_TRIPLES.index(tuple(sorted((i, j, k)))) for k in range(3)] for j in range(3)] for i in range(3)]
+    [
+        [[_TRIPLES.index((min(i, j, k), sorted((i, j, k))[1], max(i, j, k))) for k in range(3)] for j in range(3)]
+        for i in range(3)
+    ]
 )
 """The same for the second derivatives, which are symmetric in all three indices."""
 

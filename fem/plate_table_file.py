@@ -106,7 +106,11 @@ def driven_plate_key(
 
     Coefficients of expansions count to nine digits: solved again, they differ in the last ones.
     """
-    numbers = [plate.box.center, plate.box.rotation, [plate.lowering.distance if plate.lowering else 0.0]]
+    numbers: list[ArrayLike] = [
+        plate.box.center,
+        plate.box.rotation,
+        [plate.lowering.distance if plate.lowering else 0.0],
+    ]
     for magnet in rotor.uniform:
         numbers += [magnet.box.size, magnet.box.center, magnet.box.rotation, magnet.polarization]
     for expansion in rotor.expansions:

@@ -68,7 +68,8 @@ def equilibria_job(scene: Scene, asked: Tables, spin: float, out: Path) -> Job:
 
 def simulate_job(scene: Scene, asked: Tables, duration: float, out: Path, resume: bool) -> Job:
     """The motion; writes trajectory.nc, and keeps a checkpoint while it lasts."""
-    identity = to_json([scene.text, vars(asked), duration, version("spinlev"), version("heyoka")])
+    versions = {name: version(name) for name in ("spinlev", "heyoka")}
+    identity = to_json({"scene": scene.text, "duration_s": duration, **vars(asked), **versions})
     checkpoint = Checkpoint(out / "checkpoint.npz", identity)
     if not resume:
         checkpoint.remove()
