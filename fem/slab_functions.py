@@ -66,7 +66,7 @@ def slab_functions(network: SlabNetwork, tolerance: float) -> tuple[Multipoles, 
 def _on_meridian(network: SlabNetwork, places: Array) -> Functions:
     """From φ = 0, where one partner shows ρ and z and the other φ, which grows with the other sign."""
     couplings = network.couplings(local_dipoles(network.waves.frame, places))
-    zero, *rest = (part.T.reshape(part.shape[1], -1, 3) for part in couplings)
+    zero, *rest = (part.T.reshape(part.shape[1], len(places), 3) for part in couplings)
     return [zero, *((even - odd) / np.sqrt(2) for even, odd in zip(rest[::2], rest[1::2], strict=True))]
 
 
