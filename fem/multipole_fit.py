@@ -63,7 +63,7 @@ def fit_multipoles(
     """
     columns = choice.fields(points) * point_scale[:, None, None]
     columns = columns.swapaxes(1, 2).reshape(-1, len(choice.kinds))
-    target = (values * state_scale[:, None, None] * point_scale[:, None]).reshape(len(values), -1).T
+    target = (values * state_scale[:, None, None] * point_scale[:, None]).reshape(len(values), len(columns)).T
     size = np.linalg.norm(columns, axis=0)
     free, rest = columns / size, target
     chosen: list[int] = []
@@ -91,4 +91,4 @@ def fit_multipoles(
 
 
 def _worst(rest: Array) -> float:
-    return float(np.sqrt(np.max(np.sum((rest**2).reshape(-1, 3, rest.shape[1]), axis=(1, 2)))))
+    return float(np.sqrt(np.max(np.sum((rest**2).reshape(len(rest) // 3, 3 * rest.shape[1]), axis=1))))

@@ -47,3 +47,7 @@ def test_a_fit_ends_where_its_candidates_do(step):
     assert len(fit.multipoles.kinds) == 2
     rebuilt = np.tensordot(fit.weights, fit.multipoles.fields(POINTS), (1, 1))
     assert values - rebuilt == pytest.approx(fit.error, abs=1e-9 * abs(values).max())
+
+
+def test_no_functions_need_no_multipoles():
+    assert fitted(CHOICE, np.zeros((0, len(POINTS), 3)), 1e-3).weights.shape == (0, 0)
