@@ -35,17 +35,19 @@ class PlateMemory:
     table : its currents and their fields, in its own frame
     share : what the turning rotor adds to the signals
     model : name of the plate's model
+    neglected : estimated relative error of the model itself: of a slab, what its edges would change
     """
 
     plate: Plate
     table: PlateTable
     share: RotorShare
     model: str = "reduced"
+    neglected: float = 0.0
 
     @property
     def error(self) -> float:
         """Estimated relative error of what the plate does."""
-        return max(self.table.errors.total, self.share.error)
+        return max(self.table.errors.total, self.share.error) + self.neglected
 
     @property
     def names(self) -> list[str]:
@@ -91,7 +93,7 @@ def memory_terms(memory: PlateMemory, position: Vector, moment: Vector, states: 
     force = [length * strength * f for f in _seen_by_rotor(memory.plate, push)]
     turn = [strength * t for t in cross(moment, _seen_by_rotor(memory.plate, field))]
     decay = [float(rate) * hy.par[Parameter.TIME] * y for rate, y in zip(memory.table.rates, currents, strict=True)]
-    descent = [*turned(position)[:2], hy.par[Parameter.PLATE_SPEED]]
+    descent = [*turned(position)[:2], hy.par[Parameter.PLATE_SPEED] if memory.plate.lowering else hy.expression(0.0)]
     drive = dot(force, descent) + hy.par[Parameter.RATE] * turn[2]
     return MemoryTerms(
         rates=[-d for d in decay],
@@ -111,7 +113,8 @@ def _seen_by_plate(plate: Plate, position: Vector, moment: Vector) -> tuple[Vect
     """Position (m, from the plate's centre) and moment direction along the plate's axes."""
     depth = hy.par[Parameter.PLATE_DEPTH] + hy.par[Parameter.PLATE_SPEED] * hy.time
     lab = [hy.par[Parameter.LENGTH] * x for x in _turn(position, 1.0)]
-    lab[2] = lab[2] + hy.par[Parameter.LENGTH] * depth
+    if plate.lowering:
+        lab[2] = lab[2] + hy.par[Parameter.LENGTH] * depth
     shifted = [lab[i] - float(plate.box.center[i]) for i in range(3)]
     axes = plate.box.rotation.T
     return _product(axes, shifted), _product(axes, _turn(moment, 1.0))

@@ -104,6 +104,8 @@ class PlateForce:
 
     @property
     def _depth(self) -> float:
+        if self.memory.plate.lowering is None:
+            return 0.0
         return float(self.values[Parameter.PLATE_DEPTH] * self.values[Parameter.LENGTH])
 
     def _multipoles(self, times: Array, position: Array) -> tuple[Array, Array, Array]:

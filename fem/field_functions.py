@@ -17,6 +17,7 @@ import numpy as np
 
 from ..geometry.box import Array, frozen_array
 from .compiled import FieldExpressions
+from .harmonics import derivative, outer_sums
 from .multipole import MultipoleExpansion
 from .plate_region import Region
 
@@ -95,6 +96,20 @@ class Multipoles:
         """∂²B_i/∂x_j∂x_k (n, k, 3, 3, 3) T/m² at points (n, 3) m."""
         values = self._compiled_curvature(np.ascontiguousarray(points.T)).reshape(len(self.kinds), 10, -1)
         return np.moveaxis(values[:, UNFOLDED_THRICE], -1, 0)
+
+    def fields(self, points: Array) -> Array:
+        """B (n, k, 3) T at points (n, 3) m, without compilation."""
+        found = np.zeros((len(points), len(self.kinds), 3))
+        degree = int(self.kinds[:, 0].max())
+        for center in np.unique(self.centers, axis=0):
+            here = np.flatnonzero((self.centers == center).all(axis=1))
+            single = np.zeros((len(here), degree + 1, degree + 1), complex)
+            for row, number in enumerate(here):
+                coefficients = self._expansions[number].coefficients
+                single[row, : len(coefficients), : len(coefficients)] = coefficients
+            parts = [-derivative(coefficients, axis) for coefficients in single for axis in range(3)]
+            found[:, here] = outer_sums(parts, (points - center) / self.scale).reshape(len(points), len(here), 3)
+        return found
 
     def evaluate(self, points: Array) -> tuple[Array, Array]:
         """B (n, k, 3) T and ∂B_i/∂x_j (n, k, 3, 3) T/m at points (n, 3) m."""

@@ -22,7 +22,7 @@ INDEPENDENT = 1e-10
 NOISE = 1e-11
 """Weights below this share of the largest are what symmetry forbids."""
 STEP, PATIENCE, STALLED = 2, 6, 0.95
-"""Multipoles at a time; the fit ends where so many steps leave more than this share of the error."""
+"""Multipoles at a time, unless told; the fit ends where so many steps leave more than this share of the error."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,6 +49,7 @@ def fit_multipoles(
     point_scale: Array,
     tolerance: float,
     enough: Callable[[Array], bool],
+    step: int = STEP,
 ) -> Fit:
     """Few multipoles that meet the tolerance and are `enough`, or as many as still help.
 
@@ -58,10 +59,11 @@ def fit_multipoles(
     state_scale, point_scale : (functions,) and (n,) factors that make errors comparable
     tolerance : for the norm of the scaled error over functions and components, at every point
     enough : whether errors (functions, n, 3) are small enough
+    step : multipoles between two looks at the error
     """
-    columns = choice.evaluate(points)[0] * point_scale[:, None, None]
+    columns = choice.fields(points) * point_scale[:, None, None]
     columns = columns.swapaxes(1, 2).reshape(-1, len(choice.kinds))
-    target = (values * state_scale[:, None, None] * point_scale[:, None]).reshape(len(values), -1).T
+    target = (values * state_scale[:, None, None] * point_scale[:, None]).reshape(len(values), len(columns)).T
     size = np.linalg.norm(columns, axis=0)
     free, rest = columns / size, target
     chosen: list[int] = []
@@ -71,10 +73,12 @@ def fit_multipoles(
         stalled = len(left) > PATIENCE and left[-1] > STALLED * left[-1 - PATIENCE]
         if stalled or (left[-1] <= tolerance and enough(error)):
             break
-        for _ in range(STEP):
+        for _ in range(step):
             remaining = np.einsum("ij,ij->j", free, free)
             gain = np.sum((free.T @ rest) ** 2, axis=1) / np.maximum(remaining, INDEPENDENT)
             best = int(np.argmax(np.where(remaining > INDEPENDENT, gain, 0.0)))
+            if remaining[best] <= INDEPENDENT:  # none is left: the error stays until the fit has stalled
+                break
             direction = free[:, best] / np.linalg.norm(free[:, best])
             chosen.append(best)
             free = free - np.outer(direction, direction @ free)
@@ -87,4 +91,4 @@ def fit_multipoles(
 
 
 def _worst(rest: Array) -> float:
-    return float(np.sqrt(np.max(np.sum((rest**2).reshape(-1, 3, rest.shape[1]), axis=(1, 2)))))
+    return float(np.sqrt(np.max(np.sum((rest**2).reshape(len(rest) // 3, 3 * rest.shape[1]), axis=1))))

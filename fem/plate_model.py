@@ -65,7 +65,7 @@ def tabulate(network: PlateNetwork, rtol: float) -> PlateTable:
     point_scale = 1 / np.sqrt(np.sum((values * state_scale[:, None, None]) ** 2, axis=(0, 2)))
 
     def worst(error: Array) -> float:
-        return max(_tensor_error(values, error, rates, omega) for omega in (low, middle, high))
+        return max(tensor_error(values, error, rates, omega) for omega in (low, middle, high))
 
     choice = candidates(region, half_edges)
     fit = fit_multipoles(
@@ -101,7 +101,7 @@ def field_values(network: PlateNetwork, points: Array) -> Array:
     return couplings.reshape(len(couplings), -1, 3)
 
 
-def _tensor_error(values: Array, error: Array, rates: Array, omega: float) -> float:
+def tensor_error(values: Array, error: Array, rates: Array, omega: float) -> float:
     """Largest relative error of reaction tensors from errors of the field functions."""
     weight = 1 / (rates + 1j * omega)
     exact, found = (np.einsum("ina,i,inb->nab", b, weight, b, optimize=True) for b in (values, values - error))

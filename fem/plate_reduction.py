@@ -88,11 +88,7 @@ def reduce_plate(
     AccuracyError : the mesh is too coarse for `rtol`, or the frequencies do not suffice
     """
     start = time.perf_counter()
-    low, high = frequencies
-    if not 0 < low < high < np.inf:
-        raise ValueError(f"Input frequencies_hz must be positive and increasing; instead received {frequencies}.")
-    if not 0 < rtol < 1:
-        raise ValueError(f"Input rtol must be between 0 and 1; instead received {rtol}.")
+    low, high = checked_ranges(frequencies, rtol)
     rule = rule or (MeshRule() if rtol >= 5e-4 else MeshRule(1.0, 1.6, 1.4))
     others = others or OtherSources()
     places = np.concatenate([region.grid((2, 2, 2), fold=True), others.places])
@@ -112,7 +108,7 @@ def reduce_plate(
             break
         used = sorted([*used, tried.pop(0)])
         tried += [float(np.sqrt(used[-1] * used[-2])), float(np.sqrt(used[-2] * used[-3]))]
-    chosen, state_error = truncated(training, basis, allowed)
+    chosen, state_error = truncated(training.worst, basis, allowed)
     if state_error > allowed:
         raise AccuracyError(f"Input rtol must be larger: the states leave {state_error:.1e}, allowed is {allowed:.1e}.")
     diagonal = [part.diagonalised() for part in chosen]
@@ -122,3 +118,18 @@ def reduce_plate(
         float(error.max()), state_error, tuple(sorted(training.reactions)),
         time.perf_counter() - start,
     )  # fmt: skip
+
+
+def checked_ranges(frequencies: tuple[float, float], rtol: float) -> tuple[float, float]:
+    """The frequencies (Hz), once they and the tolerance are found good.
+
+    Raises
+    ------
+    ValueError : they are not
+    """
+    low, high = frequencies
+    if not 0 < low < high < np.inf:
+        raise ValueError(f"Input frequencies_hz must be positive and increasing; instead received {frequencies}.")
+    if not 0 < rtol < 1:
+        raise ValueError(f"Input rtol must be between 0 and 1; instead received {rtol}.")
+    return low, high

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -89,16 +89,11 @@ class Training:
             b.couplings(modes.amplitudes @ modes.rows, 2 * np.pi * frequency)
             for b, modes in zip(basis, self.modes, strict=True)
         ]
-        found, truth = np.asarray(sum(parts)), self.truth(frequency)
-        return max(
-            float(_relative(f, t).max(initial=0.0)) for f, t in zip(self._seen(found), self._seen(truth), strict=True)
-        )
+        return coupling_error(np.asarray(sum(parts)), self.truth(frequency), self.places)
 
-    def _seen(self, couplings: ComplexArray) -> tuple[ComplexArray, ComplexArray]:
-        """Own tensors (places, 9), and fields (other sources, components at all places)."""
-        n = self.places
-        blocks = couplings[: 3 * n, : 3 * n].reshape(n, 3, n, 3)
-        return np.einsum("iaib->iab", blocks).reshape(n, 9), couplings[3 * n :, : 3 * n]
+    def worst(self, basis: Sequence[OrderedBasis]) -> float:
+        """Largest error at all solved frequencies."""
+        return max(self.error(basis, frequency) for frequency in self.reactions)
 
 
 def prepare_training(space: EddySpace, region: Region, rtol: float, others: OtherSources) -> Training:
@@ -109,8 +104,7 @@ def prepare_training(space: EddySpace, region: Region, rtol: float, others: Othe
     groups = parity_groups(space.parity, region.mirrors)
     rows = group_rows(space, groups, sources)
     scale = _scale(rows, len(others.training))
-    probes = qmc.scale(qmc.Halton(3, seed=1).random(PROBES), region.lower, region.upper)
-    probes = np.concatenate([region.surface((2, 2, 2), fold=True), probes])
+    probes = probe_places(region, fold=True)
     tests = group_rows(space, groups, [*unit_dipoles(probes), *others.probes])
     test_scale = _scale(tests, len(others.probes))
     trained = [source_modes(space, g, r, scale, MODE_SHARE * rtol) for g, r in zip(groups, rows, strict=True)]
@@ -119,29 +113,52 @@ def prepare_training(space: EddySpace, region: Region, rtol: float, others: Othe
     return Training(space, modes, weights, len(probes))
 
 
+def probe_places(region: Region, fold: bool = False) -> Array:
+    """(n, 3) m: corners of the region, folded those not mirrored, and some places within."""
+    inside = qmc.scale(qmc.Halton(3, seed=1).random(PROBES), region.lower, region.upper)
+    return np.concatenate([region.surface((2, 2, 2), fold), inside])
+
+
 def _scale(rows: Sequence[Array], others: int) -> Array:
+    return unit_power(np.sum([np.sum(part**2, axis=1) for part in rows], axis=0), others)
+
+
+def unit_power(power: Array, others: int) -> Array:
     """Factors (sources,) that give each place of three dipoles, and each of the last `others` sources, unit power."""
-    power = np.sum([np.sum(part**2, axis=1) for part in rows], axis=0)
     dipoles = len(power) - others
     place = np.repeat(power[:dipoles].reshape(-1, 3).sum(axis=1), 3)
     return np.asarray(1 / np.sqrt(np.concatenate([place, power[dipoles:]])))
+
+
+def coupling_error(found: ComplexArray, truth: ComplexArray, places: int) -> float:
+    """Largest relative error of own tensors and of other sources' fields, in couplings (sources, sources).
+
+    Three dipoles at each of some places come first, then the others.
+    """
+    pairs = zip(_seen(found, places), _seen(truth, places), strict=True)
+    return max(float(_relative(f, t).max(initial=0.0)) for f, t in pairs)
+
+
+def _seen(couplings: ComplexArray, places: int) -> tuple[ComplexArray, ComplexArray]:
+    """Own tensors (places, 9), and fields (other sources, components at all places)."""
+    n = places
+    blocks = couplings[: 3 * n, : 3 * n].reshape(n, 3, n, 3)
+    return np.einsum("iaib->iab", blocks).reshape(n, 9), couplings[3 * n :, : 3 * n]
 
 
 def _relative(found: ComplexArray, truth: ComplexArray) -> Array:
     return np.asarray(np.linalg.norm(found - truth, axis=1) / np.linalg.norm(truth, axis=1))
 
 
-def truncated(training: Training, basis: Sequence[OrderedBasis], tolerance: float) -> tuple[list[OrderedBasis], float]:
-    """The fewest leading fields with which all probes at all solved frequencies meet the tolerance; their error."""
+def truncated(
+    worst: Callable[[Sequence[OrderedBasis]], float], basis: Sequence[OrderedBasis], tolerance: float
+) -> tuple[list[OrderedBasis], float]:
+    """The fewest leading fields whose `worst` error meets the tolerance, and that error."""
     levels = np.sort(np.concatenate([part.energies for part in basis]))[::-1]
     low, high = 0, len(levels) - 1
     while low < high:
         middle = (low + high) // 2
-        error = _worst(training, [part.leading(levels[middle]) for part in basis])
+        error = worst([part.leading(levels[middle]) for part in basis])
         low, high = (low, middle) if error <= tolerance else (middle + 1, high)
     chosen = [part.leading(levels[low]) for part in basis]
-    return chosen, _worst(training, chosen)
-
-
-def _worst(training: Training, basis: Sequence[OrderedBasis]) -> float:
-    return max(training.error(basis, frequency) for frequency in training.reactions)
+    return chosen, worst(chosen)

@@ -19,6 +19,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Protocol
 
 import heyoka as hy
 import numpy as np
@@ -27,14 +28,20 @@ from ..geometry.box import Array, frozen_array
 from ..geometry.scene import Plate
 from .accuracy_error import AccuracyError
 from .eddy_space import Source
-from .plate_reduction import PlateNetwork
 from .rotor_source import posed_rotor, rotor_parts
 from .table import RotorTable
 
 MOST_TERMS = 15
 """Highest number of harmonics, and of points along the way."""
-NOISE = 1e-8
-"""Amplitudes below this share of the largest are what symmetry forbids."""
+NOISE = 1e-10
+"""Amplitudes below this share of the largest signal are what symmetry forbids."""
+
+
+class Network(Protocol):
+    """Currents as states that listen to sources."""
+
+    def couplings(self, sources: Sequence[Source]) -> list[Array]:
+        """s_i, √J, of sources in the plate's frame: (sources, states) for each group of states."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,13 +90,13 @@ class RotorShare:
 
 
 def rotor_share(
-    network: PlateNetwork, plate: Plate, rotor: RotorTable, tolerance: float = 1e-4, most: int = MOST_TERMS
+    network: Network, plate: Plate, rotor: RotorTable, tolerance: float = 1e-4, most: int = MOST_TERMS
 ) -> RotorShare:
     """Signals of a rotor for the pose and the way of `plate`.
 
     Parameters
     ----------
-    network : of a plate of the same size and conductivity
+    network : of a plate of the same size and conductivity, or of what stands for it
     tolerance : for the estimated error; harmonics and depths are added until it is met
     most : highest number of either
 
@@ -118,12 +125,12 @@ def _trimmed(distance: float, series: Array, error: float, tolerance: float, siz
     tails = np.cumsum(np.abs(series).sum(axis=2).max(axis=1)[::-1])[::-1] / size
     kept = max(3, int(np.argmax(np.append(tails, 0.0) <= tolerance)) | 1)
     part = series[:kept]
-    small = np.abs(part) < NOISE * np.abs(part).max()
+    small = np.abs(part) < NOISE * size
     return RotorShare(distance, np.where(small, 0.0, part), error + float(np.append(tails, [0.0, 0.0])[kept]))
 
 
 def _sampled(
-    network: PlateNetwork, plate: Plate, parts: Sequence[Source], distance: float, harmonics: int, depths: int
+    network: Network, plate: Plate, parts: Sequence[Source], distance: float, harmonics: int, depths: int
 ) -> tuple[Array, Array]:
     """Series (2H+1, states, depths) through samples (depths, 2H+1, states) at equidistant angles, Chebyshev depths."""
     turns = 2 * harmonics + 1

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from ..dynamics import PlateMemory
 from ..fem.driven_plate import reachable_region
 from ..fem.plate_region import Region
 from ..fem.plate_table_file import cached_driven_plate
+from ..fem.slab_table import slab_and_rotor_table
 from ..fem.table import RotorTable
 from ..geometry import SceneError
 from ..geometry.box import Array
@@ -24,6 +27,8 @@ RASTER = 0.001
 """Bounds of regions are multiples of this, m, so that scenes that differ little share a table."""
 LOWEST, HIGHEST, HARMONICS = 0.5, 250.0, 2.0
 """Frequencies of a table, Hz, at least; and the multiple of the rotor's that it must hold."""
+PLUMB = 1e-9
+"""Cosine of the angle between a slab's normal and the vertical below which it stands upright."""
 NEGLIGIBLE = 1e-6
 """Part of the floater's weight below which the largest conceivable force of the plate is left out."""
 
@@ -49,14 +54,19 @@ def resolve_plate_model(scene: Scene, model: str, place: Array | None, rtol: flo
     if mirror < NEGLIGIBLE * weight:
         return "none", f"at {gap * 1e3:.3g} mm the plate pushes with less than {NEGLIGIBLE:.0e} of the weight"
     body, normal = plate.box.to_body(place), int(np.argmin(plate.box.size))
-    lateral = [axis for axis in range(3) if axis != normal]
-    depth = abs(float(body[normal])) + plate.box.half_edges[normal]
     if abs(body[normal]) > plate.box.half_edges[normal]:
-        missing = beyond_edges(body[lateral], plate.box.size[lateral] / 2, depth)
+        missing = _missing(plate, place)
         if missing <= rtol:
             return "slab", f"only {missing:.1e} of the source lies beyond the plate's edges"
         return "reduced", f"{missing:.1e} of the source lies beyond the plate's edges, {rtol:.1e} is allowed"
     return "reduced", "the floater is beside the plate's edge"
+
+
+def _missing(plate: Plate, place: Array) -> float:
+    """Part of a dipole's squared potential at the plate's far face that lies beyond its edges."""
+    body, size, normal = plate.box.to_body(place), plate.box.size, int(np.argmin(plate.box.size))
+    lateral = [axis for axis in range(3) if axis != normal]
+    return beyond_edges(body[lateral], size[lateral] / 2, abs(float(body[normal])) + size[normal] / 2)
 
 
 def plate_memory(
@@ -66,15 +76,21 @@ def plate_memory(
 
     Raises
     ------
-    InputError : the plate leaves the floater no room
+    InputError : the plate leaves the floater no room, or is no slab for the floater and the rotor
     """
+    if model == "slab" and plate.lowering and abs(plate.box.rotation[2, np.argmin(plate.box.size)]) < PLUMB:
+        plate = replace(plate, lowering=None)  # an infinite slab that moves along itself stays where it is
     sideways = float(np.hypot(place[0], place[1])) + REACH
     region = _rastered(reachable_region(plate, [0.0, 0.0, place[2]], [sideways, sideways, REACH], scene.floater.radius))
     frequencies = (LOWEST, max(HIGHEST, HARMONICS * scene.frequency))
     note("Plate's currents ...")
-    made, share, found = cached_driven_plate(plate, table, region, frequencies, rtol, note)
-    note("  from the cache." if found else f"  {len(made.rates)} states in {made.provenance['seconds']:.0f} s.")
-    return PlateMemory(plate, made, share, model), found
+    if model == "slab":
+        made, share = slab_and_rotor_table(plate, table, region, frequencies, rtol)
+        found = False
+    else:
+        made, share, found = cached_driven_plate(plate, table, region, frequencies, rtol, note)
+    note("  from the cache." if found else f"  {len(made.rates)} states in {made.provenance['seconds']:.1f} s.")
+    return PlateMemory(plate, made, share, model, _missing(plate, place) if model == "slab" else 0.0), found
 
 
 def _rastered(region: Region) -> Region:

@@ -86,6 +86,25 @@ def test_simulate(spinlev, tmp_path):
     assert answer["not_modelled"]  # the scene has a plate
 
 
+def test_the_plate_is_in_the_equilibria_and_the_motion(spinlev):
+    """A plate that lies under the floater damps it: the infinite slab, which needs no finite elements."""
+    options = (SCENES / "tilt-over-plate.toml", "--model", "cuboid", "--plate-model", "slab", "--json")
+    status, out, err = spinlev("equilibria", *options)
+    assert status == 0, err
+    first = json.loads(out)["equilibria"][0]
+    assert first["with_plate"]
+    assert first["stable"]
+    assert -5 < first["growth_per_s"] < -1
+    assert abs(first["without_plate"]["growth_per_s"]) < 1e-3
+    status, out, err = spinlev("simulate", *options, "--duration-s", "0.05")
+    assert status == 0, err
+    answer = json.loads(out)
+    assert answer["plate_model"] == "slab"
+    assert answer["plate_error_estimate"] > 0.1  # the real plate is not infinite
+    assert answer["energy_error"] < 1e-9
+    assert answer["beyond_plate_table"] == 0
+
+
 def test_run_writes_everything_and_finds_its_table_again(spinlev, tmp_path):
     status, out, err = spinlev("run", SCENES / "horizontal.toml", "--duration-s", "0.1", *NO_PLATE)
     assert status == 0, err

@@ -21,6 +21,7 @@ from spinlev.fem.driven_plate import plate_and_rotor_table
 from spinlev.fem.phasor import mean_force, mean_torque
 from spinlev.fem.plate_region import Region
 from spinlev.fem.rotor_share import RotorShare
+from spinlev.fem.slab_table import slab_and_rotor_table
 from spinlev.fem.table import RotorTable
 from spinlev.geometry import rotor
 from spinlev.geometry.box import Box
@@ -156,6 +157,32 @@ def test_without_a_plate_multipliers_are_the_eigenvalues(known, rates):
         assert modes.growth / Scales.of(SCENE).time == pytest.approx(equilibrium.growth_per_s, abs=1e-5)
         found = modes.angular_frequencies / (2 * np.pi * Scales.of(SCENE).time)
         np.testing.assert_allclose(found, equilibrium.frequencies_hz, rtol=1e-6)
+
+
+def test_over_an_infinite_slab_multipliers_are_the_eigenvalues_of_the_turning_frame(known, rates):
+    """A slab looks the same from every angle: the motion is steady; the plate's states turn as pairs cos mφ, sin mφ.
+
+    In the rotor's frame everything is then autonomous; its eigenvalues are Floquet's to 1e-6 of the rotor's rate.
+    """
+    plate = replace(PLATE, lowering=None)
+    table, share = slab_and_rotor_table(
+        plate, CUBOID, Region.over_face(PLATE.box.size, (0.016, 0.026), 0.004), rtol=1e-2
+    )
+    force = PlateForce(PlateMemory(plate, table, share, "slab"), VALUES)
+    orbit = periodic_orbit(rates, VALUES, 0.0, force, Scales.of(SCENE).pack(known.equilibria[0].state))
+    assert np.ptp(orbit.states, axis=0).max() < 1e-9
+    assert np.abs(orbit.states[0] - Scales.of(SCENE).pack(known.equilibria[0].state)).max() > 1e-3
+    matrix, kinds = orbit.derivatives[0].copy(), table.multipoles.kinds.astype(int)
+    used = [kinds[np.abs(row) > 0] for row in table.weights]
+    orders = np.array([kind[0, 1] for kind in used])
+    assert all((kind[:, 1] == m).all() for kind, m in zip(used, orders, strict=True))
+    for m in range(1, orders.max() + 1):
+        cosines, sines = np.split(12 + np.flatnonzero(orders == m), 2)
+        matrix[cosines, sines] += m
+        matrix[sines, cosines] -= m
+    exact = np.linalg.eigvals(matrix)
+    for rate in floquet_modes(orbit).eigenvalues:
+        assert np.abs(exact - rate).min() < 1e-6
 
 
 def test_gravity_across_the_axis_makes_the_motion_periodic(rates):
