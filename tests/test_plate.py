@@ -64,8 +64,7 @@ def test_bad_input_is_named():
 def test_self_convergence_of_every_entry(frequency):
     """Another mesh and order: every entry of G within 1e-4 of its norm; symmetric; passive.
 
-    Three heights on the axis, 20 mm from an edge, and beside the narrow face, which for an upright plate is the floater's
-    place under its edge.
+    Three heights on the axis, 20 mm from an edge, and beside the narrow face: beside an upright plate.
     """
     places = [(0.0, 0.0, h) for h in HEIGHTS] + [(0.03, 0.0, 0.02), (0.07, 0.01, -0.005)]
     found = plate_reaction(LYING, places, frequency, 1e-4)
