@@ -47,3 +47,12 @@ def rotating_torque(radius: float, conductivity: float, frequency: ArrayLike, fl
     Exact for a uniform field; (2π/15) σ ω B⊥² R⁵ where the skin depth is large.  The loss in the sphere is ω times it.
     """
     return np.asarray(-polarizability(radius, conductivity, frequency).imag * np.asarray(flux_density, float) ** 2)
+
+
+def thin_field_torque(radius: float, conductivity: float) -> float:
+    """(2π/15) σ R⁵, N m s/T²: the torque per B⊥² and relative angular velocity, where the skin depth is large.
+
+    As a vector the torque is this times B × (Ω × B), with Ω the field's angular velocity relative to the sphere.  Its
+    relative error is (ωμ0σR²)²/105: for a floater of NdFeB with R = 6.35 mm 4e-6 at 100 Hz.
+    """
+    return 2 * np.pi / 15 * conductivity * radius**5
