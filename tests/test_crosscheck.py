@@ -51,12 +51,13 @@ def test_both_assemblies_agree_on_one_mesh(name, formulation, tolerance):
 
 
 def test_anisotropic_split_and_elements_without_any_closed_form_agree():
-    """Two formulations, two meshes: the moment of a box whose easy axis is not along its edges, to 1e-7."""
+    """Two formulations and meshes: the moment of a box whose easy axis is not along its edges; direct order 4 is the
+    less exact of the two, to 1e-6."""
     rotor = ROTORS["anisotropic"]
-    direct = solve_rotor(rotor, Refinement(6, MeshSettings(magnet_size=0.5, hp_layers=2, curve_order=8), 12), "direct")
+    direct = solve_rotor(rotor, Refinement(4, MeshSettings(hp_layers=2, curve_order=8), 8), "direct")
     (expansion,) = direct.expansions(direct.coefficients)
-    table, remanent = fem_table(rotor, Accuracy(1e-7)), rotor[0].moment
-    assert np.linalg.norm(table.moment - expansion.moment) < 1e-7 * np.linalg.norm(remanent)
+    table, remanent = fem_table(rotor, Accuracy(1e-5)), rotor[0].moment
+    assert np.linalg.norm(table.moment - expansion.moment) < 1e-6 * np.linalg.norm(remanent)
     alike = fem_table((Magnet(TURNED, rotor[0].polarization, 1.05),), Accuracy(1e-5)).moment
     assert np.linalg.norm(table.moment - alike) > 1e-3 * np.linalg.norm(remanent)  # the transverse permeability acts
 
