@@ -24,7 +24,7 @@ def trimmed(
     """The coefficients that matter, and what they leave out: at most `allowed` (n,) T at points (n, 3) m.
 
     The smallest ones are left out first. Those that stay are fitted to the whole field (weighted least squares), and
-    stand in for what is missing: about half as many do then.
+    stand in for what is missing: little more than half as many do then.
     """
     parts = [
         (k, int(l), int(m), part)
