@@ -51,7 +51,9 @@ def _fewest(fields: Array) -> Array:
     """Factors of the first few of the fields (k, n, 3), with which they make the sum of all to 1 at every point."""
     total = fields.sum(axis=0)
     left_out = np.linalg.norm(total - np.cumsum(fields, axis=0), axis=2).max(axis=1)
-    too_few, enough = -1, 0 if np.linalg.norm(total, axis=1).max() <= 1 else int(np.argmax(left_out <= 1)) + 1
+    if np.linalg.norm(total, axis=1).max() <= 1:
+        return np.zeros(0)
+    too_few, enough = 0, int(np.argmax(left_out <= 1)) + 1
     factors = np.ones(enough)
     if enough > MOST:
         return factors
