@@ -15,7 +15,13 @@ from spinlev.fem.models import rotor_table
 from spinlev.geometry import load_scene
 
 SCENE = load_scene("scenes/horizontal.toml")
-POINTS = np.random.default_rng(0).uniform(-0.015, 0.015, (100_000, 3)) - [0, 0, 0.03]
+GENERATOR = np.random.default_rng(0)
+WAY = GENERATOR.normal(size=(100_000, 3))
+POINTS = (
+    SCENE.rotor[0].box.center
+    + GENERATOR.uniform(0.013, 0.04, (100_000, 1)) * WAY / np.linalg.norm(WAY, axis=1)[:, None]
+)
+"""All around the magnet, 13 to 40 mm from its centre."""
 
 
 def peer(rotor):
@@ -44,7 +50,7 @@ def test_evaluation(benchmark, model):
         table = RotorTable("moments", rotor, (), tuple(uniform_moments(m, 13) for m in rotor))
         field = benchmark(lambda: table.evaluate(POINTS))[0]
     else:
-        table = rotor_table(rotor, model)
+        table = rotor_table(rotor, model, nearest=SCENE.floater.radius)
         field = benchmark(lambda: table.evaluate(POINTS))[0]
     assert np.isfinite(field).all()
 

@@ -25,7 +25,7 @@ def carrier(magnet: Magnet) -> Magnet:
     turn = magnet.box.rotation
     susceptibility = turn.T @ (magnet.permeability_in_rotor - np.eye(3)) @ turn
     polarization = np.linalg.solve(np.eye(3) + susceptibility @ _mean_tensor(magnet.box), magnet.polarization)
-    return Magnet(magnet.box, np.asarray(polarization, dtype=np.float64))
+    return Magnet(magnet.box, np.asarray(polarization, float))
 
 
 def _mean_tensor(box: Box) -> Array:

@@ -36,7 +36,9 @@ RUNGS = (2, 3, 4, 5, 6, 7, 8)
 FIRST_RATE = 0.5
 """Ratio of two differences that is assumed before it is known; 0.1 to 0.3 were measured."""
 FASTEST_RATE, SLOWEST_RATE = 0.1, 0.75
-SAFETY = 2.0
+FASTEST_RATE_STRONG, STRONG = 0.3, 0.5
+"""For μ - 1 from 0.5 on: the singularity at edges is so strong there that the layers, not the orders, set the pace."""
+SAFETY = 2.5
 """Factor on the extrapolated difference."""
 HIGHEST_DEGREE = 44
 BESIDE = 2.5
@@ -130,7 +132,7 @@ def climb(
         difference = [b - a for a, b in zip(coarse.coefficients, fine.coefficients, strict=True)]
         field = sum(e.evaluate(points)[0] for e in fine.expansions(difference))
         size = float(np.max(np.linalg.norm(field, axis=1) / scale))
-        rate = _rate(size, before, fine.layers == rung(order, settings).mesh.hp_layers)
+        rate = _rate(size, before, _fastest(fine, rung(order, settings)))
         factor = SAFETY * rate / (1 - rate)
         if factor * size <= target:
             break
@@ -138,11 +140,18 @@ def climb(
     return fine, order, fine.expansions([factor * d for d in difference])
 
 
-def _rate(size: float, before: float, graded: bool) -> float:
-    """Ratio of the next difference to the last one; with too few layers at edges orders converge slowly later on."""
+def _fastest(solution: RotorSolution, wanted: Refinement) -> float:
+    """Rate that may be trusted: slow where layers at the edges lack, since orders then converge slowly later on."""
+    if solution.layers < wanted.mesh.hp_layers:
+        return FIRST_RATE
+    contrast = max(magnet.contrast for magnet in solution.mesh.magnets)
+    return FASTEST_RATE if contrast < STRONG else FASTEST_RATE_STRONG
+
+
+def _rate(size: float, before: float, fastest: float) -> float:
+    """Ratio of the next difference to the last one."""
     if np.isinf(before):
         return FIRST_RATE
-    fastest = FASTEST_RATE if graded else FIRST_RATE
     return min(max(size / before, fastest) if before else 0.0, SLOWEST_RATE)
 
 

@@ -24,7 +24,7 @@ def trimmed(
     """The coefficients that matter, and what they leave out: at most `allowed` (n,) T at points (n, 3) m.
 
     The smallest ones are left out first. Those that stay are fitted to the whole field (weighted least squares), and
-    stand in for what is missing: about half as many do then.
+    stand in for what is missing: little more than half as many do then. Dipole moments stay as they are.
     """
     parts = [
         (k, int(l), int(m), part)
@@ -37,9 +37,13 @@ def trimmed(
         return list(expansions), [_with(e, [], 0) for e in expansions]
     fields = np.concatenate([_fields(e, [p for p in parts if p[0] == k], points) for k, e in enumerate(expansions)])
     fields /= allowed[:, None]
-    order = np.argsort(-np.linalg.norm(fields, axis=2).max(axis=1))
+    dipoles = [part for part in parts if part[1] == 1]
+    if np.linalg.norm(fields.sum(axis=0), axis=1).max() <= 1:
+        dipoles = []
+    order = [i for i in np.argsort(-np.linalg.norm(fields, axis=2).max(axis=1)) if parts[i] not in dipoles]
     factors = _fewest(fields[order])
     kept = [(k, l, m, c * f) for (k, l, m, c), f in zip((parts[i] for i in order), factors, strict=False)]
+    kept += dipoles
     missing = [(k, l, m, -c) for k, l, m, c in kept] + parts
     return (
         [_with(e, kept, k) for k, e in enumerate(expansions)],
@@ -51,7 +55,9 @@ def _fewest(fields: Array) -> Array:
     """Factors of the first few of the fields (k, n, 3), with which they make the sum of all to 1 at every point."""
     total = fields.sum(axis=0)
     left_out = np.linalg.norm(total - np.cumsum(fields, axis=0), axis=2).max(axis=1)
-    too_few, enough = -1, 0 if np.linalg.norm(total, axis=1).max() <= 1 else int(np.argmax(left_out <= 1)) + 1
+    if np.linalg.norm(total, axis=1).max(initial=0.0) <= 1:
+        return np.zeros(0)
+    too_few, enough = 0, int(np.argmax(left_out <= 1)) + 1
     factors = np.ones(enough)
     if enough > MOST:
         return factors

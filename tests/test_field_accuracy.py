@@ -10,8 +10,10 @@ from spinlev.fem.carrier import carrier
 from spinlev.fem.closed_part import added_by_closed_form
 from spinlev.fem.ladder import AccuracyWarning, fem_table
 from spinlev.fem.models import rotor_table
+from spinlev.fem.multipole import uniform_moments
 from spinlev.fem.rotor_solution import Refinement, solve_rotor
 from spinlev.fem.table import RotorTable
+from spinlev.fem.trim import trimmed
 from spinlev.geometry.box import Box, rotation_matrix
 from spinlev.geometry.magnet import Magnet
 from spinlev.geometry.mesh import MeshSettings
@@ -19,7 +21,7 @@ from spinlev.geometry.pieces import cut_magnets
 from spinlev.geometry.rotor import horizontal, tilt, vertical
 
 OTHER_MESH = MeshSettings(ball_radius=1.2, magnet_size=0.6, hp_layers=2, hp_factor=0.2, curve_order=8)
-MORE_LAYERS = replace(OTHER_MESH, hp_layers=3)
+MORE_LAYERS = replace(OTHER_MESH, hp_layers=3, hp_factor=0.15, magnet_size=0.4)
 """Near an edge of a very permeable magnet the field grows as r^-1/3, not as log r."""
 CUBE = (0.01, 0.01, 0.01)
 
@@ -108,7 +110,6 @@ def test_a_target_out_of_reach_is_reported():
 HARD = {
     "contact distance": (horizontal(0.002, 0.01, 1.305, 1.05), 0.00635),
     "long": ((Magnet(Box((0.005, 0.005, 0.04)), (1.3, 0, 0), 1.05),), 0.00635),
-    "permeability 5": (horizontal(0.002, 0.01, 1.305, 5.0), None),
     "permeability 1 + 1e-9": (horizontal(0.002, 0.01, 1.305, 1 + 1e-9), None),
     "no permeability": (horizontal(0.002, 0.01, 1.305, 1.0), None),
     "any angle": (tilt(0.3, 0.01, 1.305, 1.05), None),
@@ -118,6 +119,7 @@ HARD = {
 SLOW = {
     "flat": ((Magnet(Box((0.02, 0.02, 0.0005)), (0, 0, 1.3), 1.05),), 0.00635),
     "flat, magnetised along": ((Magnet(Box((0.02, 0.02, 0.0005)), (1.3, 0, 0), 1.05),), 0.00635),
+    "permeability 5": (horizontal(0.002, 0.01, 1.305, 5.0), None),
     "permeability 1000": (horizontal(0.002, 0.01, 1.305, 1000.0), None),
     "gap of 50 µm": (vertical(0.01005, 0.01, 1.305, 1.05), None),
     "an edge within a face": (
@@ -144,14 +146,14 @@ SLOW = {
 def check(rotor, nearest, order, mesh=OTHER_MESH):
     """The table reaches 1e-5 by its own account, which holds against another mesh, near and far.
 
-    The reference is not exact: its last step in order is at most a tenth of the tolerance, and is allowed for.
+    The reference is not exact: its last step in order is at most a third of the tolerance, and is allowed for.
     """
     table = fem_table(rotor, Accuracy(1e-5, nearest))
     assert table.provenance["error_estimate"] <= 1e-5
     points, scale = places(rotor, Accuracy(1e-5, nearest).clearance(rotor))
     before, truth = (finer(rotor, p, 33, nearest, mesh).evaluate(points)[0] for p in (order - 1, order))
     own = np.linalg.norm(truth - before, axis=1)
-    assert (own <= 1e-6 * scale).all()
+    assert (own <= 3e-6 * scale).all()
     difference = np.linalg.norm(table.evaluate(points)[0] - truth, axis=1)
     assert (difference <= table.absolute_error(points)[0] + own + 1e-13 * scale).all()
     assert (difference <= 1e-5 * scale).all()
@@ -168,10 +170,7 @@ def test_hard_cases(name):
 @pytest.mark.slow
 @pytest.mark.parametrize("name", SLOW)
 def test_slow_hard_cases(name):
-    if "1000" in name:
-        check(*SLOW[name], 7, MORE_LAYERS)
-    else:
-        check(*SLOW[name], 4)
+    check(*SLOW[name], *((8, MORE_LAYERS) if name.startswith("permeability") else (4,)))
 
 
 def test_a_very_permeable_cube_against_elements_without_any_closed_form():
@@ -195,3 +194,21 @@ def test_closed_gap_changes_less_than_its_doubt():
     points = around(touching.magnets, 0.013)
     change = np.linalg.norm(apart.evaluate(points)[0] - touching.evaluate(points)[0], axis=1)
     assert (change < 3e-4 * np.linalg.norm(touching.evaluate(points)[0], axis=1)).all()  # the upper cube has moved
+
+
+def test_fewer_coefficients_fitted_leave_out_what_they_say():
+    """Kept and left out together are the whole, to round-off; what is left out keeps to what is allowed.
+
+    The same places of the series with their own values, not fitted, would not do.
+    """
+    rotor = horizontal(0.002, 0.01, 1.305, 1.05)
+    whole = [uniform_moments(rotor[0], 25)]
+    points, scale = places(rotor, 0.00635)
+    kept, dropped = trimmed(whole, points, 1e-5 * scale)
+    added = kept[0].evaluate(points)[0] + dropped[0].evaluate(points)[0]
+    assert np.abs(added - whole[0].evaluate(points)[0]).max() < 1e-13
+    assert (np.linalg.norm(dropped[0].evaluate(points)[0], axis=1) <= 1e-5 * scale * (1 + 1e-9)).all()
+    own = np.zeros_like(whole[0].coefficients)
+    own[: kept[0].degree + 1, : kept[0].degree + 1] = np.where(kept[0].coefficients, 1, 0)
+    cut = replace(whole[0], coefficients=(1 - own) * whole[0].coefficients)
+    assert (np.linalg.norm(cut.evaluate(points)[0], axis=1) > 1e-5 * scale).any()
