@@ -13,6 +13,7 @@ from .curve import Curve
 from .equations import parameters
 from .equilibrium import Equilibrium, EquilibriumError, ForceCurve, Survey
 from .memory import PlateMemory
+from .mode_names import named_modes
 from .rates import Rates
 from .search import SearchRange
 from .stability import modes
@@ -146,6 +147,7 @@ def _equilibrium(table: FieldTable, scales: Scales, balance: Balance, position: 
         growth_per_s=motion.growth / scales.time,
         growth_error_per_s=float(motion.errors.max()) / scales.time,
         frequencies_hz=motion.angular_frequencies / (2 * np.pi * scales.time),
+        modes=named_modes(motion, scales.time),
     )
 
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..geometry.box import Array
+from .mode_names import Mode
 from .state import State
 
 
@@ -30,6 +31,7 @@ class Equilibrium:
     growth_per_s : largest growth rate of a small motion, 1/s
     growth_error_per_s : what round-off may do to it, 1/s
     frequencies_hz : (k,) frequencies of the small motions in the rotor's frame
+    modes : the small motions by name
     turn : (n, 3) the motion at equal intervals of a turn, the first at t = 0; None where it is at rest in this frame
     currents : (n, k) states of the plate then, √J; None where the plate's currents are not modelled
     without : the fixed point that it would be without the plate and with gravity along the axis
@@ -43,6 +45,7 @@ class Equilibrium:
     growth_per_s: float
     growth_error_per_s: float
     frequencies_hz: Array
+    modes: tuple[Mode, ...] = ()
     turn: State | None = None
     currents: Array | None = None
     without: Equilibrium | None = None

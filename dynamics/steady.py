@@ -12,6 +12,7 @@ from .equilibrium import Equilibrium
 from .events import clearance
 from .floquet import floquet_modes
 from .memory import PlateMemory
+from .mode_names import named_modes
 from .orbit import Orbit, periodic_orbit
 from .plate_force import PlateForce
 from .rates import Rates
@@ -66,6 +67,7 @@ class Shaken:
             growth_per_s=motion.growth / scales.time,
             growth_error_per_s=float(motion.errors.max()) / scales.time,
             frequencies_hz=motion.angular_frequencies / (2 * np.pi * scales.time),
+            modes=named_modes(motion, scales.time),
             turn=turn,
             currents=orbit.plate / self.values[Parameter.PLATE_SHARE] if self.memory else None,
             without=fixed,

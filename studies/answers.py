@@ -50,6 +50,7 @@ def equilibrium_answer(equilibrium: Equilibrium) -> dict[str, Any]:
         "growth_per_s": equilibrium.growth_per_s,
         "growth_error_per_s": equilibrium.growth_error_per_s,
         "frequencies_hz": equilibrium.frequencies_hz,
+        "modes": [vars(mode) for mode in equilibrium.modes],
         "with_plate": equilibrium.currents is not None,
         "without_plate": None if equilibrium.without is None else equilibrium_answer(equilibrium.without),
     }

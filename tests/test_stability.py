@@ -116,3 +116,21 @@ def test_published_stability_of_the_vertical_rotor(frequency, spin, stable):
     found = [e for e in find_equilibria(scene, dipole_table(magnets), spin) if 15e-3 < e.distance < 30e-3]
     assert found
     assert found[0].stable is stable
+
+
+def test_modes_are_named_by_their_shapes():
+    """Bounce alone moves along the axis; side modes lie about the rotor's rate, at the slow lateral rate from it."""
+    equilibrium = next(e for e in find_equilibria(SCENE, CUBOID) if e.stable)
+    modes = {mode.name: mode for mode in equilibrium.modes}
+    assert list(modes) == ["bounce", "side, backward", "side, forward", "precession", "nutation"]
+    assert 10 < modes["bounce"].frequency_hz < 30
+    assert modes["side, backward"].frequency_hz < SCENE.frequency < modes["side, forward"].frequency_hz
+    assert modes["precession"].frequency_hz < modes["nutation"].frequency_hz
+    np.testing.assert_allclose(sorted(m.frequency_hz for m in modes.values()), equilibrium.frequencies_hz, rtol=1e-12)
+
+
+def test_of_a_pair_that_does_not_oscillate_the_growing_one_is_told():
+    far = next(e for e in find_equilibria(SCENE, CUBOID) if not e.stable)
+    assert far.modes[0].name == "bounce"
+    assert far.modes[0].frequency_hz == pytest.approx(0, abs=1e-6)
+    assert far.modes[0].growth_per_s == pytest.approx(far.growth_per_s)
