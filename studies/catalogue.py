@@ -14,6 +14,8 @@ from .dipole_validity import dipole_validity, validity_figure, validity_lines
 from .figures import save_figure
 from .floater_figure import floater_figure, floater_lines
 from .floater_permeability import floater_permeability
+from .plate_damping import plate_damping
+from .plate_damping_figure import damping_figure, damping_lines
 from .results import write_dataset
 from .shipped_scenes import default_scene
 from .speed_accuracy import speed_accuracy
@@ -57,6 +59,12 @@ CATALOGUE = {
         lambda quick: floater_permeability(load_scene(default_scene()), quick=quick),
         floater_figure,
         floater_lines,
+    ),
+    "plate-damping": Study(
+        "what a plate does to each small motion, against its place, conductivity and thickness",
+        plate_damping,
+        damping_figure,
+        damping_lines,
     ),
     "team7": Study(
         "eddy currents against the measurement of TEAM workshop problem 7", team7_study, team7_figure, team7_lines

@@ -8,4 +8,9 @@ from pathlib import Path
 
 def default_scene() -> Path:
     """The scene that is meant where none is named: `horizontal`."""
-    return Path(sysconfig.get_path("data")) / "share" / "spinlev" / "scenes" / "horizontal.toml"
+    return shipped_scene("horizontal")
+
+
+def shipped_scene(name: str) -> Path:
+    """The file of a scene that comes with the program."""
+    return Path(sysconfig.get_path("data")) / "share" / "spinlev" / "scenes" / f"{name}.toml"

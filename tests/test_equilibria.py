@@ -164,5 +164,3 @@ def test_what_has_no_fixed_point_says_so():
     table = table_of(scene, "dipole")
     with pytest.raises(EquilibriumError, match="Earnshaw"):
         find_equilibria(replace(scene, frequency=0.0), table)
-    with pytest.raises(EquilibriumError, match="periodic"):
-        find_equilibria(replace(scene, gravity=np.array([1.0, 0.0, -9.8])), table)

@@ -13,6 +13,7 @@ from spinlev.dynamics.floquet import floquet_modes
 from spinlev.dynamics.integration import integrate
 from spinlev.dynamics.memory import PlateMemory
 from spinlev.dynamics.orbit import differentiation, periodic_orbit, resampled
+from spinlev.dynamics.plate_action import plate_action
 from spinlev.dynamics.plate_force import PlateForce
 from spinlev.dynamics.rates import Rates
 from spinlev.dynamics.state import Scales
@@ -34,15 +35,14 @@ MAGNETS = rotor.horizontal(2e-3, 10e-3, 1.305, 1.0)
 CUBOID = RotorTable("cuboid", MAGNETS, MAGNETS)
 PLATE = Plate(Box((0.1, 0.24, 0.03), (0.01, 0.0, -0.055)), 3.5e7, Lowering(0.1, 0.02, 0.002))
 SCENE = Scene(110.0, MAGNETS, FLOATER, Drag(0.0, 0.0), plate=PLATE, start=OffsetStart(np.zeros(3)))
+REGION = Region(np.array([-0.014, -0.004, 0.031]), np.array([-0.006, 0.004, 0.041]))
 VALUES = parameters(SCENE, Scales.of(SCENE), frozen_spin=True)
 
 
 @pytest.fixture(scope="module")
 def memory():
     """A rough plate off the axis: its table errs by some per cent, its identities do not."""
-    region = Region.over_face(PLATE.box.size, (0.016, 0.026), 0.004)
-    region = Region(region.lower - [0.01, 0, 0], region.upper - [0.01, 0, 0])
-    table, share = plate_and_rotor_table(PLATE, CUBOID, region, (5.0, 250.0), 0.1, MeshRule(2.0, 3.0, 3.0))
+    table, share = plate_and_rotor_table(PLATE, CUBOID, REGION, (5.0, 250.0), 0.1, MeshRule(2.0, 3.0, 3.0))
     return PlateMemory(PLATE, table, share)
 
 
@@ -165,9 +165,7 @@ def test_over_an_infinite_slab_multipliers_are_the_eigenvalues_of_the_turning_fr
     In the rotor's frame everything is then autonomous; its eigenvalues are Floquet's to 1e-6 of the rotor's rate.
     """
     plate = replace(PLATE, lowering=None)
-    table, share = slab_and_rotor_table(
-        plate, CUBOID, Region.over_face(PLATE.box.size, (0.016, 0.026), 0.004), rtol=1e-2
-    )
+    table, share = slab_and_rotor_table(plate, CUBOID, REGION, rtol=1e-2)
     force = PlateForce(PlateMemory(plate, table, share, "slab"), VALUES)
     orbit = periodic_orbit(rates, VALUES, 0.0, force, Scales.of(SCENE).pack(known.equilibria[0].state))
     assert np.ptp(orbit.states, axis=0).max() < 1e-9
@@ -183,6 +181,25 @@ def test_over_an_infinite_slab_multipliers_are_the_eigenvalues_of_the_turning_fr
     exact = np.linalg.eigvals(matrix)
     for rate in floquet_modes(orbit).eigenvalues:
         assert np.abs(exact - rate).min() < 1e-6
+
+
+def test_what_the_plate_burns_comes_from_the_turn(known, rates):
+    """Without the rotor's share the loss is the plate's torque about the rotor's axis times its rate: 1e-9."""
+    plate, scales = replace(PLATE, lowering=None), Scales.of(SCENE)
+    table, share = slab_and_rotor_table(plate, CUBOID, REGION, rtol=1e-2)
+    alone = PlateMemory(plate, table, replace(share, series=0 * share.series), "slab")
+    found = with_plate(SCENE, CUBOID, Survey(known.equilibria[:1], ()), alone, rates).equilibria[0]
+    action = plate_action(SCENE, alone, found)
+    force = PlateForce(alone, VALUES)
+    heard = force(np.zeros(1), scales.pack(found.start)[None])
+    currents = found.currents[0] * VALUES[Parameter.PLATE_SHARE] - heard.signals[0]
+    push = heard.fields[0].T @ currents * FLOATER.mass * scales.length / scales.time**2
+    orbit = np.cross(found.position, push[:3])[2]  # the force drags the floater's orbit as well
+    assert action.torque[2] < 0
+    assert action.force[2] > 0
+    assert action.loss == pytest.approx(-SCENE.angular_velocity * (action.torque[2] + orbit), rel=1e-9)
+    with pytest.raises(ValueError, match="found with the plate"):
+        plate_action(SCENE, alone, known.equilibria[0])
 
 
 def test_gravity_across_the_axis_makes_the_motion_periodic(rates):
