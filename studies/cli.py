@@ -24,9 +24,8 @@ from ..geometry.box import Array
 from .console import answers_only, note, to_json
 from .points_file import read_points
 from .shipped_scenes import default_scene
+from .tables import FieldModel, Tables
 
-FieldModel = Literal["dipole", "cuboid", "fem", "auto"]
-PlateModel = Literal["none", "slab", "fem", "reduced", "auto"]
 ReactionModel = Literal["slab", "fem", "reduced", "auto"]
 
 app = App(
@@ -67,11 +66,8 @@ class Answer:
 def run(
     scene: Path | None = None,
     *,
-    model: FieldModel = "auto",
-    plate_model: PlateModel = "auto",
-    plate_rtol: float = 3e-3,
+    asked: Tables = Tables(),
     duration_s: float = 3.0,
-    rtol: float = 3e-6,
     output: Output = Output(),
 ) -> Answer:
     """The main job: fields, tables, equilibria, stability, motion, pictures, result.nc and summary.json.
@@ -80,25 +76,14 @@ def run(
     ----------
     scene
         Scene file (left out: the one that comes with the program).
-    model
-        Field model of the motion.
-    plate_model
-        none, slab (infinite), fem or reduced (the network of the finite elements), or auto.
-    plate_rtol
-        Relative accuracy asked of the plate's reaction.
     duration_s
         Simulated time, s.
-    rtol
-        Relative accuracy asked of the field wherever the floater can be.
     """
     _positive("--duration-s", duration_s)
-    _tolerance(rtol)
-    _plate_tolerance(plate_rtol)
     loaded = load_scene(scene or default_scene())
     from .run import main_job
-    from .shelf import Tables
 
-    values, lines = main_job(loaded, Tables(model, rtol, plate_model, plate_rtol), duration_s, output.out)
+    values, lines = main_job(loaded, asked.checked(), duration_s, output.out)
     return Answer(values, tuple(lines), output.json)
 
 
@@ -124,11 +109,11 @@ def field(
     rtol
         Relative accuracy asked of the field wherever the floater can be.
     """
-    _tolerance(rtol)
+    asked = Tables(model, rtol=rtol).checked()
     loaded, places = load_scene(scene), read_points(points)
     from .single import field_job
 
-    values, lines = field_job(loaded, places, model, rtol, output.out)
+    values, lines = field_job(loaded, places, asked, output.out)
     return Answer(values, tuple(lines), output.json)
 
 
@@ -136,11 +121,8 @@ def field(
 def equilibria(
     scene: Path,
     *,
-    model: FieldModel = "auto",
-    plate_model: PlateModel = "auto",
-    plate_rtol: float = 3e-3,
+    asked: Tables = Tables(),
     spin: float = 0.0,
-    rtol: float = 3e-6,
     output: Output = Output(),
 ) -> Answer:
     """All synchronous equilibria and their stability.
@@ -149,26 +131,15 @@ def equilibria(
     ----------
     scene
         Scene file.
-    model
-        Field model.
-    plate_model
-        none, slab (infinite), fem or reduced (the network of the finite elements), or auto.
-    plate_rtol
-        Relative accuracy asked of the plate's reaction.
     spin
         Body spin S = Ω·m̂/ω of the floater about its own moment.
-    rtol
-        Relative accuracy asked of the field wherever the floater can be.
     """
-    _tolerance(rtol)
-    _plate_tolerance(plate_rtol)
     if not -1e3 <= spin <= 1e3:
         raise InputError(f"Input --spin must be between -1000 and 1000; instead received {spin}.")
     loaded = load_scene(scene)
-    from .shelf import Tables
     from .single import equilibria_job
 
-    values, lines = equilibria_job(loaded, Tables(model, rtol, plate_model, plate_rtol), spin, output.out)
+    values, lines = equilibria_job(loaded, asked.checked(), spin, output.out)
     return Answer(values, tuple(lines), output.json)
 
 
@@ -177,10 +148,7 @@ def simulate(
     scene: Path,
     *,
     duration_s: float,
-    model: FieldModel = "auto",
-    plate_model: PlateModel = "auto",
-    plate_rtol: float = 3e-3,
-    rtol: float = 3e-6,
+    asked: Tables = Tables(),
     resume: Annotated[bool, Parameter(negative="")] = False,
     output: Output = Output(),
 ) -> Answer:
@@ -192,25 +160,14 @@ def simulate(
         Scene file.
     duration_s
         Simulated time, s.
-    model
-        Field model.
-    plate_model
-        none, slab (infinite), fem or reduced (the network of the finite elements), or auto.
-    plate_rtol
-        Relative accuracy asked of the plate's reaction.
-    rtol
-        Relative accuracy asked of the field wherever the floater can be.
     resume
         Go on from the checkpoint of the same flight in --out, if one is there.
     """
     _positive("--duration-s", duration_s)
-    _tolerance(rtol)
-    _plate_tolerance(plate_rtol)
     loaded = load_scene(scene)
-    from .shelf import Tables
     from .single import simulate_job
 
-    values, lines = simulate_job(loaded, Tables(model, rtol, plate_model, plate_rtol), duration_s, output.out, resume)
+    values, lines = simulate_job(loaded, asked.checked(), duration_s, output.out, resume)
     return Answer(values, tuple(lines), output.json)
 
 
@@ -291,16 +248,6 @@ def _three_numbers(name: str, text: str) -> Array:
 def _positive(name: str, value: float) -> None:
     if not 0 < value < float("inf"):
         raise InputError(f"Input {name} must be a positive number; instead received {value}.")
-
-
-def _tolerance(value: float) -> None:
-    if not 1e-13 <= value < 1:
-        raise InputError(f"Input --rtol must be at least 1e-13 and less than 1; instead received {value}.")
-
-
-def _plate_tolerance(value: float) -> None:
-    if not 1e-5 <= value <= 0.1:
-        raise InputError(f"Input --plate-rtol must be at least 1e-5 and at most 0.1; instead received {value}.")
 
 
 def main() -> None:

@@ -18,8 +18,9 @@ from .answers import equilibria_answer, equilibria_lines, flight_answer, flight_
 from .console import note, to_json
 from .figures import field_figure, force_figure, save_figure, trajectory_figure
 from .results import axis_dataset, curve_dataset, equilibria_dataset, trajectory_dataset, write_dataset
-from .shelf import Shelf, Tables
+from .shelf import Shelf
 from .single import Job, fly
+from .tables import Tables
 
 MODELS = ("dipole", "cuboid", "fem")
 DEEPEST = 0.05

@@ -13,24 +13,7 @@ from ..geometry.box import Array
 from ..geometry.scene import AbsoluteStart, Scene
 from .console import note
 from .plate_shelf import check_room, plate_memory, resolve_plate_model
-
-
-@dataclass(frozen=True)
-class Tables:
-    """Which tables are asked for.
-
-    Parameters
-    ----------
-    model : of the rotor's field
-    rtol : relative accuracy of B asked of the finite elements
-    plate_model : none, slab, fem, reduced or auto
-    plate_rtol : relative accuracy asked of the plate's reaction
-    """
-
-    model: str
-    rtol: float
-    plate_model: str = "none"
-    plate_rtol: float = 3e-3
+from .tables import Tables
 
 
 @dataclass

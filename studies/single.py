@@ -17,15 +17,16 @@ from .answers import equilibria_answer, equilibria_lines, field_answer, flight_a
 from .console import note, progress, to_json
 from .points_file import COLUMNS
 from .results import trajectory_dataset, write_dataset
-from .shelf import Shelf, Tables
+from .shelf import Shelf
+from .tables import Tables
 
 Job = tuple[Mapping[str, Any], list[str]]
 """Numbers for a program, lines for a person."""
 
 
-def field_job(scene: Scene, points: Array, model: str, rtol: float, out: Path) -> Job:
+def field_job(scene: Scene, points: Array, asked: Tables, out: Path) -> Job:
     """B and its gradient at points (n, 3) m; writes field.csv."""
-    shelf = Shelf(scene, Tables(model, rtol))
+    shelf = Shelf(scene, asked)
     values = field_answer(shelf.table(), points)
     header = [
         *COLUMNS,
