@@ -15,7 +15,7 @@ REMANENCE, PERMEABILITY = 1.305, 1.05
 CONTACT = 0.00635
 """The floater's radius (m): it touches a face of the cube when their centres are 11.35 mm apart."""
 OTHER_MESH = MeshSettings(ball_radius=1.2, magnet_size=0.6, hp_layers=2, hp_factor=0.2, curve_order=8)
-MORE_LAYERS = replace(OTHER_MESH, hp_layers=3, hp_factor=0.15, magnet_size=0.4)
+MORE_LAYERS = replace(OTHER_MESH, hp_layers=4, hp_factor=0.15, magnet_size=0.4)
 """Near an edge of a very permeable magnet the field grows as r^-1/3, not as log r."""
 
 

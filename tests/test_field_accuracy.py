@@ -21,7 +21,7 @@ from spinlev.geometry.pieces import cut_magnets
 from spinlev.geometry.rotor import horizontal, tilt, vertical
 
 OTHER_MESH = MeshSettings(ball_radius=1.2, magnet_size=0.6, hp_layers=2, hp_factor=0.2, curve_order=8)
-MORE_LAYERS = replace(OTHER_MESH, hp_layers=3, hp_factor=0.15, magnet_size=0.4)
+MORE_LAYERS = replace(OTHER_MESH, hp_layers=4, hp_factor=0.15, magnet_size=0.4)
 """Near an edge of a very permeable magnet the field grows as r^-1/3, not as log r."""
 CUBE = (0.01, 0.01, 0.01)
 
@@ -143,17 +143,17 @@ SLOW = {
 }
 
 
-def check(rotor, nearest, order, mesh=OTHER_MESH):
+def check(rotor, nearest, order, mesh=OTHER_MESH, own_step=1e-6):
     """The table reaches 1e-5 by its own account, which holds against another mesh, near and far.
 
-    The reference is not exact: its last step in order is at most a third of the tolerance, and is allowed for.
+    The reference is not exact: its last step in order is at most `own_step` of the field, and is allowed for.
     """
     table = fem_table(rotor, Accuracy(1e-5, nearest))
     assert table.provenance["error_estimate"] <= 1e-5
     points, scale = places(rotor, Accuracy(1e-5, nearest).clearance(rotor))
     before, truth = (finer(rotor, p, 33, nearest, mesh).evaluate(points)[0] for p in (order - 1, order))
     own = np.linalg.norm(truth - before, axis=1)
-    assert (own <= 3e-6 * scale).all()
+    assert (own <= own_step * scale).all()
     difference = np.linalg.norm(table.evaluate(points)[0] - truth, axis=1)
     assert (difference <= table.absolute_error(points)[0] + own + 1e-13 * scale).all()
     assert (difference <= 1e-5 * scale).all()
@@ -170,7 +170,8 @@ def test_hard_cases(name):
 @pytest.mark.slow
 @pytest.mark.parametrize("name", SLOW)
 def test_slow_hard_cases(name):
-    check(*SLOW[name], *((8, MORE_LAYERS) if name.startswith("permeability") else (4,)))
+    reference = {"permeability 5": (8, MORE_LAYERS), "permeability 1000": (8, MORE_LAYERS, 3e-6)}
+    check(*SLOW[name], *reference.get(name, (4,)))
 
 
 def test_a_very_permeable_cube_against_elements_without_any_closed_form():
