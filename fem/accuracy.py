@@ -48,17 +48,25 @@ def places(magnets: tuple[Magnet, ...], clearance: float) -> tuple[Array, Array]
     fields cancel; 1 T if nothing is magnetised.
     """
     size = max(float(np.linalg.norm(m.box.corners - magnets[0].box.center, axis=1).max()) for m in magnets)
+    shells = [shell(magnets, clearance + factor * size) for factor in OFFSETS]
+    points, scales = zip(*[(points, typical_field(magnets, points)) for points in shells], strict=True)
+    return np.concatenate(points), np.concatenate(scales)
+
+
+def shell(magnets: tuple[Magnet, ...], offset: float) -> Array:
+    """Points (n, 3) m at a distance `offset` (m) from the nearest of the magnets' faces, all around them."""
     directions = np.random.default_rng(0).normal(size=(150, 3))
     directions /= np.linalg.norm(directions, axis=1)[:, None]
+    points = np.concatenate([_offset_surface(magnet.box, offset, directions) for magnet in magnets])
+    outside = np.all([magnet.box.distance(points) >= offset * (1 - 1e-6) for magnet in magnets], axis=0)
+    return np.asarray(points[outside])
+
+
+def typical_field(magnets: tuple[Magnet, ...], points: Array) -> Array:
+    """B (n,) T to which errors at points (n, 3) m, all about as far away, are relative: see `places`."""
     dipoles = [uniform_moments(carrier(magnet), 1) for magnet in magnets]
-    points, scales = [], []
-    for offset in (clearance + factor * size for factor in OFFSETS):
-        shell = np.concatenate([_offset_surface(magnet.box, offset, directions) for magnet in magnets])
-        outside = np.all([magnet.box.distance(shell) >= offset * (1 - 1e-6) for magnet in magnets], axis=0)
-        field = np.linalg.norm(sum(dipole.evaluate(shell[outside])[0] for dipole in dipoles), axis=1)
-        points.append(shell[outside])
-        scales.append(np.maximum(field, np.median(field) / 3) if field.any() else np.ones(len(field)))
-    return np.concatenate(points), np.concatenate(scales)
+    field = np.linalg.norm(sum(dipole.evaluate(points)[0] for dipole in dipoles), axis=1)
+    return np.maximum(field, np.median(field) / 3) if field.any() else np.ones(len(field))
 
 
 def guards(magnets: tuple[Magnet, ...], clearance: float) -> tuple[Array, Array]:
@@ -69,12 +77,11 @@ def guards(magnets: tuple[Magnet, ...], clearance: float) -> tuple[Array, Array]
     """
     directions = np.random.default_rng(2).normal(size=(150, 3))
     directions /= np.linalg.norm(directions, axis=1)[:, None]
-    shells = [m.box.center + (clearance + m.box.half_edges.max()) * directions for m in magnets]
-    shell = np.concatenate(shells)
-    gaps = np.min([magnet.box.distance(shell) for magnet in magnets], axis=0)
-    shell = shell[(gaps >= clearance / 2) & (gaps < clearance)]
-    field = np.linalg.norm(sum(uniform_moments(carrier(m), 1).evaluate(shell)[0] for m in magnets), axis=1)
-    return shell, np.maximum(field, np.median(field) / 3) if field.any() else np.ones(len(field))
+    spheres = [m.box.center + (clearance + m.box.half_edges.max()) * directions for m in magnets]
+    points = np.concatenate(spheres)
+    gaps = np.min([magnet.box.distance(points) for magnet in magnets], axis=0)
+    points = points[(gaps >= clearance / 2) & (gaps < clearance)]
+    return points, typical_field(magnets, points)
 
 
 def _offset_surface(box: Box, offset: float, directions: Array) -> Array:

@@ -9,7 +9,8 @@ import numpy as np
 from ..geometry.magnet import Magnet
 from ..geometry.mesh import MeshSettings
 from .accuracy import Accuracy, places
-from .ladder import climb, provenance, rung, tail, used
+from .climb import climb, rung, strongest
+from .ladder import provenance, tail, used
 from .multipole import without_noise
 from .rotor_solution import Refinement, RotorSolution, solve_rotor
 from .table import RotorTable
@@ -29,7 +30,7 @@ def direct_table(magnets: tuple[Magnet, ...], accuracy: Accuracy | None = None) 
     points, scale = places(magnets, accuracy.clearance(magnets))
 
     def whole(order: int) -> RotorSolution:
-        return solve_rotor(magnets, Refinement(order, rung(order, SETTINGS).mesh, DEGREE), "direct")
+        return solve_rotor(magnets, Refinement(order, rung(order, SETTINGS, strongest(magnets)).mesh, DEGREE), "direct")
 
     solution, order, doubt = climb(whole, points, scale, accuracy.rtol / 2, SETTINGS)
     coefficients = without_noise(solution.coefficients[0], 1e-15)

@@ -1,10 +1,7 @@
-"""Tables of finite-element fields with a stated error, from a ladder of refinements.
+"""Tables of finite-element fields with a stated error.
 
-From rung to rung the order of the elements, the layers at the edges, the quadrature, the curvature of the outer sphere
-and the degree of its open boundary all grow, and the coefficients of the expansions converge geometrically. The
-difference of two rungs is the error of the lower one; times ρ/(1 - ρ), with ρ the ratio of the last two differences, it
-is that of the upper one, and it is kept as a field: the doubt "discretisation". The closed part of the moments is
-exact; what is cut off the expansions is known and kept as the doubt "truncation".
+What the elements add comes from a ladder of refinements, see `climb`, whose last step gives the doubt "discretisation".
+The closed part of the moments is exact; what is cut off the expansions is known and kept as the doubt "truncation".
 """
 
 from __future__ import annotations
@@ -13,7 +10,7 @@ import importlib.metadata
 import resource
 import time
 import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -25,21 +22,13 @@ from ..geometry.mesh import MeshSettings
 from ..geometry.pieces import CONVERGENCE, cut_magnets
 from .accuracy import Accuracy, guards, places
 from .carrier import carrier
+from .climb import climb, rung, strongest
 from .closed_part import closed_part
 from .multipole import MultipoleExpansion, without_noise
-from .rotor_solution import Refinement, RotorSolution, solve_rotor
+from .rotor_solution import RotorSolution, solve_rotor
 from .table import KNOWN, RotorTable
 from .trim import trimmed
 
-RUNGS = (2, 3, 4, 5, 6, 7, 8)
-"""Orders of the elements."""
-FIRST_RATE = 0.5
-"""Ratio of two differences that is assumed before it is known; 0.1 to 0.3 were measured."""
-FASTEST_RATE, SLOWEST_RATE = 0.1, 0.75
-FASTEST_RATE_STRONG, STRONG = 0.3, 0.5
-"""For μ - 1 from 0.5 on: the singularity at edges is so strong there that the layers, not the orders, set the pace."""
-SAFETY = 2.5
-"""Factor on the extrapolated difference."""
 HIGHEST_DEGREE = 44
 BESIDE = 2.5
 """How much larger errors may be beside edges and corners, at the same distance from the magnet's centre."""
@@ -49,13 +38,6 @@ GAP_SAFETY = 20.0
 
 class AccuracyWarning(UserWarning):
     """A table does not reach the accuracy that was asked for."""
-
-
-def rung(order: int, settings: MeshSettings) -> Refinement:
-    """The refinement that belongs to an order: layers at the edges 1 (orders 2, 3), 2 (to 6), 3 (7, 8)."""
-    layers = 1 if order < 4 else 2 if order < 7 else 3
-    mesh = replace(settings, hp_layers=layers if settings.hp_layers else 0, curve_order=min(order + 1, 8))
-    return Refinement(order, mesh, 2 * order + 2)
 
 
 def fem_table(
@@ -78,7 +60,8 @@ def fem_table(
     closed, unsure = closed_part(cut, magnets, carriers, degree)
 
     def reaction(order: int) -> RotorSolution:
-        return solve_rotor(magnets, rung(order, settings), "split", degree, cut, use_symmetry, carriers)
+        refinement = rung(order, settings, strongest(magnets))
+        return solve_rotor(magnets, refinement, "split", degree, cut, use_symmetry, carriers)
 
     solution, order, doubt = climb(reaction, points, scale, accuracy.rtol / 3, settings)
     whole = solution.expansions(
@@ -109,50 +92,6 @@ def fem_table(
             stacklevel=2,
         )
     return replace(table, provenance=provenance(solution, order, settings, reached, time.perf_counter() - start))
-
-
-def climb(
-    solve: Callable[[int], RotorSolution], points: Array, scale: Array, target: float, settings: MeshSettings
-) -> tuple[RotorSolution, int, list[MultipoleExpansion]]:
-    """Climb the ladder until the error is below the target.
-
-    Parameters
-    ----------
-    solve : solution at an order
-    points, scale : where (n, 3) m the error is looked at, and the field (n,) T to which it is relative
-    settings : of the mesh, as given to `rung`
-
-    Returns
-    -------
-    The last solution, its order, and the estimated error of its field.
-    """
-    coarse, before = solve(RUNGS[0]), np.inf
-    for order in RUNGS[1:]:
-        fine = solve(order)
-        difference = [b - a for a, b in zip(coarse.coefficients, fine.coefficients, strict=True)]
-        field = sum(e.evaluate(points)[0] for e in fine.expansions(difference))
-        size = float(np.max(np.linalg.norm(field, axis=1) / scale))
-        rate = _rate(size, before, _fastest(fine, rung(order, settings)))
-        factor = SAFETY * rate / (1 - rate)
-        if factor * size <= target:
-            break
-        coarse, before = fine, size
-    return fine, order, fine.expansions([factor * d for d in difference])
-
-
-def _fastest(solution: RotorSolution, wanted: Refinement) -> float:
-    """Rate that may be trusted: slow where layers at the edges lack, since orders then converge slowly later on."""
-    if solution.layers < wanted.mesh.hp_layers:
-        return FIRST_RATE
-    contrast = max(magnet.contrast for magnet in solution.mesh.magnets)
-    return FASTEST_RATE if contrast < STRONG else FASTEST_RATE_STRONG
-
-
-def _rate(size: float, before: float, fastest: float) -> float:
-    """Ratio of the next difference to the last one."""
-    if np.isinf(before):
-        return FIRST_RATE
-    return min(max(size / before, fastest) if before else 0.0, SLOWEST_RATE)
 
 
 def _degree(pieces: Sequence[Magnet], points: Array, rtol: float) -> int:

@@ -11,6 +11,8 @@ from matplotlib.figure import Figure
 
 from ..geometry import load_scene
 from .dipole_validity import dipole_validity, validity_figure, validity_lines
+from .field_hard_cases import field_hard_cases, hard_case_lines
+from .field_hard_cases_figure import hard_case_figure
 from .figures import save_figure
 from .floater_figure import floater_figure, floater_lines
 from .floater_permeability import floater_permeability
@@ -53,6 +55,12 @@ CATALOGUE = {
         speed_accuracy,
         speed_figure,
         speed_lines,
+    ),
+    "field-hard-cases": Study(
+        "true and stated error of the rotor's table in hard cases: contact, extensions, flat, touching, strong, many",
+        field_hard_cases,
+        hard_case_figure,
+        hard_case_lines,
     ),
     "floater-permeability": Study(
         "what the rigid dipole misses once rotor and floater magnetise each other, in the default scene",

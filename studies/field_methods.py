@@ -11,9 +11,10 @@ import numpy as np
 
 from ..fem import FieldMap, FieldTable, RotorTable, fit_field_map, uniform_moments
 from ..fem.carrier import carrier
+from ..fem.climb import rung
 from ..fem.closed_part import added_by_closed_form
 from ..fem.crosscheck import magnet_dipoles
-from ..fem.ladder import AccuracyWarning, rung
+from ..fem.ladder import AccuracyWarning
 from ..fem.models import rotor_table
 from ..fem.multipole import without_noise
 from ..fem.rotor_solution import Refinement, solve_rotor

@@ -14,15 +14,14 @@ from spinlev.fem.multipole import uniform_moments
 from spinlev.fem.rotor_solution import Refinement, solve_rotor
 from spinlev.fem.table import RotorTable
 from spinlev.fem.trim import trimmed
-from spinlev.geometry.box import Box, rotation_matrix
+from spinlev.geometry.box import Box
 from spinlev.geometry.magnet import Magnet
 from spinlev.geometry.mesh import MeshSettings
 from spinlev.geometry.pieces import cut_magnets
-from spinlev.geometry.rotor import horizontal, tilt, vertical
+from spinlev.geometry.rotor import horizontal, vertical
+from spinlev.studies.field_hard_cases import extensions, reference
+from spinlev.studies.hard_cases import CASES, MORE_LAYERS, OTHER_MESH
 
-OTHER_MESH = MeshSettings(ball_radius=1.2, magnet_size=0.6, hp_layers=2, hp_factor=0.2, curve_order=8)
-MORE_LAYERS = replace(OTHER_MESH, hp_layers=3, hp_factor=0.15, magnet_size=0.4)
-"""Near an edge of a very permeable magnet the field grows as r^-1/3, not as log r."""
 CUBE = (0.01, 0.01, 0.01)
 
 
@@ -107,75 +106,44 @@ def test_a_target_out_of_reach_is_reported():
     assert table.provenance["error_estimate"] > 1e-10
 
 
-HARD = {
-    "contact distance": (horizontal(0.002, 0.01, 1.305, 1.05), 0.00635),
-    "long": ((Magnet(Box((0.005, 0.005, 0.04)), (1.3, 0, 0), 1.05),), 0.00635),
-    "permeability 1 + 1e-9": (horizontal(0.002, 0.01, 1.305, 1 + 1e-9), None),
-    "no permeability": (horizontal(0.002, 0.01, 1.305, 1.0), None),
-    "any angle": (tilt(0.3, 0.01, 1.305, 1.05), None),
-    "anisotropic": ((Magnet(Box(CUBE, rotation=rotation_matrix((15, 40, 70))), (1, 0, 0), 1.05, 1.15),), None),
-    "gap of 1 µm": (vertical(0.010001, 0.01, 1.305, 1.05), None),
-}
-SLOW = {
-    "flat": ((Magnet(Box((0.02, 0.02, 0.0005)), (0, 0, 1.3), 1.05),), 0.00635),
-    "flat, magnetised along": ((Magnet(Box((0.02, 0.02, 0.0005)), (1.3, 0, 0), 1.05),), 0.00635),
-    "permeability 5": (horizontal(0.002, 0.01, 1.305, 5.0), None),
-    "permeability 1000": (horizontal(0.002, 0.01, 1.305, 1000.0), None),
-    "gap of 50 µm": (vertical(0.01005, 0.01, 1.305, 1.05), None),
-    "an edge within a face": (
-        (
-            Magnet(Box(CUBE), (1, 0, 0), 1.05),
-            Magnet(Box((0.006, 0.006, 0.006), (0.001, 0.0015, 0.008), rotation_matrix((0, 0, 30))), (0, 0.5, 1), 1.05),
-        ),
-        None,
-    ),
-    "eight magnets": (
-        tuple(
-            Magnet(
-                Box((0.006,) * 3, (0.012 * np.cos(a), 0.012 * np.sin(a), 0.001 * k), rotation_matrix((10 * k, 20, 30))),
-                (1.2 + 0.01 * k, 0.1 * k, 0),
-                1.05,
-            )
-            for k, a in enumerate(np.arange(8) * np.pi / 4)
-        ),
-        None,
-    ),
-}
+SLOW = {"μr = 5", "μr = 1000", "flat, across", "flat, along", "gap of 50 µm", "an edge within a face", "eight magnets"}
 
 
-def check(rotor, nearest, order, mesh=OTHER_MESH):
+def check(case, own_step=1e-6):
     """The table reaches 1e-5 by its own account, which holds against another mesh, near and far.
 
-    The reference is not exact: its last step in order is at most a third of the tolerance, and is allowed for.
+    The reference is not exact: its last step in order is at most `own_step` of the field, and is allowed for.
     """
-    table = fem_table(rotor, Accuracy(1e-5, nearest))
+    table = fem_table(case.magnets, Accuracy(1e-5, case.nearest))
     assert table.provenance["error_estimate"] <= 1e-5
-    points, scale = places(rotor, Accuracy(1e-5, nearest).clearance(rotor))
-    before, truth = (finer(rotor, p, 33, nearest, mesh).evaluate(points)[0] for p in (order - 1, order))
+    points, scale = places(case.magnets, case.clearance)
+    before, truth = reference(case, points)
     own = np.linalg.norm(truth - before, axis=1)
-    assert (own <= 3e-6 * scale).all()
+    assert (own <= own_step * scale).all()
     difference = np.linalg.norm(table.evaluate(points)[0] - truth, axis=1)
     assert (difference <= table.absolute_error(points)[0] + own + 1e-13 * scale).all()
     assert (difference <= 1e-5 * scale).all()
-    reach = np.linalg.norm(rotor[0].box.half_edges) * 3
-    extensions = rotor[0].box.corners[:4] + reach * rotor[0].box.rotation[:, 2]
-    assert np.isfinite(table.evaluate(extensions[table.in_range(extensions)])[1]).all()
+    on_lines = extensions(case, case.clearance)
+    on_lines = on_lines[table.in_range(on_lines)]
+    assert len(on_lines)
+    assert np.isfinite(table.evaluate(on_lines)[1]).all()
 
 
-@pytest.mark.parametrize("name", HARD)
+@pytest.mark.parametrize("name", [name for name in CASES if name not in SLOW])
 def test_hard_cases(name):
-    check(*HARD[name], 5)
+    check(CASES[name])
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", SLOW)
+@pytest.mark.slow
+@pytest.mark.parametrize("name", sorted(SLOW))
 def test_slow_hard_cases(name):
-    check(*SLOW[name], *((8, MORE_LAYERS) if name.startswith("permeability") else (4,)))
+    check(CASES[name], 3e-6 if name == "μr = 1000" else 1e-6)
 
 
 def test_a_very_permeable_cube_against_elements_without_any_closed_form():
     """μr = 1000: the dipole moment, a 275th of the remanent one, of two formulations, meshes and orders."""
-    rotor, _ = SLOW["permeability 1000"]
+    rotor = CASES["μr = 1000"].magnets
     direct = solve_rotor(rotor, Refinement(6, MORE_LAYERS, 12), "direct")
     (expansion,) = direct.expansions(direct.coefficients)
     assert fem_table(rotor).moment == pytest.approx(expansion.moment, rel=1e-5, abs=1e-12)

@@ -65,6 +65,7 @@ ROTORS = {
     "centred": horizontal(0.0, 0.01, 1.305, 1.0),
     "displaced": horizontal(0.0023, 0.01, 1.305, 1.0),
     "vertical": vertical(0.012, 0.01, 1.305, 1.0),
+    "touching": vertical(0.01, 0.01, 1.305, 1.0),
 }
 
 

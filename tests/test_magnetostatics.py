@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 
 from spinlev.fem.accuracy import Accuracy
+from spinlev.fem.climb import rung
 from spinlev.fem.direct import direct_table
-from spinlev.fem.ladder import fem_table, rung
+from spinlev.fem.ladder import fem_table
 from spinlev.fem.magnetostatics import assemble, solve
 from spinlev.fem.models import resolve_model, rotor_table
 from spinlev.fem.moments import trace_moments
