@@ -7,7 +7,7 @@ from ..geometry.scene import Plate
 from .accuracy_error import AccuracyError
 
 HIGHEST_ORDER = 5
-MOST_UNKNOWNS = 60_000
+MOST_UNKNOWNS = 80_000
 """Coupling unknowns that are solved at most: beyond, one frequency takes many minutes and several GB."""
 
 
@@ -24,7 +24,10 @@ def highest_order(cells: int) -> int:
     """
     found = [p for p in range(3, HIGHEST_ORDER + 1) if cells * (3 * p * (p + 2) + 2 * p + 1) <= MOST_UNKNOWNS]
     if not found:
-        raise MeshTooLargeError(f"A mesh of {cells} cells has more than {MOST_UNKNOWNS} coupling unknowns at order 3.")
+        raise MeshTooLargeError(
+            f"Input frequency_hz must be lower, or the tolerance larger: a mesh of {cells} cells has more than "
+            f"{MOST_UNKNOWNS} unknowns. The infinite slab (model slab) has no such limit."
+        )
     return found[-1]
 
 
