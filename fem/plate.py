@@ -21,11 +21,13 @@ from ..geometry.scene import Plate
 from .accuracy_error import AccuracyError
 from .eddy import EddyResponse, solve_eddy
 from .phasor import ComplexArray
+from .plate_limits import MeshTooLargeError, highest_order, refusal
 from .sources import UniformField, unit_dipoles
 
-HIGHEST_ORDER = 5
 LEAST_REDUCTION = 0.2
 """The smallest error reduction from one order to the next that is believed without having seen the next."""
+BEST_REDUCTION = 0.03
+"""More than an order ever gains: where even this for all orders left does not do, none of them is solved."""
 STALLED = 0.6
 """A weaker reduction than this says that the mesh is too coarse for its order."""
 
@@ -78,7 +80,7 @@ def plate_reaction(
     Raises
     ------
     ValueError : a position inside the plate, a size, a conductivity or a frequency out of range
-    AccuracyError : `rtol` not reached after all refinements of the mesh
+    AccuracyError : `rtol` not reached after all refinements of the mesh, or with `MOST_UNKNOWNS`
     """
     places = np.asarray(positions, float).reshape(-1, 3)
     body = plate.box.to_body(places)
@@ -88,7 +90,10 @@ def plate_reaction(
         return PlateReaction(0.0, places, silent, np.zeros(len(places)), 0, 0, 0)
     best = np.inf
     for _ in range(refinements + 1):
-        response, error = raise_order(plate, body, frequency, rtol, rule)
+        try:
+            response, error = raise_order(plate, body, frequency, rtol, rule)
+        except MeshTooLargeError:
+            break
         best = min(best, float(error.max()))
         if best <= rtol:
             mutual = _to_laboratory(response.couplings, plate.box.rotation)
@@ -97,26 +102,31 @@ def plate_reaction(
                 frequency, places, mutual, error, response.space.order, cells, response.coupling_unknowns
             )
         rule = rule.finer()
-    raise AccuracyError(
-        f"Input rtol must be at least {best:.1e} for this plate at {frequency:g} Hz; instead received {rtol:.1e}."
-    )
+    raise AccuracyError(refusal(plate, frequency, rtol, best))
 
 
 def raise_order(plate: Plate, body: Array, frequency: float, rtol: float, rule: MeshRule) -> tuple[EddyResponse, Array]:
-    """The response of the lowest order that meets `rtol` on one mesh, or of the last that helped, and its errors."""
+    """The response of the lowest order that meets `rtol` on one mesh, or of the last that helped, and its errors.
+
+    Raises
+    ------
+    MeshTooLargeError : not even order 3 is within `MOST_UNKNOWNS`
+    """
     mesh = plate_mesh(plate.box.size, plate.conductivity, body, frequency, rule)
+    highest = highest_order(mesh.mesh.ne)
     sources = unit_dipoles(body)
     response = solve_eddy(mesh, 1, frequency, sources)
     tensors, change = own_tensors(response), np.ones(len(body))
     error = change
-    for order in range(2, HIGHEST_ORDER + 1):
+    for order in range(2, highest + 1):
         response = solve_eddy(mesh, order, frequency, sources)
         previous, tensors = tensors, own_tensors(response)
         size = np.linalg.norm(tensors, axis=(1, 2))
         last, change = change, np.linalg.norm(tensors - previous, axis=(1, 2)) / size
         reduction = np.clip(change / last, LEAST_REDUCTION, 1.0)
         error = change * reduction + _truncation(response, rule.reach * plate.box.size.max()) / size
-        if error.max() <= rtol or (order > 2 and np.max(change / last) > STALLED):
+        hopeless = error.max() * BEST_REDUCTION ** (highest - order) > rtol
+        if error.max() <= rtol or hopeless or (order > 2 and np.max(change / last) > STALLED):
             break
     return response, error
 

@@ -27,6 +27,8 @@ from .plate_training import OtherSources, prepare_training, truncated
 MESH_SHARE, NETWORK_SHARE = 0.6, 0.9
 """Shares of the tolerance for the finite elements, and for them and the truncated basis together; the rest is the
 field functions'."""
+STRICT, STRICT_SHARES = 5e-4, (0.3, 0.6)
+"""Tolerances below this have a finer mesh and leave more to the field functions, whose floor the elements set."""
 MOST_FREQUENCIES = 8
 
 
@@ -78,7 +80,7 @@ def reduce_plate(
 
     Parameters
     ----------
-    rtol : relative accuracy of reaction tensors (Frobenius norm); `NETWORK_SHARE` of it is used here
+    rtol : relative accuracy of reaction tensors (Frobenius norm); the network's share of it is used here
     rule : mesh (default by `rtol`)
     others : more sources whose currents the network shall hold: the rotor's
 
@@ -89,13 +91,14 @@ def reduce_plate(
     """
     start = time.perf_counter()
     low, high = checked_ranges(frequencies, rtol)
-    rule = rule or (MeshRule() if rtol >= 5e-4 else MeshRule(1.0, 1.6, 1.4))
+    rule = rule or (MeshRule() if rtol >= STRICT else MeshRule(1.0, 1.6, 1.4))
+    mesh_share, network_share = (MESH_SHARE, NETWORK_SHARE) if rtol >= STRICT else STRICT_SHARES
     others = others or OtherSources()
     places = np.concatenate([region.grid((2, 2, 2), fold=True), others.places])
-    response, error = raise_order(plate, places, high, MESH_SHARE * rtol, rule)
-    if error.max() > MESH_SHARE * rtol:
-        raise AccuracyError(f"Input rtol must be at least {error.max() / MESH_SHARE:.1e} for the mesh rule {rule}.")
-    allowed = NETWORK_SHARE * rtol - float(error.max())
+    response, error = raise_order(plate, places, high, mesh_share * rtol, rule)
+    if error.max() > mesh_share * rtol:
+        raise AccuracyError(f"Input rtol must be at least {error.max() / mesh_share:.1e} for the mesh rule {rule}.")
+    allowed = network_share * rtol - float(error.max())
     training = prepare_training(response.space, region, rtol, others)
     middle = low**0.25 * high**0.75
     used, tried = [low, middle, high], [np.sqrt(middle * high), np.sqrt(low * middle)]

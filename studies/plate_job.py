@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from ..fem.accuracy_error import AccuracyError
 from ..fem.phasor import ComplexArray
 from ..fem.plate import plate_reaction
 from ..fem.plate_region import Region
@@ -48,7 +49,10 @@ def plate_job(scene: Scene, place: Array, frequency: float, model: str, rtol: fl
     plate = checked_plate(scene, place, frequency)
     if not TIGHTEST <= rtol < 1:
         raise InputError(f"Input --rtol must be at least {TIGHTEST:g} and less than 1; instead received {rtol}.")
-    answer = MODELS[model](plate, place, frequency, rtol)
+    try:
+        answer = MODELS[model](plate, place, frequency, rtol)
+    except AccuracyError as error:
+        raise InputError(str(error)) from error
     values = {
         "model": answer.model,
         "error_estimate": answer.error,

@@ -39,12 +39,19 @@ def team7_lines(result: xr.Dataset) -> list[str]:
 
 @styled
 def team7_figure(result: xr.Dataset) -> Figure:
-    """The four curves and what is measured."""
-    figure, ((axes,),) = panels(1, 1, (6.0, 4.0))
+    """The four curves with what is measured, and their deviation."""
+    figure, ((left, right),) = panels(1, 2, (8.0, 3.6))
+    x = 1e3 * result["x"].values
     for curve, color in zip(result["curve"].values, PALETTE, strict=False):
-        axes.plot(1e3 * result["x"], 1e3 * result["computed"].sel(curve=curve), color=color, label=curve)
-        axes.plot(1e3 * result["x"], 1e3 * result["measured"].sel(curve=curve), "o", ms=4, color=color)
-    axes.plot([], [], "ko", ms=4, label="measured (Fujiwara and Nakata 1990)")
-    axes.set(xlabel="x (mm)", ylabel="$B_z$ (mT)", title="TEAM problem 7: line y = 72 mm, z = 34 mm")
-    axes.legend()
+        here = result.sel(curve=curve)
+        left.plot(x, 1e3 * here["computed"], color=color, label=curve)
+        left.plot(x, 1e3 * here["measured"], "o", ms=3.5, color=color)
+        right.plot(x, 100 * here["deviation"], "o-", ms=3, color=color, label=curve)
+    left.plot([], [], "-", color="0.3", label="computed (same places)")
+    left.plot([], [], "o", ms=3.5, color="0.3", label="measured (COMPEL 1990)")
+    right.axhspan(-5, 5, color="0.93", zorder=0)
+    left.set(xlabel="x (mm)", ylabel="$B_z$ (mT)", title="TEAM problem 7: line y = 72 mm, z = 34 mm", ylim=(-3, 12.5))
+    right.set(xlabel="x (mm)", ylabel="computed - measured (% of the line's peak)", title="Deviation", ylim=(-6, 8))
+    left.legend(loc="upper left", ncols=2)
+    right.legend(loc="upper left", ncols=2)
     return figure

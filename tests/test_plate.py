@@ -9,6 +9,7 @@ from ngsolve import SetNumThreads
 from spinlev.fem.accuracy_error import AccuracyError
 from spinlev.fem.phasor import mean_loss
 from spinlev.fem.plate import plate_reaction
+from spinlev.fem.slab import Slab, reaction_tensor
 from spinlev.geometry.box import Box, rotation_matrix
 from spinlev.geometry.plate_mesh import MeshRule
 from spinlev.geometry.scene import Plate
@@ -57,6 +58,27 @@ def test_bad_input_is_named():
         plate_reaction(LYING, [(0, 0, 0.02)], -50.0)
     with pytest.raises(AccuracyError, match="Input rtol must be at least"):
         plate_reaction(LYING, [(0, 0, 0.1)], 1.0, 1e-12, MeshRule(4.0, 4.0, 4.0), refinements=0)
+
+
+def test_a_frequency_beyond_the_finite_elements_is_refused_before_it_is_tried():
+    """5 MHz, skin depth 0.04 mm: the mesh alone has too many cells; at once, and the remedy is named."""
+    with pytest.raises(AccuracyError, match=r"frequency_hz must be lower for finite elements.*model slab"):
+        plate_reaction(LYING, [(0, 0, 0.02)], 5e6, 0.1)
+
+
+@pytest.mark.slow
+def test_a_hopeless_frequency_ends_at_a_low_order():
+    """1 MHz: the mesh is made, but no order that is within the limit can do."""
+    with pytest.raises(AccuracyError, match=r"must be lower for finite elements.*0\.085 mm"):
+        plate_reaction(LYING, [(0, 0, 0.017)], 1e6, 0.1)
+
+
+@pytest.mark.slow
+def test_a_hundred_kilohertz_is_answered():
+    """The skin depth is 1/110 of the thickness; near the infinite slab, to which the edges make a difference."""
+    found = plate_reaction(LYING, [(0, 0, 0.017)], 1e5, 0.1)
+    slab = reaction_tensor(Slab(LYING.conductivity, 0.03), 0.017, 1e5)
+    assert np.linalg.norm(found.tensors[0] - slab) < 0.1 * np.linalg.norm(slab)
 
 
 @pytest.mark.slow

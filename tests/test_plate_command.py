@@ -73,6 +73,7 @@ def test_slab_estimate_vanishes_for_a_wide_plate():
         (("--at", "0,0,-20", "--frequency-hz", "50", "--rtol", "1e-9"), "--rtol must be at least 1e-05 and less than"),
         (("--at", "0,0,-20", "--frequency-hz", "50", "--rtol", "2"), "--rtol must be at least 1e-05 and less than 1"),
         (("--at", "0,0,-20", "--frequency-hz", "nan"), "--frequency-hz must be finite and not negative"),
+        (("--at", "0,0,-20", "--frequency-hz", "5e6", "--model", "fem", "--rtol", "0.1"), "model slab"),
         (("--at", "0,0", "--frequency-hz", "50"), "--at must be three numbers"),
         (("--at", "60,0,-50", "--frequency-hz", "50", "--model", "slab"), "--model slab must have --at over"),
     ],
