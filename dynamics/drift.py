@@ -1,0 +1,81 @@
+"""The slow drift of the body spin: averaged flights of minutes and hours along a branch of equilibria.
+
+The magnetic torque of a rigid moment has no part along the moment, so that s = Ω·m̂/ω is moved by air drag and by the
+floater's own eddy currents alone, over minutes, while everything else has settled.  The floater follows the branch of
+its equilibria in s (`averaged`), to a balance, a fold or a loss of stability.
+The model leaves out what a flight does within the time of a bounce, 0.1 s.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from ..fem.table import FieldTable
+from ..geometry.scene import Scene
+from .arclength import Steps, follow_branch
+from .averaged import BALANCE, CONTACT, Drift, flown, steady
+from .branch import FOLD, Family, Point, spins
+from .equilibria import find_equilibria
+from .equilibrium import Equilibrium, EquilibriumError
+from .events import clearance
+from .rates import Rates
+from .slow_torque import SlowTorque
+from .state import Scales
+
+
+def drift(
+    scene: Scene,
+    table: FieldTable,
+    spin: float = 0.0,
+    duration: float = 250.0,
+    rates: Rates | None = None,
+    start: Equilibrium | None = None,
+    stokes: bool = False,
+) -> Drift:
+    """Follow the stable equilibrium of a scene while its body spin drifts.
+
+    Parameters
+    ----------
+    scene : its drag and the floater's conductivity are the slow torques; its plate is left out
+    table : the rotor's field
+    spin : body spin at the start
+    duration : at most, s; may be infinite where there is a slow torque
+    rates : `Rates` of the same table, to compile them once for many scenes
+    start : equilibrium at `spin`, if it is known; else the one at which small motions grow the slowest
+    stokes : drag proportional to spin, as in `simulate`, instead of `air_torque`
+
+    Raises
+    ------
+    EquilibriumError : no equilibrium at the start
+    """
+    rates = rates or Rates.of(scene, table)
+    torque = SlowTorque.of(scene, rates, stokes)
+    start = start or _start(scene, table, spin, rates)
+    state = Scales.of(scene).pack(start.state)
+    first = torque(state)
+    if not first:
+        return steady(start, duration)
+    towards = spin + np.copysign(3.0, first)
+
+    def over(point: Point) -> bool:
+        return point.kind == FOLD or torque(point.state) * (towards - spin) <= 0 or _touches(scene, point)
+
+    points = follow_branch(Family(rates, spins(scene)), state, spin, towards, Steps(longest=0.03, turn=0.05), over)
+    fold = next((k for k, point in enumerate(points) if point.kind == FOLD), None)
+    if fold is not None:
+        return flown(torque, points[: fold + 1], duration, FOLD)
+    return flown(torque, points, duration, CONTACT if _touches(scene, points[-1]) else BALANCE)
+
+
+def _start(scene: Scene, table: FieldTable, spin: float, rates: Rates) -> Equilibrium:
+    """The equilibrium at which small motions grow the slowest."""
+    known = find_equilibria(scene, table, spin, rates=rates)
+    if not known:
+        raise EquilibriumError(f"At {scene.frequency:g} Hz the floater has no equilibrium with body spin {spin:g}.")
+    return min(known, key=lambda equilibrium: equilibrium.growth_per_s)
+
+
+def _touches(scene: Scene, point: Point) -> bool:
+    return bool(clearance(replace(scene, plate=None), np.zeros(1), point.position[None])[0] < 0)
