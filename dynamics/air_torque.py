@@ -24,10 +24,10 @@ BOUNDARY_LAYER, REST = 6.45, 32.1
 
 def reynolds(radius: float, angular_velocity: ArrayLike) -> Array:
     """ΩR²/ν in air of a sphere (m) that spins (rad/s)."""
-    return np.abs(np.asarray(angular_velocity, float)) * radius**2 * AIR_DENSITY / AIR_VISCOSITY
+    return np.asarray(np.abs(np.asarray(angular_velocity, float)) * radius**2 * AIR_DENSITY / AIR_VISCOSITY)
 
 
 def beyond_stokes(reynolds_number: ArrayLike) -> Array:
     """Torque of a spinning sphere over Stokes' 8πηR³Ω, at Re = ΩR²/ν: 1 up to 7.9, about 4.7 at 1000."""
     number = np.asarray(reynolds_number, float)
-    return np.maximum(1.0, (BOUNDARY_LAYER * np.sqrt(number) + REST) / (16 * np.pi))
+    return np.asarray(np.maximum(1.0, (BOUNDARY_LAYER * np.sqrt(number) + REST) / (16 * np.pi)))

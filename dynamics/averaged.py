@@ -76,8 +76,8 @@ def steady(start: Equilibrium, duration: float) -> Drift:
     growth = max(0.0, start.growth_per_s - start.growth_error_per_s)
     ended = INSTABILITY if growth * duration > E_FOLDS else DURATION
     time = np.array([0.0, E_FOLDS / growth if ended == INSTABILITY else duration])
-    same = [np.full(2, value) for value in (start.spin, start.distance, start.growth_per_s)]
-    return Drift(time, *same, ended, np.nan, np.nan)
+    spin, distance, rate = (np.full(2, value) for value in (start.spin, start.distance, start.growth_per_s))
+    return Drift(time, spin, distance, rate, ended, np.nan, np.nan)
 
 
 def flown(torque: SlowTorque, points: list[Point], duration: float, end: str) -> Drift:
@@ -133,4 +133,4 @@ def _escape(points: list[Point], arc: Array, bend: float) -> float:
     before = next(k for k in range(len(points) - 2, -1, -1) if arc[-1] - arc[k] > 0.01 or k == 0)
     slowest = float(points[before].motion.angular_frequencies[0]) / points[before].time_unit
     remaining = abs(bend) / 2 * (arc[-1] - arc[before]) ** 2
-    return ESCAPE * (4 * remaining / slowest**4) ** 0.2
+    return float(ESCAPE * (4 * remaining / slowest**4) ** 0.2)

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ..fem.accuracy import Accuracy
 from ..geometry import Box, Magnet, horizontal, rotation_matrix, tilt, vertical
+from ..geometry.box import Array
 from ..geometry.mesh import MeshSettings
 
 CUBE = (0.01, 0.01, 0.01)
@@ -46,6 +48,14 @@ class HardCase:
         return Accuracy(nearest=self.nearest).clearance(self.magnets)
 
 
+def _box(size: Sequence[float], center: Sequence[float] = (0.0, 0.0, 0.0), rotation: Array | None = None) -> Box:
+    return Box(np.array(size, float), np.array(center, float), np.eye(3) if rotation is None else rotation)
+
+
+def _magnet(box: Box, polarization: Sequence[float], along: float, across: float | None = None) -> Magnet:
+    return Magnet(box, np.array(polarization, float), along, across)
+
+
 def _cube(permeability: float) -> tuple[Magnet, ...]:
     return horizontal(0.002, 0.01, REMANENCE, permeability)
 
@@ -55,27 +65,27 @@ def _pair(distance: float) -> tuple[Magnet, ...]:
 
 
 def _plate(polarization: tuple[float, float, float]) -> tuple[Magnet, ...]:
-    return (Magnet(Box((0.02, 0.02, 0.0005)), polarization, PERMEABILITY),)
+    return (_magnet(_box((0.02, 0.02, 0.0005)), polarization, PERMEABILITY),)
 
 
 EDGE_WITHIN_A_FACE = (
-    Magnet(Box(CUBE), (1, 0, 0), PERMEABILITY),
-    Magnet(
-        Box((0.006,) * 3, (0.001, 0.0015, 0.008), rotation_matrix((0, 0, 30))),
+    _magnet(_box(CUBE), (1, 0, 0), PERMEABILITY),
+    _magnet(
+        _box((0.006,) * 3, (0.001, 0.0015, 0.008), rotation_matrix((0, 0, 30))),
         (0, 0.5, 1),
         PERMEABILITY,
     ),
 )
 EIGHT = tuple(
-    Magnet(
-        Box((0.006,) * 3, (0.012 * np.cos(a), 0.012 * np.sin(a), 0.001 * k), rotation_matrix((10 * k, 20, 30))),
+    _magnet(
+        _box((0.006,) * 3, (0.012 * np.cos(a), 0.012 * np.sin(a), 0.001 * k), rotation_matrix((10 * k, 20, 30))),
         (1.2 + 0.01 * k, 0.1 * k, 0),
         PERMEABILITY,
     )
     for k, a in enumerate(np.arange(8) * np.pi / 4)
 )
-OBLIQUE = (Magnet(Box(CUBE, rotation=rotation_matrix((15, 40, 70))), (1, 0, 0), 1.05, 1.15),)
-LONG = (Magnet(Box((0.005, 0.005, 0.04)), (1.3, 0, 0), PERMEABILITY),)
+OBLIQUE = (_magnet(_box(CUBE, rotation=rotation_matrix((15, 40, 70))), (1, 0, 0), 1.05, 1.15),)
+LONG = (_magnet(_box((0.005, 0.005, 0.04)), (1.3, 0, 0), PERMEABILITY),)
 
 CASES = {
     "contact distance": HardCase(_cube(PERMEABILITY), CONTACT, quick=True),
@@ -94,6 +104,6 @@ CASES = {
     "anisotropic, any angle": HardCase(OBLIQUE),
     "an edge within a face": HardCase(EDGE_WITHIN_A_FACE, order=4),
     "eight magnets": HardCase(EIGHT, order=4),
-    "no polarisation": HardCase((Magnet(Box(CUBE), (0, 0, 0), PERMEABILITY),), quick=True),
+    "no polarisation": HardCase((_magnet(_box(CUBE), (0, 0, 0), PERMEABILITY),), quick=True),
 }
 """By name, in the order of the figure."""
