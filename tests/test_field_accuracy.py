@@ -36,11 +36,11 @@ class Truth:
         return [sum(values) for values in zip(*parts, strict=True)]
 
 
-def finer(rotor, order=6, degree=33, nearest=None, mesh=OTHER_MESH):
+def finer(rotor, order=6, degree=33):
     """The field from another, finer mesh at a higher order, with all moments kept; good to about 1e-8 of B."""
-    pieces = cut_magnets(rotor, Accuracy(1e-5, nearest).clearance(rotor))
+    pieces = cut_magnets(rotor, Accuracy().clearance(rotor))
     carriers = tuple(carrier(magnet) for magnet in rotor)
-    solution = solve_rotor(rotor, Refinement(order, mesh, 14), "split", degree, pieces, carriers=carriers)
+    solution = solve_rotor(rotor, Refinement(order, OTHER_MESH, 14), "split", degree, pieces, carriers=carriers)
     closed = added_by_closed_form(pieces, rotor, carriers, degree)
     parts = solution.expansions([a + b for a, b in zip(closed, solution.coefficients, strict=True)])
     return Truth(carriers, parts)
