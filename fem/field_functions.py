@@ -117,8 +117,11 @@ class Multipoles:
         return np.moveaxis(values[:, :3], -1, 0), np.moveaxis(values[:, UNFOLDED], -1, 0)
 
 
-def candidates(region: Region, half_edges: Array) -> Multipoles:
+def candidates(region: Region, half_edges: Array, degree: int = HIGHEST_DEGREE) -> Multipoles:
     """Multipoles to choose from for a region beside a plate with these half edges (m), both about the plate's centre.
+
+    The highest `degree` sets how well they can do: in a region half as wide as it is far from the plate, degree 4 ends
+    near 8e-5 of the field of the plate's currents, degree 5 near 2e-5.
 
     Raises
     ------
@@ -141,6 +144,6 @@ def candidates(region: Region, half_edges: Array) -> Multipoles:
     lines[axis] = of_plate[[axis]]
     starts = np.array(list(product(*lines)))
     centers = np.concatenate([starts + depth * gap * away for depth in DEPTHS])
-    kinds = [(l, m, part) for l in range(HIGHEST_DEGREE + 1) for m in range(l + 1) for part in (0, 1)[: 1 + (m > 0)]]
+    kinds = [(l, m, part) for l in range(degree + 1) for m in range(l + 1) for part in (0, 1)[: 1 + (m > 0)]]
     pairs = list(product(centers, kinds))
     return Multipoles(np.array([p[0] for p in pairs]), np.array([p[1] for p in pairs], float), gap)

@@ -2,9 +2,9 @@
 
 From many candidates those are taken one by one that lower the remaining error most (orthogonal least squares:
 S. Chen et al., Int. J. Control 50 (1989) 1873), until the fit on the surface of the region is good enough;
-inside, harmonic functions are at most as wrong as there.  What finite elements cannot do sets a floor: their
-currents are free of divergence only weakly, so that their field is harmonic only to their own accuracy.
-There the fit ends too.
+inside, harmonic functions are at most as wrong as there.  Two things set a floor, where the fit ends too: the
+highest degree among the candidates, and the finite elements, whose currents are free of divergence only weakly, so
+that their field is harmonic only to their own accuracy.
 """
 
 from __future__ import annotations

@@ -11,9 +11,9 @@ from ..geometry.box import Array
 from ..geometry.plate_mesh import MeshRule
 from ..geometry.scene import Plate
 from .accuracy_error import AccuracyError
-from .field_functions import candidates
+from .field_functions import HIGHEST_DEGREE, candidates
 from .multipole_fit import fit_multipoles
-from .plate_reduction import PlateNetwork, reduce_plate
+from .plate_reduction import STRICT, PlateNetwork, reduce_plate
 from .plate_region import Region
 from .plate_table import PlateErrors, PlateTable
 from .plate_training import OtherSources
@@ -21,6 +21,8 @@ from .sources import unit_dipoles
 
 FUNCTION_SHARE = 0.1
 """Share of the tolerance for the field functions; what the other errors leave of it comes on top."""
+STRICT_DEGREE = 7
+"""Highest degree of the multipoles for strict tolerances."""
 
 
 def plate_table(
@@ -67,7 +69,7 @@ def tabulate(network: PlateNetwork, rtol: float) -> PlateTable:
     def worst(error: Array) -> float:
         return max(tensor_error(values, error, rates, omega) for omega in (low, middle, high))
 
-    choice = candidates(region, half_edges)
+    choice = candidates(region, half_edges, HIGHEST_DEGREE if rtol >= STRICT else STRICT_DEGREE)
     fit = fit_multipoles(
         choice, points, values, state_scale, point_scale, rtol, lambda error: worst(error) <= FUNCTION_SHARE * rtol
     )

@@ -27,8 +27,8 @@ from .plate_training import OtherSources, prepare_training, truncated
 MESH_SHARE, NETWORK_SHARE = 0.6, 0.9
 """Shares of the tolerance for the finite elements, and for them and the truncated basis together; the rest is the
 field functions'."""
-STRICT, STRICT_SHARES = 5e-4, (0.3, 0.6)
-"""Tolerances below this have a finer mesh and leave more to the field functions, whose floor the elements set."""
+STRICT, STRICT_SHARES = 5e-4, (0.6, 0.8)
+"""Tolerances below this have a finer mesh, and leave more to the field functions."""
 MOST_FREQUENCIES = 8
 
 
