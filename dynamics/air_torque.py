@@ -4,7 +4,7 @@ With Re = ΩR²/ν the torque is ½ρΩ²R⁵ C.  Slow: C = 16π/Re, which is 8�
 throws off a jet at its equator and C = 6.45/√Re + 32.1/Re (S. C. R. Dennis, S. N. Singh and D. B. Ingham, J. Fluid
 Mech. 101 (1980) 257; 20 ≤ Re ≤ 1000, steady; the first term is the boundary layer's, so that laminar flow reaches
 further).  The two meet at Re = 7.9; the larger one is taken.  E. Loth's fit of other data (AIAA J. 46 (2008) 801),
-1 + 5/(64π) (4 Re)^0.6 times Stokes, is 11 % higher at Re = 20 and agrees within 3 % from 100 to 1000.
+1 + 5/(64π) (4 Re)^0.6 times Stokes, is 11 % higher at Re = 20 and agrees within 5 % from 100 to 2000.
 
 The air is far from walls and its flow is steady: a sphere that also swings once a turn moves more of it.
 """

@@ -53,11 +53,10 @@ def drift(
     rates = rates or Rates.of(scene, table)
     torque = SlowTorque.of(scene, rates, stokes)
     start = start or _start(scene, table, spin, rates)
-    state = Scales.of(scene).pack(start.state)
-    first = torque(state)
-    if not first:
+    if torque.absent:
         return steady(start, duration)
-    towards = spin + np.copysign(3.0, first)
+    state = Scales.of(scene).pack(start.state)
+    towards = spin + np.copysign(3.0, torque(state))
 
     def over(point: Point) -> bool:
         return point.kind == FOLD or torque(point.state) * (towards - spin) <= 0 or _touches(scene, point)

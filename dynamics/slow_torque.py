@@ -44,6 +44,11 @@ class SlowTorque:
         """The slow torques of a scene."""
         return cls(rates, parameters(scene, Scales.of(scene)), scene.floater.radius, stokes)
 
+    @property
+    def absent(self) -> bool:
+        """Whether nothing moves the spin."""
+        return not np.any(self.values[[Parameter.SPIN_DRAG, Parameter.SPIN_EDDY]])
+
     def __call__(self, state: Array) -> float:
         """ds/dt, 1/s, at a scaled state (12,) at rest in the rotor's frame."""
         moment, spin = state[6:9], state[9:]
