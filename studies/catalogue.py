@@ -11,6 +11,8 @@ from matplotlib.figure import Figure
 
 from ..geometry import load_scene
 from .dipole_validity import dipole_validity, validity_figure, validity_lines
+from .drift import drift_study
+from .drift_figure import drift_figure, drift_lines
 from .figures import save_figure
 from .floater_figure import floater_figure, floater_lines
 from .floater_permeability import floater_permeability
@@ -57,6 +59,12 @@ CATALOGUE = {
         lambda quick: floater_permeability(load_scene(default_scene()), quick=quick),
         floater_figure,
         floater_lines,
+    ),
+    "drift": Study(
+        "levitation time against frequency by the slow drift of the floater's spin",
+        drift_study,
+        drift_figure,
+        drift_lines,
     ),
     "team7": Study(
         "eddy currents against the measurement of TEAM workshop problem 7", team7_study, team7_figure, team7_lines
