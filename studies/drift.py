@@ -83,8 +83,8 @@ def drift_study(quick: bool) -> xr.Dataset:
 
     Returns
     -------
-    Dataset over `case`, `variant` and `step` of frequency; `quick` has two cases, fewer frequencies and variants, and point dipoles
-    instead of cuboids (μr = 1).  Recoil permeability is 1.05 in the floater's moment and left out in the rotor.
+    Dataset over `case`, `variant` and `step` of frequency; `quick` has two cases, fewer frequencies and variants, and
+    point dipoles instead of cuboids (μr = 1).  Recoil permeability is 1.05 in the floater and left out in the rotor.
     """
     names, variants = (QUICK, QUICK_VARIANTS) if quick else (tuple(CASES), tuple(VARIANTS))
     steps, model = (11, "dipole") if quick else (29, "cuboid")
