@@ -21,7 +21,6 @@ from scipy.interpolate import CubicHermiteSpline, CubicSpline, PchipInterpolator
 
 from ..geometry.box import Array
 from .branch import FOLD, Point
-from .equilibrium import Equilibrium
 from .slow_torque import SlowTorque
 
 BALANCE, DURATION, INSTABILITY, CONTACT = "balance", "duration", "instability", "contact"
@@ -71,9 +70,9 @@ class Drift:
         return float((ends[1] - ends[0]) / (times[1] - times[0]))
 
 
-def steady(start: Equilibrium, duration: float) -> Drift:
+def steady(start: Point, duration: float) -> Drift:
     """A flight on which nothing moves the spin."""
-    growth = max(0.0, start.growth_per_s - start.growth_error_per_s)
+    growth = max(0.0, start.growth_per_s - start.doubt_per_s)
     ended = INSTABILITY if growth * duration > E_FOLDS else DURATION
     time = np.array([0.0, E_FOLDS / growth if ended == INSTABILITY else duration])
     spin, distance, rate = (np.full(2, value) for value in (start.spin, start.distance, start.growth_per_s))

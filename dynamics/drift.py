@@ -22,7 +22,7 @@ from .equilibrium import Equilibrium, EquilibriumError
 from .events import clearance
 from .rates import Rates
 from .slow_torque import SlowTorque
-from .state import Scales
+from .state import Scales, State
 
 
 def drift(
@@ -31,7 +31,7 @@ def drift(
     spin: float = 0.0,
     duration: float = 250.0,
     rates: Rates | None = None,
-    start: Equilibrium | None = None,
+    start: State | None = None,
     stokes: bool = False,
 ) -> Drift:
     """Follow the stable equilibrium of a scene while its body spin drifts.
@@ -43,7 +43,7 @@ def drift(
     spin : body spin at the start
     duration : at most, s; may be infinite where there is a slow torque
     rates : `Rates` of the same table, to compile them once for many scenes
-    start : equilibrium at `spin`, if it is known; else the one at which small motions grow the slowest
+    start : the equilibrium at `spin`, if it is known; else the one at which small motions grow the slowest
     stokes : drag proportional to spin, as in `simulate`, instead of `air_torque`
 
     Raises
@@ -52,16 +52,16 @@ def drift(
     """
     rates = rates or Rates.of(scene, table)
     torque = SlowTorque.of(scene, rates, stokes)
-    start = start or _start(scene, table, spin, rates)
+    family = Family(rates, spins(scene))
+    state = Scales.of(scene).pack(start or _start(scene, table, spin, rates).state)
     if torque.absent:
-        return steady(start, duration)
-    state = Scales.of(scene).pack(start.state)
+        return steady(family.point(state[:3], state[6:9], spin), duration)
     towards = spin + np.copysign(3.0, torque(state))
 
     def over(point: Point) -> bool:
         return point.kind == FOLD or torque(point.state) * (towards - spin) <= 0 or _touches(scene, point)
 
-    points = follow_branch(Family(rates, spins(scene)), state, spin, towards, Steps(longest=0.03, turn=0.05), over)
+    points = follow_branch(family, state, spin, towards, Steps(longest=0.03, turn=0.05), over)
     fold = next((k for k, point in enumerate(points) if point.kind == FOLD), None)
     if fold is not None:
         return flown(torque, points[: fold + 1], duration, FOLD)

@@ -11,6 +11,8 @@ from matplotlib.figure import Figure
 
 from ..geometry import load_scene
 from .dipole_validity import dipole_validity, validity_figure, validity_lines
+from .drift import drift_study
+from .drift_figure import drift_figure, drift_lines
 from .field_hard_cases import field_hard_cases, hard_case_lines
 from .field_hard_cases_figure import hard_case_figure
 from .figures import save_figure
@@ -73,6 +75,12 @@ CATALOGUE = {
         plate_damping,
         damping_figure,
         damping_lines,
+    ),
+    "drift": Study(
+        "levitation time against frequency by the slow drift of the floater's spin",
+        drift_study,
+        drift_figure,
+        drift_lines,
     ),
     "team7": Study(
         "eddy currents against the measurement of TEAM workshop problem 7", team7_study, team7_figure, team7_lines

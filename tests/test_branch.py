@@ -1,4 +1,4 @@
-"""Branches of equilibria against published numbers, against surveys that know nothing of them, and themselves."""
+"""Branches of equilibria against known numbers, surveys that know nothing of them, and themselves."""
 
 from dataclasses import replace
 

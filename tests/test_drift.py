@@ -98,7 +98,7 @@ def test_loss_in_the_fold_as_in_the_full_motion(rates):
     """Slow torques 100 times as large: heights to 1e-3 (measured 3e-4), time of loss to 2 % (measured 0.9 %)."""
     scene = faster(VERTICAL, 100.0)
     start = nearest(scene, VERTICAL_TABLE, rates=rates)
-    averaged = drift(scene, VERTICAL_TABLE, 0.0, 60.0, rates, start, stokes=True)
+    averaged = drift(scene, VERTICAL_TABLE, 0.0, 60.0, rates, start.state, stokes=True)
     flight, distance, spin = flown(scene, VERTICAL_TABLE, start, 60.0)
     assert (averaged.ended_by, flight.ended_by) == ("fold", "lost")
     assert_heights_agree(averaged, flight, distance, spin, (0.2, 0.5, 0.8, 0.9), 1e-3)
@@ -112,7 +112,7 @@ def test_balance_as_in_the_full_motion(rates):
     """At 75 Hz the balance comes before the fold: the flight is endless, and the full motion settles at the same s*."""
     scene = replace(faster(VERTICAL, 100.0), frequency=75.0)
     start = nearest(scene, VERTICAL_TABLE, rates=rates)
-    averaged = drift(scene, VERTICAL_TABLE, 0.0, np.inf, rates, start, stokes=True)
+    averaged = drift(scene, VERTICAL_TABLE, 0.0, np.inf, rates, start.state, stokes=True)
     _, distance, spin = flown(scene, VERTICAL_TABLE, start, 45.0)
     assert averaged.ended_by == "balance"
     assert averaged.levitated_s == np.inf
@@ -130,7 +130,7 @@ def test_oscillatory_instability_ends_the_flight(rates):
     """At 85 Hz small motions grow by e in a third of a second, which the drift does not change so soon."""
     scene = replace(VERTICAL, frequency=85.0)
     start = nearest(scene, VERTICAL_TABLE, rates=rates)
-    found = drift(scene, VERTICAL_TABLE, 0.0, 250.0, rates, start)
+    found = drift(scene, VERTICAL_TABLE, 0.0, 250.0, rates, start.state)
     assert found.ended_by == "instability"
     assert found.levitated_s == pytest.approx(7.0 / start.growth_per_s, rel=0.02)
 
@@ -146,7 +146,7 @@ def test_oscillatory_instability_ends_the_flight(rates):
 def test_real_slow_torques(scene, table, ended):
     """Heights to 1e-4, time of loss to 0.5 % (measured 0.13 %)."""
     start = nearest(scene, table)
-    averaged = drift(scene, table, 0.0, 250.0, start=start, stokes=True)
+    averaged = drift(scene, table, 0.0, 250.0, start=start.state, stokes=True)
     flight, distance, spin = flown(scene, table, start, 250.0)
     print(f"\n{averaged.ended_by}: averaged {averaged.levitated_s:.3f} s, full motion {flight.levitated_s:.3f} s")
     assert (averaged.ended_by, flight.ended_by) == ended
