@@ -82,7 +82,7 @@ def drift_lines(result: xr.Dataset) -> list[str]:
                     f", falling {_span(1e3 * chosen['fall_rate'])} mm/s, late over early {_span(chosen['fall_ratio'])}"
                 )
             if number == KEPT:
-                endless = np.isfinite(chosen["balance_spin"]).values
+                endless = np.isfinite(chosen["balance_spin"].values)
                 words += f"; endless: {endless.sum()} of {len(endless)}, s* {_span(chosen['balance_spin'])}"
             lines.append(words)
     return lines
