@@ -154,7 +154,7 @@ def rotors():
 
 def test_rigid_dipole_is_the_table_of_the_rotor(rotors):
     """F = (m·∇)B and m × B with the rotor's table, made by other functionals of another solution."""
-    table = rotor_table(rotors[0].magnets, "fem", 1e-5)
+    table = rotor_table(rotors[0].magnets, "fem", 1e-6)
     b, gradient = table.evaluate(PLACE[None])
     rigid = two_body(rotors[-1], FLOATER, PLACE, DIRECTION).rigid
     dipole = FLOATER.moment * DIRECTION
