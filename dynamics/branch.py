@@ -54,7 +54,7 @@ class Point:
     spin : body spin s
     position : (3,) m, rotor's frame
     state : (12,) scaled
-    tangent : (7,) unit direction of the branch in scaled place and direction of the moment and the parameter by its unit
+    tangent : (7,) unit direction of the branch: place and direction of the moment, scaled; the parameter by its unit
     motion : small motions, in scaled time
     time_unit : s
     kind : what is marked here: "fold", "oscillatory", "real"; "" at an ordinary point
