@@ -30,7 +30,7 @@ STRONG = 0.5
 FIRST_RATE = 0.5
 """Ratio of two differences that is assumed before it is known; 0.1 to 0.3 were measured."""
 FASTEST_RATE, FASTEST_RATE_STRONG, SLOWEST_RATE = 0.1, 0.3, 0.75
-SAFETY = 3.0
+SAFETY = 2.5
 """Factor on the extrapolated difference."""
 
 

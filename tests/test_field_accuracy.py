@@ -106,7 +106,16 @@ def test_a_target_out_of_reach_is_reported():
     assert table.provenance["error_estimate"] > 1e-10
 
 
-SLOW = {"μr = 5", "μr = 1000", "flat, across", "flat, along", "gap of 50 µm", "an edge within a face", "eight magnets"}
+SLOW = {
+    "long",
+    "μr = 5",
+    "μr = 1000",
+    "flat, across",
+    "flat, along",
+    "gap of 50 µm",
+    "an edge within a face",
+    "eight magnets",
+}
 
 
 def check(case, own_step=1e-6):
