@@ -69,16 +69,20 @@ def survey(
     scales = Scales.of(scene)
     values, rates = parameters(scene, scales, frozen_spin=True), rates or Rates.of(scene, table)
     balance = Balance(rates, values, spin)
-    where = SearchRange(scene, farthest)
+    curves, points = fixed_points(balance, SearchRange(scene, farthest))
+    found = [_equilibrium(table, scales, balance, r, m) for r, m in points]
+    if np.any(scene.gravity[:2]):
+        found = _shaken(Shaken(scene, rates, values, None), found)
+    return Survey(_in_order(found), tuple(_force_curve(scene, scales, curve) for curve in curves))
+
+
+def fixed_points(balance: Balance, where: SearchRange) -> tuple[list[Curve], list[tuple[Array, Array]]]:
+    """Curves of lateral balance in the range, and the scaled positions and moments of the equilibria on them."""
     curves = all_curves(balance, where)
     guesses = [curve.balanced() for curve in curves]
     position = np.concatenate([np.zeros((0, 3)), *(p for p, _ in guesses)])
     moment = np.concatenate([np.zeros((0, 3)), *(m for _, m in guesses)])
-    points = _polished(balance, position, moment)
-    found = [_equilibrium(table, scales, balance, r, m) for r, m in points if r in where]
-    if np.any(scene.gravity[:2]):
-        found = _shaken(Shaken(scene, rates, values, None), found)
-    return Survey(_in_order(found), tuple(_force_curve(scene, scales, curve) for curve in curves))
+    return curves, [(r, m) for r, m in _polished(balance, position, moment) if r in where]
 
 
 def with_plate(
