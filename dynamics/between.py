@@ -121,9 +121,7 @@ def _tangent(grid: Grid, walk: _Walk, before: Array) -> Array:
     """Unit directions (n, 7) of the branches, going on as `before` (n, 7); not a number where there is none."""
     _, slope = _extended(grid, walk)
     basis = tangent_basis(walk.moment)
-    old = np.concatenate(
-        [before[:, :3], np.einsum("nka,na->nk", basis, before[:, 3:6]), before[:, 6:]], axis=1
-    )
+    old = np.concatenate([before[:, :3], np.einsum("nka,na->nk", basis, before[:, 3:6]), before[:, 6:]], axis=1)
     along = _solved(np.concatenate([slope, old[:, None]], axis=1), np.eye(6)[5] + np.zeros((len(old), 1)))
     along /= np.linalg.norm(along, axis=1, keepdims=True)
     return np.concatenate([along[:, :3], np.einsum("nk,nka->na", along[:, 3:5], basis), along[:, 5:]], axis=1)

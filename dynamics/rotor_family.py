@@ -13,6 +13,7 @@ from ..fem.models import rotor_table
 from ..geometry.box import Array, Box
 from ..geometry.magnet import Magnet
 from ..geometry.scene import Scene
+from .branch import Problem
 from .equations import parameters
 from .movable import MovableField, Move, Shift, Turn
 from .rates import Rates
@@ -58,6 +59,14 @@ class RotorFamily:
         values = np.array([parameters(scene, Scales.of(scene), frozen_spin=True) for scene in scenes])[which]
         values[:, Parameter.MEASURE] = measure
         return np.asarray(values)
+
+    def frequencies(self, measure: float, spin: float = 0.0) -> Problem:
+        """The problem whose parameter is the frequency, Hz, at one measure."""
+        return lambda frequency: (self.values(frequency, measure)[0], spin)
+
+    def measures(self, frequency: float, spin: float = 0.0) -> Problem:
+        """The problem whose parameter is the measure, m or rad, at one frequency."""
+        return lambda measure: (self.values(frequency, measure)[0], spin)
 
     @cached_property
     def rates(self) -> Rates:
