@@ -26,7 +26,7 @@ from .rotor_family import RotorFamily
 from .stability import spectra
 from .symbols import Parameter
 
-SPACING = 12
+SPACING = 10
 """Points of the map between two searches."""
 JUMP = 0.15
 """A neighbour farther away than this (radii and rad) may be another branch's."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -56,9 +55,10 @@ class RotorFamily:
         frequency, measure = np.broadcast_arrays(np.atleast_1d(frequency), np.atleast_1d(measure))
         different, which = np.unique(frequency, return_inverse=True)
         scenes = [replace(self.scene, frequency=float(f)) for f in different]
-        values = np.array([parameters(scene, Scales.of(scene), frozen_spin=True) for scene in scenes])[which]
+        each = [parameters(scene, Scales.of(scene), frozen_spin=True) for scene in scenes]
+        values = np.reshape(each, (-1, len(Parameter)))[which]
         values[:, Parameter.MEASURE] = measure
-        return np.asarray(values)
+        return values
 
     def frequencies(self, measure: float, spin: float = 0.0) -> Problem:
         """The problem whose parameter is the frequency, Hz, at one measure."""
@@ -94,8 +94,8 @@ def rotor_family(
     """
     if configuration not in MOVES or len(MOVES[configuration]) != len(scene.rotor):
         raise ValueError(
-            f"Input configuration must be one of {', '.join(MOVES)} and that of the scene's {len(scene.rotor)} magnets; "
-            f"instead received {configuration!r}."
+            f"Input configuration must be one of {', '.join(MOVES)} and have the scene's number of magnets, "
+            f"{len(scene.rotor)}; instead received {configuration!r}."
         )
     moves = MOVES[configuration]
     rotor = tuple(_unmoved(magnet, move) for magnet, move in zip(scene.rotor, moves, strict=True))
