@@ -1,10 +1,11 @@
 """All equilibria and their stability over a grid of frequencies and measures of the rotor.
 
-On a coarse grid everything is searched for (`equilibria.survey`).  From there each equilibrium is carried to the
-points beside it, all at once, until nothing new is found.  Where that does not lead to the neighbour the branch is
-followed by its arc length, around the fold and back on the other side if there is one (`between`).  So a sheet of
-equilibria is found whole if one of its points, or of a sheet that meets it in a fold, is one of a search; only one that
-fits between the points of the coarse grid, and meets no other, can be missed.
+On a coarse grid Newton's method searches from the starts of `search`, all of them at some points and a random quarter
+at others.  From what is found each equilibrium is carried to the points beside it, all at once, until nothing new is
+found.  Where that does not lead to the neighbour the branch is followed by its arc length, around the fold and back on
+the other side if there is one (`between`).  So a sheet of equilibria is found whole if one of its points, or of a sheet
+that meets it in a fold, is found by a search; only one that fits between the points of the coarse grid, and meets no
+other, can be missed.
 """
 
 from __future__ import annotations
@@ -19,15 +20,16 @@ from ..geometry.box import Array
 from .atlas import Atlas
 from .balance import EVERY, Indices, solve
 from .between import between
-from .equilibria import fixed_points
 from .equilibrium import EquilibriumError
 from .grid import Grid
 from .rotor_family import RotorFamily
 from .stability import spectra
 from .symbols import Parameter
 
-SPACING = 10
+SPACING = 5
 """Points of the map between two searches."""
+WHOLE, PART = 8, 4
+"""Every eighth search has all starts, the others a quarter of them."""
 JUMP = 0.15
 """A neighbour farther away than this (radii and rad) may be another branch's."""
 
@@ -89,7 +91,7 @@ def equilibrium_map(
     frequencies, measures : axes, Hz and m or rad
     spin : body spin s
     farthest : largest depth, and distance from the axis, m
-    spacing : steps of the grid between two searches
+    spacing : steps of the grid between two searches; a sheet between them is missed if it meets no other in a fold
     progress : called with the finished part, 0 to 1
 
     Raises
@@ -104,16 +106,27 @@ def equilibrium_map(
         )
     grid = Grid(family, *axes, spin, farthest)
     atlas, nodes = Atlas(len(grid)), grid.coarse(spacing)
-    seeds = []
+    seeds, random = [], np.random.default_rng(0)
     for number, point in enumerate(nodes):
-        _, found = fixed_points(grid.alone(int(point)), grid.range(int(point)))
-        seeds += [(point, r, m) for r, m in found]
+        seeds.append(_searched(grid, int(point), None if number % WHOLE == 0 else random))
         if progress is not None:
             progress(0.9 * (number + 1) / len(nodes))
-    if seeds:
-        points, position, moment = (np.array(part) for part in zip(*seeds, strict=True))
-        _spread(grid, atlas, points, position, moment)
+    point, position, moment = (np.concatenate(part) for part in zip(*seeds, strict=True))
+    _spread(grid, atlas, point, position, moment)
     return _judged(grid, atlas, len(nodes))
+
+
+def _searched(grid: Grid, point: int, random: np.random.Generator | None) -> tuple[Indices, Array, Array]:
+    """Equilibria of one point, from all starts or from some; each perhaps many times."""
+    where = grid.range(point)
+    position, moment = where.starts()
+    if random is not None:
+        chosen = random.choice(len(position), len(position) // PART, replace=False)
+        position, moment = position[chosen], moment[chosen]
+    with np.errstate(all="ignore"):  # many of these starts run away
+        position, moment, step = solve(grid.alone(point), position, moment, EVERY, 25)
+    good = (step < 1e-8) & where.holds(position)
+    return np.full(good.sum(), point), position[good], moment[good]
 
 
 def _spread(grid: Grid, atlas: Atlas, point: Indices, position: Array, moment: Array) -> None:
