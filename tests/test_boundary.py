@@ -76,6 +76,7 @@ def test_a_fold_is_the_same_in_either_parameter(family, stable):
     assert again[0].angular_frequency == 0
 
 
+@pytest.mark.slow
 def test_with_drag_the_crossing_is_where_growth_changes_its_sign(stable):
     """Strong linear drag: growth is within 1e-6 of zero in units of the rotor's rate, and changes its sign there."""
     scene = replace(SCENE, drag=Drag(3e-2, 1e-7))

@@ -69,6 +69,7 @@ def test_a_moved_rotor_has_the_field_of_its_own_table(name):
         np.testing.assert_allclose(ours, theirs, atol=1e-13 * np.abs(theirs).max())
 
 
+@pytest.mark.slow
 def test_sheets_are_found_around_their_folds():
     """With one search in a corner of the map, far beyond the folds: the same as with searches all over it."""
     family, measures = rotor_family(scene_of("horizontal"), "horizontal", "dipole"), ROTORS["horizontal"][1]

@@ -46,6 +46,7 @@ def leaning():
     return table, rates, family, follow_orbits(family, states, 0.0, 0.1)
 
 
+@pytest.mark.slow
 def test_tilted_gravity_ends_levitation_in_a_fold(leaning):
     """0.81° is the most that the vertical rotor bears at 14 mm and 80 Hz; motions found on their own say the same."""
     table, rates, _, points = leaning
@@ -57,6 +58,7 @@ def test_tilted_gravity_ends_levitation_in_a_fold(leaning):
         assert [e.stable for e in found if abs(e.position[2] + 26.2e-3) < 0.5e-3][:1] == expected
 
 
+@pytest.mark.slow
 def test_beyond_the_fold_it_comes_back_to_upright_gravity_off_the_axis(leaning):
     """There the floater hangs beside the axis, in balance but unstable: flown for five turns it comes back."""
     table, _, _, points = leaning
