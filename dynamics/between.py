@@ -7,13 +7,16 @@ comes to the neighbour (λ = 1) or, after a fold, back to its own point (λ = 0)
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..geometry.box import Array
 from .balance import EVERY, Balance, Indices, moved, solve, tangent_basis
 from .grid import Grid
 
+Truth = NDArray[np.bool_]
 UNIT = 0.1
 """Length of the way between two points, in radii and rad."""
 FIRST, LONGEST, SHORTEST, MOST = 0.01, 0.1, 1e-5, 300
@@ -36,7 +39,7 @@ class _Walk:
     tangent: Array
     step: Array
 
-    def kept(self, rows: Array) -> _Walk:
+    def kept(self, rows: NDArray[Any]) -> _Walk:
         return _Walk(*(getattr(self, name)[rows] for name in self.__dataclass_fields__))
 
 
@@ -52,7 +55,7 @@ def between(grid: Grid, start: Indices, end: Indices, position: Array, moment: A
     first = np.zeros((count, 7))
     first[:, 6] = 1.0
     walk.tangent = _tangent(grid, walk, first)
-    walk = walk.kept(np.isfinite(walk.tangent).all(axis=1))
+    walk = walk.kept(np.flatnonzero(np.isfinite(walk.tangent).all(axis=1)))
     ended: list[tuple[Indices, Array, Array]] = []
     for _ in range(MOST):
         if not len(walk.start):
@@ -66,7 +69,7 @@ def between(grid: Grid, start: Indices, end: Indices, position: Array, moment: A
     return np.concatenate(points), np.concatenate(places), np.concatenate(moments)
 
 
-def _advanced(grid: Grid, walk: _Walk) -> tuple[_Walk, Array]:
+def _advanced(grid: Grid, walk: _Walk) -> tuple[_Walk, Truth]:
     """One step of each branch, or a shorter one to try where it was too long; and which have come to an end."""
     position = walk.position + walk.step[:, None] * walk.tangent[:, :3]
     moment = walk.moment + walk.step[:, None] * walk.tangent[:, 3:6]
@@ -84,7 +87,7 @@ def _advanced(grid: Grid, walk: _Walk) -> tuple[_Walk, Array]:
     return new, good & ((new.way >= 1.0) | (new.way <= 0.0))
 
 
-def _corrected(grid: Grid, walk: _Walk, step: Array) -> Array:
+def _corrected(grid: Grid, walk: _Walk, step: Array) -> Truth:
     """Newton's method across the tangents, in place; says where it found the branch again."""
     active, good = np.arange(len(step)), np.zeros(len(step), bool)
     for _ in range(5):
@@ -129,8 +132,8 @@ def _tangent(grid: Grid, walk: _Walk, before: Array) -> Array:
 
 def _solved(matrices: Array, vectors: Array) -> Array:
     """Solutions (n, k); not a number where a matrix is singular or not finite."""
-    good = np.isfinite(matrices).all(axis=(1, 2))
-    sign = np.zeros(len(good))
+    good: Truth = np.asarray(np.isfinite(matrices).all(axis=(1, 2)))
+    sign = np.zeros(len(matrices))
     sign[good] = np.linalg.slogdet(matrices[good])[0]
     good &= sign != 0
     found = np.full(vectors.shape, np.nan)
@@ -140,9 +143,9 @@ def _solved(matrices: Array, vectors: Array) -> Array:
 
 def _landed(grid: Grid, walk: _Walk) -> tuple[Indices, Array, Array]:
     """The equilibria at the points in which branches ended."""
+    if not len(walk.start):
+        return walk.start, walk.position, walk.moment
     point = np.where(walk.way >= 1.0, walk.end, walk.start)
-    if not len(point):
-        return point, walk.position, walk.moment
     position, moment, size = solve(grid.balance(point), walk.position, walk.moment, EVERY, 12)
     good = size < 1e-8
     return point[good], position[good], moment[good]

@@ -162,10 +162,10 @@ def _corrected(boundary: _Boundary, guess: BoundaryPoint, tangent: Array | None)
         if not np.isfinite(slope).all():
             return None
         if tangent is None:
-            change = -np.linalg.lstsq(slope, value, rcond=None)[0]
+            change = -np.asarray(np.linalg.lstsq(slope, value, rcond=None)[0])
         else:
             matrix = np.vstack([slope, _local(point, tangent)])
-            change = -np.linalg.lstsq(matrix, np.append(value, 0.0), rcond=None)[0]
+            change = -np.asarray(np.linalg.lstsq(matrix, np.append(value, 0.0), rcond=None)[0])
         size = float(np.linalg.norm(change))
         if size > 1.0:
             return None

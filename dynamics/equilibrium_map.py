@@ -68,10 +68,10 @@ class EquilibriumMap:
     @property
     def number(self) -> tuple[Indices, Indices]:
         """Equilibria and stable equilibria at each point: two of (frequencies, measures)."""
-        counts = np.zeros((2, len(self.frequencies), len(self.measures)), int)
-        np.add.at(counts, (0, self.row, self.column), 1)
-        np.add.at(counts, (1, self.row, self.column), self.stable)
-        return counts[0], counts[1]
+        shape = len(self.frequencies), len(self.measures)
+        place, size = self.row * shape[1] + self.column, shape[0] * shape[1]
+        every, stable = np.bincount(place, minlength=size), np.bincount(place[self.stable], minlength=size)
+        return every.reshape(shape), stable.reshape(shape)
 
 
 def equilibrium_map(
@@ -166,7 +166,7 @@ def _judged(grid: Grid, atlas: Atlas, searches: int) -> EquilibriumMap:
         column=column,
         position=position * grid.family.scene.floater.radius,
         moment=moment,
-        eigenvalues=values / time,
+        eigenvalues=np.asarray(values / time, complex),
         errors=errors.max(axis=1, initial=0.0) / time[:, 0],
         stable=np.all(values.real <= errors, axis=1),
         searches=searches,

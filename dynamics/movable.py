@@ -10,16 +10,10 @@ import heyoka as hy
 import numpy as np
 
 from ..fem.compiled import FieldExpressions
+from ..fem.table import FieldFormula
 from ..geometry.box import rotation_matrix
 from ..geometry.magnet import Magnet
 from .symbols import Parameter, Vector
-
-
-class Expressed(Protocol):
-    """A field that can be written as expressions of a position (m, rotor's frame)."""
-
-    def expressions(self, position: Sequence[hy.expression]) -> FieldExpressions:
-        """B and its gradient."""
 
 
 class Move(Protocol):
@@ -28,7 +22,7 @@ class Move(Protocol):
     def moved(self, magnet: Magnet, measure: float) -> Magnet:
         """The magnet, from where it is at measure zero."""
 
-    def field(self, source: Expressed, position: Vector, measure: hy.expression) -> FieldExpressions:
+    def field(self, source: FieldFormula, position: Vector, measure: hy.expression) -> FieldExpressions:
         """Field of the moved source."""
 
 
@@ -43,7 +37,7 @@ class Shift:
         center = magnet.box.center + measure * np.array(self.way)
         return replace(magnet, box=replace(magnet.box, center=center))
 
-    def field(self, source: Expressed, position: Vector, measure: hy.expression) -> FieldExpressions:
+    def field(self, source: FieldFormula, position: Vector, measure: hy.expression) -> FieldExpressions:
         """Field of the moved source."""
         return source.expressions([p - w * measure if w else p for p, w in zip(position, self.way, strict=True)])
 
@@ -57,7 +51,7 @@ class Turn:
         turn, box = rotation_matrix((0.0, -np.degrees(measure), 0.0)), magnet.box
         return replace(magnet, box=replace(box, center=turn @ box.center, rotation=turn @ box.rotation))
 
-    def field(self, source: Expressed, position: Vector, measure: hy.expression) -> FieldExpressions:
+    def field(self, source: FieldFormula, position: Vector, measure: hy.expression) -> FieldExpressions:
         """Field of the moved source."""
         cosine, sine = hy.cos(measure), hy.sin(measure)
         x, y, z = position
@@ -80,7 +74,7 @@ class MovableField:
     parts : fields as they are at measure zero, and how each moves; None for one that stands still
     """
 
-    parts: tuple[tuple[Expressed, Move | None], ...]
+    parts: tuple[tuple[FieldFormula, Move | None], ...]
 
     def expressions(self, position: Sequence[hy.expression]) -> FieldExpressions:
         """B and its gradient as expressions of a position (m, rotor's frame) and of `Parameter.MEASURE`."""

@@ -6,7 +6,7 @@ import heyoka as hy
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..fem.table import FieldTable
+from ..fem.table import FieldFormula
 from ..geometry.box import Array
 from ..geometry.scene import Scene
 from .equations import equations_of_motion
@@ -22,7 +22,7 @@ class Rates:
     optimised : for very many states: faster, and compiled in twice the time
     """
 
-    def __init__(self, table: FieldTable, conducting: bool = False, optimised: bool = False) -> None:
+    def __init__(self, table: FieldFormula, conducting: bool = False, optimised: bool = False) -> None:
         equations = equations_of_motion(table, conducting=conducting)
         variables = list(equations.variables)
         tensors = hy.diff_tensors(list(equations.rates), diff_args=variables, diff_order=1)
@@ -31,7 +31,7 @@ class Rates:
         self._function = hy.cfunc(outputs, variables, compact_mode=True, opt_level=1 if optimised else 0)
 
     @classmethod
-    def of(cls, scene: Scene, table: FieldTable) -> Rates:
+    def of(cls, scene: Scene, table: FieldFormula) -> Rates:
         """The rates that a scene needs."""
         return cls(table, bool(scene.floater.conductivity))
 
