@@ -11,7 +11,7 @@ import numpy as np
 
 from ..fem.compiled import FieldExpressions
 from ..fem.table import FieldFormula
-from ..geometry.box import rotation_matrix
+from ..geometry.box import Array, rotation_matrix
 from ..geometry.magnet import Magnet
 from .symbols import Parameter, Vector
 
@@ -32,9 +32,13 @@ class Shift:
 
     way: tuple[float, float, float]
 
+    def way_of(self, measure: float) -> Array:
+        """How far it moves, (3,) m."""
+        return measure * np.array(self.way)
+
     def moved(self, magnet: Magnet, measure: float) -> Magnet:
         """The magnet, from where it is at measure zero."""
-        center = magnet.box.center + measure * np.array(self.way)
+        center = magnet.box.center + self.way_of(measure)
         return replace(magnet, box=replace(magnet.box, center=center))
 
     def field(self, source: FieldFormula, position: Vector, measure: hy.expression) -> FieldExpressions:

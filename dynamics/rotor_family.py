@@ -8,10 +8,13 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..fem.carrier import carrier
 from ..fem.models import rotor_table
+from ..fem.table import RotorTable
 from ..geometry.box import Array, Box
 from ..geometry.magnet import Magnet
 from ..geometry.scene import Scene
+from .blend import blended, nodes
 from .branch import Problem
 from .equations import parameters
 from .movable import MovableField, Move, Shift, Turn
@@ -25,6 +28,9 @@ MOVES: dict[str, tuple[Move | None, ...]] = {
     "tilt": (Turn(),),
 }
 """How each magnet of the article's rotors moves with displacement (m) or tilt (rad)."""
+
+NODES = 7
+"""Tables between which changing moments are interpolated."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,7 +81,12 @@ class RotorFamily:
 
 
 def rotor_family(
-    scene: Scene, configuration: str, model: str, rtol: float = 3e-6, nearest: float | None = None
+    scene: Scene,
+    configuration: str,
+    model: str,
+    rtol: float = 3e-6,
+    nearest: float | None = None,
+    measures: tuple[float, float] | None = None,
 ) -> RotorFamily:
     """The family of one of the article's rotors, with the magnets of `scene`.
 
@@ -84,13 +95,14 @@ def rotor_family(
     configuration : "horizontal" (measure: displacement of the cube along +x, m), "vertical" (of the second cube along
         +z, m) or "tilt" (of the cube, rad)
     model, rtol, nearest : of the field, see `fem.rotor_table`
+    measures : between which "vertical" with "fem" shall hold: how the cubes magnetise each other changes with their
+        distance and is interpolated between `NODES` tables, about two seconds each
 
-    A rotor that moves as a whole keeps its table, whatever the model: the family is as good as the tables of its
-    scenes.  Two magnets of which one moves are the sum of theirs, which leaves out how they magnetise each other.
+    A rotor that moves as a whole keeps its table, whatever the model: the family is as good as its scenes' tables.
 
     Raises
     ------
-    ValueError : unknown configuration or one of other magnets, or a model that a rotor of several parts cannot have
+    ValueError : unknown configuration or one of other magnets, or no `measures` where they are needed
     """
     if configuration not in MOVES or len(MOVES[configuration]) != len(scene.rotor):
         raise ValueError(
@@ -100,12 +112,33 @@ def rotor_family(
     moves = MOVES[configuration]
     rotor = tuple(_unmoved(magnet, move) for magnet, move in zip(scene.rotor, moves, strict=True))
     if len(rotor) > 1 and model == "fem":
-        raise ValueError(
-            "Input model must be one without mutual magnetisation for magnets that move against each other, such as "
-            "'cuboid'; instead received 'fem'. For each place a table of its own is needed."
-        )
+        return RotorFamily(scene, rotor, moves, _mutual(rotor, moves, rtol, nearest, measures))
     parts = [(rotor_table((m,), model, rtol, nearest), move) for m, move in zip(rotor, moves, strict=True)]
     return RotorFamily(scene, rotor, moves, MovableField(tuple(parts)))
+
+
+def _mutual(
+    rotor: tuple[Magnet, ...],
+    moves: tuple[Move | None, ...],
+    rtol: float,
+    nearest: float | None,
+    measures: tuple[float, float] | None,
+) -> MovableField:
+    """Closed forms that move, and expansions that also change."""
+    if measures is None:
+        raise ValueError(
+            "Input measures must be given for magnets that magnetise each other and move against each other, such as "
+            "(0.010, 0.020) m; instead received None."
+        )
+    places, shifts = nodes(*measures, NODES), [move if isinstance(move, Shift) else None for move in moves]
+    pairs = list(zip(rotor, shifts, strict=True))
+    tables = [
+        rotor_table(tuple(s.moved(m, float(d)) if s else m for m, s in pairs), "fem", rtol, nearest).expansions
+        for d in places
+    ]
+    carriers = [carrier(magnet) for magnet in rotor]
+    closed = [(RotorTable("cuboid", (c,), (c,)), s) for c, s in zip(carriers, shifts, strict=True)]
+    return MovableField((*closed, *blended(tables, places, [(m.box.center, s) for m, s in pairs])))
 
 
 def _unmoved(magnet: Magnet, move: Move | None) -> Magnet:

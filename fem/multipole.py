@@ -67,7 +67,7 @@ class MultipoleExpansion:
         return FOUR_PI * self.radius**3 / MU_0 * np.array([-2 * c[1].real, 2 * c[1].imag, c[0].real])
 
     @cached_property
-    def _components(self) -> tuple[list[dict[Any, float]], list[list[dict[Any, float]]]]:
+    def components(self) -> tuple[list[dict[Any, float]], list[list[dict[Any, float]]]]:
         """Real-harmonic weights of B_i and of ∂B_i/∂x̃_j."""
         potentials = [-derivative(self.coefficients, i) for i in range(3)]
         gradients = [[real_terms(derivative(p, j)) for j in range(3)] for p in potentials]
@@ -76,7 +76,7 @@ class MultipoleExpansion:
     def expressions(self, position: Sequence[hy.expression]) -> tuple[list[hy.expression], list[list[hy.expression]]]:
         """B (T) and ∂B_i/∂x_j (T/m) at a position (three expressions, m, rotor's frame)."""
         scaled = [(position[i] - float(self.center[i])) * (1.0 / self.radius) for i in range(3)]
-        fields, gradients = self._components
+        fields, gradients = self.components
         slopes = [{k: w / self.radius for k, w in gradients[i][j].items()} for i, j in UPPER]
         sums = harmonic_sums(scaled, [*fields, *slopes])
         upper = dict(zip(UPPER, sums[3:], strict=True))
