@@ -52,7 +52,7 @@ def test_surroundings_of_a_point_with_few_states():
 
 
 def test_column_over_the_plate_to_a_ten_thousandth():
-    """1e-4 with at most 160 states; the reference, on a finer mesh, is the same computation to 1e-4."""
+    """1e-4 with at most 160 states; the reference is on a finer mesh, its own estimated error 1e-4 as well."""
     table = plate_table(PLATE, COLUMN, (0.5, 250.0), 1e-4)
     assert len(table.rates) <= 160
-    assert deviation(table, COLUMN, (80.0,), 1e-4, FINEST) <= 2e-4
+    assert deviation(table, COLUMN, (80.0,), 1e-4, FINEST) <= 1e-4
