@@ -54,12 +54,14 @@ def test_field_functions_are_those_of_the_currents(network, table):
 def test_network_is_passive_everywhere(table):
     """Positive rates; dissipation of any moment at 1000 places and frequencies; reciprocity to round-off."""
     assert table.rates.min() > 0
-    rng = np.random.default_rng(1)
+    rng, smallest = np.random.default_rng(1), np.inf
     for point, frequency in zip(places(1000, 1), 10 ** rng.uniform(-2, 2.39, 1000), strict=True):
         tensor = table.reaction_tensor(point, frequency)[0]
         assert abs(tensor - tensor.T).max() <= 1e-14 * abs(tensor).max()
-        assert np.linalg.eigvalsh(-tensor.imag).min() >= 0
-        assert np.linalg.eigvalsh(-tensor.real).min() >= 0
+        resistive, reactive = (np.linalg.eigvalsh(-part) for part in (tensor.imag, tensor.real))
+        smallest = min(smallest, resistive.min() / resistive.max(), reactive.min() / reactive.max())
+    print(f"\nslowest rate {table.rates.min():.3g} /s; smallest of all eigenvalues {smallest:.1e} of the largest")
+    assert smallest >= 0
 
 
 def test_field_functions_are_harmonic_and_their_gradient_exact(table):
@@ -75,7 +77,9 @@ def test_field_functions_are_harmonic_and_their_gradient_exact(table):
     for axis, unit in enumerate(np.eye(3)):
         b = {k: table.field_functions(inner + k * step * unit)[0] for k in range(-4, 5)}
         slope = sum(w * (b[k] - b[-k]) for k, w in weights.items()) / step
-        assert abs(slope - gradient[..., axis]).max() < 1e-10 * abs(gradient).max()
+        error = abs(slope - gradient[..., axis]).max() / abs(gradient).max()
+        print(f"\naxis {axis}: gradient and derivative differ by {error:.1e}")
+        assert error < 1e-10
 
 
 def test_reaction_gradient_is_half_the_derivative_of_the_tensor(table):
