@@ -139,4 +139,5 @@ class FrequencySystem:
         """Solutions (sources, unknowns), T m, and the number of coupling unknowns."""
         free = self.space.free_unknowns(parity_class, self.fes)
         inverse = self.form.mat.Inverse(free, inverse="sparsecholesky")
-        return solve_condensed(self.form, inverse, -self.rate / MILLIMETRE * loads), sum(free)
+        right = np.asarray(-self.rate / MILLIMETRE * loads, np.complex128)
+        return solve_condensed(self.form, inverse, right), sum(free)
