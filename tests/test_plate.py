@@ -44,6 +44,7 @@ def test_a_mesh_too_coarse_for_the_skin_depth_is_refined():
     made = plate_reaction(LYING, place, frequency, 2e-2)
     rough = plate_reaction(LYING, place, frequency, 2e-2, MeshRule(2.0, 60.0, 3.0))
     difference = np.linalg.norm(made.tensors - rough.tensors) / np.linalg.norm(made.tensors)
+    print(f"\ncells {made.cells} and, after refinement, {rough.cells}: {difference:.1e} apart")
     assert difference < 4e-2  # both within 2e-2
 
 
@@ -78,7 +79,11 @@ def test_a_hundred_kilohertz_is_answered():
     """The skin depth is 1/110 of the thickness; near the infinite slab, to which the edges make a difference."""
     found = plate_reaction(LYING, [(0, 0, 0.017)], 1e5, 0.1)
     slab = reaction_tensor(Slab(LYING.conductivity, 0.03), 0.017, 1e5)
-    assert np.linalg.norm(found.tensors[0] - slab) < 0.1 * np.linalg.norm(slab)
+    difference = np.linalg.norm(found.tensors[0] - slab) / np.linalg.norm(slab)
+    print(
+        f"\norder {found.order}, cells {found.cells}, estimated error {found.error_estimate[0]:.1e}, {difference:.1e} off"
+    )
+    assert difference < 0.1
 
 
 @pytest.mark.slow
