@@ -13,7 +13,8 @@ from spinlev.fem.slab import Slab, reaction_tensor
 from spinlev.geometry.box import Box, rotation_matrix
 from spinlev.geometry.plate_mesh import MeshRule
 from spinlev.geometry.scene import Plate
-from spinlev.studies.team7 import compute_line, measured_line, team7, team7_mesh
+from spinlev.studies.team7 import Team7Comparison, compute_line, measured_line, team7, team7_mesh
+from spinlev.studies.team7_report import team7_dataset, team7_lines
 
 SetNumThreads(1)
 LYING = Plate(Box((0.1, 0.24, 0.03), (0.0, 0.0, -0.015)), 3.5e7)
@@ -108,6 +109,16 @@ def test_team7_coarse():
     x, measured = measured_line()
     computed = compute_line(50.0, x, team7_mesh(50.0, 80.0, 3.0, 3.0), order=2)
     assert abs(computed - measured[:, :2]).max() < 0.06 * np.hypot(*measured[:, :2].T).max()
+
+
+def test_team7_report_finds_a_common_phase():
+    """Computed values that are the measured ones, turned by -5° at 50 Hz: turned back, nothing is left."""
+    x, measured = measured_line()
+    turned = (measured[:, 0] - 1j * measured[:, 1]) * np.exp(-1j * np.radians(5.0))
+    computed = np.column_stack([turned.real, -turned.imag, measured[:, 2:]])
+    lines = team7_lines(team7_dataset(Team7Comparison(x, measured, computed)))
+    assert "50 Hz, all phases turned by +5.00°: largest 0.00, mean 0.00" in lines[-2]
+    assert "200 Hz, all phases turned by +0.00°: largest 0.00, mean 0.00" in lines[-1]
 
 
 @pytest.mark.slow
