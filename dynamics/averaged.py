@@ -103,7 +103,12 @@ def flown(torque: SlowTorque, points: list[Point], duration: float, end: str) ->
         change, span, [0.0, 0.0, 0.0], "LSODA", events=list(limits.values()), rtol=1e-9, atol=1e-12, dense_output=True
     )
     ended = next(name for name, hits in zip(limits, found.t_events, strict=True) if len(hits))
-    lengths, times, _ = found.sol(np.linspace(0.0, found.t[-1], SAMPLES))
+    lengths, times, folds = found.sol(np.linspace(0.0, found.t[-1], SAMPLES))
+    rate = float(growth(lengths[-1]))
+    if ended == BALANCE and rate > points[-1].doubt_per_s:  # it stays there only until this has grown
+        wait = (E_FOLDS - folds[-1]) / rate
+        ended = INSTABILITY if times[-1] + wait < duration else DURATION
+        lengths, times = np.append(lengths, lengths[-1]), np.append(times, min(times[-1] + wait, duration))
     spin, distance = course(lengths).T
     balances = pace.roots(extrapolate=False)
     return Drift(
