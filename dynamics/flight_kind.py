@@ -22,9 +22,10 @@ def flight_kind(flight: Trajectory) -> str:
     """How a flight went.
 
     Told from the mean distance, and from the size of the oscillation in the rotor's frame about its trend, in twenty
-    parts of the flight.  Lost or in contact: "not held" from the beginning; an "oscillating loss" if the oscillation grew more than the mean distance
-    changed; else a "linear fall".  Still up at the end: "growing oscillation" if it became more than twice as large, or
-    "drifting" if the distance goes on changing steadily in the second half, both by 0.02 mm at least; else "stable".
+    parts of the flight.  Lost or in contact: "not held" from the beginning; an "oscillating loss" if the oscillation
+    grew more than the mean distance changed; else a "linear fall".  Still up at the end: "growing oscillation" if it
+    became more than twice as large, or "drifting" if the distance goes on changing steadily in the second half, both
+    by 0.02 mm at least; else "stable".
     """
     lasted = flight.ended_by == DURATION
     distance = np.linalg.norm(flight.lab.position, axis=1)

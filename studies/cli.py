@@ -21,6 +21,7 @@ from cyclopts import App, CycloptsError, Parameter
 
 from ..geometry import InputError, load_scene
 from ..geometry.box import Array
+from ..geometry.input_error import ComputationError
 from .console import answers_only, note, to_json
 from .points_file import read_points
 from .shipped_scenes import default_scene
@@ -267,6 +268,9 @@ def _status(arguments: list[str], out: Any) -> int:
     except InputError as error:
         note(f"spinlev: {error}")
         return 2
+    except ComputationError as error:
+        note(f"spinlev: {error}")
+        return 1
     except OSError as error:
         note(f"spinlev: the computation failed to write or read {error.filename}: {error.strerror}; see --out.")
         return 1

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -15,67 +15,16 @@ from ..dynamics.equilibrium import EquilibriumError
 from ..dynamics.state import Scales
 from ..fem.models import rotor_table
 from ..fem.table import FieldTable
-from ..geometry import rotor
 from ..geometry.box import Array
-from ..geometry.scene import Drag, Floater, Scene
+from ..geometry.scene import Scene
+from .drift_cases import CASES, QUICK, QUICK_VARIANTS, VARIANTS, Case, Variant, scene_of
 from .results import variable
 
 CAP, SHORTEST = 250.0, 3.0
 """The article stopped a flight after 250 s, and did not count one of less than 3 s."""
-CONDUCTIVITY = 6.7e5
-"""Of sintered NdFeB, S/m; makers give 6.2e5 to 9e5."""
 SAMPLES = 60
 KEPT, NONE = 3, 4
 OUTCOMES = ("contact", "fold", "instability", "levitates", "no equilibrium")
-
-
-@dataclass(frozen=True)
-class Case:
-    """One rotor of the article: a maker of magnets, its displacement (m or rad), and frequencies, Hz.
-
-    At `reference` it has an equilibrium for all variants; `lowest` and `highest` bound what is asked.
-    """
-
-    make: Callable[..., rotor.Rotor]
-    size: float
-    reference: float
-    lowest: float
-    highest: float
-
-
-CASES = {
-    "vertical 14 mm": Case(rotor.vertical, 14e-3, 78.0, 60.0, 88.0),
-    "horizontal 1 mm": Case(rotor.horizontal, 1e-3, 195.0, 150.0, 222.0),
-    "vertical 12 mm": Case(rotor.vertical, 12e-3, 70.0, 48.0, 80.0),
-    "vertical 16 mm": Case(rotor.vertical, 16e-3, 95.0, 68.0, 110.0),
-    "horizontal 2 mm": Case(rotor.horizontal, 2e-3, 120.0, 85.0, 180.0),
-    "tilt 5 deg": Case(rotor.tilt, np.radians(5), 185.0, 140.0, 250.0),
-    "tilt 10 deg": Case(rotor.tilt, np.radians(10), 110.0, 75.0, 170.0),
-}
-QUICK = ("vertical 14 mm", "horizontal 1 mm")
-
-
-@dataclass(frozen=True)
-class Variant:
-    """What is not known of the experiment: release spin, remanence of all magnets (T), conductivity, the air's law."""
-
-    spin: float = 0.0
-    remanence: float = 1.305
-    conductivity: float = CONDUCTIVITY
-    stokes: bool = False
-
-
-VARIANTS = {
-    "nominal": Variant(),
-    "spin -0.1": Variant(spin=-0.1),
-    "spin +0.1": Variant(spin=0.1),
-    "remanence 1.29 T": Variant(remanence=1.29),
-    "remanence 1.32 T": Variant(remanence=1.32),
-    "conductivity -20 %": Variant(conductivity=0.8 * CONDUCTIVITY),
-    "conductivity +20 %": Variant(conductivity=1.2 * CONDUCTIVITY),
-    "Stokes drag": Variant(stokes=True),
-}
-QUICK_VARIANTS = ("nominal", "spin -0.1", "spin +0.1", "remanence 1.29 T", "remanence 1.32 T", "Stokes drag")
 
 
 def drift_study(quick: bool) -> xr.Dataset:
@@ -87,7 +36,7 @@ def drift_study(quick: bool) -> xr.Dataset:
     point dipoles instead of cuboids (μr = 1).  Recoil permeability is 1.05 in the floater and left out in the rotor.
     """
     names, variants = (QUICK, QUICK_VARIANTS) if quick else (tuple(CASES), tuple(VARIANTS))
-    steps, model = (11, "dipole") if quick else (29, "cuboid")
+    steps, model = (11, "dipole") if quick else (36, "cuboid")
     grids = np.array([np.linspace(CASES[n].lowest, CASES[n].highest, steps) for n in names])
     pairs = [_rows(CASES[n], grid, variants, model) for n, grid in zip(names, grids, strict=True)]
     rows, courses = (np.array([pair[k] for pair in pairs]) for k in (0, 1))
@@ -114,34 +63,34 @@ def drift_study(quick: bool) -> xr.Dataset:
 
 def _rows(case: Case, grid: Array, variants: Sequence[str], model: str) -> tuple[Array, Array]:
     """Quantities (variant, frequency, quantity) of one case, and the nominal flights (frequency, 2, sample)."""
-    scene = _scene(case, Variant())
-    table = rotor_table(scene.rotor, model)
-    rates = Rates.of(scene, table)
-    found = min(find_equilibria(scene, table, rates=rates), key=lambda e: e.growth_per_s)
     rows, courses = [], np.full((len(grid), 2, SAMPLES), np.nan)
-    for variant in (VARIANTS[name] for name in variants):
-        scene = _scene(case, variant)
-        if variant.remanence != Variant().remanence:
-            table = rotor_table(scene.rotor, model)
-            rates = Rates.of(scene, table)
-        flights = dict(_flights(scene, table, rates, Scales.of(scene).pack(found.state), variant, grid))
+    compiled: dict[tuple[float, float], tuple[FieldTable, Rates, Array]] = {}
+    for name in variants:
+        variant = VARIANTS[name]
+        scene = scene_of(case, variant)
+        made = (variant.remanence, variant.misplaced)
+        if made not in compiled:
+            compiled[made] = _compiled(scene, model)
+        flights = dict(_flights(scene, *compiled[made], variant, grid))
         rows.append([_row(flights.get(f)) for f in grid])
-        if variant == Variant():
+        if name == "nominal":
             for k in (k for k, f in enumerate(grid) if f in flights):
                 courses[k] = _course(flights[grid[k]])
     return np.array(rows), courses
+
+
+def _compiled(scene: Scene, model: str) -> tuple[FieldTable, Rates, Array]:
+    """Table and rates of a scene, and the scaled state of the equilibrium at which small motions grow the slowest."""
+    table = rotor_table(scene.rotor, model)
+    rates = Rates.of(scene, table)
+    found = min(find_equilibria(scene, table, rates=rates), key=lambda e: e.growth_per_s)
+    return table, rates, Scales.of(scene).pack(found.state)
 
 
 def _course(flight: Drift) -> Array:
     """Time and distance (2, sample) of a flight."""
     times = np.linspace(0.0, flight.time[-1], SAMPLES)
     return np.array([times, np.interp(times, flight.time, flight.distance)])
-
-
-def _scene(case: Case, variant: Variant) -> Scene:
-    floater = Floater(6.35e-3, variant.remanence, 1.05, 7500.0, variant.conductivity)
-    magnets = case.make(case.size, 10e-3, variant.remanence, 1.0)
-    return Scene(case.reference, magnets, floater, Drag.stokes(floater.radius))
 
 
 def _flights(
@@ -164,7 +113,7 @@ def _flights(
                 state, here = last.state, frequency
             there = replace(scene, frequency=frequency)
             at_rest = Scales.of(there).unpack(state)
-            yield frequency, drift(there, table, variant.spin, CAP, rates, at_rest, variant.stokes)
+            yield frequency, drift(there, table, variant.spin, CAP, rates, at_rest, variant.stokes, variant.e_folds)
 
 
 def _row(flight: Drift | None) -> list[float]:

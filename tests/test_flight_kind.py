@@ -63,7 +63,7 @@ def test_a_fall_from_the_hand_is_no_flight():
     ],
 )
 def test_one_real_flight_of_each_kind(frequency, conductivity, duration, kind):
-    """Point dipoles, vertical 14 mm, from 1 µm beside the equilibrium at s = 0; the falls have 100-fold eddy currents."""
+    """Point dipoles, vertical 14 mm, 1 µm beside the equilibrium at s = 0; two with slow torques 100 times as large."""
     floater = replace(FLOATER, conductivity=conductivity)
     scene = replace(VERTICAL, frequency=frequency, floater=floater)
     if conductivity:
