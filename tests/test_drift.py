@@ -134,13 +134,16 @@ def test_loss_in_the_fold_as_in_the_full_motion(rates):
 
 
 def test_balance_as_in_the_full_motion(rates):
-    """At 75 Hz the balance comes before the fold: the flight is endless, and the full motion settles at the same s*."""
+    """At 75 Hz the balance comes before the fold: the full motion settles at the same s*, long before it grows unstable.
+
+    With 100 times the eddy currents but not the air's drag on the way, precession grows slowly there.
+    """
     scene = replace(faster(VERTICAL, 100.0), frequency=75.0)
     start = nearest(scene, VERTICAL_TABLE, rates=rates)
     averaged = drift(scene, VERTICAL_TABLE, 0.0, np.inf, rates, start.state, stokes=True)
     _, distance, spin = flown(scene, VERTICAL_TABLE, start, 45.0)
-    assert averaged.ended_by == "balance"
-    assert averaged.levitated_s == np.inf
+    assert averaged.ended_by == "instability"
+    assert averaged.levitated_s > 100.0
     assert spin[-200:].mean() == pytest.approx(averaged.balance_spin, abs=1e-3)
     assert distance[-200:].mean() == pytest.approx(averaged.distance[-1], rel=1e-3)
 
@@ -154,16 +157,32 @@ def test_oscillatory_instability_ends_the_flight(rates):
     assert found.levitated_s == pytest.approx(7.0 / start.growth_per_s, rel=0.02)
 
 
+def test_a_balance_where_small_motions_grow_is_not_endless():
+    """At 210 Hz the floater's own currents drive the precession: after s* it waits until that has grown by e^7."""
+    scene = replace(HORIZONTAL, frequency=210.0)
+    found = drift(scene, HORIZONTAL_TABLE, 0.0, np.inf)
+    assert found.ended_by == "instability"
+    assert found.spin[-1] == pytest.approx(found.balance_spin, abs=2e-3)
+    growth = np.maximum(found.growth_per_s, 0.0)
+    assert np.trapezoid(growth, found.time) == pytest.approx(7.0, rel=1e-2)
+    short = drift(scene, HORIZONTAL_TABLE, 0.0, 900.0)
+    assert (short.ended_by, short.time[-1]) == ("duration", pytest.approx(900.0))
+
+
 @pytest.mark.parametrize(
     ("scene", "table", "ended"),
     [
         (HORIZONTAL, HORIZONTAL_TABLE, ("fold", "lost")),
+        pytest.param(replace(HORIZONTAL, frequency=200.0), HORIZONTAL_TABLE, ("fold", "lost"), marks=pytest.mark.slow),
+        pytest.param(
+            replace(VERTICAL, frequency=64.0), VERTICAL_TABLE, ("duration", "duration"), marks=pytest.mark.slow
+        ),
         (replace(VERTICAL, frequency=70.0), VERTICAL_TABLE, ("duration", "duration")),
     ],
-    ids=["lost after 73 s", "250 s"],
+    ids=["lost after 73 s", "lost after 143 s", "250 s near the fold", "250 s"],
 )
 def test_real_slow_torques(scene, table, ended):
-    """Heights to 1e-4, time of loss to 0.5 % (measured 0.13 %)."""
+    """Heights to 1e-4, time of loss to 0.5 % (measured 0.15 % and 0.07 %)."""
     start = nearest(scene, table)
     averaged = drift(scene, table, 0.0, 250.0, start=start.state, stokes=True)
     flight, distance, spin = flown(scene, table, start, 250.0)
