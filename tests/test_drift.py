@@ -134,7 +134,7 @@ def test_loss_in_the_fold_as_in_the_full_motion(rates):
 
 
 def test_balance_as_in_the_full_motion(rates):
-    """At 75 Hz the balance comes before the fold: the full motion settles at the same s*, long before it grows unstable.
+    """At 75 Hz the balance comes before the fold: the full motion settles at the same s*, before it grows unstable.
 
     With 100 times the eddy currents but not the air's drag on the way, precession grows slowly there.
     """
