@@ -17,8 +17,9 @@ from ..fem.models import rotor_table
 from ..fem.table import FieldTable
 from ..geometry.box import Array
 from ..geometry.scene import Scene
-from .drift_cases import CASES, QUICK, QUICK_VARIANTS, VARIANTS, Case, Variant, scene_of
+from .drift_cases import CASES, QUICK, QUICK_VARIANTS, VARIANTS, Variant, scene_of
 from .results import variable
+from .study import Point
 
 CAP, SHORTEST = 250.0, 3.0
 """The article stopped a flight after 250 s, and did not count one of less than 3 s."""
@@ -27,56 +28,56 @@ KEPT, NONE = 3, 4
 OUTCOMES = ("contact", "fold", "instability", "levitates", "no equilibrium")
 
 
-def drift_study(quick: bool) -> xr.Dataset:
-    """Levitation time, start and end of the averaged flight for every case, variant and frequency.
+QUANTITIES = {
+    "levitation_time": ("s", f"time until the loss, at most {CAP:g} s"),
+    "outcome": ("1", "how it ended: " + ", ".join(f"{k} {name}" for k, name in enumerate(OUTCOMES))),
+    "distance_start": ("m", "distance from the rotor at the start"),
+    "distance_end": ("m", "distance at the end or the cap"),
+    "spin_end": ("1", "body spin at the end or the cap"),
+    "fall_rate": ("m/s", "mean rate of fall over the first nine tenths of the flight"),
+    "fall_ratio": ("1", "rate of fall from 0.6 to 0.9 of the flight over that from 0 to 0.3"),
+    "balance_spin": ("1", "body spin at which drag and eddy currents balance"),
+    "growth": ("1/s", "largest growth of small motions during the flight"),
+}
 
-    Returns
-    -------
-    Dataset over `case`, `variant` and `step` of frequency; `quick` has two cases, fewer frequencies and variants, and
-    point dipoles instead of cuboids (μr = 1).  Recoil permeability is 1.05 in the floater and left out in the rotor.
-    """
+
+def drift_points(quick: bool) -> list[Point]:
+    """Every case with every variant; `quick` has two cases, fewer frequencies and variants, and point dipoles."""
     names, variants = (QUICK, QUICK_VARIANTS) if quick else (tuple(CASES), tuple(VARIANTS))
     steps, model = (11, "dipole") if quick else (36, "cuboid")
-    grids = np.array([np.linspace(CASES[n].lowest, CASES[n].highest, steps) for n in names])
-    pairs = [_rows(CASES[n], grid, variants, model) for n, grid in zip(names, grids, strict=True)]
-    rows, courses = (np.array([pair[k] for pair in pairs]) for k in (0, 1))
+    return [{"case": c, "variant": v, "steps": steps, "model": model} for c in names for v in variants]
+
+
+def drift_row(point: Point) -> xr.Dataset:
+    """Levitation time, start and end of the averaged flights of one rotor with one variant, over `step` of frequency.
+
+    Recoil permeability is 1.05 in the floater and left out in the rotor.
+    """
+    case, variant = CASES[point["case"]], VARIANTS[point["variant"]]
+    grid = np.linspace(case.lowest, case.highest, point["steps"])
+    scene = scene_of(case, variant)
+    flights = dict(_flights(scene, *_compiled(scene, point["model"]), variant, grid))
+    rows = np.array([_row(flights.get(f)) for f in grid])
+    courses = np.array([_course(flights.get(f)) for f in grid])
     dims = ("case", "variant", "step")
-    labels = {
-        "levitation_time": ("s", f"time until the loss, at most {CAP:g} s"),
-        "outcome": ("1", "how it ended: " + ", ".join(f"{k} {name}" for k, name in enumerate(OUTCOMES))),
-        "distance_start": ("m", "distance from the rotor at the start"),
-        "distance_end": ("m", "distance at the end or the cap"),
-        "spin_end": ("1", "body spin at the end or the cap"),
-        "fall_rate": ("m/s", "mean rate of fall over the first nine tenths of the flight"),
-        "fall_ratio": ("1", "rate of fall from 0.6 to 0.9 of the flight over that from 0 to 0.3"),
-        "balance_spin": ("1", "body spin at which drag and eddy currents balance"),
-        "growth": ("1/s", "largest growth of small motions during the flight"),
-    }
-    data = {name: variable(dims, rows[..., k], *label) for k, (name, label) in enumerate(labels.items())}
-    course = ("case", "step", "sample")
-    data["flight_time"] = variable(course, courses[..., 0, :], "s", "time")
-    data["flight_distance"] = variable(course, courses[..., 1, :], "m", "distance from the rotor, nominal")
-    frequency = variable(("case", "step"), grids, "Hz", "frequency of the rotor")
-    coordinates = {"case": list(names), "variant": list(variants), "frequency": frequency}
-    return xr.Dataset(data, coordinates, {"model": model, "cap_s": CAP, "shortest_s": SHORTEST})
+    data = {name: variable(dims, rows[None, None, :, k], *label) for k, (name, label) in enumerate(QUANTITIES.items())}
+    course = (*dims, "sample")
+    data["flight_time"] = variable(course, courses[None, None, :, 0], "s", "time")
+    data["flight_distance"] = variable(course, courses[None, None, :, 1], "m", "distance from the rotor")
+    frequency = variable(("case", "step"), grid[None], "Hz", "frequency of the rotor")
+    coordinates = {"case": [point["case"]], "variant": [point["variant"]], "frequency": frequency}
+    return xr.Dataset(data, coordinates, {"model": point["model"], "cap_s": CAP, "shortest_s": SHORTEST})
 
 
-def _rows(case: Case, grid: Array, variants: Sequence[str], model: str) -> tuple[Array, Array]:
-    """Quantities (variant, frequency, quantity) of one case, and the nominal flights (frequency, 2, sample)."""
-    rows, courses = [], np.full((len(grid), 2, SAMPLES), np.nan)
-    compiled: dict[tuple[float, float], tuple[FieldTable, Rates, Array]] = {}
-    for name in variants:
-        variant = VARIANTS[name]
-        scene = scene_of(case, variant)
-        made = (variant.remanence, variant.misplaced)
-        if made not in compiled:
-            compiled[made] = _compiled(scene, model)
-        flights = dict(_flights(scene, *compiled[made], variant, grid))
-        rows.append([_row(flights.get(f)) for f in grid])
-        if name == "nominal":
-            for k in (k for k, f in enumerate(grid) if f in flights):
-                courses[k] = _course(flights[grid[k]])
-    return np.array(rows), courses
+def drift_result(parts: Sequence[xr.Dataset]) -> xr.Dataset:
+    """All rows by `case` and `variant`; NaN where one is missing."""
+    together: dict[str, list[xr.Dataset]] = {}
+    for part in parts:
+        together.setdefault(str(part["case"].item()), []).append(part)
+    cases = [
+        xr.concat(rows, "variant", data_vars="all", coords="minimal", compat="override") for rows in together.values()
+    ]
+    return xr.concat(cases, "case", data_vars="all", coords="different", compat="equals", join="outer")
 
 
 def _compiled(scene: Scene, model: str) -> tuple[FieldTable, Rates, Array]:
@@ -87,8 +88,10 @@ def _compiled(scene: Scene, model: str) -> tuple[FieldTable, Rates, Array]:
     return table, rates, Scales.of(scene).pack(found.state)
 
 
-def _course(flight: Drift) -> Array:
+def _course(flight: Drift | None) -> Array:
     """Time and distance (2, sample) of a flight."""
+    if flight is None:
+        return np.full((2, SAMPLES), np.nan)
     times = np.linspace(0.0, flight.time[-1], SAMPLES)
     return np.array([times, np.interp(times, flight.time, flight.distance)])
 

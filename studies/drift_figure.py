@@ -64,7 +64,8 @@ def _times(axes: Axes, result: xr.Dataset, flown: dict[int, str]) -> None:
         names = ["nominal", *(v for v in variants if v.startswith(start))]
         if len(names) > 1:
             band = time.sel(variant=names).values
-            axes.fill_between(frequency, band.min(axis=0), band.max(axis=0), color=color, alpha=0.28, lw=0, label=label)
+            low, high = np.fmin.reduce(band), np.fmax.reduce(band)
+            axes.fill_between(frequency, low, high, color=color, alpha=0.28, lw=0, label=label)
     for name, (dashes, label) in LINES.items():
         if name in variants:
             axes.plot(frequency, time.sel(variant=name), dashes, color="0.25", lw=1, label=label)
@@ -90,7 +91,7 @@ def _flights(axes: Axes, result: xr.Dataset) -> None:
     shown = np.unique([*falls[:: max(1, -(-len(falls) // 4))], *lasts[:: max(1, -(-len(lasts) // 3))]]).astype(int)
     for number, k in enumerate(shown):
         color = PALETTE[number % len(PALETTE)]
-        time, distance = result["flight_time"][k].values, 1e3 * result["flight_distance"][k].values
+        time, distance = nominal["flight_time"][k].values, 1e3 * nominal["flight_distance"][k].values
         axes.plot(time, distance, color=color)
         words = f" {frequency[k]:.4g} Hz" if time[-1] > 200 else f"{frequency[k]:.4g} Hz"
         axes.annotate(words, (time[-1], distance[-1]), color=color, size=7, ha="left", va="center")

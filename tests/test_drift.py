@@ -12,7 +12,7 @@ from spinlev.dynamics.drift import drift
 from spinlev.dynamics.flight import compile_flight
 from spinlev.dynamics.integration import integrate
 from spinlev.dynamics.slow_torque import SlowTorque
-from spinlev.dynamics.state import Scales
+from spinlev.dynamics.state import Scales, State
 from spinlev.fem.models import rotor_table
 from spinlev.geometry import rotor
 from spinlev.geometry.scene import AIR_VISCOSITY, Drag, Floater, Scene
@@ -111,6 +111,18 @@ def test_stokes_drag_alone_lets_the_spin_decay_exponentially(rates):
     expected = -0.2 * np.exp(-scene.drag.angular / FLOATER.inertia * found.time)
     np.testing.assert_allclose(found.spin, expected, atol=2e-7)
     assert found.balance_spin == pytest.approx(0.0, abs=1e-6)
+
+
+def test_whatever_happens_at_the_release_leaves_the_spin():
+    """Let go at rest, it is flung about; without slow torques Ω·m̂ stays 0 to round-off: flights begin at s = 0."""
+    spin, moment = np.zeros(3), np.array([0.3, 0.1, 1.0])
+    scene = replace(VERTICAL, drag=Drag(0.0, 0.0), floater=replace(FLOATER, conductivity=None))
+    start = State(np.array([1e-3, 0.0, -25e-3]), np.zeros(3), moment / np.linalg.norm(moment), spin)
+    flight = integrate(scene, compile_flight(scene, VERTICAL_TABLE, 1.0, compact=True), start, 1.0)
+    found = np.einsum("na,na->n", flight.lab.spin, flight.lab.moment)
+    across = np.linalg.norm(flight.lab.spin, axis=1)
+    assert across.max() > 0.1 * scene.angular_velocity
+    assert np.abs(found).max() < 1e-11 * across.max()
 
 
 def test_without_slow_torque_nothing_moves(rates):
