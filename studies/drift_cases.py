@@ -34,7 +34,7 @@ CASES = {
     "horizontal 1 mm": Case(rotor.horizontal, 1e-3, 0.2e-3, 215.0, 110.0, 250.0),
     "vertical 14 mm": Case(rotor.vertical, 14e-3, 0.5e-3, 78.0, 58.0, 93.0),
     "horizontal 1.5 mm": Case(rotor.horizontal, 1.5e-3, 0.2e-3, 160.0, 95.0, 220.0),
-    "vertical 12.8 mm": Case(rotor.vertical, 12.8e-3, 0.5e-3, 72.0, 52.0, 87.0),
+    "vertical 12.6 mm": Case(rotor.vertical, 12.6e-3, 0.5e-3, 70.0, 51.0, 86.0),
     "horizontal 2 mm": Case(rotor.horizontal, 2e-3, 0.2e-3, 130.0, 80.0, 195.0),
     "vertical 16 mm": Case(rotor.vertical, 16e-3, 0.5e-3, 95.0, 68.0, 110.0),
     "tilt 5 deg": Case(rotor.tilt, np.radians(5), np.radians(0.5), 185.0, 130.0, 250.0),

@@ -29,7 +29,7 @@ FLOWN = {
     "horizontal 1 mm": {115: "linear fall", 140: "stable", 150: "oscillating loss"},
     "horizontal 1.5 mm": {115: "linear fall", 140: "stable", 150: "oscillating loss"},
     "vertical 14 mm": {60: "24 hours"},
-    "vertical 12.8 mm": {60: "24 hours"},
+    "vertical 12.6 mm": {60: "24 hours"},
 }
 """What the article saw (δx = 1 mm and δz = 14 mm there), by frequency in Hz."""
 
