@@ -67,7 +67,7 @@ class SlowTorque:
     def _beyond_stokes(self, moment: Array, spin: Array) -> float:
         """Scaled spin about the moment, each part times what its drag is more than Stokes'."""
         time, turning = self.values[Parameter.TIME], self.values[Parameter.RATE]
-        steady = spin[2] * moment[2]
+        steady = float(spin[2] * moment[2])
         more_steady = float(spinning(reynolds(self.radius, spin[2] / time))) - 1
         more_swing = float(swinging(reynolds(self.radius, turning / time))) - 1
         return more_steady * steady + more_swing * float(spin @ moment - steady)
