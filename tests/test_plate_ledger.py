@@ -11,7 +11,7 @@ from spinlev.dynamics.integration import integrate
 from spinlev.dynamics.simulation import initial_state, starting_point
 from spinlev.dynamics.state import State
 from spinlev.fem.models import rotor_table
-from spinlev.fem.phasor import mean_force, mean_torque
+from spinlev.fem.phasor import mean_force, mean_loss, mean_torque
 from spinlev.fem.plate_region import Region
 from spinlev.fem.slab_table import slab_and_rotor_table
 from spinlev.geometry import rotor
@@ -31,7 +31,7 @@ def memory_of(table):
 
 
 def test_what_a_steady_turn_loses_is_that_of_the_frequency_domain():
-    """Weighing 800 t, the floater turns in one place: momentum and spin it gains and loses in 55 turns, to 1e-5."""
+    """Weighing 800 t, the floater turns in one place: momentum, spin and energy lost in 55 turns, to 1e-5."""
     magnets = rotor.horizontal(2e-3, 10e-3, 1e-12, 1.0)
     heavy = replace(FLOATER, density=7.5e11)
     scene = replace(SCENE, rotor=magnets, floater=heavy, drag=Drag(0.0, 0.0), gravity=np.zeros(3))
@@ -57,6 +57,8 @@ def test_what_a_steady_turn_loses_is_that_of_the_frequency_domain():
     assert np.abs(memory.table.reaction_tensor(body, 0.0)[0] @ still).max() == 0  # what does not turn induces nothing
     assert force[2] == pytest.approx(lift, rel=1e-5)
     assert torque[2] == pytest.approx(mean_torque(tensor, phasor)[2], rel=1e-5)
+    power = heavy.inertia * (spin[last] @ spin[last] - spin[first] @ spin[first]) / (2 * seconds)
+    assert power == pytest.approx(-mean_loss(tensor, phasor, 110.0), rel=1e-5)
     assert lift > 0
     assert torque[2] < 0
     assert flight.energy_error < 1e-12
