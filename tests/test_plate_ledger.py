@@ -64,6 +64,7 @@ def test_what_a_steady_turn_loses_is_that_of_the_frequency_domain():
     assert flight.energy_error < 1e-12
 
 
+@pytest.mark.slow
 def test_ledger_of_ten_seconds():
     """Work = change of energy + loss in the plate, by drag and in the floater, after a kick: 1e-8 asked."""
     scene = replace(SCENE, floater=replace(FLOATER, conductivity=6.7e5))
