@@ -5,8 +5,8 @@ Stokes' torque is 8πηR³Ω (G. Kirchhoff, 1876).  Two things make the real one
 A steady spin throws off a jet at the equator.  With Re = ΩR²/ν the torque is ½ρΩ²R⁵ C, C = 6.45/√Re + 32.1/Re for
 20 ≤ Re ≤ 1000 (S. C. R. Dennis, S. N. Singh and D. B. Ingham, J. Fluid Mech. 101 (1980) 257: computed for 1 to 100, in
 agreement with measurements; the first term is that of the boundary layer, so that laminar flow reaches further).
-Stokes is C = 16π/Re; the two meet at Re = 7.9, and the larger one is taken.  E. Loth's fit of other data (AIAA J. 46 (2008) 801), 1 + 5/(64π) (4 Re)^0.6 times Stokes, is 11 % higher at
-Re = 20 and agrees within 5 % from 100 to 2000.
+Stokes is C = 16π/Re; the two meet at Re = 7.9, and the larger one is taken.  E. Loth's fit of other data (AIAA J. 46
+(2008) 801), 1 + 5/(64π) (4 Re)^0.6 times Stokes, is 11 % higher at Re = 20 and agrees within 5 % from 100 to 2000.
 
 A small swing at the rotor's rate ω moves a layer of depth δ = √(2ν/ω), 0.2 to 0.3 mm.  Exactly, to first order in its
 angle (L. D. Landau and E. M. Lifshitz, Fluid Mechanics, section 24, problem on the oscillating sphere), the part of the
