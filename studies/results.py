@@ -124,6 +124,7 @@ def trajectory_dataset(flight: Trajectory) -> xr.Dataset:
         },
         coords={"time": variable(("time",), flight.time, "s", "time"), "axis": list(AXIS)},
         attrs={
+            "study": "simulate",
             "ended_by": str(flight.ended_by),
             "levitated_s": flight.levitated_s,
             "energy_error": flight.energy_error,
