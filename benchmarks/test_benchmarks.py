@@ -12,7 +12,12 @@ from spinlev.dynamics.rates import Rates
 from spinlev.dynamics.simulation import initial_state
 from spinlev.fem import RotorTable, uniform_moments
 from spinlev.fem.models import rotor_table
+from spinlev.fem.plate import plate_reaction
+from spinlev.fem.plate_model import plate_table
+from spinlev.fem.plate_region import Region
 from spinlev.geometry import load_scene
+from spinlev.geometry.box import Box
+from spinlev.geometry.scene import Plate
 
 SCENE = load_scene("scenes/horizontal.toml")
 GENERATOR = np.random.default_rng(0)
@@ -22,6 +27,7 @@ POINTS = (
     + GENERATOR.uniform(0.013, 0.04, (100_000, 1)) * WAY / np.linalg.norm(WAY, axis=1)[:, None]
 )
 """All around the magnet, 13 to 40 mm from its centre."""
+PLATE = Plate(Box((0.1, 0.24, 0.03)), 3.5e7)
 
 
 def peer(rotor):
@@ -79,3 +85,17 @@ def test_flight(benchmark, model):
     flight = compile_flight(SCENE, table, duration=1.0)
     trajectory = benchmark.pedantic(lambda: integrate(SCENE, flight, start, 1.0, None), rounds=3, warmup_rounds=1)
     assert trajectory.ended_by == "duration"
+
+
+@pytest.mark.benchmark(group="plate, 100 Hz, 1e-3: ten places 12 to 30 mm over the face and three directions")
+def test_plate_reaction(benchmark):
+    places = np.random.default_rng(1).uniform((-0.01, -0.01, 0.027), (0.01, 0.01, 0.045), (10, 3))
+    found = benchmark.pedantic(plate_reaction, (PLATE, places, 100.0, 1e-3), rounds=1)
+    assert found.error_estimate.max() <= 1e-3
+
+
+@pytest.mark.benchmark(group="plate's table from nothing: 10 to 40 mm over the face, ±5 mm, 0.5 to 250 Hz, 1e-3")
+def test_plate_table(benchmark):
+    region = Region.over_face(PLATE.box.size, (0.01, 0.04), 0.005)
+    table = benchmark.pedantic(plate_table, (PLATE, region, (0.5, 250.0), 1e-3), rounds=1)
+    assert table.errors.total <= 1e-3
