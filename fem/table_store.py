@@ -63,9 +63,7 @@ def read_netcdf(path: str | Path) -> xr.Dataset:
     FileNotFoundError : it is missing
     """
     try:
-        with h5py.File(
-            path, "r"
-        ) as file:  # damage found by h5netcdf's constructor prints a traceback in its destructor
+        with h5py.File(path, "r") as file:  # damage found by h5netcdf's constructor prints a traceback in its destructor
             dict(file.attrs)
             file.visititems(lambda _, item: dict(item.attrs) and None)
         with xr.open_dataset(path, engine="h5netcdf") as opened:

@@ -28,25 +28,7 @@ from spinlev.studies import cli
 SCENES = sorted((Path(__file__).parent.parent / "scenes").glob("*.toml"))
 LONGEST = 20
 """Seconds after which an input counts as a hang."""
-ODD = [
-    "",
-    "0",
-    "-1",
-    "nan",
-    "inf",
-    "1e400",
-    "1e-400",
-    "'x'",
-    "[]",
-    "[1, 2]",
-    "true",
-    "{}",
-    "1979-05-27",
-    "\\u0000",
-    "µ",
-    '"',
-    "=",
-]
+ODD = ["", "0", "-1", "nan", "inf", "1e400", "1e-400", "'x'", "[]", "[1, 2]", "true", "{}", "1979-05-27", "\\u0000", "µ", '"', "="]
 
 
 class HangError(Exception):
