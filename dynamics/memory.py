@@ -19,6 +19,7 @@ from dataclasses import dataclass
 import heyoka as hy
 import numpy as np
 
+from ..fem.multipole import UPPER
 from ..fem.plate_table import PlateTable
 from ..fem.rotor_share import RotorShare
 from ..geometry.scene import Plate
@@ -81,27 +82,30 @@ def memory_terms(memory: PlateMemory, position: Vector, moment: Vector, states: 
     strength, length = hy.par[Parameter.PLATE_MOMENT], hy.par[Parameter.LENGTH]
     place, pointing = _seen_by_plate(memory.plate, position, moment)
     parts = memory.table.multipoles.expressions(place)
-    heard = [strength * dot(pointing, field) for field, _ in parts]
-    shares, share_rates = _rotor(memory.share)
+    source = [strength * m for m in pointing]
+    heard = [dot(source, field) for field, _ in parts]
+    basis, basis_rates = _rotor(memory.share)
+    shares = memory.share.expressions(basis)
     signals = [_combined(row, heard) + share for row, share in zip(memory.table.weights, shares, strict=True)]
     currents = [p - s for p, s in zip(states, signals, strict=True)]
     weights = [_combined(column, currents) for column in memory.table.weights.T]
     pairs = list(zip(weights, parts, strict=True))
     field = [hy.sum([w * b[i] for w, (b, _) in pairs]) for i in range(3)]
-    slope = {(i, j): hy.sum([w * g[i][j] for w, (_, g) in pairs]) for i in range(3) for j in range(i, 3)}
-    push = [hy.sum([pointing[i] * slope[min(i, j), max(i, j)] for i in range(3)]) for j in range(3)]
-    force = [length * strength * f for f in _seen_by_rotor(memory.plate, push)]
+    slope = {(i, j): hy.sum([w * g[i][j] for w, (_, g) in pairs]) for i, j in UPPER}
+    slope[2, 2] = -slope[0, 0] - slope[1, 1]
+    push = [hy.sum([source[i] * slope[min(i, j), max(i, j)] for i in range(3)]) for j in range(3)]
+    force = [length * f for f in _seen_by_rotor(memory.plate, push)]
     turn = [strength * t for t in cross(moment, _seen_by_rotor(memory.plate, field))]
-    decay = [float(rate) * hy.par[Parameter.TIME] * y for rate, y in zip(memory.table.rates, currents, strict=True)]
+    decay = [-float(rate) * y for rate, y in zip(memory.table.rates, currents, strict=True)]
     descent = [*turned(position)[:2], hy.par[Parameter.PLATE_SPEED] if memory.plate.lowering else hy.expression(0.0)]
     drive = dot(force, descent) + hy.par[Parameter.RATE] * turn[2]
     return MemoryTerms(
-        rates=[-d for d in decay],
+        rates=[hy.par[Parameter.TIME] * d for d in decay],
         force=force,
         torque=[t / hy.par[Parameter.INERTIA] for t in turn],
         stored=0.5 * hy.sum([y * y for y in currents]),
-        loss=hy.sum([d * y for d, y in zip(decay, currents, strict=True)]),
-        drive=drive + hy.sum([y * rate for y, rate in zip(currents, share_rates, strict=True)]),
+        loss=-hy.par[Parameter.TIME] * hy.sum([d * y for d, y in zip(decay, currents, strict=True)]),
+        drive=drive + _driven(memory.share.series, currents, basis_rates),
     )
 
 
@@ -136,17 +140,24 @@ def _product(matrix: np.ndarray, vector: Vector) -> list[hy.expression]:
     return [hy.sum([float(row[i]) * vector[i] for i in range(3) if row[i]]) for row in exact]
 
 
-def _rotor(share: RotorShare) -> tuple[Vector, Vector]:
-    """The rotor's scaled signals and their rates."""
+def _rotor(share: RotorShare) -> tuple[list[list[hy.expression]], list[list[hy.expression]]]:
+    """The scaled functions of time that the rotor's signals are sums of, and their rates."""
     names = hy.make_vars("rotor_angle", "plate_depth")
     angle = hy.par[Parameter.RATE] * hy.time
     speed = hy.par[Parameter.LENGTH] * hy.par[Parameter.PLATE_SPEED]
     depth = hy.par[Parameter.LENGTH] * hy.par[Parameter.PLATE_DEPTH] + speed * hy.time
     now = {"rotor_angle": angle, "plate_depth": depth}
+    basis = share.basis(*names)
+    rates = [
+        [hy.par[Parameter.RATE] * hy.diff(f, names[0]) + speed * hy.diff(f, names[1]) for f in row] for row in basis
+    ]
     scale = hy.par[Parameter.PLATE_SHARE]
-    signals, rates = [], []
-    for signal in share.expressions(*names):
-        rate = hy.diff(signal, names[0]) * hy.par[Parameter.RATE] + hy.diff(signal, names[1]) * speed
-        signals.append(scale * hy.subs(signal, now))
-        rates.append(scale * hy.subs(rate, now))
-    return signals, rates
+    signals, slopes = ([[scale * hy.subs(f, now) for f in row] for row in rows] for rows in (basis, rates))
+    return signals, slopes
+
+
+def _driven(series: np.ndarray, currents: Vector, rates: list[list[hy.expression]]) -> hy.expression:
+    """Σ y_i ∂s_i/∂t of the rotor's signals: the currents are summed first, for each function of time."""
+    pairs = [(rate, column) for row, part in zip(rates, series, strict=True)
+             for rate, column in zip(row, part.T, strict=True)]  # fmt: skip
+    return hy.sum([rate * _combined(column, currents) for rate, column in pairs if column.any()])

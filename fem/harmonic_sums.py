@@ -53,11 +53,18 @@ def _chain(z: hy.expression, inverse: hy.expression, m: int, highest: int) -> di
 
 
 def _summed(terms: Terms, sectoral: list[dict[str, Any]], chains: dict[int, dict[int, Any]]) -> hy.expression:
-    parts: dict[tuple[int, str], list[hy.expression]] = {}
+    parts: dict[tuple[int, str], list[tuple[float, hy.expression]]] = {}
     for (l, m, part), weight in terms.items():
         factor = (-1.0) ** m * weight
         for j in range(1, l + 1):
             factor *= 2 * j - 1
-        parts.setdefault((m, part), []).append(factor * chains[m][l])
-    found = [sectoral[m][part] * hy.sum(inner) for (m, part), inner in parts.items()]
+        parts.setdefault((m, part), []).append((factor, chains[m][l]))
+    found = [_product(sectoral[m][part], inner) for (m, part), inner in parts.items()]
     return hy.sum(found) if found else hy.expression(0.0)
+
+
+def _product(sectoral: hy.expression, inner: Sequence[tuple[float, hy.expression]]) -> hy.expression:
+    """S_m Σ factor Q_lm; a single harmonic is made before its factor, so that all sums share it."""
+    if len(inner) == 1:
+        return inner[0][0] * (sectoral * inner[0][1])
+    return sectoral * hy.sum([factor * chain for factor, chain in inner])

@@ -70,8 +70,8 @@ class RotorShare:
     def _place(self, depth: float) -> float:
         return 2 * depth / self.distance - 1 if self.distance else 0.0
 
-    def expressions(self, angle: hy.expression, depth: hy.expression) -> list[hy.expression]:
-        """s_i of every state as heyoka expressions of the rotor's angle (rad) and the plate's depth (m)."""
+    def basis(self, angle: hy.expression, depth: hy.expression) -> list[list[hy.expression]]:
+        """Harmonics of the angle (rad) times Chebyshev polynomials of the depth (m), as `series` has them."""
         place = depth * (2 / self.distance) - 1.0 if self.distance else hy.expression(0.0)
         powers = [hy.expression(1.0), place]
         while len(powers) < self.series.shape[2]:
@@ -79,14 +79,13 @@ class RotorShare:
         turns = [hy.expression(1.0)]
         for h in range(1, len(self.series) // 2 + 1):
             turns += [hy.cos(float(h) * angle), hy.sin(float(h) * angle)]
-        return [
-            hy.sum([
-                turn * hy.sum([float(c) * power for c, power in zip(row, powers, strict=False) if c])
-                for turn, row in zip(turns, self.series[:, state], strict=True)
-                if row.any()
-            ])
-            for state in range(self.series.shape[1])
-        ]  # fmt: skip
+        return [[turn * power for power in powers[: self.series.shape[2]]] for turn in turns]
+
+    def expressions(self, basis: list[list[hy.expression]]) -> list[hy.expression]:
+        """s_i of every state as heyoka expressions of the `basis`, whose members all of them share."""
+        members = [member for row in basis for member in row]
+        columns = self.series.swapaxes(0, 1).reshape(self.series.shape[1], len(members))
+        return [hy.sum([float(c) * m for c, m in zip(row, members, strict=True) if c]) for row in columns]
 
 
 def rotor_share(
