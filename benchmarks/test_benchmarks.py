@@ -1,7 +1,7 @@
 """Speed of the core, each beside a peer in the same run; pytest-benchmark prints the ratios in brackets."""
 
 from dataclasses import replace
-from time import perf_counter
+from time import perf_counter, process_time
 
 import magpylib
 import numpy as np
@@ -15,7 +15,7 @@ from spinlev.dynamics.equations import parameters
 from spinlev.dynamics.flight import compile_flight
 from spinlev.dynamics.integration import integrate
 from spinlev.dynamics.rates import Rates
-from spinlev.dynamics.simulation import initial_state
+from spinlev.dynamics.simulation import PLATE_TOLERANCE, initial_state
 from spinlev.dynamics.stability import modes
 from spinlev.dynamics.state import Scales
 from spinlev.fem import RotorTable, uniform_moments
@@ -26,6 +26,7 @@ from spinlev.fem.plate_region import Region
 from spinlev.geometry import load_scene
 from spinlev.geometry.box import Box
 from spinlev.geometry.scene import Plate
+from spinlev.studies.plate_shelf import plate_memory
 
 SCENE = load_scene("scenes/horizontal.toml")
 GENERATOR = np.random.default_rng(0)
@@ -127,6 +128,27 @@ def test_flight(benchmark, model, compact):
     trajectory = benchmark.pedantic(lambda: integrate(SCENE, flight, start, 1.0, None), rounds=3, warmup_rounds=1)
     print(f"\n{model}: compiled in {flight.compile_seconds:.1f} s, {trajectory.realtime_factor:.0f} x real time")
     assert trajectory.ended_by == "duration"
+
+
+@pytest.mark.parametrize(("plate_model", "rtol"), [("reduced", 3e-3), ("slab", 3e-4)], ids=["30 states", "80 states"])
+@pytest.mark.parametrize("model", ["cuboid", "fem"])
+def test_flight_with_plate(model, plate_model, rtol):
+    """Simulated time by processor time, of a floater that does not rest, at the tolerance that `simulate` uses."""
+    table = rotor_table(SCENE.rotor, model, nearest=SCENE.floater.radius)
+    start, _ = initial_state(replace(SCENE, plate=None), table)
+    memory, _ = plate_memory(SCENE, SCENE.plate, plate_model, table, start.position, rtol)
+    flight = compile_flight(SCENE, table, 0.5, PLATE_TOLERANCE, True, memory)
+    still = np.zeros(len(memory.table.rates))
+    integrate(SCENE, flight, start, 0.05, currents=still)
+    began = process_time()
+    flown = integrate(SCENE, flight, start, 0.5, currents=still)
+    speed = 0.5 / (process_time() - began)
+    print(
+        f"\n{model}, {plate_model}: {len(still)} states, {len(memory.table.multipoles.kinds)} multipoles, "
+        f"{len(memory.share.series) // 2} harmonics; {flown.steps / (0.5 * SCENE.frequency):.1f} steps a turn, "
+        f"{speed:.1f} x real time; ledger {flown.energy_error:.0e}"
+    )
+    assert flown.ended_by == "duration"
 
 
 def test_flight_against_scipy():

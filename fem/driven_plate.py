@@ -15,6 +15,7 @@ from .plate_table import PlateTable
 from .plate_training import OtherSources
 from .rotor_share import RotorShare, rotor_share
 from .rotor_source import DOWN, posed_rotor, rotor_parts
+from .share_trim import MISSED, trimmed
 from .table import RotorTable
 
 ANGLES, DEPTHS = 8, 5
@@ -53,7 +54,8 @@ def plate_and_rotor_table(
     others = turning_rotor(plate, rotor)
     network = reduce_plate(plate, region, frequencies, rtol, rule, others)
     share = rotor_share(network, plate, rotor, SHARE_PART * rtol)
-    return tabulate(network, rtol), share
+    table = tabulate(network, rtol)
+    return table, trimmed(share, table, MISSED * rtol)
 
 
 def turning_rotor(plate: Plate, rotor: RotorTable) -> OtherSources:

@@ -14,6 +14,7 @@ from .plate_model import FUNCTION_SHARE
 from .plate_region import Region
 from .plate_table import PlateErrors, PlateTable
 from .rotor_share import RotorShare, rotor_share
+from .share_trim import MISSED, trimmed
 from .slab_frame import rotor_reach, slab_frame
 from .slab_functions import slab_functions
 from .slab_reduction import SlabNetwork, reduce_slab
@@ -45,7 +46,8 @@ def slab_and_rotor_table(
     size = np.where(np.arange(3) == np.argmin(plate.box.size), plate.box.size, ENDLESS)
     endless = replace(plate, box=replace(plate.box, size=size))
     network = reduce_slab(plate, region, frequencies, rtol, turning_rotor(endless, rotor), far)
-    return tabulate_slab(network, rtol), rotor_share(network, endless, rotor, SHARE_PART * rtol)
+    share, table = rotor_share(network, endless, rotor, SHARE_PART * rtol), tabulate_slab(network, rtol)
+    return table, trimmed(share, table, MISSED * rtol)
 
 
 def tabulate_slab(network: SlabNetwork, rtol: float) -> PlateTable:

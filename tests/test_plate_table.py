@@ -14,9 +14,10 @@ from spinlev.fem.plate_region import Region
 from spinlev.fem.plate_table_file import cached_plate_table, load_plate_table, plate_key, save_plate_table
 from spinlev.fem.rotor_share import rotor_share
 from spinlev.fem.rotor_source import posed_rotor, rotor_parts
+from spinlev.fem.share_trim import trimmed
 from spinlev.fem.table import RangeError
 from spinlev.fem.table_store import TableFileError
-from spinlev.geometry import vertical
+from spinlev.geometry import horizontal, vertical
 from spinlev.geometry.box import Box
 from spinlev.geometry.plate_mesh import MeshRule
 from spinlev.geometry.scene import Lowering, Plate
@@ -111,6 +112,31 @@ def test_rotor_share_follows_the_turning_rotor(network):
     variables = hy.make_vars("angle", "depth")
     expressed = hy.cfunc(share.expressions(share.basis(*variables)), variables, compact_mode=True)([angle, depth])
     assert expressed == pytest.approx(share.signals(angle, depth), rel=1e-10, abs=1e-13 * abs(exact).max())
+
+
+def test_harmonics_that_the_floater_does_not_feel_are_left_out(network, table):
+    """At an unseen place, depth and frequency the rest misses no more of the force's gradient than is stated."""
+    rotor = rotor_table(horizontal(4e-3, 0.01, 1.305, 1.0), "cuboid")
+    share = rotor_share(network, PLATE, rotor, 1e-5)
+    assert trimmed(share, table, 0.0).error == share.error
+    few = trimmed(share, table, 1e-2)
+    assert 1 < len(few.series) < len(share.series)
+    left_out = few.error - share.error
+    assert 0 < left_out <= 1e-2
+    assert np.array_equal(few.series, share.series[: len(few.series)])
+    whole, part = (_swing(s, table, 60.0) for s in (share, few))
+    assert np.linalg.norm(whole - part) < left_out * np.linalg.norm(whole)
+    assert np.linalg.norm(whole - part) > 0.05 * left_out * np.linalg.norm(whole)
+
+
+def _swing(share, table, frequency):
+    """Gradients (time, 9) of the field of the rotor's steady currents during a turn, at one place and depth."""
+    turns = np.arange(64) / 64
+    signals = np.array([share.signals(2 * np.pi * turn, 0.006) for turn in turns])
+    rates = 2j * np.pi * frequency * np.fft.fftfreq(64, 1 / 64)[:, None]
+    currents = np.fft.ifft(np.fft.fft(signals, axis=0) * -rates / (table.rates + rates), axis=0).real
+    gradient = table.field_functions(places(3)[1])[1][0]
+    return currents @ gradient.reshape(len(table.rates), 9)
 
 
 def test_a_table_survives_the_disk_and_the_cache(table, tmp_path, monkeypatch):
