@@ -70,12 +70,16 @@ def survey(
     values, rates = parameters(scene, scales, frozen_spin=True), rates or Rates.of(scene, table)
     balance = Balance(rates, values, spin)
     where = SearchRange(scene, farthest)
+
+    def known(position: Array) -> bool:
+        return bool(table.in_range(position * scales.length)[0])
+
     curves = all_curves(balance, where)
     guesses = [curve.balanced() for curve in curves]
     position = np.concatenate([np.zeros((0, 3)), *(p for p, _ in guesses)])
     moment = np.concatenate([np.zeros((0, 3)), *(m for _, m in guesses)])
     points = _polished(balance, position, moment)
-    found = [_equilibrium(table, scales, balance, r, m) for r, m in points if r in where]
+    found = [_equilibrium(table, scales, balance, r, m) for r, m in points if r in where and known(r)]
     if np.any(scene.gravity[:2]):
         found = _shaken(Shaken(scene, rates, values, None), found)
     return Survey(_in_order(found), tuple(_force_curve(scene, scales, curve) for curve in curves))

@@ -50,8 +50,10 @@ def parse_scene(text: str, source: str = "scene") -> Scene:
     faults = _start_faults(table.start)
     if faults:
         raise SceneError(source, faults)
-    scene = _scene(table, text)
+    scene = _scene(table, text, Path(source).parent)
     faults = overlap_faults(scene)
+    if scene.field_map and not scene.field_map.is_file():
+        faults.append(f"Input rotor.field_map must be a file; instead there is no {scene.field_map}.")
     if faults:
         raise SceneError(source, faults)
     return scene
@@ -76,7 +78,7 @@ def _start_faults(start: StartSection | None) -> list[str]:
     return faults
 
 
-def _scene(table: SceneSection, text: str) -> Scene:
+def _scene(table: SceneSection, text: str, folder: Path) -> Scene:
     floater = Floater(
         radius=table.floater.diameter_mm * MILLI / 2,
         remanence=table.floater.remanence_T,
@@ -95,6 +97,7 @@ def _scene(table: SceneSection, text: str) -> Scene:
         plate=_plate(table.plate) if table.plate else None,
         drag=drag,
         start=_start(table.start),
+        field_map=folder / table.rotor.field_map if table.rotor.field_map else None,
         text=text,
     )
 
