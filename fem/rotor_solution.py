@@ -19,7 +19,7 @@ from .moments import reaction_moments, trace_moments
 from .multipole import MultipoleExpansion
 from .spherical import turned
 
-SIZES = (1.0, 0.4)
+SIZES = (1.0, 0.8, 0.5)
 """Of elements in magnets, relative to what is asked for, that are tried."""
 
 
