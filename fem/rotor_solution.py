@@ -122,8 +122,8 @@ def _meshed_system(
 ) -> tuple[MagnetMesh, System, int]:
     """Mesh, matrix, layers at the edges: where the mesher cannot match them, smaller elements, else fewer layers.
 
-    An element that touches edges of two magnets near each other is refined otherwise from either side; smaller ones do
-    not. An edge within a face remains.
+    Two elements that touch edges of magnets near each other may be refined otherwise on the face between them; in
+    another mesh of nearly the same size they are mostly not there.
     """
     for layers, size in product(range(refinement.mesh.hp_layers, -1, -1), SIZES):
         settings = replace(refinement.mesh, hp_layers=layers, magnet_size=size * refinement.mesh.magnet_size)
