@@ -58,11 +58,15 @@ def read_checked(path: str | Path, file_format: str) -> xr.Dataset:
 
 
 def _digest(dataset: xr.Dataset) -> str:
-    """SHA-256 over the numbers, their names and shapes, and the attributes."""
+    """SHA-256 over the values, their names and shapes, and the attributes."""
     digest = hashlib.sha256()
-    for name in sorted(str(n) for n in dataset.data_vars):
-        values = np.ascontiguousarray(dataset[name].values, dtype="<f8")
-        digest.update(f"{name}{values.shape}".encode() + values.tobytes())
+    for name in sorted(str(n) for n in dataset.variables):
+        values = np.asarray(dataset[name].values)
+        digest.update(f"{name}{values.shape}".encode())
+        if values.dtype.kind in "biuf":
+            digest.update(np.ascontiguousarray(values, dtype="<f8").tobytes())
+        else:
+            digest.update(json.dumps(values.astype(str).tolist()).encode())
     attrs = {k: str(v) for k, v in dataset.attrs.items() if k != "content_sha256"}
     digest.update(json.dumps(attrs, sort_keys=True).encode())
     return digest.hexdigest()

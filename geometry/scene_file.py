@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import tomllib
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from pydantic import ValidationError
@@ -25,7 +27,7 @@ def load_scene(path: str | Path) -> Scene:
     Raises
     ------
     SceneError : the file is missing or unreadable, is not TOML, has unknown, missing or wrong keys, or its
-        bodies overlap
+        bodies overlap, or its map of the field is no file
     """
     source = str(path)
     try:
@@ -34,15 +36,29 @@ def load_scene(path: str | Path) -> Scene:
         raise SceneError(source, ["the scene file does not exist; give the path of a TOML file."]) from None
     except (OSError, UnicodeDecodeError) as error:
         raise SceneError(source, [f"the scene file must be a readable UTF-8 text; {error}."]) from None
-    return parse_scene(text, source)
+    scene = parse_scene(text, source)
+    if scene.field_map and not scene.field_map.is_file():
+        raise SceneError(source, [f"Input rotor.field_map must be a file; instead there is no {scene.field_map}."])
+    return scene
 
 
-def parse_scene(text: str, source: str = "scene") -> Scene:
-    """Build a scene from the text of a scene file; `source` names it in messages. Raises `SceneError`."""
+def parse_scene(text: str, source: str = "scene", changes: Mapping[str, float] | None = None) -> Scene:
+    """Build a scene from the text of a scene file; `source` names it in messages.
+
+    Parameters
+    ----------
+    changes : numbers that replace those of the file, by key, such as `rotor.displacement_mm` or `plate.center_mm.2`
+
+    Raises
+    ------
+    SceneError : as `load_scene`, also for a change that no key takes
+    """
     try:
         raw = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
         raise SceneError(source, [f"the scene file must be TOML; {error}."]) from None
+    for key, value in (changes or {}).items():
+        _replace(raw, key, value, source)
     try:
         table = SceneSection.model_validate(raw)
     except ValidationError as error:
@@ -52,11 +68,25 @@ def parse_scene(text: str, source: str = "scene") -> Scene:
         raise SceneError(source, faults)
     scene = _scene(table, text, Path(source).parent)
     faults = overlap_faults(scene)
-    if scene.field_map and not scene.field_map.is_file():
-        faults.append(f"Input rotor.field_map must be a file; instead there is no {scene.field_map}.")
     if faults:
         raise SceneError(source, faults)
     return scene
+
+
+def _replace(raw: Any, key: str, value: float, source: str) -> None:
+    """Put a number in the place of `key`: names of tables, and numbers of list entries from 0, joined by dots."""
+    *path, last = (int(part) if part.isdecimal() else part for part in key.split("."))
+    try:
+        for part in path:
+            raw = raw[part]
+        if isinstance(last, int):
+            raw[last] = value
+        else:
+            raw.update({last: value})
+    except (KeyError, IndexError, TypeError, AttributeError):
+        raise SceneError(
+            source, [f"Input {key} must be a key inside the tables and lists that the scene has; instead it is not."]
+        ) from None
 
 
 def _start_faults(start: StartSection | None) -> list[str]:

@@ -1,7 +1,6 @@
 """The command line: `spinlev`.
 
 Exit status 0: done; 2: bad input, with one message that says what is allowed; 1: the computation failed.
-The numeric libraries are imported once the input has been found good: a wrong scene is answered at once.
 """
 
 from __future__ import annotations
@@ -10,23 +9,17 @@ import os
 import sys
 import time
 import traceback
-from collections.abc import Mapping
-from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Any
 
-import numpy as np
-from cyclopts import App, CycloptsError, Parameter
+from cyclopts import App, CycloptsError
 
-from ..geometry import InputError, load_scene
-from ..geometry.box import Array
+from ..geometry import InputError
 from .console import answers_only, note, to_json
-from .points_file import read_points
-from .shipped_scenes import default_scene
-from .tables import FieldModel, Tables
-
-ReactionModel = Literal["slab", "fem", "reduced", "auto"]
+from .output import Answer
+from .result_commands import add_result_commands
+from .scene_commands import add_scene_commands
 
 app = App(
     name="spinlev",
@@ -34,220 +27,8 @@ app = App(
     help="Magnetic levitation by rotation: true fields, true motion.",
     help_format="plaintext",
 )
-
-
-@Parameter(name="*")
-@dataclass(frozen=True)
-class Output:
-    """Where answers go.
-
-    Parameters
-    ----------
-    json
-        Print one JSON object and nothing else on standard output.
-    out
-        Folder for the files.
-    """
-
-    json: Annotated[bool, Parameter(negative="")] = False
-    out: Path = Path("out")
-
-
-@dataclass(frozen=True)
-class Answer:
-    """What a command says: numbers for a program, lines for a person."""
-
-    values: Mapping[str, Any]
-    lines: tuple[str, ...]
-    json: bool
-
-
-@app.command
-def run(
-    scene: Path | None = None,
-    *,
-    asked: Tables = Tables(),
-    duration_s: float = 3.0,
-    output: Output = Output(),
-) -> Answer:
-    """The main job: fields, tables, equilibria, stability, motion, pictures, result.nc and summary.json.
-
-    Parameters
-    ----------
-    scene
-        Scene file (left out: the one that comes with the program).
-    duration_s
-        Simulated time, s.
-    """
-    _positive("--duration-s", duration_s)
-    loaded = load_scene(scene or default_scene())
-    from .run import main_job
-
-    values, lines = main_job(loaded, asked.checked(), duration_s, output.out)
-    return Answer(values, tuple(lines), output.json)
-
-
-@app.command
-def field(
-    scene: Path,
-    *,
-    points: Path,
-    model: FieldModel = "auto",
-    rtol: float = 3e-6,
-    output: Output = Output(),
-) -> Answer:
-    """B and its gradient at points in the rotor's frame at t = 0.
-
-    Parameters
-    ----------
-    scene
-        Scene file.
-    points
-        CSV file with the columns x_mm, y_mm, z_mm.
-    model
-        Field model.
-    rtol
-        Relative accuracy asked of the field wherever the floater can be.
-    """
-    asked = Tables(model, rtol=rtol).checked()
-    loaded, places = load_scene(scene), read_points(points)
-    from .single import field_job
-
-    values, lines = field_job(loaded, places, asked, output.out)
-    return Answer(values, tuple(lines), output.json)
-
-
-@app.command
-def equilibria(
-    scene: Path,
-    *,
-    asked: Tables = Tables(),
-    spin: float = 0.0,
-    output: Output = Output(),
-) -> Answer:
-    """All synchronous equilibria and their stability.
-
-    Parameters
-    ----------
-    scene
-        Scene file.
-    spin
-        Body spin S = Ω·m̂/ω of the floater about its own moment.
-    """
-    if not -1e3 <= spin <= 1e3:
-        raise InputError(f"Input --spin must be between -1000 and 1000; instead received {spin}.")
-    loaded = load_scene(scene)
-    from .single import equilibria_job
-
-    values, lines = equilibria_job(loaded, asked.checked(), spin, output.out)
-    return Answer(values, tuple(lines), output.json)
-
-
-@app.command
-def simulate(
-    scene: Path,
-    *,
-    duration_s: float,
-    asked: Tables = Tables(),
-    resume: Annotated[bool, Parameter(negative="")] = False,
-    output: Output = Output(),
-) -> Answer:
-    """The floater's motion: trajectory.nc and how it ended.
-
-    Parameters
-    ----------
-    scene
-        Scene file.
-    duration_s
-        Simulated time, s.
-    resume
-        Go on from the checkpoint of the same flight in --out, if one is there.
-    """
-    _positive("--duration-s", duration_s)
-    loaded = load_scene(scene)
-    from .single import simulate_job
-
-    values, lines = simulate_job(loaded, asked.checked(), duration_s, output.out, resume)
-    return Answer(values, tuple(lines), output.json)
-
-
-@app.command
-def study(
-    name: str | None = None,
-    *,
-    list: Annotated[bool, Parameter(negative="")] = False,
-    quick: Annotated[bool, Parameter(negative="")] = False,
-    output: Output = Output(),
-) -> Answer:
-    """One study of the catalogue: NAME.nc, NAME.png and what it says.
-
-    Parameters
-    ----------
-    name
-        Name of the study.
-    list
-        Show the catalogue.
-    quick
-        Coarser, in less than a minute.
-    """
-    from .catalogue import CATALOGUE, run_study
-
-    summaries = {key: entry.summary for key, entry in CATALOGUE.items()}
-    if list:
-        return Answer({"studies": summaries}, tuple(f"{k:22} {v}" for k, v in summaries.items()), output.json)
-    if name not in CATALOGUE:
-        raise InputError(f"Input name must be one of {', '.join(CATALOGUE)}; instead received {name}.")
-    lines = run_study(name, quick, output.out)
-    return Answer({"study": name, "report": lines, "result": str(output.out / f"{name}.nc")}, tuple(lines), output.json)
-
-
-@app.command
-def plate(
-    scene: Path,
-    *,
-    at: Annotated[str, Parameter(allow_leading_hyphen=True)],
-    frequency_hz: float,
-    model: ReactionModel = "auto",
-    rtol: float = 1e-3,
-    output: Output = Output(),
-) -> Answer:
-    """Reaction tensor G of the plate's eddy currents: B = G m at the dipole's own place, phasors e^(+iωt).
-
-    Parameters
-    ----------
-    scene
-        Scene file with a plate.
-    at
-        Place X,Y,Z of the dipole in the laboratory frame, mm.
-    frequency_hz
-        Frequency of the dipole, Hz.
-    model
-        slab (infinite, exact), fem, reduced (a table around the place), or auto.
-    rtol
-        Relative accuracy asked of the tensor.
-    """
-    _positive("--rtol", rtol)
-    place = _three_numbers("--at", at)
-    loaded = load_scene(scene)
-    from .plate_job import plate_job
-
-    values, lines = plate_job(loaded, place * 1e-3, frequency_hz, model, rtol, output.out)
-    return Answer(values, tuple(lines), output.json)
-
-
-def _three_numbers(name: str, text: str) -> Array:
-    try:
-        numbers = np.array([float(part) for part in text.split(",")])
-    except ValueError:
-        numbers = np.zeros(0)
-    if len(numbers) != 3 or not np.all(np.isfinite(numbers)):
-        raise InputError(f"Input {name} must be three numbers X,Y,Z; instead received {text!r}.")
-    return numbers
-
-
-def _positive(name: str, value: float) -> None:
-    if not 0 < value < float("inf"):
-        raise InputError(f"Input {name} must be a positive number; instead received {value}.")
+add_scene_commands(app)
+add_result_commands(app)
 
 
 def main() -> None:

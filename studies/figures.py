@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 from collections.abc import Callable
 from functools import wraps
 from pathlib import Path
@@ -37,9 +38,10 @@ NAMES = {
     "cuboid": "cuboid, closed form (μr = 1)",
     "fem": "finite elements",
     "moments": "moments",
+    "map": "map",
 }
-COLORS = dict(zip(("dipole", "cuboid", "fem", "moments"), PALETTE, strict=False))
-DASHES = {"dipole": "--", "cuboid": "-.", "fem": "-", "moments": ":"}
+COLORS = dict(zip(NAMES, PALETTE, strict=False))
+DASHES = {"dipole": "--", "cuboid": "-.", "fem": "-", "moments": ":", "map": "-"}
 
 
 Draw = TypeVar("Draw", bound=Callable[..., Figure])
@@ -66,6 +68,14 @@ def save_figure(figure: Figure, path: Path) -> None:
     """Write a figure; the format follows the suffix."""
     with mpl.rc_context(STYLE), replacing(path) as temporary:
         figure.savefig(temporary)
+
+
+def png(figure: Figure) -> bytes:
+    """The figure as the content of a PNG file."""
+    stream = io.BytesIO()
+    with mpl.rc_context(STYLE):
+        figure.savefig(stream, format="png")
+    return stream.getvalue()
 
 
 @styled

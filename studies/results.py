@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+import shlex
 import sys
 from collections.abc import Mapping, Sequence
-from datetime import UTC, datetime
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -23,15 +23,16 @@ LIBRARIES = ("spinlev", "ngsolve", "heyoka", "numpy", "scipy", "xarray")
 
 
 def write_dataset(dataset: xr.Dataset, path: Path, scene: Scene | None = None) -> None:
-    """Write a result with its provenance: versions, command, time and the scene's text if it has one."""
+    """Write a result with its provenance: versions, command, and the scene's text if it has one.
+
+    The same command gives the same file, to the last byte, wherever its numbers are not times.
+    """
     provenance = {f"version_{name}": version(name) for name in LIBRARIES}
     if scene:
         provenance["scene"] = scene.text
-    stamp = datetime.now(UTC).isoformat(timespec="seconds")
     with replacing(path) as temporary:
-        dataset.assign_attrs(command=" ".join(sys.argv), created=stamp, **provenance).to_netcdf(
-            temporary, engine="h5netcdf"
-        )
+        command = shlex.join(["spinlev", *sys.argv[1:]])
+        dataset.assign_attrs(command=command, **provenance).to_netcdf(temporary, engine="h5netcdf")
 
 
 def variable(dims: Sequence[str], values: Any, units: str, long_name: str) -> xr.Variable:
@@ -123,6 +124,7 @@ def trajectory_dataset(flight: Trajectory) -> xr.Dataset:
         },
         coords={"time": variable(("time",), flight.time, "s", "time"), "axis": list(AXIS)},
         attrs={
+            "study": "simulate",
             "ended_by": str(flight.ended_by),
             "levitated_s": flight.levitated_s,
             "energy_error": flight.energy_error,

@@ -71,8 +71,7 @@ class Shelf:
             note(f"Plate model: {name} ({reason})")
         if name == "none" or self.scene.plate is None or place is None:
             return None
-        sources = table.expansions if isinstance(table, GriddedTable) else table
-        memory, found = plate_memory(self.scene, self.scene.plate, name, sources, place, self.asked.plate_rtol)
+        memory, found = plate_memory(self.scene, self.scene.plate, name, sources(table), place, self.asked.plate_rtol)
         if found:
             self.from_cache.append("plate")
         return memory
@@ -96,3 +95,8 @@ class Shelf:
             self.from_cache.append(name)
         note("  from the cache." if found else f"  done in {table.provenance['seconds']:.1f} s.")
         return table
+
+
+def sources(table: RotorField) -> RotorTable:
+    """The closed forms and expansions that make a table's field."""
+    return table.expansions if isinstance(table, GriddedTable) else table

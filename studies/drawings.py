@@ -1,0 +1,64 @@
+"""The figures of any result, from its file alone."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+
+import xarray as xr
+from matplotlib.figure import Figure
+
+from ..geometry import InputError
+from .catalogue import CATALOGUE
+from .figures import field_figure, force_figure, save_figure, trajectory_figure
+from .question_figure import drawable, question_figure
+
+QUESTION = "question"
+"""What the result of one's own question is called."""
+
+
+def draw_result(path: Path, out: Path) -> list[str]:
+    """Draw a result file anew; returns the files written.
+
+    Raises
+    ------
+    InputError : the file cannot be read, or is no result of this program
+    """
+    return save_figures(figures_of(read_result(path)), out)
+
+
+def read_result(path: Path) -> xr.Dataset:
+    """The whole of a result file. Raises InputError if it cannot be read, or is no result of this program."""
+    try:
+        with xr.open_dataset(path, engine="h5netcdf") as opened:
+            result = opened.load()
+    except FileNotFoundError:
+        raise InputError(f"Input {path} must be a file that exists; instead it is missing.") from None
+    except Exception as error:  # the HDF5 layer raises many kinds on a damaged file
+        raise InputError(f"Input {path} must be a netCDF file that can be read; {error}.") from None
+    if "study" not in result.attrs:
+        raise InputError(f"Input {path} must be a result of spinlev; instead it has no attribute 'study'.")
+    return result
+
+
+def figures_of(result: xr.Dataset) -> Mapping[str, Figure]:
+    """The figures of a result by name."""
+    kind = str(result.attrs["study"])
+    if kind in CATALOGUE:
+        return {kind: CATALOGUE[kind].draw(result)}
+    if kind == QUESTION:
+        return {QUESTION: question_figure(result)} if drawable(result) else {}
+    draws = {"axis_field": field_figure, "curve_force": force_figure, "position_rotor_frame": trajectory_figure}
+    names = {"axis_field": "field", "curve_force": "force", "position_rotor_frame": "trajectory"}
+    found = {names[key]: draw(result) for key, draw in draws.items() if key in result}
+    if not found:
+        raise InputError(f"Input study must be one that this version knows; instead the result is of '{kind}'.")
+    return found
+
+
+def save_figures(figures: Mapping[str, Figure], out: Path) -> list[str]:
+    """Write each figure as PNG and PDF; returns the files."""
+    files = [out / f"{name}.{suffix}" for name in figures for suffix in ("png", "pdf")]
+    for file in files:
+        save_figure(figures[file.stem], file)
+    return [str(file) for file in files]

@@ -1,0 +1,68 @@
+"""What a study is: a pure function of one point, and the points at which it is asked."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from operator import itemgetter
+from typing import Any
+
+import xarray as xr
+from matplotlib.figure import Figure
+
+Point = Mapping[str, Any]
+"""What tells one point of a study from the others, in types that JSON knows."""
+
+
+def by_case(parts: Sequence[xr.Dataset]) -> xr.Dataset:
+    """The points' results one after the other along `case`; dimensions of unlike length are filled with NaN."""
+    return xr.concat(parts, "case", data_vars="all", coords="different", compat="equals", join="outer")
+
+
+@dataclass(frozen=True)
+class Study:
+    """One question to the program.
+
+    Parameters
+    ----------
+    summary : what it gives, in a line
+    points : takes `quick` and returns the points
+    compute : takes a point and returns its labelled result, the same whoever computes it
+    gather : joins the results of the points into one
+    draw : the figure, from the joined result alone
+    report : what it says, in lines, from the joined result alone
+    timed : whether it measures times, for which its points must have the machine for themselves
+    settings : what all points have in common, if they do not say it themselves
+    """
+
+    summary: str
+    points: Callable[[bool], Sequence[Point]]
+    compute: Callable[[Point], xr.Dataset]
+    gather: Callable[[Sequence[xr.Dataset]], xr.Dataset]
+    draw: Callable[[xr.Dataset], Figure]
+    report: Callable[[xr.Dataset], list[str]]
+    timed: bool = False
+    settings: Point = field(default_factory=dict)
+
+
+def study_of_one(
+    summary: str,
+    compute: Callable[[bool], xr.Dataset],
+    draw: Callable[[xr.Dataset], Figure],
+    report: Callable[[xr.Dataset], list[str]],
+    timed: bool = False,
+) -> Study:
+    """A study that is computed as a whole: its only point says whether it is quick."""
+    return Study(summary, _settings, _Whole(compute), itemgetter(0), draw, report, timed)
+
+
+def _settings(quick: bool) -> list[Point]:
+    return [{"quick": quick}]
+
+
+@dataclass(frozen=True)
+class _Whole:
+    compute: Callable[[bool], xr.Dataset]
+
+    def __call__(self, point: Point) -> xr.Dataset:
+        return self.compute(point["quick"])
