@@ -8,11 +8,12 @@ from dataclasses import asdict, dataclass
 import numpy as np
 import xarray as xr
 
-from ..dynamics import flight_kind
+from ..dynamics import PlateMemory, flight_kind
+from ..fem.table import RotorTable
 from ..geometry import Scene, parse_scene
 from ..geometry.box import Array
 from .answers import flight_answer
-from .results import AXIS, variable
+from .results import AXIS, found_dataset, variable
 from .shelf import Shelf
 from .single import fly, surveyed
 from .study import Point
@@ -77,26 +78,7 @@ def _asked(tables: Tables) -> dict[str, str | float]:
 def _equilibria(question: Question, scene: Scene, shelf: Shelf) -> xr.Dataset:
     table = shelf.table()
     found, memory = surveyed(shelf, table, question.spin)
-    rows = found.equilibria
-
-    def column(values: Sequence[float], units: str, name: str) -> xr.Variable:
-        return variable(("equilibrium",), np.array(values, float), units, name)
-
-    return xr.Dataset(
-        {
-            "position": variable(
-                ("equilibrium", "axis"), np.array([e.position for e in rows]).reshape(-1, 3), "m", "mean position"
-            ),
-            "position_error": column([e.position_error for e in rows], "m", "estimated error of the position"),
-            "polar_angle": column([e.polar_angle_deg for e in rows], "deg", "polar angle of the moment"),
-            "lag": column([e.lag_deg for e in rows], "deg", "lag of the moment behind the rotor"),
-            "stable": column([e.stable for e in rows], "1", "1 stable, 0 not"),
-            "growth": column([e.growth_per_s for e in rows], "1/s", "largest growth rate of a small motion"),
-            "number": variable((), len(rows), "1", "number of equilibria"),
-        },
-        {"axis": list(AXIS), "equilibrium": np.arange(len(rows))},
-        {"model": table.model, "plate_model": memory.model if memory else "none"},
-    )
+    return found_dataset(found.equilibria).assign_attrs(_models(table, memory))
 
 
 def _flight(question: Question, scene: Scene, shelf: Shelf) -> xr.Dataset:
@@ -114,8 +96,12 @@ def _flight(question: Question, scene: Scene, shelf: Shelf) -> xr.Dataset:
             "height_spread": variable((), np.ptp(height), "m", "highest less lowest height"),
             "energy_error": variable((), answer["energy_error"], "1", "violation of the energy ledger"),
         },
-        attrs={"model": table.model, "plate_model": memory.model if memory else "none"},
+        attrs=_models(table, memory),
     )
+
+
+def _models(table: RotorTable, memory: PlateMemory | None) -> dict[str, str]:
+    return {"model": table.model, "plate_model": memory.model if memory else "none"}
 
 
 def _field(question: Question, scene: Scene, shelf: Shelf) -> xr.Dataset:

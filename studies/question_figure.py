@@ -38,7 +38,7 @@ def _derived(result: xr.Dataset) -> xr.Dataset:
         distance = -1e3 * result["position"].sel(axis="z")
         return result.assign(distance=distance.assign_attrs(units="mm", long_name="distance below the rotor"))
     if "B" in result:
-        size = 1e3 * np.sqrt((result["B"] ** 2).sum("axis", skipna=False))
+        size = 1e3 * (result["B"] ** 2).sum("axis", skipna=False) ** 0.5
         return result.assign(size=size.assign_attrs(units="mT", long_name="|B|"))
     return result
 
