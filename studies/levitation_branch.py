@@ -20,8 +20,9 @@ from ..dynamics.state import Scales
 from ..dynamics.symbols import Parameter
 from ..fem.table import RotorTable
 from ..geometry.box import Array
-from ..geometry.scene import Scene
+from ..geometry.scene import AbsoluteStart, Scene
 
+UP = np.array([0.0, 0.0, 1.0])
 UNIT = 50.0
 """Hz over which the equilibrium moves by about a radius of the floater."""
 SLOWEST = 10.0
@@ -88,6 +89,14 @@ def levitating_branch(scene: Scene, table: RotorTable, rates: Rates, highest: fl
     return Branch(family, tuple(points[folds[0] :: -1]), tuple(points[folds[0] : end]))
 
 
+def kicked(scene: Scene, point: Point, speed: float) -> Scene:
+    """The scene at the frequency of an equilibrium, beginning there with `speed` (m/s) upwards."""
+    there = replace(scene, frequency=point.parameter)
+    state = Scales.of(there).unpack(point.state)
+    start = AbsoluteStart(state.position, state.velocity + speed * UP, state.moment, state.spin)
+    return replace(there, start=start)
+
+
 def touches(scene: Scene, position: Array) -> bool:
     """Whether a floater at `position` (3,) m reaches into a magnet of the rotor."""
     return any(float(magnet.box.distance(position)) < scene.floater.radius for magnet in scene.rotor)
@@ -95,7 +104,7 @@ def touches(scene: Scene, position: Array) -> bool:
 
 def _hanging(scene: Scene, table: RotorTable, family: Family) -> Array:
     """Scaled state (12,) near the far equilibrium: on the axis, upright, where attraction carries the weight."""
-    scales, upright = Scales.of(scene), np.array([[0.0, 0.0, 1.0]])
+    scales, upright = Scales.of(scene), UP[None]
     weight = scene.floater.mass * abs(float(scene.gravity[2]))
 
     def excess(distance: float) -> float:
@@ -110,7 +119,7 @@ def _hanging(scene: Scene, table: RotorTable, family: Family) -> Array:
             f"Nowhere from {1e3 * nearest:.3g} to {1e3 * REACH[1]:.3g} mm does the attraction carry the weight."
         )
     distance = float(brentq(excess, grid[carried[-1]], grid[carried[-1] + 1]))
-    return family.balance(scene.frequency).states(np.array([[0.0, 0.0, -distance / scales.length]]), upright)[0]
+    return family.balance(scene.frequency).states(-distance / scales.length * upright, upright)[0]
 
 
 def distance_error(scene: Scene, table: RotorTable, family: Family, point: Point) -> float:

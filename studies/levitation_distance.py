@@ -2,20 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import xarray as xr
 
 from ..dynamics import Family, Rates, simulate
 from ..dynamics.branch import Point as Equilibrium
-from ..dynamics.state import Scales
 from ..fem.table import RotorTable
 from ..geometry.box import Array
-from ..geometry.scene import AbsoluteStart, Scene
+from ..geometry.scene import Scene
 from .article import CONFIGURATIONS, FLOATER, HIGHEST, LOWEST, article_scene, article_table, one_case, stable
 from .article_formulas import analytic_distance, balanced
-from .levitation_branch import distance_error, levitating_branch
+from .levitation_branch import distance_error, kicked, levitating_branch
 from .results import variable
 from .study import Point
 
@@ -25,7 +22,6 @@ FLIGHTS = 3
 """Simulated flights of each rotor, spread over its stable frequencies."""
 KICK, SECONDS = 0.01, 1.0
 """Speed with which a simulated floater leaves its equilibrium upwards, m/s, and duration of the flight."""
-UP = np.array([0.0, 0.0, 1.0])
 QUICK = {"horizontal": (1.0, 4.0), "vertical": (14.0,), "tilt": (10.0,)}
 
 
@@ -96,10 +92,7 @@ def mean_height(scene: Scene, table: RotorTable, point: Equilibrium) -> tuple[fl
 
     Means are weighted by sin², which takes out the bounce; NaN where the flight did not last.
     """
-    there = replace(scene, frequency=point.parameter)
-    state = Scales.of(there).unpack(point.state)
-    start = AbsoluteStart(state.position, state.velocity + KICK * UP, state.moment, state.spin)
-    flight = simulate(replace(there, start=start), table, SECONDS, [])
+    flight = simulate(kicked(scene, point, KICK), table, SECONDS, [])
     if flight.ended_by != "duration":
         return np.nan, np.nan
     height = -flight.lab.position[:, 2]

@@ -2,20 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import xarray as xr
 
 from ..dynamics import Rates, simulate
 from ..dynamics.branch import Point as Equilibrium
-from ..dynamics.state import Scales
 from ..fem.table import RotorTable
 from ..geometry.box import Array
-from ..geometry.scene import AbsoluteStart, Scene
+from ..geometry.scene import Scene
 from .article import CONFIGURATIONS, HIGHEST, LOWEST, article_scene, article_table, one_case
 from .article_formulas import side_radius
-from .levitation_branch import levitating_branch
+from .levitation_branch import kicked, levitating_branch
 from .results import variable
 from .study import Point
 
@@ -78,10 +75,7 @@ def _row(point: Equilibrium | None) -> list[float]:
 
 def _flight(scene: Scene, table: RotorTable, point: Equilibrium) -> Array:
     """Angle of the rotor and place of the floater (4, sample) in the last turns of a flight that a kick began."""
-    there = replace(scene, frequency=FLIGHT)
-    state = Scales.of(there).unpack(point.state)
-    start = AbsoluteStart(state.position, state.velocity + [0.0, 0.0, KICK], state.moment, state.spin)
-    flight = simulate(replace(there, start=start), table, SECONDS, [])
+    flight = simulate(kicked(scene, point, KICK), table, SECONDS, [])
     times = flight.time[-1] - np.linspace(TURNS / FLIGHT, 0.0, SAMPLES)
     place = [np.interp(times, flight.time, column) for column in flight.lab.position.T]
     return np.array([2 * np.pi * FLIGHT * times, *place])

@@ -1,7 +1,7 @@
-"""Linear fall, stable and unstable flight: the levitation distance against time, the article's fourth supplementary figure.
+"""Linear fall, stable and unstable flight: levitation distance against time, the article's last supplementary figure.
 
-Its experiment had δx = 1 mm and fell at 115 Hz, stayed at 140 Hz and was lost in oscillations at 150 Hz.  Each flight is
-simulated in full, from equilibrium with spin s = 0, with drag and the floater's own eddy currents, and compared with
+Its experiment had δx = 1 mm and fell at 115 Hz, stayed at 140 Hz and was lost in oscillations at 150 Hz.  Each flight
+is simulated in full, from equilibrium with spin s = 0, with drag and the floater's own eddy currents, and compared with
 the averaged flight along the branch of equilibria.
 """
 
@@ -17,9 +17,9 @@ from ..dynamics.branch import Point as Equilibrium
 from ..dynamics.state import Scales
 from ..fem.table import RotorTable
 from ..geometry.box import Array
-from ..geometry.scene import AbsoluteStart, Scene
+from ..geometry.scene import Scene
 from .article import FLIGHT, FLOATER, HIGHEST, article_scene, article_table, one_case
-from .levitation_branch import levitating_branch
+from .levitation_branch import kicked, levitating_branch
 from .results import variable
 from .study import Point
 
@@ -37,12 +37,10 @@ NONE = "no equilibrium"
 
 
 def flight_points(quick: bool) -> list[Point]:
-    """The three displacements in the field of the finite elements; `quick` has the dipole's and a quarter of the time."""
+    """The three displacements in the field of finite elements; `quick` has the dipole's and a quarter of the time."""
     model, seconds = ("dipole", FLIGHT / 4) if quick else ("fem", FLIGHT)
-    return [
-        {"configuration": "horizontal", "value": value, "model": model, "duration_s": seconds}
-        for value in DISPLACEMENTS
-    ]
+    asked = {"configuration": "horizontal", "model": model, "duration_s": seconds}
+    return [{**asked, "value": value} for value in DISPLACEMENTS]
 
 
 def trajectories(point: Point) -> xr.Dataset:
@@ -50,8 +48,8 @@ def trajectories(point: Point) -> xr.Dataset:
 
     Returns
     -------
-    Dataset over `frequency`: what became of the simulated flight and of the averaged one; over `part` of the flight: its
-    time, and the least, mean and largest distance along the axis; over `sample`: the averaged flight.
+    Dataset over `frequency`: what became of the simulated flight and of the averaged one; over `part` of the flight:
+    its time, and the least, mean and largest distance along the axis; over `sample`: the averaged flight.
     """
     scene = article_scene(point["configuration"], point["value"], HIGHEST)
     scene = replace(scene, floater=replace(FLOATER, conductivity=CONDUCTIVITY))
@@ -93,8 +91,7 @@ def _row(
     state = Scales.of(there).unpack(start.state)
     slow = drift(there, table, 0.0, seconds, rates, state, stokes=True)
     times = np.linspace(0.0, slow.time[-1], SAMPLES)
-    begin = AbsoluteStart(state.position, state.velocity + [0.0, 0.0, KICK], state.moment, state.spin)
-    flight = simulate(replace(there, start=begin), table, seconds, [])
+    flight = simulate(kicked(there, start, KICK), table, seconds, [])
     return {
         **_parts(flight),
         "kind": flight_kind(flight),
