@@ -18,8 +18,8 @@ from .study import Point
 
 SIDES = ("near", "far")
 FORMULAS, FIELDS = ("semi-analytic", "analytic"), ("dipole", "fem")
-FLIGHTS = 3
-"""Simulated flights of each rotor, spread over its stable frequencies."""
+FLOWN, FLIGHTS = "dipole", 3
+"""The field of the simulated flights, and their number for each rotor, spread over its stable frequencies."""
 KICK, SECONDS = 0.01, 1.0
 """Speed with which a simulated floater leaves its equilibrium upwards, m/s, and duration of the flight."""
 QUICK = {"horizontal": (1.0, 4.0), "vertical": (14.0,), "tilt": (10.0,)}
@@ -45,7 +45,7 @@ def levitation_distance(point: Point) -> xr.Dataset:
     -------
     Dataset over `frequency` and `side`: distance along the axis of the near and of the far equilibrium, NaN where there
     is none, and in a field also its error by the table, growth of small motions and polar angle; where the two sides
-    meet; `FLIGHTS` simulations.
+    meet; in the dipole's field `FLIGHTS` simulations.
     """
     grid = np.arange(LOWEST, HIGHEST + 1e-9, point["step_hz"])
     made = _by_formula(point, grid) if point["model"] in FORMULAS else _in_field(point, grid)
@@ -72,7 +72,8 @@ def _in_field(point: Point, grid: Array) -> xr.Dataset:
     rows = np.array([[_row(scene, table, branch.family, p) for p in side] for side in found])
     distance, error, growth, angle = (rows[..., k].T for k in range(4))
     fold = branch.fold
-    known = [p for p in found[0] if p is not None and stable(p.growth_per_s)]
+    flown = found[0] if point["model"] == FLOWN else []
+    known = [p for p in flown if p is not None and stable(p.growth_per_s)]
     places = np.unique(np.linspace(0, len(known) - 1, FLIGHTS).astype(int)) if known else []
     flights = np.full((3, FLIGHTS), np.nan)
     for k, place in enumerate(places):
