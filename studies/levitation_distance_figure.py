@@ -28,11 +28,14 @@ def distance_figure(result: xr.Dataset) -> Figure:
             _fields(left, chosen(result, **rotor), color=shade(configuration, value), label=name(configuration, value))
             _formulas(right, chosen(result, **rotor), color=shade(configuration, value))
         for axis in (left, right):
-            axis.set(xlabel="frequency of the rotor (Hz)", ylabel="levitation distance (mm)", ylim=LIMITS)
+            axis.set(
+                xlabel="frequency of the rotor (Hz)", ylabel="levitation distance (mm)", xlim=(35, 255), ylim=LIMITS
+            )
         left.set_title(TITLES[configuration])
         left.plot([], [], ":", color="0.3", lw=0.8, label="dipole")
-        left.legend(ncols=2)
-        right.set_title("the article's formulas")
+        left.plot([], [], "o", color="0.3", ms=3, label="fold")
+        left.legend(ncols=2, loc="upper right")
+        right.set_title("The article's formulas")
     _key(axes[0, 1])
     return figure
 
@@ -58,6 +61,8 @@ def _fields(axes: Axes, rotor: xr.Dataset, **style: Any) -> None:
         )
         other, _ = _side(rotor, "dipole", side)
         axes.plot(frequency, 1e3 * other, ":", color=style["color"], lw=0.8)
+    fold = chosen(rotor, model="fem")[["fold_frequency", "fold_distance"]].isel(case=0)
+    axes.plot(float(fold["fold_frequency"]), 1e3 * float(fold["fold_distance"]), "o", color=style["color"], ms=3)
     error = 1e3 * chosen(rotor, model="fem")["distance_error"].sel(side="near").values[0]
     near, _ = _side(rotor, "fem", "near")
     axes.fill_between(frequency, 1e3 * near - error, 1e3 * near + error, color=style["color"], alpha=0.3, lw=0)
@@ -83,8 +88,15 @@ def _side(rotor: xr.Dataset, model: str, side: str) -> tuple[Array, Array]:
 def distance_lines(result: xr.Dataset) -> list[str]:
     """For each rotor: where it levitates, and how far formulas and simulations are from the equilibrium."""
     lines = []
-    for configuration in CONFIGURATIONS:
-        for value in values_of(result, configuration):
+    for configuration, kind in CONFIGURATIONS.items():
+        values = values_of(result, configuration)
+        for model, text in (("fem", "finite elements"), ("dipole", "dipole")):
+            found = chosen(result, configuration=configuration, model=model).sortby("value")
+            flown = found.isel(case=np.isin(found["value"].values, kind.levitated))["fold_frequency"].values
+            if len(flown) > 1:
+                words = f"{configuration}, {text}: from {flown.max():.1f} down to {flown.min():.1f} Hz"
+                lines.append(f"{words} by the parameters that levitated, a factor of {flown.max() / flown.min():.2f}.")
+        for value in values:
             rotor = chosen(result, configuration=configuration, value=value)
             lines.append(f"{label(configuration, value)}: " + "; ".join(_sentences(rotor)) + ".")
     return lines
