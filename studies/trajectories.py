@@ -39,8 +39,8 @@ SHORTEST = 3.0
 
 
 def flight_points(quick: bool) -> list[Point]:
-    """The displacements, flown for 125 s in the field of finite elements; `quick` for 62.5 s in the dipole's."""
-    model, seconds = ("dipole", FLIGHT / 4) if quick else ("fem", FLIGHT / 2)
+    """The displacements, flown for 60 s in the field of finite elements, `quick` in the dipole's."""
+    model, seconds = ("dipole" if quick else "fem"), 60.0
     asked = {"configuration": "horizontal", "model": model, "duration_s": seconds}
     return [{**asked, "value": value} for value in DISPLACEMENTS]
 
@@ -91,7 +91,7 @@ def _row(
         return {**empty, "kind": NONE, "averaged_end": NONE}
     there = replace(scene, frequency=start.parameter)
     state = Scales.of(there).unpack(start.state)
-    slow = drift(there, table, 0.0, seconds, rates, state, stokes=True)
+    slow = drift(there, table, 0.0, FLIGHT, rates, state, stokes=True)
     times = np.linspace(0.0, slow.time[-1], SAMPLES)
     flight = simulate(kicked(there, start, KICK), table, seconds, [])
     return {
