@@ -6,6 +6,7 @@ import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter, NullFormatter
 
 from ..geometry.box import Array
 from .article import CONFIGURATIONS, chosen
@@ -24,9 +25,11 @@ def components_figure(result: xr.Dataset) -> Figure:
         for axis, (quantity, text) in zip(row, PARTS.items(), strict=False):
             _components(axis, part, quantity)
             axis.set(ylabel=text, yscale="log")
+            axis.yaxis.set_major_formatter(FuncFormatter(lambda field, _: f"{field:g}"))
+            axis.yaxis.set_minor_formatter(NullFormatter())
         _differences(row[2], part)
         row[0].set_title(TITLES[configuration])
-        row[2].set(ylabel="|ΔB| / |B| (%)", yscale="log", title="difference from finite elements")
+        row[2].set(ylabel="|ΔB| / |B| (%)", yscale="log", title="Difference from finite elements")
         for axis in row:
             axis.set_xlabel(f"{kind.symbol} ({kind.unit})")
     _keys(axes[0, 0], axes[0, 1], axes[0, 2], result["distance"].values)
@@ -36,7 +39,8 @@ def components_figure(result: xr.Dataset) -> Figure:
 def _keys(first: Axes, second: Axes, third: Axes, distances: Array) -> None:
     for distance, color in zip(distances, PALETTE, strict=False):
         first.plot([], [], color=color, label=f"{1e3 * distance:g} mm below")
-    first.legend(ncols=2)
+    first.legend(ncols=3, loc="lower left")
+    first.set_ylim(0.4, 45)
     for model in ("fem", "dipole"):
         second.plot([], [], DASHES[model], color="0.3", label=NAMES[model])
     second.plot([], [], "+", color="0.3", label="article's formula")

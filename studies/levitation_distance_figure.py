@@ -14,7 +14,7 @@ from .article import CONFIGURATIONS, chosen, label, stable
 from .article_figure import TITLES, branch, name, shade, values_of
 from .figures import panels, styled
 
-LIMITS = (8.0, 50.0)
+LIMITS = (8.0, 66.0)
 """Of the axis of distances, mm."""
 
 
@@ -26,16 +26,17 @@ def distance_figure(result: xr.Dataset) -> Figure:
         for value in values_of(result, configuration):
             rotor = {"configuration": configuration, "value": value}
             _fields(left, chosen(result, **rotor), color=shade(configuration, value), label=name(configuration, value))
-            _formulas(right, chosen(result, **rotor), color=shade(configuration, value))
+            if value in CONFIGURATIONS[configuration].levitated:
+                _formulas(right, chosen(result, **rotor), color=shade(configuration, value))
         for axis in (left, right):
             axis.set(
-                xlabel="frequency of the rotor (Hz)", ylabel="levitation distance (mm)", xlim=(35, 255), ylim=LIMITS
+                xlabel="frequency of the rotor (Hz)", ylabel="levitation distance (mm)", xlim=(25, 255), ylim=LIMITS
             )
         left.set_title(TITLES[configuration])
         left.plot([], [], ":", color="0.3", lw=0.8, label="dipole")
         left.plot([], [], "o", color="0.3", ms=3, label="fold")
-        left.legend(ncols=2, loc="upper right")
-        right.set_title("The article's formulas")
+        left.legend(ncols=3, loc="upper right")
+        right.set_title("The article's formulas, for what levitated")
     _key(axes[0, 1])
     return figure
 
@@ -111,9 +112,10 @@ def _sentences(rotor: xr.Dataset) -> list[str]:
         fold = f"{text}: none below {float(found['fold_frequency']):.2f} Hz"
         if good.any():
             kept = rotor["frequency"].values[good]
-            exponent = np.polyfit(np.log(kept), np.log(near[good]), 1)[0] if good.sum() > 1 else np.nan
             span = f"{1e3 * near[good].max():.2f}–{1e3 * near[good].min():.2f} mm"
-            fold += f", stable at {kept[0]:g}–{kept[-1]:g} Hz, {span}, d ~ f^{exponent:.2f}"
+            fold += f", stable at {kept[0]:g}–{kept[-1]:g} Hz, {span}"
+            if len(kept) > 2:
+                fold += f", d ~ f^{np.polyfit(np.log(kept), np.log(near[good]), 1)[0]:.2f}"
         words.append(fold if good.any() else fold + ", stable nowhere")
     near, growth = _side(rotor, "dipole", "near")
     good = stable(growth)
