@@ -39,8 +39,8 @@ def components_figure(result: xr.Dataset) -> Figure:
 def _keys(first: Axes, second: Axes, third: Axes, distances: Array) -> None:
     for distance, color in zip(distances, PALETTE, strict=False):
         first.plot([], [], color=color, label=f"{1e3 * distance:g} mm below")
-    first.legend(ncols=3, loc="lower left")
-    first.set_ylim(0.4, 45)
+    first.legend(ncols=2, loc="lower left")
+    first.set_ylim(0.25, 45)
     for model in ("fem", "dipole"):
         second.plot([], [], DASHES[model], color="0.3", label=NAMES[model])
     second.plot([], [], "+", color="0.3", label="article's formula")
