@@ -11,6 +11,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, TypeVar
 
+import h5py
 import numpy as np
 import xarray as xr
 
@@ -44,19 +45,33 @@ def read_checked(path: str | Path, file_format: str) -> xr.Dataset:
     ------
     TableFileError : the file is not of this format, or its content is not what was written
     """
-    try:
-        with xr.open_dataset(path, engine="h5netcdf") as opened:
-            dataset = opened.load()
-    except FileNotFoundError:
-        raise
-    except Exception as error:  # the HDF5 layer raises many kinds on a damaged file
-        raise TableFileError(f"Input {path} must be a readable netCDF file; {error}.") from error
+    dataset = read_netcdf(path)
     attrs = dataset.attrs
     if attrs.get("format") != file_format:
         raise TableFileError(f"Input {path} must be a '{file_format}'; instead received '{attrs.get('format')}'.")
     if attrs.pop("content_sha256", None) != _digest(dataset):
         raise TableFileError(f"Input {path} must be as it was written; instead its checksum does not match.")
     return dataset
+
+
+def read_netcdf(path: str | Path) -> xr.Dataset:
+    """The whole of a netCDF file.
+
+    Raises
+    ------
+    TableFileError : the file is damaged or is none
+    FileNotFoundError : it is missing
+    """
+    try:
+        with h5py.File(path, "r") as file:  # damage found by h5netcdf's constructor prints a traceback in its destructor
+            dict(file.attrs)
+            file.visititems(lambda _, item: dict(item.attrs) and None)
+        with xr.open_dataset(path, engine="h5netcdf") as opened:
+            return opened.load()
+    except FileNotFoundError:
+        raise
+    except Exception as error:  # the HDF5 layer raises many kinds on a damaged file
+        raise TableFileError(f"Input {path} must be a readable netCDF file; {error}.") from error
 
 
 def _digest(dataset: xr.Dataset) -> str:
