@@ -10,13 +10,12 @@ from dataclasses import dataclass
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from ..fem.cache import cached_rotor_table
 from ..fem.models import rotor_table
 from ..fem.table import RotorTable
 from ..geometry import rotor
-from ..geometry.box import Array
 from ..geometry.scene import Drag, Floater, Scene
 from .console import note
 from .study import Point
@@ -92,9 +91,9 @@ def label(configuration: str, value: float) -> str:
     return f"{kind.symbol} = {value:g}{'' if kind.unit == '°' else ' '}{kind.unit}"
 
 
-def stable(growth: Array) -> NDArray[np.bool_]:
+def stable(growth: ArrayLike) -> NDArray[np.bool_]:
     """Where no disturbance grows e-fold within `FLIGHT`; False where there is no equilibrium (NaN)."""
-    return np.asarray(growth <= 1 / FLIGHT)
+    return np.asarray(np.asarray(growth) <= 1 / FLIGHT)
 
 
 def one_case(point: Point, dataset: xr.Dataset) -> xr.Dataset:

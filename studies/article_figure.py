@@ -8,6 +8,7 @@ import matplotlib as mpl
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
+from numpy.typing import NDArray
 
 from ..geometry.box import Array
 from .article import CONFIGURATIONS, label
@@ -36,7 +37,7 @@ def values_of(result: xr.Dataset, configuration: str) -> list[float]:
     return sorted(set(result["value"].values[result["configuration"].values == configuration].tolist()))
 
 
-def branch(axes: Axes, x: Array, y: Array, solid: Array, **style: Any) -> None:
+def branch(axes: Axes, x: Array, y: Array, solid: NDArray[np.bool_], **style: Any) -> None:
     """A curve, solid where `solid`, else dashed, without a gap between."""
     inside = solid & np.append(solid[1:], True) & np.append(True, solid[:-1])
     axes.plot(x, np.where(inside, np.nan, y), "--", **{**style, "label": None})

@@ -119,7 +119,7 @@ def _hanging(scene: Scene, table: RotorTable, family: Family) -> Array:
             f"Nowhere from {1e3 * nearest:.3g} to {1e3 * REACH[1]:.3g} mm does the attraction carry the weight."
         )
     distance = float(brentq(excess, grid[carried[-1]], grid[carried[-1] + 1]))
-    return family.balance(scene.frequency).states(-distance / scales.length * upright, upright)[0]
+    return np.asarray(family.balance(scene.frequency).states(-distance / scales.length * upright, upright)[0])
 
 
 def distance_error(scene: Scene, table: RotorTable, family: Family, point: Point) -> float:

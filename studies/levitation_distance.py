@@ -61,7 +61,8 @@ def _by_formula(point: Point, grid: Array) -> xr.Dataset:
     else:
         weight = FLOATER.mass * 9.81
         distance = np.array([balanced(configuration, value, frequency, weight) for frequency in grid])
-    return _dataset(distance, *[np.full(distance.shape, np.nan)] * 3, (np.nan, np.nan), np.full((3, FLIGHTS), np.nan))
+    unknown = np.full(distance.shape, np.nan)
+    return _dataset(distance, unknown, unknown, unknown, (np.nan, np.nan), np.full((3, FLIGHTS), np.nan))
 
 
 def _in_field(point: Point, grid: Array) -> xr.Dataset:
@@ -74,7 +75,7 @@ def _in_field(point: Point, grid: Array) -> xr.Dataset:
     fold = branch.fold
     flown = found[0] if point["model"] == FLOWN else []
     known = [p for p in flown if p is not None and stable(p.growth_per_s)]
-    places = np.unique(np.linspace(0, len(known) - 1, FLIGHTS).astype(int)) if known else []
+    places = np.unique(np.linspace(0, len(known) - 1, FLIGHTS if known else 0).astype(int))
     flights = np.full((3, FLIGHTS), np.nan)
     for k, place in enumerate(places):
         flights[:, k] = known[place].parameter, *mean_height(scene, table, known[place])
