@@ -18,19 +18,19 @@ from .study import Point
 
 SIDES = ("near", "far")
 FORMULAS, FIELDS = ("semi-analytic", "analytic"), ("dipole", "fem")
-FLOWN, FLIGHTS = "dipole", 3
-"""The field of the simulated flights, and their number for each rotor, spread over its stable frequencies."""
+FLOWN = "dipole"
+"""The field of the simulated flights, which are spread over a rotor's stable frequencies."""
 KICK, SECONDS = 0.01, 1.0
 """Speed with which a simulated floater leaves its equilibrium upwards, m/s, and duration of the flight."""
-QUICK = {"horizontal": (1.0, 4.0), "vertical": (14.0,), "tilt": (10.0,)}
+QUICK = {"horizontal": (1.0,), "vertical": (14.0,), "tilt": (10.0,)}
 
 
 def distance_points(quick: bool) -> list[Point]:
-    """Every rotor of the article by every formula and field; `quick` takes four rotors and a coarser grid."""
-    step = 10.0 if quick else 2.5
+    """Every rotor of the article by every formula and field; `quick` takes three rotors and a coarser grid."""
+    step, flights = (10.0, 1) if quick else (2.5, 3)
     rotors = {name: QUICK[name] if quick else kind.tested for name, kind in CONFIGURATIONS.items()}
     return [
-        {"configuration": name, "value": value, "model": model, "step_hz": step}
+        {"configuration": name, "value": value, "model": model, "step_hz": step, "flights": flights}
         for name, values in rotors.items()
         for value in values
         for model in (*FORMULAS, *FIELDS)
@@ -45,7 +45,7 @@ def levitation_distance(point: Point) -> xr.Dataset:
     -------
     Dataset over `frequency` and `side`: distance along the axis of the near and of the far equilibrium, NaN where there
     is none, and in a field also its error by the table, growth of small motions and polar angle; where the two sides
-    meet; in the dipole's field `FLIGHTS` simulations.
+    meet; in the dipole's field some simulations.
     """
     grid = np.arange(LOWEST, HIGHEST + 1e-9, point["step_hz"])
     made = _by_formula(point, grid) if point["model"] in FORMULAS else _in_field(point, grid)
@@ -62,7 +62,7 @@ def _by_formula(point: Point, grid: Array) -> xr.Dataset:
         weight = FLOATER.mass * 9.81
         distance = np.array([balanced(configuration, value, frequency, weight) for frequency in grid])
     unknown = np.full(distance.shape, np.nan)
-    return _dataset(distance, unknown, unknown, unknown, (np.nan, np.nan), np.full((3, FLIGHTS), np.nan))
+    return _dataset(distance, unknown, unknown, unknown, (np.nan, np.nan), np.full((3, point["flights"]), np.nan))
 
 
 def _in_field(point: Point, grid: Array) -> xr.Dataset:
@@ -75,8 +75,8 @@ def _in_field(point: Point, grid: Array) -> xr.Dataset:
     fold = branch.fold
     flown = found[0] if point["model"] == FLOWN else []
     known = [p for p in flown if p is not None and stable(p.growth_per_s)]
-    places = np.unique(np.linspace(0, len(known) - 1, FLIGHTS if known else 0).astype(int))
-    flights = np.full((3, FLIGHTS), np.nan)
+    places = np.unique(np.linspace(0, len(known) - 1, point["flights"] if known else 0).astype(int))
+    flights = np.full((3, point["flights"]), np.nan)
     for k, place in enumerate(places):
         flights[:, k] = known[place].parameter, *mean_height(scene, table, known[place])
     return _dataset(distance, error, growth, angle, (fold.parameter, -fold.position[2]), flights)

@@ -76,7 +76,7 @@ def test_field_components(configuration, value):
 
 @pytest.fixture(scope="module")
 def distances():
-    asked = {**ONE, "step_hz": 35.0}
+    asked = {**ONE, "step_hz": 35.0, "flights": 3}
     return by_case([levitation_distance({**asked, "model": m}) for m in ("semi-analytic", "analytic", "dipole", "fem")])
 
 
