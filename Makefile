@@ -5,7 +5,7 @@ BIN := $(VENV)/bin
 SOURCES := $(wildcard geometry/* fem/* dynamics/* studies/* scenes/*.toml) pyproject.toml README.md LICENSE
 PACKAGES := -p spinlev.geometry -p spinlev.fem -p spinlev.dynamics -p spinlev.studies
 
-.PHONY: install run test lint types bench docs validate lock clean
+.PHONY: install run test lint types bench docs validate fuzz lock clean
 
 install: $(VENV)/installed
 
@@ -42,7 +42,10 @@ validate: install
 	$(BIN)/pytest -m slow -s
 
 bench: install
-	$(BIN)/pytest benchmarks --benchmark-columns=min,median,rounds
+	$(BIN)/pytest benchmarks --benchmark-timer=time.process_time --benchmark-columns=min,median,rounds
+
+fuzz: install
+	$(BIN)/python tests/fuzzing.py all 10000
 
 docs: install
 	$(BIN)/sphinx-build --fail-on-warning --quiet -b html docs docs/_build/html

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from ..geometry import load_scene
 from .dipole_validity import dipole_validity, validity_figure, validity_lines
-from .drift import drift_study
+from .drift import drift_points, drift_result, drift_row
 from .drift_figure import drift_figure, drift_lines
 from .field_components import field_components, field_points
 from .field_components_figure import components_figure, components_lines
@@ -100,9 +100,11 @@ CATALOGUE: dict[str, Study] = {
         damping_figure,
         damping_lines,
     ),
-    "drift": study_of_one(
+    "drift": Study(
         "levitation time against frequency by the slow drift of the floater's spin",
-        drift_study,
+        drift_points,
+        drift_row,
+        drift_result,
         drift_figure,
         drift_lines,
     ),

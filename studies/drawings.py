@@ -8,7 +8,7 @@ from pathlib import Path
 import xarray as xr
 from matplotlib.figure import Figure
 
-from ..fem.table_store import TableFileError, read_netcdf
+from ..fem.table_store import TableFileError, read_checked
 from ..geometry import InputError
 from .catalogue import CATALOGUE
 from .figures import field_figure, force_figure, save_figure, trajectory_figure
@@ -31,7 +31,7 @@ def draw_result(path: Path, out: Path) -> list[str]:
 def read_result(path: Path) -> xr.Dataset:
     """The whole of a result file. Raises InputError if it cannot be read, or is no result of this program."""
     try:
-        result = read_netcdf(path)
+        result = read_checked(path)
     except FileNotFoundError:
         raise InputError(f"Input {path} must be a file that exists; instead it is missing.") from None
     except TableFileError as error:

@@ -8,8 +8,19 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-from ..dynamics import Checkpoint, Equilibrium, PlateMemory, Rates, Survey, Trajectory, simulate, survey, with_plate
-from ..fem.table import RotorTable
+from ..dynamics import (
+    Checkpoint,
+    Equilibrium,
+    PlateMemory,
+    Rates,
+    Survey,
+    Trajectory,
+    simulate,
+    starting_point,
+    survey,
+    with_plate,
+)
+from ..fem.table import FieldTable
 from ..geometry.atomic import replacing
 from ..geometry.box import Array
 from ..geometry.scene import OffsetStart, Scene
@@ -17,7 +28,7 @@ from .answers import equilibria_answer, equilibria_lines, field_answer, flight_a
 from .console import note, progress, to_json
 from .points_file import COLUMNS
 from .results import trajectory_dataset, write_dataset
-from .shelf import Shelf
+from .shelf import RotorField, Shelf
 from .tables import Tables
 
 Job = tuple[Mapping[str, Any], list[str]]
@@ -81,6 +92,9 @@ def simulate_job(scene: Scene, asked: Tables, duration: float, out: Path, resume
     if isinstance(scene.start, OffsetStart):
         note("Equilibria ...")
         found, memory = surveyed(shelf, table)
+        chosen = starting_point(found.equilibria)
+        if chosen is not None and not chosen.stable:
+            note(f"The flight begins at an unstable equilibrium: e-fold in {1 / chosen.growth_per_s:.2g} s.")
     else:
         found, memory = None, shelf.memory(table, ())
     equilibria = found.equilibria if found else ()
@@ -95,7 +109,7 @@ def simulate_job(scene: Scene, asked: Tables, duration: float, out: Path, resume
     return values, [*flight_lines(flight), *values["not_modelled"], f"Trajectory in {values['trajectory']}"]
 
 
-def surveyed(shelf: Shelf, table: RotorTable, spin: float = 0.0) -> tuple[Survey, PlateMemory | None]:
+def surveyed(shelf: Shelf, table: RotorField, spin: float = 0.0) -> tuple[Survey, PlateMemory | None]:
     """Equilibria with the plate of the scene, and that plate."""
     rates = Rates.of(shelf.scene, table)
     found = survey(shelf.scene, table, spin, rates=rates)
@@ -105,7 +119,7 @@ def surveyed(shelf: Shelf, table: RotorTable, spin: float = 0.0) -> tuple[Survey
 
 def fly(
     scene: Scene,
-    table: RotorTable,
+    table: FieldTable,
     duration: float,
     found: tuple[Equilibrium, ...],
     memory: PlateMemory | None,

@@ -22,13 +22,32 @@ import xarray as xr
 
 from spinlev.fem.models import rotor_table
 from spinlev.fem.table_file import TableFileError, load_table, save_table
+from spinlev.fem.table_store import write_checked
 from spinlev.geometry import horizontal
 from spinlev.studies import cli
 
 SCENES = sorted((Path(__file__).parent.parent / "scenes").glob("*.toml"))
 LONGEST = 20
 """Seconds after which an input counts as a hang."""
-ODD = ["", "0", "-1", "nan", "inf", "1e400", "1e-400", "'x'", "[]", "[1, 2]", "true", "{}", "1979-05-27", "\\u0000", "µ", '"', "="]
+ODD = [
+    "",
+    "0",
+    "-1",
+    "nan",
+    "inf",
+    "1e400",
+    "1e-400",
+    "'x'",
+    "[]",
+    "[1, 2]",
+    "true",
+    "{}",
+    "1979-05-27",
+    "\\u0000",
+    "µ",
+    '"',
+    "=",
+]
 
 
 class HangError(Exception):
@@ -117,8 +136,7 @@ def table(chance: random.Random, folder: Path) -> int:
     path.write_bytes(damaged(whole.read_bytes(), chance))
     try:
         load_table(path)
-    except TableFileError as error:
-        assert str(error).startswith("Input ")
+    except TableFileError:
         return 2
     return 0
 
@@ -129,10 +147,10 @@ def result(chance: random.Random, folder: Path) -> int:
         time = np.linspace(0.0, 1.0, 20)
         vectors = {n: (("time", "axis"), np.ones((20, 3))) for n in ("position", "moment", "position_rotor_frame")}
         flight = xr.Dataset(vectors, {"time": time, "axis": list("xyz")}, {"study": "simulate", "scene": "x = 1"})
-        flight.to_netcdf(whole, engine="h5netcdf")
+        write_checked(flight, whole)
     path = folder / "result.nc"
     path.write_bytes(damaged(whole.read_bytes(), chance))
-    with mock.patch("spinlev.studies.drawings.save_figures", lambda figures, out: []):
+    with mock.patch("spinlev.studies.drawings.save_figures", return_value=[]):
         return answered([chance.choice(["figure", "show"]), str(path), "--out", str(folder / "out")])
 
 
@@ -147,8 +165,10 @@ COMMANDS = {
     "show": ["--out"],
     "report": ["--out"],
 }
-VALUES = ["", "0", "1", "-1", "3.5", "1e-5", "nan", "inf", "dipole", "slab", "auto", "x", "1,2,3", "frequency_hz=1:2:1", "-0",
-          "a=1", "--json", "team7", "tcp://", str(SCENES[0]), "/nonexistent", "../..", "ä", "9" * 400, "-1,0,-40"]  # fmt: skip
+VALUES = ["", "0", "1", "-1", "3.5", "1e-5", "nan", "inf", "dipole", "slab", "auto", "x", "1,2,3",
+          "frequency_hz=1:2:1", "-0", "a=1", "--json", "team7", "tcp://", str(SCENES[0]),
+          "/nonexistent", "../..", "ä", "9" * 400,
+          "-1,0,-40"]  # fmt: skip
 JOBS = [
     "run.main_job", "single.field_job", "single.equilibria_job", "single.simulate_job", "plate_job.plate_job",
     "study_job.study_job", "study_job.question_job", "drawings.draw_result", "show.show_job", "report.report_job",
@@ -175,7 +195,7 @@ KINDS: dict[str, Callable[[random.Random, Path], int]] = {
 
 
 def fuzz(kind: str, number: int, seed: int = 0) -> Counter[int]:
-    """Try `number` inputs of a kind; the number of each exit status. Raises AssertionError with the seed of a failure."""
+    """Try `number` inputs of a kind; the number of each exit status. AssertionError names the seed of a failure."""
 
     def too_long(*_: object) -> None:
         raise HangError
