@@ -9,7 +9,9 @@ from matplotlib.figure import Figure
 
 from .article import label
 from .figures import PALETTE, panels, styled
-from .trajectories import NONE, TOLD
+from .trajectories import NONE, SHORT, TOLD
+
+LOST = (SHORT, "linear fall", "oscillating loss")
 
 
 @styled
@@ -38,7 +40,7 @@ def _flight(axes: Axes, flight: xr.Dataset, color: str) -> None:
     axes.fill_between(time, low, high, color=color, alpha=0.3, lw=0)
     axes.plot(time, mean, color=color, label=text)
     axes.plot(flight["averaged_time"], 1e3 * flight["averaged_distance"], "--", color="k", lw=0.7)
-    if kind != "stable":
+    if kind in LOST:
         last = np.flatnonzero(np.isfinite(mean))[-1]
         axes.plot(time[last], min(mean[last], 34), "x", color=color)
 
