@@ -6,19 +6,69 @@ from ..geometry import load_scene
 from .dipole_validity import dipole_validity, validity_figure, validity_lines
 from .drift import drift_points, drift_result, drift_row
 from .drift_figure import drift_figure, drift_lines
+from .field_components import field_components, field_points
+from .field_components_figure import components_figure, components_lines
 from .field_hard_cases import field_hard_cases, hard_case_lines
 from .field_hard_cases_figure import hard_case_figure
 from .floater_figure import floater_figure, floater_lines
 from .floater_permeability import floater_permeability
+from .force_curve import force_curve, force_points
+from .force_curve_figure import force_figure, force_lines
+from .levitation_distance import distance_points, levitation_distance
+from .levitation_distance_figure import distance_figure, distance_lines
 from .plate_damping import plate_damping
 from .plate_damping_figure import damping_figure, damping_lines
 from .shipped_scenes import default_scene
+from .side_mode import side_mode, side_points
+from .side_mode_figure import side_figure, side_lines
 from .speed_accuracy import speed_accuracy
 from .speed_accuracy_figure import speed_figure, speed_lines
-from .study import Study, study_of_one
+from .study import Study, by_case, study_of_one
 from .team7_report import team7_figure, team7_lines, team7_study
+from .trajectories import flight_points, trajectories
+from .trajectories_figure import flight_figure, flight_lines
 
 CATALOGUE: dict[str, Study] = {
+    "field-components": Study(
+        "off-axis and on-axis field against the parameter of each rotor of the article, by four models",
+        field_points,
+        field_components,
+        by_case,
+        components_figure,
+        components_lines,
+    ),
+    "force-curve": Study(
+        "force along the axis with its two parts, stable and tipping points; the article's formulas and full fields",
+        force_points,
+        force_curve,
+        by_case,
+        force_figure,
+        force_lines,
+    ),
+    "levitation-distance": Study(
+        "distance against frequency for every rotor of the article: equilibria, its formulas, simulated flights",
+        distance_points,
+        levitation_distance,
+        by_case,
+        distance_figure,
+        distance_lines,
+    ),
+    "side-mode": Study(
+        "the circle on which the floater goes with the rotor, and the article's formula for its radius",
+        side_points,
+        side_mode,
+        by_case,
+        side_figure,
+        side_lines,
+    ),
+    "trajectories": Study(
+        "linear fall, stable and unstable flight: the distance against time, simulated and averaged",
+        flight_points,
+        trajectories,
+        by_case,
+        flight_figure,
+        flight_lines,
+    ),
     "dipole-validity": study_of_one(
         "where the dipole and each further model are good to 10, 1, 0.1 and 0.01 %",
         dipole_validity,
