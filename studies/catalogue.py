@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 from ..geometry import load_scene
+from . import design, dipole_vs_fem, sensitivity
+from .design_figure import design_figure, design_lines
 from .dipole_validity import dipole_validity, validity_figure, validity_lines
+from .dipole_vs_fem_figure import dipole_figure, dipole_lines
 from .drift import drift_study
 from .drift_figure import drift_figure, drift_lines
 from .field_hard_cases import field_hard_cases, hard_case_lines
@@ -13,9 +16,10 @@ from .floater_permeability import floater_permeability
 from .plate_damping import plate_damping
 from .plate_damping_figure import damping_figure, damping_lines
 from .shipped_scenes import default_scene
+from .sensitivity_figure import sensitivity_figure, sensitivity_lines
 from .speed_accuracy import speed_accuracy
 from .speed_accuracy_figure import speed_figure, speed_lines
-from .study import Study, study_of_one
+from .study import Study, by_case, study_of_one
 from .team7_report import team7_figure, team7_lines, team7_study
 
 CATALOGUE: dict[str, Study] = {
@@ -55,6 +59,30 @@ CATALOGUE: dict[str, Study] = {
         drift_study,
         drift_figure,
         drift_lines,
+    ),
+    "dipole-vs-fem": Study(
+        "what true fields change in distance, angle, modes and limits, split into shape, permeability, mutual answers",
+        dipole_vs_fem.points,
+        dipole_vs_fem.compute,
+        by_case,
+        dipole_figure,
+        dipole_lines,
+    ),
+    "sensitivity": Study(
+        "which parameter matters: derivatives of distance and limits, and bands of realistic tolerances",
+        sensitivity.points,
+        sensitivity.compute,
+        by_case,
+        sensitivity_figure,
+        sensitivity_lines,
+    ),
+    "design": Study(
+        "which displacement, tilt and magnet size give a wanted distance and frequency with the largest margin",
+        design.points,
+        design.compute,
+        by_case,
+        design_figure,
+        design_lines,
     ),
     "team7": study_of_one(
         "eddy currents against the measurement of TEAM workshop problem 7", team7_study, team7_figure, team7_lines

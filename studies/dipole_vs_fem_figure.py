@@ -1,0 +1,160 @@
+"""Figure and sentences of the study that compares the point dipole with true fields, from its dataset alone."""
+
+from __future__ import annotations
+
+import numpy as np
+import xarray as xr
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from ..geometry.box import Array
+from .figures import PALETTE, panels, styled
+from .rotor_points import CONFIGURATIONS, SYMBOLS, UNITS
+
+CAUSES = {
+    "floater's permeability": ("article", "dipole"),
+    "shape": ("dipole", "cuboid"),
+    "rotor's permeability": ("cuboid", "fem"),
+    "mutual magnetisation": ("fem", "mutual"),
+}
+"""What lies between two models."""
+TOTAL = ("article", "mutual")
+
+
+def change(result: xr.Dataset, name: str, models: tuple[str, str]) -> tuple[xr.DataArray, xr.DataArray]:
+    """By how much a quantity is larger in the second model than in the first, and the estimated error."""
+    first, second = models
+    value = result[name].sel(model=second) - result[name].sel(model=first)
+    return value, result[f"{name}_error"].sel(model=second) + result[f"{name}_error"].sel(model=first)
+
+
+def of_configuration(result: xr.Dataset, configuration: str) -> xr.Dataset:
+    """The cases of one configuration, by ascending displacement or tilt."""
+    return result.isel(case=np.flatnonzero(result["configuration"].values == configuration)).sortby("measure")
+
+
+@styled
+def dipole_figure(result: xr.Dataset) -> Figure:
+    """Distance by point dipoles and by true fields; the change of distance by cause; ranges of stable levitation."""
+    figure, axes = panels(3, 3, (10.0, 9.0))
+    for column, configuration in enumerate(CONFIGURATIONS):
+        part = of_configuration(result, configuration)
+        if not part.sizes["case"]:
+            continue
+        _distances(axes[0, column], part)
+        _causes(axes[1, column], part)
+        _ranges(axes[2, column], part)
+        label = f"{SYMBOLS[configuration]} ({UNITS[configuration]})"
+        axes[0, column].set_title(configuration)
+        for row in (1, 2):
+            axes[row, column].set_xticks(range(part.sizes["case"]), [f"{m:g}" for m in part["measure"].values])
+            axes[row, column].set_xlabel(label)
+    axes[1, 0].legend(fontsize=6)
+    axes[2, 0].legend(fontsize=6)
+    return figure
+
+
+def _distances(axes: Axes, part: xr.Dataset) -> None:
+    kind = str(part["configuration"].values[0])
+    for k, color in zip(range(part.sizes["case"]), PALETTE, strict=False):
+        one = part.isel(case=k)
+        for model, style in (("article", "--"), ("mutual", "-")):
+            distance = 1e3 * one["distance"].sel(model=model).values
+            label = f"{SYMBOLS[kind]} = {float(one['measure']):g} {UNITS[kind]}" if model == "mutual" else None
+            axes.plot(one["frequency"].values, distance, style, color=color, label=label)
+    axes.plot([], [], "--", color="0.3", label="point dipoles")
+    axes.plot([], [], "-", color="0.3", label="true fields")
+    axes.set(xlabel="frequency of the rotor (Hz)", ylabel="levitation distance (mm)")
+    axes.legend(fontsize=6)
+
+
+def _causes(axes: Axes, part: xr.Dataset) -> None:
+    width = 0.8 / (len(CAUSES) + 1)
+    for k, (cause, models) in enumerate([*CAUSES.items(), ("all together", TOTAL)]):
+        value, error = (1e3 * values.values for values in change(part, "distance", models))
+        places = np.arange(len(value)) + (k - len(CAUSES) / 2) * width
+        mean = value.mean(axis=1)
+        spread = np.array([mean - (value - error).min(axis=1), (value + error).max(axis=1) - mean])
+        color = "0.3" if models == TOTAL else PALETTE[k]
+        axes.bar(places, mean, width, color=color, label=cause, yerr=spread, error_kw={"lw": 0.7, "capsize": 1.5})
+    axes.axhline(0.0, color="0.3", lw=0.8)
+    axes.set(ylabel="change of the distance (mm):\nmean and range over the frequencies")
+
+
+def _ranges(axes: Axes, part: xr.Dataset) -> None:
+    for model, offset, color, name in (
+        ("article", -0.2, PALETTE[5], "point dipoles"),
+        ("mutual", 0.2, PALETTE[0], "true fields"),
+    ):
+        low, high = (part[name].sel(model=model).values for name in ("lowest", "highest"))
+        places = np.arange(len(low)) + offset
+        axes.bar(places, high - low, 0.35, bottom=low, color=color, label=name)
+        for end, values in (("lowest", low), ("highest", high)):
+            axes.errorbar(places, values, part[f"{end}_error"].sel(model=model).values, fmt="none", ecolor="0.1", lw=1)
+        touching = part["high_kind"].sel(model=model).values == "contact"
+        label = "ends at the rotor" if model == "article" else None
+        axes.plot(places[touching], high[touching], "kv", ms=4, label=label)
+    axes.set(ylabel="stable from - to (Hz)")
+
+
+def dipole_lines(result: xr.Dataset) -> list[str]:
+    """Ranges of the changes for each configuration and cause, the limits of every rotor, and the sentence."""
+    lines = []
+    for configuration in CONFIGURATIONS:
+        part = of_configuration(result, configuration)
+        if not part.sizes["case"]:
+            continue
+        lines.append(f"{configuration}:")
+        for cause, models in [*CAUSES.items(), ("all together", TOTAL)]:
+            lines.append(f"  {cause}: " + "; ".join(_quantities(part, models)))
+        lines += [f"  {_limits(part.isel(case=k))}" for k in range(part.sizes["case"])]
+    return [*lines, sentence(result)]
+
+
+def _quantities(part: xr.Dataset, models: tuple[str, str]) -> list[str]:
+    names = {"distance": ("distance", 1e3, "mm"), "polar_angle": ("polar angle", 1.0, "°")}
+    names |= {"lowest": ("lowest", 1.0, "Hz"), "highest": ("highest", 1.0, "Hz")}
+    words = [
+        f"{word} {spanned(*change(part, name, models), scale)} {unit}" for name, (word, scale, unit) in names.items()
+    ]
+    value, error = change(part, "mode_frequency", models)
+    relative = 100 / part["mode_frequency"].sel(model=models[0])
+    bounce = {"mode": "bounce"}
+    words.append(f"bounce {spanned((value * relative).sel(bounce), (error * relative).sel(bounce))} %")
+    return words
+
+
+def spanned(value: xr.DataArray, error: xr.DataArray, scale: float = 1.0) -> str:
+    """A range of values and the largest error."""
+    known: Array = scale * value.values[np.isfinite(value.values)]
+    if not known.size:
+        return "unknown"
+    worst = scale * float(np.nanmax(error.values))
+    digits = int(np.clip(1 - np.floor(np.log10(max(worst, 1e-6))), 1, 4))
+    return f"{known.min():+.{digits}f} to {known.max():+.{digits}f} (± {worst:.1g})"
+
+
+def _limits(one: xr.Dataset) -> str:
+    kind = str(one["configuration"].values)
+    words = []
+    for model in ("article", "cuboid", "fem", "mutual"):
+        ends = [f"{float(one[n].sel(model=model)):.2f} ± {float(one[f'{n}_error'].sel(model=model)):.1g} ({k})"
+                for n, k in (("lowest", one["low_kind"].sel(model=model).item()),
+                             ("highest", one["high_kind"].sel(model=model).item()))]  # fmt: skip
+        words.append(f"{model} {ends[0]} to {ends[1]} Hz")
+    return f"{SYMBOLS[kind]} = {float(one['measure']):g} {UNITS[kind]}: " + "; ".join(words)
+
+
+def sentence(result: xr.Dataset) -> str:
+    """The answer in one sentence."""
+    distance, angle, low = (
+        spanned(*change(result, name, TOTAL), scale)
+        for name, scale in (("distance", 1e3), ("polar_angle", 1.0), ("lowest", 1.0))
+    )
+    parts = ", ".join(
+        f"{cause} {spanned(*change(result, 'distance', models), 1e3)} mm" for cause, models in CAUSES.items()
+    )
+    return (
+        f"True fields change the dipole's levitation distance by {distance} mm ({parts}), its polar angle by {angle}° "
+        f"and its lowest frequency by {low} Hz."
+    )
