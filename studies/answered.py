@@ -13,7 +13,7 @@ from ..fem.rotor_response import rotor_ladder
 from ..fem.two_body import TwoBodyError
 from ..geometry.scene import Scene
 from .mutual import Mutual, pose, settled
-from .stable_range import BORDER, CONTACT, HIGHEST, LOWEST, STEPS, StableRange, at_frequency, stability_end
+from .stable_range import BORDER, CONTACT, HIGHEST, LOWEST, STEPS, StableRange, at_frequency, is_stable, stability_end
 
 INSIDE = (0.02, 0.06, 0.15)
 """Parts of its frequency by which the search for a limit may begin inside that of the rigid dipole."""
@@ -77,7 +77,7 @@ class Answered:
                 here = self.at(rigid.parameter * (1 - part * way))
             except (EquilibriumError, TwoBodyError):
                 continue
-            if here.motion.stable:
+            if is_stable(here):
                 return here
         raise EquilibriumError("No stable equilibrium was found near the rigid dipole's.")
 

@@ -15,8 +15,8 @@ from .floater_figure import floater_figure, floater_lines
 from .floater_permeability import floater_permeability
 from .plate_damping import plate_damping
 from .plate_damping_figure import damping_figure, damping_lines
-from .shipped_scenes import default_scene
 from .sensitivity_figure import sensitivity_figure, sensitivity_lines
+from .shipped_scenes import default_scene
 from .speed_accuracy import speed_accuracy
 from .speed_accuracy_figure import speed_figure, speed_lines
 from .study import Study, by_case, study_of_one

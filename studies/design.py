@@ -21,7 +21,7 @@ from . import study
 from .console import note
 from .results import variable
 from .rotor_points import CONFIGURATIONS, FLOATER, REMANENCE, rotor_scene
-from .stable_range import HIGHEST, LOWEST, UNIT, gap, stability_end
+from .stable_range import HIGHEST, LOWEST, UNIT, gap, is_stable, stability_end
 
 EDGES = (6.0, 8.0, 10.0, 12.7, 16.0)
 """Edges of the cubes that are tried, mm."""
@@ -32,8 +32,8 @@ CLOSE_ENOUGH = 1e-6
 
 def points(quick: bool) -> list[study.Point]:
     """Wanted distances (mm) and frequencies (Hz) for each configuration."""
-    wanted = [(25.0, 100.0)] if quick else [(d, f) for d in (20.0, 25.0, 30.0) for f in (70.0, 100.0, 140.0)]
-    edges = [8.0, 12.7] if quick else list(EDGES)
+    wanted = [(20.0, 120.0)] if quick else [(d, f) for d in (20.0, 25.0, 30.0) for f in (80.0, 120.0)]
+    edges = [10.0] if quick else list(EDGES)
     return [
         {"configuration": c, "distance_mm": d, "frequency": f, "edges_mm": edges}
         for d, f in wanted for c in CONFIGURATIONS
@@ -136,7 +136,7 @@ def _judged(scene: Scene, rates: Rates, measure: float, place: Array, moment: Ar
     here = family.point(place / scene.floater.radius, moment, scene.frequency)
     if gap(scene, here) < 0:
         raise EquilibriumError("The floater would overlap with the rotor.")
-    if not here.motion.stable:
+    if not is_stable(here):
         return Design(measure, here, here, here)
     low, high = (stability_end(scene, family, here.state, scene.frequency, end) for end in (LOWEST, HIGHEST))
     return Design(measure, here, low, high)

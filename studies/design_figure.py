@@ -65,8 +65,8 @@ def _best(one: xr.Dataset) -> str:
     at = one.isel(edge=best)
     unit = UNITS[kind]
     found = (
-        f"{kind}: edge {1e3 * float(at['edge']):g} mm, {SYMBOLS[kind]} = {float(at['measure']):.3f} {unit} by the closed "
-        f"form, margin {100 * float(at['margin']):.1f} % ({float(at['lowest']):.1f} to {float(at['highest']):.1f} Hz)"
+        f"{kind}: edge {1e3 * float(at['edge']):g} mm, {SYMBOLS[kind]} = {float(at['measure']):.3f} {unit} (closed "
+        f"form), margin {100 * float(at['margin']):.1f} % ({float(at['lowest']):.1f} to {float(at['highest']):.1f} Hz)"
     )
     if not np.isfinite(float(one["true_distance"])):
         return f"{found}; the true field was not met."

@@ -35,8 +35,10 @@ ROUND_OFF = 1e-10
 
 
 def points(quick: bool) -> list[study.Point]:
-    """The rotors that levitated; few frequencies and coarser answers of the bodies where it shall be quick."""
-    settings = {"steps": 1, "orders": [1, 2]} if quick else {"steps": 5, "orders": [2, 3]}
+    """The rotors that levitated; quick: one frequency, coarser answers of the bodies and no limits with them (NaN)."""
+    settings = (
+        {"steps": 1, "orders": [1, 2], "limits": False} if quick else {"steps": 5, "orders": [2, 3], "limits": True}
+    )
     return [{**point, **settings} for point in levitated(quick)]
 
 
@@ -76,7 +78,7 @@ def compute(point: study.Point) -> xr.Dataset:
     grid = low + (high - low) * (np.arange(point["steps"]) + 0.5) / point["steps"]
     rows = {name: _described(each.at, each.range.low, each.range.high, grid) for name, each in made.items()}
     answered, doubt = with_answers(made["fem"].scene, made["fem"].family, made["fem"].range, point["orders"])
-    ends = [answered.end(side) for side in SIDES]
+    ends = [answered.end(side) if point["limits"] else None for side in SIDES]
     rows["mutual"] = _described(answered.at, ends[0], ends[1], grid)
     errors = {name: {key: ROUND_OFF * np.abs(value) for key, value in rows[name].items()} for name in MODELS[:3]}
     errors["fem"] = {key: np.abs(value - rows["coarse"][key]) for key, value in rows["fem"].items()}
@@ -85,7 +87,7 @@ def compute(point: study.Point) -> xr.Dataset:
     }
     kinds = {side: [getattr(made[m].range, side).kind for m in MODELS[:-1]] for side in SIDES}
     for side, end in zip(SIDES, ends, strict=True):
-        kinds[side].append(end.kind)
+        kinds[side].append(end.kind if end else "")
     return _dataset(point, grid, rows, errors, kinds)
 
 
@@ -100,7 +102,7 @@ def _by_elements(scene: Scene, rtol: float) -> Rates:
     return Rates.of(scene, cached_rotor_table(scene.rotor, "fem", rtol, note, scene.floater.radius)[0])
 
 
-def _described(at: Callable[[float], Point], low: Point, high: Point, grid: Array) -> dict[str, Array]:
+def _described(at: Callable[[float], Point], low: Point | None, high: Point | None, grid: Array) -> dict[str, Array]:
     found = [at(float(frequency)) for frequency in grid]
     moment = np.array([point.state[6:9] for point in found])
     modes = [named_modes(point.motion, point.time_unit) for point in found]
@@ -108,8 +110,8 @@ def _described(at: Callable[[float], Point], low: Point, high: Point, grid: Arra
         "distance": np.array([point.distance for point in found]),
         "polar_angle": np.degrees(np.arctan2(np.hypot(moment[:, 0], moment[:, 1]), moment[:, 2])),
         "mode_frequency": np.array([[mode.frequency_hz for mode in row] for row in modes]),
-        "lowest": np.array(low.parameter),
-        "highest": np.array(high.parameter),
+        "lowest": np.array(low.parameter if low else np.nan),
+        "highest": np.array(high.parameter if high else np.nan),
     }
 
 

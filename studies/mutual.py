@@ -23,7 +23,7 @@ from ..geometry.scene import Floater
 
 STEP = 0.02
 """Of the central differences, in floater radii and rad; their error is of its square, 1e-4 of the slope."""
-SETTLED, MOST = 1e-6, 8
+SETTLED, MOST = 1e-5, 8
 """Change of the equilibrium (radii and rad) at which expanding again ends, and how often it may be done."""
 
 
