@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from ..geometry import load_scene
-from . import design, dipole_vs_fem, sensitivity
+from . import design, dipole_vs_fem, sensitivity, stability_map
 from .design_figure import design_figure, design_lines
 from .dipole_validity import dipole_validity, validity_figure, validity_lines
 from .dipole_vs_fem_figure import dipole_figure, dipole_lines
@@ -19,6 +19,7 @@ from .sensitivity_figure import sensitivity_figure, sensitivity_lines
 from .shipped_scenes import default_scene
 from .speed_accuracy import speed_accuracy
 from .speed_accuracy_figure import speed_figure, speed_lines
+from .stability_map_figure import map_figure, map_lines
 from .study import Study, by_case, study_of_one
 from .team7_report import team7_figure, team7_lines, team7_study
 
@@ -83,6 +84,14 @@ CATALOGUE: dict[str, Study] = {
         by_case,
         design_figure,
         design_lines,
+    ),
+    "stability-map": Study(
+        "regions of stable levitation in frequency and displacement, their boundaries, with and without a plate",
+        stability_map.points,
+        stability_map.compute,
+        by_case,
+        map_figure,
+        map_lines,
     ),
     "team7": study_of_one(
         "eddy currents against the measurement of TEAM workshop problem 7", team7_study, team7_figure, team7_lines

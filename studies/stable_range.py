@@ -64,25 +64,26 @@ def reference_state(scene: Scene) -> tuple[Array, float]:
     raise EquilibriumError("No stable levitation of point dipoles at any of the frequencies that are tried.")
 
 
-def stable_range(scene: Scene, rates: Rates, start: Array, frequency: float) -> StableRange | None:
-    """The widest interval of stability on the branch through the equilibrium near `start` (12,) at `frequency` (Hz).
+def stable_ranges(scene: Scene, rates: Rates, start: Array, frequency: float) -> list[StableRange]:
+    """All intervals of stability on the branch through the equilibrium near `start` (12,) at `frequency` (Hz).
 
-    The branch is followed both ways to its first fold, contact with the rotor or the border. None without any
-    stable part. Frequencies of the ends are good to round-off in the table's field.
+    The branch is followed both ways to its first fold, contact with the rotor or the border. Frequencies of the ends
+    are good to round-off in the table's field.
     """
     walk = partial(_side, replace(scene, plate=None), Family(rates, frequencies(scene), UNIT), start, frequency)
     below, above = walk(LOWEST), walk(HIGHEST)
-    chain = [*below[:0:-1], *above]
     runs: list[list[Point]] = [[]]
-    for point in chain:
+    for point in [*below[:0:-1], *above]:
         runs[-1].append(point)
         if point.kind:
             runs.append([point])
-    stable = [run for run in runs if _is_stable(run)]
-    if not stable:
-        return None
-    best = max(stable, key=lambda run: run[-1].parameter - run[0].parameter)
-    return StableRange(best[0], best[-1], tuple(best))
+    return [StableRange(run[0], run[-1], tuple(run)) for run in runs if _is_stable(run)]
+
+
+def stable_range(scene: Scene, rates: Rates, start: Array, frequency: float) -> StableRange | None:
+    """The widest of these intervals; None without any."""
+    found = stable_ranges(scene, rates, start, frequency)
+    return max(found, key=lambda run: run.high.parameter - run.low.parameter, default=None)
 
 
 def at_frequency(scene: Scene, rates: Rates, near: Point, frequency: float) -> Point:
