@@ -9,8 +9,10 @@ import numpy as np
 
 from ..dynamics import EquilibriumError, Family, Point
 from ..dynamics.arclength import follow_branch
+from ..dynamics.balance import EVERY, solve
 from ..fem.rotor_response import rotor_ladder
 from ..fem.two_body import TwoBodyError
+from ..geometry.box import Array
 from ..geometry.scene import Scene
 from .mutual import Mutual, pose, settled
 from .stable_range import BORDER, CONTACT, HIGHEST, LOWEST, STEPS, StableRange, at_frequency, is_stable, stability_end
@@ -39,8 +41,10 @@ class Answered:
 
     def at(self, frequency: float) -> Point:
         """The equilibrium at a frequency, Hz. Raises EquilibriumError where there is none."""
-        near = self.range.near(frequency)
-        return self._settled(at_frequency(self.scene, self.family.rates, near, frequency), frequency)
+        return self._settled(self._rigid(frequency), frequency)
+
+    def _rigid(self, frequency: float) -> Point:
+        return at_frequency(self.scene, self.family.rates, self.range.near(frequency), frequency)
 
     def end(self, side: str) -> Point:
         """Where stability ends on the "low" or "high" side.
@@ -48,6 +52,26 @@ class Answered:
         Raises EquilibriumError where no stable equilibrium is found to begin with.
         """
         rigid, way = getattr(self.range, side), -1 if side == "low" else 1
+        return self._close(rigid, way) or self._stepwise(rigid, way)
+
+    def _close(self, rigid: Point, way: int) -> Point | None:
+        """An end near the rigid dipole's, if there is one, by expansions about it alone."""
+        inside, border = (rigid.parameter * (1 + part * way) for part in (-INSIDE[1], INSIDE[1]))
+        begin = self._rigid(inside)
+
+        def find(family: Family, last: Point) -> Point:
+            found = stability_end(self.scene, family, begin.state, inside, border)
+            if found.kind in (BORDER, CONTACT) or not is_stable(family.point(*_start(family, begin, inside), inside)):
+                raise EquilibriumError("There is no end of stability near the rigid dipole's.")
+            return found
+
+        try:
+            return settled(self.family, self.mutual, rigid, find, self.mutual.expanded(*pose(rigid)))
+        except (EquilibriumError, TwoBodyError):
+            return None
+
+    def _stepwise(self, rigid: Point, way: int) -> Point:
+        """An end anywhere, in steps over which one expansion is trusted."""
         here = self._inside(rigid, way)
         for _ in range(MOST):
             expansion = self.mutual.expanded(*pose(here))
@@ -80,6 +104,11 @@ class Answered:
             if is_stable(here):
                 return here
         raise EquilibriumError("No stable equilibrium was found near the rigid dipole's.")
+
+
+def _start(family: Family, near: Point, frequency: float) -> tuple[Array, Array]:
+    places, moments, _ = solve(family.balance(frequency), *(part[None] for part in pose(near)), EVERY)
+    return places[0], moments[0]
 
 
 def with_answers(scene: Scene, family: Family, stable: StableRange, orders: Sequence[int]) -> tuple[Answered, float]:

@@ -37,7 +37,7 @@ ROUND_OFF = 1e-10
 def points(quick: bool) -> list[study.Point]:
     """The rotors that levitated; quick: one frequency, coarser answers of the bodies and no limits with them (NaN)."""
     settings = (
-        {"steps": 1, "orders": [1, 2], "limits": False} if quick else {"steps": 5, "orders": [2, 3], "limits": True}
+        {"steps": 1, "orders": [1, 2], "limits": False} if quick else {"steps": 4, "orders": [2, 3], "limits": True}
     )
     return [{**point, **settings} for point in levitated(quick)]
 

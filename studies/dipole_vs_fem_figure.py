@@ -49,8 +49,8 @@ def dipole_figure(result: xr.Dataset) -> Figure:
         for row in (1, 2):
             axes[row, column].set_xticks(range(part.sizes["case"]), [f"{m:g}" for m in part["measure"].values])
             axes[row, column].set_xlabel(label)
-    axes[1, 0].legend(fontsize=6)
-    axes[2, 0].legend(fontsize=6)
+    handles = [*axes[1, 0].get_legend_handles_labels()[0], *axes[2, 0].get_legend_handles_labels()[0]]
+    figure.legend(handles=handles, loc="outside lower center", ncols=4)
     return figure
 
 
@@ -94,7 +94,7 @@ def _ranges(axes: Axes, part: xr.Dataset) -> None:
         touching = part["high_kind"].sel(model=model).values == "contact"
         label = "ends at the rotor" if model == "article" else None
         axes.plot(places[touching], high[touching], "kv", ms=4, label=label)
-    axes.set(ylabel="stable from - to (Hz)")
+    axes.set(ylabel="frequencies of stable levitation (Hz)")
 
 
 def dipole_lines(result: xr.Dataset) -> list[str]:
@@ -147,14 +147,14 @@ def _limits(one: xr.Dataset) -> str:
 
 def sentence(result: xr.Dataset) -> str:
     """The answer in one sentence."""
-    distance, angle, low = (
+    distance, angle, low, high = (
         spanned(*change(result, name, TOTAL), scale)
-        for name, scale in (("distance", 1e3), ("polar_angle", 1.0), ("lowest", 1.0))
+        for name, scale in (("distance", 1e3), ("polar_angle", 1.0), ("lowest", 1.0), ("highest", 1.0))
     )
     parts = ", ".join(
         f"{cause} {spanned(*change(result, 'distance', models), 1e3)} mm" for cause, models in CAUSES.items()
     )
     return (
-        f"True fields change the dipole's levitation distance by {distance} mm ({parts}), its polar angle by {angle}° "
-        f"and its lowest frequency by {low} Hz."
+        f"True fields change the point dipoles' levitation distance by {distance} mm ({parts}), the polar angle by "
+        f"{angle}°, the lowest frequency by {low} Hz and the highest by {high} Hz."
     )

@@ -23,8 +23,8 @@ from ..geometry.scene import Floater
 
 STEP = 0.02
 """Of the central differences, in floater radii and rad; their error is of its square, 1e-4 of the slope."""
-SETTLED, MOST = 1e-5, 8
-"""Change of the equilibrium (radii and rad) at which expanding again ends, and how often it may be done."""
+RENEWED, SETTLED, MOST = 1e-3, 1e-5, 8
+"""Changes of the equilibrium (radii, rad) above which the slopes are taken anew, and below which it is found; trials."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,8 +123,10 @@ def settled(
         here = new
         if k and change < SETTLED:
             return here
-        # The slopes stay those of the second guess, which is within a hundredth of a radius of the last.
-        expansion = expansion.about(*pose(here), mutual(*pose(here))) if k else mutual.expanded(*pose(here))
+        if k == 0 or change > RENEWED:
+            expansion = mutual.expanded(*pose(here))
+        else:
+            expansion = expansion.about(*pose(here), mutual(*pose(here)))
     raise EquilibriumError("The answers of rotor and floater to each other did not settle on an equilibrium.")
 
 

@@ -63,7 +63,7 @@ def points(quick: bool) -> list[study.Point]:
 
     One step alone gives derivatives without an estimate of their error, which is then NaN.
     """
-    return [{**point, "samples": 4 if quick else 60, "steps": [1] if quick else [1, 2]} for point in levitated(quick)]
+    return [{**point, "samples": 4 if quick else 50, "steps": [1] if quick else [1, 2]} for point in levitated(quick)]
 
 
 @dataclass(frozen=True, eq=False)

@@ -48,8 +48,7 @@ def sensitivity_figure(result: xr.Dataset) -> Figure:
         _contributions(axes[0, column], part, MIDDLE, 1e3, "distance in mid-range (mm)")
         _contributions(axes[1, column], part, "lowest", 1.0, "lowest frequency (Hz)")
         _bands(axes[2, column], part, configuration)
-    axes[0, 0].legend(fontsize=6)
-    axes[2, 0].legend(fontsize=6)
+    figure.legend(handles=axes[2, 0].get_legend_handles_labels()[0], loc="outside lower center", ncols=3)
     for place in axes[:2, 1:].flat:
         place.set_yticklabels([])
     return figure
@@ -70,6 +69,7 @@ def _contributions(axes: Axes, part: xr.Dataset, quantity: str, scale: float, la
         )  # fmt: skip
     axes.set_yticks(places, [WORDS[name] for name in names])
     axes.invert_yaxis()
+    axes.legend(fontsize=6)
     axes.set(xlabel=f"one standard deviation of the tolerance changes\nthe {label} by")
 
 

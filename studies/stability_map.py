@@ -43,7 +43,7 @@ def points(quick: bool) -> list[study.Point]:
     return [
         {"configuration": c, "measure": m, "model": model, "with_plate": plates}
         for c, measures in chosen.items() for m in measures for model in MODELS
-        for plates in [(2 if quick else 6) if model == "fem" and m in few[c] else 0]
+        for plates in [(2 if quick else 5) if model == "fem" and m in few[c] else 0]
     ]  # fmt: skip
 
 

@@ -42,10 +42,12 @@ def map_figure(result: xr.Dataset) -> Figure:
     handles = [
         *(axes[0, 0].plot([], [], "s", color=COLORS[m], alpha=0.5, label=f"stable: {NAMES[m]}")[0] for m in MODELS),
         *(axes[0, 0].plot([], [], k, color="0.3", mfc="white", label=MEANINGS[n])[0] for n, k in MARKERS.items()),
-        axes[0, 0].plot([], [], "P", color=PALETTE[2], label=f"stable with a plate {-1e3 * FACE:g} mm below")[0],
+        axes[0, 0].plot([], [], "P", color=PALETTE[4], label=f"stable with a plate {-1e3 * FACE:g} mm below")[0],
         axes[0, 0].plot([], [], "x", color=PALETTE[3], label="unstable with it")[0],
         axes[0, 0].plot([], [], "1", color="0.2", label="no equilibrium is left with it")[0],
     ]
+    for place in axes[0]:
+        place.margins(x=0.08)
     figure.legend(handles=handles, loc="outside lower center", ncols=5, fontsize=7)
     return figure
 
@@ -67,7 +69,7 @@ def _plate(axes: Axes, part: xr.Dataset) -> None:
     growth, frequency = part["plate_growth"].values, part["plate_frequency"].values
     measure = np.broadcast_to(part["measure"].values[:, None], growth.shape)
     gone = np.isnan(growth) & np.isfinite(frequency)
-    for chosen, style, color in ((growth < 0, "P", PALETTE[2]), (growth >= 0, "x", PALETTE[3]), (gone, "1", "0.2")):
+    for chosen, style, color in ((growth < 0, "P", PALETTE[4]), (growth >= 0, "x", PALETTE[3]), (gone, "1", "0.2")):
         axes.plot(measure[chosen], frequency[chosen], style, color=color, ms=4, mew=0.8)
 
 
