@@ -107,7 +107,8 @@ class Answered:
 
 
 def _start(family: Family, near: Point, frequency: float) -> tuple[Array, Array]:
-    places, moments, _ = solve(family.balance(frequency), *(part[None] for part in pose(near)), EVERY)
+    place, moment = pose(near)
+    places, moments, _ = solve(family.balance(frequency), place[None], moment[None], EVERY)
     return places[0], moments[0]
 
 

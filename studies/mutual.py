@@ -23,8 +23,10 @@ from ..geometry.scene import Floater
 
 STEP = 0.02
 """Of the central differences, in floater radii and rad; their error is of its square, 1e-4 of the slope."""
+POSE, ACCELERATED = np.array([0, 1, 2, 6, 7, 8]), np.array([3, 4, 5, 9, 10, 11])
+"""Places in the state of position and moment, and of velocity and spin."""
 RENEWED, SETTLED, MOST = 1e-3, 1e-5, 8
-"""Changes of the equilibrium (radii, rad) above which the slopes are taken anew, and below which it is found; trials."""
+"""Changes of the equilibrium (radii, rad) above which slopes are taken anew, and below which it is found; trials."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,10 +92,9 @@ class _Answered(Rates):
         states = np.asarray(states, float)
         rates, slopes = self._rates(states, values)
         scale = np.broadcast_to(values[..., Parameter.TIME], len(states))[:, None] ** 2 * self._per_unit
-        poses = states[:, [0, 1, 2, 6, 7, 8]] - self._extra.center
-        accelerated = np.array([3, 4, 5, 9, 10, 11])
-        rates[:, accelerated] += scale * (self._extra.value + poses @ self._extra.slope.T)
-        slopes[np.ix_(range(len(states)), accelerated, [0, 1, 2, 6, 7, 8])] += scale[:, :, None] * self._extra.slope
+        poses = states[:, POSE] - self._extra.center
+        rates[:, ACCELERATED] += scale * (self._extra.value + poses @ self._extra.slope.T)
+        slopes[:, ACCELERATED[:, None], POSE] += scale[:, :, None] * self._extra.slope
         return rates, slopes
 
 

@@ -11,7 +11,8 @@ from ..geometry.box import Array
 from .dipole_vs_fem_figure import of_configuration
 from .figures import PALETTE, panels, styled
 from .rotor_points import CONFIGURATIONS, SYMBOLS, UNITS
-from .sensitivity import FRACTIONS, PARAMETERS, QUANTITIES, TILT_SPREAD, TILTS
+from .sensitivity import TILTS
+from .tolerances import FRACTIONS, PARAMETERS, QUANTITIES, TILT_SPREAD
 
 WORDS = {
     "measure": "displacement or tilt",
@@ -60,8 +61,10 @@ def _contributions(axes: Axes, part: xr.Dataset, quantity: str, scale: float, la
     for k in range(count):
         one = part.isel(case=k)
         sizes = xr.DataArray(scale * spreads(one), dims="parameter", coords={"parameter": one["parameter"]})
-        value = np.abs(one["derivative"].sel(quantity=quantity) * sizes).sel(parameter=names)
-        error = np.abs(one["derivative_error"].sel(quantity=quantity) * sizes).sel(parameter=names)
+        value, error = (
+            np.abs((one[name].sel(quantity=quantity) * sizes).sel(parameter=names).values)
+            for name in ("derivative", "derivative_error")
+        )
         kind = str(one["configuration"].values)
         axes.barh(
             places + (k - (count - 1) / 2) * 0.8 / count, value, 0.8 / count, xerr=error, color=PALETTE[k],
@@ -75,7 +78,7 @@ def _contributions(axes: Axes, part: xr.Dataset, quantity: str, scale: float, la
 
 def _bands(axes: Axes, part: xr.Dataset, configuration: str) -> None:
     twin = axes.twinx()
-    places = np.arange(part.sizes["case"])
+    places: Array = np.arange(part.sizes["case"], dtype=float)
     for quantity, offset, color, on in (("lowest", -0.2, PALETTE[0], axes), ("highest", 0.0, PALETTE[1], axes)):
         _box(on, part, quantity, places + offset, color, 1.0, f"{quantity} frequency")
     _box(twin, part, MIDDLE, places + 0.2, PALETTE[2], 1e3, "distance")

@@ -16,12 +16,13 @@ from spinlev.fem.rotor_response import rotor_ladder
 from spinlev.fem.two_body import two_body
 from spinlev.studies import dipole_vs_fem, stability_map
 from spinlev.studies.answered import Answered
-from spinlev.studies.design import designed
+from spinlev.studies.design_search import designed
 from spinlev.studies.dipole_vs_fem_figure import CAUSES, TOTAL, change
 from spinlev.studies.mutual import Expansion, Mutual, pose
 from spinlev.studies.rotor_points import FLOATER, rotor_scene
-from spinlev.studies.sensitivity import PARAMETERS, QUANTITIES, _slope, levitation, nominal, scene_of
+from spinlev.studies.sensitivity import slope_by
 from spinlev.studies.stable_range import UNIT, Family, gap, reference_state, stable_range
+from spinlev.studies.tolerances import PARAMETERS, QUANTITIES, levitation, nominal, scene_of
 
 
 @pytest.fixture(scope="module")
@@ -70,7 +71,7 @@ def test_vertical_range_against_known_numbers():
 def test_remanence_and_density_enter_only_as_a_ratio(horizontal):
     """Accelerations are those of gravity and Br Br'/density: their logarithmic derivatives are one number."""
     names = "rotor_remanence", "floater_remanence", "density"
-    rows = [_slope(horizontal, n, 1e-3 * horizontal.values[n]) * horizontal.values[n] for n in names]
+    rows = [slope_by(horizontal, n, 1e-3 * horizontal.values[n]) * horizontal.values[n] for n in names]
     np.testing.assert_allclose(rows[1], rows[0], rtol=1e-5)
     np.testing.assert_allclose(rows[2], -rows[0], rtol=1e-4)  # steps of 1 and 1/(1 ± 0.001) differ in second order
 
