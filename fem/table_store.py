@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import fcntl
 import hashlib
 import json
 import os
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -89,17 +91,38 @@ def from_cache(
     """A table, from the cache if it is there under `name`, and whether it was.
 
     A damaged entry is reported, computed anew and replaced; a cache that cannot be written is reported and
-    does no harm.
+    does no harm.  While one process makes a table, others that need the same one wait for it.
     """
     path = cache_folder() / name
-    if path.exists():
+    with _alone(path.with_suffix(".lock"), report):
+        if path.exists():
+            try:
+                return load(path), True
+            except (TableFileError, OSError) as error:
+                report(f"The cached table is damaged and is computed anew: {error}")
+        table = make()
         try:
-            return load(path), True
-        except (TableFileError, OSError) as error:
-            report(f"The cached table is damaged and is computed anew: {error}")
-    table = make()
+            save(table, path)
+        except OSError as error:
+            report(f"The table could not be cached: {error}")
+        return table, False
+
+
+@contextmanager
+def _alone(lock: Path, report: Callable[[str], None]) -> Iterator[None]:
+    """Be the only process in this block with the same lock file; the system frees it if the process dies."""
     try:
-        save(table, path)
-    except OSError as error:
-        report(f"The table could not be cached: {error}")
-    return table, False
+        lock.parent.mkdir(parents=True, exist_ok=True)
+        stream = lock.open("w")
+    except OSError:  # a cache that cannot be written cannot be shared either
+        yield
+        return
+    with stream:
+        try:
+            fcntl.flock(stream, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            report("Another process is making this table: waiting for it ...")
+            fcntl.flock(stream, fcntl.LOCK_EX)
+        except OSError:  # a file system without locks: at worst a table is made twice
+            report("The cache's file system has no locks.")
+        yield

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import tomllib
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from pydantic import ValidationError
@@ -37,12 +39,23 @@ def load_scene(path: str | Path) -> Scene:
     return parse_scene(text, source)
 
 
-def parse_scene(text: str, source: str = "scene") -> Scene:
-    """Build a scene from the text of a scene file; `source` names it in messages. Raises `SceneError`."""
+def parse_scene(text: str, source: str = "scene", changes: Mapping[str, float] | None = None) -> Scene:
+    """Build a scene from the text of a scene file; `source` names it in messages.
+
+    Parameters
+    ----------
+    changes : numbers that replace those of the file, by key, such as `rotor.displacement_mm` or `plate.center_mm.2`
+
+    Raises
+    ------
+    SceneError : as `load_scene`, also for a change that no key takes
+    """
     try:
         raw = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
         raise SceneError(source, [f"the scene file must be TOML; {error}."]) from None
+    for key, value in (changes or {}).items():
+        _replace(raw, key, value, source)
     try:
         table = SceneSection.model_validate(raw)
     except ValidationError as error:
@@ -55,6 +68,22 @@ def parse_scene(text: str, source: str = "scene") -> Scene:
     if faults:
         raise SceneError(source, faults)
     return scene
+
+
+def _replace(raw: Any, key: str, value: float, source: str) -> None:
+    """Put a number in the place of `key`: names of tables, and numbers of list entries from 0, joined by dots."""
+    *path, last = (int(part) if part.isdecimal() else part for part in key.split("."))
+    try:
+        for part in path:
+            raw = raw[part]
+        if isinstance(last, int):
+            raw[last] = value
+        else:
+            raw.update({last: value})
+    except (KeyError, IndexError, TypeError, AttributeError):
+        raise SceneError(
+            source, [f"Input {key} must be a key inside the tables and lists that the scene has; instead it is not."]
+        ) from None
 
 
 def _start_faults(start: StartSection | None) -> list[str]:

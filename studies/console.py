@@ -22,6 +22,16 @@ def note(text: str) -> None:
 
 
 @contextmanager
+def silence() -> Iterator[None]:
+    """No messages inside the block."""
+    before, ERRORS.quiet = ERRORS.quiet, True
+    try:
+        yield
+    finally:
+        ERRORS.quiet = before
+
+
+@contextmanager
 def progress(label: str) -> Iterator[Callable[[float], None]]:
     """A progress bar on standard error; gives a function that takes the finished fraction."""
     columns = (TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(), TimeRemainingColumn())

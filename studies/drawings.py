@@ -11,6 +11,10 @@ from matplotlib.figure import Figure
 from ..geometry import InputError
 from .catalogue import CATALOGUE
 from .figures import field_figure, force_figure, save_figure, trajectory_figure
+from .question_figure import drawable, question_figure
+
+QUESTION = "question"
+"""What the result of one's own question is called."""
 
 
 def draw_result(path: Path, out: Path) -> list[str]:
@@ -28,6 +32,8 @@ def read_result(path: Path) -> xr.Dataset:
     try:
         with xr.open_dataset(path, engine="h5netcdf") as opened:
             result = opened.load()
+    except FileNotFoundError:
+        raise InputError(f"Input {path} must be a file that exists; instead it is missing.") from None
     except Exception as error:  # the HDF5 layer raises many kinds on a damaged file
         raise InputError(f"Input {path} must be a netCDF file that can be read; {error}.") from None
     if "study" not in result.attrs:
@@ -40,6 +46,8 @@ def figures_of(result: xr.Dataset) -> Mapping[str, Figure]:
     kind = str(result.attrs["study"])
     if kind in CATALOGUE:
         return {kind: CATALOGUE[kind].draw(result)}
+    if kind == QUESTION:
+        return {QUESTION: question_figure(result)} if drawable(result) else {}
     draws = {"axis_field": field_figure, "curve_force": force_figure, "position_rotor_frame": trajectory_figure}
     names = {"axis_field": "field", "curve_force": "force", "position_rotor_frame": "trajectory"}
     found = {names[key]: draw(result) for key, draw in draws.items() if key in result}

@@ -7,12 +7,13 @@ import os
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import xarray as xr
 from cyclopts import Parameter
 
 from ..geometry import InputError
+from .console import silence
 from .study import Point
 
 if TYPE_CHECKING:
@@ -72,7 +73,7 @@ class Engine:
         from distributed import as_completed
 
         with _client(self.scheduler, number) as client:
-            futures = {client.submit(attempt, compute, point, pure=False): k for k, point in points.items()}
+            futures = {client.submit(_silently, compute, point, pure=False): k for k, point in points.items()}
             for future in as_completed(list(futures), loop=client.loop):
                 yield futures[future], _collected(future)
                 future.release()
@@ -86,7 +87,13 @@ def attempt(compute: Compute, point: Point) -> xr.Dataset | Failure:
         return Failure(f"{type(error).__name__}: {error}")
 
 
-def _collected(future: Future) -> xr.Dataset | Failure:
+def _silently(compute: Compute, point: Point) -> xr.Dataset | Failure:
+    """An attempt in a worker, whose messages would come in between those of the others."""
+    with silence():
+        return attempt(compute, point)
+
+
+def _collected(future: Future[Any]) -> xr.Dataset | Failure:
     from distributed.scheduler import KilledWorker
 
     try:

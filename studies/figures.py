@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 from collections.abc import Callable
 from functools import wraps
 from pathlib import Path
@@ -66,6 +67,14 @@ def save_figure(figure: Figure, path: Path) -> None:
     """Write a figure; the format follows the suffix."""
     with mpl.rc_context(STYLE), replacing(path) as temporary:
         figure.savefig(temporary)
+
+
+def png(figure: Figure) -> bytes:
+    """The figure as the content of a PNG file."""
+    stream = io.BytesIO()
+    with mpl.rc_context(STYLE):
+        figure.savefig(stream, format="png")
+    return stream.getvalue()
 
 
 @styled

@@ -15,10 +15,9 @@ from ..geometry import InputError, load_scene
 from ..geometry.box import Array, Box, rotation_matrix
 from ..geometry.scene import Plate, Scene
 from .plate_shelf import plate_memory
-from .results import AXIS, variable
+from .results import AXIS, MODES, variable
 from .shipped_scenes import shipped_scene
 
-MODES = ("bounce", "side, backward", "side, forward", "precession", "nutation")
 SIZE = (0.1, 0.24, 0.03)
 """Edges of the article's plate, m."""
 CONDUCTIVITY, DISTANCE = 3.5e7, 0.018

@@ -7,14 +7,17 @@ from typing import Annotated
 
 from cyclopts import App, Parameter
 
-from ..geometry import InputError
+from ..geometry import InputError, load_scene
 from .engine import Engine
+from .numbers import positive, three_numbers
 from .output import Answer, Output
+from .tables import Quantity, Tables
+from .vary import parse_vary
 
 
 def add_result_commands(app: App) -> None:
     """Let the command line know these commands."""
-    for command in (study, figure):
+    for command in (study, figure, show, report):
         app.command(command)
 
 
@@ -23,33 +26,74 @@ def study(
     *,
     list: Annotated[bool, Parameter(negative="")] = False,
     quick: Annotated[bool, Parameter(negative="")] = False,
+    vary: Annotated[tuple[str, ...], Parameter(negative="")] = (),
+    ask: Quantity = "equilibria",
+    at: Annotated[str, Parameter(allow_leading_hyphen=True)] = "0,0,-20",
+    spin: float = 0.0,
+    duration_s: float = 3.0,
+    asked: Tables = Tables(),
     engine: Engine = Engine(),
     output: Output = Output(),
 ) -> Answer:
-    """One study of the catalogue: NAME.nc, its figure as NAME.png and NAME.pdf, and what it says.
+    """One study of the catalogue, or any quantity of a scene over any of its parameters.
 
-    A study that was stopped goes on where it was.
+    Writes NAME.nc (question.nc for one's own), its figure as PNG and PDF, and says what it found. A study that was
+    stopped goes on where it was.
 
     Parameters
     ----------
     name
-        Name of the study.
+        Name of the study; with --vary a scene file.
     list
         Show the catalogue.
     quick
         Coarser, in less than a minute.
+    vary
+        A parameter of the scene and its values, KEY=FIRST:LAST:STEP or KEY=VALUE,VALUE,...; may be given again.
+    ask
+        What is computed with --vary.
+    at
+        Place X,Y,Z of the field asked for, mm, rotor's frame.
+    spin
+        Body spin S = Ω·m̂/ω of the equilibria asked for.
+    duration_s
+        Duration of the flights asked for, s.
     """
+    if vary:
+        return _own_question(name, vary, (ask, at, spin, duration_s), asked, engine, output)
     from .catalogue import CATALOGUE
 
     if list:
         summaries = {key: entry.summary for key, entry in CATALOGUE.items()}
         return Answer({"studies": summaries}, tuple(f"{k:22} {v}" for k, v in summaries.items()), output.json)
     if name not in CATALOGUE:
-        raise InputError(f"Input name must be one of {', '.join(CATALOGUE)}; instead received {name}.")
+        scene = " A scene needs --vary." if name and name.endswith(".toml") else ""
+        raise InputError(f"Input name must be one of {', '.join(CATALOGUE)}; instead received {name}.{scene}")
     from .study_job import study_job
 
     values, lines = study_job(name, quick, engine.checked(), output.out)
     return Answer(values, tuple(lines), output.json)
+
+
+def _own_question(
+    scene: str | None,
+    vary: tuple[str, ...],
+    what: tuple[Quantity, str, float, float],
+    asked: Tables,
+    engine: Engine,
+    output: Output,
+) -> Answer:
+    if scene is None:
+        raise InputError("Input name must be a scene file where --vary is given; instead it is missing.")
+    values, place = parse_vary(vary), three_numbers("--at", what[1])
+    positive("--duration-s", what[3])
+    text = load_scene(scene).text
+    from .question import Question
+    from .study_job import question_job
+
+    question = Question(text, scene, what[0], asked.checked(), what[2], what[3], tuple(1e-3 * place))
+    answer, lines = question_job(question, values, engine.checked(), output.out)
+    return Answer(answer, tuple(lines), output.json)
 
 
 def figure(result: Path, *, output: Output = Output()) -> Answer:
@@ -64,3 +108,31 @@ def figure(result: Path, *, output: Output = Output()) -> Answer:
 
     files = draw_result(result, output.out)
     return Answer({"figures": files}, tuple(f"Figure in {file}" for file in files), output.json)
+
+
+def show(result: Path, *, output: Output = Output()) -> Answer:
+    """Three-dimensional pictures of a flight: the scene with its field and the plate's currents, and an animation.
+
+    Parameters
+    ----------
+    result
+        result.nc of `run` or trajectory.nc of `simulate`.
+    """
+    from .show import show_job
+
+    files = show_job(result, output.out)
+    return Answer({"pictures": files}, tuple(f"Picture in {file}" for file in files), output.json)
+
+
+def report(folder: Path, *, output: Output = Output()) -> Answer:
+    """One page, report.html, about all results in a folder: figures, numbers, errors, provenance.
+
+    Parameters
+    ----------
+    folder
+        Where `run` and `study` have written.
+    """
+    from .report import report_job
+
+    page, names = report_job(folder, output.out)
+    return Answer({"report": str(page), "results": names}, (f"{', '.join(names)}: {page}",), output.json)

@@ -13,12 +13,14 @@ import numpy as np
 import xarray as xr
 
 from ..dynamics import Equilibrium, ForceCurve, Trajectory
+from ..dynamics.mode_names import SIDE, TILT
 from ..fem.table import FieldTable
 from ..geometry.atomic import replacing
 from ..geometry.box import Array
 from ..geometry.scene import Scene
 
 AXIS = ("x", "y", "z")
+MODES = ("bounce", *SIDE, *TILT)
 LIBRARIES = ("spinlev", "ngsolve", "heyoka", "numpy", "scipy", "xarray")
 
 
@@ -110,6 +112,35 @@ def equilibria_dataset(found: Mapping[str, Sequence[Equilibrium]]) -> xr.Dataset
     )
 
 
+def found_dataset(rows: Sequence[Equilibrium]) -> xr.Dataset:
+    """Equilibria of one scene and one model over `equilibrium`, with their small motions over `mode`."""
+
+    def column(read: Any, units: str, name: str, *dims: str) -> xr.Variable:
+        values = np.array([read(e) for e in rows], float).reshape(len(rows), *(sizes[d] for d in dims))
+        return variable(("equilibrium", *dims), values, units, name)
+
+    def by_name(equilibrium: Equilibrium, quantity: str) -> list[float]:
+        known = {mode.name: float(getattr(mode, quantity)) for mode in equilibrium.modes}
+        return [known.get(name, np.nan) for name in MODES]
+
+    sizes = {"axis": 3, "mode": len(MODES)}
+    return xr.Dataset(
+        {
+            "position": column(lambda e: e.position, "m", "mean position, rotor's frame", "axis"),
+            "position_error": column(lambda e: e.position_error, "m", "estimated error of the position"),
+            "moment": column(lambda e: e.state.moment, "1", "direction of the moment, rotor's frame", "axis"),
+            "polar_angle": column(lambda e: e.polar_angle_deg, "deg", "polar angle of the moment"),
+            "lag": column(lambda e: e.lag_deg, "deg", "lag of the moment behind the rotor"),
+            "stable": column(lambda e: e.stable, "1", "1 stable, 0 not"),
+            "growth": column(lambda e: e.growth_per_s, "1/s", "largest growth rate of a small motion"),
+            "mode_growth": column(lambda e: by_name(e, "growth_per_s"), "1/s", "growth of a mode", "mode"),
+            "mode_frequency": column(lambda e: by_name(e, "frequency_hz"), "Hz", "its frequency", "mode"),
+            "number": variable((), len(rows), "1", "number of equilibria"),
+        },
+        {"axis": list(AXIS), "equilibrium": np.arange(len(rows)), "mode": list(MODES)},
+    )
+
+
 def trajectory_dataset(flight: Trajectory) -> xr.Dataset:
     """A flight in the laboratory frame, with its position in the rotor's frame as well."""
     lab, rotor = flight.lab, flight.rotor
@@ -124,6 +155,7 @@ def trajectory_dataset(flight: Trajectory) -> xr.Dataset:
         },
         coords={"time": variable(("time",), flight.time, "s", "time"), "axis": list(AXIS)},
         attrs={
+            "study": "simulate",
             "ended_by": str(flight.ended_by),
             "levitated_s": flight.levitated_s,
             "energy_error": flight.energy_error,

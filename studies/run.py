@@ -12,7 +12,6 @@ import xarray as xr
 from ..dynamics import EquilibriumError, Survey, Trajectory, survey, with_plate
 from ..fem.table import RotorTable
 from ..geometry.atomic import replacing
-from ..geometry.box import Array
 from ..geometry.scene import AbsoluteStart, Scene
 from .answers import equilibria_answer, equilibria_lines, flight_answer, flight_lines, omissions
 from .console import note, to_json
@@ -112,27 +111,24 @@ def _static_dataset(scene: Scene, tables: dict[str, RotorTable], surveys: dict[s
         curve_dataset({name: found.curves for name, found in surveys.items()}),
         equilibria_dataset({name: found.equilibria for name, found in surveys.items()}),
     ]
-    return xr.merge(parts).assign_attrs(best_model=best, weight_N=scene.floater.mass * float(scene.gravity[2]))
+    return xr.merge(parts).assign_attrs(
+        study="run", best_model=best, weight_N=scene.floater.mass * float(scene.gravity[2])
+    )
 
 
 def _write(
     scene: Scene, table: RotorTable, result: xr.Dataset, values: dict[str, Any], flight: Trajectory | None, out: Path
 ) -> None:
-    from .picture import scene_picture
+    from .picture import last_view, scene_picture
 
     note("Files and figures ...")
     figures = {"field": field_figure(result), "force": force_figure(result)}
     if flight:
         result = xr.merge([result, trajectory_dataset(flight)], combine_attrs="no_conflicts")
         figures["trajectory"] = trajectory_figure(result)
-        scene_picture(scene, table, *_pose(flight), file=out / "scene.png")
+        scene_picture(last_view(scene, table, flight.rotor), out / "scene.png")
     write_dataset(result, out / "result.nc", scene)
     for name, figure in figures.items():
         save_figure(figure, out / f"{name}.png")
     with replacing(out / "summary.json") as temporary:
         temporary.write_text(to_json(values) + "\n")
-
-
-def _pose(flight: Trajectory) -> tuple[Array, Array, Array]:
-    """Where the floater is at the end, how it points, and its path; rotor's frame."""
-    return flight.rotor.position[-1], flight.rotor.moment[-1], flight.rotor.position

@@ -8,11 +8,10 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated, Literal
 
-import numpy as np
 from cyclopts import App, Parameter
 
 from ..geometry import InputError, load_scene
-from ..geometry.box import Array
+from .numbers import positive, three_numbers
 from .output import Answer, Output
 from .points_file import read_points
 from .shipped_scenes import default_scene
@@ -43,7 +42,7 @@ def run(
     duration_s
         Simulated time, s.
     """
-    _positive("--duration-s", duration_s)
+    positive("--duration-s", duration_s)
     loaded = load_scene(scene or default_scene())
     from .run import main_job
 
@@ -124,7 +123,7 @@ def simulate(
     resume
         Go on from the checkpoint of the same flight in --out, if one is there.
     """
-    _positive("--duration-s", duration_s)
+    positive("--duration-s", duration_s)
     loaded = load_scene(scene)
     from .single import simulate_job
 
@@ -156,25 +155,10 @@ def plate(
     rtol
         Relative accuracy asked of the tensor.
     """
-    _positive("--rtol", rtol)
-    place = _three_numbers("--at", at)
+    positive("--rtol", rtol)
+    place = three_numbers("--at", at)
     loaded = load_scene(scene)
     from .plate_job import plate_job
 
     values, lines = plate_job(loaded, place * 1e-3, frequency_hz, model, rtol, output.out)
     return Answer(values, tuple(lines), output.json)
-
-
-def _three_numbers(name: str, text: str) -> Array:
-    try:
-        numbers = np.array([float(part) for part in text.split(",")])
-    except ValueError:
-        numbers = np.zeros(0)
-    if len(numbers) != 3 or not np.all(np.isfinite(numbers)):
-        raise InputError(f"Input {name} must be three numbers X,Y,Z; instead received {text!r}.")
-    return numbers
-
-
-def _positive(name: str, value: float) -> None:
-    if not 0 < value < float("inf"):
-        raise InputError(f"Input {name} must be a positive number; instead received {value}.")

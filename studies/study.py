@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from operator import itemgetter
 from typing import Any
 
@@ -32,6 +32,7 @@ class Study:
     draw : the figure, from the joined result alone
     report : what it says, in lines, from the joined result alone
     timed : whether it measures times, for which its points must have the machine for themselves
+    settings : what all points have in common, if they do not say it themselves
     """
 
     summary: str
@@ -41,6 +42,7 @@ class Study:
     draw: Callable[[xr.Dataset], Figure]
     report: Callable[[xr.Dataset], list[str]]
     timed: bool = False
+    settings: Point = field(default_factory=dict)
 
 
 def study_of_one(

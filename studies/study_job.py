@@ -3,26 +3,58 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import xarray as xr
 
 from .catalogue import CATALOGUE
-from .drawings import save_figures
+from .drawings import QUESTION, figures_of, save_figures
 from .engine import Engine
+from .question import Question
+from .question_figure import question_figure, question_lines
 from .results import write_dataset
+from .single import Job
+from .study import Point, Study
 from .sweep import forget, swept
+from .vary import combinations
 
 
-def study_job(name: str, quick: bool, engine: Engine, out: Path) -> tuple[dict[str, Any], list[str]]:
+def study_job(name: str, quick: bool, engine: Engine, out: Path) -> Job:
     """Compute a study of the catalogue; writes NAME.nc, NAME.png and NAME.pdf. Errors are those of `swept`."""
     study = CATALOGUE[name]
-    result = swept(name, study, dict(enumerate(study.points(quick))), engine, out)
+    return _studied(name, study, study.points(quick), engine, out)
+
+
+def question_job(question: Question, values: dict[str, list[float]], engine: Engine, out: Path) -> Job:
+    """Answer one's own question over a grid; writes question.nc and its figure.
+
+    Raises
+    ------
+    SceneError : the scene does not take the first of the values
+    """
+    points = combinations(values)
+    question.scene(points[0])
+    study = Study(
+        f"{question.ask} over {', '.join(values)}",
+        lambda quick: points,
+        question,
+        partial(question.gather, values=values),
+        question_figure,
+        question_lines,
+        settings=question.settings,
+    )
+    return _studied(QUESTION, study, points, engine, out)
+
+
+def _studied(name: str, study: Study, points: Sequence[Point], engine: Engine, out: Path) -> Job:
+    result = swept(name, study, dict(enumerate(points)), engine, out)
     path = out / f"{name}.nc"
     write_dataset(result, path)
     forget(name, out)
-    figures = save_figures({name: study.draw(result)}, out)
+    figures = save_figures(figures_of(result), out)
     lines = [*study.report(result), *failure_lines(result)]
     values = {
         "study": name,
@@ -31,7 +63,7 @@ def study_job(name: str, quick: bool, engine: Engine, out: Path) -> tuple[dict[s
         "result": str(path),
         "figures": figures,
     }
-    return values, [*lines, f"Result and figures: {', '.join([str(path), *figures])}"]
+    return values, [*lines, f"Written: {', '.join([str(path), *figures])}"]
 
 
 def failed_points(result: xr.Dataset) -> list[dict[str, Any]]:

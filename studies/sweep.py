@@ -32,7 +32,7 @@ def swept(name: str, study: Study, points: Mapping[int, Point], engine: Engine, 
     InputError : the scheduler does not answer
     OSError : `out` cannot be written
     """
-    journal = _journal(name, points, out)
+    journal = _journal(name, study, points, out)
     finished = {k: point for k, point in journal.finished().items() if k in points}
     if finished:
         note(f"{len(finished)} of {len(points)} points are there from an earlier run.")
@@ -61,10 +61,10 @@ def forget(name: str, out: Path) -> None:
     Journal(out / f"{name}.points", "", note).remove()
 
 
-def _journal(name: str, points: Mapping[int, Point], out: Path) -> Journal:
+def _journal(name: str, study: Study, points: Mapping[int, Point], out: Path) -> Journal:
     versions = {library: version(library) for library in LIBRARIES}
-    identity = to_json({"study": name, "points": list(points.values()), **versions, "program": program_digest()})
-    return Journal(out / f"{name}.points", identity, note)
+    asked = {"study": name, "settings": study.settings, "points": list(points.values())}
+    return Journal(out / f"{name}.points", to_json({**asked, **versions, "program": program_digest()}), note)
 
 
 def program_digest() -> str:

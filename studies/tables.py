@@ -10,6 +10,7 @@ from cyclopts import Parameter
 from ..geometry import InputError
 
 FieldModel = Literal["dipole", "cuboid", "fem", "auto"]
+Quantity = Literal["equilibria", "flight", "field"]
 PlateModel = Literal["none", "slab", "fem", "reduced", "auto"]
 
 

@@ -1,0 +1,145 @@
+"""The program from Python: what the command line does, with labelled results instead of files.
+
+from spinlev.studies.api import draw, equilibria, load_scene, simulate
+
+scene = load_scene("scenes/horizontal.toml")
+found = equilibria(scene, plate_model="none")    # an xarray.Dataset with units and error estimates
+flight = simulate(scene, 3.0, plate_model="none")
+draw(flight)["trajectory"]                       # a matplotlib figure
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+
+import xarray as xr
+from matplotlib.figure import Figure
+
+from ..dynamics import EquilibriumError, PlateMemory
+from ..fem.table import RotorTable
+from ..geometry import InputError, Scene, load_scene, parse_scene
+from ..geometry.scene import OffsetStart
+from .catalogue import CATALOGUE
+from .drawings import figures_of
+from .engine import Engine
+from .results import found_dataset, trajectory_dataset
+from .shelf import Shelf
+from .single import fly, surveyed
+from .sweep import forget, swept
+from .tables import FieldModel, PlateModel, Tables
+
+__all__ = [
+    "EquilibriumError",
+    "InputError",
+    "Scene",
+    "draw",
+    "equilibria",
+    "load_scene",
+    "parse_scene",
+    "plate_table",
+    "rotor_table",
+    "run_study",
+    "simulate",
+]
+
+
+def rotor_table(scene: Scene, model: FieldModel = "auto", rtol: float = 3e-6) -> RotorTable:
+    """The rotor's field: `evaluate(points)` gives B (n, 3) T and its gradient (n, 3, 3) T/m at points (n, 3) m.
+
+    Accurate to `rtol` wherever the floater can be; `relative_error(points)` is the estimate. Raises InputError for a
+    tolerance out of range and AccuracyError where it cannot be reached.
+    """
+    return Shelf(scene, Tables(model, rtol=rtol).checked()).table()
+
+
+def plate_table(
+    scene: Scene,
+    model: FieldModel = "auto",
+    plate_model: PlateModel = "auto",
+    rtol: float = 3e-6,
+    plate_rtol: float = 3e-3,
+) -> PlateMemory | None:
+    """The plate's currents around the place where the floater levitates, or None where none are modelled.
+
+    Its `table` holds the network, its `share` what the rotor drives, its `error` the estimated relative error.
+    """
+    shelf = Shelf(scene, Tables(model, plate_model, rtol, plate_rtol).checked())
+    return surveyed(shelf, shelf.table())[1]
+
+
+def equilibria(
+    scene: Scene,
+    model: FieldModel = "auto",
+    plate_model: PlateModel = "auto",
+    spin: float = 0.0,
+    rtol: float = 3e-6,
+    plate_rtol: float = 3e-3,
+) -> xr.Dataset:
+    """All synchronous equilibria, the stable ones first, with errors, growth and frequency of each small motion.
+
+    Parameters
+    ----------
+    spin : body spin S = Ω·m̂/ω
+
+    Returns
+    -------
+    Dataset over `equilibrium`, `mode` and `axis`, SI units. Raises EquilibriumError for a rotor at rest.
+    """
+    shelf = Shelf(scene, Tables(model, plate_model, rtol, plate_rtol).checked())
+    table = shelf.table()
+    found, memory = surveyed(shelf, table, spin)
+    labels = {"model": table.model, "plate_model": memory.model if memory else "none", "scene": scene.text}
+    return found_dataset(found.equilibria).assign_attrs(labels)
+
+
+def simulate(
+    scene: Scene,
+    duration: float,
+    model: FieldModel = "auto",
+    plate_model: PlateModel = "auto",
+    rtol: float = 3e-6,
+    plate_rtol: float = 3e-3,
+) -> xr.Dataset:
+    """The floater's motion for `duration` (s) from where the scene says.
+
+    Returns
+    -------
+    Dataset over `time`, SI units; how it ended and the violation of the energy ledger are attributes. Raises
+    EquilibriumError where the scene starts from an equilibrium and has none.
+    """
+    shelf = Shelf(scene, Tables(model, plate_model, rtol, plate_rtol).checked())
+    table = shelf.table()
+    if isinstance(scene.start, OffsetStart):
+        survey, memory = surveyed(shelf, table)
+        found = survey.equilibria
+    else:
+        found, memory = (), shelf.memory(table, ())
+    flight = fly(scene, table, duration, found, memory)
+    return trajectory_dataset(flight).assign_attrs(model=table.model, scene=scene.text)
+
+
+def run_study(
+    name: str,
+    quick: bool = True,
+    workers: int | None = 1,
+    scheduler: str | None = None,
+    out: str | Path = "out",
+) -> xr.Dataset:
+    """The result of a study of the catalogue; points finished before an interruption are kept in `out`.
+
+    More than one worker needs the caller's script to be guarded by `if __name__ == "__main__":`. Raises InputError for
+    an unknown name.
+    """
+    if name not in CATALOGUE:
+        raise InputError(f"Input name must be one of {', '.join(CATALOGUE)}; instead received {name}.")
+    study = CATALOGUE[name]
+    engine = Engine(workers, scheduler).checked()
+    result = swept(name, study, dict(enumerate(study.points(quick))), engine, Path(out))
+    forget(name, Path(out))
+    return result
+
+
+def draw(result: xr.Dataset) -> Mapping[str, Figure]:
+    """The figures of a result by name; a notebook shows them. Raises InputError where the result has no figure."""
+    return figures_of(result)
