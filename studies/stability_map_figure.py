@@ -77,11 +77,13 @@ def map_lines(result: xr.Dataset) -> list[str]:
     """Every rotor's intervals by both models, and where the plate below keeps or undoes stability."""
     lines = []
     for configuration in CONFIGURATIONS:
-        parts = {model: part_of(result, configuration, model) for model in MODELS}
-        for k in range(parts[MODELS[0]].sizes["case"]):
-            words = [f"{model} {_intervals(part.isel(case=k))}" for model, part in parts.items()]
-            head = f"{SYMBOLS[configuration]} = {float(parts[MODELS[0]]['measure'][k]):g} {UNITS[configuration]}"
-            lines.append(f"{head}: {'; '.join(words)}{_verdicts(parts[MODELS[-1]].isel(case=k))}")
+        both = result.isel(case=np.flatnonzero(result["configuration"].values == configuration))
+        for measure in np.unique(both["measure"].values):
+            rows = both.isel(case=np.flatnonzero(both["measure"].values == measure))
+            found = {str(m): rows.isel(case=k) for k, m in enumerate(rows["model"].values)}
+            words = [f"{model} {_intervals(one)}" for model, one in found.items()]
+            head = f"{SYMBOLS[configuration]} = {measure:g} {UNITS[configuration]}"
+            lines.append(f"{head}: {'; '.join(words)}{''.join(_verdicts(one) for one in found.values())}")
     return lines
 
 
