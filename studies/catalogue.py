@@ -6,7 +6,8 @@ from ..geometry import load_scene
 from . import design, dipole_vs_fem, sensitivity, stability_map
 from .design_figure import design_figure, design_lines
 from .dipole_validity import dipole_validity, validity_figure, validity_lines
-from .dipole_vs_fem_figure import dipole_figure, dipole_lines
+from .dipole_vs_fem_figure import dipole_figure
+from .dipole_vs_fem_report import dipole_lines
 from .drift import drift_study
 from .drift_figure import drift_figure, drift_lines
 from .field_hard_cases import field_hard_cases, hard_case_lines
