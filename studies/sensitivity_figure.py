@@ -121,13 +121,17 @@ def _by_measure(one: xr.Dataset, unit: str) -> str:
     slope = one["derivative"].sel(parameter="measure")
     doubt = one["derivative_error"].sel(parameter="measure")
     words = [
-        f"{name} {float(slope.sel(quantity=name)):+.3g} ± {float(doubt.sel(quantity=name)):.1g} Hz/{unit}"
+        f"{name} {float(slope.sel(quantity=name)):+.3g}{_doubt(float(doubt.sel(quantity=name)))} Hz/{unit}"
         for name in ("lowest", "highest")
     ]
     along = [1e3 * float(slope.sel(quantity=name)) for name in QUANTITIES[2:]]
     words += [f"distance {a:+.2f} mm/{unit} at {f:.0%} of the range" for a, f in zip(along, FRACTIONS, strict=True)]
     steepest = np.nanmax(np.abs(along))
     return "; ".join(words) + f"; 1 mm of distance is {1 / steepest:.2g} {unit}"
+
+
+def _doubt(error: float) -> str:
+    return f" ± {error:.1g}" if np.isfinite(error) else ""
 
 
 def _all(one: xr.Dataset) -> str:

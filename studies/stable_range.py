@@ -25,6 +25,8 @@ CONTACT, BORDER = "contact", "border"
 TOLERATED = 0.02
 """Growth that counts as stable, 1/s: more than what the error of finite elements makes of undamped motion."""
 STEPS = Steps(longest=0.1, turn=0.15, tolerated=TOLERATED)
+LONG_STEPS = Steps(longest=0.4, turn=0.3, tolerated=TOLERATED)
+"""For a branch that is known from one that is near."""
 UNIT = 50.0
 
 
@@ -86,7 +88,7 @@ def stable_range(scene: Scene, rates: Rates, start: Array, frequency: float) -> 
     return max(found, key=lambda run: run.high.parameter - run.low.parameter, default=None)
 
 
-def at_frequency(scene: Scene, rates: Rates, near: Point, frequency: float) -> Point:
+def at_frequency(scene: Scene, rates: Rates, near: Point, frequency: float, steps: Steps = STEPS) -> Point:
     """The equilibrium at one frequency (Hz) on the branch through another.
 
     Raises EquilibriumError where the branch does not reach it.
@@ -94,15 +96,17 @@ def at_frequency(scene: Scene, rates: Rates, near: Point, frequency: float) -> P
     family = Family(rates, frequencies(scene), UNIT)
     if frequency == near.parameter:
         return family.point(near.state[:3], near.state[6:9], frequency)
-    last = follow_branch(family, near.state, near.parameter, frequency, STEPS)[-1]
+    last = follow_branch(family, near.state, near.parameter, frequency, steps)[-1]
     if last.parameter != frequency:
         raise EquilibriumError(f"The branch of equilibria ends before {frequency:g} Hz.")
     return last
 
 
-def stability_end(scene: Scene, family: Family, start: Array, frequency: float, towards: float) -> Point:
+def stability_end(
+    scene: Scene, family: Family, start: Array, frequency: float, towards: float, steps: Steps = STEPS
+) -> Point:
     """The first fold, change of stability, contact or border that is met from `frequency` towards another (Hz)."""
-    return next(point for point in _side(scene, family, start, frequency, towards) if point.kind)
+    return next(point for point in _side(scene, family, start, frequency, towards, steps) if point.kind)
 
 
 def is_stable(point: Point) -> bool:
@@ -120,13 +124,15 @@ def _is_stable(run: Sequence[Point]) -> bool:
     return bool(inner) and all(is_stable(point) for point in inner)
 
 
-def _side(scene: Scene, family: Family, start: Array, frequency: float, end: float) -> list[Point]:
+def _side(
+    scene: Scene, family: Family, start: Array, frequency: float, end: float, steps: Steps = STEPS
+) -> list[Point]:
     """The branch from `frequency` towards `end`, to its first fold, contact or the border, which is marked."""
 
     def over(point: Point) -> bool:
         return point.kind == FOLD or gap(scene, point) < 0
 
-    points = follow_branch(family, start, frequency, end, STEPS, over)
+    points = follow_branch(family, start, frequency, end, steps, over)
     for k, point in enumerate(points):
         if point.kind == FOLD:
             return points[: k + 1]

@@ -12,7 +12,17 @@ from ..fem.models import rotor_table
 from ..geometry.box import Array
 from ..geometry.scene import Floater, Scene
 from .rotor_points import rotor_scene
-from .stable_range import HIGHEST, LOWEST, UNIT, StableRange, at_frequency, reference_state, stability_end, stable_range
+from .stable_range import (
+    HIGHEST,
+    LONG_STEPS,
+    LOWEST,
+    UNIT,
+    StableRange,
+    at_frequency,
+    reference_state,
+    stability_end,
+    stable_range,
+)
 
 MODEL = "cuboid"
 FRACTIONS = (0.1, 0.5, 0.9)
@@ -104,11 +114,13 @@ def levitation(base: Nominal, values: dict[str, float], shift: float = 0.0) -> A
     family = Family(rates, frequencies(scene), UNIT)
     row = np.full(len(QUANTITIES), np.nan)
     try:
-        ends = [stability_end(scene, family, middle.state, middle.parameter, end) for end in (LOWEST, HIGHEST)]
+        ends = [
+            stability_end(scene, family, middle.state, middle.parameter, end, LONG_STEPS) for end in (LOWEST, HIGHEST)
+        ]
     except EquilibriumError:
         return row
     row[:2] = [end.parameter for end in ends]
     for k, frequency in enumerate(base.grid + shift, 2):
         if row[0] < frequency < row[1]:
-            row[k] = at_frequency(scene, rates, middle, float(frequency)).distance
+            row[k] = at_frequency(scene, rates, middle, float(frequency), LONG_STEPS).distance
     return row
