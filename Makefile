@@ -5,7 +5,7 @@ BIN := $(VENV)/bin
 SOURCES := $(wildcard geometry/* fem/* dynamics/* studies/* scenes/*.toml) pyproject.toml README.md LICENSE
 PACKAGES := -p spinlev.geometry -p spinlev.fem -p spinlev.dynamics -p spinlev.studies
 
-.PHONY: install run test lint types bench docs validate lock clean
+.PHONY: install run test lint types bench docs validate fuzz lock clean
 
 install: $(VENV)/installed
 
@@ -43,6 +43,9 @@ validate: install
 
 bench: install
 	$(BIN)/pytest benchmarks --benchmark-columns=min,median,rounds
+
+fuzz: install
+	$(BIN)/python tests/fuzzing.py all 10000
 
 docs: install
 	$(BIN)/sphinx-build --fail-on-warning --quiet -b html docs docs/_build/html

@@ -2,36 +2,46 @@
 
 from .arclength import Steps, follow_branch
 from .averaged import Drift
+from .boundary import BoundaryPoint, Plane, follow_boundary
 from .branch import Family, Point
 from .checkpoint import Checkpoint
 from .drift import drift
 from .equilibria import find_equilibria, survey, with_plate
 from .equilibrium import Equilibrium, EquilibriumError, ForceCurve, Survey
+from .equilibrium_map import EquilibriumMap, equilibrium_map
 from .flight_kind import flight_kind
 from .memory import PlateMemory
 from .rates import Rates
+from .rotor_family import RotorFamily, rotor_family
 from .simulation import StartError, initial_state, simulate, starting_point
 from .trajectory import Trajectory
 
 __all__ = [
+    "BoundaryPoint",
     "Checkpoint",
     "Drift",
     "Equilibrium",
     "EquilibriumError",
+    "EquilibriumMap",
     "Family",
     "ForceCurve",
+    "Plane",
     "PlateMemory",
     "Point",
     "Rates",
+    "RotorFamily",
     "StartError",
     "Steps",
     "Survey",
     "Trajectory",
     "drift",
+    "equilibrium_map",
     "find_equilibria",
     "flight_kind",
+    "follow_boundary",
     "follow_branch",
     "initial_state",
+    "rotor_family",
     "simulate",
     "starting_point",
     "survey",

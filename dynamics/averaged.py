@@ -27,7 +27,7 @@ BALANCE, DURATION, INSTABILITY, CONTACT = "balance", "duration", "instability", 
 SETTLED = 1e-3
 """A balance is reached where ds/dt has fallen to this part of what it was at the start."""
 E_FOLDS = 7.0
-"""Growth after which a disturbance has ended the flight: from micrometres to millimetres."""
+"""Growth after which a disturbance has ended the flight, unless it is given: from 3 µm to 3 mm."""
 SAMPLES = 400
 ESCAPE = 3.40922
 """Where the solution of y'' = t + y² that comes from y = -√(-t) becomes infinite; found numerically."""
@@ -70,16 +70,16 @@ class Drift:
         return float((ends[1] - ends[0]) / (times[1] - times[0]))
 
 
-def steady(start: Point, duration: float) -> Drift:
+def steady(start: Point, duration: float, e_folds: float = E_FOLDS) -> Drift:
     """A flight on which nothing moves the spin."""
     growth = max(0.0, start.growth_per_s - start.doubt_per_s)
-    ended = INSTABILITY if growth * duration > E_FOLDS else DURATION
-    time = np.array([0.0, E_FOLDS / growth if ended == INSTABILITY else duration])
+    ended = INSTABILITY if growth * duration > e_folds else DURATION
+    time = np.array([0.0, e_folds / growth if ended == INSTABILITY else duration])
     spin, distance, rate = (np.full(2, value) for value in (start.spin, start.distance, start.growth_per_s))
     return Drift(time, spin, distance, rate, ended, np.nan, np.nan)
 
 
-def flown(torque: SlowTorque, points: list[Point], duration: float, end: str) -> Drift:
+def flown(torque: SlowTorque, points: list[Point], duration: float, end: str, e_folds: float = E_FOLDS) -> Drift:
     """The flight along the points of a branch, to its `end` or to what comes first."""
     arc, course = _course(points)
     pace = CubicSpline(arc, [torque(p.state) for p in points])
@@ -94,7 +94,7 @@ def flown(torque: SlowTorque, points: list[Point], duration: float, end: str) ->
         end: lambda _, y: y[0] - arc[-1],
         BALANCE: lambda _, y: abs(float(pace(y[0]))) / first - SETTLED,
         DURATION: lambda _, y: y[1] - duration if np.isfinite(duration) else -1.0,
-        INSTABILITY: lambda _, y: y[2] - E_FOLDS,
+        INSTABILITY: lambda _, y: y[2] - e_folds,
     }
     for limit in limits.values():
         limit.terminal = True  # type: ignore[attr-defined]
@@ -103,7 +103,12 @@ def flown(torque: SlowTorque, points: list[Point], duration: float, end: str) ->
         change, span, [0.0, 0.0, 0.0], "LSODA", events=list(limits.values()), rtol=1e-9, atol=1e-12, dense_output=True
     )
     ended = next(name for name, hits in zip(limits, found.t_events, strict=True) if len(hits))
-    lengths, times, _ = found.sol(np.linspace(0.0, found.t[-1], SAMPLES))
+    lengths, times, folds = found.sol(np.linspace(0.0, found.t[-1], SAMPLES))
+    rate = float(growth(lengths[-1]))
+    if ended == BALANCE and rate > points[-1].doubt_per_s:  # it stays there only until this has grown
+        wait = (e_folds - folds[-1]) / rate
+        ended = INSTABILITY if times[-1] + wait < duration else DURATION
+        lengths, times = np.append(lengths, lengths[-1]), np.append(times, min(times[-1] + wait, duration))
     spin, distance = course(lengths).T
     balances = pace.roots(extrapolate=False)
     return Drift(

@@ -8,7 +8,8 @@ The torque of drag along the moment is left out: it moves s, slowly; s is what t
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,7 +32,7 @@ class Balance:
     Parameters
     ----------
     rates : compiled rates and their derivatives
-    values : their parameters, with the drag along the moment left out
+    values : their parameters, with the drag along the moment left out: (p,), or (n, p) where every point has its own
     spin : body spin s = Ω·m̂/ω
     """
 
@@ -39,9 +40,18 @@ class Balance:
     values: Array
     spin: float
 
+    @property
+    def rate(self) -> Array:
+        """The rotor's rate, (1,) or (n, 1)."""
+        return np.asarray(self.values[..., [Parameter.RATE]])
+
+    def at(self, rows: NDArray[Any]) -> Balance:
+        """The balance of some of the points only."""
+        return self if self.values.ndim == 1 else replace(self, values=self.values[rows])
+
     def states(self, position: Array, moment: Array) -> Array:
         """States (n, 12) at rest in the rotor's frame at positions and moments (n, 3)."""
-        rate = self.values[Parameter.RATE]
+        rate = self.rate
         velocity = rate * np.stack([-position[:, 1], position[:, 0], 0 * position[:, 0]], axis=1)
         spin = rate * ((self.spin - moment[:, 2:]) * moment + np.array([0.0, 0.0, 1.0]))
         return np.concatenate([position, velocity, moment, spin], axis=1)
@@ -65,10 +75,10 @@ class Balance:
 
     def _directions(self, moment: Array, tangents: Array) -> Array:
         """Change of the state (n, 12, 5) by each unknown."""
-        rate = self.values[Parameter.RATE]
+        rate = self.rate
         change = np.zeros((len(moment), 12, 5))
         change[:, [0, 1, 2], [0, 1, 2]] = 1.0
-        change[:, 4, 0], change[:, 3, 1] = rate, -rate
+        change[:, 4, 0], change[:, 3, 1] = rate[..., 0], -rate[..., 0]
         change[:, 6:9, 3:] = np.swapaxes(tangents, 1, 2)
         for k in range(2):
             tilt = tangents[:, k]
@@ -118,7 +128,7 @@ def solve(
     length = np.full(len(position), np.inf)
     active = np.arange(len(position))
     for _ in range(iterations):
-        value, slope = balance(position[active], moment[active])
+        value, slope = balance.at(active)(position[active], moment[active])
         step = np.zeros((len(active), 5))
         good = np.isfinite(slope).all(axis=(1, 2))
         step[np.ix_(good, free)] = -_divided(slope[good][:, free[:, None], free], value[good][:, free])

@@ -15,7 +15,7 @@ import numpy as np
 from ..fem.table import FieldTable
 from ..geometry.scene import Scene
 from .arclength import Steps, follow_branch
-from .averaged import BALANCE, CONTACT, Drift, flown, steady
+from .averaged import BALANCE, CONTACT, E_FOLDS, Drift, flown, steady
 from .branch import FOLD, Family, Point, spins
 from .equilibria import find_equilibria
 from .equilibrium import Equilibrium, EquilibriumError
@@ -33,6 +33,7 @@ def drift(
     rates: Rates | None = None,
     start: State | None = None,
     stokes: bool = False,
+    e_folds: float = E_FOLDS,
 ) -> Drift:
     """Follow the stable equilibrium of a scene while its body spin drifts.
 
@@ -45,6 +46,7 @@ def drift(
     rates : `Rates` of the same table, to compile them once for many scenes
     start : the equilibrium at `spin`, if it is known; else the one at which small motions grow the slowest
     stokes : drag proportional to spin, as in `simulate`, instead of `air_torque`
+    e_folds : growth of a small motion after which it has ended the flight
 
     Raises
     ------
@@ -55,7 +57,7 @@ def drift(
     family = Family(rates, spins(scene))
     state = Scales.of(scene).pack(start or _start(scene, table, spin, rates).state)
     if torque.absent:
-        return steady(family.point(state[:3], state[6:9], spin), duration)
+        return steady(family.point(state[:3], state[6:9], spin), duration, e_folds)
     towards = spin + np.copysign(3.0, torque(state))
 
     def over(point: Point) -> bool:
@@ -64,8 +66,8 @@ def drift(
     points = follow_branch(family, state, spin, towards, Steps(longest=0.03, turn=0.05), over)
     fold = next((k for k, point in enumerate(points) if point.kind == FOLD), None)
     if fold is not None:
-        return flown(torque, points[: fold + 1], duration, FOLD)
-    return flown(torque, points, duration, CONTACT if _touches(scene, points[-1]) else BALANCE)
+        return flown(torque, points[: fold + 1], duration, FOLD, e_folds)
+    return flown(torque, points, duration, CONTACT if _touches(scene, points[-1]) else BALANCE, e_folds)
 
 
 def _start(scene: Scene, table: FieldTable, spin: float, rates: Rates) -> Equilibrium:

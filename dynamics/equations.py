@@ -27,7 +27,7 @@ import heyoka as hy
 import numpy as np
 
 from ..fem.sphere_eddy import rotating_torque
-from ..fem.table import FieldTable
+from ..fem.table import FieldFormula
 from ..geometry.box import Array
 from ..geometry.scene import Scene
 from .memory import PlateMemory, memory_terms
@@ -79,7 +79,7 @@ def parameters(scene: Scene, scales: Scales, frozen_spin: bool = False) -> Array
 
 
 def equations_of_motion(
-    table: FieldTable, tilted_gravity: bool = False, memory: PlateMemory | None = None, conducting: bool = False
+    table: FieldFormula, tilted_gravity: bool = False, memory: PlateMemory | None = None, conducting: bool = False
 ) -> Equations:
     """Rates of the scaled state in the field of a table.
 

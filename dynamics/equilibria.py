@@ -59,7 +59,7 @@ def survey(
     -------
     Equilibria, the stable ones first, then by distance, accurate to round-off in the table's field: every curve of
     lateral balance that is met from some four thousand starts is followed, and every zero of the axial force on it is
-    polished.
+    polished; so is what Newton's method finds directly from these starts.
 
     Raises
     ------
@@ -69,16 +69,28 @@ def survey(
     scales = Scales.of(scene)
     values, rates = parameters(scene, scales, frozen_spin=True), rates or Rates.of(scene, table)
     balance = Balance(rates, values, spin)
-    where = SearchRange(scene, farthest)
-    curves = all_curves(balance, where)
-    guesses = [curve.balanced() for curve in curves]
-    position = np.concatenate([np.zeros((0, 3)), *(p for p, _ in guesses)])
-    moment = np.concatenate([np.zeros((0, 3)), *(m for _, m in guesses)])
-    points = _polished(balance, position, moment)
-    found = [_equilibrium(table, scales, balance, r, m) for r, m in points if r in where]
+    curves, points = fixed_points(balance, SearchRange(scene, farthest))
+    found = [_equilibrium(table, scales, balance, r, m) for r, m in points]
     if np.any(scene.gravity[:2]):
         found = _shaken(Shaken(scene, rates, values, None), found)
     return Survey(_in_order(found), tuple(_force_curve(scene, scales, curve) for curve in curves))
+
+
+def fixed_points(balance: Balance, where: SearchRange) -> tuple[list[Curve], list[tuple[Array, Array]]]:
+    """Curves of lateral balance in the range, and the scaled positions and moments of the equilibria on them."""
+    curves = all_curves(balance, where)
+    guesses = [*(curve.balanced() for curve in curves), _scattered(balance, where)]
+    position, moment = (np.concatenate(part) for part in zip(*guesses, strict=True))
+    return curves, [(r, m) for r, m in _polished(balance, position, moment) if r in where]
+
+
+def _scattered(balance: Balance, where: SearchRange) -> tuple[Array, Array]:
+    """What Newton's method in all five unknowns finds from the starts: short curves may pass between them."""
+    with np.errstate(all="ignore"):  # many of these starts run away
+        position, moment, step = solve(balance, *where.starts(), EVERY, 25)
+    points = np.concatenate([position, moment], axis=1)[(step < 1e-8) & where.holds(position)]
+    _, first = np.unique(points.round(6), axis=0, return_index=True)
+    return points[first, :3], points[first, 3:]
 
 
 def with_plate(

@@ -7,11 +7,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..geometry.box import Array
+from ..geometry.input_error import ComputationError
 from .mode_names import Mode
 from .state import State
 
 
-class EquilibriumError(RuntimeError):
+class EquilibriumError(ComputationError):
     """There is no synchronous equilibrium, or not of the kind that was asked for."""
 
 

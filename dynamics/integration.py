@@ -13,6 +13,7 @@ import heyoka as hy
 import numpy as np
 
 from ..geometry.box import Array
+from ..geometry.input_error import ComputationError
 from ..geometry.scene import Scene
 from .checkpoint import Checkpoint, Progress
 from .events import CONTACT, clearance, plate_legs, plate_places
@@ -34,7 +35,7 @@ MOST_SAMPLES = 20000
 SAMPLES_PER_TURN = 32
 
 
-class IntegrationError(RuntimeError):
+class IntegrationError(ComputationError):
     """The motion could not be integrated."""
 
 

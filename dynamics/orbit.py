@@ -73,11 +73,11 @@ def periodic_orbit(rates: Rates, values: Array, spin: float, plate: PlateForce |
 
 
 def _newton(rates: Rates, values: Array, spin: float, plate: PlateForce | None, states: Array) -> Orbit | None:
-    problem = _Problem(rates, values, plate, len(states))
+    problem = OrbitProblem(rates, values, plate, len(states))
     states, size = states.copy(), np.inf
     for _ in range(25):
         residual, slope = problem(states)
-        rows, aims = _kept(states, spin * abs(values[Parameter.RATE]))
+        rows, aims = kept(states, spin * abs(values[Parameter.RATE]))
         if not np.isfinite(slope).all():
             return None
         matrix, target = np.vstack([slope, rows]), -np.append(residual, aims)
@@ -93,7 +93,7 @@ def _newton(rates: Rates, values: Array, spin: float, plate: PlateForce | None, 
     return Orbit(states, *problem.whole(states), max(size, tail))
 
 
-def _kept(states: Array, spin: float) -> tuple[Array, Array]:
+def kept(states: Array, spin: float) -> tuple[Array, Array]:
     """Derivatives (2, 12 n) and values (2,) of |m̂|²/2 - 1/2 and Ω·m̂ - s at the first instant."""
     moment, turning = states[0, 6:9], states[0, 9:]
     rows = np.zeros((2, states.size))
@@ -102,7 +102,7 @@ def _kept(states: Array, spin: float) -> tuple[Array, Array]:
 
 
 @dataclass(frozen=True, eq=False)
-class _Problem:
+class OrbitProblem:
     """Equations of an orbit at `count` instants of a turn."""
 
     rates: Rates
@@ -112,6 +112,7 @@ class _Problem:
 
     @property
     def times(self) -> Array:
+        """(n,) scaled."""
         return 2 * np.pi * np.arange(self.count) / self.count
 
     def __call__(self, states: Array) -> tuple[Array, Array]:

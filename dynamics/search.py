@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..geometry.box import Array
 from ..geometry.scene import Scene
@@ -26,11 +27,16 @@ class SearchRange:
 
     def __contains__(self, position: Array) -> bool:
         """Whether a scaled position (3,) belongs to the range."""
+        return bool(self.holds(position[None])[0])
+
+    def holds(self, position: Array) -> NDArray[np.bool_]:
+        """Which of the scaled positions (n, 3) belong to the range: (n,)."""
         radius = self.scene.floater.radius
-        bound = self.farthest / radius
-        if not -bound <= position[2] <= 0 or np.hypot(position[0], position[1]) > bound:
-            return False
-        return all(magnet.box.distance(position * radius) > radius for magnet in self.scene.rotor)
+        bound, height = self.farthest / radius, position[:, 2]
+        inside = (-bound <= height) & (height <= 0) & (np.hypot(position[:, 0], position[:, 1]) <= bound)
+        for magnet in self.scene.rotor:
+            inside &= magnet.box.distance(position * radius) > radius
+        return np.asarray(inside)
 
     def starts(self) -> tuple[Array, Array]:
         """Scaled positions and moments (n, 3) below the rotor and beside it, in fourteen directions each."""

@@ -27,6 +27,8 @@ from .trajectory import Trajectory
 
 PLATE_TOLERANCE = 1e-13
 """Of a Taylor step with a plate, whose table is known to 1e-4 at best."""
+SLOWLY = 1 / 3
+"""Growth (1/s) with which a flight may still begin: an e-fold in the shortest flight that counts, 3 s."""
 FREQUENCY_RATIO, FREQUENCY_TRIALS = 1.08, 9
 """Steps in which a frequency that works is looked for: up and down by a factor of two."""
 
@@ -86,9 +88,8 @@ def initial_state(
     """State at t = 0, when the rotor's frame is the laboratory's, and the plate's states (k,), √J.
 
     An `OffsetStart` displaces the stable equilibrium in the rotor's frame and keeps the floater at rest in it; among
-    several it takes the nearest; where there is none, one that only the plate's currents make unstable.  An absolute
-    start finds the plate as if the floater had long turned with the rotor there.  `equilibria` are found if they are
-    not given.
+    several it takes the nearest; where there is none, what `starting_point` says.  An absolute start finds the plate as
+    if the floater had long turned with the rotor there.  `equilibria` are found if they are not given.
 
     Raises
     ------
@@ -121,9 +122,14 @@ def initial_state(
 
 
 def starting_point(equilibria: Sequence[Equilibrium]) -> Equilibrium | None:
-    """The nearest stable equilibrium, or else the nearest that is stable without the plate."""
+    """The nearest stable equilibrium, or else the nearest that only the plate, or only slowly something, undoes.
+
+    The floater's own eddy currents do so slowly, in minutes.
+    """
     stable = [e for e in equilibria if e.stable]
-    return next(iter([*stable, *(e for e in equilibria if e.without and e.without.stable)]), None)
+    without = [e for e in equilibria if e.without and e.without.stable]
+    slowly = [e for e in equilibria if e.growth_per_s < SLOWLY]
+    return next(iter([*stable, *without, *slowly]), None)
 
 
 def _displaced(scene: Scene, start: State, offset: Array) -> State:

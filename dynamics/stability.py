@@ -55,22 +55,35 @@ def modes(state: Array, slope: Array) -> Modes:
     state : (12,) scaled equilibrium
     slope : (12, 12) derivatives of its rates, drag along the moment left out
     """
-    tangent, projection = tangent_space(state)
-    matrix = projection @ slope @ tangent
-    values, right = np.linalg.eig(matrix)
+    values, errors, shapes = spectra(state[None], slope[None])
+    return Modes(values[0], errors[0], shapes[0])
+
+
+def spectra(states: Array, slopes: Array) -> tuple[Array, Array, Array]:
+    """`modes` of many equilibria in one call: eigenvalues (n, 10), their errors (n, 10) and shapes (n, 12, 10)."""
+    tangents, projections = tangent_spaces(states)
+    matrices = projections @ slopes @ tangents
+    values, right = np.linalg.eig(matrices)
     left = np.linalg.pinv(right)
-    condition = np.linalg.norm(left, axis=1) * np.linalg.norm(right, axis=0)
-    round_off = 100 * np.finfo(float).eps * np.linalg.norm(matrix)
-    return Modes(values, np.minimum(round_off * condition, 1e-6), tangent @ right)
+    condition = np.linalg.norm(left, axis=2) * np.linalg.norm(right, axis=1)
+    round_off = 100 * np.finfo(float).eps * np.linalg.norm(matrices, axis=(1, 2))[:, None]
+    return values.astype(complex), np.minimum(round_off * condition, 1e-6), tangents @ right
 
 
 def tangent_space(state: Array) -> tuple[Array, Array]:
     """Ten directions (12, 10) and the projection (10, 12) on their coordinates."""
-    moment, spin = state[6:9], state[9:]
-    across = tangent_basis(moment[None])[0]
-    tangent, projection = np.zeros((12, 10)), np.zeros((10, 12))
-    tangent[:6, :6] = projection[:6, :6] = np.eye(6)
-    tangent[6:9, 6:8] = tangent[9:, 8:] = across.T
-    tangent[9:, 6:8] = -np.outer(moment, across @ spin)  # what the tilt takes from Ω·m̂ is given back
-    projection[6:8, 6:9] = projection[8:, 9:] = across
-    return tangent, projection
+    tangents, projections = tangent_spaces(state[None])
+    return tangents[0], projections[0]
+
+
+def tangent_spaces(states: Array) -> tuple[Array, Array]:
+    """The same of many states: (n, 12, 10) and (n, 10, 12)."""
+    moment, spin = states[:, 6:9], states[:, 9:]
+    across = tangent_basis(moment)
+    tangents, projections = np.zeros((len(states), 12, 10)), np.zeros((len(states), 10, 12))
+    tangents[:, :6, :6] = projections[:, :6, :6] = np.eye(6)
+    tangents[:, 6:9, 6:8] = tangents[:, 9:, 8:] = np.swapaxes(across, 1, 2)
+    lost = np.einsum("nka,na->nk", across, spin)  # what the tilt takes from Ω·m̂ is given back
+    tangents[:, 9:, 6:8] = -moment[:, :, None] * lost[:, None, :]
+    projections[:, 6:8, 6:9] = projections[:, 8:, 9:] = across
+    return tangents, projections

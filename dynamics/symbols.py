@@ -11,10 +11,11 @@ Vector = Sequence[hy.expression]
 
 
 class Parameter(IntEnum):
-    """Places of the runtime parameters; free of units but LENGTH (m), TORQUE (1/T), TIME (s) and the last.
+    """Places of the runtime parameters; free of units but LENGTH (m), TORQUE (1/T), TIME (s) and the last ones.
 
     PLATE_MOMENT is the floater's moment by the root of the unit of energy (A m²/√J), PLATE_SHARE one by that root.
     TILT_EDDY and SPIN_EDDY are the floater's own eddy currents, 1/T²: accelerations by unit field and relative turn.
+    MEASURE is that of a rotor whose shape is a parameter, m or rad (`rotor_family`); no other rotor has it.
     """
 
     RATE = 0
@@ -35,6 +36,7 @@ class Parameter(IntEnum):
     PLATE_SHARE = auto()
     TILT_EDDY = auto()
     SPIN_EDDY = auto()
+    MEASURE = auto()
 
 
 def dot(a: Vector, b: Vector) -> hy.expression:

@@ -24,6 +24,7 @@ import numpy as np
 from ..geometry.box import Array
 from ..geometry.conductor_mesh import MILLIMETRE, ConductorMesh
 from ..geometry.magnet import MU_0
+from .condensed import solve_condensed
 from .eddy_space import EddySpace, Source
 from .phasor import ComplexArray
 
@@ -138,14 +139,5 @@ class FrequencySystem:
         """Solutions (sources, unknowns), T m, and the number of coupling unknowns."""
         free = self.space.free_unknowns(parity_class, self.fes)
         inverse = self.form.mat.Inverse(free, inverse="sparsecholesky")
-        right, solution = ngsolve.GridFunction(self.fes), ngsolve.GridFunction(self.fes)
-        condensed = right.vec.CreateVector()
-        found = np.zeros(loads.shape, complex)
-        for row, load in zip(found, loads, strict=True):
-            right.vec.FV().NumPy()[:] = -self.rate / MILLIMETRE * load
-            condensed.data = right.vec + self.form.harmonic_extension_trans * right.vec
-            solution.vec.data = inverse * condensed
-            solution.vec.data += self.form.inner_solve * right.vec
-            solution.vec.data += self.form.harmonic_extension * solution.vec
-            row[:] = solution.vec.FV().NumPy()
-        return found, sum(free)
+        right = np.asarray(-self.rate / MILLIMETRE * loads, np.complex128)
+        return solve_condensed(self.form, inverse, right), sum(free)

@@ -19,6 +19,7 @@ import numpy as np
 from ..geometry.box import Array
 from ..geometry.conductor_mesh import MILLIMETRE
 from ..geometry.magnet import MU_0
+from .condensed import solve_condensed
 from .eddy_space import EddySpace, Source
 
 GAMMA = 1 - np.sqrt(0.5)
@@ -72,18 +73,9 @@ class TimeStepper:
 
     def _solve(self, right: Array) -> Array:
         """A (classes, unknowns) of (M + γ Δt K) A = right."""
-        form = self._form
-        given, solution = ngsolve.GridFunction(self.space.real), ngsolve.GridFunction(self.space.real)
-        condensed = given.vec.CreateVector()
-        found = np.zeros_like(right)
-        for row, load, inverse in zip(found, right, self._inverses, strict=True):
-            given.vec.FV().NumPy()[:] = MU_0 / (GAMMA * self.step * MILLIMETRE) * load
-            condensed.data = given.vec + form.harmonic_extension_trans * given.vec
-            solution.vec.data = inverse * condensed
-            solution.vec.data += form.inner_solve * given.vec
-            solution.vec.data += form.harmonic_extension * solution.vec
-            row[:] = solution.vec.FV().NumPy()
-        return found
+        loads = MU_0 / (GAMMA * self.step * MILLIMETRE) * right
+        pairs = zip(self._inverses, loads, strict=True)
+        return np.concatenate([solve_condensed(self._form, inverse, load[None]) for inverse, load in pairs])
 
     def _massive(self, reaction: Array) -> Array:
         mass = self._mass.mat

@@ -12,12 +12,12 @@ import numpy as np
 
 from ..geometry.box import Array, frozen_array
 from ..geometry.magnet import MU_0, Magnet
+from .harmonic_sums import harmonic_sums
 from .harmonics import (
     Coefficients,
     derivative,
     field_sizes,
     field_spectrum,
-    irregular,
     outer_sums,
     real_terms,
     regular,
@@ -26,6 +26,8 @@ from .harmonics import (
 )
 
 FOUR_PI = 4 * np.pi
+UPPER = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2))
+"""Entries of the gradient that determine the rest: it is symmetric and traceless."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,7 +67,7 @@ class MultipoleExpansion:
         return FOUR_PI * self.radius**3 / MU_0 * np.array([-2 * c[1].real, 2 * c[1].imag, c[0].real])
 
     @cached_property
-    def _components(self) -> tuple[list[dict[Any, float]], list[list[dict[Any, float]]]]:
+    def components(self) -> tuple[list[dict[Any, float]], list[list[dict[Any, float]]]]:
         """Real-harmonic weights of B_i and of ∂B_i/∂x̃_j."""
         potentials = [-derivative(self.coefficients, i) for i in range(3)]
         gradients = [[real_terms(derivative(p, j)) for j in range(3)] for p in potentials]
@@ -74,19 +76,12 @@ class MultipoleExpansion:
     def expressions(self, position: Sequence[hy.expression]) -> tuple[list[hy.expression], list[list[hy.expression]]]:
         """B (T) and ∂B_i/∂x_j (T/m) at a position (three expressions, m, rotor's frame)."""
         scaled = [(position[i] - float(self.center[i])) * (1.0 / self.radius) for i in range(3)]
-        fields, gradients = self._components
-        orders = {key[1] for row in gradients for terms in row for key in terms} | {key[1] for t in fields for key in t}
-        harmonics = irregular(self.degree + 2, scaled, sorted(orders))
-        zero = hy.expression(0.0)
-
-        def combine(terms: dict[Any, float], factor: float) -> hy.expression:
-            return hy.sum([(factor * weight) * harmonics[key] for key, weight in terms.items()]) if terms else zero
-
-        upper = {(i, j): combine(gradients[i][j], 1.0 / self.radius) for i in range(3) for j in range(i, 3)}
-        return (
-            [combine(terms, 1.0) for terms in fields],
-            [[upper[min(i, j), max(i, j)] for j in range(3)] for i in range(3)],
-        )
+        fields, gradients = self.components
+        slopes = [{k: w / self.radius for k, w in gradients[i][j].items()} for i, j in UPPER]
+        sums = harmonic_sums(scaled, [*fields, *slopes])
+        upper = dict(zip(UPPER, sums[3:], strict=True))
+        upper[2, 2] = -upper[0, 0] - upper[1, 1]
+        return sums[:3], [[upper[min(i, j), max(i, j)] for j in range(3)] for i in range(3)]
 
     def evaluate(self, points: Array) -> tuple[Array, Array]:
         """B (n, 3) T and ∂B_i/∂x_j (n, 3, 3) T/m at points (n, 3) m, without compilation."""

@@ -19,10 +19,11 @@ from ..geometry.plate_mesh import MeshRule
 from ..geometry.scene import Plate
 from .accuracy_error import AccuracyError
 from .eddy_space import EddySpace, Source
+from .network_error import truncated
 from .plate import raise_order
 from .plate_region import Region
 from .plate_snapshots import Group, group_rows
-from .plate_training import OtherSources, prepare_training, truncated
+from .plate_training import OtherSources, prepare_training
 
 MESH_SHARE, NETWORK_SHARE = 0.6, 0.9
 """Shares of the tolerance for the finite elements, and for them and the truncated basis together; the rest is the

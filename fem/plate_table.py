@@ -2,21 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-import heyoka as hy
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..geometry.box import Array, frozen_array
-from .compiled import FieldExpressions
 from .field_functions import Multipoles
 from .phasor import ComplexArray
 from .plate_region import Region
 from .table import RangeError
-
-Vector = Sequence[hy.expression]
 
 
 @dataclass(frozen=True)
@@ -125,39 +121,3 @@ class PlateTable:
             )
         omega = 2 * np.pi * frequency
         return np.asarray(-1j * omega / (self.rates + 1j * omega))
-
-    def expressions(self, position: Vector) -> list[FieldExpressions]:
-        """b_i and its gradient of every state as heyoka expressions of a position (m, plate's frame).
-
-        `interaction` says the same of all states together, at a quarter of the operations.
-        """
-        parts = self.multipoles.expressions(position)
-        found = []
-        for row in self.weights:
-            terms = [(float(w), part) for w, part in zip(row, parts, strict=True) if w]
-            b = [hy.sum([w * part[0][i] for w, part in terms]) for i in range(3)]
-            gradient = [[hy.sum([w * part[1][i][j] for w, part in terms]) for j in range(3)] for i in range(3)]
-            found.append((b, gradient))
-        return found
-
-    def interaction(self, position: Vector, moment: Vector, currents: Vector) -> tuple[Vector, FieldExpressions]:
-        """Signals s_i = b_i·m of a dipole, and the field Σ y_i b_i with its gradient at its place, as expressions.
-
-        Parameters
-        ----------
-        position : (3) m, plate's frame
-        moment : (3) A m², along the plate's axes
-        currents : (states) y_i, √J
-        """
-        parts = self.multipoles.expressions(position)
-        heard = [hy.sum([moment[i] * b[i] for i in range(3)]) for b, _ in parts]
-        signals = [hy.sum([float(w) * h for w, h in zip(row, heard, strict=True) if w]) for row in self.weights]
-        strengths = [
-            hy.sum([float(w) * y for w, y in zip(column, currents, strict=True) if w]) for column in self.weights.T
-        ]
-        pairs = list(zip(strengths, parts, strict=True))
-        b = [hy.sum([strength * part[0][i] for strength, part in pairs]) for i in range(3)]
-        gradient = [
-            [hy.sum([strength * part[1][i][j] for strength, part in pairs]) for j in range(3)] for i in range(3)
-        ]
-        return signals, (b, gradient)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -10,6 +10,7 @@ from scipy.stats import qmc
 
 from ..geometry.box import Array
 from .eddy_space import EddySpace, Source
+from .network_error import coupling_error
 from .phasor import ComplexArray
 from .plate_region import Region
 from .plate_snapshots import SourceModes, group_rows, parity_groups, solve_modes, source_modes
@@ -128,37 +129,3 @@ def unit_power(power: Array, others: int) -> Array:
     dipoles = len(power) - others
     place = np.repeat(power[:dipoles].reshape(-1, 3).sum(axis=1), 3)
     return np.asarray(1 / np.sqrt(np.concatenate([place, power[dipoles:]])))
-
-
-def coupling_error(found: ComplexArray, truth: ComplexArray, places: int) -> float:
-    """Largest relative error of own tensors and of other sources' fields, in couplings (sources, sources).
-
-    Three dipoles at each of some places come first, then the others.
-    """
-    pairs = zip(_seen(found, places), _seen(truth, places), strict=True)
-    return max(float(_relative(f, t).max(initial=0.0)) for f, t in pairs)
-
-
-def _seen(couplings: ComplexArray, places: int) -> tuple[ComplexArray, ComplexArray]:
-    """Own tensors (places, 9), and fields (other sources, components at all places)."""
-    n = places
-    blocks = couplings[: 3 * n, : 3 * n].reshape(n, 3, n, 3)
-    return np.einsum("iaib->iab", blocks).reshape(n, 9), couplings[3 * n :, : 3 * n]
-
-
-def _relative(found: ComplexArray, truth: ComplexArray) -> Array:
-    return np.asarray(np.linalg.norm(found - truth, axis=1) / np.linalg.norm(truth, axis=1))
-
-
-def truncated(
-    worst: Callable[[Sequence[OrderedBasis]], float], basis: Sequence[OrderedBasis], tolerance: float
-) -> tuple[list[OrderedBasis], float]:
-    """The fewest leading fields whose `worst` error meets the tolerance, and that error."""
-    levels = np.sort(np.concatenate([part.energies for part in basis]))[::-1]
-    low, high = 0, len(levels) - 1
-    while low < high:
-        middle = (low + high) // 2
-        error = worst([part.leading(levels[middle]) for part in basis])
-        low, high = (low, middle) if error <= tolerance else (middle + 1, high)
-    chosen = [part.leading(levels[low]) for part in basis]
-    return chosen, worst(chosen)

@@ -16,10 +16,11 @@ from ..geometry.box import Array
 from ..geometry.scene import Plate
 from .accuracy_error import AccuracyError
 from .eddy_space import Source
+from .network_error import coupling_error, truncated
 from .phasor import ComplexArray
 from .plate_reduction import NETWORK_SHARE, checked_ranges
 from .plate_region import Region
-from .plate_training import OtherSources, coupling_error, probe_places, truncated, unit_power
+from .plate_training import OtherSources, probe_places, unit_power
 from .pod import OrderedBasis
 from .slab import reaction_tensor
 from .slab_frame import SlabFrame, corners, slab_frame

@@ -28,15 +28,19 @@ class RangeError(InputError):
     """A field was asked for where the table does not know it."""
 
 
-class FieldTable(Protocol):
+class FieldFormula(Protocol):
+    """A field that the equations of motion can be written with."""
+
+    def expressions(self, position: Sequence[hy.expression]) -> FieldExpressions:
+        """B and its gradient as heyoka expressions of a position (m, rotor's frame)."""
+
+
+class FieldTable(FieldFormula, Protocol):
     """What the dynamics asks of a rotor's field; a new field model is one class with these members."""
 
     @property
     def model(self) -> str:
         """Name of the model."""
-
-    def expressions(self, position: Sequence[hy.expression]) -> FieldExpressions:
-        """B and its gradient as heyoka expressions of a position (m, rotor's frame)."""
 
     def evaluate(self, points: ArrayLike) -> tuple[Array, Array]:
         """B (n, 3) T and ∂B_i/∂x_j (n, 3, 3) T/m at points (n, 3) m in the rotor's frame."""

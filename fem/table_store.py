@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 import fcntl
-import hashlib
-import json
 import os
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, TypeVar
 
-import numpy as np
+import h5py
 import xarray as xr
 
 from ..geometry.atomic import replacing
+from ..geometry.seal import seal, sealed
 
 Variables = Mapping[str, tuple[tuple[str, ...], Any, str]]
 """Dimensions, values and unit by name."""
@@ -31,47 +30,42 @@ def described(variables: Variables, attributes: Mapping[str, Any]) -> xr.Dataset
 
 
 def write_checked(dataset: xr.Dataset, path: str | Path) -> None:
-    """Write a dataset with its checksum; the file is whole or absent."""
-    dataset.attrs["content_sha256"] = _digest(dataset)
+    """Write a dataset with the checksum of the file at its end; the file is whole or absent."""
     with replacing(path) as temporary:
         dataset.to_netcdf(temporary, engine="h5netcdf")
+        seal(temporary)
 
 
-def read_checked(path: str | Path, file_format: str) -> xr.Dataset:
-    """Read a dataset of the given format.
+def read_checked(path: str | Path, file_format: str | None = None) -> xr.Dataset:
+    """Read a dataset that is as it was written.
+
+    Parameters
+    ----------
+    file_format : that it must have; None for any, and for files that others have written or changed
 
     Raises
     ------
-    TableFileError : the file is not of this format, or its content is not what was written
+    TableFileError : the file is damaged, is no netCDF, or is not of this format
+    FileNotFoundError : it is missing
     """
+    whole = sealed(Path(path))
+    if whole is False:
+        raise TableFileError(f"Input {path} must be as it was written; instead its checksum does not match.")
+    if whole is None and file_format:
+        raise TableFileError(f"Input {path} must be a whole '{file_format}'; instead it does not end in its checksum.")
     try:
+        if whole is None:  # walk through it first: what h5netcdf's constructor trips over prints from its destructor
+            with h5py.File(path, "r") as file:
+                dict(file.attrs)
+                file.visititems(lambda _, item: dict(item.attrs) and None)
         with xr.open_dataset(path, engine="h5netcdf") as opened:
             dataset = opened.load()
-    except FileNotFoundError:
-        raise
     except Exception as error:  # the HDF5 layer raises many kinds on a damaged file
         raise TableFileError(f"Input {path} must be a readable netCDF file; {error}.") from error
-    attrs = dataset.attrs
-    if attrs.get("format") != file_format:
-        raise TableFileError(f"Input {path} must be a '{file_format}'; instead received '{attrs.get('format')}'.")
-    if attrs.pop("content_sha256", None) != _digest(dataset):
-        raise TableFileError(f"Input {path} must be as it was written; instead its checksum does not match.")
+    if file_format and dataset.attrs.get("format") != file_format:
+        received = dataset.attrs.get("format")
+        raise TableFileError(f"Input {path} must be a '{file_format}'; instead received '{received}'.")
     return dataset
-
-
-def _digest(dataset: xr.Dataset) -> str:
-    """SHA-256 over the values, their names and shapes, and the attributes."""
-    digest = hashlib.sha256()
-    for name in sorted(str(n) for n in dataset.variables):
-        values = np.asarray(dataset[name].values)
-        digest.update(f"{name}{values.shape}".encode())
-        if values.dtype.kind in "biuf":
-            digest.update(np.ascontiguousarray(values, dtype="<f8").tobytes())
-        else:
-            digest.update(json.dumps(values.astype(str).tolist()).encode())
-    attrs = {k: str(v) for k, v in dataset.attrs.items() if k != "content_sha256"}
-    digest.update(json.dumps(attrs, sort_keys=True).encode())
-    return digest.hexdigest()
 
 
 def cache_folder() -> Path:

@@ -8,7 +8,7 @@ from .design_figure import design_figure, design_lines
 from .dipole_validity import dipole_validity, validity_figure, validity_lines
 from .dipole_vs_fem_figure import dipole_figure
 from .dipole_vs_fem_report import dipole_lines
-from .drift import drift_study
+from .drift import drift_points, drift_result, drift_row
 from .drift_figure import drift_figure, drift_lines
 from .field_hard_cases import field_hard_cases, hard_case_lines
 from .field_hard_cases_figure import hard_case_figure
@@ -56,9 +56,11 @@ CATALOGUE: dict[str, Study] = {
         damping_figure,
         damping_lines,
     ),
-    "drift": study_of_one(
+    "drift": Study(
         "levitation time against frequency by the slow drift of the floater's spin",
-        drift_study,
+        drift_points,
+        drift_row,
+        drift_result,
         drift_figure,
         drift_lines,
     ),

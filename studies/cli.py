@@ -16,6 +16,7 @@ from typing import Any
 from cyclopts import App, CycloptsError
 
 from ..geometry import InputError
+from ..geometry.input_error import ComputationError
 from .console import answers_only, note, to_json
 from .output import Answer
 from .result_commands import add_result_commands
@@ -48,6 +49,9 @@ def _status(arguments: list[str], out: Any) -> int:
     except InputError as error:
         note(f"spinlev: {error}")
         return 2
+    except ComputationError as error:
+        note(f"spinlev: {error}")
+        return 1
     except OSError as error:
         note(f"spinlev: the computation failed to write or read {error.filename}: {error.strerror}; see --out.")
         return 1

@@ -8,6 +8,7 @@ from pathlib import Path
 import xarray as xr
 from matplotlib.figure import Figure
 
+from ..fem.table_store import TableFileError, read_checked
 from ..geometry import InputError
 from .catalogue import CATALOGUE
 from .figures import field_figure, force_figure, save_figure, trajectory_figure
@@ -30,12 +31,11 @@ def draw_result(path: Path, out: Path) -> list[str]:
 def read_result(path: Path) -> xr.Dataset:
     """The whole of a result file. Raises InputError if it cannot be read, or is no result of this program."""
     try:
-        with xr.open_dataset(path, engine="h5netcdf") as opened:
-            result = opened.load()
+        result = read_checked(path)
     except FileNotFoundError:
         raise InputError(f"Input {path} must be a file that exists; instead it is missing.") from None
-    except Exception as error:  # the HDF5 layer raises many kinds on a damaged file
-        raise InputError(f"Input {path} must be a netCDF file that can be read; {error}.") from None
+    except TableFileError as error:
+        raise InputError(str(error)) from None
     if "study" not in result.attrs:
         raise InputError(f"Input {path} must be a result of spinlev; instead it has no attribute 'study'.")
     return result

@@ -17,6 +17,8 @@ SWEEPS = {
     "thickness": ("thickness (mm), plate 18 mm below", 1e3),
 }
 DISTANCES = (10, 15, 20, 30, 40, 60)
+MODELS = {"": ("infinite slab", "o-", 3.0), ", real plate": ("real plate", "s", 6.0)}
+"""By the ending of a sweep's name: what the plate is, its marks and their size."""
 LINEAR = 0.1
 """Growth rates below this are drawn on a linear scale, 1/s."""
 
@@ -34,7 +36,11 @@ def damping_figure(result: xr.Dataset) -> Figure:
     axes[0, 1].set_title("Plate standing beside")
     axes[1, 0].set_title("Conductivity")
     axes[1, 1].set_title("Thickness")
-    axes[0, 0].legend(loc="upper left")
+    axes[0, 0].legend(loc="lower right")
+    for ending, (name, style, size) in MODELS.items():
+        if _part(result, f"beside{ending}").sizes["case"]:
+            axes[0, 1].plot([], [], style, ms=size, mfc="none" if ending else "0.3", color="0.3", label=name)
+    axes[0, 1].legend(loc="lower right")
     _means(axes[0, 2], axes[1, 2], result)
     for place in (*axes[0], axes[1, 2]):
         place.set_xticks(DISTANCES, [f"{d:g}" for d in DISTANCES])
@@ -47,16 +53,17 @@ def _part(result: xr.Dataset, sweep: str) -> xr.Dataset:
 
 
 def _growth(axes: Axes, result: xr.Dataset, sweep: str, scale: float) -> None:
-    for part, style in ((_part(result, sweep), "o-"), (_part(result, f"{sweep}, real plate"), "s")):
+    for ending, (_, style, size) in MODELS.items():
+        part = _part(result, sweep + ending)
         for mode, color in zip(result["mode"].values, PALETTE, strict=False):
             growth, error = part["growth"].sel(mode=mode).values, part["error"].values
-            label = str(mode) if style == "o-" else None
             axes.errorbar(
-                part["value"].values * scale, growth, yerr=np.abs(growth) * error, fmt=style, ms=3 if label else 6,
-                mfc=color if label else "none", color=color, label=label,
+                part["value"].values * scale, growth, yerr=np.abs(growth) * error, fmt=style, ms=size,
+                mfc="none" if ending else color, color=color, label=None if ending or sweep != "below" else str(mode),
             )  # fmt: skip
     axes.set_xscale("log")
     axes.set_yscale("symlog", linthresh=LINEAR)
+    axes.margins(y=0.12)
     axes.axhline(0.0, color="0.3", lw=0.8)
 
 

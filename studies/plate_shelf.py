@@ -12,7 +12,7 @@ from ..fem.plate_region import Region
 from ..fem.plate_table_file import cached_driven_plate
 from ..fem.slab_table import slab_and_rotor_table
 from ..fem.table import RotorTable
-from ..geometry import SceneError
+from ..geometry import InputError
 from ..geometry.box import Array
 from ..geometry.magnet import MU_0
 from ..geometry.overlap import TOUCHING, sphere_overlap
@@ -107,15 +107,12 @@ def check_room(scene: Scene, place: Array) -> None:
 
     Raises
     ------
-    SceneError : it overlaps the floater
+    InputError : it overlaps the floater
     """
     depth = sphere_overlap(place, scene.floater.radius, scene.plate.box) if scene.plate else 0.0
-    if depth > TOUCHING:
-        where = ", ".join(f"{c * 1e3:.3f}" for c in place)
-        raise SceneError(
-            "scene",
-            [
-                f"Input plate must leave room for the floater; instead it overlaps it by {depth * 1e3:.4g} mm where it "
-                f"levitates, at ({where}) mm; move the plate away."
-            ],
+    if scene.plate and depth > TOUCHING:
+        center, levitates = (np.round(c * 1e3, 3).tolist() for c in (scene.plate.box.center, place))
+        raise InputError(
+            f"Input plate.center_mm must leave room for the floater; instead received {center}: the plate overlaps it "
+            f"by {depth * 1e3:.4g} mm where it levitates, at {levitates} mm; move the plate away."
         )

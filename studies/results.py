@@ -15,7 +15,7 @@ import xarray as xr
 from ..dynamics import Equilibrium, ForceCurve, Trajectory
 from ..dynamics.mode_names import SIDE, TILT
 from ..fem.table import FieldTable
-from ..geometry.atomic import replacing
+from ..fem.table_store import write_checked
 from ..geometry.box import Array
 from ..geometry.scene import Scene
 
@@ -32,9 +32,8 @@ def write_dataset(dataset: xr.Dataset, path: Path, scene: Scene | None = None) -
     provenance = {f"version_{name}": version(name) for name in LIBRARIES}
     if scene:
         provenance["scene"] = scene.text
-    with replacing(path) as temporary:
-        command = shlex.join(["spinlev", *sys.argv[1:]])
-        dataset.assign_attrs(command=command, **provenance).to_netcdf(temporary, engine="h5netcdf")
+    command = shlex.join(["spinlev", *sys.argv[1:]])
+    write_checked(dataset.assign_attrs(command=command, **provenance), path)
 
 
 def variable(dims: Sequence[str], values: Any, units: str, long_name: str) -> xr.Variable:

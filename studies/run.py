@@ -124,7 +124,8 @@ def _write(
     note("Files and figures ...")
     figures = {"field": field_figure(result), "force": force_figure(result)}
     if flight:
-        result = xr.merge([result, trajectory_dataset(flight)], combine_attrs="no_conflicts")
+        flown = trajectory_dataset(flight).assign_attrs(study="run")
+        result = xr.merge([result, flown], combine_attrs="no_conflicts")
         figures["trajectory"] = trajectory_figure(result)
         scene_picture(last_view(scene, table, flight.rotor), out / "scene.png")
     write_dataset(result, out / "result.nc", scene)

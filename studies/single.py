@@ -8,7 +8,18 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-from ..dynamics import Checkpoint, Equilibrium, PlateMemory, Rates, Survey, Trajectory, simulate, survey, with_plate
+from ..dynamics import (
+    Checkpoint,
+    Equilibrium,
+    PlateMemory,
+    Rates,
+    Survey,
+    Trajectory,
+    simulate,
+    starting_point,
+    survey,
+    with_plate,
+)
 from ..fem.table import RotorTable
 from ..geometry.atomic import replacing
 from ..geometry.box import Array
@@ -81,6 +92,9 @@ def simulate_job(scene: Scene, asked: Tables, duration: float, out: Path, resume
     if isinstance(scene.start, OffsetStart):
         note("Equilibria ...")
         found, memory = surveyed(shelf, table)
+        chosen = starting_point(found.equilibria)
+        if chosen is not None and not chosen.stable:
+            note(f"The flight begins at an unstable equilibrium: e-fold in {1 / chosen.growth_per_s:.2g} s.")
     else:
         found, memory = None, shelf.memory(table, ())
     equilibria = found.equilibria if found else ()

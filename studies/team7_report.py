@@ -8,14 +8,20 @@ from matplotlib.figure import Figure
 
 from .figures import PALETTE, panels, styled
 from .results import variable
-from .team7 import team7
+from .team7 import Team7Comparison, team7
 
 CURVES = ("50 Hz, ωt = 0", "50 Hz, ωt = 90°", "200 Hz, ωt = 0", "200 Hz, ωt = 90°")
+
+FIELDS = ("measured", "computed")
 
 
 def team7_study(quick: bool) -> xr.Dataset:
     """Measured and computed B_z on the line, in T, and their deviation in units of the line's peak."""
-    compared = team7(order=2 if quick else 3)
+    return team7_dataset(team7(order=2 if quick else 3))
+
+
+def team7_dataset(compared: Team7Comparison) -> xr.Dataset:
+    """A comparison with names and units."""
     dims = ("x", "curve")
     return xr.Dataset(
         {
@@ -34,7 +40,20 @@ def team7_lines(result: xr.Dataset) -> list[str]:
         size = 100 * np.abs(result["deviation"].sel(curve=curve).values)
         lines.append(f"  {curve:18} largest {size.max():5.2f}, mean {size.mean():5.2f}")
     size = 100 * np.abs(result["deviation"].values)
-    return [*lines, f"  all {size.size} values         largest {size.max():5.2f}, mean {size.mean():5.2f}"]
+    lines.append(f"  all {size.size} values         largest {size.max():5.2f}, mean {size.mean():5.2f}")
+    return [*lines, *(_common_phase(result, number) for number in (0, 2))]
+
+
+def _common_phase(result: xr.Dataset, number: int) -> str:
+    """What stays at a frequency, whose curves are `number` and the next, once all phases are turned by one angle."""
+    measured, computed = (result[name].values[:, number] - 1j * result[name].values[:, number + 1] for name in FIELDS)
+    angle = float(np.angle(np.vdot(computed, measured)))
+    left = 100 * (computed * np.exp(1j * angle) - measured) / np.abs(measured).max()
+    size = np.abs([left.real, left.imag])
+    return (
+        f"  {CURVES[number].split(',')[0]}, all phases turned by {np.degrees(angle):+.2f}°: "
+        f"largest {size.max():.2f}, mean {size.mean():.2f}; at 90° largest {size[1].max():.2f}"
+    )
 
 
 @styled

@@ -4,14 +4,15 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.special import spherical_kn
 
 from spinlev.dynamics import Rates, find_equilibria
-from spinlev.dynamics.air_torque import beyond_stokes, reynolds
+from spinlev.dynamics.air_torque import reynolds, spinning, swinging
 from spinlev.dynamics.drift import drift
 from spinlev.dynamics.flight import compile_flight
 from spinlev.dynamics.integration import integrate
 from spinlev.dynamics.slow_torque import SlowTorque
-from spinlev.dynamics.state import Scales
+from spinlev.dynamics.state import Scales, State
 from spinlev.fem.models import rotor_table
 from spinlev.geometry import rotor
 from spinlev.geometry.scene import AIR_VISCOSITY, Drag, Floater, Scene
@@ -67,15 +68,39 @@ def test_slow_torque_is_that_of_the_closed_forms(rates, spin):
     assert torque == pytest.approx((air + eddy) / FLOATER.inertia, rel=1e-3)
 
 
-def test_air_torque_has_stokes_limit_and_agrees_with_another_fit():
-    assert beyond_stokes([0.0, 1.0, 5.0]).tolist() == [1.0, 1.0, 1.0]
+def test_air_on_a_steady_spin_has_stokes_limit_and_agrees_with_another_fit():
+    assert spinning([0.0, 1.0, 5.0]).tolist() == [1.0, 1.0, 1.0]
     number = np.geomspace(100, 2000, 20)  # two fits of different data
     loth = 1 + 5 / (64 * np.pi) * (4 * number) ** 0.6
-    np.testing.assert_allclose(beyond_stokes(number), loth, rtol=0.05)
+    np.testing.assert_allclose(spinning(number), loth, rtol=0.05)
     torque = 0.5 * 1.19 * 377.0**2 * RADIUS**5 * (6.45 / np.sqrt(990.0) + 32.1 / 990.0)
     stokes = 8 * np.pi * AIR_VISCOSITY * RADIUS**3 * 377.0
-    assert beyond_stokes(990.0) * stokes == pytest.approx(torque, rel=5e-3)
+    assert spinning(990.0) * stokes == pytest.approx(torque, rel=5e-3)
     assert float(reynolds(RADIUS, 377.0)) == pytest.approx(990.0, rel=5e-3)
+
+
+def test_air_on_a_swing_is_that_of_the_diffusing_layer():
+    """Outside the sphere u = Ω sin θ R k1(ar)/k1(aR) with a² = iω/ν: the torque is Stokes' times Re(1 - R u'/u)/3."""
+    number = np.geomspace(1e-4, 1e4, 9)
+    root = np.sqrt(1j * number)
+    ratio = (1 - root * spherical_kn(1, root, derivative=True) / spherical_kn(1, root)).real / 3
+    np.testing.assert_allclose(swinging(number), ratio, rtol=1e-12)
+    assert float(swinging(0.0)) == 1.0
+
+
+def test_air_alone_drives_the_spin_to_what_the_swing_asks(rates):
+    """Where s is small: (h/f - 1) sin²θ, to the next order in θ and s; without the swing's layer it would be zero."""
+    scene = replace(VERTICAL, frequency=80.0, floater=replace(FLOATER, conductivity=None))
+    found = drift(scene, VERTICAL_TABLE, 0.0, np.inf, rates)
+    assert found.ended_by == "balance"
+    angle = np.radians(nearest(scene, VERTICAL_TABLE, found.balance_spin, rates).polar_angle_deg)
+    steady = np.sin(angle) ** 2 + found.balance_spin * np.cos(angle)
+    f, h = spinning(reynolds(RADIUS, steady * scene.angular_velocity)), swinging(reynolds(RADIUS, 2 * np.pi * 80.0))
+    # In balance f s_z cos θ + h (s - s_z cos θ) = 0 with s_z = sin²θ + s cos θ.
+    across = np.sin(angle) ** 2 * np.cos(angle)
+    expected = (h - f) * across / (f * np.cos(angle) ** 2 + h * np.sin(angle) ** 2)
+    assert found.balance_spin == pytest.approx(expected, rel=1e-3)
+    assert 0.02 < found.balance_spin < 0.2
 
 
 def test_stokes_drag_alone_lets_the_spin_decay_exponentially(rates):
@@ -86,6 +111,18 @@ def test_stokes_drag_alone_lets_the_spin_decay_exponentially(rates):
     expected = -0.2 * np.exp(-scene.drag.angular / FLOATER.inertia * found.time)
     np.testing.assert_allclose(found.spin, expected, atol=2e-7)
     assert found.balance_spin == pytest.approx(0.0, abs=1e-6)
+
+
+def test_whatever_happens_at_the_release_leaves_the_spin():
+    """Let go at rest, it is flung about; without slow torques Ω·m̂ stays 0 to round-off: flights begin at s = 0."""
+    spin, moment = np.zeros(3), np.array([0.3, 0.1, 1.0])
+    scene = replace(VERTICAL, drag=Drag(0.0, 0.0), floater=replace(FLOATER, conductivity=None))
+    start = State(np.array([1e-3, 0.0, -25e-3]), np.zeros(3), moment / np.linalg.norm(moment), spin)
+    flight = integrate(scene, compile_flight(scene, VERTICAL_TABLE, 1.0, compact=True), start, 1.0)
+    found = np.einsum("na,na->n", flight.lab.spin, flight.lab.moment)
+    across = np.linalg.norm(flight.lab.spin, axis=1)
+    assert across.max() > 0.1 * scene.angular_velocity
+    assert np.abs(found).max() < 1e-11 * across.max()
 
 
 def test_without_slow_torque_nothing_moves(rates):
@@ -109,21 +146,18 @@ def test_loss_in_the_fold_as_in_the_full_motion(rates):
 
 
 def test_balance_as_in_the_full_motion(rates):
-    """At 75 Hz the balance comes before the fold: the flight is endless, and the full motion settles at the same s*."""
+    """At 75 Hz the balance comes before the fold: the full motion settles at the same s*, before it grows unstable.
+
+    With 100 times the eddy currents but not the air's drag on the way, precession grows slowly there.
+    """
     scene = replace(faster(VERTICAL, 100.0), frequency=75.0)
     start = nearest(scene, VERTICAL_TABLE, rates=rates)
     averaged = drift(scene, VERTICAL_TABLE, 0.0, np.inf, rates, start.state, stokes=True)
     _, distance, spin = flown(scene, VERTICAL_TABLE, start, 45.0)
-    assert averaged.ended_by == "balance"
-    assert averaged.levitated_s == np.inf
+    assert averaged.ended_by == "instability"
+    assert averaged.levitated_s > 100.0
     assert spin[-200:].mean() == pytest.approx(averaged.balance_spin, abs=1e-3)
     assert distance[-200:].mean() == pytest.approx(averaged.distance[-1], rel=1e-3)
-
-
-def test_drag_beyond_stokes_puts_the_balance_nearer(rates):
-    scene = replace(VERTICAL, frequency=75.0)
-    real, stokes = (drift(scene, VERTICAL_TABLE, 0.0, np.inf, rates, stokes=s) for s in (False, True))
-    assert 0 < real.balance_spin < 0.8 * stokes.balance_spin
 
 
 def test_oscillatory_instability_ends_the_flight(rates):
@@ -135,16 +169,32 @@ def test_oscillatory_instability_ends_the_flight(rates):
     assert found.levitated_s == pytest.approx(7.0 / start.growth_per_s, rel=0.02)
 
 
+def test_a_balance_where_small_motions_grow_is_not_endless():
+    """At 210 Hz the floater's own currents drive the precession: after s* it waits until that has grown by e^7."""
+    scene = replace(HORIZONTAL, frequency=210.0)
+    found = drift(scene, HORIZONTAL_TABLE, 0.0, np.inf)
+    assert found.ended_by == "instability"
+    assert found.spin[-1] == pytest.approx(found.balance_spin, abs=2e-3)
+    growth = np.maximum(found.growth_per_s, 0.0)
+    assert np.trapezoid(growth, found.time) == pytest.approx(7.0, rel=1e-2)
+    short = drift(scene, HORIZONTAL_TABLE, 0.0, 900.0)
+    assert (short.ended_by, short.time[-1]) == ("duration", pytest.approx(900.0))
+
+
 @pytest.mark.parametrize(
     ("scene", "table", "ended"),
     [
         (HORIZONTAL, HORIZONTAL_TABLE, ("fold", "lost")),
+        pytest.param(replace(HORIZONTAL, frequency=200.0), HORIZONTAL_TABLE, ("fold", "lost"), marks=pytest.mark.slow),
+        pytest.param(
+            replace(VERTICAL, frequency=64.0), VERTICAL_TABLE, ("duration", "duration"), marks=pytest.mark.slow
+        ),
         (replace(VERTICAL, frequency=70.0), VERTICAL_TABLE, ("duration", "duration")),
     ],
-    ids=["lost after 73 s", "250 s"],
+    ids=["lost after 73 s", "lost after 143 s", "250 s near the fold", "250 s"],
 )
 def test_real_slow_torques(scene, table, ended):
-    """Heights to 1e-4, time of loss to 0.5 % (measured 0.13 %)."""
+    """Heights to 1e-4, time of loss to 0.5 % (measured 0.15 % and 0.07 %)."""
     start = nearest(scene, table)
     averaged = drift(scene, table, 0.0, 250.0, start=start.state, stokes=True)
     flight, distance, spin = flown(scene, table, start, 250.0)

@@ -1,29 +1,75 @@
-"""Kinds of flight: heights whose kind is plain."""
+"""Kinds of flight: distances whose kind is plain, and one real flight of each kind."""
+
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from spinlev.dynamics import flight_kind
-from spinlev.dynamics.flight_kind import LINEAR_FALL, OSCILLATING_LOSS, STABLE
+from spinlev.dynamics import find_equilibria, flight_kind
+from spinlev.dynamics.flight import compile_flight
+from spinlev.dynamics.flight_kind import DRIFTING, GROWING, LINEAR_FALL, NOT_HELD, OSCILLATING_LOSS, STABLE
+from spinlev.dynamics.integration import integrate
 from spinlev.dynamics.state import State
 from spinlev.dynamics.trajectory import Trajectory
+from spinlev.fem.models import rotor_table
+from spinlev.geometry import rotor
+from spinlev.geometry.scene import Drag, Floater, Scene
 
 TIME = np.linspace(0, 20, 5000)
+RADIUS = 6.35e-3
+FLOATER = Floater(RADIUS, 1.305, 1.0, 7500.0)
+VERTICAL = Scene(80.0, rotor.vertical(14e-3, 10e-3, 1.305, 1.0), FLOATER, Drag.stokes(RADIUS))
 
 
-def flown(distance, ended_by):
-    position = np.stack([0 * distance, 0 * distance, -distance], axis=1)
-    return Trajectory(TIME, State(position, position, position, position), 600.0, ended_by, 0.0, 1.0, 1, 0.0)
+def flown(distance, ended_by, time=TIME):
+    position = np.stack([0 * distance, 0 * distance, -distance], axis=1)  # on the axis: the same in both frames
+    return Trajectory(time, State(position, position, position, position), 600.0, ended_by, 0.0, 1.0, 1, 0.0)
+
+
+WAVE = np.sin(60 * TIME)
 
 
 @pytest.mark.parametrize(
     ("distance", "ended_by", "kind"),
     [
-        (0.02 + 1e-4 * np.sin(60 * TIME), "duration", STABLE),
-        (0.02 + 1e-4 * np.sin(60 * TIME) + 2e-4 * TIME, "lost", LINEAR_FALL),
-        (0.02 + 1e-6 * np.exp(0.4 * TIME) * np.sin(60 * TIME), "contact", OSCILLATING_LOSS),
-        (0.02 + 1e-6 * np.exp(0.4 * TIME) * np.sin(60 * TIME) + 1e-5 * TIME, "lost", OSCILLATING_LOSS),
+        (0.02 + 1e-4 * WAVE, "duration", STABLE),
+        (0.02 + 1e-4 * WAVE * np.exp(-0.3 * TIME), "duration", STABLE),
+        (0.02 + 1e-4 * np.exp(-TIME), "duration", STABLE),  # it has settled
+        (0.02 + 1e-4 * WAVE + 1e-5 * TIME, "duration", DRIFTING),
+        (0.02 - 1e-5 * TIME, "duration", DRIFTING),
+        (0.02 + 1e-6 * np.exp(0.3 * TIME) * WAVE, "duration", GROWING),
+        (0.02 + 1e-4 * WAVE + 2e-4 * TIME, "lost", LINEAR_FALL),
+        (0.02 + 1e-6 * np.exp(0.4 * TIME) * WAVE, "contact", OSCILLATING_LOSS),
+        (0.02 + 1e-6 * np.exp(0.4 * TIME) * WAVE + 1e-5 * TIME, "lost", OSCILLATING_LOSS),
     ],
 )
 def test_plain_cases(distance, ended_by, kind):
     assert flight_kind(flown(distance, ended_by)) == kind
+
+
+def test_a_fall_from_the_hand_is_no_flight():
+    time = np.linspace(0, 0.1, 1000)
+    assert flight_kind(flown(0.04 + 4.9 * time**2, "lost", time)) == NOT_HELD
+
+
+@pytest.mark.parametrize(
+    ("frequency", "conductivity", "duration", "kind"),
+    [
+        (80.0, None, 10.0, STABLE),
+        (66.0, 6.7e7, 60.0, LINEAR_FALL),
+        (66.0, 6.7e7, 4.0, DRIFTING),
+        (100.0, None, 10.0, OSCILLATING_LOSS),
+        (86.0, None, 1.2, GROWING),
+    ],
+)
+def test_one_real_flight_of_each_kind(frequency, conductivity, duration, kind):
+    """Point dipoles, vertical 14 mm, 1 µm beside the equilibrium at s = 0; two with slow torques 100 times as large."""
+    floater = replace(FLOATER, conductivity=conductivity)
+    scene = replace(VERTICAL, frequency=frequency, floater=floater)
+    if conductivity:
+        scene = replace(scene, drag=Drag(scene.drag.linear, 100 * scene.drag.angular))
+    table = rotor_table(scene.rotor, "dipole")
+    start = min(find_equilibria(scene, table), key=lambda e: e.growth_per_s).state
+    start = replace(start, position=start.position + np.array([0.0, 0.0, 1e-6]))
+    flight = integrate(scene, compile_flight(scene, table, duration, compact=True), start, duration)
+    assert flight_kind(flight) == kind

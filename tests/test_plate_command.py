@@ -8,11 +8,12 @@ import numpy as np
 import pytest
 from ngsolve import SetNumThreads
 
-from spinlev.geometry import InputError
+from spinlev.geometry import InputError, load_scene
 from spinlev.geometry.box import Box, rotation_matrix
 from spinlev.geometry.scene import Plate
 from spinlev.studies.cli import app
 from spinlev.studies.plate_job import MODELS
+from spinlev.studies.plate_shelf import check_room
 
 SetNumThreads(1)
 SCENE = "scenes/tilt-over-plate.toml"
@@ -93,3 +94,11 @@ def test_a_scene_without_plate_is_refused(tmp_path):
             print_error=False,
             result_action="return_value",
         )
+
+
+def test_a_plate_where_the_floater_levitates_is_refused():
+    """Nothing in the scene file says where that is: found with the equilibrium."""
+    scene = load_scene(SCENE)
+    check_room(scene, np.array([0.0, 0.0, -0.019]))
+    with pytest.raises(InputError, match=r"plate\.center_mm must leave room .* by 3\.35 mm .*; move the plate"):
+        check_room(scene, np.array([0.0, 0.0, -0.034]))

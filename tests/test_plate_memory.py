@@ -77,6 +77,7 @@ def test_energy_ledger_closes_in_a_motion_that_spins_bounces_and_lowers(table):
     work, loss = states[len(table.rates) : len(table.rates) + 2, -1]
     b = table.field_functions(place(0.1))[0][0]
     stored = 0.5 * np.sum((states[: len(table.rates), -1] - b @ moment(0.1)) ** 2)
+    print(f"\nledger of the floater's motion: {abs(work + stored + loss) / loss:.1e}")
     assert loss > 0
     assert abs(work + stored + loss) < 1e-10 * loss
 
@@ -173,5 +174,6 @@ def test_ledger_with_the_rotor_closes():
     start = np.concatenate([b @ moment(0.0) + first, np.zeros(2)])
     end = solve_ivp(rates, (0, 0.05), start, "DOP853", rtol=1e-12, atol=1e-16).y[:, -1]
     stored = 0.5 * np.sum(state(0.05, end[:n])[-1] ** 2)
+    print(f"\nledger with the rotor: {abs(end[n] + stored + end[n + 1]) / end[n + 1]:.1e}")
     assert end[n + 1] > 0
     assert abs(end[n] + stored + end[n + 1]) < 1e-10 * end[n + 1]

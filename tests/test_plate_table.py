@@ -54,12 +54,14 @@ def test_field_functions_are_those_of_the_currents(network, table):
 def test_network_is_passive_everywhere(table):
     """Positive rates; dissipation of any moment at 1000 places and frequencies; reciprocity to round-off."""
     assert table.rates.min() > 0
-    rng = np.random.default_rng(1)
+    rng, smallest = np.random.default_rng(1), np.inf
     for point, frequency in zip(places(1000, 1), 10 ** rng.uniform(-2, 2.39, 1000), strict=True):
         tensor = table.reaction_tensor(point, frequency)[0]
         assert abs(tensor - tensor.T).max() <= 1e-14 * abs(tensor).max()
-        assert np.linalg.eigvalsh(-tensor.imag).min() >= 0
-        assert np.linalg.eigvalsh(-tensor.real).min() >= 0
+        resistive, reactive = (np.linalg.eigvalsh(-part) for part in (tensor.imag, tensor.real))
+        smallest = min(smallest, resistive.min() / resistive.max(), reactive.min() / reactive.max())
+    print(f"\nslowest rate {table.rates.min():.3g} /s; smallest of all eigenvalues {smallest:.1e} of the largest")
+    assert smallest >= 0
 
 
 def test_field_functions_are_harmonic_and_their_gradient_exact(table):
@@ -75,7 +77,9 @@ def test_field_functions_are_harmonic_and_their_gradient_exact(table):
     for axis, unit in enumerate(np.eye(3)):
         b = {k: table.field_functions(inner + k * step * unit)[0] for k in range(-4, 5)}
         slope = sum(w * (b[k] - b[-k]) for k, w in weights.items()) / step
-        assert abs(slope - gradient[..., axis]).max() < 1e-10 * abs(gradient).max()
+        error = abs(slope - gradient[..., axis]).max() / abs(gradient).max()
+        print(f"\naxis {axis}: gradient and derivative differ by {error:.1e}")
+        assert error < 1e-10
 
 
 def test_reaction_gradient_is_half_the_derivative_of_the_tensor(table):
@@ -88,19 +92,11 @@ def test_reaction_gradient_is_half_the_derivative_of_the_tensor(table):
         assert m @ gradient[axis] @ m == pytest.approx(slope / 2, rel=1e-5, abs=1e-6 * abs(gradient).max())
 
 
-def test_expressions_say_what_the_table_says(table):
-    """State by state, and all together as the dynamics uses them: round-off."""
-    position, moment = hy.make_vars("x", "y", "z"), hy.make_vars("u", "v", "w")
-    currents = hy.make_vars(*(f"y_{i}" for i in range(len(table.rates))))
-    signals, (field, gradient) = table.interaction(position, moment, currents)
-    single = [b[i] for b, _ in table.expressions(position) for i in range(3)]
-    outputs = [*signals, *field, *(gradient[i][j] for i in range(3) for j in range(3)), *single]
-    function = hy.cfunc(outputs, [*position, *moment, *currents], compact_mode=True)
-    point, m, y = places(1)[0], np.array([0.2, 0.3, 0.9]), np.random.default_rng(2).normal(size=len(table.rates))
-    values = function(np.concatenate([point, m, y]))
-    b, slope = (part[0] for part in table.field_functions(point))
-    expected = np.concatenate([b @ m, y @ b, np.tensordot(y, slope, 1).ravel(), b.ravel()])
-    assert values == pytest.approx(expected, rel=1e-10, abs=1e-12 * abs(b).max())
+def test_compiled_field_functions_are_the_multipoles(table):
+    """The expressions that the dynamics uses, compiled, against sums of solid harmonics: round-off."""
+    points = places(4)
+    direct = np.einsum("ik,nka->nia", table.weights, table.multipoles.fields(points))
+    assert table.field_functions(points)[0] == pytest.approx(direct, rel=1e-10, abs=1e-12 * abs(direct).max())
 
 
 def test_rotor_share_follows_the_turning_rotor(network):

@@ -1,0 +1,173 @@
+"""All equilibria and their stability over a grid of frequencies and measures of the rotor.
+
+On a coarse grid Newton's method searches from the starts of `search`, all of them at some points and a random quarter
+at others.  From what is found each equilibrium is carried to the points beside it, all at once, until nothing new is
+found.  Where that does not lead to the neighbour the branch is followed by its arc length, around the fold and back on
+the other side if there is one (`between`).  So a sheet of equilibria is found whole if one of its points, or of a sheet
+that meets it in a fold, is found by a search; only one that fits between the points of the coarse grid, and meets no
+other, can be missed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..geometry.box import Array
+from .atlas import Atlas
+from .balance import EVERY, Indices, solve
+from .between import between
+from .equilibrium import EquilibriumError
+from .grid import Grid
+from .rotor_family import RotorFamily
+from .stability import spectra
+from .symbols import Parameter
+
+SPACING = 5
+"""Points of the map between two searches."""
+WHOLE, PART = 8, 4
+"""Every eighth search has all starts, the others a quarter of them."""
+JUMP = 0.15
+"""A neighbour farther away than this (radii and rad) may be another branch's."""
+
+
+@dataclass(frozen=True, eq=False)
+class EquilibriumMap:
+    """Equilibria (k,) of a map, point by point; rotor's frame.
+
+    Parameters
+    ----------
+    frequencies, measures : axes of the map, Hz and m or rad
+    row, column : (k,) place of each equilibrium on them
+    position, moment : (k, 3) m and direction
+    eigenvalues : (k, 10) of the small motions, 1/s
+    errors : (k,) what round-off may do to them, 1/s
+    stable : (k,) whether every small motion stays small
+    searches : points of the map at which all was searched for
+    """
+
+    frequencies: Array
+    measures: Array
+    row: Indices
+    column: Indices
+    position: Array
+    moment: Array
+    eigenvalues: NDArray[np.complex128]
+    errors: Array
+    stable: NDArray[np.bool_]
+    searches: int
+
+    @property
+    def growth_per_s(self) -> Array:
+        """(k,) largest growth rate of a small motion."""
+        return np.asarray(self.eigenvalues.real.max(axis=1))
+
+    @property
+    def number(self) -> tuple[Indices, Indices]:
+        """Equilibria and stable equilibria at each point: two of (frequencies, measures)."""
+        shape = len(self.frequencies), len(self.measures)
+        place, size = self.row * shape[1] + self.column, shape[0] * shape[1]
+        every, stable = np.bincount(place, minlength=size), np.bincount(place[self.stable], minlength=size)
+        return every.reshape(shape), stable.reshape(shape)
+
+
+def equilibrium_map(
+    family: RotorFamily,
+    frequencies: ArrayLike,
+    measures: ArrayLike,
+    spin: float = 0.0,
+    farthest: float = 0.1,
+    spacing: int = SPACING,
+    progress: Callable[[float], None] | None = None,
+) -> EquilibriumMap:
+    """All synchronous equilibria with z < 0 over a grid, with their stability; gravity along the axis, no plate.
+
+    Parameters
+    ----------
+    family : the scenes; nothing is compiled again within a family
+    frequencies, measures : axes, Hz and m or rad
+    spin : body spin s
+    farthest : largest depth, and distance from the axis, m
+    spacing : steps of the grid between two searches; a sheet between them is missed if it meets no other in a fold
+    progress : called with the finished part, 0 to 1
+
+    Raises
+    ------
+    EquilibriumError : a frequency is zero, or gravity has a part across the axis
+    """
+    axes = np.atleast_1d(np.asarray(frequencies, float)), np.atleast_1d(np.asarray(measures, float))
+    if not axes[0].all() or np.any(family.scene.gravity[:2]):
+        raise EquilibriumError(
+            "Input frequencies must not be zero, and gravity must be along the axis: only then equilibria are fixed "
+            "points. Elsewhere use find_equilibria."
+        )
+    grid = Grid(family, *axes, spin, farthest)
+    atlas, nodes = Atlas(len(grid)), grid.coarse(spacing)
+    seeds, random = [], np.random.default_rng(0)
+    for number, point in enumerate(nodes):
+        seeds.append(_searched(grid, int(point), None if number % WHOLE == 0 else random))
+        if progress is not None:
+            progress(0.9 * (number + 1) / len(nodes))
+    point, position, moment = (np.concatenate(part) for part in zip(*seeds, strict=True))
+    _spread(grid, atlas, point, position, moment)
+    return _judged(grid, atlas, len(nodes))
+
+
+def _searched(grid: Grid, point: int, random: np.random.Generator | None) -> tuple[Indices, Array, Array]:
+    """Equilibria of one point, from all starts or from some; each perhaps many times."""
+    where = grid.range(point)
+    position, moment = where.starts()
+    if random is not None:
+        chosen = random.choice(len(position), len(position) // PART, replace=False)
+        position, moment = position[chosen], moment[chosen]
+    with np.errstate(all="ignore"):  # many of these starts run away
+        position, moment, step = solve(grid.alone(point), position, moment, EVERY, 25)
+    good = (step < 1e-8) & where.holds(position)
+    return np.full(good.sum(), point), position[good], moment[good]
+
+
+def _spread(grid: Grid, atlas: Atlas, point: Indices, position: Array, moment: Array) -> None:
+    """Carry equilibria from point to point until nothing new is found."""
+    while len(point):
+        new = atlas.add(point, position, moment)
+        point, position, moment = point[new], position[new], moment[new]
+        source, target = grid.neighbours(point)
+        if not len(source):
+            return
+        arrived, turned, size = solve(grid.balance(target), position[source], moment[source], EVERY, 12)
+        apart = np.linalg.norm(np.concatenate([arrived - position[source], turned - moment[source]], axis=1), axis=1)
+        good = (size < 1e-8) & (apart < JUMP)
+        rest = source[~good]
+        walked = between(grid, point[rest], target[~good], position[rest], moment[rest])
+        point = np.concatenate([target[good], walked[0]])
+        position = np.concatenate([arrived[good], walked[1]])
+        moment = np.concatenate([turned[good], walked[2]])
+        inside = grid.holds(point, position)
+        point, position, moment = point[inside], position[inside], moment[inside]
+
+
+def _judged(grid: Grid, atlas: Atlas, searches: int) -> EquilibriumMap:
+    point, position, moment = atlas.all()
+    row, column = np.divmod(point, len(grid.measures))
+    time = np.zeros((0, 1))
+    values, errors = np.zeros((0, 10), complex), np.zeros((0, 10))
+    if len(point):
+        balance = grid.balance(point)
+        states = balance.states(position, moment)
+        values, errors, _ = spectra(states, balance.rates(states, balance.values)[1])
+        time = balance.values[:, [Parameter.TIME]]
+    return EquilibriumMap(
+        frequencies=grid.frequencies,
+        measures=grid.measures,
+        row=row,
+        column=column,
+        position=position * grid.family.scene.floater.radius,
+        moment=moment,
+        eigenvalues=np.asarray(values / time, complex),
+        errors=errors.max(axis=1, initial=0.0) / time[:, 0],
+        stable=np.all(values.real <= errors, axis=1),
+        searches=searches,
+    )

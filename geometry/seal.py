@@ -1,0 +1,28 @@
+"""A checksum at the end of a file, so that damage is known before any library tries to make sense of the content.
+
+HDF5 ignores what comes after its own end; given a damaged file it may print, raise anything, or not return at all.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from pathlib import Path
+
+MARK = b"\nspinlev sha256 "
+LENGTH = len(MARK) + 64
+
+
+def seal(path: Path) -> None:
+    """Append the checksum of all bytes of the file."""
+    with path.open("r+b") as stream:
+        digest = hashlib.sha256(stream.read()).hexdigest()
+        stream.write(MARK + digest.encode())
+
+
+def sealed(path: Path) -> bool | None:
+    """Whether the file is as it was when it was sealed; None if it never was. Raises OSError if it cannot be read."""
+    content = path.read_bytes()
+    body, end = content[:-LENGTH], content[-LENGTH:]
+    if not end.startswith(MARK):
+        return None
+    return end[len(MARK) :] == hashlib.sha256(body).hexdigest().encode()

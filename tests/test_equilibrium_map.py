@@ -1,0 +1,108 @@
+"""Maps of equilibria against searches that know nothing of their neighbours."""
+
+import heyoka as hy
+import numpy as np
+import pytest
+
+from spinlev.dynamics import EquilibriumError, equilibrium_map, find_equilibria, rotor_family
+from spinlev.dynamics.rates import Rates
+from spinlev.dynamics.symbols import Parameter
+from spinlev.fem.models import rotor_table
+from spinlev.geometry import rotor
+from spinlev.geometry.scene import Drag, Floater, Scene
+
+SHAPE = (10e-3, 1.305, 1.05)
+FLOATER = Floater(radius=6.35e-3, remanence=1.305, recoil_permeability=1.05, density=7500.0)
+ROTORS = {
+    "horizontal": (rotor.horizontal(2e-3, *SHAPE), np.linspace(1e-3, 4e-3, 9)),
+    "vertical": (rotor.vertical(14e-3, *SHAPE), np.linspace(10e-3, 18e-3, 9)),
+    "tilt": (rotor.tilt(np.radians(10.0), *SHAPE), np.radians(np.linspace(5.0, 20.0, 9))),
+}
+FREQUENCIES = np.linspace(60.0, 180.0, 13)
+
+
+def scene_of(name):
+    return Scene(110.0, ROTORS[name][0], FLOATER, Drag(0.0, 0.0))
+
+
+@pytest.mark.parametrize(
+    ("name", "model"),
+    [
+        ("horizontal", "dipole"),
+        *(pytest.param(name, "dipole", marks=pytest.mark.slow) for name in ("vertical", "tilt")),
+        *(pytest.param(name, "cuboid", marks=pytest.mark.slow) for name in ROTORS),
+        pytest.param("horizontal", "fem", marks=pytest.mark.slow),
+    ],
+)
+def test_map_equals_searches_at_random_points(name, model):
+    """All equilibria, their places to 1e-9 m, growth and stability, of a table made for the point's own rotor."""
+    family, measures = rotor_family(scene_of(name), name, model, 1e-4), ROTORS[name][1]
+    spacing = 8 if name == "horizontal" else 3  # of the vertical rotor a sheet between 11 and 14 mm ends at 61 Hz
+    found, rng = equilibrium_map(family, FREQUENCIES, measures, spacing=spacing), np.random.default_rng(1)
+    assert found.number[0].sum() == len(found.row)
+    for row, column in rng.integers((len(FREQUENCIES), len(measures)), size=(4, 2)):
+        scene = family.at(FREQUENCIES[row], measures[column])
+        expected = find_equilibria(scene, rotor_table(scene.rotor, model, 1e-4))
+        here = np.flatnonzero((found.row == row) & (found.column == column))
+        assert len(here) == len(expected)
+        assert found.number[1][row, column] == sum(e.stable for e in expected)
+        for e in expected:
+            apart = np.linalg.norm(found.position[here] - e.position, axis=1)
+            apart += np.linalg.norm(found.moment[here] - e.state.moment, axis=1) * FLOATER.radius
+            same = here[np.argmin(apart)]
+            assert apart.min() < 1e-9
+            assert found.stable[same] == e.stable
+            tolerance = 1e-6 + 3 * (e.growth_error_per_s + found.errors[same])
+            assert found.growth_per_s[same] == pytest.approx(e.growth_per_s, abs=tolerance)
+
+
+@pytest.mark.parametrize("name", ROTORS)
+def test_a_moved_rotor_has_the_field_of_its_own_table(name):
+    """Rates at random states: the field with a runtime measure, and a table made for that measure; round-off."""
+    family = rotor_family(scene_of(name), name, "cuboid")
+    measure = ROTORS[name][1][3]
+    scene = family.at(110.0, measure)
+    values = family.values(110.0, measure)
+    assert values[0, Parameter.MEASURE] == measure
+    states = np.random.default_rng(0).normal(size=(5, 12)) * 0.3 + np.eye(12)[2] * -4.0
+    expected = Rates(rotor_table(scene.rotor, "cuboid"))(states, values[0])
+    for ours, theirs in zip(family.rates(states, np.repeat(values, 5, axis=0)), expected, strict=True):
+        np.testing.assert_allclose(ours, theirs, atol=1e-13 * np.abs(theirs).max())
+
+
+@pytest.mark.slow
+def test_sheets_are_found_around_their_folds():
+    """With one search in a corner of the map, far beyond the folds: the same as with searches all over it."""
+    family, measures = rotor_family(scene_of("horizontal"), "horizontal", "dipole"), ROTORS["horizontal"][1]
+    frequencies = FREQUENCIES[2:]
+    one = equilibrium_map(family, frequencies, measures, spacing=100)
+    many = equilibrium_map(family, frequencies, measures, spacing=4)
+    assert one.searches == 4
+    assert many.searches > 8
+    np.testing.assert_array_equal(one.number, many.number)
+
+
+def test_what_has_no_map_says_so():
+    family = rotor_family(scene_of("horizontal"), "horizontal", "dipole")
+    with pytest.raises(EquilibriumError, match="frequencies must not be zero"):
+        equilibrium_map(family, [0.0, 10.0], [1e-3])
+    with pytest.raises(ValueError, match="configuration must be one of"):
+        rotor_family(scene_of("horizontal"), "vertical", "dipole")
+    with pytest.raises(ValueError, match="measures must be given"):
+        rotor_family(scene_of("vertical"), "vertical", "fem")
+
+
+@pytest.mark.slow
+def test_mutual_magnetisation_is_interpolated():
+    """Between the seven tables the field is that of a table of its own, twice the accuracy asked of each: 2e-4."""
+    family = rotor_family(scene_of("vertical"), "vertical", "fem", 1e-4, FLOATER.radius, (10e-3, 20e-3))
+    x, y, z = variables = hy.make_vars("x", "y", "z")
+    field = hy.cfunc(family.field.expressions([x, y, z])[0], variables, compact_mode=True, opt_level=0)
+    rng = np.random.default_rng(0)
+    points = np.stack([*rng.uniform(-4e-3, 4e-3, (2, 100)), -rng.uniform(11.4e-3, 35e-3, 100)])
+    for measure in (10e-3, 11.3e-3, 19.9e-3):
+        table = rotor_table(rotor.vertical(measure, *SHAPE), "fem", 1e-5, nearest=FLOATER.radius)
+        expected, pars = table.evaluate(points.T)[0], np.zeros((Parameter.MEASURE + 1, 100))
+        pars[Parameter.MEASURE] = measure
+        apart = np.linalg.norm(field(points, pars=pars).T - expected, axis=1)
+        assert np.all(apart <= 2e-4 * np.linalg.norm(expected, axis=1))
