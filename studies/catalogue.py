@@ -3,7 +3,11 @@
 from __future__ import annotations
 
 from ..geometry import load_scene
+from . import design, dipole_vs_fem, sensitivity, stability_map
+from .design_figure import design_figure, design_lines
 from .dipole_validity import dipole_validity, validity_figure, validity_lines
+from .dipole_vs_fem_figure import dipole_figure
+from .dipole_vs_fem_report import dipole_lines
 from .drift import drift_points, drift_result, drift_row
 from .drift_figure import drift_figure, drift_lines
 from .field_components import field_components, field_points
@@ -18,11 +22,13 @@ from .levitation_distance import distance_points, levitation_distance
 from .levitation_distance_figure import distance_figure, distance_lines
 from .plate_damping import plate_damping
 from .plate_damping_figure import damping_figure, damping_lines
+from .sensitivity_figure import sensitivity_figure, sensitivity_lines
 from .shipped_scenes import default_scene
 from .side_mode import side_mode, side_points
 from .side_mode_figure import side_figure, side_lines
 from .speed_accuracy import speed_accuracy
 from .speed_accuracy_figure import speed_figure, speed_lines
+from .stability_map_figure import map_figure, map_lines
 from .study import Study, by_case, study_of_one
 from .team7_report import team7_figure, team7_lines, team7_study
 from .trajectories import flight_points, trajectories
@@ -100,13 +106,45 @@ CATALOGUE: dict[str, Study] = {
         damping_figure,
         damping_lines,
     ),
-    "drift": Study(
+    "levitation-time": Study(
         "levitation time against frequency by the slow drift of the floater's spin",
         drift_points,
         drift_row,
         drift_result,
         drift_figure,
         drift_lines,
+    ),
+    "dipole-vs-fem": Study(
+        "what true fields change in distance, angle, modes and limits, split into shape, permeability, mutual answers",
+        dipole_vs_fem.points,
+        dipole_vs_fem.compute,
+        by_case,
+        dipole_figure,
+        dipole_lines,
+    ),
+    "sensitivity": Study(
+        "which parameter matters: derivatives of distance and limits, and bands of realistic tolerances",
+        sensitivity.points,
+        sensitivity.compute,
+        by_case,
+        sensitivity_figure,
+        sensitivity_lines,
+    ),
+    "design": Study(
+        "which displacement, tilt and magnet size give a wanted distance and frequency with the largest margin",
+        design.points,
+        design.compute,
+        by_case,
+        design_figure,
+        design_lines,
+    ),
+    "stability-map": Study(
+        "regions of stable levitation in frequency and displacement, their boundaries, with and without a plate",
+        stability_map.points,
+        stability_map.compute,
+        by_case,
+        map_figure,
+        map_lines,
     ),
     "team7": study_of_one(
         "eddy currents against the measurement of TEAM workshop problem 7", team7_study, team7_figure, team7_lines
