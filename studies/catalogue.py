@@ -20,7 +20,7 @@ from .force_curve import force_curve, force_points
 from .force_curve_figure import force_figure, force_lines
 from .levitation_distance import distance_points, levitation_distance
 from .levitation_distance_figure import distance_figure, distance_lines
-from .plate_damping import plate_damping
+from .plate_damping import damping_points, gather_damping, plate_damping
 from .plate_damping_figure import damping_figure, damping_lines
 from .sensitivity_figure import sensitivity_figure, sensitivity_lines
 from .shipped_scenes import default_scene
@@ -100,9 +100,11 @@ CATALOGUE: dict[str, Study] = {
         floater_figure,
         floater_lines,
     ),
-    "plate-damping": study_of_one(
+    "plate-damping": Study(
         "what a plate does to each small motion, against its place, conductivity and thickness",
+        damping_points,
         plate_damping,
+        gather_damping,
         damping_figure,
         damping_lines,
     ),

@@ -4,19 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-import numpy as np
-
-from ..geometry import rotor
 from ..geometry.scene import Drag, Floater, Scene
+from .article import CONFIGURATIONS as ARTICLE
+from .article import EDGE, FLOATER, PERMEABILITY, REMANENCE
 from .study import Point
 
-CONFIGURATIONS = ("horizontal", "vertical", "tilt")
-LEVITATED = {"horizontal": (1, 2, 3, 4), "vertical": (10, 12, 14, 16), "tilt": (5, 10, 15, 20)}
-"""Displacements (mm) and tilts (degrees) with which the article's floater levitated."""
-UNITS = {"horizontal": "mm", "vertical": "mm", "tilt": "°"}
-SYMBOLS = {"horizontal": "δx", "vertical": "δz", "tilt": "δθ"}
-EDGE, REMANENCE, PERMEABILITY = 10e-3, 1.305, 1.05
-FLOATER = Floater(6.35e-3, REMANENCE, PERMEABILITY, 7500.0)
+CONFIGURATIONS = tuple(ARTICLE)
+UNITS = {name: kind.unit for name, kind in ARTICLE.items()}
+SYMBOLS = {name: kind.symbol for name, kind in ARTICLE.items()}
 
 
 def levitated(quick: bool) -> list[Point]:
@@ -25,9 +20,9 @@ def levitated(quick: bool) -> list[Point]:
 
 
 def _levitated(quick: bool) -> Iterator[Point]:
-    for configuration, measures in LEVITATED.items():
-        for measure in measures[1:2] if quick else measures:
-            yield {"configuration": configuration, "measure": float(measure)}
+    for configuration, kind in ARTICLE.items():
+        for measure in kind.levitated[1:2] if quick else kind.levitated:
+            yield {"configuration": configuration, "measure": measure}
 
 
 def rotor_scene(
@@ -47,6 +42,6 @@ def rotor_scene(
     frequency : Hz
     edge, remanence, permeability : of the cubes, m, T and 1
     """
-    size = np.radians(measure) if configuration == "tilt" else 1e-3 * measure
-    magnets = getattr(rotor, configuration)(float(size), edge, remanence, permeability)
+    kind = ARTICLE[configuration]
+    magnets = kind.make(kind.si(measure), edge, remanence, permeability)
     return Scene(frequency, magnets, floater, Drag(0.0, 0.0))
