@@ -9,10 +9,11 @@ from ..dynamics import EquilibriumError, find_equilibria
 from ..fem.cache import cached_rotor_table
 from ..geometry.box import Array
 from . import study
+from .article import FLOATER
 from .console import note
 from .design_search import designed
 from .results import variable
-from .rotor_points import CONFIGURATIONS, FLOATER, rotor_scene
+from .rotor_points import CONFIGURATIONS, rotor_scene
 
 EDGES = (6.0, 8.0, 10.0, 12.7, 16.0)
 """Edges of the cubes that are tried, mm."""

@@ -15,7 +15,8 @@ from ..fem.models import rotor_table
 from ..geometry.box import Array
 from ..geometry.magnet import MU_0
 from ..geometry.scene import Scene
-from .rotor_points import FLOATER, REMANENCE, rotor_scene
+from .article import FLOATER, REMANENCE
+from .rotor_points import rotor_scene
 from .stable_range import HIGHEST, LOWEST, UNIT, gap, is_stable, stability_end
 
 

@@ -14,10 +14,11 @@ from ..fem.table import RotorTable
 from ..geometry.box import Box
 from ..geometry.scene import Plate, Scene
 from . import study
+from .article import FLOATER
 from .console import note
 from .plate_shelf import plate_memory
 from .results import variable
-from .rotor_points import FLOATER, rotor_scene
+from .rotor_points import rotor_scene
 from .stable_range import HIGHEST, StableRange, at_frequency, reference_state, stable_ranges
 
 MEASURES = {

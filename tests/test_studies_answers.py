@@ -16,10 +16,11 @@ from spinlev.fem.rotor_response import rotor_ladder
 from spinlev.fem.two_body import two_body
 from spinlev.studies import dipole_vs_fem, stability_map
 from spinlev.studies.answered import Answered
+from spinlev.studies.article import FLOATER
 from spinlev.studies.design_search import designed
 from spinlev.studies.dipole_vs_fem_figure import CAUSES, TOTAL, change
 from spinlev.studies.mutual import Expansion, Mutual, pose
-from spinlev.studies.rotor_points import FLOATER, rotor_scene
+from spinlev.studies.rotor_points import rotor_scene
 from spinlev.studies.sensitivity import slope_by
 from spinlev.studies.stable_range import UNIT, Family, gap, reference_state, stable_range
 from spinlev.studies.tolerances import PARAMETERS, QUANTITIES, levitation, nominal, scene_of
