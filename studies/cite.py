@@ -18,7 +18,8 @@ REFERENCES = {
     "heyoka": "F. Biscani, D. Izzo, Mon. Not. R. Astron. Soc. 504, 2614 (2021), doi 10.1093/mnras/stab1032 (motion)",
     "eddy": "O. Bíró, Comput. Methods Appl. Mech. Engrg. 169, 391 (1999) (eddy currents with edge elements)",
     "team7": "K. Fujiwara, T. Nakata, COMPEL 9, 137 (1990) (measurement of TEAM workshop problem 7)",
-    "magpylib": "M. Ortner, L. G. Coliado Bandeira, SoftwareX 11, 100466 (2020), doi 10.1016/j.softx.2020.100466 (peer)",
+    "magpylib": "M. Ortner, L. G. Coliado Bandeira, SoftwareX 11, 100466 (2020), doi 10.1016/j.softx.2020.100466 "
+    "(peer)",
     "scikit-fem": "T. Gustafsson, G. D. McBain, J. Open Source Softw. 5, 2369 (2020), doi 10.21105/joss.02369 (peer)",
     "air": "S. C. R. Dennis, S. N. Singh, D. B. Ingham, J. Fluid Mech. 101, 257 (1980) (torque of air on a sphere)",
 }

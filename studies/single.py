@@ -105,7 +105,8 @@ def simulate_job(scene: Scene, asked: Tables, duration: float, out: Path, resume
         "trajectory": str(out / "trajectory.nc"),
         "tables_from_cache": shelf.from_cache,
     }
-    write_dataset(trajectory_dataset(flight), out / "trajectory.nc", scene)
+    models = {"model": table.model, "plate_model": memory.model if memory else "none"}
+    write_dataset(trajectory_dataset(flight).assign_attrs(models), out / "trajectory.nc", scene)
     return values, [*flight_lines(flight), *values["not_modelled"], f"Trajectory in {values['trajectory']}"]
 
 
