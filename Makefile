@@ -42,7 +42,7 @@ validate: install
 	$(BIN)/pytest -m slow -s
 
 bench: install
-	$(BIN)/pytest benchmarks --benchmark-columns=min,median,rounds
+	$(BIN)/pytest benchmarks --benchmark-timer=time.process_time --benchmark-columns=min,median,rounds
 
 fuzz: install
 	$(BIN)/python tests/fuzzing.py all 10000

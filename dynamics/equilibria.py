@@ -70,7 +70,8 @@ def survey(
     values, rates = parameters(scene, scales, frozen_spin=True), rates or Rates.of(scene, table)
     balance = Balance(rates, values, spin)
     curves, points = fixed_points(balance, SearchRange(scene, farthest))
-    found = [_equilibrium(table, scales, balance, r, m) for r, m in points]
+    known = [(r, m) for r, m in points if table.in_range(r * scales.length)[0]]
+    found = [_equilibrium(table, scales, balance, r, m) for r, m in known]
     if np.any(scene.gravity[:2]):
         found = _shaken(Shaken(scene, rates, values, None), found)
     return Survey(_in_order(found), tuple(_force_curve(scene, scales, curve) for curve in curves))

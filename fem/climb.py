@@ -2,8 +2,9 @@
 
 From rung to rung the order of the elements, the layers at the edges, the quadrature, the curvature of the outer sphere
 and the degree of its open boundary all grow, and the coefficients of the expansions converge geometrically. The
-difference of two rungs is the error of the lower one; times ρ/(1 - ρ), with ρ the ratio of the last two differences, it
-is that of the upper one, and it is kept as a field.
+difference d_n of two rungs is the error of the lower one. With ρ the ratio of the last two differences where they are
+largest, that of the upper one is d_n ρ/(1 - ρ), and ρ d_(n-1) may stand for d_n there. Both are kept as fields, to be
+added, because elsewhere, far away above all, one of them may be small by chance.
 
 A step in order cannot tell what the layers leave: about factor^(2λ) a layer, where the potential goes as r^λ at an edge
 and λ falls from 1 to 2/3 as μ grows. From `STRONG` on there are more of them, so that this is small beside the step.
@@ -19,6 +20,7 @@ import numpy as np
 from ..geometry.box import Array
 from ..geometry.magnet import Magnet
 from ..geometry.mesh import MeshSettings
+from .harmonics import Coefficients
 from .multipole import MultipoleExpansion
 from .rotor_solution import Refinement, RotorSolution
 
@@ -30,8 +32,8 @@ STRONG = 0.5
 FIRST_RATE = 0.5
 """Ratio of two differences that is assumed before it is known; 0.1 to 0.3 were measured."""
 FASTEST_RATE, FASTEST_RATE_STRONG, SLOWEST_RATE = 0.1, 0.3, 0.75
-SAFETY = 2.5
-"""Factor on the extrapolated difference."""
+SAFETY = 1.25
+"""Factor on each of the two extrapolated differences."""
 
 
 def strongest(magnets: Sequence[Magnet]) -> float:
@@ -47,7 +49,7 @@ def rung(order: int, settings: MeshSettings, contrast: float = 0.0) -> Refinemen
 
 def climb(
     solve: Callable[[int], RotorSolution], points: Array, scale: Array, target: float, settings: MeshSettings
-) -> tuple[RotorSolution, int, list[MultipoleExpansion]]:
+) -> tuple[RotorSolution, int, dict[str, list[MultipoleExpansion]]]:
     """Climb the ladder until the error is below the target.
 
     Parameters
@@ -58,21 +60,23 @@ def climb(
 
     Returns
     -------
-    The last solution, its order, and the estimated error of its field.
+    The last solution, its order, and the two estimates of its error, to be added, as fields.
     """
     first, *others = LAYERS
-    coarse, before = solve(first), np.inf
+    coarse, before, old = solve(first), np.inf, list[Coefficients]()
     for order in others:
         fine = solve(order)
-        difference = [b - a for a, b in zip(coarse.coefficients, fine.coefficients, strict=True)]
-        field = sum(e.evaluate(points)[0] for e in fine.expansions(difference))
+        new = [b - a for a, b in zip(coarse.coefficients, fine.coefficients, strict=True)]
+        field = sum(e.evaluate(points)[0] for e in fine.expansions(new))
         size = float(np.max(np.linalg.norm(field, axis=1) / scale))
         rate = _rate(size, before, _fastest(fine, order, settings))
         factor = SAFETY * rate / (1 - rate)
-        if factor * size <= target:
+        earlier = [size / before * d for d in old] if old and before else new
+        if 2 * factor * size <= target:
             break
-        coarse, before = fine, size
-    return fine, order, fine.expansions([factor * d for d in difference])
+        coarse, before, old = fine, size, new
+    doubts = {"discretisation": new, "discretisation, earlier step": earlier}
+    return fine, order, {cause: fine.expansions([factor * d for d in ds]) for cause, ds in doubts.items()}
 
 
 def _fastest(solution: RotorSolution, order: int, settings: MeshSettings) -> float:

@@ -11,8 +11,10 @@ from .harmonics import Coefficients
 from .quadrature import oblique_contact
 from .remanent import closed_moments
 
-OBLIQUE_NODES = (40, 64)
-"""Of the rules for boxes that touch without being parallel; the error falls about as nodes⁻³."""
+OBLIQUE_NODES, OBLIQUE_NODES_ANISOTROPIC = (96, 128), (40, 64)
+"""Of the rules for boxes that touch without being parallel, over faces, and in volumes where faces do not suffice.
+
+A 6 mm cube across the face of a 10 mm one: 5e-7 of B is wrong with 40 and 64, 9e-8 with 96, 4e-8 with 128."""
 
 
 def added_by_closed_form(
@@ -38,5 +40,6 @@ def closed_part(
     if not oblique_contact([magnet.box for magnet in magnets]):
         closed = added_by_closed_form(cut, magnets, carriers, degree)
         return closed, [np.zeros_like(c) for c in closed]
-    coarse, fine = (added_by_closed_form(cut, magnets, carriers, degree, nodes) for nodes in OBLIQUE_NODES)
+    rules = OBLIQUE_NODES if all(magnet.isotropic for magnet in magnets) else OBLIQUE_NODES_ANISOTROPIC
+    coarse, fine = (added_by_closed_form(cut, magnets, carriers, degree, nodes) for nodes in rules)
     return fine, [b - a for a, b in zip(coarse, fine, strict=True)]

@@ -32,14 +32,14 @@ def direct_table(magnets: tuple[Magnet, ...], accuracy: Accuracy | None = None) 
     def whole(order: int) -> RotorSolution:
         return solve_rotor(magnets, Refinement(order, rung(order, SETTINGS, strongest(magnets)).mesh, DEGREE), "direct")
 
-    solution, order, doubt = climb(whole, points, scale, accuracy.rtol / 2, SETTINGS)
+    solution, order, steps = climb(whole, points, scale, accuracy.rtol / 2, SETTINGS)
     coefficients = without_noise(solution.coefficients[0], 1e-15)
     expansions = used(solution.expansions([coefficients]))
     # a radius that is wrong by ε, as the meshed sphere's is by half its area error, changes degree l by (l + 1) ε
     roundness = solution.area_error / 2 * np.arange(1, len(coefficients) + 1)[:, None] * coefficients
     doubts = {
         "tail": used(tail(expansions)),
-        "discretisation": used(doubt),
+        **{cause: used(step) for cause, step in steps.items()},
         "roundness": used(solution.expansions([roundness])),
     }
     table = RotorTable("fem", magnets, (), expansions, doubts)

@@ -77,7 +77,7 @@ def fit_field_map(
     doubts = {"tail": left_out} if left_out else {}
     provenance = _provenance(basis, fit, field_map, time.perf_counter() - start)
     region = _region(field_map, middle, radii)
-    return GriddedTable(RotorTable("gridded", (), (), expansions, doubts, provenance), deviations, region)
+    return GriddedTable(RotorTable("map", (), (), expansions, doubts, provenance), deviations, region)
 
 
 def _radii(distances: Array, radius: float | None) -> Array:
@@ -124,7 +124,7 @@ def _left_out(
     tails = [replace(e, coefficients=_zonal(_tail(field_spectrum(e.coefficients)))) for e in expansions]
     near = np.nonzero((distances <= EDGE * distances.min(axis=0)).any(axis=1))[0]
     near = near[:: 1 + len(near) // EDGE_POINTS]
-    predicted = RotorTable("gridded", (), doubts={"tail": tuple(tails)}).absolute_error(field_map.points[near])[0]
+    predicted = RotorTable("map", (), doubts={"tail": tuple(tails)}).absolute_error(field_map.points[near])[0]
     residuals = field_map.field[near] - _held_out_field(basis, fit, field_map.points, near)
     sizes = np.sqrt(np.nansum(residuals**2, axis=1))
     scale = EDGE_SAFETY * float(np.max(sizes / (predicted + np.finfo(float).tiny)))

@@ -1,6 +1,7 @@
 """Tables of finite-element fields with a stated error.
 
-What the elements add comes from a ladder of refinements, see `climb`, whose last step gives the doubt "discretisation".
+What the elements add comes from a ladder of refinements, see `climb`, whose last two steps give the doubts of
+the discretisation.
 The closed part of the moments is exact; what is cut off the expansions is known and kept as the doubt "truncation".
 """
 
@@ -63,12 +64,12 @@ def fem_table(
         refinement = rung(order, settings, strongest(magnets))
         return solve_rotor(magnets, refinement, "split", degree, cut, use_symmetry, carriers)
 
-    solution, order, doubt = climb(reaction, points, scale, accuracy.rtol / 3, settings)
+    solution, order, steps = climb(reaction, points, scale, accuracy.rtol / 3, settings)
     whole = solution.expansions(
         [without_noise(a + b, 1e-15) for a, b in zip(closed, solution.coefficients, strict=True)]
     )
     doubts = {
-        "discretisation": used(doubt),
+        **{cause: used(step) for cause, step in steps.items()},
         "quadrature": used(solution.expansions(unsure)),
         "tail": used(tail(whole)),
         "gap": used(gap_doubt(magnets, solution)),

@@ -22,7 +22,6 @@ from typing import Any, Literal
 import ngsolve as ng
 import numpy as np
 from netgen.meshing import NgException
-from scipy.sparse.linalg import LinearOperator, cg
 
 from ..geometry.box import Array
 from ..geometry.magnet import Magnet
@@ -30,16 +29,13 @@ from ..geometry.mesh import MagnetMesh
 from .demagnetization import remanent_field
 from .integration_points import volume_points
 from .open_boundary import OpenBoundary
+from .open_solve import solve_open
 
 Formulation = Literal["split", "direct"]
 
 
 class MeshError(RuntimeError):
     """The elements of a mesh do not match each other."""
-
-
-class ConvergenceError(RuntimeError):
-    """The linear solver did not reach its tolerance."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -141,7 +137,8 @@ def solve(
     for plane, sign in zip(mesh.planes, signs, strict=True):
         if sign < 0:
             free = free & ~space.GetDofs(mesh.mesh.Boundaries(f"plane{plane}"))
-    potential = _solve_open(system, load, free, boundary)
+    inverse = system.stiffness.mat.Inverse(free, inverse="sparsecholesky")
+    potential = solve_open(system.stiffness, inverse, free, load, boundary)
     return Solution(system, formulation, tuple(sources), signs, potential, boundary)
 
 
@@ -159,32 +156,3 @@ def _add_source(
     source = remanent_field(sources, mesh.to_meter(points.points)) @ susceptibility + rest
     for axis in range(3):
         load += points.function(source[:, axis]) * ng.grad(test)[axis] * points.measure
-
-
-def _solve_open(system: System, load: Any, free_dofs: Any, boundary: OpenBoundary) -> Any:
-    """Static condensation, a sparse Cholesky factor, and conjugate gradients for the open boundary on top of it."""
-    stiffness, space = system.stiffness, system.space
-    potential = ng.GridFunction(space)
-    inverse = stiffness.mat.Inverse(free_dofs, inverse="sparsecholesky")
-    load.vec.data += stiffness.harmonic_extension_trans * load.vec
-    free = np.array(free_dofs)
-    source, target = load.vec.CreateVector(), load.vec.CreateVector()
-
-    def multiply(operator: Any, values: Array) -> Array:
-        source.FV().NumPy()[:] = values
-        target.data = operator * source
-        return np.where(free, target.FV().NumPy(), 0.0)
-
-    shape = (space.ndof, space.ndof)
-    full = LinearOperator(
-        shape, matvec=lambda x: multiply(stiffness.mat, x) + np.where(free, boundary.apply(x), 0.0), dtype=float
-    )
-    preconditioner = LinearOperator(shape, matvec=lambda x: multiply(inverse, x), dtype=float)
-    right_hand_side = np.where(free, load.vec.FV().NumPy(), 0.0)
-    result, failed = cg(full, right_hand_side, rtol=1e-12, maxiter=100, M=preconditioner)
-    if failed:
-        raise ConvergenceError(f"The open boundary did not converge in {failed} iterations; use a larger ball of air.")
-    potential.vec.FV().NumPy()[:] = result
-    potential.vec.data += stiffness.harmonic_extension * potential.vec
-    potential.vec.data += stiffness.inner_solve * load.vec
-    return potential

@@ -15,12 +15,11 @@ from typing import Any
 
 import ngsolve as ng
 import numpy as np
-from scipy.sparse.linalg import LinearOperator, cg
 
 from ..geometry.box import Array
 from .integration_points import IntegrationPoints, volume_points
-from .magnetostatics import ConvergenceError
 from .open_boundary import OpenBoundary
+from .open_solve import solve_open
 
 BOUNDARY_DEGREE = 8
 """Harmonics up to this degree see an exactly open boundary; higher ones reach the bodies below 1e-8."""
@@ -56,35 +55,13 @@ class PermeableRegions:
             for axis in range(3):
                 load += points.function(source[:, axis]) * ng.grad(test)[axis] * points.measure
         load.Assemble()
-        slope = ng.grad(self._potential(load))
+        free = self.space.FreeDofs(True)
+        slope = ng.grad(solve_open(self.stiffness, self.inverse, free, load, self.boundary))
         result = {}
         for name, points in self.points.items():
             own = points.sample(*(slope[axis] for axis in range(3)))
             result[name] = (fields[name] - own) @ self.susceptibility[name]
         return result
-
-    def _potential(self, load: Any) -> Any:
-        """Static condensation, then conjugate gradients for the open boundary on top of the sparse factor."""
-        potential, form = ng.GridFunction(self.space), self.stiffness
-        load.vec.data += form.harmonic_extension_trans * load.vec
-        free = np.array(self.space.FreeDofs(True))
-        source, target = load.vec.CreateVector(), load.vec.CreateVector()
-
-        def multiply(operator: Any, values: Array) -> Array:
-            source.FV().NumPy()[:] = values
-            target.data = operator * source
-            return np.where(free, target.FV().NumPy(), 0.0)
-
-        shape = (self.space.ndof, self.space.ndof)
-        full = LinearOperator(shape, lambda x: multiply(form.mat, x) + self.boundary.apply(x), dtype=float)
-        factor = LinearOperator(shape, lambda x: multiply(self.inverse, x), dtype=float)
-        values, failed = cg(full, np.where(free, load.vec.FV().NumPy(), 0.0), rtol=1e-11, maxiter=100, M=factor)
-        if failed:
-            raise ConvergenceError(f"The open boundary did not converge in {failed} iterations; use a larger ball.")
-        potential.vec.FV().NumPy()[:] = values
-        potential.vec.data += form.harmonic_extension * potential.vec
-        potential.vec.data += form.inner_solve * load.vec
-        return potential
 
 
 def assemble_regions(mesh: Any, permeability: Mapping[str, Array], ball_radius: float, order: int) -> PermeableRegions:

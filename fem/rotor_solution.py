@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import product
 
 import numpy as np
 
@@ -17,6 +18,9 @@ from .magnetostatics import Formulation, MeshError, System, assemble, solve
 from .moments import reaction_moments, trace_moments
 from .multipole import MultipoleExpansion
 from .spherical import turned
+
+SIZES = (1.0, 0.8, 0.5)
+"""Of elements in magnets, relative to what is asked for, that are tried."""
 
 
 @dataclass(frozen=True)
@@ -116,9 +120,14 @@ def solve_rotor(
 def _meshed_system(
     bodies: list[Magnet], refinement: Refinement, planes: tuple[int, ...], edges_of: list[Box]
 ) -> tuple[MagnetMesh, System, int]:
-    """Mesh, matrix, layers at the edges: fewer where the mesher cannot match them (an edge within a face)."""
-    for layers in range(refinement.mesh.hp_layers, -1, -1):
-        mesh = mesh_magnets(bodies, replace(refinement.mesh, hp_layers=layers), planes, edges_of)
+    """Mesh, matrix, layers at the edges: where the mesher cannot match them, smaller elements, else fewer layers.
+
+    Two elements that touch edges of magnets near each other may be refined otherwise on the face between them; in
+    another mesh of nearly the same size they are mostly not there.
+    """
+    for layers, size in product(range(refinement.mesh.hp_layers, -1, -1), SIZES):
+        settings = replace(refinement.mesh, hp_layers=layers, magnet_size=size * refinement.mesh.magnet_size)
+        mesh = mesh_magnets(bodies, settings, planes, edges_of)
         try:
             return mesh, assemble(mesh, refinement.order), layers
         except MeshError:

@@ -17,7 +17,7 @@ from .table_store import TableFileError, described, read_checked, write_checked
 
 __all__ = ["FORMAT", "TableFileError", "load_table", "save_table"]
 
-FORMAT = "spinlev rotor table 3"
+FORMAT = "spinlev rotor table 4"
 
 
 def save_table(table: RotorTable, path: str | Path) -> None:

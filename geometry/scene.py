@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from pathlib import Path
 
 import numpy as np
 
@@ -118,6 +119,7 @@ class Scene:
     plate : conducting plate, or None
     drag : of the surrounding medium
     start : where a simulation begins
+    field_map : file of a map of the rotor's B in its frame, or None
     text : the scene file as it was read, for the record
     """
 
@@ -128,6 +130,7 @@ class Scene:
     gravity: Array = field(default_factory=lambda: frozen_array((0.0, 0.0, -9.81), (3,)))
     plate: Plate | None = None
     start: OffsetStart | AbsoluteStart = field(default_factory=OffsetStart)
+    field_map: Path | None = None
     text: str = ""
 
     @property

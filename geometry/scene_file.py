@@ -27,7 +27,7 @@ def load_scene(path: str | Path) -> Scene:
     Raises
     ------
     SceneError : the file is missing or unreadable, is not TOML, has unknown, missing or wrong keys, or its
-        bodies overlap
+        bodies overlap, or its map of the field is no file
     """
     source = str(path)
     try:
@@ -36,7 +36,10 @@ def load_scene(path: str | Path) -> Scene:
         raise SceneError(source, ["the scene file does not exist; give the path of a TOML file."]) from None
     except (OSError, UnicodeDecodeError) as error:
         raise SceneError(source, [f"the scene file must be a readable UTF-8 text; {error}."]) from None
-    return parse_scene(text, source)
+    scene = parse_scene(text, source)
+    if scene.field_map and not scene.field_map.is_file():
+        raise SceneError(source, [f"Input rotor.field_map must be a file; instead there is no {scene.field_map}."])
+    return scene
 
 
 def parse_scene(text: str, source: str = "scene", changes: Mapping[str, float] | None = None) -> Scene:
@@ -63,7 +66,7 @@ def parse_scene(text: str, source: str = "scene", changes: Mapping[str, float] |
     faults = _start_faults(table.start)
     if faults:
         raise SceneError(source, faults)
-    scene = _scene(table, text)
+    scene = _scene(table, text, Path(source).parent)
     faults = overlap_faults(scene)
     if faults:
         raise SceneError(source, faults)
@@ -105,7 +108,7 @@ def _start_faults(start: StartSection | None) -> list[str]:
     return faults
 
 
-def _scene(table: SceneSection, text: str) -> Scene:
+def _scene(table: SceneSection, text: str, folder: Path) -> Scene:
     floater = Floater(
         radius=table.floater.diameter_mm * MILLI / 2,
         remanence=table.floater.remanence_T,
@@ -124,6 +127,7 @@ def _scene(table: SceneSection, text: str) -> Scene:
         plate=_plate(table.plate) if table.plate else None,
         drag=drag,
         start=_start(table.start),
+        field_map=folder / table.rotor.field_map if table.rotor.field_map else None,
         text=text,
     )
 

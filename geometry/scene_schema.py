@@ -40,7 +40,11 @@ class _Table(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid")
 
 
-class _ArticleRotor(_Table):
+class _AnyRotor(_Table):
+    field_map: Annotated[str, Field(min_length=1)] | None = None
+
+
+class _ArticleRotor(_AnyRotor):
     edge_mm: Length
     remanence_T: Remanence
     recoil_permeability: MagnetPermeability = [RECOIL_PERMEABILITY, RECOIL_PERMEABILITY]
@@ -77,7 +81,7 @@ class MagnetSection(_Table):
     recoil_permeability: MagnetPermeability = [RECOIL_PERMEABILITY, RECOIL_PERMEABILITY]
 
 
-class ExplicitRotor(_Table):
+class ExplicitRotor(_AnyRotor):
     """Any set of cuboids."""
 
     magnets: Annotated[list[MagnetSection], Field(min_length=1)]

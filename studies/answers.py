@@ -9,7 +9,7 @@ import numpy as np
 
 from ..dynamics import Equilibrium, PlateMemory, Trajectory, flight_kind
 from ..fem.sphere_eddy import rotating_torque
-from ..fem.table import RotorTable
+from ..fem.table import FieldTable
 from ..geometry.box import Array
 from ..geometry.scene import Scene
 
@@ -23,7 +23,7 @@ MAGNET_CONDUCTIVITY = 6.7e5
 """Of sintered NdFeB, S/m: to say what is left out where the scene gives none."""
 
 
-def field_answer(table: RotorTable, points: Array) -> dict[str, Any]:
+def field_answer(table: FieldTable, points: Array) -> dict[str, Any]:
     """B, its gradient and their estimated errors at points (n, 3) m."""
     b, gradient = table.evaluate(points)
     error, gradient_error = table.relative_error(points)
@@ -57,7 +57,7 @@ def equilibrium_answer(equilibrium: Equilibrium) -> dict[str, Any]:
 
 
 def equilibria_answer(
-    table: RotorTable, equilibria: tuple[Equilibrium, ...], memory: PlateMemory | None
+    table: FieldTable, equilibria: tuple[Equilibrium, ...], memory: PlateMemory | None
 ) -> dict[str, Any]:
     """All equilibria; the error estimate is the field's largest relative error at any of them."""
     places = np.array([e.position for e in equilibria]).reshape(-1, 3)
@@ -81,7 +81,7 @@ def plate_answer(memory: PlateMemory | None) -> dict[str, Any]:
     }
 
 
-def flight_answer(table: RotorTable, flight: Trajectory, memory: PlateMemory | None) -> dict[str, Any]:
+def flight_answer(table: FieldTable, flight: Trajectory, memory: PlateMemory | None) -> dict[str, Any]:
     """How a flight went; the error estimate is the field's largest relative error along it."""
     places = flight.rotor.position[:: max(1, len(flight.time) // 500)]
     return {
@@ -98,7 +98,7 @@ def flight_answer(table: RotorTable, flight: Trajectory, memory: PlateMemory | N
 
 
 def omissions(
-    scene: Scene, table: RotorTable, equilibria: Sequence[Equilibrium], memory: PlateMemory | None
+    scene: Scene, table: FieldTable, equilibria: Sequence[Equilibrium], memory: PlateMemory | None
 ) -> list[str]:
     """What is in the scene but not in the computation."""
     left_out = [PLATE_NOT_MODELLED] if scene.plate and memory is None else []
@@ -110,7 +110,7 @@ def omissions(
     return left_out
 
 
-def _floater_currents(scene: Scene, table: RotorTable, equilibrium: Equilibrium) -> str:
+def _floater_currents(scene: Scene, table: FieldTable, equilibrium: Equilibrium) -> str:
     """How large the torque of the floater's own eddy currents would be."""
     across = float(np.linalg.norm(np.cross(table.evaluate(equilibrium.position)[0][0], equilibrium.state.moment)))
     relative = scene.frequency * (1 - equilibrium.spin)

@@ -17,7 +17,7 @@ import xarray as xr
 from matplotlib.figure import Figure
 
 from ..dynamics import EquilibriumError, PlateMemory
-from ..fem.table import RotorTable
+from ..fem.table import FieldTable
 from ..geometry import InputError, Scene, load_scene, parse_scene
 from ..geometry.scene import OffsetStart
 from .catalogue import CATALOGUE
@@ -44,7 +44,7 @@ __all__ = [
 ]
 
 
-def rotor_table(scene: Scene, model: FieldModel = "auto", rtol: float = 3e-6) -> RotorTable:
+def rotor_table(scene: Scene, model: FieldModel = "auto", rtol: float = 3e-6) -> FieldTable:
     """The rotor's field: `evaluate(points)` gives B (n, 3) T and its gradient (n, 3, 3) T/m at points (n, 3) m.
 
     Accurate to `rtol` wherever the floater can be; `relative_error(points)` is the estimate. Raises InputError for a

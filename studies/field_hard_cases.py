@@ -19,6 +19,7 @@ from ..fem.accuracy import Accuracy, shell, typical_field
 from ..fem.carrier import carrier
 from ..fem.closed_part import added_by_closed_form
 from ..fem.ladder import AccuracyWarning, fem_table
+from ..fem.quadrature import oblique_contact
 from ..fem.rotor_solution import Refinement, solve_rotor
 from ..geometry.box import Array
 from ..geometry.pieces import cut_magnets
@@ -33,6 +34,8 @@ DEGREE = 33
 """Of the reference's expansions."""
 BOUNDARY_DEGREE = 20
 """Of the reference's open boundary: a ball of 1.2 radii leaves (1/1.2)^(2 · 20 + 1), 6e-4 of what degree 20 adds."""
+OBLIQUE_NODES = 192
+"""Of the reference's rules for boxes that touch without being parallel."""
 PLACES = 12
 """Distances from the faces, from the case's own nearest one to `FARTHEST`."""
 ROUND_OFF = 1e-13
@@ -104,7 +107,8 @@ def reference(case: HardCase, points: Array) -> tuple[Array, Array]:
     pieces = cut_magnets(case.magnets, case.clearance)
     carriers = tuple(carrier(magnet) for magnet in case.magnets)
     remanent = RotorTable("cuboid", carriers, carriers).evaluate(points)[0]
-    closed = added_by_closed_form(pieces, case.magnets, carriers, DEGREE)
+    nodes = OBLIQUE_NODES if oblique_contact([magnet.box for magnet in case.magnets]) else None
+    closed = added_by_closed_form(pieces, case.magnets, carriers, DEGREE, nodes)
     fields = []
     for order in (case.order - 1, case.order):
         found = solve_rotor(

@@ -33,7 +33,7 @@ def hard_case_figure(result: xr.Dataset) -> Figure:
         panel.axhline(1e-5, color="0.2", lw=0.7, label="tolerance asked for")
         panel.set_title(name, fontsize=8.5)
         small = float(row["true_error"].min()) < SMALL
-        panel.set(xlim=(5, 1300), ylim=(3e-17 if small else 1e-10, 1e-4))
+        panel.set(xlim=(4, 1300), ylim=(3e-17 if small else 1e-10, 1e-4))
         panel.yaxis.set_major_locator(LogLocator(numticks=6))
         panel.tick_params(axis="y", labelsize=7)
     for panel in axes.flat[len(names) :]:

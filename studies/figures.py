@@ -38,9 +38,10 @@ NAMES = {
     "cuboid": "cuboid, closed form (μr = 1)",
     "fem": "finite elements",
     "moments": "moments",
+    "map": "map",
 }
-COLORS = dict(zip(("dipole", "cuboid", "fem", "moments"), PALETTE, strict=False))
-DASHES = {"dipole": "--", "cuboid": "-.", "fem": "-", "moments": ":"}
+COLORS = dict(zip(NAMES, PALETTE, strict=False))
+DASHES = {"dipole": "--", "cuboid": "-.", "fem": "-", "moments": ":", "map": "-"}
 
 
 Draw = TypeVar("Draw", bound=Callable[..., Figure])

@@ -2,21 +2,25 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, replace
+from functools import cache
 
 import numpy as np
 import xarray as xr
 
 from ..dynamics import Equilibrium, Rates, Survey, starting_point, survey, with_plate
 from ..dynamics.plate_action import plate_action
-from ..fem.models import rotor_table
+from ..fem.cache import cached_rotor_table
 from ..fem.table import RotorTable
 from ..geometry import InputError, load_scene
 from ..geometry.box import Array, Box, rotation_matrix
 from ..geometry.scene import Plate, Scene
+from .console import note
 from .plate_shelf import plate_memory
 from .results import AXIS, MODES, variable
 from .shipped_scenes import shipped_scene
+from .study import Point
 
 SIZE = (0.1, 0.24, 0.03)
 """Edges of the article's plate, m."""
@@ -61,45 +65,60 @@ class Case:
 def cases(quick: bool) -> list[Case]:
     """The plates of the study."""
     few = 5 if quick else 11
-    found = [Case("below", d, distance=d) for d in np.geomspace(0.0085, 0.06, few)]
-    found += [Case("beside", d, upright=True, distance=d) for d in np.geomspace(0.01, 0.06, few)]
-    found += [Case("conductivity", s, conductivity=s) for s in np.geomspace(1e6, 6e7, few)]
-    found += [Case("thickness", t, thickness=t) for t in np.geomspace(1e-3, 5e-2, few)]
+    found = [Case("below", d, distance=d) for d in np.geomspace(0.0085, 0.06, few).tolist()]
+    found += [Case("beside", d, upright=True, distance=d) for d in np.geomspace(0.01, 0.06, few).tolist()]
+    found += [Case("conductivity", s, conductivity=s) for s in np.geomspace(1e6, 6e7, few).tolist()]
+    found += [Case("thickness", t, thickness=t) for t in np.geomspace(1e-3, 5e-2, few).tolist()]
     if not quick:
         found += [Case("below, real plate", d, "reduced", distance=d) for d in (0.012, 0.018, 0.03)]
         found += [Case("beside, real plate", d, "reduced", True, d) for d in (0.012, 0.018, 0.03)]
     return found
 
 
-def plate_damping(quick: bool) -> xr.Dataset:
-    """Levitation of the scene `tilt-over-plate` with other plates in place of its own, one after the other.
+def damping_points(quick: bool) -> list[Point]:
+    """The plates as points of the study."""
+    return [asdict(case) for case in cases(quick)]
+
+
+def plate_damping(point: Point) -> xr.Dataset:
+    """Levitation of the scene `tilt-over-plate` with another plate in place of its own.
 
     Returns
     -------
     Dataset over `case`: growth and frequency of each mode, displacement, mean force, torque and loss; NaN where the
     plate undoes the equilibrium.  Plates are infinite slabs but for those called real.
     """
-    scene = replace(load_scene(shipped_scene("tilt-over-plate")), plate=None)
-    table = rotor_table(scene.rotor, "fem", 1e-5, scene.floater.radius)
-    rates = Rates.of(scene, table)
-    known = survey(scene, table, rates=rates)
-    start = starting_point(known.equilibria)
-    if start is None:
-        raise InputError("Input scene must have a stable equilibrium without a plate; instead it has none.")
-    plates = cases(quick)
-    rows = [_row(replace(scene, plate=case.plate(start.position)), case, table, rates, start) for case in plates]
-    data = {name: (("case", *dims), np.array([row[name] for row in rows])) for name, dims in COLUMNS.items()}
+    case = Case(**point)
+    scene, table, rates, start = _without_plate()
+    row = _row(replace(scene, plate=case.plate(start.position)), case, table, rates, start)
     without = np.array([mode.growth_per_s for mode in start.modes])
     return xr.Dataset(
         {
-            **{name: variable(dims, values, *UNITS[name]) for name, (dims, values) in data.items()},
-            "sweep": (("case",), [case.sweep for case in plates]),
-            "value": variable(("case",), [case.value for case in plates], "SI", "distance, conductivity or thickness"),
+            **{n: variable(("case", *dims), np.array([row[n]]), *UNITS[n]) for n, dims in COLUMNS.items()},
+            "sweep": (("case",), [case.sweep]),
+            "value": variable(("case",), [case.value], "SI", "distance, conductivity or thickness"),
             "growth_without": variable(("mode",), without, "1/s", "growth rate without a plate"),
         },
         {"mode": list(MODES), "axis": list(AXIS)},
         {"weight_N": scene.floater.mass * 9.81, "frequency_hz": scene.frequency, "plate_rtol": RTOL},
     )
+
+
+def gather_damping(parts: Sequence[xr.Dataset]) -> xr.Dataset:
+    """The plates one after the other."""
+    return xr.concat(parts, "case", data_vars="minimal", coords="minimal", compat="override", join="exact")
+
+
+@cache
+def _without_plate() -> tuple[Scene, RotorTable, Rates, Equilibrium]:
+    """The scene, its rotor's field and its stable equilibrium, once for all points that a process computes."""
+    scene = replace(load_scene(shipped_scene("tilt-over-plate")), plate=None)
+    table, _ = cached_rotor_table(scene.rotor, "fem", 1e-5, note, scene.floater.radius)
+    rates = Rates.of(scene, table)
+    start = starting_point(survey(scene, table, rates=rates).equilibria)
+    if start is None:
+        raise InputError("Input scene must have a stable equilibrium without a plate; instead it has none.")
+    return scene, table, rates, start
 
 
 COLUMNS: dict[str, tuple[str, ...]] = {

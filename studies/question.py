@@ -9,7 +9,7 @@ import numpy as np
 import xarray as xr
 
 from ..dynamics import PlateMemory, flight_kind
-from ..fem.table import RotorTable
+from ..fem.table import FieldTable
 from ..geometry import Scene, parse_scene
 from ..geometry.box import Array
 from .answers import flight_answer
@@ -100,7 +100,7 @@ def _flight(question: Question, scene: Scene, shelf: Shelf) -> xr.Dataset:
     )
 
 
-def _models(table: RotorTable, memory: PlateMemory | None) -> dict[str, str]:
+def _models(table: FieldTable, memory: PlateMemory | None) -> dict[str, str]:
     return {"model": table.model, "plate_model": memory.model if memory else "none"}
 
 

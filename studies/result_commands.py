@@ -1,4 +1,4 @@
-"""The commands about many scenes and about results: study, figure, show, report."""
+"""The commands about many scenes and about results: study, figure, show, report, cite."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from .vary import parse_vary
 
 def add_result_commands(app: App) -> None:
     """Let the command line know these commands."""
-    for command in (study, figure, show, report):
+    for command in (study, figure, show, report, cite):
         app.command(command)
 
 
@@ -136,3 +136,17 @@ def report(folder: Path, *, output: Output = Output()) -> Answer:
 
     page, names = report_job(folder, output.out)
     return Answer({"report": str(page), "results": names}, (f"{', '.join(names)}: {page}",), output.json)
+
+
+def cite(result: Path, *, output: Output = Output()) -> Answer:
+    """The papers behind what a result used.
+
+    Parameters
+    ----------
+    result
+        A netCDF file that spinlev has written.
+    """
+    from .cite import cite_job
+
+    references = cite_job(result)
+    return Answer({"references": references}, tuple(references), output.json)

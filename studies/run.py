@@ -10,7 +10,7 @@ import numpy as np
 import xarray as xr
 
 from ..dynamics import EquilibriumError, Survey, Trajectory, survey, with_plate
-from ..fem.table import RotorTable
+from ..fem.table import FieldTable
 from ..geometry.atomic import replacing
 from ..geometry.scene import AbsoluteStart, Scene
 from .answers import equilibria_answer, equilibria_lines, flight_answer, flight_lines, omissions
@@ -67,7 +67,7 @@ def main_job(scene: Scene, asked: Tables, duration: float, out: Path) -> Job:
     return values, [*lines, f"Results and figures in {out}/"]
 
 
-def _surveys(scene: Scene, tables: Mapping[str, RotorTable]) -> tuple[dict[str, Survey], EquilibriumError | None]:
+def _surveys(scene: Scene, tables: Mapping[str, FieldTable]) -> tuple[dict[str, Survey], EquilibriumError | None]:
     """Equilibria by each table, or empty surveys and the reason why there cannot be any."""
     note("Equilibria ...")
     try:
@@ -103,7 +103,9 @@ def comparison_lines(compared: Mapping[str, Any] | None) -> list[str]:
     ]
 
 
-def _static_dataset(scene: Scene, tables: dict[str, RotorTable], surveys: dict[str, Survey], best: str) -> xr.Dataset:
+def _static_dataset(
+    scene: Scene, tables: Mapping[str, FieldTable], surveys: Mapping[str, Survey], best: str
+) -> xr.Dataset:
     lowest = min(float(corner[2]) for magnet in scene.rotor for corner in magnet.box.corners)
     heights = np.linspace(min(lowest - scene.floater.radius, -1e-3), min(lowest - 1e-3, -DEEPEST), 200)
     parts = [
@@ -117,7 +119,7 @@ def _static_dataset(scene: Scene, tables: dict[str, RotorTable], surveys: dict[s
 
 
 def _write(
-    scene: Scene, table: RotorTable, result: xr.Dataset, values: dict[str, Any], flight: Trajectory | None, out: Path
+    scene: Scene, table: FieldTable, result: xr.Dataset, values: dict[str, Any], flight: Trajectory | None, out: Path
 ) -> None:
     from .picture import last_view, scene_picture
 

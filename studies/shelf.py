@@ -7,6 +7,8 @@ from dataclasses import dataclass, field
 
 from ..dynamics import Equilibrium, PlateMemory, starting_point
 from ..fem.cache import cached_rotor_table
+from ..fem.gridded import GriddedTable
+from ..fem.map_table import map_table
 from ..fem.models import resolve_model, rotor_table
 from ..fem.table import RotorTable
 from ..geometry.box import Array
@@ -14,6 +16,9 @@ from ..geometry.scene import AbsoluteStart, Scene
 from .console import note
 from .plate_shelf import check_room, plate_memory, resolve_plate_model
 from .tables import Tables
+
+RotorField = RotorTable | GriddedTable
+"""A rotor's table: computed, or from a map."""
 
 
 @dataclass
@@ -32,24 +37,26 @@ class Shelf:
     scene: Scene
     asked: Tables
     from_cache: list[str] = field(default_factory=list)
-    _tables: dict[str, RotorTable] = field(default_factory=dict)
+    _tables: dict[str, RotorField] = field(default_factory=dict)
 
     @property
     def nearest(self) -> float:
         """Distance from the magnets' faces from which on the accuracy is asked for, m."""
         return self.scene.floater.radius
 
-    def table(self, model: str | None = None) -> RotorTable:
+    def table(self, model: str | None = None) -> RotorField:
         """The table of a model, by default the one asked for; `auto` chooses and says why."""
         model = model or self.asked.model
-        name, reason = resolve_model(self.scene.rotor, model, self.asked.rtol, self.nearest)
+        name, reason = "map", ""
+        if model != "map":
+            name, reason = resolve_model(self.scene.rotor, model, self.asked.rtol, self.nearest)
         if model == "auto" and name not in self._tables:
             note(f"Field model: {name} ({reason})")
         if name not in self._tables:
             self._tables[name] = self._made(name)
         return self._tables[name]
 
-    def memory(self, table: RotorTable, without: Sequence[Equilibrium]) -> PlateMemory | None:
+    def memory(self, table: RotorField, without: Sequence[Equilibrium]) -> PlateMemory | None:
         """The plate in the motion, around where the floater begins; None where no currents are modelled.
 
         Parameters
@@ -64,7 +71,7 @@ class Shelf:
             note(f"Plate model: {name} ({reason})")
         if name == "none" or self.scene.plate is None or place is None:
             return None
-        memory, found = plate_memory(self.scene, self.scene.plate, name, table, place, self.asked.plate_rtol)
+        memory, found = plate_memory(self.scene, self.scene.plate, name, sources(table), place, self.asked.plate_rtol)
         if found:
             self.from_cache.append("plate")
         return memory
@@ -76,7 +83,10 @@ class Shelf:
         chosen = starting_point(without) or next(iter(without), None)
         return None if chosen is None else chosen.position
 
-    def _made(self, name: str) -> RotorTable:
+    def _made(self, name: str) -> RotorField:
+        if name == "map":
+            note("Rotor's field from its map ...")
+            return map_table(self.scene.field_map, self.scene.rotor)
         if name != "fem":  # closed forms are quicker to make than to read
             return rotor_table(self.scene.rotor, name, self.asked.rtol, self.nearest)
         note("Rotor's field by finite elements ...")
@@ -85,3 +95,8 @@ class Shelf:
             self.from_cache.append(name)
         note("  from the cache." if found else f"  done in {table.provenance['seconds']:.1f} s.")
         return table
+
+
+def sources(table: RotorField) -> RotorTable:
+    """The closed forms and expansions that make a table's field."""
+    return table.expansions if isinstance(table, GriddedTable) else table

@@ -17,7 +17,7 @@ from .console import note, progress
 from .drawings import read_result
 from .picture import last_view, scene_picture
 from .plate_currents import plate_currents
-from .shelf import Shelf
+from .shelf import Shelf, sources
 from .tables import Tables
 
 
@@ -41,7 +41,7 @@ def show_job(path: Path, out: Path) -> list[str]:
     currents = None
     if scene.plate is not None:
         note("Currents in the plate ...")
-        currents = partial(plate_currents, scene, scene.plate, table, view.floater)
+        currents = partial(plate_currents, scene, scene.plate, sources(table), view.floater)
     picture, animation = (out / f"{path.stem}-{name}" for name in ("scene.png", "flight.gif"))
     scene_picture(replace(view, currents=currents), picture)
     with progress("Animation") as advance:

@@ -20,7 +20,7 @@ from ..dynamics import (
     survey,
     with_plate,
 )
-from ..fem.table import RotorTable
+from ..fem.table import FieldTable
 from ..geometry.atomic import replacing
 from ..geometry.box import Array
 from ..geometry.scene import OffsetStart, Scene
@@ -28,7 +28,7 @@ from .answers import equilibria_answer, equilibria_lines, field_answer, flight_a
 from .console import note, progress, to_json
 from .points_file import COLUMNS
 from .results import trajectory_dataset, write_dataset
-from .shelf import Shelf
+from .shelf import RotorField, Shelf
 from .tables import Tables
 
 Job = tuple[Mapping[str, Any], list[str]]
@@ -105,11 +105,12 @@ def simulate_job(scene: Scene, asked: Tables, duration: float, out: Path, resume
         "trajectory": str(out / "trajectory.nc"),
         "tables_from_cache": shelf.from_cache,
     }
-    write_dataset(trajectory_dataset(flight), out / "trajectory.nc", scene)
+    models = {"model": table.model, "plate_model": memory.model if memory else "none"}
+    write_dataset(trajectory_dataset(flight).assign_attrs(models), out / "trajectory.nc", scene)
     return values, [*flight_lines(flight), *values["not_modelled"], f"Trajectory in {values['trajectory']}"]
 
 
-def surveyed(shelf: Shelf, table: RotorTable, spin: float = 0.0) -> tuple[Survey, PlateMemory | None]:
+def surveyed(shelf: Shelf, table: RotorField, spin: float = 0.0) -> tuple[Survey, PlateMemory | None]:
     """Equilibria with the plate of the scene, and that plate."""
     rates = Rates.of(shelf.scene, table)
     found = survey(shelf.scene, table, spin, rates=rates)
@@ -119,7 +120,7 @@ def surveyed(shelf: Shelf, table: RotorTable, spin: float = 0.0) -> tuple[Survey
 
 def fly(
     scene: Scene,
-    table: RotorTable,
+    table: FieldTable,
     duration: float,
     found: tuple[Equilibrium, ...],
     memory: PlateMemory | None,

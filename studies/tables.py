@@ -9,7 +9,7 @@ from cyclopts import Parameter
 
 from ..geometry import InputError
 
-FieldModel = Literal["dipole", "cuboid", "fem", "auto"]
+FieldModel = Literal["dipole", "cuboid", "fem", "map", "auto"]
 Quantity = Literal["equilibria", "flight", "field"]
 PlateModel = Literal["none", "slab", "fem", "reduced", "auto"]
 

@@ -151,7 +151,7 @@ def result(chance: random.Random, folder: Path) -> int:
     path = folder / "result.nc"
     path.write_bytes(damaged(whole.read_bytes(), chance))
     with mock.patch("spinlev.studies.drawings.save_figures", return_value=[]):
-        return answered([chance.choice(["figure", "show"]), str(path), "--out", str(folder / "out")])
+        return answered([chance.choice(["figure", "show", "cite"]), str(path), "--out", str(folder / "out")])
 
 
 COMMANDS = {
@@ -164,6 +164,7 @@ COMMANDS = {
     "figure": ["--json", "--out"],
     "show": ["--out"],
     "report": ["--out"],
+    "cite": ["--json"],
 }
 VALUES = ["", "0", "1", "-1", "3.5", "1e-5", "nan", "inf", "dipole", "slab", "auto", "x", "1,2,3",
           "frequency_hz=1:2:1", "-0", "a=1", "--json", "team7", "tcp://", str(SCENES[0]),

@@ -191,7 +191,7 @@ def test_a_table_survives_the_disk_to_the_last_bit(tmp_path):
     for question in ("evaluate", "relative_error"):
         for before, after in zip(getattr(table, question)(points), getattr(read, question)(points), strict=True):
             assert np.array_equal(before, after)
-    assert read.model == "gridded"
+    assert read.model == "map"
     assert dict(read.expansions.provenance) == dict(table.expansions.provenance)
     with pytest.raises(TableFileError, match="rotor table"):
         load_table(tmp_path / "t.nc")

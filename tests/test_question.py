@@ -12,6 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from spinlev.geometry import InputError, SceneError, load_scene, parse_scene
+from spinlev.studies.cite import used
 from spinlev.studies.cli import _status
 from spinlev.studies.vary import combinations, parse_vary
 
@@ -127,6 +128,7 @@ def test_field_over_one_parameter(spinlev):
         (("figure", "none.nc"), "must be a file that exists"),
         (("figure", SCENE), "must be a readable netCDF file"),
         (("show", "none.nc"), "must be a file that exists"),
+        (("cite", "none.nc"), "must be a file that exists"),
         (("report", "nowhere"), "must be a folder with results"),
         (("report", "."), "must have results"),
     ],
@@ -173,6 +175,21 @@ def test_a_flight_is_shown_and_reported(spinlev, tmp_path, monkeypatch):
     assert len([s for s in sources.found if s.startswith("data:image/")]) == 3
     assert all(s.startswith(("data:image/", "#")) for s in sources.found)
     assert "frequency_hz = 110.0" in page
+
+
+@pytest.mark.parametrize(
+    ("attributes", "there", "absent"),
+    [
+        ({"study": "question", "ask": "field", "model": "cuboid"}, ["effect", "program"], ["heyoka", "ngsolve"]),
+        ({"study": "simulate", "model": "fem", "plate_model": "reduced"}, ["heyoka", "ngsolve", "eddy"], ["magpylib"]),
+        ({"study": "levitation-time", "model": "cuboid"}, ["air", "heyoka"], ["ngsolve"]),
+        ({"study": "team7"}, ["team7", "eddy", "ngsolve"], ["heyoka"]),
+    ],
+)
+def test_what_is_cited(attributes, there, absent):
+    keys = used(xr.Dataset(attrs=attributes))
+    assert set(there) <= set(keys)
+    assert not set(absent) & set(keys)
 
 
 def test_a_study_has_no_scene_to_show(spinlev, tmp_path):

@@ -1,0 +1,37 @@
+"""What the compiler may reorder stays at round-off: compiled fields against the same fields by other ways."""
+
+import numpy as np
+import pytest
+
+from spinlev.fem import uniform_moments
+from spinlev.fem.compiled import CompiledField
+from spinlev.fem.uniform import UniformField
+from spinlev.geometry.box import Box
+from spinlev.geometry.magnet import Magnet
+from spinlev.studies.coulomb import coulomb_field
+
+WAY = np.random.default_rng(3).normal(size=(100, 3))
+POINTS = np.linspace(0.013, 0.04, 100)[:, None] * WAY / np.linalg.norm(WAY, axis=1)[:, None]
+"""Where a floater may be."""
+
+
+@pytest.fixture(params=[(1.305, 0, 0), (0.3, -0.7, 1.1)])
+def magnet(request):
+    return Magnet(Box((0.01, 0.01, 0.01)), request.param)
+
+
+def worst(values, exact, axes):
+    return (np.linalg.norm(values - exact, axis=axes) / np.linalg.norm(exact, axis=axes)).max()
+
+
+def test_closed_form_is_coulombs_law_to_1e_13(magnet):
+    """Against 80-bit numbers: 4e-14 was measured, with and without reordering."""
+    assert worst(CompiledField(UniformField(magnet).expressions)(POINTS)[0], coulomb_field(magnet, POINTS), 1) < 1e-13
+
+
+def test_expansion_is_its_sum_to_1e_13(magnet):
+    """B and gradient against NumPy, which knows another recurrence."""
+    expansion = uniform_moments(magnet, 17)
+    compiled, summed = CompiledField(expansion.expressions)(POINTS), expansion.evaluate(POINTS)
+    for values, exact, axes in zip(compiled, summed, (1, (1, 2)), strict=True):
+        assert worst(values, exact, axes) < 1e-13

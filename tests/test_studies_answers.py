@@ -1,0 +1,141 @@
+"""The studies that answer the mission: each against something that does not share its way."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from spinlev.dynamics import Rates, find_equilibria
+from spinlev.dynamics.balance import Balance
+from spinlev.dynamics.branch import frequencies
+from spinlev.dynamics.equations import parameters
+from spinlev.dynamics.perturbed import PerturbedBalance
+from spinlev.dynamics.state import Scales
+from spinlev.fem.models import rotor_table
+from spinlev.fem.rotor_response import rotor_ladder
+from spinlev.fem.two_body import two_body
+from spinlev.studies import dipole_vs_fem, stability_map
+from spinlev.studies.answered import Answered
+from spinlev.studies.article import FLOATER
+from spinlev.studies.design_search import designed
+from spinlev.studies.dipole_vs_fem_figure import CAUSES, TOTAL, change
+from spinlev.studies.mutual import Expansion, Mutual, pose
+from spinlev.studies.rotor_points import rotor_scene
+from spinlev.studies.sensitivity import slope_by
+from spinlev.studies.stable_range import UNIT, Family, gap, reference_state, stable_range
+from spinlev.studies.tolerances import PARAMETERS, QUANTITIES, levitation, nominal, scene_of
+
+
+@pytest.fixture(scope="module")
+def tilted():
+    """Scene, rates and stable range of the cube tilted by 10° in the field of point dipoles."""
+    scene = rotor_scene("tilt", 10.0)
+    rates = Rates(rotor_table(scene.rotor, "dipole"))
+    return scene, rates, stable_range(scene, rates, *reference_state(scene))
+
+
+@pytest.fixture(scope="module")
+def horizontal():
+    return nominal("horizontal", 2.0)
+
+
+def test_stability_ends_where_the_bodies_touch(tilted):
+    """A dipole has no size, so that only the geometry ends its levitation at high frequency."""
+    scene, _, found = tilted
+    assert found.high.kind == "contact"
+    assert abs(gap(scene, found.high)) < 1e-7
+
+
+def test_a_range_ends_where_a_survey_says_so(tilted):
+    """Beside the fold a search that knows nothing of the branch finds the pair of equilibria, or none."""
+    scene, rates, found = tilted
+    table = rotor_table(scene.rotor, "dipole")
+
+    def near(frequency):
+        there = find_equilibria(replace(scene, frequency=frequency), table, rates=rates)
+        return [e.stable for e in there if abs(e.distance - found.low.distance) < 1e-3]
+
+    assert found.low.kind == "fold"
+    assert near(found.low.parameter + 0.01) == [True, False]
+    assert near(found.low.parameter - 0.01) == []
+
+
+def test_vertical_range_against_known_numbers():
+    """PHYSICS.md, dipoles of μr = 1: with 14 mm none at 60 Hz, stable at 80 Hz, unstable from about 100 Hz."""
+    point = {"configuration": "vertical", "measure": 14.0, "model": "dipole", "with_plate": 0}
+    result = stability_map.compute(point).isel(case=0, interval=0)
+    assert 60 < float(result["lowest"]) < 80 < float(result["highest"]) < 100
+    assert result["low_kind"].item() == "fold"
+    assert result["high_kind"].item() == "oscillatory"
+
+
+def test_remanence_and_density_enter_only_as_a_ratio(horizontal):
+    """Accelerations are those of gravity and Br Br'/density: their logarithmic derivatives are one number."""
+    names = "rotor_remanence", "floater_remanence", "density"
+    rows = [slope_by(horizontal, n, 1e-3 * horizontal.values[n]) * horizontal.values[n] for n in names]
+    np.testing.assert_allclose(rows[1], rows[0], rtol=1e-5)
+    np.testing.assert_allclose(rows[2], -rows[0], rtol=1e-4)  # steps of 1 and 1/(1 ± 0.001) differ in second order
+
+
+def test_distance_of_a_sample_is_that_of_a_survey(horizontal):
+    values = horizontal.values | {"measure": 2.05, "edge": 10.03e-3, "density": 7450.0}
+    found = dict(zip(QUANTITIES, levitation(horizontal, values), strict=True))
+    scene = scene_of("horizontal", values, float(horizontal.grid[1]))
+    expected = next(e for e in find_equilibria(scene, rotor_table(scene.rotor, "cuboid")) if e.stable)
+    assert found["distance at 50%"] == pytest.approx(expected.distance, abs=1e-10)
+    assert set(values) | {"frequency"} == set(PARAMETERS)
+
+
+def test_a_design_holds_the_floater_where_it_was_wanted():
+    found = designed("tilt", 12.7e-3, 25e-3, 100.0)
+    scene = rotor_scene("tilt", found.measure, 100.0, 12.7e-3, permeability=1.0)
+    stable = next(e for e in find_equilibria(scene, rotor_table(scene.rotor, "cuboid")) if e.stable)
+    assert stable.distance == pytest.approx(25e-3, abs=1e-9)
+    assert found.margin == pytest.approx(min(100 - found.low.parameter, found.high.parameter - 100) / 100)
+
+
+def test_an_added_force_is_as_good_as_less_gravity(tilted):
+    """A constant lift of a tenth of the weight gives the rates of a scene with nine tenths of gravity."""
+    scene, rates, found = tilted
+    lift = np.array([0.0, 0.0, 0.1 * FLOATER.mass * 9.81, 0.0, 0.0, 0.0])
+    state = found.near(120.0).state[None]
+    lifted = Expansion(np.concatenate(pose(found.near(120.0))), lift, np.zeros((6, 6)), FLOATER).added(rates)
+    lighter = replace(scene, gravity=0.9 * scene.gravity)
+    value, slope = lifted(state, parameters(scene, Scales.of(scene)))
+    expected, slopes = rates(state, parameters(lighter, Scales.of(lighter)))
+    np.testing.assert_allclose(value, expected, atol=1e-15)
+    np.testing.assert_allclose(slope, slopes, atol=1e-15)
+
+
+def test_mutual_magnetisation_moves_the_floater_as_the_perturbed_balance_says(tilted):
+    """Newton's method with expanded forces, against Broyden's with the forces themselves."""
+    scene, rates, found = tilted
+    (rotor,) = rotor_ladder(scene.rotor, (1,))
+    family = Family(rates, frequencies(scene), UNIT)
+    there = replace(scene, frequency=120.0)
+    answered = Answered(there, family, found, Mutual(rotor, FLOATER)).at(120.0)
+    scales = Scales.of(there)
+    balance = Balance(rates, parameters(there, scales, frozen_spin=True), 0.0)
+    rigid = next(e for e in find_equilibria(there, rotor_table(scene.rotor, "dipole"), rates=rates) if e.stable)
+
+    def extra(position, moment):
+        both = two_body(rotor, FLOATER, position, moment)
+        added = both.total - both.rigid
+        return added.force, added.torque
+
+    shift = PerturbedBalance(balance, scales, there).shift(rigid.position, rigid.state.moment, extra)
+    assert np.linalg.norm(shift.position - rigid.position) > 2e-5
+    np.testing.assert_allclose(answered.position, shift.position, atol=1e-9)
+
+
+@pytest.mark.slow
+def test_causes_add_up_and_the_default_scene_is_met():
+    """README: in the default rotor at 110 Hz the point dipole (floater's moment true) is 0.067 mm too far away."""
+    point = {"configuration": "horizontal", "measure": 2.0, "steps": 3, "orders": [1, 2], "limits": False}
+    result = dipole_vs_fem.compute(point)
+    parts = sum(change(result, "distance", models)[0] for models in CAUSES.values())
+    np.testing.assert_allclose(parts, change(result, "distance", TOTAL)[0], atol=1e-15)
+    apart = (result["distance"].sel(model="fem") - result["distance"].sel(model="dipole")).values[0]
+    frequency = result["frequency"].values[0]
+    assert frequency[0] < 110 < frequency[-1]
+    assert 1e3 * np.interp(110.0, frequency, apart) == pytest.approx(-0.067, abs=0.03)
