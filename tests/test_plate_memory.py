@@ -149,7 +149,7 @@ def test_ledger_with_the_rotor_closes():
     table, share = plate_and_rotor_table(PLATE, rotor, REGION, (20.0, 250.0), 0.1, MeshRule(1.6, 2.5, 2.5))
     n, omega, slope = len(table.rates), 2 * np.pi * 100, 0.02
     variables = hy.make_vars("angle", "depth")
-    signals = share.expressions(*variables)
+    signals = share.expressions(share.basis(*variables))
     driven = hy.cfunc([*signals, *(hy.diff(s, v) for v in variables for s in signals)], variables, compact_mode=True)
     moment = spinning(omega, 0.3)
 
