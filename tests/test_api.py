@@ -37,7 +37,7 @@ def test_a_flight_and_its_figure():
 
 def test_wrong_input(tmp_path):
     scene = api.load_scene(SCENE)
-    with pytest.raises(api.InputError, match="must be one of .*dipole-validity"):
+    with pytest.raises(api.InputError, match=r"must be one of .*dipole-validity"):
         api.run_study("no-such-study", out=tmp_path)
     with pytest.raises(api.InputError, match="--rtol"):
         api.rotor_table(scene, rtol=2.0)

@@ -152,7 +152,7 @@ def test_a_table_survives_the_disk_and_the_cache(table, tmp_path, monkeypatch):
     assert cached
     assert np.array_equal(found.weights, table.weights)
     (tmp_path / "t.nc").write_bytes(b"no table")
-    with pytest.raises(TableFileError, match="readable netCDF"):
+    with pytest.raises(TableFileError, match="does not end in its checksum"):
         load_plate_table(tmp_path / "t.nc")
 
 
