@@ -125,7 +125,7 @@ def _client(scheduler: str | None, number: int) -> Iterator[Client]:
             n_workers=number,
             threads_per_worker=1,
             host="127.0.0.1",
-            dashboard_address=None,
+            dashboard_address="127.0.0.1:0",  # any free port: two sweeps at once must not meet
             silence_logs=logging.CRITICAL,
         ) as cluster,
         Client(cluster, set_as_default=False) as client,

@@ -50,7 +50,7 @@ def bytes_of(result, path):
 def test_serial_local_cluster_and_a_scheduler_give_the_same_file(tmp_path):
     asked = points(*np.linspace(0.0, 7.0, 8).tolist())
     files = [bytes_of(swept("roots", STUDY, asked, Engine(workers=n), tmp_path), tmp_path / f"{n}.nc") for n in (1, 2)]
-    with LocalCluster(n_workers=2, threads_per_worker=1, host="127.0.0.1", dashboard_address=None) as cluster:
+    with LocalCluster(n_workers=2, threads_per_worker=1, host="127.0.0.1", dashboard_address="127.0.0.1:0") as cluster:
         there = swept("roots", STUDY, asked, Engine(scheduler=cluster.scheduler_address), tmp_path / "there")
     files.append(bytes_of(there, tmp_path / "there.nc"))
     assert files[0] == files[1] == files[2]
