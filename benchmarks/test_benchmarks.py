@@ -26,7 +26,7 @@ from spinlev.fem.plate_region import Region
 from spinlev.geometry import load_scene
 from spinlev.geometry.box import Box
 from spinlev.geometry.scene import Plate
-from spinlev.studies.plate_shelf import plate_memory
+from spinlev.studies.plate_shelf import plate_memory, table_in_flight
 
 SCENE = load_scene("scenes/horizontal.toml")
 GENERATOR = np.random.default_rng(0)
@@ -137,6 +137,7 @@ def test_flight_with_plate(model, plate_model, rtol):
     table = rotor_table(SCENE.rotor, model, nearest=SCENE.floater.radius)
     start, _ = initial_state(replace(SCENE, plate=None), table)
     memory, _ = plate_memory(SCENE, SCENE.plate, plate_model, table, start.position, rtol)
+    table = table_in_flight(SCENE, table, start.position, 3e-6)
     flight = compile_flight(SCENE, table, 0.5, PLATE_TOLERANCE, True, memory)
     still = np.zeros(len(memory.table.rates))
     integrate(SCENE, flight, start, 0.05, currents=still)

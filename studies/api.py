@@ -115,7 +115,7 @@ def simulate(
         found = survey.equilibria
     else:
         found, memory = (), shelf.memory(table, ())
-    flight = fly(scene, table, duration, found, memory)
+    flight = fly(scene, shelf.in_flight(table, memory, found), duration, found, memory)
     return trajectory_dataset(flight).assign_attrs(model=table.model, scene=scene.text)
 
 

@@ -98,6 +98,7 @@ def simulate_job(scene: Scene, asked: Tables, duration: float, out: Path, resume
     else:
         found, memory = None, shelf.memory(table, ())
     equilibria = found.equilibria if found else ()
+    table = shelf.in_flight(table, memory, equilibria)
     flight = fly(scene, table, duration, equilibria, memory, checkpoint)
     values = {
         **flight_answer(table, flight, memory),
