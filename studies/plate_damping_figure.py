@@ -116,7 +116,7 @@ def _rotors(axes: Axes, result: xr.Dataset) -> None:
     axes.set_yscale("symlog", linthresh=LINEAR)
     axes.axhline(0.0, color="0.3", lw=0.8)
     axes.set(title="Rotors of the article, plate at 18 mm", ylabel="growth of the least damped motion (1/s)")
-    axes.margins(y=0.12)
+    axes.margins(x=0.08, y=0.12)
     axes.legend()
 
 
