@@ -23,7 +23,8 @@ def groups(saved):
     found = defaultdict(list)
     for one in saved["benchmarks"]:
         extra = one["extra_info"]
-        name = one["param"] or one["name"].removeprefix("test_").replace("_", " ")
+        own = one["name"].removeprefix("test_")  # a name that was given by hand has no such prefix
+        name = one["param"] if one["param"] and own != one["name"] else own.replace("_", " ")
         found[one["group"]].append((name, one["stats"]["min"] / extra.get("count", 1), extra))
     return dict(found)
 
