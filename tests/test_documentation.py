@@ -47,5 +47,5 @@ def test_the_container_has_what_it_copies_and_what_the_makefile_asks_for():
     copied = [name for line in re.findall(r"^COPY (.+)$", recipe, re.MULTILINE) for name in line.split()[:-1]]
     assert [name for name in copied if not (ROOT / name).exists()] == []
     assert set(copied) > {"geometry", "fem", "dynamics", "studies", "scenes", "requirements.txt"}
-    libraries = re.search(r"apt-get install ([\w ]+)", (ROOT / "Makefile").read_text(encoding="utf-8"))
+    libraries = re.search(r"apt-get install ([\w -]+)", (ROOT / "Makefile").read_text(encoding="utf-8"))
     assert set(libraries[1].split()) <= set(recipe.split())
