@@ -37,7 +37,9 @@ class Magnet:
     def __post_init__(self) -> None:
         object.__setattr__(self, "polarization", frozen_array(self.polarization, (3,)))
         if not self.isotropic and not self.polarization.any():
-            raise ValueError("Input polarization must not be zero where the permeability has an easy axis.")
+            raise ValueError(
+                "Input polarization must not be zero where the permeability has an easy axis; instead it is zero."
+            )
 
     @property
     def isotropic(self) -> bool:

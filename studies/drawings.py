@@ -44,6 +44,8 @@ def read_result(path: Path) -> xr.Dataset:
         raise InputError(f"Input {path} must be a file that exists; instead it is missing.") from None
     except TableFileError as error:
         raise InputError(str(error)) from None
+    except OSError as error:
+        raise InputError(f"Input {path} must be a readable file; instead: {error.strerror}.") from None
     if "study" not in result.attrs:
         raise InputError(f"Input {path} must be a result of spinlev; instead it has no attribute 'study'.")
     return result
