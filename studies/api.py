@@ -1,12 +1,14 @@
 """The program from Python: what the command line does, with labelled results instead of files.
 
-from spinlev.studies.api import draw, equilibria, load_scene, simulate, stability
+As in a notebook::
 
-scene = load_scene("scenes/horizontal.toml")
-found = equilibria(scene, plate_model="none")    # an xarray.Dataset with units and error estimates
-small = stability(scene, plate_model="none")     # the small motions about the one at which a flight begins
-flight = simulate(scene, 3.0, plate_model="none")
-draw(flight)["trajectory"]                       # a matplotlib figure
+    from spinlev.studies.api import draw, equilibria, load_scene, simulate, stability
+
+    scene = load_scene("scenes/horizontal.toml")
+    found = equilibria(scene, plate_model="none")    # an xarray.Dataset with units and error estimates
+    small = stability(scene, plate_model="none")     # the small motions about the one at which a flight begins
+    flight = simulate(scene, 3.0, plate_model="none")
+    draw(flight)["trajectory"]                       # a matplotlib figure
 """
 
 from __future__ import annotations
