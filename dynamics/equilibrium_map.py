@@ -61,8 +61,8 @@ def equilibrium_map(
     axes = np.atleast_1d(np.asarray(frequencies, float)), np.atleast_1d(np.asarray(measures, float))
     if not axes[0].all() or np.any(family.scene.gravity[:2]):
         raise EquilibriumError(
-            "Input frequencies must not be zero, and gravity must be along the axis: only then equilibria are fixed "
-            "points. Elsewhere use find_equilibria."
+            "Equilibria are fixed points only where the rotor turns and gravity is along its axis. Elsewhere use "
+            "find_equilibria."
         )
     grid = Grid(family, *axes, spin, farthest)
     atlas, nodes = Atlas(len(grid)), grid.coarse(spacing)

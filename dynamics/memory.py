@@ -55,6 +55,11 @@ class PlateMemory:
         """What a rotor turning so fast (rad/s) leaves in the plate."""
         return RotorCurrents(self.share, self.table.rates, angular_velocity)
 
+    def __repr__(self) -> str:
+        harmonics = len(self.share.series) // 2
+        told = f"relative error {self.error:.1e}, {harmonics} harmonics of the rotor"
+        return f"PlateMemory {self.model!r}: {told}\n{self.table!r}"
+
     @property
     def names(self) -> list[str]:
         """Names of the states."""

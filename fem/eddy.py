@@ -26,6 +26,7 @@ from ..geometry.conductor_mesh import MILLIMETRE, ConductorMesh
 from ..geometry.magnet import MU_0
 from .condensed import solve_condensed
 from .eddy_space import EddySpace, Source
+from .memory import require_memory
 from .phasor import ComplexArray
 
 RESISTIVE = 1e-2
@@ -93,6 +94,7 @@ def solve_eddy(
     Raises
     ------
     ValueError : frequency negative or not finite, order below 1, or no sources
+    TooLargeError : the memory does not hold the system
     """
     if not (np.isfinite(frequency) and frequency >= 0):
         raise ValueError(f"Input frequency_hz must be finite and not negative; instead received {frequency!r}.")
@@ -127,6 +129,11 @@ class FrequencySystem:
     def __init__(self, space: EddySpace, frequency: float) -> None:
         self.space = space
         self.fes = space.complex_space()
+        require_memory(
+            self.fes,
+            self.fes.FreeDofs(True),
+            "Allow a larger error of the plate (--plate-rtol, or --rtol of the command plate)",
+        )
         trial, test = self.fes.TnT()
         self.rate = 2j * np.pi * frequency * MU_0
         form = ngsolve.BilinearForm(self.fes, symmetric=True, condense=True)

@@ -12,6 +12,7 @@ import xarray as xr
 
 from ..geometry.box import Array
 from .field_map import FieldMap, FieldMapError
+from .table_store import TableFileError, read_checked
 
 AXES = ("x", "y", "z")
 METERS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3}
@@ -77,7 +78,7 @@ def _csv_columns(path: Path) -> dict[str, Array]:
         with path.open(newline="", encoding="utf-8-sig") as stream:
             rows = [row for row in csv.reader(stream, skipinitialspace=True) if any(cell.strip() for cell in row)]
     except (OSError, UnicodeDecodeError, csv.Error) as error:
-        raise FieldMapError(f"Input must be a readable CSV text; {error}.") from None
+        raise FieldMapError(f"Input map must be a readable CSV text; instead: {error}.") from None
     header = [name.strip() for name in rows[0]] if rows else []
     columns = {}
     for index, title in enumerate(header):
@@ -100,10 +101,9 @@ def _number(title: str, line: int, row: list[str], column: int) -> float:
 
 def _netcdf_columns(path: Path) -> dict[str, Array]:
     try:
-        with xr.open_dataset(path, engine="h5netcdf") as opened:
-            dataset = opened.load()
-    except Exception as error:  # the HDF5 layer raises many kinds on a damaged file
-        raise FieldMapError(f"Input must be a readable netCDF file; {error}.") from error
+        dataset = read_checked(path)
+    except TableFileError as error:
+        raise FieldMapError(str(error)) from error
     found = {name: dataset[name] for name in AXES if name in dataset}
     for name in ("B", "B_err"):
         if name in dataset:
@@ -130,7 +130,7 @@ def _mesh_columns(path: Path, length: float, field: float) -> dict[str, Array]:
     try:
         mesh = meshio.read(path)
     except (Exception, SystemExit) as error:  # meshio leaves the program where no reader takes the file
-        raise FieldMapError(f"Input must be a mesh that meshio reads; {error}.") from None
+        raise FieldMapError(f"Input map must be a mesh that meshio reads; instead: {error}.") from None
     columns = {axis: length * mesh.points[:, k] for k, axis in enumerate(AXES[: mesh.points.shape[1]])}
     for name, values in mesh.point_data.items():
         values = np.asarray(values, float)

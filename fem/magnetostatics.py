@@ -24,17 +24,19 @@ import numpy as np
 from netgen.meshing import NgException
 
 from ..geometry.box import Array
+from ..geometry.input_error import ComputationError
 from ..geometry.magnet import Magnet
 from ..geometry.mesh import MagnetMesh
 from .demagnetization import remanent_field
 from .integration_points import volume_points
+from .memory import require_memory
 from .open_boundary import OpenBoundary
 from .open_solve import solve_open
 
 Formulation = Literal["split", "direct"]
 
 
-class MeshError(RuntimeError):
+class MeshError(ComputationError):
     """The elements of a mesh do not match each other."""
 
 
@@ -85,8 +87,10 @@ def assemble(mesh: MagnetMesh, order: int) -> System:
     Raises
     ------
     MeshError : layers of elements do not match
+    TooLargeError : the memory does not hold the system
     """
     space = ng.H1(mesh.mesh, order=order)
+    require_memory(space, space.FreeDofs(True), "Allow a larger error of the field (--rtol)")
     trial, test = space.TnT()
     stiffness = ng.BilinearForm(space, symmetric=True, condense=True)
     matrices = {f"magnet{k}": magnet.permeability_in_rotor for k, magnet in enumerate(mesh.magnets)}

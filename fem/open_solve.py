@@ -9,10 +9,11 @@ import numpy as np
 from scipy.sparse.linalg import LinearOperator, cg
 
 from ..geometry.box import Array
+from ..geometry.input_error import ComputationError
 from .open_boundary import OpenBoundary
 
 
-class ConvergenceError(RuntimeError):
+class ConvergenceError(ComputationError):
     """The linear solver did not reach its tolerance."""
 
 

@@ -18,6 +18,7 @@ import numpy as np
 
 from ..geometry.box import Array
 from .integration_points import IntegrationPoints, volume_points
+from .memory import require_memory
 from .open_boundary import OpenBoundary
 from .open_solve import solve_open
 
@@ -72,8 +73,13 @@ def assemble_regions(mesh: Any, permeability: Mapping[str, Array], ball_radius: 
     mesh : NGSolve mesh of a ball about the origin with the boundary `outer`
     permeability : (3, 3) μ by region name; regions not named have μ = 1
     ball_radius : in the mesh's coordinates
+
+    Raises
+    ------
+    TooLargeError : the memory does not hold the system
     """
     space = ng.H1(mesh, order=order)
+    require_memory(space, space.FreeDofs(True), "Take elements of a lower degree")
     trial, test = space.TnT()
     tensors = {name: ng.CF(tuple(map(float, mu.ravel())), dims=(3, 3)) for name, mu in permeability.items()}
     boundary = OpenBoundary(mesh, space, ball_radius, BOUNDARY_DEGREE, order)

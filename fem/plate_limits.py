@@ -25,8 +25,8 @@ def highest_order(cells: int) -> int:
     found = [p for p in range(3, HIGHEST_ORDER + 1) if cells * (3 * p * (p + 2) + 2 * p + 1) <= MOST_UNKNOWNS]
     if not found:
         raise MeshTooLargeError(
-            f"Input frequency_hz must be lower, or the tolerance larger: a mesh of {cells} cells has more than "
-            f"{MOST_UNKNOWNS} unknowns. The infinite slab (model slab) has no such limit."
+            f"Input mesh must have at most {MOST_UNKNOWNS} unknowns; instead one of {cells} cells has more. Lower the "
+            "frequency, allow a larger error, or take the infinite slab (model slab), which has no such limit."
         )
     return found[-1]
 

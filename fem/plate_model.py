@@ -75,7 +75,10 @@ def tabulate(network: PlateNetwork, rtol: float) -> PlateTable:
     )
     errors = PlateErrors(network.mesh_error, network.state_error, worst(fit.error))
     if errors.total > rtol:
-        raise AccuracyError(f"Input rtol must be at least {errors.total:.1e} for this plate and region; {errors}.")
+        raise AccuracyError(
+            f"Input rtol must be at least {errors.total:.1e} for this plate and region; instead received {rtol:.1e} "
+            f"({errors})."
+        )
     provenance: dict[str, str | float] = {
         "ngsolve": version("ngsolve"),
         "order": float(network.space.order),

@@ -98,7 +98,10 @@ def reduce_plate(
     places = np.concatenate([region.grid((2, 2, 2), fold=True), others.places])
     response, error = raise_order(plate, places, high, mesh_share * rtol, rule)
     if error.max() > mesh_share * rtol:
-        raise AccuracyError(f"Input rtol must be at least {error.max() / mesh_share:.1e} for the mesh rule {rule}.")
+        raise AccuracyError(
+            f"Input rtol must be at least {error.max() / mesh_share:.1e} for the mesh rule {rule}; instead received "
+            f"{rtol:.1e}."
+        )
     allowed = network_share * rtol - float(error.max())
     training = prepare_training(response.space, region, rtol, others)
     middle = low**0.25 * high**0.75
@@ -114,7 +117,10 @@ def reduce_plate(
         tried += [float(np.sqrt(used[-1] * used[-2])), float(np.sqrt(used[-2] * used[-3]))]
     chosen, state_error = truncated(training.worst, basis, allowed)
     if state_error > allowed:
-        raise AccuracyError(f"Input rtol must be larger: the states leave {state_error:.1e}, allowed is {allowed:.1e}.")
+        raise AccuracyError(
+            f"Input rtol must be larger: the states leave {state_error:.1e}, allowed is {allowed:.1e}; "
+            f"instead received {rtol:.1e}."
+        )
     diagonal = [part.diagonalised() for part in chosen]
     return PlateNetwork(
         plate, region, frequencies, response.space, tuple(m.group for m in training.modes),

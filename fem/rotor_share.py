@@ -124,7 +124,10 @@ def rotor_share(
         if max(turns, ways) <= tolerance / 2:
             return _trimmed(distance, series, turns + ways, tolerance / 2, float(size))
         if max(harmonics, depths) >= most:
-            raise AccuracyError(f"Input tolerance must be at least {turns + ways:.1e} for this rotor and this way.")
+            raise AccuracyError(
+                f"Input tolerance must be at least {turns + ways:.1e} for this rotor and this way; instead received "
+                f"{tolerance:.1e}."
+            )
         harmonics += 2 * (turns > tolerance / 2)
         depths += 2 * (ways > tolerance / 2)
 

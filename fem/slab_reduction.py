@@ -104,7 +104,10 @@ def reduce_slab(
 
     chosen, state_error = truncated(worst, basis, NETWORK_SHARE * rtol - sums_error)
     if sums_error + state_error > NETWORK_SHARE * rtol:
-        raise AccuracyError(f"Input rtol must be larger; sums leave {sums_error:.1e}, the states {state_error:.1e}.")
+        raise AccuracyError(
+            f"Input rtol must be larger: sums leave {sums_error:.1e}, the states {state_error:.1e}; instead received "
+            f"{rtol:.1e}."
+        )
     end = max(m for m, part in enumerate(chosen) if len(part.energies)) + 1
     rates, fields = zip(*[part.diagonalised() for part in chosen[:end]], strict=True)
     return SlabNetwork(

@@ -61,7 +61,10 @@ def tabulate_slab(network: SlabNetwork, rtol: float) -> PlateTable:
     multipoles, weights, error = slab_functions(network, FUNCTION_SHARE * rtol)
     errors = PlateErrors(network.sums_error, network.state_error, error)
     if errors.total > rtol:
-        raise AccuracyError(f"Input rtol must be at least {errors.total:.1e} for this slab and region; {errors}.")
+        raise AccuracyError(
+            f"Input rtol must be at least {errors.total:.1e} for this slab and region; instead received {rtol:.1e} "
+            f"({errors})."
+        )
     provenance: dict[str, str | float] = {
         "conductor": "infinite slab",
         "wave_numbers": float(network.waves.modes.rates.shape[0]),

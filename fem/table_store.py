@@ -61,7 +61,7 @@ def read_checked(path: str | Path, file_format: str | None = None) -> xr.Dataset
         with xr.open_dataset(path, engine="h5netcdf") as opened:
             dataset = opened.load()
     except Exception as error:  # the HDF5 layer raises many kinds on a damaged file
-        raise TableFileError(f"Input {path} must be a readable netCDF file; {error}.") from error
+        raise TableFileError(f"Input {path} must be a readable netCDF file; instead: {error}.") from error
     if file_format and dataset.attrs.get("format") != file_format:
         received = dataset.attrs.get("format")
         raise TableFileError(f"Input {path} must be a '{file_format}'; instead received '{received}'.")

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..geometry.box import Array
+from ..geometry.input_error import ComputationError
 from ..geometry.overlap import TOUCHING, sphere_overlap
 from ..geometry.scene import Floater
 from .harmonics import Coefficients
@@ -25,7 +26,7 @@ from .rotor_response import RotorResponse
 MOST_TERMS = 60
 
 
-class TwoBodyError(RuntimeError):
+class TwoBodyError(ComputationError):
     """The bodies overlap, or the answers of one to the other do not settle."""
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import tomllib
 from collections.abc import Mapping
 from pathlib import Path
@@ -33,11 +34,11 @@ def load_scene(path: str | Path) -> Scene:
     try:
         text = Path(path).read_text(encoding="utf-8")
     except FileNotFoundError:
-        raise SceneError(source, ["the scene file does not exist; give the path of a TOML file."]) from None
+        raise SceneError(source, ["Input scene must be a TOML file that exists; instead there is none."]) from None
     except (OSError, UnicodeDecodeError) as error:
-        raise SceneError(source, [f"the scene file must be a readable UTF-8 text; {error}."]) from None
+        raise SceneError(source, [f"Input scene must be a readable UTF-8 text; instead: {error}."]) from None
     scene = parse_scene(text, source)
-    if scene.field_map and not scene.field_map.is_file():
+    if scene.field_map and not os.path.isfile(scene.field_map):  # unlike Path.is_file never raises
         raise SceneError(source, [f"Input rotor.field_map must be a file; instead there is no {scene.field_map}."])
     return scene
 
@@ -56,7 +57,7 @@ def parse_scene(text: str, source: str = "scene", changes: Mapping[str, float] |
     try:
         raw = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
-        raise SceneError(source, [f"the scene file must be TOML; {error}."]) from None
+        raise SceneError(source, [f"Input scene must be TOML; instead: {error}."]) from None
     for key, value in (changes or {}).items():
         _replace(raw, key, value, source)
     try:
@@ -96,7 +97,7 @@ def _start_faults(start: StartSection | None) -> list[str]:
     absolute = {key: getattr(start, key) for key in ("velocity_mm_s", "moment", "spin_hz")}
     faults = []
     if start.offset_mm is not None and start.position_mm is not None:
-        faults.append("Input start must have offset_mm or position_mm, not both.")
+        faults.append("Input start must have offset_mm or position_mm; instead received both.")
     if start.position_mm is None:
         faults += [
             f"Input start.{key} must come with start.position_mm; instead received it alone."

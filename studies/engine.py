@@ -57,7 +57,7 @@ class Engine:
         if self.workers is not None and not 1 <= self.workers <= 1024:
             raise InputError(f"Input --workers must be between 1 and 1024; instead received {self.workers}.")
         if self.workers is not None and self.scheduler is not None:
-            raise InputError("Input --workers must be left out where --scheduler is given; its workers are its own.")
+            raise InputError("Input --workers must be left out where --scheduler is given; instead received both.")
         return self
 
     def results(self, compute: Compute, points: Mapping[int, Point]) -> Iterator[tuple[int, xr.Dataset | Failure]]:

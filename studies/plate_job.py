@@ -95,7 +95,8 @@ def _slab(plate: Plate, place: Array, frequency: float, rtol: float) -> Answer:
     height = abs(body[normal]) - size[normal] / 2
     if height <= 0:
         raise InputError(
-            "Input --model slab must have --at over one of the plate's two largest faces; use --model fem."
+            "Input --at must be over one of the plate's two largest faces for --model slab; instead it is beside them. "
+            "Use --model fem."
         )
     local = reaction_tensor(Slab(plate.conductivity, size[normal]), height, frequency)
     along = plate.box.rotation[:, normal]

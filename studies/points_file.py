@@ -23,10 +23,10 @@ def read_points(path: Path) -> Array:
             rows = list(csv.reader(stream, skipinitialspace=True))
     except FileNotFoundError:
         raise InputError(
-            f"{path}: the points file does not exist; give a CSV file with {', '.join(COLUMNS)}."
+            f"{path}: Input points must be a CSV file with {', '.join(COLUMNS)}; instead there is no such file."
         ) from None
     except (OSError, UnicodeDecodeError, csv.Error) as error:
-        raise InputError(f"{path}: the points file must be a readable CSV text; {error}.") from None
+        raise InputError(f"{path}: Input points must be a readable CSV text; instead: {error}.") from None
     header = [name.strip() for name in rows[0]] if rows else []
     if any(column not in header for column in COLUMNS):
         raise InputError(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import json
+import os
 from collections.abc import Mapping
 from dataclasses import dataclass
 from importlib.resources import files
@@ -52,7 +53,7 @@ def report_job(folder: Path, out: Path) -> tuple[Path, list[str]]:
     ------
     InputError : the folder is missing, has no result, or one that cannot be read
     """
-    if not folder.is_dir():
+    if not os.path.isdir(folder):  # unlike Path.is_dir never raises
         raise InputError(f"Input DIR must be a folder with results; instead received {folder}.")
     paths = sorted(folder.glob("*.nc"))
     if not paths:
@@ -96,7 +97,10 @@ def _answers(path: Path) -> dict[str, str]:
     summary = path.parent / "summary.json"
     if not summary.exists():
         return {}
-    values: dict[str, Any] = json.loads(summary.read_text(encoding="utf-8"))
+    try:
+        values: dict[str, Any] = dict(json.loads(summary.read_text(encoding="utf-8")))
+    except (ValueError, TypeError) as error:
+        raise InputError(f"Input {summary} must be a JSON object; instead: {error}.") from None
     texts = {key: json.dumps(value, ensure_ascii=False) for key, value in values.items()}
     return {key: text if len(text) <= LONGEST else text[:LONGEST] + " …" for key, text in texts.items()}
 

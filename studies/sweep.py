@@ -9,6 +9,7 @@ from pathlib import Path
 
 import xarray as xr
 
+from ..geometry.input_error import ComputationError
 from .console import note, progress, to_json
 from .engine import Engine, Failure
 from .journal import Journal
@@ -16,7 +17,7 @@ from .results import LIBRARIES
 from .study import Point, Study
 
 
-class SweepError(RuntimeError):
+class SweepError(ComputationError):
     """No point of a sweep could be computed."""
 
 
@@ -50,7 +51,7 @@ def swept(name: str, study: Study, points: Mapping[int, Point], engine: Engine, 
                 finished[k] = result
             advance((len(finished) + len(failed)) / len(points))
     if not finished:
-        raise SweepError(f"all {len(points)} points failed; the first: {failed[min(failed)]}")
+        raise SweepError(f"All {len(points)} points failed; the first: {failed[min(failed)]}")
     reasons = [{"point": points[k], "reason": failed[k]} for k in sorted(failed)]
     joined = study.gather([finished[k] for k in sorted(finished)])
     return joined.assign_attrs(study=name, failed_points=to_json({"failed": reasons}))

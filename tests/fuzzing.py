@@ -17,13 +17,16 @@ from collections.abc import Callable
 from pathlib import Path
 from unittest import mock
 
+import meshio
 import numpy as np
 import xarray as xr
 
+from spinlev.fem.field_map import FieldMapError
+from spinlev.fem.field_map_file import read_field_map
 from spinlev.fem.models import rotor_table
 from spinlev.fem.table_file import TableFileError, load_table, save_table
 from spinlev.fem.table_store import write_checked
-from spinlev.geometry import horizontal
+from spinlev.geometry import horizontal, seal
 from spinlev.studies import cli
 
 SCENES = sorted((Path(__file__).parent.parent / "scenes").glob("*.toml"))
@@ -142,16 +145,52 @@ def table(chance: random.Random, folder: Path) -> int:
 
 
 def result(chance: random.Random, folder: Path) -> int:
-    whole = folder / "whole-result.nc"
+    whole = folder / "whole" / "result.nc"
     if not whole.exists():
         time = np.linspace(0.0, 1.0, 20)
         vectors = {n: (("time", "axis"), np.ones((20, 3))) for n in ("position", "moment", "position_rotor_frame")}
         flight = xr.Dataset(vectors, {"time": time, "axis": list("xyz")}, {"study": "simulate", "scene": "x = 1"})
         write_checked(flight, whole)
-    path = folder / "result.nc"
-    path.write_bytes(damaged(whole.read_bytes(), chance))
+    path = folder / "results" / "result.nc"
+    path.parent.mkdir(exist_ok=True)
+    content = whole.read_bytes()
+    if chance.random() < 0.5:  # as another program would have written it: HDF5 must find the damage
+        content = content[: -seal.LENGTH]
+    path.write_bytes(damaged(content, chance))
+    command = chance.choice(["figure", "show", "cite", "report"])
     with mock.patch("spinlev.studies.drawings.save_figures", return_value=[]):
-        return answered([chance.choice(["figure", "show", "cite"]), str(path), "--out", str(folder / "out")])
+        return answered([command, str(path.parent if command == "report" else path), "--out", str(folder / "out")])
+
+
+def field_map(chance: random.Random, folder: Path) -> int:
+    """A measured map as CSV, as netCDF of another program (without our checksum), or as a mesh."""
+    suffix = chance.choice([".csv", ".nc", ".vtu", ".vtk"])
+    whole, path = folder / f"whole-map{suffix}", folder / f"map{suffix}"
+    if not whole.exists():
+        _write_map(whole)
+    if suffix == ".csv":
+        path.write_text(mutated(whole.read_text(), chance), errors="replace")
+    else:
+        path.write_bytes(damaged(whole.read_bytes(), chance))
+    try:
+        read_field_map(path)
+    except FieldMapError:
+        return 2
+    return 0
+
+
+def _write_map(path: Path) -> None:
+    places = np.stack(np.meshgrid(*[np.linspace(-0.02, 0.02, 4)] * 3), axis=-1).reshape(-1, 3) - [0.0, 0.0, 0.04]
+    field = rotor_table(horizontal(2e-3, 10e-3, 1.3, 1.0), "cuboid").evaluate(places)[0]
+    if path.suffix == ".csv":
+        rows = [",".join(f"{value:.6g}" for value in row) for row in np.hstack([1e3 * places, field])]
+        path.write_text("\n".join(["x_mm,y_mm,z_mm,Bx_T,By_T,Bz_T", *rows]))
+    elif path.suffix == ".nc":
+        columns = {n: ("point", v, {"units": "m"}) for n, v in zip("xyz", places.T, strict=True)}
+        columns |= {f"B{n}": ("point", v, {"units": "T"}) for n, v in zip("xyz", field.T, strict=True)}
+        xr.Dataset(columns).to_netcdf(path, engine="h5netcdf")
+    else:
+        meshio.Mesh(places, [("vertex", np.arange(len(places))[:, None])], point_data={"B": field}).write(path)
 
 
 COMMANDS = {
@@ -191,7 +230,7 @@ def command(chance: random.Random, folder: Path) -> int:
 
 
 KINDS: dict[str, Callable[[random.Random, Path], int]] = {
-    "scene": scene, "points": points, "table": table, "result": result, "command": command,
+    "scene": scene, "points": points, "table": table, "result": result, "map": field_map, "command": command,
 }  # fmt: skip
 
 

@@ -145,8 +145,8 @@ def test_wrong_scenes_end_with_status_2_one_message_and_no_file(spinlev, tmp_pat
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
-        (("run", "none.toml"), "none.toml: the scene file does not exist"),
-        (("field", "S", "--points", "none.csv"), "none.csv: the points file does not exist"),
+        (("run", "none.toml"), "none.toml: Input scene must be a TOML file that exists"),
+        (("field", "S", "--points", "none.csv"), "none.csv: Input points must be a CSV file"),
         (("field", "S", "--points", "P", "--model", "magic"), "magic"),
         (("field", "S", "--points", "P", "--rtol", "-1"), "--rtol must be at least"),
         (("field", "S"), "--points"),

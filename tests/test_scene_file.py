@@ -128,7 +128,7 @@ def test_files_that_are_no_scene(tmp_path, content):
 
 
 def test_missing_file_and_folder(tmp_path):
-    with pytest.raises(SceneError, match="does not exist"):
+    with pytest.raises(SceneError, match="a TOML file that exists"):
         load_scene(tmp_path / "none.toml")
     with pytest.raises(SceneError, match="readable"):
         load_scene(tmp_path)

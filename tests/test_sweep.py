@@ -119,7 +119,7 @@ def test_a_failed_point_is_named_and_the_rest_goes_on(tmp_path, workers):
 
 
 def test_all_points_failed(tmp_path):
-    with pytest.raises(SweepError, match="all 2 points failed; the first: ValueError: no root"):
+    with pytest.raises(SweepError, match="All 2 points failed; the first: ValueError: no root"):
         swept("roots", STUDY, points(-1.0, -2.0), Engine(workers=1), tmp_path)
 
 
