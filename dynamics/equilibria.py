@@ -58,7 +58,7 @@ def survey(
     Returns
     -------
     Equilibria, the stable ones first, then by distance, accurate to round-off in the table's field: every curve of
-    lateral balance that is met from some four thousand starts is followed, and every zero of the axial force on it is
+    lateral balance that is met from nearly five thousand starts is followed, and every zero of the axial force on it is
     polished; so is what Newton's method finds directly from these starts.
 
     Raises
