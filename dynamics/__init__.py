@@ -14,7 +14,7 @@ from .memory import PlateMemory
 from .rates import Rates
 from .rotor_family import RotorFamily, rotor_family
 from .simulation import StartError, initial_state, simulate, starting_point
-from .trajectory import Trajectory
+from .trajectory import FlightStopped, Trajectory
 
 __all__ = [
     "BoundaryPoint",
@@ -24,6 +24,7 @@ __all__ = [
     "EquilibriumError",
     "EquilibriumMap",
     "Family",
+    "FlightStopped",
     "ForceCurve",
     "Plane",
     "PlateMemory",

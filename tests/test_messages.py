@@ -47,7 +47,7 @@ def raised(path):
     for node in ast.walk(ast.parse(path.read_text())):
         if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.args:
             kind = getattr(module, node.func.id, getattr(builtins, node.func.id, None))
-            if isinstance(kind, type) and issubclass(kind, BaseException):
+            if isinstance(kind, type) and issubclass(kind, Exception):
                 yield kind, node.args[-1], f"{path.parent.name}/{path.name}:{node.lineno}"
 
 
