@@ -1,0 +1,46 @@
+"""Results that earlier runs wrote (`study NAME --quick`, in tests/data/quick) still open, are drawn and reported."""
+
+import re
+import shutil
+from pathlib import Path
+
+import matplotlib.pyplot as plt
+import pytest
+
+from spinlev.studies.catalogue import CATALOGUE
+from spinlev.studies.cite import cite_job
+from spinlev.studies.drawings import figures_of, read_result
+from spinlev.studies.figures import drawn
+from spinlev.studies.report import report_job
+
+STORED = sorted((Path(__file__).parent / "data" / "quick").glob("*.nc"))
+
+
+@pytest.mark.parametrize("path", STORED, ids=lambda path: path.stem)
+def test_a_stored_result_is_drawn_and_reported_from_its_file_alone(path):
+    result = read_result(path)
+    assert result.attrs["study"] == path.stem
+    (figure,) = figures_of(result).values()
+    try:
+        shown = [axes for axes in figure.axes if axes.has_data()]
+        assert shown
+        for axes in shown:
+            for label in (axes.get_xlabel(), axes.get_ylabel()):
+                assert not re.search(r"\bnan\b|None", label)
+        assert any(axes.get_xlabel() for axes in shown)
+        assert any(axes.get_ylabel() for axes in shown)
+        assert drawn(figure, "png").startswith(b"\x89PNG")
+    finally:
+        plt.close(figure)
+    lines = CATALOGUE[path.stem].report(result)
+    assert any(re.search(r"\d", line) for line in lines)
+    assert cite_job(path)
+
+
+def test_stored_results_make_one_report(tmp_path):
+    chosen = [path for path in STORED if path.stem in ("design", "sensitivity")]
+    for path in chosen:
+        shutil.copy(path, tmp_path)
+    page, names = report_job(tmp_path, tmp_path)
+    assert names == ["design", "sensitivity"]
+    assert page.read_text().count("data:image/png;base64,") == 2
