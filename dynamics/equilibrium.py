@@ -81,6 +81,12 @@ class Equilibrium:
         lag = float(np.degrees(np.arctan2(-y, x)))
         return 180.0 if lag < -180 + 1e-9 else lag + 0.0
 
+    def __repr__(self) -> str:
+        x, y, z = 1e3 * self.position
+        place = f"({x:.4f}, {y:.4f}, {z:.4f}) ± {1e3 * self.position_error:.1g} mm"
+        kind = "stable" if self.stable else f"unstable, e-fold in {1 / self.growth_per_s:.2g} s"
+        return f"Equilibrium at {place}, polar angle {self.polar_angle_deg:.3f}°, spin {self.spin:g}, {kind}"
+
 
 @dataclass(frozen=True, eq=False)
 class ForceCurve:

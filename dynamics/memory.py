@@ -50,6 +50,11 @@ class PlateMemory:
         """Estimated relative error of what the plate does."""
         return max(self.table.errors.total, self.share.error) + self.neglected
 
+    def __repr__(self) -> str:
+        harmonics = len(self.share.series) // 2
+        told = f"relative error {self.error:.1e}, {harmonics} harmonics of the rotor"
+        return f"PlateMemory {self.model!r}: {told}\n{self.table!r}"
+
     @property
     def names(self) -> list[str]:
         """Names of the states."""

@@ -37,6 +37,14 @@ class Trajectory:
     compile_seconds: float
     beyond_plate_table: float = 0.0
 
+    def __repr__(self) -> str:
+        place = ", ".join(f"{1e3 * value:.4f}" for value in self.lab.position[-1])
+        speed = f"{self.steps} steps, {self.realtime_factor:.3g} times real time"
+        return (
+            f"Trajectory of {self.levitated_s:.4g} s ({len(self.time)} samples), "
+            f"ended by {self.ended_by} at ({place}) mm\n  energy ledger to {self.energy_error:.1e}; {speed}"
+        )
+
     @property
     def levitated_s(self) -> float:
         """Duration of the flight, s."""

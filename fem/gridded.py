@@ -16,6 +16,7 @@ from .ensemble import Ensemble
 from .harmonic_fit import FLOOR
 from .harmonics import Coefficients
 from .table import RangeError, RotorTable
+from .table_text import gridded_table_text
 
 COVERAGE = 4.0
 """The error bar in standard deviations: with a spread of a dozen members, once in 500 the error is beyond it."""
@@ -42,6 +43,9 @@ class GriddedTable:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "region", frozen_array(self.region, (2, 3)))
+
+    def __repr__(self) -> str:
+        return gridded_table_text(self)
 
     @property
     def model(self) -> str:

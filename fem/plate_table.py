@@ -13,6 +13,7 @@ from .field_functions import Multipoles
 from .phasor import ComplexArray
 from .plate_region import Region
 from .table import RangeError
+from .table_text import plate_table_text
 
 
 @dataclass(frozen=True)
@@ -71,6 +72,9 @@ class PlateTable:
         object.__setattr__(self, "size", frozen_array(self.size, (3,)))
         object.__setattr__(self, "rates", frozen_array(self.rates, (len(self.rates),)))
         object.__setattr__(self, "weights", frozen_array(self.weights, (len(self.rates), len(self.multipoles.kinds))))
+
+    def __repr__(self) -> str:
+        return plate_table_text(self)
 
     def field_functions(self, points: ArrayLike) -> tuple[Array, Array]:
         """b_i (n, states, 3), T/√J, and ∂b_ia/∂x_c (n, states, 3, 3), T/(√J m), at points (n, 3), m.

@@ -16,6 +16,7 @@ from ..geometry.input_error import InputError
 from ..geometry.magnet import Magnet
 from .compiled import CompiledField, FieldExpressions, as_columns, unpacked
 from .multipole import MultipoleExpansion
+from .table_text import rotor_table_text
 from .uniform import UniformField, squared_distance
 
 BLUR = 0.5
@@ -81,6 +82,9 @@ class RotorTable:
             [hy.sum([b[i] for b, _ in parts]) for i in range(3)],
             [[hy.sum([g[i][j] for _, g in parts]) for j in range(3)] for i in range(3)],
         )
+
+    def __repr__(self) -> str:
+        return rotor_table_text(self)
 
     @cached_property
     def _closed_forms(self) -> tuple[UniformField, ...]:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from .box import Array, Box, frozen_array
+from .scene_text import magnet_text
 
 MU_0 = 4e-7 * np.pi
 """Vacuum permeability, T m/A (the value before 2019; the relative difference is 5e-10)."""
@@ -68,3 +69,6 @@ class Magnet:
     def moment(self) -> Array:
         """(3,) moment J V/μ0 of the remanent polarisation alone, rotor's frame, A m²."""
         return self.polarization_in_rotor * self.box.volume / MU_0
+
+    def __repr__(self) -> str:
+        return magnet_text(self)

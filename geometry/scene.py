@@ -9,6 +9,7 @@ import numpy as np
 
 from .box import Array, Box, frozen_array
 from .magnet import MU_0, Magnet
+from .scene_text import floater_text, plate_text, scene_text
 
 AIR_VISCOSITY = 1.83e-5
 """Dynamic viscosity of air at 20-25 °C, Pa s."""
@@ -53,6 +54,9 @@ class Floater:
         """Magnetic moment (Br V/μ0) 3/(μr + 2) of the free sphere, A m²."""
         return self.remanence * self.volume / MU_0 * 3 / (self.recoil_permeability + 2)
 
+    def __repr__(self) -> str:
+        return floater_text(self)
+
 
 @dataclass(frozen=True)
 class Lowering:
@@ -74,6 +78,9 @@ class Plate:
     box: Box
     conductivity: float
     lowering: Lowering | None = None
+
+    def __repr__(self) -> str:
+        return plate_text(self)
 
 
 @dataclass(frozen=True)
@@ -137,3 +144,6 @@ class Scene:
     def angular_velocity(self) -> float:
         """ω = 2π frequency, rad/s."""
         return 2 * np.pi * self.frequency
+
+    def __repr__(self) -> str:
+        return scene_text(self)

@@ -1,11 +1,14 @@
 """The program from Python: what the command line does, with labelled results instead of files.
 
-from spinlev.studies.api import draw, equilibria, load_scene, simulate
+As in a notebook::
 
-scene = load_scene("scenes/horizontal.toml")
-found = equilibria(scene, plate_model="none")    # an xarray.Dataset with units and error estimates
-flight = simulate(scene, 3.0, plate_model="none")
-draw(flight)["trajectory"]                       # a matplotlib figure
+    from spinlev.studies.api import draw, equilibria, load_scene, simulate, stability
+
+    scene = load_scene("scenes/horizontal.toml")
+    found = equilibria(scene, plate_model="none")    # an xarray.Dataset with units and error estimates
+    small = stability(scene, plate_model="none")     # the small motions about the one at which a flight begins
+    flight = simulate(scene, 3.0, plate_model="none")
+    draw(flight)["trajectory"]                       # a matplotlib figure
 """
 
 from __future__ import annotations
@@ -16,14 +19,14 @@ from pathlib import Path
 import xarray as xr
 from matplotlib.figure import Figure
 
-from ..dynamics import EquilibriumError, PlateMemory
+from ..dynamics import Equilibrium, EquilibriumError, PlateMemory, starting_point
 from ..fem.table import FieldTable
 from ..geometry import InputError, Scene, load_scene, parse_scene
 from ..geometry.scene import OffsetStart
 from .catalogue import CATALOGUE
 from .drawings import figures_of
 from .engine import Engine
-from .results import found_dataset, trajectory_dataset
+from .results import found_dataset, trajectory_dataset, variable
 from .shelf import Shelf
 from .single import fly, surveyed
 from .sweep import forget, swept
@@ -41,6 +44,7 @@ __all__ = [
     "rotor_table",
     "run_study",
     "simulate",
+    "stability",
 ]
 
 
@@ -87,10 +91,46 @@ def equilibria(
     Dataset over `equilibrium`, `mode` and `axis`, SI units. Raises EquilibriumError for a rotor at rest.
     """
     shelf = Shelf(scene, Tables(model, plate_model, rtol, plate_rtol).checked())
+    found, _, labels = _surveyed(shelf, spin)
+    return found_dataset(found).assign_attrs(study="equilibria", **labels)
+
+
+def stability(
+    scene: Scene,
+    model: FieldModel = "auto",
+    plate_model: PlateModel = "auto",
+    spin: float = 0.0,
+    rtol: float = 3e-6,
+    plate_rtol: float = 3e-3,
+) -> xr.Dataset:
+    """The five small motions about the equilibrium at which a flight begins, the nearest stable one if there is one.
+
+    Parameters
+    ----------
+    spin : body spin S = Ω·m̂/ω
+
+    Returns
+    -------
+    Dataset over `mode` (bounce, two side motions, precession, nutation): growth (1/s; negative where it dies out) and
+    frequency (Hz, rotor's frame); `stable`, `growth` and `growth_error` (what round-off may do to it) of the whole.
+    Raises EquilibriumError where there is no equilibrium to begin at.
+    """
+    shelf = Shelf(scene, Tables(model, plate_model, rtol, plate_rtol).checked())
+    found, _, labels = _surveyed(shelf, spin)
+    chosen = starting_point(found) or next(iter(found), None)
+    if chosen is None:
+        raise EquilibriumError(f"At {scene.frequency:g} Hz the floater has no equilibrium with body spin {spin:g}.")
+    dataset = found_dataset((chosen,)).isel(equilibrium=0, drop=True).drop_vars("number")
+    error = variable((), chosen.growth_error_per_s, "1/s", "what round-off may do to the growth")
+    return dataset.assign(growth_error=error).assign_attrs(study="stability", **labels)
+
+
+def _surveyed(shelf: Shelf, spin: float) -> tuple[tuple[Equilibrium, ...], PlateMemory | None, dict[str, str]]:
+    """Equilibria, the plate, and what a result says of both models."""
     table = shelf.table()
     found, memory = surveyed(shelf, table, spin)
-    labels = {"model": table.model, "plate_model": memory.model if memory else "none", "scene": scene.text}
-    return found_dataset(found.equilibria).assign_attrs(labels)
+    labels = {"model": table.model, "plate_model": memory.model if memory else "none", "scene": shelf.scene.text}
+    return found.equilibria, memory, labels
 
 
 def simulate(
@@ -110,13 +150,14 @@ def simulate(
     """
     shelf = Shelf(scene, Tables(model, plate_model, rtol, plate_rtol).checked())
     table = shelf.table()
+    found: tuple[Equilibrium, ...] = ()
     if isinstance(scene.start, OffsetStart):
-        survey, memory = surveyed(shelf, table)
-        found = survey.equilibria
+        found, memory, _ = _surveyed(shelf, 0.0)
     else:
-        found, memory = (), shelf.memory(table, ())
+        memory = shelf.memory(table, ())
     flight = fly(scene, table, duration, found, memory)
-    return trajectory_dataset(flight).assign_attrs(model=table.model, scene=scene.text)
+    labels = {"model": table.model, "plate_model": memory.model if memory else "none", "scene": scene.text}
+    return trajectory_dataset(flight).assign_attrs(labels)
 
 
 def run_study(

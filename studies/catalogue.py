@@ -21,7 +21,8 @@ from .force_curve_figure import force_figure, force_lines
 from .levitation_distance import distance_points, levitation_distance
 from .levitation_distance_figure import distance_figure, distance_lines
 from .plate_damping import damping_points, gather_damping, plate_damping
-from .plate_damping_figure import damping_figure, damping_lines
+from .plate_damping_figure import damping_figure
+from .plate_damping_report import damping_lines
 from .sensitivity_figure import sensitivity_figure, sensitivity_lines
 from .shipped_scenes import default_scene
 from .side_mode import side_mode, side_points

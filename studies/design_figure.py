@@ -30,6 +30,7 @@ def design_figure(result: xr.Dataset) -> Figure:
             _margins(place, result.isel(case=int(k)))
         place.set_title(f"{1e3 * distance:g} mm at {frequency:g} Hz")
         place.yaxis.set_major_formatter(PercentFormatter(1.0, decimals=0))
+        place.margins(y=0.15)
         place.set(xlabel="edge of the cubes (mm)", ylabel="margin in frequency", ylim=(-0.02, None))
         place.legend(fontsize=6, loc="upper left")
     return figure

@@ -101,9 +101,11 @@ def _ranges(axes: Axes, part: xr.Dataset) -> None:
         for end, values in (("lowest", low), ("highest", high)):
             error = _best_known(part, f"{end}_error", model)
             axes.errorbar(places, values, error, fmt="none", ecolor="0.1", lw=1)
+        axes.use_sticky_edges = False
         touching = part["high_kind"].sel(model=model).values == "contact"
         label = "ends at the rotor" if model == "article" else None
         axes.plot(places[touching], high[touching], "kv", ms=4, label=label)
+    axes.margins(y=0.08)
     axes.set(ylabel="frequencies of stable levitation (Hz)")
 
 

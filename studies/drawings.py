@@ -12,10 +12,18 @@ from ..fem.table_store import TableFileError, read_checked
 from ..geometry import InputError
 from .catalogue import CATALOGUE
 from .figures import field_figure, force_figure, save_figure, trajectory_figure
+from .modes_figure import modes_figure
 from .question_figure import drawable, question_figure
 
 QUESTION = "question"
 """What the result of one's own question is called."""
+DRAWN = {
+    "axis_field": ("field", field_figure),
+    "curve_force": ("force", force_figure),
+    "position_rotor_frame": ("trajectory", trajectory_figure),
+    "mode_growth": ("modes", modes_figure),
+}
+"""By variable of a result that is no study: name of the figure and who draws it."""
 
 
 def draw_result(path: Path, out: Path) -> list[str]:
@@ -50,9 +58,7 @@ def figures_of(result: xr.Dataset) -> Mapping[str, Figure]:
         return {kind: CATALOGUE[kind].draw(result)}
     if kind == QUESTION:
         return {QUESTION: question_figure(result)} if drawable(result) else {}
-    draws = {"axis_field": field_figure, "curve_force": force_figure, "position_rotor_frame": trajectory_figure}
-    names = {"axis_field": "field", "curve_force": "force", "position_rotor_frame": "trajectory"}
-    found = {names[key]: draw(result) for key, draw in draws.items() if key in result}
+    found = {name: draw(result) for key, (name, draw) in DRAWN.items() if key in result}
     if not found:
         raise InputError(f"Input study must be one that this version knows; instead the result is of '{kind}'.")
     return found

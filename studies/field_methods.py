@@ -111,7 +111,7 @@ def methods(quick: bool) -> dict[str, Method]:
     found["closed form, μr left out"] = Method("closed form", "permeable", _closed_form)
     for size in (0.5,) if quick else (0.5, 0.25):
         name = f"scikit-fem P2, size {size:g}"
-        found[name] = Method("scikit-fem P2", "permeable", partial(_second_opinion, size))
+        found[name] = Method("scikit-fem P2, mean only", "permeable", partial(_second_opinion, size))
     for order in (2, 3) if quick else (1, 2, 3, 4, 5, 6):
         name = f"direct, μr, order {order}"
         found[name] = Method("direct finite elements", "permeable", partial(_direct, order))

@@ -73,7 +73,7 @@ def _contributions(axes: Axes, part: xr.Dataset, quantity: str, scale: float, la
     axes.set_yticks(places, [WORDS[name] for name in names])
     axes.invert_yaxis()
     axes.legend(fontsize=6)
-    axes.set(xlabel=f"one standard deviation of the tolerance changes\nthe {label} by")
+    axes.set(xlabel=f"{label},\none standard deviation of the tolerance")
 
 
 def _bands(axes: Axes, part: xr.Dataset, configuration: str) -> None:

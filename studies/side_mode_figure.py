@@ -41,10 +41,11 @@ def side_figure(result: xr.Dataset) -> Figure:
             )
             panel.plot(found["frequency"], 1e3 * found["article_radius"], ":", lw=1.6, **style)
         panel.plot([], [], ":", lw=1.6, color="0.3", label="$\\mathcal{G}/\\mu_f\\omega^2$")
+        panel.plot([], [], "--", color="0.3", label="unstable")
         panel.set(xlabel="frequency of the rotor (Hz)", ylabel="radius of the side mode (mm)")
-        panel.set(xlim=(35, 255), ylim=(0, 1.5))
+        panel.set(xlim=(35, 255), ylim=(0, 2.1))
         panel.set_title(TITLES[configuration])
-        panel.legend(ncols=2, loc="upper right")
+        panel.legend(ncols=2, loc="upper right", frameon=True, framealpha=0.95)
     return figure
 
 

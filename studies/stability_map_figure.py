@@ -55,7 +55,9 @@ def map_figure(result: xr.Dataset) -> Figure:
 def _region(axes: Axes, part: xr.Dataset, model: str) -> None:
     measure = part["measure"].values
     low, high = part["lowest"].values, part["highest"].values
-    axes.fill_between(measure, low[:, 0], high[:, 0], color=COLORS[model], alpha=0.2, lw=0)
+    wide = measure if len(measure) > 1 else measure * np.array([0.99, 1.01])  # one rotor alone is a bar
+    borders = [np.broadcast_to(values[:, 0], wide.shape) for values in (low, high)]
+    axes.fill_between(wide, *borders, color=COLORS[model], alpha=0.2, lw=0)
     for k in range(part.sizes["interval"]):
         for ends, kinds in ((low, part["low_kind"].values), (high, part["high_kind"].values)):
             if k == 0:

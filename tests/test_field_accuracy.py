@@ -176,6 +176,7 @@ def test_slow_hard_cases(name):
     check(CASES[name], 3e-6 if name == "μr = 1000" else 1e-6)
 
 
+@pytest.mark.slow
 def test_a_very_permeable_cube_against_elements_without_any_closed_form():
     """μr = 1000: the dipole moment, a 275th of the remanent one, of two formulations, meshes and orders."""
     rotor = CASES["μr = 1000"].magnets

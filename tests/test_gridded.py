@@ -69,7 +69,10 @@ ROTORS = {
 }
 
 
-@pytest.fixture(scope="module", params=ROTORS)
+FAST = [pytest.param(name, marks=pytest.mark.slow) if name == "touching" else name for name in ROTORS]
+
+
+@pytest.fixture(scope="module", params=FAST)
 def fitted(request):
     rotor = ROTORS[request.param]
     centers = None if request.param == "displaced" else [magnet.box.center for magnet in rotor]
