@@ -59,7 +59,7 @@ def speed_figure(result: xr.Dataset) -> Figure:
         panel.axhspan(1e-17, max(own, 1e-16), facecolor="0.9", edgecolor="0.6", label="error of the reference")
         panel.set(xlabel="processor time from nothing (s)", ylabel="relative error of B", title=title)
         panel.set_ylim(bottom=1e-16)
-        panel.legend()
+        panel.legend(frameon=True)
     figure.suptitle(
         "20 mm from the cube's centre (faint: 13 mm); bars reach to the error that a table states", fontsize=9
     )
