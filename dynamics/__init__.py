@@ -16,7 +16,7 @@ from .memory import PlateMemory
 from .rates import Rates
 from .rotor_family import RotorFamily, rotor_family
 from .simulation import StartError, initial_state, simulate, starting_point
-from .trajectory import Trajectory
+from .trajectory import FlightStopped, Trajectory
 
 __all__ = [
     "BoundaryPoint",
@@ -26,6 +26,7 @@ __all__ = [
     "EquilibriumError",
     "EquilibriumMap",
     "Family",
+    "FlightStopped",
     "ForceCurve",
     "Plane",
     "PlateMemory",

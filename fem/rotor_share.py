@@ -91,7 +91,7 @@ class RotorShare:
             turns += [hy.cos(float(h) * angle), hy.sin(float(h) * angle)]
         return [[turn * power for power in powers[: self.series.shape[2]]] for turn in turns]
 
-    def expressions(self, basis: list[list[hy.expression]]) -> list[hy.expression]:
+    def expressions(self, basis: Sequence[Sequence[hy.expression]]) -> list[hy.expression]:
         """s_i of every state as heyoka expressions of the `basis`, whose members all of them share."""
         members = [member for row in basis for member in row]
         columns = self.series.swapaxes(0, 1).reshape(self.series.shape[1], len(members))

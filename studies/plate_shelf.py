@@ -22,7 +22,6 @@ from ..geometry.scene import Plate, Scene
 from .console import note
 from .plate_job import beyond_edges
 
-PLATE_MODELS = ("none", "slab", "fem", "reduced", "auto")
 REACH = 0.003
 """The floater may move so far from where it begins, along each axis, m."""
 RASTER = 0.001
