@@ -145,14 +145,14 @@ def test_a_disk_that_takes_no_more_than_so_many_bytes_a_file(spinlev, arguments,
 
 @pytest.mark.parametrize("arguments", [FIELD, RUN], ids=["field", "run"])
 def test_too_little_memory(spinlev, arguments):
-    """30 MB of address space left (and NGSolve's heap) when the solve begins: refused in words; else all is well."""
+    """2 MB of address space left (and NGSolve's heap) when the solve begins: refused in words; else all is well."""
     code = (
         "import resource, psutil; from spinlev.fem import rotor_solution\n"
         "meshed, (_, most) = rotor_solution.mesh_magnets, resource.getrlimit(resource.RLIMIT_AS)\n"
         "def starved(*a):\n"
         "    resource.setrlimit(resource.RLIMIT_AS, (most, most))\n"
         "    mesh = meshed(*a)\n"
-        "    resource.setrlimit(resource.RLIMIT_AS, (psutil.Process().memory_info().vms + 330_000_000, most))\n"
+        "    resource.setrlimit(resource.RLIMIT_AS, (psutil.Process().memory_info().vms + 302_000_000, most))\n"
         "    return mesh\n"
         "rotor_solution.mesh_magnets = starved\n" + CALL
     )
