@@ -17,7 +17,7 @@ MODELS = ["dipole", "cuboid", "fem"]
 ONE, ALL, MAP = (
     "one equilibrium near a guess and its stability, compiled",
     "all equilibria of a scene and their stability, compiled: for each of them",
-    "map of 50 × 50, all equilibria and their stability: for each of them",
+    "map of 100 × 100, all equilibria and their stability: for each of them",
 )
 
 
@@ -69,8 +69,9 @@ def test_one_equilibrium(benchmark, model):
 @pytest.mark.parametrize("model", MODELS)
 def test_map(benchmark, model):
     family = rotor_family(SCENE, "horizontal", model, nearest=SCENE.floater.radius)
-    axes = np.linspace(50.0, 250.0, 50), np.linspace(1e-3, 8e-3, 50)
+    axes = np.linspace(50.0, 250.0, 100), np.linspace(1e-3, 8e-3, 100)
     assert family.rates is not None  # compiled
     found = benchmark.pedantic(equilibrium_map, (family, *axes), rounds=1)
     benchmark.extra_info["count"] = len(found.row)
+    print(f"\n{model}: {len(found.row)} equilibria, {found.stable.sum()} of them stable")
     assert found.stable.any()

@@ -52,7 +52,7 @@ def needed_by(text):
 def page():
     """The whole page."""
     run, _, rest = (ROOT / "pyproject.toml").read_text("utf-8").partition("[project.optional-dependencies]")
-    run, dev = reasons(run), reasons(rest.partition("[project.scripts]")[0])
+    run, dev = reasons(run.partition("dependencies = [")[2]), reasons(rest.partition("[project.scripts]")[0])
     pinned = needed_by((ROOT / "requirements.txt").read_text("utf-8"))
     lines = [HEAD]
     for title, names in (("To run", run), ("To develop", dev)):

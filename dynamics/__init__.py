@@ -2,14 +2,16 @@
 
 from .arclength import Steps, follow_branch
 from .averaged import Drift
-from .boundary import BoundaryPoint, Plane, follow_boundary
+from .boundary import follow_boundary
+from .boundary_equations import BoundaryPoint, Plane
 from .branch import Family, Point
 from .checkpoint import Checkpoint
 from .drift import drift
 from .equilibria import find_equilibria, survey, with_plate
 from .equilibrium import Equilibrium, EquilibriumError, ForceCurve, Survey
-from .equilibrium_map import EquilibriumMap, equilibrium_map
+from .equilibrium_map import equilibrium_map
 from .flight_kind import flight_kind
+from .map_stability import EquilibriumMap
 from .memory import PlateMemory
 from .rates import Rates
 from .rotor_family import RotorFamily, rotor_family

@@ -110,8 +110,7 @@ def _begin(flight: Flight, start: State, currents: Array) -> Array:
     """Set the integrator to the start; the runtime parameters with the distance at which the floater is lost."""
     flight.integrator.time = 0.0
     values = flight.values.copy()
-    plate = currents * values[Parameter.PLATE_SHARE]
-    flight.integrator.state[:] = np.concatenate([flight.scales.pack(start), plate, [0.0]])
+    flight.integrator.state[:] = flight.state(start, currents)
     flight.integrator.reset_cooldowns()
     values[Parameter.LOST_DISTANCE] = max(0.1, 2 * float(np.linalg.norm(start.position))) / flight.scales.length
     return values

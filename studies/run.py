@@ -53,8 +53,9 @@ def main_job(scene: Scene, asked: Tables, duration: float, out: Path) -> Job:
     flight = None
     if failure is None or isinstance(scene.start, AbsoluteStart):
         try:
-            flight = fly(scene, chosen, duration, found, memory)
-            values |= flight_answer(chosen, flight, memory)
+            table = shelf.in_flight(chosen, memory, found)
+            flight = fly(scene, table, duration, found, memory)
+            values |= flight_answer(table, flight, memory)
             lines += flight_lines(flight)
         except EquilibriumError as error:
             failure = error

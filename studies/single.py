@@ -100,6 +100,7 @@ def simulate_job(scene: Scene, asked: Tables, duration: float, out: Path, resume
     else:
         found, memory = None, shelf.memory(table, ())
     equilibria = found.equilibria if found else ()
+    table = shelf.in_flight(table, memory, equilibria)
     models = {"model": table.model, "plate_model": memory.model if memory else "none"}
 
     def keep(flight: Trajectory) -> None:

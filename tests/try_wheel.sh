@@ -12,16 +12,18 @@ place=$(mktemp -d)
 trap 'rm -rf "$place"' EXIT
 unset PYTHONPATH
 
-"$python" -m venv "$place/venv"
-own=$("$place/venv/bin/python" -c 'import sysconfig; print(sysconfig.get_path("purelib"))')
-"$python" -c 'import sysconfig; print(sysconfig.get_path("purelib"))' > "$own/lent.pth"
 cp -r "$repository/tests" "$repository/scenes" "$repository/pyproject.toml" "$place"
 cd "$place"
 export SPINLEV_CACHE="$place/cache"
 
 for file in "$dist"/*.tar.gz "$dist"/*.whl; do
   echo "== $(basename "$file")"
-  venv/bin/pip install --quiet --disable-pip-version-check --no-index --no-deps --no-build-isolation --force-reinstall "$file"
+  rm -rf venv
+  "$python" -m venv --without-pip venv
+  own=$(venv/bin/python -c 'import sysconfig; print(sysconfig.get_path("purelib"))')
+  "$python" -c 'import sysconfig; print(sysconfig.get_path("purelib"))' > "$own/lent.pth"
+  "$python" -m pip --python venv/bin/python install --quiet --disable-pip-version-check --no-index --no-deps \
+    --no-build-isolation --ignore-installed "$file"
   venv/bin/python - "$own" <<'PYTHON'
 import sys
 from importlib.metadata import distribution
