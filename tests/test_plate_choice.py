@@ -37,7 +37,7 @@ def test_auto(size, center, model, reason):
 
 
 def test_more_is_asked_of_the_slab_where_the_tolerance_is_smaller():
-    """Beyond the edges lies about the square of the depth over their distance: (2.5/15)² = 2.8 %, in a square a little less."""
+    """Beyond the edges lies about the square of the depth over their distance: (2.5/15)² = 2.8 %."""
     wide = ((0.3, 0.3, 0.01), (0.0, 0.0, -0.04))
     assert chosen(*wide, rtol=5e-2)[0] == "slab"
     assert chosen(*wide, rtol=1e-2)[0] == "reduced"
