@@ -20,14 +20,14 @@ SCENE = str(Path(__file__).parent.parent / "scenes" / "horizontal.toml")
 CALL = "import sys; from spinlev.studies.cli import main; sys.argv[0] = 'spinlev'; main()"
 DIPOLE = ("--model", "dipole", "--plate-model", "none")
 FIELD = ("field", SCENE, "--points", "points.csv", "--model", "fem", "--rtol", "3e-5", "--json")
-FLIGHT = ("simulate", SCENE, "--duration-s", "400", *DIPOLE, "--json")
+FLIGHT = ("simulate", SCENE, "--duration-s", "300", *DIPOLE, "--json")
 RUN = ("run", SCENE, "--duration-s", "0.2", "--rtol", "1e-3", *DIPOLE, "--json")
 VARY = ("frequency_hz=92,95,100,105,110,120",)
 SWEEP = ("study", SCENE, "--vary", *VARY, *DIPOLE, "--json")
 PHASES = {
     "field: the table is computed": (FIELD, "finite elements ...", 0.2),
     "simulate: equilibria": (FLIGHT, "Equilibria ...", 0.3),
-    "simulate: motion": (FLIGHT, "Motion ...", 1.5),
+    "simulate: motion": (FLIGHT, "Motion ...", 1.0),
     "run: table": (RUN, "finite elements ...", 0.2),
     "run: equilibria": (RUN, "Equilibria ...", 0.3),
     "run: files": (RUN, "Files and figures ...", 0.5),
