@@ -30,7 +30,7 @@ from spinlev.geometry import horizontal, seal
 from spinlev.studies import cli
 
 SCENES = sorted((Path(__file__).parent.parent / "scenes").glob("*.toml"))
-LONGEST = 20
+LONGEST = 60
 """Seconds after which an input counts as a hang."""
 ODD = [
     "",
