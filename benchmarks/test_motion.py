@@ -12,7 +12,7 @@ from spinlev.dynamics.flight import compile_flight
 from spinlev.dynamics.integration import integrate
 from spinlev.dynamics.simulation import PLATE_TOLERANCE, initial_state
 from spinlev.fem.models import rotor_table
-from spinlev.studies.plate_shelf import plate_memory
+from spinlev.studies.plate_shelf import plate_memory, table_in_flight
 
 FREE = replace(SCENE, plate=None, drag=replace(SCENE.drag, linear=0.0, angular=0.0))
 TURNS = 2
@@ -61,6 +61,7 @@ def test_flight_with_plate(benchmark, start, model, plate_model, rtol):
     """A floater that does not rest over the plate's currents, at the tolerance that `simulate` uses."""
     table = rotor_table(SCENE.rotor, model, nearest=SCENE.floater.radius)
     memory, _ = plate_memory(SCENE, SCENE.plate, plate_model, table, start.position, rtol)
+    table = table_in_flight(SCENE, table, start.position, 3e-6)
     flight = compile_flight(SCENE, table, 0.5, PLATE_TOLERANCE, True, memory)
     still = np.zeros(len(memory.table.rates))
     integrate(SCENE, flight, start, 0.05, currents=still)

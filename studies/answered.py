@@ -19,8 +19,10 @@ from .stable_range import BORDER, CONTACT, HIGHEST, LOWEST, STEPS, StableRange, 
 
 INSIDE = (0.02, 0.06, 0.15)
 """Parts of its frequency by which the search for a limit may begin inside that of the rigid dipole."""
-TRUSTED, MOST = 0.08, 10
+TRUSTED, MOST = 0.08, 16
 """Part of its frequency over which an expansion is trusted to lead towards a limit, and how often it is renewed."""
+NEAR, PART = 0.02, 0.7
+"""Part of its frequency from which an expansion tells where the bodies touch, and of the way there in one step."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,7 +54,8 @@ class Answered:
         Raises EquilibriumError where no stable equilibrium is found to begin with.
         """
         rigid, way = getattr(self.range, side), -1 if side == "low" else 1
-        return self._close(rigid, way) or self._stepwise(rigid, way)
+        close = None if rigid.kind in (BORDER, CONTACT) else self._close(rigid, way)
+        return close or self._stepwise(rigid, way)
 
     def _close(self, rigid: Point, way: int) -> Point | None:
         """An end near the rigid dipole's, if there is one, by expansions about it alone."""
@@ -71,11 +74,11 @@ class Answered:
             return None
 
     def _stepwise(self, rigid: Point, way: int) -> Point:
-        """An end anywhere, in steps over which one expansion is trusted."""
-        here = self._inside(rigid, way)
+        """An end anywhere, in steps over which one expansion is trusted; shorter ones up to contact with the rotor."""
+        here, stride = self._inside(rigid, way), TRUSTED
         for _ in range(MOST):
             expansion = self.mutual.expanded(*pose(here))
-            border = float(np.clip(here.parameter * (1 + TRUSTED * way), LOWEST, HIGHEST))
+            border = float(np.clip(here.parameter * (1 + stride * way), LOWEST, HIGHEST))
 
             def find(family: Family, last: Point, here: Point = here, border: float = border) -> Point:
                 return stability_end(self.scene, family, here.state, here.parameter, border)
@@ -83,9 +86,14 @@ class Answered:
             found = find(replace(self.family, rates=expansion.added(self.family.rates)), here)
             if found.kind not in (BORDER, CONTACT):
                 found = settled(self.family, self.mutual, found, find, self.mutual.expanded(*pose(found)))
-            if found.kind != BORDER or border in (LOWEST, HIGHEST):
+            if found.kind == CONTACT and abs(found.parameter / here.parameter - 1) > NEAR:
+                border = here.parameter + PART * (found.parameter - here.parameter)
+            elif found.kind != BORDER or border in (LOWEST, HIGHEST):
                 return found
-            here = self._settled(found, border)
+            try:
+                here = self._settled(found, border)
+            except TwoBodyError:
+                stride /= 2
         raise EquilibriumError("The end of stability was not reached.")
 
     def _settled(self, near: Point, frequency: float) -> Point:

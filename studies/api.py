@@ -155,7 +155,7 @@ def simulate(
         found, memory, _ = _surveyed(shelf, 0.0)
     else:
         memory = shelf.memory(table, ())
-    flight = fly(scene, table, duration, found, memory)
+    flight = fly(scene, shelf.in_flight(table, memory, found), duration, found, memory)
     labels = {"model": table.model, "plate_model": memory.model if memory else "none", "scene": scene.text}
     return trajectory_dataset(flight).assign_attrs(labels)
 

@@ -23,7 +23,7 @@ from ..fem.two_body import two_body
 from ..geometry.box import Array
 from ..geometry.scene import Floater
 
-STEP = 0.02
+STEP, SHORTEST = 0.02, 1e-3
 """Of the central differences, in floater radii and rad; their error is of its square, 1e-4 of the slope."""
 POSE, ACCELERATED = np.array([0, 1, 2, 6, 7, 8]), np.array([3, 4, 5, 9, 10, 11])
 """Places in the state of position and moment, and of velocity and spin."""
@@ -61,14 +61,19 @@ class Mutual:
         return Expansion(center, self(position, moment), np.zeros((6, 6)), self.floater)
 
     def expanded(self, position: Array, moment: Array) -> Expansion:
-        """Value and slopes by central differences."""
-        columns = []
-        for step in np.eye(5) * STEP:
+        """Value and slopes by central differences, whose steps are shorter where the bodies are about to touch."""
+        columns, size = [], float(np.clip(0.9 * self._gap(position), SHORTEST, STEP))
+        for step in np.eye(5) * size:
             ends = [moved(position[None], moment[None], sign * step[None]) for sign in (1, -1)]
-            columns.append((self(*(part[0] for part in ends[0])) - self(*(part[0] for part in ends[1]))) / (2 * STEP))
+            columns.append((self(*(part[0] for part in ends[0])) - self(*(part[0] for part in ends[1]))) / (2 * size))
         across = np.zeros((5, 6))
         across[:3, :3], across[3:, 3:] = np.eye(3), tangent_basis(moment[None])[0]
         return replace(self.constant(position, moment), slope=np.column_stack(columns) @ across)
+
+    def _gap(self, position: Array) -> float:
+        """Distance between the bodies, in floater radii."""
+        center, radius = position * self.floater.radius, self.floater.radius
+        return min(float(magnet.box.distance(center)) / radius for magnet in self.rotor.magnets) - 1
 
 
 @dataclass(frozen=True, eq=False)

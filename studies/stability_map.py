@@ -19,7 +19,7 @@ from .console import note
 from .plate_shelf import plate_memory
 from .results import variable
 from .rotor_points import rotor_scene
-from .stable_range import HIGHEST, StableRange, at_frequency, reference_state, stable_ranges
+from .stable_range import HIGHEST, StableRange, at_frequency, levitating_ranges
 
 MEASURES = {
     "horizontal": (0.5, 1.0, 1.5, 2.0, 2.5, 3.0, 3.5, 4.0, 5.0, 6.0, 7.0, 8.0),
@@ -54,18 +54,17 @@ def compute(point: study.Point) -> xr.Dataset:
     table = _table(scene, point["model"])
     rates = Rates.of(scene, table)
     try:
-        found = stable_ranges(scene, rates, *reference_state(scene))
+        found = levitating_ranges(scene, table, rates)
     except EquilibriumError as error:
         note(str(error))
         found = []
     rows, kinds = np.full((MOST, 5), np.nan), np.full((MOST, 2), "", dtype="U12")
-    for k, run in enumerate(sorted(found, key=lambda r: r.low.parameter - r.high.parameter)[:MOST]):
+    for k, run in enumerate(found[:MOST]):
         ends = run.low, run.high
         rows[k] = [*(e.parameter for e in ends), *(e.distance for e in ends), run.low.leading_hz]
         rows[k, 4] = run.high.leading_hz
         kinds[k] = [e.kind for e in ends]
-    best = max(found, key=lambda run: run.high.parameter - run.low.parameter, default=None)
-    plate = _with_plate(scene, table, rates, best, point["with_plate"])
+    plate = _with_plate(scene, table, rates, found[0] if found else None, point["with_plate"])
     return _dataset(point, rows, kinds, plate)
 
 

@@ -9,17 +9,17 @@ from functools import partial
 import numpy as np
 from scipy.optimize import brentq
 
-from ..dynamics import EquilibriumError, Family, Point, Rates, Steps, find_equilibria, follow_branch
+from ..dynamics import EquilibriumError, Family, Point, Rates, Steps, follow_branch
 from ..dynamics.branch import FOLD, frequencies
 from ..dynamics.events import clearance
-from ..dynamics.state import Scales
 from ..fem.models import rotor_table
+from ..fem.table import RotorTable
 from ..geometry.box import Array
 from ..geometry.scene import Scene
+from .levitation_branch import levitating_branch
 
 LOWEST, HIGHEST = 25.0, 400.0
 """Frequencies between which is looked, Hz."""
-TRIED = (100.0, 130.0, 80.0, 170.0, 65.0, 210.0, 55.0, 260.0, 45.0, 36.0)
 CONTACT, BORDER = "contact", "border"
 """Ends beside those of `dynamics.branch`: the floater touches the rotor; the end of what was looked at."""
 TOLERATED = 0.02
@@ -50,20 +50,30 @@ class StableRange:
 
 
 def reference_state(scene: Scene) -> tuple[Array, float]:
-    """Scaled state (12,) and frequency (Hz) of a stable equilibrium of point dipoles on the axis below the rotor.
+    """Scaled state (12,) and frequency (Hz) of a stable equilibrium of point dipoles, amid those from the fold on.
 
     Raises
     ------
-    EquilibriumError : none at any of the frequencies that are tried
+    EquilibriumError : there is none up to `HIGHEST`
     """
     table = rotor_table(scene.rotor, "dipole")
-    rates = Rates.of(scene, table)
-    for frequency in TRIED:
-        there = replace(scene, frequency=frequency)
-        for found in find_equilibria(there, table, rates=rates):
-            if found.stable and np.hypot(*found.position[:2]) < 0.2 * -found.position[2]:
-                return Scales.of(there).pack(found.state), frequency
-    raise EquilibriumError("No stable levitation of point dipoles at any of the frequencies that are tried.")
+    found = levitating_ranges(scene, table, Rates.of(scene, table))
+    if not found:
+        raise EquilibriumError("Point dipoles levitate stably at none of the frequencies that are looked at.")
+    lowest = found[0]
+    middle = lowest.near((lowest.low.parameter + lowest.high.parameter) / 2)
+    return middle.state, middle.parameter
+
+
+def levitating_ranges(scene: Scene, table: RotorTable, rates: Rates) -> list[StableRange]:
+    """All intervals of stability on the branch that levitates below the rotor, by ascending frequency.
+
+    The branch is found without a search, see `levitation_branch`.  Raises EquilibriumError where there is no branch.
+    """
+    bare = replace(scene, plate=None)
+    near = levitating_branch(bare, table, rates, HIGHEST).near
+    start = near[len(near) // 2]
+    return stable_ranges(bare, rates, start.state, start.parameter)
 
 
 def stable_ranges(scene: Scene, rates: Rates, start: Array, frequency: float) -> list[StableRange]:
@@ -83,9 +93,9 @@ def stable_ranges(scene: Scene, rates: Rates, start: Array, frequency: float) ->
 
 
 def stable_range(scene: Scene, rates: Rates, start: Array, frequency: float) -> StableRange | None:
-    """The widest of these intervals; None without any."""
+    """The one of these intervals that holds the frequency or is nearest to it; None without any."""
     found = stable_ranges(scene, rates, start, frequency)
-    return max(found, key=lambda run: run.high.parameter - run.low.parameter, default=None)
+    return min(found, key=lambda run: max(run.low.parameter - frequency, frequency - run.high.parameter), default=None)
 
 
 def at_frequency(scene: Scene, rates: Rates, near: Point, frequency: float, steps: Steps = STEPS) -> Point:

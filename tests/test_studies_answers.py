@@ -22,7 +22,15 @@ from spinlev.studies.dipole_vs_fem_figure import CAUSES, TOTAL, change
 from spinlev.studies.mutual import Expansion, Mutual, pose
 from spinlev.studies.rotor_points import rotor_scene
 from spinlev.studies.sensitivity import slope_by
-from spinlev.studies.stable_range import UNIT, Family, gap, reference_state, stable_range
+from spinlev.studies.stable_range import (
+    UNIT,
+    Family,
+    at_frequency,
+    gap,
+    levitating_ranges,
+    reference_state,
+    stable_range,
+)
 from spinlev.studies.tolerances import PARAMETERS, QUANTITIES, levitation, nominal, scene_of
 
 
@@ -58,6 +66,19 @@ def test_a_range_ends_where_a_survey_says_so(tilted):
     assert found.low.kind == "fold"
     assert near(found.low.parameter + 0.01) == [True, False]
     assert near(found.low.parameter - 0.01) == []
+
+
+def test_a_narrow_range_is_found_and_a_survey_confirms_it():
+    """δx = 5 mm levitates over 4 Hz only, which a search at a few frequencies would miss."""
+    scene = rotor_scene("horizontal", 5.0)
+    table = rotor_table(scene.rotor, "dipole")
+    rates = Rates(table)
+    (found,) = levitating_ranges(scene, table, rates)
+    assert (found.low.kind, found.high.kind) == ("fold", "oscillatory")
+    assert 0 < found.high.parameter - found.low.parameter < 5
+    middle = (found.low.parameter + found.high.parameter) / 2
+    stable = [e for e in find_equilibria(replace(scene, frequency=middle), table, rates=rates) if e.stable]
+    assert min(abs(e.distance - at_frequency(scene, rates, found.near(middle), middle).distance) for e in stable) < 1e-9
 
 
 def test_vertical_range_against_known_numbers():
