@@ -52,8 +52,20 @@ def pushed(magnets, position, moment, step):
     return field[0], (energy[:, :, 0] - energy[:, :, 1]) @ EIGHTH_ORDER / step
 
 
+def scipy_equilibria(scene, magnets, starts):
+    """Positions (n, 3) m of all that least squares finds from random starts below the rotor."""
+    generator, found = np.random.default_rng(0), []
+    for _ in range(starts):
+        place = generator.uniform((-0.005, -0.005, -0.05), (0.005, 0.005, -0.012))
+        way = generator.normal(size=3)
+        other = scipy_equilibrium(scene, magnets, place, way / np.linalg.norm(way))
+        if other is not None and other[2] < -0.011 and all(np.linalg.norm(other - known) > 1e-6 for known in found):
+            found.append(other)
+    return np.array(found)
+
+
 def scipy_equilibrium(scene, magnets, position, moment):
-    """Position (3,) m of the equilibrium with body spin 0 near a guess, by least squares; no plate, no drag."""
+    """Position (3,) m of the equilibrium with body spin 0 near a guess, or None; least squares, no plate, no drag."""
     floater, rate = scene.floater, np.array([0.0, 0.0, scene.angular_velocity])
 
     def unbalanced(unknowns):
@@ -63,13 +75,14 @@ def scipy_equilibrium(scene, magnets, position, moment):
         field, force = pushed(magnets, place, floater.moment * axis, np.linalg.norm(place) / 40)
         turning = floater.inertia * (rate - rate @ axis * axis)
         torque = np.cross(floater.moment * axis, field) - np.cross(rate, turning)
-        across = np.array([np.cross([0.0, 0.0, 1.0], axis), np.cross(axis, np.cross([0.0, 0.0, 1.0], axis))])
+        side = np.array([-np.sin(azimuth), np.cos(azimuth), 0.0])  # of length one even where the moment is upright
+        across = np.array([side, np.cross(axis, side)])
         inertia = floater.mass * np.cross(rate, np.cross(rate, place))
         return np.concatenate([(force + floater.mass * scene.gravity - inertia) / 0.08, across @ torque / 1e-3])
 
     guess = [*1e3 * position, np.arccos(moment[2]), np.arctan2(moment[1], moment[0])]
     found = least_squares(unbalanced, guess, x_scale=[0.1, 0.1, 1.0, 0.1, 0.1], xtol=1e-14, ftol=1e-14, gtol=1e-14)
-    return found.x[:3] * 1e-3
+    return found.x[:3] * 1e-3 if np.abs(found.fun).max() < 1e-8 else None
 
 
 def scipy_slab(heights, frequency):

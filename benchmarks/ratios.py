@@ -16,6 +16,7 @@ import numpy as np
 
 CHANGED = 1.25
 """Change of a ratio that is marked; processor times of one machine repeat to some 10 %."""
+RULE = "| --- | --- | --- | --- | --- |"
 
 
 def groups(saved):
@@ -62,15 +63,11 @@ def report(saved):
         ratios = peer_ratios(saved).get(group)
         if ratios is None:
             continue
-        lines += [
-            f"### {group}",
-            "",
-            "| | time, peer = 1 | peer's time over it | processor time |",
-            "| --- | --- | --- | --- |",
-        ]
+        lines += [f"### {group}", "", "| | time, peer = 1 | peer's time over it | processor time | error |", RULE]
         for name, seconds, extra in rows:
             mark = " (peer)" if extra.get("peer") else ""
-            lines.append(f"| {name}{mark} | {ratios[name]:.3g} | {1 / ratios[name]:.3g} | {told(seconds)} |")
+            columns = (f"{name}{mark}", f"{ratios[name]:.3g}", f"{1 / ratios[name]:.3g}", told(seconds))
+            lines.append(f"| {' | '.join(columns)} | {extra.get('error', '')} |")
         lines.append("")
     lines += ["### Scaling", "", "| size | from … to | time from … to | exponent |", "| --- | --- | --- | --- |"]
     for group, (slope, error, sized) in exponents(saved).items():

@@ -12,7 +12,7 @@ def saved(factor=1.0, power=1.5):
     """Ours takes a tenth of the peer's time a thing, times `factor`; a job that grows as size^power."""
     rows = [
         ("field", "test_a[peer]", "peer", 2.0, {"peer": True}),
-        ("field", "test_a[ours]", "ours", 0.8 * factor, {"count": 4}),
+        ("field", "test_a[ours]", "ours", 0.8 * factor, {"count": 4, "error": "1e-3"}),
         ("alone", "test_b", None, 1.0, {}),
         *(("scaling: points", f"test_c[{n}]", str(n), n**power, {"size": n}) for n in (10, 100, 1000, 10000)),
     ]
@@ -25,7 +25,7 @@ def saved(factor=1.0, power=1.5):
 def test_ratios_are_to_the_peer_and_for_one_thing():
     found = RATIOS["peer_ratios"](saved())
     assert found == {"field": {"peer": 1.0, "ours": pytest.approx(0.1)}}
-    assert "| ours | 0.1 | 10 | 200 ms |" in RATIOS["report"](saved())
+    assert "| ours | 0.1 | 10 | 200 ms | 1e-3 |" in RATIOS["report"](saved())
 
 
 def test_exponent_is_fitted():
