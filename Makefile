@@ -2,10 +2,12 @@
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
+OLD ?= benchmarks/measured.json
+NEW ?= out/benchmarks.json
 SOURCES := $(wildcard geometry/* fem/* dynamics/* studies/* scenes/*.toml) pyproject.toml README.md LICENSE
 PACKAGES := -p spinlev.geometry -p spinlev.fem -p spinlev.dynamics -p spinlev.studies
 
-.PHONY: install run test lint types bench docs validate fuzz lock clean
+.PHONY: install run test lint types bench bench-compare dist gallery docs validate fuzz lock clean
 
 install: $(VENV)/installed
 
@@ -41,8 +43,16 @@ test: lint types
 validate: install
 	$(BIN)/pytest -m slow -s
 
+# Processor times, so that other work on the machine matters little; the report says them as ratios to the peers.
 bench: install
-	$(BIN)/pytest benchmarks --benchmark-timer=time.process_time --benchmark-columns=min,median,rounds
+	@mkdir -p out
+	$(BIN)/pytest benchmarks --benchmark-timer=time.process_time --benchmark-columns=min,median,rounds \
+	  --benchmark-json=$(NEW)
+	$(BIN)/python benchmarks/ratios.py $(NEW) | tee out/benchmarks.md
+
+# Two commits: make bench in both, then make bench-compare OLD=theirs.json; by default with the one in the repository.
+bench-compare: install
+	$(BIN)/python benchmarks/ratios.py $(OLD) $(NEW)
 
 fuzz: install
 	$(BIN)/python tests/fuzzing.py all 10000
@@ -51,10 +61,22 @@ docs: install
 	$(BIN)/sphinx-build --fail-on-warning --quiet -b html docs docs/_build/html
 	@echo docs/_build/html/index.html
 
+# The examples' pictures, and the list of dependencies.
+gallery: install
+	$(BIN)/python docs/draw_gallery.py
+	$(BIN)/python docs/list_dependencies.py
+
+# Wheel and source distribution in dist/, without a network; then the wheel is tested outside the repository.
+dist: install
+	rm -rf dist build
+	$(BIN)/python -c 'import setuptools.build_meta as b; print(b.build_sdist("dist"), b.build_wheel("dist"))'
+	@rm -rf build *.egg-info
+	sh tests/try_wheel.sh $(BIN)/python dist
+
 # Pin anew (needs pip-tools in the environment that calls it).
 lock:
 	pip-compile --quiet --extra dev --generate-hashes --allow-unsafe --strip-extras --no-emit-index-url \
 	  --no-emit-trusted-host --no-emit-find-links --output-file requirements.txt pyproject.toml
 
 clean:
-	rm -rf $(VENV) build out
+	rm -rf $(VENV) build dist out

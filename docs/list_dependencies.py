@@ -16,9 +16,9 @@ KNOWN = {"matplotlib": "PSF-based (BSD compatible)"}
 HEAD = """# Dependencies
 
 Written by `docs/list_dependencies.py` from `pyproject.toml`, `requirements.txt` and what the packages say of their
-licences; `tests/test_documentation.py` keeps it up to date. spinlev itself has the MIT licence. Licences with a condition
-on changed copies of the library are LGPL (NGSolve, Netgen and Open CASCADE) and MPL (heyoka and some small ones); all
-are used unchanged, as separate packages.
+licences; `tests/test_documentation.py` keeps it up to date. spinlev itself has the MIT licence. Licences with a
+condition on changed copies of the library are LGPL (NGSolve, Netgen and Open CASCADE) and MPL (heyoka and some small
+ones); all are used unchanged, as separate packages.
 """
 
 
@@ -52,7 +52,7 @@ def needed_by(text):
 def page():
     """The whole page."""
     run, _, rest = (ROOT / "pyproject.toml").read_text("utf-8").partition("[project.optional-dependencies]")
-    run, dev = reasons(run), reasons(rest.partition("[project.scripts]")[0])
+    run, dev = reasons(run.partition("dependencies = [")[2]), reasons(rest.partition("[project.scripts]")[0])
     pinned = needed_by((ROOT / "requirements.txt").read_text("utf-8"))
     lines = [HEAD]
     for title, names in (("To run", run), ("To develop", dev)):

@@ -2,19 +2,21 @@
 
 from .arclength import Steps, follow_branch
 from .averaged import Drift
-from .boundary import BoundaryPoint, Plane, follow_boundary
+from .boundary import follow_boundary
+from .boundary_equations import BoundaryPoint, Plane
 from .branch import Family, Point
 from .checkpoint import Checkpoint
 from .drift import drift
 from .equilibria import find_equilibria, survey, with_plate
 from .equilibrium import Equilibrium, EquilibriumError, ForceCurve, Survey
-from .equilibrium_map import EquilibriumMap, equilibrium_map
+from .equilibrium_map import equilibrium_map
 from .flight_kind import flight_kind
+from .map_stability import EquilibriumMap
 from .memory import PlateMemory
 from .rates import Rates
 from .rotor_family import RotorFamily, rotor_family
 from .simulation import StartError, initial_state, simulate, starting_point
-from .trajectory import Trajectory
+from .trajectory import FlightStopped, Trajectory
 
 __all__ = [
     "BoundaryPoint",
@@ -24,6 +26,7 @@ __all__ = [
     "EquilibriumError",
     "EquilibriumMap",
     "Family",
+    "FlightStopped",
     "ForceCurve",
     "Plane",
     "PlateMemory",

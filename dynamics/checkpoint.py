@@ -7,13 +7,14 @@ it loses nothing over millions of turns) and what has been recorded.
 from __future__ import annotations
 
 import hashlib
+import io
 import zipfile
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
-from ..geometry.atomic import replacing
+from ..geometry.atomic import write_whole
 from ..geometry.box import Array
 from ..geometry.input_error import InputError
 from .flight import Flight
@@ -78,8 +79,9 @@ class Checkpoint:
 
     def write(self, progress: Progress) -> None:
         """Keep the progress; the file is whole or as it was."""
-        with replacing(self.path) as temporary, temporary.open("wb") as stream:
-            np.savez(stream, allow_pickle=False, key=np.array(self._key), **vars(progress))
+        stream = io.BytesIO()
+        np.savez(stream, allow_pickle=False, key=np.array(self._key), **vars(progress))
+        write_whole(self.path, stream.getvalue())
 
     def read(self) -> Progress | None:
         """What was kept, or None if there is nothing.

@@ -79,7 +79,11 @@ def parameters(scene: Scene, scales: Scales, frozen_spin: bool = False) -> Array
 
 
 def equations_of_motion(
-    table: FieldFormula, tilted_gravity: bool = False, memory: PlateMemory | None = None, conducting: bool = False
+    table: FieldFormula,
+    tilted_gravity: bool = False,
+    memory: PlateMemory | None = None,
+    conducting: bool = False,
+    angular_velocity: float = 0.0,
 ) -> Equations:
     """Rates of the scaled state in the field of a table.
 
@@ -89,6 +93,7 @@ def equations_of_motion(
     tilted_gravity : whether gravity has a part across the axis; it turns in this frame, so that time enters
     memory : the plate's currents, if they are modelled
     conducting : whether the floater has eddy currents of its own
+    angular_velocity : of the rotor, rad/s; only `memory` needs it, in which it is compiled in
     """
     variables = hy.make_vars(*NAMES)
     position, velocity, moment, spin = (variables[i : i + 3] for i in (0, 3, 6, 9))
@@ -118,12 +123,12 @@ def equations_of_motion(
     state_rates: Vector = []
     if memory is not None:
         states = [hy.expression(name) for name in memory.names]
-        plate = memory_terms(memory, position, moment, states)
+        plate = memory_terms(memory, angular_velocity, position, moment, states)
         force = [a + b for a, b in zip(force, plate.force, strict=True)]
         turn = [a + b for a, b in zip(turn, plate.torque, strict=True)]
         state_rates = plate.rates
         jacobi.append(plate.stored)
-        power = power - plate.loss - plate.drive
+        power = power - plate.spent
     rates = [
         *drift,
         *subtract([force[i] + axial[i] + push[i] for i in range(3)], turned(velocity)),

@@ -11,10 +11,9 @@ other, can be missed.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from ..geometry.box import Array
 from .atlas import Atlas
@@ -22,56 +21,17 @@ from .balance import EVERY, Indices, solve
 from .between import between
 from .equilibrium import EquilibriumError
 from .grid import Grid
+from .map_stability import EquilibriumMap, judged
 from .rotor_family import RotorFamily
-from .stability import spectra
-from .symbols import Parameter
 
 SPACING = 5
 """Points of the map between two searches."""
 WHOLE, PART = 8, 4
 """Every eighth search has all starts, the others a quarter of them."""
+MARGIN = 0.3
+"""Sheets are followed so far beyond the range (radii): what its border cuts into pieces is whole there."""
 JUMP = 0.15
 """A neighbour farther away than this (radii and rad) may be another branch's."""
-
-
-@dataclass(frozen=True, eq=False)
-class EquilibriumMap:
-    """Equilibria (k,) of a map, point by point; rotor's frame.
-
-    Parameters
-    ----------
-    frequencies, measures : axes of the map, Hz and m or rad
-    row, column : (k,) place of each equilibrium on them
-    position, moment : (k, 3) m and direction
-    eigenvalues : (k, 10) of the small motions, 1/s
-    errors : (k,) what round-off may do to them, 1/s
-    stable : (k,) whether every small motion stays small
-    searches : points of the map at which all was searched for
-    """
-
-    frequencies: Array
-    measures: Array
-    row: Indices
-    column: Indices
-    position: Array
-    moment: Array
-    eigenvalues: NDArray[np.complex128]
-    errors: Array
-    stable: NDArray[np.bool_]
-    searches: int
-
-    @property
-    def growth_per_s(self) -> Array:
-        """(k,) largest growth rate of a small motion."""
-        return np.asarray(self.eigenvalues.real.max(axis=1))
-
-    @property
-    def number(self) -> tuple[Indices, Indices]:
-        """Equilibria and stable equilibria at each point: two of (frequencies, measures)."""
-        shape = len(self.frequencies), len(self.measures)
-        place, size = self.row * shape[1] + self.column, shape[0] * shape[1]
-        every, stable = np.bincount(place, minlength=size), np.bincount(place[self.stable], minlength=size)
-        return every.reshape(shape), stable.reshape(shape)
 
 
 def equilibrium_map(
@@ -113,7 +73,7 @@ def equilibrium_map(
             progress(0.9 * (number + 1) / len(nodes))
     point, position, moment = (np.concatenate(part) for part in zip(*seeds, strict=True))
     _spread(grid, atlas, point, position, moment)
-    return _judged(grid, atlas, len(nodes))
+    return judged(grid, atlas, len(nodes))
 
 
 def _searched(grid: Grid, point: int, random: np.random.Generator | None) -> tuple[Indices, Array, Array]:
@@ -125,7 +85,7 @@ def _searched(grid: Grid, point: int, random: np.random.Generator | None) -> tup
         position, moment = position[chosen], moment[chosen]
     with np.errstate(all="ignore"):  # many of these starts run away
         position, moment, step = solve(grid.alone(point), position, moment, EVERY, 25)
-    good = (step < 1e-8) & where.holds(position)
+    good = (step < 1e-8) & where.holds(position, MARGIN)
     return np.full(good.sum(), point), position[good], moment[good]
 
 
@@ -145,29 +105,5 @@ def _spread(grid: Grid, atlas: Atlas, point: Indices, position: Array, moment: A
         point = np.concatenate([target[good], walked[0]])
         position = np.concatenate([arrived[good], walked[1]])
         moment = np.concatenate([turned[good], walked[2]])
-        inside = grid.holds(point, position)
+        inside = grid.holds(point, position, MARGIN)
         point, position, moment = point[inside], position[inside], moment[inside]
-
-
-def _judged(grid: Grid, atlas: Atlas, searches: int) -> EquilibriumMap:
-    point, position, moment = atlas.all()
-    row, column = np.divmod(point, len(grid.measures))
-    time = np.zeros((0, 1))
-    values, errors = np.zeros((0, 10), complex), np.zeros((0, 10))
-    if len(point):
-        balance = grid.balance(point)
-        states = balance.states(position, moment)
-        values, errors, _ = spectra(states, balance.rates(states, balance.values)[1])
-        time = balance.values[:, [Parameter.TIME]]
-    return EquilibriumMap(
-        frequencies=grid.frequencies,
-        measures=grid.measures,
-        row=row,
-        column=column,
-        position=position * grid.family.scene.floater.radius,
-        moment=moment,
-        eigenvalues=np.asarray(values / time, complex),
-        errors=errors.max(axis=1, initial=0.0) / time[:, 0],
-        stable=np.all(values.real <= errors, axis=1),
-        searches=searches,
-    )

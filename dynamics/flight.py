@@ -12,9 +12,10 @@ from ..fem.table import FieldTable
 from ..geometry.box import Array
 from ..geometry.scene import Scene
 from .equations import Equations, equations_of_motion, parameters
-from .events import flight_events
+from .events import flight_events, plate_depth
 from .memory import PlateMemory
-from .state import Scales
+from .state import Scales, State
+from .symbols import Parameter
 
 TOLERANCE = 1e-16
 """Of a Taylor step. Measured over 1300 turns: J drifts by 3e-13 at 1e-15, by 1e-14 at 1e-16 with 1 % more steps."""
@@ -35,6 +36,7 @@ class Flight:
     ledger : compiled terms of the Jacobi integral
     values : runtime parameters
     scales : units of the state
+    left : (k,) √J, what the turning rotor alone leaves in the plate at t = 0
     compile_seconds : time that compilation took
     """
 
@@ -43,7 +45,13 @@ class Flight:
     ledger: hy.cfunc
     values: Array
     scales: Scales
+    left: Array
     compile_seconds: float
+
+    def state(self, start: State, currents: Array) -> Array:
+        """The integrator's state at t = 0, from the floater's and the plate's (k,), √J."""
+        plate = (currents - self.left) * self.values[Parameter.PLATE_SHARE]
+        return np.concatenate([self.scales.pack(start), plate, [0.0]])
 
     def terms(self, times: Array, states: Array, values: Array) -> Array:
         """Terms (k, n) of the Jacobi integral at scaled times (n,), states (n, s) and runtime parameters (n, p)."""
@@ -81,7 +89,8 @@ def compile_flight(
     started = perf_counter()
     scales = Scales.of(scene)
     values = parameters(scene, scales)
-    equations = equations_of_motion(table, bool(np.any(scene.gravity[:2])), memory, bool(scene.floater.conductivity))
+    tilted, conducting = bool(np.any(scene.gravity[:2])), bool(scene.floater.conductivity)
+    equations = equations_of_motion(table, tilted, memory, conducting, scene.angular_velocity)
     events, meanings = flight_events(scene, equations.variables[:3])
     work = hy.expression("work")
     if compact is None:
@@ -95,7 +104,11 @@ def compile_flight(
         t_events=events,
     )
     ledger = hy.cfunc(list(equations.jacobi), list(equations.variables), compact_mode=True)
-    return Flight(integrator, meanings, ledger, values, scales, perf_counter() - started)
+    left = np.zeros(0)
+    if memory is not None:
+        depth = float(plate_depth(memory.plate, np.zeros(1))[0])
+        left = memory.driven(scene.angular_velocity).left.signals(0.0, depth)
+    return Flight(integrator, meanings, ledger, values, scales, left, perf_counter() - started)
 
 
 def _worth_compiling(equations: Equations, scene: Scene, duration: float) -> bool:

@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..geometry.box import Array
-from .integration import DURATION
-from .trajectory import Trajectory
+from .trajectory import DURATION, STOPPED, Trajectory
 
 STABLE, LINEAR_FALL, OSCILLATING_LOSS = "stable", "linear fall", "oscillating loss"
 DRIFTING, GROWING, NOT_HELD = "drifting", "growing oscillation", "not held"
@@ -27,7 +26,7 @@ def flight_kind(flight: Trajectory) -> str:
     became more than twice as large, or "drifting" if the distance goes on changing steadily in the second half, both
     by 0.02 mm at least; else "stable".
     """
-    lasted = flight.ended_by == DURATION
+    lasted = flight.ended_by in (DURATION, STOPPED)
     distance = np.linalg.norm(flight.lab.position, axis=1)
     if len(distance) < 4 * WINDOWS or not (lasted or flight.levitated_s > HELD):
         return STABLE if lasted else NOT_HELD

@@ -56,12 +56,12 @@ class Grid:
         """Where equilibria of one point are looked for."""
         return self._ranges[point % len(self.measures)]
 
-    def holds(self, point: Indices, position: Array) -> NDArray[np.bool_]:
-        """Which of the scaled positions (n, 3) lie in the range of their points (n,)."""
+    def holds(self, point: Indices, position: Array, margin: float = 0.0) -> NDArray[np.bool_]:
+        """Which of the scaled positions (n, 3) lie in the range of their points (n,), or at most a margin outside."""
         inside, column = np.zeros(len(point), bool), point % len(self.measures)
         for k in np.unique(column):
             chosen = column == k
-            inside[chosen] = self._ranges[k].holds(position[chosen])
+            inside[chosen] = self._ranges[k].holds(position[chosen], margin)
         return inside
 
     def neighbours(self, point: Indices) -> tuple[Indices, Indices]:

@@ -21,9 +21,8 @@ from .flight import Flight
 from .recorder import Recorder
 from .state import State
 from .symbols import Parameter
-from .trajectory import Trajectory
+from .trajectory import DURATION, STOPPED, FlightStopped, Trajectory
 
-DURATION = "duration"
 PIECE_TURNS, PIECE_SAMPLES = 256, 256
 """The most turns and samples between two looks at what has been flown.
 
@@ -45,7 +44,7 @@ class _Log:
 
     ended_by: str = DURATION
     steps: int = 0
-    interrupted: bool = False
+    latest: Progress | None = None
 
 
 def integrate(
@@ -64,13 +63,15 @@ def integrate(
     scene, flight : the problem and its compiled form
     progress : called with the finished part, 0 to 1, a few times a second
     currents : states of the plate at the start, √J, if the flight has a plate's memory
-    checkpoint : where the flight is kept while it lasts; it goes on from there if there is something
+    checkpoint : where the flight is kept while it lasts; it goes on from there if there is something. Remove it when
+        the trajectory is safe.
 
     Accuracy: a step errs by round-off, so that energy and |m̂| drift by about 1e-14 in a thousand turns;
-    `Trajectory.energy_error` tells.  A keyboard interrupt returns what is finished.
+    `Trajectory.energy_error` tells.
 
     Raises
     ------
+    FlightStopped : by a keyboard interrupt; it has what is finished, and so has the checkpoint
     IntegrationError : the state became infinite
     """
     scales = flight.scales
@@ -85,12 +86,12 @@ def integrate(
     try:
         _fly(scene, flight, values, duration, recorder, log, progress, checkpoint)
     except KeyboardInterrupt:
-        log.interrupted = True
-    if checkpoint and not log.interrupted:
-        checkpoint.remove()
+        log.ended_by = STOPPED
+        if checkpoint and log.latest:
+            checkpoint.write(log.latest)
     seconds = perf_counter() - began
     time = np.minimum(recorder.times * scales.time, duration)
-    return Trajectory(
+    flown = Trajectory(
         time=time,
         lab=scales.unpack(recorder.states).to_lab(scene.angular_velocity * time),
         angular_velocity=scene.angular_velocity,
@@ -99,16 +100,17 @@ def integrate(
         realtime_factor=float((recorder.times[-1] - first) * scales.time / seconds),
         steps=log.steps,
         compile_seconds=flight.compile_seconds,
-        interrupted=log.interrupted,
     )
+    if log.ended_by == STOPPED:
+        raise FlightStopped(flown)
+    return flown
 
 
 def _begin(flight: Flight, start: State, currents: Array) -> Array:
     """Set the integrator to the start; the runtime parameters with the distance at which the floater is lost."""
     flight.integrator.time = 0.0
     values = flight.values.copy()
-    plate = currents * values[Parameter.PLATE_SHARE]
-    flight.integrator.state[:] = np.concatenate([flight.scales.pack(start), plate, [0.0]])
+    flight.integrator.state[:] = flight.state(start, currents)
     flight.integrator.reset_cooldowns()
     values[Parameter.LOST_DISTANCE] = max(0.1, 2 * float(np.linalg.norm(start.position))) / flight.scales.length
     return values
@@ -138,12 +140,14 @@ def _fly(
             log.steps += steps
             over = log.ended_by != DURATION or times[-1] * scales.time >= duration * (1 - 1e-12)
             recorder.add(times[1:], states[1:], over)
+            if checkpoint:
+                log.latest = Progress.of(flight, values, recorder, log.steps)
             if progress is not None:
                 progress(min(1.0, times[-1] * scales.time / duration))
             if over:
                 return
-            if checkpoint and perf_counter() - kept > CHECKPOINT_SECONDS:
-                checkpoint.write(Progress.of(flight, values, recorder, log.steps))
+            if checkpoint and log.latest and perf_counter() - kept > CHECKPOINT_SECONDS:
+                checkpoint.write(log.latest)
                 kept = perf_counter()
 
 

@@ -2,10 +2,11 @@
 
 In the units of `Scales`, with energies in M R²/T², the plate's states p̃ and what they listen to,
 
-    dp̃_i/dt = -λ_i T (p̃_i - s̃_i),    s̃_i = μ̃ b_i(x)·m̂ + rotor's share,    ỹ_i = p̃_i - s̃_i,    μ̃ = m/√(M R²/T²),
+    dp̃_i/dt = -λ_i T (p̃_i - s̃_i),    s̃_i = μ̃ b_i(x)·m̂ + r̃_i(φ, d),    ỹ_i = p̃_i - s̃_i,    μ̃ = m/√(M R²/T²),
 
-act on the floater by F = R μ̃ Σ ỹ_i ∇(m̂·b_i) and τ = (μ̃/i) m̂ × Σ ỹ_i b_i.  The plate turns backwards in the rotor's
-frame and may go down, so that time enters.  Stored energy ½ Σ ỹ² and Jacobi integral together change by the loss
+with the rotor's share r̃, act on the floater by F = R μ̃ Σ ỹ_i ∇(m̂·b_i) and τ = (μ̃/i) m̂ × Σ ỹ_i b_i.  Integrated are
+p̃_i less what the rotor alone leaves (`rotor_currents`).  The plate turns backwards in the rotor's frame and may go
+down, so that time enters.  Stored energy ½ Σ ỹ² and Jacobi integral together change by the loss
 Σ λ_i T ỹ_i², and by what turning the plate's view, lowering it and turning the rotor against its currents takes:
 
     F·(W × r + u ẑ) + i W·τ + Σ ỹ_i ∂s̃_i/∂t (rotor's share),    u: speed of the plate's descent.
@@ -13,7 +14,6 @@ frame and may go down, so that time enters.  Stored energy ½ Σ ỹ² and Jacob
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import heyoka as hy
@@ -23,7 +23,8 @@ from ..fem.multipole import UPPER
 from ..fem.plate_table import PlateTable
 from ..fem.rotor_share import RotorShare
 from ..geometry.scene import Plate
-from .symbols import Parameter, Vector, cross, dot, turned
+from .rotor_currents import RotorCurrents, rotor_terms
+from .symbols import Parameter, Vector, combined, cross, dot, turned
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,6 +51,10 @@ class PlateMemory:
         """Estimated relative error of what the plate does."""
         return max(self.table.errors.total, self.share.error) + self.neglected
 
+    def driven(self, angular_velocity: float) -> RotorCurrents:
+        """What a rotor turning so fast (rad/s) leaves in the plate."""
+        return RotorCurrents(self.share, self.table.rates, angular_velocity)
+
     def __repr__(self) -> str:
         harmonics = len(self.share.series) // 2
         told = f"relative error {self.error:.1e}, {harmonics} harmonics of the rotor"
@@ -69,31 +74,30 @@ class MemoryTerms:
     ----------
     rates : of its states
     force, torque : accelerations of the floater's position and spin
-    stored : energy of the currents
-    loss : power turned into heat
-    drive : power that the currents give to what turns the rotor and lowers the plate
+    stored : energy of the currents, without that of the rotor's currents alone
+    spent : power that it gives to heat, and to what turns the rotor and lowers the plate
     """
 
     rates: Vector
     force: Vector
     torque: Vector
     stored: hy.expression
-    loss: hy.expression
-    drive: hy.expression
+    spent: hy.expression
 
 
-def memory_terms(memory: PlateMemory, position: Vector, moment: Vector, states: Vector) -> MemoryTerms:
-    """The plate's part of the equations, from the floater's scaled position and moment and the plate's states."""
+def memory_terms(
+    memory: PlateMemory, angular_velocity: float, position: Vector, moment: Vector, states: Vector
+) -> MemoryTerms:
+    """The plate's part of the equations, from the floater's scaled position and moment and the plate's states p - q."""
     strength, length = hy.par[Parameter.PLATE_MOMENT], hy.par[Parameter.LENGTH]
     place, pointing = _seen_by_plate(memory.plate, position, moment)
     parts = memory.table.multipoles.expressions(place)
     source = [strength * m for m in pointing]
     heard = [dot(source, field) for field, _ in parts]
-    basis, basis_rates = _rotor(memory.share)
-    shares = memory.share.expressions(basis)
-    signals = [_combined(row, heard) + share for row, share in zip(memory.table.weights, shares, strict=True)]
-    currents = [p - s for p, s in zip(states, signals, strict=True)]
-    weights = [_combined(column, currents) for column in memory.table.weights.T]
+    own = [p - combined(row, heard) for p, row in zip(states, memory.table.weights, strict=True)]
+    rotor = rotor_terms(memory.driven(angular_velocity), memory.table.weights, own)
+    strengths = [combined(column, own) for column in memory.table.weights.T]
+    weights = [a + b for a, b in zip(strengths, rotor.strengths, strict=True)]
     pairs = list(zip(weights, parts, strict=True))
     field = [hy.sum([w * b[i] for w, (b, _) in pairs]) for i in range(3)]
     slope = {(i, j): hy.sum([w * g[i][j] for w, (_, g) in pairs]) for i, j in UPPER}
@@ -101,21 +105,18 @@ def memory_terms(memory: PlateMemory, position: Vector, moment: Vector, states: 
     push = [hy.sum([source[i] * slope[min(i, j), max(i, j)] for i in range(3)]) for j in range(3)]
     force = [length * f for f in _seen_by_rotor(memory.plate, push)]
     turn = [strength * t for t in cross(moment, _seen_by_rotor(memory.plate, field))]
-    decay = [-float(rate) * y for rate, y in zip(memory.table.rates, currents, strict=True)]
+    lost = [float(rate) * y for rate, y in zip(memory.table.rates, own, strict=True)]
+    decay = [-hy.par[Parameter.TIME] * term for term in lost]
+    heat = hy.par[Parameter.TIME] * hy.sum([term * y for term, y in zip(lost, own, strict=True)])
     descent = [*turned(position)[:2], hy.par[Parameter.PLATE_SPEED] if memory.plate.lowering else hy.expression(0.0)]
     drive = dot(force, descent) + hy.par[Parameter.RATE] * turn[2]
     return MemoryTerms(
-        rates=[hy.par[Parameter.TIME] * d for d in decay],
+        rates=[a + b for a, b in zip(decay, rotor.lowering, strict=True)] if rotor.lowering else decay,
         force=force,
         torque=[t / hy.par[Parameter.INERTIA] for t in turn],
-        stored=0.5 * hy.sum([y * y for y in currents]),
-        loss=-hy.par[Parameter.TIME] * hy.sum([d * y for d, y in zip(decay, currents, strict=True)]),
-        drive=drive + _driven(memory.share.series, currents, basis_rates),
+        stored=0.5 * hy.sum([y * y for y in own]) + rotor.stored,
+        spent=heat + rotor.spent + drive,
     )
-
-
-def _combined(weights: Sequence[float] | np.ndarray, terms: Vector) -> hy.expression:
-    return hy.sum([float(w) * t for w, t in zip(weights, terms, strict=True) if w])
 
 
 def _seen_by_plate(plate: Plate, position: Vector, moment: Vector) -> tuple[Vector, Vector]:
@@ -143,26 +144,3 @@ def _turn(vector: Vector, sense: float) -> list[hy.expression]:
 def _product(matrix: np.ndarray, vector: Vector) -> list[hy.expression]:
     exact = np.where(np.abs(matrix) < 1e-15, 0.0, matrix)  # a quarter turn leaves 6e-17, which would cost operations
     return [hy.sum([float(row[i]) * vector[i] for i in range(3) if row[i]]) for row in exact]
-
-
-def _rotor(share: RotorShare) -> tuple[list[list[hy.expression]], list[list[hy.expression]]]:
-    """The scaled functions of time that the rotor's signals are sums of, and their rates."""
-    names = hy.make_vars("rotor_angle", "plate_depth")
-    angle = hy.par[Parameter.RATE] * hy.time
-    speed = hy.par[Parameter.LENGTH] * hy.par[Parameter.PLATE_SPEED]
-    depth = hy.par[Parameter.LENGTH] * hy.par[Parameter.PLATE_DEPTH] + speed * hy.time
-    now = {"rotor_angle": angle, "plate_depth": depth}
-    basis = share.basis(*names)
-    rates = [
-        [hy.par[Parameter.RATE] * hy.diff(f, names[0]) + speed * hy.diff(f, names[1]) for f in row] for row in basis
-    ]
-    scale = hy.par[Parameter.PLATE_SHARE]
-    signals, slopes = ([[scale * hy.subs(f, now) for f in row] for row in rows] for rows in (basis, rates))
-    return signals, slopes
-
-
-def _driven(series: np.ndarray, currents: Vector, rates: list[list[hy.expression]]) -> hy.expression:
-    """Σ y_i ∂s_i/∂t of the rotor's signals: the currents are summed first, for each function of time."""
-    pairs = [(rate, column) for row, part in zip(rates, series, strict=True)
-             for rate, column in zip(row, part.T, strict=True)]  # fmt: skip
-    return hy.sum([rate * _combined(column, currents) for rate, column in pairs if column.any()])

@@ -29,13 +29,13 @@ class SearchRange:
         """Whether a scaled position (3,) belongs to the range."""
         return bool(self.holds(position[None])[0])
 
-    def holds(self, position: Array) -> NDArray[np.bool_]:
-        """Which of the scaled positions (n, 3) belong to the range: (n,)."""
+    def holds(self, position: Array, margin: float = 0.0) -> NDArray[np.bool_]:
+        """Which of the scaled positions (n, 3) belong to the range, or lie at most a margin (radii) outside: (n,)."""
         radius = self.scene.floater.radius
-        bound, height = self.farthest / radius, position[:, 2]
-        inside = (-bound <= height) & (height <= 0) & (np.hypot(position[:, 0], position[:, 1]) <= bound)
+        bound, height = self.farthest / radius + margin, position[:, 2]
+        inside = (-bound <= height) & (height <= margin) & (np.hypot(position[:, 0], position[:, 1]) <= bound)
         for magnet in self.scene.rotor:
-            inside &= magnet.box.distance(position * radius) > radius
+            inside &= magnet.box.distance(position * radius) > (1 - margin) * radius
         return np.asarray(inside)
 
     def starts(self) -> tuple[Array, Array]:

@@ -62,6 +62,7 @@ def simulate(
     ------
     EquilibriumError : the flight shall begin near a stable equilibrium and there is none
     StartError : it would begin in contact, or `duration` is not positive
+    FlightStopped : by a keyboard interrupt; it has what is finished
     """
     if not duration > 0:
         raise StartError(f"Input duration must be positive; instead received {duration} s.")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from enum import IntEnum, auto
 
 import heyoka as hy
@@ -37,6 +37,11 @@ class Parameter(IntEnum):
     TILT_EDDY = auto()
     SPIN_EDDY = auto()
     MEASURE = auto()
+
+
+def combined(weights: Iterable[float], terms: Vector) -> hy.expression:
+    """Σ weight · term, without the terms whose weight is zero."""
+    return hy.sum([float(w) * t for w, t in zip(weights, terms, strict=True) if w])
 
 
 def dot(a: Vector, b: Vector) -> hy.expression:

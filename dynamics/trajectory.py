@@ -7,6 +7,8 @@ from dataclasses import dataclass
 from ..geometry.box import Array
 from .state import State
 
+DURATION, STOPPED = "duration", "stopped"
+
 
 @dataclass(frozen=True, eq=False)
 class Trajectory:
@@ -17,12 +19,11 @@ class Trajectory:
     time : (n,) s, at equal intervals but for the last
     lab : motion (n, 3) along the laboratory's axes, SI units
     angular_velocity : of the rotor, rad/s
-    ended_by : "duration", "contact" or "lost"
+    ended_by : "duration", "contact" or "lost"; "stopped" by the user
     energy_error : largest relative violation of the energy ledger or of |m̂| = 1
     realtime_factor : simulated seconds per second of integration, compilation left out
     steps : number of Taylor steps
     compile_seconds : time spent on compilation (little where heyoka's cache knows the system)
-    interrupted : whether it was stopped by the user before it ended
     beyond_plate_table : part of the samples at which the floater was out of the range of the plate's table
     """
 
@@ -34,7 +35,6 @@ class Trajectory:
     realtime_factor: float
     steps: int
     compile_seconds: float
-    interrupted: bool = False
     beyond_plate_table: float = 0.0
 
     def __repr__(self) -> str:
@@ -54,3 +54,11 @@ class Trajectory:
     def rotor(self) -> State:
         """Motion (n, 3) along the rotor's axes, SI units."""
         return self.lab.to_rotor(self.angular_velocity * self.time)
+
+
+class FlightStopped(KeyboardInterrupt):
+    """The user stopped a flight; `flown` is what is finished of it. Who does not catch it is stopped as well."""
+
+    def __init__(self, flown: Trajectory) -> None:
+        self.flown = flown
+        super().__init__(f"The flight was stopped at {flown.levitated_s:.4g} s.")

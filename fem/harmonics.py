@@ -14,7 +14,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-import heyoka as hy
 import numpy as np
 from numpy.typing import NDArray
 from scipy.special import gammaln
@@ -62,37 +61,6 @@ def regular_derivative(sums: Coefficients, axis: int) -> Coefficients:
     below = np.vstack([np.zeros((1, full.shape[1])), full[:-1]])
     plus, minus = below[:, zero + orders + 1], -below[:, zero + orders - 1]
     return np.asarray(((plus + minus) / 2, (plus - minus) / 2j, below[:, zero + orders])[axis])
-
-
-def irregular(
-    degree: int, position: Sequence[hy.expression], orders: Sequence[int] | None = None
-) -> dict[Any, hy.expression]:
-    """Real and imaginary parts of Θ_lm up to `degree`: keys (l, m, "re") and (l, m, "im").
-
-    `position` are three heyoka expressions; `orders` restricts m (all if None).
-    """
-    x, y, z = position
-    inverse = 1.0 / (x * x + y * y + z * z)
-    x, y, z = x * inverse, y * inverse, z * inverse
-    found: dict[Any, hy.expression] = {}
-    re, im = hy.sqrt(inverse), hy.expression(0.0)
-    for m in range(degree + 1):
-        if m:
-            re, im = -(2.0 * m - 1.0) * (x * re - y * im), -(2.0 * m - 1.0) * (x * im + y * re)
-        if orders is not None and m not in orders:
-            continue
-        for part, sectoral in (("re", re), ("im", im)):
-            if part == "im" and m == 0:
-                continue
-            below, here = None, sectoral
-            found[m, m, part] = here
-            for l in range(m + 1, degree + 1):
-                upper = (2.0 * l - 1.0) * z * here
-                if below is not None:
-                    upper = upper - float((l - 1) ** 2 - m * m) * (inverse * below)
-                below, here = here, upper
-                found[l, m, part] = here
-    return found
 
 
 def irregular_values(degree: int, points: Array) -> dict[tuple[int, int], Any]:

@@ -18,7 +18,7 @@ The static interaction of rotor and floater is not in these sums.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Protocol
 
 import heyoka as hy
@@ -28,6 +28,7 @@ from ..geometry.box import Array, frozen_array
 from ..geometry.scene import Plate
 from .accuracy_error import AccuracyError
 from .eddy_space import Source
+from .phasor import ComplexArray
 from .rotor_source import posed_rotor, rotor_parts
 from .table import RotorTable
 
@@ -68,6 +69,14 @@ class RotorShare:
         factors = np.polynomial.chebyshev.chebvander(np.array([self._place(depth)]), self.series.shape[2] - 1)[0]
         return np.asarray(_harmonics(angle, len(self.series)) @ (self.series @ factors))
 
+    def filtered(self, factors: ComplexArray) -> RotorShare:
+        """What a linear system makes of the share, with the response (H+1, states) to cos hφ → Re(… e^{ihφ})."""
+        turns = (self.series[1::2] - 1j * self.series[2::2]) * factors[1:, :, None]
+        series = np.empty_like(self.series)
+        series[0] = self.series[0] * factors[0].real[:, None]
+        series[1::2], series[2::2] = turns.real, -turns.imag
+        return replace(self, series=series)
+
     def _place(self, depth: float) -> float:
         return 2 * depth / self.distance - 1 if self.distance else 0.0
 
@@ -82,7 +91,7 @@ class RotorShare:
             turns += [hy.cos(float(h) * angle), hy.sin(float(h) * angle)]
         return [[turn * power for power in powers[: self.series.shape[2]]] for turn in turns]
 
-    def expressions(self, basis: list[list[hy.expression]]) -> list[hy.expression]:
+    def expressions(self, basis: Sequence[Sequence[hy.expression]]) -> list[hy.expression]:
         """s_i of every state as heyoka expressions of the `basis`, whose members all of them share."""
         members = [member for row in basis for member in row]
         columns = self.series.swapaxes(0, 1).reshape(self.series.shape[1], len(members))

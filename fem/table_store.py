@@ -12,7 +12,7 @@ from typing import Any, TypeVar
 import h5py
 import xarray as xr
 
-from ..geometry.atomic import replacing
+from ..geometry.atomic import write_whole
 from ..geometry.seal import seal, sealed
 
 Variables = Mapping[str, tuple[tuple[str, ...], Any, str]]
@@ -30,10 +30,8 @@ def described(variables: Variables, attributes: Mapping[str, Any]) -> xr.Dataset
 
 
 def write_checked(dataset: xr.Dataset, path: str | Path) -> None:
-    """Write a dataset with the checksum of the file at its end; the file is whole or absent."""
-    with replacing(path) as temporary:
-        dataset.to_netcdf(temporary, engine="h5netcdf")
-        seal(temporary)
+    """Write a dataset with the checksum of the file at its end; the file is whole or absent. Raises OSError."""
+    write_whole(path, seal(bytes(dataset.to_netcdf(engine="h5netcdf"))))  # on a full disk HDF5 itself would crash
 
 
 def read_checked(path: str | Path, file_format: str | None = None) -> xr.Dataset:

@@ -17,7 +17,7 @@ FARTHER = 20e-3
 
 def rotor_table_text(table: RotorTable) -> str:
     """Model, parts, error below the rotor and how the table was made."""
-    kept = sum(np.count_nonzero(part.coefficients) for part in table.expansions)
+    kept = sum(int(np.count_nonzero(part.coefficients)) for part in table.expansions)
     degrees = max((part.degree for part in table.expansions), default=0)
     parts = [_counted(len(table.uniform), "closed form")] if table.uniform else []
     parts += [f"{_counted(kept, 'moment')} up to degree {degrees}"] if kept else []

@@ -52,7 +52,7 @@ def describe_fault(detail: ErrorDetails) -> str:
     """One fault found by the schema, as a sentence that says what to do."""
     place, kind, received = list(detail["loc"]), detail["type"], detail["input"]
     tag = place.pop(1) if place[0] == "rotor" and len(place) > 2 else None
-    key = "".join(f"[{p}]" if isinstance(p, int) else f".{p}" for p in place).lstrip(".")
+    key = "".join(f"[{p}]" if isinstance(p, int) else f".{p or repr(p)}" for p in place).lstrip(".")
     if kind == "extra_forbidden":
         return f"Input {key} must be a known key; {_allowed(place, tag)}."
     if kind == "missing":

@@ -12,17 +12,14 @@ MARK = b"\nspinlev sha256 "
 LENGTH = len(MARK) + 64
 
 
-def seal(path: Path) -> None:
-    """Append the checksum of all bytes of the file."""
-    with path.open("r+b") as stream:
-        digest = hashlib.sha256(stream.read()).hexdigest()
-        stream.write(MARK + digest.encode())
+def seal(content: bytes) -> bytes:
+    """The content with its checksum."""
+    return content + MARK + hashlib.sha256(content).hexdigest().encode()
 
 
 def sealed(path: Path) -> bool | None:
     """Whether the file is as it was when it was sealed; None if it never was. Raises OSError if it cannot be read."""
     content = path.read_bytes()
-    body, end = content[:-LENGTH], content[-LENGTH:]
-    if not end.startswith(MARK):
+    if content[-LENGTH:-64] != MARK:
         return None
-    return end[len(MARK) :] == hashlib.sha256(body).hexdigest().encode()
+    return seal(content[:-LENGTH]) == content

@@ -1,12 +1,14 @@
 """The program from Python: what the command line does, with labelled results instead of files.
 
-from spinlev.studies.api import draw, equilibria, load_scene, simulate, stability
+As in a notebook::
 
-scene = load_scene("scenes/horizontal.toml")
-found = equilibria(scene, plate_model="none")    # an xarray.Dataset with units and error estimates
-small = stability(scene, plate_model="none")     # the small motions about the one at which a flight begins
-flight = simulate(scene, 3.0, plate_model="none")
-draw(flight)["trajectory"]                       # a matplotlib figure
+    from spinlev.studies.api import draw, equilibria, load_scene, simulate, stability
+
+    scene = load_scene("scenes/horizontal.toml")
+    found = equilibria(scene, plate_model="none")    # an xarray.Dataset with units and error estimates
+    small = stability(scene, plate_model="none")     # the small motions about the one at which a flight begins
+    flight = simulate(scene, 3.0, plate_model="none")
+    draw(flight)["trajectory"]                       # a matplotlib figure
 """
 
 from __future__ import annotations
@@ -153,7 +155,7 @@ def simulate(
         found, memory, _ = _surveyed(shelf, 0.0)
     else:
         memory = shelf.memory(table, ())
-    flight = fly(scene, table, duration, found, memory)
+    flight = fly(scene, shelf.in_flight(table, memory, found), duration, found, memory)
     labels = {"model": table.model, "plate_model": memory.model if memory else "none", "scene": scene.text}
     return trajectory_dataset(flight).assign_attrs(labels)
 

@@ -6,6 +6,7 @@ Exit status 0: done; 2: bad input, with one message that says what is allowed; 1
 from __future__ import annotations
 
 import os
+import signal
 import sys
 import time
 import traceback
@@ -27,6 +28,7 @@ app = App(
     version=version("spinlev"),
     help="Magnetic levitation by rotation: true fields, true motion.",
     help_format="plaintext",
+    suppress_keyboard_interrupt=False,
 )
 add_scene_commands(app)
 add_result_commands(app)
@@ -34,15 +36,15 @@ add_result_commands(app)
 
 def main() -> None:
     """Run the command line and leave with its exit status."""
+    signal.signal(signal.SIGTERM, signal.default_int_handler)  # a batch system stops like a person
     with answers_only() as out:
         status = _status(sys.argv[1:], out)
     sys.exit(status)
 
 
 def _status(arguments: list[str], out: Any) -> int:
-    began = time.perf_counter()
     try:
-        answer = app(arguments, exit_on_error=False, print_error=False, result_action="return_value")
+        _answer(arguments, out)
     except CycloptsError as error:
         note(f"spinlev: {error}\nTry: spinlev --help")
         return 2
@@ -53,7 +55,8 @@ def _status(arguments: list[str], out: Any) -> int:
         note(f"spinlev: {error}")
         return 1
     except OSError as error:
-        note(f"spinlev: the computation failed to write or read {error.filename}: {error.strerror}; see --out.")
+        where = error.filename or "standard output"
+        note(f"spinlev: the computation failed to write or read {where}: {error.strerror or error}; see --out.")
         return 1
     except KeyboardInterrupt:
         note("spinlev: stopped; what was finished is kept.")
@@ -65,7 +68,12 @@ def _status(arguments: list[str], out: Any) -> int:
         where = f"{Path(frame.filename).parent.name}/{Path(frame.filename).name}:{frame.lineno}"
         note(f"spinlev: the computation failed at {where}: {type(error).__name__}: {error}")
         return 1
+    return 0
+
+
+def _answer(arguments: list[str], out: Any) -> None:
+    began = time.perf_counter()
+    answer = app(arguments, exit_on_error=False, print_error=False, result_action="return_value")
     if isinstance(answer, Answer):
         values = {**answer.values, "seconds": time.perf_counter() - began}
-        print(to_json(values) if answer.json else "\n".join(answer.lines), file=out)
-    return 0
+        print(to_json(values) if answer.json else "\n".join(answer.lines), file=out, flush=True)

@@ -6,7 +6,7 @@ import json
 import os
 import sys
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from typing import Any, TextIO
 
 import numpy as np
@@ -50,8 +50,10 @@ def answers_only() -> Iterator[TextIO]:
     kept = os.dup(1)
     os.dup2(2, 1)
     try:
-        with os.fdopen(os.dup(kept), "w") as stream:
-            yield stream
+        stream = os.fdopen(os.dup(kept), "w")
+        yield stream
+        with suppress(OSError):  # who prints flushes, and is told then
+            stream.close()
     finally:
         sys.stdout.flush()
         os.dup2(kept, 1)

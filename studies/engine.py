@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import logging
 import os
+import signal
+import threading
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -104,6 +106,19 @@ def _collected(future: Future[Any]) -> xr.Dataset | Failure:
 
 
 @contextmanager
+def _deaf_children() -> Iterator[None]:
+    """Processes begun in this block do not hear Ctrl-C, which a terminal sends to all of a group; nor does this one."""
+    if threading.current_thread() is not threading.main_thread():  # there are no handlers elsewhere
+        yield
+        return
+    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
+
+
+@contextmanager
 def _client(scheduler: str | None, number: int) -> Iterator[Client]:
     """A client of the scheduler, or of a local cluster that listens on loopback only."""
     from distributed import Client, LocalCluster
@@ -120,14 +135,13 @@ def _client(scheduler: str | None, number: int) -> Iterator[Client]:
             yield client
         return
     # One thread in each worker, and (dask's default) in the numeric libraries inside it.
-    with (
-        LocalCluster(
+    with _deaf_children():
+        cluster = LocalCluster(
             n_workers=number,
             threads_per_worker=1,
             host="127.0.0.1",
             dashboard_address="127.0.0.1:0",  # any free port: two sweeps at once must not meet
             silence_logs=logging.CRITICAL,
-        ) as cluster,
-        Client(cluster, set_as_default=False) as client,
-    ):
+        )
+    with cluster, Client(cluster, set_as_default=False) as client:
         yield client

@@ -15,7 +15,7 @@ from cycler import cycler
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from ..geometry.atomic import replacing
+from ..geometry.atomic import write_whole
 
 PALETTE = ["#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9"]
 """Colours of M. Okabe and K. Ito, which all kinds of colour vision tell apart."""
@@ -66,15 +66,14 @@ def panels(rows: int, columns: int, size: tuple[float, float]) -> tuple[Figure, 
 
 def save_figure(figure: Figure, path: Path) -> None:
     """Write a figure; the format follows the suffix."""
-    with mpl.rc_context(STYLE), replacing(path) as temporary:
-        figure.savefig(temporary)
+    write_whole(path, drawn(figure, path.suffix[1:]))
 
 
-def png(figure: Figure) -> bytes:
-    """The figure as the content of a PNG file."""
+def drawn(figure: Figure, kind: str) -> bytes:
+    """The figure as the content of a file of the kind `png` or `pdf`."""
     stream = io.BytesIO()
     with mpl.rc_context(STYLE):
-        figure.savefig(stream, format="png")
+        figure.savefig(stream, format=kind)
     return stream.getvalue()
 
 

@@ -9,7 +9,7 @@ from pathlib import Path
 import xarray as xr
 
 from ..fem.table_store import TableFileError, read_checked, write_checked
-from ..geometry.atomic import replacing
+from ..geometry.atomic import write_whole
 
 FORMAT = "spinlev point 1"
 
@@ -32,7 +32,7 @@ class Journal:
         if not self.folder.exists():
             return {}
         label = self.folder / "identity.json"
-        if not label.exists() or label.read_text(errors="replace") != self.identity:
+        if not label.exists() or label.read_bytes() != self.identity.encode():
             self.report(f"{self.folder} is of another sweep or another version of the program: all is computed anew.")
             self.remove()
             return {}
@@ -52,8 +52,7 @@ class Journal:
         """Keep the result of a point. Raises OSError where the folder cannot be written."""
         label = self.folder / "identity.json"
         if not label.exists():
-            with replacing(label) as temporary:
-                temporary.write_text(self.identity)
+            write_whole(label, self.identity.encode())
         write_checked(result.assign_attrs(format=FORMAT), self.folder / f"{number:06}.nc")
 
     def remove(self) -> None:

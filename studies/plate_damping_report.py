@@ -66,7 +66,7 @@ def sentence(result: xr.Dataset) -> str:
     for sweep, place in zip(ROTORS, ("below the floater", "standing beside it"), strict=True):
         part = part_of(result, sweep)
         error, worst = part["error"], part["growth"].max("mode")
-        moved = np.hypot(np.hypot(*(part["shift"].sel(axis=a) for a in "xy")), part["shift"].sel(axis="z"))
+        moved = (part["shift"] ** 2).sum("axis", skipna=False) ** 0.5
         lift = 100 * part["force"].sel(axis="z") / float(result.attrs["weight_N"])
         torque = -1e6 * part["torque"].sel(axis="z")
         kept, gone = int((worst < 0).sum()), int(worst.isnull().sum())

@@ -15,7 +15,7 @@ from ..fem.plate import plate_reaction
 from ..fem.plate_region import Region
 from ..fem.plate_table_file import cached_plate_table
 from ..fem.slab import Slab, reaction_tensor
-from ..geometry.atomic import replacing
+from ..geometry.atomic import write_whole
 from ..geometry.box import Array
 from ..geometry.input_error import InputError
 from ..geometry.scene import Plate, Scene
@@ -59,8 +59,7 @@ def plate_job(scene: Scene, place: Array, frequency: float, model: str, rtol: fl
         "G_T_per_A_m2": {"real": answer.tensor.real, "imag": answer.tensor.imag},
         "tables_from_cache": list(answer.from_cache),
     }
-    with replacing(out / "plate.json") as temporary:
-        temporary.write_text(to_json(values) + "\n")
+    write_whole(out / "plate.json", f"{to_json(values)}\n".encode())
     lines = [f"Reaction tensor at {frequency:g} Hz, T/(A m²), phasors e^(+iωt), laboratory frame:"]
     lines += ["  ".join(f"{g.real: .6e} {g.imag:+.6e}i" for g in row) for row in answer.tensor]
     return values, [*lines, f"Model {answer.model}; estimated relative error {answer.error:.1e}"]

@@ -7,6 +7,8 @@ from dataclasses import replace
 import numpy as np
 
 from ..dynamics import PlateMemory
+from ..fem.accuracy import Accuracy
+from ..fem.distant import distant
 from ..fem.driven_plate import reachable_region
 from ..fem.plate_region import Region
 from ..fem.plate_table_file import cached_driven_plate
@@ -20,7 +22,6 @@ from ..geometry.scene import Plate, Scene
 from .console import note
 from .plate_job import beyond_edges
 
-PLATE_MODELS = ("none", "slab", "fem", "reduced", "auto")
 REACH = 0.003
 """The floater may move so far from where it begins, along each axis, m."""
 RASTER = 0.001
@@ -91,6 +92,12 @@ def plate_memory(
         made, share, found = cached_driven_plate(plate, table, region, frequencies, rtol, note)
     note("  from the cache." if found else f"  {len(made.rates)} states in {made.provenance['seconds']:.1f} s.")
     return PlateMemory(plate, made, share, model, _missing(plate, place) if model == "slab" else 0.0), found
+
+
+def table_in_flight(scene: Scene, table: RotorTable, place: Array, rtol: float) -> RotorTable:
+    """The rotor's table with the coefficients that count from `REACH` nearer to the magnets than `place` (3,) m on."""
+    gap = min(float(magnet.box.distance(place)) for magnet in scene.rotor) - REACH
+    return distant(table, Accuracy(rtol, max(gap, scene.floater.radius)))
 
 
 def _rastered(region: Region) -> Region:

@@ -84,6 +84,7 @@ def _equilibria(question: Question, scene: Scene, shelf: Shelf) -> xr.Dataset:
 def _flight(question: Question, scene: Scene, shelf: Shelf) -> xr.Dataset:
     table = shelf.table()
     found, memory = surveyed(shelf, table)
+    table = shelf.in_flight(table, memory, found.equilibria)
     flight = fly(scene, table, question.duration, found.equilibria, memory)
     answer = flight_answer(table, flight, memory)
     height = flight.lab.position[:, 2]

@@ -16,10 +16,10 @@ import numpy as np
 import xarray as xr
 
 from ..geometry import InputError
-from ..geometry.atomic import replacing
+from ..geometry.atomic import write_whole
 from .catalogue import CATALOGUE
 from .drawings import QUESTION, figures_of, read_result
-from .figures import png
+from .figures import drawn
 from .question_figure import question_lines
 from .study_job import failure_lines
 
@@ -61,8 +61,7 @@ def report_job(folder: Path, out: Path) -> tuple[Path, list[str]]:
     parts = [_part(path) for path in paths]
     template = files(__package__).joinpath("report.html").read_text(encoding="utf-8")
     page = jinja2.Environment(autoescape=True).from_string(template).render(folder=folder.resolve().name, parts=parts)
-    with replacing(out / "report.html") as temporary:
-        temporary.write_text(page, encoding="utf-8")
+    write_whole(out / "report.html", page.encode())
     return out / "report.html", [part.name for part in parts]
 
 
@@ -70,7 +69,7 @@ def _part(path: Path) -> Part:
     result = read_result(path)
     kind = str(result.attrs["study"])
     study = CATALOGUE.get(kind)
-    pictures = [(name, _embedded(png(figure), "png")) for name, figure in figures_of(result).items()]
+    pictures = [(name, _embedded(drawn(figure, "png"), "png")) for name, figure in figures_of(result).items()]
     beside = [path.parent / "scene.png"] if kind == "run" else []
     beside += [path.parent / f"{path.stem}-{name}" for name in ("scene.png", "flight.gif")]
     pictures += [(f.stem, _embedded(f.read_bytes(), f.suffix[1:])) for f in beside if f.exists()]

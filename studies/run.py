@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from ..dynamics import EquilibriumError, Survey, Trajectory, survey, with_plate
+from ..dynamics import EquilibriumError, FlightStopped, Survey, Trajectory, survey, with_plate
 from ..fem.table import FieldTable
-from ..geometry.atomic import replacing
+from ..geometry.atomic import write_whole
 from ..geometry.scene import AbsoluteStart, Scene
 from .answers import equilibria_answer, equilibria_lines, flight_answer, flight_lines, omissions
 from .console import note, to_json
@@ -30,12 +30,13 @@ def main_job(scene: Scene, asked: Tables, duration: float, out: Path) -> Job:
     """Compute everything of a scene; writes result.nc, summary.json and the figures.
 
     What is finished before a failure is kept: a scene without a stable equilibrium still leaves its fields and force
-    curves, then the error goes on to the caller.
+    curves, a flight that the user stops its beginning; then the error goes on to the caller.
     """
     shelf = Shelf(scene, asked)
     exact = "cuboid" if all(magnet.contrast == 0 for magnet in scene.rotor) else "fem"
     chosen, best = shelf.table(), shelf.table(exact)
     tables = {name: shelf.table(name) for name in MODELS}
+    failure: EquilibriumError | FlightStopped | None
     surveys, failure = _surveys(scene, {table.model: table for table in (tables["dipole"], best, chosen)})
     compared = comparison(surveys["dipole"], surveys[best.model], best.model)
     memory = shelf.memory(chosen, surveys[chosen.model].equilibria)
@@ -52,17 +53,20 @@ def main_job(scene: Scene, asked: Tables, duration: float, out: Path) -> Job:
     flight = None
     if failure is None or isinstance(scene.start, AbsoluteStart):
         try:
-            flight = fly(scene, chosen, duration, found, memory)
-            values |= flight_answer(chosen, flight, memory)
+            table = shelf.in_flight(chosen, memory, found)
+            flight = fly(scene, table, duration, found, memory)
+            values |= flight_answer(table, flight, memory)
             lines += flight_lines(flight)
         except EquilibriumError as error:
             failure = error
+        except FlightStopped as stop:
+            flight = (failure := stop).flown
     if failure:
         values["failed"] = str(failure)
         lines.append(str(failure))
     result = _static_dataset(scene, tables, surveys, best.model)
     _write(scene, chosen, result, values, flight, out)
-    if failure and flight is None:
+    if failure and (flight is None or isinstance(failure, FlightStopped)):
         raise failure
     return values, [*lines, f"Results and figures in {out}/"]
 
@@ -124,6 +128,7 @@ def _write(
     from .picture import last_view, scene_picture
 
     note("Files and figures ...")
+    (out / "summary.json").unlink(missing_ok=True)  # an older one must not stand beside the new result
     figures = {"field": field_figure(result), "force": force_figure(result)}
     if flight:
         flown = trajectory_dataset(flight).assign_attrs(study="run")
@@ -133,5 +138,4 @@ def _write(
     write_dataset(result, out / "result.nc", scene)
     for name, figure in figures.items():
         save_figure(figure, out / f"{name}.png")
-    with replacing(out / "summary.json") as temporary:
-        temporary.write_text(to_json(values) + "\n")
+    write_whole(out / "summary.json", f"{to_json(values)}\n".encode())

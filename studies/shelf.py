@@ -14,7 +14,7 @@ from ..fem.table import RotorTable
 from ..geometry.box import Array
 from ..geometry.scene import AbsoluteStart, Scene
 from .console import note
-from .plate_shelf import check_room, plate_memory, resolve_plate_model
+from .plate_shelf import check_room, plate_memory, resolve_plate_model, table_in_flight
 from .tables import Tables
 
 RotorField = RotorTable | GriddedTable
@@ -75,6 +75,13 @@ class Shelf:
         if found:
             self.from_cache.append("plate")
         return memory
+
+    def in_flight(self, table: RotorField, memory: PlateMemory | None, without: Sequence[Equilibrium]) -> RotorField:
+        """The table for the motion: beside a plate, whose own table reaches no farther, `table_in_flight`."""
+        place = self._place(without)
+        if memory is None or place is None or not isinstance(table, RotorTable):
+            return table
+        return table_in_flight(self.scene, table, place, self.asked.rtol)
 
     def _place(self, without: Sequence[Equilibrium]) -> Array | None:
         """Where the floater is while it levitates, (3,) m."""

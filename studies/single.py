@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import io
 from collections.abc import Mapping
 from importlib.metadata import version
 from pathlib import Path
@@ -11,6 +12,7 @@ from typing import Any
 from ..dynamics import (
     Checkpoint,
     Equilibrium,
+    FlightStopped,
     PlateMemory,
     Rates,
     Survey,
@@ -21,7 +23,7 @@ from ..dynamics import (
     with_plate,
 )
 from ..fem.table import FieldTable
-from ..geometry.atomic import replacing
+from ..geometry.atomic import write_whole
 from ..geometry.box import Array
 from ..geometry.scene import OffsetStart, Scene
 from .answers import equilibria_answer, equilibria_lines, field_answer, flight_answer, flight_lines, omissions
@@ -50,10 +52,11 @@ def field_job(scene: Scene, points: Array, asked: Tables, out: Path) -> Job:
     rows = zip(
         points * 1e3, values["B_T"], values["dB_T_per_m"].reshape(-1, 9), values["B_relative_error"], strict=True
     )
-    with replacing(out / "field.csv") as temporary, temporary.open("w", newline="") as stream:
-        writer = csv.writer(stream)
-        writer.writerow(header)
-        writer.writerows([*place, *b, *gradient, error] for place, b, gradient, error in rows)
+    stream = io.StringIO(newline="")
+    writer = csv.writer(stream)
+    writer.writerow(header)
+    writer.writerows([*place, *b, *gradient, error] for place, b, gradient, error in rows)
+    write_whole(out / "field.csv", stream.getvalue().encode())
     lines = [f"{'x':>9} {'y':>9} {'z':>9} mm {'Bx':>14} {'By':>14} {'Bz':>14} T   relative error"]
     lines += [
         f"{x:9.3f} {y:9.3f} {z:9.3f}    {b[0]:14.6e} {b[1]:14.6e} {b[2]:14.6e}     {error:.1e}"
@@ -73,8 +76,7 @@ def equilibria_job(scene: Scene, asked: Tables, spin: float, out: Path) -> Job:
         "not_modelled": omissions(scene, table, found.equilibria, memory),
         "tables_from_cache": shelf.from_cache,
     }
-    with replacing(out / "equilibria.json") as temporary:
-        temporary.write_text(to_json(values) + "\n")
+    write_whole(out / "equilibria.json", f"{to_json(values)}\n".encode())
     return values, [*equilibria_lines(scene, found.equilibria, memory), *values["not_modelled"]]
 
 
@@ -98,15 +100,26 @@ def simulate_job(scene: Scene, asked: Tables, duration: float, out: Path, resume
     else:
         found, memory = None, shelf.memory(table, ())
     equilibria = found.equilibria if found else ()
-    flight = fly(scene, table, duration, equilibria, memory, checkpoint)
+    table = shelf.in_flight(table, memory, equilibria)
+    models = {"model": table.model, "plate_model": memory.model if memory else "none"}
+
+    def keep(flight: Trajectory) -> None:
+        write_dataset(trajectory_dataset(flight).assign_attrs(models), out / "trajectory.nc", scene)
+
+    try:
+        flight = fly(scene, table, duration, equilibria, memory, checkpoint)
+    except FlightStopped as stop:
+        keep(stop.flown)
+        note(f"{stop} It is in {out / 'trajectory.nc'}; --resume goes on from there.")
+        raise
+    keep(flight)
+    checkpoint.remove()
     values = {
         **flight_answer(table, flight, memory),
         "not_modelled": omissions(scene, table, equilibria, memory),
         "trajectory": str(out / "trajectory.nc"),
         "tables_from_cache": shelf.from_cache,
     }
-    models = {"model": table.model, "plate_model": memory.model if memory else "none"}
-    write_dataset(trajectory_dataset(flight).assign_attrs(models), out / "trajectory.nc", scene)
     return values, [*flight_lines(flight), *values["not_modelled"], f"Trajectory in {values['trajectory']}"]
 
 

@@ -57,8 +57,8 @@ def _region(axes: Axes, part: xr.Dataset, model: str) -> None:
     low, high = part["lowest"].values, part["highest"].values
     wide = measure if len(measure) > 1 else measure * np.array([0.99, 1.01])  # one rotor alone is a bar
     for k in range(part.sizes["interval"]):
-        borders = [np.broadcast_to(values[:, k], wide.shape) for values in (low, high)]
-        axes.fill_between(wide, *borders, color=COLORS[model], alpha=0.2, lw=0)
+        bottom, top = (np.broadcast_to(values[:, k], wide.shape) for values in (low, high))
+        axes.fill_between(wide, bottom, top, color=COLORS[model], alpha=0.2, lw=0)
         for ends, kinds in ((low, part["low_kind"].values), (high, part["high_kind"].values)):
             axes.plot(measure, ends[:, k], color=COLORS[model], lw=0.8)
             for kind, marker in MARKERS.items():

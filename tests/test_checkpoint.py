@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from spinlev.dynamics import Checkpoint, integration, simulate
+from spinlev.dynamics import Checkpoint, FlightStopped, integration, simulate
 from spinlev.fem.multipole import uniform_moments
 from spinlev.fem.table import RotorTable
 from spinlev.geometry import rotor
@@ -29,13 +29,24 @@ def stopped_at(part):
     return progress
 
 
-def test_a_stopped_flight_goes_on_to_the_last_bit(checkpoint):
+def begun(part, checkpoint):
+    """What is flown when the user stops at a part of the flight."""
+    with pytest.raises(FlightStopped) as stop:
+        simulate(SCENE, DIPOLE, 4.0, compact=True, progress=stopped_at(part), checkpoint=checkpoint)
+    return stop.value.flown
+
+
+@pytest.mark.parametrize("seconds", [0.0, 1e9])
+def test_a_stopped_flight_goes_on_to_the_last_bit(checkpoint, monkeypatch, seconds):
+    """Also where no checkpoint was due before the stop: then that of the stop itself."""
+    monkeypatch.setattr(integration, "CHECKPOINT_SECONDS", seconds)
     whole = simulate(SCENE, DIPOLE, 4.0, compact=True)
-    first = simulate(SCENE, DIPOLE, 4.0, compact=True, progress=stopped_at(0.3), checkpoint=checkpoint)
-    assert first.interrupted
+    first = begun(0.3, checkpoint)
+    assert first.ended_by == "stopped"
     assert 0 < first.levitated_s < 2
-    assert checkpoint.path.exists()
+    assert len(checkpoint.read().times) == len(first.time)
     second = simulate(SCENE, DIPOLE, 4.0, compact=True, checkpoint=checkpoint)
+    checkpoint.remove()
     assert not checkpoint.path.exists()
     np.testing.assert_array_equal(second.time, whole.time)
     for found, exact in zip(second.lab.vectors, whole.lab.vectors, strict=True):
@@ -44,7 +55,7 @@ def test_a_stopped_flight_goes_on_to_the_last_bit(checkpoint):
 
 
 def test_another_flights_checkpoint_is_refused(checkpoint):
-    simulate(SCENE, DIPOLE, 4.0, compact=True, progress=stopped_at(0.1), checkpoint=checkpoint)
+    begun(0.1, checkpoint)
     other = Checkpoint(checkpoint.path, "another flight")
     with pytest.raises(InputError, match="another scene"):
         other.read()
@@ -52,7 +63,7 @@ def test_another_flights_checkpoint_is_refused(checkpoint):
 
 @pytest.mark.parametrize("damage", [lambda b: b[: len(b) // 2], lambda b: b"", lambda b: b"not an archive"])
 def test_a_damaged_checkpoint_is_reported(checkpoint, damage):
-    simulate(SCENE, DIPOLE, 4.0, compact=True, progress=stopped_at(0.1), checkpoint=checkpoint)
+    begun(0.1, checkpoint)
     checkpoint.path.write_bytes(damage(checkpoint.path.read_bytes()))
     with pytest.raises(InputError, match="damaged"):
         checkpoint.read()

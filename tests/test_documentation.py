@@ -40,3 +40,12 @@ def test_dependencies_are_listed_with_reason_and_licence():
     assert {re.split(r"[><=~]", text)[0] for text in wanted} <= names
     assert [row[0] for row in rows if any(not cell.strip(" |") for cell in row)] == []
     assert "see its files" not in said
+
+
+def test_the_container_has_what_it_copies_and_what_the_makefile_asks_for():
+    recipe = (ROOT / "Containerfile").read_text(encoding="utf-8")
+    copied = [name for line in re.findall(r"^COPY (.+)$", recipe, re.MULTILINE) for name in line.split()[:-1]]
+    assert [name for name in copied if not (ROOT / name).exists()] == []
+    assert set(copied) > {"geometry", "fem", "dynamics", "studies", "scenes", "requirements.txt"}
+    libraries = re.search(r"apt-get install ([\w -]+)", (ROOT / "Makefile").read_text(encoding="utf-8"))
+    assert set(libraries[1].split()) <= set(recipe.split())

@@ -8,6 +8,7 @@ import pytest
 from spinlev.dynamics.equilibrium import EquilibriumError
 from spinlev.dynamics.events import clearance
 from spinlev.dynamics.simulation import StartError, initial_state, simulate
+from spinlev.dynamics.trajectory import FlightStopped
 from spinlev.fem.multipole import uniform_moments
 from spinlev.fem.table import RotorTable
 from spinlev.geometry import rotor
@@ -115,8 +116,10 @@ def test_progress_rises_to_one_and_an_interrupt_keeps_what_is_finished():
     def interrupt(_):
         raise KeyboardInterrupt
 
-    flight = simulate(thrown((0.0, 0.0, -30e-3), (0.0, 0.0, 0.0)), DIPOLE, 0.05, compact=True, progress=interrupt)
-    assert flight.interrupted
+    with pytest.raises(FlightStopped, match=r"stopped at 0\.0") as stop:
+        simulate(thrown((0.0, 0.0, -30e-3), (0.0, 0.0, 0.0)), DIPOLE, 0.05, compact=True, progress=interrupt)
+    flight = stop.value.flown
+    assert flight.ended_by == "stopped"
     assert 0 < flight.levitated_s < 0.05
     assert len(flight.time) > 10
 

@@ -64,7 +64,9 @@ def test_a_limit_of_the_process_is_seen_before_it_is_hit():
         "resource.setrlimit(resource.RLIMIT_AS, (size, size))\n"
         "t.assemble(mesh, 4)\n"
     )
-    done = subprocess.run([sys.executable, "-c", code], cwd=Path(__file__).parent, capture_output=True, text=True, check=False)
+    done = subprocess.run(
+        [sys.executable, "-c", code], cwd=Path(__file__).parent, capture_output=True, text=True, check=False
+    )
     assert done.returncode == 1
     said = re.search(r"TooLargeError: .* need about (\S+) GB .*; (\S+) GB are free", done.stderr)
     assert said, done.stderr

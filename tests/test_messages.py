@@ -26,6 +26,7 @@ RELAYED = {
     "[describe_fault(detail) for detail in error.errors()]": "scene_file: sentences of scene_faults",
     "refusal(plate, frequency, rtol, best)": "plate: a sentence of plate_limits",
     "str(error)": "an error's own sentence, with another class",
+    "str(path)": "atomic: the system's own error, with the name of the file",
     "_way_out(scene, table, known)": "simulation: says what would levitate",
 }
 
@@ -47,7 +48,7 @@ def raised(path):
     for node in ast.walk(ast.parse(path.read_text())):
         if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.args:
             kind = getattr(module, node.func.id, getattr(builtins, node.func.id, None))
-            if isinstance(kind, type) and issubclass(kind, BaseException):
+            if isinstance(kind, type) and issubclass(kind, Exception):
                 yield kind, node.args[-1], f"{path.parent.name}/{path.name}:{node.lineno}"
 
 

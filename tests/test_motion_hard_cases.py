@@ -1,4 +1,7 @@
-"""Motion where it is hard: each case against something that is known exactly, and the ledger of energy."""
+"""Motion where it is hard: each case against something that is known exactly, and the ledger of energy.
+
+With -s each prints what docs/hard-cases.md tells.
+"""
 
 from dataclasses import replace
 
@@ -51,6 +54,10 @@ def thrown(position, moment=(0.0, 0.0, 1.0), spin=(0.0, 0.0, 0.0), **changes):
     return replace(SCENE, start=start, **changes)
 
 
+def told(case, **numbers):
+    print(f"\n{case}: " + ", ".join(f"{name} {value:.3g}" for name, value in numbers.items()))
+
+
 def test_next_to_a_fold(rates):
     """A part of 1e-6 above the fold's frequency both equilibria are found; the floater stays, or is lost if pushed."""
     first = find_equilibria(SCENE, TABLE, rates=rates)[0]
@@ -69,7 +76,12 @@ def test_next_to_a_fold(rates):
     pushed = replace(stable.state, position=stable.position + 2 * (unstable.position - stable.position))
     falling = flown(scene, pushed, 5.0)
     assert falling.ended_by == "lost"
-    assert max(resting.energy_error, falling.energy_error) < LEDGER
+    strayed = np.abs(resting.rotor.position - stable.position).max()
+    ledger = max(resting.energy_error, falling.energy_error)
+    told(
+        "next to a fold", apart_mm=1e3 * (unstable.distance - stable.distance), strayed_nm=1e9 * strayed, ledger=ledger
+    )
+    assert ledger < LEDGER
 
 
 def test_one_micrometre_from_contact():
@@ -79,6 +91,7 @@ def test_one_micrometre_from_contact():
     scene = thrown((0.0, 0.0, -65e-3 + RADIUS + 1e-6), plate=plate, floater=neutral)
     flight = simulate(scene, TABLE, 1.0, compact=True)
     assert flight.ended_by == "contact"
+    told("1 µm from contact", time_error=flight.levitated_s / np.sqrt(2e-6 / 9.81) - 1)
     assert flight.levitated_s == pytest.approx(np.sqrt(2e-6 / 9.81), rel=1e-8)
 
 
@@ -90,6 +103,8 @@ def test_moment_along_the_axis_and_against_it(tilt):
     scene = thrown((0.0, 0.0, -20e-3), (-tilt, 0.0, -1.0), rotor=mirrored)
     down = simulate(scene, rotor_table(mirrored, "dipole"), 0.04, compact=True)
     assert (up.ended_by, down.ended_by) == ("duration", "duration")
+    apart = np.abs(up.lab.position - down.lab.position).max()
+    told(f"θ = {tilt:g} and 180° less it", apart_m=apart, ledger=max(up.energy_error, down.energy_error))
     np.testing.assert_allclose(up.lab.position, down.lab.position, atol=1e-14)
     np.testing.assert_allclose(up.lab.moment, -down.lab.moment, atol=1e-11)
     assert max(up.energy_error, down.energy_error) < LEDGER
@@ -107,6 +122,7 @@ def test_without_weight_everything_scales(rates):
     small = find_equilibria(scene, TABLE, rates=rates)
     found = find_equilibria(large, rotor_table(large.rotor, "dipole"), farthest=0.3)
     assert small[0].stable
+    told("weightless", apart=np.abs(found[0].position - 3 * small[0].position).max() / small[0].distance)
     np.testing.assert_allclose(found[0].position, 3 * small[0].position, rtol=1e-9, atol=1e-12)
     np.testing.assert_allclose(3 * found[0].frequencies_hz, small[0].frequencies_hz, rtol=1e-6)
     kick = replace(scene, start=OffsetStart(np.array([0.0, 0.0, 1e-3])))
@@ -124,6 +140,10 @@ def test_upside_down(rates):
         assert flight.ended_by == "duration"
         assert flight.energy_error < LEDGER
         distances.append(found[0].distance)
+    told(
+        "upside down",
+        **dict(zip(("upside_down_mm", "weightless_mm", "upright_mm"), 1e3 * np.array(distances), strict=True)),
+    )
     assert distances == sorted(distances)
 
 
@@ -135,7 +155,9 @@ def test_horizontal_axis(rates):
     flight = flown(scene, found.start, 20 / scene.frequency)
     turns = np.isclose(flight.time * scene.frequency, np.round(flight.time * scene.frequency), atol=1e-7)
     assert turns.sum() == 21
-    assert np.abs(flight.rotor.position[turns] - found.start.position).max() < 1e-9
+    back = np.abs(flight.rotor.position[turns] - found.start.position).max()
+    told("horizontal axis", back_after_each_turn_m=back, ledger=flight.energy_error)
+    assert back < 1e-9
     assert flight.lab.position[:, 0].mean() > 1e-4
     assert flight.energy_error < LEDGER
 
@@ -152,6 +174,7 @@ def test_ten_times_the_drag(rates):
         flight = simulate(kicked, TABLE, 3.0, found, compact=True)
         assert flight.ended_by == "duration"
         assert flight.energy_error < LEDGER
+    told("ten times the drag", growth=growth[0], ten_times=growth[1], ledger=flight.energy_error)
     assert growth[0] < 0
     assert growth[1] == pytest.approx(10 * growth[0], rel=0.02)
 
@@ -169,6 +192,7 @@ def test_one_kilohertz(rates):
     assert found[0].stable
     kicked = replace(scene, start=OffsetStart(np.array([0.0, 0.0, 1e-4])))
     flight = simulate(kicked, table, 1.0, found, compact=True)
+    told("1 kHz", ledger=flight.energy_error)
     assert flight.ended_by == "duration"
     assert flight.energy_error < 20 * LEDGER
 
@@ -190,6 +214,8 @@ def test_plate_one_millimetre_below(rates):
     motion = integrate(scene, flight, found.start, 0.1, currents=found.currents[0])
     assert motion.ended_by == "duration"
     assert np.abs(motion.rotor.position - found.start.position).max() < 1e-10  # an infinite plate shakes nothing
+    hangs = 1e3 * (fixed.position[2] - found.position[2])
+    told("plate 1 mm below", lower_mm=hangs, growth=found.growth_per_s, ledger=motion.energy_error)
     assert motion.energy_error < 1e-10
 
 
@@ -203,6 +229,7 @@ def test_error_falls_as_asked():
         flight = simulate(kicked, TABLE, 0.5, found, tolerance, compact=True)
         errors.append(np.abs(flight.lab.position[-1] - truth.lab.position[-1]).max() / RADIUS)
         ledgers.append(flight.energy_error)
+    told("tolerance ladder", **dict(zip(("e6", "e9", "e12", "e15"), errors, strict=True)))
     assert errors[0] > 1e-8
     for error, ledger, tolerance in zip(errors, ledgers, (1e-6, 1e-9, 1e-12, 1e-15), strict=True):
         assert error < 1e3 * tolerance
@@ -214,6 +241,7 @@ def test_a_rotor_that_does_not_turn():
     with pytest.raises(EquilibriumError, match="Earnshaw"):
         simulate(replace(SCENE, frequency=0.0), TABLE, 1.0)
     flight = simulate(thrown((0.0, 0.0, -40e-3), frequency=0.0), TABLE, 1.0, compact=True)
+    told("rotor at rest", levitated_s=flight.levitated_s, ledger=flight.energy_error)
     assert flight.ended_by in {"lost", "contact"}
     assert flight.energy_error < LEDGER
 

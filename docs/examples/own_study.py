@@ -1,8 +1,8 @@
 """A study of your own: how the bounce depends on the floater's density.
 
 A study is a pure function of a point, the points at which it is asked, and what is drawn and said of the joined
-result. One entry in the catalogue, and it is resumable, runs on any number of workers, and `spinlev study bounce`
-knows it.
+result. One entry in the catalogue, and it is resumable and runs on any number of workers; with the entry in
+`studies/catalogue.py` the command line knows it too.
 """
 
 import tempfile

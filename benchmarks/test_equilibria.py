@@ -1,0 +1,77 @@
+"""Equilibria, their stability and maps of them, beside SciPy's least squares with magpylib's field."""
+
+import numpy as np
+import pytest
+from peers import SCENE, magpylib_rotor, scipy_equilibrium
+
+from spinlev.dynamics import equilibrium_map, find_equilibria, rotor_family
+from spinlev.dynamics.balance import EVERY, Balance, solve
+from spinlev.dynamics.equations import parameters
+from spinlev.dynamics.rates import Rates
+from spinlev.dynamics.stability import modes
+from spinlev.dynamics.state import Scales
+from spinlev.fem.models import rotor_table
+
+PEER = "least squares + magpylib, no stability"
+MODELS = ["dipole", "cuboid", "fem"]
+ONE, ALL, MAP = (
+    "one equilibrium near a guess and its stability, compiled",
+    "all equilibria of a scene and their stability, compiled: for each of them",
+    "map of 100 × 100, all equilibria and their stability: for each of them",
+)
+
+
+@pytest.mark.benchmark
+@pytest.mark.parametrize("group", [ONE, ALL, MAP], ids=["one", "all", "map"])
+def test_peer(benchmark, group):
+    """One equilibrium from a guess 0.02 radii away, to the same place as ours."""
+    benchmark.group = group
+    benchmark.extra_info["peer"] = True
+    benchmark.name = PEER
+    best = next(e for e in find_equilibria(SCENE, rotor_table(SCENE.rotor, "cuboid")) if e.stable)
+    magnets, guess = magpylib_rotor(SCENE.rotor), best.position + 0.02 * SCENE.floater.radius
+    arguments = (SCENE, magnets, guess, best.state.moment)
+    found = benchmark.pedantic(scipy_equilibrium, arguments, rounds=3)
+    # Air drag, which the peer leaves out, makes the moment lag by microradians
+    assert np.abs(found - best.position).max() < 1e-8
+
+
+@pytest.mark.benchmark(group=ALL)
+@pytest.mark.parametrize("model", MODELS)
+def test_equilibria(benchmark, model):
+    table = rotor_table(SCENE.rotor, model, nearest=SCENE.floater.radius)
+    rates = Rates(table)
+    found = benchmark.pedantic(lambda: find_equilibria(SCENE, table, rates=rates), rounds=3, warmup_rounds=1)
+    benchmark.extra_info["count"] = len(found)
+    assert any(equilibrium.stable for equilibrium in found)
+
+
+@pytest.mark.benchmark(group=ONE)
+@pytest.mark.parametrize("model", MODELS)
+def test_one_equilibrium(benchmark, model):
+    table = rotor_table(SCENE.rotor, model, nearest=SCENE.floater.radius)
+    rates, scales = Rates(table), Scales.of(SCENE)
+    near = next(e for e in find_equilibria(SCENE, table, rates=rates) if e.stable)
+    guess = scales.pack(near.state) + 0.02
+    balance = Balance(rates, parameters(SCENE, scales, frozen_spin=True), 0.0)
+
+    def found():
+        position, moment, step = solve(balance, guess[None, :3], guess[None, 6:9], EVERY)
+        state = balance.states(position, moment)
+        return step, modes(state[0], rates(state, balance.values)[1][0])
+
+    step, motion = benchmark(found)
+    assert step[0] < 1e-8
+    assert motion.stable
+
+
+@pytest.mark.benchmark(group=MAP)
+@pytest.mark.parametrize("model", MODELS)
+def test_map(benchmark, model):
+    family = rotor_family(SCENE, "horizontal", model, nearest=SCENE.floater.radius)
+    axes = np.linspace(50.0, 250.0, 100), np.linspace(1e-3, 8e-3, 100)
+    assert family.rates is not None  # compiled
+    found = benchmark.pedantic(equilibrium_map, (family, *axes), rounds=1)
+    benchmark.extra_info["count"] = len(found.row)
+    print(f"\n{model}: {len(found.row)} equilibria, {found.stable.sum()} of them stable")
+    assert found.stable.any()

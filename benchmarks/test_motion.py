@@ -1,0 +1,77 @@
+"""Flights beside SciPy's DOP853 with magpylib's field; × real time is printed with -s."""
+
+from dataclasses import replace
+from time import process_time
+
+import numpy as np
+import pytest
+from peer_flight import fly
+from peers import SCENE, magpylib_rotor
+
+from spinlev.dynamics.flight import compile_flight
+from spinlev.dynamics.integration import integrate
+from spinlev.dynamics.simulation import PLATE_TOLERANCE, initial_state
+from spinlev.fem.models import rotor_table
+from spinlev.studies.plate_shelf import plate_memory, table_in_flight
+
+FREE = replace(SCENE, plate=None, drag=replace(SCENE.drag, linear=0.0, angular=0.0))
+TURNS = 2
+"""Of the peer's flight."""
+
+
+@pytest.fixture(scope="module")
+def start():
+    """Near the equilibrium in the closed form's field."""
+    return initial_state(FREE, rotor_table(SCENE.rotor, "cuboid"))[0]
+
+
+@pytest.mark.benchmark(group="a simulated second at 110 Hz")
+@pytest.mark.parametrize("rtol", [1e-10, 1e-13], ids=["DOP853 + magpylib, 1e-10", "DOP853 + magpylib, 1e-13"])
+def test_flight_against_scipy(benchmark, start, rtol):
+    """Time a simulated second, and the error after two turns against our tightest flight."""
+    exact = integrate(FREE, compile_flight(FREE, rotor_table(SCENE.rotor, "cuboid"), 1.0, 1e-16, False), start,
+                      TURNS / FREE.frequency, None).rotor.position[-1]  # fmt: skip
+    magnets = magpylib_rotor(SCENE.rotor)
+    benchmark.extra_info.update(peer=rtol == 1e-13, count=TURNS / FREE.frequency)
+    end = benchmark.pedantic(fly, (FREE, magnets, start, TURNS / FREE.frequency, rtol), rounds=1)
+    benchmark.extra_info["error_m"] = float(np.abs(end[:3] - exact).max())
+    print(f"\nDOP853 at {rtol:g}: error {benchmark.extra_info['error_m']:.1e} m after {TURNS} turns")
+    assert benchmark.extra_info["error_m"] < 1e-11
+
+
+@pytest.mark.benchmark(group="a simulated second at 110 Hz")
+@pytest.mark.parametrize("compact", [True, False], ids=["loops", "straight code"])
+@pytest.mark.parametrize("model", ["dipole", "cuboid", "fem"])
+def test_flight(benchmark, start, model, compact):
+    if model == "fem" and not compact:
+        pytest.skip("straight code for the expansion takes minutes to compile")
+    table = rotor_table(SCENE.rotor, model, nearest=SCENE.floater.radius)
+    flight = compile_flight(FREE, table, 1.0, 1e-14, compact)
+    trajectory = benchmark.pedantic(lambda: integrate(FREE, flight, start, 1.0, None), rounds=3, warmup_rounds=1)
+    print(f"\n{model}: compiled in {flight.compile_seconds:.1f} s, {trajectory.realtime_factor:.0f} x real time")
+    benchmark.extra_info["ledger"] = trajectory.energy_error
+    assert trajectory.ended_by == "duration"
+
+
+@pytest.mark.benchmark(group="a simulated second at 110 Hz")
+@pytest.mark.parametrize(("plate_model", "rtol"), [("reduced", 3e-3), ("slab", 2e-4)], ids=["network", "slab"])
+@pytest.mark.parametrize("model", ["cuboid", "fem"])
+def test_flight_with_plate(benchmark, start, model, plate_model, rtol):
+    """A floater that does not rest over the plate's currents, at the tolerance that `simulate` uses."""
+    table = rotor_table(SCENE.rotor, model, nearest=SCENE.floater.radius)
+    memory, _ = plate_memory(SCENE, SCENE.plate, plate_model, table, start.position, rtol)
+    table = table_in_flight(SCENE, table, start.position, 3e-6)
+    flight = compile_flight(SCENE, table, 0.5, PLATE_TOLERANCE, True, memory)
+    still = np.zeros(len(memory.table.rates))
+    integrate(SCENE, flight, start, 0.05, currents=still)
+    began = process_time()
+    fly_on = lambda: integrate(SCENE, flight, start, 0.5, currents=still)  # noqa: E731
+    flown = benchmark.pedantic(fly_on, rounds=1)
+    speed = 0.5 / (process_time() - began)
+    benchmark.extra_info.update(count=0.5, states=len(still))
+    print(
+        f"\n{model}, {plate_model}: {len(still)} states, {len(memory.table.multipoles.kinds)} multipoles, "
+        f"{len(memory.share.series) // 2} harmonics; {flown.steps / (0.5 * SCENE.frequency):.1f} steps a turn, "
+        f"{speed:.1f} x real time; ledger {flown.energy_error:.0e}"
+    )
+    assert flown.ended_by == "duration"

@@ -1,0 +1,87 @@
+"""How the time grows with the size of each job; `ratios.py` fits the exponents."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from peers import PLATE, SCENE, around
+
+from spinlev.dynamics import equilibrium_map, rotor_family
+from spinlev.dynamics.flight import compile_flight
+from spinlev.dynamics.integration import integrate
+from spinlev.dynamics.simulation import PLATE_TOLERANCE, initial_state
+from spinlev.fem.carrier import carrier
+from spinlev.fem.climb import rung
+from spinlev.fem.eddy import solve_eddy
+from spinlev.fem.models import rotor_table
+from spinlev.fem.rotor_solution import solve_rotor
+from spinlev.fem.sources import unit_dipoles
+from spinlev.geometry.mesh import MeshSettings
+from spinlev.geometry.plate_mesh import MeshRule, plate_mesh
+from spinlev.studies.plate_shelf import plate_memory
+
+FREE = replace(SCENE, plate=None, drag=replace(SCENE.drag, linear=0.0, angular=0.0))
+
+
+@pytest.mark.benchmark(group="scaling: points of a table (finite elements)")
+@pytest.mark.parametrize("points", [100, 1_000, 10_000, 100_000, 1_000_000])
+def test_points(benchmark, points):
+    table = rotor_table(SCENE.rotor, "fem", nearest=SCENE.floater.radius)
+    places = around(SCENE.rotor[0], points)
+    benchmark.extra_info["size"] = points
+    assert np.isfinite(benchmark.pedantic(table.evaluate, (places,), rounds=5, warmup_rounds=1)[0]).all()
+
+
+@pytest.mark.benchmark(group="scaling: unknowns of the rotor's field")
+@pytest.mark.parametrize("order", [3, 4, 5, 6, 7, 8])
+def test_field_unknowns(benchmark, order):
+    carriers = tuple(carrier(magnet) for magnet in SCENE.rotor)
+
+    def solved():
+        return solve_rotor(SCENE.rotor, rung(order, MeshSettings()), "split", 6 + 4 * order, carriers=carriers)
+
+    benchmark.extra_info["size"] = benchmark.pedantic(solved, rounds=2).unknowns
+
+
+@pytest.mark.benchmark(group="scaling: unknowns of the plate's currents, one place, 100 Hz")
+@pytest.mark.parametrize("order", [1, 2, 3, 4])
+def test_plate_unknowns(benchmark, order):
+    body = np.array([[0.003, 0.002, 0.035]])
+    mesh = plate_mesh(PLATE.box.size, PLATE.conductivity, body, 100.0, MeshRule())
+    found = benchmark.pedantic(solve_eddy, (mesh, order, 100.0, unit_dipoles(body)), rounds=1)
+    benchmark.extra_info["size"] = found.coupling_unknowns
+
+
+@pytest.mark.benchmark(group="scaling: states of the plate in a flight of 0.2 s")
+@pytest.mark.parametrize("rtol", [1e-1, 3e-2, 1e-2, 3e-3, 1e-3, 3e-4])
+def test_states(benchmark, rtol):
+    table = rotor_table(SCENE.rotor, "cuboid", nearest=SCENE.floater.radius)
+    start, _ = initial_state(FREE, table)
+    memory, _ = plate_memory(SCENE, SCENE.plate, "slab", table, start.position, rtol)
+    flight = compile_flight(SCENE, table, 0.2, PLATE_TOLERANCE, True, memory)
+    still = np.zeros(len(memory.table.rates))
+    flown = benchmark.pedantic(lambda: integrate(SCENE, flight, start, 0.2, currents=still), rounds=2, warmup_rounds=1)
+    benchmark.extra_info["size"] = len(still)
+    assert flown.ended_by == "duration"
+
+
+@pytest.mark.benchmark(group="scaling: turns of a flight (dipole)")
+@pytest.mark.parametrize("turns", [100, 1_000, 10_000, 100_000])
+def test_turns(benchmark, turns):
+    table = rotor_table(SCENE.rotor, "dipole")
+    start, _ = initial_state(FREE, table)
+    duration = turns / FREE.frequency
+    flight = compile_flight(FREE, table, duration, 1e-14, True)
+    benchmark.extra_info["size"] = turns
+    flown = benchmark.pedantic(lambda: integrate(FREE, flight, start, duration, None), rounds=2, warmup_rounds=0)
+    assert flown.ended_by == "duration"
+
+
+@pytest.mark.benchmark(group="scaling: points of a map of equilibria (dipole)")
+@pytest.mark.parametrize("side", [10, 20, 40, 80])
+def test_grid(benchmark, side):
+    family = rotor_family(SCENE, "horizontal", "dipole", nearest=SCENE.floater.radius)
+    axes = np.linspace(50.0, 250.0, side), np.linspace(1e-3, 8e-3, side)
+    assert family.rates is not None  # compiled
+    benchmark.extra_info["size"] = side**2
+    assert benchmark.pedantic(equilibrium_map, (family, *axes), rounds=1).stable.any()

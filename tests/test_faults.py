@@ -1,0 +1,369 @@
+"""Faults injected into the program itself: nothing is lost, no number is wrong, the next run repairs (docs/faults.md).
+
+The same with signals to real processes is in test_faults_processes.py.
+"""
+
+import errno
+import json
+import os
+import re
+import shutil
+import subprocess
+import sys
+from contextlib import contextmanager
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+import xarray as xr
+
+from spinlev.fem import memory
+from spinlev.fem.table_store import read_checked, write_checked
+from spinlev.geometry.atomic import replacing, write_whole
+from spinlev.studies.cli import _status
+
+SCENE = str(Path(__file__).parent.parent / "scenes" / "horizontal.toml")
+OVER_PLATE = str(Path(__file__).parent.parent / "scenes" / "tilt-over-plate.toml")
+DIPOLE = ("--model", "dipole", "--plate-model", "none")
+FIELD = ("field", SCENE, "--points", "points.csv", "--model", "fem", "--rtol", "1e-2")
+TIMES = ("seconds", "realtime_factor", "tables_from_cache")
+
+
+@pytest.fixture(scope="module")
+def table(tmp_path_factory):
+    """A cache that has the table of `FIELD`."""
+    folder = tmp_path_factory.mktemp("cache")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("SPINLEV_CACHE", str(folder))
+        (folder / "points.csv").write_text("x_mm,y_mm,z_mm\n0,0,-20\n3,1,-25\n")
+        patch.chdir(folder)
+        assert _status([*FIELD, "--out", str(folder / "out")], sys.stderr) == 0
+    return next(folder.glob("rotor-*.nc"))
+
+
+@pytest.fixture
+def spinlev(tmp_path, monkeypatch, capsys):
+    """Run the command line in this process in an empty folder; gives exit status, answer and messages."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("SPINLEV_CACHE", str(tmp_path / "cache"))
+    monkeypatch.setattr("sys.argv", ["spinlev", "test"])
+    Path("points.csv").write_text("x_mm,y_mm,z_mm\n0,0,-20\n3,1,-25\n")
+
+    def run(*arguments):
+        with Path("answer").open("w") as out:
+            status = _status([*map(str, arguments), "--json"], out)
+        said = Path("answer").read_text()
+        answer = {key: value for key, value in json.loads(said).items() if key not in TIMES} if said else None
+        return status, answer, capsys.readouterr().err
+
+    return run
+
+
+def same(answer, expected):
+    """Numbers of a table made anew: to round-off; estimated errors are differences of such numbers, which cancel."""
+    assert answer.keys() == expected.keys()
+    for key, value in expected.items():
+        if "error" in key:
+            np.testing.assert_allclose(answer[key], value, rtol=1e-8)
+        elif key in ("B_T", "dB_T_per_m"):
+            np.testing.assert_allclose(answer[key], value, rtol=1e-12, atol=1e-12 * np.abs(value).max())
+        else:
+            assert str(answer[key]).replace("out/", "undisturbed/") == str(value).replace("out/", "undisturbed/")
+
+
+def hidden(folder):
+    """Files that were begun and not finished."""
+    return [path for path in Path(folder).rglob(".*") if path.is_file()]
+
+
+def flipped(content, chance):
+    found = bytearray(content)
+    found[chance.integers(len(found))] ^= 1 << chance.integers(8)
+    return bytes(found)
+
+
+def of_another_version(path):
+    dataset = read_checked(path)
+    write_checked(dataset.assign_attrs(format="spinlev rotor table 0"), path)
+
+
+def in_its_place_a_folder(path):
+    path.unlink()
+    path.mkdir()
+
+
+def quick(cases, *names):
+    """All cases, of which only the named ones are in the fast suite."""
+    return [case if case in names else pytest.param(case, marks=pytest.mark.slow) for case in cases]
+
+
+DAMAGES = {
+    "cut off": lambda path: path.write_bytes(path.read_bytes()[:1000]),
+    "cut off by the checksum": lambda path: path.write_bytes(path.read_bytes()[:-79]),
+    "empty": lambda path: path.write_bytes(b""),
+    "other bytes": lambda path: path.write_bytes(b"\x89HDF" * 500),
+    "a bit": lambda path: path.write_bytes(flipped(path.read_bytes(), np.random.default_rng(1))),
+    "another bit": lambda path: path.write_bytes(flipped(path.read_bytes(), np.random.default_rng(2))),
+    "of another version": of_another_version,
+    "a folder": in_its_place_a_folder,
+}
+
+
+@pytest.mark.parametrize("damage", quick(DAMAGES, "cut off", "a bit", "of another version", "a folder"))
+def test_a_damaged_cache_entry_is_named_and_made_anew(spinlev, table, damage):
+    Path("cache").mkdir()
+    entry = Path(shutil.copy(table, "cache"))
+    whole = spinlev(*FIELD)
+    assert whole[0] == 0
+    assert "from the cache" in whole[2]
+    DAMAGES[damage](entry)
+    status, answer, said = spinlev(*FIELD)
+    assert status == 0
+    assert "damaged and is computed anew" in said
+    same(answer, whole[1])
+    if damage != "a folder":
+        assert "from the cache" in spinlev(*FIELD)[2]
+    assert hidden(".") == []
+
+
+def test_every_flipped_bit_is_found(table, tmp_path):
+    content, chance = table.read_bytes(), np.random.default_rng(0)
+    for _ in range(300):
+        (tmp_path / "t.nc").write_bytes(flipped(content, chance))
+        with pytest.raises(ValueError, match="checksum"):
+            read_checked(tmp_path / "t.nc", "spinlev rotor table 1")
+
+
+def test_a_cache_that_cannot_be_written_costs_time_only(spinlev, monkeypatch, table):
+    Path("cache").mkdir()
+    shutil.copy(table, "cache")
+    expected = spinlev(*FIELD)[1]
+    for place in (Path("points.csv", "below-a-file").absolute(), "/sys/spinlev"):
+        monkeypatch.setenv("SPINLEV_CACHE", str(place))
+        status, answer, said = spinlev(*FIELD)
+        assert status == 0
+        same(answer, expected)
+        assert "could not be cached" in said
+
+
+VARY = ("study", SCENE, "--vary", "frequency_hz=100,110", "--workers", "1")
+SWEEP = (*VARY, "--ask", "field", "--model", "cuboid")
+WRITERS = {
+    "field.csv": ("field", SCENE, "--points", "points.csv", "--model", "dipole"),
+    "equilibria.json": ("equilibria", SCENE, *DIPOLE),
+    "trajectory.nc": ("simulate", SCENE, "--duration-s", "0.1", *DIPOLE),
+    "plate.json": ("plate", OVER_PLATE, "--at", "0,0,-20", "--frequency-hz", "50", "--model", "slab"),
+    "identity.json": SWEEP,
+    "000000.nc": SWEEP,
+    "question.nc": SWEEP,
+    "question.png": SWEEP,
+}
+
+
+@pytest.mark.parametrize("name", quick(WRITERS, "field.csv", "trajectory.nc", "000000.nc"))
+def test_a_full_disk(spinlev, monkeypatch, name):
+    """Half of a file is written, then there is no space: named, nothing of that file is left, the next run is whole."""
+    write = Path.write_bytes
+
+    def full(path, content):
+        if re.match(rf"\.{Path(name).stem}-", path.name) and path.suffix == Path(name).suffix:
+            write(path, content[: len(content) // 2])
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+        return write(path, content)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(Path, "write_bytes", full)
+        status, answer, said = spinlev(*WRITERS[name])
+    assert status == 1
+    assert answer is None
+    assert f"{name}: No space left on device" in said.replace("\n", "")
+    assert not list(Path("out").rglob(name))
+    assert hidden("out") == []
+    assert spinlev(*WRITERS[name])[0] == 0
+    assert Path("out", "question.pdf" if WRITERS[name] == SWEEP else name).exists()
+
+
+def test_results_go_to_memory_before_the_disk_since_hdf5_crashes_on_a_full_one(tmp_path):
+    """A child that may write 20 kB: an error in words (HDF5 itself, on a real full disk, ended with SIGSEGV)."""
+    code = (
+        "import resource, sys, numpy, xarray; from spinlev.fem.table_store import write_checked\n"
+        "resource.setrlimit(resource.RLIMIT_FSIZE, (20000, 20000))\n"
+        "write_checked(xarray.Dataset({'a': ('x', numpy.arange(9999.0))}), sys.argv[1])\n"
+    )
+    command = [sys.executable, "-c", code, str(tmp_path / "r.nc")]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 1
+    assert done.stderr.strip().endswith(f"OSError: [Errno 27] File too large: '{tmp_path / 'r.nc'}'")
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("place", ["points.csv", "points.csv/below", "/sys/spinlev"])
+def test_an_output_folder_that_cannot_be_written(spinlev, place):
+    """A file in its place, and a file system that even root may not write."""
+    status, answer, said = spinlev(*WRITERS["field.csv"], "--out", place)
+    assert (status, answer) == (1, None)
+    assert "failed to write or read" in said
+    assert "--out" in said
+
+
+def test_a_full_disk_behind_standard_output(spinlev, capsys):
+    with Path("/dev/full").open("w") as full:
+        status = _status([*WRITERS["field.csv"]], full)
+        assert status == 1
+        assert "standard output: No space left on device" in capsys.readouterr().err
+        os.dup2(os.open("/dev/null", os.O_WRONLY), full.fileno())  # so that it can be closed
+
+
+PHASES = {
+    "table": ("spinlev.fem.cache.rotor_table", FIELD),
+    "table, when it is written": ("spinlev.fem.table_store.write_whole", FIELD),
+    "equilibria": ("spinlev.studies.single.survey", WRITERS["equilibria.json"]),
+    "files": ("spinlev.studies.single.write_whole", WRITERS["equilibria.json"]),
+    "sweep": ("spinlev.studies.shelf.rotor_table", SWEEP),
+    "sweep, when a point is kept": ("spinlev.studies.journal.write_checked", SWEEP),
+    "sweep, when all are joined": ("spinlev.studies.study_job.write_dataset", SWEEP),
+    "figures": ("spinlev.studies.study_job.save_figures", SWEEP),
+}
+
+
+@pytest.mark.parametrize("phase", quick(PHASES, "table, when it is written", "equilibria", "sweep"))
+def test_ctrl_c_in_every_phase(spinlev, monkeypatch, phase):
+    """Exit status 1 with a word, nothing half done, and the next run says what an undisturbed one does."""
+    place, arguments = PHASES[phase]
+    undisturbed = spinlev(*arguments, "--out", "undisturbed")
+    shutil.rmtree("cache", ignore_errors=True)
+    calls = []
+
+    def pressed(*_, **__):
+        calls.append(1)
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as patch:
+        patch.setattr(place, pressed)
+        status, answer, said = spinlev(*arguments)
+    assert calls
+    assert (status, answer) == (1, None)
+    assert "stopped; what was finished is kept" in said
+    assert hidden(".") == []
+    status, answer, _ = spinlev(*arguments)
+    assert status == 0
+    same(answer, undisturbed[1])
+
+
+def pressing(monkeypatch, after):
+    """Ctrl-C in the flights, after a number of looks at what has been flown."""
+    looks = []
+
+    def advance(done):
+        looks.append(done)
+        if len(looks) > after:
+            raise KeyboardInterrupt
+
+    @contextmanager
+    def progress(label):
+        yield advance
+
+    monkeypatch.setattr("spinlev.studies.single.progress", progress)
+
+
+def test_ctrl_c_in_a_flight_keeps_it_and_it_goes_on_to_the_last_bit(spinlev, monkeypatch):
+    arguments = ("simulate", SCENE, "--duration-s", "3", *DIPOLE)
+    undisturbed = spinlev(*arguments, "--out", "undisturbed")[1]
+    with monkeypatch.context() as patch:
+        pressing(patch, 2)
+        status, answer, said = spinlev(*arguments)
+    assert (status, answer) == (1, None)
+    assert "--resume goes on" in said
+    begun = read_checked("out/trajectory.nc")
+    assert begun.attrs["ended_by"] == "stopped"
+    status, answer, _ = spinlev(*arguments, "--resume")
+    assert status == 0
+    assert answer["energy_error"] == undisturbed["energy_error"]
+    whole, resumed = (read_checked(f"{folder}/trajectory.nc") for folder in ("undisturbed", "out"))
+    xr.testing.assert_equal(whole, resumed)
+    assert 0 < begun.attrs["levitated_s"] < 3
+    assert not Path("out/checkpoint.npz").exists()
+
+
+def test_a_stopped_flight_is_no_point_of_a_sweep(spinlev, monkeypatch):
+    """Ctrl-C in the second of two flights: the first is kept, the second is flown anew, not taken as it was."""
+    arguments = (*VARY, "--ask", "flight", "--duration-s", "0.5", *DIPOLE)
+    assert spinlev(*arguments, "--out", "undisturbed")[0] == 0
+    looks = []
+
+    def pressed(done):
+        looks.append(done)
+        if looks.count(1.0) and done < 1.0:
+            raise KeyboardInterrupt
+
+    @contextmanager
+    def progress(label):
+        yield pressed
+
+    with monkeypatch.context() as patch:
+        patch.setattr("spinlev.studies.single.progress", progress)
+        assert spinlev(*arguments)[0] == 1
+    assert [path.name for path in Path("out/question.points").glob("0*.nc")] == ["000000.nc"]
+    status, _, said = spinlev(*arguments)
+    assert status == 0
+    assert "1 of 2 points are there" in said
+    xr.testing.assert_equal(*(read_checked(f"{folder}/question.nc") for folder in ("undisturbed", "out")))
+
+
+def test_no_solve_is_begun_that_the_memory_does_not_hold(spinlev, monkeypatch):
+    with monkeypatch.context() as patch:
+        patch.setattr(memory, "free_memory", lambda: 2e6)
+        status, answer, said = spinlev(*FIELD)
+    assert (status, answer) == (1, None)
+    assert re.search(
+        r"need about 0\.\d+ GB of memory for \d+ coupled unknowns; 0\.002 GB are free\. Allow .*--rtol", said
+    )
+    assert spinlev(*FIELD)[0] == 0
+
+
+def test_files_of_killed_processes_are_tidied_and_those_of_living_ones_are_not(tmp_path):
+    """A process that dies between two bytes leaves a file under a temporary name; the next writer removes it."""
+    code = (
+        "import os, signal, sys; from spinlev.geometry.atomic import replacing\n"
+        "with replacing(sys.argv[1]) as temporary:\n"
+        "    temporary.write_text('half')\n"
+        "    os.kill(os.getpid(), signal.SIGKILL)\n"
+    )
+    path = tmp_path / "result.nc"
+    for _ in range(2):
+        subprocess.run([sys.executable, "-c", code, str(path)], check=False)
+    assert len(hidden(tmp_path)) == 1  # the second has tidied up after the first
+    other = tmp_path / ".result-another-machine-12-x.nc"
+    other.write_text("of another machine, which may be alive")
+    with replacing(path) as mine:
+        mine.write_bytes(b"half of mine")
+        write_whole(path, b"whole")
+        assert mine.exists()
+        mine.write_bytes(b"whole of mine")
+    assert path.read_bytes() == b"whole of mine"
+    assert hidden(tmp_path) == [other]
+
+
+@pytest.mark.slow
+def test_a_result_and_its_summary_are_of_the_same_run(spinlev, monkeypatch):
+    """A run that dies after its result is written leaves no summary of the run before."""
+    Path("out").mkdir()
+    Path("out/summary.json").write_text("{}")
+    monkeypatch.setattr("spinlev.studies.run.write_dataset", lambda *_: (_ for _ in ()).throw(KeyboardInterrupt))
+    status, _, said = spinlev("run", SCENE, "--duration-s", "0.1", "--rtol", "1e-2", *DIPOLE)
+    assert status == 1
+    assert "stopped" in said
+    assert not Path("out/summary.json").exists()
+
+
+def test_files_that_others_wrote_are_read_as_far_as_they_are_whole(spinlev):
+    """Without our checksum HDF5 must find the damage: a message, whatever it raises."""
+    with h5py.File("r.nc", "w") as file:
+        file.attrs["study"] = "run"
+    content = Path("r.nc").read_bytes()
+    for length in range(0, len(content), 97):
+        Path("r.nc").write_bytes(content[:length])
+        status, _, said = spinlev("cite", "r.nc")
+        assert status == 2
+        assert "Traceback" not in said

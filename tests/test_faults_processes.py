@@ -1,0 +1,175 @@
+"""Real processes that are stopped, killed, starved or run side by side; within one process: test_faults."""
+
+import json
+import os
+import resource
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from spinlev.fem.table_store import read_checked
+
+pytestmark = pytest.mark.slow
+
+SCENE = str(Path(__file__).parent.parent / "scenes" / "horizontal.toml")
+CALL = "import sys; from spinlev.studies.cli import main; sys.argv[0] = 'spinlev'; main()"
+DIPOLE = ("--model", "dipole", "--plate-model", "none")
+FIELD = ("field", SCENE, "--points", "points.csv", "--model", "fem", "--rtol", "3e-5", "--json")
+FLIGHT = ("simulate", SCENE, "--duration-s", "400", *DIPOLE, "--json")
+RUN = ("run", SCENE, "--duration-s", "0.2", "--rtol", "1e-3", *DIPOLE, "--json")
+VARY = ("frequency_hz=92,95,100,105,110,120",)
+SWEEP = ("study", SCENE, "--vary", *VARY, *DIPOLE, "--json")
+PHASES = {
+    "field: the table is computed": (FIELD, "finite elements ...", 0.2),
+    "simulate: equilibria": (FLIGHT, "Equilibria ...", 0.3),
+    "simulate: motion": (FLIGHT, "Motion ...", 1.5),
+    "run: table": (RUN, "finite elements ...", 0.2),
+    "run: equilibria": (RUN, "Equilibria ...", 0.3),
+    "run: files": (RUN, "Files and figures ...", 0.5),
+    "sweep in one process": ((*SWEEP, "--workers", "1"), "000000.nc", 0.1),
+    "sweep on a cluster": ((*SWEEP, "--workers", "2"), "000000.nc", 0.1),
+}
+RESULTS = ("field.csv", "trajectory.nc", "result.nc", "question.nc")
+
+
+@pytest.fixture
+def spinlev(tmp_path, monkeypatch):
+    """Start the command in an empty folder, as a group of processes like those of a terminal."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("SPINLEV_CACHE", str(tmp_path / "cache"))
+    Path("points.csv").write_text("x_mm,y_mm,z_mm\n0,0,-20\n3,1,-25\n")
+
+    def start(*arguments, limit=None):
+        with Path("said").open("w") as said, Path("answer").open("w") as answer:
+            return subprocess.Popen(
+                [sys.executable, "-c", CALL, *map(str, arguments)],
+                stdout=answer,
+                stderr=said,
+                start_new_session=True,
+                preexec_fn=limit,
+            )
+
+    return start
+
+
+def reached(process, sign):
+    """Wait until the phase has begun: its message, or a file of it."""
+    while sign not in Path("said").read_text() and not list(Path("out").rglob(sign)):
+        assert process.poll() is None, Path("said").read_text()
+        time.sleep(0.01)
+
+
+def numbers(folder):
+    """What a finished command has left, as comparable values."""
+    found = {}
+    for path in sorted(Path(folder).rglob("*")):
+        if path.name in RESULTS and path.suffix == ".nc":
+            dataset = read_checked(path)
+            found[path.name] = {str(k): v.values for k, v in dataset.variables.items() if v.dtype.kind == "f"}
+        elif path.name == "field.csv":
+            found[path.name] = {"table": np.loadtxt(path, delimiter=",", skiprows=1)[:, :15]}
+    assert found
+    return found
+
+
+def same(folder, other):
+    first, second = numbers(folder), numbers(other)
+    assert first.keys() == second.keys()
+    for name, columns in first.items():
+        for key, values in columns.items():
+            # Estimated errors are differences that cancel; a table made anew is the same to round-off.
+            scale = np.nanmax(np.abs(values), initial=1e-300)
+            rtol = 1e-7 if "error" in key else 1e-10
+            np.testing.assert_allclose(second[name][key], values, rtol=rtol, atol=rtol * scale, err_msg=f"{name} {key}")
+
+
+@pytest.mark.parametrize("blow", [signal.SIGINT, signal.SIGTERM, signal.SIGKILL], ids=lambda blow: blow.name)
+@pytest.mark.parametrize("phase", PHASES)
+def test_a_blow_in_every_phase(spinlev, phase, blow):
+    """Ctrl-C and SIGTERM end with status 1 and leave nothing half done; after SIGKILL the next run tidies up."""
+    arguments, sign, later = PHASES[phase]
+    process = spinlev(*arguments)
+    reached(process, sign)
+    time.sleep(later)
+    assert process.poll() is None, "the phase was over already"
+    os.killpg(process.pid, blow)
+    status = process.wait(timeout=60)
+    said = Path("said").read_text()
+    assert "Traceback" not in said, said
+    if blow == signal.SIGKILL:
+        assert status == -signal.SIGKILL
+    else:
+        assert status == 1, said
+        assert "stopped; what was finished is kept" in said
+        assert Path("answer").read_text() == ""
+        assert [path for path in Path().rglob(".*") if path.is_file()] == []
+    again = (*arguments, "--resume") if arguments == FLIGHT else arguments
+    assert spinlev(*again).wait(timeout=300) == 0, Path("said").read_text()
+    assert json.loads(Path("answer").read_text())
+    assert [path for path in Path().rglob(".*") if path.is_file()] == []
+    assert spinlev(*arguments, "--out", "undisturbed").wait(timeout=300) == 0
+    same("undisturbed", "out")
+
+
+def test_two_processes_that_need_the_same_table(spinlev):
+    processes = [spinlev(*FIELD, "--out", folder) for folder in ("one", "two")]
+    assert [process.wait(timeout=300) for process in processes] == [0, 0]
+    assert len(list(Path("cache").glob("rotor-*.nc"))) == 1
+    same("one", "two")
+
+
+@pytest.mark.parametrize("size", [0, 5_000, 60_000])
+@pytest.mark.parametrize("arguments", [FIELD, RUN, (*SWEEP, "--workers", "1")], ids=["field", "run", "sweep"])
+def test_a_disk_that_takes_no_more_than_so_many_bytes_a_file(spinlev, arguments, size):
+    """Also of the libraries that write themselves (pictures): status 0 or 1 in words, and only whole files."""
+    status = spinlev(*arguments, limit=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (size, size))).wait(
+        timeout=300
+    )
+    if size:  # else not even messages can be written
+        said = Path("said").read_text()
+        assert "Traceback" not in said
+        assert status == 1 or arguments == FIELD, said
+    assert status in (0, 1, 120)  # 120: Python could not write its messages
+    assert [path for path in Path().rglob(".*") if path.is_file()] == []
+    for path in Path().rglob("*.nc"):
+        read_checked(path)
+    assert spinlev(*arguments).wait(timeout=300) == 0, Path("said").read_text()
+    assert spinlev(*arguments, "--out", "undisturbed").wait(timeout=300) == 0
+    same("undisturbed", "out")
+
+
+@pytest.mark.parametrize("arguments", [FIELD, RUN], ids=["field", "run"])
+def test_too_little_memory(spinlev, arguments):
+    """An address space with 30 MB left when the solve begins is refused in words; without the limit all is well."""
+    code = (
+        "import sys, resource, psutil; from spinlev.fem import rotor_solution\n"
+        "meshed = rotor_solution.mesh_magnets\n"
+        "def starved(*a):\n"
+        "    mesh = meshed(*a)\n"
+        "    size = psutil.Process().memory_info().vms + 30_000_000\n"
+        "    resource.setrlimit(resource.RLIMIT_AS, (size, size))\n"
+        "    return mesh\n"
+        "rotor_solution.mesh_magnets = starved\n" + CALL
+    )
+    done = subprocess.run([sys.executable, "-c", code, *arguments], capture_output=True, text=True, check=False)
+    assert done.returncode == 1, done.stderr
+    assert "of memory for" in done.stderr
+    assert "use a machine with more" in done.stderr
+    assert "Traceback" not in done.stderr
+    assert spinlev(*arguments).wait(timeout=300) == 0
+
+
+def test_a_full_pipe_that_nobody_reads(spinlev):
+    """`spinlev ... | head -0`: status 1 in words."""
+    arguments = [a if a != "fem" else "dipole" for a in FIELD]
+    process = subprocess.Popen([sys.executable, "-c", CALL, *arguments], stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+    process.stdout.close()
+    said = process.stderr.read().decode()
+    assert process.wait(timeout=60) == 1
+    assert "standard output: Broken pipe" in said
+    assert "Traceback" not in said

@@ -1,0 +1,63 @@
+"""Results that earlier runs wrote (`study NAME --quick`, in tests/data/quick) still open, are drawn and reported."""
+
+import re
+import shutil
+from pathlib import Path
+
+import matplotlib.pyplot as plt
+import numpy as np
+import pytest
+
+from spinlev.studies.catalogue import CATALOGUE
+from spinlev.studies.cite import cite_job
+from spinlev.studies.drawings import figures_of, read_result
+from spinlev.studies.figures import drawn
+from spinlev.studies.report import report_job
+
+STORED = sorted((Path(__file__).parent / "data" / "quick").glob("*.nc"))
+
+
+@pytest.mark.parametrize("path", STORED, ids=lambda path: path.stem)
+def test_a_stored_result_is_drawn_and_reported_from_its_file_alone(path):
+    result = read_result(path)
+    assert result.attrs["study"] == path.stem
+    (figure,) = figures_of(result).values()
+    try:
+        shown = [axes for axes in figure.axes if axes.has_data()]
+        assert shown
+        for axes in shown:
+            for label in (axes.get_xlabel(), axes.get_ylabel()):
+                assert not re.search(r"\bnan\b|None", label)
+        assert any(axes.get_xlabel() or axes.get_title() for axes in shown)
+        assert drawn(figure, "png").startswith(b"\x89PNG")
+    finally:
+        plt.close(figure)
+    lines = CATALOGUE[path.stem].report(result)
+    assert any(re.search(r"\d", line) for line in lines)
+    assert cite_job(path)
+
+
+def test_stored_results_make_one_report(tmp_path):
+    chosen = [path for path in STORED if path.stem in ("design", "sensitivity")]
+    for path in chosen:
+        shutil.copy(path, tmp_path)
+    page, names = report_job(tmp_path, tmp_path)
+    assert names == ["design", "sensitivity"]
+    assert page.read_text().count("data:image/png;base64,") == 2
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("path", STORED, ids=lambda path: path.stem)
+def test_the_first_point_of_a_study_is_still_what_was_stored(path):
+    """To 1 %: accuracy has limits that move with the program, results have not."""
+    study, stored = CATALOGUE[path.stem], read_result(path)
+    found = study.gather([study.compute(study.points(True)[0])])
+    assert set(found.data_vars) == set(stored.data_vars)
+    compared = 0
+    for name, values in found.data_vars.items():
+        known = stored[name].isel(case=slice(len(values["case"]))) if "case" in values.dims else stored[name]
+        if values.dtype.kind == "f" and known.shape == values.shape and not re.search("error|second|time|memory", name):
+            scale = np.nanmax(np.abs(known.values), initial=1e-300)
+            np.testing.assert_allclose(values, known, rtol=1e-2, atol=1e-2 * scale, err_msg=str(name))
+            compared += 1
+    assert compared

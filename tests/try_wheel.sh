@@ -1,0 +1,44 @@
+#!/bin/sh
+# Installs a source distribution and a wheel outside the repository and tests the wheel there.
+#
+#   sh tests/try_wheel.sh PYTHON DIST
+#
+# PYTHON has the dependencies, which are lent to the new environment; DIST holds the two files.
+set -eu
+python=$(cd "$(dirname "$1")" && pwd)/$(basename "$1")
+dist=$(cd "$2" && pwd)
+repository=$(cd "$(dirname "$0")/.." && pwd)
+place=$(mktemp -d)
+trap 'rm -rf "$place"' EXIT
+unset PYTHONPATH
+
+cp -r "$repository/tests" "$repository/scenes" "$repository/pyproject.toml" "$place"
+cd "$place"
+export SPINLEV_CACHE="$place/cache"
+
+for file in "$dist"/*.tar.gz "$dist"/*.whl; do
+  echo "== $(basename "$file")"
+  rm -rf venv
+  "$python" -m venv --without-pip venv
+  own=$(venv/bin/python -c 'import sysconfig; print(sysconfig.get_path("purelib"))')
+  "$python" -c 'import sysconfig; print(sysconfig.get_path("purelib"))' > "$own/lent.pth"
+  "$python" -m pip --python venv/bin/python install --quiet --disable-pip-version-check --no-index --no-deps \
+    --no-build-isolation --ignore-installed "$file"
+  venv/bin/python - "$own" <<'PYTHON'
+import sys
+from importlib.metadata import distribution
+from pathlib import Path
+
+from spinlev import dynamics, fem, geometry, studies
+
+homes = {str(Path(package.__file__).parents[2]) for package in (geometry, fem, dynamics, studies)}
+assert homes == {sys.argv[1]}, homes
+files = {str(file) for file in distribution("spinlev").files}
+assert {"spinlev/studies/report.html", "spinlev/studies/team7_line_A1B1.csv", "spinlev/fem/py.typed"} <= files
+print("installed:", len([file for file in files if file.endswith(".py")]), "modules in", sys.argv[1])
+PYTHON
+  venv/bin/spinlev equilibria scenes/vertical-24h.toml --model dipole --json --out out > answer.json
+  venv/bin/python -c 'import json; print("distance", json.load(open("answer.json"))["equilibria"][0]["position_mm"][2], "mm")'
+done
+venv/bin/python -m pytest -q -m "not slow" -p no:cacheprovider tests/test_api.py tests/test_closed_form.py \
+  tests/test_scene_file.py tests/test_command_line.py tests/test_integration.py tests/test_sweep.py
