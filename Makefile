@@ -38,7 +38,7 @@ types: install
 	$(BIN)/mypy $(PACKAGES)
 
 test: lint types
-	$(BIN)/pytest -n 2 -m "not slow"
+	$(BIN)/pytest -n 2 --dist worksteal -m "not slow"
 
 validate: install
 	$(BIN)/pytest -m slow -s

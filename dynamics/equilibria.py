@@ -7,11 +7,11 @@ import numpy as np
 from ..fem.table import FieldTable
 from ..geometry.box import Array
 from ..geometry.scene import Scene
-from .balance import EVERY, Balance, solve
-from .continuation import all_curves
+from .balance import Balance
 from .curve import Curve
 from .equations import parameters
 from .equilibrium import Equilibrium, EquilibriumError, ForceCurve, Survey
+from .fixed_points import fixed_points
 from .memory import PlateMemory
 from .mode_names import named_modes
 from .rates import Rates
@@ -58,7 +58,7 @@ def survey(
     Returns
     -------
     Equilibria, the stable ones first, then by distance, accurate to round-off in the table's field: every curve of
-    lateral balance that is met from some four thousand starts is followed, and every zero of the axial force on it is
+    lateral balance that is met from nearly five thousand starts is followed, and every zero of the axial force on it is
     polished; so is what Newton's method finds directly from these starts.
 
     Raises
@@ -75,23 +75,6 @@ def survey(
     if np.any(scene.gravity[:2]):
         found = _shaken(Shaken(scene, rates, values, None), found)
     return Survey(_in_order(found), tuple(_force_curve(scene, scales, curve) for curve in curves))
-
-
-def fixed_points(balance: Balance, where: SearchRange) -> tuple[list[Curve], list[tuple[Array, Array]]]:
-    """Curves of lateral balance in the range, and the scaled positions and moments of the equilibria on them."""
-    curves = all_curves(balance, where)
-    guesses = [*(curve.balanced() for curve in curves), _scattered(balance, where)]
-    position, moment = (np.concatenate(part) for part in zip(*guesses, strict=True))
-    return curves, [(r, m) for r, m in _polished(balance, position, moment) if r in where]
-
-
-def _scattered(balance: Balance, where: SearchRange) -> tuple[Array, Array]:
-    """What Newton's method in all five unknowns finds from the starts: short curves may pass between them."""
-    with np.errstate(all="ignore"):  # many of these starts run away
-        position, moment, step = solve(balance, *where.starts(), EVERY, 25)
-    points = np.concatenate([position, moment], axis=1)[(step < 1e-8) & where.holds(position)]
-    _, first = np.unique(points.round(6), axis=0, return_index=True)
-    return points[first, :3], points[first, 3:]
 
 
 def with_plate(
@@ -130,18 +113,6 @@ def _shaken(problem: Shaken, found: list[Equilibrium]) -> list[Equilibrium]:
         elif not np.any(problem.scene.gravity[:2]):
             kept.append(fixed)
     return kept
-
-
-def _polished(balance: Balance, position: Array, moment: Array) -> list[tuple[Array, Array]]:
-    """Distinct zeros of all five balances near the guesses (n, 3), to round-off."""
-    if not len(position):
-        return []
-    position, moment, step = solve(balance, position, moment, EVERY)
-    points: list[tuple[Array, Array]] = []
-    for r, m, size in zip(position, moment, step, strict=True):
-        if size < 1e-8 and not any(np.linalg.norm(r - q) + np.linalg.norm(m - n) < 1e-6 for q, n in points):
-            points.append((r, m))
-    return points
 
 
 def _equilibrium(table: FieldTable, scales: Scales, balance: Balance, position: Array, moment: Array) -> Equilibrium:

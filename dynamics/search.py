@@ -45,7 +45,7 @@ class SearchRange:
         beside = 1.0 + np.array([1.0, 1.1, 1.3, 2.0]) * max((np.abs(c[:, :2]).max() for c in corners), default=0.0)
         below = -np.geomspace(nearest, max(self.farthest / self.scene.floater.radius, nearest), 16)
         places = np.concatenate(
-            [_rings(below, np.array([0.0, 0.15, 0.7]), 4), _rings(np.array([-0.01, -0.1, -0.4, -0.9]), beside, 8)]
+            [_rings(below, np.array([0.0, 0.15, 0.7]), 4), _rings(np.array([-0.01, -0.1, -0.4, -0.9]), beside, 12)]
         )
         moment = np.array([v for v in product((-1.0, 0.0, 1.0), repeat=3) if sum(map(abs, v)) in (1.0, 3.0)])
         moment /= np.linalg.norm(moment, axis=1, keepdims=True)

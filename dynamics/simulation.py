@@ -20,17 +20,15 @@ from .flight import TOLERANCE, compile_flight
 from .integration import integrate
 from .memory import PlateMemory
 from .plate_force import PlateForce
-from .rates import Rates
 from .state import Scales, State
 from .symbols import Parameter
 from .trajectory import Trajectory
+from .way_out import way_out
 
 PLATE_TOLERANCE = 1e-13
 """Of a Taylor step with a plate, whose table is known to 1e-4 at best."""
 SLOWLY = 1 / 3
 """Growth (1/s) with which a flight may still begin: an e-fold in the shortest flight that counts, 3 s."""
-FREQUENCY_RATIO, FREQUENCY_TRIALS = 1.08, 9
-"""Steps in which a frequency that works is looked for: up and down by a factor of two."""
 
 
 class StartError(InputError):
@@ -109,7 +107,7 @@ def initial_state(
         known = find_equilibria(scene, table, memory=memory) if equilibria is None else equilibria
         chosen = starting_point(known)
         if chosen is None:
-            raise EquilibriumError(_way_out(scene, table, known))
+            raise EquilibriumError(way_out(scene, table, known))
         state = _displaced(scene, chosen.start, scene.start.offset)
         currents = currents if chosen.currents is None else chosen.currents[0]
     gap = float(clearance(scene, np.zeros(1), state.position[None])[0])
@@ -136,22 +134,3 @@ def starting_point(equilibria: Sequence[Equilibrium]) -> Equilibrium | None:
 def _displaced(scene: Scene, start: State, offset: Array) -> State:
     turning = np.cross([0.0, 0.0, scene.angular_velocity], offset)
     return replace(start, position=start.position + offset, velocity=start.velocity + turning)
-
-
-def _way_out(scene: Scene, table: FieldTable, equilibria: Sequence[Equilibrium]) -> str:
-    kinds = dict.fromkeys(f"{1e3 * e.distance:.2f} mm (grows e-fold in {1 / e.growth_per_s:.2g} s)" for e in equilibria)
-    found = f"only unstable ones at {', '.join(kinds)}" if kinds else "nor any unstable one below the rotor"
-    other = _levitating_frequency(scene, table)
-    advice = f"About {other:.4g} Hz has one; or give" if other else "None was found within a factor of two; give"
-    return f"At {scene.frequency:g} Hz the floater has no stable equilibrium, {found}. {advice} start.position_mm."
-
-
-def _levitating_frequency(scene: Scene, table: FieldTable) -> float | None:
-    """The nearest tried frequency at which there is a stable equilibrium, Hz."""
-    rates = Rates.of(scene, table)
-    for step in range(1, FREQUENCY_TRIALS + 1):
-        for ratio in (FREQUENCY_RATIO**step, FREQUENCY_RATIO**-step):
-            frequency = scene.frequency * ratio
-            if any(e.stable for e in find_equilibria(replace(scene, frequency=frequency), table, rates=rates)):
-                return frequency
-    return None

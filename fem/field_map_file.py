@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import csv
+import io
 from collections.abc import Mapping
+from contextlib import redirect_stderr
 from pathlib import Path
 
 import meshio
@@ -127,10 +129,13 @@ def _components(vector: xr.DataArray, name: str) -> dict[str, xr.DataArray]:
 
 
 def _mesh_columns(path: Path, length: float, field: float) -> dict[str, Array]:
+    said = io.StringIO()
     try:
-        mesh = meshio.read(path)
-    except (Exception, SystemExit) as error:  # meshio leaves the program where no reader takes the file
-        raise FieldMapError(f"Input map must be a mesh that meshio reads; instead: {error}.") from None
+        with redirect_stderr(said):
+            mesh = meshio.read(path)
+    except (Exception, SystemExit) as error:  # where no reader takes the file meshio prints why, and leaves the program
+        reason = " ".join(said.getvalue().split()) or error
+        raise FieldMapError(f"Input map must be a mesh that meshio reads; instead: {reason}.") from None
     columns = {axis: length * mesh.points[:, k] for k, axis in enumerate(AXES[: mesh.points.shape[1]])}
     for name, values in mesh.point_data.items():
         values = np.asarray(values, float)

@@ -29,11 +29,12 @@ from ..geometry.magnet import Magnet
 from ..geometry.mesh import MagnetMesh
 from .demagnetization import remanent_field
 from .integration_points import volume_points
-from .memory import require_memory
+from .memory import TooLargeError, require_memory
 from .open_boundary import OpenBoundary
 from .open_solve import solve_open
 
 Formulation = Literal["split", "direct"]
+WAY_OUT = "Allow a larger error of the field (--rtol)"
 
 
 class MeshError(ComputationError):
@@ -90,7 +91,7 @@ def assemble(mesh: MagnetMesh, order: int) -> System:
     TooLargeError : the memory does not hold the system
     """
     space = ng.H1(mesh.mesh, order=order)
-    require_memory(space, space.FreeDofs(True), "Allow a larger error of the field (--rtol)")
+    require_memory(space, space.FreeDofs(True), WAY_OUT)
     trial, test = space.TnT()
     stiffness = ng.BilinearForm(space, symmetric=True, condense=True)
     matrices = {f"magnet{k}": magnet.permeability_in_rotor for k, magnet in enumerate(mesh.magnets)}
@@ -103,8 +104,10 @@ def assemble(mesh: MagnetMesh, order: int) -> System:
     stiffness += 2 / mesh.ball_radius * trial * test * ng.ds("outer")
     try:
         stiffness.Assemble()
-    except NgException as error:  # netgen refined a face otherwise from either side
-        raise MeshError(str(error)) from error
+    except NgException as error:
+        if "alloc" in str(error):
+            raise TooLargeError(f"The memory ran out in elements of order {order}: {error}. {WAY_OUT}.") from error
+        raise MeshError(str(error)) from error  # netgen refined a face otherwise from either side
     return System(mesh, order, space, stiffness)
 
 

@@ -24,6 +24,8 @@ SEPARATORS = 34.0
 """Numbers in the factor over the square of the unknowns on a plane; 17 to 36 were measured."""
 PEAK = 1.2
 """The largest amount while the factor is made, over what is kept."""
+HEAP = 300_000_000
+"""Address space that NGSolve reserves while it assembles, bytes; most of it is never touched."""
 GROUP = Path("/sys/fs/cgroup")
 """Where Linux tells the limits of a container or a batch job."""
 
@@ -79,7 +81,7 @@ def free_memory() -> float:
     own, _ = resource.getrlimit(resource.RLIMIT_AS)
     limits = [float(psutil.virtual_memory().available), _group_memory()]
     if own != resource.RLIM_INFINITY:
-        limits.append(float(own - psutil.Process().memory_info().vms))
+        limits.append(float(own - psutil.Process().memory_info().vms - HEAP))
     return max(min(limits), 0.0)
 
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 import os
 import signal
 import sys
+import threading
 import time
 import traceback
 from importlib.metadata import version
@@ -23,6 +24,7 @@ from .output import Answer
 from .result_commands import add_result_commands
 from .scene_commands import add_scene_commands
 
+STOPPED = "spinlev: stopped; what was finished is kept."
 app = App(
     name="spinlev",
     version=version("spinlev"),
@@ -36,13 +38,21 @@ add_result_commands(app)
 
 def main() -> None:
     """Run the command line and leave with its exit status."""
-    signal.signal(signal.SIGTERM, signal.default_int_handler)  # a batch system stops like a person
+    stop = threading.Event()
+
+    def stopped(*_: object) -> None:
+        stop.set()
+        raise KeyboardInterrupt
+
+    for number in (signal.SIGINT, signal.SIGTERM):  # a batch system stops like a person
+        signal.signal(number, stopped)
     with answers_only() as out:
-        status = _status(sys.argv[1:], out)
+        status = _status(sys.argv[1:], out, stop)
     sys.exit(status)
 
 
-def _status(arguments: list[str], out: Any) -> int:
+def _status(arguments: list[str], out: Any, stop: threading.Event | None = None) -> int:
+    """The exit status; `stop` tells that the user has stopped the program, whatever a library made of that."""
     try:
         _answer(arguments, out)
     except CycloptsError as error:
@@ -59,9 +69,12 @@ def _status(arguments: list[str], out: Any) -> int:
         note(f"spinlev: the computation failed to write or read {where}: {error.strerror or error}; see --out.")
         return 1
     except KeyboardInterrupt:
-        note("spinlev: stopped; what was finished is kept.")
+        note(STOPPED)
         return 1
     except Exception as error:  # the last resort: say what and where, without a traceback
+        if stop and stop.is_set():
+            note(STOPPED)
+            return 1
         if "SPINLEV_TRACEBACK" in os.environ:
             raise
         frame = traceback.extract_tb(error.__traceback__)[-1]

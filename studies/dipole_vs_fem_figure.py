@@ -19,6 +19,8 @@ CAUSES = {
 }
 """What lies between two models."""
 TOTAL = ("article", "mutual")
+ENDS = {"contact": ("v", "ends at the rotor"), "border": ("^", "goes on beyond")}
+"""Upper ends that are no loss of stability."""
 
 
 def change(result: xr.Dataset, name: str, models: tuple[str, str]) -> tuple[xr.DataArray, xr.DataArray]:
@@ -102,9 +104,9 @@ def _ranges(axes: Axes, part: xr.Dataset) -> None:
             error = _best_known(part, f"{end}_error", model)
             axes.errorbar(places, values, error, fmt="none", ecolor="0.1", lw=1)
         axes.use_sticky_edges = False
-        touching = part["high_kind"].sel(model=model).values == "contact"
-        label = "ends at the rotor" if model == "article" else None
-        axes.plot(places[touching], high[touching], "kv", ms=4, label=label)
+        for kind, (marker, words) in ENDS.items():
+            ends = part["high_kind"].sel(model=model).values == kind
+            axes.plot(places[ends], high[ends], marker, color="k", ms=4, label=words if model == "article" else None)
     axes.margins(y=0.08)
     axes.set(ylabel="frequencies of stable levitation (Hz)")
 

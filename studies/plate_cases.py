@@ -22,7 +22,7 @@ CONDUCTIVITY, DISTANCE = 3.5e7, 0.018
 """Defaults of the sweeps: aluminium, S/m; face below or beside the floater's centre, m."""
 CONFIGURATION, MEASURE, FREQUENCY = "tilt", 10.0, 130.0
 """The rotor of the sweeps over plates, that of the scene `tilt-over-plate`: tilt in degrees, Hz."""
-REAL = (0.012, 0.018, 0.03)
+REAL = (DISTANCE,)
 """Distances of the face at which the real plate, with its edges, is computed beside the infinite slab, m."""
 FIELD_RTOL = 1e-4
 MIDDLE = 0.5

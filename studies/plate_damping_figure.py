@@ -110,6 +110,8 @@ def _rotors(axes: Axes, result: xr.Dataset) -> None:
         worst, error = part["growth"].max("mode").values, part["error"].values
         places = np.arange(part.sizes["case"])
         axes.errorbar(places, worst, np.abs(worst) * error, fmt=marker, ms=4, color=color, label=sweep.split(", ")[1])
+        gone = places[np.isnan(worst)]
+        axes.plot(gone, 0 * gone, "x", color=color, label="no equilibrium is left" if len(gone) else None)
         rotors = zip(part["configuration"].values, part["value"].values, strict=True)
         names = [label(str(configuration), float(value)) for configuration, value in rotors]
         axes.set_xticks(places, names, rotation=90, fontsize=7)

@@ -69,11 +69,13 @@ def sentence(result: xr.Dataset) -> str:
         moved = (part["shift"] ** 2).sum("axis", skipna=False) ** 0.5
         lift = 100 * part["force"].sel(axis="z") / float(result.attrs["weight_N"])
         torque = -1e6 * part["torque"].sel(axis="z")
-        kept = int((worst < 0).sum())
+        kept, gone = int((worst < 0).sum()), int(worst.isnull().sum())
+        lost = f", {gone} without an equilibrium" if gone else ""
         words.append(
-            f"{place} to {spanned(worst, abs(worst) * error)} /s ({kept} of {part.sizes['case']} stable), moving it by "
-            f"{spanned(moved, moved * error, 1e3)} mm, with a mean force up of {spanned(lift, abs(lift) * error)} % of "
-            f"its weight and a braking torque of {spanned(torque, abs(torque) * error)} µN m"
+            f"{place} to {spanned(worst, abs(worst) * error)} /s ({kept} of {part.sizes['case']} stable{lost}), moving "
+            f"it by {spanned(moved, moved * error, 1e3)} mm, with a mean force up of "
+            f"{spanned(lift, abs(lift) * error)} % of its weight and a braking torque of "
+            f"{spanned(torque, abs(torque) * error)} µN m"
         )
     before = result["growth_without"].max("mode").values
     return (

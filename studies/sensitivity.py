@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import xarray as xr
+from scipy.special import ndtri
 
 from ..dynamics import Rates, find_equilibria
 from ..fem.models import rotor_table
@@ -40,7 +41,7 @@ def points(quick: bool) -> list[study.Point]:
 
     One step alone gives derivatives without an estimate of their error, which is then NaN.
     """
-    return [{**point, "samples": 4 if quick else 50, "steps": [1] if quick else [1, 2]} for point in levitated(quick)]
+    return [{**point, "samples": 4 if quick else 32, "steps": [1] if quick else [1, 2]} for point in levitated(quick)]
 
 
 def derivatives(base: Nominal, factors: Sequence[int] = (1, 2)) -> tuple[Array, Array]:
@@ -64,11 +65,16 @@ def slope_by(base: Nominal, name: str, step: float) -> Array:
 
 
 def drawn(base: Nominal, samples: int) -> tuple[Array, Array]:
-    """What `samples` draws of the tolerances give (sample, quantity), and the draws (sample, parameter)."""
+    """What `samples` draws of the tolerances give (sample, quantity), and the draws (sample, parameter).
+
+    A Latin hypercube: each parameter's draws are spread evenly (McKay, Beckman, Conover, Technometrics 21 (1979) 239).
+    """
     generator = np.random.default_rng(SEED)
+    ranks = generator.permuted(np.tile(np.arange(samples)[:, None], len(PARAMETERS)), axis=0)
+    levels = (ranks + generator.random(ranks.shape)) / samples
     draws = np.zeros((samples, len(PARAMETERS)))
     for k, (name, known) in enumerate(PARAMETERS.items()):
-        unit = generator.normal(size=samples) if known.normal else generator.uniform(-1, 1, samples)
+        unit = ndtri(levels[:, k]) if known.normal else 2 * levels[:, k] - 1
         tilted = name == "measure" and base.configuration == "tilt"
         draws[:, k] = (TILT_SPREAD if tilted else known.spread) * unit
     rows = []

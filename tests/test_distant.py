@@ -8,6 +8,8 @@ from spinlev.fem.distant import distant
 from spinlev.fem.models import rotor_table
 from spinlev.fem.multipole import uniform_moments
 from spinlev.geometry import horizontal
+from spinlev.geometry.scene import Drag, Floater, Scene
+from spinlev.studies.plate_shelf import table_in_flight
 
 ROTOR = horizontal(2e-3, 10e-3, 1.305, 1.0)
 RTOL, CONTACT, FAR = 1e-4, 6.35e-3, 12e-3
@@ -35,3 +37,15 @@ def test_fewer_coefficients_do_from_farther_on():
 def test_a_closed_form_stays_as_it_is():
     table = rotor_table(ROTOR, "cuboid")
     assert distant(table, Accuracy(RTOL, FAR)) is table
+
+
+def test_a_flight_takes_the_table_for_its_place():
+    """At 22 mm below the cube it holds from 14 mm off the faces on, next to contact from contact on."""
+    scene = Scene(110.0, ROTOR, Floater(CONTACT, 1.305, 1.0, 7500.0), Drag(0.0, 0.0))
+    whole = rotor_table(ROTOR, "moments", RTOL, CONTACT)
+    far, near = (table_in_flight(scene, whole, np.array([2e-3, 0.0, z]), RTOL) for z in (-22e-3, -13e-3))
+    points = shell(ROTOR, 14e-3)
+    assert np.all(far.absolute_error(points)[0] <= RTOL * typical_field(ROTOR, points))
+    assert coefficients(far) < coefficients(near) <= coefficients(whole)
+    points = shell(ROTOR, CONTACT)
+    assert np.all(near.absolute_error(points)[0] <= 1.5 * RTOL * typical_field(ROTOR, points))

@@ -5,6 +5,8 @@ import numpy as np
 import pytest
 
 from spinlev.dynamics import EquilibriumError, equilibrium_map, find_equilibria, rotor_family
+from spinlev.dynamics.fixed_points import fixed_points
+from spinlev.dynamics.grid import Grid
 from spinlev.dynamics.rates import Rates
 from spinlev.dynamics.symbols import Parameter
 from spinlev.fem.models import rotor_table
@@ -37,7 +39,7 @@ def scene_of(name):
 def test_map_equals_searches_at_random_points(name, model):
     """All equilibria, their places to 1e-9 m, growth and stability, of a table made for the point's own rotor."""
     family, measures = rotor_family(scene_of(name), name, model, 1e-4), ROTORS[name][1]
-    spacing = 8 if name == "horizontal" else 3  # of the vertical rotor a sheet between 11 and 14 mm ends at 61 Hz
+    spacing = 8 if name == "horizontal" else 3
     found, rng = equilibrium_map(family, FREQUENCIES, measures, spacing=spacing), np.random.default_rng(1)
     assert found.number[0].sum() == len(found.row)
     for row, column in rng.integers((len(FREQUENCIES), len(measures)), size=(4, 2)):
@@ -54,6 +56,21 @@ def test_map_equals_searches_at_random_points(name, model):
             assert found.stable[same] == e.stable
             tolerance = 1e-6 + 3 * (e.growth_error_per_s + found.errors[same])
             assert found.growth_per_s[same] == pytest.approx(e.growth_per_s, abs=tolerance)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("model", ["dipole", "cuboid"])
+@pytest.mark.parametrize("name", ["horizontal", "vertical"])
+def test_map_misses_nothing_that_a_search_finds(name, model):
+    """At thirty random points; sheets that leave the range, such as z > 0, and come back are followed outside it."""
+    family, measures = rotor_family(scene_of(name), name, model, 1e-4), ROTORS[name][1]
+    grid = Grid(family, FREQUENCIES, measures, 0.0, 0.1)
+    found = equilibrium_map(family, FREQUENCIES, measures, spacing=3)
+    places = np.concatenate([found.position / FLOATER.radius, found.moment], axis=1)
+    for point in np.random.default_rng(5).choice(len(grid), 30, replace=False):
+        here = places[found.row * len(measures) + found.column == point]
+        for position, moment in fixed_points(grid.alone(int(point)), grid.range(int(point)))[1]:
+            assert np.linalg.norm(here - np.concatenate([position, moment]), axis=1).min() < 1e-6
 
 
 @pytest.mark.parametrize("name", ROTORS)

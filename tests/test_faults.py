@@ -10,6 +10,7 @@ import re
 import shutil
 import subprocess
 import sys
+import threading
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -249,6 +250,19 @@ def test_ctrl_c_in_every_phase(spinlev, monkeypatch, phase):
     status, answer, _ = spinlev(*arguments)
     assert status == 0
     same(answer, undisturbed[1])
+
+
+def test_ctrl_c_that_a_library_takes_for_its_own_failure(spinlev, monkeypatch, capsys):
+    """vtk makes an ImportError of a KeyboardInterrupt while it is loaded."""
+    stop = threading.Event()
+
+    def pressed(*_):
+        stop.set()
+        raise ImportError("No module named vtk")
+
+    monkeypatch.setattr("spinlev.studies.single.write_whole", pressed)
+    assert _status([*WRITERS["field.csv"]], sys.stderr, stop) == 1
+    assert "stopped; what was finished is kept" in capsys.readouterr().err
 
 
 def pressing(monkeypatch, after):

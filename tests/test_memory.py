@@ -8,6 +8,7 @@ from pathlib import Path
 
 import ngsolve
 import pytest
+from netgen.meshing import NgException
 
 from spinlev.fem import memory
 from spinlev.fem.climb import rung
@@ -55,12 +56,12 @@ def test_a_solve_that_the_memory_does_not_hold_is_refused(monkeypatch):
 
 
 def test_a_limit_of_the_process_is_seen_before_it_is_hit():
-    """A child that may have 60 MB more than it has: refused in words, where the solver would have died."""
+    """A child that may have 60 MB more than it has and NGSolve's heap: refused in words where the solver would die."""
     code = (
         "import resource, psutil, test_memory as t\n"
         "from spinlev.geometry.mesh import MeshSettings\n"
         "mesh = t.mesh_magnets(t.ROTOR, t.rung(4, MeshSettings(), 0.05).mesh)\n"
-        "size = psutil.Process().memory_info().vms + 60_000_000\n"
+        "size = psutil.Process().memory_info().vms + 360_000_000\n"
         "resource.setrlimit(resource.RLIMIT_AS, (size, size))\n"
         "t.assemble(mesh, 4)\n"
     )
@@ -72,6 +73,22 @@ def test_a_limit_of_the_process_is_seen_before_it_is_hit():
     assert said, done.stderr
     assert float(said[1]) > 0.1
     assert float(said[2]) <= 0.06
+
+
+def test_a_memory_that_runs_out_all_the_same_is_no_fault_of_the_mesh(monkeypatch):
+    class Full:
+        def __init__(self, *_, **__):
+            pass
+
+        __iadd__ = lambda self, _: self  # noqa: E731
+
+        def Assemble(self):
+            raise NgException("Could not allocate localheap, heapsize = 200000000")
+
+    mesh = mesh_magnets(ROTOR)
+    monkeypatch.setattr("ngsolve.BilinearForm", Full)
+    with pytest.raises(TooLargeError, match=r"ran out in elements of order 1.*localheap.*--rtol"):
+        assemble(mesh, 1)
 
 
 def test_the_limit_of_a_container_counts(monkeypatch, tmp_path):

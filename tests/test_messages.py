@@ -27,7 +27,7 @@ RELAYED = {
     "refusal(plate, frequency, rtol, best)": "plate: a sentence of plate_limits",
     "str(error)": "an error's own sentence, with another class",
     "str(path)": "atomic: the system's own error, with the name of the file",
-    "_way_out(scene, table, known)": "simulation: says what would levitate",
+    "way_out(scene, table, known)": "simulation: says what would levitate",
 }
 
 
