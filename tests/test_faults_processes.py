@@ -167,9 +167,10 @@ def test_too_little_memory(spinlev, arguments):
 def test_a_full_pipe_that_nobody_reads(spinlev):
     """`spinlev ... | head -0`: status 1 in words."""
     arguments = [a if a != "fem" else "dipole" for a in FIELD]
-    process = subprocess.Popen([sys.executable, "-c", CALL, *arguments], stdout=subprocess.PIPE, stderr=subprocess.PIPE)
-    process.stdout.close()
-    said = process.stderr.read().decode()
-    assert process.wait(timeout=60) == 1
+    command = [sys.executable, "-c", CALL, *arguments]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as process:
+        process.stdout.close()
+        said = process.stderr.read().decode()
+        assert process.wait(timeout=60) == 1
     assert "standard output: Broken pipe" in said
     assert "Traceback" not in said
