@@ -37,7 +37,7 @@ def map_figure(result: xr.Dataset) -> Figure:
         _plate(place, part_of(result, configuration, MODELS[-1]))
         place.set(
             xlabel=f"{SYMBOLS[configuration]} ({UNITS[configuration]})", ylabel="frequency of the rotor (Hz)",
-            title=configuration, ylim=(30, 410),
+            title=configuration, ylim=(20, 410),
         )  # fmt: skip
     handles = [
         *(axes[0, 0].plot([], [], "s", color=COLORS[m], alpha=0.5, label=f"stable: {NAMES[m]}")[0] for m in MODELS),

@@ -120,7 +120,7 @@ def test_field_over_one_parameter(spinlev):
     [
         (("study", SCENE), "A scene needs --vary"),
         (("study", "--vary", "frequency_hz=1"), "must be a scene file"),
-        (("study", "none.toml", "--vary", "frequency_hz=1"), "does not exist"),
+        (("study", "none.toml", "--vary", "frequency_hz=1"), "must be a TOML file that exists"),
         (("study", SCENE, "--vary", "frequency_hz=-1"), "frequency_hz must be at least 0"),
         (("study", SCENE, "--vary", "frequency_hz=1", "--at", "1,2"), "--at must be three numbers"),
         (("study", SCENE, "--vary", "frequency_hz=1", "--workers", "0"), "--workers must be between"),
@@ -174,6 +174,7 @@ def test_a_flight_is_shown_and_reported(spinlev, tmp_path, monkeypatch):
     sources.feed(page)
     assert len([s for s in sources.found if s.startswith("data:image/")]) == 3
     assert all(s.startswith(("data:image/", "#")) for s in sources.found)
+    assert not any(loading in page for loading in ("<script", "<link", "<iframe", "@import", "url(", "srcset"))
     assert "frequency_hz = 110.0" in page
 
 
