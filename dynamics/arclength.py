@@ -66,16 +66,25 @@ def follow_branch(
     steps = steps or Steps()
     here = _start(family, start, parameter, end)
     points, step = [here], steps.longest / 8
+
+    def outside(value: float) -> bool:
+        return (value - end) * (end - parameter) > 0 or (value - parameter) * (end - parameter) < 0
+
     while len(points) < MOST_POINTS and step > steps.shortest:
         new = _stepped(family, here, step)
         if new is None or new.tangent @ here.tangent < np.cos(steps.turn):
             step /= 2
             continue
-        out = (new.parameter - end) * (end - parameter) > 0 or (new.parameter - parameter) * (end - parameter) < 0
+        marked = _marked(family, here, new, step, steps.tolerated)
+        if any(point.kind == FOLD and outside(point.parameter) for point in marked):
+            step /= 2  # past the end and on round a fold: the point at the end would be missed
+            continue
+        out = outside(new.parameter)
         if out:
             border = end if (new.parameter - end) * (end - parameter) > 0 else parameter
             new = _landed(family, new, border)
-        points += [*_marked(family, here, new, step, steps.tolerated), new]
+            marked = _marked(family, here, new, step, steps.tolerated)
+        points += [*marked, new]
         if out or (until is not None and until(new)):
             break
         here, step = new, min(1.4 * step, steps.longest)
