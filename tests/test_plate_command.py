@@ -76,7 +76,7 @@ def test_slab_estimate_vanishes_for_a_wide_plate():
         (("--at", "0,0,-20", "--frequency-hz", "nan"), "--frequency-hz must be finite and not negative"),
         (("--at", "0,0,-20", "--frequency-hz", "5e6", "--model", "fem", "--rtol", "0.1"), "model slab"),
         (("--at", "0,0", "--frequency-hz", "50"), "--at must be three numbers"),
-        (("--at", "60,0,-50", "--frequency-hz", "50", "--model", "slab"), "--model slab must have --at over"),
+        (("--at", "60,0,-50", "--frequency-hz", "50", "--model", "slab"), "--at must be over one of the plate"),
     ],
 )
 def test_bad_input_is_named(tmp_path, arguments, message):
