@@ -9,6 +9,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, TypeVar
 
+import dask
 import h5py
 import xarray as xr
 
@@ -31,7 +32,9 @@ def described(variables: Variables, attributes: Mapping[str, Any]) -> xr.Dataset
 
 def write_checked(dataset: xr.Dataset, path: str | Path) -> None:
     """Write a dataset with the checksum of the file at its end; the file is whole or absent. Raises OSError."""
-    write_whole(path, seal(bytes(dataset.to_netcdf(engine="h5netcdf"))))  # on a full disk HDF5 itself would crash
+    with dask.config.set(scheduler="synchronous"):  # or xarray would ask a cluster for a lock of memory that is its own
+        content = bytes(dataset.to_netcdf(engine="h5netcdf"))  # on a full disk HDF5 itself would crash
+    write_whole(path, seal(content))
 
 
 def read_checked(path: str | Path, file_format: str | None = None) -> xr.Dataset:

@@ -6,6 +6,7 @@ import signal
 import subprocess
 import sys
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +15,7 @@ import xarray as xr
 from distributed import LocalCluster
 from matplotlib.figure import Figure
 
+from spinlev.fem.table_store import read_checked, write_checked
 from spinlev.geometry import InputError
 from spinlev.studies.engine import Engine
 from spinlev.studies.results import write_dataset
@@ -45,6 +47,18 @@ def points(*values, **more):
 def bytes_of(result, path):
     write_dataset(result, path)
     return path.read_bytes()
+
+
+def kept(point):
+    """A point that makes a table's file on its way, as those do that need a new field."""
+    write_checked(root(point), Path(point["file"]))
+    return read_checked(point["file"])
+
+
+def test_workers_of_a_cluster_write_tables(tmp_path):
+    asked = {k: {**point, "file": str(tmp_path / f"{k}.nc")} for k, point in points(4.0, 9.0).items()}
+    found = swept("roots", replace(STUDY, compute=kept), asked, Engine(workers=2), tmp_path)
+    np.testing.assert_array_equal(found["root"], [2.0, 3.0])
 
 
 def test_serial_local_cluster_and_a_scheduler_give_the_same_file(tmp_path):
