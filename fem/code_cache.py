@@ -6,6 +6,8 @@ with 9.5 GB that took 3 s of processor time, and 9 s where others read it too.  
 
 from __future__ import annotations
 
+import fcntl
+
 import heyoka as hy
 
 from .table_store import cache_folder
@@ -15,14 +17,15 @@ LIMIT = 2**29
 
 
 def keep_code() -> None:
-    """Keep compiled code in the cache's folder; nothing is kept where that cannot be written."""
+    """Keep compiled code in the cache's folder; nothing is kept where that cannot be opened."""
     folder = cache_folder() / "code"
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        writable = True
-    except OSError:
-        writable = False
-    hy.llvm_state.set_diskcache_enabled(writable)
-    if writable:
-        hy.llvm_state.set_diskcache_path(folder)
-        hy.llvm_state.set_diskcache_limit(LIMIT)
+        with (folder / "lock").open("w") as lock:
+            fcntl.flock(lock, fcntl.LOCK_EX)  # two processes that make the file at once fail
+            hy.llvm_state.set_diskcache_path(folder)
+            hy.llvm_state.set_diskcache_limit(LIMIT)
+    except (OSError, RuntimeError):
+        hy.llvm_state.set_diskcache_enabled(False)
+    else:
+        hy.llvm_state.set_diskcache_enabled(True)
