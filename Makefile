@@ -7,7 +7,7 @@ NEW ?= out/benchmarks.json
 SOURCES := $(wildcard geometry/* fem/* dynamics/* studies/* scenes/*.toml) pyproject.toml README.md LICENSE
 PACKAGES := -p spinlev.geometry -p spinlev.fem -p spinlev.dynamics -p spinlev.studies
 
-.PHONY: install run test lint types bench bench-compare dist gallery docs validate fuzz lock clean
+.PHONY: install run test lint types coverage bench bench-compare dist gallery docs validate fuzz lock clean
 
 install: $(VENV)/installed
 
@@ -39,6 +39,14 @@ types: install
 
 test: lint types
 	$(BIN)/pytest -n 2 --dist worksteal -m "not slow"
+
+# Lines that the fast tests run, in child processes too; what a killed process has left of its own count is removed.
+coverage: install
+	$(BIN)/pytest -n 2 --dist worksteal -m "not slow" --cov --cov-report=
+	@rm -f .coverage.*
+	$(BIN)/coverage report --fail-under=95
+	@for p in geometry fem dynamics studies; do \
+	  echo "$$p $$($(BIN)/coverage report --include="*/$$p/*" --format=total) %"; done
 
 validate: install
 	$(BIN)/pytest -m slow -s
@@ -79,4 +87,4 @@ lock:
 	  --no-emit-trusted-host --no-emit-find-links --output-file requirements.txt pyproject.toml
 
 clean:
-	rm -rf $(VENV) build dist out
+	rm -rf $(VENV) build dist out .coverage*

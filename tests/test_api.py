@@ -79,6 +79,9 @@ def test_objects_print_what_they_are():
         "  Floater Ø 12.7 mm, 8.044 g, 1.096 A m², μr 1.05",
         "  Plate (100, 240, 30) mm at (35, 0, -21) mm, 3.5e+07 S/m",
     ]
+    for part in (*scene.rotor, scene.floater, scene.plate):
+        assert f"  {part!r}" in repr(scene).splitlines()
+    assert re.search(r"\n  \d+ elements of order \d, \d+ unknowns, made in", repr(api.rotor_table(scene, "fem", 1e-2)))
     lowered = api.load_scene(SCENE.with_name("tilt-over-plate.toml"))
     assert "lowered by 55 mm at 10 mm/s from 3 s on" in repr(lowered)
     table = api.rotor_table(scene, "cuboid")

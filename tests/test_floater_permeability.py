@@ -12,7 +12,7 @@ from spinlev.fem.models import rotor_table
 from spinlev.fem.rotor_response import rotor_ladder
 from spinlev.geometry.scene import Drag, Floater, Scene
 from spinlev.geometry.scene_file import load_scene
-from spinlev.studies.floater_figure import floater_figure
+from spinlev.studies.floater_figure import floater_figure, floater_lines
 from spinlev.studies.floater_permeability import LEVELS, floater_permeability, missed, sufficient
 
 SCENES = Path(__file__).parent.parent / "scenes"
@@ -85,6 +85,27 @@ def test_additional_weight_moves_the_equilibrium_like_gravity(scene):
     assert max(step[0] for _, _, step in found) < 1e-8
     np.testing.assert_allclose(shift.position, places[1], rtol=0, atol=1e-11)
     np.testing.assert_allclose(shift.linear, places[1] - places[0], rtol=0, atol=0.1 * abs(places[1] - places[0]).max())
+
+
+def test_with_coarse_elements_the_study_tells_the_same(scene, monkeypatch):
+    """Elements of the lowest degrees give the missed lift and the shift to some per cent; both are on the figure."""
+    name = "spinlev.studies.floater_permeability.rotor_ladder"
+    monkeypatch.setattr(name, lambda magnets, orders: rotor_ladder(magnets, (1, 2)))
+    result = floater_permeability(scene, quick=True)
+    nearest, farthest = result["distance"].values[[0, -1]]
+    box = scene.rotor[0].box
+    assert box.distance(np.array([0.0, 0.0, -nearest])) - scene.floater.radius == pytest.approx(0.0, abs=2e-5)
+    assert farthest == pytest.approx(0.05)
+    share = float(result["missed_force"].sel(axis="z")) / result.attrs["weight_N"]
+    assert share == pytest.approx(0.108, rel=0.1)
+    shift, linear, error = (float(result[name].sel(axis="z")) for name in ("shift", "linear_shift", "shift_error"))
+    assert shift == pytest.approx(9.0e-5, rel=0.1)
+    assert linear == pytest.approx(shift, rel=0.03)
+    assert 0 < error < 0.2 * shift
+    assert f"{1e3 * shift:+.4f} " in floater_lines(result)[-1]
+    marks = [line.get_xdata()[0] for axes in floater_figure(result).axes for line in axes.lines if line.get_ls() == ":"]
+    np.testing.assert_allclose(marks, -1e3 * float(result["rigid_position"].sel(axis="z")))
+    assert len(marks) == 2
 
 
 @pytest.mark.slow

@@ -5,9 +5,13 @@ from dataclasses import asdict, replace
 import numpy as np
 import pytest
 
+from spinlev.dynamics import Rates
+from spinlev.fem.models import rotor_table
 from spinlev.studies.catalogue import CATALOGUE
 from spinlev.studies.plate_cases import ROTORS, Case, cases
 from spinlev.studies.plate_damping import gather_damping, plate_damping
+from spinlev.studies.rotor_points import rotor_scene
+from spinlev.studies.stable_range import reference_state, stable_range
 
 STUDY = CATALOGUE["plate-damping"]
 WEAK = 2e4
@@ -32,6 +36,18 @@ def test_weak_currents_act_in_proportion_to_the_conductivity(weak):
     for name in ("torque", "loss"):
         values = [abs(each[name]).max().item() for each in (one, two)]
         assert values[1] / values[0] == pytest.approx(2.0, rel=0.02)
+
+
+def test_a_part_of_the_range_is_a_frequency_of_stable_levitation():
+    """Half way between the ends, which dipoles know to some per cent; weak currents damp what is neutral."""
+    scene = rotor_scene("tilt", 10.0)
+    dipoles = Rates(rotor_table(scene.rotor, "dipole"))
+    rough = stable_range(scene, dipoles, *reference_state(scene))
+    row = plate_damping(asdict(Case("frequency", 0.5, conductivity=WEAK, part=0.5))).isel(case=0)
+    middle = (rough.low.parameter + rough.high.parameter) / 2
+    assert float(row["rotor_frequency"]) == pytest.approx(middle, rel=0.05)
+    assert np.all(np.abs(row["growth_without"]) < 0.01)
+    assert np.all(row["growth"] < row["growth_without"])
 
 
 def test_the_sentence_and_figure_come_from_the_dataset_alone(weak):

@@ -1,0 +1,230 @@
+"""Where a search has nothing to find, a problem is degenerate or the system refuses: what is said or done instead."""
+
+import errno
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import heyoka as hy
+import numpy as np
+import pytest
+
+from spinlev.dynamics import (
+    EquilibriumError,
+    Family,
+    Plane,
+    Rates,
+    find_equilibria,
+    follow_boundary,
+    follow_branch,
+    rotor_family,
+)
+from spinlev.dynamics.balance import EVERY, solve
+from spinlev.dynamics.branch import FOLD
+from spinlev.dynamics.drift import drift
+from spinlev.dynamics.perturbed import TILTS, PerturbedBalance
+from spinlev.dynamics.state import Scales
+from spinlev.dynamics.symbols import Parameter
+from spinlev.dynamics.way_out import way_out
+from spinlev.fem.eddy_export import write_vtu
+from spinlev.fem.models import rotor_table
+from spinlev.fem.racetrack import Racetrack
+from spinlev.fem.table_store import cache_folder, from_cache
+from spinlev.geometry import atomic, rotor
+from spinlev.geometry.box import Box, rotation_matrix
+from spinlev.geometry.conductor_mesh import ConductorMesh
+from spinlev.geometry.grading import graded_partition
+from spinlev.geometry.hex_mesh import Block, hex_mesh
+from spinlev.geometry.magnet import MU_0, Magnet
+from spinlev.geometry.occ_mesh import Conductor, occ_mesh
+from spinlev.geometry.pieces import CONVERGENCE, cut_magnets
+from spinlev.geometry.scene import Drag, Floater, Scene
+
+FLOATER = Floater(6.35e-3, 1.305, 1.0, 7500.0)
+SCENE = Scene(110.0, rotor.horizontal(2e-3, 10e-3, 1.305, 1.0), FLOATER, Drag(0.0, 0.0))
+TABLE = rotor_table(SCENE.rotor, "dipole")
+WEAK = replace(SCENE, floater=replace(FLOATER, remanence=1e-3))
+"""A floater that no distance up to 0.1 m lets levitate."""
+
+
+@pytest.fixture(scope="module")
+def rates():
+    return Rates(TABLE)
+
+
+@pytest.fixture(scope="module")
+def stable(rates):
+    return next(e for e in find_equilibria(SCENE, TABLE, rates=rates) if e.stable)
+
+
+class Spring:
+    """A balance that does not know of the moment, so that its matrix is singular to the last bit."""
+
+    def at(self, active):
+        return self
+
+    def __call__(self, position, moment):
+        slope = np.zeros((len(position), 5, 5))
+        slope[:, :3, :3] = np.eye(3)
+        return np.pad(position - [0.1, 0.2, -3.0], ((0, 0), (0, 2))), slope
+
+
+def test_newton_takes_the_shortest_way_where_a_matrix_is_singular():
+    moments = np.array([[0.0, 0.6, 0.8], [1.0, 0.0, 0.0]])
+    places, turned, step = solve(Spring(), np.array([[0.0, 0.0, -2.0], [1.0, 1.0, -3.0]]), moments, EVERY)
+    np.testing.assert_allclose(places, np.tile([0.1, 0.2, -3.0], (2, 1)), atol=1e-14)
+    np.testing.assert_allclose(turned, moments, atol=1e-14)
+    assert np.all(step < 1e-11)
+
+
+def test_gravity_across_the_axis_beyond_what_holds_the_floater(rates, stable):
+    """With a tenth of gravity to the side it stays, with six times gravity no periodic motion is left to be found."""
+    found = [replace(SCENE, gravity=np.array([side, 0.0, -9.81])) for side in (1.0, 60.0)]
+    mild, strong = (find_equilibria(scene, TABLE, rates=rates) for scene in found)
+    assert np.linalg.norm(mild[0].position - stable.position) < 1e-3
+    assert all(np.linalg.norm(each.position - stable.position) > 5e-3 for each in strong)
+
+
+def test_no_frequency_helps_a_floater_without_strength(monkeypatch):
+    """The way out names no frequency (of two tried each way), and a drift has nowhere to begin."""
+    monkeypatch.setattr(sys.modules["spinlev.dynamics.way_out"], "FREQUENCY_TRIALS", 2)
+    assert "None was found within a factor of two; give start.position_mm" in way_out(WEAK, TABLE, ())
+    with pytest.raises(EquilibriumError, match=r"At 110 Hz the floater has no equilibrium with body spin 0\.25"):
+        drift(WEAK, TABLE, spin=0.25)
+
+
+def test_no_boundary_starts_away_from_one(stable):
+    """At 110 Hz the stable equilibrium is 20 Hz from its fold; the plane ends before that."""
+    family = rotor_family(SCENE, "horizontal", "dipole")
+    units = np.array([50.0, 2e-3])
+    plane = Plane(family.rates, family.values, 0.0, units, np.array([109.0, 1.9e-3]), np.array([111.0, 2.1e-3]))
+    start, problem = Scales.of(SCENE).pack(stable.state), family.frequencies(2e-3)
+    point = follow_branch(Family(family.rates, problem, 50.0), start, 110.0, 111.0)[0]
+    far = replace(point, state=np.r_[point.state[:2], -40.0, point.state[3:]])
+    with pytest.raises(EquilibriumError, match="must lie on a fold of the plane; instead there was none near it"):
+        follow_boundary(plane, far, np.array([110.0, 2e-3]), FOLD)
+
+
+def test_the_balanced_direction_feels_no_torque(rates):
+    """At any place near the axis; a guess that leads nowhere is given back."""
+    balance = PerturbedBalance.of(SCENE, TABLE)
+    place = np.array([1e-3, 2e-3, -0.025])
+    found = balance.direction(place, np.array([0.2, 0.0, np.sqrt(0.96)]))
+    scaled = (place / balance.scales.length)[None]
+    assert np.abs(balance.balance(scaled, found[None])[0][0, TILTS]).max() < 1e-9
+    assert np.linalg.norm(found) == pytest.approx(1.0)
+
+
+def test_an_additional_force_that_throws_the_floater_out_leaves_no_place(stable):
+    """Ten times the weight upwards; a linear estimate there is, but no equilibrium."""
+    balance, lift = PerturbedBalance.of(SCENE, TABLE), -10 * FLOATER.mass * SCENE.gravity
+    found = balance.shift(stable.position, stable.state.moment, lambda place, moment: (lift, np.zeros(3)))
+    assert np.isnan(found.position).all()
+    assert np.isfinite(found.linear).all()
+
+
+def test_tables_of_magnets_that_magnetise_each_other_are_met_at_the_nodes(monkeypatch):
+    """Two coarse tables; at the displacement of one of them the family's field is that of the table."""
+    monkeypatch.setattr(sys.modules["spinlev.dynamics.rotor_family"], "NODES", 2)
+    shape = (10e-3, 1.305, 1.05)
+    scene = replace(SCENE, rotor=rotor.vertical(14e-3, *shape))
+    family = rotor_family(scene, "vertical", "fem", 1e-3, FLOATER.radius, (12e-3, 16e-3))
+    x, y, z = variables = hy.make_vars("x", "y", "z")
+    field = hy.cfunc(family.field.expressions([x, y, z])[0], variables, compact_mode=True, opt_level=0)
+    points, measure = np.array([[0.0, 0.0, -0.02], [2e-3, 1e-3, -0.03]]), 14e-3 + 2e-3 * np.cos(np.pi / 4)  # Chebyshev
+    pars = np.zeros((Parameter.MEASURE + 1, 2))
+    pars[Parameter.MEASURE] = measure
+    found = field(np.ascontiguousarray(points.T), pars=pars).T
+    expected = rotor_table(rotor.vertical(measure, *shape), "fem", 1e-3, FLOATER.radius).evaluate(points)[0]
+    np.testing.assert_allclose(found, expected, atol=1e-9 * np.abs(expected).max())
+
+
+def test_a_flat_magnet_is_cut_into_pieces_that_converge():
+    """Volume and moment are kept, each piece is inside, and a point at the nearest distance is beyond its series."""
+    turned = rotation_matrix((10.0, 20.0, 30.0))
+    whole = Magnet(Box((20e-3, 20e-3, 2e-3), (1e-3, 2e-3, 3e-3), turned), (0.3, 0.4, 1.0), 1.05)
+    nearest = 4e-3
+    (pieces,) = cut_magnets([whole], nearest)
+    assert len(pieces) > 4
+    np.testing.assert_allclose(sum(piece.moment for piece in pieces), whole.moment, rtol=1e-12)
+    for piece in pieces:
+        assert np.all(
+            np.abs(whole.box.to_body(piece.box.center)) + piece.box.half_edges <= whole.box.half_edges + 1e-12
+        )
+        assert nearest + piece.box.half_edges.min() >= CONVERGENCE * piece.box.circumradius * (1 - 1e-12)
+    assert cut_magnets([whole], 0.1) == ((whole,),)
+
+
+def test_a_round_coil_has_the_field_of_a_thick_solenoid():
+    """A racetrack without straight parts: B on the axis in closed form, j μ0 h/2 · asinh terms."""
+    inner, outer, height, turns = 0.02, 0.03, 0.04, 500.0
+    coil = Racetrack(np.zeros(3), (2 * outer, 2 * outer), height, inner, outer, turns)
+    z = np.array([0.0, 0.01, 0.05])
+
+    def part(end):
+        return end * (np.arcsinh(outer / np.abs(end)) - np.arcsinh(inner / np.abs(end)))
+
+    expected = MU_0 * turns / (2 * height * (outer - inner)) * (part(height / 2 - z) + part(height / 2 + z))
+    field = coil.flux_density(np.column_stack([0 * z, 0 * z, z]))
+    np.testing.assert_allclose(field[:, 2], expected, rtol=1e-7)
+    np.testing.assert_allclose(field[:, :2], 0.0, atol=1e-12)
+
+
+def test_a_cache_on_a_file_system_without_locks_still_works(tmp_path, monkeypatch):
+    said = []
+
+    def refused(*_):
+        raise OSError(errno.ENOLCK, "No locks available")
+
+    monkeypatch.setenv("SPINLEV_CACHE", str(tmp_path))
+    monkeypatch.setattr("spinlev.fem.table_store.fcntl.flock", refused)
+    made = from_cache("a.txt", Path.read_text, lambda: "made", lambda text, path: path.write_text(text), said.append)
+    assert made == ("made", False)
+    assert said == ["The cache's file system has no locks."]
+    again = from_cache("a.txt", Path.read_text, lambda: "anew", lambda text, path: path.write_text(text), said.append)
+    assert again == ("made", True)
+
+
+def test_where_the_cache_is(tmp_path, monkeypatch):
+    monkeypatch.delenv("SPINLEV_CACHE", raising=False)
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    assert cache_folder() == tmp_path / "spinlev"
+    monkeypatch.delenv("XDG_CACHE_HOME")
+    monkeypatch.setenv("HOME", str(tmp_path))
+    assert cache_folder() == tmp_path / ".cache" / "spinlev"
+
+
+def test_another_user_s_unfinished_file_is_left_alone(tmp_path, monkeypatch):
+    """The system forbids to ask for that process, which shows that it lives."""
+    left = tmp_path / f".r-{atomic.platform.node()}-123-x.nc"
+    left.write_bytes(b"half")
+
+    def forbidden(process, number):
+        raise PermissionError
+
+    monkeypatch.setattr(atomic.os, "kill", forbidden)
+    atomic.write_whole(tmp_path / "r.nc", b"whole")
+    assert (tmp_path / "r.nc").read_bytes() == b"whole"
+    assert left.exists()
+
+
+def air_cube():
+    lines = [np.array([-10.0, 0.0, 10.0])] * 3
+    return hex_mesh(lines, [Block("plate", np.zeros(3), np.full(3, 10.0))])
+
+
+@pytest.mark.parametrize(
+    ("make", "said"),
+    [
+        (lambda: ConductorMesh(air_cube(), {"iron": 1e7}), r"must name one of \['air', 'plate'\]; .* received iron"),
+        (lambda: ConductorMesh(air_cube(), {"plate": 0.0}), "conductivity of plate must be positive, S/m; .* 0.0"),
+        (lambda: graded_partition([0.0, 2.0, 1.0], np.ones_like), r"must increase; .* \[0.0, 2.0, 1.0\]"),
+        (lambda: occ_mesh({}), "at least one conductor; .* none"),
+        (lambda: occ_mesh({"rod": Conductor(None, 1e7, 0.0)}), "cell_mm of rod must be positive; .* 0.0"),
+        (lambda: write_vtu(Path("x.vtu"), None, [], [], [np.zeros(2), np.zeros(1), np.zeros(2)]), r"\(2, 1, 2\)"),
+    ],
+    ids=["name", "conductivity", "breakpoints", "no conductor", "cell", "axes"],
+)
+def test_meshes_that_make_no_sense_are_refused(make, said):
+    with pytest.raises(ValueError, match=said):
+        make()

@@ -1,0 +1,248 @@
+"""The computing of studies, in coarse fields at few points, against scaling laws, searches and balances."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from spinlev.dynamics import EquilibriumError, Family, Rates, find_equilibria
+from spinlev.dynamics.balance import Balance
+from spinlev.dynamics.branch import frequencies
+from spinlev.dynamics.equations import parameters
+from spinlev.dynamics.state import Scales
+from spinlev.fem.models import rotor_table
+from spinlev.studies import answered, design, dipole_vs_fem, sensitivity, stability_map, stable_range, tolerances
+from spinlev.studies.design_search import designed
+from spinlev.studies.mutual import pose
+from spinlev.studies.rotor_points import rotor_scene
+from spinlev.studies.stable_range import BORDER, FOLD, UNIT, reference_state
+
+
+def nearest(scene, model, distance):
+    """The equilibrium whose distance is nearest to the given one, by a search that knows of no branch; or None."""
+    found = find_equilibria(scene, rotor_table(scene.rotor, model))
+    return min(found, key=lambda each: abs(each.distance - distance), default=None)
+
+
+@pytest.fixture(scope="module")
+def derived():
+    """Derivatives and a sample of a rotor of point dipoles."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(tolerances, "MODEL", "dipole")
+        patch.setattr(sensitivity, "MODEL", "dipole")
+        point = {"configuration": "horizontal", "measure": 2.0, "samples": 1, "steps": [1]}
+        return sensitivity.compute(point).isel(case=0)
+
+
+NOMINAL = {
+    "measure": 2.0,
+    "rotor_remanence": 1.305,
+    "floater_remanence": 1.305,
+    "density": 7500.0,
+    "edge": 10e-3,
+    "diameter": 12.7e-3,
+    "gravity": 9.81,
+}
+
+
+def changed_by_scale(derived, exponents):
+    """First-order change of all quantities, per unit of ln λ, when each parameter goes with a power of λ."""
+    by = derived["derivative"]
+    parts = [power * NOMINAL[name] * by.sel(parameter=name) for name, power in exponents.items() if name in NOMINAL]
+    at = np.concatenate([[0.0, 0.0], derived["frequency"]])
+    return sum(parts).values + exponents["frequency"] * at * by.sel(parameter="frequency").values
+
+
+def test_all_derivatives_obey_a_change_of_the_unit_of_time(derived):
+    """Rates × λ where accelerations are × λ²: by λ² for gravity and for the product of the remanences."""
+    change = changed_by_scale(derived, {"gravity": 2, "rotor_remanence": 1, "floater_remanence": 1, "frequency": 1})
+    nominal = derived["nominal"].values
+    np.testing.assert_allclose(change[:2], nominal[:2], rtol=1e-4)
+    np.testing.assert_allclose(change[2:], 0.0, atol=1e-4 * nominal[2:].max())
+
+
+def test_all_derivatives_obey_a_change_of_the_unit_of_length(derived):
+    """All lengths × λ at the same Br and density: the force per mass is × 1/λ, so that all rates are, and gravity."""
+    lengths = {"measure": 1, "edge": 1, "diameter": 1, "gravity": -1, "frequency": -1}
+    change, nominal = changed_by_scale(derived, lengths), derived["nominal"].values
+    np.testing.assert_allclose(change[:2], -nominal[:2], rtol=1e-4)
+    np.testing.assert_allclose(change[2:], nominal[2:], rtol=1e-4)
+
+
+def test_a_sample_is_what_the_derivatives_foretell(derived):
+    """Tolerances are small: the tangent plane gives the limits of stability but for second-order terms."""
+    draws, by = derived["drawn"].values, derived["derivative"].values[:, :2]
+    moved = derived["sample"].values[:, :2] - derived["nominal"].values[:2]
+    assert np.all(np.abs(moved) > 0.05)  # Hz
+    assert np.all(np.abs(draws @ by - moved) < 0.1 * np.abs(draws) @ np.abs(by))
+
+
+def test_a_small_tilt_of_the_axis_moves_the_floater_in_second_order(derived):
+    """By symmetry the mean distance is even in the tilt: 2° changes it four times as much as 1°."""
+    upright, one, two = derived["leaning_distance"].values
+    assert 0 < abs(one - upright) < 1e-6
+    assert (two - upright) / (one - upright) == pytest.approx(4.0, rel=0.01)
+    assert np.all(derived["leaning_growth"].values < 1e-6)
+
+
+def test_a_design_is_stable_up_to_its_margin(monkeypatch):
+    """Half a hertz beyond its ends a search finds nothing stable; cubes of 2 mm are too weak."""
+    monkeypatch.setattr(design, "RTOL", 1e-2)
+    monkeypatch.setattr(design, "CLOSE_ENOUGH", 1e-5)
+    asked = {"configuration": "tilt", "distance_mm": 25.0, "frequency": 100.0, "edges_mm": [2.0, 12.7]}
+    found = design.compute(asked).isel(case=0)
+    weak, chosen = (found.isel(edge=k) for k in (0, 1))
+    assert np.isnan(weak["measure"])
+    assert int(found["best"]) == 1
+    for end, beyond in (("lowest", -0.5), ("highest", 0.5)):
+        measure, frequency = float(chosen["measure"]), float(chosen[end]) + beyond
+        outside = rotor_scene("tilt", measure, frequency, 12.7e-3, permeability=1.0)
+        assert not [e for e in find_equilibria(outside, rotor_table(outside.rotor, "cuboid")) if e.stable]
+    margin = min(100 - float(chosen["lowest"]), float(chosen["highest"]) - 100) / 100
+    assert float(chosen["margin"]) == pytest.approx(margin)
+    assert abs(float(found["true_distance"]) - 25e-3) < 1e-5
+    # Its own field takes (μr - 1)/3 of a permeable cube's moment: the weaker one has to be tilted a little less.
+    assert 0.95 < float(found["true_measure"] / chosen["measure"]) < 1.0
+
+
+@pytest.mark.parametrize(
+    ("rotor", "said"),
+    [
+        (("horizontal", 2e-3, 25e-3, 100.0), "measure of 103"),
+        (("vertical", 16e-3, 25e-3, 100.0), "measure of 6.59"),
+    ],
+)
+def test_a_design_that_cannot_be_built_says_why(rotor, said):
+    with pytest.raises(EquilibriumError, match=said):
+        designed(*rotor)
+
+
+def test_an_unstable_design_has_no_margin():
+    """A search confirms the place and that small motions grow there."""
+    found = designed("vertical", 10e-3, 25e-3, 100.0)
+    scene = rotor_scene("vertical", found.measure, 100.0, permeability=1.0)
+    there = nearest(scene, "cuboid", 25e-3)
+    assert there.distance == pytest.approx(25e-3, abs=1e-9)
+    assert not there.stable
+    assert found.margin == 0.0
+    assert found.here.growth_per_s == pytest.approx(there.growth_per_s, rel=1e-6)
+
+
+@pytest.fixture(scope="module")
+def compared():
+    """Levitation by every model, with finite elements of 1e-3 and answers of the lowest degrees."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(dipole_vs_fem, "RTOL", 1e-3)
+        patch.setattr(dipole_vs_fem, "COARSE", 1e-2)
+        point = {"configuration": "horizontal", "measure": 2.0, "steps": 1, "orders": [1, 2], "limits": False}
+        return dipole_vs_fem.compute(point).isel(case=0, step=0)
+
+
+@pytest.mark.parametrize("model", ["dipole", "cuboid"])
+def test_each_model_s_levitation_is_that_of_a_search(compared, model):
+    frequency = float(compared["frequency"])
+    there = nearest(rotor_scene("horizontal", 2.0, frequency), model, float(compared["distance"].sel(model=model)))
+    here = compared.sel(model=model)
+    assert float(here["distance"]) == pytest.approx(there.distance, abs=1e-10)
+    np.testing.assert_allclose(
+        np.sort(here["mode_frequency"]), np.sort([m.frequency_hz for m in there.modes]), rtol=1e-6
+    )
+
+
+def test_causes_go_the_way_that_physics_says(compared):
+    """A floater of full remanence is the stronger one, and attraction by magnetised iron moves it nearer the rotor."""
+    distance = compared["distance"]
+    assert distance.sel(model="article") > distance.sel(model="dipole")
+    assert distance.sel(model="mutual") < distance.sel(model="fem")
+    assert list(compared["high_kind"].values) == [*["oscillatory"] * 4, ""]
+    rigid = compared.sel(model=["article", "dipole", "cuboid", "fem"])
+    assert np.all(rigid["lowest"] < compared["frequency"])
+    assert np.all(compared["frequency"] < rigid["highest"])
+    assert np.isnan(compared["highest"].sel(model="mutual"))
+    assert np.all(compared["distance_error"].sel(model=["fem", "mutual"]) < 1e-4)
+
+
+@pytest.fixture(scope="module")
+def mutual():
+    """Levitation with answers of the cube tilted by 10°, about the equilibria of point dipoles below 130 Hz."""
+    with pytest.MonkeyPatch.context() as patch:
+        for module in (stable_range, answered):
+            patch.setattr(module, "HIGHEST", 130.0)
+        scene = rotor_scene("tilt", 10.0)
+        rates = Rates(rotor_table(scene.rotor, "dipole"))
+        start, frequency = reference_state(scene)
+        rigid = stable_range.stable_range(scene, rates, start, frequency)
+        made, doubt = answered.with_answers(scene, Family(rates, frequencies(scene), UNIT), rigid, (1, 2))
+        return made, doubt, {side: made.end(side) for side in ("low", "high")}
+
+
+def balanced(made, point):
+    """Unbalanced accelerations (5,) and their slopes (5, 5), with the answers expanded at the point itself."""
+    scene = replace(made.scene, frequency=point.parameter)
+    rates = made.mutual.expanded(*pose(point)).added(made.family.rates)
+    place, moment = pose(point)
+    value, slope = Balance(rates, parameters(scene, Scales.of(scene), frozen_spin=True), 0.0)(place[None], moment[None])
+    return value[0], slope[0]
+
+
+def test_with_answers_a_fold_is_where_the_balance_has_a_double_root(mutual):
+    """Force and torque vanish, and so does their change along one direction; it lies below the rigid dipole's."""
+    made, _, ends = mutual
+    low = ends["low"]
+    value, slope = balanced(made, low)
+    sizes = np.linalg.svd(slope)[1]
+    assert low.kind == FOLD
+    assert np.abs(value).max() < 1e-6
+    assert sizes[-1] < 1e-3 * sizes[-2]
+    assert 0 < made.range.low.parameter - low.parameter < 1
+
+
+def test_a_search_that_ends_at_the_border_gives_the_equilibrium_there(mutual):
+    """Of an expansion at most 8 % of the frequency away; the equilibrium itself is balanced to round-off."""
+    made, doubt, ends = mutual
+    high, there = ends["high"], made.at(130.0)
+    assert (high.kind, high.parameter) == (BORDER, 130.0)
+    np.testing.assert_allclose(high.position, there.position, atol=1e-6)
+    assert np.abs(balanced(made, there)[0]).max() < 1e-6
+    assert 0 < doubt < 0.1
+
+
+@pytest.mark.slow
+def test_with_answers_stability_ends_where_the_bodies_touch():
+    scene = rotor_scene("tilt", 10.0)
+    rates = Rates(rotor_table(scene.rotor, "dipole"))
+    rigid = stable_range.stable_range(scene, rates, *reference_state(scene))
+    made, _ = answered.with_answers(scene, Family(rates, frequencies(scene), UNIT), rigid, (1, 2))
+    high = made.end("high")
+    assert high.kind == "contact"
+    assert abs(stable_range.gap(scene, high)) < 1e-7
+
+
+def test_a_plate_below_damps_what_is_neutral_without_it(monkeypatch):
+    """Without drag nothing decays. Beside the fold the bounce is soft, so that the place moves by a millimetre or two."""
+    monkeypatch.setattr(stability_map, "RTOL", 1e-2)
+    asked = {"configuration": "vertical", "measure": 14.0, "model": "fem", "with_plate": 1}
+    found = stability_map.compute(asked).isel(case=0)
+    assert 60 < float(found["lowest"][0]) < 65
+    assert found["high_kind"].values[0] == "oscillatory"
+    tried = found.isel(tried=0)
+    alone = rotor_scene("vertical", 14.0, float(tried["plate_frequency"]))
+    there = min(find_equilibria(alone, rotor_table(alone.rotor, "fem", 1e-2)), key=lambda each: each.growth_per_s)
+    assert there.stable
+    assert abs(there.growth_per_s) < 1e-6
+    assert float(tried["plate_distance"]) == pytest.approx(there.distance, abs=2e-3)
+    assert float(tried["plate_growth"]) < -0.1
+    assert float(tried["plate_error"]) <= stability_map.PLATE_RTOL
+    assert np.isnan(found["plate_frequency"].values[1:]).all()
+
+
+def test_a_rotor_without_levitation_has_an_empty_row(monkeypatch):
+    """Where attraction nowhere carries the weight there is no branch, and a search finds nothing."""
+    scene = rotor_scene("horizontal", 2.0)
+    weak = replace(scene, floater=replace(scene.floater, remanence=1e-3))
+    monkeypatch.setattr(stability_map, "rotor_scene", lambda configuration, measure: weak)
+    asked = {"configuration": "horizontal", "measure": 2.0, "model": "dipole", "with_plate": 2}
+    found = stability_map.compute(asked)
+    assert np.isnan(found["lowest"]).all()
+    assert np.isnan(found["plate_frequency"]).all()
+    assert find_equilibria(weak, rotor_table(weak.rotor, "dipole")) == []
