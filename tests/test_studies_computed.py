@@ -219,7 +219,7 @@ def test_with_answers_stability_ends_where_the_bodies_touch():
 
 
 def test_a_plate_below_damps_what_is_neutral_without_it(monkeypatch):
-    """Without drag nothing decays. Beside the fold the bounce is soft, so that the place moves by a millimetre or two."""
+    """Without drag nothing decays. Beside the fold the bounce is soft: the place moves by a millimetre or two."""
     monkeypatch.setattr(stability_map, "RTOL", 1e-2)
     asked = {"configuration": "vertical", "measure": 14.0, "model": "fem", "with_plate": 1}
     found = stability_map.compute(asked).isel(case=0)
