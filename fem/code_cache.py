@@ -6,11 +6,9 @@ with 9.5 GB that took 3 s of processor time, and 9 s where others read it too.  
 
 from __future__ import annotations
 
-import fcntl
-
 import heyoka as hy
 
-from .table_store import cache_folder
+from .table_store import alone, cache_folder
 
 LIMIT = 2**29
 """Size of what is kept, bytes; the oldest makes room.  Looked through in 0.2 s."""
@@ -20,9 +18,7 @@ def keep_code() -> None:
     """Keep compiled code in the cache's folder; nothing is kept where that cannot be opened."""
     folder = cache_folder() / "code"
     try:
-        folder.mkdir(parents=True, exist_ok=True)
-        with (folder / "lock").open("w") as lock:
-            fcntl.flock(lock, fcntl.LOCK_EX)  # two processes that make the file at once fail
+        with alone(folder / "lock", report=lambda _: None):  # two processes that make the file at once fail
             hy.llvm_state.set_diskcache_path(folder)
             hy.llvm_state.set_diskcache_limit(LIMIT)
     except (OSError, RuntimeError):
