@@ -7,10 +7,10 @@ import pytest
 
 from spinlev.dynamics import Rates
 from spinlev.fem.models import rotor_table
+from spinlev.studies.article import article_scene
 from spinlev.studies.catalogue import CATALOGUE
 from spinlev.studies.plate_cases import ROTORS, Case, cases
 from spinlev.studies.plate_damping import gather_damping, plate_damping
-from spinlev.studies.rotor_points import rotor_scene
 from spinlev.studies.stable_range import reference_state, stable_range
 
 STUDY = CATALOGUE["plate-damping"]
@@ -40,7 +40,7 @@ def test_weak_currents_act_in_proportion_to_the_conductivity(weak):
 
 def test_a_part_of_the_range_is_a_frequency_of_stable_levitation():
     """Half way between the ends, which dipoles know to some per cent; weak currents damp what is neutral."""
-    scene = rotor_scene("tilt", 10.0)
+    scene = article_scene("tilt", 10.0)
     dipoles = Rates(rotor_table(scene.rotor, "dipole"))
     rough = stable_range(scene, dipoles, *reference_state(scene))
     row = plate_damping(asdict(Case("frequency", 0.5, conductivity=WEAK, part=0.5))).isel(case=0)

@@ -5,17 +5,18 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from spinlev.dynamics import EquilibriumError, Family, Rates, find_equilibria
+from spinlev.dynamics import EquilibriumError, Rates, find_equilibria
 from spinlev.dynamics.balance import Balance
-from spinlev.dynamics.branch import frequencies
 from spinlev.dynamics.equations import parameters
+from spinlev.dynamics.events import rotor_gap
 from spinlev.dynamics.state import Scales
 from spinlev.fem.models import rotor_table
 from spinlev.studies import answered, design, dipole_vs_fem, sensitivity, stability_map, stable_range, tolerances
+from spinlev.studies.article import article_scene
 from spinlev.studies.design_search import designed
+from spinlev.studies.levitation_branch import by_frequency
 from spinlev.studies.mutual import pose
-from spinlev.studies.rotor_points import rotor_scene
-from spinlev.studies.stable_range import BORDER, FOLD, UNIT, reference_state
+from spinlev.studies.stable_range import BORDER, FOLD, reference_state
 
 
 def nearest(scene, model, distance):
@@ -96,7 +97,7 @@ def test_a_design_is_stable_up_to_its_margin(monkeypatch):
     assert int(found["best"]) == 1
     for end, beyond in (("lowest", -0.5), ("highest", 0.5)):
         measure, frequency = float(chosen["measure"]), float(chosen[end]) + beyond
-        outside = rotor_scene("tilt", measure, frequency, 12.7e-3, permeability=1.0)
+        outside = article_scene("tilt", measure, frequency, drag=False, edge=12.7e-3, permeability=1.0)
         assert not [e for e in find_equilibria(outside, rotor_table(outside.rotor, "cuboid")) if e.stable]
     margin = min(100 - float(chosen["lowest"]), float(chosen["highest"]) - 100) / 100
     assert float(chosen["margin"]) == pytest.approx(margin)
@@ -120,7 +121,7 @@ def test_a_design_that_cannot_be_built_says_why(rotor, said):
 def test_an_unstable_design_has_no_margin():
     """A search confirms the place and that small motions grow there."""
     found = designed("vertical", 10e-3, 25e-3, 100.0)
-    scene = rotor_scene("vertical", found.measure, 100.0, permeability=1.0)
+    scene = article_scene("vertical", found.measure, drag=False, permeability=1.0)
     there = nearest(scene, "cuboid", 25e-3)
     assert there.distance == pytest.approx(25e-3, abs=1e-9)
     assert not there.stable
@@ -141,7 +142,9 @@ def compared():
 @pytest.mark.parametrize("model", ["dipole", "cuboid"])
 def test_each_model_s_levitation_is_that_of_a_search(compared, model):
     frequency = float(compared["frequency"])
-    there = nearest(rotor_scene("horizontal", 2.0, frequency), model, float(compared["distance"].sel(model=model)))
+    there = nearest(
+        article_scene("horizontal", 2.0, frequency, drag=False), model, float(compared["distance"].sel(model=model))
+    )
     here = compared.sel(model=model)
     assert float(here["distance"]) == pytest.approx(there.distance, abs=1e-10)
     np.testing.assert_allclose(
@@ -168,11 +171,11 @@ def mutual():
     with pytest.MonkeyPatch.context() as patch:
         for module in (stable_range, answered):
             patch.setattr(module, "HIGHEST", 130.0)
-        scene = rotor_scene("tilt", 10.0)
+        scene = article_scene("tilt", 10.0, drag=False)
         rates = Rates(rotor_table(scene.rotor, "dipole"))
         start, frequency = reference_state(scene)
         rigid = stable_range.stable_range(scene, rates, start, frequency)
-        made, doubt = answered.with_answers(scene, Family(rates, frequencies(scene), UNIT), rigid, (1, 2))
+        made, doubt = answered.with_answers(scene, by_frequency(scene, rates), rigid, (1, 2))
         return made, doubt, {side: made.end(side) for side in ("low", "high")}
 
 
@@ -209,13 +212,13 @@ def test_a_search_that_ends_at_the_border_gives_the_equilibrium_there(mutual):
 
 @pytest.mark.slow
 def test_with_answers_stability_ends_where_the_bodies_touch():
-    scene = rotor_scene("tilt", 10.0)
+    scene = article_scene("tilt", 10.0, drag=False)
     rates = Rates(rotor_table(scene.rotor, "dipole"))
     rigid = stable_range.stable_range(scene, rates, *reference_state(scene))
-    made, _ = answered.with_answers(scene, Family(rates, frequencies(scene), UNIT), rigid, (1, 2))
+    made, _ = answered.with_answers(scene, by_frequency(scene, rates), rigid, (1, 2))
     high = made.end("high")
     assert high.kind == "contact"
-    assert abs(stable_range.gap(scene, high)) < 1e-7
+    assert abs(rotor_gap(scene, high.position)) < 1e-7
 
 
 def test_a_plate_below_damps_what_is_neutral_without_it(monkeypatch):
@@ -226,7 +229,7 @@ def test_a_plate_below_damps_what_is_neutral_without_it(monkeypatch):
     assert 60 < float(found["lowest"][0]) < 65
     assert found["high_kind"].values[0] == "oscillatory"
     tried = found.isel(tried=0)
-    alone = rotor_scene("vertical", 14.0, float(tried["plate_frequency"]))
+    alone = article_scene("vertical", 14.0, float(tried["plate_frequency"]), drag=False)
     there = min(find_equilibria(alone, rotor_table(alone.rotor, "fem", 1e-2)), key=lambda each: each.growth_per_s)
     assert there.stable
     assert abs(there.growth_per_s) < 1e-6
@@ -238,9 +241,9 @@ def test_a_plate_below_damps_what_is_neutral_without_it(monkeypatch):
 
 def test_a_rotor_without_levitation_has_an_empty_row(monkeypatch):
     """Where attraction nowhere carries the weight there is no branch, and a search finds nothing."""
-    scene = rotor_scene("horizontal", 2.0)
+    scene = article_scene("horizontal", 2.0, drag=False)
     weak = replace(scene, floater=replace(scene.floater, remanence=1e-3))
-    monkeypatch.setattr(stability_map, "rotor_scene", lambda configuration, measure: weak)
+    monkeypatch.setattr(stability_map, "article_scene", lambda *rotor, **changes: weak)
     asked = {"configuration": "horizontal", "measure": 2.0, "model": "dipole", "with_plate": 2}
     found = stability_map.compute(asked)
     assert np.isnan(found["lowest"]).all()
