@@ -154,3 +154,9 @@ def test_team_problem_7_with_coarse_elements(monkeypatch):
     whole = team7_report.team7_lines(result)[5]
     assert whole.startswith("  all 68 values")
     assert f"largest {100 * size.max():5.2f}" in whole
+    left, right = team7_report.team7_figure(result).axes
+    for number, curve in enumerate(team7_report.CURVES):
+        (drawn,) = [line for line in left.lines if line.get_label() == curve]
+        np.testing.assert_allclose(drawn.get_ydata(), 1e3 * result["computed"][:, number])
+        (drawn,) = [line for line in right.lines if line.get_label() == curve]
+        np.testing.assert_allclose(drawn.get_ydata(), 100 * result["deviation"][:, number])

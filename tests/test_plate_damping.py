@@ -39,14 +39,13 @@ def test_weak_currents_act_in_proportion_to_the_conductivity(weak):
 
 
 def test_a_part_of_the_range_is_a_frequency_of_stable_levitation():
-    """Half way between the ends, which dipoles know to some per cent; weak currents damp what is neutral."""
+    """Half way between the ends, which the closed form knows to some per cent; weak currents damp more than air."""
     scene = article_scene("tilt", 10.0)
-    dipoles = Rates(rotor_table(scene.rotor, "dipole"))
-    rough = stable_range(scene, dipoles, *reference_state(scene))
+    rough = stable_range(scene, Rates(rotor_table(scene.rotor, "cuboid")), *reference_state(scene))
     row = plate_damping(asdict(Case("frequency", 0.5, conductivity=WEAK, part=0.5))).isel(case=0)
     middle = (rough.low.parameter + rough.high.parameter) / 2
     assert float(row["rotor_frequency"]) == pytest.approx(middle, rel=0.05)
-    assert np.all(np.abs(row["growth_without"]) < 0.01)
+    assert np.all(row["growth_without"] < 0)
     assert np.all(row["growth"] < row["growth_without"])
 
 

@@ -165,7 +165,7 @@ def test_every_point_of_every_study_is_known_to_json():
 
 def test_a_study_on_the_command_line_and_in_python_is_what_was_stored(tmp_path, monkeypatch):
     """To 1e-3, since the elements' accuracy moves with their versions; points are computed once for both."""
-    name, said = "field-components", io.StringIO()
+    name, said = "force-curve", io.StringIO()
     study = CATALOGUE[name]
     once = cache(lambda text: study.compute(json.loads(text)))
     monkeypatch.setitem(CATALOGUE, name, replace(study, compute=lambda point: once(json.dumps(point))))
@@ -176,9 +176,9 @@ def test_a_study_on_the_command_line_and_in_python_is_what_was_stored(tmp_path, 
     assert {Path(file).suffix for file in answer["figures"]} == {".png", ".pdf"}
     stored = read_result(Path(__file__).parent / "data" / "quick" / f"{name}.nc")
     for found in (read_result(Path(answer["result"])), api.run_study(name, out=tmp_path / "again")):
-        for field in ("on_axis", "off_axis"):
-            np.testing.assert_allclose(found[field], stored[field], atol=1e-3 * float(np.abs(stored[field]).max()))
-        assert list(found["configuration"].values) == list(stored["configuration"].values)
+        for part in ("attracting", "repelling", "polar_angle"):
+            np.testing.assert_allclose(found[part], stored[part], atol=1e-3 * float(np.abs(stored[part]).max()))
+        assert list(found["model"].values) == list(stored["model"].values)
     listed = io.StringIO()
     assert _status(["study", "--list"], listed) == 0
     assert [line.split()[0] for line in listed.getvalue().splitlines()] == list(CATALOGUE)
