@@ -132,3 +132,11 @@ def test_missing_file_and_folder(tmp_path):
         load_scene(tmp_path / "none.toml")
     with pytest.raises(SceneError, match="readable"):
         load_scene(tmp_path)
+
+
+def test_a_start_has_one_place_and_a_direction():
+    both = "\n[start]\noffset_mm = [0, 0, 1]\nposition_mm = [0, 0, -20]\nmoment = [0, 0, 0]\n"
+    assert list(faults(GOOD + both)) == [
+        "Input start must have offset_mm or position_mm; instead received both.",
+        "Input start.moment must be a direction, not zero; instead received [0.0, 0.0, 0.0].",
+    ]
