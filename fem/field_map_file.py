@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import io
 from collections.abc import Mapping
-from contextlib import redirect_stderr
+from contextlib import redirect_stderr, redirect_stdout
 from pathlib import Path
 
 import meshio
@@ -131,7 +131,7 @@ def _components(vector: xr.DataArray, name: str) -> dict[str, xr.DataArray]:
 def _mesh_columns(path: Path, length: float, field: float) -> dict[str, Array]:
     said = io.StringIO()
     try:
-        with redirect_stderr(said):
+        with redirect_stdout(said), redirect_stderr(said):
             mesh = meshio.read(path)
     except (Exception, SystemExit) as error:  # where no reader takes the file meshio prints why, and leaves the program
         reason = " ".join(said.getvalue().split()) or error
