@@ -9,6 +9,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+SCRIPT = Path(__file__).with_name("look_through.py")
 LONGEST = 20.0
 """Seconds to look through a small file, which takes a fraction of one."""
 PACE = 10e6
@@ -17,8 +18,7 @@ PACE = 10e6
 
 def fault(path: Path) -> str | None:
     """What is wrong with an HDF5 file, as the end of a sentence; None if all of it can be read."""
-    script = Path(__file__).with_name("look_through.py")
-    command = [sys.executable, "-P", str(script), str(path)]
+    command = [sys.executable, "-P", str(SCRIPT), str(path)]  # without this package's folder on the path
     try:
         done = subprocess.run(command, capture_output=True, text=True, timeout=allowed(path), check=False)
     except subprocess.TimeoutExpired:

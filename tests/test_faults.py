@@ -19,7 +19,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from spinlev.fem import memory
+from spinlev.fem import foreign, memory
 from spinlev.fem.table_store import read_checked, write_checked
 from spinlev.geometry.atomic import replacing, write_whole
 from spinlev.studies.cli import _status
@@ -371,13 +371,41 @@ def test_a_result_and_its_summary_are_of_the_same_run(spinlev, monkeypatch):
     assert not Path("out/summary.json").exists()
 
 
-def test_files_that_others_wrote_are_read_as_far_as_they_are_whole(spinlev):
+@pytest.mark.parametrize("step", [970, pytest.param(97, marks=pytest.mark.slow)])
+def test_files_that_others_wrote_are_read_as_far_as_they_are_whole(spinlev, step):
     """Without our checksum HDF5 must find the damage: a message, whatever it raises."""
     with h5py.File("r.nc", "w") as file:
         file.attrs["study"] = "run"
     content = Path("r.nc").read_bytes()
-    for length in range(0, len(content), 97):
+    for length in range(0, len(content), step):
         Path("r.nc").write_bytes(content[:length])
         status, _, said = spinlev("cite", "r.nc")
         assert status == 2
         assert "Traceback" not in said
+
+
+def foreign_file(name):
+    """A result as another program may write it, and where its attributes' texts are (HDF5's global heap)."""
+    with h5py.File(name, "w") as file:
+        file.attrs["study"] = "run"
+    return Path(name).read_bytes(), Path(name).read_bytes().index(b"GCOL")
+
+
+def test_a_foreign_file_that_hdf5_does_not_return_from_is_given_up(spinlev, monkeypatch):
+    """An object of no length in the heap: HDF5 goes round in a loop that no signal ends."""
+    monkeypatch.setattr(foreign, "LONGEST", 2.0)
+    content, heap = foreign_file("r.nc")
+    Path("r.nc").write_bytes(content[: heap + 16] + bytes(16) + content[heap + 32 :])
+    status, _, said = spinlev("cite", "r.nc")
+    assert status == 2
+    assert "HDF5 does not come to an end with it" in said.replace("\n", " ")
+
+
+def test_a_foreign_file_that_hdf5_crashes_on_is_refused(spinlev, monkeypatch, tmp_path):
+    """The process that looks through it dies, as HDF5 has made it on damaged files; the program does not."""
+    foreign_file("r.nc")
+    monkeypatch.setattr(foreign, "SCRIPT", tmp_path / "dies.py")
+    (tmp_path / "dies.py").write_text("import os, signal; os.kill(os.getpid(), signal.SIGSEGV)")
+    status, _, said = spinlev("cite", "r.nc")
+    assert status == 2
+    assert "HDF5 crashes on it" in said.replace("\n", " ")
