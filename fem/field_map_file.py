@@ -13,6 +13,7 @@ import numpy as np
 import xarray as xr
 
 from ..geometry.box import Array
+from . import foreign
 from .field_map import FieldMap, FieldMapError
 from .table_store import TableFileError, read_checked
 
@@ -129,6 +130,9 @@ def _components(vector: xr.DataArray, name: str) -> dict[str, xr.DataArray]:
 
 
 def _mesh_columns(path: Path, length: float, field: float) -> dict[str, Array]:
+    for part in (path, path.with_suffix(".h5")):  # where XDMF has its numbers
+        if foreign.is_hdf5(part) and (reason := foreign.fault(part)):
+            raise FieldMapError(f"Input map must be a readable HDF5 file; instead: {reason}.")
     said = io.StringIO()
     try:
         with redirect_stdout(said), redirect_stderr(said):

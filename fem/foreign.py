@@ -10,10 +10,19 @@ import sys
 from pathlib import Path
 
 SCRIPT = Path(__file__).with_name("look_through.py")
+SIGNATURE = b"\x89HDF\r\n\x1a\n"
 LONGEST = 20.0
 """Seconds to look through a small file, which takes a fraction of one."""
 PACE = 10e6
 """Bytes for each second more; disks and HDF5's filters are ten times as fast."""
+
+
+def is_hdf5(path: Path) -> bool:
+    """Whether a file is there and begins as HDF5 does."""
+    if not path.is_file():
+        return False
+    with path.open("rb") as stream:
+        return stream.read(len(SIGNATURE)) == SIGNATURE
 
 
 def fault(path: Path) -> str | None:

@@ -15,11 +15,14 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import h5py
+import meshio
 import numpy as np
 import pytest
 import xarray as xr
 
 from spinlev.fem import foreign, memory
+from spinlev.fem.field_map import FieldMapError
+from spinlev.fem.field_map_file import read_field_map
 from spinlev.fem.table_store import read_checked, write_checked
 from spinlev.geometry.atomic import replacing, write_whole
 from spinlev.studies.cli import _status
@@ -409,3 +412,13 @@ def test_a_foreign_file_that_hdf5_crashes_on_is_refused(spinlev, monkeypatch, tm
     status, _, said = spinlev("cite", "r.nc")
     assert status == 2
     assert "HDF5 crashes on it" in said.replace("\n", " ")
+
+
+def test_hdf5_of_a_mesh_is_looked_through_too(monkeypatch, tmp_path):
+    points = np.random.default_rng(0).uniform(-1e-2, 1e-2, (8, 3))
+    meshio.Mesh(points, [("vertex", np.arange(8)[:, None])], {"B": points}).write(tmp_path / "map.xdmf")
+    np.testing.assert_array_equal(read_field_map(tmp_path / "map.xdmf").field, points)
+    monkeypatch.setattr(foreign, "SCRIPT", tmp_path / "dies.py")
+    (tmp_path / "dies.py").write_text("import os, signal; os.kill(os.getpid(), signal.SIGSEGV)")
+    with pytest.raises(FieldMapError, match="HDF5 crashes on it"):
+        read_field_map(tmp_path / "map.xdmf")
