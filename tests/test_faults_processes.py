@@ -127,7 +127,7 @@ def test_two_processes_that_need_the_same_table(spinlev):
 @pytest.mark.parametrize("size", [0, 5_000, 60_000])
 @pytest.mark.parametrize("arguments", [FIELD, RUN, (*SWEEP, "--workers", "1")], ids=["field", "run", "sweep"])
 def test_a_disk_that_takes_no_more_than_so_many_bytes_a_file(spinlev, arguments, size):
-    """Also of libraries that write themselves (pictures): status 1 in words where one does not fit; only whole files."""
+    """Also of libraries that write themselves: status 1 in words where one does not fit, only whole files."""
     status = spinlev(*arguments, limit=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (size, size))).wait(
         timeout=300
     )
