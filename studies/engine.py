@@ -8,6 +8,7 @@ import signal
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
+from multiprocessing import resource_tracker
 from typing import TYPE_CHECKING, Annotated, Any
 
 import xarray as xr
@@ -110,6 +111,7 @@ def _deaf_children() -> Iterator[None]:
 
     They inherit that the signal waits, as do the threads begun here and what these begin afterwards.
     """
+    resource_tracker.ensure_running()  # its beginning would let the signal through
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
         yield

@@ -57,9 +57,9 @@ ERRORS_OF_THE_DIPOLE = ("field_error", "gradient_error")
 def test_the_first_point_of_a_study_is_still_what_was_stored(path):
     """To 1e-4 of the largest value of a quantity.
 
-    What was stored by an earlier version differed by up to 7e-12, averaged motions by 4e-8; the plate's compact table was
-    made otherwise since, which moved its quantities by 1.4e-5, less than a hundredth of their estimated error. Growth
-    rates of motions without friction are zero, as round-off shows them.
+    What earlier versions stored differed by up to 7e-12, averaged motions by 3e-8; the plate's compact table was made
+    otherwise since, which moved its quantities by 1.4e-5, less than a hundredth of their estimated error. Growth rates
+    of motions without friction are zero, as round-off shows them.
     """
     study, stored = CATALOGUE[path.stem], read_result(path)
     found = study.gather([study.compute(study.points(True)[0])])
