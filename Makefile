@@ -69,8 +69,11 @@ gallery: install
 # Wheel and source distribution in dist/, without a network; then the wheel is tested outside the repository.
 dist: install
 	rm -rf dist build
-	$(BIN)/python -c 'import setuptools.build_meta as b; print(b.build_sdist("dist"), b.build_wheel("dist"))'
+	@mkdir build
+	@$(BIN)/python -c 'import setuptools.build_meta as b; b.build_sdist("dist"); b.build_wheel("dist")' >build/log 2>&1 || \
+	  { cat build/log; exit 1; }
 	@rm -rf build *.egg-info
+	@ls dist
 	sh tests/try_wheel.sh $(BIN)/python dist
 
 # Pin anew (needs pip-tools in the environment that calls it).

@@ -8,8 +8,6 @@ The model leaves out what a flight does within the time of a bounce, 0.1 s.
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
 from ..fem.table import FieldTable
@@ -19,7 +17,7 @@ from .averaged import BALANCE, CONTACT, E_FOLDS, Drift, flown, steady
 from .branch import FOLD, Family, Point, spins
 from .equilibria import find_equilibria
 from .equilibrium import Equilibrium, EquilibriumError
-from .events import clearance
+from .events import rotor_gap
 from .rates import Rates
 from .slow_torque import SlowTorque
 from .state import Scales, State
@@ -61,13 +59,13 @@ def drift(
     towards = spin + np.copysign(3.0, torque(state))
 
     def over(point: Point) -> bool:
-        return point.kind == FOLD or torque(point.state) * (towards - spin) <= 0 or _touches(scene, point)
+        return point.kind == FOLD or torque(point.state) * (towards - spin) <= 0 or rotor_gap(scene, point.position) < 0
 
     points = follow_branch(family, state, spin, towards, Steps(longest=0.03, turn=0.05), over)
     fold = next((k for k, point in enumerate(points) if point.kind == FOLD), None)
     if fold is not None:
         return flown(torque, points[: fold + 1], duration, FOLD, e_folds)
-    return flown(torque, points, duration, CONTACT if _touches(scene, points[-1]) else BALANCE, e_folds)
+    return flown(torque, points, duration, CONTACT if rotor_gap(scene, points[-1].position) < 0 else BALANCE, e_folds)
 
 
 def _start(scene: Scene, table: FieldTable, spin: float, rates: Rates) -> Equilibrium:
@@ -76,7 +74,3 @@ def _start(scene: Scene, table: FieldTable, spin: float, rates: Rates) -> Equili
     if not known:
         raise EquilibriumError(f"At {scene.frequency:g} Hz the floater has no equilibrium with body spin {spin:g}.")
     return min(known, key=lambda equilibrium: equilibrium.growth_per_s)
-
-
-def _touches(scene: Scene, point: Point) -> bool:
-    return bool(clearance(replace(scene, plate=None), np.zeros(1), point.position[None])[0] < 0)

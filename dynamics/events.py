@@ -6,6 +6,8 @@ of the box that was nearest when it began; a contact that this may miss is found
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import heyoka as hy
 import numpy as np
 
@@ -59,6 +61,11 @@ def clearance(scene: Scene, time: Array, position: Array) -> Array:
         seen[:, 2] += plate_depth(scene.plate, time)
         gaps.append(scene.plate.box.distance(seen))
     return np.min(gaps, axis=0) - scene.floater.radius if gaps else np.full(len(position), np.inf)
+
+
+def rotor_gap(scene: Scene, position: Array) -> float:
+    """Gap in m between the floater at `position` (3,) m, rotor's frame, and the rotor; negative where they overlap."""
+    return float(clearance(replace(scene, plate=None), np.zeros(1), position[None])[0])
 
 
 def plate_depth(plate: Plate, time: Array) -> Array:

@@ -10,8 +10,6 @@ from .stability import Modes, tangent_space
 
 STEPS = 48
 """Steps in a turn, doubled once for the error."""
-OWN = 0.5
-"""Part of a mode that must be motion of the floater, by norm, for it to be one of the floater's."""
 NODES = np.array([0.5 - np.sqrt(15) / 10, 0.5, 0.5 + np.sqrt(15) / 10])
 COLLOCATION = np.array(
     [

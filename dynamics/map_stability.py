@@ -11,7 +11,7 @@ from ..geometry.box import Array
 from .atlas import Atlas
 from .balance import Indices
 from .grid import Grid
-from .stability import spectra
+from .stability import is_stable, spectra
 from .symbols import Parameter
 
 
@@ -77,6 +77,6 @@ def judged(grid: Grid, atlas: Atlas, searches: int) -> EquilibriumMap:
         moment=moment,
         eigenvalues=np.asarray(values / time, complex),
         errors=errors.max(axis=1, initial=0.0) / time[:, 0],
-        stable=np.all(values.real <= errors, axis=1),
+        stable=is_stable(values, errors),
         searches=searches,
     )

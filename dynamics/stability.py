@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..geometry.box import Array
 from .balance import tangent_basis
@@ -33,13 +35,18 @@ class Modes:
     @property
     def stable(self) -> bool:
         """Whether no mode grows faster than its round-off error."""
-        return bool(np.all(self.eigenvalues.real <= self.errors))
+        return bool(is_stable(self.eigenvalues, self.errors))
 
     @property
     def angular_frequencies(self) -> Array:
         """The distinct positive imaginary parts, ascending."""
         positive = np.sort(self.eigenvalues.imag[self.eigenvalues.imag > self.errors])
         return positive[np.diff(positive, prepend=-np.inf) > 1e-9]
+
+
+def is_stable(eigenvalues: NDArray[Any], errors: Array) -> NDArray[np.bool_]:
+    """Where (...,) no mode of eigenvalues (..., 10) grows faster than its round-off error (..., 10)."""
+    return np.asarray(np.all(eigenvalues.real <= errors, axis=-1))
 
 
 def modes(state: Array, slope: Array) -> Modes:

@@ -16,7 +16,7 @@ from .equilibrium import Equilibrium
 from .fixed_points import scattered
 from .rates import Rates
 from .search import SearchRange
-from .stability import spectra
+from .stability import is_stable, spectra
 from .state import Scales
 
 FREQUENCY_RATIO, FREQUENCY_TRIALS = 1.08, 9
@@ -52,4 +52,4 @@ def _may_levitate(scene: Scene, rates: Rates) -> bool:
     if not len(states):
         return False
     values, errors, _ = spectra(states, rates(states, balance.values)[1])
-    return bool(np.any(np.all(values.real <= errors, axis=1)))
+    return bool(np.any(is_stable(values, errors)))

@@ -6,14 +6,13 @@ with 9.5 GB that took 3 s of processor time, and 9 s where others read it too.  
 
 from __future__ import annotations
 
-import fcntl
 import sqlite3
 from pathlib import Path
 
 import heyoka as hy
 
 from .code_copy import add_copy, sound
-from .table_store import cache_folder
+from .table_store import alone, cache_folder
 
 LIMIT = 2**29
 """Size of what is kept, bytes; the oldest makes room.  Looked through in 0.2 s, after it is checked in as much."""
@@ -23,9 +22,7 @@ def keep_code() -> None:
     """Keep compiled code in the cache's folder; damaged code is thrown away, and none kept where that is impossible."""
     folder = cache_folder() / "code"
     try:
-        folder.mkdir(parents=True, exist_ok=True)
-        with (folder / "lock").open("w") as lock:
-            fcntl.flock(lock, fcntl.LOCK_EX)  # two processes that make the file at once fail
+        with alone(folder / "lock", report=lambda _: None):  # two processes that make the file at once fail
             _open(folder)
     except (OSError, RuntimeError, sqlite3.Error):
         hy.llvm_state.set_diskcache_enabled(False)

@@ -12,7 +12,8 @@ from skfem.helpers import dot, grad, mul
 
 from ..geometry.box import Array
 from ..geometry.magnet import Magnet
-from ..geometry.mesh import MagnetMesh, to_meshio
+from ..geometry.mesh import MagnetMesh
+from ..geometry.mesh_export import to_meshio
 from .demagnetization import remanent_field
 from .magnetostatics import Formulation
 from .quadrature import volume_rule

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..geometry.box import Array, frozen_array
+from ..geometry.scene_text import millimetres
 from .compiled import FieldExpressions
 from .ensemble import Ensemble
 from .harmonic_fit import FLOOR
@@ -76,12 +77,10 @@ class GriddedTable:
         return self.expansions.evaluate(points)
 
     def _range(self) -> str:
-        parts = [f"{e.radius * 1e3:.4g} mm from ({_millimeters(e.center)}) mm" for e in self.expansions.expansions]
+        parts = [f"{e.radius * 1e3:.4g} mm from {millimetres(e.center)}" for e in self.expansions.expansions]
         text = f"farther than {', '.join(parts)}"
         if np.isfinite(self.region).all():
-            text += (
-                f" and in the map's box from ({_millimeters(self.region[0])}) to ({_millimeters(self.region[1])}) mm"
-            )
+            text += f" and in the map's box from {millimetres(self.region[0])} to {millimetres(self.region[1])}"
         return text
 
     def relative_error(self, points: ArrayLike) -> tuple[Array, Array]:
@@ -103,7 +102,3 @@ class GriddedTable:
         for expansion in self.expansions.expansions:
             known &= np.linalg.norm(points - expansion.center, axis=1) > expansion.radius
         return known
-
-
-def _millimeters(place: Array) -> str:
-    return ", ".join(f"{c * 1e3:.4g}" for c in place)

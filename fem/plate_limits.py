@@ -36,7 +36,7 @@ def refusal(plate: Plate, frequency: float, rtol: float, best: float) -> str:
     depth = 1e3 * skin_depth(plate.conductivity, frequency)
     if best < 1:
         return (
-            f"Input rtol must be at least {best:.1e} for this plate at {frequency:g} Hz (skin depth {depth:.2g} mm); "
+            f"Input rtol of the plate must be at least {best:.1e} at {frequency:g} Hz (skin depth {depth:.2g} mm); "
             f"instead received {rtol:.1e}."
         )
     return (

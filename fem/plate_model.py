@@ -76,7 +76,7 @@ def tabulate(network: PlateNetwork, rtol: float) -> PlateTable:
     errors = PlateErrors(network.mesh_error, network.state_error, worst(fit.error))
     if errors.total > rtol:
         raise AccuracyError(
-            f"Input rtol must be at least {errors.total:.1e} for this plate and region; instead received {rtol:.1e} "
+            f"Input rtol of the plate must be at least {errors.total:.1e} in this region; instead received {rtol:.1e} "
             f"({errors})."
         )
     provenance: dict[str, str | float] = {

@@ -87,7 +87,7 @@ def from_cache(
     does no harm.  While one process makes a table, others that need the same one wait for it.
     """
     path = cache_folder() / name
-    with _alone(path.with_suffix(".lock"), report):
+    with alone(path.with_suffix(".lock"), report):
         if path.exists():
             try:
                 return load(path), True
@@ -102,7 +102,7 @@ def from_cache(
 
 
 @contextmanager
-def _alone(lock: Path, report: Callable[[str], None]) -> Iterator[None]:
+def alone(lock: Path, report: Callable[[str], None]) -> Iterator[None]:
     """Be the only process in this block with the same lock file; the system frees it if the process dies."""
     try:
         lock.parent.mkdir(parents=True, exist_ok=True)

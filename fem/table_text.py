@@ -6,6 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..geometry.scene_text import millimetres
+
 if TYPE_CHECKING:
     from .gridded import GriddedTable
     from .plate_table import PlateTable
@@ -31,19 +33,19 @@ def rotor_table_text(table: RotorTable) -> str:
 
 def gridded_table_text(table: GriddedTable) -> str:
     """Parts and error of a table that stands for a map."""
-    parts = [f"degree {part.degree} about ({_millimetres(part.center)}) mm" for part in table.expansions.expansions]
+    parts = [f"degree {part.degree} about {millimetres(part.center)}" for part in table.expansions.expansions]
     return "\n".join([f"GriddedTable {table.model!r}: {', '.join(parts)}", *_error(table)])
 
 
 def plate_table_text(table: PlateTable) -> str:
     """States, error and range of a plate's table."""
-    lower, upper = _millimetres(table.region.lower), _millimetres(table.region.upper)
+    lower, upper = millimetres(table.region.lower), millimetres(table.region.upper)
     slowest, fastest = 1e3 / table.rates.min(), 1e3 / table.rates.max()
     return "\n".join([
-        f"PlateTable of ({_millimetres(table.size)}) mm, {table.conductivity:.3g} S/m: {len(table.rates)} currents",
+        f"PlateTable of {millimetres(table.size)}, {table.conductivity:.3g} S/m: {len(table.rates)} currents",
         f"  memory from {fastest:.2g} to {slowest:.3g} ms; {len(table.multipoles.kinds)} multipoles",
         f"  relative error {table.errors.total:.1e} up to {table.frequencies[1]:g} Hz",
-        f"  from ({lower}) to ({upper}) mm from the plate's centre",
+        f"  from {lower} to {upper} from the plate's centre",
     ])  # fmt: skip
 
 
@@ -57,7 +59,3 @@ def _error(table: RotorTable | GriddedTable) -> list[str]:
 
 def _counted(number: int, thing: str) -> str:
     return f"{number} {thing}" if number == 1 else f"{number} {thing}s"
-
-
-def _millimetres(place: np.ndarray) -> str:
-    return ", ".join(f"{value:.4g}" for value in np.round(place * 1e3, 6) + 0.0)

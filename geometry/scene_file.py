@@ -60,6 +60,7 @@ def parse_scene(text: str, source: str = "scene", changes: Mapping[str, float] |
         raise SceneError(source, [f"Input scene must be TOML; instead: {error}."]) from None
     for key, value in (changes or {}).items():
         _replace(raw, key, value, source)
+        text += f"\n# changed: {key} = {value}"
     try:
         table = SceneSection.model_validate(raw)
     except ValidationError as error:

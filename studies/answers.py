@@ -12,6 +12,7 @@ from ..fem.sphere_eddy import rotating_torque
 from ..fem.table import FieldTable
 from ..geometry.box import Array
 from ..geometry.scene import Scene
+from .article import MAGNET_CONDUCTIVITY
 
 MILLI = 1e-3
 PLATE_NOT_MODELLED = "The plate's eddy currents are left out: the plate is only an obstacle."
@@ -19,8 +20,6 @@ ANSWERS_NOT_MODELLED = (
     "The floater is a rigid dipole: that rotor and floater magnetise each other is not in the motion "
     "(how much that is: spinlev study floater-permeability)."
 )
-MAGNET_CONDUCTIVITY = 6.7e5
-"""Of sintered NdFeB, S/m: to say what is left out where the scene gives none."""
 
 
 def field_answer(table: FieldTable, points: Array) -> dict[str, Any]:

@@ -48,7 +48,7 @@ __all__ = [
 ]
 
 
-def rotor_table(scene: Scene, model: FieldModel = "auto", rtol: float = 3e-6) -> FieldTable:
+def rotor_table(scene: Scene, model: FieldModel = "auto", rtol: float = Tables.rtol) -> FieldTable:
     """The rotor's field: `evaluate(points)` gives B (n, 3) T and its gradient (n, 3, 3) T/m at points (n, 3) m.
 
     Accurate to `rtol` wherever the floater can be; `relative_error(points)` is the estimate. Raises InputError for a
@@ -61,8 +61,8 @@ def plate_table(
     scene: Scene,
     model: FieldModel = "auto",
     plate_model: PlateModel = "auto",
-    rtol: float = 3e-6,
-    plate_rtol: float = 3e-3,
+    rtol: float = Tables.rtol,
+    plate_rtol: float = Tables.plate_rtol,
 ) -> PlateMemory | None:
     """The plate's currents around the place where the floater levitates, or None where none are modelled.
 
@@ -77,8 +77,8 @@ def equilibria(
     model: FieldModel = "auto",
     plate_model: PlateModel = "auto",
     spin: float = 0.0,
-    rtol: float = 3e-6,
-    plate_rtol: float = 3e-3,
+    rtol: float = Tables.rtol,
+    plate_rtol: float = Tables.plate_rtol,
 ) -> xr.Dataset:
     """All synchronous equilibria, the stable ones first, with errors, growth and frequency of each small motion.
 
@@ -100,8 +100,8 @@ def stability(
     model: FieldModel = "auto",
     plate_model: PlateModel = "auto",
     spin: float = 0.0,
-    rtol: float = 3e-6,
-    plate_rtol: float = 3e-3,
+    rtol: float = Tables.rtol,
+    plate_rtol: float = Tables.plate_rtol,
 ) -> xr.Dataset:
     """The five small motions about the equilibrium at which a flight begins, the nearest stable one if there is one.
 
@@ -138,8 +138,8 @@ def simulate(
     duration: float,
     model: FieldModel = "auto",
     plate_model: PlateModel = "auto",
-    rtol: float = 3e-6,
-    plate_rtol: float = 3e-3,
+    rtol: float = Tables.rtol,
+    plate_rtol: float = Tables.plate_rtol,
 ) -> xr.Dataset:
     """The floater's motion for `duration` (s) from where the scene says.
 

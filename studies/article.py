@@ -5,7 +5,7 @@ J. M. Hermansen, F. L. Durhuus and R. Bjørk, Appl. Phys. Lett. 127 (2025) 01240
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,11 +18,15 @@ from ..fem.table import RotorTable
 from ..geometry import rotor
 from ..geometry.scene import Drag, Floater, Scene
 from .console import note
-from .study import Point
+from .study import Point, chosen
 
 EDGE, REMANENCE, PERMEABILITY = 10e-3, 1.305, 1.05
 """Of the rotor's cubes: m; T, the middle of 1.29 to 1.32; recoil permeability usual for NdFeB, which is not given."""
 FLOATER = Floater(6.35e-3, REMANENCE, PERMEABILITY, 7500.0)
+MAGNET_CONDUCTIVITY = 6.7e5
+"""Of sintered NdFeB, S/m; makers give 6.2e5 to 9e5."""
+PLATE_SIZE, PLATE_CONDUCTIVITY = (0.1, 0.24, 0.03), 3.5e7
+"""Of the aluminium plate: edges, m; S/m."""
 CONTACT = EDGE / 2 + FLOATER.radius
 """Distance on the axis at which floater and a cube that is not tilted touch, m."""
 LOWEST, HIGHEST = 40.0, 250.0
@@ -71,11 +75,42 @@ CONFIGURATIONS = {
 }
 
 
-def article_scene(configuration: str, value: float, frequency: float, drag: bool = True) -> Scene:
-    """A rotor of the article above its floater, in air unless `drag` is off; `value` in the configuration's unit."""
+QUICK = {"horizontal": (1.0,), "vertical": (14.0,), "tilt": (10.0,)}
+"""One rotor of each configuration, for the quick settings of studies."""
+
+
+def levitated(quick: bool) -> list[Point]:
+    """A point for each rotor that levitated in the experiment; `quick` has one of each configuration."""
+    return [
+        {"configuration": configuration, "measure": measure}
+        for configuration, kind in CONFIGURATIONS.items()
+        for measure in (kind.levitated[1:2] if quick else kind.levitated)
+    ]
+
+
+def article_scene(
+    configuration: str,
+    value: float,
+    frequency: float = 100.0,
+    *,
+    drag: bool = True,
+    edge: float = EDGE,
+    remanence: float = REMANENCE,
+    permeability: float = PERMEABILITY,
+    floater: Floater = FLOATER,
+) -> Scene:
+    """A rotor of the article above its floater, without a plate.
+
+    Parameters
+    ----------
+    configuration, value : of the rotor; displacement in mm or tilt in degrees
+    frequency : Hz
+    drag : whether there is air (Stokes)
+    edge, remanence, permeability : of the cubes, m, T and 1
+    """
     kind = CONFIGURATIONS[configuration]
-    magnets = kind.make(kind.si(value), EDGE, REMANENCE, PERMEABILITY)
-    return Scene(frequency, magnets, FLOATER, Drag.stokes(FLOATER.radius) if drag else Drag(0.0, 0.0))
+    magnets = kind.make(kind.si(value), edge, remanence, permeability)
+    return Scene(frequency, magnets, floater, Drag.stokes(floater.radius) if drag else Drag(0.0, 0.0))
 
 
 def article_table(scene: Scene, model: str) -> RotorTable:
@@ -91,20 +126,20 @@ def label(configuration: str, value: float) -> str:
     return f"{kind.symbol} = {value:g}{'' if kind.unit == '°' else ' '}{kind.unit}"
 
 
+def axis_label(configuration: str) -> str:
+    """A configuration's parameter with its unit, for an axis."""
+    kind = CONFIGURATIONS[configuration]
+    return f"{kind.symbol} ({kind.unit})"
+
+
+def by_configuration(result: xr.Dataset) -> Iterator[tuple[str, xr.Dataset]]:
+    """Each configuration that a joined result has, with its rotors by ascending displacement or tilt."""
+    for configuration in CONFIGURATIONS:
+        part = chosen(result, configuration=configuration).sortby("measure")
+        if part.sizes["case"]:
+            yield configuration, part
+
+
 def stable(growth: ArrayLike) -> NDArray[np.bool_]:
     """Where no disturbance grows e-fold within `FLIGHT`; False where there is no equilibrium (NaN)."""
     return np.asarray(np.asarray(growth) <= 1 / FLIGHT)
-
-
-def one_case(point: Point, dataset: xr.Dataset) -> xr.Dataset:
-    """A point's result with what tells it from the others (texts and numbers), ready to be joined along `case`."""
-    labels = {name: xr.Variable((), point[name]) for name in ("configuration", "value", "model")}
-    return dataset.assign(labels).expand_dims("case")
-
-
-def chosen(result: xr.Dataset, **labels: object) -> xr.Dataset:
-    """The cases of a joined result with the given labels."""
-    found = np.ones(result.sizes["case"], bool)
-    for name, wanted in labels.items():
-        found &= result[name].values == wanted
-    return result.isel(case=np.flatnonzero(found))

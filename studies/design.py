@@ -9,11 +9,10 @@ from ..dynamics import EquilibriumError, find_equilibria
 from ..fem.cache import cached_rotor_table
 from ..geometry.box import Array
 from . import study
-from .article import FLOATER
+from .article import CONFIGURATIONS, FLOATER, article_scene
 from .console import note
 from .design_search import designed
 from .results import variable
-from .rotor_points import CONFIGURATIONS, rotor_scene
 
 EDGES = (6.0, 8.0, 10.0, 12.7, 16.0)
 """Edges of the cubes that are tried, mm."""
@@ -39,20 +38,24 @@ def checked_by_elements(configuration: str, edge: float, distance: float, freque
     -------
     Measure (mm or °), distance (m) and its error (m) of the equilibrium nearest to the wanted distance, 1 if it is
     stable, its growth (1/s).
+
+    Raises
+    ------
+    EquilibriumError : there is none, or the corrections do not settle
     """
-    measure, slope, row = first, _shifted(configuration, edge, distance, frequency, first), np.full(5, np.nan)
+    measure, slope = first, _shifted(configuration, edge, distance, frequency, first)
     for _ in range(5):
-        scene = rotor_scene(configuration, measure, frequency, edge)
+        scene = article_scene(configuration, measure, frequency, drag=False, edge=edge)
         table = cached_rotor_table(scene.rotor, "fem", RTOL, note, FLOATER.radius)[0]
         found = find_equilibria(scene, table)
         if not found:
             raise EquilibriumError("The true field has no equilibrium there.")
         best = min(found, key=lambda e: abs(e.distance - distance))
-        row = np.array([measure, best.distance, best.position_error, float(best.stable), best.growth_per_s])
         if abs(best.distance - distance) < CLOSE_ENOUGH:
-            break
+            found_there = best.distance, best.position_error, float(best.stable), best.growth_per_s
+            return np.array([measure, *found_there])
         measure -= (best.distance - distance) / slope
-    return row
+    raise EquilibriumError("The correction of the measure for the true field did not settle.")
 
 
 def _shifted(configuration: str, edge: float, distance: float, frequency: float, measure: float) -> float:
@@ -86,7 +89,10 @@ def compute(point: study.Point) -> xr.Dataset:
     best = int(np.nanargmax(margin)) if np.isfinite(margin).any() else -1
     true = np.full(len(CHECKED), np.nan)
     if best >= 0 and margin[best] > 0:
-        true = checked_by_elements(name, 1e-3 * point["edges_mm"][best], distance, frequency, rows[best, 0])
+        try:
+            true = checked_by_elements(name, 1e-3 * point["edges_mm"][best], distance, frequency, rows[best, 0])
+        except EquilibriumError as error:
+            note(str(error))
     data = {k: variable(("case", "edge"), rows[None, :, i], *NAMES[k]) for i, k in enumerate(NAMES)}
     data |= {k: variable(("case",), true[None, i], *CHECKED[k]) for i, k in enumerate(CHECKED)}
     data["wanted_distance"] = variable(("case",), np.array([distance]), "m", "wanted distance")

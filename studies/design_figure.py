@@ -8,14 +8,21 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import PercentFormatter
 
+from .article import CONFIGURATIONS, axis_label
 from .figures import PALETTE, panels, styled
-from .rotor_points import SYMBOLS, UNITS
+from .study import chosen
 
 
 def wanted(result: xr.Dataset) -> list[tuple[float, float]]:
     """The pairs of distance (m) and frequency (Hz) that were asked for."""
     pairs = zip(result["wanted_distance"].values, result["wanted_frequency"].values, strict=True)
     return sorted({(float(d), float(f)) for d, f in pairs})
+
+
+def _wish(result: xr.Dataset, distance: float, frequency: float) -> list[xr.Dataset]:
+    """What each configuration answers to one of them."""
+    found = chosen(result, wanted_distance=distance, wanted_frequency=frequency)
+    return [found.isel(case=k) for k in range(found.sizes["case"])]
 
 
 @styled
@@ -25,9 +32,8 @@ def design_figure(result: xr.Dataset) -> Figure:
     columns = len({f for _, f in wishes})
     figure, axes = panels(len(wishes) // columns, columns, (3.4 * columns, 2.7 * len(wishes) // columns + 0.3))
     for place, (distance, frequency) in zip(axes.flat, wishes, strict=True):
-        chosen = (result["wanted_distance"] == distance) & (result["wanted_frequency"] == frequency)
-        for k in np.flatnonzero(chosen.values):
-            _margins(place, result.isel(case=int(k)))
+        for one in _wish(result, distance, frequency):
+            _margins(place, one)
         place.set_title(f"{1e3 * distance:g} mm at {frequency:g} Hz")
         place.yaxis.set_major_formatter(PercentFormatter(1.0, decimals=0))
         place.margins(y=0.15)
@@ -38,9 +44,9 @@ def design_figure(result: xr.Dataset) -> Figure:
 
 def _margins(place: Axes, one: xr.Dataset) -> None:
     kind = str(one["configuration"].values)
-    color = PALETTE[list(SYMBOLS).index(kind)]
+    color = PALETTE[list(CONFIGURATIONS).index(kind)]
     edges, margin, measure = 1e3 * one["edge"].values, one["margin"].values, one["measure"].values
-    place.plot(edges, margin, "o-", ms=3, color=color, label=f"{kind}, {SYMBOLS[kind]} in {UNITS[kind]}")
+    place.plot(edges, margin, "o-", ms=3, color=color, label=f"{kind}, {axis_label(kind)}")
     for edge, height, value in zip(edges, margin, measure, strict=True):
         if np.isfinite(height) and height > 0:
             place.annotate(
@@ -53,9 +59,8 @@ def design_lines(result: xr.Dataset) -> list[str]:
     """The best rotor for each wish, checked by a forward search in the true field."""
     lines = []
     for distance, frequency in wanted(result):
-        chosen = (result["wanted_distance"] == distance) & (result["wanted_frequency"] == frequency)
         lines.append(f"{1e3 * distance:g} mm at {frequency:g} Hz:")
-        lines += [f"  {_best(result.isel(case=int(k)))}" for k in np.flatnonzero(chosen.values)]
+        lines += [f"  {_best(one)}" for one in _wish(result, distance, frequency)]
     return lines
 
 
@@ -64,15 +69,15 @@ def _best(one: xr.Dataset) -> str:
     if best < 0 or not float(one["margin"][best]) > 0:
         return f"{kind}: no edge gives stable levitation there."
     at = one.isel(edge=best)
-    unit = UNITS[kind]
+    symbol, unit = CONFIGURATIONS[kind].symbol, CONFIGURATIONS[kind].unit
     found = (
-        f"{kind}: edge {1e3 * float(at['edge']):g} mm, {SYMBOLS[kind]} = {float(at['measure']):.3f} {unit} (closed "
+        f"{kind}: edge {1e3 * float(at['edge']):g} mm, {symbol} = {float(at['measure']):.3f} {unit} (closed "
         f"form), margin {100 * float(at['margin']):.1f} % ({float(at['lowest']):.1f} to {float(at['highest']):.1f} Hz)"
     )
     if not np.isfinite(float(one["true_distance"])):
         return f"{found}; the true field was not met."
     state = "stable" if float(one["true_stable"]) else f"UNSTABLE, {float(one['true_growth']):.2g} /s"
     return (
-        f"{found}; true field: {SYMBOLS[kind]} = {float(one['true_measure']):.3f} {unit} gives "
+        f"{found}; true field: {symbol} = {float(one['true_measure']):.3f} {unit} gives "
         f"{1e3 * float(one['true_distance']):.4f} ± {1e3 * float(one['true_distance_error']):.1g} mm, {state}."
     )

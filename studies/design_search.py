@@ -6,18 +6,18 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..dynamics import EquilibriumError, Family, Point, Rates
+from ..dynamics import EquilibriumError, Point, Rates
 from ..dynamics.balance import AXIAL, LATERAL, Balance, solve
-from ..dynamics.branch import frequencies
 from ..dynamics.equations import parameters
+from ..dynamics.events import rotor_gap
 from ..dynamics.state import Scales
 from ..fem.models import rotor_table
 from ..geometry.box import Array
 from ..geometry.magnet import MU_0
 from ..geometry.scene import Scene
-from .article import FLOATER, REMANENCE
-from .rotor_points import rotor_scene
-from .stable_range import HIGHEST, LOWEST, UNIT, gap, is_stable, stability_end
+from .article import FLOATER, REMANENCE, article_scene
+from .levitation_branch import by_frequency
+from .stable_range import HIGHEST, LOWEST, is_stable, stability_end
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,7 +73,7 @@ def designed(configuration: str, edge: float, distance: float, frequency: float)
     place, moment = np.array([radius, 0.0, -distance]), np.array([np.sin(angle), 0.0, np.cos(angle)])
     known: list[tuple[float, float]] = []
     for _ in range(30):
-        scene = _checked(rotor_scene(configuration, measure, frequency, edge, permeability=1.0), configuration, measure)
+        scene = _checked(_closed_form(configuration, measure, frequency, edge), configuration, measure)
         rates = Rates.of(scene, rotor_table(scene.rotor, "cuboid"))
         place, moment, force = _lateral(scene, rates, place * distance / np.linalg.norm(place), moment)
         if known and abs(measure - known[-1][0]) < 1e-9 * measure:
@@ -81,6 +81,10 @@ def designed(configuration: str, edge: float, distance: float, frequency: float)
         known.append((measure, force))
         measure = _secant(known)
     raise EquilibriumError("The search for the measure did not settle.")
+
+
+def _closed_form(configuration: str, measure: float, frequency: float, edge: float) -> Scene:
+    return article_scene(configuration, measure, frequency, drag=False, edge=edge, permeability=1.0)
 
 
 def _secant(known: list[tuple[float, float]]) -> float:
@@ -112,9 +116,9 @@ def _lateral(scene: Scene, rates: Rates, place: Array, moment: Array) -> tuple[A
 
 
 def _judged(scene: Scene, rates: Rates, measure: float, place: Array, moment: Array) -> Design:
-    family = Family(rates, frequencies(scene), UNIT)
+    family = by_frequency(scene, rates)
     here = family.point(place / scene.floater.radius, moment, scene.frequency)
-    if gap(scene, here) < 0:
+    if rotor_gap(scene, here.position) < 0:
         raise EquilibriumError("The floater would overlap with the rotor.")
     if not is_stable(here):
         return Design(measure, here, here, here)

@@ -9,7 +9,6 @@ import numpy as np
 import xarray as xr
 
 from ..dynamics import EquilibriumError, Family, Point, Rates
-from ..dynamics.branch import frequencies
 from ..dynamics.mode_names import named_modes
 from ..fem.cache import cached_rotor_table
 from ..fem.models import rotor_table
@@ -17,10 +16,11 @@ from ..geometry.box import Array
 from ..geometry.scene import Scene
 from . import study
 from .answered import with_answers
+from .article import article_scene, levitated
 from .console import note
+from .levitation_branch import by_frequency
 from .results import variable
-from .rotor_points import levitated, rotor_scene
-from .stable_range import UNIT, StableRange, at_frequency, reference_state
+from .stable_range import StableRange, at_frequency, reference_state
 from .stable_range import stable_range as range_of
 
 MODELS = ("article", "dipole", "cuboid", "fem", "mutual")
@@ -53,7 +53,7 @@ class Levitation:
     @property
     def family(self) -> Family:
         """Its equilibria against frequency."""
-        return Family(self.rates, frequencies(self.scene), UNIT)
+        return by_frequency(self.scene, self.rates)
 
     def at(self, frequency: float) -> Point:
         """The equilibrium at a frequency, Hz."""
@@ -62,7 +62,7 @@ class Levitation:
 
 def compute(point: study.Point) -> xr.Dataset:
     """Distance, polar angle, modes and limits of stability of one rotor, by every model and with errors."""
-    scene = rotor_scene(point["configuration"], point["measure"])
+    scene = article_scene(point["configuration"], point["measure"], drag=False)
     bare = replace(scene, floater=replace(scene.floater, recoil_permeability=1.0))
     start = reference_state(scene)
     dipole = Rates.of(scene, rotor_table(scene.rotor, "dipole"))

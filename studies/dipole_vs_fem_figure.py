@@ -8,8 +8,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from ..geometry.box import Array
+from .article import axis_label, by_configuration, label
 from .figures import PALETTE, panels, styled
-from .rotor_points import CONFIGURATIONS, SYMBOLS, UNITS
 
 CAUSES = {
     "floater's permeability": ("article", "dipole"),
@@ -30,27 +30,18 @@ def change(result: xr.Dataset, name: str, models: tuple[str, str]) -> tuple[xr.D
     return value, result[f"{name}_error"].sel(model=second) + result[f"{name}_error"].sel(model=first)
 
 
-def of_configuration(result: xr.Dataset, configuration: str) -> xr.Dataset:
-    """The cases of one configuration, by ascending displacement or tilt."""
-    return result.isel(case=np.flatnonzero(result["configuration"].values == configuration)).sortby("measure")
-
-
 @styled
 def dipole_figure(result: xr.Dataset) -> Figure:
     """Distance by point dipoles and by true fields; the change of distance by cause; ranges of stable levitation."""
     figure, axes = panels(3, 3, (10.0, 9.0))
-    for column, configuration in enumerate(CONFIGURATIONS):
-        part = of_configuration(result, configuration)
-        if not part.sizes["case"]:
-            continue
+    for column, (configuration, part) in enumerate(by_configuration(result)):
         _distances(axes[0, column], part)
         _causes(axes[1, column], part)
         _ranges(axes[2, column], part)
-        label = f"{SYMBOLS[configuration]} ({UNITS[configuration]})"
         axes[0, column].set_title(configuration)
         for row in (1, 2):
             axes[row, column].set_xticks(range(part.sizes["case"]), [f"{m:g}" for m in part["measure"].values])
-            axes[row, column].set_xlabel(label)
+            axes[row, column].set_xlabel(axis_label(configuration))
             axes[row, column].set_xlim(-0.6, part.sizes["case"] - 0.4)
     handles = [*axes[1, 0].get_legend_handles_labels()[0], *axes[2, 0].get_legend_handles_labels()[0]]
     figure.legend(handles=handles, loc="outside lower center", ncols=4)
@@ -63,15 +54,15 @@ def _distances(axes: Axes, part: xr.Dataset) -> None:
         one = part.isel(case=k)
         for model, style in (("article", "--"), ("mutual", "-")):
             distance = 1e3 * one["distance"].sel(model=model).values
-            label = f"{SYMBOLS[kind]} = {float(one['measure']):g} {UNITS[kind]}" if model == "mutual" else None
+            text = label(kind, float(one["measure"])) if model == "mutual" else None
             axes.plot(
                 one["frequency"].values,
                 distance,
                 f"o{style}",
                 ms=2.5,
-                mfc=color if label else "white",
+                mfc=color if text else "white",
                 color=color,
-                label=label,
+                label=text,
             )
     axes.plot([], [], "--", color="0.3", label="point dipoles")
     axes.plot([], [], "-", color="0.3", label="true fields")

@@ -6,17 +6,14 @@ import numpy as np
 import xarray as xr
 
 from ..geometry.box import Array
-from .dipole_vs_fem_figure import CAUSES, TOTAL, change, of_configuration
-from .rotor_points import CONFIGURATIONS, SYMBOLS, UNITS
+from .article import by_configuration, label
+from .dipole_vs_fem_figure import CAUSES, TOTAL, change
 
 
 def dipole_lines(result: xr.Dataset) -> list[str]:
     """Ranges of the changes for each configuration and cause, the limits of every rotor, and the sentence."""
     lines = []
-    for configuration in CONFIGURATIONS:
-        part = of_configuration(result, configuration)
-        if not part.sizes["case"]:
-            continue
+    for configuration, part in by_configuration(result):
         lines.append(f"{configuration}:")
         for cause, models in [*CAUSES.items(), ("all together", TOTAL)]:
             lines.append(f"  {cause}: " + "; ".join(_quantities(part, models)))
@@ -55,7 +52,7 @@ def _limits(one: xr.Dataset) -> str:
                 for n, k in (("lowest", one["low_kind"].sel(model=model).item()),
                              ("highest", one["high_kind"].sel(model=model).item()))]  # fmt: skip
         words.append(f"{model} {ends[0]} to {ends[1]} Hz")
-    return f"{SYMBOLS[kind]} = {float(one['measure']):g} {UNITS[kind]}: " + "; ".join(words)
+    return f"{label(kind, float(one['measure']))}: " + "; ".join(words)
 
 
 def sentence(result: xr.Dataset) -> str:

@@ -10,9 +10,7 @@ import numpy as np
 from ..dynamics.averaged import E_FOLDS
 from ..geometry import rotor
 from ..geometry.scene import Drag, Floater, Scene
-
-CONDUCTIVITY = 6.7e5
-"""Of sintered NdFeB, S/m; makers give 6.2e5 to 9e5."""
+from .article import MAGNET_CONDUCTIVITY
 
 
 @dataclass(frozen=True)
@@ -60,7 +58,7 @@ class Variant:
 
     spin: float = 0.0
     remanence: float = 1.305
-    conductivity: float = CONDUCTIVITY
+    conductivity: float = MAGNET_CONDUCTIVITY
     stokes: bool = False
     e_folds: float = E_FOLDS
     misplaced: float = 0.0
@@ -74,8 +72,8 @@ VARIANTS = {
     "remanence 1.32 T": Variant(remanence=1.32),
     "displacement smaller": Variant(misplaced=-1.0),
     "displacement larger": Variant(misplaced=1.0),
-    "conductivity -20 %": Variant(conductivity=0.8 * CONDUCTIVITY),
-    "conductivity +80 %": Variant(conductivity=1.8 * CONDUCTIVITY),
+    "conductivity -20 %": Variant(conductivity=0.8 * MAGNET_CONDUCTIVITY),
+    "conductivity +80 %": Variant(conductivity=1.8 * MAGNET_CONDUCTIVITY),
     "rough release": Variant(e_folds=np.log(30.0)),
     "Stokes drag": Variant(stokes=True),
 }

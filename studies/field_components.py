@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import xarray as xr
 
-from .article import CONFIGURATIONS, article_scene, article_table, one_case
+from .article import CONFIGURATIONS, article_scene, article_table
 from .article_formulas import field
 from .results import variable
-from .study import Point
+from .study import Point, one_case
 
 DISTANCES = (15e-3, 20e-3, 25e-3, 30e-3, 40e-3)
 """Places of the floater on the axis below the rotor, m; the article's text does not give its own."""
@@ -38,7 +38,7 @@ def field_components(point: Point) -> xr.Dataset:
         across, along = field(point["configuration"], point["value"], distance)
         error = np.zeros_like(distance)
     else:
-        scene = article_scene(point["configuration"], point["value"], 100.0)
+        scene = article_scene(point["configuration"], point["value"])
         table = article_table(scene, point["model"])
         places = distance[:, None] * np.array([0.0, 0.0, -1.0])
         b, _ = table.evaluate(places)

@@ -9,9 +9,10 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, NullFormatter
 
 from ..geometry.box import Array
-from .article import CONFIGURATIONS, chosen
+from .article import CONFIGURATIONS
 from .article_figure import TITLES
 from .figures import DASHES, NAMES, PALETTE, panels, styled
+from .study import chosen
 
 PARTS = {"off_axis": "off-axis $B_\\perp$ (mT)", "on_axis": "on-axis $B_z$ (mT)"}
 

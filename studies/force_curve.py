@@ -11,10 +11,10 @@ from ..dynamics import ForceCurve, survey
 from ..fem.table import RotorTable
 from ..geometry.box import Array
 from ..geometry.scene import Scene
-from .article import CONTACT, FLOATER, article_scene, article_table, one_case
+from .article import CONTACT, FLOATER, article_scene, article_table
 from .article_formulas import force
 from .results import variable
-from .study import Point
+from .study import Point, one_case
 
 CONFIGURATION, VALUE = "horizontal", 1.0
 """The rotor of the article's figure; its text does not give the frequency."""

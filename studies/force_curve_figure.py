@@ -7,9 +7,9 @@ import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from .article import chosen
 from .figures import PALETTE, panels, styled
 from .force_curve import TOLD_ANGLE, TOLD_DISTANCE, WEIGHT
+from .study import chosen
 
 STYLES = {"fem": "-", "dipole": "--", "semi-analytic": ":", "small angles": "-."}
 TEXTS = {

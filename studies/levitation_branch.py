@@ -16,6 +16,7 @@ from ..dynamics import EquilibriumError, Family, Point, Rates, Steps, follow_bra
 from ..dynamics.balance import EVERY, solve
 from ..dynamics.branch import FOLD, frequencies
 from ..dynamics.equations import parameters
+from ..dynamics.events import rotor_gap
 from ..dynamics.state import Scales
 from ..dynamics.symbols import Parameter
 from ..fem.table import RotorTable
@@ -72,6 +73,11 @@ class Branch:
         return self.family.point(position[0], moments[0], frequency)
 
 
+def by_frequency(scene: Scene, rates: Rates) -> Family:
+    """A scene's equilibria against the frequency of the rotor."""
+    return Family(rates, frequencies(scene), UNIT)
+
+
 def levitating_branch(scene: Scene, table: RotorTable, rates: Rates, highest: float) -> Branch:
     """The branch of a scene's floater up to the frequency `highest` (Hz) or contact; gravity along the axis, s = 0.
 
@@ -79,9 +85,13 @@ def levitating_branch(scene: Scene, table: RotorTable, rates: Rates, highest: fl
     ------
     EquilibriumError : no distance at which attraction carries the weight, or no fold above `SLOWEST`
     """
-    family = Family(rates, frequencies(scene), UNIT)
+    family = by_frequency(scene, rates)
     start = _hanging(replace(scene, frequency=highest), table, family)
-    points = follow_branch(family, start, highest, SLOWEST, Steps(longest=0.1), lambda p: touches(scene, p.position))
+
+    def over(point: Point) -> bool:
+        return rotor_gap(scene, point.position) < 0
+
+    points = follow_branch(family, start, highest, SLOWEST, Steps(longest=0.1), over)
     folds = [k for k, point in enumerate(points) if point.kind == FOLD]
     if not folds:
         raise EquilibriumError(f"The levitating branch has no fold between {SLOWEST:g} and {highest:g} Hz.")
@@ -95,11 +105,6 @@ def kicked(scene: Scene, point: Point, speed: float) -> Scene:
     state = Scales.of(there).unpack(point.state)
     start = AbsoluteStart(state.position, state.velocity + speed * UP, state.moment, state.spin)
     return replace(there, start=start)
-
-
-def touches(scene: Scene, position: Array) -> bool:
-    """Whether a floater at `position` (3,) m reaches into a magnet of the rotor."""
-    return any(float(magnet.box.distance(position)) < scene.floater.radius for magnet in scene.rotor)
 
 
 def _hanging(scene: Scene, table: RotorTable, family: Family) -> Array:

@@ -10,11 +10,11 @@ from ..dynamics.branch import Point as Equilibrium
 from ..fem.table import RotorTable
 from ..geometry.box import Array
 from ..geometry.scene import Scene
-from .article import CONFIGURATIONS, FLOATER, HIGHEST, LOWEST, article_scene, article_table, one_case, stable
+from .article import CONFIGURATIONS, FLOATER, HIGHEST, LOWEST, QUICK, article_scene, article_table, stable
 from .article_formulas import analytic_distance, balanced
 from .levitation_branch import distance_error, kicked, levitating_branch
 from .results import variable
-from .study import Point
+from .study import Point, one_case
 
 SIDES = ("near", "far")
 FORMULAS, FIELDS = ("semi-analytic", "analytic"), ("dipole", "fem")
@@ -22,7 +22,6 @@ FLOWN = "dipole"
 """The field of the simulated flights, which are spread over a rotor's stable frequencies."""
 KICK, SECONDS = 0.01, 1.0
 """Speed with which a simulated floater leaves its equilibrium upwards, m/s, and duration of the flight."""
-QUICK = {"horizontal": (1.0,), "vertical": (14.0,), "tilt": (10.0,)}
 
 
 def distance_points(quick: bool) -> list[Point]:

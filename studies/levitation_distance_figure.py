@@ -10,9 +10,10 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from ..geometry.box import Array
-from .article import CONFIGURATIONS, chosen, label, stable
+from .article import CONFIGURATIONS, label, stable
 from .article_figure import TITLES, branch, name, shade, values_of
 from .figures import panels, styled
+from .study import chosen
 
 LIMITS = (8.0, 66.0)
 """Of the axis of distances, mm."""

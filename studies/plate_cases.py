@@ -12,14 +12,12 @@ from ..fem.cache import cached_rotor_table
 from ..fem.table import RotorTable
 from ..geometry.box import Array, Box, rotation_matrix
 from ..geometry.scene import Plate, Scene
-from .article import CONFIGURATIONS, article_scene
+from .article import CONFIGURATIONS, PLATE_CONDUCTIVITY, PLATE_SIZE, article_scene
 from .console import note
 from .stable_range import StableRange, at_frequency, reference_state, stable_range
 
-SIZE = (0.1, 0.24, 0.03)
-"""Edges of the article's plate, m."""
-CONDUCTIVITY, DISTANCE = 3.5e7, 0.018
-"""Defaults of the sweeps: aluminium, S/m; face below or beside the floater's centre, m."""
+DISTANCE = 0.018
+"""Face below or beside the floater's centre in the sweeps over all else, m."""
 CONFIGURATION, MEASURE, FREQUENCY = "tilt", 10.0, 130.0
 """The rotor of the sweeps over plates, that of the scene `tilt-over-plate`: tilt in degrees, Hz."""
 REAL = (DISTANCE,)
@@ -52,15 +50,15 @@ class Case:
     model: str = "slab"
     upright: bool = False
     distance: float = DISTANCE
-    thickness: float = SIZE[2]
-    conductivity: float = CONDUCTIVITY
+    thickness: float = PLATE_SIZE[2]
+    conductivity: float = PLATE_CONDUCTIVITY
     configuration: str = CONFIGURATION
     measure: float = MEASURE
     part: float | None = None
 
     def plate(self, place: Array) -> Plate:
         """The plate for a floater at `place` (3,) m."""
-        size = np.array([SIZE[0], SIZE[1], self.thickness])
+        size = np.array([*PLATE_SIZE[:2], self.thickness])
         away = self.distance + self.thickness / 2
         if self.upright:
             center = np.array([away, 0.0, place[2]])

@@ -14,6 +14,7 @@ from ..geometry.box import Array
 from .article import label
 from .figures import PALETTE, panels, styled
 from .plate_cases import ROTORS
+from .study import chosen
 
 SWEEPS = {
     "below": ("Plate below", "distance of the face from the floater's centre (mm)", 1e3),
@@ -83,7 +84,7 @@ def damping_figure(result: xr.Dataset) -> Figure:
 
 def part_of(result: xr.Dataset, sweep: str) -> xr.Dataset:
     """The cases of one sweep, in ascending order of what is varied."""
-    part = result.isel(case=np.flatnonzero(result["sweep"].values == sweep))
+    part = chosen(result, sweep=sweep)
     return part if sweep in ROTORS else part.sortby("value")
 
 

@@ -13,8 +13,8 @@ from ..dynamics import Rates, find_equilibria
 from ..fem.models import rotor_table
 from ..geometry.box import Array
 from . import study
+from .article import levitated
 from .results import variable
-from .rotor_points import levitated
 from .stable_range import at_frequency
 from .tolerances import (
     FRACTIONS,

@@ -8,9 +8,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from ..geometry.box import Array
-from .dipole_vs_fem_figure import of_configuration
+from .article import CONFIGURATIONS, axis_label, by_configuration, label
 from .figures import PALETTE, panels, styled
-from .rotor_points import CONFIGURATIONS, SYMBOLS, UNITS
 from .sensitivity import TILTS
 from .tolerances import FRACTIONS, PARAMETERS, QUANTITIES, TILT_SPREAD
 
@@ -41,10 +40,7 @@ def spreads(one: xr.Dataset) -> Array:
 def sensitivity_figure(result: xr.Dataset) -> Figure:
     """What the tolerance of each parameter does to distance and lowest frequency; bands of all tolerances together."""
     figure, axes = panels(3, 3, (10.0, 9.0))
-    for column, configuration in enumerate(CONFIGURATIONS):
-        part = of_configuration(result, configuration)
-        if not part.sizes["case"]:
-            continue
+    for column, (configuration, part) in enumerate(by_configuration(result)):
         axes[0, column].set_title(configuration)
         _contributions(axes[0, column], part, MIDDLE, 1e3, "distance in mid-range (mm)")
         _contributions(axes[1, column], part, "lowest", 1.0, "lowest frequency (Hz)")
@@ -55,7 +51,7 @@ def sensitivity_figure(result: xr.Dataset) -> Figure:
     return figure
 
 
-def _contributions(axes: Axes, part: xr.Dataset, quantity: str, scale: float, label: str) -> None:
+def _contributions(axes: Axes, part: xr.Dataset, quantity: str, scale: float, words: str) -> None:
     names = [name for name in PARAMETERS if name != "gravity"]
     places, count = np.arange(len(names)), part.sizes["case"]
     for k in range(count):
@@ -68,12 +64,12 @@ def _contributions(axes: Axes, part: xr.Dataset, quantity: str, scale: float, la
         kind = str(one["configuration"].values)
         axes.barh(
             places + (k - (count - 1) / 2) * 0.8 / count, value, 0.8 / count, xerr=error, color=PALETTE[k],
-            label=f"{SYMBOLS[kind]} = {float(one['measure']):g} {UNITS[kind]}", error_kw={"lw": 0.7},
+            label=label(kind, float(one["measure"])), error_kw={"lw": 0.7},
         )  # fmt: skip
     axes.set_yticks(places, [WORDS[name] for name in names])
     axes.invert_yaxis()
     axes.legend(fontsize=6)
-    axes.set(xlabel=f"{label},\none standard deviation of the tolerance")
+    axes.set(xlabel=f"{words},\none standard deviation of the tolerance")
 
 
 def _bands(axes: Axes, part: xr.Dataset, configuration: str) -> None:
@@ -87,7 +83,7 @@ def _bands(axes: Axes, part: xr.Dataset, configuration: str) -> None:
     twin.set_ylabel("distance in mid-range (mm)", color=PALETTE[2])
     axes.set_xticks(places, [f"{m:g}" for m in part["measure"].values])
     axes.set(
-        xlabel=f"{SYMBOLS[configuration]} ({UNITS[configuration]})",
+        xlabel=axis_label(configuration),
         ylabel=f"frequency (Hz): {PERCENTILES[0]} to {PERCENTILES[1]} % of\nthe rotors within tolerance",
     )
 
@@ -106,14 +102,11 @@ def band(part: xr.Dataset, quantity: str) -> Array:
 def sensitivity_lines(result: xr.Dataset) -> list[str]:
     """Derivatives by the measure, what sub-millimetre precision buys, and the bands."""
     lines = []
-    for configuration in CONFIGURATIONS:
-        part = of_configuration(result, configuration)
+    for configuration, part in by_configuration(result):
         for k in range(part.sizes["case"]):
             one = part.isel(case=k)
-            unit, head = UNITS[configuration], f"{SYMBOLS[configuration]} = {float(one['measure']):g}"
-            lines += [
-                f"{head} {unit}: {line}" for line in (_by_measure(one, unit), _all(one), _leading(one), _lean(one))
-            ]
+            unit, head = CONFIGURATIONS[configuration].unit, label(configuration, float(one["measure"]))
+            lines += [f"{head}: {line}" for line in (_by_measure(one, unit), _all(one), _leading(one), _lean(one))]
     return lines
 
 

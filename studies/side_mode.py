@@ -10,18 +10,17 @@ from ..dynamics.branch import Point as Equilibrium
 from ..fem.table import RotorTable
 from ..geometry.box import Array
 from ..geometry.scene import Scene
-from .article import CONFIGURATIONS, HIGHEST, LOWEST, article_scene, article_table, one_case
+from .article import CONFIGURATIONS, HIGHEST, LOWEST, QUICK, article_scene, article_table
 from .article_formulas import side_radius
 from .levitation_branch import kicked, levitating_branch
 from .results import variable
-from .study import Point
+from .study import Point, one_case
 
 MODELS = ("dipole", "fem")
 FLIGHT = 170.0
 """Frequency of the flight in the article's figure, Hz, for δx = 1 mm."""
 KICK, SECONDS, TURNS, SAMPLES = 0.01, 2.0, 3, 400
 """Speed upwards with which the flight begins, m/s; its duration, s; turns of it that are kept, and samples of them."""
-QUICK = {"horizontal": (1.0,), "vertical": (14.0,), "tilt": (10.0,)}
 
 
 def side_points(quick: bool) -> list[Point]:

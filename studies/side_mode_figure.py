@@ -7,11 +7,12 @@ import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from .article import CONFIGURATIONS, chosen, label, stable
+from .article import CONFIGURATIONS, label, stable
 from .article_figure import TITLES, branch, name, shade, values_of
 from .article_formulas import side_radius
 from .figures import PALETTE, panels, styled
 from .side_mode import FLIGHT, TURNS
+from .study import chosen
 
 TOLD = (0.1, 0.3)
 """Radii that the article calls typical, mm."""

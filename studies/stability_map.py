@@ -14,11 +14,10 @@ from ..fem.table import RotorTable
 from ..geometry.box import Box
 from ..geometry.scene import Plate, Scene
 from . import study
-from .article import FLOATER
+from .article import CONFIGURATIONS, FLOATER, PLATE_CONDUCTIVITY, PLATE_SIZE, article_scene
 from .console import note
 from .plate_shelf import plate_memory
 from .results import variable
-from .rotor_points import rotor_scene
 from .stable_range import HIGHEST, StableRange, at_frequency, levitating_ranges
 
 MEASURES = {
@@ -31,7 +30,7 @@ MODELS = ("dipole", "fem")
 RTOL, PLATE_RTOL = 1e-4, 1e-2
 MOST = 4
 """Intervals of stability that are kept of one rotor."""
-FACE, SIZE, CONDUCTIVITY = -0.045, (0.1, 0.24, 0.03), 3.5e7
+FACE = -0.045
 """Height of the plate's upper face below the rotor's origin, m: no floater that levitates touches it."""
 BEYOND = 1.15
 """How far above the last stable frequency the plate is tried."""
@@ -39,18 +38,17 @@ BEYOND = 1.15
 
 def points(quick: bool) -> list[study.Point]:
     """All rotors with both models; frequencies with the plate for the rotors of the article's figures."""
-    chosen = {"horizontal": (2.0,), "vertical": (14.0,), "tilt": (10.0,)} if quick else MEASURES
-    few = {"horizontal": (1.0, 2.0, 3.0, 4.0), "vertical": (10.0, 12.0, 14.0, 16.0), "tilt": (5.0, 10.0, 15.0, 20.0)}
+    rotors = {"horizontal": (2.0,), "vertical": (14.0,), "tilt": (10.0,)} if quick else MEASURES
     return [
         {"configuration": c, "measure": m, "model": model, "with_plate": plates}
-        for c, measures in chosen.items() for m in measures for model in MODELS
-        for plates in [(2 if quick else 5) if model == "fem" and m in few[c] else 0]
+        for c, measures in rotors.items() for m in measures for model in MODELS
+        for plates in [(2 if quick else 5) if model == "fem" and m in CONFIGURATIONS[c].levitated else 0]
     ]  # fmt: skip
 
 
 def compute(point: study.Point) -> xr.Dataset:
     """Intervals of stable frequencies of one rotor, and growth with a plate below at some frequencies."""
-    scene = rotor_scene(point["configuration"], point["measure"])
+    scene = article_scene(point["configuration"], point["measure"], drag=False)
     table = _table(scene, point["model"])
     rates = Rates.of(scene, table)
     try:
@@ -82,8 +80,8 @@ def _with_plate(
     if stable is None or not number:
         return rows
     last = min(BEYOND * stable.high.parameter, HIGHEST)
-    center = np.array([0.0, 0.0, FACE - SIZE[2] / 2])
-    plate = Plate(Box(np.array(SIZE), center), CONDUCTIVITY)
+    center = np.array([0.0, 0.0, FACE - PLATE_SIZE[2] / 2])
+    plate = Plate(Box(np.array(PLATE_SIZE), center), PLATE_CONDUCTIVITY)
     for k, frequency in enumerate(np.linspace(1.01 * stable.low.parameter, last, number)):
         there = replace(scene, frequency=float(frequency), plate=plate)
         rows[k, 0] = frequency

@@ -7,9 +7,10 @@ import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from .article import axis_label, by_configuration, label
 from .figures import COLORS, NAMES, PALETTE, panels, styled
-from .rotor_points import CONFIGURATIONS, SYMBOLS, UNITS
 from .stability_map import FACE, MODELS
+from .study import chosen
 
 MARKERS = {"fold": "^", "oscillatory": "o", "real": "D", "contact": "v", "border": "_"}
 MEANINGS = {
@@ -21,22 +22,16 @@ MEANINGS = {
 }
 
 
-def part_of(result: xr.Dataset, configuration: str, model: str) -> xr.Dataset:
-    """The rotors of one configuration with one model, by ascending displacement or tilt."""
-    chosen = (result["configuration"] == configuration) & (result["model"] == model)
-    return result.isel(case=np.flatnonzero(chosen.values)).sortby("measure")
-
-
 @styled
 def map_figure(result: xr.Dataset) -> Figure:
     """Regions of stable levitation by dipole and by finite elements, kinds of boundary, and the plate's verdict."""
     figure, axes = panels(1, 3, (11.0, 4.6))
-    for place, configuration in zip(axes[0], CONFIGURATIONS, strict=True):
+    for place, (configuration, rotors) in zip(axes[0], by_configuration(result), strict=False):
         for model in MODELS:
-            _region(place, part_of(result, configuration, model), model)
-        _plate(place, part_of(result, configuration, MODELS[-1]))
+            _region(place, chosen(rotors, model=model), model)
+        _plate(place, chosen(rotors, model=MODELS[-1]))
         place.set(
-            xlabel=f"{SYMBOLS[configuration]} ({UNITS[configuration]})", ylabel="frequency of the rotor (Hz)",
+            xlabel=axis_label(configuration), ylabel="frequency of the rotor (Hz)",
             title=configuration, ylim=(20, 410),
         )  # fmt: skip
     handles = [
@@ -62,29 +57,28 @@ def _region(axes: Axes, part: xr.Dataset, model: str) -> None:
         for ends, kinds in ((low, part["low_kind"].values), (high, part["high_kind"].values)):
             axes.plot(measure, ends[:, k], color=COLORS[model], lw=0.8)
             for kind, marker in MARKERS.items():
-                chosen = kinds[:, k] == kind
-                axes.plot(measure[chosen], ends[chosen, k], marker, color=COLORS[model], mfc="white", ms=4)
+                here = kinds[:, k] == kind
+                axes.plot(measure[here], ends[here, k], marker, color=COLORS[model], mfc="white", ms=4)
 
 
 def _plate(axes: Axes, part: xr.Dataset) -> None:
     growth, frequency = part["plate_growth"].values, part["plate_frequency"].values
     measure = np.broadcast_to(part["measure"].values[:, None], growth.shape)
     gone = np.isnan(growth) & np.isfinite(frequency)
-    for chosen, style, color in ((growth < 0, "P", PALETTE[4]), (growth >= 0, "x", PALETTE[3]), (gone, "1", "0.2")):
-        axes.plot(measure[chosen], frequency[chosen], style, color=color, ms=4, mew=0.8)
+    for here, style, color in ((growth < 0, "P", PALETTE[4]), (growth >= 0, "x", PALETTE[3]), (gone, "1", "0.2")):
+        axes.plot(measure[here], frequency[here], style, color=color, ms=4, mew=0.8)
 
 
 def map_lines(result: xr.Dataset) -> list[str]:
     """Every rotor's intervals by both models, and where the plate below keeps or undoes stability."""
     lines = []
-    for configuration in CONFIGURATIONS:
-        both = result.isel(case=np.flatnonzero(result["configuration"].values == configuration))
-        for measure in np.unique(both["measure"].values):
-            rows = both.isel(case=np.flatnonzero(both["measure"].values == measure))
+    for configuration, rotors in by_configuration(result):
+        for measure in np.unique(rotors["measure"].values):
+            rows = chosen(rotors, measure=measure)
             found = {str(m): rows.isel(case=k) for k, m in enumerate(rows["model"].values)}
             words = [f"{model} {_intervals(one)}" for model, one in found.items()]
-            head = f"{SYMBOLS[configuration]} = {measure:g} {UNITS[configuration]}"
-            lines.append(f"{head}: {'; '.join(words)}{''.join(_verdicts(one) for one in found.values())}")
+            verdicts = "".join(_verdicts(one) for one in found.values())
+            lines.append(f"{label(configuration, measure)}: {'; '.join(words)}{verdicts}")
     return lines
 
 

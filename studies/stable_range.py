@@ -6,17 +6,16 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
-import numpy as np
 from scipy.optimize import brentq
 
 from ..dynamics import EquilibriumError, Family, Point, Rates, Steps, follow_branch
-from ..dynamics.branch import FOLD, frequencies
-from ..dynamics.events import clearance
+from ..dynamics.branch import FOLD
+from ..dynamics.events import rotor_gap
 from ..fem.models import rotor_table
 from ..fem.table import RotorTable
 from ..geometry.box import Array
 from ..geometry.scene import Scene
-from .levitation_branch import levitating_branch
+from .levitation_branch import by_frequency, levitating_branch
 
 LOWEST, HIGHEST = 25.0, 400.0
 """Frequencies between which is looked, Hz."""
@@ -27,7 +26,6 @@ TOLERATED = 0.02
 STEPS = Steps(longest=0.1, turn=0.15, tolerated=TOLERATED)
 LONG_STEPS = Steps(longest=0.4, turn=0.3, tolerated=TOLERATED)
 """For a branch that is known from one that is near."""
-UNIT = 50.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,7 +80,7 @@ def stable_ranges(scene: Scene, rates: Rates, start: Array, frequency: float) ->
     The branch is followed both ways to its first fold, contact with the rotor or the border. Frequencies of the ends
     are good to round-off in the table's field.
     """
-    walk = partial(_side, replace(scene, plate=None), Family(rates, frequencies(scene), UNIT), start, frequency)
+    walk = partial(_side, replace(scene, plate=None), by_frequency(scene, rates), start, frequency)
     below, above = walk(LOWEST), walk(HIGHEST)
     runs: list[list[Point]] = [[]]
     for point in [*below[:0:-1], *above]:
@@ -103,7 +101,7 @@ def at_frequency(scene: Scene, rates: Rates, near: Point, frequency: float, step
 
     Raises EquilibriumError where the branch does not reach it.
     """
-    family = Family(rates, frequencies(scene), UNIT)
+    family = by_frequency(scene, rates)
     if frequency == near.parameter:
         return family.point(near.state[:3], near.state[6:9], frequency)
     last = follow_branch(family, near.state, near.parameter, frequency, steps)[-1]
@@ -124,11 +122,6 @@ def is_stable(point: Point) -> bool:
     return point.growth_per_s <= max(TOLERATED, point.doubt_per_s)
 
 
-def gap(scene: Scene, point: Point) -> float:
-    """Distance between floater and rotor, m; negative where they overlap."""
-    return float(clearance(scene, np.zeros(1), point.position[None])[0])
-
-
 def _is_stable(run: Sequence[Point]) -> bool:
     inner = [point for point in run if not point.kind]
     return bool(inner) and all(is_stable(point) for point in inner)
@@ -140,13 +133,13 @@ def _side(
     """The branch from `frequency` towards `end`, to its first fold, contact or the border, which is marked."""
 
     def over(point: Point) -> bool:
-        return point.kind == FOLD or gap(scene, point) < 0
+        return point.kind == FOLD or rotor_gap(scene, point.position) < 0
 
     points = follow_branch(family, start, frequency, end, steps, over)
     for k, point in enumerate(points):
         if point.kind == FOLD:
             return points[: k + 1]
-        if k and gap(scene, point) < 0:
+        if k and rotor_gap(scene, point.position) < 0:
             return [*points[:k], replace(_touching(scene, family, points[k - 1], point), kind=CONTACT)]
     return [*points[:-1], replace(points[-1], kind=points[-1].kind or BORDER)]
 
@@ -158,4 +151,4 @@ def _touching(scene: Scene, family: Family, before: Point, after: Point) -> Poin
 
     ends = before.parameter, after.parameter
     inside = ends[0] + 1e-9 * (ends[1] - ends[0])
-    return there(float(brentq(lambda f: gap(scene, there(f)), inside, ends[1], xtol=1e-6)))
+    return there(float(brentq(lambda f: rotor_gap(scene, there(f).position), inside, ends[1], xtol=1e-6)))

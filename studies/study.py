@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from operator import itemgetter
 from typing import Any
 
+import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
 
@@ -17,6 +18,20 @@ Point = Mapping[str, Any]
 def by_case(parts: Sequence[xr.Dataset]) -> xr.Dataset:
     """The points' results one after the other along `case`; dimensions of unlike length are filled with NaN."""
     return xr.concat(parts, "case", data_vars="all", coords="different", compat="equals", join="outer")
+
+
+def one_case(point: Point, dataset: xr.Dataset) -> xr.Dataset:
+    """A point's result with what tells it from the others (texts and numbers), ready to be joined along `case`."""
+    labels = {name: xr.Variable((), point[name]) for name in ("configuration", "value", "model")}
+    return dataset.assign(labels).expand_dims("case")
+
+
+def chosen(result: xr.Dataset, **labels: object) -> xr.Dataset:
+    """The cases of a joined result with the given labels."""
+    found = np.ones(result.sizes["case"], bool)
+    for name, wanted in labels.items():
+        found &= result[name].values == wanted
+    return result.isel(case=np.flatnonzero(found))
 
 
 @dataclass(frozen=True)

@@ -6,17 +6,16 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..dynamics import EquilibriumError, Family, Rates
-from ..dynamics.branch import frequencies
+from ..dynamics import EquilibriumError, Rates
 from ..fem.models import rotor_table
 from ..geometry.box import Array
 from ..geometry.scene import Floater, Scene
-from .rotor_points import rotor_scene
+from .article import article_scene
+from .levitation_branch import by_frequency
 from .stable_range import (
     HIGHEST,
     LONG_STEPS,
     LOWEST,
-    UNIT,
     StableRange,
     at_frequency,
     reference_state,
@@ -31,27 +30,26 @@ FRACTIONS = (0.1, 0.5, 0.9)
 
 @dataclass(frozen=True)
 class Known:
-    """A parameter as it is known: its nominal value, unit, scale of the unit in SI and realistic tolerance.
+    """A parameter as it is known: its nominal value and realistic tolerance, both in `unit`.
 
     `spread` is half the width of an even distribution, or the standard deviation of a normal one.
     """
 
     nominal: float
     unit: str
-    scale: float
     spread: float
     normal: bool = False
 
 
 PARAMETERS = {
-    "measure": Known(np.nan, "mm or °", 1.0, 0.1, True),
-    "rotor_remanence": Known(1.305, "T", 1.0, 0.015),
-    "floater_remanence": Known(1.305, "T", 1.0, 0.015),
-    "density": Known(7500.0, "kg/m³", 1.0, 100.0),
-    "edge": Known(10e-3, "mm", 1e-3, 0.1e-3),
-    "diameter": Known(12.7e-3, "mm", 1e-3, 0.05e-3),
-    "gravity": Known(9.81, "m/s²", 1.0, 0.0),
-    "frequency": Known(np.nan, "Hz", 1.0, 0.5, True),
+    "measure": Known(np.nan, "mm or °", 0.1, True),
+    "rotor_remanence": Known(1.305, "T", 0.015),
+    "floater_remanence": Known(1.305, "T", 0.015),
+    "density": Known(7500.0, "kg/m³", 100.0),
+    "edge": Known(10e-3, "m", 0.1e-3),
+    "diameter": Known(12.7e-3, "m", 0.05e-3),
+    "gravity": Known(9.81, "m/s²", 0.0),
+    "frequency": Known(np.nan, "Hz", 0.5, True),
 }
 """Remanence: the article's 1.29 to 1.32 T. Size: what makers of magnets give. Place of the cube: 0.1 mm, tilt 0.5°."""
 TILT_SPREAD = 0.5
@@ -85,9 +83,10 @@ class Nominal:
 def scene_of(configuration: str, values: dict[str, float], frequency: float = 100.0) -> Scene:
     """The scene with all parameters given."""
     floater = Floater(values["diameter"] / 2, values["floater_remanence"], 1.05, values["density"])
-    scene = rotor_scene(
-        configuration, values["measure"], frequency, values["edge"], values["rotor_remanence"], 1.0, floater
-    )
+    scene = article_scene(
+        configuration, values["measure"], frequency, drag=False,
+        edge=values["edge"], remanence=values["rotor_remanence"], permeability=1.0, floater=floater,
+    )  # fmt: skip
     return replace(scene, gravity=np.array([0.0, 0.0, -values["gravity"]]))
 
 
@@ -111,7 +110,7 @@ def levitation(base: Nominal, values: dict[str, float], shift: float = 0.0) -> A
     scene = scene_of(base.configuration, values)
     rates = Rates.of(scene, rotor_table(scene.rotor, MODEL))
     middle = base.range.near(base.grid[1])
-    family = Family(rates, frequencies(scene), UNIT)
+    family = by_frequency(scene, rates)
     row = np.full(len(QUANTITIES), np.nan)
     try:
         ends = [

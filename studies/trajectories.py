@@ -18,18 +18,16 @@ from ..dynamics.state import Scales
 from ..fem.table import RotorTable
 from ..geometry.box import Array
 from ..geometry.scene import Scene
-from .article import FLIGHT, FLOATER, HIGHEST, article_scene, article_table, one_case
+from .article import FLIGHT, FLOATER, HIGHEST, MAGNET_CONDUCTIVITY, article_scene, article_table
 from .levitation_branch import kicked, levitating_branch
 from .results import variable
-from .study import Point
+from .study import Point, one_case
 
 TOLD = {115.0: "linear fall", 140.0: "stable", 150.0: "oscillating loss"}
 """The article's three flights, by frequency in Hz."""
 FREQUENCIES = (115.0, 140.0, 150.0, 160.0, 170.0, 200.0)
 DISPLACEMENTS = (1.0, 1.5, 2.0)
 """δx in mm: as in the experiment, what gives its fall at 115 Hz, and what is lost in oscillations within these."""
-CONDUCTIVITY = 6.7e5
-"""Of sintered NdFeB, S/m."""
 KICK = 1e-3
 """Speed with which a flight begins upwards, m/s."""
 PARTS, SAMPLES = 400, 100
@@ -54,7 +52,7 @@ def trajectories(point: Point) -> xr.Dataset:
     its time, and the least, mean and largest distance along the axis; over `sample`: the averaged flight.
     """
     scene = article_scene(point["configuration"], point["value"], HIGHEST)
-    scene = replace(scene, floater=replace(FLOATER, conductivity=CONDUCTIVITY))
+    scene = replace(scene, floater=replace(FLOATER, conductivity=MAGNET_CONDUCTIVITY))
     table = article_table(scene, point["model"])
     rates = Rates.of(scene, table)
     starts = levitating_branch(scene, table, rates, HIGHEST).side("near", np.array(FREQUENCIES))

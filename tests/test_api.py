@@ -93,3 +93,12 @@ def test_objects_print_what_they_are():
     first, second, *_ = repr(memory).splitlines()
     assert re.match(r"PlateMemory 'slab': relative error \d\.\de-0\d, \d+ harmonics of the rotor$", first)
     assert re.match(r"PlateTable of \(100, 240, 30\) mm, 3.5e\+07 S/m: \d+ currents$", second)
+
+
+def test_the_text_of_a_changed_scene_says_what_was_changed():
+    """It is what a result keeps of its scene."""
+    changed = api.parse_scene(SCENE.read_text(), changes={"frequency_hz": 95.0, "floater.remanence_T": 1.3})
+    assert changed.frequency == 95.0
+    assert changed.text.startswith(SCENE.read_text())
+    assert changed.text.endswith("# changed: frequency_hz = 95.0\n# changed: floater.remanence_T = 1.3")
+    assert api.parse_scene(changed.text, changes={"frequency_hz": 95.0}).frequency == 95.0

@@ -58,7 +58,7 @@ def test_bad_input_is_named():
         plate_reaction(LYING, [(0, 0, -0.001)], 50.0)
     with pytest.raises(ValueError, match="Input frequency_hz must be finite and not negative"):
         plate_reaction(LYING, [(0, 0, 0.02)], -50.0)
-    with pytest.raises(AccuracyError, match="Input rtol must be at least"):
+    with pytest.raises(AccuracyError, match="Input rtol of the plate must be at least"):
         plate_reaction(LYING, [(0, 0, 0.1)], 1.0, 1e-12, MeshRule(4.0, 4.0, 4.0), refinements=0)
 
 

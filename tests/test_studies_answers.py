@@ -7,8 +7,8 @@ import pytest
 
 from spinlev.dynamics import Rates, find_equilibria
 from spinlev.dynamics.balance import Balance
-from spinlev.dynamics.branch import frequencies
 from spinlev.dynamics.equations import parameters
+from spinlev.dynamics.events import rotor_gap
 from spinlev.dynamics.perturbed import PerturbedBalance
 from spinlev.dynamics.state import Scales
 from spinlev.fem.models import rotor_table
@@ -16,17 +16,14 @@ from spinlev.fem.rotor_response import rotor_ladder
 from spinlev.fem.two_body import two_body
 from spinlev.studies import dipole_vs_fem, stability_map
 from spinlev.studies.answered import Answered
-from spinlev.studies.article import FLOATER
+from spinlev.studies.article import FLOATER, article_scene
 from spinlev.studies.design_search import designed
 from spinlev.studies.dipole_vs_fem_figure import CAUSES, TOTAL, change
+from spinlev.studies.levitation_branch import by_frequency
 from spinlev.studies.mutual import Expansion, Mutual, pose
-from spinlev.studies.rotor_points import rotor_scene
 from spinlev.studies.sensitivity import slope_by
 from spinlev.studies.stable_range import (
-    UNIT,
-    Family,
     at_frequency,
-    gap,
     levitating_ranges,
     reference_state,
     stable_range,
@@ -37,7 +34,7 @@ from spinlev.studies.tolerances import PARAMETERS, QUANTITIES, levitation, nomin
 @pytest.fixture(scope="module")
 def tilted():
     """Scene, rates and stable range of the cube tilted by 10° in the field of point dipoles."""
-    scene = rotor_scene("tilt", 10.0)
+    scene = article_scene("tilt", 10.0, drag=False)
     rates = Rates(rotor_table(scene.rotor, "dipole"))
     return scene, rates, stable_range(scene, rates, *reference_state(scene))
 
@@ -51,7 +48,7 @@ def test_stability_ends_where_the_bodies_touch(tilted):
     """A dipole has no size, so that only the geometry ends its levitation at high frequency."""
     scene, _, found = tilted
     assert found.high.kind == "contact"
-    assert abs(gap(scene, found.high)) < 1e-7
+    assert abs(rotor_gap(scene, found.high.position)) < 1e-7
 
 
 def test_a_range_ends_where_a_survey_says_so(tilted):
@@ -70,7 +67,7 @@ def test_a_range_ends_where_a_survey_says_so(tilted):
 
 def test_a_narrow_range_is_found_and_a_survey_confirms_it():
     """δx = 5 mm levitates over 4 Hz only, which a search at a few frequencies would miss."""
-    scene = rotor_scene("horizontal", 5.0)
+    scene = article_scene("horizontal", 5.0, drag=False)
     table = rotor_table(scene.rotor, "dipole")
     rates = Rates(table)
     (found,) = levitating_ranges(scene, table, rates)
@@ -109,7 +106,7 @@ def test_distance_of_a_sample_is_that_of_a_survey(horizontal):
 
 def test_a_design_holds_the_floater_where_it_was_wanted():
     found = designed("tilt", 12.7e-3, 25e-3, 100.0)
-    scene = rotor_scene("tilt", found.measure, 100.0, 12.7e-3, permeability=1.0)
+    scene = article_scene("tilt", found.measure, drag=False, edge=12.7e-3, permeability=1.0)
     stable = next(e for e in find_equilibria(scene, rotor_table(scene.rotor, "cuboid")) if e.stable)
     assert stable.distance == pytest.approx(25e-3, abs=1e-9)
     assert found.margin == pytest.approx(min(100 - found.low.parameter, found.high.parameter - 100) / 100)
@@ -132,7 +129,7 @@ def test_mutual_magnetisation_moves_the_floater_as_the_perturbed_balance_says(ti
     """Newton's method with expanded forces, against Broyden's with the forces themselves."""
     scene, rates, found = tilted
     (rotor,) = rotor_ladder(scene.rotor, (1,))
-    family = Family(rates, frequencies(scene), UNIT)
+    family = by_frequency(scene, rates)
     there = replace(scene, frequency=120.0)
     answered = Answered(there, family, found, Mutual(rotor, FLOATER)).at(120.0)
     scales = Scales.of(there)
