@@ -23,8 +23,8 @@ from .console import answers_only, note, to_json
 from .output import Answer
 from .result_commands import add_result_commands
 from .scene_commands import add_scene_commands
+from .start import STOPPED
 
-STOPPED = "spinlev: stopped; what was finished is kept."
 app = App(
     name="spinlev",
     version=version("spinlev"),

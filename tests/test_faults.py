@@ -255,6 +255,23 @@ def test_ctrl_c_in_every_phase(spinlev, monkeypatch, phase):
     same(answer, undisturbed[1])
 
 
+@pytest.mark.parametrize(("library", "blow"), [("cyclopts", "SIGTERM"), ("numpy", "SIGINT"), ("matplotlib", "SIGINT")])
+def test_ctrl_c_while_the_program_is_loaded(library, blow):
+    """When it first looks for a library, which may make something else of it."""
+    code = (
+        "import os, signal, sys\n"
+        "class Pressed:\n"
+        "    def find_spec(self, name, *_):\n"
+        f"        if name == '{library}': os.kill(os.getpid(), signal.{blow})\n"
+        "sys.meta_path.insert(0, Pressed())\n"
+        "from spinlev.studies.start import main\n"
+        "main()\n"
+    )
+    done = subprocess.run([sys.executable, "-c", code, "cite"], capture_output=True, text=True, check=False)
+    assert done.returncode == 1, done.stderr
+    assert done.stderr == "spinlev: stopped; what was finished is kept.\n"
+
+
 def test_ctrl_c_that_a_library_takes_for_its_own_failure(spinlev, monkeypatch, capsys):
     """vtk makes an ImportError of a KeyboardInterrupt while it is loaded."""
     stop = threading.Event()

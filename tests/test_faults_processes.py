@@ -17,7 +17,7 @@ from spinlev.fem.table_store import read_checked
 pytestmark = pytest.mark.slow
 
 SCENE = str(Path(__file__).parent.parent / "scenes" / "horizontal.toml")
-CALL = "import sys; from spinlev.studies.cli import main; sys.argv[0] = 'spinlev'; main()"
+CALL = "import sys; from spinlev.studies.start import main; sys.argv[0] = 'spinlev'; main()"
 DIPOLE = ("--model", "dipole", "--plate-model", "none")
 FIELD = ("field", SCENE, "--points", "points.csv", "--model", "fem", "--rtol", "3e-5", "--json")
 FLIGHT = ("simulate", SCENE, "--duration-s", "300", *DIPOLE, "--json")
