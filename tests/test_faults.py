@@ -272,6 +272,25 @@ def test_ctrl_c_while_the_program_is_loaded(library, blow):
     assert done.stderr == "spinlev: stopped; what was finished is kept.\n"
 
 
+def test_ctrl_c_that_falls_into_a_destructor_is_not_lost():
+    """Python drops what is raised there; the program would go on."""
+    code = (
+        "import os, signal, threading\n"
+        "from spinlev.studies import cli, start\n"
+        "class Dropped:\n"
+        "    def __del__(self):\n"
+        "        os.kill(os.getpid(), signal.SIGINT)\n"
+        "def answer(*_):\n"
+        "    Dropped()\n"
+        "    threading.Event().wait(60)\n"
+        "cli._answer = answer\n"
+        "start.main()\n"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert done.returncode == 1
+    assert done.stderr.strip() == "spinlev: stopped; what was finished is kept."
+
+
 def test_ctrl_c_that_a_library_takes_for_its_own_failure(spinlev, monkeypatch, capsys):
     """vtk makes an ImportError of a KeyboardInterrupt while it is loaded."""
     stop = threading.Event()
