@@ -60,7 +60,7 @@ def test_states(benchmark, rtol):
     memory, _ = plate_memory(SCENE, SCENE.plate, "slab", table, start.position, rtol)
     flight = compile_flight(SCENE, table, 0.2, PLATE_TOLERANCE, True, memory)
     still = np.zeros(len(memory.table.rates))
-    flown = benchmark.pedantic(lambda: integrate(SCENE, flight, start, 0.2, currents=still), rounds=2, warmup_rounds=1)
+    flown = benchmark.pedantic(lambda: integrate(SCENE, flight, start, 0.2, currents=still), rounds=10, warmup_rounds=1)
     benchmark.extra_info["size"] = len(still)
     assert flown.ended_by == "duration"
 
