@@ -131,8 +131,8 @@ def _components(vector: xr.DataArray, name: str) -> dict[str, xr.DataArray]:
 
 def _mesh_columns(path: Path, length: float, field: float) -> dict[str, Array]:
     for part in (path, path.with_suffix(".h5")):  # where XDMF has its numbers
-        if foreign.is_hdf5(part) and (reason := foreign.fault(part)):
-            raise FieldMapError(f"Input map must be a readable HDF5 file; instead: {reason}.")
+        if foreign.is_hdf5(part) and (fault := foreign.fault(part)):
+            raise FieldMapError(f"Input map must be a readable HDF5 file; instead: {fault}.")
     said = io.StringIO()
     try:
         with redirect_stdout(said), redirect_stderr(said):
