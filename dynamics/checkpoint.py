@@ -97,7 +97,7 @@ class Checkpoint:
                 content = {name: data[name] for name in data.files}
             key = str(content.pop("key"))
             found = Progress(**{**content, "interval": float(content["interval"]), "steps": int(content["steps"])})
-        except (OSError, ValueError, KeyError, TypeError, EOFError, zipfile.BadZipFile) as error:
+        except (OSError, ValueError, KeyError, TypeError, EOFError, RuntimeError, zipfile.BadZipFile) as error:
             raise InputError(f"Input {self.path} must be a checkpoint; instead it is damaged: delete it.") from error
         if key != self._key:
             raise InputError(

@@ -6,22 +6,42 @@ with 9.5 GB that took 3 s of processor time, and 9 s where others read it too.  
 
 from __future__ import annotations
 
+import sqlite3
+from pathlib import Path
+
 import heyoka as hy
 
+from .code_copy import add_copy, sound
 from .table_store import alone, cache_folder
 
 LIMIT = 2**29
-"""Size of what is kept, bytes; the oldest makes room.  Looked through in 0.2 s."""
+"""Size of what is kept, bytes; the oldest makes room.  Looked through in 0.2 s, after it is checked in as much."""
 
 
 def keep_code() -> None:
-    """Keep compiled code in the cache's folder; nothing is kept where that cannot be opened."""
+    """Keep compiled code in the cache's folder; damaged code is thrown away, and none kept where that is impossible."""
     folder = cache_folder() / "code"
     try:
         with alone(folder / "lock", report=lambda _: None):  # two processes that make the file at once fail
-            hy.llvm_state.set_diskcache_path(folder)
-            hy.llvm_state.set_diskcache_limit(LIMIT)
-    except (OSError, RuntimeError):
+            _open(folder)
+    except (OSError, RuntimeError, sqlite3.Error):
         hy.llvm_state.set_diskcache_enabled(False)
     else:
         hy.llvm_state.set_diskcache_enabled(True)
+
+
+def _open(folder: Path) -> None:
+    """Let heyoka open its file, which is made anew unless it is sound.
+
+    heyoka must not have the file open while this module looks into it: a process that closes a file loses all of its
+    locks on it, also those of the other library.  Setting the path closes it.
+    """
+    file = folder / "cache.db"
+    hy.llvm_state.set_diskcache_path(folder)
+    if not (file.exists() and sound(file)):
+        for path in (file, Path(f"{file}-wal"), Path(f"{file}-shm")):
+            path.unlink(missing_ok=True)
+        hy.llvm_state.set_diskcache_limit(LIMIT)  # makes the file
+        hy.llvm_state.set_diskcache_path(folder)
+        add_copy(file)
+    hy.llvm_state.set_diskcache_limit(LIMIT)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import io
 from collections.abc import Mapping
-from contextlib import redirect_stderr
+from contextlib import redirect_stderr, redirect_stdout
 from pathlib import Path
 
 import meshio
@@ -13,6 +13,7 @@ import numpy as np
 import xarray as xr
 
 from ..geometry.box import Array
+from . import foreign
 from .field_map import FieldMap, FieldMapError
 from .table_store import TableFileError, read_checked
 
@@ -129,9 +130,12 @@ def _components(vector: xr.DataArray, name: str) -> dict[str, xr.DataArray]:
 
 
 def _mesh_columns(path: Path, length: float, field: float) -> dict[str, Array]:
+    for part in (path, path.with_suffix(".h5")):  # where XDMF has its numbers
+        if foreign.is_hdf5(part) and (fault := foreign.fault(part)):
+            raise FieldMapError(f"Input map must be a readable HDF5 file; instead: {fault}.")
     said = io.StringIO()
     try:
-        with redirect_stderr(said):
+        with redirect_stdout(said), redirect_stderr(said):
             mesh = meshio.read(path)
     except (Exception, SystemExit) as error:  # where no reader takes the file meshio prints why, and leaves the program
         reason = " ".join(said.getvalue().split()) or error

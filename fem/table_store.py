@@ -10,11 +10,11 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 import dask
-import h5py
 import xarray as xr
 
 from ..geometry.atomic import write_whole
 from ..geometry.seal import seal, sealed
+from . import foreign
 
 Variables = Mapping[str, tuple[tuple[str, ...], Any, str]]
 """Dimensions, values and unit by name."""
@@ -54,11 +54,9 @@ def read_checked(path: str | Path, file_format: str | None = None) -> xr.Dataset
         raise TableFileError(f"Input {path} must be as it was written; instead its checksum does not match.")
     if whole is None and file_format:
         raise TableFileError(f"Input {path} must be a whole '{file_format}'; instead it does not end in its checksum.")
+    if whole is None and (reason := foreign.fault(Path(path))):
+        raise TableFileError(f"Input {path} must be a readable netCDF file; instead: {reason}.")
     try:
-        if whole is None:  # walk through it first: what h5netcdf's constructor trips over prints from its destructor
-            with h5py.File(path, "r") as file:
-                dict(file.attrs)
-                file.visititems(lambda _, item: dict(item.attrs) and None)
         with xr.open_dataset(path, engine="h5netcdf") as opened:
             dataset = opened.load()
     except Exception as error:  # the HDF5 layer raises many kinds on a damaged file

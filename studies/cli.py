@@ -6,8 +6,6 @@ Exit status 0: done; 2: bad input, with one message that says what is allowed; 1
 from __future__ import annotations
 
 import os
-import signal
-import sys
 import threading
 import time
 import traceback
@@ -23,8 +21,8 @@ from .console import answers_only, note, to_json
 from .output import Answer
 from .result_commands import add_result_commands
 from .scene_commands import add_scene_commands
+from .start import STOPPED
 
-STOPPED = "spinlev: stopped; what was finished is kept."
 app = App(
     name="spinlev",
     version=version("spinlev"),
@@ -36,19 +34,10 @@ add_scene_commands(app)
 add_result_commands(app)
 
 
-def main() -> None:
-    """Run the command line and leave with its exit status."""
-    stop = threading.Event()
-
-    def stopped(*_: object) -> None:
-        stop.set()
-        raise KeyboardInterrupt
-
-    for number in (signal.SIGINT, signal.SIGTERM):  # a batch system stops like a person
-        signal.signal(number, stopped)
+def run(arguments: list[str], stop: threading.Event) -> int:
+    """Answer on standard output; the exit status."""
     with answers_only() as out:
-        status = _status(sys.argv[1:], out, stop)
-    sys.exit(status)
+        return _status(arguments, out, stop)
 
 
 def _status(arguments: list[str], out: Any, stop: threading.Event | None = None) -> int:

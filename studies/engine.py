@@ -5,10 +5,10 @@ from __future__ import annotations
 import logging
 import os
 import signal
-import threading
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
+from multiprocessing import resource_tracker
 from typing import TYPE_CHECKING, Annotated, Any
 
 import xarray as xr
@@ -107,15 +107,16 @@ def _collected(future: Future[Any]) -> xr.Dataset | Failure:
 
 @contextmanager
 def _deaf_children() -> Iterator[None]:
-    """Processes begun in this block do not hear Ctrl-C, which a terminal sends to all of a group; nor does this one."""
-    if threading.current_thread() is not threading.main_thread():  # there are no handlers elsewhere
-        yield
-        return
-    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    """Processes begun in this block do not hear Ctrl-C, which a terminal sends to all of a group; this one does later.
+
+    They inherit that the signal waits, as do the threads begun here and what these begin afterwards.
+    """
+    resource_tracker.ensure_running()  # its beginning would let the signal through
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
         yield
     finally:
-        signal.signal(signal.SIGINT, before)
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 @contextmanager
@@ -135,13 +136,14 @@ def _client(scheduler: str | None, number: int) -> Iterator[Client]:
             yield client
         return
     # One thread in each worker, and (dask's default) in the numeric libraries inside it.
-    with _deaf_children():
-        cluster = LocalCluster(
-            n_workers=number,
-            threads_per_worker=1,
-            host="127.0.0.1",
-            dashboard_address="127.0.0.1:0",  # any free port: two sweeps at once must not meet
-            silence_logs=logging.CRITICAL,
-        )
-    with cluster, Client(cluster, set_as_default=False) as client:
-        yield client
+    with ExitStack() as stack:
+        with _deaf_children():
+            cluster = LocalCluster(
+                n_workers=number,
+                threads_per_worker=1,
+                host="127.0.0.1",
+                dashboard_address="127.0.0.1:0",  # any free port: two sweeps at once must not meet
+                silence_logs=logging.CRITICAL,
+            )
+            stack.enter_context(cluster)
+        yield stack.enter_context(Client(cluster, set_as_default=False))

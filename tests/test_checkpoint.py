@@ -67,3 +67,23 @@ def test_a_damaged_checkpoint_is_reported(checkpoint, damage):
     checkpoint.path.write_bytes(damage(checkpoint.path.read_bytes()))
     with pytest.raises(InputError, match="damaged"):
         checkpoint.read()
+
+
+def test_a_flipped_bit_is_reported_or_harmless(checkpoint):
+    """Also where it makes an archive look encrypted or packed in another way."""
+    begun(0.1, checkpoint)
+    whole, kept = checkpoint.path.read_bytes(), vars(checkpoint.read())
+    chance, refused = np.random.default_rng(0), 0
+    directory = whole.rindex(b"steps.npy") - 400  # most of the file is samples: half of the bits near its end
+    for k in range(400):
+        place = chance.integers(directory if k % 2 else 0, len(whole))
+        bit = 1 << chance.integers(8)
+        checkpoint.path.write_bytes(whole[:place] + bytes([whole[place] ^ bit]) + whole[place + 1 :])
+        try:
+            found = vars(checkpoint.read())
+        except InputError:
+            refused += 1
+        else:
+            for name, values in kept.items():
+                np.testing.assert_array_equal(found[name], values)
+    assert refused > 200

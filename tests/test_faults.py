@@ -15,11 +15,14 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import h5py
+import meshio
 import numpy as np
 import pytest
 import xarray as xr
 
-from spinlev.fem import memory
+from spinlev.fem import foreign, memory
+from spinlev.fem.field_map import FieldMapError
+from spinlev.fem.field_map_file import read_field_map
 from spinlev.fem.table_store import read_checked, write_checked
 from spinlev.geometry.atomic import replacing, write_whole
 from spinlev.studies.cli import _status
@@ -253,6 +256,42 @@ def test_ctrl_c_in_every_phase(spinlev, monkeypatch, phase):
     same(answer, undisturbed[1])
 
 
+@pytest.mark.parametrize(("library", "blow"), [("cyclopts", "SIGTERM"), ("numpy", "SIGINT"), ("matplotlib", "SIGINT")])
+def test_ctrl_c_while_the_program_is_loaded(library, blow):
+    """When it first looks for a library, which may make something else of it."""
+    code = (
+        "import os, signal, sys\n"
+        "class Pressed:\n"
+        "    def find_spec(self, name, *_):\n"
+        f"        if name == '{library}': os.kill(os.getpid(), signal.{blow})\n"
+        "sys.meta_path.insert(0, Pressed())\n"
+        "from spinlev.studies.start import main\n"
+        "main()\n"
+    )
+    done = subprocess.run([sys.executable, "-c", code, "cite"], capture_output=True, text=True, check=False)
+    assert done.returncode == 1, done.stderr
+    assert done.stderr == "spinlev: stopped; what was finished is kept.\n"
+
+
+def test_ctrl_c_that_falls_into_a_destructor_is_not_lost():
+    """Python drops what is raised there; the program would go on."""
+    code = (
+        "import os, signal, threading\n"
+        "from spinlev.studies import cli, start\n"
+        "class Dropped:\n"
+        "    def __del__(self):\n"
+        "        os.kill(os.getpid(), signal.SIGINT)\n"
+        "def answer(*_):\n"
+        "    Dropped()\n"
+        "    threading.Event().wait(60)\n"
+        "cli._answer = answer\n"
+        "start.main()\n"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert done.returncode == 1
+    assert done.stderr.strip() == "spinlev: stopped; what was finished is kept."
+
+
 def test_ctrl_c_that_a_library_takes_for_its_own_failure(spinlev, monkeypatch, capsys):
     """vtk makes an ImportError of a KeyboardInterrupt while it is loaded."""
     stop = threading.Event()
@@ -372,13 +411,51 @@ def test_a_result_and_its_summary_are_of_the_same_run(spinlev, monkeypatch):
     assert not Path("out/summary.json").exists()
 
 
-def test_files_that_others_wrote_are_read_as_far_as_they_are_whole(spinlev):
+@pytest.mark.parametrize("step", [970, pytest.param(97, marks=pytest.mark.slow)])
+def test_files_that_others_wrote_are_read_as_far_as_they_are_whole(spinlev, step):
     """Without our checksum HDF5 must find the damage: a message, whatever it raises."""
     with h5py.File("r.nc", "w") as file:
         file.attrs["study"] = "run"
     content = Path("r.nc").read_bytes()
-    for length in range(0, len(content), 97):
+    for length in range(0, len(content), step):
         Path("r.nc").write_bytes(content[:length])
         status, _, said = spinlev("cite", "r.nc")
         assert status == 2
         assert "Traceback" not in said
+
+
+def foreign_file(name):
+    """A result as another program may write it, and where its attributes' texts are (HDF5's global heap)."""
+    with h5py.File(name, "w") as file:
+        file.attrs["study"] = "run"
+    return Path(name).read_bytes(), Path(name).read_bytes().index(b"GCOL")
+
+
+def test_a_foreign_file_that_hdf5_does_not_return_from_is_given_up(spinlev, monkeypatch):
+    """An object of no length in the heap: HDF5 goes round in a loop that no signal ends."""
+    monkeypatch.setattr(foreign, "LONGEST", 2.0)
+    content, heap = foreign_file("r.nc")
+    Path("r.nc").write_bytes(content[: heap + 16] + bytes(16) + content[heap + 32 :])
+    status, _, said = spinlev("cite", "r.nc")
+    assert status == 2
+    assert "HDF5 does not come to an end with it" in said.replace("\n", " ")
+
+
+def test_a_foreign_file_that_hdf5_crashes_on_is_refused(spinlev, monkeypatch, tmp_path):
+    """The process that looks through it dies, as HDF5 has made it on damaged files; the program does not."""
+    foreign_file("r.nc")
+    monkeypatch.setattr(foreign, "SCRIPT", tmp_path / "dies.py")
+    (tmp_path / "dies.py").write_text("import os, signal; os.kill(os.getpid(), signal.SIGSEGV)")
+    status, _, said = spinlev("cite", "r.nc")
+    assert status == 2
+    assert "HDF5 crashes on it" in said.replace("\n", " ")
+
+
+def test_hdf5_of_a_mesh_is_looked_through_too(monkeypatch, tmp_path):
+    points = np.random.default_rng(0).uniform(-1e-2, 1e-2, (8, 3))
+    meshio.Mesh(points, [("vertex", np.arange(8)[:, None])], {"B": points}).write(tmp_path / "map.xdmf")
+    np.testing.assert_array_equal(read_field_map(tmp_path / "map.xdmf").field, points)
+    monkeypatch.setattr(foreign, "SCRIPT", tmp_path / "dies.py")
+    (tmp_path / "dies.py").write_text("import os, signal; os.kill(os.getpid(), signal.SIGSEGV)")
+    with pytest.raises(FieldMapError, match="HDF5 crashes on it"):
+        read_field_map(tmp_path / "map.xdmf")

@@ -46,18 +46,30 @@ def test_stored_results_make_one_report(tmp_path):
     assert page.read_text().count("data:image/png;base64,") == 2
 
 
+MOVING = re.compile("error|shortfall|second|memory|per_point")
+"""What is estimated of a result, or what it took."""
+ERRORS_OF_THE_DIPOLE = ("field_error", "gradient_error")
+"""Of `dipole-validity`: these are its answer."""
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("path", STORED, ids=lambda path: path.stem)
 def test_the_first_point_of_a_study_is_still_what_was_stored(path):
-    """To 1 %: accuracy has limits that move with the program, results have not."""
+    """To 1e-4 of the largest value of a quantity.
+
+    What earlier versions stored differed by up to 7e-12, averaged motions by 3e-8; the plate's compact table was made
+    otherwise since, which moved its quantities by 1.4e-5, less than a hundredth of their estimated error. Growth rates
+    of motions without friction are zero, as round-off shows them.
+    """
     study, stored = CATALOGUE[path.stem], read_result(path)
     found = study.gather([study.compute(study.points(True)[0])])
     assert set(found.data_vars) == set(stored.data_vars)
     compared = 0
     for name, values in found.data_vars.items():
-        known = stored[name].isel(case=slice(len(values["case"]))) if "case" in values.dims else stored[name]
-        if values.dtype.kind == "f" and known.shape == values.shape and not re.search("error|second|time|memory", name):
-            scale = np.nanmax(np.abs(known.values), initial=1e-300)
-            np.testing.assert_allclose(values, known, rtol=1e-2, atol=1e-2 * scale, err_msg=str(name))
+        known = stored[name].isel({dim: slice(size) for dim, size in values.sizes.items()})  # of the first point
+        answer = path.stem == "dipole-validity" and name in ERRORS_OF_THE_DIPOLE
+        if values.dtype.kind == "f" and (answer or not MOVING.search(str(name))):
+            scale = np.nanmax(np.abs(known.values), initial=0.0)
+            np.testing.assert_allclose(values, known, rtol=0, atol=max(1e-4 * scale, 1e-12), err_msg=str(name))
             compared += 1
     assert compared
