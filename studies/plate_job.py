@@ -28,6 +28,10 @@ NEAREST = 1e-3
 """Distance of a place from the plate, m: nearer ones are on the face but for round-off, and a dipole is a sphere."""
 FARTHEST = 100.0
 """The same in units of the largest edge: from much farther, potentials differ over the plate by round-off only."""
+EDGES = 5.0
+"""Change of an infinite slab's reaction by the edges, in units of the source's share beyond them: in 64 comparisons
+with finite elements at most 1.4 at 100 Hz, 1.9 at 5 Hz and, where resistance alone rules in thin plates, 4.5 at 0.5 Hz.
+"""
 TIGHTEST = 1e-5
 """Smallest tolerance that the finite elements reach in minutes."""
 LOWEST, HIGHEST = 0.5, 250.0
@@ -101,20 +105,21 @@ def _slab(plate: Plate, place: Array, frequency: float, rtol: float) -> Answer:
     along = plate.box.rotation[:, normal]
     tensor = local[0, 0] * np.eye(3) + (local[2, 2] - local[0, 0]) * np.outer(along, along)
     lateral = [a for a in range(3) if a != normal]
-    return Answer("slab", tensor, beyond_edges(body[lateral], size[lateral] / 2, height + size[normal]))
+    return Answer("slab", tensor, edge_error(body[lateral], size[lateral] / 2, height + size[normal]))
 
 
-def beyond_edges(place: Array, half: Array, depth: float) -> float:
-    """Share of the source's squared potential, at the far face (`depth` below it), that lies beyond the edges.
+def edge_error(place: Array, half: Array, depth: float) -> float:
+    """Estimated relative error of an infinite slab's reaction for a plate with edges, at most 1.
 
-    Summed over the dipole's directions it falls as 1/r⁴, whose integral over the plane is π/depth².
+    It goes with the share of the source's squared potential that lies beyond the edges at the far face, `depth` below
+    the source.  Summed over the dipole's directions that falls as 1/r⁴, whose integral over the plane is π/depth².
     """
     nodes, weights = np.polynomial.legendre.leggauss(60)
     lower, upper = np.arcsinh((-half - place) / depth), np.arcsinh((half - place) / depth)
     u = (lower + upper)[:, None] / 2 + (upper - lower)[:, None] / 2 * nodes
     (x, y), (wx, wy) = np.sinh(u), np.cosh(u) * weights * (upper - lower)[:, None] / 2
     inside = float(wx @ (1 + x[:, None] ** 2 + y**2) ** -2 @ wy)
-    return 1 - inside / np.pi
+    return min(1.0, EDGES * (1 - inside / np.pi))
 
 
 def _fem(plate: Plate, place: Array, frequency: float, rtol: float) -> Answer:

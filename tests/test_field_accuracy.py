@@ -135,6 +135,9 @@ def test_a_target_out_of_reach_is_reported():
 
 SLOW = {
     "long",
+    "touching",
+    "extensions, μr = 1",
+    "gap of 1 µm",
     "μr = 5",
     "μr = 1000",
     "flat, across",

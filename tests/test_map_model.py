@@ -1,6 +1,7 @@
 """A measured map as the field model of a scene: `rotor.field_map` and `--model map`."""
 
 import json
+import threading
 
 import numpy as np
 import pytest
@@ -29,15 +30,12 @@ def folder(tmp_path_factory):
 
 
 @pytest.fixture
-def called(monkeypatch):
+def called():
     """Exit status of a command with the scene of a folder."""
 
     def call(folder, *arguments):
-        command = ["spinlev", arguments[0], str(folder / "scene.toml"), *arguments[1:], "--out", str(folder / "out")]
-        monkeypatch.setattr("sys.argv", command)
-        with pytest.raises(SystemExit) as stopped:
-            cli.main()
-        return stopped.value.code
+        line = [arguments[0], str(folder / "scene.toml"), *arguments[1:], "--out", str(folder / "out")]
+        return cli.run(line, threading.Event())
 
     return call
 

@@ -24,8 +24,8 @@ def chosen(size, center, model="auto", rtol=3e-3, place=PLACE):
 @pytest.mark.parametrize(
     ("size", "center", "model", "reason"),
     [
-        ((1.0, 1.0, 0.01), (0.0, 0.0, -0.04), "slab", "beyond the plate's edges"),
-        ((0.05, 0.05, 0.01), (0.0, 0.0, -0.04), "reduced", r"beyond the plate's edges, 3.0e-03 is allowed"),
+        ((2.0, 2.0, 0.01), (0.0, 0.0, -0.04), "slab", "edges take at most 2"),
+        ((0.05, 0.05, 0.01), (0.0, 0.0, -0.04), "reduced", "of an infinite slab's reaction, 3.0e-03 is allowed"),
         ((0.05, 0.05, 0.01), (0.06, 0.0, -0.02), "reduced", "beside the plate's edge"),
         ((0.05, 0.05, 0.01), (0.0, 0.0, -1.0), "none", "of the weight"),
     ],
@@ -37,8 +37,8 @@ def test_auto(size, center, model, reason):
 
 
 def test_more_is_asked_of_the_slab_where_the_tolerance_is_smaller():
-    """Beyond the edges lies about the square of the depth over their distance: (2.5/15)² = 2.8 %."""
-    wide = ((0.3, 0.3, 0.01), (0.0, 0.0, -0.04))
+    """Beyond the edges lies about the square of the depth over their distance: (2.5/30)² = 0.7 %."""
+    wide = ((0.6, 0.6, 0.01), (0.0, 0.0, -0.04))
     assert chosen(*wide, rtol=5e-2)[0] == "slab"
     assert chosen(*wide, rtol=1e-2)[0] == "reduced"
 
@@ -52,7 +52,7 @@ def test_as_asked_or_nothing_to_model():
 
 
 def test_the_command_takes_the_slab_where_it_will_do(tmp_path):
-    scene = replace(SCENE, plate=Plate(Box((1.0, 1.0, 0.01), (0.0, 0.0, -0.04)), 3.5e7))
+    scene = replace(SCENE, plate=Plate(Box((2.0, 2.0, 0.01), (0.0, 0.0, -0.04)), 3.5e7))
     slab, auto = (plate_job(scene, PLACE, 50.0, model, 1e-2, tmp_path)[0] for model in ("slab", "auto"))
     assert auto["model"] == "slab"
     np.testing.assert_array_equal(auto["G_T_per_A_m2"]["imag"], slab["G_T_per_A_m2"]["imag"])

@@ -163,6 +163,7 @@ def test_every_point_of_every_study_is_known_to_json():
             assert len({json.dumps(point) for point in points}) == len(points)
 
 
+@pytest.mark.slow
 def test_a_study_on_the_command_line_and_in_python_is_what_was_stored(tmp_path, monkeypatch):
     """To 1e-3, since the elements' accuracy moves with their versions; points are computed once for both."""
     name, said = "force-curve", io.StringIO()
