@@ -29,7 +29,7 @@ NEAREST = 1e-3
 FARTHEST = 100.0
 """The same in units of the largest edge: from much farther, potentials differ over the plate by round-off only."""
 EDGES = 5.0
-"""Change of an infinite slab's reaction by the edges, in units of the source's share beyond them: in 64 comparisons
+"""Change of an infinite slab's reaction by the edges, in units of the source's share beyond them: in 82 comparisons
 with finite elements at most 1.4 at 100 Hz, 1.9 at 5 Hz and, where resistance alone rules in thin plates, 4.5 at 0.5 Hz.
 """
 TIGHTEST = 1e-5
