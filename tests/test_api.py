@@ -94,7 +94,7 @@ def test_objects_print_what_they_are():
     assert "unstable, e-fold in" in repr(found[-1])
     memory = api.plate_table(lowered, "cuboid", "slab", plate_rtol=3e-2)
     first, second, *_ = repr(memory).splitlines()
-    assert re.match(r"PlateMemory 'slab': relative error \d\.\de-0\d, \d+ harmonics of the rotor$", first)
+    assert re.match(r"PlateMemory 'slab': relative error \d\.\de[-+]0\d, \d+ harmonics of the rotor$", first)
     assert re.match(r"PlateTable of \(100, 240, 30\) mm, 3.5e\+07 S/m: \d+ currents$", second)
 
 
