@@ -49,6 +49,7 @@ def test_search_by_least_squares(benchmark, starts):
 @pytest.mark.benchmark(group=ALL)
 @pytest.mark.parametrize("model", MODELS)
 def test_equilibria(benchmark, model):
+    """A search that knows nothing, for each field model; it must find the stable one."""
     table = rotor_table(SCENE.rotor, model, nearest=SCENE.floater.radius)
     rates = Rates(table)
     found = benchmark.pedantic(lambda: find_equilibria(SCENE, table, rates=rates), rounds=3, warmup_rounds=1)
@@ -60,6 +61,7 @@ def test_equilibria(benchmark, model):
 @pytest.mark.benchmark(group=ONE)
 @pytest.mark.parametrize("model", MODELS)
 def test_one_equilibrium(benchmark, model):
+    """Newton from 0.02 radii away and the ten eigenvalues there; it must be the stable one."""
     table = rotor_table(SCENE.rotor, model, nearest=SCENE.floater.radius)
     rates, scales = Rates(table), Scales.of(SCENE)
     near = next(e for e in find_equilibria(SCENE, table, rates=rates) if e.stable)
@@ -79,6 +81,7 @@ def test_one_equilibrium(benchmark, model):
 @pytest.mark.benchmark(group=MAP)
 @pytest.mark.parametrize("model", MODELS)
 def test_map(benchmark, model):
+    """Frequency against displacement over the ranges of the article; time for each equilibrium found."""
     family = rotor_family(SCENE, "horizontal", model, nearest=SCENE.floater.radius)
     axes = np.linspace(50.0, 250.0, 100), np.linspace(1e-3, 8e-3, 100)
     assert family.rates is not None  # compiled

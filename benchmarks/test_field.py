@@ -19,6 +19,7 @@ PEER = "magpylib, B alone"
 @pytest.mark.benchmark(group="100 000 points: B and its gradient")
 @pytest.mark.parametrize("model", [PEER, "dipole", "cuboid", "moments to 13", "fem"])
 def test_evaluation(benchmark, model):
+    """The same points for all, from 13 to 40 mm about one cube; the peer gives no gradient."""
     rotor = SCENE.rotor
     benchmark.extra_info["peer"] = model == PEER
     if model == PEER:

@@ -43,6 +43,7 @@ def test_flight_against_scipy(benchmark, start, rtol):
 @pytest.mark.parametrize("compact", [True, False], ids=["loops", "straight code"])
 @pytest.mark.parametrize("model", ["dipole", "cuboid", "fem"])
 def test_flight(benchmark, start, model, compact):
+    """Without plate and drag; compiled as loops or as straight code, which takes longer to compile."""
     if model == "fem" and not compact:
         pytest.skip("straight code for the expansion takes minutes to compile")
     table = rotor_table(SCENE.rotor, model, nearest=SCENE.floater.radius)

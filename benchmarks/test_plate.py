@@ -19,6 +19,7 @@ MADE = {}
 @pytest.mark.benchmark(group="infinite slab at 50 heights, 100 Hz")
 @pytest.mark.parametrize("way", ["SciPy's quad", "spinlev"])
 def test_slab(benchmark, way):
+    """One element of the reaction tensor; both ways agree to 1e-8."""
     benchmark.extra_info["peer"] = way != "spinlev"
     if way == "spinlev":
         found = benchmark(lambda: reaction_tensor(SLAB, HEIGHTS, 100.0)[:, 2, 2])
@@ -29,6 +30,7 @@ def test_slab(benchmark, way):
 
 @pytest.mark.benchmark(group="plate of 100 × 240 × 30 mm, ten places, 1e-3: beside finite elements at 100 Hz")
 def test_plate_reaction(benchmark):
+    """From nothing: mesh, orders and solution, until the estimated error is 1e-3."""
     benchmark.extra_info["peer"] = True
     found = benchmark.pedantic(plate_reaction, (PLATE, PLACES, 100.0, 1e-3), rounds=1)
     assert found.error_estimate.max() <= 1e-3

@@ -26,6 +26,7 @@ FREE = replace(SCENE, plate=None, drag=replace(SCENE.drag, linear=0.0, angular=0
 @pytest.mark.benchmark(group="scaling: points of a table (finite elements)")
 @pytest.mark.parametrize("points", [100, 1_000, 10_000, 100_000, 1_000_000])
 def test_points(benchmark, points):
+    """B and its gradient by the table of finite elements."""
     table = rotor_table(SCENE.rotor, "fem", nearest=SCENE.floater.radius)
     places = around(SCENE.rotor[0], points)
     benchmark.extra_info["size"] = points

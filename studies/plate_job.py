@@ -104,18 +104,21 @@ def _slab(plate: Plate, place: Array, frequency: float, rtol: float) -> Answer:
     local = reaction_tensor(Slab(plate.conductivity, size[normal]), height, frequency)
     along = plate.box.rotation[:, normal]
     tensor = local[0, 0] * np.eye(3) + (local[2, 2] - local[0, 0]) * np.outer(along, along)
-    lateral = [a for a in range(3) if a != normal]
-    return Answer("slab", tensor, edge_error(body[lateral], size[lateral] / 2, height + size[normal]))
+    return Answer("slab", tensor, edge_error(plate, place))
 
 
-def edge_error(place: Array, half: Array, depth: float) -> float:
+def edge_error(plate: Plate, place: Array) -> float:
     """Estimated relative error of an infinite slab's reaction for a plate with edges, at most 1.
 
-    It goes with the share of the source's squared potential that lies beyond the edges at the far face, `depth` below
-    the source.  Summed over the dipole's directions that falls as 1/r⁴, whose integral over the plane is π/depth².
+    It goes with the share of the source's squared potential that lies beyond the edges at the far face, for a
+    source at `place` (3,) m.  Summed over the dipole's directions that falls as 1/r⁴, whose integral over the plane is
+    π/depth².
     """
+    body, normal = plate.box.to_body(place), int(np.argmin(plate.box.size))
+    depth = abs(float(body[normal])) + plate.box.half_edges[normal]
+    centre, half = np.delete(body, normal), np.delete(plate.box.half_edges, normal)
     nodes, weights = np.polynomial.legendre.leggauss(60)
-    lower, upper = np.arcsinh((-half - place) / depth), np.arcsinh((half - place) / depth)
+    lower, upper = np.arcsinh((-half - centre) / depth), np.arcsinh((half - centre) / depth)
     u = (lower + upper)[:, None] / 2 + (upper - lower)[:, None] / 2 * nodes
     (x, y), (wx, wy) = np.sinh(u), np.cosh(u) * weights * (upper - lower)[:, None] / 2
     inside = float(wx @ (1 + x[:, None] ** 2 + y**2) ** -2 @ wy)

@@ -56,18 +56,11 @@ def resolve_plate_model(scene: Scene, model: str, place: Array | None, rtol: flo
         return "none", f"at {gap * 1e3:.3g} mm the plate pushes with less than {NEGLIGIBLE:.0e} of the weight"
     body, normal = plate.box.to_body(place), int(np.argmin(plate.box.size))
     if abs(body[normal]) > plate.box.half_edges[normal]:
-        error = _edge_error(plate, place)
+        error = edge_error(plate, place)
         if error <= rtol:
             return "slab", f"the plate's edges take at most {error:.1e} of its reaction"
         return "reduced", f"edges may take {error:.1e} of an infinite slab's reaction, {rtol:.1e} is allowed"
     return "reduced", "the floater is beside the plate's edge"
-
-
-def _edge_error(plate: Plate, place: Array) -> float:
-    """What the plate's edges may change of an infinite slab's reaction to a dipole, relative."""
-    body, size, normal = plate.box.to_body(place), plate.box.size, int(np.argmin(plate.box.size))
-    lateral = [axis for axis in range(3) if axis != normal]
-    return edge_error(body[lateral], size[lateral] / 2, abs(float(body[normal])) + size[normal] / 2)
 
 
 def plate_memory(
@@ -91,7 +84,7 @@ def plate_memory(
     else:
         made, share, found = cached_driven_plate(plate, table, region, frequencies, rtol, note)
     note("  from the cache." if found else f"  {len(made.rates)} states in {made.provenance['seconds']:.1f} s.")
-    return PlateMemory(plate, made, share, model, _edge_error(plate, place) if model == "slab" else 0.0), found
+    return PlateMemory(plate, made, share, model, edge_error(plate, place) if model == "slab" else 0.0), found
 
 
 def table_in_flight(scene: Scene, table: RotorTable, place: Array, rtol: float) -> RotorTable:
