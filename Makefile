@@ -4,8 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 OLD ?= benchmarks/measured.json
 NEW ?= out/benchmarks.json
-SOURCES := $(wildcard geometry/* fem/* dynamics/* studies/* scenes/*.toml) pyproject.toml README.md LICENSE
-PACKAGES := -p spinlev.geometry -p spinlev.fem -p spinlev.dynamics -p spinlev.studies
+SOURCES := $(shell find spinlev geometry fem dynamics studies scenes -type f -not -name "*.pyc") setup.py pyproject.toml README.md LICENSE
 
 .PHONY: install run test lint types coverage bench bench-compare dist gallery docs validate fuzz lock clean
 
@@ -35,7 +34,7 @@ lint: install
 	$(BIN)/ruff format --check .
 
 types: install
-	$(BIN)/mypy $(PACKAGES)
+	cd $(VENV) && bin/mypy --config-file ../pyproject.toml -p spinlev
 
 test: lint types
 	$(BIN)/pytest -n 2 --dist worksteal -m "not slow"

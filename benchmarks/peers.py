@@ -9,10 +9,8 @@ from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
 from spinlev.fem.slab import Slab
-from spinlev.geometry import load_scene
-from spinlev.geometry.box import Box
-from spinlev.geometry.magnet import MU_0
-from spinlev.geometry.scene import Plate
+from spinlev.geometry.basics import MU_0, Box
+from spinlev.geometry.scenes import Plate, load_scene
 
 SCENE = load_scene("scenes/horizontal.toml")
 PLATE = Plate(Box((0.1, 0.24, 0.03)), 3.5e7)

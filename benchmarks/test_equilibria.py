@@ -4,13 +4,11 @@ import numpy as np
 import pytest
 from peers import SCENE, magpylib_rotor, scipy_equilibria, scipy_equilibrium
 
-from spinlev.dynamics import equilibrium_map, find_equilibria, rotor_family
-from spinlev.dynamics.balance import EVERY, Balance, solve
-from spinlev.dynamics.equations import parameters
-from spinlev.dynamics.rates import Rates
-from spinlev.dynamics.stability import modes
-from spinlev.dynamics.state import Scales
-from spinlev.fem.models import rotor_table
+from spinlev.dynamics.equilibria import find_equilibria
+from spinlev.dynamics.maps import equilibrium_map, rotor_family
+from spinlev.dynamics.motion import Rates, Scales, parameters
+from spinlev.dynamics.steady import EVERY, Balance, modes, solve
+from spinlev.fem.rotor_tables import rotor_table
 
 PEER = "least squares + magpylib, no stability"
 MODELS = ["dipole", "cuboid", "fem"]

@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 from peers import SCENE, around, magpylib_rotor
 
-from spinlev.fem import RotorTable, uniform_moments
-from spinlev.fem.crosscheck import magnet_dipoles
-from spinlev.fem.magnetostatics import assemble, solve
-from spinlev.fem.models import rotor_table
-from spinlev.fem.moments import reaction_moments
-from spinlev.geometry import MU_0
-from spinlev.geometry.mesh import MeshSettings, mesh_magnets
+from spinlev.fem.harmonics import uniform_moments
+from spinlev.fem.magnetostatics.moments import reaction_moments
+from spinlev.fem.magnetostatics.solver import assemble, solve
+from spinlev.fem.rotor_tables import RotorTable, rotor_table
+from spinlev.fem.verification import magnet_dipoles
+from spinlev.geometry.basics import MU_0
+from spinlev.geometry.meshes import MeshSettings, mesh_magnets
 
 POINTS = around(SCENE.rotor[0], 100_000)
 PEER = "magpylib, B alone"

@@ -7,11 +7,13 @@ import pytest
 from peer_flight import fly
 from peers import SCENE, magpylib_rotor
 
-from spinlev.dynamics.flight import compile_flight
-from spinlev.dynamics.integration import integrate
-from spinlev.dynamics.simulation import PLATE_TOLERANCE, initial_state
-from spinlev.fem.models import rotor_table
-from spinlev.studies.plate_shelf import plate_memory, table_in_flight
+from spinlev.dynamics.flights import initial_state
+from spinlev.dynamics.flights.compiled_flight import compile_flight
+from spinlev.dynamics.flights.integration import integrate
+from spinlev.dynamics.flights.simulation import PLATE_TOLERANCE
+from spinlev.fem.rotor_tables import rotor_table
+from spinlev.studies.one_scene import plate_memory
+from spinlev.studies.one_scene.plate_shelf import table_in_flight
 
 FREE = replace(SCENE, plate=None, drag=replace(SCENE.drag, linear=0.0, angular=0.0))
 TURNS = 2

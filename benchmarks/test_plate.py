@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 from peers import PLATE, SLAB, scipy_slab
 
-from spinlev.fem.plate import plate_reaction
-from spinlev.fem.plate_model import plate_table
-from spinlev.fem.plate_region import Region
+from spinlev.fem.plate_network import Region, plate_reaction
+from spinlev.fem.plate_tables.tabulate import plate_table
 from spinlev.fem.slab import reaction_tensor
 
 HEIGHTS = np.linspace(0.008, 0.06, 50)

@@ -6,19 +6,17 @@ import numpy as np
 import pytest
 from peers import PLATE, SCENE, around
 
-from spinlev.dynamics import equilibrium_map, rotor_family
-from spinlev.dynamics.flight import compile_flight
-from spinlev.dynamics.integration import integrate
-from spinlev.dynamics.simulation import PLATE_TOLERANCE, initial_state
-from spinlev.fem.carrier import carrier
-from spinlev.fem.climb import rung
-from spinlev.fem.eddy import solve_eddy
-from spinlev.fem.models import rotor_table
-from spinlev.fem.rotor_solution import solve_rotor
-from spinlev.fem.sources import unit_dipoles
-from spinlev.geometry.mesh import MeshSettings
-from spinlev.geometry.plate_mesh import MeshRule, plate_mesh
-from spinlev.studies.plate_shelf import plate_memory
+from spinlev.dynamics.flights import initial_state
+from spinlev.dynamics.flights.compiled_flight import compile_flight
+from spinlev.dynamics.flights.integration import integrate
+from spinlev.dynamics.flights.simulation import PLATE_TOLERANCE
+from spinlev.dynamics.maps import equilibrium_map, rotor_family
+from spinlev.fem.closed_forms import carrier, unit_dipoles
+from spinlev.fem.eddy_currents import solve_eddy
+from spinlev.fem.magnetostatics import rung, solve_rotor
+from spinlev.fem.rotor_tables import rotor_table
+from spinlev.geometry.meshes import MeshRule, MeshSettings, plate_mesh
+from spinlev.studies.one_scene import plate_memory
 
 FREE = replace(SCENE, plate=None, drag=replace(SCENE.drag, linear=0.0, angular=0.0))
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import matplotlib as mpl
 
-from spinlev.studies.figures import STYLE
+from spinlev.studies.results.figures import STYLE
 
 DOCS = Path(__file__).parent
 

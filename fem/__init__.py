@@ -1,22 +1,8 @@
-"""What field each body makes: closed forms, finite elements, tables."""
+"""What field each body makes: closed forms, finite elements, tables.
 
-from .code_cache import keep_code
-from .field_map import FieldMap, FieldMapError
-from .gridded import GriddedTable
-from .gridded_fit import fit_field_map
-from .multipole import MultipoleExpansion, uniform_moments
-from .table import FieldTable, RangeError, RotorTable
+The public names are listed in `__init__.pyi`; each is loaded when it is first used.
+"""
 
-keep_code()
+import lazy_loader
 
-__all__ = [
-    "FieldMap",
-    "FieldMapError",
-    "FieldTable",
-    "GriddedTable",
-    "MultipoleExpansion",
-    "RangeError",
-    "RotorTable",
-    "fit_field_map",
-    "uniform_moments",
-]
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

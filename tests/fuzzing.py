@@ -22,15 +22,15 @@ import meshio
 import numpy as np
 import xarray as xr
 
-from spinlev.fem import foreign
-from spinlev.fem.field_map import FieldMapError
-from spinlev.fem.field_map_file import read_field_map
-from spinlev.fem.look_through import look_through
-from spinlev.fem.models import rotor_table
-from spinlev.fem.table_file import TableFileError, load_table, save_table
-from spinlev.fem.table_store import write_checked
-from spinlev.geometry import horizontal, seal
-from spinlev.studies import cli
+from spinlev.fem.measured_maps import FieldMapError
+from spinlev.fem.measured_maps.readers import read_field_map
+from spinlev.fem.rotor_tables import rotor_table
+from spinlev.fem.rotor_tables.table_file import TableFileError, load_table, save_table
+from spinlev.fem.storage import checksum as seal
+from spinlev.fem.storage import foreign, write_checked
+from spinlev.fem.storage.look_through import look_through
+from spinlev.geometry.bodies import horizontal
+from spinlev.studies.command_line import cli
 
 SCENES = sorted((Path(__file__).parent.parent / "scenes").glob("*.toml"))
 LONGEST = 60
@@ -182,7 +182,7 @@ def result(chance: random.Random, folder: Path) -> int:
         content = content[: -seal.LENGTH]
     path.write_bytes(damaged(content, chance))
     command = chance.choice(["figure", "show", "cite", "report"])
-    with mock.patch("spinlev.studies.drawings.save_figures", return_value=[]):
+    with mock.patch("spinlev.studies.catalogue.drawings.save_figures", return_value=[]):
         return answered([command, str(path.parent if command == "report" else path), "--out", str(folder / "out")])
 
 

@@ -6,8 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from spinlev.dynamics import find_equilibria
-from spinlev.studies import api
+from spinlev.dynamics.equilibria import find_equilibria
+from spinlev.studies.command_line import api
 
 SCENE = Path(__file__).parent.parent / "scenes" / "horizontal.toml"
 

@@ -4,10 +4,8 @@ import heyoka as hy
 import numpy as np
 import pytest
 
-from spinlev.dynamics.blend import blended, nodes
-from spinlev.dynamics.movable import Shift
-from spinlev.dynamics.symbols import Parameter
-from spinlev.fem.multipole import MultipoleExpansion
+from spinlev.dynamics.motion import Parameter, Shift, blended, nodes
+from spinlev.fem.harmonics import MultipoleExpansion
 
 RADIUS = 8e-3
 CENTER = np.array([1e-3, -2e-3, 3e-3])

@@ -5,14 +5,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from spinlev.dynamics import Family, Plane, find_equilibria, follow_boundary, follow_branch, rotor_family
-from spinlev.dynamics.boundary import COLLISION, CROSSING
-from spinlev.dynamics.branch import FOLD, OSCILLATORY
-from spinlev.dynamics.equilibrium import EquilibriumError
-from spinlev.dynamics.state import Scales
-from spinlev.fem.models import rotor_table
-from spinlev.geometry import rotor
-from spinlev.geometry.scene import Drag, Floater, Scene
+from spinlev.dynamics.branches import FOLD, Family, Plane, follow_boundary, follow_branch
+from spinlev.dynamics.branches.boundary_equations import COLLISION, CROSSING
+from spinlev.dynamics.branches.branch import OSCILLATORY
+from spinlev.dynamics.equilibria import find_equilibria
+from spinlev.dynamics.maps import rotor_family
+from spinlev.dynamics.motion import Scales
+from spinlev.dynamics.steady import EquilibriumError
+from spinlev.fem.rotor_tables import rotor_table
+from spinlev.geometry.bodies import article_rotors as rotor
+from spinlev.geometry.scenes import Drag, Floater, Scene
 
 FLOATER = Floater(radius=6.35e-3, remanence=1.305, recoil_permeability=1.0, density=7500.0)
 SCENE = Scene(110.0, rotor.horizontal(2e-3, 10e-3, 1.305, 1.0), FLOATER, Drag(0.0, 0.0))

@@ -5,13 +5,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from spinlev.dynamics import EquilibriumError, Rates, find_equilibria
-from spinlev.dynamics.arclength import Steps, follow_branch
-from spinlev.dynamics.branch import FOLD, OSCILLATORY, Family, frequencies, scenes, spins
-from spinlev.dynamics.state import Scales
-from spinlev.fem.models import rotor_table
-from spinlev.geometry import rotor
-from spinlev.geometry.scene import Drag, Floater, Scene
+from spinlev.dynamics.branches import FOLD, Family, Steps, follow_branch, frequencies, spins
+from spinlev.dynamics.branches.branch import OSCILLATORY, scenes
+from spinlev.dynamics.equilibria import find_equilibria
+from spinlev.dynamics.motion import Rates, Scales
+from spinlev.dynamics.steady import EquilibriumError
+from spinlev.fem.rotor_tables import rotor_table
+from spinlev.geometry.bodies import article_rotors as rotor
+from spinlev.geometry.scenes import Drag, Floater, Scene
 
 FLOATER = Floater(radius=6.35e-3, remanence=1.305, recoil_permeability=1.0, density=7500.0)
 HORIZONTAL = Scene(118.0, rotor.horizontal(1.7e-3, 10e-3, 1.305, 1.0), FLOATER, Drag(0.0, 0.0))

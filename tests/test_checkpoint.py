@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from spinlev.dynamics import Checkpoint, FlightStopped, integration, simulate
-from spinlev.fem.multipole import uniform_moments
-from spinlev.fem.table import RotorTable
-from spinlev.geometry import rotor
-from spinlev.geometry.input_error import InputError
-from spinlev.geometry.scene import Drag, Floater, Scene
+from spinlev.dynamics.flights import Checkpoint, FlightStopped, integration, simulate
+from spinlev.fem.harmonics import uniform_moments
+from spinlev.fem.rotor_tables import RotorTable
+from spinlev.geometry.basics import InputError
+from spinlev.geometry.bodies import article_rotors as rotor
+from spinlev.geometry.scenes import Drag, Floater, Scene
 
 MAGNETS = rotor.horizontal(2e-3, 10e-3, 1.305, 1.0)
 DIPOLE = RotorTable("dipole", MAGNETS, (), tuple(uniform_moments(m, 1) for m in MAGNETS))

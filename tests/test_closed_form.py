@@ -5,11 +5,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from spinlev.fem import RangeError, RotorTable, uniform_moments
-from spinlev.fem.compiled import CompiledField
-from spinlev.fem.uniform import UniformField
-from spinlev.geometry import Box, Magnet, horizontal, rotation_matrix, tilt, vertical
-from spinlev.studies.coulomb import coulomb_field
+from spinlev.fem.closed_forms import UniformField
+from spinlev.fem.harmonics import CompiledField, uniform_moments
+from spinlev.fem.rotor_tables import RangeError, RotorTable
+from spinlev.fem.verification import coulomb_field
+from spinlev.geometry.basics import Box, rotation_matrix
+from spinlev.geometry.bodies import Magnet, horizontal, tilt, vertical
 
 ROTORS = {
     "horizontal": horizontal(0.002, 0.01, 1.305, 1.0),

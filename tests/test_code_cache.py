@@ -6,8 +6,8 @@ import heyoka as hy
 import numpy as np
 import pytest
 
-from spinlev.fem.code_cache import LIMIT, keep_code
-from spinlev.fem.code_copy import sound
+from spinlev.fem.storage.code_copy import sound
+from spinlev.fem.storage.compiled_code import LIMIT, keep_code
 
 CONSTANT = 3.1640625
 

@@ -23,7 +23,7 @@ def spinlev(tmp_path, cache, monkeypatch):
     """Run the command in an empty folder; gives the exit status, standard output and standard error."""
     monkeypatch.setenv("SPINLEV_CACHE", str(cache))
     monkeypatch.setenv("OMP_NUM_THREADS", "1")
-    call = "import sys; from spinlev.studies.start import main; sys.argv[0] = 'spinlev'; main()"
+    call = "import sys; from spinlev.studies.command_line.start import main; sys.argv[0] = 'spinlev'; main()"
 
     def run(*arguments):
         done = subprocess.run(

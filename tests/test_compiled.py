@@ -3,12 +3,11 @@
 import numpy as np
 import pytest
 
-from spinlev.fem import uniform_moments
-from spinlev.fem.compiled import CompiledField
-from spinlev.fem.uniform import UniformField
-from spinlev.geometry.box import Box
-from spinlev.geometry.magnet import Magnet
-from spinlev.studies.coulomb import coulomb_field
+from spinlev.fem.closed_forms import UniformField
+from spinlev.fem.harmonics import CompiledField, uniform_moments
+from spinlev.fem.verification import coulomb_field
+from spinlev.geometry.basics import Box
+from spinlev.geometry.bodies import Magnet
 
 WAY = np.random.default_rng(3).normal(size=(100, 3))
 POINTS = np.linspace(0.013, 0.04, 100)[:, None] * WAY / np.linalg.norm(WAY, axis=1)[:, None]

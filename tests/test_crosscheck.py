@@ -3,16 +3,15 @@
 import numpy as np
 import pytest
 
-from spinlev.fem.crosscheck import magnet_dipoles
-from spinlev.fem.magnetostatics import assemble, solve
-from spinlev.fem.moments import reaction_moments
-from spinlev.fem.multipole import MultipoleExpansion, uniform_moments
-from spinlev.fem.remanent import induced_moments
-from spinlev.fem.rotor_solution import Refinement, solve_rotor
-from spinlev.geometry.box import Box, rotation_matrix
-from spinlev.geometry.magnet import MU_0, Magnet
-from spinlev.geometry.mesh import MeshSettings, mesh_magnets
-from spinlev.geometry.rotor import horizontal, vertical
+from spinlev.fem.closed_forms.remanent import induced_moments
+from spinlev.fem.harmonics import MultipoleExpansion, uniform_moments
+from spinlev.fem.magnetostatics import Refinement, solve_rotor
+from spinlev.fem.magnetostatics.moments import reaction_moments
+from spinlev.fem.magnetostatics.solver import assemble, solve
+from spinlev.fem.verification import magnet_dipoles
+from spinlev.geometry.basics import MU_0, Box, rotation_matrix
+from spinlev.geometry.bodies import Magnet, horizontal, vertical
+from spinlev.geometry.meshes import MeshSettings, mesh_magnets
 
 TURNED = Box((0.01, 0.012, 0.008), (0.002, 0, 0), rotation_matrix((15, 40, 70)))
 ROTORS = {

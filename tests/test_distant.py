@@ -3,13 +3,11 @@
 import numpy as np
 import pytest
 
-from spinlev.fem.accuracy import Accuracy, shell, typical_field
-from spinlev.fem.distant import distant
-from spinlev.fem.models import rotor_table
-from spinlev.fem.multipole import uniform_moments
-from spinlev.geometry import horizontal
-from spinlev.geometry.scene import Drag, Floater, Scene
-from spinlev.studies.plate_shelf import table_in_flight
+from spinlev.fem.harmonics import uniform_moments
+from spinlev.fem.rotor_tables import Accuracy, distant, rotor_table, shell, typical_field
+from spinlev.geometry.bodies import horizontal
+from spinlev.geometry.scenes import Drag, Floater, Scene
+from spinlev.studies.one_scene.plate_shelf import table_in_flight
 
 ROTOR = horizontal(2e-3, 10e-3, 1.305, 1.0)
 RTOL, CONTACT, FAR = 1e-4, 6.35e-3, 12e-3

@@ -6,16 +6,16 @@ import numpy as np
 import pytest
 from scipy.special import spherical_kn
 
-from spinlev.dynamics import Rates, find_equilibria
-from spinlev.dynamics.air_torque import reynolds, spinning, swinging
-from spinlev.dynamics.drift import drift
-from spinlev.dynamics.flight import compile_flight
-from spinlev.dynamics.integration import integrate
-from spinlev.dynamics.slow_torque import SlowTorque
-from spinlev.dynamics.state import Scales, State
-from spinlev.fem.models import rotor_table
-from spinlev.geometry import rotor
-from spinlev.geometry.scene import AIR_VISCOSITY, Drag, Floater, Scene
+from spinlev.dynamics.equilibria import find_equilibria
+from spinlev.dynamics.flights.compiled_flight import compile_flight
+from spinlev.dynamics.flights.integration import integrate
+from spinlev.dynamics.motion import Rates, Scales, State
+from spinlev.dynamics.slow_drift import drift
+from spinlev.dynamics.slow_drift.air_torque import reynolds, spinning, swinging
+from spinlev.dynamics.slow_drift.slow_torque import SlowTorque
+from spinlev.fem.rotor_tables import rotor_table
+from spinlev.geometry.bodies import article_rotors as rotor
+from spinlev.geometry.scenes import AIR_VISCOSITY, Drag, Floater, Scene
 
 RADIUS, SIGMA = 6.35e-3, 6.7e5
 FLOATER = Floater(RADIUS, 1.305, 1.0, 7500.0, SIGMA)

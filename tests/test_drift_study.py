@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from spinlev.studies.drift import OUTCOMES, drift_points, drift_result, drift_row
-from spinlev.studies.drift_figure import drift_figure, drift_lines
+from spinlev.studies.levitation.levitation_time import OUTCOMES, drift_points, drift_result, drift_row
+from spinlev.studies.levitation.levitation_time_figure import drift_figure, drift_lines
 
 
 def test_vertical_rotor_below_within_and_above_its_range():

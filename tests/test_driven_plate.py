@@ -8,23 +8,17 @@ import numpy as np
 import pytest
 from ngsolve import SetNumThreads
 
-from spinlev.fem.driven_plate import plate_and_rotor_table, reachable_region
-from spinlev.fem.eddy import solve_eddy
-from spinlev.fem.models import rotor_table
-from spinlev.fem.plate_table_file import (
-    cached_driven_plate,
-    driven_plate_key,
-    load_driven_plate,
-    load_plate_table,
-    save_plate_table,
-)
-from spinlev.fem.rotor_source import posed_rotor, rotor_parts
-from spinlev.fem.sources import unit_dipoles
-from spinlev.fem.table_store import TableFileError
-from spinlev.geometry import InputError, Lowering, tilt
-from spinlev.geometry.box import Box, rotation_matrix
-from spinlev.geometry.plate_mesh import MeshRule, plate_mesh
-from spinlev.geometry.scene import Plate
+from spinlev.fem.closed_forms import unit_dipoles
+from spinlev.fem.eddy_currents import solve_eddy
+from spinlev.fem.plate_tables import cached_driven_plate, posed_rotor, reachable_region, rotor_parts
+from spinlev.fem.plate_tables.driven_plate import plate_and_rotor_table
+from spinlev.fem.plate_tables.file import driven_plate_key, load_driven_plate, load_plate_table, save_plate_table
+from spinlev.fem.rotor_tables import rotor_table
+from spinlev.fem.storage import TableFileError
+from spinlev.geometry.basics import Box, InputError, rotation_matrix
+from spinlev.geometry.bodies import tilt
+from spinlev.geometry.meshes import MeshRule, plate_mesh
+from spinlev.geometry.scenes import Lowering, Plate
 
 SetNumThreads(1)
 TURN = rotation_matrix((5.0, -10.0, 20.0))

@@ -6,18 +6,15 @@ import numpy as np
 import pytest
 from ngsolve import SetNumThreads
 
-from spinlev.fem.eddy import solve_eddy
-from spinlev.fem.gauge import tree_edges
-from spinlev.fem.parity import Parity
-from spinlev.fem.phasor import mean_loss
+from spinlev.fem.closed_forms import Dipole, PolarizedCuboid, unit_dipoles
+from spinlev.fem.closed_forms.phasor import mean_loss
+from spinlev.fem.closed_forms.vector_potentials import DipoleDerivative
+from spinlev.fem.eddy_currents import solve_eddy
+from spinlev.fem.elements import Parity, tree_edges
 from spinlev.fem.slab import Slab, reaction_tensor
-from spinlev.fem.slab_mutual import mutual_tensor
-from spinlev.fem.sources import Dipole, DipoleDerivative, PolarizedCuboid, unit_dipoles
-from spinlev.geometry.box import Box
-from spinlev.geometry.conductor_mesh import ConductorMesh
-from spinlev.geometry.hex_mesh import Block, hex_mesh
-from spinlev.geometry.magnet import MU_0
-from spinlev.geometry.plate_mesh import MeshRule, plate_mesh
+from spinlev.fem.slab.two_places import mutual_tensor
+from spinlev.geometry.basics import MU_0, Box
+from spinlev.geometry.meshes import Block, ConductorMesh, MeshRule, hex_mesh, plate_mesh
 
 SetNumThreads(1)
 SIZE, SIGMA = (0.1, 0.24, 0.03), 3.5e7

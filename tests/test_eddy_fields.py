@@ -9,14 +9,14 @@ from netgen.occ import Box as OccBox
 from netgen.occ import Pnt, Sphere
 from ngsolve import SetNumThreads
 
-from spinlev.fem.eddy import solve_eddy
-from spinlev.fem.eddy_export import write_vtu
-from spinlev.fem.eddy_fields import current_density, joule_loss, reaction_flux_density
-from spinlev.fem.phasor import mean_loss
-from spinlev.fem.sources import UniformField, unit_dipoles
-from spinlev.fem.sphere_eddy import polarizability
-from spinlev.geometry.occ_mesh import Conductor, occ_mesh
-from spinlev.geometry.plate_mesh import MeshRule, plate_mesh
+from spinlev.fem.closed_forms import HomogeneousField, unit_dipoles
+from spinlev.fem.closed_forms.phasor import mean_loss
+from spinlev.fem.closed_forms.sphere_eddy import polarizability
+from spinlev.fem.eddy_currents import current_density, solve_eddy
+from spinlev.fem.eddy_currents.export import write_vtu
+from spinlev.fem.eddy_currents.fields import joule_loss, reaction_flux_density
+from spinlev.geometry.meshes import MeshRule, plate_mesh
+from spinlev.geometry.meshes.solids import Conductor, occ_mesh
 
 SetNumThreads(1)
 SIZE, SIGMA, FREQUENCY = (0.1, 0.24, 0.03), 3.5e7, 100.0
@@ -98,7 +98,7 @@ def test_sphere_in_a_uniform_field_on_curved_tetrahedra():
     """μ0 m² of the induced moment is the coupling of the field with itself; R/δ = 1.7."""
     radius, frequency = 0.01, 200.0
     mesh = occ_mesh({"ball": Conductor(Sphere(Pnt(0, 0, 0), 10.0), SIGMA, 8.0)}, reach=8.0)
-    sources = [UniformField(axis) for axis in np.eye(3)]
+    sources = [HomogeneousField(axis) for axis in np.eye(3)]
     found = solve_eddy(mesh, 3, frequency, sources).couplings
     exact = polarizability(radius, SIGMA, frequency)
     # the box at 8 R adds about (1/8)³ of the moment's own share

@@ -6,11 +6,10 @@ import numpy as np
 import pytest
 from ngsolve import SetNumThreads
 
-from spinlev.fem.eddy import solve_eddy
-from spinlev.fem.eddy_space import EddySpace
-from spinlev.fem.eddy_time import TimeStepper, work_on
-from spinlev.fem.sources import Dipole, unit_dipoles
-from spinlev.geometry.plate_mesh import MeshRule, plate_mesh
+from spinlev.fem.closed_forms import Dipole, unit_dipoles
+from spinlev.fem.eddy_currents import EddySpace, solve_eddy
+from spinlev.fem.verification.time_stepping import TimeStepper, work_on
+from spinlev.geometry.meshes import MeshRule, plate_mesh
 
 SetNumThreads(1)
 FREQUENCY = 200.0

@@ -8,15 +8,13 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from spinlev.dynamics.equations import equations_of_motion, parameters
-from spinlev.dynamics.flight import compile_flight
-from spinlev.dynamics.integration import integrate
-from spinlev.dynamics.rates import Rates
-from spinlev.dynamics.state import Scales, State, turned_about_z
-from spinlev.fem.multipole import uniform_moments
-from spinlev.fem.table import RotorTable
-from spinlev.geometry import rotor
-from spinlev.geometry.scene import Drag, Floater, Scene
+from spinlev.dynamics.flights.compiled_flight import compile_flight
+from spinlev.dynamics.flights.integration import integrate
+from spinlev.dynamics.motion import Rates, Scales, State, equations_of_motion, parameters, turned_about_z
+from spinlev.fem.harmonics import uniform_moments
+from spinlev.fem.rotor_tables import RotorTable
+from spinlev.geometry.bodies import article_rotors as rotor
+from spinlev.geometry.scenes import Drag, Floater, Scene
 
 FLOATER = Floater(radius=6.35e-3, remanence=1.305, recoil_permeability=1.0, density=7500.0)
 MAGNETS = rotor.vertical(14e-3, 10e-3, 1.305, 1.0)

@@ -8,17 +8,13 @@ import pytest
 from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
-from spinlev.dynamics.balance import EVERY, Balance, solve
-from spinlev.dynamics.equations import parameters
-from spinlev.dynamics.equilibria import find_equilibria, survey
-from spinlev.dynamics.equilibrium import EquilibriumError
-from spinlev.dynamics.rates import Rates
-from spinlev.dynamics.search import SearchRange
-from spinlev.dynamics.state import Scales
-from spinlev.fem.multipole import uniform_moments
-from spinlev.fem.table import RotorTable
-from spinlev.geometry import rotor
-from spinlev.geometry.scene import Drag, Floater, Scene
+from spinlev.dynamics.equilibria import SearchRange, find_equilibria, survey
+from spinlev.dynamics.motion import Rates, Scales, parameters
+from spinlev.dynamics.steady import EVERY, Balance, EquilibriumError, solve
+from spinlev.fem.harmonics import uniform_moments
+from spinlev.fem.rotor_tables import RotorTable
+from spinlev.geometry.bodies import article_rotors as rotor
+from spinlev.geometry.scenes import Drag, Floater, Scene
 
 FLOATER = Floater(radius=6.35e-3, remanence=1.305, recoil_permeability=1.0, density=7500.0)
 SHAPE = {"edge": 10e-3, "remanence": 1.305, "recoil_permeability": 1.0}

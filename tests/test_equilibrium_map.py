@@ -4,14 +4,15 @@ import heyoka as hy
 import numpy as np
 import pytest
 
-from spinlev.dynamics import EquilibriumError, equilibrium_map, find_equilibria, rotor_family
-from spinlev.dynamics.fixed_points import fixed_points
-from spinlev.dynamics.grid import Grid
-from spinlev.dynamics.rates import Rates
-from spinlev.dynamics.symbols import Parameter
-from spinlev.fem.models import rotor_table
-from spinlev.geometry import rotor
-from spinlev.geometry.scene import Drag, Floater, Scene
+from spinlev.dynamics.equilibria import find_equilibria
+from spinlev.dynamics.equilibria.fixed_points import fixed_points
+from spinlev.dynamics.maps import equilibrium_map, rotor_family
+from spinlev.dynamics.maps.grid import Grid
+from spinlev.dynamics.motion import Parameter, Rates
+from spinlev.dynamics.steady import EquilibriumError
+from spinlev.fem.rotor_tables import rotor_table
+from spinlev.geometry.bodies import article_rotors as rotor
+from spinlev.geometry.scenes import Drag, Floater, Scene
 
 SHAPE = (10e-3, 1.305, 1.05)
 FLOATER = Floater(radius=6.35e-3, remanence=1.305, recoil_permeability=1.05, density=7500.0)

@@ -20,12 +20,11 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from spinlev.fem import foreign, memory
-from spinlev.fem.field_map import FieldMapError
-from spinlev.fem.field_map_file import read_field_map
-from spinlev.fem.table_store import read_checked, write_checked
-from spinlev.geometry.atomic import replacing, write_whole
-from spinlev.studies.cli import _status
+from spinlev.fem.elements.memory import memory_need as memory
+from spinlev.fem.measured_maps import FieldMapError
+from spinlev.fem.measured_maps.readers import read_field_map
+from spinlev.fem.storage import foreign, read_checked, replacing, write_checked, write_whole
+from spinlev.studies.command_line.cli import _status
 
 SCENE = str(Path(__file__).parent.parent / "scenes" / "horizontal.toml")
 OVER_PLATE = str(Path(__file__).parent.parent / "scenes" / "tilt-over-plate.toml")
@@ -191,7 +190,7 @@ def test_a_full_disk(spinlev, monkeypatch, name):
 def test_results_go_to_memory_before_the_disk_since_hdf5_crashes_on_a_full_one(tmp_path):
     """A child that may write 20 kB: an error in words (HDF5 itself, on a real full disk, ended with SIGSEGV)."""
     code = (
-        "import resource, sys, numpy, xarray; from spinlev.fem.table_store import write_checked\n"
+        "import resource, sys, numpy, xarray; from spinlev.fem.storage.checked_files import write_checked\n"
         "resource.setrlimit(resource.RLIMIT_FSIZE, (20000, 20000))\n"
         "write_checked(xarray.Dataset({'a': ('x', numpy.arange(9999.0))}), sys.argv[1])\n"
     )
@@ -221,14 +220,14 @@ def test_a_full_disk_behind_standard_output(spinlev, capsys):
 
 
 PHASES = {
-    "table": ("spinlev.fem.cache.rotor_table", FIELD),
-    "table, when it is written": ("spinlev.fem.table_store.write_whole", FIELD),
-    "equilibria": ("spinlev.studies.single.survey", WRITERS["equilibria.json"]),
-    "files": ("spinlev.studies.single.write_whole", WRITERS["equilibria.json"]),
-    "sweep": ("spinlev.studies.shelf.rotor_table", SWEEP),
-    "sweep, when a point is kept": ("spinlev.studies.journal.write_checked", SWEEP),
-    "sweep, when all are joined": ("spinlev.studies.study_job.write_dataset", SWEEP),
-    "figures": ("spinlev.studies.study_job.save_figures", SWEEP),
+    "table": ("spinlev.fem.rotor_tables.cache.rotor_table", FIELD),
+    "table, when it is written": ("spinlev.fem.storage.checked_files.write_whole", FIELD),
+    "equilibria": ("spinlev.studies.one_scene.single.survey", WRITERS["equilibria.json"]),
+    "files": ("spinlev.studies.one_scene.single.write_whole", WRITERS["equilibria.json"]),
+    "sweep": ("spinlev.studies.one_scene.shelf.rotor_table", SWEEP),
+    "sweep, when a point is kept": ("spinlev.studies.sweeps.finished_points.write_checked", SWEEP),
+    "sweep, when all are joined": ("spinlev.studies.catalogue.jobs.write_dataset", SWEEP),
+    "figures": ("spinlev.studies.catalogue.jobs.save_figures", SWEEP),
 }
 
 
@@ -265,7 +264,7 @@ def test_ctrl_c_while_the_program_is_loaded(library, blow):
         "    def find_spec(self, name, *_):\n"
         f"        if name == '{library}': os.kill(os.getpid(), signal.{blow})\n"
         "sys.meta_path.insert(0, Pressed())\n"
-        "from spinlev.studies.start import main\n"
+        "from spinlev.studies.command_line.start import main\n"
         "main()\n"
     )
     done = subprocess.run([sys.executable, "-c", code, "cite"], capture_output=True, text=True, check=False)
@@ -300,7 +299,7 @@ def test_ctrl_c_that_a_library_takes_for_its_own_failure(spinlev, monkeypatch, c
         stop.set()
         raise ImportError("No module named vtk")
 
-    monkeypatch.setattr("spinlev.studies.single.write_whole", pressed)
+    monkeypatch.setattr("spinlev.studies.one_scene.single.write_whole", pressed)
     assert _status([*WRITERS["field.csv"]], sys.stderr, stop) == 1
     assert "stopped; what was finished is kept" in capsys.readouterr().err
 
@@ -318,7 +317,7 @@ def pressing(monkeypatch, after):
     def progress(label):
         yield advance
 
-    monkeypatch.setattr("spinlev.studies.single.progress", progress)
+    monkeypatch.setattr("spinlev.studies.one_scene.single.progress", progress)
 
 
 def test_ctrl_c_in_a_flight_keeps_it_and_it_goes_on_to_the_last_bit(spinlev, monkeypatch):
@@ -356,7 +355,7 @@ def test_a_stopped_flight_is_no_point_of_a_sweep(spinlev, monkeypatch):
         yield pressed
 
     with monkeypatch.context() as patch:
-        patch.setattr("spinlev.studies.single.progress", progress)
+        patch.setattr("spinlev.studies.one_scene.single.progress", progress)
         assert spinlev(*arguments)[0] == 1
     assert [path.name for path in Path("out/question.points").glob("0*.nc")] == ["000000.nc"]
     status, _, said = spinlev(*arguments)
@@ -379,7 +378,7 @@ def test_no_solve_is_begun_that_the_memory_does_not_hold(spinlev, monkeypatch):
 def test_files_of_killed_processes_are_tidied_and_those_of_living_ones_are_not(tmp_path):
     """A process that dies between two bytes leaves a file under a temporary name; the next writer removes it."""
     code = (
-        "import os, signal, sys; from spinlev.geometry.atomic import replacing\n"
+        "import os, signal, sys; from spinlev.fem.storage.whole_files import replacing\n"
         "with replacing(sys.argv[1]) as temporary:\n"
         "    temporary.write_text('half')\n"
         "    os.kill(os.getpid(), signal.SIGKILL)\n"
@@ -404,7 +403,9 @@ def test_a_result_and_its_summary_are_of_the_same_run(spinlev, monkeypatch):
     """A run that dies after its result is written leaves no summary of the run before."""
     Path("out").mkdir()
     Path("out/summary.json").write_text("{}")
-    monkeypatch.setattr("spinlev.studies.run.write_dataset", lambda *_: (_ for _ in ()).throw(KeyboardInterrupt))
+    monkeypatch.setattr(
+        "spinlev.studies.one_scene.run.write_dataset", lambda *_: (_ for _ in ()).throw(KeyboardInterrupt)
+    )
     status, _, said = spinlev("run", SCENE, "--duration-s", "0.1", "--rtol", "1e-2", *DIPOLE)
     assert status == 1
     assert "stopped" in said

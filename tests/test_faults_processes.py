@@ -12,12 +12,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from spinlev.fem.table_store import read_checked
+from spinlev.fem.storage import read_checked
 
 pytestmark = pytest.mark.slow
 
 SCENE = str(Path(__file__).parent.parent / "scenes" / "horizontal.toml")
-CALL = "import sys; from spinlev.studies.start import main; sys.argv[0] = 'spinlev'; main()"
+CALL = "import sys; from spinlev.studies.command_line.start import main; sys.argv[0] = 'spinlev'; main()"
 DIPOLE = ("--model", "dipole", "--plate-model", "none")
 FIELD = ("field", SCENE, "--points", "points.csv", "--model", "fem", "--rtol", "3e-5", "--json")
 FLIGHT = ("simulate", SCENE, "--duration-s", "300", *DIPOLE, "--json")

@@ -6,22 +6,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from spinlev.fem.accuracy import Accuracy, places
-from spinlev.fem.carrier import carrier
-from spinlev.fem.closed_part import added_by_closed_form
-from spinlev.fem.ladder import AccuracyWarning, fem_table
-from spinlev.fem.models import rotor_table
-from spinlev.fem.multipole import uniform_moments
-from spinlev.fem.rotor_solution import Refinement, solve_rotor
-from spinlev.fem.table import RotorTable
-from spinlev.fem.trim import trimmed
-from spinlev.geometry.box import Box
-from spinlev.geometry.magnet import Magnet
-from spinlev.geometry.mesh import MeshSettings
-from spinlev.geometry.pieces import cut_magnets
-from spinlev.geometry.rotor import horizontal, vertical
-from spinlev.studies.field_hard_cases import extensions, reference
-from spinlev.studies.hard_cases import CASES, MORE_LAYERS, OTHER_MESH
+from spinlev.fem.closed_forms import added_by_closed_form, carrier
+from spinlev.fem.harmonics import trimmed, uniform_moments
+from spinlev.fem.magnetostatics import Refinement, solve_rotor
+from spinlev.fem.rotor_tables import Accuracy, AccuracyWarning, RotorTable, fem_table, places, rotor_table
+from spinlev.geometry.basics import Box
+from spinlev.geometry.bodies import Magnet, cut_magnets, horizontal, vertical
+from spinlev.geometry.meshes import MeshSettings
+from spinlev.studies.field_quality.field_hard_cases import extensions, reference
+from spinlev.studies.field_quality.hard_cases import CASES, MORE_LAYERS, OTHER_MESH
 
 CUBE = (0.01, 0.01, 0.01)
 

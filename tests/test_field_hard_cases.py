@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from spinlev.studies.field_hard_cases import case_errors, extensions, hard_case_lines
-from spinlev.studies.field_hard_cases_figure import hard_case_figure
-from spinlev.studies.hard_cases import CASES
+from spinlev.studies.field_quality.field_hard_cases import case_errors, extensions, hard_case_lines
+from spinlev.studies.field_quality.field_hard_cases_figure import hard_case_figure
+from spinlev.studies.field_quality.hard_cases import CASES
 
 
 def test_extensions_lie_on_the_lines_and_planes_of_edges_and_faces():

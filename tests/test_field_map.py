@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from spinlev.fem import FieldMap, FieldMapError
-from spinlev.fem.field_map_file import read_field_map
+from spinlev.fem.measured_maps import FieldMap, FieldMapError
+from spinlev.fem.measured_maps.readers import read_field_map
 
 AXES = {"x": [-1.0, 1.0], "y": [0.0, 2.0], "z": [-20.0, -18.0, -16.0]}  # mm
 POINTS = np.stack(np.meshgrid(*AXES.values(), indexing="ij"), -1).reshape(-1, 3)

@@ -4,10 +4,12 @@ import heyoka as hy
 import numpy as np
 import pytest
 
-from spinlev.fem.models import rotor_table
-from spinlev.studies import dipole_validity, speed_accuracy, team7, team7_report
-from spinlev.studies.field_methods import methods
-from spinlev.studies.speed_accuracy import DISTANCES, cube, measure, sphere_points
+from spinlev.fem.rotor_tables import rotor_table
+from spinlev.studies.field_quality.dipole_validity import dipole_validity
+from spinlev.studies.field_quality.field_methods import methods
+from spinlev.studies.field_quality.speed_accuracy import DISTANCES, cube, measure, speed_accuracy, sphere_points
+from spinlev.studies.plates import team7_report
+from spinlev.studies.plates.team7 import team7
 
 QUICK = methods(quick=True)
 

@@ -5,15 +5,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from spinlev.dynamics import find_equilibria, flight_kind
-from spinlev.dynamics.flight import compile_flight
-from spinlev.dynamics.flight_kind import DRIFTING, GROWING, LINEAR_FALL, NOT_HELD, OSCILLATING_LOSS, STABLE
-from spinlev.dynamics.integration import integrate
-from spinlev.dynamics.state import State
-from spinlev.dynamics.trajectory import Trajectory
-from spinlev.fem.models import rotor_table
-from spinlev.geometry import rotor
-from spinlev.geometry.scene import Drag, Floater, Scene
+from spinlev.dynamics.equilibria import find_equilibria
+from spinlev.dynamics.flights import Trajectory, flight_kind
+from spinlev.dynamics.flights.compiled_flight import compile_flight
+from spinlev.dynamics.flights.integration import integrate
+from spinlev.dynamics.flights.kind import DRIFTING, GROWING, LINEAR_FALL, NOT_HELD, OSCILLATING_LOSS, STABLE
+from spinlev.dynamics.motion import State
+from spinlev.fem.rotor_tables import rotor_table
+from spinlev.geometry.bodies import article_rotors as rotor
+from spinlev.geometry.scenes import Drag, Floater, Scene
 
 TIME = np.linspace(0, 20, 5000)
 RADIUS = 6.35e-3

@@ -6,14 +6,13 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from spinlev.dynamics.balance import EVERY, solve
-from spinlev.dynamics.perturbed import PerturbedBalance
-from spinlev.fem.models import rotor_table
-from spinlev.fem.rotor_response import rotor_ladder
-from spinlev.geometry.scene import Drag, Floater, Scene
-from spinlev.geometry.scene_file import load_scene
-from spinlev.studies.floater_figure import floater_figure, floater_lines
-from spinlev.studies.floater_permeability import LEVELS, floater_permeability, missed, sufficient
+from spinlev.dynamics.equilibria import PerturbedBalance
+from spinlev.dynamics.steady import EVERY, solve
+from spinlev.fem.mutual import rotor_ladder
+from spinlev.fem.rotor_tables import rotor_table
+from spinlev.geometry.scenes import Drag, Floater, Scene, load_scene
+from spinlev.studies.levitation.floater_permeability import LEVELS, floater_permeability, missed, sufficient
+from spinlev.studies.levitation.floater_permeability_figure import floater_figure, floater_lines
 
 SCENES = Path(__file__).parent.parent / "scenes"
 
@@ -89,7 +88,7 @@ def test_additional_weight_moves_the_equilibrium_like_gravity(scene):
 
 def test_with_coarse_elements_the_study_tells_the_same(scene, monkeypatch):
     """Elements of the lowest degrees give the missed lift and the shift to some per cent; both are on the figure."""
-    name = "spinlev.studies.floater_permeability.rotor_ladder"
+    name = "spinlev.studies.levitation.floater_permeability.rotor_ladder"
     monkeypatch.setattr(name, lambda magnets, orders: rotor_ladder(magnets, (1, 2)))
     result = floater_permeability(scene, quick=True)
     nearest, farthest = result["distance"].values[[0, -1]]

@@ -7,9 +7,10 @@ import matplotlib as mpl
 import numpy as np
 import pytest
 
-from spinlev.geometry import MU_0, load_scene
+from spinlev.geometry.basics import MU_0
+from spinlev.geometry.scenes import load_scene
 from spinlev.studies.catalogue import CATALOGUE
-from spinlev.studies.figures import STYLE
+from spinlev.studies.results.figures import STYLE
 
 DOCS = Path(__file__).parent.parent / "docs"
 MOMENT = load_scene(DOCS.parent / "scenes" / "horizontal.toml").floater.moment * np.sin(np.radians(5.0))

@@ -3,11 +3,14 @@
 import numpy as np
 import pytest
 
-from spinlev.fem import FieldMap, FieldMapError, RangeError, RotorTable, fit_field_map, uniform_moments
-from spinlev.fem.dipole_center import find_center
-from spinlev.fem.gridded_file import load_gridded, save_gridded
-from spinlev.fem.table_file import TableFileError, load_table
-from spinlev.geometry import Box, Magnet, horizontal, vertical
+from spinlev.fem.harmonics import uniform_moments
+from spinlev.fem.measured_maps import FieldMap, FieldMapError, fit_field_map
+from spinlev.fem.measured_maps.file import load_gridded, save_gridded
+from spinlev.fem.measured_maps.source_center import find_center
+from spinlev.fem.rotor_tables import RangeError, RotorTable
+from spinlev.fem.rotor_tables.table_file import TableFileError, load_table
+from spinlev.geometry.basics import Box
+from spinlev.geometry.bodies import Magnet, horizontal, vertical
 
 INNER, OUTER, STEP = 0.013, 0.040, 0.002
 CORNERS = 0.0087

@@ -1,44 +1,73 @@
-"""Imports go one way: geometry <- fem <- dynamics <- studies."""
+"""Imports go one way: between floors, between the rooms of a floor, and through the faces of rooms."""
 
 import ast
 from pathlib import Path
 
 import pytest
 
-ORDER = ["geometry", "fem", "dynamics", "studies"]
+FLOORS = {
+    "geometry": ["basics", "bodies", "scenes", "meshes"],
+    "fem": [
+        *("storage", "harmonics", "closed_forms", "elements", "magnetostatics", "rotor_tables", "measured_maps"),
+        *("mutual", "eddy_currents", "plate_network", "plate_tables", "slab", "verification"),
+    ],
+    "dynamics": ["motion", "steady", "equilibria", "branches", "maps", "flights", "slow_drift"],
+    "studies": [
+        *("terminal", "results", "pictures", "one_scene", "sweeps", "article", "field_quality", "levitation"),
+        *("margins", "plates", "catalogue", "command_line"),
+    ],
+}
+ORDER = [(floor, room) for floor, rooms in FLOORS.items() for room in rooms]
+LARGEST = 12
+"""Modules in a room, its face not counted."""
 ROOT = Path(__file__).parent.parent
-SOURCES = [path for folder in ORDER for path in sorted((ROOT / folder).glob("*.py"))]
+SOURCES = [path for floor in FLOORS for path in sorted((ROOT / floor).glob("*/*.py"))]
 
 
-def imported_siblings(path: Path) -> set[str]:
-    """Names of the packages of the house that a module imports, relative or absolute."""
-    found = set()
+def imported(path: Path) -> set[tuple[str, ...]]:
+    """Modules of the house that a module imports, as (floor, room) or (floor, room, file)."""
+    package, found = ["spinlev", *path.relative_to(ROOT).parts[:-1]], set()
     for node in ast.walk(ast.parse(path.read_text())):
-        if isinstance(node, ast.ImportFrom) and node.level == 2:
-            found.add((node.module or node.names[0].name).split(".")[0])
-        names = [a.name for a in node.names] if isinstance(node, ast.Import) else []
-        if isinstance(node, ast.ImportFrom) and node.level == 0:
-            names = [node.module or ""]
-        found |= {name.split(".")[1] for name in names if name.startswith("spinlev.")}
+        names = [alias.name.split(".") for alias in node.names] if isinstance(node, ast.Import) else []
+        if isinstance(node, ast.ImportFrom):
+            base = package[: len(package) - node.level + 1] if node.level else []
+            base += node.module.split(".") if node.module else []
+            names = [base] if len(base) > 2 else [[*base, alias.name] for alias in node.names]
+        found |= {tuple(name[1:]) for name in names if name[0] == "spinlev"}
     return found
 
 
-@pytest.mark.parametrize("path", SOURCES, ids=lambda p: f"{p.parent.name}/{p.name}")
-def test_a_module_imports_only_from_rooms_before_its_own(path):
-    allowed = ORDER[: ORDER.index(path.parent.name)]
-    assert imported_siblings(path) <= set(allowed)
+def test_the_rooms_are_known():
+    there = {tuple(path.relative_to(ROOT).parts[:-1]) for path in SOURCES}
+    assert there == set(ORDER)
+    assert [path for floor in FLOORS for path in (ROOT / floor).glob("*.py") if path.name != "__init__.py"] == []
+
+
+@pytest.mark.parametrize("path", SOURCES, ids=lambda p: "/".join(p.relative_to(ROOT).parts))
+def test_a_module_imports_only_from_rooms_before_its_own_and_from_their_faces(path):
+    own = tuple(path.relative_to(ROOT).parts[:-1])
+    for module in imported(path):
+        assert len(module) >= 2, f"{module}: from a room, not from a floor"
+        if module[:2] != own:
+            assert ORDER.index(module[:2]) < ORDER.index(own)
+            assert len(module) == 2 or path.name == "entries.py", f"{module}: from the face of the room"
+
+
+@pytest.mark.parametrize("room", ORDER, ids="/".join)
+def test_a_room_says_its_question_and_is_not_crowded(room):
+    face = ast.parse((ROOT / Path(*room) / "__init__.py").read_text())
+    assert (ast.get_docstring(face) or "").partition("\n")[0].count("?") == 1
+    modules = {path.stem for path in (ROOT / Path(*room)).glob("*.py")} - {"__init__"}
+    assert len(modules) <= LARGEST
+    public = {alias.name for node in face.body if isinstance(node, ast.ImportFrom) for alias in node.names}
+    assert not public & modules, "a module has the name of a function that its room gives out"
 
 
 def test_dynamics_knows_no_mesh_and_geometry_and_dynamics_no_solver():
     for path in SOURCES:
-        text = path.read_text()
-        if path.parent.name in ("dynamics", "studies"):
+        text, floor = path.read_text(), path.relative_to(ROOT).parts[0]
+        if floor in ("dynamics", "studies"):
             assert "import ngsolve" not in text
             assert "from ngsolve" not in text
-        if path.parent.name == "dynamics":
-            assert "geometry.mesh" not in text
-
-
-def test_folders_are_flat():
-    nested = [path for folder in ORDER for path in (ROOT / folder).glob("*/*.py")]
-    assert nested == []
+        if floor == "dynamics":
+            assert ("geometry", "meshes") not in imported(path)

@@ -9,11 +9,12 @@ import pytest
 from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 
-from spinlev.geometry import InputError, Scene, SceneError, parse_scene
-from spinlev.studies.numbers import positive, three_numbers
-from spinlev.studies.points_file import read_points
-from spinlev.studies.tables import Tables
-from spinlev.studies.vary import MOST, combinations, parse_vary
+from spinlev.geometry.basics import InputError
+from spinlev.geometry.scenes import Scene, SceneError, parse_scene
+from spinlev.studies.one_scene import read_points
+from spinlev.studies.sweeps import combinations, parse_vary
+from spinlev.studies.sweeps.vary import MOST
+from spinlev.studies.terminal import Tables, positive, three_numbers
 
 GOOD = (Path(__file__).parent.parent / "scenes" / "horizontal.toml").read_text()
 NUMBERS = dict(re.findall(r"^(\w+) = (-?[\d.e+-]+)", GOOD, re.MULTILINE))

@@ -5,15 +5,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from spinlev.dynamics.equilibrium import EquilibriumError
-from spinlev.dynamics.events import clearance
-from spinlev.dynamics.simulation import StartError, initial_state, simulate
-from spinlev.dynamics.trajectory import FlightStopped
-from spinlev.fem.multipole import uniform_moments
-from spinlev.fem.table import RotorTable
-from spinlev.geometry import rotor
-from spinlev.geometry.box import Box
-from spinlev.geometry.scene import AbsoluteStart, Drag, Floater, Lowering, Plate, Scene
+from spinlev.dynamics.flights import FlightStopped, StartError, initial_state, simulate
+from spinlev.dynamics.motion import clearance
+from spinlev.dynamics.steady import EquilibriumError
+from spinlev.fem.harmonics import uniform_moments
+from spinlev.fem.rotor_tables import RotorTable
+from spinlev.geometry.basics import Box
+from spinlev.geometry.bodies import article_rotors as rotor
+from spinlev.geometry.scenes import AbsoluteStart, Drag, Floater, Lowering, Plate, Scene
 
 RADIUS = 6.35e-3
 FLOATER = Floater(RADIUS, 1.305, 1.0, 7500.0)

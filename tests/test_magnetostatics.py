@@ -6,22 +6,17 @@ import ngsolve as ng
 import numpy as np
 import pytest
 
-from spinlev.fem.accuracy import Accuracy
-from spinlev.fem.climb import rung
-from spinlev.fem.direct import direct_table
-from spinlev.fem.ladder import fem_table
-from spinlev.fem.magnetostatics import assemble, solve
-from spinlev.fem.models import resolve_model, rotor_table
-from spinlev.fem.moments import trace_moments
-from spinlev.fem.multipole import MultipoleExpansion
-from spinlev.fem.open_boundary import OpenBoundary
-from spinlev.fem.remanent import induced_moments
-from spinlev.fem.rotor_solution import solve_rotor
-from spinlev.geometry.box import Box, rotation_matrix
-from spinlev.geometry.magnet import Magnet
-from spinlev.geometry.mesh import MeshSettings, mesh_magnets
-from spinlev.geometry.rotor import horizontal, tilt, vertical
-from spinlev.geometry.symmetry import find_symmetry, parity_parts
+from spinlev.fem.closed_forms.remanent import induced_moments
+from spinlev.fem.elements import OpenBoundary
+from spinlev.fem.harmonics import MultipoleExpansion
+from spinlev.fem.magnetostatics import rung, solve_rotor
+from spinlev.fem.magnetostatics.moments import trace_moments
+from spinlev.fem.magnetostatics.solver import assemble, solve
+from spinlev.fem.rotor_tables import Accuracy, fem_table, resolve_model, rotor_table
+from spinlev.fem.verification.elements_alone import direct_table
+from spinlev.geometry.basics import Box, rotation_matrix
+from spinlev.geometry.bodies import Magnet, find_symmetry, horizontal, parity_parts, tilt, vertical
+from spinlev.geometry.meshes import MeshSettings, mesh_magnets
 
 EDGE, REMANENCE = 0.01, 1.305
 CUBE_RATIO = 0.98366887

@@ -6,10 +6,10 @@ import threading
 import numpy as np
 import pytest
 
-from spinlev.fem import RotorTable
-from spinlev.geometry import SceneError, load_scene
-from spinlev.studies import cli
-from spinlev.studies.shipped_scenes import default_scene
+from spinlev.fem.rotor_tables import RotorTable
+from spinlev.geometry.scenes import SceneError, load_scene
+from spinlev.studies.command_line import cli
+from spinlev.studies.terminal import default_scene
 
 GRID = np.arange(-0.036, 0.037, 0.006)
 HEADER = "x_mm,y_mm,z_mm,Bx_mT,By_mT,Bz_mT"

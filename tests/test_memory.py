@@ -10,16 +10,15 @@ import ngsolve
 import pytest
 from netgen.meshing import NgException
 
-from spinlev.fem import memory
-from spinlev.fem.climb import rung
-from spinlev.fem.eddy import FrequencySystem
-from spinlev.fem.eddy_space import EddySpace
-from spinlev.fem.magnetostatics import assemble
-from spinlev.fem.memory import TooLargeError, free_memory, memory_need
-from spinlev.fem.models import rotor_table
-from spinlev.geometry import horizontal, vertical
-from spinlev.geometry.mesh import MeshSettings, mesh_magnets
-from spinlev.geometry.plate_mesh import plate_mesh
+from spinlev.fem.eddy_currents import EddySpace, FrequencySystem
+from spinlev.fem.elements import TooLargeError
+from spinlev.fem.elements.memory import free_memory, memory_need
+from spinlev.fem.elements.memory import memory_need as memory
+from spinlev.fem.magnetostatics import rung
+from spinlev.fem.magnetostatics.solver import assemble
+from spinlev.fem.rotor_tables import rotor_table
+from spinlev.geometry.bodies import horizontal, vertical
+from spinlev.geometry.meshes import MeshSettings, mesh_magnets, plate_mesh
 
 ROTOR = vertical(0.014, 0.01, 1.305, 1.05)
 
@@ -59,7 +58,7 @@ def test_a_limit_of_the_process_is_seen_before_it_is_hit():
     """A child that may have 60 MB more than it has and NGSolve's heap: refused in words where the solver would die."""
     code = (
         "import resource, psutil, test_memory as t\n"
-        "from spinlev.geometry.mesh import MeshSettings\n"
+        "from spinlev.geometry.meshes.magnets import MeshSettings\n"
         "mesh = t.mesh_magnets(t.ROTOR, t.rung(4, MeshSettings(), 0.05).mesh)\n"
         "size = psutil.Process().memory_info().vms + 360_000_000\n"
         "resource.setrlimit(resource.RLIMIT_AS, (size, size))\n"

@@ -12,10 +12,10 @@ from pathlib import Path
 
 import pytest
 
-from spinlev.geometry.input_error import ComputationError
+from spinlev.geometry.basics import ComputationError
 
 ROOT = Path(__file__).parent.parent
-FILES = sorted(path for folder in ("geometry", "fem", "dynamics", "studies") for path in (ROOT / folder).glob("*.py"))
+FILES = sorted(path for folder in ("geometry", "fem", "dynamics", "studies") for path in (ROOT / folder).rglob("*.py"))
 INPUT = re.compile(r"(\{\}: )?Input \S.* must .+; instead[ :].+", re.DOTALL)
 SENTENCE = re.compile(r"[A-Z].*[.}]", re.DOTALL)
 OTHER_FORMS = {
@@ -44,7 +44,7 @@ def literal(node):
 
 def raised(path):
     """Every error that a module makes: its class and the last argument."""
-    module = import_module(f"spinlev.{path.parent.name}.{path.stem}")
+    module = import_module(".".join(("spinlev", *path.relative_to(ROOT).with_suffix("").parts)))
     for node in ast.walk(ast.parse(path.read_text())):
         if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.args:
             kind = getattr(module, node.func.id, getattr(builtins, node.func.id, None))

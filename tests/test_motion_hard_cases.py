@@ -8,27 +8,19 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from spinlev.dynamics import (
-    EquilibriumError,
-    Family,
-    Rates,
-    Survey,
-    find_equilibria,
-    follow_branch,
-    simulate,
-    with_plate,
-)
-from spinlev.dynamics.branch import FOLD, frequencies
-from spinlev.dynamics.flight import compile_flight
-from spinlev.dynamics.integration import integrate
-from spinlev.dynamics.memory import PlateMemory
-from spinlev.dynamics.state import Scales
-from spinlev.fem.models import rotor_table
-from spinlev.fem.plate_region import Region
-from spinlev.fem.slab_table import slab_and_rotor_table
-from spinlev.geometry import rotor
-from spinlev.geometry.box import Box
-from spinlev.geometry.scene import AbsoluteStart, Drag, Floater, OffsetStart, Plate, Scene
+from spinlev.dynamics.branches import FOLD, Family, follow_branch, frequencies
+from spinlev.dynamics.equilibria import find_equilibria, with_plate
+from spinlev.dynamics.flights import simulate
+from spinlev.dynamics.flights.compiled_flight import compile_flight
+from spinlev.dynamics.flights.integration import integrate
+from spinlev.dynamics.motion import PlateMemory, Rates, Scales
+from spinlev.dynamics.steady import EquilibriumError, Survey
+from spinlev.fem.plate_network import Region
+from spinlev.fem.rotor_tables import rotor_table
+from spinlev.fem.slab import slab_and_rotor_table
+from spinlev.geometry.basics import Box
+from spinlev.geometry.bodies import article_rotors as rotor
+from spinlev.geometry.scenes import AbsoluteStart, Drag, Floater, OffsetStart, Plate, Scene
 
 RADIUS = 6.35e-3
 FLOATER = Floater(RADIUS, 1.305, 1.0, 7500.0)

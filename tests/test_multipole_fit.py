@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from spinlev.fem.field_functions import Multipoles, candidates
-from spinlev.fem.multipole_fit import fit_multipoles
-from spinlev.fem.plate_region import Region
+from spinlev.fem.plate_network import Region
+from spinlev.fem.plate_tables import Multipoles, fit_multipoles
+from spinlev.fem.plate_tables.field_functions import candidates
 
 REGION = Region.over_face((0.1, 0.1, 0.02), (0.015, 0.025), 0.004)
 CHOICE = candidates(REGION, np.array([0.05, 0.05, 0.01]))

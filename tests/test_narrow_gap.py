@@ -9,9 +9,8 @@ import numpy as np
 import pytest
 from magpylib.core import magnet_cuboid_Bfield
 
-from spinlev.fem.accuracy import Accuracy
-from spinlev.fem.ladder import fem_table
-from spinlev.geometry.rotor import vertical
+from spinlev.fem.rotor_tables import Accuracy, fem_table
+from spinlev.geometry.bodies import vertical
 
 GAP = 1e-6
 WAY = np.random.default_rng(1).normal(size=(60, 3))

@@ -9,36 +9,25 @@ import heyoka as hy
 import numpy as np
 import pytest
 
-from spinlev.dynamics import (
-    EquilibriumError,
-    Family,
-    Plane,
-    Rates,
-    find_equilibria,
-    follow_boundary,
-    follow_branch,
-    rotor_family,
-)
-from spinlev.dynamics.balance import EVERY, solve
-from spinlev.dynamics.branch import FOLD
-from spinlev.dynamics.drift import drift
-from spinlev.dynamics.perturbed import TILTS, PerturbedBalance
-from spinlev.dynamics.state import Scales
-from spinlev.dynamics.symbols import Parameter
-from spinlev.dynamics.way_out import way_out
-from spinlev.fem.eddy_export import write_vtu
-from spinlev.fem.models import rotor_table
-from spinlev.fem.racetrack import Racetrack
-from spinlev.fem.table_store import cache_folder, from_cache
-from spinlev.geometry import atomic, rotor
-from spinlev.geometry.box import Box, rotation_matrix
-from spinlev.geometry.conductor_mesh import ConductorMesh
-from spinlev.geometry.grading import graded_partition
-from spinlev.geometry.hex_mesh import Block, hex_mesh
-from spinlev.geometry.magnet import MU_0, Magnet
-from spinlev.geometry.occ_mesh import Conductor, occ_mesh
-from spinlev.geometry.pieces import CONVERGENCE, cut_magnets
-from spinlev.geometry.scene import Drag, Floater, Scene
+from spinlev.dynamics.branches import FOLD, Family, Plane, follow_boundary, follow_branch
+from spinlev.dynamics.equilibria import PerturbedBalance, find_equilibria, way_out
+from spinlev.dynamics.equilibria.perturbed import TILTS
+from spinlev.dynamics.maps import rotor_family
+from spinlev.dynamics.motion import Parameter, Rates, Scales
+from spinlev.dynamics.slow_drift import drift
+from spinlev.dynamics.steady import EVERY, EquilibriumError, solve
+from spinlev.fem.closed_forms import Racetrack
+from spinlev.fem.eddy_currents.export import write_vtu
+from spinlev.fem.rotor_tables import rotor_table
+from spinlev.fem.storage import from_cache
+from spinlev.fem.storage import whole_files as atomic
+from spinlev.fem.storage.checked_files import cache_folder
+from spinlev.geometry.basics import MU_0, Box, rotation_matrix
+from spinlev.geometry.bodies import CONVERGENCE, Magnet, cut_magnets
+from spinlev.geometry.bodies import article_rotors as rotor
+from spinlev.geometry.meshes import Block, ConductorMesh, graded_partition, hex_mesh
+from spinlev.geometry.meshes.solids import Conductor, occ_mesh
+from spinlev.geometry.scenes import Drag, Floater, Scene
 
 FLOATER = Floater(6.35e-3, 1.305, 1.0, 7500.0)
 SCENE = Scene(110.0, rotor.horizontal(2e-3, 10e-3, 1.305, 1.0), FLOATER, Drag(0.0, 0.0))
@@ -87,7 +76,7 @@ def test_gravity_across_the_axis_beyond_what_holds_the_floater(rates, stable):
 
 def test_no_frequency_helps_a_floater_without_strength(monkeypatch):
     """The way out names no frequency (of two tried each way), and a drift has nowhere to begin."""
-    monkeypatch.setattr(sys.modules["spinlev.dynamics.way_out"], "FREQUENCY_TRIALS", 2)
+    monkeypatch.setattr(sys.modules["spinlev.dynamics.equilibria.advice"], "FREQUENCY_TRIALS", 2)
     assert "None was found within a factor of two; give start.position_mm" in way_out(WEAK, TABLE, ())
     with pytest.raises(EquilibriumError, match=r"At 110 Hz the floater has no equilibrium with body spin 0\.25"):
         drift(WEAK, TABLE, spin=0.25)
@@ -125,7 +114,7 @@ def test_an_additional_force_that_throws_the_floater_out_leaves_no_place(stable)
 
 def test_tables_of_magnets_that_magnetise_each_other_are_met_at_the_nodes(monkeypatch):
     """Two coarse tables; at the displacement of one of them the family's field is that of the table."""
-    monkeypatch.setattr(sys.modules["spinlev.dynamics.rotor_family"], "NODES", 2)
+    monkeypatch.setattr(sys.modules["spinlev.dynamics.maps.families"], "NODES", 2)
     shape = (10e-3, 1.305, 1.05)
     scene = replace(SCENE, rotor=rotor.vertical(14e-3, *shape))
     family = rotor_family(scene, "vertical", "fem", 1e-3, FLOATER.radius, (12e-3, 16e-3))
@@ -177,7 +166,7 @@ def test_a_cache_on_a_file_system_without_locks_still_works(tmp_path, monkeypatc
         raise OSError(errno.ENOLCK, "No locks available")
 
     monkeypatch.setenv("SPINLEV_CACHE", str(tmp_path))
-    monkeypatch.setattr("spinlev.fem.table_store.fcntl.flock", refused)
+    monkeypatch.setattr("spinlev.fem.storage.checked_files.fcntl.flock", refused)
     made = from_cache("a.txt", Path.read_text, lambda: "made", lambda text, path: path.write_text(text), said.append)
     assert made == ("made", False)
     assert said == ["The cache's file system has no locks."]

@@ -5,24 +5,22 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from spinlev.dynamics import PlateMemory, Survey, find_equilibria, survey, with_plate
-from spinlev.dynamics.branch import FOLD, REAL
-from spinlev.dynamics.equations import parameters
-from spinlev.dynamics.equilibrium import EquilibriumError
-from spinlev.dynamics.flight import compile_flight
-from spinlev.dynamics.integration import integrate
-from spinlev.dynamics.orbit import periodic_orbit, resampled
-from spinlev.dynamics.orbit_branch import DOUBLING, TORUS, OrbitFamily, follow_orbits, kind_of
-from spinlev.dynamics.plate_force import PlateForce
-from spinlev.dynamics.rates import Rates
-from spinlev.dynamics.state import Scales
-from spinlev.dynamics.symbols import Parameter
-from spinlev.fem.models import rotor_table
-from spinlev.fem.plate_region import Region
-from spinlev.fem.slab_table import slab_and_rotor_table
-from spinlev.geometry import rotor
-from spinlev.geometry.box import Box
-from spinlev.geometry.scene import Drag, Floater, Lowering, Plate, Scene
+from spinlev.dynamics.branches import FOLD
+from spinlev.dynamics.branches.branch import REAL
+from spinlev.dynamics.branches.orbit_branch import DOUBLING, TORUS, follow_orbits, kind_of
+from spinlev.dynamics.branches.orbit_family import OrbitFamily
+from spinlev.dynamics.equilibria import find_equilibria, survey, with_plate
+from spinlev.dynamics.flights.compiled_flight import compile_flight
+from spinlev.dynamics.flights.integration import integrate
+from spinlev.dynamics.motion import Parameter, PlateForce, PlateMemory, Rates, Scales, parameters
+from spinlev.dynamics.steady import EquilibriumError, Survey, periodic_orbit
+from spinlev.dynamics.steady.harmonic_balance import resampled
+from spinlev.fem.plate_network import Region
+from spinlev.fem.rotor_tables import rotor_table
+from spinlev.fem.slab import slab_and_rotor_table
+from spinlev.geometry.basics import Box
+from spinlev.geometry.bodies import article_rotors as rotor
+from spinlev.geometry.scenes import Drag, Floater, Lowering, Plate, Scene
 
 FLOATER = Floater(radius=6.35e-3, remanence=1.305, recoil_permeability=1.0, density=7500.0)
 VERTICAL = Scene(80.0, rotor.vertical(14e-3, 10e-3, 1.305, 1.0), FLOATER, Drag(0.0, 0.0))

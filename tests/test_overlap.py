@@ -6,8 +6,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.optimize import linprog
 
-from spinlev.geometry import Box, rotation_matrix
-from spinlev.geometry.overlap import box_overlap, deepest_overlap_in_a_turn, sphere_overlap
+from spinlev.geometry.basics import Box, rotation_matrix
+from spinlev.geometry.bodies import deepest_overlap_in_a_turn, sphere_overlap
+from spinlev.geometry.bodies.overlap import box_overlap
 
 angle = st.floats(-180, 180)
 length = st.floats(0.2, 3.0)

@@ -6,15 +6,15 @@ import numpy as np
 import pytest
 from ngsolve import SetNumThreads
 
-from spinlev.fem.accuracy_error import AccuracyError
-from spinlev.fem.phasor import mean_loss
-from spinlev.fem.plate import plate_reaction
+from spinlev.fem.closed_forms.phasor import mean_loss
+from spinlev.fem.plate_network import plate_reaction
+from spinlev.fem.rotor_tables import AccuracyError
 from spinlev.fem.slab import Slab, reaction_tensor
-from spinlev.geometry.box import Box, rotation_matrix
-from spinlev.geometry.plate_mesh import MeshRule
-from spinlev.geometry.scene import Plate
-from spinlev.studies.team7 import Team7Comparison, compute_line, measured_line, team7, team7_mesh
-from spinlev.studies.team7_report import team7_dataset, team7_lines
+from spinlev.geometry.basics import Box, rotation_matrix
+from spinlev.geometry.meshes import MeshRule
+from spinlev.geometry.scenes import Plate
+from spinlev.studies.plates.team7 import Team7Comparison, compute_line, measured_line, team7, team7_mesh
+from spinlev.studies.plates.team7_report import team7_dataset, team7_lines
 
 SetNumThreads(1)
 LYING = Plate(Box((0.1, 0.24, 0.03), (0.0, 0.0, -0.015)), 3.5e7)

@@ -6,12 +6,11 @@ import numpy as np
 import pytest
 from ngsolve import SetNumThreads
 
-from spinlev.fem.plate import plate_reaction
-from spinlev.fem.plate_model import plate_table
-from spinlev.fem.plate_region import Region
-from spinlev.geometry.box import Box
-from spinlev.geometry.plate_mesh import MeshRule
-from spinlev.geometry.scene import Plate
+from spinlev.fem.plate_network import Region, plate_reaction
+from spinlev.fem.plate_tables.tabulate import plate_table
+from spinlev.geometry.basics import Box
+from spinlev.geometry.meshes import MeshRule
+from spinlev.geometry.scenes import Plate
 
 SetNumThreads(1)
 pytestmark = pytest.mark.slow

@@ -6,11 +6,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from spinlev.geometry import load_scene
-from spinlev.geometry.box import Box
-from spinlev.geometry.scene import Plate
-from spinlev.studies.plate_job import plate_job
-from spinlev.studies.plate_shelf import resolve_plate_model
+from spinlev.geometry.basics import Box
+from spinlev.geometry.scenes import Plate, load_scene
+from spinlev.studies.one_scene import plate_job
+from spinlev.studies.one_scene.plate_shelf import resolve_plate_model
 
 SCENE = load_scene(Path(__file__).parent.parent / "scenes" / "horizontal.toml")
 PLACE = np.array([0.0, 0.0, -0.02])

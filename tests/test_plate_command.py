@@ -8,12 +8,11 @@ import numpy as np
 import pytest
 from ngsolve import SetNumThreads
 
-from spinlev.geometry import InputError, load_scene
-from spinlev.geometry.box import Box, rotation_matrix
-from spinlev.geometry.scene import Plate
-from spinlev.studies.cli import app
-from spinlev.studies.plate_job import EDGES, MODELS
-from spinlev.studies.plate_shelf import check_room
+from spinlev.geometry.basics import Box, InputError, rotation_matrix
+from spinlev.geometry.scenes import Plate, load_scene
+from spinlev.studies.command_line.cli import app
+from spinlev.studies.one_scene.plate_shelf import check_room
+from spinlev.studies.one_scene.reaction import EDGES, MODELS
 
 SetNumThreads(1)
 SCENE = "scenes/tilt-over-plate.toml"

@@ -5,13 +5,13 @@ from dataclasses import asdict, replace
 import numpy as np
 import pytest
 
-from spinlev.dynamics import Rates
-from spinlev.fem.models import rotor_table
+from spinlev.dynamics.branches import reference_state, stable_range
+from spinlev.dynamics.motion import Rates
+from spinlev.fem.rotor_tables import rotor_table
 from spinlev.studies.article import article_scene
 from spinlev.studies.catalogue import CATALOGUE
-from spinlev.studies.plate_cases import ROTORS, Case, cases
-from spinlev.studies.plate_damping import gather_damping, plate_damping
-from spinlev.studies.stable_range import reference_state, stable_range
+from spinlev.studies.plates.plate_cases import ROTORS, Case, cases
+from spinlev.studies.plates.plate_damping import gather_damping, plate_damping
 
 STUDY = CATALOGUE["plate-damping"]
 WEAK = 2e4

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from spinlev.fem.plate import plate_reaction
+from spinlev.fem.plate_network import plate_reaction
 from spinlev.fem.slab import Slab, reaction_tensor
-from spinlev.geometry.box import Box
-from spinlev.geometry.plate_mesh import MeshRule
-from spinlev.geometry.scene import Plate
+from spinlev.geometry.basics import Box
+from spinlev.geometry.meshes import MeshRule
+from spinlev.geometry.scenes import Plate
 
 SIGMA = 3.5e7
 LYING = Plate(Box((0.1, 0.24, 0.03), (0.0, 0.0, -0.015)), SIGMA)

@@ -5,18 +5,19 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from spinlev.dynamics import PlateMemory, Rates, Survey, find_equilibria, with_plate
-from spinlev.dynamics.flight import compile_flight
-from spinlev.dynamics.integration import integrate
-from spinlev.dynamics.simulation import initial_state, starting_point
-from spinlev.dynamics.state import State
-from spinlev.fem.models import rotor_table
-from spinlev.fem.phasor import mean_force, mean_loss, mean_torque
-from spinlev.fem.plate_region import Region
-from spinlev.fem.slab_table import slab_and_rotor_table
-from spinlev.geometry import rotor
-from spinlev.geometry.box import Box
-from spinlev.geometry.scene import AbsoluteStart, Drag, Floater, Plate, Scene
+from spinlev.dynamics.equilibria import find_equilibria, with_plate
+from spinlev.dynamics.flights import initial_state, starting_point
+from spinlev.dynamics.flights.compiled_flight import compile_flight
+from spinlev.dynamics.flights.integration import integrate
+from spinlev.dynamics.motion import PlateMemory, Rates, State
+from spinlev.dynamics.steady import Survey
+from spinlev.fem.closed_forms.phasor import mean_force, mean_loss, mean_torque
+from spinlev.fem.plate_network import Region
+from spinlev.fem.rotor_tables import rotor_table
+from spinlev.fem.slab import slab_and_rotor_table
+from spinlev.geometry.basics import Box
+from spinlev.geometry.bodies import article_rotors as rotor
+from spinlev.geometry.scenes import AbsoluteStart, Drag, Floater, Plate, Scene
 
 RADIUS = 6.35e-3
 MAGNETS = rotor.horizontal(2e-3, 10e-3, 1.305, 1.0)

@@ -11,17 +11,17 @@ import pytest
 from ngsolve import SetNumThreads
 from scipy.integrate import solve_ivp
 
-from spinlev.fem.eddy_time import TimeStepper, work_on
-from spinlev.fem.models import rotor_table
-from spinlev.fem.phasor import mean_force, mean_loss, mean_torque
-from spinlev.fem.plate_model import tabulate
-from spinlev.fem.plate_reduction import reduce_plate
-from spinlev.fem.plate_region import Region
-from spinlev.fem.slab_table import slab_and_rotor_table
-from spinlev.fem.sources import Dipole, DipoleDerivative, unit_dipoles
-from spinlev.geometry import horizontal
-from spinlev.geometry.box import Box
-from spinlev.geometry.scene import Lowering, Plate
+from spinlev.fem.closed_forms import Dipole, unit_dipoles
+from spinlev.fem.closed_forms.phasor import mean_force, mean_loss, mean_torque
+from spinlev.fem.closed_forms.vector_potentials import DipoleDerivative
+from spinlev.fem.plate_network import Region, reduce_plate
+from spinlev.fem.plate_tables.tabulate import tabulate
+from spinlev.fem.rotor_tables import rotor_table
+from spinlev.fem.slab import slab_and_rotor_table
+from spinlev.fem.verification.time_stepping import TimeStepper, work_on
+from spinlev.geometry.basics import Box
+from spinlev.geometry.bodies import horizontal
+from spinlev.geometry.scenes import Lowering, Plate
 
 SetNumThreads(1)
 PLATE = Plate(Box((0.1, 0.24, 0.03), (0.0, 0.0, -0.055)), 3.5e7, Lowering(0.0, 0.02, 0.02))

@@ -7,28 +7,23 @@ import pytest
 from ngsolve import SetNumThreads
 from scipy.integrate import solve_ivp
 
-from spinlev.dynamics import Survey, find_equilibria, simulate, survey, with_plate
-from spinlev.dynamics.equations import parameters
-from spinlev.dynamics.flight import compile_flight
-from spinlev.dynamics.floquet import floquet_modes
-from spinlev.dynamics.integration import integrate
-from spinlev.dynamics.memory import PlateMemory
-from spinlev.dynamics.orbit import differentiation, periodic_orbit, resampled
-from spinlev.dynamics.plate_action import plate_action
-from spinlev.dynamics.plate_force import PlateForce
-from spinlev.dynamics.rates import Rates
-from spinlev.dynamics.state import Scales
-from spinlev.dynamics.symbols import Parameter
-from spinlev.fem.driven_plate import plate_and_rotor_table
-from spinlev.fem.phasor import mean_force, mean_torque
-from spinlev.fem.plate_region import Region
-from spinlev.fem.rotor_share import RotorShare
-from spinlev.fem.slab_table import slab_and_rotor_table
-from spinlev.fem.table import RotorTable
-from spinlev.geometry import rotor
-from spinlev.geometry.box import Box
-from spinlev.geometry.plate_mesh import MeshRule
-from spinlev.geometry.scene import Drag, Floater, Lowering, OffsetStart, Plate, Scene
+from spinlev.dynamics.equilibria import find_equilibria, plate_action, survey, with_plate
+from spinlev.dynamics.flights import simulate
+from spinlev.dynamics.flights.compiled_flight import compile_flight
+from spinlev.dynamics.flights.integration import integrate
+from spinlev.dynamics.motion import Parameter, PlateForce, PlateMemory, Rates, Scales, parameters
+from spinlev.dynamics.steady import Survey, floquet_modes, periodic_orbit
+from spinlev.dynamics.steady.harmonic_balance import differentiation, resampled
+from spinlev.fem.closed_forms.phasor import mean_force, mean_torque
+from spinlev.fem.plate_network import Region
+from spinlev.fem.plate_tables import RotorShare
+from spinlev.fem.plate_tables.driven_plate import plate_and_rotor_table
+from spinlev.fem.rotor_tables import RotorTable
+from spinlev.fem.slab import slab_and_rotor_table
+from spinlev.geometry.basics import Box
+from spinlev.geometry.bodies import article_rotors as rotor
+from spinlev.geometry.meshes import MeshRule
+from spinlev.geometry.scenes import Drag, Floater, Lowering, OffsetStart, Plate, Scene
 
 SetNumThreads(1)
 FLOATER = Floater(radius=6.35e-3, remanence=1.305, recoil_permeability=1.0, density=7500.0)

@@ -7,20 +7,16 @@ import numpy as np
 import pytest
 from ngsolve import SetNumThreads
 
-from spinlev.fem.models import rotor_table
-from spinlev.fem.plate_model import field_values, tabulate
-from spinlev.fem.plate_reduction import reduce_plate
-from spinlev.fem.plate_region import Region
-from spinlev.fem.plate_table_file import cached_plate_table, load_plate_table, plate_key, save_plate_table
-from spinlev.fem.rotor_share import rotor_share
-from spinlev.fem.rotor_source import posed_rotor, rotor_parts
-from spinlev.fem.share_trim import trimmed
-from spinlev.fem.table import RangeError
-from spinlev.fem.table_store import TableFileError
-from spinlev.geometry import horizontal, vertical
-from spinlev.geometry.box import Box
-from spinlev.geometry.plate_mesh import MeshRule
-from spinlev.geometry.scene import Lowering, Plate
+from spinlev.fem.plate_network import Region, reduce_plate
+from spinlev.fem.plate_tables import cached_plate_table, posed_rotor, rotor_parts, rotor_share, trimmed
+from spinlev.fem.plate_tables.file import load_plate_table, plate_key, save_plate_table
+from spinlev.fem.plate_tables.tabulate import field_values, tabulate
+from spinlev.fem.rotor_tables import RangeError, rotor_table
+from spinlev.fem.storage import TableFileError
+from spinlev.geometry.basics import Box
+from spinlev.geometry.bodies import horizontal, vertical
+from spinlev.geometry.meshes import MeshRule
+from spinlev.geometry.scenes import Lowering, Plate
 
 SetNumThreads(1)
 PLATE = Plate(Box((0.1, 0.24, 0.03), (0.0, 0.0, -0.055)), 3.5e7, Lowering(0.0, 0.01, 0.02))

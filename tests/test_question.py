@@ -11,10 +11,12 @@ import xarray as xr
 from hypothesis import given
 from hypothesis import strategies as st
 
-from spinlev.geometry import InputError, SceneError, load_scene, parse_scene
-from spinlev.studies.cite import used
-from spinlev.studies.cli import _status
-from spinlev.studies.vary import combinations, parse_vary
+from spinlev.geometry.basics import InputError
+from spinlev.geometry.scenes import SceneError, load_scene, parse_scene
+from spinlev.studies.catalogue.cite import used
+from spinlev.studies.command_line.cli import _status
+from spinlev.studies.sweeps import combinations, parse_vary
+from spinlev.studies.terminal import Tables
 
 SCENE = str(Path(__file__).parent.parent / "scenes" / "horizontal.toml")
 FAST = ("--plate-model", "none", "--model", "dipole", "--workers", "1", "--json")
@@ -152,7 +154,7 @@ class Sources(HTMLParser):
 
 
 def test_a_flight_is_shown_and_reported(spinlev, tmp_path, monkeypatch):
-    monkeypatch.setattr("spinlev.studies.animation.FRAMES", 1)
+    monkeypatch.setattr("spinlev.studies.pictures.animation.FRAMES", 1)
     status, _, err = spinlev("simulate", SCENE, "--duration-s", "0.1", *FAST[:4])
     assert status == 0, err
     trajectory = tmp_path / "out" / "trajectory.nc"
@@ -160,7 +162,7 @@ def test_a_flight_is_shown_and_reported(spinlev, tmp_path, monkeypatch):
     with xr.open_dataset(trajectory, engine="h5netcdf") as opened:
         flight = opened.load().assign_attrs(scene=text[: text.index("[plate]")])
     flight.to_netcdf(trajectory, engine="h5netcdf")
-    monkeypatch.setattr("spinlev.studies.show.Tables", lambda: __import__("spinlev").studies.tables.Tables("cuboid"))
+    monkeypatch.setattr("spinlev.studies.catalogue.show.Tables", lambda: Tables("cuboid"))
     status, answer, err = spinlev("show", trajectory, "--json")
     assert status == 0, err
     assert Path(answer["pictures"][0]).read_bytes().startswith(b"\x89PNG")

@@ -5,7 +5,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from spinlev.geometry import MU_0, AbsoluteStart, OffsetStart, SceneError, load_scene, parse_scene
+from spinlev.geometry.basics import MU_0
+from spinlev.geometry.scenes import AbsoluteStart, OffsetStart, SceneError, load_scene, parse_scene
 
 SCENES = Path(__file__).parent.parent / "scenes"
 GOOD = (SCENES / "horizontal.toml").read_text()

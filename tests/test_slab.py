@@ -6,11 +6,12 @@ import mpmath
 import numpy as np
 import pytest
 
-from spinlev.fem.phasor import mean_force, mean_loss, mean_torque
-from spinlev.fem.slab import Slab, ThinSheet, reaction_gradient, reaction_tensor
-from spinlev.fem.slab_mutual import mutual_tensor
-from spinlev.fem.sliding import drag_tensor, sliding_force
-from spinlev.geometry.magnet import MU_0
+from spinlev.fem.closed_forms.phasor import mean_force, mean_loss, mean_torque
+from spinlev.fem.slab import Slab, reaction_tensor
+from spinlev.fem.slab.reaction import ThinSheet, reaction_gradient
+from spinlev.fem.slab.sliding import drag_tensor, sliding_force
+from spinlev.fem.slab.two_places import mutual_tensor
+from spinlev.geometry.basics import MU_0
 
 PLATE = Slab(3.5e7, 0.03)
 ROUND_OFF = 1e-12

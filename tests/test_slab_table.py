@@ -8,19 +8,18 @@ import numpy as np
 import pytest
 from scipy.special import jv
 
-from spinlev.fem.harmonic_waves import cylinder_moments
-from spinlev.fem.models import rotor_table
-from spinlev.fem.multipole import uniform_moments
-from spinlev.fem.plate_region import Region
-from spinlev.fem.rotor_source import DOWN, ExpansionSource, posed_rotor, rotor_parts
-from spinlev.fem.slab import Slab, reaction_tensor
-from spinlev.fem.slab_modes import modes_needed, slab_modes
-from spinlev.fem.slab_mutual import mutual_tensor
-from spinlev.fem.slab_table import slab_and_rotor_table
-from spinlev.fem.sources import Dipole, PolarizedCuboid, UniformField
-from spinlev.geometry import InputError, Lowering, tilt
-from spinlev.geometry.box import Box, rotation_matrix
-from spinlev.geometry.scene import Plate
+from spinlev.fem.closed_forms import Dipole, HomogeneousField, PolarizedCuboid
+from spinlev.fem.harmonics import uniform_moments
+from spinlev.fem.plate_network import Region
+from spinlev.fem.plate_tables import DOWN, ExpansionSource, posed_rotor, rotor_parts
+from spinlev.fem.rotor_tables import rotor_table
+from spinlev.fem.slab import Slab, reaction_tensor, slab_and_rotor_table
+from spinlev.fem.slab.modes import modes_needed, slab_modes
+from spinlev.fem.slab.two_places import mutual_tensor
+from spinlev.fem.slab.waves import cylinder_moments
+from spinlev.geometry.basics import Box, InputError, rotation_matrix
+from spinlev.geometry.bodies import tilt
+from spinlev.geometry.scenes import Lowering, Plate
 
 SLAB = Slab(3.5e7, 0.03)
 SIZE = np.array([0.1, 0.24, 0.03])
@@ -115,7 +114,7 @@ def test_waves_hear_a_cuboid_and_its_moments_alike():
     )
     assert abs(cuboid - moments).max() < 1e-13 * abs(cuboid).max()
     with pytest.raises(TypeError, match="Input source must be a magnetisation"):
-        cylinder_moments([UniformField(np.eye(3)[0])], np.zeros(3), np.eye(3), np.array([1.0]), 1, 4)
+        cylinder_moments([HomogeneousField(np.eye(3)[0])], np.zeros(3), np.eye(3), np.array([1.0]), 1, 4)
 
 
 def test_reaction_tensor_is_the_closed_form_within_the_stated_error(made):

@@ -6,11 +6,9 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from spinlev.fem.newton import attraction, newton_potential
-from spinlev.fem.racetrack import Racetrack
-from spinlev.fem.sources import Dipole, PolarizedCuboid, UniformField
-from spinlev.geometry.box import Box
-from spinlev.geometry.magnet import MU_0
+from spinlev.fem.closed_forms import Dipole, HomogeneousField, PolarizedCuboid, Racetrack
+from spinlev.fem.closed_forms.newton import attraction, newton_potential
+from spinlev.geometry.basics import MU_0, Box
 
 COIL = Racetrack((0.194, 0.1, 0.099), (0.2, 0.2), 0.1, 0.025, 0.05, 2742.0)
 POINTS = np.array([[0.021, 0.004, -0.013], [-0.03, 0.05, 0.02], [0.0, 0.0, 0.025]])
@@ -61,7 +59,7 @@ def test_cuboid_far_away_is_a_dipole_and_turns_with_its_box():
 
 
 def test_potential_of_a_uniform_field():
-    found = curl(UniformField(np.array([1.0, 2.0, 3.0])).vector_potential, POINTS)
+    found = curl(HomogeneousField(np.array([1.0, 2.0, 3.0])).vector_potential, POINTS)
     assert found == pytest.approx(np.tile([1.0, 2.0, 3.0], (3, 1)), rel=1e-9)  # linear: differences are exact
 
 

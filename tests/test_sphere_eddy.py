@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 from scipy.special import spherical_in
 
-from spinlev.fem.sphere_eddy import SERIES, polarizability, rotating_torque, thin_field_torque
-from spinlev.geometry.magnet import MU_0
+from spinlev.fem.closed_forms import rotating_torque
+from spinlev.fem.closed_forms.sphere_eddy import SERIES, polarizability, thin_field_torque
+from spinlev.geometry.basics import MU_0
 
 RADIUS, CONDUCTIVITY = 6.35e-3, 6.7e5
 

@@ -8,11 +8,9 @@ import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 
-from spinlev.studies.catalogue import CATALOGUE
-from spinlev.studies.cite import cite_job
-from spinlev.studies.drawings import figures_of, read_result
-from spinlev.studies.figures import drawn
-from spinlev.studies.report import report_job
+from spinlev.studies.catalogue import CATALOGUE, cite_job, figures_of, report_job
+from spinlev.studies.catalogue.drawings import read_result
+from spinlev.studies.results import drawn
 
 STORED = sorted((Path(__file__).parent / "data" / "quick").glob("*.nc"))
 

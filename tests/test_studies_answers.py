@@ -5,30 +5,21 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from spinlev.dynamics import Rates, find_equilibria
-from spinlev.dynamics.balance import Balance
-from spinlev.dynamics.equations import parameters
-from spinlev.dynamics.events import rotor_gap
-from spinlev.dynamics.perturbed import PerturbedBalance
-from spinlev.dynamics.state import Scales
-from spinlev.fem.models import rotor_table
-from spinlev.fem.rotor_response import rotor_ladder
-from spinlev.fem.two_body import two_body
-from spinlev.studies import dipole_vs_fem, stability_map
-from spinlev.studies.answered import Answered
+from spinlev.dynamics.branches import at_frequency, by_frequency, levitating_ranges, reference_state, stable_range
+from spinlev.dynamics.branches.mutual_equilibria import Expansion, Mutual, pose
+from spinlev.dynamics.branches.mutual_levitation import Answered
+from spinlev.dynamics.equilibria import PerturbedBalance, find_equilibria
+from spinlev.dynamics.motion import Rates, Scales, parameters, rotor_gap
+from spinlev.dynamics.steady import Balance
+from spinlev.fem.mutual import rotor_ladder, two_body
+from spinlev.fem.rotor_tables import rotor_table
 from spinlev.studies.article import FLOATER, article_scene
-from spinlev.studies.design_search import designed
-from spinlev.studies.dipole_vs_fem_figure import CAUSES, TOTAL, change
-from spinlev.studies.levitation_branch import by_frequency
-from spinlev.studies.mutual import Expansion, Mutual, pose
-from spinlev.studies.sensitivity import slope_by
-from spinlev.studies.stable_range import (
-    at_frequency,
-    levitating_ranges,
-    reference_state,
-    stable_range,
-)
-from spinlev.studies.tolerances import PARAMETERS, QUANTITIES, levitation, nominal, scene_of
+from spinlev.studies.levitation import dipole_vs_fem
+from spinlev.studies.levitation.dipole_vs_fem_figure import CAUSES, TOTAL, change
+from spinlev.studies.margins import stability_map
+from spinlev.studies.margins.design_search import designed
+from spinlev.studies.margins.sensitivity import slope_by
+from spinlev.studies.margins.tolerances import PARAMETERS, QUANTITIES, levitation, nominal, scene_of
 
 
 @pytest.fixture(scope="module")

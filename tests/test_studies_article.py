@@ -3,22 +3,22 @@
 import numpy as np
 import pytest
 
-from spinlev.dynamics import find_equilibria
-from spinlev.fem.models import rotor_table
-from spinlev.geometry.scene import Scene
-from spinlev.studies import article_formulas as formulas
+from spinlev.dynamics.equilibria import find_equilibria
+from spinlev.fem.rotor_tables import rotor_table
+from spinlev.fem.verification import coulomb_field
+from spinlev.geometry.scenes import Scene
 from spinlev.studies.article import CONFIGURATIONS, FLOATER, article_scene, stable
+from spinlev.studies.article import article_formulas as formulas
+from spinlev.studies.article.article import MODELS as FIELD_MODELS
+from spinlev.studies.article.article import MODELS as FORCE_MODELS
+from spinlev.studies.article.field_components import field_components
+from spinlev.studies.article.force_curve import WEIGHT, force_curve
+from spinlev.studies.article.levitation_distance import levitation_distance
 from spinlev.studies.catalogue import CATALOGUE
-from spinlev.studies.coulomb import coulomb_field
-from spinlev.studies.field_components import MODELS as FIELD_MODELS
-from spinlev.studies.field_components import field_components
-from spinlev.studies.figures import save_figure
-from spinlev.studies.force_curve import MODELS as FORCE_MODELS
-from spinlev.studies.force_curve import WEIGHT, force_curve
-from spinlev.studies.levitation_distance import levitation_distance
-from spinlev.studies.side_mode import side_mode
-from spinlev.studies.study import by_case
-from spinlev.studies.trajectories import NONE, trajectories
+from spinlev.studies.levitation.levitation_time import NONE
+from spinlev.studies.levitation.side_mode import side_mode
+from spinlev.studies.levitation.trajectories import trajectories
+from spinlev.studies.results import by_case, save_figure
 
 ROTORS = [("horizontal", 2.0), ("vertical", 14.0), ("tilt", 10.0)]
 ONE = {"configuration": "horizontal", "value": 1.0}

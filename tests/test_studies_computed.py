@@ -5,18 +5,19 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from spinlev.dynamics import EquilibriumError, Rates, find_equilibria
-from spinlev.dynamics.balance import Balance
-from spinlev.dynamics.equations import parameters
-from spinlev.dynamics.events import rotor_gap
-from spinlev.dynamics.state import Scales
-from spinlev.fem.models import rotor_table
-from spinlev.studies import answered, design, dipole_vs_fem, sensitivity, stability_map, stable_range, tolerances
+from spinlev.dynamics.branches import FOLD, by_frequency, reference_state
+from spinlev.dynamics.branches import mutual_levitation as answered
+from spinlev.dynamics.branches import stable_frequencies as stable_range
+from spinlev.dynamics.branches.mutual_equilibria import pose
+from spinlev.dynamics.branches.stable_frequencies import BORDER
+from spinlev.dynamics.equilibria import find_equilibria
+from spinlev.dynamics.motion import Rates, Scales, parameters, rotor_gap
+from spinlev.dynamics.steady import Balance, EquilibriumError
+from spinlev.fem.rotor_tables import rotor_table
 from spinlev.studies.article import article_scene
-from spinlev.studies.design_search import designed
-from spinlev.studies.levitation_branch import by_frequency
-from spinlev.studies.mutual import pose
-from spinlev.studies.stable_range import BORDER, FOLD, reference_state
+from spinlev.studies.levitation import dipole_vs_fem
+from spinlev.studies.margins import design, sensitivity, stability_map, tolerances
+from spinlev.studies.margins.design_search import designed
 
 
 def nearest(scene, model, distance):

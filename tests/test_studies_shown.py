@@ -12,23 +12,23 @@ import pytest
 import pyvista as pv
 import xarray as xr
 
-from spinlev.dynamics import find_equilibria
-from spinlev.dynamics.state import State
-from spinlev.fem.models import rotor_table
-from spinlev.geometry import InputError
-from spinlev.geometry.scene_file import load_scene
-from spinlev.studies import api, cli, field_hard_cases, plate_job
-from spinlev.studies.catalogue import CATALOGUE
-from spinlev.studies.cli import _status
-from spinlev.studies.drawings import read_result
-from spinlev.studies.hard_cases import CASES
-from spinlev.studies.picture import View, add_floater, add_plate, new_plotter
-from spinlev.studies.plate_currents import plate_currents
-from spinlev.studies.question_figure import question_figure
-from spinlev.studies.report import LONGEST, report_job
+from spinlev.dynamics.equilibria import find_equilibria
+from spinlev.dynamics.motion import State
+from spinlev.fem.rotor_tables import rotor_table
+from spinlev.geometry.basics import InputError
+from spinlev.geometry.scenes import load_scene
+from spinlev.studies.catalogue import CATALOGUE, report_job, show_job
+from spinlev.studies.catalogue.drawings import read_result
+from spinlev.studies.catalogue.report import LONGEST
+from spinlev.studies.command_line import api, cli
+from spinlev.studies.command_line.cli import _status
+from spinlev.studies.field_quality.field_hard_cases import field_hard_cases
+from spinlev.studies.field_quality.hard_cases import CASES
+from spinlev.studies.one_scene import reaction as plate_job
+from spinlev.studies.pictures import plate_currents, question_figure
+from spinlev.studies.pictures.still import View, add_floater, add_plate, new_plotter
 from spinlev.studies.results import write_dataset
-from spinlev.studies.show import show_job
-from spinlev.studies.tables import Tables
+from spinlev.studies.terminal import Tables
 
 SCENES = Path(__file__).parent.parent / "scenes"
 
@@ -103,9 +103,9 @@ def test_a_flight_is_shown_with_the_plate_where_it_has_been_lowered_to(tmp_path,
         asked.append(plate)
         return np.zeros_like(points)
 
-    monkeypatch.setattr("spinlev.studies.animation.FRAMES", 1)
-    monkeypatch.setattr("spinlev.studies.show.Tables", lambda: Tables("dipole"))
-    monkeypatch.setattr("spinlev.studies.show.plate_currents", currents)
+    monkeypatch.setattr("spinlev.studies.pictures.animation.FRAMES", 1)
+    monkeypatch.setattr("spinlev.studies.catalogue.show.Tables", lambda: Tables("dipole"))
+    monkeypatch.setattr("spinlev.studies.catalogue.show.plate_currents", currents)
     files = [Path(name) for name in show_job(path, tmp_path)]
     assert [file.suffix for file in files] == [".png", ".gif"]
     assert all(file.stat().st_size for file in files)

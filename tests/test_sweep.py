@@ -15,12 +15,11 @@ import xarray as xr
 from distributed import LocalCluster
 from matplotlib.figure import Figure
 
-from spinlev.fem.table_store import read_checked, write_checked
-from spinlev.geometry import InputError
-from spinlev.studies.engine import Engine
-from spinlev.studies.results import write_dataset
-from spinlev.studies.study import Study, by_case
-from spinlev.studies.sweep import SweepError, forget, swept
+from spinlev.fem.storage import read_checked, write_checked
+from spinlev.geometry.basics import InputError
+from spinlev.studies.results import Study, by_case, write_dataset
+from spinlev.studies.sweeps import Engine, forget, swept
+from spinlev.studies.sweeps.running import SweepError
 
 
 def root(point):
@@ -157,6 +156,6 @@ def test_a_wrong_engine(engine, message):
 
 
 def test_a_scheduler_that_does_not_answer(monkeypatch, tmp_path):
-    monkeypatch.setattr("spinlev.studies.engine.CONNECTING", 1)
+    monkeypatch.setattr("spinlev.studies.sweeps.workers.CONNECTING", 1)
     with pytest.raises(InputError, match="--scheduler must be the address of a dask scheduler that answers"):
         swept("roots", STUDY, points(1.0), Engine(scheduler="tcp://127.0.0.1:1"), tmp_path)

@@ -8,12 +8,13 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from spinlev.fem import MultipoleExpansion, RotorTable, uniform_moments
-from spinlev.fem.cache import cached_rotor_table, rotor_key
-from spinlev.fem.carrier import carrier
-from spinlev.fem.table_file import TableFileError, load_table, save_table
-from spinlev.fem.table_store import from_cache
-from spinlev.geometry import horizontal, vertical
+from spinlev.fem.closed_forms import carrier
+from spinlev.fem.harmonics import MultipoleExpansion, uniform_moments
+from spinlev.fem.rotor_tables import RotorTable, cached_rotor_table
+from spinlev.fem.rotor_tables.cache import rotor_key
+from spinlev.fem.rotor_tables.table_file import TableFileError, load_table, save_table
+from spinlev.fem.storage import from_cache
+from spinlev.geometry.bodies import horizontal, vertical
 
 ROTOR = vertical(0.012, 0.01, 1.305, 1.05)
 POINTS = np.random.default_rng(4).uniform(-0.01, 0.01, (20, 3)) - [0, 0, 0.03]

@@ -3,20 +3,27 @@
 import numpy as np
 import pytest
 
-from spinlev.fem.both_bodies import solve_both_bodies
-from spinlev.fem.demagnetization import remanent_field
-from spinlev.fem.harmonics import derivative, outer_sums
-from spinlev.fem.local_degree import enough_degree
-from spinlev.fem.local_field import Ball, dipole_sources, field_at_center, force, from_magnetization, moment, torque
-from spinlev.fem.models import rotor_table
-from spinlev.fem.multipole import moments_of_magnetization, uniform_moments
-from spinlev.fem.permeable_sphere import induced_sources, inner_field, permanent_sources
-from spinlev.fem.rotor_response import rotor_ladder
-from spinlev.fem.two_body import TwoBodyError, two_body, two_body_ladder
-from spinlev.geometry.magnet import MU_0
-from spinlev.geometry.rotor import horizontal, vertical
-from spinlev.geometry.scene import Floater
-from spinlev.geometry.two_body_mesh import mesh_two_bodies
+from spinlev.fem.closed_forms import remanent_field
+from spinlev.fem.harmonics import (
+    Ball,
+    derivative,
+    dipole_sources,
+    force,
+    from_magnetization,
+    moments_of_magnetization,
+    outer_sums,
+    torque,
+    uniform_moments,
+)
+from spinlev.fem.harmonics.interior import field_at_center, moment
+from spinlev.fem.mutual import TwoBodyError, enough_degree, rotor_ladder, two_body, two_body_ladder
+from spinlev.fem.mutual.permeable_sphere import induced_sources, inner_field, permanent_sources
+from spinlev.fem.rotor_tables import rotor_table
+from spinlev.fem.verification.both_bodies import solve_both_bodies
+from spinlev.geometry.basics import MU_0
+from spinlev.geometry.bodies import horizontal, vertical
+from spinlev.geometry.meshes.two_bodies import mesh_two_bodies
+from spinlev.geometry.scenes import Floater
 
 RADIUS = 0.00635
 FLOATER = Floater(RADIUS, 1.305, 1.05, 7500.0)

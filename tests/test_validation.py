@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from spinlev.dynamics import simulate
-from spinlev.fem import RotorTable
-from spinlev.fem.models import rotor_table
-from spinlev.fem.rotor_solution import Refinement, solve_rotor
-from spinlev.geometry import Drag, Floater, Scene, horizontal, tilt, vertical
-from spinlev.geometry.mesh import MeshSettings
+from spinlev.dynamics.flights import simulate
+from spinlev.fem.magnetostatics import Refinement, solve_rotor
+from spinlev.fem.rotor_tables import RotorTable, rotor_table
+from spinlev.geometry.bodies import horizontal, tilt, vertical
+from spinlev.geometry.meshes import MeshSettings
+from spinlev.geometry.scenes import Drag, Floater, Scene
 
 pytestmark = pytest.mark.slow
 

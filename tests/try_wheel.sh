@@ -12,6 +12,9 @@ place=$(mktemp -d)
 trap 'rm -rf "$place"' EXIT
 unset PYTHONPATH
 
+# What must be in a wheel: every file of the packages.
+(cd "$repository" && find spinlev -type f && find geometry fem dynamics studies -type f | sed 's|^|spinlev/|') |
+  grep -v __pycache__ > "$place/tree.txt"
 cp -r "$repository/tests" "$repository/scenes" "$repository/pyproject.toml" "$place"
 cd "$place"
 export SPINLEV_CACHE="$place/cache"
@@ -34,7 +37,9 @@ from spinlev import dynamics, fem, geometry, studies
 homes = {str(Path(package.__file__).parents[2]) for package in (geometry, fem, dynamics, studies)}
 assert homes == {sys.argv[1]}, homes
 files = {str(file) for file in distribution("spinlev").files}
-assert {"spinlev/studies/report.html", "spinlev/studies/team7_line_A1B1.csv", "spinlev/fem/py.typed"} <= files
+tree = {line.strip() for line in open("tree.txt")}
+packed = {file for file in files if file.startswith("spinlev/") and "__pycache__" not in file}
+assert packed == tree, packed ^ tree
 print("installed:", len([file for file in files if file.endswith(".py")]), "modules in", sys.argv[1])
 PYTHON
   venv/bin/spinlev equilibria scenes/vertical-24h.toml --model dipole --json --out out > answer.json

@@ -6,8 +6,8 @@ What is left at a large distance is the permeability alone: it weakens the cube'
 
 import numpy as np
 
-from spinlev.studies.api import load_scene, rotor_table
-from spinlev.studies.figures import panels
+from spinlev.studies.command_line.api import load_scene, rotor_table
+from spinlev.studies.results import panels
 
 scene = load_scene("scenes/horizontal.toml")
 distance = np.linspace(13e-3, 60e-3, 95)  # m, below the cube's centre

@@ -7,8 +7,8 @@ elements with its recoil permeability (points).
 
 import numpy as np
 
-from spinlev.studies.api import load_scene, parse_scene, rotor_table
-from spinlev.studies.figures import panels
+from spinlev.studies.command_line.api import load_scene, parse_scene, rotor_table
+from spinlev.studies.results import panels
 
 text = load_scene("scenes/horizontal.toml").text
 place = np.array([[0.0, 0.0, -0.02]])  # m

@@ -9,10 +9,10 @@ the closed form.
 import heyoka as hy
 import numpy as np
 
-from spinlev.dynamics import find_equilibria
-from spinlev.fem.compiled import CompiledField
-from spinlev.studies.api import load_scene, rotor_table
-from spinlev.studies.figures import panels
+from spinlev.dynamics.equilibria import find_equilibria
+from spinlev.fem.harmonics import CompiledField
+from spinlev.studies.command_line.api import load_scene, rotor_table
+from spinlev.studies.results import panels
 
 
 class ChargeTable:

@@ -2,7 +2,7 @@
 
 A study is a pure function of a point, the points at which it is asked, and what is drawn and said of the joined
 result. One entry in the catalogue, and it is resumable and runs on any number of workers; with the entry in
-`studies/catalogue.py` the command line knows it too.
+`studies/catalogue/entries.py` the command line knows it too.
 """
 
 import tempfile
@@ -10,11 +10,9 @@ import tempfile
 import numpy as np
 import xarray as xr
 
-from spinlev.studies.api import draw, load_scene, parse_scene, run_study, stability
 from spinlev.studies.catalogue import CATALOGUE
-from spinlev.studies.figures import panels, styled
-from spinlev.studies.results import variable
-from spinlev.studies.study import Study, by_case
+from spinlev.studies.command_line.api import draw, load_scene, parse_scene, run_study, stability
+from spinlev.studies.results import Study, by_case, panels, styled, variable
 
 TEXT = load_scene("scenes/horizontal.toml").text
 

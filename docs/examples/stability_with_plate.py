@@ -7,8 +7,8 @@ out within a third of a second.
 
 import numpy as np
 
-from spinlev.studies.api import load_scene, stability
-from spinlev.studies.figures import panels
+from spinlev.studies.command_line.api import load_scene, stability
+from spinlev.studies.results import panels
 
 scene = load_scene("scenes/tilt-over-plate.toml")
 bare = stability(scene, model="cuboid", plate_model="none")

@@ -7,8 +7,8 @@ and resumable.)
 
 import xarray as xr
 
-from spinlev.studies.api import equilibria, load_scene, parse_scene
-from spinlev.studies.figures import panels
+from spinlev.studies.command_line.api import equilibria, load_scene, parse_scene
+from spinlev.studies.results import panels
 
 text = load_scene("scenes/horizontal.toml").text
 fixed = {"rotor.displacement_mm": 1.7, "rotor.recoil_permeability": 1.0, "floater.recoil_permeability": 1.0}

@@ -1,0 +1,114 @@
+"""What vanishes on a boundary of stability: the five balances of an equilibrium and one test, smooth across it.
+
+- fold: the determinant of the balances' derivatives;
+- crossing (Hopf): the real part of the pair of eigenvalues that crosses the imaginary axis;
+- collision: -(λ₁ - λ₂)² of the two eigenvalues that meet on the imaginary axis.  Without drag, where the small motions
+  are Hamiltonian, stability is lost in no other way but a fold (M. G. Krein, 1950): two frequencies become one, and
+  beyond it one of the two motions grows.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ...geometry.basics import Array
+from ..motion import Rates
+from ..steady import Balance, moved, spectra
+from .branch import FOLD
+
+COLLISION, CROSSING = "collision", "crossing"
+DIFFERENCE = 1e-5
+"""Step of the central differences, good to 1e-10, from which the corrector converges to round-off all the same."""
+
+
+@dataclass(frozen=True, eq=False)
+class Plane:
+    """Two parameters of a scene.
+
+    Parameters
+    ----------
+    rates : compiled once for the whole plane
+    values : parameters (n,) and (n,) -> values (n, p) of the runtime parameters, drag along the moment left out
+    spin : body spin s
+    units : of the two, changes over which an equilibrium moves by about its radius
+    lower, upper : (2,) corners of the part of the plane that is looked at
+    """
+
+    rates: Rates
+    values: Callable[[Array, Array], Array]
+    spin: float
+    units: Array
+    lower: Array
+    upper: Array
+
+    def holds(self, place: Array) -> bool:
+        """Whether a place (2,) lies in the part that is looked at."""
+        return bool(np.all((place >= self.lower) & (place <= self.upper)))
+
+
+@dataclass(frozen=True, eq=False)
+class BoundaryPoint:
+    """A point of a boundary.
+
+    Parameters
+    ----------
+    place : (2,) the two parameters
+    position, moment : (3,) of the equilibrium there, scaled, and direction
+    angular_frequency : of the motion that becomes unstable, in units of the rotor's; 0 at a fold
+    """
+
+    place: Array
+    position: Array
+    moment: Array
+    angular_frequency: float
+
+
+@dataclass(frozen=True, eq=False)
+class Boundary:
+    """What vanishes on a boundary.
+
+    Parameters
+    ----------
+    plane : the two parameters
+    kind : "fold", "crossing" or "collision"
+    scale : typical size of the determinant
+    """
+
+    plane: Plane
+    kind: str
+    scale: float
+
+    def residual(self, at: BoundaryPoint, change: Array) -> tuple[Array, Array]:
+        """What shall vanish (n, 6) after changes (n, 7) of a point, and the imaginary part (n,) that is followed."""
+        here = np.zeros((len(change), 3))
+        position, moment = moved(here + at.position, here + at.moment, change[:, :5])
+        place = at.place + change[:, 5:] * self.plane.units
+        balance = Balance(self.plane.rates, self.plane.values(*place.T), self.plane.spin)
+        value, slope = balance(position, moment)
+        test, frequency = self._test(balance, position, moment, slope, at.angular_frequency)
+        return np.column_stack([value, test]), frequency
+
+    def _test(self, balance: Balance, position: Array, moment: Array, slope: Array, near: float) -> tuple[Array, Array]:
+        if self.kind == FOLD:
+            return np.linalg.det(slope) / self.scale, np.zeros(len(slope))
+        states = balance.states(position, moment)
+        values = spectra(states, balance.rates(states, balance.values)[1])[0]
+        order = np.argsort(np.abs(values - 1j * near), axis=1)
+        first, second = np.take_along_axis(values, order[:, :2], axis=1).T
+        if self.kind == CROSSING:
+            return first.real, first.imag
+        return -np.real((first - second) ** 2), (first + second).imag / 2
+
+    def linear(self, at: BoundaryPoint) -> tuple[Array, Array, float]:
+        """Residual (6,), its derivatives (6, 7) and the frequency at a point."""
+        changes = np.concatenate([np.zeros((1, 7)), DIFFERENCE * np.eye(7), -DIFFERENCE * np.eye(7)])
+        values, frequencies = self.residual(at, changes)
+        return values[0], (values[1:8] - values[8:]).T / (2 * DIFFERENCE), float(frequencies[0])
+
+    def stepped(self, at: BoundaryPoint, change: Array) -> BoundaryPoint:
+        """The point after a change (7,) of its unknowns."""
+        position, moment = moved(at.position[None], at.moment[None], change[None, :5])
+        return replace(at, position=position[0], moment=moment[0], place=at.place + change[5:] * self.plane.units)

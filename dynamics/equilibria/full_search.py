@@ -1,0 +1,143 @@
+"""All synchronous equilibria of a floater: fixed points in the frame that turns with the rotor."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...fem.rotor_tables import FieldTable
+from ...geometry.basics import Array
+from ...geometry.scenes import Scene
+from ..motion import Parameter, PlateMemory, Rates, Scales, parameters
+from ..steady import Balance, Equilibrium, EquilibriumError, ForceCurve, Survey, modes, named_modes
+from .curve import Curve
+from .fixed_points import fixed_points
+from .periodic_equilibrium import Shaken
+from .search import SearchRange
+
+
+def find_equilibria(
+    scene: Scene,
+    table: FieldTable,
+    spin: float = 0.0,
+    farthest: float = 0.1,
+    rates: Rates | None = None,
+    memory: PlateMemory | None = None,
+) -> list[Equilibrium]:
+    """All synchronous equilibria below the rotor, the stable ones first, then by distance; see `survey`."""
+    rates = rates or Rates.of(scene, table)
+    found = survey(scene, table, spin, farthest, rates)
+    return list((found if memory is None else with_plate(scene, table, found, memory, rates)).equilibria)
+
+
+def survey(
+    scene: Scene,
+    table: FieldTable,
+    spin: float = 0.0,
+    farthest: float = 0.1,
+    rates: Rates | None = None,
+) -> Survey:
+    """All synchronous equilibria with z < 0 between contact with the rotor and `farthest`, with their stability.
+
+    Parameters
+    ----------
+    scene : the scene; its plate is left out
+    table : the rotor's field
+    spin : body spin s = Ω·m̂/ω, which magnetic torque does not change
+    farthest : largest depth, and distance from the axis, m
+    rates : `Rates` of the same table, to compile them once for many scenes
+
+    With gravity across the axis equilibria are periodic motions, followed from the fixed points without it.
+
+    Returns
+    -------
+    Equilibria, the stable ones first, then by distance, accurate to round-off in the table's field: every curve of
+    lateral balance that is met from nearly five thousand starts is followed, and every zero of the axial force on it is
+    polished; so is what Newton's method finds directly from these starts.
+
+    Raises
+    ------
+    EquilibriumError : the rotor is at rest
+    """
+    _check(scene)
+    scales = Scales.of(scene)
+    values, rates = parameters(scene, scales, frozen_spin=True), rates or Rates.of(scene, table)
+    balance = Balance(rates, values, spin)
+    curves, points = fixed_points(balance, SearchRange(scene, farthest))
+    known = [(r, m) for r, m in points if table.in_range(r * scales.length)[0]]
+    found = [_equilibrium(table, scales, balance, r, m) for r, m in known]
+    if np.any(scene.gravity[:2]):
+        found = _shaken(Shaken(scene, rates, values, None), found)
+    return Survey(_in_order(found), tuple(_force_curve(scene, scales, curve) for curve in curves))
+
+
+def with_plate(
+    scene: Scene, table: FieldTable, known: Survey, memory: PlateMemory, rates: Rates | None = None
+) -> Survey:
+    """The equilibria of a survey with the plate's currents: periodic motions, followed from the fixed points without.
+
+    Those beyond the range of the plate's table stay as they are, without `currents`; those that the plate undoes, or
+    pushes against a body, are left out.
+    """
+    values = parameters(scene, Scales.of(scene), frozen_spin=True)
+    fixed = [equilibrium.without or equilibrium for equilibrium in known.equilibria]
+    found = _shaken(Shaken(scene, rates or Rates.of(scene, table), values, memory), fixed)
+    return Survey(_in_order(found), known.curves)
+
+
+def _in_order(found: list[Equilibrium]) -> tuple[Equilibrium, ...]:
+    return tuple(sorted(found, key=lambda equilibrium: (not equilibrium.stable, equilibrium.distance)))
+
+
+def _check(scene: Scene) -> None:
+    if not scene.frequency:
+        raise EquilibriumError(
+            "At 0 Hz nothing levitates: a magnet has no stable equilibrium in a static field and gravity "
+            "(S. Earnshaw, 1842), and no synchronous one without a turning rotor. Give the rotor a frequency."
+        )
+
+
+def _shaken(problem: Shaken, found: list[Equilibrium]) -> list[Equilibrium]:
+    """The same equilibria with the plate's currents and the whole gravity."""
+    kept = []
+    for fixed in found:
+        if problem.reaches(fixed.position):
+            moved = problem.equilibrium(fixed)
+            kept += [] if moved is None else [moved]
+        elif not np.any(problem.scene.gravity[:2]):
+            kept.append(fixed)
+    return kept
+
+
+def _equilibrium(table: FieldTable, scales: Scales, balance: Balance, position: Array, moment: Array) -> Equilibrium:
+    state = balance.states(position[None], moment[None])
+    value, slope = balance(position[None], moment[None])
+    motion = modes(state[0], balance.rates(state, balance.values)[1][0])
+    doubt = np.abs(value[0]) + _field_doubt(table, balance.values, position * scales.length)
+    error = float(np.linalg.norm((np.abs(np.linalg.inv(slope[0])) @ doubt)[:3]))
+    gravity = abs(float(balance.values[Parameter.GRAVITY_Z]))
+    return Equilibrium(
+        state=scales.unpack(state[0]),
+        spin=balance.spin,
+        residual=float(np.abs(value).max() / (gravity or 1.0)),
+        position_error=error * scales.length,
+        stable=motion.stable,
+        growth_per_s=motion.growth / scales.time,
+        growth_error_per_s=float(motion.errors.max()) / scales.time,
+        frequencies_hz=motion.angular_frequencies / (2 * np.pi * scales.time),
+        modes=named_modes(motion, scales.time),
+    )
+
+
+def _field_doubt(table: FieldTable, values: Array, position: Array) -> Array:
+    """What the table's own error may add to the three forces and two torques at `position` (m), scaled."""
+    field, gradient = table.evaluate(position)
+    error_b, error_g = table.relative_error(position)
+    torque = values[Parameter.TORQUE] * np.linalg.norm(field) * error_b[0]
+    force = np.prod(values[[Parameter.TORQUE, Parameter.INERTIA, Parameter.LENGTH]]) * np.linalg.norm(gradient)
+    return np.array([force * error_g[0]] * 3 + [torque] * 2)
+
+
+def _force_curve(scene: Scene, scales: Scales, curve: Curve) -> ForceCurve:
+    weight = scene.floater.mass * float(scene.gravity[2])
+    unit = scene.floater.mass * scales.length / scales.time**2
+    return ForceCurve(curve.position * scales.length, curve.moment, curve.force * unit - weight, weight)

@@ -1,0 +1,110 @@
+"""A long flight kept on disk while it lasts, so that it can go on where it was stopped, to the last bit.
+
+What determines the rest of a flight is the integrator's state at the end of a piece, its time (two numbers, so that
+it loses nothing over millions of turns) and what has been recorded.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import io
+import zipfile
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from ...fem.storage import write_whole
+from ...geometry.basics import Array, InputError
+from .compiled_flight import Flight
+from .recorder import Recorder
+
+
+@dataclass(frozen=True, eq=False)
+class Progress:
+    """How far a flight is.
+
+    Parameters
+    ----------
+    time : (2,) scaled time as a sum of two numbers
+    state : of the integrator
+    values : runtime parameters
+    times, states : samples so far
+    interval : of the samples
+    steps : Taylor steps so far
+    """
+
+    time: Array
+    state: Array
+    values: Array
+    times: Array
+    states: Array
+    interval: float
+    steps: int
+
+    @classmethod
+    def of(cls, flight: Flight, values: Array, recorder: Recorder, steps: int) -> Progress:
+        """Where a flight is now."""
+        integrator = flight.integrator
+        return cls(
+            np.array(integrator.dtime), integrator.state.copy(), values, recorder.times, recorder.states,
+            recorder.interval, steps,
+        )  # fmt: skip
+
+    def restore(self, flight: Flight, recorder: Recorder) -> tuple[Array, int]:
+        """Put everything back to where it was; the runtime parameters and the steps so far."""
+        flight.integrator.dtime = (float(self.time[0]), float(self.time[1]))
+        flight.integrator.state[:] = self.state
+        recorder.times, recorder.states, recorder.interval = self.times, self.states, self.interval
+        return self.values.copy(), self.steps
+
+
+@dataclass(frozen=True)
+class Checkpoint:
+    """The file of a flight.
+
+    Parameters
+    ----------
+    path : where it is
+    identity : everything that the flight depends on, as text; another flight's checkpoint is refused
+    """
+
+    path: Path
+    identity: str
+
+    @property
+    def _key(self) -> str:
+        return hashlib.sha256(self.identity.encode()).hexdigest()
+
+    def write(self, progress: Progress) -> None:
+        """Keep the progress; the file is whole or as it was."""
+        stream = io.BytesIO()
+        np.savez(stream, allow_pickle=False, key=np.array(self._key), **vars(progress))
+        write_whole(self.path, stream.getvalue())
+
+    def read(self) -> Progress | None:
+        """What was kept, or None if there is nothing.
+
+        Raises
+        ------
+        InputError : the file is damaged, or belongs to another flight
+        """
+        if not self.path.exists():
+            return None
+        try:
+            with self.path.open("rb") as stream, np.load(stream) as data:
+                content = {name: data[name] for name in data.files}
+            key = str(content.pop("key"))
+            found = Progress(**{**content, "interval": float(content["interval"]), "steps": int(content["steps"])})
+        except (OSError, ValueError, KeyError, TypeError, EOFError, RuntimeError, zipfile.BadZipFile) as error:
+            raise InputError(f"Input {self.path} must be a checkpoint; instead it is damaged: delete it.") from error
+        if key != self._key:
+            raise InputError(
+                f"Input {self.path} must be a checkpoint of this flight; instead it was kept by another scene, model, "
+                "duration or version: delete it, choose another --out, or leave out --resume."
+            )
+        return found
+
+    def remove(self) -> None:
+        """The flight is over."""
+        self.path.unlink(missing_ok=True)

@@ -1,0 +1,64 @@
+"""A simulated flight."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from ...geometry.basics import Array
+from ..motion import State
+
+DURATION, STOPPED = "duration", "stopped"
+
+
+@dataclass(frozen=True, eq=False)
+class Trajectory:
+    """Samples of a flight and how it ended.
+
+    Parameters
+    ----------
+    time : (n,) s, at equal intervals but for the last
+    lab : motion (n, 3) along the laboratory's axes, SI units
+    angular_velocity : of the rotor, rad/s
+    ended_by : "duration", "contact" or "lost"; "stopped" by the user
+    energy_error : largest relative violation of the energy ledger or of |m̂| = 1
+    realtime_factor : simulated seconds per second of integration, compilation left out
+    steps : number of Taylor steps
+    compile_seconds : time spent on compilation (little where heyoka's cache knows the system)
+    beyond_plate_table : part of the samples at which the floater was out of the range of the plate's table
+    """
+
+    time: Array
+    lab: State
+    angular_velocity: float
+    ended_by: str
+    energy_error: float
+    realtime_factor: float
+    steps: int
+    compile_seconds: float
+    beyond_plate_table: float = 0.0
+
+    def __repr__(self) -> str:
+        place = ", ".join(f"{1e3 * value:.4f}" for value in self.lab.position[-1])
+        speed = f"{self.steps} steps, {self.realtime_factor:.3g} times real time"
+        return (
+            f"Trajectory of {self.levitated_s:.4g} s ({len(self.time)} samples), "
+            f"ended by {self.ended_by} at ({place}) mm\n  energy ledger to {self.energy_error:.1e}; {speed}"
+        )
+
+    @property
+    def levitated_s(self) -> float:
+        """Duration of the flight, s."""
+        return float(self.time[-1])
+
+    @property
+    def rotor(self) -> State:
+        """Motion (n, 3) along the rotor's axes, SI units."""
+        return self.lab.to_rotor(self.angular_velocity * self.time)
+
+
+class FlightStopped(KeyboardInterrupt):
+    """The user stopped a flight; `flown` is what is finished of it. Who does not catch it is stopped as well."""
+
+    def __init__(self, flown: Trajectory) -> None:
+        self.flown = flown
+        super().__init__(f"The flight was stopped at {flown.levitated_s:.4g} s.")

@@ -1,0 +1,142 @@
+"""Scenes that differ in the rotor's frequency and in one measure of the rotor: what a map or a curve runs over."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ...fem.closed_forms import carrier
+from ...fem.rotor_tables import RotorTable, rotor_table
+from ...geometry.basics import Array, Box
+from ...geometry.bodies import Magnet
+from ...geometry.scenes import Scene
+from ..branches import Problem
+from ..motion import MovableField, Move, Parameter, Rates, Scales, Shift, Turn, blended, nodes, parameters
+
+MOVES: dict[str, tuple[Move | None, ...]] = {
+    "horizontal": (Shift((1.0, 0.0, 0.0)),),
+    "vertical": (None, Shift((0.0, 0.0, 1.0))),
+    "tilt": (Turn(),),
+}
+"""How each magnet of the article's rotors moves with displacement (m) or tilt (rad)."""
+
+NODES = 7
+"""Tables between which changing moments are interpolated."""
+
+
+@dataclass(frozen=True, eq=False)
+class RotorFamily:
+    """A scene with frequency and one measure of its rotor left open.
+
+    Parameters
+    ----------
+    scene : all else; its plate is left out
+    rotor : magnets as they are at measure zero
+    moves : how each of them moves, None for one that stands still
+    field : of the rotor, with `Parameter.MEASURE`
+    """
+
+    scene: Scene
+    rotor: tuple[Magnet, ...]
+    moves: tuple[Move | None, ...]
+    field: MovableField
+
+    def at(self, frequency: float, measure: float) -> Scene:
+        """The scene at one frequency (Hz) and measure (m or rad)."""
+        pairs = zip(self.rotor, self.moves, strict=True)
+        rotor = tuple(move.moved(magnet, measure) if move else magnet for magnet, move in pairs)
+        return replace(self.scene, frequency=float(frequency), rotor=rotor)
+
+    def values(self, frequency: ArrayLike, measure: ArrayLike) -> Array:
+        """Runtime parameters (n, p), with the drag along the moment left out, at frequencies and measures (n,)."""
+        frequency, measure = np.broadcast_arrays(np.atleast_1d(frequency), np.atleast_1d(measure))
+        different, which = np.unique(frequency, return_inverse=True)
+        scenes = [replace(self.scene, frequency=float(f)) for f in different]
+        each = [parameters(scene, Scales.of(scene), frozen_spin=True) for scene in scenes]
+        values = np.reshape(each, (-1, len(Parameter)))[which]
+        values[:, Parameter.MEASURE] = measure
+        return values
+
+    def frequencies(self, measure: float, spin: float = 0.0) -> Problem:
+        """The problem whose parameter is the frequency, Hz, at one measure."""
+        return lambda frequency: (self.values(frequency, measure)[0], spin)
+
+    def measures(self, frequency: float, spin: float = 0.0) -> Problem:
+        """The problem whose parameter is the measure, m or rad, at one frequency."""
+        return lambda measure: (self.values(frequency, measure)[0], spin)
+
+    @cached_property
+    def rates(self) -> Rates:
+        """Compiled once for all frequencies and measures."""
+        return Rates(self.field, bool(self.scene.floater.conductivity), optimised=True)
+
+
+def rotor_family(
+    scene: Scene,
+    configuration: str,
+    model: str,
+    rtol: float = 3e-6,
+    nearest: float | None = None,
+    measures: tuple[float, float] | None = None,
+) -> RotorFamily:
+    """The family of one of the article's rotors, with the magnets of `scene`.
+
+    Parameters
+    ----------
+    configuration : "horizontal" (measure: displacement of the cube along +x, m), "vertical" (of the second cube along
+        +z, m) or "tilt" (of the cube, rad)
+    model, rtol, nearest : of the field, see `fem.rotor_table`
+    measures : between which "vertical" with "fem" shall hold: how the cubes magnetise each other changes with their
+        distance and is interpolated between `NODES` tables, about two seconds each
+
+    A rotor that moves as a whole keeps its table, whatever the model: the family is as good as its scenes' tables.
+
+    Raises
+    ------
+    ValueError : unknown configuration or one of other magnets, or no `measures` where they are needed
+    """
+    if configuration not in MOVES or len(MOVES[configuration]) != len(scene.rotor):
+        raise ValueError(
+            f"Input configuration must be one of {', '.join(MOVES)} and have the scene's number of magnets, "
+            f"{len(scene.rotor)}; instead received {configuration!r}."
+        )
+    moves = MOVES[configuration]
+    rotor = tuple(_unmoved(magnet, move) for magnet, move in zip(scene.rotor, moves, strict=True))
+    if len(rotor) > 1 and model == "fem":
+        return RotorFamily(scene, rotor, moves, _mutual(rotor, moves, rtol, nearest, measures))
+    parts = [(rotor_table((m,), model, rtol, nearest), move) for m, move in zip(rotor, moves, strict=True)]
+    return RotorFamily(scene, rotor, moves, MovableField(tuple(parts)))
+
+
+def _mutual(
+    rotor: tuple[Magnet, ...],
+    moves: tuple[Move | None, ...],
+    rtol: float,
+    nearest: float | None,
+    measures: tuple[float, float] | None,
+) -> MovableField:
+    """Closed forms that move, and expansions that also change."""
+    if measures is None:
+        raise ValueError(
+            "Input measures must be given for magnets that magnetise each other and move against each other, such as "
+            "(0.010, 0.020) m; instead received None."
+        )
+    places, shifts = nodes(*measures, NODES), [move if isinstance(move, Shift) else None for move in moves]
+    pairs = list(zip(rotor, shifts, strict=True))
+    tables = [
+        rotor_table(tuple(s.moved(m, float(d)) if s else m for m, s in pairs), "fem", rtol, nearest).expansions
+        for d in places
+    ]
+    carriers = [carrier(magnet) for magnet in rotor]
+    closed = [(RotorTable("cuboid", (c,), (c,)), s) for c, s in zip(carriers, shifts, strict=True)]
+    return MovableField((*closed, *blended(tables, places, [(m.box.center, s) for m, s in pairs])))
+
+
+def _unmoved(magnet: Magnet, move: Move | None) -> Magnet:
+    """The magnet where its measure is zero: on the axis' origin, its axes along the rotor's."""
+    if move is None:
+        return magnet
+    return replace(magnet, box=Box(magnet.box.size))

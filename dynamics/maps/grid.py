@@ -1,0 +1,83 @@
+"""The points of a map, frequency by measure of the rotor, and the balances there."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...geometry.basics import Array
+from ..equilibria import SearchRange
+from ..steady import Balance, Indices
+from .families import RotorFamily
+
+
+@dataclass(frozen=True, eq=False)
+class Grid:
+    """A map's points, numbered row by row.
+
+    Parameters
+    ----------
+    family : its scenes
+    frequencies, measures : (n,) Hz and (m,) m or rad
+    spin : body spin s
+    farthest : of the range in which equilibria are looked for, m
+    """
+
+    family: RotorFamily
+    frequencies: Array
+    measures: Array
+    spin: float
+    farthest: float
+
+    def __len__(self) -> int:
+        return len(self.frequencies) * len(self.measures)
+
+    @cached_property
+    def _ranges(self) -> list[SearchRange]:
+        return [SearchRange(self.family.at(self.frequencies[0], m), self.farthest) for m in self.measures]
+
+    def place(self, point: Indices) -> tuple[Array, Array]:
+        """Frequencies and measures (n,) of points (n,)."""
+        row, column = np.divmod(point, len(self.measures))
+        return self.frequencies[row], self.measures[column]
+
+    def balance(self, point: Indices) -> Balance:
+        """The balance in which every point has its own problem."""
+        return Balance(self.family.rates, self.family.values(*self.place(point)), self.spin)
+
+    def alone(self, point: int) -> Balance:
+        """The balance of one point, for any number of positions."""
+        return Balance(self.family.rates, self.family.values(*self.place(np.array([point])))[0], self.spin)
+
+    def range(self, point: int) -> SearchRange:
+        """Where equilibria of one point are looked for."""
+        return self._ranges[point % len(self.measures)]
+
+    def holds(self, point: Indices, position: Array, margin: float = 0.0) -> NDArray[np.bool_]:
+        """Which of the scaled positions (n, 3) lie in the range of their points (n,), or at most a margin outside."""
+        inside, column = np.zeros(len(point), bool), point % len(self.measures)
+        for k in np.unique(column):
+            chosen = column == k
+            inside[chosen] = self._ranges[k].holds(position[chosen], margin)
+        return inside
+
+    def neighbours(self, point: Indices) -> tuple[Indices, Indices]:
+        """Pairs of a place in `point` and one of the up to four points beside it."""
+        row, column = np.divmod(point, len(self.measures))
+        pairs = []
+        for along, across in ((1, 0), (-1, 0), (0, 1), (0, -1)):
+            r, c = row + along, column + across
+            inside = (r >= 0) & (r < len(self.frequencies)) & (c >= 0) & (c < len(self.measures))
+            pairs.append((np.flatnonzero(inside), (r * len(self.measures) + c)[inside]))
+        return np.concatenate([p[0] for p in pairs]), np.concatenate([p[1] for p in pairs])
+
+    def coarse(self, spacing: int) -> Indices:
+        """Points of a coarse grid with at most `spacing` steps between, the borders included."""
+        rows, columns = (
+            np.unique(np.linspace(0, n - 1, -(-(n - 1) // spacing) + 1).round().astype(int))
+            for n in (len(self.frequencies), len(self.measures))
+        )
+        return np.asarray((rows[:, None] * len(self.measures) + columns).ravel())

@@ -1,0 +1,81 @@
+"""Equilibria of a map with the stability of each."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...geometry.basics import Array
+from ..motion import Parameter
+from ..steady import Indices, is_stable, spectra
+from .atlas import Atlas
+from .grid import Grid
+
+
+@dataclass(frozen=True, eq=False)
+class EquilibriumMap:
+    """Equilibria (k,) of a map, point by point; rotor's frame.
+
+    Parameters
+    ----------
+    frequencies, measures : axes of the map, Hz and m or rad
+    row, column : (k,) place of each equilibrium on them
+    position, moment : (k, 3) m and direction
+    eigenvalues : (k, 10) of the small motions, 1/s
+    errors : (k,) what round-off may do to them, 1/s
+    stable : (k,) whether every small motion stays small
+    searches : points of the map at which all was searched for
+    """
+
+    frequencies: Array
+    measures: Array
+    row: Indices
+    column: Indices
+    position: Array
+    moment: Array
+    eigenvalues: NDArray[np.complex128]
+    errors: Array
+    stable: NDArray[np.bool_]
+    searches: int
+
+    @property
+    def growth_per_s(self) -> Array:
+        """(k,) largest growth rate of a small motion."""
+        return np.asarray(self.eigenvalues.real.max(axis=1))
+
+    @property
+    def number(self) -> tuple[Indices, Indices]:
+        """Equilibria and stable equilibria at each point: two of (frequencies, measures)."""
+        shape = len(self.frequencies), len(self.measures)
+        place, size = self.row * shape[1] + self.column, shape[0] * shape[1]
+        every, stable = np.bincount(place, minlength=size), np.bincount(place[self.stable], minlength=size)
+        return every.reshape(shape), stable.reshape(shape)
+
+
+def judged(grid: Grid, atlas: Atlas, searches: int) -> EquilibriumMap:
+    """What an atlas knows within the range, all spectra in one call."""
+    point, position, moment = atlas.all()
+    inside = grid.holds(point, position)
+    point, position, moment = point[inside], position[inside], moment[inside]
+    row, column = np.divmod(point, len(grid.measures))
+    time = np.zeros((0, 1))
+    values, errors = np.zeros((0, 10), complex), np.zeros((0, 10))
+    if len(point):
+        balance = grid.balance(point)
+        states = balance.states(position, moment)
+        values, errors, _ = spectra(states, balance.rates(states, balance.values)[1])
+        time = balance.values[:, [Parameter.TIME]]
+    return EquilibriumMap(
+        frequencies=grid.frequencies,
+        measures=grid.measures,
+        row=row,
+        column=column,
+        position=position * grid.family.scene.floater.radius,
+        moment=moment,
+        eigenvalues=np.asarray(values / time, complex),
+        errors=errors.max(axis=1, initial=0.0) / time[:, 0],
+        stable=is_stable(values, errors),
+        searches=searches,
+    )

@@ -1,0 +1,37 @@
+"""Which equations does the floater obey?"""
+
+from .blend import blended, nodes
+from .equations import Equations, equations_of_motion, parameters
+from .events import CONTACT, clearance, flight_events, plate_depth, plate_legs, plate_places, rotor_gap
+from .movable import MovableField, Move, Shift, Turn
+from .plate_force import PlateForce
+from .plate_terms import PlateMemory
+from .rates import Rates
+from .state import Scales, State, turned_about_z
+from .symbols import Parameter
+
+__all__ = [
+    "CONTACT",
+    "Equations",
+    "MovableField",
+    "Move",
+    "Parameter",
+    "PlateForce",
+    "PlateMemory",
+    "Rates",
+    "Scales",
+    "Shift",
+    "State",
+    "Turn",
+    "blended",
+    "clearance",
+    "equations_of_motion",
+    "flight_events",
+    "nodes",
+    "parameters",
+    "plate_depth",
+    "plate_legs",
+    "plate_places",
+    "rotor_gap",
+    "turned_about_z",
+]

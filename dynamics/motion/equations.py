@@ -1,0 +1,163 @@
+"""Equations of motion of the floater, in the frame that turns with the rotor.
+
+With unit length R (the floater's radius) and unit time T (`Scales`), position r, velocity v and spin Ω as seen from
+the laboratory but along the rotor's axes, unit moment m̂ and the rotor's rate W = ωT about z:
+
+    ṙ = v - W × r                         m̂' = (Ω - W) × m̂
+    v̇ = F + g - c v - W × v               Ω̇ = τ - γ Ω⊥ - γ_s Ω∥ - W × Ω
+
+F = (m T²/M R) ∇(m̂·B) and τ = (m T²/I) m̂ × B: exact for a rigidly magnetised sphere.  Without drag and with gravity
+along the axis everything is autonomous, and the Jacobi integral
+
+    J = v²/2 + i Ω²/2 - i (m T²/I) m̂·B - g·r - W·(r × v + i Ω),   i = I/(M R²)   (unit: M R²/T²)
+
+is conserved: the energy less ω times the angular momentum about the axis.  What drag and a horizontal part of gravity
+do in the rotating frame is integrated along as the last state, `work`, so that J - work never changes.
+A conducting floater is dragged along by the field that turns past it (`fem.sphere_eddy`): in a uniform field, and
+slowly enough for its skin depth, by the torque -κ [(Ω - W) B² - B B·(Ω - W)].  A plate adds its currents as further
+states (`memory`) and their energy to J.
+Every number that a sweep may change is a runtime parameter; only the tables' own geometry is compiled in.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import heyoka as hy
+import numpy as np
+
+from ...fem.closed_forms import rotating_torque
+from ...fem.rotor_tables import FieldFormula
+from ...geometry.basics import Array
+from ...geometry.scenes import Scene
+from .plate_terms import PlateMemory, memory_terms
+from .state import Scales
+from .symbols import Parameter, Vector, cross, dot, subtract, turned
+
+NAMES = tuple(f"{vector}_{axis}" for vector in ("position", "velocity", "moment", "spin") for axis in "xyz")
+
+
+@dataclass(frozen=True, eq=False)
+class Equations:
+    """The equations of motion as heyoka expressions.
+
+    Parameters
+    ----------
+    variables : the twelve of the floater, then the plate's
+    rates : their derivatives with respect to scaled time
+    jacobi : the terms of the Jacobi integral: motion, turning, magnet, weight, swirl, and the plate's energy
+    power : its rate of change, by drag, by gravity across the axis and by the plate
+    """
+
+    variables: Vector
+    rates: Vector
+    jacobi: Vector
+    power: hy.expression
+
+
+def parameters(scene: Scene, scales: Scales, frozen_spin: bool = False) -> Array:
+    """Values of the runtime parameters; `frozen_spin` takes the drag off the spin about the moment."""
+    floater, drag, (length, time) = scene.floater, scene.drag, (scales.length, scales.time)
+    root_energy = np.sqrt(floater.mass) * length / time
+    values = np.zeros(len(Parameter))
+    values[Parameter.RATE] = scene.angular_velocity * time
+    values[Parameter.LENGTH] = length
+    values[Parameter.TORQUE] = floater.moment * time**2 / floater.inertia
+    values[Parameter.INERTIA] = floater.inertia / (floater.mass * length**2)
+    values[Parameter.GRAVITY_X : Parameter.GRAVITY_Z + 1] = scene.gravity * (time**2 / length)
+    values[Parameter.LINEAR_DRAG] = drag.linear * time / floater.mass
+    values[Parameter.TILT_DRAG] = drag.angular * time / floater.inertia
+    values[Parameter.SPIN_DRAG] = 0.0 if frozen_spin else values[Parameter.TILT_DRAG]
+    if floater.conductivity and scene.frequency:
+        turning = float(rotating_torque(floater.radius, floater.conductivity, scene.frequency, 1.0))
+        values[Parameter.TILT_EDDY] = turning / scene.angular_velocity * time / floater.inertia
+        values[Parameter.SPIN_EDDY] = 0.0 if frozen_spin else values[Parameter.TILT_EDDY]
+    values[Parameter.TIME] = time
+    values[Parameter.PLATE_MOMENT] = floater.moment / root_energy
+    values[Parameter.PLATE_SHARE] = 1 / root_energy
+    return values
+
+
+def equations_of_motion(
+    table: FieldFormula,
+    tilted_gravity: bool = False,
+    memory: PlateMemory | None = None,
+    conducting: bool = False,
+    angular_velocity: float = 0.0,
+) -> Equations:
+    """Rates of the scaled state in the field of a table.
+
+    Parameters
+    ----------
+    table : the rotor's field
+    tilted_gravity : whether gravity has a part across the axis; it turns in this frame, so that time enters
+    memory : the plate's currents, if they are modelled
+    conducting : whether the floater has eddy currents of its own
+    angular_velocity : of the rotor, rad/s; only `memory` needs it, in which it is compiled in
+    """
+    variables = hy.make_vars(*NAMES)
+    position, velocity, moment, spin = (variables[i : i + 3] for i in (0, 3, 6, 9))
+    length, torque, inertia, linear = (
+        hy.par[p] for p in (Parameter.LENGTH, Parameter.TORQUE, Parameter.INERTIA, Parameter.LINEAR_DRAG)
+    )
+    field, gradient = table.expressions([length * p for p in position])
+    strength = torque * inertia * length
+    force = [strength * dot(moment, [gradient[i][j] for i in range(3)]) for j in range(3)]
+    turn = [torque * component for component in cross(moment, field)]
+    axial, lateral = _gravity(tilted_gravity)
+    push = [lateral[i] - linear * velocity[i] for i in range(3)]
+    drift = subtract(velocity, turned(position))
+    lag = [spin[0], spin[1], spin[2] - hy.par[Parameter.RATE]]
+    brake = _angular_drag(moment, spin)
+    if conducting:
+        brake = [a + b for a, b in zip(brake, _own_currents(moment, field, lag), strict=True)]
+    jacobi = [
+        0.5 * dot(velocity, velocity),
+        0.5 * inertia * dot(spin, spin),
+        -inertia * torque * dot(moment, field),
+        -axial[2] * position[2],
+        -hy.par[Parameter.RATE] * (cross(position, velocity)[2] + inertia * spin[2]),
+    ]
+    power = dot(push, drift) + inertia * dot(brake, lag)
+    states: list[hy.expression] = []
+    state_rates: Vector = []
+    if memory is not None:
+        states = [hy.expression(name) for name in memory.names]
+        plate = memory_terms(memory, angular_velocity, position, moment, states)
+        force = [a + b for a, b in zip(force, plate.force, strict=True)]
+        turn = [a + b for a, b in zip(turn, plate.torque, strict=True)]
+        state_rates = plate.rates
+        jacobi.append(plate.stored)
+        power = power - plate.spent
+    rates = [
+        *drift,
+        *subtract([force[i] + axial[i] + push[i] for i in range(3)], turned(velocity)),
+        *cross(lag, moment),
+        *subtract([turn[i] + brake[i] for i in range(3)], turned(spin)),
+    ]
+    return Equations([*variables, *states], [*rates, *state_rates], jacobi, power)
+
+
+def _gravity(tilted: bool) -> tuple[Vector, Vector]:
+    """Gravity along the axis and across it, both along the rotor's axes."""
+    zero = hy.expression(0.0)
+    axial = [zero, zero, hy.par[Parameter.GRAVITY_Z]]
+    if not tilted:
+        return axial, [zero, zero, zero]
+    x, y, angle = hy.par[Parameter.GRAVITY_X], hy.par[Parameter.GRAVITY_Y], hy.par[Parameter.RATE] * hy.time
+    return axial, [hy.cos(angle) * x + hy.sin(angle) * y, hy.cos(angle) * y - hy.sin(angle) * x, zero]
+
+
+def _angular_drag(moment: Vector, spin: Vector) -> Vector:
+    tilt, along = hy.par[Parameter.TILT_DRAG], hy.par[Parameter.SPIN_DRAG]
+    excess = (tilt - along) * dot(spin, moment)
+    return [excess * moment[i] - tilt * spin[i] for i in range(3)]
+
+
+def _own_currents(moment: Vector, field: Vector, lag: Vector) -> Vector:
+    """Acceleration of the spin by the floater's own eddy currents; across the moment and along it."""
+    tilt, along = hy.par[Parameter.TILT_EDDY], hy.par[Parameter.SPIN_EDDY]
+    square, turning = dot(field, field), dot(field, lag)
+    torque = [turning * field[i] - square * lag[i] for i in range(3)]
+    excess = (along - tilt) * dot(torque, moment)
+    return [tilt * torque[i] + excess * moment[i] for i in range(3)]

@@ -1,0 +1,97 @@
+"""What ends a flight: contact with a magnet or the plate, and loss.
+
+The distance of the floater's centre from a box is exact, faces, edges and corners.  A Taylor step knows only the part
+of the box that was nearest when it began; a contact that this may miss is found by `clearance` at the samples.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import heyoka as hy
+import numpy as np
+
+from ...geometry.basics import Array, Box
+from ...geometry.scenes import Plate, Scene
+from .state import turned_about_z
+from .symbols import Parameter, Vector
+
+CONTACT, LOST = "contact", "lost"
+
+
+def flight_events(scene: Scene, position: Vector) -> tuple[list[hy.t_event], list[str]]:
+    """Terminal events of the scaled motion, and what each of them means."""
+    length = hy.par[Parameter.LENGTH]
+    metres = [length * p for p in position]
+    gaps = [_excess(magnet.box, metres) for magnet in scene.rotor]
+    if scene.plate is not None:
+        gaps.append(_excess(scene.plate.box, _plate_view(metres)))
+    falling = hy.event_direction.negative
+    events = [hy.t_event(gap / (length * length) - 1.0, direction=falling) for gap in gaps]
+    reach = hy.par[Parameter.LOST_DISTANCE] ** 2.0 - hy.sum([p * p for p in position])
+    return [*events, hy.t_event(reach, direction=falling)], [CONTACT] * len(gaps) + [LOST]
+
+
+def _excess(box: Box, position: Vector) -> hy.expression:
+    """Squared distance of a point outside a box from its surface, m²."""
+    shifted = [position[i] - float(box.center[i]) for i in range(3)]
+    terms = []
+    for axis in range(3):
+        along = hy.sum([float(box.rotation[i, axis]) * shifted[i] for i in range(3) if box.rotation[i, axis]])
+        half = float(box.half_edges[axis])
+        beyond = hy.relu(along - half) + hy.relu(-along - half)
+        terms.append(beyond * beyond)
+    return hy.sum(terms)
+
+
+def _plate_view(position: Vector) -> Vector:
+    """The position along the laboratory's axes, raised by what the plate has gone down, m."""
+    angle = hy.par[Parameter.RATE] * hy.time
+    depth = hy.par[Parameter.LENGTH] * (hy.par[Parameter.PLATE_DEPTH] + hy.par[Parameter.PLATE_SPEED] * hy.time)
+    cosine, sine = hy.cos(angle), hy.sin(angle)
+    x, y, z = position
+    return [cosine * x - sine * y, sine * x + cosine * y, z + depth]
+
+
+def clearance(scene: Scene, time: Array, position: Array) -> Array:
+    """Smallest gap (n,) in m between the floater and any body; `time` (n,) s, `position` (n, 3) m, rotor's frame."""
+    gaps = [magnet.box.distance(position) for magnet in scene.rotor]
+    if scene.plate is not None:
+        seen = turned_about_z(position, scene.angular_velocity * time)
+        seen[:, 2] += plate_depth(scene.plate, time)
+        gaps.append(scene.plate.box.distance(seen))
+    return np.min(gaps, axis=0) - scene.floater.radius if gaps else np.full(len(position), np.inf)
+
+
+def rotor_gap(scene: Scene, position: Array) -> float:
+    """Gap in m between the floater at `position` (3,) m, rotor's frame, and the rotor; negative where they overlap."""
+    return float(clearance(replace(scene, plate=None), np.zeros(1), position[None])[0])
+
+
+def plate_depth(plate: Plate, time: Array) -> Array:
+    """How far the plate has gone down at `time` (n,) s, in m."""
+    return np.array([plate.lowering.depth(float(t)) if plate.lowering else 0.0 for t in time])
+
+
+def plate_legs(plate: Plate | None, duration: float) -> list[tuple[float, float, float]]:
+    """Stretches of steady motion of the plate: end (s), depth at t = 0 if it had always moved so (m), speed (m/s)."""
+    lowering = plate.lowering if plate else None
+    if lowering is None or not lowering.speed:
+        return [(duration, 0.0, 0.0)]
+    finish = lowering.start + lowering.distance / lowering.speed
+    legs = [
+        (lowering.start, 0.0, 0.0),
+        (finish, -lowering.start * lowering.speed, lowering.speed),
+        (duration, lowering.distance, 0.0),
+    ]
+    return [(min(end, duration), depth, speed) for end, depth, speed in legs]
+
+
+def plate_places(scene: Scene, values: Array, times: Array) -> Array:
+    """Runtime parameters (n, p) at scaled times (n,): where the plate is, as if it stood there."""
+    places = np.tile(values, (len(times), 1))
+    places[:, Parameter.PLATE_SPEED] = 0.0
+    if scene.plate is not None:
+        places[:, Parameter.PLATE_DEPTH] = plate_depth(scene.plate, times * values[Parameter.TIME])
+        places[:, Parameter.PLATE_DEPTH] /= values[Parameter.LENGTH]
+    return places

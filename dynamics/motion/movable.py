@@ -1,0 +1,93 @@
+"""A rotor's field with one measure of the rotor as a runtime parameter, so that a map needs one compilation."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Protocol
+
+import heyoka as hy
+import numpy as np
+
+from ...fem.harmonics import FieldExpressions
+from ...fem.rotor_tables import FieldFormula
+from ...geometry.basics import Array, rotation_matrix
+from ...geometry.bodies import Magnet
+from .symbols import Parameter, Vector
+
+
+class Move(Protocol):
+    """How a part of the rotor moves with the measure."""
+
+    def moved(self, magnet: Magnet, measure: float) -> Magnet:
+        """The magnet, from where it is at measure zero."""
+
+    def field(self, source: FieldFormula, position: Vector, measure: hy.expression) -> FieldExpressions:
+        """Field of the moved source."""
+
+
+@dataclass(frozen=True)
+class Shift:
+    """By the measure (m) along a unit vector."""
+
+    way: tuple[float, float, float]
+
+    def way_of(self, measure: float) -> Array:
+        """How far it moves, (3,) m."""
+        return measure * np.array(self.way)
+
+    def moved(self, magnet: Magnet, measure: float) -> Magnet:
+        """The magnet, from where it is at measure zero."""
+        center = magnet.box.center + self.way_of(measure)
+        return replace(magnet, box=replace(magnet.box, center=center))
+
+    def field(self, source: FieldFormula, position: Vector, measure: hy.expression) -> FieldExpressions:
+        """Field of the moved source."""
+        return source.expressions([p - w * measure if w else p for p, w in zip(position, self.way, strict=True)])
+
+
+@dataclass(frozen=True)
+class Turn:
+    """By the measure (rad) about y, so that +x comes towards +z."""
+
+    def moved(self, magnet: Magnet, measure: float) -> Magnet:
+        """The magnet, from where it is at measure zero."""
+        turn, box = rotation_matrix((0.0, -np.degrees(measure), 0.0)), magnet.box
+        return replace(magnet, box=replace(box, center=turn @ box.center, rotation=turn @ box.rotation))
+
+    def field(self, source: FieldFormula, position: Vector, measure: hy.expression) -> FieldExpressions:
+        """Field of the moved source."""
+        cosine, sine = hy.cos(measure), hy.sin(measure)
+        x, y, z = position
+        field, slope = source.expressions([cosine * x + sine * z, y, cosine * z - sine * x])
+
+        def back(vector: Vector) -> list[hy.expression]:
+            return [cosine * vector[0] - sine * vector[2], vector[1], sine * vector[0] + cosine * vector[2]]
+
+        half = [back(row) for row in slope]
+        columns = [back([half[i][j] for i in range(3)]) for j in range(3)]
+        return back(field), [[columns[j][i] for j in range(3)] for i in range(3)]
+
+
+@dataclass(frozen=True, eq=False)
+class MovableField:
+    """The sum of fields of which each moves in its own way.
+
+    Parameters
+    ----------
+    parts : fields as they are at measure zero, and how each moves; None for one that stands still
+    """
+
+    parts: tuple[tuple[FieldFormula, Move | None], ...]
+
+    def expressions(self, position: Sequence[hy.expression]) -> FieldExpressions:
+        """B and its gradient as expressions of a position (m, rotor's frame) and of `Parameter.MEASURE`."""
+        measure = hy.par[Parameter.MEASURE]
+        found = [
+            move.field(source, position, measure) if move else source.expressions(position)
+            for source, move in self.parts
+        ]
+        return (
+            [hy.sum([b[i] for b, _ in found]) for i in range(3)],
+            [[hy.sum([g[i][j] for _, g in found]) for j in range(3)] for i in range(3)],
+        )

@@ -1,0 +1,149 @@
+"""Balance of forces and torques on a floater at rest in the frame that turns with the rotor.
+
+Unknown are the position and the direction of the moment.  At rest the velocity is W × r and the spin is
+Ω = W ẑ + (s - cos θ) W m̂, which turns with the frame and has the component s W along the moment: L = IΩ is that of
+a synchronous floater with body spin s.  What remains to vanish are three forces and the two torques across the moment.
+The torque of drag along the moment is left out: it moves s, slowly; s is what the caller fixes.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...geometry.basics import Array
+from ..motion import Parameter, Rates
+
+Indices = NDArray[np.intp]
+LATERAL: Indices = np.array([0, 1, 3, 4])
+"""The four balances but the axial force, and the four unknowns but the height."""
+EVERY: Indices = np.arange(5)
+AXIAL = 2
+
+
+@dataclass(frozen=True, eq=False)
+class Balance:
+    """Five balances as functions of five unknowns, all in scaled units, at many points in one call.
+
+    Parameters
+    ----------
+    rates : compiled rates and their derivatives
+    values : their parameters, with the drag along the moment left out: (p,), or (n, p) where every point has its own
+    spin : body spin s = Ω·m̂/ω
+    """
+
+    rates: Rates
+    values: Array
+    spin: float
+
+    @property
+    def rate(self) -> Array:
+        """The rotor's rate, (1,) or (n, 1)."""
+        return np.asarray(self.values[..., [Parameter.RATE]])
+
+    def at(self, rows: NDArray[Any]) -> Balance:
+        """The balance of some of the points only."""
+        return self if self.values.ndim == 1 else replace(self, values=self.values[rows])
+
+    def states(self, position: Array, moment: Array) -> Array:
+        """States (n, 12) at rest in the rotor's frame at positions and moments (n, 3)."""
+        rate = self.rate
+        velocity = rate * np.stack([-position[:, 1], position[:, 0], 0 * position[:, 0]], axis=1)
+        spin = rate * ((self.spin - moment[:, 2:]) * moment + np.array([0.0, 0.0, 1.0]))
+        return np.concatenate([position, velocity, moment, spin], axis=1)
+
+    def __call__(self, position: Array, moment: Array) -> tuple[Array, Array]:
+        """Balances (n, 5): force x, y, z and torque along two tangents; and their derivatives (n, 5, 5).
+
+        The derivatives are by x, y, z and by tilts of the moment along the same two tangents.
+        """
+        rates, slopes = self.rates(self.states(position, moment), self.values)
+        tangents = tangent_basis(moment)
+        along = self._directions(moment, tangents)
+        changes = slopes @ along
+        torque, torque_change = rates[:, 9:], changes[:, 9:]
+        balance = np.concatenate([rates[:, 3:6], np.einsum("nka,na->nk", tangents, torque)], axis=1)
+        slope = np.concatenate([changes[:, 3:6], tangents @ torque_change], axis=1)
+        held = np.einsum("na,na->n", moment, torque)
+        slope[:, 3, 3] -= held  # the tangents turn with the moment
+        slope[:, 4, 4] -= held
+        return balance, slope
+
+    def _directions(self, moment: Array, tangents: Array) -> Array:
+        """Change of the state (n, 12, 5) by each unknown."""
+        rate = self.rate
+        change = np.zeros((len(moment), 12, 5))
+        change[:, [0, 1, 2], [0, 1, 2]] = 1.0
+        change[:, 4, 0], change[:, 3, 1] = rate[..., 0], -rate[..., 0]
+        change[:, 6:9, 3:] = np.swapaxes(tangents, 1, 2)
+        for k in range(2):
+            tilt = tangents[:, k]
+            change[:, 9:, 3 + k] = rate * ((self.spin - moment[:, 2:]) * tilt - tilt[:, 2:] * moment)
+        return change
+
+
+def tangent_basis(moment: Array) -> Array:
+    """Two unit vectors (n, 2, 3) across each unit vector (n, 3), without a singular direction.
+
+    T. Duff et al., J. Comput. Graph. Tech. 6 (2017) 1.
+    """
+    x, y, z = moment.T
+    sign = np.copysign(1.0, z)
+    a = -1.0 / (sign + z)
+    basis = np.empty((len(moment), 2, 3))
+    basis[:, 0, 0], basis[:, 0, 1], basis[:, 0, 2] = 1 + sign * x * x * a, sign * x * y * a, -sign * x
+    basis[:, 1, 0], basis[:, 1, 1], basis[:, 1, 2] = x * y * a, sign + y * y * a, -y
+    return basis
+
+
+def moved(position: Array, moment: Array, step: Array) -> tuple[Array, Array]:
+    """Positions and moments (n, 3) after a step (n, 5) of the unknowns; the moments stay unit vectors."""
+    moment = moment + np.einsum("nk,nka->na", step[:, 3:], tangent_basis(moment))
+    return position + step[:, :3], moment / np.linalg.norm(moment, axis=1, keepdims=True)
+
+
+def solve(
+    balance: Balance, position: Array, moment: Array, free: Indices, iterations: int = 60, reach: float = 0.3
+) -> tuple[Array, Array, Array]:
+    """Newton's method from many starts at once.
+
+    Parameters
+    ----------
+    balance : what shall vanish
+    position, moment : starts (n, 3)
+    free : which unknowns move and which balances count, e.g. `LATERAL` to keep the height
+    iterations : at most
+    reach : longest step of the position (floater radii) and of the moment (rad)
+
+    Returns
+    -------
+    position, moment : (n, 3)
+    step : (n,) length of the last step: an estimate of the error before it was made; infinite where it failed
+    """
+    position, moment = position.copy(), moment.copy()
+    length = np.full(len(position), np.inf)
+    active = np.arange(len(position))
+    for _ in range(iterations):
+        value, slope = balance.at(active)(position[active], moment[active])
+        step = np.zeros((len(active), 5))
+        good = np.isfinite(slope).all(axis=(1, 2))
+        step[np.ix_(good, free)] = -_divided(slope[good][:, free[:, None], free], value[good][:, free])
+        size = np.maximum(np.linalg.norm(step[:, :3], axis=1), np.linalg.norm(step[:, 3:], axis=1))
+        step *= np.minimum(1.0, reach / np.maximum(size, reach))[:, None]
+        position[active], moment[active] = moved(position[active], moment[active], step)
+        done = ~good | (size < 1e-11)
+        length[active] = np.where(good, size, np.inf)
+        active = active[~done]
+        if not len(active):
+            break
+    return position, moment, length
+
+
+def _divided(matrix: Array, vector: Array) -> Array:
+    try:
+        return np.asarray(np.linalg.solve(matrix, vector[..., None])[..., 0])
+    except np.linalg.LinAlgError:  # one of them is singular to the last bit
+        return np.asarray((np.linalg.pinv(matrix) @ vector[..., None])[..., 0])

@@ -1,0 +1,174 @@
+"""Periodic motion in the rotor's frame, where a plate or tilted gravity shakes the floater once a turn.
+
+The floater's state at N equidistant instants of a turn is unknown; derivatives are those of the trigonometric
+interpolation, so that the error falls geometrically with N.  The plate's states are eliminated exactly: at the
+multiple h of the rotor's frequency p̃ = λ/(λ + ih) s̃.  Newton's method with exact derivatives (harmonic balance in the
+time domain: J. P. Boyd, Chebyshev and Fourier Spectral Methods, 2001, ch. 6 and 15).
+
+The equations keep |m̂| and the body spin s = Ω·m̂/ω; both are prescribed beside them.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...geometry.basics import Array
+from ..motion import Parameter, PlateForce, Rates, turned_about_z
+
+FEWEST, MOST = 9, 65
+"""Instants in a turn, odd."""
+TAIL = 1e-10
+"""Size of the highest harmonics, in floater radii and rad, below which there are enough instants."""
+CONVERGED, LONGEST_STEP = 1e-11, 0.3
+
+
+@dataclass(frozen=True, eq=False)
+class Orbit:
+    """One turn of a periodic motion, scaled, along the rotor's axes.
+
+    Parameters
+    ----------
+    states : (n, 12) of the floater at n equidistant instants, the first at t = 0
+    plate : (n, k) states of the plate
+    derivatives : (n, 12 + k, 12 + k) of all rates by all states
+    error : estimate, from the highest harmonics and the last step of Newton's method
+    """
+
+    states: Array
+    plate: Array
+    derivatives: Array
+    error: float
+
+    @property
+    def mean(self) -> Array:
+        """(12,) mean state; its moment is made a unit vector again."""
+        state = self.states.mean(axis=0)
+        state[6:9] /= np.linalg.norm(state[6:9])
+        return np.asarray(state)
+
+
+def periodic_orbit(rates: Rates, values: Array, spin: float, plate: PlateForce | None, guess: Array) -> Orbit | None:
+    """The orbit near a state (12,) or a turn (n, 12) of states; None where Newton's method does not find one.
+
+    Parameters
+    ----------
+    rates : compiled equations of the rotor's field
+    values : their parameters, with the drag along the moment left out; gravity may have any direction
+    spin : body spin s
+    plate : its currents, if they are modelled
+    """
+    count = FEWEST
+    states = np.broadcast_to(guess, (count, 12)) if guess.ndim == 1 else resampled(guess, count)
+    while True:
+        found = _newton(rates, values, spin, plate, states)
+        if found is None or found.error < TAIL or count >= MOST:
+            return found
+        count = 2 * count - 1
+        states = resampled(found.states, count)
+
+
+def _newton(rates: Rates, values: Array, spin: float, plate: PlateForce | None, states: Array) -> Orbit | None:
+    problem = OrbitProblem(rates, values, plate, len(states))
+    states, size = states.copy(), np.inf
+    for _ in range(25):
+        residual, slope = problem(states)
+        rows, aims = kept(states, spin * abs(values[Parameter.RATE]))
+        if not np.isfinite(slope).all():
+            return None
+        matrix, target = np.vstack([slope, rows]), -np.append(residual, aims)
+        step = np.linalg.lstsq(matrix, target, rcond=1e-14)[0].reshape(states.shape)
+        size = float(np.abs(step).max())
+        states = states + step * min(1.0, LONGEST_STEP / size)
+        if size < CONVERGED:
+            break
+    else:
+        return None
+    spectrum = np.abs(np.fft.rfft(states, axis=0)) / len(states)
+    tail = float(spectrum[-2:].max()) if plate or np.any(values[Parameter.GRAVITY_X : Parameter.GRAVITY_Z]) else 0.0
+    return Orbit(states, *problem.whole(states), max(size, tail))
+
+
+def kept(states: Array, spin: float) -> tuple[Array, Array]:
+    """Derivatives (2, 12 n) and values (2,) of |m̂|²/2 - 1/2 and Ω·m̂ - s at the first instant."""
+    moment, turning = states[0, 6:9], states[0, 9:]
+    rows = np.zeros((2, states.size))
+    rows[0, 6:9], rows[1, 6:9], rows[1, 9:12] = moment, turning, moment
+    return rows, np.array([(moment @ moment - 1) / 2, turning @ moment - spin])
+
+
+@dataclass(frozen=True, eq=False)
+class OrbitProblem:
+    """Equations of an orbit at `count` instants of a turn."""
+
+    rates: Rates
+    values: Array
+    plate: PlateForce | None
+    count: int
+
+    @property
+    def times(self) -> Array:
+        """(n,) scaled."""
+        return 2 * np.pi * np.arange(self.count) / self.count
+
+    def __call__(self, states: Array) -> tuple[Array, Array]:
+        """What shall vanish (12 n,), and its derivatives (12 n, 12 n)."""
+        n, change = self.count, differentiation(self.count)
+        rates, slopes = self._floater(states)
+        residual = change @ states - rates
+        slope = np.einsum("ab,xy->axby", change, np.eye(12))
+        slope[np.arange(n), :, np.arange(n)] -= slopes
+        if self.plate is not None:
+            heard, memory = self.plate(self.times, states), self.plate.remembered(n)
+            currents = np.einsum("iab,bi->ai", memory, heard.signals) - heard.signals
+            residual[:, ACCELERATED] -= np.einsum("aix,ai->ax", heard.fields, currents)
+            pull = np.einsum("akyx,ak->axy", heard.pull, self.plate.strengths(currents))
+            slope[np.arange(n)[:, None], ACCELERATED, np.arange(n)[:, None]] -= pull
+            answer = memory - np.eye(n)
+            slope[:, ACCELERATED] -= np.einsum("aix,iab,biy->axby", heard.fields, answer, heard.by_state, optimize=True)
+        return residual.ravel(), slope.reshape(12 * n, 12 * n)
+
+    def whole(self, states: Array) -> tuple[Array, Array]:
+        """States of the plate (n, k), and derivatives of all rates by all states (n, 12 + k, 12 + k)."""
+        slopes = self._floater(states)[1]
+        if self.plate is None:
+            return np.zeros((self.count, 0)), slopes
+        heard, decay = self.plate(self.times, states), self.plate.rates
+        memory = np.einsum("iab,bi->ai", self.plate.remembered(self.count), heard.signals)
+        size = 12 + len(decay)
+        full = np.zeros((self.count, size, size))
+        full[:, :12, :12] = slopes
+        strengths = self.plate.strengths(memory - heard.signals)
+        full[:, ACCELERATED, :12] += np.einsum("akyx,ak->axy", heard.pull, strengths)
+        full[:, ACCELERATED, :12] -= np.einsum("aix,aiy->axy", heard.fields, heard.by_state)
+        full[:, ACCELERATED, 12:] = heard.fields.swapaxes(1, 2)
+        full[:, 12:, :12] = decay[:, None] * heard.by_state
+        full[:, 12:, 12:] = -np.diag(decay)
+        return memory, full
+
+    def _floater(self, states: Array) -> tuple[Array, Array]:
+        rates, slopes = self.rates(states, self.values)
+        gravity = np.append(self.values[Parameter.GRAVITY_X : Parameter.GRAVITY_Z], 0.0)
+        rates[:, 3:6] += turned_about_z(gravity[None], -self.values[Parameter.RATE] * self.times)
+        return rates, slopes
+
+
+ACCELERATED = np.array([3, 4, 5, 9, 10, 11])
+"""Places of velocity and spin in the state."""
+
+
+def differentiation(count: int) -> Array:
+    """(n, n) derivative of the trigonometric interpolation at an odd number of equidistant instants of 2π."""
+    order = np.arange(count)
+    gap = order[:, None] - order
+    with np.errstate(divide="ignore"):
+        matrix = 0.5 * (-1.0) ** gap / np.sin(np.pi * gap / count)
+    np.fill_diagonal(matrix, 0.0)
+    return np.asarray(matrix)
+
+
+def resampled(samples: Array, count: int) -> Array:
+    """Trigonometric interpolation (count, ...) of samples (n, ...) at equidistant instants, both numbers odd."""
+    spectrum = np.fft.rfft(samples, axis=0)[: count // 2 + 1] * (count / len(samples))
+    return np.fft.irfft(spectrum, count, axis=0)

@@ -1,0 +1,57 @@
+"""Eddy currents of a conducting sphere, in closed form: the floater's own.
+
+In a uniform field B e^{iωt} a non-magnetic sphere takes the moment (W. R. Smythe, Static and Dynamic Electricity,
+3rd ed., section 10.06; L. D. Landau, E. M. Lifshitz, Electrodynamics of Continuous Media, section 59)
+
+    m = α B,    α = -(2πR³/μ0) [1 - 3 coth(x)/x + 3/x²],    x² = iωμ0σR²,
+
+and where skin depth is large against R: α = -iω (2π/15) σ R⁵.  In a field of size B⊥ that turns at ω across its axis
+it feels the torque -Im α B⊥² along the turn, and loses the power ω times that.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ...geometry.basics import MU_0, Array
+from .phasor import ComplexArray
+
+SERIES = 0.02
+"""|x²| below which four terms of the series are used: there they and the closed form are both good to 3e-11."""
+COEFFICIENTS = (1 / 15, -2 / 315, 1 / 1575, -2 / 31185)
+
+
+def polarizability(radius: float, conductivity: float, frequency: ArrayLike) -> ComplexArray:
+    """α (...,), A m²/T, of a sphere (m, S/m) at frequencies (Hz) of either sign; 0 at 0 Hz.
+
+    Raises
+    ------
+    ValueError : radius or conductivity not positive
+    """
+    for name, value in (("radius_m", radius), ("conductivity_S_m", conductivity)):
+        if not (np.isfinite(value) and value > 0):
+            raise ValueError(f"Input {name} must be positive; instead received {value!r}.")
+    square = 2j * np.pi * np.asarray(frequency, float) * MU_0 * conductivity * radius**2
+    small = np.abs(square) < SERIES
+    x = np.sqrt(np.where(small, 1.0, square))
+    closed = 1 - 3 / (x * np.tanh(x)) + 3 / x**2
+    series = sum(c * square ** (n + 1) for n, c in enumerate(COEFFICIENTS))
+    return np.asarray(-2 * np.pi * radius**3 / MU_0 * np.where(small, series, closed))
+
+
+def rotating_torque(radius: float, conductivity: float, frequency: ArrayLike, flux_density: ArrayLike) -> Array:
+    """Torque (...,), N m, along the turn of a field of size B⊥ (T) at frequencies (Hz) relative to the sphere.
+
+    Exact for a uniform field; (2π/15) σ ω B⊥² R⁵ where the skin depth is large.  The loss in the sphere is ω times it.
+    """
+    return np.asarray(-polarizability(radius, conductivity, frequency).imag * np.asarray(flux_density, float) ** 2)
+
+
+def thin_field_torque(radius: float, conductivity: float) -> float:
+    """(2π/15) σ R⁵, N m s/T²: the torque per B⊥² and relative angular velocity, where the skin depth is large.
+
+    As a vector the torque is this times B × (Ω × B), with Ω the field's angular velocity relative to the sphere.  Its
+    relative error is (ωμ0σR²)²/105: for a floater of NdFeB with R = 6.35 mm 4e-6 at 100 Hz.
+    """
+    return 2 * np.pi / 15 * conductivity * radius**5

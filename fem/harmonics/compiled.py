@@ -1,0 +1,50 @@
+"""Field expressions compiled to machine code, evaluated at many points in one call."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import heyoka as hy
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ...geometry.basics import Array
+
+FieldExpressions = tuple[list[hy.expression], list[list[hy.expression]]]
+"""B_i (T) and ∂B_i/∂x_j (T/m), the latter symmetric."""
+
+
+class CompiledField:
+    """B and its gradient at points.
+
+    The compiler may contract and reorder sums, which makes long expansions twice as fast and moves closed forms by no
+    more than their own round-off, 5e-14 of B. An integrator compiles the same expressions without that.
+
+    Parameters
+    ----------
+    build : takes three heyoka expressions (position, m) and returns `FieldExpressions`
+    """
+
+    def __init__(self, build: Callable[[Sequence[hy.expression]], FieldExpressions]) -> None:
+        variables = hy.make_vars("x", "y", "z")
+        field, gradient = build(variables)
+        symmetric = [gradient[min(i, j)][max(i, j)] for i in range(3) for j in range(3)]
+        self._function = hy.cfunc([*field, *symmetric], variables, fast_math=True)
+
+    def rows(self, columns: Array) -> Array:
+        """The three components of B (T) and the nine of its gradient (T/m): (12, n) at `columns` (3, n), m."""
+        return np.asarray(self._function(columns))
+
+    def __call__(self, points: ArrayLike) -> tuple[Array, Array]:
+        """B (n, 3) in T and ∂B_i/∂x_j (n, 3, 3) in T/m at `points` (n, 3), m."""
+        return unpacked(self.rows(as_columns(points)))
+
+
+def as_columns(points: ArrayLike) -> Array:
+    """Points (n, 3) as contiguous (3, n)."""
+    return np.ascontiguousarray(np.asarray(points, float).reshape(-1, 3).T)
+
+
+def unpacked(rows: Array) -> tuple[Array, Array]:
+    """B (n, 3) and its gradient (n, 3, 3) as views of (12, n)."""
+    return rows[:3].T, np.moveaxis(rows[3:].reshape(3, 3, -1), -1, 0)

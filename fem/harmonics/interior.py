@@ -1,0 +1,127 @@
+"""A field without sources in a sphere: its expansion about the centre, and what it does to the sphere's sources.
+
+With the harmonics of `harmonics`, lengths in radii of the sphere, r̃ = (r - center)/radius, and B = -∇̃ u, the incident
+potential is u = Σ conj a_lm Υ_lm(r̃) and that of the sphere's own sources u = Σ c_lm Θ_lm(r̃). Their energy is
+
+    U = (4π radius³/μ0) Σ_lm a_lm c_lm,        F = -∇U with the sources carried along,
+
+because 1/|r - s| = Σ conj Υ_lm(r) Θ_lm(s) makes a charge's c_lm = conj Υ_lm its weight in U.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.special import gammaln
+
+from ...geometry.basics import MU_0, Array
+from .solid import CHUNK, Coefficients, irregular_values, regular
+
+FOUR_PI = 4 * np.pi
+
+
+@dataclass(frozen=True, eq=False)
+class Ball:
+    """The sphere about which fields are expanded: centre (3,) m and radius m."""
+
+    center: Array
+    radius: float
+
+
+def factorials(degree: int) -> Array:
+    """(l-m)! (l+m)! as [l, m], 1 for m > l: Θ_lm over Υ_lm on the unit sphere. Finite up to degree 85."""
+    l, m = np.indices((degree + 1, degree + 1))
+    return np.where(m <= l, np.exp(gammaln(np.maximum(l - m, 0) + 1) + gammaln(l + m + 1)), 1.0)
+
+
+def projected(field: Callable[[Array], Array], ball: Ball, degree: int) -> Coefficients:
+    """Coefficients a_lm (T) of a field given as a function, points (n, 3) m -> B (n, 3) T, without sources in the ball.
+
+    By the normal component on the surface. Aliasing is a part ρ^(degree + 10) of the field, ρ the radius over the
+    distance of the centre from the nearest singularity.
+    """
+    nodes = degree + 6
+    height, weights = np.polynomial.legendre.leggauss(nodes)
+    angle = np.pi * np.arange(2 * nodes) / nodes
+    across = np.sqrt(1 - height**2)[:, None]
+    grid = np.broadcast_arrays(across * np.cos(angle), across * np.sin(angle), height[:, None])
+    normals = np.stack(grid, axis=-1).reshape(-1, 3)
+    radial = np.sum(field(ball.center + ball.radius * normals) * normals, axis=1)
+    radial *= np.repeat(weights * np.pi / nodes, 2 * nodes)
+    result = np.zeros((degree + 1, degree + 1), complex)
+    for (l, m), values in regular(degree, *normals.T).items():
+        if l:
+            result[l, m] = -(2 * l + 1) / (FOUR_PI * l) * (values @ radial)
+    return np.asarray(factorials(degree) * result, complex)
+
+
+def from_magnetization(points: Array, moments: Array, ball: Ball, degree: int) -> Coefficients:
+    """Coefficients a_lm (T) of dipoles outside the ball: positions (n, 3) m and μ0 M dV (n, 3) T m³.
+
+    a_lm = (4π radius³)⁻¹ Σ μ0 M dV · ∇̃Θ_lm, exact for these dipoles.
+    """
+    size = degree + 2
+    degrees, orders = np.tril_indices(size)
+    sums = np.zeros((3, size, size), complex)
+    for start in range(0, len(points), CHUNK):
+        chosen = slice(start, start + CHUNK)
+        harmonics = irregular_values(degree + 1, (points[chosen] - ball.center) / ball.radius)
+        values = np.array([harmonics[int(l), int(m)] for l, m in zip(degrees, orders, strict=True)])
+        sums[:, degrees, orders] += (values.real @ moments[chosen] + 1j * (values.imag @ moments[chosen])).T
+    minus = np.concatenate([-np.conj(sums[:, 1:, 1:2]), sums[:, 1:, :-2]], axis=2)
+    plus = sums[:, 1:, 1:]
+    x, y, z = (plus[0] - minus[0]) / 2, (plus[1] + minus[1]) / 2j, -sums[2, 1:, :-1]
+    total = np.tril(x + y + z)
+    total[0] = 0.0  # a constant potential
+    return np.asarray(total / (FOUR_PI * ball.radius**3))
+
+
+def field_at_center(incident: Coefficients) -> Array:
+    """B (3,) T at the centre."""
+    return np.array([incident[1, 1].real, incident[1, 1].imag, -incident[1, 0].real])
+
+
+def gradient_coefficients(incident: Coefficients, axis: int) -> Coefficients:
+    """a_lm of ∂u/∂x̃_axis of u = Σ conj a_lm Υ_lm: one degree less."""
+    above = incident[1:]
+    size = len(above)
+    lower = np.hstack([-np.conj(above[:, 1:2]), above[:, : size - 1]])  # m - 1
+    upper = above[:, 1 : size + 1]  # m + 1
+    return np.asarray(((lower - upper) / 2, 0.5j * (lower + upper), above[:, :size])[axis])
+
+
+def force(incident: Coefficients, sources: Coefficients, ball: Ball) -> Array:
+    """Force (3,) N of the incident field a_lm on the sources c_lm (T) in the ball; exact."""
+    factor = -FOUR_PI * ball.radius**2 / MU_0
+    return np.array([factor * _product(gradient_coefficients(incident, axis), sources) for axis in range(3)])
+
+
+def torque(incident: Coefficients, sources: Coefficients, ball: Ball) -> Array:
+    """Torque (3,) N m about the centre on sources in the ball whose degrees above 1 answer to the incident field alone.
+
+    m × B at the centre: a multipole -t_l conj a_lm induced in a sphere feels no torque from the field that induces it.
+    """
+    return np.cross(moment(sources, ball), field_at_center(incident))
+
+
+def moment(sources: Coefficients, ball: Ball) -> Array:
+    """Dipole moment (3,) A m² of sources c_lm (T)."""
+    c = sources[1]
+    return FOUR_PI * ball.radius**3 / MU_0 * np.array([-2 * c[1].real, 2 * c[1].imag, c[0].real])
+
+
+def dipole_sources(moment: Array, ball: Ball, degree: int) -> Coefficients:
+    """Coefficients c_lm (T) of a dipole moment (3,) A m² at the centre."""
+    result = np.zeros((degree + 1, degree + 1), complex)
+    x, y, z = moment * MU_0 / (FOUR_PI * ball.radius**3)
+    result[1, :2] = z, (-x + 1j * y) / 2
+    return result
+
+
+def _product(incident: Coefficients, sources: Coefficients) -> float:
+    """Σ_lm a_lm c_lm over positive and negative m."""
+    size = min(len(incident), len(sources))
+    products = np.real(incident[:size, :size] * sources[:size, :size])
+    return float(2 * products.sum() - products[:, 0].sum())

@@ -1,0 +1,153 @@
+"""Solid harmonics and what derivatives do to their coefficients.
+
+Normalisation of W. Dehnen, Comput. Astrophys. Cosmol. 1 (2014) 1: with the regular harmonics Υ_lm and the
+irregular ones Θ_lm,
+
+    1/|r - s| = Σ_lm conj Υ_lm(s) Θ_lm(r),    ∂_z Θ_lm = -Θ_(l+1)m,   (∂_x ± i ∂_y) Θ_lm = ±Θ_(l+1)(m±1),
+    ∂_z Υ_lm = Υ_(l-1)m,   (∂_x ± i ∂_y) Υ_lm = ±Υ_(l-1)(m±1),        Θ_l(-m) = (-1)^m conj Θ_lm.
+
+A real harmonic function outside a sphere is Σ_lm c_lm Θ_lm with c_l(-m) = (-1)^m conj c_lm; only m ≥ 0 is kept.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import gammaln
+
+from ...geometry.basics import Array
+
+Coefficients = NDArray[np.complex128]
+"""c[l, m] for 0 ≤ m ≤ l, as a square array."""
+
+
+CHUNK = 4096
+"""Points at once, so that the harmonics of all degrees fit in memory."""
+
+
+def regular(degree: int, x: Array, y: Array, z: Array) -> dict[tuple[int, int], Any]:
+    """Complex regular harmonics Υ_lm, 0 ≤ m ≤ l ≤ degree, at NumPy arrays x, y, z."""
+    found: dict[tuple[int, int], Any] = {(0, 0): np.ones_like(x) + 0j}
+    square = x * x + y * y + z * z
+    for m in range(degree + 1):
+        if m:
+            found[m, m] = -(x + 1j * y) / (2 * m) * found[m - 1, m - 1]
+        for l in range(m + 1, degree + 1):
+            upper = (2 * l - 1) * z * found[l - 1, m]
+            if l - 2 >= m:
+                upper = upper - square * found[l - 2, m]
+            found[l, m] = upper / ((l + m) * (l - m))
+    return found
+
+
+def weighted_sums(harmonics: dict[tuple[int, int], Any], weights: Array, degree: int) -> Coefficients:
+    """Σ_n weight_n Υ_lm(r_n), [l, m], from a dictionary made by `regular`."""
+    result = np.zeros((degree + 1, degree + 1), complex)
+    for (l, m), values in harmonics.items():
+        result[l, m] = values @ weights
+    return result
+
+
+def regular_derivative(sums: Coefficients, axis: int) -> Coefficients:
+    """[l, m] of a real linear functional of ∂Υ_lm/∂x_axis, from its values on Υ_lm itself (m ≥ 0)."""
+    size = len(sums)
+    full = np.zeros((size, 2 * size + 3), complex)  # column m + size + 1, with room for m ± 1
+    zero, orders = size + 1, np.arange(size)
+    full[:, zero + orders] = sums
+    full[:, zero - orders] = (-1.0) ** orders * np.conj(sums)
+    below = np.vstack([np.zeros((1, full.shape[1])), full[:-1]])
+    plus, minus = below[:, zero + orders + 1], -below[:, zero + orders - 1]
+    return np.asarray(((plus + minus) / 2, (plus - minus) / 2j, below[:, zero + orders])[axis])
+
+
+def irregular_values(degree: int, points: Array) -> dict[tuple[int, int], Any]:
+    """Θ_lm, 0 ≤ m ≤ l ≤ degree, at NumPy points (n, 3), by Θ_lm(r) = (l-m)! (l+m)! Υ_lm(r/r²)/r."""
+    square = np.sum(points**2, axis=1)
+    found = regular(degree, *(points / square[:, None]).T)
+    distance = np.sqrt(square)
+    return {(l, m): np.exp(gammaln(l - m + 1) + gammaln(l + m + 1)) / distance * v for (l, m), v in found.items()}
+
+
+def irregular_gradient(harmonics: dict[tuple[int, int], Any], l: int, m: int) -> list[Any]:
+    """Gradient (three complex arrays) of Θ_lm, from a dictionary made by `irregular_values` up to l + 1 (m ≥ 0)."""
+    plus = harmonics[l + 1, m + 1]
+    minus = harmonics[l + 1, m - 1] if m else -np.conj(harmonics[l + 1, 1])
+    return [(plus - minus) / 2, (plus + minus) / 2j, -harmonics[l + 1, m]]
+
+
+def regular_gradient(harmonics: dict[tuple[int, int], Any], l: int, m: int) -> list[Any]:
+    """Gradient (three complex arrays) of Υ_lm, from a dictionary made by `regular` (m ≥ 0)."""
+
+    def at(n: int, k: int) -> Any:
+        if n < 0 or abs(k) > n:
+            return 0.0
+        return harmonics[n, k] if k >= 0 else (-1) ** k * np.conj(harmonics[n, -k])
+
+    plus, minus = at(l - 1, m + 1), -at(l - 1, m - 1)
+    return [(plus + minus) / 2, (plus - minus) / 2j, at(l - 1, m)]
+
+
+def outer_sums(coefficients: Sequence[Coefficients], points: Array) -> Array:
+    """Σ c_lm Θ_lm (n, k) at points (n, 3), for k arrays c of one size."""
+    stacked = np.stack(coefficients, axis=-1)
+    used = np.nonzero(stacked.any(axis=2))
+    weights = np.where(used[1] == 0, 1.0, 2.0)[:, None] * stacked[used]
+    result = np.zeros((len(points), stacked.shape[2]))
+    for start in range(0, len(points), CHUNK):
+        block = points[start : start + CHUNK]
+        harmonics = irregular_values(len(stacked) - 1, block)
+        values = np.array([harmonics[key] for key in zip(*used, strict=True)]).reshape(-1, len(block))
+        result[start : start + CHUNK] = np.real(values.T @ weights)
+    return result
+
+
+def derivative(coefficients: Coefficients, axis: int) -> Coefficients:
+    """Coefficients of ∂f/∂x_axis of f = Σ c_lm Θ_lm: one degree more."""
+    size = coefficients.shape[0]
+    full = np.zeros((size, 2 * size + 3), complex)  # column m + size + 1, with room for m ± 1
+    zero = size + 1
+    for m in range(size):
+        full[:, zero + m] = coefficients[:, m]
+        if m:
+            full[:, zero - m] = (-1) ** m * np.conj(coefficients[:, m])
+    result = np.zeros((size + 1, size + 1), complex)
+    orders = np.arange(size + 1)
+    lower, upper = full[:, zero + orders - 1], full[:, zero + orders + 1]
+    if axis == 0:
+        result[1:] = (lower - upper) / 2
+    elif axis == 1:
+        result[1:] = (lower + upper) / 2j
+    else:
+        result[1:, :size] = -coefficients
+    return result
+
+
+def real_terms(coefficients: Coefficients) -> dict[Any, float]:
+    """The same function as a sum over real harmonics: {(l, m, part): weight}, zero weights left out."""
+    terms: dict[Any, float] = {}
+    for l, m in zip(*np.nonzero(coefficients), strict=True):
+        c, factor = coefficients[l, m], 1.0 if m == 0 else 2.0
+        if c.real:
+            terms[int(l), int(m), "re"] = factor * float(c.real)
+        if c.imag and m:
+            terms[int(l), int(m), "im"] = -factor * float(c.imag)
+    return terms
+
+
+def field_sizes(degree: int) -> Array:
+    """Root mean square of |grad Re Θ_lm| (or Im) over the unit sphere, [l, m], times √2 for m > 0; 0 for m > l.
+
+    The mean of |Θ_lm|² is (l-m)!(l+m)!/(2l+1), and that of |grad f|² is (l+1)(2l+1) times the mean of f² for a
+    harmonic f of degree l. The size of Σ c_lm Θ_lm is the root of Σ |c_lm|² size_lm².
+    """
+    l, m = np.meshgrid(np.arange(degree + 1), np.arange(degree + 1), indexing="ij")
+    logarithm = gammaln(np.maximum(l - m, 0) + 1) + gammaln(l + m + 1)
+    return np.where(m <= l, np.sqrt(np.where(m == 0, 1.0, 2.0) * (l + 1.0) * np.exp(logarithm)), 0.0)
+
+
+def field_spectrum(coefficients: Coefficients) -> Array:
+    """Root mean square of |grad f| over the unit sphere, by degree: (L+1,)."""
+    return np.asarray(np.linalg.norm(np.abs(coefficients) * field_sizes(len(coefficients) - 1), axis=1))

@@ -1,0 +1,107 @@
+"""Expansions shortened to the coefficients that matter."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from ...geometry.basics import Array
+from .multipole import MultipoleExpansion
+from .solid import irregular_gradient, irregular_values
+
+Part = tuple[int, int, int, complex]
+"""Number of the expansion, l, m, and the real or imaginary part of the coefficient."""
+MOST = 300
+"""Coefficients up to which a fit is worth its time."""
+ROUNDS = 6
+"""Of reweighting in a fit."""
+
+
+def trimmed(
+    expansions: Sequence[MultipoleExpansion], points: Array, allowed: Array
+) -> tuple[list[MultipoleExpansion], list[MultipoleExpansion]]:
+    """The coefficients that matter, and what they leave out: at most `allowed` (n,) T at points (n, 3) m.
+
+    The smallest ones are left out first. Those that stay are fitted to the whole field (weighted least squares), and
+    stand in for what is missing: little more than half as many do then. Dipole moments stay as they are.
+    """
+    parts = [
+        (k, int(l), int(m), part)
+        for k, expansion in enumerate(expansions)
+        for l, m in zip(*np.nonzero(expansion.coefficients), strict=True)
+        for part in (expansion.coefficients[l, m].real, 1j * expansion.coefficients[l, m].imag)
+        if part
+    ]
+    if not parts:
+        return list(expansions), [_with(e, [], 0) for e in expansions]
+    fields = np.concatenate([_fields(e, [p for p in parts if p[0] == k], points) for k, e in enumerate(expansions)])
+    fields /= allowed[:, None]
+    dipoles = [part for part in parts if part[1] == 1]
+    if np.linalg.norm(fields.sum(axis=0), axis=1).max() <= 1:
+        dipoles = []
+    order = [i for i in np.argsort(-np.linalg.norm(fields, axis=2).max(axis=1)) if parts[i] not in dipoles]
+    factors = _fewest(fields[order])
+    kept = [(k, l, m, c * f) for (k, l, m, c), f in zip((parts[i] for i in order), factors, strict=False)]
+    kept += dipoles
+    missing = [(k, l, m, -c) for k, l, m, c in kept] + parts
+    return (
+        [_with(e, kept, k) for k, e in enumerate(expansions)],
+        [_with(e, missing, k) for k, e in enumerate(expansions)],
+    )
+
+
+def _fewest(fields: Array) -> Array:
+    """Factors of the first few of the fields (k, n, 3), with which they make the sum of all to 1 at every point."""
+    total = fields.sum(axis=0)
+    left_out = np.linalg.norm(total - np.cumsum(fields, axis=0), axis=2).max(axis=1)
+    if np.linalg.norm(total, axis=1).max(initial=0.0) <= 1:
+        return np.zeros(0)
+    too_few, enough = 0, int(np.argmax(left_out <= 1)) + 1
+    factors = np.ones(enough)
+    if enough > MOST:
+        return factors
+    while enough - too_few > 1:
+        count = (enough + too_few) // 2
+        found = _fitted(fields[:count], total)
+        if found is None:
+            too_few = count
+        else:
+            factors, enough = found, count
+    return factors
+
+
+def _fitted(fields: Array, total: Array) -> Array | None:
+    """Factors (k,) with which the fields make the total to 1 at every point; None if none were found."""
+    columns, weights = fields.reshape(len(fields), -1).T, np.ones(len(total))
+    for _ in range(ROUNDS):
+        rows = np.repeat(weights, 3)
+        factors = np.linalg.lstsq(columns * rows[:, None], total.ravel() * rows, rcond=None)[0]
+        error = np.linalg.norm(total - (columns @ factors).reshape(total.shape), axis=1)
+        if error.max() <= 1:
+            return np.asarray(factors)
+        weights *= np.sqrt(0.3 + error / error.max())  # towards equal largest errors
+        weights /= weights.mean()
+    return None
+
+
+def _fields(expansion: MultipoleExpansion, parts: list[Part], points: Array) -> Array:
+    """B (parts, n, 3) of every single part."""
+    if not parts:
+        return np.zeros((0, len(points), 3))
+    harmonics = irregular_values(expansion.degree + 1, (points - expansion.center) / expansion.radius)
+    fields = []
+    for _, l, m, value in parts:
+        gradient = irregular_gradient(harmonics, l, m)
+        fields.append([-(1 if m == 0 else 2) * np.real(value * component) for component in gradient])
+    return np.moveaxis(np.array(fields), 1, 2)
+
+
+def _with(expansion: MultipoleExpansion, parts: list[Part], number: int) -> MultipoleExpansion:
+    """The expansion with only the given parts among those of its number, no longer than they need."""
+    mine = [part for part in parts if part[0] == number]
+    degree = max((l for _, l, _, _ in mine), default=0)
+    coefficients = np.zeros((degree + 1, degree + 1), complex)
+    for _, l, m, value in mine:
+        coefficients[l, m] += value
+    return MultipoleExpansion(expansion.center, expansion.radius, coefficients)

@@ -1,0 +1,149 @@
+"""The field of a whole rotor at one level of refinement: symmetry, parity parts, moments."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import product
+
+import numpy as np
+
+from ...geometry.basics import Array, Box
+from ...geometry.bodies import Magnet, Symmetry, closing_shifts, find_symmetry, moved, parity_parts
+from ...geometry.meshes import MagnetMesh, MeshSettings, mesh_magnets
+from ..harmonics import Coefficients, MultipoleExpansion, turned
+from .moments import reaction_moments, trace_moments
+from .solver import Formulation, MeshError, System, assemble, solve
+
+SIZES = (1.0, 0.8, 0.5)
+"""Of elements in magnets, relative to what is asked for, that are tried."""
+
+
+@dataclass(frozen=True)
+class Refinement:
+    """How fine a solution is.
+
+    Parameters
+    ----------
+    order : of the elements
+    mesh : the mesh's settings
+    boundary_degree : to which the outer boundary is exactly open
+    """
+
+    order: int
+    mesh: MeshSettings
+    boundary_degree: int
+
+
+@dataclass(frozen=True, eq=False)
+class RotorSolution:
+    """Expansions of ψ's field outside, in the rotor's frame.
+
+    Parameters
+    ----------
+    coefficients : c_lm (T), one per piece about its centre in `split`, one about the mesh's in `direct`
+    spheres : centre (3,) m and radius m of every expansion, in the rotor's frame
+    mesh : of the part of space that the mirror planes leave, in their frame
+    unknowns : number of unknowns
+    area_error : relative error of the area of the outer sphere
+    layers : of elements at the edges; fewer than asked for where the mesher cannot match more
+    """
+
+    coefficients: tuple[Coefficients, ...]
+    spheres: tuple[tuple[Array, float], ...]
+    mesh: MagnetMesh
+    unknowns: int
+    area_error: float
+    layers: int
+
+    def expansions(self, coefficients: Sequence[Coefficients]) -> list[MultipoleExpansion]:
+        """Expansions about the same spheres with other coefficients."""
+        return [MultipoleExpansion(*sphere, c) for sphere, c in zip(self.spheres, coefficients, strict=True)]
+
+
+def solve_rotor(
+    magnets: Sequence[Magnet],
+    refinement: Refinement,
+    formulation: Formulation = "split",
+    degree: int = 1,
+    pieces: Sequence[Sequence[Magnet]] | None = None,
+    use_symmetry: bool = True,
+    carriers: Sequence[Magnet] | None = None,
+) -> RotorSolution:
+    """Solve for every parity part of the polarisation and add up; gaps too narrow for elements are closed.
+
+    Parameters
+    ----------
+    degree : of the moments in `split`, where they are those of -(μ - 1) ∇ψ; in `direct` it is the boundary's
+    pieces : of every magnet, each with its own expansion; by default the magnets
+    use_symmetry : whether to mesh only one side of the mirror planes
+    carriers : in `split`, the magnets with μr = 1 whose closed form is split off, each in the place of one of the
+        magnets; by default the magnets' own remanence
+
+    Raises
+    ------
+    ConvergenceError : the iteration for the open boundary stalls
+    MeshError : no mesh of the magnets fits together
+    """
+    cut = pieces or [(magnet,) for magnet in magnets]
+    shifts = closing_shifts(magnets)
+    closed = [moved(magnet, shift) for magnet, shift in zip(magnets, shifts, strict=True)]
+    symmetry = find_symmetry(closed)
+    planes = symmetry.planes if use_symmetry else ()
+    seen = [symmetry.to_frame(magnet) for magnet in closed]
+    bodies = [piece for whole in cut for piece in whole]
+    meshed = [symmetry.to_frame(moved(p, s)) for whole, s in zip(cut, shifts, strict=True) for p in whole]
+    mesh, system, layers = _meshed_system(meshed, refinement, planes, [magnet.box for magnet in seen])
+    total: list[Coefficients] = []
+    area_error = 0.0
+    owners = [k for k, whole in enumerate(cut) for _ in whole]
+    for signs, (own, carried) in parity_parts(seen, planes, _polarizations(magnets, carriers, symmetry)):
+        sources = [_polarized(magnet, j) for magnet, j in zip(seen, carried, strict=True)]
+        rest = (own - carried)[owners]
+        solution = solve(system, sources, formulation, refinement.boundary_degree, signs, rest)
+        area_error = solution.boundary.area_error
+        part = [trace_moments(solution)] if formulation == "direct" else list(reaction_moments(solution, degree))
+        total = [a + b for a, b in zip(total, part, strict=True)] if total else part
+    spheres = tuple((body.box.center, body.box.circumradius) for body in bodies)
+    size = degree
+    if formulation == "direct":
+        spheres, size = ((symmetry.center + symmetry.axes @ mesh.center, mesh.unit),), refinement.boundary_degree
+    nothing = [np.zeros((size + 1, size + 1), complex)] * len(spheres)
+    coefficients = tuple(turned(c, symmetry.axes) for c in total or nothing)
+    return RotorSolution(coefficients, spheres, mesh, system.unknowns, area_error, layers)
+
+
+def _meshed_system(
+    bodies: list[Magnet], refinement: Refinement, planes: tuple[int, ...], edges_of: list[Box]
+) -> tuple[MagnetMesh, System, int]:
+    """Mesh, matrix, layers at the edges: where the mesher cannot match them, smaller elements, else fewer layers.
+
+    Two elements that touch edges of magnets near each other may be refined otherwise on the face between them; in
+    another mesh of nearly the same size they are mostly not there.
+    """
+    for layers, size in product(range(refinement.mesh.hp_layers, -1, -1), SIZES):
+        settings = replace(refinement.mesh, hp_layers=layers, magnet_size=size * refinement.mesh.magnet_size)
+        mesh = mesh_magnets(bodies, settings, planes, edges_of)
+        try:
+            return mesh, assemble(mesh, refinement.order), layers
+        except MeshError:
+            continue
+    raise MeshError("The mesh of the magnets does not fit together; change their positions slightly.")
+
+
+def _polarizations(magnets: Sequence[Magnet], carriers: Sequence[Magnet] | None, symmetry: Symmetry) -> Array:
+    """(2, n, 3) T in the mirrors' frame: of the magnets and of their carriers."""
+    groups = (magnets, carriers or magnets)
+    return np.array([[magnet.polarization_in_rotor for magnet in group] for group in groups]) @ symmetry.axes
+
+
+def _polarized(magnet: Magnet, polarization: Array) -> Magnet:
+    """A source of the same shape with another polarisation (3,) T, in the frame of the box's pose."""
+    box = Box(magnet.box.size, magnet.box.center, magnet.box.rotation)
+    return replace(
+        magnet,
+        box=box,
+        polarization=box.rotation.T @ polarization,
+        recoil_permeability=1.0,
+        transverse_permeability=None,
+    )

@@ -1,0 +1,157 @@
+"""Least-squares fit of harmonic functions to observed field components; degree and error bar from held-out groups."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import cho_factor, cho_solve
+
+from ...geometry.basics import Array
+from .harmonic_basis import HarmonicBasis
+
+GROUPS = 12
+"""Groups of points, each of which is held out once: they choose the degree, and the fits without them differ."""
+
+MARGIN = 4
+"""Degrees beyond the chosen one that the error bar takes into account."""
+
+NEGLIGIBLE = 0.1
+"""Unknowns are left out that change the fit by less than so many standard errors: symmetry makes most of them zero."""
+
+FLOOR = 1e-8
+"""Smallest misfit that normal equations in double precision can tell, relative to the observations."""
+
+ROUND_OFF = 16 * np.finfo(float).eps
+
+CHUNK = 2000
+"""Points whose columns are held in memory at once."""
+
+
+@dataclass(frozen=True, eq=False)
+class HarmonicFit:
+    """What a fit found.
+
+    Parameters
+    ----------
+    degree : the degree chosen
+    unknowns : (count,) T
+    misfits : root mean square of held-out residuals over the errors given, by degree; that of 0 is the field itself
+    groups : (n,) number of the group that each point is in
+    held_out : (GROUPS, more) T, fits without each group, `MARGIN` degrees higher (as far as the basis goes)
+    deviations : (GROUPS, more) T, differences to `unknowns` of solutions as likely as the data leave them
+    """
+
+    degree: int
+    unknowns: Array
+    misfits: Array
+    groups: NDArray[np.intp]
+    held_out: Array
+    deviations: Array
+
+    @property
+    def misfit(self) -> float:
+        """Root mean square of held-out residuals over the errors given, at the degree chosen."""
+        return float(self.misfits[self.degree])
+
+
+def fit_harmonics(
+    basis: HarmonicBasis, points: Array, field: Array, errors: Array, generator: np.random.Generator
+) -> HarmonicFit:
+    """Fit the harmonics of `basis` to a field.
+
+    The unknowns are fields on the sources' spheres, of which none is expected to be much larger than the dipole's own:
+    that expectation (a ridge) decides where the data do not, and keeps the normal equations regular. The degree is the
+    one that predicts held-out observations best (cross-validation); the fit is then made with all of them. How the fits
+    without one group differ tells the error (jackknife; B. Efron, The Jackknife, SIAM 1982, ch. 3), whatever the
+    distribution of the noise; what the expectation alone decides is added to it.
+
+    Parameters
+    ----------
+    points : (n, 3) m
+    field : (n, 3) T, NaN where a component was not observed
+    errors : (n, 3) standard errors, T; only their ratios matter
+    generator : chooses the groups
+    """
+    groups = generator.permutation(len(points)) % GROUPS
+    parts = np.array([_normal_matrix(basis, points, field, errors, groups == k) for k in range(GROUPS)])
+    whole = parts.sum(axis=0)
+    expected = _expected_size(whole, basis)
+    nothing = _misfit([whole], [np.zeros(0)])
+    misfits = [nothing]
+    for degree in range(1, basis.degree + 1):
+        found = [_solve(whole, basis.count(degree), misfits[-1] / expected, part) for part in parts]
+        misfits.append(max(_misfit(parts, found), FLOOR * nothing))
+    degree = max(int(np.argmin(misfits)), 1)
+    ridge = misfits[degree] / expected
+    unknowns = _solve(whole, basis.count(degree), ridge)
+    stiffness = np.sqrt(whole.diagonal()[: len(unknowns)] + ridge**2)
+    kept = np.where(np.abs(unknowns) * stiffness < NEGLIGIBLE * misfits[degree], 0.0, unknowns)
+    more = basis.count(min(degree + MARGIN, basis.degree))
+    held_out = np.array([_solve(whole, more, ridge, part) for part in parts])
+    undecided = misfits[degree] * ridge * generator.normal(size=(more, GROUPS))
+    likely = _likely(held_out) + _inverse_times(whole[:more, :more], ridge, undecided).T
+    deviations = likely - np.pad(kept, (0, more - len(kept)))
+    return HarmonicFit(degree, kept, np.array(misfits), groups, held_out, deviations)
+
+
+def _likely(held_out: Array) -> Array:
+    """Solutions whose spread is the jackknife's: their mean, and √(GROUPS-1) times the change by each group."""
+    mean = held_out.mean(axis=0)
+    return np.asarray(mean + np.sqrt(GROUPS - 1) * (held_out - mean))
+
+
+def _normal_matrix(
+    basis: HarmonicBasis, points: Array, field: Array, errors: Array, chosen: NDArray[np.bool_]
+) -> Array:
+    """Products of all weighted columns and the weighted field (last but one) with each other, for `chosen` points.
+
+    The last diagonal entry counts the observations.
+    """
+    size = basis.count(basis.degree) + 1
+    product = np.zeros((size + 1, size + 1))
+    (where,) = np.nonzero(chosen)
+    for part in np.array_split(where, max(len(where) // CHUNK, 1)):
+        observed = np.isfinite(field[part].T)
+        columns = np.concatenate([basis.columns(points[part]), field[None, part].swapaxes(1, 2)])
+        columns /= errors[part].T
+        columns = columns.reshape(size, -1) if observed.all() else columns[:, observed]
+        product[:-1, :-1] += columns @ columns.T
+        product[-1, -1] += columns.shape[1]
+    return product
+
+
+def _expected_size(normal: Array, basis: HarmonicBasis) -> float:
+    """Field (T) of the largest unknown of a fit by dipoles alone."""
+    count = basis.count(1)
+    dipole = np.linalg.lstsq(normal[:count, :count], normal[:count, -2], rcond=1e-10)[0]
+    return float(np.abs(dipole[basis.background_count :]).max()) or 1.0
+
+
+def _solve(normal: Array, count: int, ridge: float, left_out: Array | None = None) -> Array:
+    """First `count` unknowns of a normal matrix, without the part `left_out`, with `ridge`² on its diagonal."""
+    matrix, right = normal[:count, :count].copy(), normal[:count, -2].copy()
+    if left_out is not None:
+        matrix -= left_out[:count, :count]
+        right -= left_out[:count, -2]
+    return _inverse_times(matrix, ridge, right)
+
+
+def _inverse_times(matrix: Array, ridge: float, right: Array) -> Array:
+    """(matrix + `ridge`²)⁻¹ right; round-off is added to the diagonal, scaled to ones, so that Cholesky succeeds."""
+    scale = 1 / np.sqrt(matrix.diagonal() + ridge**2)
+    regular = (matrix + ridge**2 * np.eye(len(matrix))) * scale[:, None] * scale
+    regular[np.diag_indices(len(matrix))] += ROUND_OFF
+    return np.asarray((scale * cho_solve(cho_factor(regular), (scale * right.T).T).T).T)
+
+
+def _misfit(normals: Array | list[Array], solutions: list[Array]) -> float:
+    """Root mean square of the weighted residuals that each solution leaves in the data of its normal matrix."""
+    squares = observations = 0.0
+    for normal, unknowns in zip(normals, solutions, strict=True):
+        count = len(unknowns)
+        explained = 2 * unknowns @ normal[:count, -2] - unknowns @ normal[:count, :count] @ unknowns
+        squares += max(normal[-2, -2] - explained, 0.0)
+        observations += normal[-1, -1]
+    return float(np.sqrt(squares / observations))

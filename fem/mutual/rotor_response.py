@@ -1,0 +1,127 @@
+"""The field of a rotor of permeable magnets in a ball beside it: by its own remanence and in answer to sources.
+
+In the magnets H0 is the closed form of the remanent polarisation J (μr = 1) plus the field of the ball's sources. The
+magnetisation (μ - 1)(H0 - ∇ψ) comes from finite elements on a mesh of the magnets alone, which serves every position of
+the ball. Its field in the ball is a volume integral over the magnets, whose error is the square of that of ∇ψ.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from ...geometry.basics import Array
+from ...geometry.bodies import Magnet
+from ...geometry.meshes import MagnetMesh, MeshSettings, mesh_magnets
+from ..closed_forms import remanent_field, volume_rule
+from ..harmonics import Ball, Coefficients, derivative, from_magnetization, outer_sums, projected
+from ..magnetostatics import PermeableRegions, assemble_regions
+
+NODES = 24
+"""Integration points per axis in a magnet for the closed form; its logarithm at the edges is met to round-off."""
+
+
+@dataclass(frozen=True, eq=False)
+class RotorResponse:
+    """A rotor that answers to fields; made by `rotor_response`.
+
+    Parameters
+    ----------
+    mesh : of the magnets
+    regions : their finite elements, or None where every μ = 1
+    """
+
+    mesh: MagnetMesh
+    regions: PermeableRegions | None
+
+    @property
+    def magnets(self) -> tuple[Magnet, ...]:
+        """The bodies."""
+        return self.mesh.magnets
+
+    def own_field(self, ball: Ball, degree: int) -> Coefficients:
+        """Coefficients a_lm (T) of the rotor's field alone, its permeability included, about the ball's centre."""
+        closed = projected(lambda points: remanent_field(self.magnets, points), ball, degree)
+        return closed + from_magnetization(*self.remanent_dipoles, ball, degree)
+
+    def answer(self, sources: Coefficients, ball: Ball, degree: int) -> Coefficients:
+        """Coefficients a_lm (T) of the field that the magnets send back to sources c_lm (T) in the ball."""
+        if self.regions is None:
+            return np.zeros((degree + 1, degree + 1), complex)
+        return from_magnetization(*self.induced_dipoles(sources, ball), ball, degree)
+
+    def induced_dipoles(self, sources: Coefficients, ball: Ball) -> tuple[Array, Array]:
+        """Positions (n, 3) m and μ0 M dV (n, 3) T m³ of what sources c_lm (T) in the ball induce in the magnets."""
+        if self.regions is None:
+            return np.zeros((0, 3)), np.zeros((0, 3))
+        potentials = [-derivative(sources, axis) for axis in range(3)]
+        fields = {
+            name: outer_sums(potentials, (points - ball.center) / ball.radius) for name, points in self._places.items()
+        }
+        return self._dipoles(self.regions.magnetization(fields))
+
+    @cached_property
+    def remanent_dipoles(self) -> tuple[Array, Array]:
+        """Positions (n, 3) m and μ0 M dV (n, 3) T m³ that the permeability adds to the remanence of the lone rotor.
+
+        The part (μ - 1) H0 stands on points apart from the mesh, graded towards edges; that of ∇ψ on the mesh's.
+        """
+        if self.regions is None:
+            return np.zeros((0, 3)), np.zeros((0, 3))
+        fields = {name: remanent_field(self.magnets, points) for name, points in self._places.items()}
+        total = self.regions.magnetization(fields)
+        chi = self.regions.susceptibility
+        parts = [self._dipoles({name: total[name] - fields[name] @ chi[name] for name in total})]
+        parts.append(closed_dipoles(self.magnets))
+        return np.concatenate([p for p, _ in parts]), np.concatenate([m for _, m in parts])
+
+    @cached_property
+    def _places(self) -> dict[str, Array]:
+        """Integration points of every magnet (n, 3), m."""
+        assert self.regions is not None
+        return {name: self.mesh.to_meter(points.points) for name, points in self.regions.points.items()}
+
+    def _dipoles(self, magnetization: Mapping[str, Array]) -> tuple[Array, Array]:
+        assert self.regions is not None
+        weights = {name: points.weights * self.mesh.unit**3 for name, points in self.regions.points.items()}
+        moments = [weights[name][:, None] * values for name, values in magnetization.items()]
+        return np.concatenate([self._places[name] for name in magnetization]), np.concatenate(moments)
+
+
+def rotor_response(mesh: MagnetMesh, order: int = 3) -> RotorResponse:
+    """Assemble and factorise a rotor on a mesh of `mesh_magnets`, with elements of degree `order`."""
+    permeability = {f"magnet{k}": permeability_tensor(magnet) for k, magnet in enumerate(mesh.magnets)}
+    if all(np.array_equal(mu, np.eye(3)) for mu in permeability.values()):
+        return RotorResponse(mesh, None)
+    return RotorResponse(mesh, assemble_regions(mesh.mesh, permeability, mesh.ball_radius, order))
+
+
+def permeability_tensor(magnet: Magnet) -> Array:
+    """(3, 3) relative permeability of a magnet."""
+    return magnet.recoil_permeability * np.eye(3)
+
+
+def closed_dipoles(magnets: Sequence[Magnet]) -> tuple[Array, Array]:
+    """Positions (n, 3) m and μ0 M dV (n, 3) T m³ of the magnetisation (μ - 1) H0 of the remanence's closed form H0.
+
+    The points are graded towards the edges, where H0 has a logarithm.
+    """
+    boxes = [magnet.box for magnet in magnets]
+    points, moments = [], []
+    for magnet in magnets:
+        places, weights = volume_rule(magnet.box, boxes, NODES)
+        field = remanent_field(magnets, places) @ (permeability_tensor(magnet) - np.eye(3))
+        points.append(places)
+        moments.append(weights[:, None] * field)
+    return np.concatenate(points), np.concatenate(moments)
+
+
+def rotor_ladder(
+    rotor: tuple[Magnet, ...], orders: tuple[int, ...] = (3, 4), settings: MeshSettings | None = None
+) -> tuple[RotorResponse, ...]:
+    """The same rotor on one mesh with elements of several degrees, from coarse to fine."""
+    mesh = mesh_magnets(rotor, settings)
+    return tuple(rotor_response(mesh, order) for order in orders)

@@ -1,0 +1,147 @@
+"""Functions of position that are harmonic where the floater is: multipoles at points beyond the region.
+
+Every field function of the plate is a sum over the same few multipoles, B = -∇ Σ c_k Θ_k, each free of divergence
+and curl by construction.  Their centres lie behind the plate's surface, on lines away from the region: near ones
+for what is close to the surface, far ones for the rest.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import combinations_with_replacement, product
+
+import heyoka as hy
+import numpy as np
+
+from ...geometry.basics import Array, frozen_array
+from ..harmonics import FieldExpressions, MultipoleExpansion, derivative, outer_sums
+from ..plate_network import Region
+
+DEPTHS = (0.0, 0.3, 0.6, 1.0, 1.6, 2.5, 4.0, 6.0, 10.0, 18.0)
+"""Depths of the centres behind the surface, in units of the distance between region and plate."""
+SPACING = 2.5
+"""Lateral distance of the lines, in the same unit."""
+HIGHEST_DEGREE = 4
+UNFOLDED = np.array([[3, 4, 5], [4, 6, 7], [5, 7, 8]])
+"""Where the entries of the symmetric gradient lie among the nine outputs of a function."""
+_TRIPLES = list(combinations_with_replacement(range(3), 3))
+UNFOLDED_THRICE = np.array(
+    [
+        [[_TRIPLES.index((min(i, j, k), sorted((i, j, k))[1], max(i, j, k))) for k in range(3)] for j in range(3)]
+        for i in range(3)
+    ]
+)
+"""The same for the second derivatives, which are symmetric in all three indices."""
+
+
+@dataclass(frozen=True, eq=False)
+class Multipoles:
+    """Single multipoles Re Θ_lm and Im Θ_lm of unit strength (T) at given centres.
+
+    Parameters
+    ----------
+    centers : (k, 3) m
+    kinds : (k, 3) whole numbers: degree l, order m, and 0 for the real or 1 for the imaginary part
+    scale : length that makes coordinates free of units, m
+    """
+
+    centers: Array
+    kinds: Array
+    scale: float
+
+    def __post_init__(self) -> None:
+        for name in ("centers", "kinds"):
+            object.__setattr__(self, name, frozen_array(getattr(self, name), (len(self.kinds), 3)))
+
+    def subset(self, numbers: Sequence[int]) -> Multipoles:
+        """Some of them."""
+        return Multipoles(self.centers[list(numbers)], self.kinds[list(numbers)], self.scale)
+
+    @cached_property
+    def _expansions(self) -> list[MultipoleExpansion]:
+        found = []
+        for center, (degree, order, imaginary) in zip(self.centers, self.kinds.astype(int), strict=True):
+            coefficients = np.zeros((degree + 1, degree + 1), complex)
+            coefficients[degree, order] = 1j if imaginary else 1.0
+            found.append(MultipoleExpansion(center, self.scale, coefficients))
+        return found
+
+    def expressions(self, position: Sequence[hy.expression]) -> list[FieldExpressions]:
+        """B (T) and its gradient (T/m) of each as heyoka expressions of a position (m)."""
+        return [expansion.expressions(position) for expansion in self._expansions]
+
+    @cached_property
+    def _compiled(self) -> hy.cfunc_dbl:
+        variables = hy.make_vars("x", "y", "z")
+        outputs: list[hy.expression] = []
+        for field, gradient in self.expressions(variables):
+            outputs += [*field, *(gradient[i][j] for i in range(3) for j in range(i, 3))]
+        return hy.cfunc(outputs, variables, compact_mode=len(outputs) > 2000)
+
+    @cached_property
+    def _compiled_curvature(self) -> hy.cfunc_dbl:
+        variables = hy.make_vars("x", "y", "z")
+        outputs = [
+            hy.diff(gradient[i][j], variables[k])
+            for _, gradient in self.expressions(variables)
+            for i, j, k in combinations_with_replacement(range(3), 3)
+        ]
+        return hy.cfunc(outputs, variables, compact_mode=True, opt_level=0)
+
+    def curvature(self, points: Array) -> Array:
+        """∂²B_i/∂x_j∂x_k (n, k, 3, 3, 3) T/m² at points (n, 3) m."""
+        values = self._compiled_curvature(np.ascontiguousarray(points.T)).reshape(len(self.kinds), 10, -1)
+        return np.moveaxis(values[:, UNFOLDED_THRICE], -1, 0)
+
+    def fields(self, points: Array) -> Array:
+        """B (n, k, 3) T at points (n, 3) m, without compilation."""
+        found = np.zeros((len(points), len(self.kinds), 3))
+        degree = int(self.kinds[:, 0].max())
+        for center in np.unique(self.centers, axis=0):
+            here = np.flatnonzero((self.centers == center).all(axis=1))
+            single = np.zeros((len(here), degree + 1, degree + 1), complex)
+            for row, number in enumerate(here):
+                coefficients = self._expansions[number].coefficients
+                single[row, : len(coefficients), : len(coefficients)] = coefficients
+            parts = [-derivative(coefficients, axis) for coefficients in single for axis in range(3)]
+            found[:, here] = outer_sums(parts, (points - center) / self.scale).reshape(len(points), len(here), 3)
+        return found
+
+    def evaluate(self, points: Array) -> tuple[Array, Array]:
+        """B (n, k, 3) T and ∂B_i/∂x_j (n, k, 3, 3) T/m at points (n, 3) m."""
+        values = self._compiled(np.ascontiguousarray(points.T)).reshape(len(self.kinds), 9, -1)
+        return np.moveaxis(values[:, :3], -1, 0), np.moveaxis(values[:, UNFOLDED], -1, 0)
+
+
+def candidates(region: Region, half_edges: Array, degree: int = HIGHEST_DEGREE) -> Multipoles:
+    """Multipoles to choose from for a region beside a plate with these half edges (m), both about the plate's centre.
+
+    The highest `degree` sets how well they can do: in a region half as wide as it is far from the plate, degree 4 ends
+    near 8e-5 of the field of the plate's currents, degree 5 near 2e-5.
+
+    Raises
+    ------
+    ValueError : the region touches the plate
+    """
+    of_region, of_plate = region.nearest(half_edges)
+    gap = float(np.linalg.norm(of_region - of_plate))
+    if gap < 1e-9:
+        raise ValueError(
+            f"Input region must be apart from the plate; instead received {region.lower.tolist()} to "
+            f"{region.upper.tolist()} m for half edges {half_edges.tolist()} m."
+        )
+    away = (of_plate - of_region) / gap
+    axis = int(np.argmax(np.abs(away)))
+    lines = []
+    for a in range(3):
+        reach = (region.upper - region.lower)[a] / 2 - gap
+        count = 1 if a == axis else 2 * int(np.ceil(max(reach, 0.0) / (SPACING * gap))) + 1
+        lines.append(region.center[a] + max(reach, 0.0) * np.linspace(-1, 1, count) * (count > 1))
+    lines[axis] = of_plate[[axis]]
+    starts = np.array(list(product(*lines)))
+    centers = np.concatenate([starts + depth * gap * away for depth in DEPTHS])
+    kinds = [(l, m, part) for l in range(degree + 1) for m in range(l + 1) for part in (0, 1)[: 1 + (m > 0)]]
+    pairs = list(product(centers, kinds))
+    return Multipoles(np.array([p[0] for p in pairs]), np.array([p[1] for p in pairs], float), gap)

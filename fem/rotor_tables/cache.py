@@ -1,0 +1,39 @@
+"""Tables that were computed before, kept on disk under a hash of all that decides them."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable
+from importlib.metadata import version
+
+import numpy as np
+
+from ...geometry.bodies import Magnet
+from ..storage import from_cache
+from .choice import rotor_table
+from .table import RotorTable
+from .table_file import FORMAT, load_table, save_table
+
+
+def rotor_key(rotor: tuple[Magnet, ...], model: str, rtol: float, nearest: float | None = None) -> str:
+    """SHA-256 of the magnets, the model, the accuracy asked for and where, and the programs that compute them."""
+    programs = f"{FORMAT} {version('spinlev')} {version('ngsolve')}"
+    digest = hashlib.sha256(f"{programs} {model} {rtol!r} {nearest!r}".encode())
+    for magnet in rotor:
+        for part in (magnet.box.size, magnet.box.center, magnet.box.rotation, magnet.polarization):
+            digest.update(np.ascontiguousarray(part + 0.0, dtype="<f8").tobytes())
+        digest.update(np.ascontiguousarray(magnet.permeability_in_rotor + 0.0, dtype="<f8").tobytes())
+    return digest.hexdigest()
+
+
+def cached_rotor_table(
+    rotor: tuple[Magnet, ...], model: str, rtol: float, report: Callable[[str], None], nearest: float | None = None
+) -> tuple[RotorTable, bool]:
+    """A rotor table, see `rotor_table`, from the cache if it is there, and whether it was."""
+    return from_cache(
+        f"rotor-{rotor_key(rotor, model, rtol, nearest)}.nc",
+        load_table,
+        lambda: rotor_table(rotor, model, rtol, nearest),
+        save_table,
+        report,
+    )

@@ -1,0 +1,87 @@
+"""The field models of a rotor, and the choice between them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from ...geometry.bodies import Magnet
+from .accuracy import Accuracy, places
+from .fem_model import fem_table
+from .simple_models import cuboid_table, dipole_table, moments_table
+from .table import RotorTable
+
+MODELS: dict[str, Callable[[tuple[Magnet, ...], Accuracy], RotorTable]] = {
+    "dipole": dipole_table,
+    "moments": moments_table,
+    "cuboid": cuboid_table,
+    "fem": fem_table,
+}
+"""From the cheapest to the dearest in evaluation."""
+
+FEW_MOMENTS = 16
+"""Coefficients per magnet up to which moments are quicker to evaluate than the closed form."""
+
+
+def resolve_model(
+    rotor: tuple[Magnet, ...], model: str, rtol: float = 3e-6, nearest: float | None = None
+) -> tuple[str, str]:
+    """Name of the model that `rotor_table` uses for `model`, and the reason in words.
+
+    `auto` is the cheapest of dipole, moments, closed form and finite elements that meets `rtol` at all distances from
+    the magnets' faces of at least `nearest` (m; None: 0.8 of the largest magnet's edge, if it were a cube).
+
+    Raises
+    ------
+    ValueError : unknown model, or rtol not between 0 and 1
+    """
+    if model == "auto":
+        return _cheapest(rotor, Accuracy(rtol, nearest))
+    if model not in MODELS:
+        raise ValueError(f"Input model must be one of {', '.join([*MODELS, 'auto'])}; instead received {model!r}.")
+    return model, "as asked"
+
+
+def rotor_table(
+    rotor: tuple[Magnet, ...], model: str = "auto", rtol: float = 3e-6, nearest: float | None = None
+) -> RotorTable:
+    """Table of a rotor's field.
+
+    Parameters
+    ----------
+    model : "dipole" (moments J V/μ0 of the remanence, as in the article), "moments" (more of them), "cuboid" (closed
+        form, μr = 1), "fem" (with recoil permeability and mutual demagnetisation), or "auto", see `resolve_model`
+    rtol, nearest : relative accuracy of B asked of "fem" and "moments", and the distance from the magnets' faces from
+        which on it holds, m (None: 0.8 of the largest magnet's edge, if it were a cube)
+
+    The table states its own error: `RotorTable.relative_error`. That of "dipole" and "cuboid" is their neglected part,
+    shape and permeability, computed to first order in μr - 1.
+
+    Raises
+    ------
+    ValueError : unknown model, no magnet, or rtol not between 0 and 1
+    """
+    accuracy = Accuracy(rtol, nearest)
+    if not rotor:
+        raise ValueError("Input rotor must hold at least one magnet; instead received none.")
+    name, _ = resolve_model(rotor, model, rtol, nearest)
+    return MODELS[name](rotor, accuracy)
+
+
+def _cheapest(rotor: tuple[Magnet, ...], accuracy: Accuracy) -> tuple[str, str]:
+    clearance = accuracy.clearance(rotor)
+    points, scale = places(rotor, clearance)
+    where = f"at {clearance * 1e3:.3g} mm from the magnets' faces and beyond, where {accuracy.rtol:.1e} is asked for"
+    cuboid = cuboid_table(rotor, accuracy)
+    permeability = float(np.max(cuboid.absolute_error(points)[0] / scale))
+    if permeability > accuracy.rtol:
+        return "fem", f"leaving out the recoil permeability is wrong by {permeability:.1e} {where}"
+    for table in (dipole_table(rotor, accuracy), moments_table(rotor, accuracy)):
+        error = float(np.max(table.absolute_error(points)[0] / scale))
+        count = sum(np.count_nonzero(expansion.coefficients) for expansion in table.expansions)
+        if error <= accuracy.rtol and count <= FEW_MOMENTS * len(rotor):
+            return table.model, f"with {count} coefficients it is wrong by {error:.1e} {where}"
+    if permeability == 0:
+        return "cuboid", "every recoil permeability is 1, so that the closed form is exact"
+    return "cuboid", f"leaving out the recoil permeability is wrong by only {permeability:.1e} {where}"

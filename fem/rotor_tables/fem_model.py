@@ -1,0 +1,141 @@
+"""Tables of finite-element fields with a stated error.
+
+What the elements add comes from a ladder of refinements, see `climb`, whose last two steps give the doubts of
+the discretisation.
+The closed part of the moments is exact; what is cut off the expansions is known and kept as the doubt "truncation".
+"""
+
+from __future__ import annotations
+
+import importlib.metadata
+import resource
+import time
+import warnings
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from ...geometry.basics import Array
+from ...geometry.bodies import CONVERGENCE, Magnet, cut_magnets, largest_shift
+from ...geometry.meshes import MeshSettings
+from ..closed_forms import carrier, closed_part
+from ..harmonics import MultipoleExpansion, trimmed, without_noise
+from ..magnetostatics import RotorSolution, climb, rung, solve_rotor, strongest
+from .accuracy import Accuracy, guards, places
+from .table import KNOWN, RotorTable
+
+HIGHEST_DEGREE = 44
+BESIDE = 2.5
+"""How much larger errors may be beside edges and corners, at the same distance from the magnet's centre."""
+GAP_SAFETY = 20.0
+"""Change of the reaction, relative to gap over edge, that a closed gap makes; 5 µm between 10 mm cubes need 17."""
+
+
+class AccuracyWarning(UserWarning):
+    """A table does not reach the accuracy that was asked for."""
+
+
+def fem_table(
+    magnets: tuple[Magnet, ...],
+    accuracy: Accuracy | None = None,
+    settings: MeshSettings | None = None,
+    use_symmetry: bool = True,
+) -> RotorTable:
+    """Field of magnets with recoil permeability: closed form of the remanence, and expansions of what is added to it.
+
+    Orders from 2 to 8 are tried until the estimated error meets the accuracy. If none does, the last table is returned
+    with an `AccuracyWarning`; its error estimate says how far it is off.
+    """
+    accuracy, settings, start = accuracy or Accuracy(), settings or MeshSettings(), time.perf_counter()
+    cut = cut_magnets(magnets, accuracy.clearance(magnets))
+    pieces = [piece for whole in cut for piece in whole]
+    points, scale = places(magnets, accuracy.clearance(magnets))
+    degree = _degree(pieces, points, accuracy.rtol)
+    carriers = tuple(carrier(magnet) for magnet in magnets)
+    closed, unsure = closed_part(cut, magnets, carriers, degree)
+
+    def reaction(order: int) -> RotorSolution:
+        refinement = rung(order, settings, strongest(magnets))
+        return solve_rotor(magnets, refinement, "split", degree, cut, use_symmetry, carriers)
+
+    solution, order, steps = climb(reaction, points, scale, accuracy.rtol / 3, settings)
+    whole = solution.expansions(
+        [without_noise(a + b, 1e-15) for a, b in zip(closed, solution.coefficients, strict=True)]
+    )
+    doubts = {
+        **{cause: used(step) for cause, step in steps.items()},
+        "quadrature": used(solution.expansions(unsure)),
+        "tail": used(tail(whole)),
+        "gap": used(gap_doubt(magnets, solution)),
+    }
+    doubts = {cause: parts for cause, parts in doubts.items() if parts}
+    rest = RotorTable("fem", magnets, carriers, (), doubts).absolute_error(points)[0]
+    allowed = 0.99 * np.maximum(scale * accuracy.rtol - rest, scale * accuracy.rtol / 20)
+    beside, scale_beside = guards(magnets, accuracy.clearance(magnets))
+    kept, dropped = trimmed(
+        whole, np.concatenate([points, beside]), np.concatenate([allowed, BESIDE * accuracy.rtol * scale_beside])
+    )
+    if any(part.coefficients.any() for part in dropped):
+        doubts[KNOWN] = used(dropped)
+    table = RotorTable("fem", magnets, carriers, used(kept), doubts)
+    reached = float(np.max(table.absolute_error(points)[0] / scale))
+    if reached > accuracy.rtol:
+        warnings.warn(
+            f"The field's estimated error is {reached:.1e}, more than the {accuracy.rtol:.1e} asked for from "
+            f"{accuracy.clearance(magnets) * 1e3:.3g} mm off the magnets' faces on.",
+            AccuracyWarning,
+            stacklevel=2,
+        )
+    return replace(table, provenance=provenance(solution, order, settings, reached, time.perf_counter() - start))
+
+
+def _degree(pieces: Sequence[Magnet], points: Array, rtol: float) -> int:
+    """Degree at which what the permeability adds has surely fallen below the tolerance; 5 to `HIGHEST_DEGREE`."""
+    needed = 5.0
+    for piece in pieces:
+        ratio = np.linalg.norm(points - piece.box.center, axis=1).min() / piece.box.circumradius
+        if piece.contrast:
+            needed = max(needed, 4 + np.log(piece.contrast / rtol) / np.log(ratio))
+    return int(min(np.ceil(needed), HIGHEST_DEGREE))
+
+
+def used(expansions: Sequence[MultipoleExpansion]) -> tuple[MultipoleExpansion, ...]:
+    """Those of the expansions that are not zero."""
+    return tuple(expansion for expansion in expansions if expansion.coefficients.any())
+
+
+def tail(expansions: Sequence[MultipoleExpansion]) -> list[MultipoleExpansion]:
+    """What lies beyond the highest degree: the last two degrees, continued as a geometric series."""
+    found = []
+    for expansion in expansions:
+        last = np.array(expansion.coefficients)
+        last[:-2] = 0.0
+        found.append(MultipoleExpansion(expansion.center, expansion.radius, last / (CONVERGENCE**2 - 1)))
+    return found
+
+
+def gap_doubt(magnets: tuple[Magnet, ...], solution: RotorSolution) -> list[MultipoleExpansion]:
+    """What the gaps that were closed for the mesh change: they are to the magnets as the error to the reaction."""
+    smallest = min(float(magnet.box.size.min()) for magnet in magnets)
+    factor = GAP_SAFETY * largest_shift(magnets) / smallest
+    return solution.expansions([factor * c for c in solution.coefficients])
+
+
+def provenance(
+    solution: RotorSolution, order: int, settings: MeshSettings, reached: float, seconds: float
+) -> dict[str, str | float]:
+    """How a table was made."""
+    return {
+        "solver": "ngsolve " + importlib.metadata.version("ngsolve"),
+        "mesher": "netgen-mesher " + importlib.metadata.version("netgen-mesher"),
+        "mirror_planes": len(solution.mesh.planes),
+        "elements": solution.mesh.elements,
+        "order": order,
+        "unknowns": solution.unknowns,
+        "hp_layers": solution.layers,
+        "ball_radius_mm": solution.mesh.ball_radius * solution.mesh.unit * 1e3,
+        "error_estimate": reached,
+        "seconds": seconds,
+        "peak_memory_MB": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024,
+    }

@@ -1,0 +1,40 @@
+"""A rotor's table with only the coefficients that count from some distance on.
+
+An expansion that is to hold close to the magnets needs several times the coefficients, and in the motion each of them
+costs time at every step.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from ..harmonics import trimmed
+from .accuracy import Accuracy, guards, places
+from .fem_model import BESIDE, used
+from .table import KNOWN, RotorTable
+
+AT_LEAST = 0.5
+"""Share of the tolerance that what is left out may always have, even if the table itself does not meet it."""
+
+
+def distant(table: RotorTable, accuracy: Accuracy) -> RotorTable:
+    """The same field within `accuracy.rtol` from `accuracy.nearest` off the magnets' faces on.
+
+    What is left out is known and a doubt of the new table, which still says how wrong it is, nearer too.  A table
+    without expansions stays as it is.
+    """
+    if not table.expansions:
+        return table
+    points, scale = places(table.magnets, accuracy.clearance(table.magnets))
+    beside, scale_beside = guards(table.magnets, accuracy.clearance(table.magnets))
+    rest = table.absolute_error(points)[0]
+    allowed = np.maximum(0.99 * (scale * accuracy.rtol - rest), AT_LEAST * scale * accuracy.rtol)
+    kept, dropped = trimmed(
+        table.expansions,
+        np.concatenate([points, beside]),
+        np.concatenate([allowed, AT_LEAST * BESIDE * accuracy.rtol * scale_beside]),
+    )
+    doubts = {**table.doubts, KNOWN: (*table.doubts.get(KNOWN, ()), *used(dropped))}
+    return replace(table, expansions=used(kept), doubts={cause: parts for cause, parts in doubts.items() if parts})

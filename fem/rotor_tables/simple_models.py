@@ -1,0 +1,73 @@
+"""Tables of the models that leave something out, and what they leave out as their doubts."""
+
+from __future__ import annotations
+
+import time
+
+import numpy as np
+
+from ...geometry.bodies import Magnet, cut_magnets
+from ..closed_forms import first_order_moments
+from ..harmonics import MultipoleExpansion, trimmed, uniform_moments
+from .accuracy import Accuracy, places
+from .table import RotorTable
+
+DEGREE = 25
+"""Degree up to which the part that a model leaves out is computed."""
+FIRST_ORDER_SAFETY = 1.1
+"""The first-order magnetisation is right to a few per cent at low degrees, to χ at high ones, for χ = μ - 1 ≤ 0.2."""
+Rotor = tuple[Magnet, ...]
+
+
+def dipole_table(rotor: Rotor, accuracy: Accuracy) -> RotorTable:
+    """Moments J V/μ0 of the remanence at the magnets' centres."""
+    start = time.perf_counter()
+    dipoles = tuple(uniform_moments(magnet, 1) for magnet in rotor)
+    doubts = {"shape": tuple(_without_dipole(uniform_moments(magnet, DEGREE)) for magnet in rotor)}
+    return _finished("dipole", rotor, (), dipoles, doubts, accuracy, start)
+
+
+def moments_table(rotor: Rotor, accuracy: Accuracy) -> RotorTable:
+    """As many moments of the remanence about the magnets' pieces as the accuracy needs."""
+    start = time.perf_counter()
+    points, scale = places(rotor, accuracy.clearance(rotor))
+    pieces = [piece for whole in cut_magnets(rotor, accuracy.clearance(rotor)) for piece in whole]
+    full = [uniform_moments(piece, 2 * DEGREE - 1) for piece in pieces]
+    kept, dropped = trimmed(full, points, scale * accuracy.rtol / 2)
+    return _finished("moments", rotor, (), tuple(kept), {"truncation": tuple(dropped)}, accuracy, start)
+
+
+def cuboid_table(rotor: Rotor, accuracy: Accuracy) -> RotorTable:
+    """The closed form of the remanence."""
+    return _finished("cuboid", rotor, rotor, (), {}, accuracy, time.perf_counter())
+
+
+def _finished(
+    model: str,
+    rotor: Rotor,
+    uniform: Rotor,
+    expansions: tuple[MultipoleExpansion, ...],
+    doubts: dict[str, tuple[MultipoleExpansion, ...]],
+    accuracy: Accuracy,
+    start: float,
+) -> RotorTable:
+    permeability = neglected_permeability(rotor, accuracy)
+    causes = {cause: parts for cause, parts in {**doubts, "permeability": permeability}.items() if parts}
+    return RotorTable(model, rotor, uniform, expansions, causes, {"seconds": time.perf_counter() - start})
+
+
+def neglected_permeability(rotor: Rotor, accuracy: Accuracy) -> tuple[MultipoleExpansion, ...]:
+    """What the permeability adds, to first order, about every piece of the magnets that have one."""
+    found = []
+    for magnet, pieces in zip(rotor, cut_magnets(rotor, accuracy.clearance(rotor)), strict=True):
+        factor = FIRST_ORDER_SAFETY * np.sqrt(1 + magnet.contrast)
+        for piece in pieces if magnet.contrast else ():
+            coefficients = factor * first_order_moments(piece, rotor, DEGREE)
+            found.append(MultipoleExpansion(piece.box.center, piece.box.circumradius, coefficients))
+    return tuple(found)
+
+
+def _without_dipole(expansion: MultipoleExpansion) -> MultipoleExpansion:
+    rest = np.array(expansion.coefficients)
+    rest[1] = 0.0
+    return MultipoleExpansion(expansion.center, expansion.radius, rest)

@@ -1,0 +1,193 @@
+"""The rotor's field as a table: where `fem` ends and `dynamics` begins."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Protocol
+
+import heyoka as hy
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ...geometry.basics import Array, InputError, counted
+from ...geometry.bodies import Magnet
+from ..closed_forms import UniformField, squared_distance
+from ..harmonics import CompiledField, FieldExpressions, MultipoleExpansion, as_columns, unpacked
+
+BLUR = 0.5
+"""Share of the root mean square of a doubt that is added to its field."""
+KNOWN = "truncation"
+"""What is cut off an expansion is known exactly."""
+
+
+class RangeError(InputError):
+    """A field was asked for where the table does not know it."""
+
+
+class FieldFormula(Protocol):
+    """A field that the equations of motion can be written with."""
+
+    def expressions(self, position: Sequence[hy.expression]) -> FieldExpressions:
+        """B and its gradient as heyoka expressions of a position (m, rotor's frame)."""
+
+
+class FieldTable(FieldFormula, Protocol):
+    """What the dynamics asks of a rotor's field; a new field model is one class with these members."""
+
+    @property
+    def model(self) -> str:
+        """Name of the model."""
+
+    def evaluate(self, points: ArrayLike) -> tuple[Array, Array]:
+        """B (n, 3) T and ∂B_i/∂x_j (n, 3, 3) T/m at points (n, 3) m in the rotor's frame."""
+
+    def relative_error(self, points: ArrayLike) -> tuple[Array, Array]:
+        """Estimated relative errors (n,) of B and of its gradient."""
+
+    def in_range(self, points: ArrayLike) -> NDArray[np.bool_]:
+        """Which of the points (n, 3) m lie where the table knows the field: (n,)."""
+
+
+@dataclass(frozen=True, eq=False)
+class RotorTable:
+    """Closed forms of magnets plus multipole expansions: free of divergence and curl by construction.
+
+    Parameters
+    ----------
+    model : "dipole", "cuboid", "fem", or of what else it is made: "moments" (a body's answer), "map"
+    magnets : the bodies, for the range: the field is known outside them
+    uniform : those whose closed form (μr = 1) is part of the field
+    expansions : what the closed forms leave out
+    doubts : by cause ("shape", "permeability", "truncation", "discretisation"), the estimated error as a field
+    provenance : how the table was made (versions, mesh, order, seconds); texts and numbers
+    """
+
+    model: str
+    magnets: tuple[Magnet, ...]
+    uniform: tuple[Magnet, ...] = ()
+    expansions: tuple[MultipoleExpansion, ...] = ()
+    doubts: Mapping[str, tuple[MultipoleExpansion, ...]] = field(default_factory=dict)
+    provenance: Mapping[str, str | float] = field(default_factory=dict)
+
+    def expressions(self, position: Sequence[hy.expression]) -> FieldExpressions:
+        """B and its gradient as heyoka expressions of a position (m, rotor's frame)."""
+        parts = [part.expressions(position) for part in self._closed_forms]
+        parts += [part.expressions(position) for part in self.expansions]
+        return (
+            [hy.sum([b[i] for b, _ in parts]) for i in range(3)],
+            [[hy.sum([g[i][j] for _, g in parts]) for j in range(3)] for i in range(3)],
+        )
+
+    def __repr__(self) -> str:
+        kept = sum(int(np.count_nonzero(part.coefficients)) for part in self.expansions)
+        degrees = max((part.degree for part in self.expansions), default=0)
+        parts = [counted(len(self.uniform), "closed form")] if self.uniform else []
+        parts += [f"{counted(kept, 'moment')} up to degree {degrees}"] if kept else []
+        lines = [f"RotorTable {self.model!r}: {' and '.join(parts) or 'no field'}", *error_below(self)]
+        made = self.provenance
+        if "elements" in made:
+            elements = f"{made['elements']} elements of order {made['order']}, {made['unknowns']} unknowns"
+            lines.append(f"  {elements}, made in {float(made['seconds']):.2g} s")
+        return "\n".join(lines)
+
+    @cached_property
+    def _closed_forms(self) -> tuple[UniformField, ...]:
+        return tuple(UniformField(magnet) for magnet in self.uniform)
+
+    @cached_property
+    def _near(self) -> CompiledField:
+        return CompiledField(self.expressions)
+
+    @cached_property
+    def _far(self) -> tuple[CompiledField, ...]:
+        """The parts one by one, where the closed forms have to give way to moments."""
+        return tuple(CompiledField(expansion.expressions) for expansion in self.expansions)
+
+    def evaluate(self, points: ArrayLike) -> tuple[Array, Array]:
+        """B (n, 3) T and ∂B_i/∂x_j (n, 3, 3) T/m at points (n, 3) m in the rotor's frame.
+
+        Raises
+        ------
+        RangeError : a point lies in a magnet or where an expansion does not converge
+        """
+        columns = as_columns(points)
+        outside = self._in_range(columns)
+        if not outside.all():
+            where = ", ".join(f"{c * 1e3:.6g}" for c in columns[:, int(np.argmin(outside))])
+            raise RangeError(
+                f"Input points must lie outside the magnets{self._beyond()}; instead received a point at ({where}) mm."
+            )
+        if not any(form.is_far(columns).any() for form in self._closed_forms):
+            return unpacked(self._near.rows(columns))
+        rows = np.zeros((12, columns.shape[1]))
+        for form in self._closed_forms:
+            rows += form.rows(columns)
+        for part in self._far:
+            rows += part.rows(columns)
+        return unpacked(rows)
+
+    @property
+    def moment(self) -> Array:
+        """(3,) dipole moment of the whole rotor, A m²."""
+        parts = [magnet.moment for magnet in self.uniform] + [expansion.moment for expansion in self.expansions]
+        return np.asarray(np.sum(parts, axis=0))
+
+    def _beyond(self) -> str:
+        nearest = max((expansion.nearest for expansion in self.expansions), default=0.0)
+        return f" and farther than {nearest * 1e3:.4g} mm from their centres" if nearest else ""
+
+    def relative_error(self, points: ArrayLike) -> tuple[Array, Array]:
+        """Estimated relative errors (n,) of B and of its gradient (Frobenius norm)."""
+        points = np.asarray(points, float).reshape(-1, 3)
+        b, g = self.evaluate(points)
+        error_b, error_g = self.absolute_error(points)
+        size_b, size_g = np.linalg.norm(b, axis=1), np.linalg.norm(g, axis=(1, 2))
+        tiny, round_off = np.finfo(float).tiny, 1e-13
+        return error_b / (size_b + tiny) + round_off, error_g / (size_g + tiny) + round_off
+
+    def absolute_error(self, points: ArrayLike) -> tuple[Array, Array]:
+        """Estimated errors (n,) of B (T) and of its gradient (T/m).
+
+        The size of each doubt's field there and, but for `KNOWN` ones, a share of its root mean square on spheres about
+        the expansions' centres, because the doubt's own zeros are not those of the error.
+        """
+        points = np.asarray(points, float).reshape(-1, 3)
+        error_b, error_g = np.zeros(len(points)), np.zeros(len(points))
+        for cause, doubts in self.doubts.items():
+            blur = 0.0 if cause == KNOWN else BLUR
+            fields = [doubt.evaluate(points) for doubt in doubts]
+            sizes = [doubt.root_mean_square(points) for doubt in doubts]
+            error_b += np.linalg.norm(sum(b for b, _ in fields), axis=1)
+            error_g += np.linalg.norm(sum(g for _, g in fields), axis=(1, 2))
+            error_b += blur * np.linalg.norm([b for b, _ in sizes], axis=0)
+            error_g += blur * np.linalg.norm([g for _, g in sizes], axis=0)
+        return error_b, error_g
+
+    def in_range(self, points: ArrayLike) -> NDArray[np.bool_]:
+        """Which of the points (n, 3) m lie outside the magnets and where the expansions converge: (n,)."""
+        return self._in_range(as_columns(points))
+
+    def _in_range(self, columns: Array) -> NDArray[np.bool_]:
+        outside = np.ones(columns.shape[1], bool)
+        for magnet in self.magnets:
+            near = squared_distance(columns, magnet.box.center) < magnet.box.circumradius**2
+            outside[near] &= magnet.box.distance(columns[:, near].T) >= 0
+        for expansion in self.expansions:
+            if expansion.nearest:
+                outside &= squared_distance(columns, expansion.center) > expansion.nearest**2
+        return outside
+
+
+FARTHER = 20e-3
+"""Distance from the rotor's origin, down its axis, at which a table's error is told, m."""
+
+
+def error_below(table: FieldTable) -> list[str]:
+    """A table's stated error below the rotor as a line for a person; nothing where it is out of range."""
+    place = np.array([[0.0, 0.0, -FARTHER]])
+    if not table.in_range(place)[0]:
+        return []
+    b, gradient = (float(error[0]) for error in table.relative_error(place))
+    return [f"  relative error {b:.1e} of B and {gradient:.1e} of its gradient {FARTHER * 1e3:g} mm below the rotor"]

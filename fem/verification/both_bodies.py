@@ -1,0 +1,65 @@
+"""Rotor and floater meshed together and solved at once: an independent check of `two_body`.
+
+Nothing is known beforehand of the sphere's answer and no series is summed: H0 is the closed form of both remanent
+polarisations, and one finite-element solution gives the magnetisation that the permeability adds in either body.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...geometry.basics import Array
+from ...geometry.meshes import TwoBodyMesh
+from ...geometry.scenes import Floater
+from ..closed_forms import remanent_field
+from ..harmonics import (
+    Ball,
+    derivative,
+    dipole_sources,
+    force,
+    from_magnetization,
+    moments_of_magnetization,
+    outer_sums,
+    projected,
+    torque,
+)
+from ..magnetostatics import assemble_regions
+from ..mutual import Wrench, closed_dipoles, permeability_tensor
+
+
+def solve_both_bodies(
+    mesh: TwoBodyMesh, floater: Floater, position: Array, direction: Array, order: int = 3, degree: int = 12
+) -> Wrench:
+    """Force and torque on the floater.
+
+    Parameters
+    ----------
+    mesh : of both bodies, the floater at `position` (3,) m
+    direction : (3,) unit vector of its remanent polarisation
+    degree : highest degree of multipoles about its centre
+    """
+    ball = Ball(np.asarray(position, float), floater.radius)
+    names = [f"magnet{k}" for k in range(len(mesh.magnets))]
+    permeability = {n: permeability_tensor(magnet) for n, magnet in zip(names, mesh.magnets, strict=True)}
+    permeability["floater"] = floater.recoil_permeability * np.eye(3)
+    regions = assemble_regions(mesh.mesh, permeability, mesh.ball_radius, order)
+    places = {name: mesh.to_meter(points.points) for name, points in regions.points.items()}
+    weights = {name: points.weights * mesh.unit**3 for name, points in regions.points.items()}
+    polarization = floater.remanence * np.asarray(direction, float)
+    whole = dipole_sources(floater.moment * direction * (floater.recoil_permeability + 2) / 3, ball, 1)
+    outer = [-derivative(whole, axis) for axis in range(3)]
+    from_floater = {n: outer_sums(outer, (places[n] - ball.center) / ball.radius) for n in names}
+    from_rotor = {n: remanent_field(mesh.magnets, points) for n, points in places.items()}
+    fields = {n: from_floater[n] + from_rotor[n] for n in names} | {"floater": from_rotor["floater"] - polarization / 3}
+    induced = regions.magnetization(fields)
+    incident = projected(lambda points: remanent_field(mesh.magnets, points), ball, degree)
+    for name in names:
+        closed = from_rotor[name] @ regions.susceptibility[name]
+        rest = weights[name][:, None] * (induced[name] - closed)
+        incident += from_magnetization(places[name], rest, ball, degree)
+    incident += from_magnetization(*closed_dipoles(mesh.magnets), ball, degree)
+    sources = moments_of_magnetization(
+        places["floater"], weights["floater"], induced["floater"], ball.center, ball.radius, degree
+    )
+    sources[:2, :2] += whole
+    return Wrench(force(incident, sources, ball), torque(incident, sources, ball))

@@ -1,0 +1,69 @@
+"""A rectangular box in any pose: the shape of every magnet and of the plate."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from .arrays import Array, frozen_array
+
+
+def rotation_matrix(degrees_xyz: ArrayLike) -> Array:
+    """Matrix that turns about the fixed x, then y, then z axis, by angles in degrees."""
+    from scipy.spatial.transform import Rotation  # three times the time of NumPy to load
+
+    return np.asarray(Rotation.from_euler("xyz", np.asarray(degrees_xyz, float), degrees=True).as_matrix())
+
+
+@dataclass(frozen=True, eq=False)
+class Box:
+    """A rectangular box.
+
+    Parameters
+    ----------
+    size : (3,) edge lengths along the body axes, m
+    center : (3,) position of the centre, m
+    rotation : (3, 3) matrix whose columns are the body axes (default: none turned)
+    """
+
+    size: Array
+    center: Array = field(default_factory=lambda: np.zeros(3))
+    rotation: Array = field(default_factory=lambda: np.eye(3))
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "size", frozen_array(self.size, (3,)))
+        object.__setattr__(self, "center", frozen_array(self.center, (3,)))
+        object.__setattr__(self, "rotation", frozen_array(self.rotation, (3, 3)))
+
+    @property
+    def half_edges(self) -> Array:
+        """(3,) half of each edge, m."""
+        return self.size / 2
+
+    @property
+    def circumradius(self) -> float:
+        """Radius of the smallest sphere about the centre that holds the box, m."""
+        return float(np.linalg.norm(self.half_edges))
+
+    @property
+    def volume(self) -> float:
+        """Volume, m³."""
+        return float(np.prod(self.size))
+
+    @property
+    def corners(self) -> Array:
+        """(8, 3) corner positions, m."""
+        signs = np.stack(np.meshgrid(*[(-1.0, 1.0)] * 3, indexing="ij"), -1).reshape(8, 3)
+        return self.center + (signs * self.half_edges) @ self.rotation.T
+
+    def to_body(self, points: ArrayLike) -> Array:
+        """Coordinates of `points` (..., 3) along the body axes, from the centre, m."""
+        return (np.asarray(points, float) - self.center) @ self.rotation
+
+    def distance(self, points: ArrayLike) -> Array:
+        """Signed distance (...,) of `points` (..., 3) from the surface, m; negative inside."""
+        excess = np.abs(self.to_body(points)) - self.half_edges
+        outside = np.linalg.norm(np.maximum(excess, 0.0), axis=-1)
+        return np.asarray(outside + np.minimum(excess.max(axis=-1), 0.0))

@@ -1,0 +1,21 @@
+"""Numbers as a person reads them."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+
+def millimetres(lengths: ArrayLike) -> str:
+    """Lengths (n,) in m as `(x, y, z) mm`."""
+    return f"({listed(np.asarray(lengths, float) * 1e3)}) mm"
+
+
+def listed(values: ArrayLike) -> str:
+    """Numbers (n,) joined by commas, round-off of 1e-9 left out."""
+    return ", ".join(f"{value:.4g}" for value in np.round(np.asarray(values, float), 9) + 0.0)
+
+
+def counted(number: int, thing: str) -> str:
+    """The number with its noun, in the plural unless it is one."""
+    return f"{number} {thing}" if number == 1 else f"{number} {thing}s"

@@ -1,0 +1,74 @@
+"""A uniformly polarised permanent magnet in the shape of a box."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..basics import MU_0, Array, Box, frozen_array, listed, millimetres
+
+
+@dataclass(frozen=True, eq=False)
+class Magnet:
+    """A permanent magnet: B = μ0 μ H + J inside, with J the remanent polarisation.
+
+    Parameters
+    ----------
+    box : shape and pose
+    polarization : (3,) remanent polarisation along the body axes, T; it turns with the body
+    recoil_permeability : μr of the demagnetisation curve, along the easy axis, which is that of the polarisation
+    transverse_permeability : μr across the easy axis; None: as along it
+
+    Raises
+    ------
+    ValueError : two unlike permeabilities without a polarisation that tells the easy axis
+    """
+
+    box: Box
+    polarization: Array
+    recoil_permeability: float = 1.0
+    transverse_permeability: float | None = None
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "polarization", frozen_array(self.polarization, (3,)))
+        if not self.isotropic and not self.polarization.any():
+            raise ValueError(
+                "Input polarization must not be zero where the permeability has an easy axis; instead it is zero."
+            )
+
+    @property
+    def isotropic(self) -> bool:
+        """Whether the permeability is the same along every axis."""
+        return self.transverse_permeability in (None, self.recoil_permeability)
+
+    @property
+    def permeability_in_rotor(self) -> Array:
+        """(3, 3) relative permeability μ in the rotor's frame."""
+        if self.isotropic:
+            return self.recoil_permeability * np.eye(3)
+        easy = self.polarization_in_rotor / np.linalg.norm(self.polarization)
+        across = float(self.transverse_permeability or 1.0)
+        return np.asarray(across * np.eye(3) + (self.recoil_permeability - across) * np.outer(easy, easy))
+
+    @property
+    def contrast(self) -> float:
+        """Largest deviation of the permeability from that of the vacuum."""
+        return max(abs(self.recoil_permeability - 1), abs((self.transverse_permeability or 1.0) - 1))
+
+    @property
+    def polarization_in_rotor(self) -> Array:
+        """(3,) remanent polarisation in the rotor's frame, T."""
+        return self.box.rotation @ self.polarization
+
+    @property
+    def moment(self) -> Array:
+        """(3,) moment J V/μ0 of the remanent polarisation alone, rotor's frame, A m²."""
+        return self.polarization_in_rotor * self.box.volume / MU_0
+
+    def __repr__(self) -> str:
+        along = self.recoil_permeability
+        permeability = f"{along:g}" if self.isotropic else f"{along:g} along, {self.transverse_permeability:g} across"
+        polarization = listed(self.polarization_in_rotor)
+        place = f"{millimetres(self.box.size)} at {millimetres(self.box.center)}"
+        return f"Magnet {place}, ({polarization}) T, μr {permeability}"

@@ -1,0 +1,47 @@
+"""Magnets cut into pieces so compact that a multipole expansion about each converges where it is needed."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import product
+
+import numpy as np
+
+from ..basics import Array, Box
+from .magnet import Magnet
+
+CONVERGENCE = 1.3
+"""Least distance of a point from a piece's centre, in circumradii of the piece."""
+
+
+def cut_magnets(magnets: Sequence[Magnet], nearest: float) -> tuple[tuple[Magnet, ...], ...]:
+    """Pieces of every magnet, equal boxes, for expansions that are used from the distance `nearest` (m) from faces on.
+
+    A cube stays whole down to 0.63 of its edge from a face.
+    """
+    return tuple(tuple(_pieces(magnet, _counts(magnet.box.size, nearest))) for magnet in magnets)
+
+
+def _counts(size: Array, nearest: float) -> tuple[int, ...]:
+    """Number of pieces along each axis: the longest side of the pieces is cut until they are compact enough."""
+    counts = np.ones(3, dtype=int)
+    while True:
+        half = size / counts / 2
+        if nearest + half.min() >= CONVERGENCE * np.linalg.norm(half):
+            return tuple(int(n) for n in counts)
+        counts[np.argmax(half)] += 1
+
+
+def _pieces(magnet: Magnet, counts: tuple[int, ...]) -> list[Magnet]:
+    if counts == (1, 1, 1):
+        return [magnet]
+    box, size = magnet.box, magnet.box.size / counts
+    return [
+        Magnet(
+            Box(size, box.center + box.rotation @ (size * (np.array(place) + 0.5) - box.half_edges), box.rotation),
+            magnet.polarization,
+            magnet.recoil_permeability,
+            magnet.transverse_permeability,
+        )
+        for place in product(*(range(n) for n in counts))
+    ]

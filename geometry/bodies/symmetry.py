@@ -1,0 +1,117 @@
+"""Mirror planes of a set of magnets, found from their shapes and permeabilities.
+
+A mirror plane of the bodies need not be one of their polarisation: any polarisation is the sum of parts that are even
+or odd at every plane (`parity_parts`), and each part needs but the bodies' share on one side of all planes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import product
+
+import numpy as np
+
+from ..basics import Array, Box
+from .magnet import Magnet
+
+SAME = 1e-9
+"""Positions that differ by less than this part of the bodies' size are the same."""
+NARROW_SIDE = 0.04
+"""A plane in a gap is left out if corners lie nearer to it than this part of the shortest edge: elements at the plane
+would be larger than their distance from the edges, whose singularity is resolved only where elements touch them."""
+
+
+@dataclass(frozen=True, eq=False)
+class Symmetry:
+    """Mirror planes through one centre.
+
+    Parameters
+    ----------
+    center : (3,) m
+    axes : (3, 3) matrix whose columns are the axes of the mirrors' frame
+    planes : which of the planes across those axes mirror the bodies onto themselves
+    """
+
+    center: Array
+    axes: Array
+    planes: tuple[int, ...]
+
+    def to_frame(self, magnet: Magnet) -> Magnet:
+        """The magnet as seen in the mirrors' frame: planes are coordinate planes through the origin."""
+        box = magnet.box
+        return replace(magnet, box=Box(box.size, self.axes.T @ (box.center - self.center), self.axes.T @ box.rotation))
+
+
+def find_symmetry(magnets: Sequence[Magnet]) -> Symmetry:
+    """The frame, of the rotor or of the first magnet, in which the bodies have most mirror planes."""
+    found = [_symmetry_along(magnets, axes) for axes in (np.eye(3), magnets[0].box.rotation)]
+    return max(found, key=lambda symmetry: len(symmetry.planes))
+
+
+def _symmetry_along(magnets: Sequence[Magnet], axes: Array) -> Symmetry:
+    corners = np.concatenate([magnet.box.corners for magnet in magnets]) @ axes
+    middle = axes @ ((corners.min(axis=0) + corners.max(axis=0)) / 2)
+    symmetry = Symmetry(middle, axes, ())
+    seen = [symmetry.to_frame(magnet) for magnet in magnets]
+    mirrors = (axis for axis in range(3) if mirror_images(seen, axis) is not None)
+    return replace(symmetry, planes=tuple(axis for axis in mirrors if not _in_narrow_gap(seen, axis)))
+
+
+def _in_narrow_gap(magnets: Sequence[Magnet], axis: int) -> bool:
+    """Whether the plane across a coordinate axis runs close by a corner of a body, but not through it."""
+    heights = np.abs([magnet.box.corners[:, axis] for magnet in magnets])
+    shortest = min(float(magnet.box.size.min()) for magnet in magnets)
+    return bool(np.any((heights > SAME * shortest) & (heights < NARROW_SIDE * shortest)))
+
+
+def mirror_images(magnets: Sequence[Magnet], axis: int) -> list[int] | None:
+    """Number of the body that is the mirror image of each, at the plane across a coordinate axis; None if one lacks."""
+    images = []
+    for magnet in magnets:
+        image = next((k for k, other in enumerate(magnets) if _mirrored(magnet, other, axis)), None)
+        if image is None:
+            return None
+        images.append(image)
+    return images
+
+
+def mirror(axis: int) -> Array:
+    """(3,) factors that mirror a vector at the plane across a coordinate axis."""
+    return np.where(np.arange(3) == axis, -1.0, 1.0)
+
+
+def _mirrored(magnet: Magnet, other: Magnet, axis: int) -> bool:
+    flip = mirror(axis)
+    size = max(magnet.box.circumradius, float(np.linalg.norm(magnet.box.center)))
+    distance = np.linalg.norm((magnet.box.corners * flip)[:, None] - other.box.corners, axis=-1)
+    if distance.min(axis=1).max() > SAME * size:
+        return False
+    permeability = magnet.permeability_in_rotor * flip[:, None] * flip
+    return bool(np.allclose(permeability, other.permeability_in_rotor, rtol=0, atol=1e-12))
+
+
+def parity_parts(
+    magnets: Sequence[Magnet], planes: tuple[int, ...], polarizations: Array | None = None
+) -> list[tuple[tuple[int, ...], Array]]:
+    """Parts of the polarisation that are even (+1) or odd (-1) at each coordinate plane, those that are zero left out.
+
+    Parameters
+    ----------
+    polarizations : (..., n, 3) T, one or several sets; by default those of the magnets
+
+    Returns
+    -------
+    Pairs of the signs, one per plane, and the polarisations (..., n, 3), T. The potential has the same signs.
+    """
+    own = np.array([magnet.polarization_in_rotor for magnet in magnets])
+    whole = own if polarizations is None else polarizations
+    images = {axis: mirror_images(magnets, axis) for axis in planes}
+    parts = []
+    for signs in product((1, -1), repeat=len(planes)):
+        part = whole
+        for axis, sign in zip(planes, signs, strict=True):
+            part = (part + sign * part[..., images[axis], :] * mirror(axis)) / 2
+        if np.abs(part).max() > 1e-14 * np.abs(whole).max():
+            parts.append((signs, part))
+    return parts

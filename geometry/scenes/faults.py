@@ -1,0 +1,94 @@
+"""What is wrong with a scene file, in one grammar: Input KEY must be RULE; instead received VALUE."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Sequence
+from typing import Any
+
+from pydantic import BaseModel
+from pydantic_core import ErrorDetails
+
+from ..basics import InputError
+from . import schema
+
+ROTORS: dict[str, type[BaseModel]] = {
+    "horizontal": schema.HorizontalRotor,
+    "vertical": schema.VerticalRotor,
+    "tilt": schema.TiltRotor,
+    "magnets": schema.ExplicitRotor,
+}
+TABLES: dict[str, type[BaseModel]] = {
+    "magnets": schema.MagnetSection,
+    "floater": schema.FloaterSection,
+    "plate": schema.PlateSection,
+    "lowering": schema.LoweringSection,
+    "drag": schema.DragSection,
+    "start": schema.StartSection,
+}
+RULES = {
+    "greater_than": "greater than {gt:g}",
+    "greater_than_equal": "at least {ge:g}",
+    "less_than_equal": "at most {le:g}",
+    "finite_number": "a finite number",
+    "float_type": "a number",
+    "list_type": "a list",
+    "too_short": "a list of {min_length} or more entries",
+    "too_long": "a list of {max_length} entries",
+    "model_type": "a table",
+    "model_attributes_type": "a table",
+}
+
+
+class SceneError(InputError):
+    """A scene file that cannot be used; `faults` lists everything that is wrong with it."""
+
+    def __init__(self, source: str, faults: Sequence[str]) -> None:
+        self.faults = tuple(faults)
+        super().__init__("\n".join(f"{source}: {fault}" for fault in self.faults))
+
+
+def describe_fault(detail: ErrorDetails) -> str:
+    """One fault found by the schema, as a sentence that says what to do."""
+    place, kind, received = list(detail["loc"]), detail["type"], detail["input"]
+    tag = place.pop(1) if place[0] == "rotor" and len(place) > 2 else None
+    key = "".join(f"[{p}]" if isinstance(p, int) else f".{p or repr(p)}" for p in place).lstrip(".")
+    if kind == "extra_forbidden":
+        return f"Input {key} must be a known key; {_allowed(place, tag)}."
+    if kind == "missing":
+        return f"Input {key} must be given; instead it is missing."
+    if kind.startswith("union_tag"):
+        configuration = received.get("configuration") if isinstance(received, dict) else received
+        return (
+            "Input rotor.configuration must be one of 'horizontal', 'vertical', 'tilt' (or rotor.magnets a list of "
+            f"magnets); instead received {_shown(configuration)}."
+        )
+    if place[-1] == "recoil_permeability" or place[-2:-1] == ["recoil_permeability"]:
+        rule = RULES.get(kind, detail["msg"]).format(**detail.get("ctx", {}))
+        if kind in ("too_short", "too_long"):
+            rule = "a number, or two: along the easy axis and across it"
+        return f"Input {key.removesuffix('[0]')} must be {rule}; instead received {_shown(received)}."
+    if kind in ("too_short", "too_long") and place[-1] != "magnets":
+        return f"Input {key} must be a list of exactly 3 numbers; instead received {_shown(received)}."
+    rule = RULES.get(kind, detail["msg"]).format(**detail.get("ctx", {}))
+    return f"Input {key} must be {rule}; instead received {_shown(received)}."
+
+
+def _allowed(place: list[Any], tag: Any) -> str:
+    """The keys allowed beside an unknown one, the likeliest first."""
+    names = [p for p in place[:-1] if isinstance(p, str)]
+    if not names:
+        table: type[BaseModel] = schema.SceneSection
+    elif names[-1] == "rotor":
+        table = ROTORS[tag]
+    else:
+        table = TABLES[names[-1]]
+    keys = list(table.model_fields)
+    close = difflib.get_close_matches(str(place[-1]), keys, n=1)
+    hint = f"did you mean {close[0]}? " if close else ""
+    return f"{hint}allowed are {', '.join(keys)}"
+
+
+def _shown(value: Any) -> str:
+    text = repr(value)
+    return text if len(text) <= 80 else text[:77] + "..."

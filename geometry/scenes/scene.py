@@ -1,0 +1,160 @@
+"""The scene: rotor, floater, plate and what acts on them, all in SI units."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from ..basics import MU_0, Array, Box, frozen_array, listed, millimetres
+from ..bodies import Magnet
+
+AIR_VISCOSITY = 1.83e-5
+"""Dynamic viscosity of air at 20-25 °C, Pa s."""
+
+
+@dataclass(frozen=True)
+class Floater:
+    """The floating sphere: rigidly magnetised, so that it is exactly a dipole, seen and seeing.
+
+    Parameters
+    ----------
+    radius : m
+    remanence : remanent polarisation, T
+    recoil_permeability : μr
+    density : kg/m³
+    conductivity : S/m, or None where its own eddy currents are not modelled
+    """
+
+    radius: float
+    remanence: float
+    recoil_permeability: float
+    density: float
+    conductivity: float | None = None
+
+    @property
+    def volume(self) -> float:
+        """Volume, m³."""
+        return 4 / 3 * np.pi * self.radius**3
+
+    @property
+    def mass(self) -> float:
+        """Mass, kg."""
+        return self.density * self.volume
+
+    @property
+    def inertia(self) -> float:
+        """Moment of inertia 2/5 M R², kg m²."""
+        return 0.4 * self.mass * self.radius**2
+
+    @property
+    def moment(self) -> float:
+        """Magnetic moment (Br V/μ0) 3/(μr + 2) of the free sphere, A m²."""
+        return self.remanence * self.volume / MU_0 * 3 / (self.recoil_permeability + 2)
+
+    def __repr__(self) -> str:
+        text = f"Floater Ø {self.radius * 2e3:.4g} mm, {self.mass * 1e3:.4g} g, {self.moment:.4g} A m²"
+        text += f", μr {self.recoil_permeability:g}"
+        return text if self.conductivity is None else f"{text}, {self.conductivity:.3g} S/m"
+
+
+@dataclass(frozen=True)
+class Lowering:
+    """The plate's motion: from `start` (s) downwards with `speed` (m/s) over `distance` (m)."""
+
+    start: float
+    speed: float
+    distance: float
+
+    def depth(self, time: float) -> float:
+        """How far the plate has gone down at `time`, m."""
+        return min(max(time - self.start, 0.0) * self.speed, self.distance)
+
+
+@dataclass(frozen=True, eq=False)
+class Plate:
+    """A conducting plate, fixed in the laboratory but for its lowering."""
+
+    box: Box
+    conductivity: float
+    lowering: Lowering | None = None
+
+    def __repr__(self) -> str:
+        text = f"Plate {millimetres(self.box.size)} at {millimetres(self.box.center)}, {self.conductivity:.3g} S/m"
+        down = self.lowering
+        if down is None:
+            return text
+        return f"{text}, lowered by {down.distance * 1e3:g} mm at {down.speed * 1e3:g} mm/s from {down.start:g} s on"
+
+
+@dataclass(frozen=True)
+class Drag:
+    """Viscous drag: force -linear v (N s/m) and torque -angular Ω (N m s)."""
+
+    linear: float
+    angular: float
+
+    @classmethod
+    def stokes(cls, radius: float) -> Drag:
+        """Stokes drag of a sphere in air: 6πηR and 8πηR³."""
+        return cls(6 * np.pi * AIR_VISCOSITY * radius, 8 * np.pi * AIR_VISCOSITY * radius**3)
+
+
+@dataclass(frozen=True, eq=False)
+class AbsoluteStart:
+    """Initial state in the laboratory frame: position m, velocity m/s, moment direction, angular velocity rad/s."""
+
+    position: Array
+    velocity: Array
+    moment: Array
+    spin: Array
+
+
+@dataclass(frozen=True, eq=False)
+class OffsetStart:
+    """Start from the stable equilibrium, displaced by `offset` (m) in the frame that turns with the rotor."""
+
+    offset: Array = field(default_factory=lambda: frozen_array((0.0, 0.0, 1e-4), (3,)))
+
+
+@dataclass(frozen=True, eq=False)
+class Scene:
+    """All that a computation needs to know.
+
+    Parameters
+    ----------
+    frequency : turns of the rotor per second about +z, Hz
+    rotor : magnets in the rotor's frame, which is the laboratory's at t = 0
+    floater : the sphere
+    gravity : (3,) m/s², laboratory frame
+    plate : conducting plate, or None
+    drag : of the surrounding medium
+    start : where a simulation begins
+    field_map : file of a map of the rotor's B in its frame, or None
+    text : the scene file as it was read, for the record
+    """
+
+    frequency: float
+    rotor: tuple[Magnet, ...]
+    floater: Floater
+    drag: Drag
+    gravity: Array = field(default_factory=lambda: frozen_array((0.0, 0.0, -9.81), (3,)))
+    plate: Plate | None = None
+    start: OffsetStart | AbsoluteStart = field(default_factory=OffsetStart)
+    field_map: Path | None = None
+    text: str = ""
+
+    @property
+    def angular_velocity(self) -> float:
+        """ω = 2π frequency, rad/s."""
+        return 2 * np.pi * self.frequency
+
+    def __repr__(self) -> str:
+        air = f"drag {self.drag.linear:.3g} N s/m, {self.drag.angular:.3g} N m s"
+        lines = [f"Scene at {self.frequency:g} Hz, gravity ({listed(self.gravity)}) m/s², {air}"]
+        lines += [f"  {magnet!r}" for magnet in self.rotor]
+        lines += [f"  Field from {self.field_map}"] if self.field_map else []
+        lines += [f"  {self.floater!r}"]
+        lines += [f"  {self.plate!r}"] if self.plate else []
+        return "\n".join(lines)

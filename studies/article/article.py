@@ -1,0 +1,141 @@
+"""The rotors, magnets and ranges of the article whose figures the studies reproduce.
+
+J. M. Hermansen, F. L. Durhuus and R. Bjørk, Appl. Phys. Lett. 127 (2025) 012402.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+
+import numpy as np
+import xarray as xr
+from numpy.typing import ArrayLike, NDArray
+
+from ...fem.rotor_tables import RotorTable, cached_rotor_table, rotor_table
+from ...geometry.bodies import article_rotors as rotor
+from ...geometry.scenes import Drag, Floater, Scene
+from ..results import Point, chosen
+from ..terminal import note
+
+EDGE, REMANENCE, PERMEABILITY = 10e-3, 1.305, 1.05
+"""Of the rotor's cubes: m; T, the middle of 1.29 to 1.32; recoil permeability usual for NdFeB, which is not given."""
+FLOATER = Floater(6.35e-3, REMANENCE, PERMEABILITY, 7500.0)
+PLATE_SIZE, PLATE_CONDUCTIVITY = (0.1, 0.24, 0.03), 3.5e7
+"""Of the aluminium plate: edges, m; S/m."""
+CONTACT = EDGE / 2 + FLOATER.radius
+"""Distance on the axis at which floater and a cube that is not tilted touch, m."""
+LOWEST, HIGHEST = 40.0, 250.0
+"""Frequencies that are looked at, Hz: the article flew from below 50 Hz to what its motor gave."""
+FLIGHT = 250.0
+"""The longest flight of the experiment, s."""
+RTOL = 1e-4
+"""Relative accuracy of B asked of the finite elements, from contact on: it moves the equilibria by less than 1 µm."""
+MODELS = ("dipole", "fem")
+
+
+@dataclass(frozen=True)
+class Configuration:
+    """One of the article's three rotors.
+
+    Parameters
+    ----------
+    make : maker of its magnets, from the parameter in SI units
+    symbol, unit, scale : of the parameter, its unit, and that in SI
+    tested : values of the parameter that the article tried, in its unit
+    levitated : those of them that levitated in the experiment
+    """
+
+    make: Callable[..., rotor.Rotor]
+    symbol: str
+    unit: str
+    scale: float
+    tested: tuple[float, ...]
+    levitated: tuple[float, ...]
+
+    def si(self, value: float) -> float:
+        """The parameter in SI units."""
+        return value * self.scale
+
+
+CONFIGURATIONS = {
+    "horizontal": Configuration(
+        rotor.horizontal, "δx", "mm", 1e-3, tuple(float(x) for x in range(1, 9)), (1.0, 2.0, 3.0, 4.0)
+    ),
+    "vertical": Configuration(
+        rotor.vertical, "δz", "mm", 1e-3, (10.0, 12.0, 14.0, 16.0, 18.0, 20.0), (10.0, 12.0, 14.0, 16.0)
+    ),
+    "tilt": Configuration(
+        rotor.tilt, "δθ", "°", np.pi / 180, tuple(float(x) for x in range(5, 50, 5)), (5.0, 10.0, 15.0, 20.0)
+    ),
+}
+
+
+QUICK = {"horizontal": (1.0,), "vertical": (14.0,), "tilt": (10.0,)}
+"""One rotor of each configuration, for the quick settings of studies."""
+
+
+def levitated(quick: bool) -> list[Point]:
+    """A point for each rotor that levitated in the experiment; `quick` has one of each configuration."""
+    return [
+        {"configuration": configuration, "measure": measure}
+        for configuration, kind in CONFIGURATIONS.items()
+        for measure in (kind.levitated[1:2] if quick else kind.levitated)
+    ]
+
+
+def article_scene(
+    configuration: str,
+    value: float,
+    frequency: float = 100.0,
+    *,
+    drag: bool = True,
+    edge: float = EDGE,
+    remanence: float = REMANENCE,
+    permeability: float = PERMEABILITY,
+    floater: Floater = FLOATER,
+) -> Scene:
+    """A rotor of the article above its floater, without a plate.
+
+    Parameters
+    ----------
+    configuration, value : of the rotor; displacement in mm or tilt in degrees
+    frequency : Hz
+    drag : whether there is air (Stokes)
+    edge, remanence, permeability : of the cubes, m, T and 1
+    """
+    kind = CONFIGURATIONS[configuration]
+    magnets = kind.make(kind.si(value), edge, remanence, permeability)
+    return Scene(frequency, magnets, floater, Drag.stokes(floater.radius) if drag else Drag(0.0, 0.0))
+
+
+def article_table(scene: Scene, model: str) -> RotorTable:
+    """The field of a scene's rotor; finite elements from the cache if they are there."""
+    if model != "fem":
+        return rotor_table(scene.rotor, model, RTOL, FLOATER.radius)
+    return cached_rotor_table(scene.rotor, model, RTOL, note, FLOATER.radius)[0]
+
+
+def label(configuration: str, value: float) -> str:
+    """A rotor's parameter with its symbol and unit."""
+    kind = CONFIGURATIONS[configuration]
+    return f"{kind.symbol} = {value:g}{'' if kind.unit == '°' else ' '}{kind.unit}"
+
+
+def axis_label(configuration: str) -> str:
+    """A configuration's parameter with its unit, for an axis."""
+    kind = CONFIGURATIONS[configuration]
+    return f"{kind.symbol} ({kind.unit})"
+
+
+def by_configuration(result: xr.Dataset) -> Iterator[tuple[str, xr.Dataset]]:
+    """Each configuration that a joined result has, with its rotors by ascending displacement or tilt."""
+    for configuration in CONFIGURATIONS:
+        part = chosen(result, configuration=configuration).sortby("measure")
+        if part.sizes["case"]:
+            yield configuration, part
+
+
+def stable(growth: ArrayLike) -> NDArray[np.bool_]:
+    """Where no disturbance grows e-fold within `FLIGHT`; False where there is no equilibrium (NaN)."""
+    return np.asarray(np.asarray(growth) <= 1 / FLIGHT)

@@ -1,0 +1,117 @@
+"""Figure and sentences of the study of the force along the axis, from its dataset alone."""
+
+from __future__ import annotations
+
+import numpy as np
+import xarray as xr
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from ..results import PALETTE, chosen, panels, styled
+from .force_curve import TOLD_ANGLE, TOLD_DISTANCE, WEIGHT
+
+STYLES = {"fem": "-", "dipole": "--", "semi-analytic": ":", "small angles": "-."}
+TEXTS = {
+    "fem": "finite elements",
+    "dipole": "point dipole",
+    "semi-analytic": "article, semi-analytic",
+    "small angles": "article, small angles",
+}
+POINTS = {"near_tipping": ("<", "tipping points"), "equilibrium": ("o", "stable point"), "far_tipping": (">", "")}
+
+
+@styled
+def force_figure(result: xr.Dataset) -> Figure:
+    """Left the force and its parts at one frequency; right the net force at all of them; below θ."""
+    figure, ((left, right), (ratio, angle)) = panels(2, 2, (9.0, 7.0))
+    shown = min(1, result.sizes["frequency"] - 1)
+    frequency = float(result["frequency"][shown])
+    one = result.isel(frequency=shown)
+    _parts(left, one)
+    left.set_title(f"δx = 1 mm, {frequency:g} Hz")
+    for k, color in zip(range(result.sizes["frequency"]), PALETTE, strict=False):
+        _net(right, result.isel(frequency=k), color)
+        here = chosen(result.isel(frequency=k), model="fem").isel(case=0)
+        angle.plot(_mm(result), np.degrees(here["polar_angle"]), color=color)
+    right.set(ylabel="net force, with gravity (mN)", ylim=(-60, 40), title="Finite elements; dipole dashed")
+    right.legend()
+    angle.axhline(np.degrees(TOLD_ANGLE), color="0.4", lw=0.8, ls="--", label="9°: the article's near tipping point")
+    angle.set(ylabel="polar angle θ (°)", ylim=(0, 20), title="Polar angle, finite elements")
+    angle.legend()
+    _differences(ratio, one)
+    for axes in (left, right, ratio, angle):
+        axes.set(xlabel="distance along the axis (mm)", xlim=(11, 45))
+    return figure
+
+
+def _mm(result: xr.Dataset) -> np.ndarray:
+    return np.asarray(1e3 * result["distance"].values)
+
+
+def _parts(axes: Axes, one: xr.Dataset) -> None:
+    for model, style in STYLES.items():
+        found = chosen(one, model=model).isel(case=0)
+        for part, color in (("attracting", PALETTE[0]), ("repelling", PALETTE[1])):
+            axes.plot(_mm(one), 1e3 * found[part], style, color=color, lw=1.0)
+        total = 1e3 * (found["attracting"] + found["repelling"] - WEIGHT)
+        axes.plot(_mm(one), total, style, color="k", label=TEXTS[model])
+        if model == "fem":
+            error = 1e3 * found["force_error"]
+            axes.fill_between(_mm(one), total - error, total + error, color="0.7", lw=0)
+            _arrows(axes, found)
+    axes.axhline(-1e3 * WEIGHT, color="0.5", lw=0.8)
+    axes.axhline(0.0, color="0.3", lw=0.6)
+    for text, place, color in (("attracting part", (24, 165), PALETTE[0]), ("repelling part", (20, -225), PALETTE[1])):
+        axes.annotate(text, place, color=color)
+    axes.annotate("gravity", (40, -1e3 * WEIGHT - 30), color="0.4", fontsize=7)
+    axes.set(ylabel="force, upwards (mN)", ylim=(-350, 350))
+    axes.legend(title="black: net force", title_fontsize=7)
+
+
+def _arrows(axes: Axes, found: xr.Dataset) -> None:
+    for mark, (symbol, text) in POINTS.items():
+        axes.plot(1e3 * float(found[mark]), 0.0, symbol, color=PALETTE[2], ms=5, label=text or None)
+    stable, far = 1e3 * float(found["equilibrium"]), 1e3 * float(found["far_tipping"])
+    for start, end in ((stable + 3.5, stable + 1), (stable - 3.5, stable - 1), (far + 1, far + 4)):
+        axes.annotate("", (end, 75), (start, 75), arrowprops={"arrowstyle": "->", "color": PALETTE[2]})
+
+
+def _net(axes: Axes, one: xr.Dataset, color: str) -> None:
+    for model in ("fem", "dipole"):
+        found = chosen(one, model=model).isel(case=0)
+        label = f"{float(one['frequency']):g} Hz" if model == "fem" else None
+        axes.plot(
+            _mm(one), 1e3 * (found["attracting"] + found["repelling"] - WEIGHT), STYLES[model], color=color, label=label
+        )
+        if model == "fem":
+            for mark, (symbol, _) in POINTS.items():
+                axes.plot(1e3 * float(found[mark]), 0.0, symbol, color=color, ms=4)
+    axes.axhline(0.0, color="0.3", lw=0.6)
+
+
+def _differences(axes: Axes, one: xr.Dataset) -> None:
+    true = chosen(one, model="fem").isel(case=0)
+    for model, color in (("dipole", PALETTE[0]), ("semi-analytic", PALETTE[1]), ("small angles", PALETTE[3])):
+        found = chosen(one, model=model).isel(case=0)
+        for part, style in (("attracting", "-"), ("repelling", "--")):
+            label = f"{TEXTS[model]}, {part}"
+            axes.plot(_mm(one), 100 * (found[part] / true[part] - 1), style, color=color, label=label)
+    axes.set(ylabel="difference from finite elements (%)", ylim=(-5, 20), title="Parts of the force")
+    axes.legend()
+
+
+def force_lines(result: xr.Dataset) -> list[str]:
+    """Stable and tipping points at each frequency, by each way, and the angle the article gives."""
+    lines = []
+    for k, frequency in enumerate(result["frequency"].values):
+        for model in STYLES:
+            found = chosen(result, model=model).isel(case=0, frequency=k)
+            far_angle = np.interp(TOLD_DISTANCE, result["distance"].values, found["polar_angle"].values)
+            lines.append(
+                f"{frequency:g} Hz, {TEXTS[model]}: stable at {1e3 * float(found['equilibrium']):.3f} mm "
+                f"(θ = {np.degrees(float(found['angle_equilibrium'])):.2f}°), tipping points at "
+                f"{1e3 * float(found['near_tipping']):.3f} mm (θ = {np.degrees(float(found['angle_near'])):.2f}°; "
+                f"the article: 9°) and {1e3 * float(found['far_tipping']):.3f} mm; "
+                f"θ = {np.degrees(far_angle):.2f}° at 40 mm (the article: almost zero)."
+            )
+    return lines

@@ -1,0 +1,124 @@
+"""Distance at which the floater levitates against frequency, for every rotor of the article: its third figure."""
+
+from __future__ import annotations
+
+import numpy as np
+import xarray as xr
+
+from ...dynamics.branches import Family, distance_error, kicked, levitating_branch
+from ...dynamics.branches import Point as Equilibrium
+from ...dynamics.flights import simulate
+from ...dynamics.motion import Rates
+from ...fem.rotor_tables import RotorTable
+from ...geometry.basics import Array
+from ...geometry.scenes import Scene
+from ..results import Point, one_case, variable
+from .article import CONFIGURATIONS, FLOATER, HIGHEST, LOWEST, QUICK, article_scene, article_table, stable
+from .article_formulas import analytic_distance, balanced
+
+SIDES = ("near", "far")
+FORMULAS, FIELDS = ("semi-analytic", "analytic"), ("dipole", "fem")
+FLOWN = "dipole"
+"""The field of the simulated flights, which are spread over a rotor's stable frequencies."""
+KICK, SECONDS = 0.01, 1.0
+"""Speed with which a simulated floater leaves its equilibrium upwards, m/s, and duration of the flight."""
+
+
+def distance_points(quick: bool) -> list[Point]:
+    """Every rotor of the article by every formula and field; `quick` takes three rotors and a coarser grid."""
+    step, flights = (10.0, 1) if quick else (2.5, 3)
+    rotors = {name: QUICK[name] if quick else kind.tested for name, kind in CONFIGURATIONS.items()}
+    return [
+        {"configuration": name, "value": value, "model": model, "step_hz": step, "flights": flights}
+        for name, values in rotors.items()
+        for value in values
+        for model in (*FORMULAS, *FIELDS)
+        if (name, model) != ("vertical", "analytic")
+    ]
+
+
+def levitation_distance(point: Point) -> xr.Dataset:
+    """Distances of one rotor by one formula, or in one field, at all frequencies.
+
+    Returns
+    -------
+    Dataset over `frequency` and `side`: distance along the axis of the near and of the far equilibrium, NaN where there
+    is none, and in a field also its error by the table, growth of small motions and polar angle; where the two sides
+    meet; in the dipole's field some simulations.
+    """
+    grid = np.arange(LOWEST, HIGHEST + 1e-9, point["step_hz"])
+    made = _by_formula(point, grid) if point["model"] in FORMULAS else _in_field(point, grid)
+    frequency = variable(("frequency",), grid, "Hz", "frequency of the rotor")
+    return one_case(point, made.assign_coords(side=list(SIDES), frequency=frequency))
+
+
+def _by_formula(point: Point, grid: Array) -> xr.Dataset:
+    configuration, value = point["configuration"], point["value"]
+    if point["model"] == "analytic":
+        near = analytic_distance(configuration, value, grid)
+        distance = np.stack([near, np.full(near.shape, np.nan)], axis=1)
+    else:
+        weight = FLOATER.mass * 9.81
+        distance = np.array([balanced(configuration, value, frequency, weight) for frequency in grid])
+    unknown = np.full(distance.shape, np.nan)
+    return _dataset(distance, unknown, unknown, unknown, (np.nan, np.nan), np.full((3, point["flights"]), np.nan))
+
+
+def _in_field(point: Point, grid: Array) -> xr.Dataset:
+    scene = article_scene(point["configuration"], point["value"], HIGHEST)
+    table = article_table(scene, point["model"])
+    branch = levitating_branch(scene, table, Rates.of(scene, table), HIGHEST)
+    found = [branch.side(side, grid) for side in SIDES]
+    rows = np.array([[_row(scene, table, branch.family, p) for p in side] for side in found])
+    distance, error, growth, angle = (rows[..., k].T for k in range(4))
+    fold = branch.fold
+    flown = found[0] if point["model"] == FLOWN else []
+    known = [p for p in flown if p is not None and stable(p.growth_per_s)]
+    places = np.unique(np.linspace(0, len(known) - 1, point["flights"] if known else 0).astype(int))
+    flights = np.full((3, point["flights"]), np.nan)
+    for k, place in enumerate(places):
+        flights[:, k] = known[place].parameter, *mean_height(scene, table, known[place])
+    return _dataset(distance, error, growth, angle, (fold.parameter, -fold.position[2]), flights)
+
+
+def _row(scene: Scene, table: RotorTable, family: Family, point: Equilibrium | None) -> list[float]:
+    if point is None:
+        return [np.nan] * 4
+    angle = float(np.arctan2(np.hypot(*point.state[6:8]), point.state[8]))
+    return [-point.position[2], distance_error(scene, table, family, point), point.growth_per_s, angle]
+
+
+def mean_height(scene: Scene, table: RotorTable, point: Equilibrium) -> tuple[float, float]:
+    """Mean distance along the axis (m) of a flight that a kick began, and by how much its halves differ.
+
+    Means are weighted by sin², which takes out the bounce; NaN where the flight did not last.
+    """
+    flight = simulate(kicked(scene, point, KICK), table, SECONDS, [])
+    if flight.ended_by != "duration":
+        return np.nan, np.nan
+    height = -flight.lab.position[:, 2]
+    halves = [_smooth_mean(part) for part in np.array_split(height, 2)]
+    return _smooth_mean(height), abs(halves[1] - halves[0])
+
+
+def _smooth_mean(values: Array) -> float:
+    return float(np.average(values, weights=np.sin(np.pi * (np.arange(len(values)) + 0.5) / len(values)) ** 2))
+
+
+def _dataset(
+    distance: Array, error: Array, growth: Array, angle: Array, fold: tuple[float, float], flights: Array
+) -> xr.Dataset:
+    rows, flight = ("frequency", "side"), ("flight",)
+    return xr.Dataset(
+        {
+            "distance": variable(rows, distance, "m", "levitation distance"),
+            "distance_error": variable(rows, error, "m", "what the field's estimated error changes of the distance"),
+            "growth": variable(rows, growth, "1/s", "largest growth rate of a small motion"),
+            "polar_angle": variable(rows, angle, "rad", "polar angle of the moment"),
+            "fold_frequency": variable((), fold[0], "Hz", "lowest frequency with an equilibrium"),
+            "fold_distance": variable((), fold[1], "m", "levitation distance there"),
+            "flight_frequency": variable(flight, flights[0], "Hz", "frequency of a simulated flight"),
+            "flight_distance": variable(flight, flights[1], "m", "mean levitation distance of a simulated flight"),
+            "flight_error": variable(flight, flights[2], "m", "difference between the flight's halves"),
+        }
+    )

@@ -1,0 +1,71 @@
+"""The figures of any result, from its file alone."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+
+import xarray as xr
+from matplotlib.figure import Figure
+
+from ...fem.storage import TableFileError, read_checked
+from ...geometry.basics import InputError
+from ..pictures import drawable, modes_figure, question_figure
+from ..results import field_figure, force_figure, save_figure, trajectory_figure
+from .entries import CATALOGUE
+
+QUESTION = "question"
+"""What the result of one's own question is called."""
+DRAWN = {
+    "axis_field": ("field", field_figure),
+    "curve_force": ("force", force_figure),
+    "position_rotor_frame": ("trajectory", trajectory_figure),
+    "mode_growth": ("modes", modes_figure),
+}
+"""By variable of a result that is no study: name of the figure and who draws it."""
+
+
+def draw_result(path: Path, out: Path) -> list[str]:
+    """Draw a result file anew; returns the files written.
+
+    Raises
+    ------
+    InputError : the file cannot be read, or is no result of this program
+    """
+    return save_figures(figures_of(read_result(path)), out)
+
+
+def read_result(path: Path) -> xr.Dataset:
+    """The whole of a result file. Raises InputError if it cannot be read, or is no result of this program."""
+    try:
+        result = read_checked(path)
+    except FileNotFoundError:
+        raise InputError(f"Input {path} must be a file that exists; instead it is missing.") from None
+    except TableFileError as error:
+        raise InputError(str(error)) from None
+    except OSError as error:
+        raise InputError(f"Input {path} must be a readable file; instead: {error.strerror}.") from None
+    if "study" not in result.attrs:
+        raise InputError(f"Input {path} must be a result of spinlev; instead it has no attribute 'study'.")
+    return result
+
+
+def figures_of(result: xr.Dataset) -> Mapping[str, Figure]:
+    """The figures of a result by name."""
+    kind = str(result.attrs["study"])
+    if kind in CATALOGUE:
+        return {kind: CATALOGUE[kind].draw(result)}
+    if kind == QUESTION:
+        return {QUESTION: question_figure(result)} if drawable(result) else {}
+    found = {name: draw(result) for key, (name, draw) in DRAWN.items() if key in result}
+    if not found:
+        raise InputError(f"Input study must be one that this version knows; instead the result is of '{kind}'.")
+    return found
+
+
+def save_figures(figures: Mapping[str, Figure], out: Path) -> list[str]:
+    """Write each figure as PNG and PDF; returns the files."""
+    files = [out / f"{name}.{suffix}" for name in figures for suffix in ("png", "pdf")]
+    for file in files:
+        save_figure(figures[file.stem], file)
+    return [str(file) for file in files]

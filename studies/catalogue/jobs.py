@@ -1,0 +1,73 @@
+"""The command `study`: computes, writes, draws and tells."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import xarray as xr
+
+from ..one_scene import Job, Question
+from ..pictures import question_figure, question_lines
+from ..results import Point, Study, write_dataset
+from ..sweeps import Engine, combinations, forget, swept
+from .drawings import QUESTION, figures_of, save_figures
+from .entries import CATALOGUE
+
+
+def study_job(name: str, quick: bool, engine: Engine, out: Path) -> Job:
+    """Compute a study of the catalogue; writes NAME.nc, NAME.png and NAME.pdf. Errors are those of `swept`."""
+    study = CATALOGUE[name]
+    return _studied(name, study, study.points(quick), engine, out)
+
+
+def question_job(question: Question, values: dict[str, list[float]], engine: Engine, out: Path) -> Job:
+    """Answer one's own question over a grid; writes question.nc and its figure.
+
+    Raises
+    ------
+    SceneError : the scene does not take the first of the values
+    """
+    points = combinations(values)
+    question.scene(points[0])
+    study = Study(
+        f"{question.ask} over {', '.join(values)}",
+        lambda quick: points,
+        question,
+        partial(question.gather, values=values),
+        question_figure,
+        question_lines,
+        settings=question.settings,
+    )
+    return _studied(QUESTION, study, points, engine, out)
+
+
+def _studied(name: str, study: Study, points: Sequence[Point], engine: Engine, out: Path) -> Job:
+    result = swept(name, study, dict(enumerate(points)), engine, out)
+    path = out / f"{name}.nc"
+    write_dataset(result, path)
+    forget(name, out)
+    figures = save_figures(figures_of(result), out)
+    lines = [*study.report(result), *failure_lines(result)]
+    values = {
+        "study": name,
+        "report": lines,
+        "failed_points": failed_points(result),
+        "result": str(path),
+        "figures": figures,
+    }
+    return values, [*lines, f"Written: {', '.join([str(path), *figures])}"]
+
+
+def failed_points(result: xr.Dataset) -> list[dict[str, Any]]:
+    """The points of a result that have no value, each with the reason."""
+    failed: list[dict[str, Any]] = json.loads(result.attrs["failed_points"])["failed"]
+    return failed
+
+
+def failure_lines(result: xr.Dataset) -> list[str]:
+    """The same for a person."""
+    return [f"No value at {json.dumps(f['point'], ensure_ascii=False)}: {f['reason']}" for f in failed_points(result)]

@@ -1,0 +1,114 @@
+"""The command `report`: one page of all results in a folder, which opens without a network."""
+
+from __future__ import annotations
+
+import base64
+import json
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+import jinja2
+import numpy as np
+import xarray as xr
+
+from ...fem.storage import write_whole
+from ...geometry.basics import InputError
+from ..pictures import question_lines
+from ..results import drawn
+from .drawings import QUESTION, figures_of, read_result
+from .entries import CATALOGUE
+from .jobs import failure_lines
+
+SUMMARIES = {
+    "run": "The main job: fields, force, equilibria and motion of a scene.",
+    "simulate": "A flight.",
+    QUESTION: "One's own question over parameters of a scene.",
+}
+LONGEST = 400
+"""Characters of a value that are shown."""
+
+
+@dataclass(frozen=True)
+class Part:
+    """What the page says of one result."""
+
+    name: str
+    summary: str
+    lines: list[str]
+    failures: list[str]
+    pictures: list[tuple[str, str]]
+    answers: Mapping[str, str]
+    variables: list[Mapping[str, str]]
+    provenance: Mapping[str, str]
+
+
+def report_job(folder: Path, out: Path) -> tuple[Path, list[str]]:
+    """Write report.html about every result in `folder`; returns it and the names of the results.
+
+    Raises
+    ------
+    InputError : the folder is missing, has no result, or one that cannot be read
+    """
+    if not os.path.isdir(folder):  # unlike Path.is_dir never raises
+        raise InputError(f"Input DIR must be a folder with results; instead received {folder}.")
+    paths = sorted(folder.glob("*.nc"))
+    if not paths:
+        raise InputError(f"Input DIR must have results (*.nc) in it; instead {folder} has none.")
+    parts = [_part(path) for path in paths]
+    template = files(__package__).joinpath("report.html").read_text(encoding="utf-8")
+    page = jinja2.Environment(autoescape=True).from_string(template).render(folder=folder.resolve().name, parts=parts)
+    write_whole(out / "report.html", page.encode())
+    return out / "report.html", [part.name for part in parts]
+
+
+def _part(path: Path) -> Part:
+    result = read_result(path)
+    kind = str(result.attrs["study"])
+    study = CATALOGUE.get(kind)
+    pictures = [(name, _embedded(drawn(figure, "png"), "png")) for name, figure in figures_of(result).items()]
+    beside = [path.parent / "scene.png"] if kind == "run" else []
+    beside += [path.parent / f"{path.stem}-{name}" for name in ("scene.png", "flight.gif")]
+    pictures += [(f.stem, _embedded(f.read_bytes(), f.suffix[1:])) for f in beside if f.exists()]
+    lines = study.report(result) if study else question_lines(result) if kind == QUESTION else []
+    summary = study.summary if study else SUMMARIES.get(kind, "")
+    return Part(
+        path.stem,
+        summary,
+        lines,
+        failure_lines(result) if "failed_points" in result.attrs else [],
+        pictures,
+        _answers(path) if kind == "run" else {},
+        [_row(name, values) for name, values in result.data_vars.items()],
+        {str(key): str(value) for key, value in result.attrs.items() if key != "failed_points"},
+    )
+
+
+def _embedded(content: bytes, kind: str) -> str:
+    return f"data:image/{kind};base64,{base64.b64encode(content).decode()}"
+
+
+def _answers(path: Path) -> dict[str, str]:
+    """The numbers that `run` said, from the summary beside its result."""
+    summary = path.parent / "summary.json"
+    if not summary.exists():
+        return {}
+    try:
+        values: dict[str, Any] = dict(json.loads(summary.read_text(encoding="utf-8")))
+    except (ValueError, TypeError) as error:
+        raise InputError(f"Input {summary} must be a JSON object; instead: {error}.") from None
+    texts = {key: json.dumps(value, ensure_ascii=False) for key, value in values.items()}
+    return {key: text if len(text) <= LONGEST else text[:LONGEST] + " …" for key, text in texts.items()}
+
+
+def _row(name: Any, values: xr.DataArray) -> dict[str, str]:
+    numbers = values.values[np.isfinite(values.values)] if values.dtype.kind in "iuf" else np.zeros(0)
+    return {
+        "title": f"{values.attrs.get('long_name', name)}",
+        "units": str(values.attrs.get("units", "")),
+        "dims": " × ".join(f"{dim} ({size})" for dim, size in values.sizes.items()),
+        "range": f"{numbers.min():.4g} … {numbers.max():.4g}" if numbers.size else "",
+    }

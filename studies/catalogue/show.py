@@ -1,0 +1,61 @@
+"""The command `show`: three-dimensional pictures and an animation of a result."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+import xarray as xr
+
+from ...dynamics.motion import State
+from ...geometry.basics import InputError
+from ...geometry.scenes import Scene, parse_scene
+from ..one_scene import Shelf, sources
+from ..pictures import flight_animation, last_view, plate_currents, scene_picture
+from ..terminal import Tables, note, progress
+from .drawings import read_result
+
+
+def show_job(path: Path, out: Path) -> list[str]:
+    """Write NAME-scene.png, and NAME-flight.gif of a flight; returns the files.
+
+    Raises
+    ------
+    InputError : the file is no result of this program, or of a study, in which there is no single scene to be seen
+    """
+    result = read_result(path)
+    if "scene" not in result.attrs or "position_rotor_frame" not in result:
+        raise InputError(
+            f"Input {path} must hold a flight (result.nc of `run`, trajectory.nc of `simulate`); instead it is of "
+            f"'{result.attrs['study']}'. Its figures: spinlev figure {path}"
+        )
+    scene = _at_end(parse_scene(str(result.attrs["scene"]), str(path)), float(result["time"][-1]))
+    table = Shelf(scene, Tables()).table()
+    motion = _motion(scene, result)
+    view = last_view(scene, table, motion)
+    currents = None
+    if scene.plate is not None:
+        note("Currents in the plate ...")
+        currents = partial(plate_currents, scene, scene.plate, sources(table), view.floater)
+    picture, animation = (out / f"{path.stem}-{name}" for name in ("scene.png", "flight.gif"))
+    scene_picture(replace(view, currents=currents), picture)
+    with progress("Animation") as advance:
+        flight_animation(view, result["time"].values, motion, animation, advance)
+    return [str(picture), str(animation)]
+
+
+def _motion(scene: Scene, result: xr.Dataset) -> State:
+    names = ("position", "velocity", "moment", "spin")
+    laboratory = State(*(result[name].values for name in names))
+    return laboratory.to_rotor(scene.angular_velocity * result["time"].values)
+
+
+def _at_end(scene: Scene, time: float) -> Scene:
+    """The scene with its plate where the lowering has brought it."""
+    plate = scene.plate
+    if plate is None or plate.lowering is None:
+        return scene
+    center = plate.box.center - np.array([0.0, 0.0, plate.lowering.depth(time)])
+    return replace(scene, plate=replace(plate, box=replace(plate.box, center=center), lowering=None))

@@ -1,0 +1,1 @@
+"""How does a user call the program?"""

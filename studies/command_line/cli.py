@@ -1,0 +1,79 @@
+"""The command line: `spinlev`.
+
+Exit status 0: done; 2: bad input, with one message that says what is allowed; 1: the computation failed.
+"""
+
+from __future__ import annotations
+
+import os
+import threading
+import time
+import traceback
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+from cyclopts import App, CycloptsError
+
+from ...geometry.basics import ComputationError, InputError
+from ..terminal import Answer, answers_only, note, to_json
+from .result_commands import add_result_commands
+from .scene_commands import add_scene_commands
+from .start import STOPPED
+
+app = App(
+    name="spinlev",
+    version=version("spinlev"),
+    help="Magnetic levitation by rotation: true fields, true motion.",
+    help_format="plaintext",
+    suppress_keyboard_interrupt=False,
+)
+add_scene_commands(app)
+add_result_commands(app)
+
+
+def run(arguments: list[str], stop: threading.Event) -> int:
+    """Answer on standard output; the exit status."""
+    with answers_only() as out:
+        return _status(arguments, out, stop)
+
+
+def _status(arguments: list[str], out: Any, stop: threading.Event | None = None) -> int:
+    """The exit status; `stop` tells that the user has stopped the program, whatever a library made of that."""
+    try:
+        _answer(arguments, out)
+    except CycloptsError as error:
+        note(f"spinlev: {error}\nTry: spinlev --help")
+        return 2
+    except InputError as error:
+        note(f"spinlev: {error}")
+        return 2
+    except ComputationError as error:
+        note(f"spinlev: {error}")
+        return 1
+    except OSError as error:
+        where = error.filename or "standard output"
+        note(f"spinlev: the computation failed to write or read {where}: {error.strerror or error}; see --out.")
+        return 1
+    except KeyboardInterrupt:
+        note(STOPPED)
+        return 1
+    except Exception as error:  # the last resort: say what and where, without a traceback
+        if stop and stop.is_set():
+            note(STOPPED)
+            return 1
+        if "SPINLEV_TRACEBACK" in os.environ:
+            raise
+        frame = traceback.extract_tb(error.__traceback__)[-1]
+        where = f"{Path(frame.filename).parent.name}/{Path(frame.filename).name}:{frame.lineno}"
+        note(f"spinlev: the computation failed at {where}: {type(error).__name__}: {error}")
+        return 1
+    return 0
+
+
+def _answer(arguments: list[str], out: Any) -> None:
+    began = time.perf_counter()
+    answer = app(arguments, exit_on_error=False, print_error=False, result_action="return_value")
+    if isinstance(answer, Answer):
+        values = {**answer.values, "seconds": time.perf_counter() - began}
+        print(to_json(values) if answer.json else "\n".join(answer.lines), file=out, flush=True)

@@ -1,0 +1,162 @@
+"""The commands about one scene: run, field, equilibria, simulate, plate.
+
+The numeric libraries are imported once the input has been found good: a wrong scene is answered at once.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Literal
+
+from cyclopts import App, Parameter
+
+from ...geometry.basics import InputError
+from ...geometry.scenes import load_scene
+from ..one_scene import read_points
+from ..terminal import Answer, FieldModel, Output, Tables, default_scene, positive, three_numbers
+
+ReactionModel = Literal["slab", "fem", "reduced", "auto"]
+
+
+def add_scene_commands(app: App) -> None:
+    """Let the command line know these commands."""
+    for command in (run, field, plate, equilibria, simulate):
+        app.command(command)
+
+
+def run(
+    scene: Path | None = None,
+    *,
+    asked: Tables = Tables(),
+    duration_s: float = 3.0,
+    output: Output = Output(),
+) -> Answer:
+    """The main job: fields, tables, equilibria, stability, motion, pictures, result.nc and summary.json.
+
+    Parameters
+    ----------
+    scene
+        Scene file (left out: the one that comes with the program).
+    duration_s
+        Simulated time, s.
+    """
+    positive("--duration-s", duration_s)
+    loaded = load_scene(scene or default_scene())
+    from ..one_scene import main_job
+
+    values, lines = main_job(loaded, asked.checked(), duration_s, output.out)
+    return Answer(values, tuple(lines), output.json)
+
+
+def field(
+    scene: Path,
+    *,
+    points: Path,
+    model: FieldModel = "auto",
+    rtol: float = 3e-6,
+    output: Output = Output(),
+) -> Answer:
+    """B and its gradient at points in the rotor's frame at t = 0.
+
+    Parameters
+    ----------
+    scene
+        Scene file.
+    points
+        CSV file with the columns x_mm, y_mm, z_mm.
+    model
+        Field model.
+    rtol
+        Relative accuracy asked of the field wherever the floater can be.
+    """
+    asked = Tables(model, rtol=rtol).checked()
+    loaded, places = load_scene(scene), read_points(points)
+    from ..one_scene import field_job
+
+    values, lines = field_job(loaded, places, asked, output.out)
+    return Answer(values, tuple(lines), output.json)
+
+
+def equilibria(
+    scene: Path,
+    *,
+    asked: Tables = Tables(),
+    spin: float = 0.0,
+    output: Output = Output(),
+) -> Answer:
+    """All synchronous equilibria and their stability.
+
+    Parameters
+    ----------
+    scene
+        Scene file.
+    spin
+        Body spin S = Ω·m̂/ω of the floater about its own moment.
+    """
+    if not -1e3 <= spin <= 1e3:
+        raise InputError(f"Input --spin must be between -1000 and 1000; instead received {spin}.")
+    loaded = load_scene(scene)
+    from ..one_scene import equilibria_job
+
+    values, lines = equilibria_job(loaded, asked.checked(), spin, output.out)
+    return Answer(values, tuple(lines), output.json)
+
+
+def simulate(
+    scene: Path,
+    *,
+    duration_s: float,
+    asked: Tables = Tables(),
+    resume: Annotated[bool, Parameter(negative="")] = False,
+    output: Output = Output(),
+) -> Answer:
+    """The floater's motion: trajectory.nc and how it ended.
+
+    Parameters
+    ----------
+    scene
+        Scene file.
+    duration_s
+        Simulated time, s.
+    resume
+        Go on from the checkpoint of the same flight in --out, if one is there.
+    """
+    positive("--duration-s", duration_s)
+    loaded = load_scene(scene)
+    from ..one_scene import simulate_job
+
+    values, lines = simulate_job(loaded, asked.checked(), duration_s, output.out, resume)
+    return Answer(values, tuple(lines), output.json)
+
+
+def plate(
+    scene: Path,
+    *,
+    at: Annotated[str, Parameter(allow_leading_hyphen=True)],
+    frequency_hz: float,
+    model: ReactionModel = "auto",
+    rtol: float = 1e-3,
+    output: Output = Output(),
+) -> Answer:
+    """Reaction tensor G of the plate's eddy currents: B = G m at the dipole's own place, phasors e^(+iωt).
+
+    Parameters
+    ----------
+    scene
+        Scene file with a plate.
+    at
+        Place X,Y,Z of the dipole in the laboratory frame, mm.
+    frequency_hz
+        Frequency of the dipole, Hz.
+    model
+        slab (infinite, exact), fem, reduced (a table around the place), or auto.
+    rtol
+        Relative accuracy asked of the tensor.
+    """
+    positive("--rtol", rtol)
+    place = three_numbers("--at", at)
+    loaded = load_scene(scene)
+    from ..one_scene import plate_job
+
+    values, lines = plate_job(loaded, place * 1e-3, frequency_hz, model, rtol, output.out)
+    return Answer(values, tuple(lines), output.json)

@@ -1,0 +1,137 @@
+"""Where the point dipole, and what lies between it and the true field, can be trusted.
+
+Region: distance below the lower magnet's centre × lateral offset, worst azimuth, for the article's three rotors.
+Truth: the finite-element table, whose own error is stored beside.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import xarray as xr
+from matplotlib.figure import Figure
+
+from ...fem.harmonics import uniform_moments
+from ...fem.rotor_tables import RotorTable, rotor_table
+from ...geometry.basics import Array
+from ...geometry.bodies import Magnet, horizontal, tilt, vertical
+from ..results import panels, styled, variable
+
+EDGE, REMANENCE, PERMEABILITY = 0.01, 1.305, 1.05
+ROTORS = {
+    "horizontal, δx = 2 mm": horizontal(0.002, EDGE, REMANENCE, PERMEABILITY),
+    "vertical, δz = 14 mm": vertical(0.014, EDGE, REMANENCE, PERMEABILITY),
+    "tilt, δθ = 10°": tilt(float(np.radians(10)), EDGE, REMANENCE, PERMEABILITY),
+}
+LEVELS = (1e-1, 1e-2, 1e-3, 1e-4)
+AZIMUTHS = np.radians(np.arange(0.0, 360.0, 30.0))
+
+
+def dipole_validity(quick: bool) -> xr.Dataset:
+    """Relative errors of B and of its gradient by rotor, model, distance and lateral offset."""
+    distance = np.linspace(0.0115, 0.05, 12 if quick else 60)
+    offset = np.linspace(0.0, 0.01, 5 if quick else 21)
+    points = _points(distance, offset)
+    parts = [_errors(magnets, points, (len(distance), len(offset), len(AZIMUTHS))) for magnets in ROTORS.values()]
+    dims = ("rotor", "model", "distance", "offset")
+    errors, gradients, own = (np.stack(part) for part in zip(*parts, strict=True))
+    return xr.Dataset(
+        {
+            "field_error": variable(dims, errors, "1", "largest relative error of B over the azimuth"),
+            "gradient_error": variable(dims, gradients, "1", "largest relative error of the gradient of B"),
+            "truth_error": variable(("rotor", "distance", "offset"), own, "1", "stated relative error of the truth"),
+        },
+        coords={
+            "rotor": list(ROTORS),
+            "model": list(models(ROTORS["horizontal, δx = 2 mm"], 1.0)),
+            "distance": variable(("distance",), distance, "m", "distance below the lower magnet's centre"),
+            "offset": variable(("offset",), offset, "m", "distance from the axis"),
+        },
+    )
+
+
+def models(magnets: tuple[Magnet, ...], factor: float) -> dict[str, RotorTable]:
+    """Models from the article's dipole to the closed form; `factor` is true over remanent moment."""
+    true = tuple(replace(magnet, polarization=factor * magnet.polarization) for magnet in magnets)
+    return {
+        "dipole": _moments(magnets, 1),
+        "dipole, true moment": _moments(true, 1),
+        "moments to 5, true moment": _moments(true, 5),
+        "moments to 13, true moment": _moments(true, 13),
+        "cuboid": RotorTable("cuboid", magnets, magnets),
+        "cuboid, true moment": RotorTable("cuboid", true, true),
+    }
+
+
+def _moments(magnets: tuple[Magnet, ...], degree: int) -> RotorTable:
+    return RotorTable("moments", magnets, (), tuple(uniform_moments(magnet, degree) for magnet in magnets))
+
+
+def _points(distance: Array, offset: Array) -> Array:
+    d, r, phi = np.meshgrid(distance, offset, AZIMUTHS, indexing="ij")
+    return np.stack([r * np.cos(phi), r * np.sin(phi), -d], axis=-1).reshape(-1, 3)
+
+
+def _errors(magnets: tuple[Magnet, ...], points: Array, shape: tuple[int, ...]) -> tuple[Array, Array, Array]:
+    truth = rotor_table(magnets, "fem", 1e-6)
+    exact, gradient = truth.evaluate(points)
+    factor = float(np.linalg.norm(truth.moment) / np.linalg.norm(sum(m.moment for m in magnets)))
+    errors, gradients = [], []
+    for table in models(magnets, factor).values():
+        b, g = table.evaluate(points)
+        apart = np.linalg.norm(b - exact, axis=1) / np.linalg.norm(exact, axis=1)
+        apart_gradient = np.linalg.norm(g - gradient, axis=(1, 2)) / np.linalg.norm(gradient, axis=(1, 2))
+        errors.append(apart.reshape(shape).max(axis=2))
+        gradients.append(apart_gradient.reshape(shape).max(axis=2))
+    own = truth.relative_error(points)[0].reshape(shape).max(axis=2)
+    return np.array(errors), np.array(gradients), own
+
+
+def validity_lines(result: xr.Dataset) -> list[str]:
+    """From which distance on each model is good to 10, 1, 0.1 and 0.01 % on the axis, by rotor."""
+    lines = ["Distance (mm) below the lower magnet from which on B on the axis is good to 10 / 1 / 0.1 / 0.01 %:"]
+    for rotor in result["rotor"].values:
+        for model in result["model"].values:
+            error = result["field_error"].sel(rotor=rotor, model=model).isel(offset=0).values
+            entries = [_reach(1e3 * result["distance"].values, error, level) for level in LEVELS]
+            lines.append(f"  {rotor:22} {model:27} {' '.join(entries)}")
+    return lines
+
+
+def _reach(distance: Array, error: Array, level: float) -> str:
+    """The distance beyond which the error stays below a level, interpolated; '>' if it never does."""
+    above = np.flatnonzero(error > level)
+    if not len(above):
+        return f"  <{distance[0]:4.1f}"
+    last = int(above[-1])
+    if last == len(distance) - 1:
+        return f"  >{distance[-1]:4.1f}"
+    share = np.log(error[last] / level) / np.log(error[last] / error[last + 1])
+    return f"   {distance[last] + share * (distance[last + 1] - distance[last]):4.1f}"
+
+
+@styled
+def validity_figure(result: xr.Dataset) -> Figure:
+    """Regions in which each model is good to 10, 1, 0.1 and 0.01 %, rotor by rotor."""
+    rotors, names = result["rotor"].values, result["model"].values
+    figure, axes = panels(len(rotors), len(names), (2.0 * len(names) + 0.8, 2.1 * len(rotors)))
+    colors = ["#2c7bb6", "#92c5de", "#ffffbf", "#fdae61", "#d7191c"]
+    bounds = [1e-9, *LEVELS[::-1], 1e3]
+    for row, rotor in zip(axes, rotors, strict=True):
+        for panel, model in zip(row, names, strict=True):
+            error = result["field_error"].sel(rotor=rotor, model=model)
+            shown = panel.contourf(
+                1e3 * result["offset"], 1e3 * result["distance"], np.clip(error, 1e-8, 1e2), bounds, colors=colors
+            )
+            panel.invert_yaxis()
+            panel.grid(visible=False)
+            if rotor == rotors[0]:
+                panel.set_title(model.replace(", ", ",\n"), fontsize=8)
+            if rotor == rotors[-1]:
+                panel.set_xlabel("offset (mm)")
+            if model == names[0]:
+                panel.set_ylabel(f"{rotor}\ndistance (mm)")
+    bar = figure.colorbar(shown, ax=axes, shrink=0.7, ticks=LEVELS, label="relative error of B")
+    bar.ax.set_yticklabels([f"{100 * level:g} %" for level in LEVELS])
+    return figure

@@ -1,0 +1,140 @@
+"""How wrong is the dipole? Levitation of the article's rotors by point dipoles and by true fields, cause by cause."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+import xarray as xr
+
+from ...dynamics.branches import Family, Point, StableRange, at_frequency, by_frequency, reference_state, with_answers
+from ...dynamics.branches import stable_range as range_of
+from ...dynamics.motion import Rates
+from ...dynamics.steady import EquilibriumError, named_modes
+from ...fem.rotor_tables import cached_rotor_table, rotor_table
+from ...geometry.basics import Array
+from ...geometry.scenes import Scene
+from ..article import article_scene, levitated
+from ..results import study, variable
+from ..terminal import note
+
+MODELS = ("article", "dipole", "cuboid", "fem", "mutual")
+"""Point dipoles of the full remanence; the floater's moment lowered by its own permeability; the rotor's shape; its
+permeability; both bodies magnetise each other."""
+MODES = ("bounce", "side, backward", "side, forward", "precession", "nutation")
+SIDES = ("low", "high")
+RTOL, COARSE = 1e-5, 1e-4
+"""Accuracy of the finite elements, and of those whose distance from them is the error estimate."""
+ROUND_OFF = 1e-10
+"""Relative error of what needs no finite elements."""
+
+
+def points(quick: bool) -> list[study.Point]:
+    """The rotors that levitated; quick: one frequency, coarser answers of the bodies and no limits with them (NaN)."""
+    settings = (
+        {"steps": 1, "orders": [1, 2], "limits": False} if quick else {"steps": 4, "orders": [2, 3], "limits": True}
+    )
+    return [{**point, **settings} for point in levitated(quick)]
+
+
+@dataclass(frozen=True, eq=False)
+class Levitation:
+    """A scene in the field of one model, and the frequencies at which it levitates."""
+
+    scene: Scene
+    rates: Rates
+    range: StableRange
+
+    @property
+    def family(self) -> Family:
+        """Its equilibria against frequency."""
+        return by_frequency(self.scene, self.rates)
+
+    def at(self, frequency: float) -> Point:
+        """The equilibrium at a frequency, Hz."""
+        return at_frequency(self.scene, self.rates, self.range.near(frequency), frequency)
+
+
+def compute(point: study.Point) -> xr.Dataset:
+    """Distance, polar angle, modes and limits of stability of one rotor, by every model and with errors."""
+    scene = article_scene(point["configuration"], point["measure"], drag=False)
+    bare = replace(scene, floater=replace(scene.floater, recoil_permeability=1.0))
+    start = reference_state(scene)
+    dipole = Rates.of(scene, rotor_table(scene.rotor, "dipole"))
+    made = {
+        "article": _levitation(bare, dipole, start),
+        "dipole": _levitation(scene, dipole, start),
+        "cuboid": _levitation(scene, Rates.of(scene, rotor_table(scene.rotor, "cuboid")), start),
+        "fem": _levitation(scene, _by_elements(scene, RTOL), start),
+        "coarse": _levitation(scene, _by_elements(scene, COARSE), start),
+    }
+    low = max(each.range.low.parameter for each in made.values())
+    high = min(each.range.high.parameter for each in made.values())
+    grid = low + (high - low) * (np.arange(point["steps"]) + 0.5) / point["steps"]
+    rows = {name: _described(each.at, each.range.low, each.range.high, grid) for name, each in made.items()}
+    answered, doubt = with_answers(made["fem"].scene, made["fem"].family, made["fem"].range, point["orders"])
+    ends = [answered.end(side) if point["limits"] else None for side in SIDES]
+    rows["mutual"] = _described(answered.at, ends[0], ends[1], grid)
+    errors = {name: {key: ROUND_OFF * np.abs(value) for key, value in rows[name].items()} for name in MODELS[:3]}
+    errors["fem"] = {key: np.abs(value - rows["coarse"][key]) for key, value in rows["fem"].items()}
+    errors["mutual"] = {
+        key: doubt * np.abs(value - rows["fem"][key]) + errors["fem"][key] for key, value in rows["mutual"].items()
+    }
+    kinds = {side: [getattr(made[m].range, side).kind for m in MODELS[:-1]] for side in SIDES}
+    for side, end in zip(SIDES, ends, strict=True):
+        kinds[side].append(end.kind if end else "")
+    return _dataset(point, grid, rows, errors, kinds)
+
+
+def _levitation(scene: Scene, rates: Rates, start: tuple[Array, float]) -> Levitation:
+    found = range_of(scene, rates, *start)
+    if found is None:
+        raise EquilibriumError("There is no stable levitation on the branch of the point dipoles.")
+    return Levitation(scene, rates, found)
+
+
+def _by_elements(scene: Scene, rtol: float) -> Rates:
+    return Rates.of(scene, cached_rotor_table(scene.rotor, "fem", rtol, note, scene.floater.radius)[0])
+
+
+def _described(at: Callable[[float], Point], low: Point | None, high: Point | None, grid: Array) -> dict[str, Array]:
+    found = [at(float(frequency)) for frequency in grid]
+    moment = np.array([point.state[6:9] for point in found])
+    modes = [named_modes(point.motion, point.time_unit) for point in found]
+    return {
+        "distance": np.array([point.distance for point in found]),
+        "polar_angle": np.degrees(np.arctan2(np.hypot(moment[:, 0], moment[:, 1]), moment[:, 2])),
+        "mode_frequency": np.array([[mode.frequency_hz for mode in row] for row in modes]),
+        "lowest": np.array(low.parameter if low else np.nan),
+        "highest": np.array(high.parameter if high else np.nan),
+    }
+
+
+LABELS: dict[str, tuple[tuple[str, ...], str, str]] = {
+    "distance": (("step",), "m", "distance from the rotor"),
+    "polar_angle": (("step",), "°", "polar angle of the moment"),
+    "mode_frequency": (("step", "mode"), "Hz", "frequency of a small motion, rotor's frame"),
+    "lowest": ((), "Hz", "lowest frequency of stable levitation"),
+    "highest": ((), "Hz", "highest frequency of stable levitation"),
+}
+
+
+def _dataset(
+    point: study.Point,
+    grid: Array,
+    rows: dict[str, dict[str, Array]],
+    errors: dict[str, dict[str, Array]],
+    kinds: dict[str, list[str]],
+) -> xr.Dataset:
+    data: dict[str, xr.Variable] = {}
+    for name, (dims, units, words) in LABELS.items():
+        for suffix, source, what in (("", rows, ""), ("_error", errors, "estimated error of the ")):
+            values = np.array([source[model][name] for model in MODELS])
+            data[name + suffix] = variable(("case", "model", *dims), values[None], units, what + words)
+    for side, names in kinds.items():
+        data[f"{side}_kind"] = xr.Variable(("case", "model"), np.array([names]))
+    data["frequency"] = variable(("case", "step"), grid[None], "Hz", "frequency of the rotor")
+    data["measure"] = variable(("case",), np.array([point["measure"]]), "mm or °", "displacement or tilt")
+    data["configuration"] = xr.Variable(("case",), np.array([point["configuration"]]))
+    return xr.Dataset(data, {"model": list(MODELS), "mode": list(MODES)})

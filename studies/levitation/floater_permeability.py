@@ -1,0 +1,156 @@
+"""When is the floater a rigid dipole? Force and torque with and without the answers of both bodies."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import partial
+
+import numpy as np
+import xarray as xr
+
+from ...dynamics.equilibria import PerturbedBalance, Shift, find_equilibria
+from ...dynamics.steady import Equilibrium
+from ...fem.mutual import RotorResponse, TwoBody, Wrench, rotor_ladder, two_body, two_body_ladder
+from ...fem.rotor_tables import rotor_table
+from ...geometry.basics import Array
+from ...geometry.scenes import Floater, Scene
+from ..results import AXIS, variable
+
+LEVELS = (0.1, 0.01, 1e-3, 1e-4)
+FARTHEST = 0.05
+"""Depth that the study reaches below the rotor's origin, m."""
+PARTS = ("rigid", "floater_answer", "rotor_answer", "total")
+
+
+def floater_permeability(scene: Scene, distances: Sequence[float] | None = None, quick: bool = False) -> xr.Dataset:
+    """Rigid dipole against mutual magnetisation, on the axis below the rotor and at the stable equilibrium.
+
+    Parameters
+    ----------
+    distances : of the floater's centre below the rotor's origin, m; by default from contact to 50 mm
+    quick : coarser elements and fewer distances
+
+    Returns
+    -------
+    Dataset over `distance`: force and torque by part with error, relative difference of the rigid dipole; over `level`
+    and `quantity`: the distance from which on the rigid dipole is good to that level; and the levitation shift. The
+    moment points as it does in synchronous motion (body spin 0, torques balanced) at that distance, followed from the
+    stable equilibrium (along -x if there is none) and held where no balance is near.
+    """
+    rotors = rotor_ladder(scene.rotor, (2, 3) if quick else (3, 4))
+    table = rotor_table(scene.rotor, "auto", 1e-4 if quick else 1e-6)
+    depths = np.array(distances if distances is not None else _depths(scene, 8 if quick else 24))
+    stable = next((e for e in find_equilibria(scene, table) if e.stable), None)
+    balance = PerturbedBalance.of(scene, table)
+    places = np.stack([0 * depths, 0 * depths, -depths], axis=1)
+    start, guess = (stable.distance, stable.state.moment) if stable else (FARTHEST, np.array([-1.0, 0.0, 0.0]))
+    dataset = missed(rotors, scene.floater, places, _directions(balance, places, start, guess))
+    weight = scene.floater.mass * float(np.linalg.norm(scene.gravity))
+    dataset = dataset.merge(sufficient(dataset)).assign_attrs(weight_N=weight)
+    return dataset.merge(levitation(rotors, scene.floater, balance, stable)) if stable else dataset
+
+
+def missed(rotors: Sequence[RotorResponse], floater: Floater, places: Array, directions: Array) -> xr.Dataset:
+    """Force and torque by part for poses (n, 3) m and (n, 3), with the error of the total."""
+    found = [two_body_ladder(rotors, floater, r, m) for r, m in zip(places, directions, strict=True)]
+    distance = variable(("distance",), -places[:, 2], "m", "distance below the rotor")
+    data = {"moment": variable(("distance", "axis"), directions, "1", "direction of the floater's remanence")}
+    for quantity, units in (("force", "N"), ("torque", "N m")):
+        values = np.array([[getattr(getattr(both, part), quantity) for part in PARTS] for both, _ in found])
+        errors = np.array([getattr(error, quantity) for _, error in found])
+        size = np.linalg.norm(values[:, -1], axis=1)
+        ratio = np.linalg.norm(values[:, -1] - values[:, 0], axis=1) / size
+        data[quantity] = variable(("distance", "part", "axis"), values, units, f"{quantity} on the floater")
+        data[f"{quantity}_error"] = variable(("distance", "axis"), errors, units, f"estimated error of the {quantity}")
+        data[f"{quantity}_missed"] = variable(
+            ("distance",), ratio, "1", f"share of the {quantity} that a dipole misses"
+        )
+        data[f"{quantity}_missed_error"] = variable(
+            ("distance",), np.linalg.norm(errors, axis=1) / size, "1", f"estimated error of the share of the {quantity}"
+        )
+    return xr.Dataset(data, {"distance": distance, "part": list(PARTS), "axis": list(AXIS)})
+
+
+def sufficient(dataset: xr.Dataset) -> xr.Dataset:
+    """Distance from which on the rigid dipole is good to each level, NaN if that is beyond the last one.
+
+    Between computed distances by interpolation of logarithms; the error is added to what is missed.
+    """
+    order = np.argsort(dataset["distance"].values)
+    distance = dataset["distance"].values[order]
+    rows = []
+    for quantity in ("force", "torque"):
+        missed = (dataset[f"{quantity}_missed"] + dataset[f"{quantity}_missed_error"]).values[order]
+        rows.append([_last_crossing(distance, missed, level) for level in LEVELS])
+    values = variable(("quantity", "level"), rows, "m", "distance from which on the rigid dipole suffices")
+    return xr.Dataset({"sufficient_from": values}, {"quantity": ["force", "torque"], "level": list(LEVELS)})
+
+
+def levitation(
+    rotors: Sequence[RotorResponse], floater: Floater, balance: PerturbedBalance, stable: Equilibrium
+) -> xr.Dataset:
+    """What the rigid dipole misses at the stable equilibrium, and where the equilibrium really is."""
+
+    def added(rotor: RotorResponse, position: Array, moment: Array) -> tuple[Array, Array]:
+        both = two_body(rotor, floater, position, moment)
+        extra = both.total - both.rigid
+        return extra.force, extra.torque
+
+    both, error = two_body_ladder(rotors, floater, stable.position, stable.state.moment)
+    shifts = [balance.shift(stable.position, stable.state.moment, partial(added, rotor)) for rotor in rotors[-2:]]
+    return _levitation_dataset(stable, both, error, shifts)
+
+
+def _levitation_dataset(stable: Equilibrium, both: TwoBody, error: Wrench, shifts: list[Shift]) -> xr.Dataset:
+    extra, fine = both.total - both.rigid, shifts[-1]
+    return xr.Dataset(
+        {
+            "rigid_position": variable(("axis",), stable.position, "m", "stable equilibrium of the rigid dipole"),
+            "missed_force": variable(("axis",), extra.force, "N", "force that the rigid dipole misses there"),
+            "missed_force_error": variable(("axis",), error.force, "N", "its estimated error"),
+            "missed_torque": variable(("axis",), extra.torque, "N m", "torque that the rigid dipole misses there"),
+            "linear_shift": variable(("axis",), fine.linear, "m", "shift of the equilibrium, linearised"),
+            "shift": variable(("axis",), fine.position - stable.position, "m", "shift of the equilibrium"),
+            "shift_error": variable(
+                ("axis",),
+                np.abs(fine.position - shifts[0].position) + stable.position_error,
+                "m",
+                "its estimated error",
+            ),
+        },
+        {"axis": list(AXIS)},
+    )
+
+
+def _depths(scene: Scene, number: int) -> Array:
+    """From contact on the axis to `FARTHEST`, evenly in their logarithm."""
+    radius, step = scene.floater.radius, 1e-5
+    heights = np.arange(0.0, FARTHEST, step)
+    places = np.stack([0 * heights, 0 * heights, -heights], axis=1)
+    gap = np.min([magnet.box.distance(places) for magnet in scene.rotor], axis=0) - radius
+    nearest = heights[gap < 0].max(initial=0.0) + step
+    return np.geomspace(nearest, FARTHEST, number)
+
+
+def _directions(balance: PerturbedBalance, places: Array, start: float, guess: Array) -> Array:
+    """Balanced moment directions (n, 3), each followed from its neighbour, outwards and inwards from `start`."""
+    result = np.zeros_like(places)
+    depths = -places[:, 2]
+    outwards = [k for k in np.argsort(depths) if depths[k] >= start]
+    inwards = [k for k in np.argsort(-depths) if depths[k] < start]
+    for chain in (outwards, inwards):
+        direction = guess
+        for k in chain:
+            direction = result[k] = balance.direction(places[k], direction)
+    return result
+
+
+def _last_crossing(distance: Array, values: Array, level: float) -> float:
+    above = np.nonzero(values > level)[0]
+    if not len(above):
+        return float(distance[0])
+    k = int(above[-1])
+    if k + 1 == len(distance):
+        return float("nan")
+    share = np.log(values[k] / level) / np.log(values[k] / values[k + 1])
+    return float(distance[k] * (distance[k + 1] / distance[k]) ** share)

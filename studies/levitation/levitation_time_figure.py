@@ -1,0 +1,136 @@
+"""Figure and report of the study of the slow drift, from its dataset alone."""
+
+from __future__ import annotations
+
+import numpy as np
+import xarray as xr
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from ..results import PALETTE, panels, styled
+from .levitation_time import KEPT, OUTCOMES
+
+MARKS = dict(zip(OUTCOMES, ("v", "o", "X", "^", "|"), strict=True))
+MEANINGS = {
+    "contact": "touches the rotor",
+    "fold": "sinks until it is lost (fold)",
+    "instability": "oscillates until it is lost",
+    "levitates": "still up after 250 s",
+    "no equilibrium": "no equilibrium",
+}
+BANDS = {
+    "displacement": "displacement ±0.2 mm, ±0.5 mm or ±0.5°",
+    "spin": "spin at release ±0.1",
+    "conductivity": "conductivity −20 … +80 %",
+    "remanence": "remanence 1.29 … 1.32 T",
+}
+LINES = {"rough release": ("--", "oscillation from 0.1 mm, not 3 µm"), "Stokes drag": (":", "air after Stokes")}
+FLOWN = {
+    "horizontal 1 mm": {115: "linear fall", 140: "stable", 150: "oscillating loss"},
+    "horizontal 1.5 mm": {115: "linear fall", 140: "stable", 150: "oscillating loss"},
+    "vertical 14 mm": {60: "24 hours"},
+    "vertical 12.6 mm": {60: "24 hours"},
+}
+"""What the article saw (δx = 1 mm and δz = 14 mm there), by frequency in Hz."""
+
+
+@styled
+def drift_figure(result: xr.Dataset) -> Figure:
+    """For each rotor: levitation time against frequency with its bands, and some nominal flights."""
+    cases = result["case"].values.tolist()
+    rows = -(-len(cases) // 2)
+    figure, axes = panels(rows, 4, (13.0, 2.75 * rows + 0.8))
+    for place, case in enumerate(cases):
+        left, right = axes[place // 2, 2 * (place % 2) :][:2]
+        chosen = result.sel(case=case)
+        _times(left, chosen, FLOWN.get(case, {}))
+        _flights(right, chosen)
+        left.set_title(case.replace(" deg", "°"), loc="left", fontweight="bold")
+        right.set_title("nominal flights", loc="left")
+    for unused in axes.flat[2 * len(cases) :]:
+        unused.remove()
+    handles, labels = axes[0, 0].get_legend_handles_labels()
+    for name in OUTCOMES:
+        handles += axes[0, 0].plot([], [], MARKS[name], color=PALETTE[0], ms=5)
+        labels.append(MEANINGS[name])
+    figure.legend(handles, labels, loc="outside lower center", ncols=4)
+    return figure
+
+
+def _times(axes: Axes, result: xr.Dataset, flown: dict[int, str]) -> None:
+    frequency, time = result["frequency"].values, result["levitation_time"]
+    variants = result["variant"].values.tolist()
+    for (start, label), color in zip(BANDS.items(), ("0.6", *PALETTE[1:]), strict=False):
+        names = ["nominal", *(v for v in variants if v.startswith(start))]
+        if len(names) > 1:
+            band = time.sel(variant=names).values
+            low, high = np.fmin.reduce(band), np.fmax.reduce(band)
+            axes.fill_between(frequency, low, high, color=color, alpha=0.28, lw=0, label=label)
+    for name, (dashes, label) in LINES.items():
+        if name in variants:
+            axes.plot(frequency, time.sel(variant=name), dashes, color="0.25", lw=1, label=label)
+    nominal = time.sel(variant="nominal").values
+    axes.plot(frequency, nominal, color=PALETTE[0], lw=1.6, label="nominal")
+    outcome = result["outcome"].sel(variant="nominal").values
+    for number, name in enumerate(OUTCOMES):
+        here = outcome == number
+        axes.plot(frequency[here], nominal[here], MARKS[name], color=PALETTE[0], ms=3.5)
+    for seen, word in flown.items():
+        axes.axvline(seen, color=PALETTE[3], lw=0.8)
+        words = axes.text(seen, 245, f"{seen} Hz {word}", rotation=90, ha="center", va="top", color=PALETTE[3], size=7)
+        words.set_bbox({"facecolor": "white", "edgecolor": "none", "pad": 0.8, "alpha": 0.85})
+    axes.set(xlabel="frequency (Hz)", ylabel="levitation time (s)", ylim=(-8, 262), xlim=(frequency[0], frequency[-1]))
+
+
+def _flights(axes: Axes, result: xr.Dataset) -> None:
+    nominal = result.sel(variant="nominal")
+    frequency = result["frequency"].values
+    flown = np.flatnonzero(nominal["levitation_time"].values >= float(result.attrs["shortest_s"]))
+    falls = flown[nominal["outcome"].values[flown] != KEPT]
+    lasts = flown[nominal["outcome"].values[flown] == KEPT]
+    shown = np.unique([*falls[:: max(1, -(-len(falls) // 4))], *lasts[:: max(1, -(-len(lasts) // 3))]]).astype(int)
+    for number, k in enumerate(shown):
+        color = PALETTE[number % len(PALETTE)]
+        time, distance = nominal["flight_time"][k].values, 1e3 * nominal["flight_distance"][k].values
+        axes.plot(time, distance, color=color)
+        words = f" {frequency[k]:.4g} Hz" if time[-1] > 200 else f"{frequency[k]:.4g} Hz"
+        axes.annotate(words, (time[-1], distance[-1]), color=color, size=7, ha="left", va="center")
+    axes.set(xlabel="time (s)", ylabel="distance (mm)", xlim=(0, 310))
+
+
+def drift_lines(result: xr.Dataset) -> list[str]:
+    """For each rotor: where flights end in the fold, where they last and where they are unstable."""
+    lines = []
+    for case in result["case"].values.tolist():
+        nominal = result.sel(case=case, variant="nominal")
+        lines.append(f"{case}:")
+        lines += [line for number in range(len(OUTCOMES)) if (line := _line(nominal, number))]
+    return lines
+
+
+def _line(nominal: xr.Dataset, number: int) -> str:
+    """What is to be said of all flights of one outcome; nothing if there is none."""
+    here = (nominal["outcome"] == number).values
+    if not here.any():
+        return ""
+    chosen, name = nominal.isel(step=here), OUTCOMES[number]
+    span = f"{_span(chosen['frequency'])} Hz"
+    if name == "no equilibrium":
+        return f"  none at {span}"
+    words = f"  {name} at {span}: {_span(chosen['levitation_time'])} s, "
+    words += f"from {_span(1e3 * chosen['distance_start'])} to {_span(1e3 * chosen['distance_end'])} mm"
+    if name == "fold":
+        words += f", falling {_span(1e3 * chosen['fall_rate'])} mm/s, late over early {_span(chosen['fall_ratio'])}"
+    if number == KEPT:
+        endless = np.isfinite(chosen["balance_spin"].values)
+        words += f"; with a balance ahead: {endless.sum()} of {len(endless)}, s* {_span(chosen['balance_spin'])}"
+        words += f"; largest growth {_span(chosen['growth'])} /s"
+    return words
+
+
+def _span(values: xr.DataArray) -> str:
+    known = values.values[np.isfinite(values.values)]
+    if not len(known):
+        return "unknown"
+    low, high = (f"{value:.3g}" for value in (known.min(), known.max()))
+    return low if low == high else f"{low}–{high}"

@@ -1,0 +1,79 @@
+"""The small circle on which the floater goes with the rotor: its radius in the true field, in flight and by formula."""
+
+from __future__ import annotations
+
+import numpy as np
+import xarray as xr
+
+from ...dynamics.branches import Point as Equilibrium
+from ...dynamics.branches import kicked, levitating_branch
+from ...dynamics.flights import simulate
+from ...dynamics.motion import Rates
+from ...fem.rotor_tables import RotorTable
+from ...geometry.basics import Array
+from ...geometry.scenes import Scene
+from ..article import CONFIGURATIONS, HIGHEST, LOWEST, QUICK, article_scene, article_table, side_radius
+from ..results import Point, one_case, variable
+
+MODELS = ("dipole", "fem")
+FLIGHT = 170.0
+"""Frequency of the flight in the article's figure, Hz, for δx = 1 mm."""
+KICK, SECONDS, TURNS, SAMPLES = 0.01, 2.0, 3, 400
+"""Speed upwards with which the flight begins, m/s; its duration, s; turns of it that are kept, and samples of them."""
+
+
+def side_points(quick: bool) -> list[Point]:
+    """Every rotor that levitated in the article's experiment in both fields; `quick` takes three of them."""
+    rotors = {name: QUICK[name] if quick else kind.levitated for name, kind in CONFIGURATIONS.items()}
+    return [
+        {"configuration": name, "value": value, "model": model, "step_hz": 10.0 if quick else 2.5}
+        for name, values in rotors.items()
+        for value in values
+        for model in MODELS
+    ]
+
+
+def side_mode(point: Point) -> xr.Dataset:
+    """Radius of the circle of one rotor's floater at all frequencies, and one flight.
+
+    Returns
+    -------
+    Dataset over `frequency`: radius of the equilibrium, the article's radius at the same distance, growth of small
+    motions; for δx = 1 mm over `sample`: the floater in the laboratory and its distance from the axis at `FLIGHT`.
+    """
+    grid = np.arange(LOWEST, HIGHEST + 1e-9, point["step_hz"])
+    scene = article_scene(point["configuration"], point["value"], HIGHEST)
+    table = article_table(scene, point["model"])
+    branch = levitating_branch(scene, table, Rates.of(scene, table), HIGHEST)
+    rows = np.array([_row(p) for p in branch.side("near", grid)])
+    flown = np.full((4, SAMPLES), np.nan)
+    if (point["configuration"], point["value"]) == ("horizontal", 1.0):
+        start = branch.side("near", np.array([FLIGHT]))[0]
+        if start is not None:
+            flown = _flight(scene, table, start)
+    row, sample = ("frequency",), ("sample",)
+    data = {
+        "radius": variable(row, rows[:, 0], "m", "radius of the floater's circle"),
+        "article_radius": variable(row, side_radius(rows[:, 1], grid), "m", "𝒢/(μ_f ω²) at the same distance"),
+        "distance": variable(row, rows[:, 1], "m", "levitation distance"),
+        "growth": variable(row, rows[:, 2], "1/s", "largest growth rate of a small motion"),
+        "flight_angle": variable(sample, flown[0], "rad", "angle of the rotor"),
+        "flight_x": variable(sample, flown[1], "m", "x of the floater in flight, laboratory frame"),
+        "flight_y": variable(sample, flown[2], "m", "y of the floater in flight, laboratory frame"),
+        "flight_z": variable(sample, flown[3], "m", "z of the floater in flight"),
+    }
+    return one_case(point, xr.Dataset(data, {"frequency": variable(row, grid, "Hz", "frequency of the rotor")}))
+
+
+def _row(point: Equilibrium | None) -> list[float]:
+    if point is None:
+        return [np.nan] * 3
+    return [float(np.hypot(*point.position[:2])), -point.position[2], point.growth_per_s]
+
+
+def _flight(scene: Scene, table: RotorTable, point: Equilibrium) -> Array:
+    """Angle of the rotor and place of the floater (4, sample) in the last turns of a flight that a kick began."""
+    flight = simulate(kicked(scene, point, KICK), table, SECONDS, [])
+    times = flight.time[-1] - np.linspace(TURNS / FLIGHT, 0.0, SAMPLES)
+    place = [np.interp(times, flight.time, column) for column in flight.lab.position.T]
+    return np.array([2 * np.pi * FLIGHT * times, *place])

@@ -1,0 +1,1 @@
+"""How far is levitation from its limits?"""

@@ -1,0 +1,113 @@
+"""The inverse question: which rotor holds the floater at a wanted distance and frequency, with the most to spare?"""
+
+from __future__ import annotations
+
+import numpy as np
+import xarray as xr
+
+from ...dynamics.equilibria import find_equilibria
+from ...dynamics.steady import EquilibriumError
+from ...fem.rotor_tables import cached_rotor_table
+from ...geometry.basics import Array
+from ..article import CONFIGURATIONS, FLOATER, article_scene
+from ..results import study, variable
+from ..terminal import note
+from .design_search import designed
+
+EDGES = (6.0, 8.0, 10.0, 12.7, 16.0)
+"""Edges of the cubes that are tried, mm."""
+RTOL = 1e-4
+CLOSE_ENOUGH = 1e-6
+"""To which the true field shall meet the wanted distance, m."""
+
+
+def points(quick: bool) -> list[study.Point]:
+    """Wanted distances (mm) and frequencies (Hz) for each configuration."""
+    wanted = [(20.0, 120.0)] if quick else [(d, f) for d in (20.0, 25.0, 30.0) for f in (80.0, 120.0)]
+    edges = [10.0] if quick else list(EDGES)
+    return [
+        {"configuration": c, "distance_mm": d, "frequency": f, "edges_mm": edges}
+        for d, f in wanted for c in CONFIGURATIONS
+    ]  # fmt: skip
+
+
+def checked_by_elements(configuration: str, edge: float, distance: float, frequency: float, first: float) -> Array:
+    """Measure corrected for the true field, and what a forward search then gives.
+
+    Returns
+    -------
+    Measure (mm or °), distance (m) and its error (m) of the equilibrium nearest to the wanted distance, 1 if it is
+    stable, its growth (1/s).
+
+    Raises
+    ------
+    EquilibriumError : there is none, or the corrections do not settle
+    """
+    measure, slope = first, _shifted(configuration, edge, distance, frequency, first)
+    for _ in range(5):
+        scene = article_scene(configuration, measure, frequency, drag=False, edge=edge)
+        table = cached_rotor_table(scene.rotor, "fem", RTOL, note, FLOATER.radius)[0]
+        found = find_equilibria(scene, table)
+        if not found:
+            raise EquilibriumError("The true field has no equilibrium there.")
+        best = min(found, key=lambda e: abs(e.distance - distance))
+        if abs(best.distance - distance) < CLOSE_ENOUGH:
+            found_there = best.distance, best.position_error, float(best.stable), best.growth_per_s
+            return np.array([measure, *found_there])
+        measure -= (best.distance - distance) / slope
+    raise EquilibriumError("The correction of the measure for the true field did not settle.")
+
+
+def _shifted(configuration: str, edge: float, distance: float, frequency: float, measure: float) -> float:
+    """Change of the distance by the measure (m by mm or °), from the closed form."""
+    step = 1e-5
+    return step / (designed(configuration, edge, distance + step, frequency).measure - measure)
+
+
+NAMES = {
+    "measure": ("mm or °", "displacement or tilt"),
+    "margin": ("1", "smallest relative change of frequency that ends stable levitation; 0 where unstable"),
+    "lowest": ("Hz", "lower end of stability"),
+    "highest": ("Hz", "upper end of stability"),
+    "growth": ("1/s", "largest growth rate"),
+    "polar_angle": ("°", "polar angle of the moment"),
+}
+CHECKED = {
+    "true_measure": ("mm or °", "measure corrected for the true field"),
+    "true_distance": ("m", "distance that a forward search in the true field gives"),
+    "true_distance_error": ("m", "its estimated error"),
+    "true_stable": ("1", "whether it is stable"),
+    "true_growth": ("1/s", "largest growth rate in the true field"),
+}
+
+
+def compute(point: study.Point) -> xr.Dataset:
+    """Measures and margins for each edge, and a forward check of the best of them by finite elements."""
+    name, distance, frequency = point["configuration"], 1e-3 * point["distance_mm"], point["frequency"]
+    rows = np.array([_row(name, 1e-3 * edge, distance, frequency) for edge in point["edges_mm"]])
+    margin = rows[:, list(NAMES).index("margin")]
+    best = int(np.nanargmax(margin)) if np.isfinite(margin).any() else -1
+    true = np.full(len(CHECKED), np.nan)
+    if best >= 0 and margin[best] > 0:
+        try:
+            true = checked_by_elements(name, 1e-3 * point["edges_mm"][best], distance, frequency, rows[best, 0])
+        except EquilibriumError as error:
+            note(str(error))
+    data = {k: variable(("case", "edge"), rows[None, :, i], *NAMES[k]) for i, k in enumerate(NAMES)}
+    data |= {k: variable(("case",), true[None, i], *CHECKED[k]) for i, k in enumerate(CHECKED)}
+    data["wanted_distance"] = variable(("case",), np.array([distance]), "m", "wanted distance")
+    data["wanted_frequency"] = variable(("case",), np.array([frequency]), "Hz", "wanted frequency")
+    data["best"] = variable(("case",), np.array([best]), "1", "which edge has the largest margin; -1 if none")
+    data["configuration"] = xr.Variable(("case",), np.array([name]))
+    return xr.Dataset(data, {"edge": variable(("edge",), 1e-3 * np.array(point["edges_mm"]), "m", "edge of the cubes")})
+
+
+def _row(configuration: str, edge: float, distance: float, frequency: float) -> list[float]:
+    try:
+        found = designed(configuration, edge, distance, frequency)
+    except EquilibriumError:
+        return [np.nan] * len(NAMES)
+    moment = found.here.state[6:9]
+    angle = float(np.degrees(np.arctan2(np.hypot(moment[0], moment[1]), moment[2])))
+    ends = found.low.parameter, found.high.parameter
+    return [found.measure, found.margin, *ends, found.here.growth_per_s, angle]

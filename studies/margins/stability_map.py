@@ -1,0 +1,130 @@
+"""Regions of stable levitation in frequency and displacement, what bounds them, and what a plate makes of them."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import xarray as xr
+
+from ...dynamics.branches import HIGHEST, StableRange, at_frequency, levitating_ranges
+from ...dynamics.equilibria import survey, with_plate
+from ...dynamics.motion import Rates
+from ...dynamics.steady import EquilibriumError, Survey
+from ...fem.rotor_tables import RotorTable, cached_rotor_table, rotor_table
+from ...geometry.basics import Box
+from ...geometry.scenes import Plate, Scene
+from ..article import CONFIGURATIONS, FLOATER, PLATE_CONDUCTIVITY, PLATE_SIZE, article_scene
+from ..one_scene import plate_memory
+from ..results import study, variable
+from ..terminal import note
+
+MEASURES = {
+    "horizontal": (0.5, 1.0, 1.5, 2.0, 2.5, 3.0, 3.5, 4.0, 5.0, 6.0, 7.0, 8.0),
+    "vertical": (10.0, 11.0, 12.0, 13.0, 14.0, 15.0, 16.0, 18.0, 20.0),
+    "tilt": (2.5, 5.0, 7.5, 10.0, 12.5, 15.0, 17.5, 20.0, 25.0, 30.0, 35.0, 40.0, 45.0),
+}
+"""Displacements (mm) and tilts (degrees): the article's tested ones and some between."""
+MODELS = ("dipole", "fem")
+RTOL, PLATE_RTOL = 1e-4, 1e-2
+MOST = 4
+"""Intervals of stability that are kept of one rotor."""
+FACE = -0.045
+"""Height of the plate's upper face below the rotor's origin, m: no floater that levitates touches it."""
+BEYOND = 1.15
+"""How far above the last stable frequency the plate is tried."""
+
+
+def points(quick: bool) -> list[study.Point]:
+    """All rotors with both models; frequencies with the plate for the rotors of the article's figures."""
+    rotors = {"horizontal": (2.0,), "vertical": (14.0,), "tilt": (10.0,)} if quick else MEASURES
+    return [
+        {"configuration": c, "measure": m, "model": model, "with_plate": plates}
+        for c, measures in rotors.items() for m in measures for model in MODELS
+        for plates in [(2 if quick else 5) if model == "fem" and m in CONFIGURATIONS[c].levitated else 0]
+    ]  # fmt: skip
+
+
+def compute(point: study.Point) -> xr.Dataset:
+    """Intervals of stable frequencies of one rotor, and growth with a plate below at some frequencies."""
+    scene = article_scene(point["configuration"], point["measure"], drag=False)
+    table = _table(scene, point["model"])
+    rates = Rates.of(scene, table)
+    try:
+        found = levitating_ranges(scene, table, rates)
+    except EquilibriumError as error:
+        note(str(error))
+        found = []
+    rows, kinds = np.full((MOST, 5), np.nan), np.full((MOST, 2), "", dtype="U12")
+    for k, run in enumerate(found[:MOST]):
+        ends = run.low, run.high
+        rows[k] = [*(e.parameter for e in ends), *(e.distance for e in ends), run.low.leading_hz]
+        rows[k, 4] = run.high.leading_hz
+        kinds[k] = [e.kind for e in ends]
+    plate = _with_plate(scene, table, rates, found[0] if found else None, point["with_plate"])
+    return _dataset(point, rows, kinds, plate)
+
+
+def _table(scene: Scene, model: str) -> RotorTable:
+    if model == "fem":
+        return cached_rotor_table(scene.rotor, model, RTOL, note, FLOATER.radius)[0]
+    return rotor_table(scene.rotor, model)
+
+
+def _with_plate(
+    scene: Scene, table: RotorTable, rates: Rates, stable: StableRange | None, number: int
+) -> np.ndarray[tuple[int, int], np.dtype[np.float64]]:
+    """Frequency (Hz), growth (1/s), distance (m) and error of the plate's table (number, 4); NaN where it fails."""
+    rows = np.full((6, 4), np.nan)
+    if stable is None or not number:
+        return rows
+    last = min(BEYOND * stable.high.parameter, HIGHEST)
+    center = np.array([0.0, 0.0, FACE - PLATE_SIZE[2] / 2])
+    plate = Plate(Box(np.array(PLATE_SIZE), center), PLATE_CONDUCTIVITY)
+    for k, frequency in enumerate(np.linspace(1.01 * stable.low.parameter, last, number)):
+        there = replace(scene, frequency=float(frequency), plate=plate)
+        rows[k, 0] = frequency
+        try:
+            near = at_frequency(scene, rates, stable.near(frequency), float(frequency))
+        except EquilibriumError:
+            continue
+        known = [e for e in survey(there, table, rates=rates).equilibria if abs(e.distance - near.distance) < 1e-6]
+        if not known:
+            continue
+        memory, _ = plate_memory(there, plate, "slab", table, known[0].position, PLATE_RTOL)
+        moved = with_plate(there, table, Survey((known[0],), ()), memory, rates).equilibria
+        if moved and moved[0].currents is not None:
+            rows[k, 1:] = moved[0].growth_per_s, moved[0].distance, max(memory.table.errors.total, memory.share.error)
+    return rows
+
+
+def _dataset(
+    point: study.Point,
+    rows: np.ndarray[tuple[int, int], np.dtype[np.float64]],
+    kinds: np.ndarray[tuple[int, int], np.dtype[np.str_]],
+    plate: np.ndarray[tuple[int, int], np.dtype[np.float64]],
+) -> xr.Dataset:
+    interval, tried = ("case", "interval"), ("case", "tried")
+    columns = {
+        "lowest": (interval, rows[:, 0], "Hz", "lower end of an interval of stability"),
+        "highest": (interval, rows[:, 1], "Hz", "upper end of an interval of stability"),
+        "distance_lowest": (interval, rows[:, 2], "m", "distance at the lower end"),
+        "distance_highest": (interval, rows[:, 3], "m", "distance at the upper end"),
+        "leading_highest": (
+            interval,
+            rows[:, 4],
+            "Hz",
+            "frequency of the motion that becomes unstable at the upper end",
+        ),
+        "plate_frequency": (tried, plate[:, 0], "Hz", "frequency at which a plate below is tried"),
+        "plate_growth": (tried, plate[:, 1], "1/s", "largest growth rate with a plate below"),
+        "plate_distance": (tried, plate[:, 2], "m", "distance with a plate below"),
+        "plate_error": (tried, plate[:, 3], "1", "estimated relative error of the plate's table"),
+    }
+    data = {name: variable(dims, values[None], units, words) for name, (dims, values, units, words) in columns.items()}
+    data["low_kind"] = xr.Variable(interval, kinds[None, :, 0])
+    data["high_kind"] = xr.Variable(interval, kinds[None, :, 1])
+    data["measure"] = variable(("case",), np.array([point["measure"]]), "mm or °", "displacement or tilt")
+    data["configuration"] = xr.Variable(("case",), np.array([point["configuration"]]))
+    data["model"] = xr.Variable(("case",), np.array([point["model"]]))
+    return xr.Dataset(data)

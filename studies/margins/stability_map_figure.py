@@ -1,0 +1,95 @@
+"""Figure and sentences of the map of stability, from its dataset alone."""
+
+from __future__ import annotations
+
+import numpy as np
+import xarray as xr
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from ..article import axis_label, by_configuration, label
+from ..results import COLORS, NAMES, PALETTE, chosen, panels, styled
+from .stability_map import FACE, MODELS
+
+MARKERS = {"fold": "^", "oscillatory": "o", "real": "D", "contact": "v", "border": "_"}
+MEANINGS = {
+    "fold": "fold: no equilibrium beyond",
+    "oscillatory": "growing oscillation (Hopf)",
+    "real": "growing without oscillation",
+    "contact": "contact with the rotor",
+    "border": "end of the search",
+}
+
+
+@styled
+def map_figure(result: xr.Dataset) -> Figure:
+    """Regions of stable levitation by dipole and by finite elements, kinds of boundary, and the plate's verdict."""
+    figure, axes = panels(1, 3, (11.0, 4.6))
+    for place, (configuration, rotors) in zip(axes[0], by_configuration(result), strict=False):
+        for model in MODELS:
+            _region(place, chosen(rotors, model=model), model)
+        _plate(place, chosen(rotors, model=MODELS[-1]))
+        place.set(
+            xlabel=axis_label(configuration), ylabel="frequency of the rotor (Hz)",
+            title=configuration, ylim=(20, 410),
+        )  # fmt: skip
+    handles = [
+        *(axes[0, 0].plot([], [], "s", color=COLORS[m], alpha=0.5, label=f"stable: {NAMES[m]}")[0] for m in MODELS),
+        *(axes[0, 0].plot([], [], k, color="0.3", mfc="white", label=MEANINGS[n])[0] for n, k in MARKERS.items()),
+        axes[0, 0].plot([], [], "P", color=PALETTE[4], label=f"stable with a plate {-1e3 * FACE:g} mm below")[0],
+        axes[0, 0].plot([], [], "x", color=PALETTE[3], label="unstable with it")[0],
+        axes[0, 0].plot([], [], "1", color="0.2", label="no equilibrium is left with it")[0],
+    ]
+    for place in axes[0]:
+        place.margins(x=0.08)
+    figure.legend(handles=handles, loc="outside lower center", ncols=5, fontsize=7)
+    return figure
+
+
+def _region(axes: Axes, part: xr.Dataset, model: str) -> None:
+    measure = part["measure"].values
+    low, high = part["lowest"].values, part["highest"].values
+    wide = measure if len(measure) > 1 else measure * np.array([0.99, 1.01])  # one rotor alone is a bar
+    for k in range(part.sizes["interval"]):
+        bottom, top = (np.broadcast_to(values[:, k], wide.shape) for values in (low, high))
+        axes.fill_between(wide, bottom, top, color=COLORS[model], alpha=0.2, lw=0)
+        for ends, kinds in ((low, part["low_kind"].values), (high, part["high_kind"].values)):
+            axes.plot(measure, ends[:, k], color=COLORS[model], lw=0.8)
+            for kind, marker in MARKERS.items():
+                here = kinds[:, k] == kind
+                axes.plot(measure[here], ends[here, k], marker, color=COLORS[model], mfc="white", ms=4)
+
+
+def _plate(axes: Axes, part: xr.Dataset) -> None:
+    growth, frequency = part["plate_growth"].values, part["plate_frequency"].values
+    measure = np.broadcast_to(part["measure"].values[:, None], growth.shape)
+    gone = np.isnan(growth) & np.isfinite(frequency)
+    for here, style, color in ((growth < 0, "P", PALETTE[4]), (growth >= 0, "x", PALETTE[3]), (gone, "1", "0.2")):
+        axes.plot(measure[here], frequency[here], style, color=color, ms=4, mew=0.8)
+
+
+def map_lines(result: xr.Dataset) -> list[str]:
+    """Every rotor's intervals by both models, and where the plate below keeps or undoes stability."""
+    lines = []
+    for configuration, rotors in by_configuration(result):
+        for measure in np.unique(rotors["measure"].values):
+            rows = chosen(rotors, measure=measure)
+            found = {str(m): rows.isel(case=k) for k, m in enumerate(rows["model"].values)}
+            words = [f"{model} {_intervals(one)}" for model, one in found.items()]
+            verdicts = "".join(_verdicts(one) for one in found.values())
+            lines.append(f"{label(configuration, measure)}: {'; '.join(words)}{verdicts}")
+    return lines
+
+
+def _intervals(one: xr.Dataset) -> str:
+    rows = zip(
+        one["lowest"].values, one["low_kind"].values, one["highest"].values, one["high_kind"].values, strict=True
+    )
+    words = [f"{low:.1f} ({a}) to {high:.1f} Hz ({b})" for low, a, high, b in rows if np.isfinite(low)]
+    return " and ".join(words) or "never stable"
+
+
+def _verdicts(one: xr.Dataset) -> str:
+    pairs = zip(one["plate_frequency"].values, one["plate_growth"].values, strict=True)
+    words = [f"{f:.0f} Hz {f'{g:+.2g}' if np.isfinite(g) else 'no equilibrium'}" for f, g in pairs if np.isfinite(f)]
+    return f"; growth with the plate (1/s): {', '.join(words)}" if words else ""

@@ -1,0 +1,159 @@
+"""What the commands answer, as mappings ready for JSON."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from ...dynamics.flights import Trajectory, flight_kind
+from ...dynamics.motion import PlateMemory
+from ...dynamics.steady import Equilibrium
+from ...fem.closed_forms import rotating_torque
+from ...fem.rotor_tables import FieldTable
+from ...geometry.basics import MAGNET_CONDUCTIVITY, Array
+from ...geometry.scenes import Scene
+
+MILLI = 1e-3
+PLATE_NOT_MODELLED = "The plate's eddy currents are left out: the plate is only an obstacle."
+ANSWERS_NOT_MODELLED = (
+    "The floater is a rigid dipole: that rotor and floater magnetise each other is not in the motion "
+    "(how much that is: spinlev study floater-permeability)."
+)
+
+
+def field_answer(table: FieldTable, points: Array) -> dict[str, Any]:
+    """B, its gradient and their estimated errors at points (n, 3) m."""
+    b, gradient = table.evaluate(points)
+    error, gradient_error = table.relative_error(points)
+    return {
+        "model": table.model,
+        "error_estimate": float(error.max()),
+        "gradient_error_estimate": float(gradient_error.max()),
+        "B_T": b,
+        "dB_T_per_m": gradient,
+        "B_relative_error": error,
+        "dB_relative_error": gradient_error,
+    }
+
+
+def equilibrium_answer(equilibrium: Equilibrium) -> dict[str, Any]:
+    """One synchronous equilibrium."""
+    return {
+        "position_mm": equilibrium.position / MILLI,
+        "position_error_mm": equilibrium.position_error / MILLI,
+        "polar_angle_deg": equilibrium.polar_angle_deg,
+        "lag_deg": equilibrium.lag_deg,
+        "spin": equilibrium.spin,
+        "stable": equilibrium.stable,
+        "growth_per_s": equilibrium.growth_per_s,
+        "growth_error_per_s": equilibrium.growth_error_per_s,
+        "frequencies_hz": equilibrium.frequencies_hz,
+        "modes": [vars(mode) for mode in equilibrium.modes],
+        "with_plate": equilibrium.currents is not None,
+        "without_plate": None if equilibrium.without is None else equilibrium_answer(equilibrium.without),
+    }
+
+
+def equilibria_answer(
+    table: FieldTable, equilibria: tuple[Equilibrium, ...], memory: PlateMemory | None
+) -> dict[str, Any]:
+    """All equilibria; the error estimate is the field's largest relative error at any of them."""
+    places = np.array([e.position for e in equilibria]).reshape(-1, 3)
+    error = float(table.relative_error(places)[0].max()) if len(places) else None
+    return {
+        "model": table.model,
+        "error_estimate": error,
+        **plate_answer(memory),
+        "equilibria": [equilibrium_answer(equilibrium) for equilibrium in equilibria],
+    }
+
+
+def plate_answer(memory: PlateMemory | None) -> dict[str, Any]:
+    """The plate's model and its estimated relative error."""
+    if memory is None:
+        return {"plate_model": "none"}
+    return {
+        "plate_model": memory.model,
+        "plate_error_estimate": memory.error,
+        "plate_states": len(memory.table.rates),
+    }
+
+
+def flight_answer(table: FieldTable, flight: Trajectory, memory: PlateMemory | None) -> dict[str, Any]:
+    """How a flight went; the error estimate is the field's largest relative error along it."""
+    places = flight.rotor.position[:: max(1, len(flight.time) // 500)]
+    return {
+        "model": table.model,
+        "error_estimate": float(table.relative_error(places[table.in_range(places)])[0].max()),
+        **plate_answer(memory),
+        "beyond_plate_table": flight.beyond_plate_table,
+        "levitated_s": flight.levitated_s,
+        "ended_by": flight.ended_by,
+        "kind": flight_kind(flight),
+        "energy_error": flight.energy_error,
+        "realtime_factor": flight.realtime_factor,
+    }
+
+
+def omissions(
+    scene: Scene, table: FieldTable, equilibria: Sequence[Equilibrium], memory: PlateMemory | None
+) -> list[str]:
+    """What is in the scene but not in the computation."""
+    left_out = [PLATE_NOT_MODELLED] if scene.plate and memory is None else []
+    permeabilities = [scene.floater.recoil_permeability, *(magnet.recoil_permeability for magnet in scene.rotor)]
+    if any(permeability != 1 for permeability in permeabilities):
+        left_out.append(ANSWERS_NOT_MODELLED)
+    if scene.floater.conductivity is None and equilibria:
+        left_out.append(_floater_currents(scene, table, equilibria[0]))
+    return left_out
+
+
+def _floater_currents(scene: Scene, table: FieldTable, equilibrium: Equilibrium) -> str:
+    """How large the torque of the floater's own eddy currents would be."""
+    across = float(np.linalg.norm(np.cross(table.evaluate(equilibrium.position)[0][0], equilibrium.state.moment)))
+    relative = scene.frequency * (1 - equilibrium.spin)
+    torque = float(rotating_torque(scene.floater.radius, MAGNET_CONDUCTIVITY, relative, across))
+    drag = scene.drag.angular * scene.angular_velocity
+    return (
+        f"The floater's own eddy currents are left out (no floater.conductivity_S_m): at {MAGNET_CONDUCTIVITY:.2g} S/m "
+        f"they would drive its spin with about {torque:.1e} N m (drag at the rotor's rate: {drag:.1e} N m)."
+    )
+
+
+def equilibria_lines(scene: Scene, equilibria: tuple[Equilibrium, ...], memory: PlateMemory | None) -> list[str]:
+    """The equilibria as a table for a person."""
+    head = f"{'x':>9} {'y':>9} {'z (mm)':>9} {'± mm':>9} {'polar °':>8} {'lag °':>8}  stable   growth (1/s)"
+    lines = [f"Synchronous equilibria at {scene.frequency:g} Hz (rotor's frame): {len(equilibria)}"]
+    lines += [head] if equilibria else []
+    for e in equilibria:
+        x, y, z = e.position / MILLI
+        lines.append(
+            f"{x:9.4f} {y:9.4f} {z:9.4f} {e.position_error / MILLI:9.1e} {e.polar_angle_deg:8.3f} {e.lag_deg:8.3f}"
+            f"  {'yes' if e.stable else 'no ':6} {e.growth_per_s:12.3e}"
+            f"{'  (without the plate)' if memory is not None and e.currents is None else ''}"
+        )
+    return lines + ([] if memory is None else _plate_lines(equilibria, memory))
+
+
+def _plate_lines(equilibria: tuple[Equilibrium, ...], memory: PlateMemory) -> list[str]:
+    """What the plate does to the first equilibrium that feels it."""
+    first = next((e for e in equilibria if e.without is not None and e.currents is not None), None)
+    if first is None or first.without is None:
+        return ["The plate undoes the equilibria within its table's range."]
+    x, y, z = (first.position - first.without.position) / MILLI
+    return [
+        f"The plate (error {memory.error:.0e}) moves the first one by ({x:+.4f}, {y:+.4f}, {z:+.4f}) mm and takes its "
+        f"growth rate from {first.without.growth_per_s:.3g} to {first.growth_per_s:.3g} /s."
+    ]
+
+
+def flight_lines(flight: Trajectory) -> list[str]:
+    """How a flight went, for a person."""
+    beyond = flight.beyond_plate_table
+    return [
+        f"Flight of {flight.levitated_s:.4g} s ({flight_kind(flight)}), ended by {flight.ended_by}; violation of the "
+        f"energy ledger and of unit length {flight.energy_error:.1e}; {flight.realtime_factor:.3g} times real time.",
+        *([f"For {beyond:.1%} of the flight the floater was beyond the range of the plate's table."] if beyond else []),
+    ]

@@ -1,0 +1,113 @@
+"""The plate of a scene as a table: which model, for which region, and from where."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from ...dynamics.motion import PlateMemory
+from ...fem.plate_network import Region
+from ...fem.plate_tables import cached_driven_plate, reachable_region
+from ...fem.rotor_tables import Accuracy, RotorTable, distant
+from ...fem.slab import slab_and_rotor_table
+from ...geometry.basics import MU_0, Array, InputError
+from ...geometry.bodies import TOUCHING, sphere_overlap
+from ...geometry.scenes import Plate, Scene
+from ..terminal import note
+from .reaction import edge_error
+
+REACH = 0.003
+"""The floater may move so far from where it begins, along each axis, m."""
+RASTER = 0.001
+"""Bounds of regions are multiples of this, m, so that scenes that differ little share a table."""
+LOWEST, HIGHEST, HARMONICS = 0.5, 250.0, 2.0
+"""Frequencies of a table, Hz, at least; and the multiple of the rotor's that it must hold."""
+PLUMB = 1e-9
+"""Cosine of the angle between a slab's normal and the vertical below which it stands upright."""
+NEGLIGIBLE = 1e-6
+"""Part of the floater's weight below which the largest conceivable force of the plate is left out."""
+
+
+def resolve_plate_model(scene: Scene, model: str, place: Array | None, rtol: float) -> tuple[str, str]:
+    """The plate's model in the motion, and the reason in words.
+
+    `auto` is none where even a perfect conductor's image would not be felt, the infinite slab where the edges are too
+    far to matter, and else the reduced network of the finite elements.
+    """
+    plate = scene.plate
+    if plate is None:
+        return "none", "the scene has no plate"
+    if place is None:
+        return "none", "there is no equilibrium around which to make a table"
+    if model == "fem":
+        return "reduced", "in the motion the finite elements enter by their reduced network"
+    if model != "auto":
+        return model, "as asked"
+    gap = float(plate.box.distance(place))
+    mirror = 3 * MU_0 * scene.floater.moment**2 / (32 * np.pi * gap**4)
+    weight = scene.floater.mass * float(np.linalg.norm(scene.gravity) or 9.81)
+    if mirror < NEGLIGIBLE * weight:
+        return "none", f"at {gap * 1e3:.3g} mm the plate pushes with less than {NEGLIGIBLE:.0e} of the weight"
+    body, normal = plate.box.to_body(place), int(np.argmin(plate.box.size))
+    if abs(body[normal]) > plate.box.half_edges[normal]:
+        error = edge_error(plate, place)
+        if error <= rtol:
+            return "slab", f"the plate's edges take at most {error:.1e} of its reaction"
+        return "reduced", f"edges may take {error:.1e} of an infinite slab's reaction, {rtol:.1e} is allowed"
+    return "reduced", "the floater is beside the plate's edge"
+
+
+def plate_memory(
+    scene: Scene, plate: Plate, model: str, table: RotorTable, place: Array, rtol: float
+) -> tuple[PlateMemory, bool]:
+    """The plate's currents for a floater about `place` (3,) m that turns with the rotor; whether they were cached.
+
+    Raises
+    ------
+    InputError : the plate leaves the floater no room, or is no slab for the floater and the rotor
+    """
+    if model == "slab" and plate.lowering and abs(plate.box.rotation[2, np.argmin(plate.box.size)]) < PLUMB:
+        plate = replace(plate, lowering=None)  # an infinite slab that moves along itself stays where it is
+    sideways = float(np.hypot(place[0], place[1])) + REACH
+    region = _rastered(reachable_region(plate, [0.0, 0.0, place[2]], [sideways, sideways, REACH], scene.floater.radius))
+    frequencies = (LOWEST, max(HIGHEST, HARMONICS * scene.frequency))
+    note("Plate's currents ...")
+    if model == "slab":
+        made, share = slab_and_rotor_table(plate, table, region, frequencies, rtol)
+        found = False
+    else:
+        made, share, found = cached_driven_plate(plate, table, region, frequencies, rtol, note)
+    note("  from the cache." if found else f"  {len(made.rates)} states in {made.provenance['seconds']:.1f} s.")
+    return PlateMemory(plate, made, share, model, edge_error(plate, place) if model == "slab" else 0.0), found
+
+
+def table_in_flight(scene: Scene, table: RotorTable, place: Array, rtol: float) -> RotorTable:
+    """The rotor's table with the coefficients that count from `REACH` nearer to the magnets than `place` (3,) m on."""
+    gap = min(float(magnet.box.distance(place)) for magnet in scene.rotor) - REACH
+    return distant(table, Accuracy(rtol, max(gap, scene.floater.radius)))
+
+
+def _rastered(region: Region) -> Region:
+    """The region with bounds on the raster; what is nearly symmetric becomes so, which halves the work."""
+    lower, upper = np.floor(region.lower / RASTER + 1e-6), np.ceil(region.upper / RASTER - 1e-6)
+    for axis in np.flatnonzero((lower < 0) & (upper > 0)):
+        upper[axis] = max(-lower[axis], upper[axis])
+        lower[axis] = -upper[axis]
+    return Region(lower * RASTER, upper * RASTER)
+
+
+def check_room(scene: Scene, place: Array) -> None:
+    """A plate that leaves a floater at `place` (3,) m no room is a wrong scene.
+
+    Raises
+    ------
+    InputError : it overlaps the floater
+    """
+    depth = sphere_overlap(place, scene.floater.radius, scene.plate.box) if scene.plate else 0.0
+    if scene.plate and depth > TOUCHING:
+        center, levitates = (np.round(c * 1e3, 3).tolist() for c in (scene.plate.box.center, place))
+        raise InputError(
+            f"Input plate.center_mm must leave room for the floater; instead received {center}: the plate overlaps it "
+            f"by {depth * 1e3:.4g} mm where it levitates, at {levitates} mm; move the plate away."
+        )

@@ -1,0 +1,151 @@
+"""The main job: fields, tables, equilibria, motion, and what the dipole picture gets wrong."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from ...dynamics.equilibria import survey, with_plate
+from ...dynamics.flights import FlightStopped, Trajectory
+from ...dynamics.steady import EquilibriumError, Survey
+from ...fem.rotor_tables import FieldTable
+from ...fem.storage import write_whole
+from ...geometry.scenes import AbsoluteStart, Scene
+from ..results import (
+    axis_dataset,
+    curve_dataset,
+    equilibria_dataset,
+    field_figure,
+    force_figure,
+    save_figure,
+    trajectory_dataset,
+    trajectory_figure,
+    write_dataset,
+)
+from ..terminal import Tables, note, to_json
+from .answers import equilibria_answer, equilibria_lines, flight_answer, flight_lines, omissions
+from .shelf import Shelf
+from .single import Job, fly
+
+MODELS = ("dipole", "cuboid", "fem")
+DEEPEST = 0.05
+"""The field figure reaches this far below the rotor's origin, m."""
+
+
+def main_job(scene: Scene, asked: Tables, duration: float, out: Path) -> Job:
+    """Compute everything of a scene; writes result.nc, summary.json and the figures.
+
+    What is finished before a failure is kept: a scene without a stable equilibrium still leaves its fields and force
+    curves, a flight that the user stops its beginning; then the error goes on to the caller.
+    """
+    shelf = Shelf(scene, asked)
+    exact = "cuboid" if all(magnet.contrast == 0 for magnet in scene.rotor) else "fem"
+    chosen, best = shelf.table(), shelf.table(exact)
+    tables = {name: shelf.table(name) for name in MODELS}
+    failure: EquilibriumError | FlightStopped | None
+    surveys, failure = _surveys(scene, {table.model: table for table in (tables["dipole"], best, chosen)})
+    compared = comparison(surveys["dipole"], surveys[best.model], best.model)
+    memory = shelf.memory(chosen, surveys[chosen.model].equilibria)
+    if memory is not None:
+        surveys[chosen.model] = with_plate(scene, chosen, surveys[chosen.model], memory)
+    found = surveys[chosen.model].equilibria
+    values: dict[str, Any] = {
+        **equilibria_answer(chosen, found, memory),
+        "comparison": compared,
+        "not_modelled": omissions(scene, chosen, found, memory),
+        "tables_from_cache": shelf.from_cache,
+    }
+    lines = [*equilibria_lines(scene, found, memory), *comparison_lines(compared), *values["not_modelled"]]
+    flight = None
+    if failure is None or isinstance(scene.start, AbsoluteStart):
+        try:
+            table = shelf.in_flight(chosen, memory, found)
+            flight = fly(scene, table, duration, found, memory)
+            values |= flight_answer(table, flight, memory)
+            lines += flight_lines(flight)
+        except EquilibriumError as error:
+            failure = error
+        except FlightStopped as stop:
+            flight = (failure := stop).flown
+    if failure:
+        values["failed"] = str(failure)
+        lines.append(str(failure))
+    result = _static_dataset(scene, tables, surveys, best.model)
+    _write(scene, chosen, result, values, flight, out)
+    if failure and (flight is None or isinstance(failure, FlightStopped)):
+        raise failure
+    return values, [*lines, f"Results and figures in {out}/"]
+
+
+def _surveys(scene: Scene, tables: Mapping[str, FieldTable]) -> tuple[dict[str, Survey], EquilibriumError | None]:
+    """Equilibria by each table, or empty surveys and the reason why there cannot be any."""
+    note("Equilibria ...")
+    try:
+        return {model: survey(scene, table) for model, table in tables.items()}, None
+    except EquilibriumError as error:
+        return {model: Survey((), ()) for model in tables}, error
+
+
+def comparison(dipole: Survey, best: Survey, name: str) -> Mapping[str, Any] | None:
+    """Levitation distance by the point dipole against the true field, mm; None if either has no stable equilibrium."""
+    pair = [next((e for e in found.equilibria if e.stable), None) for found in (dipole, best)]
+    if pair[0] is None or pair[1] is None:
+        return None
+    distances = [-float(e.position[2]) * 1e3 for e in pair if e]
+    return {
+        "true_model": name,
+        "dipole_distance_mm": distances[0],
+        "true_distance_mm": distances[1],
+        "difference_mm": distances[0] - distances[1],
+        # The dipole's own position error says how wrong its field is, which is what is measured here.
+        "difference_error_mm": pair[1].position_error * 1e3,
+    }
+
+
+def comparison_lines(compared: Mapping[str, Any] | None) -> list[str]:
+    """The same for a person."""
+    if compared is None:
+        return ["Dipole against the true field: not both have a stable equilibrium."]
+    return [
+        f"Levitation distance: dipole {compared['dipole_distance_mm']:.4f} mm, {compared['true_model']} "
+        f"{compared['true_distance_mm']:.4f} mm; the dipole is off by {compared['difference_mm']:+.4f} ± "
+        f"{compared['difference_error_mm']:.1g} mm."
+    ]
+
+
+def _static_dataset(
+    scene: Scene, tables: Mapping[str, FieldTable], surveys: Mapping[str, Survey], best: str
+) -> xr.Dataset:
+    lowest = min(float(corner[2]) for magnet in scene.rotor for corner in magnet.box.corners)
+    heights = np.linspace(min(lowest - scene.floater.radius, -1e-3), min(lowest - 1e-3, -DEEPEST), 200)
+    parts = [
+        axis_dataset(tables, heights),
+        curve_dataset({name: found.curves for name, found in surveys.items()}),
+        equilibria_dataset({name: found.equilibria for name, found in surveys.items()}),
+    ]
+    return xr.merge(parts).assign_attrs(
+        study="run", best_model=best, weight_N=scene.floater.mass * float(scene.gravity[2])
+    )
+
+
+def _write(
+    scene: Scene, table: FieldTable, result: xr.Dataset, values: dict[str, Any], flight: Trajectory | None, out: Path
+) -> None:
+    from ..pictures import last_view, scene_picture
+
+    note("Files and figures ...")
+    (out / "summary.json").unlink(missing_ok=True)  # an older one must not stand beside the new result
+    figures = {"field": field_figure(result), "force": force_figure(result)}
+    if flight:
+        flown = trajectory_dataset(flight).assign_attrs(study="run")
+        result = xr.merge([result, flown], combine_attrs="no_conflicts")
+        figures["trajectory"] = trajectory_figure(result)
+        scene_picture(last_view(scene, table, flight.rotor), out / "scene.png")
+    write_dataset(result, out / "result.nc", scene)
+    for name, figure in figures.items():
+        save_figure(figure, out / f"{name}.png")
+    write_whole(out / "summary.json", f"{to_json(values)}\n".encode())

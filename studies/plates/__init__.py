@@ -1,0 +1,1 @@
+"""What does a plate do, and are its currents right?"""

@@ -1,0 +1,126 @@
+"""The plates and rotors of the study of the plate's damping, and where the floater levitates without a plate."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cache
+
+import numpy as np
+
+from ...dynamics.branches import StableRange, at_frequency, reference_state, stable_range
+from ...dynamics.equilibria import survey
+from ...dynamics.motion import Rates
+from ...dynamics.steady import Equilibrium, EquilibriumError
+from ...fem.rotor_tables import RotorTable, cached_rotor_table
+from ...geometry.basics import Array, Box, rotation_matrix
+from ...geometry.scenes import Plate, Scene
+from ..article import CONFIGURATIONS, PLATE_CONDUCTIVITY, PLATE_SIZE, article_scene
+from ..terminal import note
+
+DISTANCE = 0.018
+"""Face below or beside the floater's centre in the sweeps over all else, m."""
+CONFIGURATION, MEASURE, FREQUENCY = "tilt", 10.0, 130.0
+"""The rotor of the sweeps over plates, that of the scene `tilt-over-plate`: tilt in degrees, Hz."""
+REAL = (DISTANCE,)
+"""Distances of the face at which the real plate, with its edges, is computed beside the infinite slab, m."""
+FIELD_RTOL = 1e-4
+MIDDLE = 0.5
+ROTORS = ("rotors, below", "rotors, beside")
+"""Sweeps over the article's rotors."""
+
+
+@dataclass(frozen=True)
+class Case:
+    """One plate and rotor.
+
+    Parameters
+    ----------
+    sweep : what is varied
+    value : of that, SI; of a rotor its displacement (mm) or tilt (degrees)
+    model : slab or reduced
+    upright : beside the floater instead of below it
+    distance : of the face from the floater's centre, m
+    thickness : m
+    conductivity : S/m
+    configuration, measure : of the rotor
+    part : place of the rotor's frequency in its range of stable frequencies, 0 to 1; None: `FREQUENCY`
+    """
+
+    sweep: str
+    value: float
+    model: str = "slab"
+    upright: bool = False
+    distance: float = DISTANCE
+    thickness: float = PLATE_SIZE[2]
+    conductivity: float = PLATE_CONDUCTIVITY
+    configuration: str = CONFIGURATION
+    measure: float = MEASURE
+    part: float | None = None
+
+    def plate(self, place: Array) -> Plate:
+        """The plate for a floater at `place` (3,) m."""
+        size = np.array([*PLATE_SIZE[:2], self.thickness])
+        away = self.distance + self.thickness / 2
+        if self.upright:
+            center = np.array([away, 0.0, place[2]])
+            return Plate(Box(size, center, rotation_matrix((0.0, 90.0, 0.0))), self.conductivity)
+        return Plate(Box(size, np.array([0.0, 0.0, place[2] - away])), self.conductivity)
+
+
+def cases(quick: bool) -> list[Case]:
+    """The plates and rotors of the study."""
+    few, real = (3, ()) if quick else (10, REAL)
+    found = [Case("below", d, distance=d) for d in (*np.geomspace(0.0085, 0.06, few).tolist(), *real)]
+    found += [Case("beside", d, upright=True, distance=d) for d in (*np.geomspace(0.01, 0.06, few).tolist(), *real)]
+    found += [Case("conductivity", s, conductivity=s) for s in np.geomspace(1e6, 6e7, few).tolist()]
+    found += [Case("thickness", t, thickness=t) for t in np.geomspace(1e-3, 5e-2, few).tolist()]
+    found += [Case("frequency", p, part=p) for p in np.linspace(0.02, 0.98, 2 if quick else 9).tolist()]
+    for sweep in ROTORS:
+        for name, kind in CONFIGURATIONS.items():
+            some = kind.levitated[1:2] if quick else kind.levitated
+            beside = sweep == ROTORS[1]
+            found += [Case(sweep, m, upright=beside, configuration=name, measure=m, part=MIDDLE) for m in some]
+    found += [Case("below, real plate", d, "reduced", distance=d) for d in real]
+    found += [Case("beside, real plate", d, "reduced", upright=True, distance=d) for d in real]
+    return found
+
+
+@cache
+def _in_field(configuration: str, measure: float) -> tuple[Scene, RotorTable, Rates]:
+    """A rotor in air, its field and compiled motion, once for all points that a process computes."""
+    scene = article_scene(configuration, measure, FREQUENCY)
+    table, _ = cached_rotor_table(scene.rotor, "fem", FIELD_RTOL, note, scene.floater.radius)
+    return scene, table, Rates.of(scene, table)
+
+
+@cache
+def _stable_range(configuration: str, measure: float) -> StableRange:
+    scene, _, rates = _in_field(configuration, measure)
+    found = stable_range(scene, rates, *reference_state(scene))
+    if found is None:
+        raise EquilibriumError("There is no stable levitation without the plate.")
+    return found
+
+
+@cache
+def without_plate(
+    configuration: str, measure: float, part: float | None
+) -> tuple[Scene, RotorTable, Rates, Equilibrium]:
+    """A scene without plate, the rotor's field, the compiled motion and the stable equilibrium.
+
+    Raises
+    ------
+    EquilibriumError : nothing levitates there
+    """
+    scene, table, rates = _in_field(configuration, measure)
+    near = None
+    if part is not None:
+        stable = _stable_range(configuration, measure)
+        frequency = stable.low.parameter + part * (stable.high.parameter - stable.low.parameter)
+        scene = replace(scene, frequency=frequency)
+        near = at_frequency(scene, rates, stable.near(frequency), frequency).distance
+    found = survey(scene, table, rates=rates).equilibria
+    known = [e for e in found if (e.stable if near is None else abs(e.distance - near) < 1e-6)]
+    if not known:
+        raise EquilibriumError("There is no stable levitation without the plate.")
+    return scene, table, rates, known[0]

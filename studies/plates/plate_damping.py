@@ -1,0 +1,102 @@
+"""What a plate does to levitation: damping of each small motion, drag, lift and loss against its place and material."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import asdict, replace
+
+import numpy as np
+import xarray as xr
+
+from ...dynamics.equilibria import plate_action, with_plate
+from ...dynamics.motion import Rates
+from ...dynamics.steady import Equilibrium, Survey
+from ...fem.rotor_tables import RotorTable
+from ...geometry.basics import Array
+from ...geometry.scenes import Scene
+from ..one_scene import plate_memory
+from ..results import AXIS, MODES, Point, variable
+from .plate_cases import Case, cases, without_plate
+
+RTOL = 3e-3
+
+
+def damping_points(quick: bool) -> list[Point]:
+    """The plates and rotors as points of the study."""
+    return [asdict(case) for case in cases(quick)]
+
+
+def plate_damping(point: Point) -> xr.Dataset:
+    """Levitation of a rotor of the article beside or above one plate.
+
+    Returns
+    -------
+    Dataset over `case`: growth and frequency of each mode, displacement, mean force, torque and loss; NaN where the
+    plate undoes the equilibrium.  Plates are infinite slabs but for those called real.
+
+    Raises
+    ------
+    EquilibriumError : nothing levitates even without the plate
+    """
+    case = Case(**point)
+    scene, table, rates, start = without_plate(case.configuration, case.measure, case.part)
+    row = _row(replace(scene, plate=case.plate(start.position)), case, table, rates, start)
+    return xr.Dataset(
+        {
+            **{n: variable(("case", *dims), np.array([row[n]]), *UNITS[n]) for n, dims in COLUMNS.items()},
+            "sweep": (("case",), [case.sweep]),
+            "configuration": (("case",), [case.configuration]),
+            "value": variable(("case",), [case.value], "SI, mm or °", "what is varied in the sweep"),
+            "rotor_frequency": variable(("case",), [scene.frequency], "Hz", "frequency of the rotor"),
+        },
+        {"mode": list(MODES), "axis": list(AXIS)},
+        {"weight_N": scene.floater.mass * 9.81, "plate_rtol": RTOL},
+    )
+
+
+def gather_damping(parts: Sequence[xr.Dataset]) -> xr.Dataset:
+    """The plates one after the other."""
+    return xr.concat(parts, "case", data_vars="minimal", coords="minimal", compat="override", join="exact")
+
+
+COLUMNS: dict[str, tuple[str, ...]] = {
+    "growth": ("mode",),
+    "growth_without": ("mode",),
+    "frequency": ("mode",),
+    "shift": ("axis",),
+    "force": ("axis",),
+    "torque": ("axis",),
+    "loss": (),
+    "error": (),
+}
+UNITS = {
+    "growth": ("1/s", "growth rate of a small motion"),
+    "growth_without": ("1/s", "growth rate without a plate"),
+    "frequency": ("Hz", "frequency of a small motion, rotor's frame"),
+    "shift": ("m", "displacement of the equilibrium by the plate"),
+    "force": ("N", "mean force of the plate on the floater"),
+    "torque": ("N m", "mean torque of the plate on the floater"),
+    "loss": ("W", "heat in the plate, by floater and rotor"),
+    "error": ("1", "estimated relative error of the plate's table"),
+}
+
+
+def _row(scene: Scene, case: Case, table: RotorTable, rates: Rates, start: Equilibrium) -> dict[str, Array]:
+    assert scene.plate is not None
+    memory, _ = plate_memory(scene, scene.plate, case.model, table, start.position, RTOL)
+    found = with_plate(scene, table, Survey((start,), ()), memory, rates).equilibria
+    sizes = {"mode": 5, "axis": 3}
+    row = {name: np.full([sizes[d] for d in dims], np.nan) for name, dims in COLUMNS.items()}
+    row["growth_without"] = np.array([mode.growth_per_s for mode in start.modes])
+    if not found or found[0].currents is None:
+        return row
+    action = plate_action(scene, memory, found[0])
+    return row | {
+        "growth": np.array([mode.growth_per_s for mode in found[0].modes]),
+        "frequency": np.array([mode.frequency_hz for mode in found[0].modes]),
+        "shift": found[0].position - start.position,
+        "force": action.force,
+        "torque": action.torque,
+        "loss": np.array(action.loss),
+        "error": np.array(max(memory.table.errors.total, memory.share.error)),
+    }

@@ -1,0 +1,94 @@
+"""TEAM workshop problem 7: an asymmetrical conductor with a hole under a racetrack coil, against measurement.
+
+Aluminium 294 × 294 × 19 mm, σ = 3.526e7 S/m, with a hole of 108 × 108 mm whose corner is at (18, 18) mm; a coil
+of 2742 ampere-turns above it.  B_z was measured on the line y = 72, z = 34 mm at 50 and 200 Hz, for ωt = 0 and 90°:
+with phasors e^{+iωt} and the current I cos ωt these are Re B and -Im B.
+
+K. Fujiwara, T. Nakata, COMPEL 9 (1990) 137-154, doi 10.1108/eb010071.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import partial
+from importlib.resources import files
+
+import numpy as np
+
+from ...fem.closed_forms import Dipole, Racetrack
+from ...fem.eddy_currents import solve_eddy
+from ...geometry.basics import Array
+from ...geometry.meshes import Block, ConductorMesh, graded_partition, hex_mesh, skin_depth
+
+CONDUCTIVITY = 3.526e7
+COIL = Racetrack(np.array([0.194, 0.100, 0.099]), (0.2, 0.2), 0.1, 0.025, 0.05, 2742.0)
+FREQUENCIES = (50.0, 200.0)
+FACES = (np.array([0.0, 18.0, 126.0, 294.0]), np.array([0.0, 18.0, 126.0, 294.0]), np.array([0.0, 19.0]))
+"""Faces of plate and hole across each axis, mm."""
+REACH = 1500.0
+"""Distance from the plate to the outer boundary, mm."""
+GAUSS = 1e-4
+
+
+@dataclass(frozen=True, eq=False)
+class Team7Comparison:
+    """Measured and computed B_z on the line.
+
+    Parameters
+    ----------
+    x : (17,) m
+    measured, computed : (17, 4) T; columns 50 Hz ωt = 0, 50 Hz ωt = 90°, 200 Hz ωt = 0, 200 Hz ωt = 90°
+    """
+
+    x: Array
+    measured: Array
+    computed: Array
+
+    @property
+    def deviation(self) -> Array:
+        """(17, 4) computed minus measured, in units of the line's peak: the largest measured |B| of that frequency."""
+        amplitude = np.hypot(self.measured[:, 0::2], self.measured[:, 1::2]).max(axis=0)
+        return np.asarray((self.computed - self.measured) / np.repeat(amplitude, 2))
+
+
+def team7_mesh(frequency: float, cell: float = 70.0, skin_share: float = 2.0, growth: float = 2.0) -> ConductorMesh:
+    """Structured mesh: cells of at most `cell` mm in the plate, finer at its faces by the skin depth at `frequency`."""
+    depth = 1e3 * skin_depth(CONDUCTIVITY, frequency)
+    lines = []
+    for faces in FACES:
+        size = partial(_cell_size, faces=faces, cell=cell, skin=skin_share * depth, growth=growth)
+        lines.append(graded_partition([faces[0] - REACH, *faces, faces[-1] + REACH], size))
+    lower, upper = np.array([f[0] for f in FACES]), np.array([f[-1] for f in FACES])
+    plate = Block("plate", lower, upper)
+    hole = Block("air", np.array([18.0, 18.0, 0.0]), np.array([126.0, 126.0, 19.0]))
+    return ConductorMesh(hex_mesh(lines, [plate, hole]), {"plate": CONDUCTIVITY})
+
+
+def _cell_size(coordinate: Array, faces: Array, cell: float, skin: float, growth: float) -> Array:
+    near = np.abs(coordinate[:, None] - faces).min(axis=1)
+    inside = (coordinate > faces[0]) & (coordinate < faces[-1])
+    return np.asarray(np.where(inside, np.minimum(cell, skin + growth * near), cell / 2 + growth * near))
+
+
+def measured_line() -> tuple[Array, Array]:
+    """x (17,) m and measured B_z (17, 4) T."""
+    text = files(__package__).joinpath("team7_line_A1B1.csv").read_text(encoding="utf-8")
+    rows = [line for line in text.splitlines() if line and line[0].isdigit()]
+    table = np.array([[float(entry) for entry in row.split(",")] for row in rows])
+    return table[:, 0] * 1e-3, table[:, 1:] * GAUSS
+
+
+def compute_line(frequency: float, x: Array, mesh: ConductorMesh, order: int = 3) -> Array:
+    """B_z (n, 2), T, at ωt = 0 and 90° on the line y = 72, z = 34 mm; the reaction by reciprocity."""
+    points = np.column_stack([x, np.full_like(x, 0.072), np.full_like(x, 0.034)])
+    response = solve_eddy(mesh, order, frequency, [COIL])
+    reaction = response.couplings_to([Dipole(p, np.array([0.0, 0.0, 1.0])) for p in points])[:, 0]
+    total = COIL.flux_density(points)[:, 2] + reaction
+    return np.column_stack([total.real, -total.imag])
+
+
+def team7(order: int = 3) -> Team7Comparison:
+    """Both frequencies against the measurement."""
+    x, measured = measured_line()
+    computed = np.hstack([compute_line(f, x, team7_mesh(f), order) for f in FREQUENCIES])
+    return Team7Comparison(x, measured, computed)

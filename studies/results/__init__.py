@@ -1,0 +1,58 @@
+"""What is a study, and how is a result labelled, kept and drawn?"""
+
+from .datasets import (
+    AXIS,
+    LIBRARIES,
+    MODES,
+    axis_dataset,
+    curve_dataset,
+    equilibria_dataset,
+    found_dataset,
+    trajectory_dataset,
+    variable,
+    write_dataset,
+)
+from .figures import (
+    COLORS,
+    DASHES,
+    NAMES,
+    PALETTE,
+    drawn,
+    field_figure,
+    force_figure,
+    panels,
+    save_figure,
+    styled,
+    trajectory_figure,
+)
+from .study import Point, Study, by_case, chosen, one_case, study_of_one
+
+__all__ = [
+    "AXIS",
+    "COLORS",
+    "DASHES",
+    "LIBRARIES",
+    "MODES",
+    "NAMES",
+    "PALETTE",
+    "Point",
+    "Study",
+    "axis_dataset",
+    "by_case",
+    "chosen",
+    "curve_dataset",
+    "drawn",
+    "equilibria_dataset",
+    "field_figure",
+    "force_figure",
+    "found_dataset",
+    "one_case",
+    "panels",
+    "save_figure",
+    "study_of_one",
+    "styled",
+    "trajectory_dataset",
+    "trajectory_figure",
+    "variable",
+    "write_dataset",
+]

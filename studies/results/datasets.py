@@ -1,0 +1,162 @@
+"""Results as labelled data with units and provenance, in netCDF."""
+
+from __future__ import annotations
+
+import shlex
+import sys
+from collections.abc import Mapping, Sequence
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from ...dynamics.flights import Trajectory
+from ...dynamics.steady import SIDE, TILT, Equilibrium, ForceCurve
+from ...fem.rotor_tables import FieldTable
+from ...fem.storage import write_checked
+from ...geometry.basics import Array
+from ...geometry.scenes import Scene
+
+AXIS = ("x", "y", "z")
+MODES = ("bounce", *SIDE, *TILT)
+LIBRARIES = ("spinlev", "ngsolve", "heyoka", "numpy", "scipy", "xarray")
+
+
+def write_dataset(dataset: xr.Dataset, path: Path, scene: Scene | None = None) -> None:
+    """Write a result with its provenance: versions, command, and the scene's text if it has one.
+
+    The same command gives the same file, to the last byte, wherever its numbers are not times.
+    """
+    provenance = {f"version_{name}": version(name) for name in LIBRARIES}
+    if scene:
+        provenance["scene"] = scene.text
+    command = shlex.join(["spinlev", *sys.argv[1:]])
+    write_checked(dataset.assign_attrs(command=command, **provenance), path)
+
+
+def variable(dims: Sequence[str], values: Any, units: str, long_name: str) -> xr.Variable:
+    """A variable with its units and a name for an axis label."""
+    return xr.Variable(dims, values, {"units": units, "long_name": long_name})
+
+
+def axis_dataset(tables: Mapping[str, FieldTable], heights: Array) -> xr.Dataset:
+    """Field of each model on the axis below the rotor, with its estimated relative error; heights (n,) m < 0."""
+    points = np.stack([np.zeros_like(heights), np.zeros_like(heights), heights], axis=1)
+    fields = np.full((len(tables), len(heights), 3), np.nan)
+    errors = np.full((len(tables), len(heights)), np.nan)
+    for k, table in enumerate(tables.values()):
+        known = table.in_range(points)
+        fields[k, known] = table.evaluate(points[known])[0]
+        errors[k, known] = table.relative_error(points[known])[0]
+    return xr.Dataset(
+        {
+            "axis_field": variable(("model", "axis_height", "axis"), fields, "T", "flux density on the axis"),
+            "axis_error": variable(("model", "axis_height"), errors, "1", "estimated relative error of the field"),
+        },
+        coords={
+            "model": list(tables),
+            "axis": list(AXIS),
+            "axis_height": variable(("axis_height",), heights, "m", "height on the axis"),
+        },
+    )
+
+
+def curve_dataset(curves: Mapping[str, Sequence[ForceCurve]]) -> xr.Dataset:
+    """Axial force along the curves of lateral balance, by model."""
+    rows = [(model, number, curve) for model, found in curves.items() for number, curve in enumerate(found)]
+    sizes = [len(curve.magnetic_force) for _, _, curve in rows]
+
+    def joined(values: list[Array], *shape: int) -> Array:
+        return np.concatenate([np.zeros((0, *shape)), *values])
+
+    return xr.Dataset(
+        {
+            "curve_model": (("curve_point",), np.repeat([m for m, _, _ in rows] or [""], sizes or [0])),
+            "curve_number": (("curve_point",), np.repeat([n for _, n, _ in rows] or [0], sizes or [0])),
+            "curve_position": variable(
+                ("curve_point", "axis"), joined([c.position for _, _, c in rows], 3), "m", "position, rotor's frame"
+            ),
+            "curve_moment": variable(
+                ("curve_point", "axis"), joined([c.moment for _, _, c in rows], 3), "1", "direction of the moment"
+            ),
+            "curve_force": variable(
+                ("curve_point",), joined([c.magnetic_force for _, _, c in rows]), "N", "axial magnetic force"
+            ),
+        },
+        coords={"axis": list(AXIS)},
+    )
+
+
+def equilibria_dataset(found: Mapping[str, Sequence[Equilibrium]]) -> xr.Dataset:
+    """Equilibria of all models in one list."""
+    rows = [(model, equilibrium) for model, equilibria in found.items() for equilibrium in equilibria]
+
+    def column(name: str, read: Any, units: str, *dims: str) -> xr.Variable:
+        values = np.array([read(e) for _, e in rows], dtype=float)
+        shape = (len(rows), *((3,) if dims else ()))
+        return variable(("equilibrium", *dims), values.reshape(shape), units, name)
+
+    return xr.Dataset(
+        {
+            "equilibrium_model": (("equilibrium",), np.array([model for model, _ in rows], dtype=object).astype(str)),
+            "equilibrium_stable": (("equilibrium",), np.array([int(e.stable) for _, e in rows], dtype="i1")),
+            "equilibrium_position": column("position, rotor's frame", lambda e: e.position, "m", "axis"),
+            "equilibrium_position_error": column("estimated position error", lambda e: e.position_error, "m"),
+            "equilibrium_moment": column("direction of the moment", lambda e: e.state.moment, "1", "axis"),
+            "equilibrium_growth": column("largest growth rate", lambda e: e.growth_per_s, "1/s"),
+        },
+        coords={"axis": list(AXIS)},
+    )
+
+
+def found_dataset(rows: Sequence[Equilibrium]) -> xr.Dataset:
+    """Equilibria of one scene and one model over `equilibrium`, with their small motions over `mode`."""
+
+    def column(read: Any, units: str, name: str, *dims: str) -> xr.Variable:
+        values = np.array([read(e) for e in rows], float).reshape(len(rows), *(sizes[d] for d in dims))
+        return variable(("equilibrium", *dims), values, units, name)
+
+    def by_name(equilibrium: Equilibrium, quantity: str) -> list[float]:
+        known = {mode.name: float(getattr(mode, quantity)) for mode in equilibrium.modes}
+        return [known.get(name, np.nan) for name in MODES]
+
+    sizes = {"axis": 3, "mode": len(MODES)}
+    return xr.Dataset(
+        {
+            "position": column(lambda e: e.position, "m", "mean position, rotor's frame", "axis"),
+            "position_error": column(lambda e: e.position_error, "m", "estimated error of the position"),
+            "moment": column(lambda e: e.state.moment, "1", "direction of the moment, rotor's frame", "axis"),
+            "polar_angle": column(lambda e: e.polar_angle_deg, "deg", "polar angle of the moment"),
+            "lag": column(lambda e: e.lag_deg, "deg", "lag of the moment behind the rotor"),
+            "stable": column(lambda e: e.stable, "1", "1 stable, 0 not"),
+            "growth": column(lambda e: e.growth_per_s, "1/s", "largest growth rate of a small motion"),
+            "mode_growth": column(lambda e: by_name(e, "growth_per_s"), "1/s", "growth of a mode", "mode"),
+            "mode_frequency": column(lambda e: by_name(e, "frequency_hz"), "Hz", "its frequency", "mode"),
+            "number": variable((), len(rows), "1", "number of equilibria"),
+        },
+        {"axis": list(AXIS), "equilibrium": np.arange(len(rows)), "mode": list(MODES)},
+    )
+
+
+def trajectory_dataset(flight: Trajectory) -> xr.Dataset:
+    """A flight in the laboratory frame, with its position in the rotor's frame as well."""
+    lab, rotor = flight.lab, flight.rotor
+    dims = ("time", "axis")
+    return xr.Dataset(
+        {
+            "position": variable(dims, lab.position, "m", "position, laboratory frame"),
+            "velocity": variable(dims, lab.velocity, "m/s", "velocity, laboratory frame"),
+            "moment": variable(dims, lab.moment, "1", "direction of the moment, laboratory frame"),
+            "spin": variable(dims, lab.spin, "rad/s", "angular velocity, laboratory frame"),
+            "position_rotor_frame": variable(dims, rotor.position, "m", "position, rotor's frame"),
+        },
+        coords={"time": variable(("time",), flight.time, "s", "time"), "axis": list(AXIS)},
+        attrs={
+            "study": "simulate",
+            "ended_by": str(flight.ended_by),
+            "levitated_s": flight.levitated_s,
+            "energy_error": flight.energy_error,
+        },
+    )

@@ -1,0 +1,77 @@
+"""Runs a study: its points one by one on the engine, kept as they come, then joined, written, drawn and reported."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Mapping
+from importlib.metadata import version
+from pathlib import Path
+
+import xarray as xr
+
+from ...geometry.basics import ComputationError
+from ..results import LIBRARIES, Point, Study
+from ..terminal import note, progress, to_json
+from .finished_points import Journal
+from .workers import Engine, Failure
+
+
+class SweepError(ComputationError):
+    """No point of a sweep could be computed."""
+
+
+def swept(name: str, study: Study, points: Mapping[int, Point], engine: Engine, out: Path) -> xr.Dataset:
+    """The joined result of a study at the points, each computed once even if the program is stopped between them.
+
+    Finished points are kept in the folder NAME.points of `out`, which is removed by `forget` once the result is safe.
+    Points that failed are named with their reasons in the attribute `failed_points`.
+
+    Raises
+    ------
+    SweepError : all points failed
+    InputError : the scheduler does not answer
+    OSError : `out` cannot be written
+    """
+    journal = _journal(name, study, points, out)
+    finished = {k: point for k, point in journal.finished().items() if k in points}
+    if finished:
+        note(f"{len(finished)} of {len(points)} points are there from an earlier run.")
+    failed: dict[int, str] = {}
+    missing = {k: point for k, point in points.items() if k not in finished}
+    engine = Engine(workers=1) if study.timed else engine
+    with progress(f"{name}: {len(points)} points") as advance:
+        advance(len(finished) / len(points))
+        for k, result in engine.results(study.compute, missing) if missing else ():
+            if isinstance(result, Failure):
+                failed[k] = result.reason
+                note(f"Point {to_json(points[k])} failed: {result.reason}")
+            else:
+                journal.keep(k, result)
+                finished[k] = result
+            advance((len(finished) + len(failed)) / len(points))
+    if not finished:
+        raise SweepError(f"All {len(points)} points failed; the first: {failed[min(failed)]}")
+    reasons = [{"point": points[k], "reason": failed[k]} for k in sorted(failed)]
+    joined = study.gather([finished[k] for k in sorted(finished)])
+    return joined.assign_attrs(study=name, failed_points=to_json({"failed": reasons}))
+
+
+def forget(name: str, out: Path) -> None:
+    """Remove the finished points of a sweep whose result is safe."""
+    Journal(out / f"{name}.points", "", note).remove()
+
+
+def _journal(name: str, study: Study, points: Mapping[int, Point], out: Path) -> Journal:
+    versions = {library: version(library) for library in LIBRARIES}
+    asked = {"study": name, "settings": study.settings, "points": list(points.values())}
+    return Journal(out / f"{name}.points", to_json({**asked, **versions, "program": program_digest()}), note)
+
+
+def program_digest() -> str:
+    """SHA-256 of the program's own text: what another text has computed is not mixed into a result."""
+    digest = hashlib.sha256()
+    root = Path(__file__).resolve().parents[2]
+    for folder in ("geometry", "fem", "dynamics", "studies"):
+        for path in sorted((root / folder).rglob("*.py")):
+            digest.update(path.read_bytes())
+    return digest.hexdigest()

@@ -1,0 +1,149 @@
+"""Who computes the points of a sweep: this process, a local cluster, or a scheduler that is already there."""
+
+from __future__ import annotations
+
+import logging
+import os
+import signal
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass
+from multiprocessing import resource_tracker
+from typing import TYPE_CHECKING, Annotated, Any
+
+import xarray as xr
+from cyclopts import Parameter
+
+from ...geometry.basics import InputError
+from ..results import Point
+from ..terminal import silence
+
+if TYPE_CHECKING:
+    from distributed import Client, Future
+
+Compute = Callable[[Point], xr.Dataset]
+CONNECTING = 20
+"""Seconds that a scheduler may take to answer."""
+
+
+@dataclass(frozen=True)
+class Failure:
+    """Why a point has no result."""
+
+    reason: str
+
+
+@Parameter(name="*")
+@dataclass(frozen=True)
+class Engine:
+    """Who computes.
+
+    Parameters
+    ----------
+    workers
+        Processes of a local cluster; 1 computes in this process. Left out: one for each core.
+    scheduler
+        Address of a dask scheduler that is already there, such as tcp://127.0.0.1:8786.
+    """
+
+    workers: Annotated[int | None, Parameter(negative="")] = None
+    scheduler: str | None = None
+
+    def checked(self) -> Engine:
+        """Itself.
+
+        Raises
+        ------
+        InputError : no number of workers, or both a number and a scheduler
+        """
+        if self.workers is not None and not 1 <= self.workers <= 1024:
+            raise InputError(f"Input --workers must be between 1 and 1024; instead received {self.workers}.")
+        if self.workers is not None and self.scheduler is not None:
+            raise InputError("Input --workers must be left out where --scheduler is given; instead received both.")
+        return self
+
+    def results(self, compute: Compute, points: Mapping[int, Point]) -> Iterator[tuple[int, xr.Dataset | Failure]]:
+        """The results as they come, each with the number of its point.
+
+        A point that raises, or whose worker dies again and again, is a `Failure`; the others go on.
+        Raises InputError if the scheduler does not answer.
+        """
+        number = min(self.workers or os.cpu_count() or 1, len(points))
+        if self.scheduler is None and number <= 1:
+            yield from ((k, attempt(compute, point)) for k, point in points.items())
+            return
+        from distributed import as_completed
+
+        with _client(self.scheduler, number) as client:
+            futures = {client.submit(_silently, compute, point, pure=False): k for k, point in points.items()}
+            for future in as_completed(list(futures), loop=client.loop):
+                yield futures[future], _collected(future)
+                future.release()
+
+
+def attempt(compute: Compute, point: Point) -> xr.Dataset | Failure:
+    """The result of a point, or why there is none."""
+    try:
+        return compute(point)
+    except Exception as error:  # a sweep lives longer than its points: the reason is kept with the result
+        return Failure(f"{type(error).__name__}: {error}")
+
+
+def _silently(compute: Compute, point: Point) -> xr.Dataset | Failure:
+    """An attempt in a worker, whose messages would come in between those of the others."""
+    with silence():
+        return attempt(compute, point)
+
+
+def _collected(future: Future[Any]) -> xr.Dataset | Failure:
+    from distributed.scheduler import KilledWorker
+
+    try:
+        result: xr.Dataset | Failure = future.result()
+    except KilledWorker as error:
+        return Failure(f"its worker died {error.allowed_failures + 1} times (out of memory?)")
+    return result
+
+
+@contextmanager
+def _deaf_children() -> Iterator[None]:
+    """Processes begun in this block do not hear Ctrl-C, which a terminal sends to all of a group; this one does later.
+
+    They inherit that the signal waits, as do the threads begun here and what these begin afterwards.
+    """
+    resource_tracker.ensure_running()  # its beginning would let the signal through
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+@contextmanager
+def _client(scheduler: str | None, number: int) -> Iterator[Client]:
+    """A client of the scheduler, or of a local cluster that listens on loopback only."""
+    from distributed import Client, LocalCluster
+
+    if scheduler is not None:
+        try:
+            client = Client(scheduler, timeout=CONNECTING, set_as_default=False)
+        except (OSError, ValueError, TimeoutError) as error:
+            raise InputError(
+                f"Input --scheduler must be the address of a dask scheduler that answers, such as "
+                f"tcp://127.0.0.1:8786; instead received {scheduler!r} ({type(error).__name__})."
+            ) from None
+        with client:
+            yield client
+        return
+    # One thread in each worker, and (dask's default) in the numeric libraries inside it.
+    with ExitStack() as stack:
+        with _deaf_children():
+            cluster = LocalCluster(
+                n_workers=number,
+                threads_per_worker=1,
+                host="127.0.0.1",
+                dashboard_address="127.0.0.1:0",  # any free port: two sweeps at once must not meet
+                silence_logs=logging.CRITICAL,
+            )
+            stack.enter_context(cluster)
+        yield stack.enter_context(Client(cluster, set_as_default=False))

@@ -1,0 +1,24 @@
+"""Numbers given on the command line."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...geometry.basics import Array, InputError
+
+
+def three_numbers(name: str, text: str) -> Array:
+    """(3,) from X,Y,Z. Raises InputError where they are not three finite numbers."""
+    try:
+        numbers = np.array([float(part) for part in text.split(",")])
+    except ValueError:
+        numbers = np.zeros(0)
+    if len(numbers) != 3 or not np.all(np.isfinite(numbers)):
+        raise InputError(f"Input {name} must be three numbers X,Y,Z; instead received {text!r}.")
+    return numbers
+
+
+def positive(name: str, value: float) -> None:
+    """Raises InputError where the value is no positive finite number."""
+    if not 0 < value < float("inf"):
+        raise InputError(f"Input {name} must be a positive number; instead received {value}.")
