@@ -17,7 +17,7 @@ from ...dynamics.steady import SIDE, TILT, Equilibrium, ForceCurve
 from ...fem.rotor_tables import FieldTable
 from ...fem.storage import write_checked
 from ...geometry.basics import Array
-from ...geometry.scenes import Scene
+from ...geometry.scenes import Scene, scene_text
 
 AXIS = ("x", "y", "z")
 MODES = ("bounce", *SIDE, *TILT)
@@ -31,7 +31,7 @@ def write_dataset(dataset: xr.Dataset, path: Path, scene: Scene | None = None) -
     """
     provenance = {f"version_{name}": version(name) for name in LIBRARIES}
     if scene:
-        provenance["scene"] = scene.text
+        provenance["scene"] = scene_text(scene)
     command = shlex.join(["spinlev", *sys.argv[1:]])
     write_checked(dataset.assign_attrs(command=command, **provenance), path)
 
