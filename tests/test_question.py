@@ -16,7 +16,7 @@ from spinlev.geometry.scenes import SceneError, load_scene, parse_scene
 from spinlev.studies.catalogue.cite import used
 from spinlev.studies.command_line.cli import _status
 from spinlev.studies.sweeps import combinations, parse_vary
-from spinlev.studies.terminal import Tables
+from spinlev.studies.terminal import Models
 
 SCENE = str(Path(__file__).parent.parent / "scenes" / "horizontal.toml")
 FAST = ("--plate-model", "none", "--model", "dipole", "--workers", "1", "--json")
@@ -162,7 +162,7 @@ def test_a_flight_is_shown_and_reported(spinlev, tmp_path, monkeypatch):
     with xr.open_dataset(trajectory, engine="h5netcdf") as opened:
         flight = opened.load().assign_attrs(scene=text[: text.index("[plate]")])
     flight.to_netcdf(trajectory, engine="h5netcdf")
-    monkeypatch.setattr("spinlev.studies.catalogue.show.Tables", lambda: Tables("cuboid"))
+    monkeypatch.setattr("spinlev.studies.catalogue.show.Models", lambda: Models("cuboid"))
     status, answer, err = spinlev("show", trajectory, "--json")
     assert status == 0, err
     assert Path(answer["pictures"][0]).read_bytes().startswith(b"\x89PNG")

@@ -28,7 +28,7 @@ from spinlev.studies.one_scene import reaction as plate_job
 from spinlev.studies.pictures import plate_currents, question_figure
 from spinlev.studies.pictures.still import View, add_floater, add_plate, new_plotter
 from spinlev.studies.results import write_dataset
-from spinlev.studies.terminal import Tables
+from spinlev.studies.terminal import Models
 
 SCENES = Path(__file__).parent.parent / "scenes"
 
@@ -104,7 +104,7 @@ def test_a_flight_is_shown_with_the_plate_where_it_has_been_lowered_to(tmp_path,
         return np.zeros_like(points)
 
     monkeypatch.setattr("spinlev.studies.pictures.animation.FRAMES", 1)
-    monkeypatch.setattr("spinlev.studies.catalogue.show.Tables", lambda: Tables("dipole"))
+    monkeypatch.setattr("spinlev.studies.catalogue.show.Models", lambda: Models("dipole"))
     monkeypatch.setattr("spinlev.studies.catalogue.show.plate_currents", currents)
     files = [Path(name) for name in show_job(path, tmp_path)]
     assert [file.suffix for file in files] == [".png", ".gif"]

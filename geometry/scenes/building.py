@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from .assembly import assemble
-from .scene import Scene
+from .contents import Scene
 
 Table = Mapping[str, Any]
 """A table of the scene file."""

@@ -10,8 +10,8 @@ from pathlib import Path
 from typing import Any
 
 from .assembly import assemble
+from .contents import Scene
 from .faults import SceneError
-from .scene import Scene
 from .writing import scene_keys
 
 

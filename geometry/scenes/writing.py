@@ -15,8 +15,8 @@ from scipy.spatial.transform import Rotation
 from ..basics import Array, Box
 from ..bodies import Magnet, horizontal, tilt, vertical
 from .assembly import assemble
+from .contents import AbsoluteStart, Drag, Lowering, Plate, Scene
 from .faults import SceneError
-from .scene import AbsoluteStart, Drag, Lowering, Plate, Scene
 
 SAME = 1e-12
 """Relative difference of numbers below which they are taken for the same."""
@@ -91,13 +91,13 @@ def _rotor(rotor: tuple[Magnet, ...]) -> dict[str, Any]:
 
 
 def _same(one: Magnet, other: Magnet) -> bool:
-    parts = [
-        np.concatenate(
-            [m.box.size, m.box.center, m.box.rotation.ravel(), m.polarization, m.permeability_in_rotor.ravel()]
-        )
-        for m in (one, other)
-    ]
-    return bool(np.allclose(*parts, rtol=SAME, atol=1e-14))
+    return bool(np.allclose(_parts(one), _parts(other), rtol=SAME, atol=1e-14))
+
+
+def _parts(magnet: Magnet) -> Array:
+    box = magnet.box
+    turned = (box.rotation, magnet.permeability_in_rotor)
+    return np.concatenate([box.size, box.center, magnet.polarization, *(matrix.ravel() for matrix in turned)])
 
 
 def _magnet(magnet: Magnet) -> dict[str, Any]:

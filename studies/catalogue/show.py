@@ -12,9 +12,9 @@ import xarray as xr
 from ...dynamics.motion import State
 from ...geometry.basics import InputError
 from ...geometry.scenes import Scene, parse_scene
-from ..one_scene import Shelf, sources
+from ..one_scene import Levitation, sources
 from ..pictures import flight_animation, last_view, plate_currents, scene_picture
-from ..terminal import Tables, note, progress
+from ..terminal import note, progress
 from .drawings import read_result
 
 
@@ -32,7 +32,7 @@ def show_job(path: Path, out: Path) -> list[str]:
             f"'{result.attrs['study']}'. Its figures: spinlev figure {path}"
         )
     scene = _at_end(parse_scene(str(result.attrs["scene"]), str(path)), float(result["time"][-1]))
-    table = Shelf(scene, Tables()).table()
+    table = Levitation(scene).table
     motion = _motion(scene, result)
     view = last_view(scene, table, motion)
     currents = None

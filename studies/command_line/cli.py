@@ -16,7 +16,7 @@ from typing import Any
 from cyclopts import App, CycloptsError
 
 from ...geometry.basics import ComputationError, InputError
-from ..terminal import Answer, answers_only, note, to_json
+from ..terminal import Answer, answers_only, heard, note, to_json
 from .result_commands import add_result_commands
 from .scene_commands import add_scene_commands
 from .start import STOPPED
@@ -40,6 +40,11 @@ def run(arguments: list[str], stop: threading.Event) -> int:
 
 def _status(arguments: list[str], out: Any, stop: threading.Event | None = None) -> int:
     """The exit status; `stop` tells that the user has stopped the program, whatever a library made of that."""
+    with heard():
+        return _heard_status(arguments, out, stop)
+
+
+def _heard_status(arguments: list[str], out: Any, stop: threading.Event | None) -> int:
     try:
         _answer(arguments, out)
     except CycloptsError as error:

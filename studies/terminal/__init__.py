@@ -1,20 +1,22 @@
 """What does a user ask for, and what does the program say?"""
 
-from .console import answers_only, note, progress, silence, to_json
-from .numbers import positive, three_numbers
+from .console import answers_only, heard, note, progress, silence, to_json
+from .models import FieldModel, Models, PlateModel, Quantity
+from .numbers import finite, positive, three_numbers
 from .output import Answer, Output
 from .shipped_scenes import default_scene
-from .tables import FieldModel, PlateModel, Quantity, Tables
 
 __all__ = [
     "Answer",
     "FieldModel",
+    "Models",
     "Output",
     "PlateModel",
     "Quantity",
-    "Tables",
     "answers_only",
     "default_scene",
+    "finite",
+    "heard",
     "note",
     "positive",
     "progress",
