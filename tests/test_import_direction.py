@@ -13,7 +13,17 @@ FLOORS = {
     ],
     "dynamics": ["motion", "steady", "equilibria", "branches", "maps", "flights", "slow_drift"],
     "studies": [
-        *("terminal", "results", "pictures", "one_scene", "sweeps", "article", "field_quality", "levitation"),
+        *(
+            "terminal",
+            "rendering",
+            "results",
+            "pictures",
+            "one_scene",
+            "sweeps",
+            "article",
+            "field_quality",
+            "levitation",
+        ),
         *("margins", "plates", "catalogue", "interface", "command_line"),
     ],
 }

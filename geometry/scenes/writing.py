@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from ..basics import Array, Box
 from ..bodies import Magnet, horizontal, tilt, vertical
@@ -135,6 +134,8 @@ def _start(scene: Scene) -> dict[str, Any]:
 
 
 def _box(box: Box) -> dict[str, Any]:
+    from scipy.spatial.transform import Rotation  # slow to load
+
     with warnings.catch_warnings():  # where y is 90°, x and z are one turn, and SciPy says so
         warnings.simplefilter("ignore", UserWarning)
         turned = Rotation.from_matrix(box.rotation).as_euler("xyz", degrees=True)

@@ -15,6 +15,8 @@ from ...dynamics.steady import EquilibriumError, Survey
 from ...fem.rotor_tables import FieldTable
 from ...fem.storage import write_whole
 from ...geometry.scenes import AbsoluteStart, Scene
+from ..pictures import last_view
+from ..rendering import RenderError, render
 from ..results import (
     axis_dataset,
     curve_dataset,
@@ -77,7 +79,7 @@ def main_job(scene: Scene, asked: Models, duration: float, out: Path) -> Job:
     if failure:
         values["failed"] = str(failure)
         lines.append(str(failure))
-    result = _static_dataset(scene, tables, surveys, best.model)
+    result = _static_dataset(scene, tables, surveys, best.model).assign_attrs(levitation.labels)
     _write(scene, chosen, result, values, flight, out)
     if failure and (flight is None or isinstance(failure, FlightStopped)):
         raise failure
@@ -129,17 +131,19 @@ def _static_dataset(
 def _write(
     scene: Scene, table: FieldTable, result: xr.Dataset, values: dict[str, Any], flight: Trajectory | None, out: Path
 ) -> None:
-    from ..pictures import last_view, scene_picture
-
+    """The result and its summary first, then what is drawn of them."""
     note("Files and figures ...")
     (out / "summary.json").unlink(missing_ok=True)  # an older one must not stand beside the new result
-    figures = {"field": field_figure(result), "force": force_figure(result)}
     if flight:
         flown = trajectory_dataset(flight).assign_attrs(study="run")
         result = xr.merge([result, flown], combine_attrs="no_conflicts")
-        figures["trajectory"] = trajectory_figure(result)
-        scene_picture(last_view(scene, table, flight.rotor), out / "scene.png")
     write_dataset(result, out / "result.nc", scene)
-    for name, figure in figures.items():
-        save_figure(figure, out / f"{name}.png")
     write_whole(out / "summary.json", f"{to_json(values)}\n".encode())
+    save_figure(field_figure(result), out / "field.png")
+    save_figure(force_figure(result), out / "force.png")
+    if flight:
+        save_figure(trajectory_figure(result), out / "trajectory.png")
+        try:
+            render({out / "scene.png": last_view(scene, table, flight.rotor)})
+        except RenderError as error:
+            note(str(error))

@@ -14,6 +14,8 @@ import numpy as np
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
 
+from .plain_text import READABLE
+
 LOG = logging.getLogger("spinlev")
 ERRORS = Console(stderr=True, highlight=False, soft_wrap=True)
 
@@ -75,7 +77,7 @@ def answers_only() -> Iterator[TextIO]:
     kept = os.dup(1)
     os.dup2(2, 1)
     try:
-        stream = os.fdopen(os.dup(kept), "w")
+        stream = os.fdopen(os.dup(kept), "w", encoding=sys.stdout.encoding, errors=READABLE)
         yield stream
         with suppress(OSError):  # who prints flushes, and is told then
             stream.close()
@@ -100,6 +102,7 @@ def plain(value: Any) -> Any:
     return value
 
 
-def to_json(answer: Mapping[str, Any]) -> str:
-    """One JSON object."""
-    return json.dumps(plain(answer), allow_nan=False, ensure_ascii=False)
+def to_json(answer: Mapping[str, Any], encoding: str | None = "utf-8") -> str:
+    """One JSON object; escapes stand for the characters that `encoding` may not have."""
+    escaped = encoding is not None and not encoding.lower().startswith("utf")
+    return json.dumps(plain(answer), allow_nan=False, ensure_ascii=escaped)
