@@ -12,7 +12,6 @@ The names below are loaded when they are first used. Lengths and times inside ar
 """
 
 import os
-from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
@@ -29,4 +28,8 @@ _loaded, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
 
 
 def __getattr__(name: str) -> Any:
-    return version("spinlev") if name == "__version__" else _loaded(name)
+    if name != "__version__":
+        return _loaded(name)
+    from importlib.metadata import version
+
+    return version("spinlev")

@@ -11,10 +11,8 @@ from hypothesis import strategies as st
 
 from spinlev.geometry.basics import InputError
 from spinlev.geometry.scenes import Scene, SceneError, parse_scene
-from spinlev.studies.one_scene import read_points
-from spinlev.studies.sweeps import combinations, parse_vary
 from spinlev.studies.sweeps.vary import MOST
-from spinlev.studies.terminal import Models, positive, three_numbers
+from spinlev.studies.terminal import Models, combinations, parse_vary, positive, read_points, three_numbers
 
 GOOD = (Path(__file__).parent.parent / "scenes" / "horizontal.toml").read_text()
 NUMBERS = dict(re.findall(r"^(\w+) = (-?[\d.e+-]+)", GOOD, re.MULTILINE))

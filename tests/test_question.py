@@ -15,7 +15,7 @@ from spinlev.geometry.basics import InputError
 from spinlev.geometry.scenes import SceneError, load_scene, parse_scene
 from spinlev.studies.catalogue.cite import used
 from spinlev.studies.command_line.cli import _status
-from spinlev.studies.sweeps import combinations, parse_vary
+from spinlev.studies.terminal import combinations, parse_vary
 
 SCENE = str(Path(__file__).parent.parent / "scenes" / "horizontal.toml")
 FAST = ("--plate-model", "none", "--model", "dipole", "--workers", "1", "--json")

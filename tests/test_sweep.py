@@ -18,8 +18,9 @@ from matplotlib.figure import Figure
 from spinlev.fem.storage import read_checked, write_checked
 from spinlev.geometry.basics import InputError
 from spinlev.studies.results import Study, by_case, write_dataset
-from spinlev.studies.sweeps import Engine, forget, swept
+from spinlev.studies.sweeps import forget, swept
 from spinlev.studies.sweeps.running import SweepError
+from spinlev.studies.terminal import Workers
 
 
 def root(point):
@@ -56,15 +57,15 @@ def kept(point):
 
 def test_workers_of_a_cluster_write_tables(tmp_path):
     asked = {k: {**point, "file": str(tmp_path / f"{k}.nc")} for k, point in points(4.0, 9.0).items()}
-    found = swept("roots", replace(STUDY, compute=kept), asked, Engine(workers=2), tmp_path)
+    found = swept("roots", replace(STUDY, compute=kept), asked, Workers(workers=2), tmp_path)
     np.testing.assert_array_equal(found["root"], [2.0, 3.0])
 
 
 def test_serial_local_cluster_and_a_scheduler_give_the_same_file(tmp_path):
     asked = points(*np.linspace(0.0, 7.0, 8).tolist())
-    files = [bytes_of(swept("roots", STUDY, asked, Engine(workers=n), tmp_path), tmp_path / f"{n}.nc") for n in (1, 2)]
+    files = [bytes_of(swept("roots", STUDY, asked, Workers(workers=n), tmp_path), tmp_path / f"{n}.nc") for n in (1, 2)]
     with LocalCluster(n_workers=2, threads_per_worker=1, host="127.0.0.1", dashboard_address="127.0.0.1:0") as cluster:
-        there = swept("roots", STUDY, asked, Engine(scheduler=cluster.scheduler_address), tmp_path / "there")
+        there = swept("roots", STUDY, asked, Workers(scheduler=cluster.scheduler_address), tmp_path / "there")
     files.append(bytes_of(there, tmp_path / "there.nc"))
     assert files[0] == files[1] == files[2]
     np.testing.assert_array_equal(there["root"], np.sqrt(np.linspace(0.0, 7.0, 8)))
@@ -73,8 +74,8 @@ def test_serial_local_cluster_and_a_scheduler_give_the_same_file(tmp_path):
 def test_finished_points_are_not_computed_again(tmp_path):
     log = tmp_path / "log"
     asked = points(1.0, 4.0, 9.0, log=str(log))
-    first = swept("roots", STUDY, asked, Engine(workers=1), tmp_path)
-    second = swept("roots", STUDY, asked, Engine(workers=1), tmp_path)
+    first = swept("roots", STUDY, asked, Workers(workers=1), tmp_path)
+    second = swept("roots", STUDY, asked, Workers(workers=1), tmp_path)
     assert log.read_text().split() == ["1.0", "4.0", "9.0"]
     assert bytes_of(first, tmp_path / "a.nc") == bytes_of(second, tmp_path / "b.nc")
     forget("roots", tmp_path)
@@ -87,7 +88,7 @@ def test_a_killed_sweep_goes_on_where_it_was(tmp_path):
     code = (
         "import json, sys; from pathlib import Path; sys.path.insert(0, sys.argv[1])\n"
         "import test_sweep as t; points = {int(k): p for k, p in json.loads(sys.argv[2]).items()}\n"
-        "t.swept('roots', t.STUDY, points, t.Engine(workers=1), Path(sys.argv[3]))"
+        "t.swept('roots', t.STUDY, points, t.Workers(workers=1), Path(sys.argv[3]))"
     )
     folder = tmp_path / "killed"
     command = [sys.executable, "-c", code, str(Path(__file__).parent), json.dumps(asked), str(folder)]
@@ -98,7 +99,7 @@ def test_a_killed_sweep_goes_on_where_it_was(tmp_path):
         process.kill()
     kept = len(list(folder.glob("roots.points/0*.nc")))
     assert 2 <= kept < 6
-    swept("roots", STUDY, asked, Engine(workers=1), folder)
+    swept("roots", STUDY, asked, Workers(workers=1), folder)
     done = log.read_text().split()
     assert sorted(set(done)) == [str(float(x)) for x in range(6)]
     assert len(done) <= 7  # at most the one point that was under way was begun twice
@@ -107,25 +108,25 @@ def test_a_killed_sweep_goes_on_where_it_was(tmp_path):
 def test_a_damaged_point_is_computed_anew(tmp_path, capsys):
     log = tmp_path / "log"
     asked = points(1.0, 4.0, log=str(log))
-    swept("roots", STUDY, asked, Engine(workers=1), tmp_path)
+    swept("roots", STUDY, asked, Workers(workers=1), tmp_path)
     damaged = tmp_path / "roots.points" / "000001.nc"
     damaged.write_bytes(damaged.read_bytes()[:-40])
-    result = swept("roots", STUDY, asked, Engine(workers=1), tmp_path)
+    result = swept("roots", STUDY, asked, Workers(workers=1), tmp_path)
     assert "damaged" in capsys.readouterr().err
     assert log.read_text().split() == ["1.0", "4.0", "4.0"]
     np.testing.assert_array_equal(result["root"], [1.0, 2.0])
 
 
 def test_points_of_another_sweep_are_not_used(tmp_path, capsys):
-    swept("roots", STUDY, points(1.0, 4.0), Engine(workers=1), tmp_path)
-    result = swept("roots", STUDY, points(9.0, 4.0), Engine(workers=1), tmp_path)
+    swept("roots", STUDY, points(1.0, 4.0), Workers(workers=1), tmp_path)
+    result = swept("roots", STUDY, points(9.0, 4.0), Workers(workers=1), tmp_path)
     assert "another sweep" in capsys.readouterr().err
     np.testing.assert_array_equal(result["root"], [3.0, 2.0])
 
 
 @pytest.mark.parametrize("workers", [1, 2])
 def test_a_failed_point_is_named_and_the_rest_goes_on(tmp_path, workers):
-    result = swept("roots", STUDY, points(4.0, -1.0, 9.0), Engine(workers=workers), tmp_path)
+    result = swept("roots", STUDY, points(4.0, -1.0, 9.0), Workers(workers=workers), tmp_path)
     np.testing.assert_array_equal(result["root"], [2.0, 3.0])
     (failed,) = json.loads(result.attrs["failed_points"])["failed"]
     assert failed == {"point": {"x": -1.0}, "reason": "ValueError: no root"}
@@ -133,12 +134,12 @@ def test_a_failed_point_is_named_and_the_rest_goes_on(tmp_path, workers):
 
 def test_all_points_failed(tmp_path):
     with pytest.raises(SweepError, match="All 2 points failed; the first: ValueError: no root"):
-        swept("roots", STUDY, points(-1.0, -2.0), Engine(workers=1), tmp_path)
+        swept("roots", STUDY, points(-1.0, -2.0), Workers(workers=1), tmp_path)
 
 
 def test_a_killed_worker_does_not_stop_the_sweep(tmp_path):
     asked = {**points(1.0, 4.0, 9.0), 3: {"x": 16.0, "kill": str(tmp_path / "killed")}}
-    result = swept("roots", STUDY, asked, Engine(workers=2), tmp_path)
+    result = swept("roots", STUDY, asked, Workers(workers=2), tmp_path)
     assert (tmp_path / "killed").exists()
     np.testing.assert_array_equal(result["root"], [1.0, 2.0, 3.0, 4.0])
 
@@ -146,8 +147,8 @@ def test_a_killed_worker_does_not_stop_the_sweep(tmp_path):
 @pytest.mark.parametrize(
     ("engine", "message"),
     [
-        (Engine(workers=0), "--workers must be between 1 and 1024"),
-        (Engine(workers=2, scheduler="tcp://127.0.0.1:1"), "--workers must be left out"),
+        (Workers(workers=0), "--workers must be between 1 and 1024"),
+        (Workers(workers=2, scheduler="tcp://127.0.0.1:1"), "--workers must be left out"),
     ],
 )
 def test_a_wrong_engine(engine, message):
@@ -158,4 +159,4 @@ def test_a_wrong_engine(engine, message):
 def test_a_scheduler_that_does_not_answer(monkeypatch, tmp_path):
     monkeypatch.setattr("spinlev.studies.sweeps.workers.CONNECTING", 1)
     with pytest.raises(InputError, match="--scheduler must be the address of a dask scheduler that answers"):
-        swept("roots", STUDY, points(1.0), Engine(scheduler="tcp://127.0.0.1:1"), tmp_path)
+        swept("roots", STUDY, points(1.0), Workers(scheduler="tcp://127.0.0.1:1"), tmp_path)

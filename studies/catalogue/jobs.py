@@ -13,18 +13,19 @@ import xarray as xr
 from ..one_scene import Job, Question
 from ..pictures import question_figure, question_lines
 from ..results import Point, Study, write_dataset
-from ..sweeps import Engine, combinations, forget, swept
+from ..sweeps import forget, swept
+from ..terminal import Workers, combinations
 from .drawings import QUESTION, figures_of, save_figures
 from .entries import CATALOGUE
 
 
-def study_job(name: str, quick: bool, engine: Engine, out: Path) -> Job:
+def study_job(name: str, quick: bool, engine: Workers, out: Path) -> Job:
     """Compute a study of the catalogue; writes NAME.nc, NAME.png and NAME.pdf. Errors are those of `swept`."""
     study = CATALOGUE[name]
     return _studied(name, study, study.points(quick), engine, out)
 
 
-def question_job(question: Question, values: dict[str, list[Any]], engine: Engine, out: Path) -> Job:
+def question_job(question: Question, values: dict[str, list[Any]], engine: Workers, out: Path) -> Job:
     """Answer one's own question over a grid; writes question.nc and its figure.
 
     Raises
@@ -52,7 +53,7 @@ def question_study(question: Question, values: Mapping[str, Sequence[Any]]) -> S
     )
 
 
-def _studied(name: str, study: Study, points: Sequence[Point], engine: Engine, out: Path) -> Job:
+def _studied(name: str, study: Study, points: Sequence[Point], engine: Workers, out: Path) -> Job:
     result = swept(name, study, dict(enumerate(points)), engine, out)
     path = out / f"{name}.nc"
     write_dataset(result, path)

@@ -24,7 +24,7 @@ from .start import STOPPED
 
 app = App(
     name="spinlev",
-    version=version("spinlev"),
+    version=lambda: version("spinlev"),
     help="Magnetic levitation by rotation: true fields, true motion.",
     help_format="plaintext",
     suppress_keyboard_interrupt=False,

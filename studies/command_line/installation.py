@@ -1,4 +1,4 @@
-"""Completes an installation and tries what the program will use: python -m spinlev.studies.command_line.installation."""
+"""Completes an installation and tries what the program will use."""
 
 from __future__ import annotations
 

@@ -8,9 +8,7 @@ from typing import Annotated
 from cyclopts import App, Parameter
 
 from ...geometry.basics import InputError
-from ...geometry.scenes import load_scene
-from ..sweeps import Engine, parse_vary
-from ..terminal import Answer, Models, Output, Quantity, positive, three_numbers
+from ..terminal import Answer, Models, Output, Quantity, Workers, parse_vary, positive, three_numbers
 
 
 def add_result_commands(app: App) -> None:
@@ -30,7 +28,7 @@ def study(
     spin: float = 0.0,
     duration_s: float = 3.0,
     asked: Models = Models(),
-    engine: Engine = Engine(),
+    engine: Workers = Workers(),
     output: Output = Output(),
 ) -> Answer:
     """One study of the catalogue, or any quantity of a scene over any of its parameters.
@@ -78,13 +76,15 @@ def _own_question(
     vary: tuple[str, ...],
     what: tuple[Quantity, str, float, float],
     asked: Models,
-    engine: Engine,
+    engine: Workers,
     output: Output,
 ) -> Answer:
     if scene is None:
         raise InputError("Input name must be a scene file where --vary is given; instead it is missing.")
     values, place = parse_vary(vary), three_numbers("--at", what[1])
     positive("--duration-s", what[3])
+    from ...geometry.scenes import load_scene
+
     loaded = load_scene(scene)
     from ..catalogue import question_job
     from ..one_scene import Question

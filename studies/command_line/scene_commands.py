@@ -11,9 +11,7 @@ from typing import Annotated, Literal
 from cyclopts import App, Parameter
 
 from ...geometry.basics import InputError
-from ...geometry.scenes import load_scene
-from ..one_scene import read_points
-from ..terminal import Answer, FieldModel, Models, Output, default_scene, positive, three_numbers
+from ..terminal import Answer, FieldModel, Models, Output, default_scene, positive, read_points, three_numbers
 
 ReactionModel = Literal["slab", "fem", "reduced", "auto"]
 
@@ -41,6 +39,8 @@ def run(
         Simulated time, s.
     """
     positive("--duration-s", duration_s)
+    from ...geometry.scenes import load_scene
+
     loaded = load_scene(scene or default_scene())
     from ..one_scene import main_job
 
@@ -70,6 +70,8 @@ def field(
         Relative accuracy asked of the field wherever the floater can be.
     """
     asked = Models(model, rtol=rtol).checked()
+    from ...geometry.scenes import load_scene
+
     loaded, places = load_scene(scene), read_points(points)
     from ..one_scene import field_job
 
@@ -95,6 +97,8 @@ def equilibria(
     """
     if not -1e3 <= spin <= 1e3:
         raise InputError(f"Input --spin must be between -1000 and 1000; instead received {spin}.")
+    from ...geometry.scenes import load_scene
+
     loaded = load_scene(scene)
     from ..one_scene import equilibria_job
 
@@ -122,6 +126,8 @@ def simulate(
         Go on from the checkpoint of the same flight in --out, if one is there.
     """
     positive("--duration-s", duration_s)
+    from ...geometry.scenes import load_scene
+
     loaded = load_scene(scene)
     from ..one_scene import simulate_job
 
@@ -155,6 +161,8 @@ def plate(
     """
     positive("--rtol", rtol)
     place = three_numbers("--at", at)
+    from ...geometry.scenes import load_scene
+
     loaded = load_scene(scene)
     from ..one_scene import plate_job
 

@@ -13,8 +13,8 @@ from ...geometry.scenes import Scene
 from ..catalogue import CATALOGUE, QUESTION, figures_of, question_study
 from ..one_scene import Question, given_scene
 from ..results import Study
-from ..sweeps import Engine, checked_values, combinations, forget, swept
-from ..terminal import FieldModel, Models, PlateModel, Quantity, heard
+from ..sweeps import forget, swept
+from ..terminal import FieldModel, Models, PlateModel, Quantity, Workers, checked_values, combinations, heard
 
 Values = Mapping[str, Sequence[float] | Sequence[str]]
 
@@ -93,6 +93,6 @@ def draw(result: xr.Dataset) -> Mapping[str, Figure]:
 def _computed(
     name: str, study: Study, points: Sequence[Mapping[str, object]], by: tuple[int | None, str | None], out: str | Path
 ) -> xr.Dataset:
-    result = swept(name, study, dict(enumerate(points)), Engine(*by).checked(), Path(out))
+    result = swept(name, study, dict(enumerate(points)), Workers(*by).checked(), Path(out))
     forget(name, Path(out))
     return result

@@ -2,7 +2,6 @@
 
 from .levitation import Levitation, given_scene, sources
 from .plate_of_scene import plate_memory
-from .points_file import read_points
 from .question import Question
 from .reaction import Job, plate_job
 from .run import main_job
@@ -18,7 +17,6 @@ __all__ = [
     "main_job",
     "plate_job",
     "plate_memory",
-    "read_points",
     "simulate_job",
     "sources",
 ]

@@ -14,10 +14,9 @@ from ...fem.storage import write_whole
 from ...geometry.basics import Array
 from ...geometry.scenes import OffsetStart, Scene, scene_text
 from ..results import trajectory_dataset, write_dataset
-from ..terminal import Models, note, to_json
+from ..terminal import COLUMNS, Models, note, to_json
 from .answers import equilibria_answer, equilibria_lines, field_answer, flight_answer, flight_lines, omissions
 from .levitation import Levitation
-from .points_file import COLUMNS
 
 Job = tuple[Mapping[str, Any], list[str]]
 """Numbers for a program, lines for a person."""

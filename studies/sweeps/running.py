@@ -11,16 +11,16 @@ import xarray as xr
 
 from ...geometry.basics import ComputationError
 from ..results import LIBRARIES, Point, Study
-from ..terminal import note, progress, to_json
+from ..terminal import Workers, note, progress, to_json
 from .finished_points import Journal
-from .workers import Engine, Failure
+from .workers import Failure, computed
 
 
 class SweepError(ComputationError):
     """No point of a sweep could be computed."""
 
 
-def swept(name: str, study: Study, points: Mapping[int, Point], engine: Engine, out: Path) -> xr.Dataset:
+def swept(name: str, study: Study, points: Mapping[int, Point], engine: Workers, out: Path) -> xr.Dataset:
     """The joined result of a study at the points, each computed once even if the program is stopped between them.
 
     Finished points are kept in the folder NAME.points of `out`, which is removed by `forget` once the result is safe.
@@ -38,10 +38,10 @@ def swept(name: str, study: Study, points: Mapping[int, Point], engine: Engine, 
         note(f"{len(finished)} of {len(points)} points are there from an earlier run.")
     failed: dict[int, str] = {}
     missing = {k: point for k, point in points.items() if k not in finished}
-    engine = Engine(workers=1) if study.timed else engine
+    engine = Workers(workers=1) if study.timed else engine
     with progress(f"{name}: {len(points)} points") as advance:
         advance(len(finished) / len(points))
-        for k, result in engine.results(study.compute, missing) if missing else ():
+        for k, result in computed(engine, study.compute, missing) if missing else ():
             if isinstance(result, Failure):
                 failed[k] = result.reason
                 note(f"Point {to_json(points[k])} failed: {result.reason}")

@@ -9,14 +9,13 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from multiprocessing import resource_tracker
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any
 
 import xarray as xr
-from cyclopts import Parameter
 
 from ...geometry.basics import InputError
 from ..results import Point
-from ..terminal import silence
+from ..terminal import Workers, silence
 
 if TYPE_CHECKING:
     from distributed import Client, Future
@@ -33,52 +32,23 @@ class Failure:
     reason: str
 
 
-@Parameter(name="*")
-@dataclass(frozen=True)
-class Engine:
-    """Who computes.
+def computed(by: Workers, compute: Compute, points: Mapping[int, Point]) -> Iterator[tuple[int, xr.Dataset | Failure]]:
+    """The results as they come, each with the number of its point.
 
-    Parameters
-    ----------
-    workers
-        Processes of a local cluster; 1 computes in this process. Left out: one for each core.
-    scheduler
-        Address of a dask scheduler that is already there, such as tcp://127.0.0.1:8786.
+    A point that raises, or whose worker dies again and again, is a `Failure`; the others go on.
+    Raises InputError if the scheduler does not answer.
     """
+    number = min(by.workers or os.cpu_count() or 1, len(points))
+    if by.scheduler is None and number <= 1:
+        yield from ((k, attempt(compute, point)) for k, point in points.items())
+        return
+    from distributed import as_completed
 
-    workers: Annotated[int | None, Parameter(negative="")] = None
-    scheduler: str | None = None
-
-    def checked(self) -> Engine:
-        """Itself.
-
-        Raises
-        ------
-        InputError : no number of workers, or both a number and a scheduler
-        """
-        if self.workers is not None and not 1 <= self.workers <= 1024:
-            raise InputError(f"Input --workers must be between 1 and 1024; instead received {self.workers}.")
-        if self.workers is not None and self.scheduler is not None:
-            raise InputError("Input --workers must be left out where --scheduler is given; instead received both.")
-        return self
-
-    def results(self, compute: Compute, points: Mapping[int, Point]) -> Iterator[tuple[int, xr.Dataset | Failure]]:
-        """The results as they come, each with the number of its point.
-
-        A point that raises, or whose worker dies again and again, is a `Failure`; the others go on.
-        Raises InputError if the scheduler does not answer.
-        """
-        number = min(self.workers or os.cpu_count() or 1, len(points))
-        if self.scheduler is None and number <= 1:
-            yield from ((k, attempt(compute, point)) for k, point in points.items())
-            return
-        from distributed import as_completed
-
-        with _client(self.scheduler, number) as client:
-            futures = {client.submit(_silently, compute, point, pure=False): k for k, point in points.items()}
-            for future in as_completed(list(futures), loop=client.loop):
-                yield futures[future], _collected(future)
-                future.release()
+    with _client(by.scheduler, number) as client:
+        futures = {client.submit(_silently, compute, point, pure=False): k for k, point in points.items()}
+        for future in as_completed(list(futures), loop=client.loop):
+            yield futures[future], _collected(future)
+            future.release()
 
 
 def attempt(compute: Compute, point: Point) -> xr.Dataset | Failure:

@@ -5,10 +5,14 @@ from .models import FieldModel, Models, PlateModel, Quantity
 from .numbers import finite, positive, three_numbers
 from .output import Answer, Output
 from .plain_text import make_readable
+from .points_file import COLUMNS, read_points
 from .shipped_scenes import default_scene
 from .system_libraries import DRAWING, FORTRAN, is_missing_library, lend_quadmath, way_out
+from .vary import checked_values, combinations, parse_vary
+from .workers import Workers
 
 __all__ = [
+    "COLUMNS",
     "DRAWING",
     "FORTRAN",
     "Answer",
@@ -17,7 +21,10 @@ __all__ = [
     "Output",
     "PlateModel",
     "Quantity",
+    "Workers",
     "answers_only",
+    "checked_values",
+    "combinations",
     "default_scene",
     "finite",
     "heard",
@@ -25,8 +32,10 @@ __all__ = [
     "lend_quadmath",
     "make_readable",
     "note",
+    "parse_vary",
     "positive",
     "progress",
+    "read_points",
     "silence",
     "three_numbers",
     "to_json",

@@ -1,0 +1,157 @@
+"""Draws the house and the way of the data from the code itself: docs/pictures/house.png and data.png.
+
+.venv/bin/python docs/draw_architecture.py
+"""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Mapping
+from itertools import groupby
+from pathlib import Path
+
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.patches import FancyArrowPatch, FancyBboxPatch
+
+ROOT = Path(__file__).parent.parent
+PICTURES = Path(__file__).parent / "pictures"
+FLOORS = ("geometry", "fem", "dynamics", "studies")
+COLORS = dict(zip(FLOORS, ("#dbe9f6", "#dff0d8", "#fdebd0", "#f3e0ee"), strict=True))
+Room = tuple[str, str]
+
+
+def rooms() -> dict[Room, set[Room]]:
+    """Every room with the rooms that it imports from."""
+    found: dict[Room, set[Room]] = {}
+    for floor in FLOORS:
+        for path in sorted((ROOT / floor).glob("*/*.py")):
+            room = (floor, path.parent.name)
+            found.setdefault(room, set()).update(_imported(path, room) - {room})
+    return found
+
+
+def _imported(path: Path, room: Room) -> set[Room]:
+    nodes = [node for node in ast.walk(ast.parse(path.read_text())) if isinstance(node, ast.ImportFrom) and node.module]
+    near = {(room[0], str(node.module).split(".")[0]) for node in nodes if node.level == 2}
+    far = {tuple(str(node.module).split(".")[:2]) for node in nodes if node.level == 3}
+    return near | {(module[0], module[1]) for module in far if len(module) == 2}
+
+
+def essential(graph: Mapping[Room, set[Room]]) -> dict[Room, set[Room]]:
+    """The arrows that no chain of other arrows replaces."""
+    below = {room: set(others) for room, others in graph.items()}
+    for _ in graph:
+        below = {room: others.union(*(below[other] for other in others)) for room, others in below.items()}
+    return {room: others - set().union(*(below[other] for other in others)) for room, others in graph.items()}
+
+
+def levels(graph: Mapping[Room, set[Room]]) -> dict[Room, int]:
+    """How many rooms lie below each one."""
+    found: dict[Room, int] = {}
+    while len(found) < len(graph):
+        for room, others in graph.items():
+            if room not in found and others <= set(found):
+                found[room] = 1 + max((found[other] for other in others), default=-1)
+    return found
+
+
+def draw_house() -> Figure:
+    """Rooms in the order of imports from left to right, one floor over the other; arrows point to what is used."""
+    graph = rooms()
+    level = levels(graph)
+    figure = Figure(figsize=(17, 9), layout="constrained")
+    axes = figure.add_subplot()
+    places: dict[Room, tuple[float, float]] = {}
+    bottom = 0.0
+    for floor in FLOORS:
+        columns = groupby(sorted((room for room in graph if room[0] == floor), key=level.__getitem__), key=level.get)
+        stacks = [list(column) for _, column in columns]
+        height = max(map(len, stacks))
+        axes.axhspan(bottom - 0.6, bottom + height - 0.4, color=COLORS[floor], zorder=0)
+        axes.text(-1.25, bottom + (height - 1) / 2, floor, fontsize=15, va="center", rotation=90)
+        for k, stack in enumerate(stacks):
+            for j, room in enumerate(stack):
+                places[room] = (1.9 * k, bottom + j + (height - len(stack)) / 2)
+        bottom += height + 0.4
+    files = {room: len(list((ROOT / Path(*room)).glob("*.py"))) - 1 for room in graph}
+    boxes = {room: _box(axes, place, f"{_words(room)}\n{files[room]} files") for room, place in places.items()}
+    for room, others in essential(graph).items():
+        for other in others:
+            _arrow(axes, boxes[room], boxes[other], places[room], places[other])
+    axes.set(xlim=(-1.6, 1.9 * max(x / 1.9 for x, _ in places.values()) + 1), ylim=(-0.8, bottom - 0.6))
+    axes.axis("off")
+    return figure
+
+
+def _words(room: Room) -> str:
+    return room[1].replace("_", " ")
+
+
+def _box(axes: Axes, place: tuple[float, float], name: str) -> FancyBboxPatch:
+    x, y = place
+    box = FancyBboxPatch((x - 0.75, y - 0.3), 1.5, 0.6, boxstyle="round,pad=0.02", fc="white", ec="0.4", zorder=3)
+    axes.add_patch(box)
+    axes.text(x, y, name, ha="center", va="center", fontsize=10, zorder=4)
+    return box
+
+
+def _arrow(
+    axes: Axes, origin: FancyBboxPatch, target: FancyBboxPatch, start: tuple[float, float], end: tuple[float, float]
+) -> None:
+    axes.add_patch(
+        FancyArrowPatch(
+            *(start, end),
+            patchA=origin,
+            patchB=target,
+            shrinkA=0,
+            shrinkB=1,
+            connectionstyle="arc3,rad=0.06",
+            arrowstyle="-|>",
+            mutation_scale=10,
+            color="0.45",
+            lw=0.8,
+            zorder=5,
+        )
+    )
+
+
+def members() -> dict[str, set[str]]:
+    """What each public member of `Levitation` asks of the others."""
+    tree = ast.parse((ROOT / "studies" / "one_scene" / "levitation.py").read_text())
+    (body,) = (node for node in tree.body if isinstance(node, ast.ClassDef))
+    functions = {node.name: node for node in body.body if isinstance(node, ast.FunctionDef)}
+    uses = {
+        name: {n.attr for n in ast.walk(node) if isinstance(n, ast.Attribute) and ast.unparse(n.value) == "self"}
+        for name, node in functions.items()
+        if name != "__init__"
+    }
+    hidden = [name for name in uses if name.startswith("_")]
+    for name in (*hidden, *hidden):
+        uses = {k: (v - {name}) | uses[name] if name in v else v for k, v in uses.items()}
+    known = {"scene", "models", *(name for name in uses if not name.startswith("_"))} - {"labels", "absolute"}
+    return {"scene": set(), "models": set()} | {k: (v & known) - {k} for k, v in uses.items() if k in known}
+
+
+def draw_data() -> Figure:
+    """From a scene to its flight: an arrow goes from what is known to what is made of it."""
+    graph = {("", name): {("", other) for other in others} for name, others in members().items()}
+    level, arrows = levels(graph), essential(graph)
+    figure = Figure(figsize=(15, 2.4), layout="constrained")
+    axes = figure.add_subplot()
+    places: dict[Room, tuple[float, float]] = {}
+    for k, column in groupby(sorted(graph, key=lambda room: (level[room], room)), key=level.__getitem__):
+        stack = list(column)
+        places |= {room: (2.1 * k, j - (len(stack) - 1) / 2) for j, room in enumerate(stack)}
+    boxes = {room: _box(axes, place, _words(room)) for room, place in places.items()}
+    for room, others in arrows.items():
+        for other in others:
+            _arrow(axes, boxes[other], boxes[room], places[other], places[room])
+    axes.set(xlim=(-1, max(x for x, _ in places.values()) + 1), ylim=(-1.2, 1.2))
+    axes.axis("off")
+    return figure
+
+
+if __name__ == "__main__":
+    for name, figure in (("house", draw_house()), ("data", draw_data())):
+        figure.savefig(PICTURES / f"{name}.png", dpi=110)
