@@ -111,7 +111,7 @@ def _arrow(
             mutation_scale=10,
             color="0.45",
             lw=0.8,
-            zorder=5,
+            zorder=2,
         )
     )
 

@@ -1,6 +1,11 @@
 """The program from Python gives what the command line gives."""
 
+import dataclasses
+import doctest
 import re
+import subprocess
+import sys
+from importlib.metadata import version
 from pathlib import Path
 
 import numpy as np
@@ -8,6 +13,7 @@ import pytest
 
 import spinlev as sl
 from spinlev.dynamics.equilibria import find_equilibria
+from spinlev.geometry.scenes import scene_text
 
 SCENE = Path(__file__).parent.parent / "scenes" / "horizontal.toml"
 
@@ -98,10 +104,118 @@ def test_objects_print_what_they_are():
     assert re.match(r"PlateTable of \(100, 240, 30\) mm, 3.5e\+07 S/m: \d+ currents$", second)
 
 
-def test_the_text_of_a_changed_scene_says_what_was_changed():
-    """It is what a result keeps of its scene."""
+def test_a_result_says_which_scene_was_solved():
+    """Also of a scene that was changed or made in Python."""
+    read = sl.load_scene(SCENE)
+    assert scene_text(read) == SCENE.read_text()
+    slower = dataclasses.replace(read, frequency=95.0)
+    assert sl.parse_scene(scene_text(slower)).frequency == 95.0
+    assert "# One cube" not in scene_text(slower)
+    found = sl.equilibria(slower, "dipole", "none")
+    assert sl.parse_scene(found.attrs["scene"]).frequency == 95.0
     changed = sl.parse_scene(SCENE.read_text(), changes={"frequency_hz": 95.0, "floater.remanence_T": 1.3})
-    assert changed.frequency == 95.0
-    assert changed.text.startswith(SCENE.read_text())
-    assert changed.text.endswith("# changed: frequency_hz = 95.0\n# changed: floater.remanence_T = 1.3")
-    assert sl.parse_scene(changed.text, changes={"frequency_hz": 95.0}).frequency == 95.0
+    again = sl.parse_scene(scene_text(changed))
+    assert (again.frequency, again.floater.remanence) == (95.0, 1.3)
+
+
+def test_a_scene_made_in_python_is_the_one_of_the_file():
+    made = sl.scene(
+        frequency_hz=110,
+        rotor=sl.horizontal(displacement_mm=2, edge_mm=10, remanence_T=1.305),
+        floater=sl.sphere(diameter_mm=12.7, remanence_T=1.305, density_kg_m3=7500),
+        plate=sl.plate(size_mm=(100, 240, 30), center_mm=(35, 0, -21), rotation_deg=(0, 90, 0), conductivity_S_m=3.5e7),
+        drag={"linear_N_s_m": 2.2e-6, "angular_N_m_s": 1.2e-10},
+    )
+    assert repr(made) == repr(sl.load_scene(SCENE))
+    assert repr(sl.parse_scene(scene_text(made))) == repr(made)
+
+
+@pytest.mark.parametrize("name", sorted(path.stem for path in SCENE.parent.glob("*.toml")))
+def test_a_scene_written_from_its_object_is_the_same_scene(name):
+    scene = dataclasses.replace(sl.load_scene(SCENE.with_name(f"{name}.toml")), text="")
+    again = sl.parse_scene(scene_text(scene))
+    assert repr(again) == repr(scene)
+    for one, other in zip(again.rotor, scene.rotor, strict=True):
+        np.testing.assert_allclose(one.box.rotation, other.box.rotation, atol=1e-13)
+        np.testing.assert_allclose(one.permeability_in_rotor, other.permeability_in_rotor, rtol=1e-13)
+
+
+@pytest.mark.parametrize(
+    ("wrong", "said"),
+    [
+        ({"frequency_hz": -1.0}, "Input frequency_hz must be at least 0; instead received -1.0."),
+        ({"rotor": {"configuration": "tilted"}}, "'horizontal', 'vertical', 'tilt'"),
+        ({"rotor": sl.magnets()}, "Input rotor.magnets must be a list of 1 or more entries"),
+        ({"floater": {"diameter_mm": 12.7}}, "Input floater.remanence_T must be given"),
+        ({"floater": sl.sphere(diameter_mm="12.7", remanence_T=1.3, density_kg_m3=7500)}, "must be a number"),
+        ({"start": {"position_mm": (0, 0, 0)}}, "overlaps rotor magnet 1"),
+    ],
+)
+def test_a_wrong_scene_is_told_as_in_a_file(wrong, said):
+    right = {
+        "frequency_hz": 110.0,
+        "rotor": sl.tilt(angle_deg=10, edge_mm=10, remanence_T=1.305),
+        "floater": sl.sphere(diameter_mm=12.7, remanence_T=1.305, density_kg_m3=7500),
+    }
+    with pytest.raises(sl.SceneError, match=re.escape(said)):
+        sl.scene(**(right | wrong))
+
+
+def test_a_sweep_over_a_parameter_and_a_model(tmp_path):
+    grid = {"frequency_hz": [110.0, 120.0], "model": ["dipole", "cuboid"]}
+    found = sl.sweep(SCENE, grid, plate_model="none", out=tmp_path)
+    assert found["growth"].dims == ("equilibrium", "frequency_hz", "model")
+    assert found["stable"].dtype == bool
+    one = found.sel(frequency_hz=120.0, model="cuboid")
+    alone = sl.equilibria(sl.parse_scene(SCENE.read_text(), changes={"frequency_hz": 120.0}), "cuboid", "none")
+    np.testing.assert_array_equal(one["position"][:3], alone["position"])
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("values", "said"),
+    [
+        ({}, "at least one key"),
+        ({"model": ["magic"]}, "Input model must be one of dipole, cuboid, fem, map, auto; instead received magic."),
+        ({"model": [1.0]}, "Input model must be varied over names"),
+        ({"frequency": [110.0]}, "did you mean frequency_hz?"),
+        ({"frequency_hz": [110.0, float("nan")]}, "finite numbers"),
+        ({"frequency_hz": ["110"]}, "finite numbers"),
+        ({"frequency_hz": [110.0, 110.0]}, "each value once"),
+        ({"frequency_hz": []}, "finite numbers"),
+    ],
+)
+def test_a_wrong_sweep(values, said, tmp_path):
+    with pytest.raises(sl.InputError, match=re.escape(said)):
+        sl.sweep(SCENE, values, out=tmp_path)
+
+
+def test_a_flight_from_a_place_needs_no_equilibrium(tmp_path):
+    """Nor a turning rotor, by whatever way it is asked for."""
+    falling = sl.scene(
+        frequency_hz=0,
+        rotor=sl.tilt(angle_deg=10, edge_mm=10, remanence_T=1.305),
+        floater=sl.sphere(diameter_mm=12.7, remanence_T=1.305, density_kg_m3=7500),
+        start={"position_mm": (0, 0, -60)},
+    )
+    alone = sl.simulate(falling, 0.01, "dipole")
+    swept = sl.sweep(falling, {"frequency_hz": [0.0]}, "flight", "dipole", duration=0.01, out=tmp_path)
+    assert alone.attrs["ended_by"] == str(swept["ended_by"].values[0]) == "duration"
+    np.testing.assert_allclose(alone["distance"][-1], -alone["position"][-1, 2], rtol=1e-3)
+    assert 0 <= float(alone["polar_angle"].min()) <= 180
+
+
+def test_python_is_quiet_unless_asked(capfd):
+    sl.equilibria(SCENE, "dipole", "none")
+    assert capfd.readouterr() == ("", "")
+    sl.equilibria(SCENE, "dipole", "none", progress=True)
+    assert "Equilibria" in capfd.readouterr().err
+
+
+def test_the_front_door_is_light_and_its_example_runs():
+    """Names are loaded when they are used: nothing but the way to them at import."""
+    code = "import sys, spinlev; print(*sorted({m.partition('.')[0] for m in sys.modules}))"
+    loaded = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.split()
+    assert not {"numpy", "scipy", "ngsolve", "xarray", "matplotlib", "heyoka", "pydantic"} & set(loaded)
+    assert sl.__version__ == version("spinlev")
+    assert doctest.testmod(sl).failed == 0

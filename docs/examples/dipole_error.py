@@ -6,7 +6,7 @@ What is left at a large distance is the permeability alone: it weakens the cube'
 
 import numpy as np
 
-from spinlev.studies.command_line.api import load_scene, rotor_table
+from spinlev import load_scene, rotor_table
 from spinlev.studies.results import panels
 
 scene = load_scene("scenes/horizontal.toml")

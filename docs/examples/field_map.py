@@ -7,7 +7,7 @@ elements with its recoil permeability (points).
 
 import numpy as np
 
-from spinlev.studies.command_line.api import load_scene, parse_scene, rotor_table
+from spinlev import load_scene, parse_scene, rotor_table
 from spinlev.studies.results import panels
 
 text = load_scene("scenes/horizontal.toml").text

@@ -9,9 +9,9 @@ the closed form.
 import heyoka as hy
 import numpy as np
 
+from spinlev import load_scene, rotor_table
 from spinlev.dynamics.equilibria import find_equilibria
 from spinlev.fem.harmonics import CompiledField
-from spinlev.studies.command_line.api import load_scene, rotor_table
 from spinlev.studies.results import panels
 
 

@@ -10,8 +10,8 @@ import tempfile
 import numpy as np
 import xarray as xr
 
+from spinlev import draw, load_scene, parse_scene, run_study, stability
 from spinlev.studies.catalogue import CATALOGUE
-from spinlev.studies.command_line.api import draw, load_scene, parse_scene, run_study, stability
 from spinlev.studies.results import Study, by_case, panels, styled, variable
 
 TEXT = load_scene("scenes/horizontal.toml").text

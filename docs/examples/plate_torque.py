@@ -8,8 +8,8 @@ to a skin.
 
 import numpy as np
 
+from spinlev import load_scene
 from spinlev.fem.slab import Slab, reaction_tensor
-from spinlev.studies.command_line.api import load_scene
 from spinlev.studies.results import panels
 
 moment = load_scene("scenes/horizontal.toml").floater.moment * np.sin(np.radians(5.0))  # A m², across the axis

@@ -7,7 +7,7 @@ out within a third of a second.
 
 import numpy as np
 
-from spinlev.studies.command_line.api import load_scene, stability
+from spinlev import load_scene, stability
 from spinlev.studies.results import panels
 
 scene = load_scene("scenes/tilt-over-plate.toml")

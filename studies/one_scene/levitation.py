@@ -103,8 +103,9 @@ class Levitation:
         """
         chosen = _first(self.equilibria)
         if chosen is None:
-            at = f"At {self.scene.frequency:g} Hz"
-            raise EquilibriumError(f"{at} the floater has no equilibrium with body spin {self.spin:g}.")
+            raise EquilibriumError(
+                f"At {self.scene.frequency:g} Hz the floater has no equilibrium with body spin {self.spin:g}."
+            )
         return chosen
 
     @cached_property
