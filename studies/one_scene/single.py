@@ -5,7 +5,6 @@ from __future__ import annotations
 import csv
 import io
 from collections.abc import Mapping
-from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +13,7 @@ from ...dynamics.flights import Checkpoint, FlightStopped, Trajectory, simulate,
 from ...dynamics.motion import PlateMemory, Rates
 from ...dynamics.steady import Equilibrium, Survey
 from ...fem.rotor_tables import FieldTable
-from ...fem.storage import write_whole
+from ...fem.storage import program_of, write_whole
 from ...geometry.basics import Array
 from ...geometry.scenes import OffsetStart, Scene
 from ..results import trajectory_dataset, write_dataset
@@ -72,8 +71,7 @@ def equilibria_job(scene: Scene, asked: Tables, spin: float, out: Path) -> Job:
 
 def simulate_job(scene: Scene, asked: Tables, duration: float, out: Path, resume: bool) -> Job:
     """The motion; writes trajectory.nc, and keeps a checkpoint while it lasts."""
-    versions = {name: version(name) for name in ("spinlev", "heyoka")}
-    identity = to_json({"scene": scene.text, "duration_s": duration, **vars(asked), **versions})
+    identity = to_json({"scene": scene.text, "duration_s": duration, **vars(asked), "program": program_of(__package__)})
     checkpoint = Checkpoint(out / "checkpoint.npz", identity)
     if not resume:
         checkpoint.remove()
