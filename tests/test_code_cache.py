@@ -69,7 +69,7 @@ def test_the_same_code_has_the_same_name_in_every_process(folder):
     )
     for seed in "123":
         environment = {**os.environ, "PYTHONHASHSEED": seed}
-        subprocess.run([sys.executable, "-c", code], check=True, env=environment)
+        subprocess.run([sys.executable, "-P", "-c", code], check=True, env=environment)
     assert len(list(folder.iterdir())) == 1
 
 

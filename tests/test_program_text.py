@@ -67,7 +67,7 @@ def test_a_new_module_and_one_of_another_name_change_the_digest(copy):
 def test_no_room_that_a_package_loads_is_missed(package):
     """Python itself says in a fresh process which rooms it has loaded."""
     code = f"import sys, json, {package}; print(json.dumps([m for m in sys.modules if m.startswith('spinlev.')]))"
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    done = subprocess.run([sys.executable, "-P", "-c", code], capture_output=True, text=True, check=True)
     loaded = {".".join(module.split(".")[:3]) for module in json.loads(done.stdout)}
     assert {room for room in loaded if room.count(".") == 2} <= rooms_of(package)
 
