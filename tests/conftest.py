@@ -1,13 +1,31 @@
-"""What tests of several files share."""
+"""What tests of several files share; and a cache of the session's own: never the user's."""
+
+import os
+import shutil
+import tempfile
 
 import pytest
 
-from spinlev.studies.rendering import unavailable
+
+def pytest_configure(config):
+    """Before anything of the program is imported; xdist's workers inherit the environment.
+
+    $SPINLEV_TEST_CACHE is a folder to keep for whoever runs one test again and again.
+    """
+    if not hasattr(config, "workerinput"):
+        os.environ["SPINLEV_CACHE"] = os.environ.get("SPINLEV_TEST_CACHE") or tempfile.mkdtemp(prefix="spinlev-tests-")
+
+
+def pytest_unconfigure(config):
+    if not hasattr(config, "workerinput") and not os.environ.get("SPINLEV_TEST_CACHE"):
+        shutil.rmtree(os.environ["SPINLEV_CACHE"], ignore_errors=True)
 
 
 @pytest.fixture
 def needs_3d():
     """Skips a test where nothing can be drawn in three dimensions, and says why."""
+    from spinlev.studies.rendering import unavailable  # after the session's cache is known
+
     reason = unavailable()
     if reason:
         pytest.skip(reason)

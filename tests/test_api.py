@@ -6,25 +6,18 @@ import re
 import subprocess
 import sys
 from importlib.metadata import version
-from pathlib import Path
 
 import numpy as np
 import pytest
+from places import HORIZONTAL, OVER_PLATE, SCENES
 
 import spinlev as sl
 from spinlev.dynamics.equilibria import find_equilibria
 from spinlev.geometry.scenes import scene_text
 
-SCENE = Path(__file__).parent.parent / "scenes" / "horizontal.toml"
-
-
-@pytest.fixture(autouse=True)
-def own_cache(tmp_path, monkeypatch):
-    monkeypatch.setenv("SPINLEV_CACHE", str(tmp_path))
-
 
 def test_equilibria_and_field():
-    scene = sl.load_scene(SCENE)
+    scene = sl.load_scene(HORIZONTAL)
     found = sl.equilibria(scene, "dipole", "none")
     assert found["stable"].values[0] == 1
     assert found["position"].attrs["units"] == "m"
@@ -37,28 +30,28 @@ def test_equilibria_and_field():
 
 
 def test_a_flight_and_its_figure():
-    flight = sl.simulate(sl.load_scene(SCENE), 0.05, "dipole", "none")
+    flight = sl.simulate(sl.load_scene(HORIZONTAL), 0.05, "dipole", "none")
     assert flight.attrs["ended_by"] == "duration"
     assert float(flight["time"][-1]) == 0.05
     assert set(sl.draw(flight)) == {"trajectory"}
 
 
 def test_wrong_input(tmp_path):
-    scene = sl.load_scene(SCENE)
+    scene = sl.load_scene(HORIZONTAL)
     with pytest.raises(sl.InputError, match=r"must be one of .*dipole-validity"):
         sl.run_study("no-such-study", out=tmp_path)
     with pytest.raises(sl.InputError, match="--rtol"):
         sl.rotor_table(scene, rtol=2.0)
     with pytest.raises(sl.InputError, match="--workers"):
         sl.run_study("team7", workers=0, out=tmp_path)
-    resting = sl.parse_scene(SCENE.read_text(), changes={"frequency_hz": 0.0})
+    resting = sl.parse_scene(HORIZONTAL.read_text(), changes={"frequency_hz": 0.0})
     with pytest.raises(sl.EquilibriumError, match="Earnshaw"):
         sl.equilibria(resting, "dipole", "none")
 
 
 def test_stability_of_the_point_where_a_flight_begins():
     """Growth and frequencies are those of the first equilibrium; the figure shows each mode."""
-    scene = sl.load_scene(SCENE)
+    scene = sl.load_scene(HORIZONTAL)
     small = sl.stability(scene, "dipole", "none")
     first = sl.equilibria(scene, "dipole", "none").isel(equilibrium=0)
     np.testing.assert_allclose(small["mode_frequency"], first["mode_frequency"])
@@ -71,14 +64,14 @@ def test_stability_of_the_point_where_a_flight_begins():
 
 
 def test_no_equilibrium_is_told():
-    weak = sl.parse_scene(SCENE.read_text(), changes={"floater.remanence_T": 1e-3})
+    weak = sl.parse_scene(HORIZONTAL.read_text(), changes={"floater.remanence_T": 1e-3})
     with pytest.raises(sl.EquilibriumError, match="At 110 Hz the floater has no equilibrium with body spin 0"):
         sl.stability(weak, "dipole", "none")
 
 
 def test_objects_print_what_they_are():
     """A notebook shows bodies, places and errors, not memory addresses or whole arrays."""
-    scene = sl.load_scene(SCENE)
+    scene = sl.load_scene(HORIZONTAL)
     assert repr(scene).splitlines() == [
         "Scene at 110 Hz, gravity (0, 0, -9.81) m/s², drag 2.2e-06 N s/m, 1.2e-10 N m s",
         "  Magnet (10, 10, 10) mm at (2, 0, 0) mm, (1.305, 0, 0) T, μr 1.05",
@@ -88,7 +81,7 @@ def test_objects_print_what_they_are():
     for part in (*scene.rotor, scene.floater, scene.plate):
         assert f"  {part!r}" in repr(scene).splitlines()
     assert re.search(r"\n  \d+ elements of order \d, \d+ unknowns, made in", repr(sl.rotor_table(scene, "fem", 1e-2)))
-    lowered = sl.load_scene(SCENE.with_name("tilt-over-plate.toml"))
+    lowered = sl.load_scene(OVER_PLATE)
     assert "lowered by 55 mm at 10 mm/s from 3 s on" in repr(lowered)
     table = sl.rotor_table(scene, "cuboid")
     assert repr(table).startswith("RotorTable 'cuboid': 1 closed form\n  relative error 3.0e-02 of B")
@@ -106,14 +99,14 @@ def test_objects_print_what_they_are():
 
 def test_a_result_says_which_scene_was_solved():
     """Also of a scene that was changed or made in Python."""
-    read = sl.load_scene(SCENE)
-    assert scene_text(read) == SCENE.read_text()
+    read = sl.load_scene(HORIZONTAL)
+    assert scene_text(read) == HORIZONTAL.read_text()
     slower = dataclasses.replace(read, frequency=95.0)
     assert sl.parse_scene(scene_text(slower)).frequency == 95.0
     assert "# One cube" not in scene_text(slower)
     found = sl.equilibria(slower, "dipole", "none")
     assert sl.parse_scene(found.attrs["scene"]).frequency == 95.0
-    changed = sl.parse_scene(SCENE.read_text(), changes={"frequency_hz": 95.0, "floater.remanence_T": 1.3})
+    changed = sl.parse_scene(HORIZONTAL.read_text(), changes={"frequency_hz": 95.0, "floater.remanence_T": 1.3})
     again = sl.parse_scene(scene_text(changed))
     assert (again.frequency, again.floater.remanence) == (95.0, 1.3)
 
@@ -126,13 +119,13 @@ def test_a_scene_made_in_python_is_the_one_of_the_file():
         plate=sl.plate(size_mm=(100, 240, 30), center_mm=(35, 0, -21), rotation_deg=(0, 90, 0), conductivity_S_m=3.5e7),
         drag={"linear_N_s_m": 2.2e-6, "angular_N_m_s": 1.2e-10},
     )
-    assert repr(made) == repr(sl.load_scene(SCENE))
+    assert repr(made) == repr(sl.load_scene(HORIZONTAL))
     assert repr(sl.parse_scene(scene_text(made))) == repr(made)
 
 
-@pytest.mark.parametrize("name", sorted(path.stem for path in SCENE.parent.glob("*.toml")))
+@pytest.mark.parametrize("name", sorted(path.stem for path in SCENES.glob("*.toml")))
 def test_a_scene_written_from_its_object_is_the_same_scene(name):
-    scene = dataclasses.replace(sl.load_scene(SCENE.with_name(f"{name}.toml")), text="")
+    scene = dataclasses.replace(sl.load_scene(SCENES / f"{name}.toml"), text="")
     again = sl.parse_scene(scene_text(scene))
     assert repr(again) == repr(scene)
     for one, other in zip(again.rotor, scene.rotor, strict=True):
@@ -163,11 +156,11 @@ def test_a_wrong_scene_is_told_as_in_a_file(wrong, said):
 
 def test_a_sweep_over_a_parameter_and_a_model(tmp_path):
     grid = {"frequency_hz": [110.0, 120.0], "model": ["dipole", "cuboid"]}
-    found = sl.sweep(SCENE, grid, plate_model="none", out=tmp_path)
+    found = sl.sweep(HORIZONTAL, grid, plate_model="none", out=tmp_path)
     assert found["growth"].dims == ("equilibrium", "frequency_hz", "model")
     assert found["stable"].dtype == bool
     one = found.sel(frequency_hz=120.0, model="cuboid")
-    alone = sl.equilibria(sl.parse_scene(SCENE.read_text(), changes={"frequency_hz": 120.0}), "cuboid", "none")
+    alone = sl.equilibria(sl.parse_scene(HORIZONTAL.read_text(), changes={"frequency_hz": 120.0}), "cuboid", "none")
     np.testing.assert_array_equal(one["position"][:3], alone["position"])
     assert list(tmp_path.iterdir()) == []
 
@@ -187,7 +180,7 @@ def test_a_sweep_over_a_parameter_and_a_model(tmp_path):
 )
 def test_a_wrong_sweep(values, said, tmp_path):
     with pytest.raises(sl.InputError, match=re.escape(said)):
-        sl.sweep(SCENE, values, out=tmp_path)
+        sl.sweep(HORIZONTAL, values, out=tmp_path)
 
 
 def test_a_flight_from_a_place_needs_no_equilibrium(tmp_path):
@@ -206,9 +199,9 @@ def test_a_flight_from_a_place_needs_no_equilibrium(tmp_path):
 
 
 def test_python_is_quiet_unless_asked(capfd):
-    sl.equilibria(SCENE, "dipole", "none")
+    sl.equilibria(HORIZONTAL, "dipole", "none")
     assert capfd.readouterr() == ("", "")
-    sl.equilibria(SCENE, "dipole", "none", progress=True)
+    sl.equilibria(HORIZONTAL, "dipole", "none", progress=True)
     assert "Equilibria" in capfd.readouterr().err
 
 

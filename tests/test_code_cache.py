@@ -1,107 +1,164 @@
-"""Compiled code on disk: kept beside the tables, bounded, and never run when damaged."""
+"""Compiled code on disk: found again by what was compiled and for what, bounded, and never run when damaged."""
 
+import os
+import pickle
 import struct
+import subprocess
+import sys
+import zlib
+from pathlib import Path
 
 import heyoka as hy
 import numpy as np
 import pytest
 
-from spinlev.fem.storage.code_copy import sound
-from spinlev.fem.storage.compiled_code import LIMIT, keep_code
+from spinlev.fem.storage import compiled, compiled_code
+from spinlev.fem.storage.checksum import seal, unsealed
 
 CONSTANT = 3.1640625
+VALUE = CONSTANT * np.sin(1.0) + np.exp(1.0)
+CALLS = []
 
 
-@pytest.fixture
-def file(tmp_path, monkeypatch):
-    """The file of a cache of its own, in which the code of `value` is kept."""
-    with monkeypatch.context() as patch:
-        patch.setenv("SPINLEV_CACHE", str(tmp_path))
-        keep_code()
-        value()
-        close(tmp_path)
-        yield tmp_path / "code" / "cache.db"
-    keep_code()
+def counted(*arguments, **options):
+    """heyoka's compiler, every call of which is counted."""
+    CALLS.append(arguments)
+    return hy.cfunc(*arguments, **options)
 
 
 def value():
-    """A compiled function's value, its code from the disk if it is there."""
+    """A compiled function's value, and whether it had to be compiled."""
     hy.llvm_state.clear_memcache()
-    x = hy.make_vars("x")
-    return hy.cfunc([hy.sin(x) * CONSTANT + hy.exp(x)], [x])([1.0])[0]
+    before, (x,) = len(CALLS), [hy.make_vars("x")]
+    function = compiled(counted, [hy.sin(x) * CONSTANT + hy.exp(x)], [x])
+    return function([1.0])[0], len(CALLS) > before
 
 
-def close(folder):
-    """Have heyoka close its file."""
-    hy.llvm_state.set_diskcache_path(folder / "elsewhere")
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    """The code of a cache of its own."""
+    monkeypatch.setenv("SPINLEV_CACHE", str(tmp_path))
+    return tmp_path / "code"
+
+
+@pytest.fixture
+def file(folder):
+    """The file of the code of `value`."""
+    assert value() == (VALUE, True)
+    (file,) = folder.iterdir()
+    return file
 
 
 def flip(content, place, bit):
     return content[:place] + bytes([content[place] ^ 1 << bit]) + content[place + 1 :]
 
 
-def test_code_is_kept_beside_the_tables_and_bounded(tmp_path, monkeypatch):
-    before = hy.llvm_state.get_diskcache_path(), hy.llvm_state.get_diskcache_enabled()
-    assert hy.llvm_state.get_diskcache_limit() == LIMIT  # by the import of the package
-    monkeypatch.setenv("SPINLEV_CACHE", str(tmp_path))
-    keep_code()
-    assert hy.llvm_state.get_diskcache_path() == tmp_path / "code"
-    (tmp_path / "file").touch()
-    monkeypatch.setenv("SPINLEV_CACHE", str(tmp_path / "file"))
-    keep_code()
+def test_code_is_compiled_once(file):
+    assert value() == (VALUE, False)
+    assert list(file.parent.iterdir()) == [file]
+
+
+def test_heyoka_keeps_nothing_by_itself(file):
     assert not hy.llvm_state.get_diskcache_enabled()
+
+
+def test_the_same_code_has_the_same_name_in_every_process(folder):
+    code = (
+        "import heyoka as hy; from spinlev.fem.storage import compiled; x, y = hy.make_vars('x', 'y')\n"
+        "r = hy.sqrt(x**2 + y**2 + 1.5); compiled(hy.cfunc, [y / r**3, hy.diff(x * y / r, x)], [x, y], fast_math=True)"
+    )
+    for seed in "123":
+        environment = {**os.environ, "PYTHONHASHSEED": seed}
+        subprocess.run([sys.executable, "-P", "-c", code], check=True, env=environment)
+    assert len(list(folder.iterdir())) == 1
+
+
+def test_other_options_and_other_processors_are_other_code(folder, monkeypatch):
     x = hy.make_vars("x")
-    assert hy.cfunc([x + 1.25], [x])([1.0])[0] == 2.25
-    hy.llvm_state.set_diskcache_path(before[0])
-    hy.llvm_state.set_diskcache_enabled(before[1])
+    for level in (0, 3):
+        compiled(hy.cfunc, [x + 1.25], [x], opt_level=level)
+    assert len(list(folder.iterdir())) == 2
+    monkeypatch.setattr(compiled_code, "_target", lambda: b"another processor")
+    compiled(hy.cfunc, [x + 1.25], [x], opt_level=0)
+    assert len(list(folder.iterdir())) == 3
 
 
-def test_a_flipped_bit_of_a_constant_is_not_computed_with(file, tmp_path):
-    """heyoka by itself does: wherever the constant is in the machine code, the value is another one."""
-    expected, whole = value(), file.read_bytes()
+def test_an_integrator_from_the_disk_flies_to_the_same_bits_and_hears_its_events(folder):
+    x, v = hy.make_vars("x", "v")
+    end = hy.t_event(x - 0.5, direction=hy.event_direction.negative)
+    flown = []
+    for _ in range(2):
+        integrator = compiled(hy.taylor_adaptive, [(x, v), (v, -hy.sin(x))], [1.0, 0.0], tol=1e-16, t_events=[end])
+        outcome = integrator.propagate_until(10.0)[0]
+        flown.append((outcome, integrator.time, *integrator.state))
+        hy.llvm_state.clear_memcache()
+    assert flown[0][0] == hy.taylor_outcome(-1)
+    assert flown[0] == flown[1]
+    assert len(list(folder.iterdir())) == 1
+
+
+def test_a_flipped_bit_of_a_constant_is_not_computed_with(file):
+    """Without the checksum it would be: wherever the constant is in the machine code, the value is another one."""
+    whole = file.read_bytes()
+    content = zlib.decompress(unsealed(file))
     pattern = struct.pack("<d", CONSTANT)
-    places = [k for k in range(len(whole)) if whole.startswith(pattern, k)]
+    places = [k for k in range(len(content)) if content.startswith(pattern, k)]
     ran = []
     for place in places:
-        file.write_bytes(flip(whole, place + 6, 1))
-        hy.llvm_state.set_diskcache_path(file.parent)
-        ran.append(value())
-        close(tmp_path)
-        file.write_bytes(flip(whole, place + 6, 1))
-        keep_code()
-        assert value() == expected
-        close(tmp_path)
-        assert sound(file)
-    assert any(one != expected for one in ran)
+        damaged = zlib.compress(flip(content, place + 6, 1))
+        hy.llvm_state.clear_memcache()
+        ran.append(pickle.loads(zlib.decompress(damaged))([1.0])[0])
+        file.write_bytes(damaged + whole[-len(seal(b"")) :])
+        assert value() == (VALUE, True)
+        assert file.read_bytes() == whole
+    assert any(one != VALUE for one in ran)
 
 
-def test_any_flipped_bit_leaves_the_value_as_it_was(file, tmp_path):
-    expected, whole, chance, found = value(), file.read_bytes(), np.random.default_rng(0), 0
+def test_any_flipped_bit_leaves_the_value_as_it_was(file):
+    whole, chance = file.read_bytes(), np.random.default_rng(0)
     for _ in range(50):
         file.write_bytes(flip(whole, chance.integers(len(whole)), chance.integers(8)))
-        found += not sound(file)
-        keep_code()
-        assert value() == expected
-        close(tmp_path)
-        assert sound(file)
-    assert found
+        assert value() == (VALUE, True)
+        assert file.read_bytes() == whole
 
 
-@pytest.mark.parametrize("damage", ["cut off", "empty", "other bytes", "without a copy", "a folder"])
-def test_a_damaged_file_is_made_anew(file, tmp_path, damage):
-    content = file.read_bytes()
+DAMAGES = {
+    "cut off": lambda content: content[:1000],
+    "empty": lambda content: b"",
+    "other bytes": lambda content: b"\x89HDF" * 999,
+    "without a checksum": lambda content: content[: -len(seal(b""))],
+    "whole, but no code": lambda content: seal(b"something else"),
+    "of a heyoka that was built otherwise": lambda content: seal(zlib.compress(b"cheyoka\nno_such_class\n.")),
+}
+
+
+@pytest.mark.parametrize("damage", DAMAGES)
+def test_a_damaged_file_is_made_anew(file, damage):
+    whole = file.read_bytes()
+    file.write_bytes(DAMAGES[damage](whole))
+    assert value() == (VALUE, True)
+    assert file.read_bytes() == whole
+
+
+def test_where_nothing_can_be_kept_code_is_compiled(file, tmp_path, monkeypatch):
     file.unlink()
-    if damage == "without a copy":  # as heyoka makes it
-        hy.llvm_state.set_diskcache_path(file.parent)
-        value()
-        close(tmp_path)
-    elif damage == "a folder":
-        file.mkdir()
-    else:
-        file.write_bytes({"cut off": content[:50_000], "empty": b"", "other bytes": b"\x89HDF" * 999}[damage])
-    keep_code()
-    assert hy.llvm_state.get_diskcache_enabled() == (damage != "a folder")
-    assert value() == 3.1640625 * np.sin(1.0) + np.exp(1.0)
-    close(tmp_path)
-    if damage != "a folder":
-        assert sound(file)
+    file.mkdir()
+    assert value() == (VALUE, True)
+    (tmp_path / "file").touch()
+    for place in (tmp_path / "file", Path("/sys/spinlev")):
+        monkeypatch.setenv("SPINLEV_CACHE", str(place))
+        assert value() == (VALUE, True)
+
+
+def test_what_was_not_used_for_the_longest_time_makes_room(tmp_path):
+    for age, name in enumerate(("new", "used", "old", "oldest")):
+        (tmp_path / f"{name}.code").write_bytes(bytes(100))
+        os.utime(tmp_path / f"{name}.code", (1e9 - age, 1e9 - age))
+    compiled_code.make_room(tmp_path, 250)
+    assert {path.stem for path in tmp_path.iterdir()} == {"new", "used"}
+
+
+def test_code_that_is_read_counts_as_used(file):
+    os.utime(file, (1e9, 1e9))
+    value()
+    assert file.stat().st_mtime > 1.5e9

@@ -3,13 +3,12 @@
 import re
 import runpy
 import tomllib
-from pathlib import Path
 
 import pytest
+from places import ROOT
 
 from spinlev.studies.terminal.system_libraries import PACKAGES
 
-ROOT = Path(__file__).parent.parent
 PAGES = sorted([ROOT / "README.md", *(ROOT / "docs").glob("*.md")])
 NAMED = re.compile(r"`((?:geometry|fem|dynamics|studies|tests|benchmarks|scenes|docs)/[\w/.-]+\.(?:py|toml|md))")
 

@@ -1,6 +1,5 @@
 """The studies of the rotor's field and of TEAM problem 7: every method against the field that it should give."""
 
-import heyoka as hy
 import numpy as np
 import pytest
 
@@ -75,15 +74,6 @@ def test_a_table_keeps_what_it_states_and_unknowns_are_counted(errors):
         assert 0 < counted[0] < counted[1]
 
 
-@pytest.fixture
-def own_compiler():
-    """A measurement compiles anew, which the other tests in this process need not."""
-    before = hy.llvm_state.get_diskcache_enabled()
-    yield
-    hy.llvm_state.set_diskcache_enabled(before)
-
-
-@pytest.mark.usefixtures("own_compiler")
 def test_one_method_is_measured(truths, monkeypatch):
     monkeypatch.setattr(speed_accuracy, "TIMED_POINTS", 100)
     found = measure("moments to 5", True)

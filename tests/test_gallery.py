@@ -1,19 +1,18 @@
 """Every example of the gallery runs as it stands, and one number of each is right."""
 
 import runpy
-from pathlib import Path
 
 import matplotlib as mpl
 import numpy as np
 import pytest
+from places import DOCS, HORIZONTAL, ROOT
 
 from spinlev.geometry.basics import MU_0
 from spinlev.geometry.scenes import load_scene
 from spinlev.studies.catalogue import CATALOGUE
 from spinlev.studies.results.figures import STYLE
 
-DOCS = Path(__file__).parent.parent / "docs"
-MOMENT = load_scene(DOCS.parent / "scenes" / "horizontal.toml").floater.moment * np.sin(np.radians(5.0))
+MOMENT = load_scene(HORIZONTAL).floater.moment * np.sin(np.radians(5.0))
 SLOW = 200 * np.pi * MOMENT**2 * MU_0**2 * 3.5e7 / (64 * np.pi) * (1 / 0.015 - 1 / 0.045) * 1e6
 """Braking torque at 100 Hz if it went on as at rest, closed form of an infinite slab, µN m."""
 
@@ -33,10 +32,9 @@ NUMBERS = {
 
 
 @pytest.fixture(autouse=True)
-def as_a_user(tmp_path_factory, monkeypatch):
-    """In the repository's root, with a cache of their own that the examples share, and the catalogue as it was."""
-    monkeypatch.chdir(DOCS.parent)
-    monkeypatch.setenv("SPINLEV_CACHE", str(tmp_path_factory.getbasetemp() / "gallery-cache"))
+def as_a_user(monkeypatch):
+    """In the repository's root, and the catalogue as it was."""
+    monkeypatch.chdir(ROOT)
     before = dict(CATALOGUE)
     yield
     CATALOGUE.clear()

@@ -8,13 +8,12 @@ import ast
 import builtins
 import re
 from importlib import import_module
-from pathlib import Path
 
 import pytest
+from places import ROOT
 
 from spinlev.geometry.basics import ComputationError
 
-ROOT = Path(__file__).parent.parent
 FILES = sorted(path for folder in ("geometry", "fem", "dynamics", "studies") for path in (ROOT / folder).rglob("*.py"))
 INPUT = re.compile(r"(\{\}: )?Input \S.* must .+; instead[ :].+", re.DOTALL)
 SENTENCE = re.compile(r"[A-Z].*[.}]", re.DOTALL)
@@ -26,7 +25,7 @@ RELAYED = {
     "[describe_fault(detail) for detail in error.errors()]": "scene_file: sentences of scene_faults",
     "refusal(plate, frequency, rtol, best)": "plate: a sentence of plate_limits",
     "str(error)": "an error's own sentence, with another class",
-    "str(path)": "atomic: the system's own error, with the name of the file",
+    "str(path)": "whole_files: the system's own error, with the name of the file",
     "way_out(scene, table, known)": "simulation: says what would levitate",
 }
 

@@ -1,6 +1,5 @@
 """Where a search has nothing to find, a problem is degenerate or the system refuses: what is said or done instead."""
 
-import errno
 import sys
 from dataclasses import replace
 from pathlib import Path
@@ -19,9 +18,6 @@ from spinlev.dynamics.steady import EVERY, EquilibriumError, solve
 from spinlev.fem.closed_forms import Racetrack
 from spinlev.fem.eddy_currents.export import write_vtu
 from spinlev.fem.rotor_tables import rotor_table
-from spinlev.fem.storage import from_cache
-from spinlev.fem.storage import whole_files as atomic
-from spinlev.fem.storage.checked_files import cache_folder
 from spinlev.geometry.basics import MU_0, Box, rotation_matrix
 from spinlev.geometry.bodies import CONVERGENCE, Magnet, cut_magnets
 from spinlev.geometry.bodies import article_rotors as rotor
@@ -157,44 +153,6 @@ def test_a_round_coil_has_the_field_of_a_thick_solenoid():
     field = coil.flux_density(np.column_stack([0 * z, 0 * z, z]))
     np.testing.assert_allclose(field[:, 2], expected, rtol=1e-7)
     np.testing.assert_allclose(field[:, :2], 0.0, atol=1e-12)
-
-
-def test_a_cache_on_a_file_system_without_locks_still_works(tmp_path, monkeypatch):
-    said = []
-
-    def refused(*_):
-        raise OSError(errno.ENOLCK, "No locks available")
-
-    monkeypatch.setenv("SPINLEV_CACHE", str(tmp_path))
-    monkeypatch.setattr("spinlev.fem.storage.checked_files.fcntl.flock", refused)
-    made = from_cache("a.txt", Path.read_text, lambda: "made", lambda text, path: path.write_text(text), said.append)
-    assert made == ("made", False)
-    assert said == ["The cache's file system has no locks."]
-    again = from_cache("a.txt", Path.read_text, lambda: "anew", lambda text, path: path.write_text(text), said.append)
-    assert again == ("made", True)
-
-
-def test_where_the_cache_is(tmp_path, monkeypatch):
-    monkeypatch.delenv("SPINLEV_CACHE", raising=False)
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
-    assert cache_folder() == tmp_path / "spinlev"
-    monkeypatch.delenv("XDG_CACHE_HOME")
-    monkeypatch.setenv("HOME", str(tmp_path))
-    assert cache_folder() == tmp_path / ".cache" / "spinlev"
-
-
-def test_another_user_s_unfinished_file_is_left_alone(tmp_path, monkeypatch):
-    """The system forbids to ask for that process, which shows that it lives."""
-    left = tmp_path / f".r-{atomic.platform.node()}-123-x.nc"
-    left.write_bytes(b"half")
-
-    def forbidden(process, number):
-        raise PermissionError
-
-    monkeypatch.setattr(atomic.os, "kill", forbidden)
-    atomic.write_whole(tmp_path / "r.nc", b"whole")
-    assert (tmp_path / "r.nc").read_bytes() == b"whole"
-    assert left.exists()
 
 
 def air_cube():

@@ -10,6 +10,7 @@ import pytest
 import xarray as xr
 from hypothesis import given
 from hypothesis import strategies as st
+from places import HORIZONTAL
 
 from spinlev.geometry.basics import InputError
 from spinlev.geometry.scenes import SceneError, load_scene, parse_scene
@@ -17,7 +18,7 @@ from spinlev.studies.catalogue.cite import used
 from spinlev.studies.command_line.cli import _status
 from spinlev.studies.terminal import combinations, parse_vary
 
-SCENE = str(Path(__file__).parent.parent / "scenes" / "horizontal.toml")
+SCENE = str(HORIZONTAL)
 FAST = ("--plate-model", "none", "--model", "dipole", "--workers", "1", "--json")
 
 
@@ -25,7 +26,6 @@ FAST = ("--plate-model", "none", "--model", "dipole", "--workers", "1", "--json"
 def spinlev(tmp_path, monkeypatch, capsys):
     """Run the command line in this process; gives the exit status, the answer and the messages."""
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setenv("SPINLEV_CACHE", str(tmp_path / "cache"))
     monkeypatch.setattr("sys.argv", ["spinlev", "test"])
 
     def run(*arguments):

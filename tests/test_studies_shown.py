@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 import pyvista as pv
 import xarray as xr
+from places import QUICK, SCENES
 
 import spinlev as sl
 from spinlev.dynamics.equilibria import find_equilibria
@@ -29,8 +30,6 @@ from spinlev.studies.pictures import plate_currents, question_figure
 from spinlev.studies.rendering import Currents, current_places
 from spinlev.studies.rendering.still import add_floater, add_plate, new_plotter
 from spinlev.studies.results import write_dataset
-
-SCENES = Path(__file__).parent.parent / "scenes"
 
 
 @pytest.fixture(scope="module")
@@ -167,7 +166,7 @@ def test_a_study_on_the_command_line_and_in_python_is_what_was_stored(tmp_path, 
     answer = json.loads(said.getvalue())
     assert (answer["study"], answer["failed_points"]) == (name, [])
     assert {Path(file).suffix for file in answer["figures"]} == {".png", ".pdf"}
-    stored = read_result(Path(__file__).parent / "data" / "quick" / f"{name}.nc")
+    stored = read_result(QUICK / f"{name}.nc")
     for found in (read_result(Path(answer["result"])), sl.run_study(name, out=tmp_path / "again")):
         for part in ("attracting", "repelling", "polar_angle"):
             np.testing.assert_allclose(found[part], stored[part], atol=1e-3 * float(np.abs(stored[part]).max()))

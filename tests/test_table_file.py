@@ -1,9 +1,5 @@
 """Tables on disk: what is read is what was written, and damage is noticed."""
 
-import multiprocessing
-import time
-from pathlib import Path
-
 import numpy as np
 import pytest
 import xarray as xr
@@ -13,7 +9,6 @@ from spinlev.fem.harmonics import MultipoleExpansion, uniform_moments
 from spinlev.fem.rotor_tables import RotorTable, cached_rotor_table
 from spinlev.fem.rotor_tables.cache import rotor_key
 from spinlev.fem.rotor_tables.table_file import TableFileError, load_table, save_table
-from spinlev.fem.storage import from_cache
 from spinlev.geometry.bodies import horizontal, vertical
 
 ROTOR = vertical(0.012, 0.01, 1.305, 1.05)
@@ -115,34 +110,3 @@ def test_a_closed_form_of_another_polarisation_survives_the_disk(tmp_path):
     assert np.array_equal(read.evaluate(POINTS)[0], table.evaluate(POINTS)[0])
     assert np.array_equal(read.moment, table.moment)
     assert not np.allclose(read.moment, RotorTable("cuboid", ROTOR, ROTOR).moment, rtol=1e-3)
-
-
-def slowly_made(log, said):
-    """Ask the cache for a table that takes a while; every making is written down."""
-
-    def make():
-        with Path(log).open("a") as stream:
-            stream.write("made\n")
-        time.sleep(1.0)
-        return "a table"
-
-    def save(table, path):
-        path.write_text(table)
-
-    table, found = from_cache("slow.txt", Path.read_text, make, save, said.put)
-    said.put((table, found))
-
-
-def test_two_processes_that_need_the_same_table_make_it_once(tmp_path, monkeypatch):
-    monkeypatch.setenv("SPINLEV_CACHE", str(tmp_path))
-    context = multiprocessing.get_context("spawn")
-    said, log = context.Queue(), tmp_path / "log"
-    processes = [context.Process(target=slowly_made, args=(log, said)) for _ in range(2)]
-    for process in processes:
-        process.start()
-    answers = [said.get(timeout=60) for _ in range(3)]
-    for process in processes:
-        process.join()
-    assert log.read_text() == "made\n"
-    assert sorted(a for a in answers if isinstance(a, tuple)) == [("a table", False), ("a table", True)]
-    assert any("waiting for it" in a for a in answers if isinstance(a, str))

@@ -9,6 +9,7 @@ import heyoka as hy
 import numpy as np
 
 from ...fem.rotor_tables import FieldTable
+from ...fem.storage import compiled
 from ...geometry.basics import Array
 from ...geometry.scenes import Scene
 from ..motion import (
@@ -101,7 +102,8 @@ def compile_flight(
     work = hy.expression("work")
     if compact is None:
         compact = not _worth_compiling(equations, scene, duration)
-    integrator = hy.taylor_adaptive(
+    integrator = compiled(
+        hy.taylor_adaptive,
         [*zip(equations.variables, equations.rates, strict=True), (work, equations.power)],
         np.zeros(len(equations.variables) + 1),
         tol=tolerance,
@@ -109,7 +111,7 @@ def compile_flight(
         opt_level=OPTIMISATION,
         t_events=events,
     )
-    ledger = hy.cfunc(list(equations.jacobi), list(equations.variables), compact_mode=True)
+    ledger = compiled(hy.cfunc, list(equations.jacobi), list(equations.variables), compact_mode=True)
     left = np.zeros(0)
     if memory is not None:
         depth = float(plate_depth(memory.plate, np.zeros(1))[0])
@@ -123,6 +125,7 @@ def _worth_compiling(equations: Equations, scene: Scene, duration: float) -> boo
     Measured: it takes about 2.5 s for n = 136 (closed form) and 30 s for n = 229 (with an expansion of degree 9), n
     being the length of the decomposed rates, and then each of some six steps a turn saves n · 0.1 µs.
     """
-    size = len(hy.cfunc(list(equations.rates), list(equations.variables), compact_mode=True).dc)
+    rates = compiled(hy.cfunc, list(equations.rates), list(equations.variables), compact_mode=True)
+    size = len(rates.dc)
     seconds = 2.5 * (size / 136) ** 5
     return seconds < PATIENCE or seconds < 6 * scene.frequency * duration * size * 0.1e-6

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ...fem.rotor_tables import FieldFormula
+from ...fem.storage import compiled
 from ...geometry.basics import Array
 from ...geometry.scenes import Scene
 from .equations import equations_of_motion
@@ -28,7 +29,8 @@ class Rates:
         tensors = hy.diff_tensors(list(equations.rates), diff_args=variables, diff_order=1)
         outputs = [*equations.rates, *np.asarray(tensors.jacobian).ravel()]
         # Unoptimised code is compiled three times as fast, and a search is over before faster code would be ready.
-        self._function = hy.cfunc(outputs, variables, compact_mode=True, opt_level=1 if optimised else 0)
+        level = 1 if optimised else 0
+        self._function = compiled(hy.cfunc, outputs, variables, compact_mode=True, opt_level=level)
 
     @classmethod
     def of(cls, scene: Scene, table: FieldFormula) -> Rates:

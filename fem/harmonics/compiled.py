@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ...geometry.basics import Array
+from ..storage import compiled
 
 FieldExpressions = tuple[list[hy.expression], list[list[hy.expression]]]
 """B_i (T) and ∂B_i/∂x_j (T/m), the latter symmetric."""
@@ -29,7 +30,7 @@ class CompiledField:
         variables = hy.make_vars("x", "y", "z")
         field, gradient = build(variables)
         symmetric = [gradient[min(i, j)][max(i, j)] for i in range(3) for j in range(3)]
-        self._function = hy.cfunc([*field, *symmetric], variables, fast_math=True)
+        self._function = compiled(hy.cfunc, [*field, *symmetric], variables, fast_math=True)
 
     def rows(self, columns: Array) -> Array:
         """The three components of B (T) and the nine of its gradient (T/m): (12, n) at `columns` (3, n), m."""

@@ -18,6 +18,7 @@ import numpy as np
 from ...geometry.basics import Array, frozen_array
 from ..harmonics import FieldExpressions, MultipoleExpansion, derivative, outer_sums
 from ..plate_network import Region
+from ..storage import compiled
 
 DEPTHS = (0.0, 0.3, 0.6, 1.0, 1.6, 2.5, 4.0, 6.0, 10.0, 18.0)
 """Depths of the centres behind the surface, in units of the distance between region and plate."""
@@ -78,7 +79,7 @@ class Multipoles:
         outputs: list[hy.expression] = []
         for field, gradient in self.expressions(variables):
             outputs += [*field, *(gradient[i][j] for i in range(3) for j in range(i, 3))]
-        return hy.cfunc(outputs, variables, compact_mode=len(outputs) > 2000)
+        return compiled(hy.cfunc, outputs, variables, compact_mode=len(outputs) > 2000)
 
     @cached_property
     def _compiled_curvature(self) -> hy.cfunc_dbl:
@@ -88,7 +89,7 @@ class Multipoles:
             for _, gradient in self.expressions(variables)
             for i, j, k in combinations_with_replacement(range(3), 3)
         ]
-        return hy.cfunc(outputs, variables, compact_mode=True, opt_level=0)
+        return compiled(hy.cfunc, outputs, variables, compact_mode=True, opt_level=0)
 
     def curvature(self, points: Array) -> Array:
         """∂²B_i/∂x_j∂x_k (n, k, 3, 3, 3) T/m² at points (n, 3) m."""

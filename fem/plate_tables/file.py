@@ -5,7 +5,6 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Callable, Sequence
-from importlib.metadata import version
 from pathlib import Path
 
 import numpy as np
@@ -17,7 +16,7 @@ from ...geometry.scenes import Plate
 from ..harmonics import FOUR_PI
 from ..plate_network import Region
 from ..rotor_tables import RotorTable
-from ..storage import TableFileError, described, from_cache, read_checked, write_checked
+from ..storage import TableFileError, described, from_cache, program_of, read_checked, write_checked
 from .driven_plate import plate_and_rotor_table
 from .field_functions import Multipoles
 from .plate_table import PlateErrors, PlateTable
@@ -120,7 +119,7 @@ def driven_plate_key(
 
 
 def _hash(name: str, parts: Sequence[ArrayLike]) -> str:
-    digest = hashlib.sha256(f"{FORMAT} {version('spinlev')} {version('ngsolve')} {name}".encode())
+    digest = hashlib.sha256(f"{FORMAT} {program_of(__package__)} {name}".encode())
     for part in parts:
         digest.update(np.ascontiguousarray(np.asarray(part) + 0.0, dtype="<f8").tobytes())
     return digest.hexdigest()

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Callable
-from importlib.metadata import version
 
 import numpy as np
 
 from ...geometry.bodies import Magnet
-from ..storage import from_cache
+from ..storage import from_cache, program_of
 from .choice import rotor_table
 from .table import RotorTable
 from .table_file import FORMAT, load_table, save_table
@@ -17,8 +16,7 @@ from .table_file import FORMAT, load_table, save_table
 
 def rotor_key(rotor: tuple[Magnet, ...], model: str, rtol: float, nearest: float | None = None) -> str:
     """SHA-256 of the magnets, the model, the accuracy asked for and where, and the programs that compute them."""
-    programs = f"{FORMAT} {version('spinlev')} {version('ngsolve')}"
-    digest = hashlib.sha256(f"{programs} {model} {rtol!r} {nearest!r}".encode())
+    digest = hashlib.sha256(f"{FORMAT} {program_of(__package__)} {model} {rtol!r} {nearest!r}".encode())
     for magnet in rotor:
         for part in (magnet.box.size, magnet.box.center, magnet.box.rotation, magnet.polarization):
             digest.update(np.ascontiguousarray(part + 0.0, dtype="<f8").tobytes())

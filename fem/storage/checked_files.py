@@ -1,13 +1,10 @@
-"""Tables on disk: one self-describing netCDF file with a checksum, and a folder of those computed before."""
+"""Data on disk: one self-describing netCDF file with a checksum."""
 
 from __future__ import annotations
 
-import fcntl
-import os
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 import dask
 import xarray as xr
@@ -18,7 +15,6 @@ from .whole_files import write_whole
 
 Variables = Mapping[str, tuple[tuple[str, ...], Any, str]]
 """Dimensions, values and unit by name."""
-Table = TypeVar("Table")
 
 
 class TableFileError(ValueError):
@@ -65,57 +61,3 @@ def read_checked(path: str | Path, file_format: str | None = None) -> xr.Dataset
         received = dataset.attrs.get("format")
         raise TableFileError(f"Input {path} must be a '{file_format}'; instead received '{received}'.")
     return dataset
-
-
-def cache_folder() -> Path:
-    """Where tables are kept: $SPINLEV_CACHE, else $XDG_CACHE_HOME/spinlev, else ~/.cache/spinlev."""
-    if folder := os.environ.get("SPINLEV_CACHE"):
-        return Path(folder)
-    return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "spinlev"
-
-
-def from_cache(
-    name: str,
-    load: Callable[[Path], Table],
-    make: Callable[[], Table],
-    save: Callable[[Table, Path], None],
-    report: Callable[[str], None],
-) -> tuple[Table, bool]:
-    """A table, from the cache if it is there under `name`, and whether it was.
-
-    A damaged entry is reported, computed anew and replaced; a cache that cannot be written is reported and
-    does no harm.  While one process makes a table, others that need the same one wait for it.
-    """
-    path = cache_folder() / name
-    with alone(path.with_suffix(".lock"), report):
-        if path.exists():
-            try:
-                return load(path), True
-            except (TableFileError, OSError) as error:
-                report(f"The cached table is damaged and is computed anew: {error}")
-        table = make()
-        try:
-            save(table, path)
-        except OSError as error:
-            report(f"The table could not be cached: {error}")
-        return table, False
-
-
-@contextmanager
-def alone(lock: Path, report: Callable[[str], None]) -> Iterator[None]:
-    """Be the only process in this block with the same lock file; the system frees it if the process dies."""
-    try:
-        lock.parent.mkdir(parents=True, exist_ok=True)
-        stream = lock.open("w")
-    except OSError:  # a cache that cannot be written cannot be shared either
-        yield
-        return
-    with stream:
-        try:
-            fcntl.flock(stream, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
-            report("Another process is making this table: waiting for it ...")
-            fcntl.flock(stream, fcntl.LOCK_EX)
-        except OSError:  # a file system without locks: at worst a table is made twice
-            report("The cache's file system has no locks.")
-        yield

@@ -23,3 +23,9 @@ def sealed(path: Path) -> bool | None:
     if content[-LENGTH:-64] != MARK:
         return None
     return seal(content[:-LENGTH]) == content
+
+
+def unsealed(path: Path) -> bytes | None:
+    """What was sealed, if the file is as it was then, else None. Raises OSError if it cannot be read."""
+    content = path.read_bytes()
+    return content[:-LENGTH] if content == seal(content[:-LENGTH]) else None

@@ -1,47 +1,87 @@
-"""Where heyoka keeps compiled code between processes: beside the tables, and not more than it can look through soon.
+"""Compiled code of earlier processes: whole files with a checksum, under a key of what was compiled.
 
-At the first compilation of a process heyoka adds up the sizes of all that it has kept, and reads its whole file for it:
-with 9.5 GB that took 3 s of processor time, and 9 s where others read it too.  Its own limit is 20 GiB.
+heyoka can keep machine code by itself, in a database without checksums: one flipped bit in a constant is a wrong
+number.  What it has compiled can be pickled with the code in it, which is read again in hundredths of a second.
 """
 
 from __future__ import annotations
 
-import sqlite3
+import hashlib
+import os
+import pickle
+import zlib
+from collections.abc import Callable
+from functools import cache
 from pathlib import Path
+from typing import Any, TypeVar
 
-import heyoka as hy
-
-from .checked_files import alone, cache_folder
-from .code_copy import add_copy, sound
+from .cache import cache_folder
+from .checksum import seal, unsealed
+from .whole_files import write_whole
 
 LIMIT = 2**29
-"""Size of what is kept, bytes; the oldest makes room.  Looked through in 0.2 s, after it is checked in as much."""
+"""Size of all that is kept, bytes; what was not used for the longest time makes room."""
+Compiled = TypeVar("Compiled")
 
 
-def keep_code() -> None:
-    """Keep compiled code in the cache's folder; damaged code is thrown away, and none kept where that is impossible."""
-    folder = cache_folder() / "code"
-    try:
-        with alone(folder / "lock", report=lambda _: None):  # two processes that make the file at once fail
-            _open(folder)
-    except (OSError, RuntimeError, sqlite3.Error):
-        hy.llvm_state.set_diskcache_enabled(False)
-    else:
-        hy.llvm_state.set_diskcache_enabled(True)
+def compiled(compiler: Callable[..., Compiled], *arguments: Any, **options: Any) -> Compiled:
+    """What a compiler makes of its arguments, from the cache if it is there.
 
+    Damaged code is thrown away without a word and compiled anew; a cache that cannot be written does no harm.
 
-def _open(folder: Path) -> None:
-    """Let heyoka open its file, which is made anew unless it is sound.
-
-    heyoka must not have the file open while this module looks into it: a process that closes a file loses all of its
-    locks on it, also those of the other library.  Setting the path closes it.
+    Parameters
+    ----------
+    compiler : ``heyoka.cfunc`` or ``heyoka.taylor_adaptive``
+    arguments, options : the compiler's
     """
-    file = folder / "cache.db"
-    hy.llvm_state.set_diskcache_path(folder)
-    if not (file.exists() and sound(file)):
-        for path in (file, Path(f"{file}-wal"), Path(f"{file}-shm")):
+    asked = pickle.dumps((compiler, arguments, options))
+    path = cache_folder() / "code" / f"{hashlib.sha256(_target() + asked).hexdigest()}.code"
+    found: Compiled | None = _read(path)
+    if found is None:
+        found = compiler(*arguments, **options)
+        _keep(found, path)
+    return found
+
+
+@cache
+def _target() -> bytes:
+    """What code is compiled for: heyoka, and the processor as its compiler sees it. heyoka keeps none from here on."""
+    import heyoka as hy
+
+    hy.llvm_state.set_diskcache_enabled(False)
+    x = hy.make_vars("x")
+    return f"{hy.__version__} {hy.cfunc([x], [x]).llvm_states}".encode()
+
+
+def _read(path: Path) -> Any:
+    try:
+        content = unsealed(path)
+        if content is None:
+            return None
+        os.utime(path)
+        return pickle.loads(zlib.decompress(content))
+    except Exception:  # missing, or of a heyoka that was built otherwise: it raises what it likes
+        return None
+
+
+def _keep(made: object, path: Path) -> None:
+    try:
+        write_whole(path, seal(zlib.compress(pickle.dumps(made), 1)))
+        make_room(path.parent)
+    except OSError:  # costs time only
+        pass
+
+
+def make_room(folder: Path, limit: int = LIMIT) -> None:
+    """Remove what was not used for the longest time until all code together keeps the limit, bytes."""
+    kept = []
+    for path in folder.glob("*.code"):
+        try:
+            kept.append((path.stat().st_mtime_ns, path.stat().st_size, path))
+        except FileNotFoundError:  # another process makes room too
+            continue
+    total = 0
+    for _, size, path in sorted(kept, reverse=True):
+        total += size
+        if total > limit:
             path.unlink(missing_ok=True)
-        hy.llvm_state.set_diskcache_limit(LIMIT)  # makes the file
-        hy.llvm_state.set_diskcache_path(folder)
-        add_copy(file)
-    hy.llvm_state.set_diskcache_limit(LIMIT)

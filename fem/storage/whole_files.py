@@ -9,6 +9,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+import psutil
+
 
 def write_whole(path: str | Path, content: bytes) -> None:
     """Write a file at once. Raises OSError, which names the file.
@@ -53,15 +55,5 @@ def _tidy(path: Path) -> None:
     prefix = _prefix(path)
     for left in path.parent.glob(f".*{path.suffix}"):
         owner = left.name.removeprefix(prefix).partition("-")[0] if left.name.startswith(prefix) else ""
-        if owner.isdecimal() and not _alive(int(owner)):
+        if owner.isdecimal() and not psutil.pid_exists(int(owner)):
             left.unlink(missing_ok=True)
-
-
-def _alive(process: int) -> bool:
-    try:
-        os.kill(process, 0)
-    except ProcessLookupError:
-        return False
-    except PermissionError:  # another user's
-        return True
-    return True

@@ -5,12 +5,11 @@ from __future__ import annotations
 import csv
 import io
 from collections.abc import Mapping
-from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
 from ...dynamics.flights import Checkpoint, FlightStopped, Trajectory
-from ...fem.storage import write_whole
+from ...fem.storage import program_of, write_whole
 from ...geometry.basics import Array
 from ...geometry.scenes import OffsetStart, Scene, scene_text
 from ..results import trajectory_dataset, write_dataset
@@ -61,8 +60,8 @@ def equilibria_job(scene: Scene, asked: Models, spin: float, out: Path) -> Job:
 
 def simulate_job(scene: Scene, asked: Models, duration: float, out: Path, resume: bool) -> Job:
     """The motion; writes trajectory.nc, and keeps a checkpoint while it lasts."""
-    versions = {name: version(name) for name in ("spinlev", "heyoka")}
-    identity = to_json({"scene": scene_text(scene), "duration_s": duration, **vars(asked), **versions})
+    asked_of = {"scene": scene_text(scene), "duration_s": duration, **vars(asked)}
+    identity = to_json({**asked_of, "program": program_of(__package__)})
     checkpoint = Checkpoint(out / "checkpoint.npz", identity)
     if not resume:
         checkpoint.remove()

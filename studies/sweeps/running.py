@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Mapping
 from importlib.metadata import version
 from pathlib import Path
 
 import xarray as xr
 
+from ...fem.storage import digest_of
 from ...geometry.basics import ComputationError
 from ..results import LIBRARIES, Point, Study
 from ..terminal import Workers, note, progress, to_json
 from .finished_points import Journal
 from .workers import Failure, computed
+
+FLOORS = ("spinlev.geometry", "spinlev.fem", "spinlev.dynamics", "spinlev.studies")
+"""What another program has computed is not mixed into a result."""
 
 
 class SweepError(ComputationError):
@@ -64,14 +67,4 @@ def forget(name: str, out: Path) -> None:
 def _journal(name: str, study: Study, points: Mapping[int, Point], out: Path) -> Journal:
     versions = {library: version(library) for library in LIBRARIES}
     asked = {"study": name, "settings": study.settings, "points": list(points.values())}
-    return Journal(out / f"{name}.points", to_json({**asked, **versions, "program": program_digest()}), note)
-
-
-def program_digest() -> str:
-    """SHA-256 of the program's own text: what another text has computed is not mixed into a result."""
-    digest = hashlib.sha256()
-    root = Path(__file__).resolve().parents[2]
-    for folder in ("geometry", "fem", "dynamics", "studies"):
-        for path in sorted((root / folder).rglob("*.py")):
-            digest.update(path.read_bytes())
-    return digest.hexdigest()
+    return Journal(out / f"{name}.points", to_json({**asked, **versions, "program": digest_of(*FLOORS)}), note)

@@ -1,0 +1,136 @@
+"""The cache's folder, its locks, and that nothing happens in it before something is asked of it."""
+
+import errno
+import multiprocessing
+import os
+import platform
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from spinlev.fem.storage import from_cache, write_whole
+from spinlev.fem.storage.cache import cache_folder
+
+IMPORT_ALL = """
+import importlib, os, pkgutil, spinlev
+names = [m.name for m in pkgutil.walk_packages(spinlev.__path__, "spinlev.")]
+for name in names:
+    importlib.import_module(name)
+import heyoka
+print(len(names), "spinlev.fem.storage.compiled_code" in names, heyoka.llvm_state.get_memcache_size())
+"""
+
+
+@pytest.fixture
+def cache(tmp_path, monkeypatch):
+    folder = tmp_path / "cache"
+    monkeypatch.setenv("SPINLEV_CACHE", str(folder))
+    return folder
+
+
+def text(made):
+    """Ask the cache for a text; gives it, whether it was there, and what was said."""
+    said = []
+    found = from_cache("a.txt", Path.read_text, lambda: made, lambda text, path: path.write_text(text), said.append)
+    return (*found, said)
+
+
+def test_importing_every_module_touches_no_file_and_compiles_nothing(tmp_path):
+    home, others = tmp_path / "home", tmp_path / "others"
+    home.mkdir()
+    places = {"HOME": home, "SPINLEV_CACHE": home / "cache", "MPLCONFIGDIR": others, "DASK_CONFIG": others}
+    environment = {k: v for k, v in os.environ.items() if not k.startswith("XDG_")} | {
+        name: str(place) for name, place in places.items()
+    }
+    command = [sys.executable, "-P", "-c", IMPORT_ALL]
+    done = subprocess.run(command, capture_output=True, text=True, check=True, env=environment)
+    number, whole, code = done.stdout.split()
+    assert int(number) > 200
+    assert (whole, code) == ("True", "0")
+    assert list(home.iterdir()) == []
+
+
+def test_where_the_cache_is(tmp_path, monkeypatch):
+    monkeypatch.delenv("SPINLEV_CACHE", raising=False)
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    assert cache_folder() == tmp_path / "spinlev"
+    monkeypatch.delenv("XDG_CACHE_HOME")
+    monkeypatch.setenv("HOME", str(tmp_path))
+    assert cache_folder() == tmp_path / ".cache" / "spinlev"
+    monkeypatch.setenv("SPINLEV_CACHE", str(tmp_path / "own"))
+    assert cache_folder() == tmp_path / "own"
+
+
+def test_the_tests_have_a_cache_of_their_own():
+    assert os.environ.get("SPINLEV_TEST_CACHE", "spinlev-tests-") in str(cache_folder())
+
+
+@pytest.mark.parametrize("number", [errno.ENOLCK, errno.EOPNOTSUPP])
+def test_a_file_system_without_locks_does_no_harm(cache, monkeypatch, number):
+    def refused(*_):
+        raise OSError(number, os.strerror(number))
+
+    fcntl = pytest.importorskip("fcntl")
+    monkeypatch.setattr(fcntl, "flock", refused)
+    assert text("made") == ("made", False, ["The cache's file system has no locks."])
+    assert text("anew") == ("made", True, ["The cache's file system has no locks."])
+
+
+def slowly_made(log, said):
+    """Ask the cache for a table that takes a while; every making is written down."""
+
+    def make():
+        with Path(log).open("a") as stream:
+            stream.write("made\n")
+        time.sleep(1.0)
+        return "a table"
+
+    def save(table, path):
+        path.write_text(table)
+
+    table, found = from_cache("slow.txt", Path.read_text, make, save, said.put)
+    said.put((table, found))
+
+
+def test_two_processes_that_need_the_same_table_make_it_once(cache, tmp_path):
+    context = multiprocessing.get_context("spawn")
+    said, log = context.Queue(), tmp_path / "log"
+    processes = [context.Process(target=slowly_made, args=(log, said)) for _ in range(2)]
+    for process in processes:
+        process.start()
+    answers = [said.get(timeout=60) for _ in range(3)]
+    for process in processes:
+        process.join()
+    assert log.read_text() == "made\n"
+    assert sorted(a for a in answers if isinstance(a, tuple)) == [("a table", False), ("a table", True)]
+    assert any("waiting for it" in a for a in answers if isinstance(a, str))
+
+
+def test_a_killed_holder_frees_its_lock(cache):
+    code = (
+        "import os, signal; from pathlib import Path; from spinlev.fem.storage import from_cache\n"
+        "from_cache('a.txt', Path.read_text, lambda: os.kill(os.getpid(), signal.SIGKILL), None, print)"
+    )
+    done = subprocess.run([sys.executable, "-P", "-c", code], check=False)
+    assert done.returncode == -signal.SIGKILL
+    assert (cache / "a.lock").exists()
+    assert text("made") == ("made", False, [])
+
+
+def test_an_error_frees_the_lock(cache):
+    with pytest.raises(ZeroDivisionError):
+        from_cache("a.txt", Path.read_text, lambda: 1 / 0, None, print)
+    assert text("made") == ("made", False, [])
+
+
+def test_the_unfinished_file_of_a_process_that_lives_is_left_alone(tmp_path):
+    """Process 1 lives always, and mostly is another user's."""
+    left = tmp_path / f".r-{platform.node()}-1-x.nc"
+    left.write_bytes(b"half")
+    write_whole(tmp_path / "r.nc", b"whole")
+    assert (tmp_path / "r.nc").read_bytes() == b"whole"
+    assert left.exists()
