@@ -21,8 +21,9 @@ $(VENV)/dependencies: requirements.txt
 
 $(VENV)/installed: $(VENV)/dependencies $(SOURCES)
 	@rm -rf build
-	$(BIN)/pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation --force-reinstall .
-	@rm -rf build *.egg-info
+	$(BIN)/pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation \
+	  --config-settings editable_mode=strict --editable .
+	@rm -rf *.egg-info
 	@$(BIN)/python -P -m spinlev.studies.command_line.installation
 	@touch $@
 
@@ -34,7 +35,7 @@ lint: install
 	$(BIN)/ruff format --check .
 
 types: install
-	cd $(VENV) && bin/mypy --config-file ../pyproject.toml -p spinlev
+	cd $(VENV) && bin/mypy --config-file ../pyproject.toml --cache-dir ../.mypy_cache -p spinlev
 
 test: lint types
 	$(BIN)/pytest -n 2 --dist worksteal -m "not slow"
@@ -75,11 +76,10 @@ gallery: install
 
 # Wheel and source distribution in dist/, without a network; then the wheel is tested outside the repository.
 dist: install
-	rm -rf dist build
-	@mkdir build
+	rm -rf dist build/lib build/bdist*
 	@$(BIN)/python -c 'import setuptools.build_meta as b; b.build_sdist("dist"); b.build_wheel("dist")' >build/log 2>&1 || \
 	  { cat build/log; exit 1; }
-	@rm -rf build *.egg-info
+	@rm -rf build/lib build/bdist* build/log *.egg-info
 	@ls dist
 	sh tests/try_wheel.sh $(BIN)/python dist
 

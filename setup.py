@@ -8,6 +8,6 @@ FLOORS = ("geometry", "fem", "dynamics", "studies")
 folders = [path.parent for floor in FLOORS for path in sorted(Path(floor).rglob("__init__.py"))]
 
 setup(
-    packages=["spinlev", *(f"spinlev.{'.'.join(folder.parts)}" for folder in folders)],
-    package_dir={"spinlev": "spinlev", **{f"spinlev.{floor}": floor for floor in FLOORS}},
+    packages=["spinlev", "spinlev.scenes", *(f"spinlev.{'.'.join(folder.parts)}" for folder in folders)],
+    package_dir={"spinlev": "spinlev", **{f"spinlev.{folder}": folder for folder in ("scenes", *FLOORS)}},
 )

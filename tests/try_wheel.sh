@@ -13,7 +13,7 @@ trap 'rm -rf "$place"' EXIT
 unset PYTHONPATH
 
 # What must be in a wheel: every file of the packages.
-(cd "$repository" && find spinlev -type f && find geometry fem dynamics studies -type f | sed 's|^|spinlev/|') |
+(cd "$repository" && find spinlev -type f && find scenes geometry fem dynamics studies -type f | sed 's|^|spinlev/|') |
   grep -v __pycache__ > "$place/tree.txt"
 cp -r "$repository/tests" "$repository/scenes" "$repository/pyproject.toml" "$place"
 cd "$place"

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import sysconfig
+from importlib.resources import files
 from pathlib import Path
 
 
@@ -13,4 +13,4 @@ def default_scene() -> Path:
 
 def shipped_scene(name: str) -> Path:
     """The file of a scene that comes with the program."""
-    return Path(sysconfig.get_path("data")) / "share" / "spinlev" / "scenes" / f"{name}.toml"
+    return Path(str(files("spinlev.scenes").joinpath(f"{name}.toml")))
