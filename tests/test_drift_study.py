@@ -2,7 +2,8 @@
 
 import numpy as np
 
-from spinlev.studies.levitation.levitation_time import OUTCOMES, drift_points, drift_result, drift_row
+from spinlev.studies.levitation.drift_cases import OUTCOMES
+from spinlev.studies.levitation.levitation_time import drift_points, drift_result, drift_row
 from spinlev.studies.levitation.levitation_time_figure import drift_figure, drift_lines
 
 

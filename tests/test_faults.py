@@ -20,7 +20,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from spinlev.fem.elements.memory import memory_need as memory
+from spinlev.fem.elements import memory
 from spinlev.fem.measured_maps import FieldMapError
 from spinlev.fem.measured_maps.readers import read_field_map
 from spinlev.fem.storage import foreign, read_checked, replacing, write_checked, write_whole

@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from spinlev.studies.field_quality.field_hard_cases import case_errors, extensions, hard_case_lines
-from spinlev.studies.field_quality.field_hard_cases_figure import hard_case_figure
+from spinlev.studies.field_quality.field_hard_cases import case_errors, extensions
+from spinlev.studies.field_quality.field_hard_cases_figure import hard_case_figure, hard_case_lines
 from spinlev.studies.field_quality.hard_cases import CASES
 
 

@@ -5,11 +5,12 @@ import numpy as np
 import pytest
 
 from spinlev.fem.rotor_tables import rotor_table
-from spinlev.studies.field_quality.dipole_validity import dipole_validity
+from spinlev.studies.field_quality import dipole_validity, method_cost, speed_accuracy
+from spinlev.studies.field_quality.dipole_validity_figure import LEVELS
 from spinlev.studies.field_quality.field_methods import methods
-from spinlev.studies.field_quality.speed_accuracy import DISTANCES, cube, measure, speed_accuracy, sphere_points
-from spinlev.studies.plates import team7_report
-from spinlev.studies.plates.team7 import team7
+from spinlev.studies.field_quality.method_cost import DISTANCES, cube, measure, sphere_points
+from spinlev.studies.plates import team7
+from spinlev.studies.plates.team7_figure import team7_figure, team7_lines
 
 QUICK = methods(quick=True)
 
@@ -85,7 +86,7 @@ def own_compiler():
 
 @pytest.mark.usefixtures("own_compiler")
 def test_one_method_is_measured(truths, monkeypatch):
-    monkeypatch.setattr(speed_accuracy, "TIMED_POINTS", 100)
+    monkeypatch.setattr(method_cost, "TIMED_POINTS", 100)
     found = measure("moments to 5", True)
     assert found.field.shape == (len(DISTANCES), 200, 3)
     apart = np.linalg.norm(found.field - truths["exact"].reshape(found.field.shape), axis=2)
@@ -126,7 +127,7 @@ def test_far_away_only_the_moment_counts(validity):
     moment = abs(1 - 1 / float(dipole_share()))
     assert float(far.sel(model="dipole").max()) == pytest.approx(moment, rel=0.02)
     assert float(far.sel(model="dipole, true moment").max()) < 0.05 * moment
-    assert float(validity["truth_error"].max()) < 0.1 * dipole_validity.LEVELS[-1]
+    assert float(validity["truth_error"].max()) < 0.1 * LEVELS[-1]
 
 
 def dipole_share():
@@ -145,19 +146,18 @@ def test_more_of_the_field_is_right_nearer_to_the_rotor(validity):
     assert np.all(gradient.max("offset") > validity["field_error"].sel(model="dipole, true moment").max("offset"))
 
 
-def test_team_problem_7_with_coarse_elements(monkeypatch):
+def test_team_problem_7_with_coarse_elements():
     """Elements of order 1 are within 10 % of the peak that was measured, where order 3 is within 5 %."""
-    monkeypatch.setattr(team7_report, "team7", lambda order: team7.team7(order=1))
-    result = team7_report.team7_study(quick=True)
+    result = team7.team7_dataset(team7.team7(order=1))
     assert result["measured"].sizes == {"x": 17, "curve": 4}
     size = np.abs(result["deviation"].values)
     assert 0 < size.max() < 0.1
     np.testing.assert_allclose(result["x"][[0, -1]], [0.0, 0.288])
-    whole = team7_report.team7_lines(result)[5]
+    whole = team7_lines(result)[5]
     assert whole.startswith("  all 68 values")
     assert f"largest {100 * size.max():5.2f}" in whole
-    left, right = team7_report.team7_figure(result).axes
-    for number, curve in enumerate(team7_report.CURVES):
+    left, right = team7_figure(result).axes
+    for number, curve in enumerate(team7.CURVES):
         (drawn,) = [line for line in left.lines if line.get_label() == curve]
         np.testing.assert_allclose(drawn.get_ydata(), 1e3 * result["computed"][:, number])
         (drawn,) = [line for line in right.lines if line.get_label() == curve]

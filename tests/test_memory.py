@@ -11,9 +11,8 @@ import pytest
 from netgen.meshing import NgException
 
 from spinlev.fem.eddy_currents import EddySpace, FrequencySystem
-from spinlev.fem.elements import TooLargeError
+from spinlev.fem.elements import TooLargeError, memory
 from spinlev.fem.elements.memory import free_memory, memory_need
-from spinlev.fem.elements.memory import memory_need as memory
 from spinlev.fem.magnetostatics import rung
 from spinlev.fem.magnetostatics.solver import assemble
 from spinlev.fem.rotor_tables import rotor_table

@@ -13,8 +13,8 @@ from spinlev.fem.slab import Slab, reaction_tensor
 from spinlev.geometry.basics import Box, rotation_matrix
 from spinlev.geometry.meshes import MeshRule
 from spinlev.geometry.scenes import Plate
-from spinlev.studies.plates.team7 import Team7Comparison, compute_line, measured_line, team7, team7_mesh
-from spinlev.studies.plates.team7_report import team7_dataset, team7_lines
+from spinlev.studies.plates.team7 import Team7Comparison, compute_line, measured_line, team7, team7_dataset, team7_mesh
+from spinlev.studies.plates.team7_figure import team7_lines
 
 SetNumThreads(1)
 LYING = Plate(Box((0.1, 0.24, 0.03), (0.0, 0.0, -0.015)), 3.5e7)

@@ -10,7 +10,7 @@ from spinlev.dynamics.motion import Rates
 from spinlev.fem.rotor_tables import rotor_table
 from spinlev.studies.article import article_scene
 from spinlev.studies.catalogue import CATALOGUE
-from spinlev.studies.plates.plate_cases import ROTORS, Case, cases
+from spinlev.studies.plates.plate_cases import ROTORS, PlateCase, cases
 from spinlev.studies.plates.plate_damping import gather_damping, plate_damping
 
 STUDY = CATALOGUE["plate-damping"]
@@ -21,8 +21,8 @@ WEAK = 2e4
 @pytest.fixture(scope="module")
 def weak():
     """A poor conductor below and beside the floater, and one of twice its conductivity below."""
-    below = Case("below", 0.018, conductivity=WEAK)
-    poor = [below, replace(below, conductivity=2 * WEAK), Case("beside", 0.018, upright=True, conductivity=WEAK)]
+    below = PlateCase("below", 0.018, conductivity=WEAK)
+    poor = [below, replace(below, conductivity=2 * WEAK), PlateCase("beside", 0.018, upright=True, conductivity=WEAK)]
     rotors = [replace(case, sweep=sweep, value=10.0) for case, sweep in zip(poor[::2], ROTORS, strict=True)]
     return gather_damping([plate_damping(asdict(case)) for case in (*poor, *rotors)])
 
@@ -42,7 +42,7 @@ def test_a_part_of_the_range_is_a_frequency_of_stable_levitation():
     """Half way between the ends, which the closed form knows to some per cent; weak currents damp more than air."""
     scene = article_scene("tilt", 10.0)
     rough = stable_range(scene, Rates(rotor_table(scene.rotor, "cuboid")), *reference_state(scene))
-    row = plate_damping(asdict(Case("frequency", 0.5, conductivity=WEAK, part=0.5))).isel(case=0)
+    row = plate_damping(asdict(PlateCase("frequency", 0.5, conductivity=WEAK, part=0.5))).isel(case=0)
     middle = (rough.low.parameter + rough.high.parameter) / 2
     assert float(row["rotor_frequency"]) == pytest.approx(middle, rel=0.05)
     assert np.all(row["growth_without"] < 0)

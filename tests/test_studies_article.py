@@ -9,15 +9,16 @@ from spinlev.fem.verification import coulomb_field
 from spinlev.geometry.scenes import Scene
 from spinlev.studies.article import CONFIGURATIONS, FLOATER, article_scene, stable
 from spinlev.studies.article import article_formulas as formulas
-from spinlev.studies.article.article import MODELS as FIELD_MODELS
-from spinlev.studies.article.article import MODELS as FORCE_MODELS
+from spinlev.studies.article.article import WEIGHT
+from spinlev.studies.article.field_components import MODELS as FIELD_MODELS
 from spinlev.studies.article.field_components import field_components
-from spinlev.studies.article.force_curve import WEIGHT, force_curve
+from spinlev.studies.article.force_curve import MODELS as FORCE_MODELS
+from spinlev.studies.article.force_curve import force_curve
 from spinlev.studies.article.levitation_distance import levitation_distance
 from spinlev.studies.catalogue import CATALOGUE
-from spinlev.studies.levitation.levitation_time import NONE
 from spinlev.studies.levitation.side_mode import side_mode
 from spinlev.studies.levitation.trajectories import trajectories
+from spinlev.studies.levitation.trajectories_figure import NONE
 from spinlev.studies.results import by_case, save_figure
 
 ROTORS = [("horizontal", 2.0), ("vertical", 14.0), ("tilt", 10.0)]

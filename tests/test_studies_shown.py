@@ -22,7 +22,7 @@ from spinlev.studies.catalogue.drawings import read_result
 from spinlev.studies.catalogue.report import LONGEST
 from spinlev.studies.command_line import api, cli
 from spinlev.studies.command_line.cli import _status
-from spinlev.studies.field_quality.field_hard_cases import field_hard_cases
+from spinlev.studies.field_quality import field_hard_cases
 from spinlev.studies.field_quality.hard_cases import CASES
 from spinlev.studies.one_scene import reaction as plate_job
 from spinlev.studies.pictures import plate_currents, question_figure

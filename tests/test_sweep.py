@@ -36,7 +36,7 @@ def root(point):
     return xr.Dataset({"root": ("case", [np.sqrt(point["x"])])}, {"x": ("case", [point["x"]])})
 
 
-STUDY = Study("roots", lambda quick: [], root, by_case, lambda result: Figure(), lambda result: [])
+STUDY = Study("roots", "square roots", lambda quick: [], root, by_case, lambda result: Figure(), lambda result: [])
 
 
 def points(*values, **more):

@@ -20,6 +20,11 @@ from .article import (
 )
 from .article_figure import TITLES, branch, name, shade, values_of
 from .article_formulas import side_radius
+from .field_components import STUDY as FIELD_COMPONENTS
+from .force_curve import STUDY as FORCE_CURVE
+from .levitation_distance import STUDY as LEVITATION_DISTANCE
+
+STUDIES = (FIELD_COMPONENTS, FORCE_CURVE, LEVITATION_DISTANCE)
 
 __all__ = [
     "CONFIGURATIONS",
@@ -31,6 +36,7 @@ __all__ = [
     "PLATE_SIZE",
     "QUICK",
     "REMANENCE",
+    "STUDIES",
     "TITLES",
     "article_scene",
     "article_table",

@@ -8,8 +8,10 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from ..results import PALETTE, chosen, panels, styled
-from .force_curve import TOLD_ANGLE, TOLD_DISTANCE, WEIGHT
+from .article import WEIGHT
 
+TOLD_ANGLE, TOLD_DISTANCE = np.radians(9.0), 0.04
+"""θ at the tipping point nearest to the rotor, in the article's text, and where that calls it almost zero, m."""
 STYLES = {"fem": "-", "dipole": "--", "semi-analytic": ":", "small angles": "-."}
 TEXTS = {
     "fem": "finite elements",

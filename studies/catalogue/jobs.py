@@ -21,7 +21,7 @@ from .entries import CATALOGUE
 def study_job(name: str, quick: bool, engine: Engine, out: Path) -> Job:
     """Compute a study of the catalogue; writes NAME.nc, NAME.png and NAME.pdf. Errors are those of `swept`."""
     study = CATALOGUE[name]
-    return _studied(name, study, study.points(quick), engine, out)
+    return _studied(study, study.points(quick), engine, out)
 
 
 def question_job(question: Question, values: dict[str, list[float]], engine: Engine, out: Path) -> Job:
@@ -34,6 +34,7 @@ def question_job(question: Question, values: dict[str, list[float]], engine: Eng
     points = combinations(values)
     question.scene(points[0])
     study = Study(
+        QUESTION,
         f"{question.ask} over {', '.join(values)}",
         lambda quick: points,
         question,
@@ -42,10 +43,11 @@ def question_job(question: Question, values: dict[str, list[float]], engine: Eng
         question_lines,
         settings=question.settings,
     )
-    return _studied(QUESTION, study, points, engine, out)
+    return _studied(study, points, engine, out)
 
 
-def _studied(name: str, study: Study, points: Sequence[Point], engine: Engine, out: Path) -> Job:
+def _studied(study: Study, points: Sequence[Point], engine: Engine, out: Path) -> Job:
+    name = study.name
     result = swept(name, study, dict(enumerate(points)), engine, out)
     path = out / f"{name}.nc"
     write_dataset(result, path)

@@ -9,18 +9,18 @@ import numpy as np
 
 from ...dynamics.slow_drift import E_FOLDS
 from ...geometry.basics import MAGNET_CONDUCTIVITY
-from ...geometry.bodies import article_rotors as rotor
+from ...geometry.bodies import Magnet, horizontal, tilt, vertical
 from ...geometry.scenes import Drag, Floater, Scene
 
 
 @dataclass(frozen=True)
-class Case:
+class DriftCase:
     """One rotor: a maker of magnets, its displacement and what may be wrong with it (m or rad), and frequencies, Hz.
 
     At `reference` it has an equilibrium for all variants; `lowest` and `highest` bound what is asked.
     """
 
-    make: Callable[..., rotor.Rotor]
+    make: Callable[..., tuple[Magnet, ...]]
     size: float
     tolerance: float
     reference: float
@@ -29,17 +29,23 @@ class Case:
 
 
 CASES = {
-    "horizontal 1 mm": Case(rotor.horizontal, 1e-3, 0.2e-3, 215.0, 110.0, 250.0),
-    "vertical 14 mm": Case(rotor.vertical, 14e-3, 0.5e-3, 78.0, 58.0, 93.0),
-    "horizontal 1.5 mm": Case(rotor.horizontal, 1.5e-3, 0.2e-3, 160.0, 95.0, 220.0),
-    "vertical 12.6 mm": Case(rotor.vertical, 12.6e-3, 0.5e-3, 70.0, 51.0, 86.0),
-    "horizontal 2 mm": Case(rotor.horizontal, 2e-3, 0.2e-3, 130.0, 80.0, 195.0),
-    "vertical 16 mm": Case(rotor.vertical, 16e-3, 0.5e-3, 95.0, 68.0, 110.0),
-    "tilt 5 deg": Case(rotor.tilt, np.radians(5), np.radians(0.5), 185.0, 130.0, 250.0),
-    "tilt 10 deg": Case(rotor.tilt, np.radians(10), np.radians(0.5), 110.0, 75.0, 180.0),
+    "horizontal 1 mm": DriftCase(horizontal, 1e-3, 0.2e-3, 215.0, 110.0, 250.0),
+    "vertical 14 mm": DriftCase(vertical, 14e-3, 0.5e-3, 78.0, 58.0, 93.0),
+    "horizontal 1.5 mm": DriftCase(horizontal, 1.5e-3, 0.2e-3, 160.0, 95.0, 220.0),
+    "vertical 12.6 mm": DriftCase(vertical, 12.6e-3, 0.5e-3, 70.0, 51.0, 86.0),
+    "horizontal 2 mm": DriftCase(horizontal, 2e-3, 0.2e-3, 130.0, 80.0, 195.0),
+    "vertical 16 mm": DriftCase(vertical, 16e-3, 0.5e-3, 95.0, 68.0, 110.0),
+    "tilt 5 deg": DriftCase(tilt, np.radians(5), np.radians(0.5), 185.0, 130.0, 250.0),
+    "tilt 10 deg": DriftCase(tilt, np.radians(10), np.radians(0.5), 110.0, 75.0, 180.0),
 }
 """Rotors of the article, and two whose displacement is chosen so that they fly where the article's did."""
 QUICK = ("horizontal 1 mm", "vertical 14 mm")
+
+
+OUTCOMES = ("contact", "fold", "instability", "levitates", "no equilibrium")
+"""How a flight may end."""
+LEVITATES, NO_EQUILIBRIUM = 3, 4
+"""Numbers of two of these."""
 
 
 @dataclass(frozen=True)
@@ -81,7 +87,7 @@ VARIANTS = {
 QUICK_VARIANTS = ("nominal", "spin -0.1", "spin +0.1", "displacement smaller", "displacement larger", "Stokes drag")
 
 
-def scene_of(case: Case, variant: Variant) -> Scene:
+def scene_of(case: DriftCase, variant: Variant) -> Scene:
     """The scene of a case at its reference frequency."""
     floater = Floater(6.35e-3, variant.remanence, 1.05, 7500.0, variant.conductivity)
     magnets = case.make(case.size + variant.misplaced * case.tolerance, 10e-3, variant.remanence, 1.0)

@@ -17,16 +17,23 @@ from ...dynamics.steady import EquilibriumError
 from ...fem.rotor_tables import FieldTable, rotor_table
 from ...geometry.basics import Array
 from ...geometry.scenes import Scene
-from ..results import Point, variable
-from .drift_cases import CASES, QUICK, QUICK_VARIANTS, VARIANTS, Variant, scene_of
+from ..results import Point, Study, variable
+from .drift_cases import (
+    CASES,
+    LEVITATES,
+    NO_EQUILIBRIUM,
+    OUTCOMES,
+    QUICK,
+    QUICK_VARIANTS,
+    VARIANTS,
+    Variant,
+    scene_of,
+)
+from .levitation_time_figure import drift_figure, drift_lines
 
 CAP, SHORTEST = 250.0, 3.0
 """The article stopped a flight after 250 s, and did not count one of less than 3 s."""
 SAMPLES = 60
-KEPT, NONE = 3, 4
-OUTCOMES = ("contact", "fold", "instability", "levitates", "no equilibrium")
-
-
 QUANTITIES = {
     "levitation_time": ("s", f"time until the loss, at most {CAP:g} s"),
     "outcome": ("1", "how it ended: " + ", ".join(f"{k} {name}" for k, name in enumerate(OUTCOMES))),
@@ -120,11 +127,22 @@ def _flights(
 
 def _row(flight: Drift | None) -> list[float]:
     if flight is None:
-        return [0.0, NONE, *[np.nan] * 7]
+        return [0.0, NO_EQUILIBRIUM, *[np.nan] * 7]
     kept = flight.ended_by in ("duration", "balance")
-    outcome = KEPT if kept else OUTCOMES.index(flight.ended_by)
+    outcome = LEVITATES if kept else OUTCOMES.index(flight.ended_by)
     rates = [flight.fall_rate(*part) for part in ((0.0, 0.9), (0.6, 0.9), (0.0, 0.3))]
     return [
         CAP if kept else min(flight.levitated_s, CAP), outcome, flight.distance[0], flight.distance[-1],
         flight.spin[-1], rates[0], rates[1] / rates[2], flight.balance_spin, flight.growth_per_s.max(),
     ]  # fmt: skip
+
+
+STUDY = Study(
+    name="levitation-time",
+    summary="levitation time against frequency by the slow drift of the floater's spin",
+    points=drift_points,
+    compute=drift_row,
+    gather=drift_result,
+    draw=drift_figure,
+    report=drift_lines,
+)

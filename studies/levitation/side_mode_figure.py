@@ -9,8 +9,9 @@ from matplotlib.figure import Figure
 
 from ..article import CONFIGURATIONS, TITLES, branch, label, name, shade, side_radius, stable, values_of
 from ..results import PALETTE, chosen, panels, styled
-from .side_mode import FLIGHT, TURNS
 
+FLOWN_HZ, TURNS = 170.0, 3
+"""Of the flight in the article's figure, for δx = 1 mm: Hz, and how many of its last turns are shown."""
 TOLD = (0.1, 0.3)
 """Radii that the article calls typical, mm."""
 
@@ -56,14 +57,14 @@ def _orbit(axes: Axes, flown: xr.Dataset) -> None:
     last = float(flown["flight_angle"][-1])
     axes.plot(np.cos(last), np.sin(last), "o", color=PALETTE[1], ms=4)
     axes.plot(1e3 * float(flown["flight_x"][-1]), 1e3 * float(flown["flight_y"][-1]), "o", color=PALETTE[0], ms=4)
-    axes.set(xlabel="x (mm)", ylabel="y (mm)", title=f"Seen from above, δx = 1 mm, {FLIGHT:g} Hz", aspect="equal")
+    axes.set(xlabel="x (mm)", ylabel="y (mm)", title=f"Seen from above, δx = 1 mm, {FLOWN_HZ:g} Hz", aspect="equal")
     axes.set(xlim=(-1.3, 1.3), ylim=(-1.3, 1.8))
     axes.legend(loc="upper right")
 
 
 def _coordinates(axes: Axes, flown: xr.Dataset, axis: str, turn: np.ufunc) -> None:
     angle = flown["flight_angle"].values
-    time = 1e3 * (angle - angle[0]) / (2 * np.pi * FLIGHT)
+    time = 1e3 * (angle - angle[0]) / (2 * np.pi * FLOWN_HZ)
     radius = 1e3 * _predicted(flown)
     axes.plot(time, turn(angle), color=PALETTE[1], label=f"${axis}_r$, rotor")
     axes.plot(time, 1e3 * flown[f"flight_{axis}"], color=PALETTE[0], label=f"${axis}_f$, floater")
@@ -75,7 +76,7 @@ def _coordinates(axes: Axes, flown: xr.Dataset, axis: str, turn: np.ufunc) -> No
 
 def _predicted(flown: xr.Dataset) -> float:
     """The article's radius at the mean distance of the flight, m."""
-    return float(side_radius(-float(flown["flight_z"].mean()), FLIGHT))
+    return float(side_radius(-float(flown["flight_z"].mean()), FLOWN_HZ))
 
 
 def side_lines(result: xr.Dataset) -> list[str]:
@@ -85,7 +86,7 @@ def side_lines(result: xr.Dataset) -> list[str]:
         flown = chosen(result, configuration="horizontal", value=1.0, model=model).isel(case=0)
         radius = 1e3 * np.hypot(flown["flight_x"].values, flown["flight_y"].values)
         lines.append(
-            f"Flight of δx = 1 mm at {FLIGHT:g} Hz, {text}: radius {radius.mean():.4f} mm "
+            f"Flight of δx = 1 mm at {FLOWN_HZ:g} Hz, {text}: radius {radius.mean():.4f} mm "
             f"({radius.min():.4f} to {radius.max():.4f}) at {-1e3 * float(flown['flight_z'].mean()):.3f} mm; "
             f"𝒢/(μ_f ω²) = {1e3 * _predicted(flown):.4f} mm."
         )

@@ -9,8 +9,11 @@ from matplotlib.figure import Figure
 
 from ..article import label
 from ..results import PALETTE, panels, styled
-from .trajectories import NONE, SHORT, TOLD
 
+TOLD = {115.0: "linear fall", 140.0: "stable", 150.0: "oscillating loss"}
+"""The article's three flights, by frequency in Hz."""
+NONE, SHORT = "no equilibrium", "lost within 3 s"
+"""Of a flight that is none."""
 LOST = (SHORT, "linear fall", "oscillating loss")
 
 

@@ -10,8 +10,7 @@ from matplotlib.figure import Figure
 from ...geometry.basics import Array
 from ..article import CONFIGURATIONS, axis_label, by_configuration, label
 from ..results import PALETTE, panels, styled
-from .sensitivity import TILTS
-from .tolerances import FRACTIONS, PARAMETERS, QUANTITIES, TILT_SPREAD
+from .tolerances import FRACTIONS, PARAMETERS, QUANTITIES, TILT_SPREAD, TILTS
 
 WORDS = {
     "measure": "displacement or tilt",

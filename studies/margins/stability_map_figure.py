@@ -9,8 +9,10 @@ from matplotlib.figure import Figure
 
 from ..article import axis_label, by_configuration, label
 from ..results import COLORS, NAMES, PALETTE, chosen, panels, styled
-from .stability_map import FACE, MODELS
 
+MODELS = ("dipole", "fem")
+FACE = -0.045
+"""Height of the plate's upper face below the rotor's origin, m: no floater that levitates touches it."""
 MARKERS = {"fold": "^", "oscillatory": "o", "real": "D", "contact": "v", "border": "_"}
 MEANINGS = {
     "fold": "fold: no equilibrium beyond",

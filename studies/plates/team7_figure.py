@@ -1,4 +1,4 @@
-"""TEAM workshop problem 7 as a study: result, table and figure."""
+"""Table and figure of TEAM workshop problem 7, from its dataset alone."""
 
 from __future__ import annotations
 
@@ -6,30 +6,9 @@ import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
 
-from ..results import PALETTE, panels, styled, variable
-from .team7 import Team7Comparison, team7
-
-CURVES = ("50 Hz, ωt = 0", "50 Hz, ωt = 90°", "200 Hz, ωt = 0", "200 Hz, ωt = 90°")
+from ..results import PALETTE, panels, styled
 
 FIELDS = ("measured", "computed")
-
-
-def team7_study(quick: bool) -> xr.Dataset:
-    """Measured and computed B_z on the line, in T, and their deviation in units of the line's peak."""
-    return team7_dataset(team7(order=2 if quick else 3))
-
-
-def team7_dataset(compared: Team7Comparison) -> xr.Dataset:
-    """A comparison with names and units."""
-    dims = ("x", "curve")
-    return xr.Dataset(
-        {
-            "measured": variable(dims, compared.measured, "T", "measured B_z"),
-            "computed": variable(dims, compared.computed, "T", "computed B_z"),
-            "deviation": variable(dims, compared.deviation, "1", "deviation over the line's peak"),
-        },
-        {"x": variable(("x",), compared.x, "m", "x"), "curve": list(CURVES)},
-    )
 
 
 def team7_lines(result: xr.Dataset) -> list[str]:
@@ -50,7 +29,7 @@ def _common_phase(result: xr.Dataset, number: int) -> str:
     left = 100 * (computed * np.exp(1j * angle) - measured) / np.abs(measured).max()
     size = np.abs([left.real, left.imag])
     return (
-        f"  {CURVES[number].split(',')[0]}, all phases turned by {np.degrees(angle):+.2f}°: "
+        f"  {str(result['curve'].values[number]).split(',')[0]}, all phases turned by {np.degrees(angle):+.2f}°: "
         f"largest {size.max():.2f}, mean {size.mean():.2f}; at 90° largest {size[1].max():.2f}"
     )
 
