@@ -20,6 +20,7 @@ from unittest import mock
 
 import meshio
 import numpy as np
+import places
 import xarray as xr
 
 from spinlev.fem.measured_maps import FieldMapError
@@ -32,7 +33,7 @@ from spinlev.fem.storage.look_through import look_through
 from spinlev.geometry.bodies import horizontal
 from spinlev.studies.command_line import cli
 
-SCENES = sorted((Path(__file__).parent.parent / "scenes").glob("*.toml"))
+SCENES = sorted(places.SCENES.glob("*.toml"))
 LONGEST = 60
 """Seconds after which an input counts as a hang."""
 PATIENCE = 3

@@ -1,15 +1,13 @@
 """The program from Python gives what the command line gives."""
 
 import re
-from pathlib import Path
 
 import numpy as np
 import pytest
+from places import HORIZONTAL
 
 from spinlev.dynamics.equilibria import find_equilibria
 from spinlev.studies.command_line import api
-
-SCENE = Path(__file__).parent.parent / "scenes" / "horizontal.toml"
 
 
 @pytest.fixture(autouse=True)
@@ -18,7 +16,7 @@ def own_cache(tmp_path, monkeypatch):
 
 
 def test_equilibria_and_field():
-    scene = api.load_scene(SCENE)
+    scene = api.load_scene(HORIZONTAL)
     found = api.equilibria(scene, "dipole", "none")
     assert found["stable"].values[0] == 1
     assert found["position"].attrs["units"] == "m"
@@ -31,28 +29,28 @@ def test_equilibria_and_field():
 
 
 def test_a_flight_and_its_figure():
-    flight = api.simulate(api.load_scene(SCENE), 0.05, "dipole", "none")
+    flight = api.simulate(api.load_scene(HORIZONTAL), 0.05, "dipole", "none")
     assert flight.attrs["ended_by"] == "duration"
     assert float(flight["time"][-1]) == 0.05
     assert set(api.draw(flight)) == {"trajectory"}
 
 
 def test_wrong_input(tmp_path):
-    scene = api.load_scene(SCENE)
+    scene = api.load_scene(HORIZONTAL)
     with pytest.raises(api.InputError, match=r"must be one of .*dipole-validity"):
         api.run_study("no-such-study", out=tmp_path)
     with pytest.raises(api.InputError, match="--rtol"):
         api.rotor_table(scene, rtol=2.0)
     with pytest.raises(api.InputError, match="--workers"):
         api.run_study("team7", workers=0, out=tmp_path)
-    resting = api.parse_scene(SCENE.read_text(), changes={"frequency_hz": 0.0})
+    resting = api.parse_scene(HORIZONTAL.read_text(), changes={"frequency_hz": 0.0})
     with pytest.raises(api.EquilibriumError, match="Earnshaw"):
         api.equilibria(resting, "dipole", "none")
 
 
 def test_stability_of_the_point_where_a_flight_begins():
     """Growth and frequencies are those of the first equilibrium; the figure shows each mode."""
-    scene = api.load_scene(SCENE)
+    scene = api.load_scene(HORIZONTAL)
     small = api.stability(scene, "dipole", "none")
     first = api.equilibria(scene, "dipole", "none").isel(equilibrium=0)
     np.testing.assert_allclose(small["mode_frequency"], first["mode_frequency"])
@@ -65,14 +63,14 @@ def test_stability_of_the_point_where_a_flight_begins():
 
 
 def test_no_equilibrium_is_told():
-    weak = api.parse_scene(SCENE.read_text(), changes={"floater.remanence_T": 1e-3})
+    weak = api.parse_scene(HORIZONTAL.read_text(), changes={"floater.remanence_T": 1e-3})
     with pytest.raises(api.EquilibriumError, match="At 110 Hz the floater has no equilibrium with body spin 0"):
         api.stability(weak, "dipole", "none")
 
 
 def test_objects_print_what_they_are():
     """A notebook shows bodies, places and errors, not memory addresses or whole arrays."""
-    scene = api.load_scene(SCENE)
+    scene = api.load_scene(HORIZONTAL)
     assert repr(scene).splitlines() == [
         "Scene at 110 Hz, gravity (0, 0, -9.81) m/s², drag 2.2e-06 N s/m, 1.2e-10 N m s",
         "  Magnet (10, 10, 10) mm at (2, 0, 0) mm, (1.305, 0, 0) T, μr 1.05",
@@ -82,7 +80,7 @@ def test_objects_print_what_they_are():
     for part in (*scene.rotor, scene.floater, scene.plate):
         assert f"  {part!r}" in repr(scene).splitlines()
     assert re.search(r"\n  \d+ elements of order \d, \d+ unknowns, made in", repr(api.rotor_table(scene, "fem", 1e-2)))
-    lowered = api.load_scene(SCENE.with_name("tilt-over-plate.toml"))
+    lowered = api.load_scene(HORIZONTAL.with_name("tilt-over-plate.toml"))
     assert "lowered by 55 mm at 10 mm/s from 3 s on" in repr(lowered)
     table = api.rotor_table(scene, "cuboid")
     assert repr(table).startswith("RotorTable 'cuboid': 1 closed form\n  relative error 3.0e-02 of B")
@@ -100,8 +98,8 @@ def test_objects_print_what_they_are():
 
 def test_the_text_of_a_changed_scene_says_what_was_changed():
     """It is what a result keeps of its scene."""
-    changed = api.parse_scene(SCENE.read_text(), changes={"frequency_hz": 95.0, "floater.remanence_T": 1.3})
+    changed = api.parse_scene(HORIZONTAL.read_text(), changes={"frequency_hz": 95.0, "floater.remanence_T": 1.3})
     assert changed.frequency == 95.0
-    assert changed.text.startswith(SCENE.read_text())
+    assert changed.text.startswith(HORIZONTAL.read_text())
     assert changed.text.endswith("# changed: frequency_hz = 95.0\n# changed: floater.remanence_T = 1.3")
     assert api.parse_scene(changed.text, changes={"frequency_hz": 95.0}).frequency == 95.0

@@ -1,11 +1,11 @@
 """The benchmarks' report and comparison, on made-up measurements whose ratios and exponents are known."""
 
 import runpy
-from pathlib import Path
 
 import pytest
+from places import ROOT
 
-RATIOS = runpy.run_path(str(Path(__file__).parent.parent / "benchmarks" / "ratios.py"))
+RATIOS = runpy.run_path(str(ROOT / "benchmarks" / "ratios.py"))
 
 
 def saved(factor=1.0, power=1.5):

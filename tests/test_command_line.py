@@ -3,12 +3,11 @@
 import json
 import subprocess
 import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
+from places import SCENES
 
-SCENES = Path(__file__).parent.parent / "scenes"
 NO_PLATE = ("--plate-model", "none")
 GOOD = (SCENES / "horizontal.toml").read_text()
 

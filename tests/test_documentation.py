@@ -3,11 +3,10 @@
 import re
 import runpy
 import tomllib
-from pathlib import Path
 
 import pytest
+from places import ROOT
 
-ROOT = Path(__file__).parent.parent
 PAGES = sorted([ROOT / "README.md", *(ROOT / "docs").glob("*.md")])
 NAMED = re.compile(r"`((?:geometry|fem|dynamics|studies|tests|benchmarks|scenes|docs)/[\w/.-]+\.(?:py|toml|md))")
 

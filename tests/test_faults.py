@@ -17,6 +17,7 @@ from pathlib import Path
 import h5py
 import meshio
 import numpy as np
+import places
 import pytest
 import xarray as xr
 
@@ -26,8 +27,7 @@ from spinlev.fem.measured_maps.readers import read_field_map
 from spinlev.fem.storage import foreign, read_checked, replacing, write_checked, write_whole
 from spinlev.studies.command_line.cli import _status
 
-SCENE = str(Path(__file__).parent.parent / "scenes" / "horizontal.toml")
-OVER_PLATE = str(Path(__file__).parent.parent / "scenes" / "tilt-over-plate.toml")
+SCENE, OVER_PLATE = str(places.HORIZONTAL), str(places.OVER_PLATE)
 DIPOLE = ("--model", "dipole", "--plate-model", "none")
 FIELD = ("field", SCENE, "--points", "points.csv", "--model", "fem", "--rtol", "1e-2")
 TIMES = ("seconds", "realtime_factor", "tables_from_cache")

@@ -11,12 +11,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from places import HORIZONTAL
 
 from spinlev.fem.storage import read_checked
 
 pytestmark = pytest.mark.slow
 
-SCENE = str(Path(__file__).parent.parent / "scenes" / "horizontal.toml")
+SCENE = str(HORIZONTAL)
 CALL = "import sys; from spinlev.studies.command_line.start import main; sys.argv[0] = 'spinlev'; main()"
 DIPOLE = ("--model", "dipole", "--plate-model", "none")
 FIELD = ("field", SCENE, "--points", "points.csv", "--model", "fem", "--rtol", "3e-5", "--json")

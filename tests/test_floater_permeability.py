@@ -1,10 +1,9 @@
 """Study of the floater's permeability: its pieces fast, the whole of it slow."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 import xarray as xr
+from places import SCENES
 
 from spinlev.dynamics.equilibria import PerturbedBalance
 from spinlev.dynamics.steady import EVERY, solve
@@ -13,8 +12,6 @@ from spinlev.fem.rotor_tables import rotor_table
 from spinlev.geometry.scenes import Drag, Floater, Scene, load_scene
 from spinlev.studies.levitation.floater_permeability import LEVELS, floater_permeability, missed, sufficient
 from spinlev.studies.levitation.floater_permeability_figure import floater_figure, floater_lines
-
-SCENES = Path(__file__).parent.parent / "scenes"
 
 
 @pytest.fixture(scope="module")

@@ -1,18 +1,17 @@
 """Every example of the gallery runs as it stands, and one number of each is right."""
 
 import runpy
-from pathlib import Path
 
 import matplotlib as mpl
 import numpy as np
 import pytest
+from places import DOCS
 
 from spinlev.geometry.basics import MU_0
 from spinlev.geometry.scenes import load_scene
 from spinlev.studies.catalogue import CATALOGUE
 from spinlev.studies.results.figures import STYLE
 
-DOCS = Path(__file__).parent.parent / "docs"
 MOMENT = load_scene(DOCS.parent / "scenes" / "horizontal.toml").floater.moment * np.sin(np.radians(5.0))
 SLOW = 200 * np.pi * MOMENT**2 * MU_0**2 * 3.5e7 / (64 * np.pi) * (1 / 0.015 - 1 / 0.045) * 1e6
 """Braking torque at 100 Hz if it went on as at rest, closed form of an infinite slab, µN m."""

@@ -4,6 +4,7 @@ import ast
 from pathlib import Path
 
 import pytest
+from places import ROOT
 
 FLOORS = {
     "geometry": ["basics", "bodies", "scenes", "meshes"],
@@ -20,7 +21,6 @@ FLOORS = {
 ORDER = [(floor, room) for floor, rooms in FLOORS.items() for room in rooms]
 LARGEST = 12
 """Modules in a room, its face not counted."""
-ROOT = Path(__file__).parent.parent
 SOURCES = [path for floor in FLOORS for path in sorted((ROOT / floor).glob("*/*.py"))]
 
 

@@ -2,12 +2,12 @@
 
 import math
 import re
-from pathlib import Path
 
 import numpy as np
 import pytest
 from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
+from places import HORIZONTAL
 
 from spinlev.geometry.basics import InputError
 from spinlev.geometry.scenes import Scene, SceneError, parse_scene
@@ -16,7 +16,7 @@ from spinlev.studies.sweeps import combinations, parse_vary
 from spinlev.studies.sweeps.vary import MOST
 from spinlev.studies.terminal import Tables, positive, three_numbers
 
-GOOD = (Path(__file__).parent.parent / "scenes" / "horizontal.toml").read_text()
+GOOD = HORIZONTAL.read_text()
 NUMBERS = dict(re.findall(r"^(\w+) = (-?[\d.e+-]+)", GOOD, re.MULTILINE))
 GRAMMAR = re.compile(r"(\S+: )?Input .+ must .+; .+", re.DOTALL)
 ANY_TEXT = st.text(max_size=40)

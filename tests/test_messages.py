@@ -8,13 +8,12 @@ import ast
 import builtins
 import re
 from importlib import import_module
-from pathlib import Path
 
 import pytest
+from places import ROOT
 
 from spinlev.geometry.basics import ComputationError
 
-ROOT = Path(__file__).parent.parent
 FILES = sorted(path for folder in ("geometry", "fem", "dynamics", "studies") for path in (ROOT / folder).rglob("*.py"))
 INPUT = re.compile(r"(\{\}: )?Input \S.* must .+; instead[ :].+", re.DOTALL)
 SENTENCE = re.compile(r"[A-Z].*[.}]", re.DOTALL)

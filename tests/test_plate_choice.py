@@ -1,17 +1,17 @@
 """Which model of the plate a motion takes: by what would be felt, and by what lies beyond the edges."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
+from places import HORIZONTAL
 
 from spinlev.geometry.basics import Box
 from spinlev.geometry.scenes import Plate, load_scene
 from spinlev.studies.one_scene import plate_job
 from spinlev.studies.one_scene.plate_shelf import resolve_plate_model
 
-SCENE = load_scene(Path(__file__).parent.parent / "scenes" / "horizontal.toml")
+SCENE = load_scene(HORIZONTAL)
 PLACE = np.array([0.0, 0.0, -0.02])
 
 

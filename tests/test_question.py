@@ -10,6 +10,7 @@ import pytest
 import xarray as xr
 from hypothesis import given
 from hypothesis import strategies as st
+from places import HORIZONTAL
 
 from spinlev.geometry.basics import InputError
 from spinlev.geometry.scenes import SceneError, load_scene, parse_scene
@@ -18,7 +19,7 @@ from spinlev.studies.command_line.cli import _status
 from spinlev.studies.sweeps import combinations, parse_vary
 from spinlev.studies.terminal import Tables
 
-SCENE = str(Path(__file__).parent.parent / "scenes" / "horizontal.toml")
+SCENE = str(HORIZONTAL)
 FAST = ("--plate-model", "none", "--model", "dipole", "--workers", "1", "--json")
 
 

@@ -1,14 +1,12 @@
 """Scene files: what loads, and what is said of what does not."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
+from places import SCENES
 
 from spinlev.geometry.basics import MU_0
 from spinlev.geometry.scenes import AbsoluteStart, OffsetStart, SceneError, load_scene, parse_scene
 
-SCENES = Path(__file__).parent.parent / "scenes"
 GOOD = (SCENES / "horizontal.toml").read_text()
 
 

@@ -2,17 +2,17 @@
 
 import re
 import shutil
-from pathlib import Path
 
 import matplotlib.pyplot as plt
 import numpy as np
 import pytest
+from places import QUICK
 
 from spinlev.studies.catalogue import CATALOGUE, cite_job, figures_of, report_job
 from spinlev.studies.catalogue.drawings import read_result
 from spinlev.studies.results import drawn
 
-STORED = sorted((Path(__file__).parent / "data" / "quick").glob("*.nc"))
+STORED = sorted(QUICK.glob("*.nc"))
 
 
 @pytest.mark.parametrize("path", STORED, ids=lambda path: path.stem)

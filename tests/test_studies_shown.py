@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 import pyvista as pv
 import xarray as xr
+from places import QUICK, SCENES
 
 from spinlev.dynamics.equilibria import find_equilibria
 from spinlev.dynamics.motion import State
@@ -29,8 +30,6 @@ from spinlev.studies.pictures import plate_currents, question_figure
 from spinlev.studies.pictures.still import View, add_floater, add_plate, new_plotter
 from spinlev.studies.results import write_dataset
 from spinlev.studies.terminal import Tables
-
-SCENES = Path(__file__).parent.parent / "scenes"
 
 
 @pytest.fixture(scope="module")
@@ -175,7 +174,7 @@ def test_a_study_on_the_command_line_and_in_python_is_what_was_stored(tmp_path, 
     answer = json.loads(said.getvalue())
     assert (answer["study"], answer["failed_points"]) == (name, [])
     assert {Path(file).suffix for file in answer["figures"]} == {".png", ".pdf"}
-    stored = read_result(Path(__file__).parent / "data" / "quick" / f"{name}.nc")
+    stored = read_result(QUICK / f"{name}.nc")
     for found in (read_result(Path(answer["result"])), api.run_study(name, out=tmp_path / "again")):
         for part in ("attracting", "repelling", "polar_angle"):
             np.testing.assert_allclose(found[part], stored[part], atol=1e-3 * float(np.abs(stored[part]).max()))
@@ -194,7 +193,7 @@ def test_what_nobody_foresaw_ends_in_one_message(monkeypatch, capsys):
     monkeypatch.setattr(cli, "app", fails)
     assert _status([], io.StringIO()) == 1
     said = capsys.readouterr().err
-    assert f"failed at tests/{Path(__file__).name}:" in said
+    assert f"failed at {Path(__file__).parent.name}/{Path(__file__).name}:" in said
     assert said.strip().endswith("ZeroDivisionError: a mistake of ours")
     stopped = threading.Event()
     stopped.set()
