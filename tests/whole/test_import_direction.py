@@ -4,7 +4,7 @@ import ast
 from pathlib import Path
 
 import pytest
-from places import ROOT
+from places import ROOT, TESTS
 
 FLOORS = {
     "geometry": ["basics", "bodies", "scenes", "meshes"],
@@ -41,6 +41,14 @@ def test_the_rooms_are_known():
     there = {tuple(path.relative_to(ROOT).parts[:-1]) for path in SOURCES}
     assert there == set(ORDER)
     assert [path for floor in FLOORS for path in (ROOT / floor).glob("*.py") if path.name != "__init__.py"] == []
+
+
+def test_the_tests_mirror_the_rooms():
+    """Each test in its room's folder, in its floor's if several rooms are in it, or in `whole`; names are unique."""
+    files = list(TESTS.rglob("test_*.py"))
+    known = {*ORDER, *((floor,) for floor in FLOORS), ("whole",)}
+    assert {path.relative_to(TESTS).parts[:-1] for path in files} <= known
+    assert len({path.name for path in files}) == len(files)
 
 
 @pytest.mark.parametrize("path", SOURCES, ids=lambda p: "/".join(p.relative_to(ROOT).parts))
