@@ -1,6 +1,6 @@
 """A field without sources in a sphere: its expansion about the centre, and what it does to the sphere's sources.
 
-With the harmonics of `harmonics`, lengths in radii of the sphere, r̃ = (r - center)/radius, and B = -∇̃ u, the incident
+With the harmonics of `solid`, lengths in radii of the sphere, r̃ = (r - center)/radius, and B = -∇̃ u, the incident
 potential is u = Σ conj a_lm Υ_lm(r̃) and that of the sphere's own sources u = Σ c_lm Θ_lm(r̃). Their energy is
 
     U = (4π radius³/μ0) Σ_lm a_lm c_lm,        F = -∇U with the sources carried along,

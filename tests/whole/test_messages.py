@@ -21,9 +21,9 @@ OTHER_FORMS = {
     "Input {} must be a known key; {}.": "of a scene file: the likeliest keys instead of a value",
 }
 RELAYED = {
-    "faults": "scene_file: found by the rules between keys and by overlaps, whose sentences are literals here too",
-    "[describe_fault(detail) for detail in error.errors()]": "scene_file: sentences of scene_faults",
-    "refusal(plate, frequency, rtol, best)": "plate: a sentence of plate_limits",
+    "faults": "scenes/file: found by the rules between keys and by overlaps, whose sentences are literals here too",
+    "[describe_fault(detail) for detail in error.errors()]": "scenes/file: sentences of scenes/faults",
+    "refusal(plate, frequency, rtol, best)": "plate_network/reaction: a sentence of limits",
     "str(error)": "an error's own sentence, with another class",
     "str(path)": "atomic: the system's own error, with the name of the file",
     "way_out(scene, table, known)": "simulation: says what would levitate",
