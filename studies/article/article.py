@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from ...fem.rotor_tables import RotorTable, cached_rotor_table, rotor_table
 from ...geometry.bodies import Magnet, horizontal, tilt, vertical
 from ...geometry.scenes import Drag, Floater, Scene
-from ..results import Point, chosen
+from ..results import Point, cases_with
 from ..terminal import note
 
 EDGE, REMANENCE, PERMEABILITY = 10e-3, 1.305, 1.05
@@ -77,7 +77,7 @@ QUICK = {"horizontal": (1.0,), "vertical": (14.0,), "tilt": (10.0,)}
 """One rotor of each configuration, for the quick settings of studies."""
 
 
-def levitated(quick: bool) -> list[Point]:
+def levitated_rotors(quick: bool) -> list[Point]:
     """A point for each rotor that levitated in the experiment; `quick` has one of each configuration."""
     return [
         {"configuration": configuration, "measure": measure}
@@ -118,7 +118,7 @@ def article_table(scene: Scene, model: str) -> RotorTable:
     return cached_rotor_table(scene.rotor, model, RTOL, note, FLOATER.radius)[0]
 
 
-def label(configuration: str, value: float) -> str:
+def rotor_label(configuration: str, value: float) -> str:
     """A rotor's parameter with its symbol and unit."""
     kind = CONFIGURATIONS[configuration]
     return f"{kind.symbol} = {value:g}{'' if kind.unit == '°' else ' '}{kind.unit}"
@@ -133,11 +133,11 @@ def axis_label(configuration: str) -> str:
 def by_configuration(result: xr.Dataset) -> Iterator[tuple[str, xr.Dataset]]:
     """Each configuration that a joined result has, with its rotors by ascending displacement or tilt."""
     for configuration in CONFIGURATIONS:
-        part = chosen(result, configuration=configuration).sortby("measure")
+        part = cases_with(result, configuration=configuration).sortby("measure")
         if part.sizes["case"]:
             yield configuration, part
 
 
-def stable(growth: ArrayLike) -> NDArray[np.bool_]:
+def stable_in_flight(growth: ArrayLike) -> NDArray[np.bool_]:
     """Where no disturbance grows e-fold within `FLIGHT`; False where there is no equilibrium (NaN)."""
     return np.asarray(np.asarray(growth) <= 1 / FLIGHT)

@@ -13,7 +13,7 @@ from ...fem.rotor_tables import RotorTable
 from ...geometry.basics import Array
 from ...geometry.scenes import Scene
 from ..results import Point, Study, by_case, one_case, variable
-from .article import CONFIGURATIONS, HIGHEST, LOWEST, QUICK, WEIGHT, article_scene, article_table, stable
+from .article import CONFIGURATIONS, HIGHEST, LOWEST, QUICK, WEIGHT, article_scene, article_table, stable_in_flight
 from .article_formulas import analytic_distance, balanced
 from .levitation_distance_figure import distance_figure, distance_lines
 
@@ -73,7 +73,7 @@ def _in_field(point: Point, grid: Array) -> xr.Dataset:
     distance, error, growth, angle = (rows[..., k].T for k in range(4))
     fold = branch.fold
     flown = found[0] if point["model"] == FLOWN else []
-    known = [p for p in flown if p is not None and stable(p.growth_per_s)]
+    known = [p for p in flown if p is not None and stable_in_flight(p.growth_per_s)]
     places = np.unique(np.linspace(0, len(known) - 1, point["flights"] if known else 0).astype(int))
     flights = np.full((3, point["flights"]), np.nan)
     for k, place in enumerate(places):

@@ -23,7 +23,7 @@ from ...dynamics.steady import EquilibriumError, named_modes
 from ...fem.rotor_tables import cached_rotor_table, rotor_table
 from ...geometry.basics import Array
 from ...geometry.scenes import Scene
-from ..article import article_scene, levitated
+from ..article import article_scene, levitated_rotors
 from ..results import Point, Study, by_case, variable
 from ..terminal import note
 from .dipole_vs_fem_figure import dipole_figure
@@ -45,7 +45,7 @@ def points(quick: bool) -> list[Point]:
     settings = (
         {"steps": 1, "orders": [1, 2], "limits": False} if quick else {"steps": 4, "orders": [2, 3], "limits": True}
     )
-    return [{**point, **settings} for point in levitated(quick)]
+    return [{**point, **settings} for point in levitated_rotors(quick)]
 
 
 @dataclass(frozen=True, eq=False)

@@ -14,7 +14,7 @@ from ...dynamics.equilibria import find_equilibria
 from ...dynamics.motion import Rates
 from ...fem.rotor_tables import rotor_table
 from ...geometry.basics import Array
-from ..article import levitated
+from ..article import levitated_rotors
 from ..results import Point, Study, by_case, variable
 from .sensitivity_figure import sensitivity_figure, sensitivity_lines
 from .tolerances import (
@@ -41,7 +41,9 @@ def points(quick: bool) -> list[Point]:
 
     One step alone gives derivatives without an estimate of their error, which is then NaN.
     """
-    return [{**point, "samples": 4 if quick else 32, "steps": [1] if quick else [1, 2]} for point in levitated(quick)]
+    return [
+        {**point, "samples": 4 if quick else 32, "steps": [1] if quick else [1, 2]} for point in levitated_rotors(quick)
+    ]
 
 
 def derivatives(base: Nominal, factors: Sequence[int] = (1, 2)) -> tuple[Array, Array]:

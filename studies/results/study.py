@@ -26,7 +26,7 @@ def one_case(point: Point, dataset: xr.Dataset) -> xr.Dataset:
     return dataset.assign(labels).expand_dims("case")
 
 
-def chosen(result: xr.Dataset, **labels: object) -> xr.Dataset:
+def cases_with(result: xr.Dataset, **labels: object) -> xr.Dataset:
     """The cases of a joined result with the given labels."""
     found = np.ones(result.sizes["case"], bool)
     for name, wanted in labels.items():

@@ -7,7 +7,7 @@ from spinlev.dynamics.equilibria import find_equilibria
 from spinlev.fem.rotor_tables import rotor_table
 from spinlev.fem.verification import coulomb_field
 from spinlev.geometry.scenes import Scene
-from spinlev.studies.article import CONFIGURATIONS, FLOATER, article_scene, stable
+from spinlev.studies.article import CONFIGURATIONS, FLOATER, article_scene, stable_in_flight
 from spinlev.studies.article import article_formulas as formulas
 from spinlev.studies.article.article import WEIGHT
 from spinlev.studies.article.field_components import MODELS as FIELD_MODELS
@@ -90,7 +90,7 @@ def test_levitation_distance_is_that_of_the_survey(distances):
         here = found.sel(side=side, frequency=frequency)
         assert float(here["distance"]) == pytest.approx(-equilibrium.position[2], rel=1e-10)
         assert float(here["growth"]) == pytest.approx(equilibrium.growth_per_s, abs=1e-5)
-        assert bool(stable(here["growth"].values)) == (side == "near") == equilibrium.stable
+        assert bool(stable_in_flight(here["growth"].values)) == (side == "near") == equilibrium.stable
     assert 145.0 < float(found["fold_frequency"]) < 180.0
     assert np.isnan(found["distance"].sel(frequency=145.0)).all()
 

@@ -10,7 +10,7 @@ from places import QUICK
 
 from spinlev.studies.catalogue import CATALOGUE, cite_job, figures_of, report_job
 from spinlev.studies.catalogue.drawings import read_result
-from spinlev.studies.results import drawn
+from spinlev.studies.results import figure_bytes
 
 STORED = sorted(QUICK.glob("*.nc"))
 
@@ -27,7 +27,7 @@ def test_a_stored_result_is_drawn_and_reported_from_its_file_alone(path):
             for label in (axes.get_xlabel(), axes.get_ylabel()):
                 assert not re.search(r"\bnan\b|None", label)
         assert any(axes.get_xlabel() or axes.get_title() for axes in shown)
-        assert drawn(figure, "png").startswith(b"\x89PNG")
+        assert figure_bytes(figure, "png").startswith(b"\x89PNG")
     finally:
         plt.close(figure)
     lines = CATALOGUE[path.stem].report(result)

@@ -14,7 +14,7 @@ from places import HORIZONTAL
 
 from spinlev.geometry.basics import InputError
 from spinlev.geometry.scenes import SceneError, load_scene, parse_scene
-from spinlev.studies.catalogue.cite import used
+from spinlev.studies.catalogue.cite import used_references
 from spinlev.studies.command_line.cli import _status
 from spinlev.studies.sweeps import combinations, parse_vary
 from spinlev.studies.terminal import Tables
@@ -191,7 +191,7 @@ def test_a_flight_is_shown_and_reported(spinlev, tmp_path, monkeypatch):
     ],
 )
 def test_what_is_cited(attributes, there, absent):
-    keys = used(xr.Dataset(attrs=attributes))
+    keys = used_references(xr.Dataset(attrs=attributes))
     assert set(there) <= set(keys)
     assert not set(absent) & set(keys)
 
