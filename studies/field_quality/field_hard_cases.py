@@ -16,7 +16,7 @@ import xarray as xr
 
 from ...fem.closed_forms import added_by_closed_form, carrier, oblique_contact
 from ...fem.magnetostatics import Refinement, solve_rotor
-from ...fem.rotor_tables import Accuracy, AccuracyWarning, RotorTable, fem_table, shell, typical_field
+from ...fem.rotor_tables import Accuracy, AccuracyWarning, RotorTable, fem_table, points_around, typical_field
 from ...fem.verification import coulomb_field
 from ...geometry.basics import Array
 from ...geometry.bodies import cut_magnets
@@ -59,7 +59,7 @@ def case_errors(case: HardCase, places: int) -> xr.Dataset:
         table = fem_table(case.magnets, Accuracy(RTOL, case.nearest))
     seconds = time.process_time() - start
     distance = np.geomspace(case.clearance, FARTHEST, places)
-    points = [extensions(case, d) if case.extensions else shell(case.magnets, d) for d in distance]
+    points = [extensions(case, d) if case.extensions else points_around(case.magnets, d) for d in distance]
     before, truth = reference(case, np.concatenate(points))
     ends = np.cumsum([len(p) for p in points])[:-1]
     rows = [

@@ -4,12 +4,12 @@ import heyoka as hy
 import numpy as np
 import pytest
 
-from spinlev.dynamics.motion import Parameter, Shift, blended, nodes
+from spinlev.dynamics.motion import Parameter, Translation, blend_tables, chebyshev_points
 from spinlev.fem.harmonics import MultipoleExpansion
 
 RADIUS = 8e-3
 CENTER = np.array([1e-3, -2e-3, 3e-3])
-MEASURES = nodes(10e-3, 20e-3, 4)
+MEASURES = chebyshev_points(10e-3, 20e-3, 4)
 
 
 def coefficients(measure):
@@ -34,7 +34,7 @@ def test_nodes_are_chebyshevs():
 @pytest.mark.parametrize("measure", [10e-3, 12.3e-3, MEASURES[1], 20e-3])
 def test_four_tables_give_a_cubic_exactly(measure):
     """Field and gradient to round-off: Lagrange's polynomials of four nodes hold cubics."""
-    ((blend, move),) = blended(tables(), MEASURES, [(CENTER, None)])
+    ((blend, move),) = blend_tables(tables(), MEASURES, [(CENTER, None)])
     assert move is None
     variables = hy.make_vars("x", "y", "z")
     b, gradient = blend.expressions(variables)
@@ -50,12 +50,12 @@ def test_four_tables_give_a_cubic_exactly(measure):
 
 
 def test_a_magnet_that_moves_takes_its_expansion_along():
-    move = Shift(np.array([0.0, 0.0, 1.0]))
-    ((blend, moved),) = blended(tables(lambda m: CENTER + move.way_of(float(m))), MEASURES, [(CENTER, move)])
+    move = Translation(np.array([0.0, 0.0, 1.0]))
+    ((blend, moved),) = blend_tables(tables(lambda m: CENTER + move.way_of(float(m))), MEASURES, [(CENTER, move)])
     assert moved is move
     assert all(np.array_equal(expansion.center, CENTER) for expansion in blend.expansions)
 
 
 def test_magnets_cut_into_pieces_are_refused():
     with pytest.raises(ValueError, match=r"one expansion about each magnet's centre; instead it has 1 for 2 magnets"):
-        blended(tables(), MEASURES, [(CENTER, None), (CENTER, None)])
+        blend_tables(tables(), MEASURES, [(CENTER, None), (CENTER, None)])

@@ -8,11 +8,11 @@ from spinlev.fem.harmonics import (
     Ball,
     derivative,
     dipole_sources,
-    force,
     from_magnetization,
     moments_of_magnetization,
+    multipole_force,
+    multipole_torque,
     outer_sums,
-    torque,
     uniform_moments,
 )
 from spinlev.fem.harmonics.interior import field_at_center, moment
@@ -86,8 +86,8 @@ def test_sphere_in_a_uniform_field(permeability):
     remanent = body.remanence * body.volume / MU_0 * 3 / (permeability + 2) * DIRECTION
     induced = 3 * body.volume * (permeability - 1) / (permeability + 2) * field / MU_0
     np.testing.assert_allclose(moment(sources, BALL), remanent + induced, rtol=1e-13)
-    assert np.abs(force(incident, sources, BALL)).max() == 0.0
-    np.testing.assert_allclose(torque(incident, sources, BALL), np.cross(remanent, field), rtol=1e-12)
+    assert np.abs(multipole_force(incident, sources, BALL)).max() == 0.0
+    np.testing.assert_allclose(multipole_torque(incident, sources, BALL), np.cross(remanent, field), rtol=1e-12)
     b, h = inner_field(field, permeability, body.remanence * DIRECTION)
     np.testing.assert_allclose((b - h) * body.volume / MU_0, remanent + induced, rtol=1e-12)
 
@@ -118,7 +118,7 @@ def test_force_between_a_dipole_and_a_permeable_sphere(permeability, distance):
         value = 0.7 * np.eye(3)[axis]
         place = BALL.center + np.array([0, 0, distance])
         incident = from_magnetization(place[None], MU_0 * value[None], BALL, degree)
-        found = force(incident, induced_sources(incident, permeability), BALL)
+        found = multipole_force(incident, induced_sources(incident, permeability), BALL)
         expected = MU_0 * 0.49 / (4 * np.pi) * series(permeability, distance, weight)
         np.testing.assert_allclose(found, [0, 0, expected], rtol=1e-11, atol=1e-11 * expected)
 
@@ -133,7 +133,7 @@ def test_infinite_permeability_has_the_image_of_a_neutral_conductor():
 
     place = BALL.center + np.array([0, 0, distance])
     incident = from_magnetization(place[None], np.array([[0, 0, MU_0 * value]]), BALL, 70)
-    found = force(incident, induced_sources(incident, 1e13), BALL)
+    found = multipole_force(incident, induced_sources(incident, 1e13), BALL)
     assert found[2] == pytest.approx(energy(distance + 1j * step).imag / step, rel=1e-10)
 
 
@@ -147,8 +147,12 @@ def test_force_and_torque_against_maxwell_stress():
         return field_of_dipoles(points, places, moments) + outer_field(sources, BALL, points)
 
     stress = maxwell_stress(field, BALL.center, 1.2 * RADIUS, 60)
-    np.testing.assert_allclose(force(incident, sources, BALL), stress[0], rtol=0, atol=1e-9 * np.abs(stress[0]).max())
-    np.testing.assert_allclose(torque(incident, sources, BALL), stress[1], rtol=0, atol=1e-9 * np.abs(stress[1]).max())
+    np.testing.assert_allclose(
+        multipole_force(incident, sources, BALL), stress[0], rtol=0, atol=1e-9 * np.abs(stress[0]).max()
+    )
+    np.testing.assert_allclose(
+        multipole_torque(incident, sources, BALL), stress[1], rtol=0, atol=1e-9 * np.abs(stress[1]).max()
+    )
 
 
 # both bodies

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from spinlev.fem.harmonics import uniform_moments
-from spinlev.fem.rotor_tables import Accuracy, distant, rotor_table, shell, typical_field
+from spinlev.fem.rotor_tables import Accuracy, distant, points_around, rotor_table, typical_field
 from spinlev.geometry.bodies import horizontal
 from spinlev.geometry.scenes import Drag, Floater, Scene
 from spinlev.studies.one_scene.plate_shelf import table_in_flight
@@ -24,7 +24,7 @@ def test_fewer_coefficients_do_from_farther_on():
     exact = uniform_moments(ROTOR[0], 49)
     assert coefficients(table) < coefficients(whole) / 2
     for offset in (CONTACT, FAR, 1.7 * FAR, 5 * FAR):
-        points = shell(ROTOR, offset)
+        points = points_around(ROTOR, offset)
         wrong = np.linalg.norm(sum(e.evaluate(points)[0] for e in table.expansions) - exact.evaluate(points)[0], axis=1)
         error = table.absolute_error(points)[0]
         assert error == pytest.approx(wrong, rel=1e-3, abs=1e-4 * error.max())  # what is cut off is known
@@ -42,8 +42,8 @@ def test_a_flight_takes_the_table_for_its_place():
     scene = Scene(110.0, ROTOR, Floater(CONTACT, 1.305, 1.0, 7500.0), Drag(0.0, 0.0))
     whole = rotor_table(ROTOR, "moments", RTOL, CONTACT)
     far, near = (table_in_flight(scene, whole, np.array([2e-3, 0.0, z]), RTOL) for z in (-22e-3, -13e-3))
-    points = shell(ROTOR, 14e-3)
+    points = points_around(ROTOR, 14e-3)
     assert np.all(far.absolute_error(points)[0] <= RTOL * typical_field(ROTOR, points))
     assert coefficients(far) < coefficients(near) <= coefficients(whole)
-    points = shell(ROTOR, CONTACT)
+    points = points_around(ROTOR, CONTACT)
     assert np.all(near.absolute_error(points)[0] <= 1.5 * RTOL * typical_field(ROTOR, points))

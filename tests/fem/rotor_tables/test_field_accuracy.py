@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from spinlev.fem.closed_forms import added_by_closed_form, carrier
-from spinlev.fem.harmonics import trimmed, uniform_moments
+from spinlev.fem.harmonics import trimmed_expansions, uniform_moments
 from spinlev.fem.magnetostatics import Refinement, solve_rotor
-from spinlev.fem.rotor_tables import Accuracy, AccuracyWarning, RotorTable, fem_table, places, rotor_table
+from spinlev.fem.rotor_tables import Accuracy, AccuracyWarning, RotorTable, error_points, fem_table, rotor_table
 from spinlev.geometry.basics import Box
 from spinlev.geometry.bodies import Magnet, cut_magnets, horizontal, vertical
 from spinlev.geometry.meshes import MeshSettings
@@ -82,7 +82,7 @@ def test_default_table_meets_its_target(known):
     """μr = 1.05: 1e-5 in B at all places, which begin 8 mm from the faces, 13 mm from the centre of a cube."""
     rotor, truth = known
     table = rotor_table(rotor)
-    points, scale = places(rotor, 0.008)
+    points, scale = error_points(rotor, 0.008)
     difference = np.linalg.norm(table.evaluate(points)[0] - truth.evaluate(points)[0], axis=1)
     assert (difference < 1e-5 * scale).all()
     assert table.provenance["error_estimate"] <= 1e-5
@@ -112,7 +112,7 @@ def test_to_a_millionth(name):
     """1e-6 of B from 8 mm off the faces on."""
     rotor = {"one cube": horizontal(0.002, 0.01, 1.305, 1.05), "two touching cubes": vertical(0.01, 0.01, 1.305, 1.05)}
     table, seconds = timed(rotor[name], 1e-6)
-    truth, (points, scale) = finer(rotor[name], 6), places(rotor[name], 0.008)
+    truth, (points, scale) = finer(rotor[name], 6), error_points(rotor[name], 0.008)
     error = np.linalg.norm(table.evaluate(points)[0] - truth.evaluate(points)[0], axis=1) / scale
     print(f"\n1e-6 asked of {name}: B to {error.max():.1e} in {seconds:.1f} s of processor time")
     assert error.max() < 1e-6
@@ -148,7 +148,7 @@ def check(case, own_step=1e-6):
     """
     table = fem_table(case.magnets, Accuracy(1e-5, case.nearest))
     assert table.provenance["error_estimate"] <= 1e-5
-    points, scale = places(case.magnets, case.clearance)
+    points, scale = error_points(case.magnets, case.clearance)
     before, truth = reference(case, points)
     own = np.linalg.norm(truth - before, axis=1)
     assert (own <= own_step * scale).all()
@@ -193,8 +193,8 @@ def test_fewer_coefficients_fitted_leave_out_what_they_say():
     """
     rotor = horizontal(0.002, 0.01, 1.305, 1.05)
     whole = [uniform_moments(rotor[0], 25)]
-    points, scale = places(rotor, 0.00635)
-    kept, dropped = trimmed(whole, points, 1e-5 * scale)
+    points, scale = error_points(rotor, 0.00635)
+    kept, dropped = trimmed_expansions(whole, points, 1e-5 * scale)
     added = kept[0].evaluate(points)[0] + dropped[0].evaluate(points)[0]
     assert np.abs(added - whole[0].evaluate(points)[0]).max() < 1e-13
     assert (np.linalg.norm(dropped[0].evaluate(points)[0], axis=1) <= 1e-5 * scale * (1 + 1e-9)).all()
