@@ -18,7 +18,7 @@ from ...fem.rotor_tables import FieldTable, rotor_table
 from ...geometry.basics import Array
 from ...geometry.scenes import Scene
 from ..results import Point, Study, variable
-from .drift_cases import (
+from .levitation_time_cases import (
     CASES,
     LEVITATES,
     NO_EQUILIBRIUM,
@@ -29,7 +29,7 @@ from .drift_cases import (
     Variant,
     scene_of,
 )
-from .levitation_time_figure import drift_figure, drift_lines
+from .levitation_time_figure import time_figure, time_lines
 
 CAP, SHORTEST = 250.0, 3.0
 """The article stopped a flight after 250 s, and did not count one of less than 3 s."""
@@ -47,14 +47,14 @@ QUANTITIES = {
 }
 
 
-def drift_points(quick: bool) -> list[Point]:
+def time_points(quick: bool) -> list[Point]:
     """Every case with every variant; `quick` has two cases, fewer frequencies and variants, and point dipoles."""
     names, variants = (QUICK, QUICK_VARIANTS) if quick else (tuple(CASES), tuple(VARIANTS))
     steps, model = (11, "dipole") if quick else (36, "cuboid")
     return [{"case": c, "variant": v, "steps": steps, "model": model} for c in names for v in variants]
 
 
-def drift_row(point: Point) -> xr.Dataset:
+def levitation_times(point: Point) -> xr.Dataset:
     """Levitation time, start and end of the averaged flights of one rotor with one variant, over `step` of frequency.
 
     Recoil permeability is 1.05 in the floater and left out in the rotor.
@@ -75,7 +75,7 @@ def drift_row(point: Point) -> xr.Dataset:
     return xr.Dataset(data, coordinates, {"model": point["model"], "cap_s": CAP, "shortest_s": SHORTEST})
 
 
-def drift_result(parts: Sequence[xr.Dataset]) -> xr.Dataset:
+def gather_times(parts: Sequence[xr.Dataset]) -> xr.Dataset:
     """All rows by `case` and `variant`; NaN where one is missing."""
     together: dict[str, list[xr.Dataset]] = {}
     for part in parts:
@@ -140,9 +140,9 @@ def _row(flight: Drift | None) -> list[float]:
 STUDY = Study(
     name="levitation-time",
     summary="levitation time against frequency by the slow drift of the floater's spin",
-    points=drift_points,
-    compute=drift_row,
-    gather=drift_result,
-    draw=drift_figure,
-    report=drift_lines,
+    points=time_points,
+    compute=levitation_times,
+    gather=gather_times,
+    draw=time_figure,
+    report=time_lines,
 )

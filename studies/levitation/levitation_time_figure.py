@@ -8,7 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from ..results import PALETTE, panels, styled
-from .drift_cases import LEVITATES, OUTCOMES
+from .levitation_time_cases import LEVITATES, OUTCOMES
 
 MARKS = dict(zip(OUTCOMES, ("v", "o", "X", "^", "|"), strict=True))
 MEANINGS = {
@@ -35,7 +35,7 @@ FLOWN = {
 
 
 @styled
-def drift_figure(result: xr.Dataset) -> Figure:
+def time_figure(result: xr.Dataset) -> Figure:
     """For each rotor: levitation time against frequency with its bands, and some nominal flights."""
     cases = result["case"].values.tolist()
     rows = -(-len(cases) // 2)
@@ -98,7 +98,7 @@ def _flights(axes: Axes, result: xr.Dataset) -> None:
     axes.set(xlabel="time (s)", ylabel="distance (mm)", xlim=(0, 310))
 
 
-def drift_lines(result: xr.Dataset) -> list[str]:
+def time_lines(result: xr.Dataset) -> list[str]:
     """For each rotor: where flights end in the fold, where they last and where they are unstable."""
     lines = []
     for case in result["case"].values.tolist():
