@@ -13,6 +13,8 @@ install: $(VENV)/installed
 $(VENV)/dependencies: requirements.txt
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \
 	  { echo "spinlev needs Python 3.11 or newer; set PYTHON=/path/to/python3.11"; exit 1; }
+	@$(PYTHON) -c 'import venv, ensurepip' 2>/dev/null || \
+	  { echo "$(PYTHON) cannot make environments. On Debian or Ubuntu: apt-get install python3-venv"; exit 1; }
 	$(PYTHON) -m venv $(VENV)
 	$(BIN)/pip install --quiet --disable-pip-version-check --require-hashes --no-deps -r requirements.txt
 	@touch $@
@@ -21,9 +23,7 @@ $(VENV)/installed: $(VENV)/dependencies $(SOURCES)
 	@rm -rf build
 	$(BIN)/pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation --force-reinstall .
 	@rm -rf build *.egg-info
-	@cd $(VENV) && bin/python -c 'import ngsolve, pyvista' || { \
-	  echo "A system library is missing. On Debian or Ubuntu: apt-get install libgl1 libglu1-mesa libegl1 libxrender1"; \
-	  exit 1; }
+	@$(BIN)/python -P -m spinlev.studies.command_line.installation
 	@touch $@
 
 run: install

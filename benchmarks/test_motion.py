@@ -13,7 +13,7 @@ from spinlev.dynamics.flights.integration import integrate
 from spinlev.dynamics.flights.simulation import PLATE_TOLERANCE
 from spinlev.fem.rotor_tables import rotor_table
 from spinlev.studies.one_scene import plate_memory
-from spinlev.studies.one_scene.plate_shelf import table_in_flight
+from spinlev.studies.one_scene.plate_of_scene import table_in_flight
 
 FREE = replace(SCENE, plate=None, drag=replace(SCENE.drag, linear=0.0, angular=0.0))
 TURNS = 2

@@ -47,4 +47,4 @@ PYTHON
 done
 venv/bin/python -m pytest -q -m "not slow" -p no:cacheprovider tests/fem/closed_forms/test_closed_form.py \
   tests/geometry/scenes/test_scene_file.py tests/dynamics/flights/test_integration.py tests/studies/sweeps/test_sweep.py \
-  tests/studies/command_line/test_api.py tests/studies/command_line/test_command_line.py
+  tests/studies/interface/test_api.py tests/studies/command_line/test_command_line.py

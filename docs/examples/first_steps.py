@@ -5,7 +5,8 @@ finite elements of the rotor's field; the stable ones come first. The figure sho
 grows or dies out: below zero on all five counts means held.
 """
 
-from spinlev.studies.command_line.api import draw, equilibria, load_scene
+from spinlev.studies.command_line.api import draw, load_scene
+from spinlev.studies.command_line.scene_commands import equilibria
 
 scene = load_scene("scenes/horizontal.toml")
 print(scene)

@@ -10,7 +10,8 @@ import numpy as np
 
 from spinlev.dynamics.equilibria import find_equilibria
 from spinlev.geometry.scenes import AbsoluteStart
-from spinlev.studies.command_line.api import draw, load_scene, rotor_table, simulate
+from spinlev.studies.command_line.api import draw, load_scene, rotor_table
+from spinlev.studies.command_line.scene_commands import simulate
 
 scene = replace(load_scene("scenes/horizontal.toml"), plate=None)
 rest = find_equilibria(scene, rotor_table(scene, "cuboid"))[0]

@@ -4,7 +4,8 @@ A scene is a text (a file, or a string as here) in which every key carries its u
 permeability 1, and the point dipole is asked for: an equilibrium that can be found with pencil and paper.
 """
 
-from spinlev.studies.command_line.api import draw, equilibria, parse_scene, simulate
+from spinlev.studies.command_line.api import draw, parse_scene
+from spinlev.studies.command_line.scene_commands import equilibria, simulate
 
 scene = parse_scene("""
 frequency_hz = 80.0

@@ -7,7 +7,8 @@ and resumable.)
 
 import xarray as xr
 
-from spinlev.studies.command_line.api import equilibria, load_scene, parse_scene
+from spinlev.studies.command_line.api import load_scene, parse_scene
+from spinlev.studies.command_line.scene_commands import equilibria
 from spinlev.studies.results import panels
 
 text = load_scene("scenes/horizontal.toml").text

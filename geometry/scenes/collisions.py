@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from ..bodies import TOUCHING, deepest_overlap_in_a_turn, overlapping_magnets, sphere_overlap
-from .scene import AbsoluteStart, Scene
+from .contents import AbsoluteStart, Scene
 
 
 def overlap_faults(scene: Scene) -> list[str]:

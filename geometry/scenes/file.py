@@ -5,21 +5,14 @@ from __future__ import annotations
 import os
 import tomllib
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-from pydantic import ValidationError
-
-from ..basics import Array, Box, rotation_matrix
-from ..bodies import Magnet
-from ..bodies import article_rotors as rotors
-from .collisions import overlap_faults
-from .faults import SceneError, describe_fault
-from .scene import AbsoluteStart, Drag, Floater, Lowering, OffsetStart, Plate, Scene
-from .schema import ExplicitRotor, PlateSection, Rotor, SceneSection, StartSection, TiltRotor
-
-MILLI = 1e-3
+from .assembly import assemble
+from .contents import Scene
+from .faults import SceneError
+from .writing import scene_keys
 
 
 def load_scene(path: str | Path) -> Scene:
@@ -55,24 +48,21 @@ def parse_scene(text: str, source: str = "scene", changes: Mapping[str, float] |
     SceneError : as `load_scene`, also for a change that no key takes
     """
     try:
-        raw = tomllib.loads(text)
+        keys = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
         raise SceneError(source, [f"Input scene must be TOML; instead: {error}."]) from None
     for key, value in (changes or {}).items():
-        _replace(raw, key, value, source)
-        text += f"\n# changed: {key} = {value}"
-    try:
-        table = SceneSection.model_validate(raw)
-    except ValidationError as error:
-        raise SceneError(source, [describe_fault(detail) for detail in error.errors()]) from None
-    faults = _start_faults(table.start)
-    if faults:
-        raise SceneError(source, faults)
-    scene = _scene(table, text, Path(source).parent)
-    faults = overlap_faults(scene)
-    if faults:
-        raise SceneError(source, faults)
-    return scene
+        _replace(keys, key, value, source)
+    scene = assemble(keys, source)
+    return scene if changes else replace(scene, text=text)
+
+
+def changed(scene: Scene, changes: Mapping[str, float], source: str = "scene") -> Scene:
+    """The scene with numbers replaced by key, as in `parse_scene`. Raises SceneError."""
+    keys = scene_keys(scene)
+    for key, value in changes.items():
+        _replace(keys, key, value, source)
+    return assemble(keys, source)
 
 
 def _replace(raw: Any, key: str, value: float, source: str) -> None:
@@ -89,87 +79,3 @@ def _replace(raw: Any, key: str, value: float, source: str) -> None:
         raise SceneError(
             source, [f"Input {key} must be a key inside the tables and lists that the scene has; instead it is not."]
         ) from None
-
-
-def _start_faults(start: StartSection | None) -> list[str]:
-    """Rules between the keys of `[start]`."""
-    if start is None:
-        return []
-    absolute = {key: getattr(start, key) for key in ("velocity_mm_s", "moment", "spin_hz")}
-    faults = []
-    if start.offset_mm is not None and start.position_mm is not None:
-        faults.append("Input start must have offset_mm or position_mm; instead received both.")
-    if start.position_mm is None:
-        faults += [
-            f"Input start.{key} must come with start.position_mm; instead received it alone."
-            for key, value in absolute.items()
-            if value is not None
-        ]
-    if start.moment is not None and not any(start.moment):
-        faults.append(f"Input start.moment must be a direction, not zero; instead received {start.moment}.")
-    return faults
-
-
-def _scene(table: SceneSection, text: str, folder: Path) -> Scene:
-    floater = Floater(
-        radius=table.floater.diameter_mm * MILLI / 2,
-        remanence=table.floater.remanence_T,
-        recoil_permeability=table.floater.recoil_permeability,
-        density=table.floater.density_kg_m3,
-        conductivity=table.floater.conductivity_S_m,
-    )
-    drag = Drag.stokes(floater.radius)
-    if table.drag:
-        drag = Drag(table.drag.linear_N_s_m, table.drag.angular_N_m_s)
-    return Scene(
-        frequency=table.frequency_hz,
-        gravity=np.array(table.gravity_m_s2),
-        rotor=_rotor(table.rotor),
-        floater=floater,
-        plate=_plate(table.plate) if table.plate else None,
-        drag=drag,
-        start=_start(table.start),
-        field_map=folder / table.rotor.field_map if table.rotor.field_map else None,
-        text=text,
-    )
-
-
-def _box(size_mm: list[float], center_mm: list[float], rotation_deg: list[float]) -> Box:
-    return Box(_metres(size_mm), _metres(center_mm), rotation_matrix(rotation_deg))
-
-
-def _metres(millimetres: list[float]) -> Array:
-    return np.array(millimetres) * MILLI
-
-
-def _rotor(rotor: Rotor) -> tuple[Magnet, ...]:
-    if isinstance(rotor, ExplicitRotor):
-        return tuple(
-            Magnet(_box(m.size_mm, m.center_mm, m.rotation_deg), np.array(m.polarization_T), *m.recoil_permeability)
-            for m in rotor.magnets
-        )
-    material = (rotor.edge_mm * MILLI, rotor.remanence_T, *rotor.recoil_permeability)
-    if isinstance(rotor, TiltRotor):
-        return rotors.tilt(float(np.radians(rotor.angle_deg)), *material)
-    build = rotors.horizontal if rotor.configuration == "horizontal" else rotors.vertical
-    return build(rotor.displacement_mm * MILLI, *material)
-
-
-def _plate(plate: PlateSection) -> Plate:
-    down = plate.lowering
-    lowering = Lowering(down.start_s, down.speed_mm_s * MILLI, down.distance_mm * MILLI) if down else None
-    return Plate(_box(plate.size_mm, plate.center_mm, plate.rotation_deg), plate.conductivity_S_m, lowering)
-
-
-def _start(start: StartSection | None) -> OffsetStart | AbsoluteStart:
-    if start is None or start == StartSection():
-        return OffsetStart()
-    if start.position_mm is None:
-        return OffsetStart(_metres(start.offset_mm or [0.0, 0.0, 0.1]))
-    moment = np.array(start.moment or [0.0, 0.0, 1.0])
-    return AbsoluteStart(
-        position=_metres(start.position_mm),
-        velocity=_metres(start.velocity_mm_s or [0.0, 0.0, 0.0]),
-        moment=moment / np.linalg.norm(moment),
-        spin=2 * np.pi * np.array(start.spin_hz or [0.0, 0.0, 0.0]),
-    )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -24,16 +24,24 @@ def study_job(name: str, quick: bool, engine: Engine, out: Path) -> Job:
     return _studied(study, study.points(quick), engine, out)
 
 
-def question_job(question: Question, values: dict[str, list[float]], engine: Engine, out: Path) -> Job:
+def question_job(question: Question, values: dict[str, list[Any]], engine: Engine, out: Path) -> Job:
     """Answer one's own question over a grid; writes question.nc and its figure.
 
     Raises
     ------
     SceneError : the scene does not take the first of the values
     """
+    return _studied(question_study(question, values), combinations(values), engine, out)
+
+
+def question_study(question: Question, values: Mapping[str, Sequence[Any]]) -> Study:
+    """One's own question over a grid as a study. Raises InputError where the first point or a model cannot be."""
     points = combinations(values)
-    question.scene(points[0])
-    study = Study(
+    for key in ("plate_model", "model"):
+        for value in values.get(key, ()):
+            question.levitation({**points[0], key: value})
+    question.levitation(points[0])
+    return Study(
         QUESTION,
         f"{question.ask} over {', '.join(values)}",
         lambda quick: points,
@@ -43,7 +51,6 @@ def question_job(question: Question, values: dict[str, list[float]], engine: Eng
         question_lines,
         settings=question.settings,
     )
-    return _studied(study, points, engine, out)
 
 
 def _studied(study: Study, points: Sequence[Point], engine: Engine, out: Path) -> Job:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -12,9 +11,10 @@ import xarray as xr
 from ...dynamics.motion import State
 from ...geometry.basics import InputError
 from ...geometry.scenes import Scene, parse_scene
-from ..one_scene import Shelf, sources
-from ..pictures import flight_animation, last_view, plate_currents, scene_picture
-from ..terminal import Tables, note, progress
+from ..one_scene import Levitation, sources
+from ..pictures import flight_frames, last_view, plate_currents
+from ..rendering import Currents, current_places, render
+from ..terminal import Models, note, progress
 from .drawings import read_result
 
 
@@ -24,6 +24,7 @@ def show_job(path: Path, out: Path) -> list[str]:
     Raises
     ------
     InputError : the file is no result of this program, or of a study, in which there is no single scene to be seen
+    RenderError : no picture can be drawn, or not all; those that could be are written
     """
     result = read_result(path)
     if "scene" not in result.attrs or "position_rotor_frame" not in result:
@@ -32,17 +33,18 @@ def show_job(path: Path, out: Path) -> list[str]:
             f"'{result.attrs['study']}'. Its figures: spinlev figure {path}"
         )
     scene = _at_end(parse_scene(str(result.attrs["scene"]), str(path)), float(result["time"][-1]))
-    table = Shelf(scene, Tables()).table()
+    table = Levitation(scene, Models(result.attrs.get("model", "auto"))).table
     motion = _motion(scene, result)
     view = last_view(scene, table, motion)
-    currents = None
     if scene.plate is not None:
         note("Currents in the plate ...")
-        currents = partial(plate_currents, scene, scene.plate, sources(table), view.floater)
+        places = current_places(scene.plate.box, view.position)
+        floater = State(*(vector[-1] for vector in motion.vectors))
+        density = plate_currents(scene, scene.plate, sources(table), floater, places)
+        view = replace(view, currents=Currents(places, density))
     picture, animation = (out / f"{path.stem}-{name}" for name in ("scene.png", "flight.gif"))
-    scene_picture(replace(view, currents=currents), picture)
-    with progress("Animation") as advance:
-        flight_animation(view, result["time"].values, motion, animation, advance)
+    with progress("Pictures") as advance:
+        render({picture: view, animation: flight_frames(scene, result["time"].values, motion)}, advance)
     return [str(picture), str(animation)]
 
 

@@ -6,6 +6,7 @@ Exit status 0: done; 2: bad input, with one message that says what is allowed; 1
 from __future__ import annotations
 
 import os
+import sys
 import threading
 import time
 import traceback
@@ -16,7 +17,7 @@ from typing import Any
 from cyclopts import App, CycloptsError
 
 from ...geometry.basics import ComputationError, InputError
-from ..terminal import Answer, answers_only, note, to_json
+from ..terminal import FORTRAN, Answer, answers_only, heard, is_missing_library, note, to_json, way_out
 from .result_commands import add_result_commands
 from .scene_commands import add_scene_commands
 from .start import STOPPED
@@ -40,6 +41,11 @@ def run(arguments: list[str], stop: threading.Event) -> int:
 
 def _status(arguments: list[str], out: Any, stop: threading.Event | None = None) -> int:
     """The exit status; `stop` tells that the user has stopped the program, whatever a library made of that."""
+    with heard():
+        return _heard_status(arguments, out, stop)
+
+
+def _heard_status(arguments: list[str], out: Any, stop: threading.Event | None) -> int:
     try:
         _answer(arguments, out)
     except CycloptsError as error:
@@ -64,11 +70,19 @@ def _status(arguments: list[str], out: Any, stop: threading.Event | None = None)
             return 1
         if "SPINLEV_TRACEBACK" in os.environ:
             raise
-        frame = traceback.extract_tb(error.__traceback__)[-1]
-        where = f"{Path(frame.filename).parent.name}/{Path(frame.filename).name}:{frame.lineno}"
-        note(f"spinlev: the computation failed at {where}: {type(error).__name__}: {error}")
+        note(f"spinlev: {_unforeseen(error)}")
         return 1
     return 0
+
+
+def _unforeseen(error: Exception) -> str:
+    """What failed and where; of a library that the system lacks, what to do."""
+    if is_missing_library(error):
+        mend = f"{sys.executable} -m {__package__}.installation"
+        return f"a library cannot be loaded: {error}. It may be enough to run {mend}. {way_out(FORTRAN)}"
+    frame = traceback.extract_tb(error.__traceback__)[-1]
+    where = f"{Path(frame.filename).parent.name}/{Path(frame.filename).name}:{frame.lineno}"
+    return f"the computation failed at {where}: {type(error).__name__}: {error}"
 
 
 def _answer(arguments: list[str], out: Any) -> None:
@@ -76,4 +90,5 @@ def _answer(arguments: list[str], out: Any) -> None:
     answer = app(arguments, exit_on_error=False, print_error=False, result_action="return_value")
     if isinstance(answer, Answer):
         values = {**answer.values, "seconds": time.perf_counter() - began}
-        print(to_json(values) if answer.json else "\n".join(answer.lines), file=out, flush=True)
+        said = to_json(values, getattr(out, "encoding", None)) if answer.json else "\n".join(answer.lines)
+        print(said, file=out, flush=True)

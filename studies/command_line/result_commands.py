@@ -10,7 +10,7 @@ from cyclopts import App, Parameter
 from ...geometry.basics import InputError
 from ...geometry.scenes import load_scene
 from ..sweeps import Engine, parse_vary
-from ..terminal import Answer, Output, Quantity, Tables, positive, three_numbers
+from ..terminal import Answer, Models, Output, Quantity, positive, three_numbers
 
 
 def add_result_commands(app: App) -> None:
@@ -29,7 +29,7 @@ def study(
     at: Annotated[str, Parameter(allow_leading_hyphen=True)] = "0,0,-20",
     spin: float = 0.0,
     duration_s: float = 3.0,
-    asked: Tables = Tables(),
+    asked: Models = Models(),
     engine: Engine = Engine(),
     output: Output = Output(),
 ) -> Answer:
@@ -77,7 +77,7 @@ def _own_question(
     scene: str | None,
     vary: tuple[str, ...],
     what: tuple[Quantity, str, float, float],
-    asked: Tables,
+    asked: Models,
     engine: Engine,
     output: Output,
 ) -> Answer:
@@ -85,11 +85,11 @@ def _own_question(
         raise InputError("Input name must be a scene file where --vary is given; instead it is missing.")
     values, place = parse_vary(vary), three_numbers("--at", what[1])
     positive("--duration-s", what[3])
-    text = load_scene(scene).text
+    loaded = load_scene(scene)
     from ..catalogue import question_job
     from ..one_scene import Question
 
-    question = Question(text, scene, what[0], asked.checked(), what[2], what[3], tuple(1e-3 * place))
+    question = Question(loaded, scene, what[0], asked.checked(), what[2], what[3], tuple(1e-3 * place))
     answer, lines = question_job(question, values, engine.checked(), output.out)
     return Answer(answer, tuple(lines), output.json)
 

@@ -13,7 +13,7 @@ from cyclopts import App, Parameter
 from ...geometry.basics import InputError
 from ...geometry.scenes import load_scene
 from ..one_scene import read_points
-from ..terminal import Answer, FieldModel, Output, Tables, default_scene, positive, three_numbers
+from ..terminal import Answer, FieldModel, Models, Output, default_scene, positive, three_numbers
 
 ReactionModel = Literal["slab", "fem", "reduced", "auto"]
 
@@ -27,7 +27,7 @@ def add_scene_commands(app: App) -> None:
 def run(
     scene: Path | None = None,
     *,
-    asked: Tables = Tables(),
+    asked: Models = Models(),
     duration_s: float = 3.0,
     output: Output = Output(),
 ) -> Answer:
@@ -69,7 +69,7 @@ def field(
     rtol
         Relative accuracy asked of the field wherever the floater can be.
     """
-    asked = Tables(model, rtol=rtol).checked()
+    asked = Models(model, rtol=rtol).checked()
     loaded, places = load_scene(scene), read_points(points)
     from ..one_scene import field_job
 
@@ -80,7 +80,7 @@ def field(
 def equilibria(
     scene: Path,
     *,
-    asked: Tables = Tables(),
+    asked: Models = Models(),
     spin: float = 0.0,
     output: Output = Output(),
 ) -> Answer:
@@ -106,7 +106,7 @@ def simulate(
     scene: Path,
     *,
     duration_s: float,
-    asked: Tables = Tables(),
+    asked: Models = Models(),
     resume: Annotated[bool, Parameter(negative="")] = False,
     output: Output = Output(),
 ) -> Answer:

@@ -1,25 +1,24 @@
 """What does one scene do?"""
 
-from .plate_shelf import plate_memory
+from .levitation import Levitation, given_scene, sources
+from .plate_of_scene import plate_memory
 from .points_file import read_points
 from .question import Question
 from .reaction import Job, plate_job
 from .run import main_job
-from .shelf import Shelf, sources
-from .single import equilibria_job, field_job, fly, simulate_job, surveyed
+from .single import equilibria_job, field_job, simulate_job
 
 __all__ = [
     "Job",
+    "Levitation",
     "Question",
-    "Shelf",
     "equilibria_job",
     "field_job",
-    "fly",
+    "given_scene",
     "main_job",
     "plate_job",
     "plate_memory",
     "read_points",
     "simulate_job",
     "sources",
-    "surveyed",
 ]

@@ -14,6 +14,8 @@ from ...fem.closed_forms import rotating_torque
 from ...fem.rotor_tables import FieldTable
 from ...geometry.basics import MAGNET_CONDUCTIVITY, Array
 from ...geometry.scenes import Scene
+from ..results import EQUILIBRIUM_FIELDS
+from .levitation import Levitation
 
 MILLI = 1e-3
 PLATE_NOT_MODELLED = "The plate's eddy currents are left out: the plate is only an obstacle."
@@ -41,14 +43,7 @@ def field_answer(table: FieldTable, points: Array) -> dict[str, Any]:
 def equilibrium_answer(equilibrium: Equilibrium) -> dict[str, Any]:
     """One synchronous equilibrium."""
     return {
-        "position_mm": equilibrium.position / MILLI,
-        "position_error_mm": equilibrium.position_error / MILLI,
-        "polar_angle_deg": equilibrium.polar_angle_deg,
-        "lag_deg": equilibrium.lag_deg,
-        "spin": equilibrium.spin,
-        "stable": equilibrium.stable,
-        "growth_per_s": equilibrium.growth_per_s,
-        "growth_error_per_s": equilibrium.growth_error_per_s,
+        **{field.key: field.shown(equilibrium) for field in EQUILIBRIUM_FIELDS if field.key},
         "frequencies_hz": equilibrium.frequencies_hz,
         "modes": [vars(mode) for mode in equilibrium.modes],
         "with_plate": equilibrium.currents is not None,
@@ -56,17 +51,16 @@ def equilibrium_answer(equilibrium: Equilibrium) -> dict[str, Any]:
     }
 
 
-def equilibria_answer(
-    table: FieldTable, equilibria: tuple[Equilibrium, ...], memory: PlateMemory | None
-) -> dict[str, Any]:
-    """All equilibria; the error estimate is the field's largest relative error at any of them."""
-    places = np.array([e.position for e in equilibria]).reshape(-1, 3)
-    error = float(table.relative_error(places)[0].max()) if len(places) else None
+def equilibria_answer(levitation: Levitation, equilibria: Sequence[Equilibrium] | None = None) -> dict[str, Any]:
+    """All equilibria, or those given; the error estimate is the field's largest relative error at any of them."""
+    found = levitation.equilibria if equilibria is None else equilibria
+    places = np.array([e.position for e in found]).reshape(-1, 3)
     return {
-        "model": table.model,
-        "error_estimate": error,
-        **plate_answer(memory),
-        "equilibria": [equilibrium_answer(equilibrium) for equilibrium in equilibria],
+        "model": levitation.table.model,
+        "error_estimate": float(levitation.table.relative_error(places)[0].max()) if len(places) else None,
+        **plate_answer(levitation.plate),
+        "equilibria": [equilibrium_answer(equilibrium) for equilibrium in found],
+        "not_modelled": omissions(levitation, found),
     }
 
 
@@ -81,13 +75,14 @@ def plate_answer(memory: PlateMemory | None) -> dict[str, Any]:
     }
 
 
-def flight_answer(table: FieldTable, flight: Trajectory, memory: PlateMemory | None) -> dict[str, Any]:
+def flight_answer(levitation: Levitation, flight: Trajectory) -> dict[str, Any]:
     """How a flight went; the error estimate is the field's largest relative error along it."""
+    table = levitation.flight_table
     places = flight.rotor.position[:: max(1, len(flight.time) // 500)]
     return {
         "model": table.model,
         "error_estimate": float(table.relative_error(places[table.in_range(places)])[0].max()),
-        **plate_answer(memory),
+        **plate_answer(levitation.plate),
         "beyond_plate_table": flight.beyond_plate_table,
         "levitated_s": flight.levitated_s,
         "ended_by": flight.ended_by,
@@ -97,16 +92,15 @@ def flight_answer(table: FieldTable, flight: Trajectory, memory: PlateMemory | N
     }
 
 
-def omissions(
-    scene: Scene, table: FieldTable, equilibria: Sequence[Equilibrium], memory: PlateMemory | None
-) -> list[str]:
+def omissions(levitation: Levitation, equilibria: Sequence[Equilibrium]) -> list[str]:
     """What is in the scene but not in the computation."""
-    left_out = [PLATE_NOT_MODELLED] if scene.plate and memory is None else []
+    scene = levitation.scene
+    left_out = [PLATE_NOT_MODELLED] if scene.plate and levitation.plate is None else []
     permeabilities = [scene.floater.recoil_permeability, *(magnet.recoil_permeability for magnet in scene.rotor)]
     if any(permeability != 1 for permeability in permeabilities):
         left_out.append(ANSWERS_NOT_MODELLED)
     if scene.floater.conductivity is None and equilibria:
-        left_out.append(_floater_currents(scene, table, equilibria[0]))
+        left_out.append(_floater_currents(scene, levitation.table, equilibria[0]))
     return left_out
 
 
@@ -122,8 +116,10 @@ def _floater_currents(scene: Scene, table: FieldTable, equilibrium: Equilibrium)
     )
 
 
-def equilibria_lines(scene: Scene, equilibria: tuple[Equilibrium, ...], memory: PlateMemory | None) -> list[str]:
-    """The equilibria as a table for a person."""
+def equilibria_lines(levitation: Levitation, equilibria: Sequence[Equilibrium] | None = None) -> list[str]:
+    """The equilibria, all or those given, as a table for a person."""
+    scene, memory = levitation.scene, levitation.plate
+    equilibria = levitation.equilibria if equilibria is None else equilibria
     head = f"{'x':>9} {'y':>9} {'z (mm)':>9} {'± mm':>9} {'polar °':>8} {'lag °':>8}  stable   growth (1/s)"
     lines = [f"Synchronous equilibria at {scene.frequency:g} Hz (rotor's frame): {len(equilibria)}"]
     lines += [head] if equilibria else []
@@ -137,7 +133,7 @@ def equilibria_lines(scene: Scene, equilibria: tuple[Equilibrium, ...], memory: 
     return lines + ([] if memory is None else _plate_lines(equilibria, memory))
 
 
-def _plate_lines(equilibria: tuple[Equilibrium, ...], memory: PlateMemory) -> list[str]:
+def _plate_lines(equilibria: Sequence[Equilibrium], memory: PlateMemory) -> list[str]:
     """What the plate does to the first equilibrium that feels it."""
     first = next((e for e in equilibria if e.without is not None and e.currents is not None), None)
     if first is None or first.without is None:

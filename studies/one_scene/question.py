@@ -3,21 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
+from typing import Any
 
 import numpy as np
 import xarray as xr
 
-from ...dynamics.flights import flight_kind
-from ...dynamics.motion import PlateMemory
-from ...fem.rotor_tables import FieldTable
-from ...geometry.basics import Array
-from ...geometry.scenes import Scene, parse_scene
+from ...geometry.basics import Array, InputError
+from ...geometry.scenes import Scene, changed, scene_text
 from ..results import AXIS, Point, found_dataset, variable
-from ..terminal import Quantity, Tables
+from ..terminal import Models, Quantity, positive
 from .answers import flight_answer
-from .shelf import Shelf
-from .single import fly, surveyed
+from .levitation import Levitation
+
+CHOICES = ("model", "plate_model", "spin")
+"""What can be varied beside the keys of the scene file."""
 
 
 @dataclass(frozen=True)
@@ -26,87 +26,91 @@ class Question:
 
     Parameters
     ----------
-    text, source : the scene file's content and name
+    scene : whose parameters are varied
+    source : its name in messages
     ask : the quantity
-    tables : which tables are asked for
+    models : of the field and of the plate
     spin : body spin of the equilibria
     duration : of a flight, s
     place : of the field, m, rotor's frame
     """
 
-    text: str
+    scene: Scene
     source: str
     ask: Quantity
-    tables: Tables
+    models: Models
     spin: float
     duration: float
     place: tuple[float, ...]
 
+    def __post_init__(self) -> None:
+        if self.ask not in ANSWERS:
+            raise InputError(f"Input ask must be one of {', '.join(ANSWERS)}; instead received {self.ask}.")
+        positive("duration", self.duration)
+
     @property
     def settings(self) -> Point:
         """The same in types that JSON knows."""
-        return asdict(self)
+        return vars(self) | {"scene": scene_text(self.scene), "models": asdict(self.models)}
 
-    def scene(self, point: Point) -> Scene:
-        """The scene of a point. Raises SceneError."""
-        return parse_scene(self.text, self.source, point)
+    def levitation(self, point: Point) -> Levitation:
+        """The scene of a point with the models of a point. Raises SceneError, and InputError for an unknown model."""
+        chosen = {key: point[key] for key in CHOICES if key in point}
+        spin = float(chosen.pop("spin", self.spin))
+        keys = {key: value for key, value in point.items() if key not in CHOICES}
+        texts = [key for key, value in keys.items() if isinstance(value, str)]
+        if texts:
+            raise InputError(f"Input {texts[0]} must be varied over numbers; instead received {keys[texts[0]]!r}.")
+        return Levitation(changed(self.scene, keys, self.source), replace(self.models, **chosen), spin)
 
     def __call__(self, point: Point) -> xr.Dataset:
         """The answer at a point: a dataset over `case`, whose coordinates are the values varied."""
-        scene = self.scene(point)
-        answer = ANSWERS[self.ask](self, scene, Shelf(scene, self.tables))
+        answer = ANSWERS[self.ask](self, self.levitation(point))
         return answer.expand_dims("case").assign_coords({key: ("case", [value]) for key, value in point.items()})
 
-    def gather(self, parts: Sequence[xr.Dataset], values: Mapping[str, Sequence[float]]) -> xr.Dataset:
-        """The points on the grid of the values; NaN where a point failed or has fewer equilibria than another."""
-        joined = xr.concat(parts, "case", data_vars="all", coords="different", compat="equals", join="outer")
+    def gather(self, parts: Sequence[xr.Dataset], values: Mapping[str, Sequence[Any]]) -> xr.Dataset:
+        """The points on the grid of the values.
+
+        NaN, or not stable, where a point failed or has fewer equilibria than another.
+        """
+        nothing = {"stable": False}
+        how: dict[str, Any] = {"data_vars": "all", "coords": "different", "compat": "equals"}
+        joined = xr.concat(parts, "case", join="outer", fill_value=nothing, combine_attrs="drop_conflicts", **how)
         grid = joined.set_index(case=list(values))
-        grid = grid.unstack("case") if len(values) > 1 else grid.rename(case=next(iter(values)))
-        joined = grid.reindex({key: list(chosen) for key, chosen in values.items()})
+        grid = grid.unstack("case", fill_value=nothing) if len(values) > 1 else grid.rename(case=next(iter(values)))
+        joined = grid.reindex({key: list(chosen) for key, chosen in values.items()}, fill_value=nothing)
         for name, column in joined.data_vars.items():
             if column.dtype == object:
                 joined[name] = column.fillna("").astype(str)
         for key in values:
             joined[key].attrs["long_name"] = key
-        return joined.assign_attrs(scene=self.text, ask=self.ask, varied=list(values), **_asked(self.tables))
+        asked = {f"asked_{name}": value for name, value in asdict(self.models).items()}
+        return joined.assign_attrs(scene=scene_text(self.scene), ask=self.ask, varied=list(values), **asked)
 
 
-def _asked(tables: Tables) -> dict[str, str | float]:
-    return {f"asked_{name}": value for name, value in asdict(tables).items()}
+def _equilibria(question: Question, levitation: Levitation) -> xr.Dataset:
+    return found_dataset(levitation.equilibria).assign_attrs(levitation.labels)
 
 
-def _equilibria(question: Question, scene: Scene, shelf: Shelf) -> xr.Dataset:
-    table = shelf.table()
-    found, memory = surveyed(shelf, table, question.spin)
-    return found_dataset(found.equilibria).assign_attrs(_models(table, memory))
-
-
-def _flight(question: Question, scene: Scene, shelf: Shelf) -> xr.Dataset:
-    table = shelf.table()
-    found, memory = surveyed(shelf, table)
-    table = shelf.in_flight(table, memory, found.equilibria)
-    flight = fly(scene, table, question.duration, found.equilibria, memory)
-    answer = flight_answer(table, flight, memory)
+def _flight(question: Question, levitation: Levitation) -> xr.Dataset:
+    flight = levitation.flight(question.duration)
+    answer = flight_answer(levitation, flight)
     height = flight.lab.position[:, 2]
     return xr.Dataset(
         {
             "levitated": variable((), answer["levitated_s"], "s", "levitation time"),
             "ended_by": ((), answer["ended_by"]),
-            "kind": ((), flight_kind(flight)),
+            "kind": ((), answer["kind"]),
             "mean_height": variable((), height.mean(), "m", "mean height"),
             "height_spread": variable((), np.ptp(height), "m", "highest less lowest height"),
             "energy_error": variable((), answer["energy_error"], "1", "violation of the energy ledger"),
         },
-        attrs=_models(table, memory),
+        attrs=levitation.labels,
     )
 
 
-def _models(table: FieldTable, memory: PlateMemory | None) -> dict[str, str]:
-    return {"model": table.model, "plate_model": memory.model if memory else "none"}
-
-
-def _field(question: Question, scene: Scene, shelf: Shelf) -> xr.Dataset:
-    table, place = shelf.table(), np.array(question.place)[None]
+def _field(question: Question, levitation: Levitation) -> xr.Dataset:
+    table, place = levitation.table, np.array(question.place)[None]
     b, gradient = (values[0] for values in table.evaluate(place))
     errors: list[Array] = [values[0] for values in table.relative_error(place)]
     return xr.Dataset(
@@ -121,7 +125,7 @@ def _field(question: Question, scene: Scene, shelf: Shelf) -> xr.Dataset:
     )
 
 
-ANSWERS: Mapping[Quantity, Callable[[Question, Scene, Shelf], xr.Dataset]] = {
+ANSWERS: Mapping[Quantity, Callable[[Question, Levitation], xr.Dataset]] = {
     "equilibria": _equilibria,
     "flight": _flight,
     "field": _field,

@@ -9,12 +9,14 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from ...dynamics.equilibria import survey, with_plate
+from ...dynamics.equilibria import survey
 from ...dynamics.flights import FlightStopped, Trajectory
 from ...dynamics.steady import EquilibriumError, Survey
 from ...fem.rotor_tables import FieldTable
 from ...fem.storage import write_whole
 from ...geometry.scenes import AbsoluteStart, Scene
+from ..pictures import last_view
+from ..rendering import RenderError, render
 from ..results import (
     axis_dataset,
     curve_dataset,
@@ -26,46 +28,49 @@ from ..results import (
     trajectory_figure,
     write_dataset,
 )
-from ..terminal import Tables, note, to_json
-from .answers import equilibria_answer, equilibria_lines, flight_answer, flight_lines, omissions
-from .shelf import Shelf
-from .single import Job, fly
+from ..terminal import Models, note, to_json
+from .answers import equilibria_answer, equilibria_lines, flight_answer, flight_lines
+from .levitation import Levitation
+from .single import Job
 
 MODELS = ("dipole", "cuboid", "fem")
 DEEPEST = 0.05
 """The field figure reaches this far below the rotor's origin, m."""
 
 
-def main_job(scene: Scene, asked: Tables, duration: float, out: Path) -> Job:
+def main_job(scene: Scene, asked: Models, duration: float, out: Path) -> Job:
     """Compute everything of a scene; writes result.nc, summary.json and the figures.
 
     What is finished before a failure is kept: a scene without a stable equilibrium still leaves its fields and force
     curves, a flight that the user stops its beginning; then the error goes on to the caller.
     """
-    shelf = Shelf(scene, asked)
+    levitation = Levitation(scene, asked)
     exact = "cuboid" if all(magnet.contrast == 0 for magnet in scene.rotor) else "fem"
-    chosen, best = shelf.table(), shelf.table(exact)
-    tables = {name: shelf.table(name) for name in MODELS}
-    failure: EquilibriumError | FlightStopped | None
-    surveys, failure = _surveys(scene, {table.model: table for table in (tables["dipole"], best, chosen)})
-    compared = comparison(surveys["dipole"], surveys[best.model], best.model)
-    memory = shelf.memory(chosen, surveys[chosen.model].equilibria)
-    if memory is not None:
-        surveys[chosen.model] = with_plate(scene, chosen, surveys[chosen.model], memory)
-    found = surveys[chosen.model].equilibria
+    chosen, best = levitation.table, levitation.field(exact)
+    tables = {name: levitation.field(name) for name in MODELS}
+    failure: EquilibriumError | FlightStopped | None = None
+    try:
+        alone = {
+            model: levitation.without_plate if model == chosen.model else survey(scene, levitation.field(model))
+            for model in dict.fromkeys(("dipole", best.model, chosen.model))
+        }
+        surveys = alone | {chosen.model: levitation.survey}
+    except EquilibriumError as error:
+        failure = error
+        surveys = alone = {table.model: Survey((), ()) for table in (tables["dipole"], best, chosen)}
+    compared = comparison(alone["dipole"], alone[best.model], best.model)
     values: dict[str, Any] = {
-        **equilibria_answer(chosen, found, memory),
+        **equilibria_answer(levitation, surveys[chosen.model].equilibria),
         "comparison": compared,
-        "not_modelled": omissions(scene, chosen, found, memory),
-        "tables_from_cache": shelf.from_cache,
+        "tables_from_cache": levitation.from_cache,
     }
-    lines = [*equilibria_lines(scene, found, memory), *comparison_lines(compared), *values["not_modelled"]]
+    lines = [*equilibria_lines(levitation, surveys[chosen.model].equilibria), *comparison_lines(compared)]
+    lines += values["not_modelled"]
     flight = None
     if failure is None or isinstance(scene.start, AbsoluteStart):
         try:
-            table = shelf.in_flight(chosen, memory, found)
-            flight = fly(scene, table, duration, found, memory)
-            values |= flight_answer(table, flight, memory)
+            flight = levitation.flight(duration)
+            values |= flight_answer(levitation, flight)
             lines += flight_lines(flight)
         except EquilibriumError as error:
             failure = error
@@ -74,20 +79,11 @@ def main_job(scene: Scene, asked: Tables, duration: float, out: Path) -> Job:
     if failure:
         values["failed"] = str(failure)
         lines.append(str(failure))
-    result = _static_dataset(scene, tables, surveys, best.model)
+    result = _static_dataset(scene, tables, surveys, best.model).assign_attrs(levitation.labels)
     _write(scene, chosen, result, values, flight, out)
     if failure and (flight is None or isinstance(failure, FlightStopped)):
         raise failure
     return values, [*lines, f"Results and figures in {out}/"]
-
-
-def _surveys(scene: Scene, tables: Mapping[str, FieldTable]) -> tuple[dict[str, Survey], EquilibriumError | None]:
-    """Equilibria by each table, or empty surveys and the reason why there cannot be any."""
-    note("Equilibria ...")
-    try:
-        return {model: survey(scene, table) for model, table in tables.items()}, None
-    except EquilibriumError as error:
-        return {model: Survey((), ()) for model in tables}, error
 
 
 def comparison(dipole: Survey, best: Survey, name: str) -> Mapping[str, Any] | None:
@@ -135,17 +131,19 @@ def _static_dataset(
 def _write(
     scene: Scene, table: FieldTable, result: xr.Dataset, values: dict[str, Any], flight: Trajectory | None, out: Path
 ) -> None:
-    from ..pictures import last_view, scene_picture
-
+    """The result and its summary first, then what is drawn of them."""
     note("Files and figures ...")
     (out / "summary.json").unlink(missing_ok=True)  # an older one must not stand beside the new result
-    figures = {"field": field_figure(result), "force": force_figure(result)}
     if flight:
         flown = trajectory_dataset(flight).assign_attrs(study="run")
         result = xr.merge([result, flown], combine_attrs="no_conflicts")
-        figures["trajectory"] = trajectory_figure(result)
-        scene_picture(last_view(scene, table, flight.rotor), out / "scene.png")
     write_dataset(result, out / "result.nc", scene)
-    for name, figure in figures.items():
-        save_figure(figure, out / f"{name}.png")
     write_whole(out / "summary.json", f"{to_json(values)}\n".encode())
+    save_figure(field_figure(result), out / "field.png")
+    save_figure(force_figure(result), out / "force.png")
+    if flight:
+        save_figure(trajectory_figure(result), out / "trajectory.png")
+        try:
+            render({out / "scene.png": last_view(scene, table, flight.rotor)})
+        except RenderError as error:
+            note(str(error))

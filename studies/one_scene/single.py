@@ -9,28 +9,24 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-from ...dynamics.equilibria import survey, with_plate
-from ...dynamics.flights import Checkpoint, FlightStopped, Trajectory, simulate, starting_point
-from ...dynamics.motion import PlateMemory, Rates
-from ...dynamics.steady import Equilibrium, Survey
-from ...fem.rotor_tables import FieldTable
+from ...dynamics.flights import Checkpoint, FlightStopped, Trajectory
 from ...fem.storage import write_whole
 from ...geometry.basics import Array
-from ...geometry.scenes import OffsetStart, Scene
+from ...geometry.scenes import OffsetStart, Scene, scene_text
 from ..results import trajectory_dataset, write_dataset
-from ..terminal import Tables, note, progress, to_json
+from ..terminal import Models, note, to_json
 from .answers import equilibria_answer, equilibria_lines, field_answer, flight_answer, flight_lines, omissions
+from .levitation import Levitation
 from .points_file import COLUMNS
-from .shelf import RotorField, Shelf
 
 Job = tuple[Mapping[str, Any], list[str]]
 """Numbers for a program, lines for a person."""
 
 
-def field_job(scene: Scene, points: Array, asked: Tables, out: Path) -> Job:
+def field_job(scene: Scene, points: Array, asked: Models, out: Path) -> Job:
     """B and its gradient at points (n, 3) m; writes field.csv."""
-    shelf = Shelf(scene, asked)
-    values = field_answer(shelf.table(), points)
+    levitation = Levitation(scene, asked)
+    values = field_answer(levitation.table, points)
     header = [
         *COLUMNS,
         "Bx_T",
@@ -53,51 +49,36 @@ def field_job(scene: Scene, points: Array, asked: Tables, out: Path) -> Job:
         for (x, y, z), b, error in zip(points[:20] * 1e3, values["B_T"], values["B_relative_error"], strict=False)
     ]
     lines.append(f"Model {values['model']}; {len(points)} points with gradients in {out / 'field.csv'}")
-    return {**values, "tables_from_cache": shelf.from_cache}, lines
+    return {**values, "tables_from_cache": levitation.from_cache}, lines
 
 
-def equilibria_job(scene: Scene, asked: Tables, spin: float, out: Path) -> Job:
+def equilibria_job(scene: Scene, asked: Models, spin: float, out: Path) -> Job:
     """All synchronous equilibria and their stability; writes equilibria.json."""
-    shelf = Shelf(scene, asked)
-    table = shelf.table()
-    found, memory = surveyed(shelf, table, spin)
-    values = {
-        **equilibria_answer(table, found.equilibria, memory),
-        "not_modelled": omissions(scene, table, found.equilibria, memory),
-        "tables_from_cache": shelf.from_cache,
-    }
+    levitation = Levitation(scene, asked, spin)
+    values = {**equilibria_answer(levitation), "tables_from_cache": levitation.from_cache}
     write_whole(out / "equilibria.json", f"{to_json(values)}\n".encode())
-    return values, [*equilibria_lines(scene, found.equilibria, memory), *values["not_modelled"]]
+    return values, [*equilibria_lines(levitation), *values["not_modelled"]]
 
 
-def simulate_job(scene: Scene, asked: Tables, duration: float, out: Path, resume: bool) -> Job:
+def simulate_job(scene: Scene, asked: Models, duration: float, out: Path, resume: bool) -> Job:
     """The motion; writes trajectory.nc, and keeps a checkpoint while it lasts."""
     versions = {name: version(name) for name in ("spinlev", "heyoka")}
-    identity = to_json({"scene": scene.text, "duration_s": duration, **vars(asked), **versions})
+    identity = to_json({"scene": scene_text(scene), "duration_s": duration, **vars(asked), **versions})
     checkpoint = Checkpoint(out / "checkpoint.npz", identity)
     if not resume:
         checkpoint.remove()
     elif checkpoint.read() is None:
         note(f"No checkpoint in {out}: the flight begins at t = 0.")
-    shelf = Shelf(scene, asked)
-    table = shelf.table()
-    if isinstance(scene.start, OffsetStart):
-        note("Equilibria ...")
-        found, memory = surveyed(shelf, table)
-        chosen = starting_point(found.equilibria)
-        if chosen is not None and not chosen.stable:
-            note(f"The flight begins at an unstable equilibrium: e-fold in {1 / chosen.growth_per_s:.2g} s.")
-    else:
-        found, memory = None, shelf.memory(table, ())
-    equilibria = found.equilibria if found else ()
-    table = shelf.in_flight(table, memory, equilibria)
-    models = {"model": table.model, "plate_model": memory.model if memory else "none"}
+    levitation = Levitation(scene, asked)
+    if isinstance(scene.start, OffsetStart) and levitation.equilibria and not levitation.stability.stable:
+        growth = levitation.stability.growth_per_s
+        note(f"The flight begins at an unstable equilibrium: e-fold in {1 / growth:.2g} s.")
 
     def keep(flight: Trajectory) -> None:
-        write_dataset(trajectory_dataset(flight).assign_attrs(models), out / "trajectory.nc", scene)
+        write_dataset(trajectory_dataset(flight).assign_attrs(levitation.labels), out / "trajectory.nc", scene)
 
     try:
-        flight = fly(scene, table, duration, equilibria, memory, checkpoint)
+        flight = levitation.flight(duration, checkpoint)
     except FlightStopped as stop:
         keep(stop.flown)
         note(f"{stop} It is in {out / 'trajectory.nc'}; --resume goes on from there.")
@@ -105,31 +86,9 @@ def simulate_job(scene: Scene, asked: Tables, duration: float, out: Path, resume
     keep(flight)
     checkpoint.remove()
     values = {
-        **flight_answer(table, flight, memory),
-        "not_modelled": omissions(scene, table, equilibria, memory),
+        **flight_answer(levitation, flight),
+        "not_modelled": omissions(levitation, () if levitation.absolute else levitation.equilibria),
         "trajectory": str(out / "trajectory.nc"),
-        "tables_from_cache": shelf.from_cache,
+        "tables_from_cache": levitation.from_cache,
     }
     return values, [*flight_lines(flight), *values["not_modelled"], f"Trajectory in {values['trajectory']}"]
-
-
-def surveyed(shelf: Shelf, table: RotorField, spin: float = 0.0) -> tuple[Survey, PlateMemory | None]:
-    """Equilibria with the plate of the scene, and that plate."""
-    rates = Rates.of(shelf.scene, table)
-    found = survey(shelf.scene, table, spin, rates=rates)
-    memory = shelf.memory(table, found.equilibria)
-    return (found if memory is None else with_plate(shelf.scene, table, found, memory, rates)), memory
-
-
-def fly(
-    scene: Scene,
-    table: FieldTable,
-    duration: float,
-    found: tuple[Equilibrium, ...],
-    memory: PlateMemory | None,
-    checkpoint: Checkpoint | None = None,
-) -> Trajectory:
-    """Simulate with a progress bar."""
-    note("Motion ...")
-    with progress("Motion") as advance:
-        return simulate(scene, table, duration, found, progress=advance, memory=memory, checkpoint=checkpoint)

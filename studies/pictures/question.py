@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 
 from ..results import PALETTE, panels, styled
 
-SHOWN = {"equilibria": ("distance", "growth"), "flight": ("levitated", "height_spread"), "field": ("size", "B_error")}
+SHOWN = {"equilibria": ("depth", "growth"), "flight": ("levitated", "height_spread"), "field": ("size", "B_error")}
 """Quantities drawn for each question."""
 
 
@@ -35,8 +35,8 @@ def question_figure(result: xr.Dataset) -> Figure:
 def _derived(result: xr.Dataset) -> xr.Dataset:
     """The result with what is drawn instead of what is kept."""
     if "position" in result:
-        distance = -1e3 * result["position"].sel(axis="z")
-        return result.assign(distance=distance.assign_attrs(units="mm", long_name="distance below the rotor"))
+        depth = -1e3 * result["position"].sel(axis="z")
+        return result.assign(depth=depth.assign_attrs(units="mm", long_name="distance below the rotor"))
     if "B" in result:
         size = 1e3 * (result["B"] ** 2).sum("axis", skipna=False) ** 0.5
         return result.assign(size=size.assign_attrs(units="mT", long_name="|B|"))

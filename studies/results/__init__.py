@@ -12,6 +12,7 @@ from .datasets import (
     variable,
     write_dataset,
 )
+from .equilibrium_fields import EQUILIBRIUM_FIELDS
 from .figures import (
     COLORS,
     DASHES,
@@ -31,6 +32,7 @@ __all__ = [
     "AXIS",
     "COLORS",
     "DASHES",
+    "EQUILIBRIUM_FIELDS",
     "LIBRARIES",
     "MODES",
     "NAMES",

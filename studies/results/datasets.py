@@ -17,7 +17,8 @@ from ...dynamics.steady import SIDE, TILT, Equilibrium, ForceCurve
 from ...fem.rotor_tables import FieldTable
 from ...fem.storage import write_checked
 from ...geometry.basics import Array
-from ...geometry.scenes import Scene
+from ...geometry.scenes import Scene, scene_text
+from .equilibrium_fields import EQUILIBRIUM_FIELDS, Field
 
 AXIS = ("x", "y", "z")
 MODES = ("bounce", *SIDE, *TILT)
@@ -31,7 +32,7 @@ def write_dataset(dataset: xr.Dataset, path: Path, scene: Scene | None = None) -
     """
     provenance = {f"version_{name}": version(name) for name in LIBRARIES}
     if scene:
-        provenance["scene"] = scene.text
+        provenance["scene"] = scene_text(scene)
     command = shlex.join(["spinlev", *sys.argv[1:]])
     write_checked(dataset.assign_attrs(command=command, **provenance), path)
 
@@ -90,50 +91,36 @@ def curve_dataset(curves: Mapping[str, Sequence[ForceCurve]]) -> xr.Dataset:
 
 
 def equilibria_dataset(found: Mapping[str, Sequence[Equilibrium]]) -> xr.Dataset:
-    """Equilibria of all models in one list."""
-    rows = [(model, equilibrium) for model, equilibria in found.items() for equilibrium in equilibria]
-
-    def column(name: str, read: Any, units: str, *dims: str) -> xr.Variable:
-        values = np.array([read(e) for _, e in rows], dtype=float)
-        shape = (len(rows), *((3,) if dims else ()))
-        return variable(("equilibrium", *dims), values.reshape(shape), units, name)
-
-    return xr.Dataset(
-        {
-            "equilibrium_model": (("equilibrium",), np.array([model for model, _ in rows], dtype=object).astype(str)),
-            "equilibrium_stable": (("equilibrium",), np.array([int(e.stable) for _, e in rows], dtype="i1")),
-            "equilibrium_position": column("position, rotor's frame", lambda e: e.position, "m", "axis"),
-            "equilibrium_position_error": column("estimated position error", lambda e: e.position_error, "m"),
-            "equilibrium_moment": column("direction of the moment", lambda e: e.state.moment, "1", "axis"),
-            "equilibrium_growth": column("largest growth rate", lambda e: e.growth_per_s, "1/s"),
-        },
-        coords={"axis": list(AXIS)},
-    )
+    """Equilibria of all models in one list; names begin with `equilibrium_`."""
+    models = [model for model, equilibria in found.items() for _ in equilibria]
+    rows = found_dataset([equilibrium for equilibria in found.values() for equilibrium in equilibria])
+    rows = rows.drop_vars(["number", "equilibrium"])
+    named = rows.rename({name: f"equilibrium_{name}" for name in rows.data_vars})
+    return named.assign(equilibrium_model=(("equilibrium",), np.array(models, dtype=object).astype(str)))
 
 
 def found_dataset(rows: Sequence[Equilibrium]) -> xr.Dataset:
     """Equilibria of one scene and one model over `equilibrium`, with their small motions over `mode`."""
+    sizes = {"axis": 3, "mode": len(MODES)}
 
-    def column(read: Any, units: str, name: str, *dims: str) -> xr.Variable:
-        values = np.array([read(e) for e in rows], float).reshape(len(rows), *(sizes[d] for d in dims))
-        return variable(("equilibrium", *dims), values, units, name)
+    def column(field: Field) -> xr.Variable:
+        shape = (len(rows), *(sizes[dim] for dim in field.dims))
+        values: Any = np.array([field.read(e) for e in rows], field.kind).reshape(shape)
+        return variable(("equilibrium", *field.dims), values, field.unit, field.label)
 
     def by_name(equilibrium: Equilibrium, quantity: str) -> list[float]:
         known = {mode.name: float(getattr(mode, quantity)) for mode in equilibrium.modes}
         return [known.get(name, np.nan) for name in MODES]
 
-    sizes = {"axis": 3, "mode": len(MODES)}
     return xr.Dataset(
         {
-            "position": column(lambda e: e.position, "m", "mean position, rotor's frame", "axis"),
-            "position_error": column(lambda e: e.position_error, "m", "estimated error of the position"),
-            "moment": column(lambda e: e.state.moment, "1", "direction of the moment, rotor's frame", "axis"),
-            "polar_angle": column(lambda e: e.polar_angle_deg, "deg", "polar angle of the moment"),
-            "lag": column(lambda e: e.lag_deg, "deg", "lag of the moment behind the rotor"),
-            "stable": column(lambda e: e.stable, "1", "1 stable, 0 not"),
-            "growth": column(lambda e: e.growth_per_s, "1/s", "largest growth rate of a small motion"),
-            "mode_growth": column(lambda e: by_name(e, "growth_per_s"), "1/s", "growth of a mode", "mode"),
-            "mode_frequency": column(lambda e: by_name(e, "frequency_hz"), "Hz", "its frequency", "mode"),
+            **{field.name: column(field) for field in EQUILIBRIUM_FIELDS},
+            "mode_growth": column(
+                Field("mode_growth", "1/s", "growth of a mode", lambda e: by_name(e, "growth_per_s"), ("mode",))
+            ),
+            "mode_frequency": column(
+                Field("mode_frequency", "Hz", "its frequency", lambda e: by_name(e, "frequency_hz"), ("mode",))
+            ),
             "number": variable((), len(rows), "1", "number of equilibria"),
         },
         {"axis": list(AXIS), "equilibrium": np.arange(len(rows)), "mode": list(MODES)},
@@ -144,6 +131,8 @@ def trajectory_dataset(flight: Trajectory) -> xr.Dataset:
     """A flight in the laboratory frame, with its position in the rotor's frame as well."""
     lab, rotor = flight.lab, flight.rotor
     dims = ("time", "axis")
+    far = np.linalg.norm(lab.position, axis=1)
+    tilt = np.degrees(np.arctan2(np.hypot(lab.moment[:, 0], lab.moment[:, 1]), lab.moment[:, 2]))
     return xr.Dataset(
         {
             "position": variable(dims, lab.position, "m", "position, laboratory frame"),
@@ -151,6 +140,8 @@ def trajectory_dataset(flight: Trajectory) -> xr.Dataset:
             "moment": variable(dims, lab.moment, "1", "direction of the moment, laboratory frame"),
             "spin": variable(dims, lab.spin, "rad/s", "angular velocity, laboratory frame"),
             "position_rotor_frame": variable(dims, rotor.position, "m", "position, rotor's frame"),
+            "distance": variable(("time",), far, "m", "distance from the rotor's origin"),
+            "polar_angle": variable(("time",), tilt, "deg", "polar angle of the moment"),
         },
         coords={"time": variable(("time",), flight.time, "s", "time"), "axis": list(AXIS)},
         attrs={

@@ -1,7 +1,7 @@
 """How are many points computed, kept and gone on with?"""
 
 from .running import forget, swept
-from .vary import combinations, parse_vary
+from .vary import checked_values, combinations, parse_vary
 from .workers import Engine
 
-__all__ = ["Engine", "combinations", "forget", "parse_vary", "swept"]
+__all__ = ["Engine", "checked_values", "combinations", "forget", "parse_vary", "swept"]

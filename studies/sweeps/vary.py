@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import math
+from collections.abc import Iterable, Mapping, Sequence
 from itertools import product
+from numbers import Real
+from typing import Any
 
 import numpy as np
 
@@ -11,29 +14,54 @@ from ...geometry.basics import InputError
 
 MOST = 100_000
 """Points of a sweep, at most."""
+NAMED = ("model", "plate_model")
+"""Keys whose values are names."""
 
 
-def parse_vary(asked: Sequence[str]) -> dict[str, list[float]]:
+def parse_vary(asked: Sequence[str]) -> dict[str, list[Any]]:
     """Values by key, in the order given.
 
     Raises
     ------
     InputError : not of this form, no number, no value, a key given twice, or too many points
     """
-    found: dict[str, list[float]] = {}
+    found: dict[str, list[Any]] = {}
     for text in asked:
         key, equals, values = text.partition("=")
         if not equals or not key:
             raise _wrong(text)
         if key in found:
             raise InputError(f"Input --vary must give each key once; instead received {key} twice.")
-        found[key] = _values(text, values)
-    if np.prod([float(len(values)) for values in found.values()]) > MOST:
-        raise InputError(f"Input --vary must make at most {MOST} points; instead received {', '.join(asked)}.")
+        found[key] = [part.strip() for part in values.split(",")] if key in NAMED else _values(text, values)
+    return checked_values(found)
+
+
+def checked_values(values: Mapping[str, Sequence[Any]]) -> dict[str, list[Any]]:
+    """Values by key as lists of floats and, for `NAMED` keys, of texts.
+
+    Raises
+    ------
+    InputError : no key, no value, one that is no finite number, one that is given twice, or too many points
+    """
+    if not values:
+        raise InputError("Input values must have at least one key; instead received none.")
+    found = {}
+    for key, given in values.items():
+        listed = list(given) if isinstance(given, Iterable) and not isinstance(given, str) else [given]
+        fine = all(isinstance(v, str) if key in NAMED else isinstance(v, Real) and math.isfinite(v) for v in listed)
+        if not listed or not fine:
+            what = "names" if key in NAMED else "finite numbers"
+            raise InputError(f"Input {key} must be varied over {what}; instead received {given!r}.")
+        if len(set(listed)) < len(listed):
+            raise InputError(f"Input {key} must be given each value once; instead received {given!r}.")
+        found[key] = listed if key in NAMED else [float(value) for value in listed]
+    points = math.prod(len(each) for each in found.values())
+    if points > MOST:
+        raise InputError(f"Input values must make at most {MOST} points; instead received {points}.")
     return found
 
 
-def combinations(values: Mapping[str, Sequence[float]]) -> list[dict[str, float]]:
+def combinations(values: Mapping[str, Sequence[Any]]) -> list[dict[str, Any]]:
     """Every combination; the last key changes fastest."""
     return [dict(zip(values, chosen, strict=True)) for chosen in product(*values.values())]
 
@@ -47,8 +75,6 @@ def _values(text: str, values: str) -> list[float]:
     if not np.all(np.isfinite(numbers)):
         raise _wrong(text)
     if separator == ",":
-        if len(set(numbers)) < len(numbers):
-            raise InputError(f"Input --vary must give each value once; instead received {text!r}.")
         return numbers
     if len(numbers) != 3 or numbers[2] == 0 or (numbers[1] - numbers[0]) / numbers[2] < 0:
         raise _wrong(text)

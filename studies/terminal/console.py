@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import logging
 import os
 import sys
 from collections.abc import Callable, Iterator, Mapping
@@ -13,12 +14,38 @@ import numpy as np
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
 
+from .plain_text import READABLE
+
+LOG = logging.getLogger("spinlev")
 ERRORS = Console(stderr=True, highlight=False, soft_wrap=True)
 
 
 def note(text: str) -> None:
-    """A message on standard error."""
-    ERRORS.print(text, markup=False)
+    """A message; on the command line, and where a caller asks for it, it goes to standard error."""
+    LOG.info(text)
+
+
+class _Printed(logging.Handler):
+    """Messages as they are, above a progress bar."""
+
+    def emit(self, record: logging.LogRecord) -> None:
+        ERRORS.print(record.getMessage(), markup=False)
+
+
+@contextmanager
+def heard(wanted: bool = True) -> Iterator[None]:
+    """Messages and progress on standard error inside the block, if they are wanted."""
+    if not wanted or LOG.handlers:
+        yield
+        return
+    handler, level = _Printed(), LOG.level
+    LOG.addHandler(handler)
+    LOG.setLevel(logging.INFO)
+    try:
+        yield
+    finally:
+        LOG.removeHandler(handler)
+        LOG.setLevel(level)
 
 
 @contextmanager
@@ -33,9 +60,9 @@ def silence() -> Iterator[None]:
 
 @contextmanager
 def progress(label: str) -> Iterator[Callable[[float], None]]:
-    """A progress bar on standard error; gives a function that takes the finished fraction."""
+    """A progress bar where messages are heard; gives a function that takes the finished fraction."""
     columns = (TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(), TimeRemainingColumn())
-    with Progress(*columns, console=ERRORS, transient=True) as bar:
+    with Progress(*columns, console=ERRORS, transient=True, disable=not LOG.handlers) as bar:
         task = bar.add_task(label, total=1.0)
         yield lambda fraction: bar.update(task, completed=fraction)
 
@@ -50,7 +77,7 @@ def answers_only() -> Iterator[TextIO]:
     kept = os.dup(1)
     os.dup2(2, 1)
     try:
-        stream = os.fdopen(os.dup(kept), "w")
+        stream = os.fdopen(os.dup(kept), "w", encoding=sys.stdout.encoding, errors=READABLE)
         yield stream
         with suppress(OSError):  # who prints flushes, and is told then
             stream.close()
@@ -75,6 +102,7 @@ def plain(value: Any) -> Any:
     return value
 
 
-def to_json(answer: Mapping[str, Any]) -> str:
-    """One JSON object."""
-    return json.dumps(plain(answer), allow_nan=False, ensure_ascii=False)
+def to_json(answer: Mapping[str, Any], encoding: str | None = "utf-8") -> str:
+    """One JSON object; escapes stand for the characters that `encoding` may not have."""
+    escaped = encoding is not None and not encoding.lower().startswith("utf")
+    return json.dumps(plain(answer), allow_nan=False, ensure_ascii=escaped)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from numbers import Real
+
 import numpy as np
 
 from ...geometry.basics import Array, InputError
@@ -20,5 +22,12 @@ def three_numbers(name: str, text: str) -> Array:
 
 def positive(name: str, value: float) -> None:
     """Raises InputError where the value is no positive finite number."""
-    if not 0 < value < float("inf"):
+    if not (isinstance(value, Real) and 0 < value < float("inf")):
         raise InputError(f"Input {name} must be a positive number; instead received {value}.")
+
+
+def finite(name: str, value: float) -> float:
+    """The value. Raises InputError where it is no finite number."""
+    if not (isinstance(value, Real) and abs(value) < float("inf")):
+        raise InputError(f"Input {name} must be a finite number; instead received {value!r}.")
+    return float(value)

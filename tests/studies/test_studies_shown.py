@@ -13,23 +13,23 @@ import pyvista as pv
 import xarray as xr
 from places import QUICK, SCENES
 
+import spinlev as sl
 from spinlev.dynamics.equilibria import find_equilibria
-from spinlev.dynamics.motion import State
 from spinlev.fem.rotor_tables import rotor_table
 from spinlev.geometry.basics import InputError
 from spinlev.geometry.scenes import load_scene
 from spinlev.studies.catalogue import CATALOGUE, report_job, show_job
 from spinlev.studies.catalogue.drawings import read_result
 from spinlev.studies.catalogue.report import LONGEST
-from spinlev.studies.command_line import api, cli
+from spinlev.studies.command_line import cli
 from spinlev.studies.command_line.cli import _status
 from spinlev.studies.field_quality import field_hard_cases
 from spinlev.studies.field_quality.hard_cases import CASES
 from spinlev.studies.one_scene import reaction as plate_job
 from spinlev.studies.pictures import plate_currents, question_figure
-from spinlev.studies.pictures.still import View, add_floater, add_plate, new_plotter
+from spinlev.studies.rendering import Currents, current_places
+from spinlev.studies.rendering.still import add_floater, add_plate, new_plotter
 from spinlev.studies.results import write_dataset
-from spinlev.studies.terminal import Tables
 
 
 @pytest.fixture(scope="module")
@@ -54,27 +54,18 @@ def test_no_net_current_flows_through_a_section_of_the_plate(scene):
     assert np.abs(out[:, 2]).max() < 0.02 * np.abs(out).max()
 
 
-def drawn_view(scene, currents):
-    floater = State(np.array([0.0, 0.0, -0.02]), np.zeros(3), np.array([0.0, 0.0, 1.0]), np.zeros(3))
-    return View(scene, rotor_table(scene.rotor, "dipole"), floater, np.zeros((0, 3)), currents)
-
-
+@pytest.mark.usefixtures("needs_3d")
 def test_arrows_show_the_currents_under_the_face_that_the_floater_is_before(scene):
     """All places lie in the plate, a hundredth of its thickness below that face; the longest arrow is 12 mm."""
-    asked, box = [], scene.plate.box
-
-    def currents(points):
-        asked.append(points)
-        return np.tile([0.0, 2e6, 0.0], (len(points), 1))
-
-    plotter, view = new_plotter((300, 200)), drawn_view(scene, currents)
-    add_plate(plotter, view)
-    (points,) = asked
+    box, floater = scene.plate.box, np.array([0.0, 0.0, -0.02])
+    points = current_places(box, floater)
     inside = box.to_body(points) / box.size
     normal = int(np.argmin(box.size))
-    side = np.sign(box.to_body(view.floater.position[None])[0, normal])
+    side = np.sign(box.to_body(floater[None])[0, normal])
     np.testing.assert_allclose(inside[:, normal], 0.49 * side)
     assert np.abs(inside).max() < 0.5
+    plotter = new_plotter((300, 200))
+    add_plate(plotter, scene, Currents(points, np.tile([0.0, 2e6, 0.0], (len(points), 1))))
     arrows = plotter.meshes[-1]
     assert isinstance(arrows, pv.PolyData)
     lower, upper = np.array(arrows.bounds).reshape(3, 2).T
@@ -84,6 +75,7 @@ def test_arrows_show_the_currents_under_the_face_that_the_floater_is_before(scen
     plotter.close()
 
 
+@pytest.mark.usefixtures("needs_3d")
 def test_a_floater_without_a_direction_has_no_arrow(scene):
     plotter = new_plotter((300, 200))
     drawn = [add_floater(plotter, scene, np.zeros(3), moment) for moment in (np.zeros(3), np.array([0.0, 0.0, 1.0]))]
@@ -91,10 +83,11 @@ def test_a_floater_without_a_direction_has_no_arrow(scene):
     plotter.close()
 
 
+@pytest.mark.usefixtures("needs_3d")
 def test_a_flight_is_shown_with_the_plate_where_it_has_been_lowered_to(tmp_path, monkeypatch):
     """After 4 s of a lowering that begins at 3 s with 10 mm/s the currents are those of a plate 10 mm further down."""
     scene = load_scene(SCENES / "tilt-over-plate.toml")
-    flight = api.simulate(scene, 0.05, "dipole", "none")
+    flight = sl.simulate(scene, 0.05, "dipole", "none")
     path, asked = tmp_path / "trajectory.nc", []
     write_dataset(flight.assign_coords(time=flight["time"] + 3.95), path)
 
@@ -102,8 +95,7 @@ def test_a_flight_is_shown_with_the_plate_where_it_has_been_lowered_to(tmp_path,
         asked.append(plate)
         return np.zeros_like(points)
 
-    monkeypatch.setattr("spinlev.studies.pictures.animation.FRAMES", 1)
-    monkeypatch.setattr("spinlev.studies.catalogue.show.Tables", lambda: Tables("dipole"))
+    monkeypatch.setattr("spinlev.studies.rendering.view.FRAMES", 1)
     monkeypatch.setattr("spinlev.studies.catalogue.show.plate_currents", currents)
     files = [Path(name) for name in show_job(path, tmp_path)]
     assert [file.suffix for file in files] == [".png", ".gif"]
@@ -114,7 +106,7 @@ def test_a_flight_is_shown_with_the_plate_where_it_has_been_lowered_to(tmp_path,
 
 
 def test_the_report_of_a_run_has_its_numbers_cut_where_they_are_long(scene, tmp_path):
-    result = api.simulate(replace(scene, plate=None), 0.02, "dipole", "none").assign_attrs(study="run")
+    result = sl.simulate(replace(scene, plate=None), 0.02, "dipole", "none").assign_attrs(study="run")
     write_dataset(result, tmp_path / "result.nc")
     numbers = {"levitated_s": 0.0215, "long": "x" * LONGEST + " the end"}
     (tmp_path / "summary.json").write_text(json.dumps(numbers))
@@ -175,7 +167,7 @@ def test_a_study_on_the_command_line_and_in_python_is_what_was_stored(tmp_path, 
     assert (answer["study"], answer["failed_points"]) == (name, [])
     assert {Path(file).suffix for file in answer["figures"]} == {".png", ".pdf"}
     stored = read_result(QUICK / f"{name}.nc")
-    for found in (read_result(Path(answer["result"])), api.run_study(name, out=tmp_path / "again")):
+    for found in (read_result(Path(answer["result"])), sl.run_study(name, out=tmp_path / "again")):
         for part in ("attracting", "repelling", "polar_angle"):
             np.testing.assert_allclose(found[part], stored[part], atol=1e-3 * float(np.abs(stored[part]).max()))
         assert list(found["model"].values) == list(stored["model"].values)

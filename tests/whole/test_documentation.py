@@ -7,6 +7,8 @@ import tomllib
 import pytest
 from places import ROOT
 
+from spinlev.studies.terminal.system_libraries import PACKAGES
+
 PAGES = sorted([ROOT / "README.md", *(ROOT / "docs").glob("*.md")])
 NAMED = re.compile(r"`((?:geometry|fem|dynamics|studies|tests|benchmarks|scenes|docs)/[\w/.-]+\.(?:py|toml|md))")
 
@@ -41,10 +43,10 @@ def test_dependencies_are_listed_with_reason_and_licence():
     assert "see its files" not in said
 
 
-def test_the_container_has_what_it_copies_and_what_the_makefile_asks_for():
+def test_the_container_has_what_it_copies_and_what_the_program_asks_for():
     recipe = (ROOT / "Containerfile").read_text(encoding="utf-8")
     copied = [name for line in re.findall(r"^COPY (.+)$", recipe, re.MULTILINE) for name in line.split()[:-1]]
     assert [name for name in copied if not (ROOT / name).exists()] == []
     assert set(copied) > {"geometry", "fem", "dynamics", "studies", "scenes", "requirements.txt"}
-    libraries = re.search(r"apt-get install ([\w -]+)", (ROOT / "Makefile").read_text(encoding="utf-8"))
-    assert set(libraries[1].split()) <= set(recipe.split())
+    for command in PACKAGES["Debian or Ubuntu"].values():
+        assert set(command.removeprefix("apt-get install ").split()) <= set(recipe.split())

@@ -24,8 +24,11 @@ import xarray as xr
 from spinlev.fem.elements import memory
 from spinlev.fem.measured_maps import FieldMapError
 from spinlev.fem.measured_maps.readers import read_field_map
-from spinlev.fem.storage import foreign, read_checked, replacing, write_checked, write_whole
+from spinlev.fem.storage import foreign, read_checked, write_checked, write_whole
+from spinlev.fem.storage.whole_files import replacing
 from spinlev.studies.command_line.cli import _status
+from spinlev.studies.rendering import renderer
+from spinlev.studies.terminal import Tables
 
 SCENE, OVER_PLATE = str(places.HORIZONTAL), str(places.OVER_PLATE)
 DIPOLE = ("--model", "dipole", "--plate-model", "none")
@@ -410,6 +413,30 @@ def test_a_result_and_its_summary_are_of_the_same_run(spinlev, monkeypatch):
     assert status == 1
     assert "stopped" in said
     assert not Path("out/summary.json").exists()
+
+
+def test_a_renderer_that_dies_takes_no_result_with_it(spinlev, monkeypatch):
+    """As VTK makes it without graphics libraries: a line on the console; all but these pictures is whole."""
+    dies = "import os, signal; os.kill(os.getpid(), signal.SIGSEGV)"
+    arguments = ("run", SCENE, "--duration-s", "0.1", "--rtol", "1e-2", *DIPOLE)
+    Path("out").mkdir()
+    Path("out/scene.png").write_text("of an older result")
+    with monkeypatch.context() as patch:
+        patch.setattr(renderer, "COMMAND", (sys.executable, "-c", dies))
+        patch.setattr("spinlev.studies.catalogue.show.Tables", lambda: Tables("dipole"))
+        patch.setattr("spinlev.studies.catalogue.show.plate_currents", lambda *given: np.zeros_like(given[-1]))
+        status, answer, said = spinlev(*arguments)
+        shown = spinlev("show", "out/result.nc")
+    assert status == 0
+    (line,) = [line for line in said.splitlines() if "3-D" in line]
+    assert line.startswith("The 3-D pictures are left out (scene.png): the process that draws them died (Segmentation")
+    assert sorted(path.name for path in Path("out").glob("*.png")) == ["field.png", "force.png", "trajectory.png"]
+    assert len(read_checked("out/result.nc")["time"]) > 10
+    summary = json.loads(Path("out/summary.json").read_text())
+    assert answer["levitated_s"] == summary["levitated_s"] == 0.1
+    assert shown[:2] == (1, None)
+    assert "result-scene.png, result-flight.gif" in shown[2]
+    assert spinlev("report", "out")[0] == 0
 
 
 @pytest.mark.parametrize("step", [970, pytest.param(97, marks=pytest.mark.slow)])

@@ -14,8 +14,18 @@ FLOORS = {
     ],
     "dynamics": ["motion", "steady", "equilibria", "branches", "maps", "flights", "slow_drift"],
     "studies": [
-        *("terminal", "results", "pictures", "one_scene", "sweeps", "article", "field_quality", "levitation"),
-        *("margins", "plates", "catalogue", "command_line"),
+        *(
+            "terminal",
+            "rendering",
+            "results",
+            "pictures",
+            "one_scene",
+            "sweeps",
+            "article",
+            "field_quality",
+            "levitation",
+        ),
+        *("margins", "plates", "catalogue", "interface", "command_line"),
     ],
 }
 ORDER = [(floor, room) for floor, rooms in FLOORS.items() for room in rooms]

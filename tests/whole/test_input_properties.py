@@ -14,7 +14,7 @@ from spinlev.geometry.scenes import Scene, SceneError, parse_scene
 from spinlev.studies.one_scene import read_points
 from spinlev.studies.sweeps import combinations, parse_vary
 from spinlev.studies.sweeps.vary import MOST
-from spinlev.studies.terminal import Tables, positive, three_numbers
+from spinlev.studies.terminal import Models, positive, three_numbers
 
 GOOD = HORIZONTAL.read_text()
 NUMBERS = dict(re.findall(r"^(\w+) = (-?[\d.e+-]+)", GOOD, re.MULTILINE))
@@ -131,7 +131,7 @@ def test_any_place_is_three_finite_numbers_or_is_refused(text):
 def test_number_options_take_their_range_and_nothing_else(value, other):
     for check, inside in [
         (lambda: positive("--duration-s", value), 0 < value < math.inf),
-        (lambda: Tables(rtol=value, plate_rtol=other).checked(), 1e-13 <= value < 1 and 1e-5 <= other <= 0.1),
+        (lambda: Models(rtol=value, plate_rtol=other).checked(), 1e-13 <= value < 1 and 1e-5 <= other <= 0.1),
     ]:
         if inside:
             check()

@@ -7,7 +7,7 @@ from spinlev.fem.harmonics import uniform_moments
 from spinlev.fem.rotor_tables import Accuracy, distant, points_around, rotor_table, typical_field
 from spinlev.geometry.bodies import horizontal
 from spinlev.geometry.scenes import Drag, Floater, Scene
-from spinlev.studies.one_scene.plate_shelf import table_in_flight
+from spinlev.studies.one_scene.plate_of_scene import table_in_flight
 
 ROTOR = horizontal(2e-3, 10e-3, 1.305, 1.0)
 RTOL, CONTACT, FAR = 1e-4, 6.35e-3, 12e-3

@@ -11,7 +11,7 @@ from ngsolve import SetNumThreads
 from spinlev.geometry.basics import Box, InputError, rotation_matrix
 from spinlev.geometry.scenes import Plate, load_scene
 from spinlev.studies.command_line.cli import app
-from spinlev.studies.one_scene.plate_shelf import check_room
+from spinlev.studies.one_scene.plate_of_scene import check_room
 from spinlev.studies.one_scene.reaction import EDGES, MODELS
 
 SetNumThreads(1)

@@ -17,7 +17,6 @@ from spinlev.geometry.scenes import SceneError, load_scene, parse_scene
 from spinlev.studies.catalogue.cite import used_references
 from spinlev.studies.command_line.cli import _status
 from spinlev.studies.sweeps import combinations, parse_vary
-from spinlev.studies.terminal import Tables
 
 SCENE = str(HORIZONTAL)
 FAST = ("--plate-model", "none", "--model", "dipole", "--workers", "1", "--json")
@@ -154,8 +153,9 @@ class Sources(HTMLParser):
         self.found += [value for key, value in attrs if key in ("src", "href")]
 
 
+@pytest.mark.usefixtures("needs_3d")
 def test_a_flight_is_shown_and_reported(spinlev, tmp_path, monkeypatch):
-    monkeypatch.setattr("spinlev.studies.pictures.animation.FRAMES", 1)
+    monkeypatch.setattr("spinlev.studies.rendering.view.FRAMES", 1)
     status, _, err = spinlev("simulate", SCENE, "--duration-s", "0.1", *FAST[:4])
     assert status == 0, err
     trajectory = tmp_path / "out" / "trajectory.nc"
@@ -163,7 +163,6 @@ def test_a_flight_is_shown_and_reported(spinlev, tmp_path, monkeypatch):
     with xr.open_dataset(trajectory, engine="h5netcdf") as opened:
         flight = opened.load().assign_attrs(scene=text[: text.index("[plate]")])
     flight.to_netcdf(trajectory, engine="h5netcdf")
-    monkeypatch.setattr("spinlev.studies.catalogue.show.Tables", lambda: Tables("cuboid"))
     status, answer, err = spinlev("show", trajectory, "--json")
     assert status == 0, err
     assert Path(answer["pictures"][0]).read_bytes().startswith(b"\x89PNG")

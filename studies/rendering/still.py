@@ -2,63 +2,48 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
-from pathlib import Path
+import io
 
 import numpy as np
 import pyvista as pv
 from vtkmodules.vtkCommonCore import vtkLogger
 
-from ...dynamics.motion import State
-from ...fem.rotor_tables import FieldTable
-from ...fem.storage import replacing
 from ...geometry.basics import Array, Box
 from ...geometry.scenes import Scene
+from .view import Currents, FieldPlane, View
 
 MILLI = 1e-3
 NORTH = "#D55E00"
 METAL = "#9AA5B1"
 
 
-@dataclass(frozen=True, eq=False)
-class View:
-    """What is drawn.
-
-    Parameters
-    ----------
-    scene, table : and the field in it
-    floater : along the rotor's axes, at the instant shown
-    path : (n, 3) positions of the flight, rotor's frame, m
-    currents : draws the current density in the plate at points (n, 3) m, as arrows (n, 3) A/m²; None for no currents
-    """
-
-    scene: Scene
-    table: FieldTable
-    floater: State
-    path: Array
-    currents: Callable[[Array], Array] | None = None
-
-
-def last_view(scene: Scene, table: FieldTable, motion: State) -> View:
-    """The end of a flight (n, 3) along the rotor's axes, with its path."""
-    return View(scene, table, State(*(vector[-1] for vector in motion.vectors)), motion.position)
-
-
-def scene_picture(view: View, file: Path) -> None:
-    """Write a PNG of rotor, floater, plate, field and path, seen in the rotor's frame."""
+def scene_picture(view: View) -> bytes:
+    """A PNG of rotor, floater, plate, field and path, seen in the rotor's frame."""
     plotter = new_plotter()
     add_rotor(plotter, view.scene)
-    add_plate(plotter, view)
-    add_floater(plotter, view.scene, view.floater.position, view.floater.moment)
-    depth = float(-view.floater.position[2]) / MILLI
-    _field(plotter, view.table, depth)
+    add_plate(plotter, view.scene, view.currents)
+    add_floater(plotter, view.scene, view.position, view.moment)
+    depth = float(-view.position[2]) / MILLI
+    if view.plane is not None:
+        _field(plotter, view.plane)
     if len(view.path) > 1:
         plotter.add_mesh(pv.MultipleLines(view.path / MILLI), color="#0072B2", line_width=2)
     look(plotter, view.scene, depth)
-    with replacing(file) as temporary:
-        plotter.screenshot(temporary)
+    return _png(plotter)
+
+
+def sample_picture() -> bytes:
+    """A PNG of a sphere."""
+    plotter = new_plotter((64, 64))
+    plotter.add_mesh(pv.Sphere())
+    return _png(plotter)
+
+
+def _png(plotter: pv.Plotter) -> bytes:
+    file = io.BytesIO()
+    plotter.screenshot(file)
     plotter.close()
+    return file.getvalue()
 
 
 def new_plotter(size: tuple[int, int] = (1400, 1100)) -> pv.Plotter:
@@ -87,26 +72,19 @@ def add_floater(plotter: pv.Plotter, scene: Scene, position: Array, moment: Arra
     return [drawn, *_arrow(plotter, center, moment, radius)]
 
 
-def add_plate(plotter: pv.Plotter, view: View) -> None:
+def add_plate(plotter: pv.Plotter, scene: Scene, currents: Currents | None = None) -> None:
     """Draw the plate, with its currents where they are given."""
-    plate = view.scene.plate
-    if plate is None:
+    if scene.plate is None:
         return
-    plotter.add_mesh(_box(plate.box), color=METAL, opacity=0.25, show_edges=True)
-    if view.currents is not None:
-        _add_currents(plotter, plate.box, view.floater.position, view.currents)
+    plotter.add_mesh(_box(scene.plate.box), color=METAL, opacity=0.25, show_edges=True)
+    if currents is not None:
+        _add_currents(plotter, currents)
 
 
-def _add_currents(plotter: pv.Plotter, box: Box, floater: Array, currents: Callable[[Array], Array]) -> None:
-    """Arrows of the current density just under that face of a plate which the floater is before."""
-    axes = [np.linspace(-0.48, 0.48, max(3, int(size / MILLI / 5))) * size for size in box.size]
-    normal = int(np.argmin(box.size))
-    side = np.sign(box.to_body(floater[None])[0, normal]) or 1.0
-    axes[normal] = np.array([0.49 * side * box.size[normal]])
-    body = np.stack(np.meshgrid(*axes, indexing="ij"), -1).reshape(-1, 3)
-    points = box.center + body @ box.rotation.T
-    current = 1e-6 * currents(points)
-    cloud = pv.PolyData(points / MILLI)
+def _add_currents(plotter: pv.Plotter, currents: Currents) -> None:
+    """Arrows of the current density; the longest is 12 mm."""
+    current = 1e-6 * currents.density
+    cloud = pv.PolyData(currents.points / MILLI)
     cloud["J"], cloud["|J| (A/mm²)"] = current, np.linalg.norm(current, axis=1)
     longest = float(cloud["|J| (A/mm²)"].max()) or 1.0
     arrows = cloud.glyph(orient="J", scale="|J| (A/mm²)", factor=12.0 / longest, geom=pv.Arrow())
@@ -141,16 +119,13 @@ def _arrow(plotter: pv.Plotter, center: Array, direction: Array, radius: float) 
     return [plotter.add_mesh(arrow, color=NORTH)]
 
 
-def _field(plotter: pv.Plotter, table: FieldTable, depth: float) -> None:
+def _field(plotter: pv.Plotter, shown: FieldPlane) -> None:
     """|B| on the plane y = 0 below the rotor, and field lines in it."""
-    width = max(1.2 * depth, 30.0)
+    width, depth = shown.width, shown.depth
     grid = pv.ImageData(dimensions=(81, 3, 81), spacing=(2 * width / 80, 0.5, 1.6 * depth / 80))
     grid.origin = (-width, -0.5, -1.6 * depth - 2)
-    field = np.zeros((grid.n_points, 3))
-    known = table.in_range(np.asarray(grid.points) * MILLI)
-    field[known] = table.evaluate(np.asarray(grid.points)[known] * MILLI)[0]
-    grid["B"] = field
-    grid["|B| (mT)"] = np.where(known, 1e3 * np.linalg.norm(field, axis=1), np.nan)
+    grid["B"] = np.nan_to_num(shown.field)
+    grid["|B| (mT)"] = 1e3 * np.linalg.norm(shown.field, axis=1)
     plane = grid.slice(normal="y", origin=(0, 0, 0))
     bar = {"title": "|B| (mT)", "color": "black", "fmt": "%.3g"}
     plotter.add_mesh(

@@ -10,12 +10,11 @@ from ...dynamics.motion import PlateMemory
 from ...fem.plate_network import Region
 from ...fem.plate_tables import cached_driven_plate, reachable_region
 from ...fem.rotor_tables import Accuracy, RotorTable, distant
-from ...fem.slab import slab_and_rotor_table
-from ...geometry.basics import MU_0, Array, InputError
+from ...fem.slab import edge_error, slab_and_rotor_table
+from ...geometry.basics import Array, InputError
 from ...geometry.bodies import TOUCHING, sphere_overlap
 from ...geometry.scenes import Plate, Scene
 from ..terminal import note
-from .reaction import edge_error
 
 REACH = 0.003
 """The floater may move so far from where it begins, along each axis, m."""
@@ -25,37 +24,6 @@ LOWEST, HIGHEST, HARMONICS = 0.5, 250.0, 2.0
 """Frequencies of a table, Hz, at least; and the multiple of the rotor's that it must hold."""
 PLUMB = 1e-9
 """Cosine of the angle between a slab's normal and the vertical below which it stands upright."""
-NEGLIGIBLE = 1e-6
-"""Part of the floater's weight below which the largest conceivable force of the plate is left out."""
-
-
-def resolve_plate_model(scene: Scene, model: str, place: Array | None, rtol: float) -> tuple[str, str]:
-    """The plate's model in the motion, and the reason in words.
-
-    `auto` is none where even a perfect conductor's image would not be felt, the infinite slab where the edges are too
-    far to matter, and else the reduced network of the finite elements.
-    """
-    plate = scene.plate
-    if plate is None:
-        return "none", "the scene has no plate"
-    if place is None:
-        return "none", "there is no equilibrium around which to make a table"
-    if model == "fem":
-        return "reduced", "in the motion the finite elements enter by their reduced network"
-    if model != "auto":
-        return model, "as asked"
-    gap = float(plate.box.distance(place))
-    mirror = 3 * MU_0 * scene.floater.moment**2 / (32 * np.pi * gap**4)
-    weight = scene.floater.mass * float(np.linalg.norm(scene.gravity) or 9.81)
-    if mirror < NEGLIGIBLE * weight:
-        return "none", f"at {gap * 1e3:.3g} mm the plate pushes with less than {NEGLIGIBLE:.0e} of the weight"
-    body, normal = plate.box.to_body(place), int(np.argmin(plate.box.size))
-    if abs(body[normal]) > plate.box.half_edges[normal]:
-        error = edge_error(plate, place)
-        if error <= rtol:
-            return "slab", f"the plate's edges take at most {error:.1e} of its reaction"
-        return "reduced", f"edges may take {error:.1e} of an infinite slab's reaction, {rtol:.1e} is allowed"
-    return "reduced", "the floater is beside the plate's edge"
 
 
 def plate_memory(

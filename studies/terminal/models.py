@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, get_args
 
 from cyclopts import Parameter
 
@@ -16,7 +16,7 @@ PlateModel = Literal["none", "slab", "fem", "reduced", "auto"]
 
 @Parameter(name="*")
 @dataclass(frozen=True)
-class Tables:
+class Models:
     """Which tables are asked for.
 
     Parameters
@@ -36,13 +36,16 @@ class Tables:
     rtol: float = 3e-6
     plate_rtol: float = 3e-3
 
-    def checked(self) -> Tables:
+    def checked(self) -> Models:
         """Itself.
 
         Raises
         ------
-        InputError : a tolerance out of range
+        InputError : a model that does not exist, or a tolerance out of range
         """
+        for name, known in (("model", get_args(FieldModel)), ("plate_model", get_args(PlateModel))):
+            if (value := getattr(self, name)) not in known:
+                raise InputError(f"Input {name} must be one of {', '.join(known)}; instead received {value}.")
         if not 1e-13 <= self.rtol < 1:
             raise InputError(f"Input --rtol must be at least 1e-13 and less than 1; instead received {self.rtol}.")
         if not 1e-5 <= self.plate_rtol <= 0.1:

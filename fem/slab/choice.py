@@ -1,0 +1,41 @@
+"""Which model of the plate a scene needs."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...geometry.basics import MU_0, Array
+from ...geometry.scenes import Scene
+from .edges import edge_error
+
+NEGLIGIBLE = 1e-6
+"""Part of the floater's weight below which the largest conceivable force of the plate is left out."""
+
+
+def resolve_plate_model(scene: Scene, model: str, place: Array | None, rtol: float) -> tuple[str, str]:
+    """The plate's model in the motion, and the reason in words.
+
+    `auto` is none where even a perfect conductor's image would not be felt, the infinite slab where the edges are too
+    far to matter, and else the reduced network of the finite elements.
+    """
+    plate = scene.plate
+    if plate is None:
+        return "none", "the scene has no plate"
+    if place is None:
+        return "none", "there is no equilibrium around which to make a table"
+    if model == "fem":
+        return "reduced", "in the motion the finite elements enter by their reduced network"
+    if model != "auto":
+        return model, "as asked"
+    gap = float(plate.box.distance(place))
+    mirror = 3 * MU_0 * scene.floater.moment**2 / (32 * np.pi * gap**4)
+    weight = scene.floater.mass * float(np.linalg.norm(scene.gravity) or 9.81)
+    if mirror < NEGLIGIBLE * weight:
+        return "none", f"at {gap * 1e3:.3g} mm the plate pushes with less than {NEGLIGIBLE:.0e} of the weight"
+    body, normal = plate.box.to_body(place), int(np.argmin(plate.box.size))
+    if abs(body[normal]) > plate.box.half_edges[normal]:
+        error = edge_error(plate, place)
+        if error <= rtol:
+            return "slab", f"the plate's edges take at most {error:.1e} of its reaction"
+        return "reduced", f"edges may take {error:.1e} of an infinite slab's reaction, {rtol:.1e} is allowed"
+    return "reduced", "the floater is beside the plate's edge"

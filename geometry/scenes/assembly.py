@@ -1,0 +1,123 @@
+"""From the keys of a scene file to the scene in SI units."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from pydantic import ValidationError
+
+from ..basics import Array, Box, rotation_matrix
+from ..bodies import Magnet, horizontal, tilt, vertical
+from .collisions import overlap_faults
+from .contents import AbsoluteStart, Drag, Floater, Lowering, OffsetStart, Plate, Scene
+from .faults import SceneError, describe_fault
+from .schema import ExplicitRotor, PlateSection, Rotor, SceneSection, StartSection, TiltRotor
+
+MILLI = 1e-3
+
+
+def assemble(keys: Mapping[str, Any], source: str) -> Scene:
+    """The scene of a scene file's keys; `source` names it in messages, and lies where its map of the field does.
+
+    Raises
+    ------
+    SceneError : unknown, missing or wrong keys, or bodies that overlap
+    """
+    try:
+        table = SceneSection.model_validate(keys)
+    except ValidationError as error:
+        raise SceneError(source, [describe_fault(detail) for detail in error.errors()]) from None
+    faults = _start_faults(table.start)
+    if faults:
+        raise SceneError(source, faults)
+    scene = _scene(table, Path(source).parent)
+    faults = overlap_faults(scene)
+    if faults:
+        raise SceneError(source, faults)
+    return scene
+
+
+def _start_faults(start: StartSection | None) -> list[str]:
+    """Rules between the keys of `[start]`."""
+    if start is None:
+        return []
+    absolute = {key: getattr(start, key) for key in ("velocity_mm_s", "moment", "spin_hz")}
+    faults = []
+    if start.offset_mm is not None and start.position_mm is not None:
+        faults.append("Input start must have offset_mm or position_mm; instead received both.")
+    if start.position_mm is None:
+        faults += [
+            f"Input start.{key} must come with start.position_mm; instead received it alone."
+            for key, value in absolute.items()
+            if value is not None
+        ]
+    if start.moment is not None and not any(start.moment):
+        faults.append(f"Input start.moment must be a direction, not zero; instead received {start.moment}.")
+    return faults
+
+
+def _scene(table: SceneSection, folder: Path) -> Scene:
+    floater = Floater(
+        radius=table.floater.diameter_mm * MILLI / 2,
+        remanence=table.floater.remanence_T,
+        recoil_permeability=table.floater.recoil_permeability,
+        density=table.floater.density_kg_m3,
+        conductivity=table.floater.conductivity_S_m,
+    )
+    drag = Drag.stokes(floater.radius)
+    if table.drag:
+        drag = Drag(table.drag.linear_N_s_m, table.drag.angular_N_m_s)
+    return Scene(
+        frequency=table.frequency_hz,
+        gravity=np.array(table.gravity_m_s2),
+        rotor=_rotor(table.rotor),
+        floater=floater,
+        plate=_plate(table.plate) if table.plate else None,
+        drag=drag,
+        start=_start(table.start),
+        field_map=folder / table.rotor.field_map if table.rotor.field_map else None,
+    )
+
+
+def _box(size_mm: list[float], center_mm: list[float], rotation_deg: list[float]) -> Box:
+    return Box(_metres(size_mm), _metres(center_mm), rotation_matrix(rotation_deg))
+
+
+def _metres(millimetres: list[float]) -> Array:
+    return np.array(millimetres) * MILLI
+
+
+def _rotor(rotor: Rotor) -> tuple[Magnet, ...]:
+    if isinstance(rotor, ExplicitRotor):
+        return tuple(
+            Magnet(_box(m.size_mm, m.center_mm, m.rotation_deg), np.array(m.polarization_T), *m.recoil_permeability)
+            for m in rotor.magnets
+        )
+    material = (rotor.edge_mm * MILLI, rotor.remanence_T, *rotor.recoil_permeability)
+    if isinstance(rotor, TiltRotor):
+        return tilt(float(np.radians(rotor.angle_deg)), *material)
+    build = horizontal if rotor.configuration == "horizontal" else vertical
+    return build(rotor.displacement_mm * MILLI, *material)
+
+
+def _plate(plate: PlateSection) -> Plate:
+    down = plate.lowering
+    lowering = Lowering(down.start_s, down.speed_mm_s * MILLI, down.distance_mm * MILLI) if down else None
+    return Plate(_box(plate.size_mm, plate.center_mm, plate.rotation_deg), plate.conductivity_S_m, lowering)
+
+
+def _start(start: StartSection | None) -> OffsetStart | AbsoluteStart:
+    if start is None or start == StartSection():
+        return OffsetStart()
+    if start.position_mm is None:
+        return OffsetStart(_metres(start.offset_mm or [0.0, 0.0, 0.1]))
+    moment = np.array(start.moment or [0.0, 0.0, 1.0])
+    return AbsoluteStart(
+        position=_metres(start.position_mm),
+        velocity=_metres(start.velocity_mm_s or [0.0, 0.0, 0.0]),
+        moment=moment / np.linalg.norm(moment),
+        spin=2 * np.pi * np.array(start.spin_hz or [0.0, 0.0, 0.0]),
+    )

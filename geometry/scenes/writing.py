@@ -1,0 +1,174 @@
+"""A scene as the keys of a scene file: what is written beside a result, also of a scene that was made in Python."""
+
+from __future__ import annotations
+
+import json
+import tomllib
+import warnings
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..basics import Array, Box
+from ..bodies import Magnet, horizontal, tilt, vertical
+from .assembly import assemble
+from .contents import AbsoluteStart, Drag, Lowering, Plate, Scene
+from .faults import SceneError
+
+SAME = 1e-12
+"""Relative difference of numbers below which they are taken for the same."""
+DEFAULT_START = {"offset_mm": [0.0, 0.0, 0.1]}
+
+
+def scene_text(scene: Scene) -> str:
+    """The scene file of a scene: the one that was read if it still says the same, else one written from the object."""
+    return scene.text if scene.text and _says(scene.text, scene) else _toml(_keys(scene))
+
+
+def scene_keys(scene: Scene) -> dict[str, Any]:
+    """The keys of a scene file that describe a scene, as tables within tables."""
+    return tomllib.loads(scene_text(scene))
+
+
+def _says(text: str, scene: Scene) -> bool:
+    """Whether a scene file describes this scene; the folder of its map of the field is not in the file."""
+    try:
+        both = [_keys(assemble(tomllib.loads(text), "scene")), _keys(scene)]
+    except (SceneError, tomllib.TOMLDecodeError):
+        return False
+    told, used = (str(keys["rotor"].pop("field_map", "")) for keys in both)
+    return both[0] == both[1] and Path(used).parts[-len(Path(told).parts) :] == Path(told).parts
+
+
+def _keys(scene: Scene) -> dict[str, Any]:
+    floater = scene.floater
+    keys: dict[str, Any] = {
+        "frequency_hz": _number(scene.frequency),
+        "gravity_m_s2": _numbers(scene.gravity),
+        "rotor": _rotor(scene.rotor) | ({"field_map": str(scene.field_map)} if scene.field_map else {}),
+        "floater": {
+            "diameter_mm": _milli(2 * floater.radius),
+            "remanence_T": _number(floater.remanence),
+            "recoil_permeability": _number(floater.recoil_permeability),
+            "density_kg_m3": _number(floater.density),
+        },
+    }
+    if floater.conductivity is not None:
+        keys["floater"]["conductivity_S_m"] = _number(floater.conductivity)
+    if scene.plate:
+        keys["plate"] = _plate(scene.plate)
+    if scene.drag != Drag.stokes(floater.radius):
+        keys["drag"] = {"linear_N_s_m": scene.drag.linear, "angular_N_m_s": scene.drag.angular}
+    start = _start(scene)
+    return keys if start == DEFAULT_START else keys | {"start": start}
+
+
+def _rotor(rotor: tuple[Magnet, ...]) -> dict[str, Any]:
+    """A rotor of the article by its name, any other as its magnets."""
+    first = rotor[0]
+    material = (float(first.box.size[0]), float(np.linalg.norm(first.polarization)), first.recoil_permeability)
+    transverse = first.transverse_permeability
+    x, _, z = rotor[-1].box.center
+    angle = float(np.arctan2(first.polarization_in_rotor[2], first.polarization_in_rotor[0]))
+    known = {
+        ("horizontal", "displacement_mm", _milli(x)): horizontal(float(x), *material, transverse),
+        ("vertical", "displacement_mm", _milli(z)): vertical(float(z), *material, transverse),
+        ("tilt", "angle_deg", _number(float(np.degrees(angle)))): tilt(angle, *material, transverse),
+    }
+    for (configuration, key, value), like in known.items():
+        if len(like) == len(rotor) and all(map(_same, like, rotor)) and value >= (0 if key != "angle_deg" else -90):
+            return {
+                "configuration": configuration,
+                key: value,
+                "edge_mm": _milli(material[0]),
+                "remanence_T": _number(material[1]),
+                "recoil_permeability": _permeability(first),
+            }
+    return {"magnets": [_magnet(magnet) for magnet in rotor]}
+
+
+def _same(one: Magnet, other: Magnet) -> bool:
+    return bool(np.allclose(_parts(one), _parts(other), rtol=SAME, atol=1e-14))
+
+
+def _parts(magnet: Magnet) -> Array:
+    box = magnet.box
+    turned = (box.rotation, magnet.permeability_in_rotor)
+    return np.concatenate([box.size, box.center, magnet.polarization, *(matrix.ravel() for matrix in turned)])
+
+
+def _magnet(magnet: Magnet) -> dict[str, Any]:
+    return {
+        **_box(magnet.box),
+        "polarization_T": _numbers(magnet.polarization),
+        "recoil_permeability": _permeability(magnet),
+    }
+
+
+def _permeability(magnet: Magnet) -> float | list[float]:
+    across = magnet.transverse_permeability
+    return magnet.recoil_permeability if magnet.isotropic else [magnet.recoil_permeability, float(across or 1.0)]
+
+
+def _plate(plate: Plate) -> dict[str, Any]:
+    keys = {**_box(plate.box), "conductivity_S_m": _number(plate.conductivity)}
+    return keys | ({"lowering": _lowering(plate.lowering)} if plate.lowering else {})
+
+
+def _lowering(down: Lowering) -> dict[str, Any]:
+    return {"start_s": _number(down.start), "speed_mm_s": _milli(down.speed), "distance_mm": _milli(down.distance)}
+
+
+def _start(scene: Scene) -> dict[str, Any]:
+    start = scene.start
+    if not isinstance(start, AbsoluteStart):
+        return {"offset_mm": _millis(start.offset)}
+    return {
+        "position_mm": _millis(start.position),
+        "velocity_mm_s": _millis(start.velocity),
+        "moment": _numbers(start.moment),
+        "spin_hz": _numbers(start.spin / (2 * np.pi)),
+    }
+
+
+def _box(box: Box) -> dict[str, Any]:
+    from scipy.spatial.transform import Rotation  # slow to load
+
+    with warnings.catch_warnings():  # where y is 90°, x and z are one turn, and SciPy says so
+        warnings.simplefilter("ignore", UserWarning)
+        turned = Rotation.from_matrix(box.rotation).as_euler("xyz", degrees=True)
+    return {"size_mm": _millis(box.size), "center_mm": _millis(box.center), "rotation_deg": _numbers(turned)}
+
+
+def _number(value: float) -> float:
+    """A number without the round-off of its way through SI units."""
+    return float(f"{float(value):.14g}") + 0.0
+
+
+def _milli(value: float) -> float:
+    return _number(1e3 * value)
+
+
+def _numbers(values: Array) -> list[float]:
+    scale = float(np.abs(values).max()) * SAME
+    return [_number(value) if abs(value) > scale else 0.0 for value in values]
+
+
+def _millis(values: Array) -> list[float]:
+    return _numbers(1e3 * np.asarray(values))
+
+
+def _toml(keys: Mapping[str, Any], table: str = "") -> str:
+    """Keys as TOML: numbers and texts first, then tables, then lists of tables."""
+    plain, tables = "", ""
+    for key, value in keys.items():
+        name = f"{table}.{key}".lstrip(".")
+        if isinstance(value, Mapping):
+            tables += f"\n[{name}]\n{_toml(value, name)}"
+        elif isinstance(value, list) and value and isinstance(value[0], Mapping):
+            tables += "".join(f"\n[[{name}]]\n{_toml(entry, name)}" for entry in value)
+        else:
+            plain += f"{key} = {json.dumps(value)}\n"
+    return plain + tables

@@ -1,0 +1,38 @@
+"""Completes an installation and tries what the program uses: python -m spinlev.studies.command_line.installation."""
+
+from __future__ import annotations
+
+import importlib
+import sys
+
+from ..terminal import FORTRAN, lend_quadmath, way_out
+
+MODULES = ("ngsolve", "netgen.occ", "heyoka", "h5py", "matplotlib.figure", "distributed", "spinlev.studies.interface")
+"""Those with compiled code, and what stands on them."""
+
+
+def main() -> int:
+    """Exit status 0, with a note where only pictures cannot be drawn; 1 where the program cannot run."""
+    try:
+        lent = lend_quadmath()
+    except OSError as error:
+        print(f"spinlev: NGSolve could not be given a libquadmath: {error}", file=sys.stderr)
+        lent = None
+    for module in MODULES:
+        try:
+            importlib.import_module(module)
+        except ImportError as error:
+            print(f"spinlev: {module} cannot be loaded: {error}. {way_out(FORTRAN)}", file=sys.stderr)
+            return 1
+    if lent:
+        print(f"NOTE: NGSolve uses the libquadmath that came with {lent.resolve().parent.name.removesuffix('.libs')}.")
+    from ..rendering import unavailable
+
+    without = unavailable()
+    if without:
+        print(f"NOTE: {without}")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

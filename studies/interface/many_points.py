@@ -1,0 +1,98 @@
+"""Studies and sweeps of one's own from Python."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import xarray as xr
+from matplotlib.figure import Figure
+
+from ...geometry.basics import InputError
+from ...geometry.scenes import Scene
+from ..catalogue import CATALOGUE, QUESTION, figures_of, question_study
+from ..one_scene import Question, given_scene
+from ..results import Study
+from ..sweeps import Engine, checked_values, combinations, forget, swept
+from ..terminal import FieldModel, Models, PlateModel, Quantity, heard
+
+Values = Mapping[str, Sequence[float] | Sequence[str]]
+
+
+def sweep(
+    scene: Scene | str | Path,
+    values: Values,
+    ask: Quantity = "equilibria",
+    model: FieldModel = "auto",
+    plate_model: PlateModel = "auto",
+    spin: float = 0.0,
+    duration: float = 3.0,
+    place: Sequence[float] = (0.0, 0.0, -0.02),
+    rtol: float = Models.rtol,
+    plate_rtol: float = Models.plate_rtol,
+    workers: int | None = 1,
+    scheduler: str | None = None,
+    out: str | Path = "out",
+    progress: bool = False,
+) -> xr.Dataset:
+    """Any quantity of a scene over a grid of its parameters; each key becomes a dimension.
+
+    Parameters
+    ----------
+    scene : a scene or the path of a scene file
+    values : by key, numbers for keys of the scene file (`frequency_hz`, `rotor.angle_deg`, `plate.center_mm.2`) and for
+        `spin`, names for `model` and `plate_model`
+    ask : "equilibria", "flight" or "field"
+    model, plate_model, spin, rtol, plate_rtol : of all points, unless they are varied
+    duration : of a flight, s
+    place : (3,) of the field, m, rotor's frame
+    workers, scheduler : processes here, or the address of a dask scheduler; more than one worker needs the caller's
+        script to be guarded by `if __name__ == "__main__":`
+    out : folder in which finished points are kept until all are done; the same sweep goes on there
+    progress : whether messages and a progress bar go to standard error
+
+    Returns
+    -------
+    Dataset over the keys; points that failed are NaN and named in the attribute `failed_points`. Raises InputError for
+    a key, a value or a model that is not allowed, and SweepError if no point could be computed.
+    """
+    loaded = given_scene(scene)
+    models = Models(model, plate_model, rtol, plate_rtol).checked()
+    where = tuple(float(c) for c in place)
+    question = Question(loaded, "scene", ask, models, float(spin), float(duration), where)
+    grid = checked_values(values)
+    with heard(progress):
+        return _computed(QUESTION, question_study(question, grid), combinations(grid), (workers, scheduler), out)
+
+
+def run_study(
+    name: str,
+    quick: bool = True,
+    workers: int | None = 1,
+    scheduler: str | None = None,
+    out: str | Path = "out",
+    progress: bool = False,
+) -> xr.Dataset:
+    """The result of a study of the catalogue; points finished before an interruption are kept in `out`.
+
+    More than one worker needs the caller's script to be guarded by `if __name__ == "__main__":`. Raises InputError for
+    an unknown name.
+    """
+    if name not in CATALOGUE:
+        raise InputError(f"Input name must be one of {', '.join(CATALOGUE)}; instead received {name}.")
+    study = CATALOGUE[name]
+    with heard(progress):
+        return _computed(name, study, study.points(quick), (workers, scheduler), out)
+
+
+def draw(result: xr.Dataset) -> Mapping[str, Figure]:
+    """The figures of a result by name; a notebook shows them. Raises InputError where the result has no figure."""
+    return figures_of(result)
+
+
+def _computed(
+    name: str, study: Study, points: Sequence[Mapping[str, object]], by: tuple[int | None, str | None], out: str | Path
+) -> xr.Dataset:
+    result = swept(name, study, dict(enumerate(points)), Engine(*by).checked(), Path(out))
+    forget(name, Path(out))
+    return result

@@ -1,0 +1,198 @@
+"""One scene from its field to its flight: each step is computed once, when it is first asked for."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import cached_property
+from pathlib import Path
+
+from ...dynamics.equilibria import survey, with_plate
+from ...dynamics.flights import Checkpoint, Trajectory, simulate, starting_point
+from ...dynamics.motion import PlateMemory, Rates
+from ...dynamics.steady import Equilibrium, EquilibriumError, Survey
+from ...fem.measured_maps import GriddedTable, map_table
+from ...fem.rotor_tables import RotorTable, cached_rotor_table, resolve_model, rotor_table
+from ...fem.slab import resolve_plate_model
+from ...geometry.basics import Array, InputError
+from ...geometry.scenes import AbsoluteStart, Scene, load_scene
+from ..terminal import Models, finite, note, positive, progress
+from .plate_of_scene import check_room, plate_memory, table_in_flight
+
+RotorField = RotorTable | GriddedTable
+"""A rotor's table: computed, or from a map."""
+
+
+class Levitation:
+    """What one scene does, by the models that are asked for.
+
+    Every member is computed when it is first used and then kept: the rotor's `table`, the `survey` of all equilibria,
+    the currents of the `plate`, the `stability` of the equilibrium at which a flight begins, and a `flight`.
+
+    Parameters
+    ----------
+    scene : a scene, or the path of a scene file
+    models : of the field and of the plate, with their tolerances
+    spin : body spin S = Ω·m̂/ω of the equilibria
+
+    Raises
+    ------
+    SceneError : the file cannot be used
+    InputError : a model that does not exist, or a tolerance out of range
+    """
+
+    def __init__(self, scene: Scene | str | Path, models: Models = Models(), spin: float = 0.0) -> None:
+        self.scene = given_scene(scene)
+        self.models = models.checked()
+        self.spin = finite("spin", spin)
+        self.from_cache: list[str] = []
+        """Names of the tables that were found in the cache."""
+        self._fields: dict[str, RotorField] = {}
+
+    @property
+    def table(self) -> RotorField:
+        """The rotor's field by the model that was asked for; `auto` chooses and says why."""
+        return self.field(self.models.model)
+
+    @cached_property
+    def without_plate(self) -> Survey:
+        """All equilibria as if there were no plate. Raises EquilibriumError for a rotor at rest."""
+        note("Equilibria ...")
+        return survey(self.scene, self.table, self.spin, rates=self._rates)
+
+    @cached_property
+    def plate(self) -> PlateMemory | None:
+        """The plate's currents around the place where the floater levitates; None where none are modelled.
+
+        Raises
+        ------
+        InputError : the plate leaves the floater no room, or the model does not fit it
+        """
+        scene = self.scene
+        alone = self.absolute or scene.plate is None or not scene.frequency
+        place = self._place(() if alone else self.without_plate.equilibria)
+        if place is not None:
+            check_room(scene, place)
+        name, reason = resolve_plate_model(scene, self.models.plate_model, place, self.models.plate_rtol)
+        if scene.plate is not None:
+            note(f"Plate model: {name} ({reason})")
+        if name == "none" or scene.plate is None or place is None:
+            return None
+        memory, found = plate_memory(scene, scene.plate, name, sources(self.table), place, self.models.plate_rtol)
+        if found:
+            self.from_cache.append("plate")
+        return memory
+
+    @cached_property
+    def survey(self) -> Survey:
+        """All equilibria, the stable ones first, with the plate where its currents are modelled."""
+        found = self.without_plate
+        return found if self.plate is None else with_plate(self.scene, self.table, found, self.plate, self._rates)
+
+    @property
+    def equilibria(self) -> tuple[Equilibrium, ...]:
+        """Those of the survey."""
+        return self.survey.equilibria
+
+    @cached_property
+    def stability(self) -> Equilibrium:
+        """The equilibrium at which a flight begins, with its small motions; if none will do, the nearest of all.
+
+        Raises
+        ------
+        EquilibriumError : there is none
+        """
+        chosen = _first(self.equilibria)
+        if chosen is None:
+            at = f"At {self.scene.frequency:g} Hz"
+            raise EquilibriumError(f"{at} the floater has no equilibrium with body spin {self.spin:g}.")
+        return chosen
+
+    @cached_property
+    def flight_table(self) -> RotorField:
+        """The rotor's field for the motion: beside a plate, whose own table reaches no farther, with fewer terms."""
+        table = self.table
+        if self.plate is None or not isinstance(table, RotorTable):
+            return table
+        place = self._place(() if self.absolute else self.equilibria)
+        return table if place is None else table_in_flight(self.scene, table, place, self.models.rtol)
+
+    def flight(self, duration: float, checkpoint: Checkpoint | None = None) -> Trajectory:
+        """The motion for `duration` (s) from where the scene says, kept in `checkpoint` while it lasts.
+
+        Raises
+        ------
+        EquilibriumError : it shall begin at an equilibrium, and there is none that will do
+        InputError : `duration` is not positive, or the flight would begin in contact
+        FlightStopped : the user stopped it; the error holds what was flown
+        """
+        positive("duration", duration)
+        known = () if self.absolute else self.equilibria
+        table, plate = self.flight_table, self.plate
+        note("Motion ...")
+        with progress("Motion") as advance:
+            return simulate(self.scene, table, duration, known, progress=advance, memory=plate, checkpoint=checkpoint)
+
+    def field(self, model: str) -> RotorField:
+        """The rotor's field by any model, accurate wherever the floater can be: from its radius off the magnets on."""
+        name, reason = "map", ""
+        if model != "map":
+            name, reason = resolve_model(self.scene.rotor, model, self.models.rtol, self.scene.floater.radius)
+        if name not in self._fields:
+            if model == "auto":
+                note(f"Field model: {name} ({reason})")
+            self._fields[name] = self._made(name)
+        return self._fields[name]
+
+    @property
+    def labels(self) -> dict[str, str]:
+        """What a result says of its models."""
+        return {"model": self.table.model, "plate_model": self.plate.model if self.plate else "none"}
+
+    @cached_property
+    def _rates(self) -> Rates:
+        return Rates.of(self.scene, self.table)
+
+    @property
+    def absolute(self) -> bool:
+        """Whether a flight begins where the scene says, and needs no equilibrium."""
+        return isinstance(self.scene.start, AbsoluteStart)
+
+    def _place(self, known: Sequence[Equilibrium]) -> Array | None:
+        """Where the floater is while it levitates, (3,) m."""
+        if isinstance(self.scene.start, AbsoluteStart):
+            return self.scene.start.position
+        chosen = _first(known)
+        return None if chosen is None else chosen.position
+
+    def _made(self, name: str) -> RotorField:
+        scene, rtol = self.scene, self.models.rtol
+        if name == "map":
+            note("Rotor's field from its map ...")
+            return map_table(scene.field_map, scene.rotor)
+        if name != "fem":  # closed forms are quicker to make than to read
+            return rotor_table(scene.rotor, name, rtol, scene.floater.radius)
+        note("Rotor's field by finite elements ...")
+        table, found = cached_rotor_table(scene.rotor, name, rtol, note, scene.floater.radius)
+        if found:
+            self.from_cache.append(name)
+        note("  from the cache." if found else f"  done in {table.provenance['seconds']:.1f} s.")
+        return table
+
+
+def given_scene(scene: Scene | str | Path) -> Scene:
+    """A scene as it is, or from the path of its file. Raises SceneError, and InputError for anything else."""
+    if isinstance(scene, Scene):
+        return scene
+    if isinstance(scene, str | Path):
+        return load_scene(scene)
+    raise InputError(f"Input scene must be a Scene or the path of a scene file; instead received {scene!r}.")
+
+
+def _first(known: Sequence[Equilibrium]) -> Equilibrium | None:
+    """The equilibrium at which a flight begins, or else the nearest."""
+    return starting_point(known) or next(iter(known), None)
+
+
+def sources(table: RotorField) -> RotorTable:
+    """The closed forms and expansions that make a table's field."""
+    return table.expansions if isinstance(table, GriddedTable) else table

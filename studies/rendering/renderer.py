@@ -1,0 +1,102 @@
+"""Pictures in three dimensions, drawn by a process of its own.
+
+VTK ends the process that calls it, without a word, where it finds no graphics library: a computation must survive that.
+"""
+
+from __future__ import annotations
+
+import os
+import pickle
+import signal
+import subprocess
+import sys
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import cache
+from pathlib import Path
+from typing import Protocol
+
+from ...geometry.basics import ComputationError
+from ..terminal import DRAWING, way_out
+from .view import Sample
+
+COMMAND = (sys.executable, "-P", "-m", f"{__package__}.draw_process")
+
+
+class RenderError(ComputationError):
+    """Pictures that could not be drawn, and why; those finished before are there."""
+
+
+class Picture(Protocol):
+    """What can be drawn: numbers that can be pickled."""
+
+    def draw(self, progress: Callable[[float], None]) -> bytes:
+        """The file's content; called in the other process."""
+
+
+def render(pictures: Mapping[Path, Picture], progress: Callable[[float], None] = lambda fraction: None) -> None:
+    """Draw pictures, all in one process, and write each as soon as it is finished.
+
+    Raises
+    ------
+    RenderError : the process died or found no way to draw; no older picture is left where one could not be drawn
+    OSError : a file cannot be written
+    """
+    from ...fem.storage import write_whole  # the other process has no use for it
+
+    for path in pictures:
+        path.unlink(missing_ok=True)
+    left = list(pictures)
+    for answer in _drawn(list(pictures.values()), progress):
+        if isinstance(answer, str):
+            names = ", ".join(path.name for path in left)
+            raise RenderError(f"The 3-D pictures are left out ({names}): {answer}")
+        write_whole(left.pop(0), answer)
+
+
+@cache
+def unavailable() -> str | None:
+    """Why nothing can be drawn in three dimensions on this machine; None where a small picture can."""
+    (answer,) = _drawn([Sample()], lambda fraction: None)
+    return f"No 3-D pictures can be drawn: {answer}" if isinstance(answer, str) else None
+
+
+def _drawn(pictures: Sequence[Picture], progress: Callable[[float], None]) -> Iterator[bytes | str]:
+    """The files' contents, one after the other; where that fails, last the reason."""
+    messages = None if "SPINLEV_TRACEBACK" in os.environ else subprocess.DEVNULL
+    pipe = subprocess.PIPE
+    # Ctrl-C at the terminal is for this process, which then ends the other: hence a group of its own.
+    with subprocess.Popen(COMMAND, stdin=pipe, stdout=pipe, stderr=messages, process_group=0) as process:
+        try:
+            unfinished = len(pictures)
+            for answer in _answers(process, pickle.dumps(pictures)):
+                if isinstance(answer, float):
+                    progress(answer)
+                else:
+                    yield answer
+                    unfinished = 0 if isinstance(answer, str) else unfinished - 1
+            if unfinished:
+                yield _death(process.wait())
+        except BaseException:
+            process.kill()
+            raise
+
+
+def _answers(process: subprocess.Popen[bytes], question: bytes) -> Iterator[bytes | float | str]:
+    """What the process says until it ends."""
+    assert process.stdin
+    assert process.stdout
+    try:
+        with process.stdin as stream:
+            stream.write(question)
+        while True:
+            yield pickle.load(process.stdout)
+    except (BrokenPipeError, EOFError, pickle.UnpicklingError):  # it has ended, perhaps in the middle of a word
+        return
+
+
+def _death(status: int) -> str:
+    """How the process ended too early, and what would help."""
+    if status == -signal.SIGKILL:
+        return "the process that draws them was killed; too little memory may be the reason."
+    how = signal.strsignal(-status) if status < 0 else f"exit status {status}"
+    return f"the process that draws them died ({how}), as it does without graphics libraries. {way_out(DRAWING)}"
