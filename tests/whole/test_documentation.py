@@ -1,5 +1,6 @@
 """What the documentation names is there: modules, tests, pictures; the dependencies are all accounted for."""
 
+import pkgutil
 import re
 import runpy
 import tomllib
@@ -20,6 +21,12 @@ def test_files_that_are_named_exist(page):
     missing = [name for name in NAMED.findall(text) if not (ROOT / name).is_file()]
     missing += [link for link in links if not (page.parent / link).exists()]
     assert not missing
+
+
+@pytest.mark.parametrize("page", [*PAGES, *(ROOT / "docs" / "examples").glob("*.py")], ids=lambda page: page.name)
+def test_modules_that_are_named_exist(page):
+    for name in set(re.findall(r"\bspinlev(?:\.[A-Za-z_]\w*)+", page.read_text(encoding="utf-8"))):
+        pkgutil.resolve_name(name)
 
 
 def test_every_section_of_the_mathematics_names_the_code_that_is_it():
