@@ -16,7 +16,7 @@ KNOWN = {"matplotlib": "PSF-based (BSD compatible)"}
 HEAD = """# Dependencies
 
 Written by `docs/list_dependencies.py` from `pyproject.toml`, `requirements.txt` and what the packages say of their
-licences; `tests/test_documentation.py` keeps it up to date. spinlev itself has the MIT licence. Licences with a
+licences; `tests/whole/test_documentation.py` keeps it up to date. spinlev itself has the MIT licence. Licences with a
 condition on changed copies of the library are LGPL (NGSolve, Netgen and Open CASCADE) and MPL (heyoka and some small
 ones); all are used unchanged, as separate packages.
 """

@@ -1,8 +1,8 @@
 """A study of your own: how the bounce depends on the floater's density.
 
 A study is a pure function of a point, the points at which it is asked, and what is drawn and said of the joined
-result. One entry in the catalogue, and it is resumable and runs on any number of workers; with the entry in
-`studies/catalogue/entries.py` the command line knows it too.
+result. One object joins them, and it is resumable and runs on any number of workers; put into `STUDIES` of a room of
+`studies`, the command line knows it too.
 """
 
 import tempfile
@@ -49,10 +49,19 @@ def report(result):
     return [f"{density:.0f} kg/m³: {bounce:.2f} Hz" for density, bounce in rows]
 
 
-CATALOGUE["bounce"] = Study("bounce against the floater's density", points, compute, by_case, picture, report)
+STUDY = Study(
+    name="bounce",
+    summary="bounce against the floater's density",
+    points=points,
+    compute=compute,
+    gather=by_case,
+    draw=picture,
+    report=report,
+)
+CATALOGUE[STUDY.name] = STUDY
 
 with tempfile.TemporaryDirectory() as folder:
-    result = run_study("bounce", quick=True, out=folder)
+    result = run_study(STUDY.name, quick=True, out=folder)
 print(*report(result), sep="\n")
 bounce_hz = float(result["bounce"].sel(case=2))
-figure = draw(result)["bounce"]
+figure = draw(result)[STUDY.name]

@@ -20,7 +20,7 @@ from .levitation_branch import by_frequency, levitating_branch
 LOWEST, HIGHEST = 25.0, 400.0
 """Frequencies between which is looked, Hz."""
 CONTACT, BORDER = "contact", "border"
-"""Ends beside those of `dynamics.branch`: the floater touches the rotor; the end of what was looked at."""
+"""Ends beside those of `branch`: the floater touches the rotor; the end of what was looked at."""
 TOLERATED = 0.02
 """Growth that counts as stable, 1/s: more than what the error of finite elements makes of undamped motion."""
 STEPS = Steps(longest=0.1, turn=0.15, tolerated=TOLERATED)

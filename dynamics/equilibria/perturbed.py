@@ -60,6 +60,21 @@ class PerturbedBalance:
         _, moment, step = solve(self.balance, place, guess[None], TILTS)
         return np.asarray(moment[0] if step[0] < 1e-8 else guess)
 
+    def directions(self, places: Array, start: float, guess: Array) -> Array:
+        """Balanced moment directions (n, 3) at places (n, 3) m, followed downwards and upwards from `start` (m) below.
+
+        Each begins at its neighbour's, the first ones at `guess`.
+        """
+        result = np.zeros_like(places)
+        depths = -places[:, 2]
+        downwards = [k for k in np.argsort(depths) if depths[k] >= start]
+        upwards = [k for k in np.argsort(-depths) if depths[k] < start]
+        for chain in (downwards, upwards):
+            direction = guess
+            for k in chain:
+                direction = result[k] = self.direction(places[k], direction)
+        return result
+
     def shift(self, position: Array, moment: Array, extra: Extra, most: int = 20, tolerance: float = 1e-7) -> Shift:
         """Follow an equilibrium, position (3,) m and moment direction (3,), to where the additional forces put it.
 

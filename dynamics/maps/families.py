@@ -14,12 +14,23 @@ from ...geometry.basics import Array, Box
 from ...geometry.bodies import Magnet
 from ...geometry.scenes import Scene
 from ..branches import Problem
-from ..motion import MovableField, Move, Parameter, Rates, Scales, Shift, Turn, blended, nodes, parameters
+from ..motion import (
+    MovableField,
+    Move,
+    Parameter,
+    Rates,
+    Rotation,
+    Scales,
+    Translation,
+    blend_tables,
+    chebyshev_points,
+    parameters,
+)
 
 MOVES: dict[str, tuple[Move | None, ...]] = {
-    "horizontal": (Shift((1.0, 0.0, 0.0)),),
-    "vertical": (None, Shift((0.0, 0.0, 1.0))),
-    "tilt": (Turn(),),
+    "horizontal": (Translation((1.0, 0.0, 0.0)),),
+    "vertical": (None, Translation((0.0, 0.0, 1.0))),
+    "tilt": (Rotation(),),
 }
 """How each magnet of the article's rotors moves with displacement (m) or tilt (rad)."""
 
@@ -124,7 +135,8 @@ def _mutual(
             "Input measures must be given for magnets that magnetise each other and move against each other, such as "
             "(0.010, 0.020) m; instead received None."
         )
-    places, shifts = nodes(*measures, NODES), [move if isinstance(move, Shift) else None for move in moves]
+    places = chebyshev_points(*measures, NODES)
+    shifts = [move if isinstance(move, Translation) else None for move in moves]
     pairs = list(zip(rotor, shifts, strict=True))
     tables = [
         rotor_table(tuple(s.moved(m, float(d)) if s else m for m, s in pairs), "fem", rtol, nearest).expansions
@@ -132,7 +144,7 @@ def _mutual(
     ]
     carriers = [carrier(magnet) for magnet in rotor]
     closed = [(RotorTable("cuboid", (c,), (c,)), s) for c, s in zip(carriers, shifts, strict=True)]
-    return MovableField((*closed, *blended(tables, places, [(m.box.center, s) for m, s in pairs])))
+    return MovableField((*closed, *blend_tables(tables, places, [(m.box.center, s) for m, s in pairs])))
 
 
 def _unmoved(magnet: Magnet, move: Move | None) -> Magnet:

@@ -1,11 +1,11 @@
 """All equilibria and their stability over a grid of frequencies and measures of the rotor.
 
-On a coarse grid Newton's method searches from the starts of `search`, all of them at some points and a random quarter
-at others.  From what is found each equilibrium is carried to the points beside it, all at once, until nothing new is
-found.  Where that does not lead to the neighbour the branch is followed by its arc length, around the fold and back on
-the other side if there is one (`between`).  So a sheet of equilibria is found whole if one of its points, or of a sheet
-that meets it in a fold, is found by a search; only one that fits between the points of the coarse grid, and meets no
-other, can be missed.
+On a coarse grid Newton's method searches from the starts of `equilibria.search`, all of them at some points and a
+random quarter at others.  From what is found each equilibrium is carried to the points beside it, all at once, until
+nothing new is found.  Where that does not lead to the neighbour the branch is followed by its arc length, around the
+fold and back on the other side if there is one (`between`).  So a sheet of equilibria is found whole if one of its
+points, or of a sheet that meets it in a fold, is found by a search; only one that fits between the points of the coarse
+grid, and meets no other, can be missed.
 """
 
 from __future__ import annotations

@@ -1,9 +1,9 @@
 """Which equations does the floater obey?"""
 
-from .blend import blended, nodes
+from .blend import blend_tables, chebyshev_points
 from .equations import Equations, equations_of_motion, parameters
 from .events import CONTACT, clearance, flight_events, plate_depth, plate_legs, plate_places, rotor_gap
-from .movable import MovableField, Move, Shift, Turn
+from .movable import MovableField, Move, Rotation, Translation
 from .plate_force import PlateForce
 from .plate_terms import PlateMemory
 from .rates import Rates
@@ -19,15 +19,15 @@ __all__ = [
     "PlateForce",
     "PlateMemory",
     "Rates",
+    "Rotation",
     "Scales",
-    "Shift",
     "State",
-    "Turn",
-    "blended",
+    "Translation",
+    "blend_tables",
+    "chebyshev_points",
     "clearance",
     "equations_of_motion",
     "flight_events",
-    "nodes",
     "parameters",
     "plate_depth",
     "plate_legs",

@@ -11,11 +11,11 @@ import numpy as np
 
 from ...fem.harmonics import UPPER, FieldExpressions, MultipoleExpansion, harmonic_sums
 from ...geometry.basics import Array
-from .movable import Shift
+from .movable import Translation
 from .symbols import Parameter
 
 
-def nodes(lowest: float, highest: float, count: int) -> Array:
+def chebyshev_points(lowest: float, highest: float, count: int) -> Array:
     """Chebyshev points of an interval, in ascending order."""
     return (lowest + highest) / 2 - (highest - lowest) / 2 * np.cos(np.pi * (np.arange(count) + 0.5) / count)
 
@@ -69,9 +69,11 @@ def _shares(measures: Array) -> list[hy.expression]:
     return found
 
 
-def blended(
-    tables: Sequence[tuple[MultipoleExpansion, ...]], measures: Array, magnets: Sequence[tuple[Array, Shift | None]]
-) -> list[tuple[Blend, Shift | None]]:
+def blend_tables(
+    tables: Sequence[tuple[MultipoleExpansion, ...]],
+    measures: Array,
+    magnets: Sequence[tuple[Array, Translation | None]],
+) -> list[tuple[Blend, Translation | None]]:
     """The expansions of several tables (k,), known at `measures` (k,), as blends, one for each magnet.
 
     Parameters

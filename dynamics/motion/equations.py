@@ -13,10 +13,10 @@ along the axis everything is autonomous, and the Jacobi integral
 
 is conserved: the energy less ω times the angular momentum about the axis.  What drag and a horizontal part of gravity
 do in the rotating frame is integrated along as the last state, `work`, so that J - work never changes.
-A conducting floater is dragged along by the field that turns past it (`fem.sphere_eddy`): in a uniform field, and
-slowly enough for its skin depth, by the torque -κ [(Ω - W) B² - B B·(Ω - W)].  A plate adds its currents as further
-states (`memory`) and their energy to J.
-Every number that a sweep may change is a runtime parameter; only the tables' own geometry is compiled in.
+A conducting floater is dragged along by the field that turns past it (`fem.closed_forms.sphere_eddy`): in a uniform
+field, and slowly enough for its skin depth, by the torque -κ [(Ω - W) B² - B B·(Ω - W)].  A plate adds its currents as
+further states (`plate_terms`) and their energy to J. Every number that a sweep may change is a runtime parameter; only
+the tables' own geometry is compiled in.
 """
 
 from __future__ import annotations

@@ -27,7 +27,7 @@ class Move(Protocol):
 
 
 @dataclass(frozen=True)
-class Shift:
+class Translation:
     """By the measure (m) along a unit vector."""
 
     way: tuple[float, float, float]
@@ -47,7 +47,7 @@ class Shift:
 
 
 @dataclass(frozen=True)
-class Turn:
+class Rotation:
     """By the measure (rad) about y, so that +x comes towards +z."""
 
     def moved(self, magnet: Magnet, measure: float) -> Magnet:

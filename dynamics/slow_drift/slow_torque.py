@@ -20,12 +20,12 @@ class SlowTorque:
 
         ds/dt = -(γ/I) [f s_z cos θ + h (s - s_z cos θ)] + κ B⊥² (cos θ - s) / I,   B⊥² = B² - (m̂·B)²,
 
-    with γ and κ those of `equations`, which are compiled and evaluated here.  Seen from the laboratory the floater
-    spins steadily about the rotor's axis, at s_z ω = (sin²θ + s cos θ) ω, and swings across it once a turn; f and h are
-    the factors of `air_torque` for these two.  Where f = h = 1, Stokes, drag is -γ s / I.  As h > f, the swing, which
-    the rotor keeps up, drives s to a small positive value instead of zero, about (h/f - 1) sin²θ.  To second order in θ
-    the swing also drives a steady flow, but none about the axis: the mean of a × (a × r) over a turn, with a the
-    turning rate of a shell of air, has no such part.
+    with γ and κ those of `motion.equations`, which are compiled and evaluated here.  Seen from the laboratory the
+    floater spins steadily about the rotor's axis, at s_z ω = (sin²θ + s cos θ) ω, and swings across it once a turn; f
+    and h are the factors of `air_torque` for these two.  Where f = h = 1, Stokes, drag is -γ s / I.  As h > f, the
+    swing, which the rotor keeps up, drives s to a small positive value instead of zero, about (h/f - 1) sin²θ.  To
+    second order in θ the swing also drives a steady flow, but none about the axis: the mean of a × (a × r) over a turn,
+    with a the turning rate of a shell of air, has no such part.
 
     The field is taken as uniform over the floater.  That of a dipole at distance d, which turns across its way, has
     1 + (12/7) (R/d)² + (15/7) (R/d)⁴ times that torque on a small θ: 8 % more at 30 mm and 19 % at 20 mm.  A plating of

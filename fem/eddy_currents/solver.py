@@ -87,7 +87,8 @@ def solve_eddy(
     """Eddy currents of all `sources` at `frequency` (Hz), with one factorisation for each parity class that they touch.
 
     Any frequency from 0 up is safe: the gauge needs no parameter, and below ωμ0σL² = 1e-2 the resistive limit
-    is used, exact to 1e-8.  At high frequency the mesh must resolve the skin depth; `plate` estimates whether it does.
+    is used, exact to 1e-8.  At high frequency the mesh must resolve the skin depth; `plate_network` estimates whether
+    it does.
 
     Raises
     ------

@@ -13,7 +13,7 @@ import ngsolve as ng
 import numpy as np
 
 from ...geometry.basics import Array
-from ..harmonics import FOUR_PI, Coefficients, Keys, orthonormal, orthonormal_keys, outer_coefficients, parity
+from ..harmonics import FOUR_PI, Coefficients, Keys, harmonic_parity, orthonormal, orthonormal_keys, outer_coefficients
 from .integration_points import surface_points
 
 
@@ -49,7 +49,7 @@ class OpenBoundary:
         self.keys: Keys = [
             key
             for key in orthonormal_keys(degree)
-            if all(parity(key, axis) == sign for axis, sign in zip(planes, signs, strict=True))
+            if all(harmonic_parity(key, axis) == sign for axis, sign in zip(planes, signs, strict=True))
         ]
         harmonics = np.zeros((len(used), len(self.keys)))
         harmonics[used] = orthonormal(self.keys, surface.points[used])

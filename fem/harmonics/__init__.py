@@ -1,8 +1,17 @@
 """How is a field outside or between its sources written as a sum of solid harmonics?"""
 
-from .compiled import CompiledField, FieldExpressions, as_columns, unpacked
+from .compiled import CompiledField, FieldExpressions, as_columns, field_and_gradient
 from .expressions import harmonic_sums
-from .interior import FOUR_PI, Ball, dipole_sources, factorials, force, from_magnetization, projected, torque
+from .interior import (
+    FOUR_PI,
+    Ball,
+    dipole_sources,
+    factorials,
+    from_magnetization,
+    interior_coefficients,
+    multipole_force,
+    multipole_torque,
+)
 from .multipole import (
     UPPER,
     MultipoleExpansion,
@@ -19,11 +28,19 @@ from .solid import (
     irregular_gradient,
     irregular_values,
     outer_sums,
-    regular,
     regular_gradient,
+    regular_values,
 )
-from .surface import Keys, mirrored, orthonormal, orthonormal_keys, outer_coefficients, parity, turned
-from .trim import trimmed
+from .surface import (
+    Keys,
+    harmonic_parity,
+    mirrored_harmonics,
+    orthonormal,
+    orthonormal_keys,
+    outer_coefficients,
+    rotated_harmonics,
+)
+from .trim import trimmed_expansions
 
 __all__ = [
     "FOUR_PI",
@@ -39,27 +56,27 @@ __all__ = [
     "derivative",
     "dipole_sources",
     "factorials",
+    "field_and_gradient",
     "field_sizes",
     "field_spectrum",
-    "force",
     "from_magnetization",
+    "harmonic_parity",
     "harmonic_sums",
+    "interior_coefficients",
     "irregular_gradient",
     "irregular_values",
-    "mirrored",
+    "mirrored_harmonics",
     "moments_of_magnetization",
+    "multipole_force",
+    "multipole_torque",
     "orthonormal",
     "orthonormal_keys",
     "outer_coefficients",
     "outer_sums",
-    "parity",
-    "projected",
-    "regular",
     "regular_gradient",
-    "torque",
-    "trimmed",
-    "turned",
+    "regular_values",
+    "rotated_harmonics",
+    "trimmed_expansions",
     "uniform_moments",
-    "unpacked",
     "without_noise",
 ]

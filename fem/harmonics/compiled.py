@@ -38,7 +38,7 @@ class CompiledField:
 
     def __call__(self, points: ArrayLike) -> tuple[Array, Array]:
         """B (n, 3) in T and ∂B_i/∂x_j (n, 3, 3) in T/m at `points` (n, 3), m."""
-        return unpacked(self.rows(as_columns(points)))
+        return field_and_gradient(self.rows(as_columns(points)))
 
 
 def as_columns(points: ArrayLike) -> Array:
@@ -46,6 +46,6 @@ def as_columns(points: ArrayLike) -> Array:
     return np.ascontiguousarray(np.asarray(points, float).reshape(-1, 3).T)
 
 
-def unpacked(rows: Array) -> tuple[Array, Array]:
+def field_and_gradient(rows: Array) -> tuple[Array, Array]:
     """B (n, 3) and its gradient (n, 3, 3) as views of (12, n)."""
     return rows[:3].T, np.moveaxis(rows[3:].reshape(3, 3, -1), -1, 0)

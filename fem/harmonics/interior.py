@@ -1,6 +1,6 @@
 """A field without sources in a sphere: its expansion about the centre, and what it does to the sphere's sources.
 
-With the harmonics of `harmonics`, lengths in radii of the sphere, r̃ = (r - center)/radius, and B = -∇̃ u, the incident
+With the harmonics of `solid`, lengths in radii of the sphere, r̃ = (r - center)/radius, and B = -∇̃ u, the incident
 potential is u = Σ conj a_lm Υ_lm(r̃) and that of the sphere's own sources u = Σ c_lm Θ_lm(r̃). Their energy is
 
     U = (4π radius³/μ0) Σ_lm a_lm c_lm,        F = -∇U with the sources carried along,
@@ -17,7 +17,7 @@ import numpy as np
 from scipy.special import gammaln
 
 from ...geometry.basics import MU_0, Array
-from .solid import CHUNK, Coefficients, irregular_values, regular
+from .solid import CHUNK, Coefficients, irregular_values, regular_values
 
 FOUR_PI = 4 * np.pi
 
@@ -36,7 +36,7 @@ def factorials(degree: int) -> Array:
     return np.where(m <= l, np.exp(gammaln(np.maximum(l - m, 0) + 1) + gammaln(l + m + 1)), 1.0)
 
 
-def projected(field: Callable[[Array], Array], ball: Ball, degree: int) -> Coefficients:
+def interior_coefficients(field: Callable[[Array], Array], ball: Ball, degree: int) -> Coefficients:
     """Coefficients a_lm (T) of a field given as a function, points (n, 3) m -> B (n, 3) T, without sources in the ball.
 
     By the normal component on the surface. Aliasing is a part ρ^(degree + 10) of the field, ρ the radius over the
@@ -51,7 +51,7 @@ def projected(field: Callable[[Array], Array], ball: Ball, degree: int) -> Coeff
     radial = np.sum(field(ball.center + ball.radius * normals) * normals, axis=1)
     radial *= np.repeat(weights * np.pi / nodes, 2 * nodes)
     result = np.zeros((degree + 1, degree + 1), complex)
-    for (l, m), values in regular(degree, *normals.T).items():
+    for (l, m), values in regular_values(degree, *normals.T).items():
         if l:
             result[l, m] = -(2 * l + 1) / (FOUR_PI * l) * (values @ radial)
     return np.asarray(factorials(degree) * result, complex)
@@ -92,13 +92,13 @@ def gradient_coefficients(incident: Coefficients, axis: int) -> Coefficients:
     return np.asarray(((lower - upper) / 2, 0.5j * (lower + upper), above[:, :size])[axis])
 
 
-def force(incident: Coefficients, sources: Coefficients, ball: Ball) -> Array:
+def multipole_force(incident: Coefficients, sources: Coefficients, ball: Ball) -> Array:
     """Force (3,) N of the incident field a_lm on the sources c_lm (T) in the ball; exact."""
     factor = -FOUR_PI * ball.radius**2 / MU_0
     return np.array([factor * _product(gradient_coefficients(incident, axis), sources) for axis in range(3)])
 
 
-def torque(incident: Coefficients, sources: Coefficients, ball: Ball) -> Array:
+def multipole_torque(incident: Coefficients, sources: Coefficients, ball: Ball) -> Array:
     """Torque (3,) N m about the centre on sources in the ball whose degrees above 1 answer to the incident field alone.
 
     m × B at the centre: a multipole -t_l conj a_lm induced in a sphere feels no torque from the field that induces it.

@@ -20,8 +20,8 @@ from .solid import (
     field_spectrum,
     outer_sums,
     real_terms,
-    regular,
     regular_derivative,
+    regular_values,
     weighted_sums,
 )
 
@@ -109,7 +109,7 @@ def moments_of_magnetization(
 
     q_lm = ∫ M · ∇ conj Υ_lm dV, with `points` (n, 3) m, `weights` (n,) m³ and `magnetization` (n, 3) μ0 M in T.
     """
-    harmonics = regular(degree, *((points - center) / radius).T)
+    harmonics = regular_values(degree, *((points - center) / radius).T)
     weighted = (weights / (FOUR_PI * radius**3))[:, None] * magnetization
     potentials = [weighted_sums(harmonics, weighted[:, axis], degree) for axis in range(3)]
     return np.asarray(sum(np.conj(regular_derivative(p, axis)) for axis, p in enumerate(potentials)))
@@ -119,7 +119,7 @@ def curvature_moments(
     points: Array, weights: Array, matrix: Array, center: Array, radius: float, degree: int
 ) -> Coefficients:
     """Coefficients (T) ∫ w Σ A_ij ∂_ij conj Υ_lm, with `weights` (n,) w in T m⁴ and `matrix` (3, 3) A, symmetric."""
-    harmonics = regular(degree, *((points - center) / radius).T)
+    harmonics = regular_values(degree, *((points - center) / radius).T)
     sums = weighted_sums(harmonics, weights / (FOUR_PI * radius**4), degree)
     second = [[regular_derivative(regular_derivative(sums, i), j) for j in range(3)] for i in range(3)]
     return np.asarray(sum(np.conj(matrix[i, j] * second[i][j]) for i in range(3) for j in range(3)))

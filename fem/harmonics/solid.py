@@ -28,7 +28,7 @@ CHUNK = 4096
 """Points at once, so that the harmonics of all degrees fit in memory."""
 
 
-def regular(degree: int, x: Array, y: Array, z: Array) -> dict[tuple[int, int], Any]:
+def regular_values(degree: int, x: Array, y: Array, z: Array) -> dict[tuple[int, int], Any]:
     """Complex regular harmonics Υ_lm, 0 ≤ m ≤ l ≤ degree, at NumPy arrays x, y, z."""
     found: dict[tuple[int, int], Any] = {(0, 0): np.ones_like(x) + 0j}
     square = x * x + y * y + z * z
@@ -44,7 +44,7 @@ def regular(degree: int, x: Array, y: Array, z: Array) -> dict[tuple[int, int], 
 
 
 def weighted_sums(harmonics: dict[tuple[int, int], Any], weights: Array, degree: int) -> Coefficients:
-    """Σ_n weight_n Υ_lm(r_n), [l, m], from a dictionary made by `regular`."""
+    """Σ_n weight_n Υ_lm(r_n), [l, m], from a dictionary made by `regular_values`."""
     result = np.zeros((degree + 1, degree + 1), complex)
     for (l, m), values in harmonics.items():
         result[l, m] = values @ weights
@@ -66,7 +66,7 @@ def regular_derivative(sums: Coefficients, axis: int) -> Coefficients:
 def irregular_values(degree: int, points: Array) -> dict[tuple[int, int], Any]:
     """Θ_lm, 0 ≤ m ≤ l ≤ degree, at NumPy points (n, 3), by Θ_lm(r) = (l-m)! (l+m)! Υ_lm(r/r²)/r."""
     square = np.sum(points**2, axis=1)
-    found = regular(degree, *(points / square[:, None]).T)
+    found = regular_values(degree, *(points / square[:, None]).T)
     distance = np.sqrt(square)
     return {(l, m): np.exp(gammaln(l - m + 1) + gammaln(l + m + 1)) / distance * v for (l, m), v in found.items()}
 
@@ -79,7 +79,7 @@ def irregular_gradient(harmonics: dict[tuple[int, int], Any], l: int, m: int) ->
 
 
 def regular_gradient(harmonics: dict[tuple[int, int], Any], l: int, m: int) -> list[Any]:
-    """Gradient (three complex arrays) of Υ_lm, from a dictionary made by `regular` (m ≥ 0)."""
+    """Gradient (three complex arrays) of Υ_lm, from a dictionary made by `regular_values` (m ≥ 0)."""
 
     def at(n: int, k: int) -> Any:
         if n < 0 or abs(k) > n:

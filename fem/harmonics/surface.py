@@ -6,7 +6,7 @@ import numpy as np
 from scipy.special import gammaln
 
 from ...geometry.basics import Array
-from .solid import Coefficients, regular
+from .solid import Coefficients, regular_values
 
 FOUR_PI = 4 * np.pi
 Keys = list[tuple[int, int, bool]]
@@ -32,19 +32,19 @@ def orthonormal_keys(degree: int) -> Keys:
 def orthonormal(keys: Keys, points: Array) -> Array:
     """Real orthonormal harmonics (n, columns) in the directions of `points` (n, 3)."""
     degree = max(l for l, _, _ in keys)
-    harmonics = regular(degree, *(points / np.linalg.norm(points, axis=1)[:, None]).T)
+    harmonics = regular_values(degree, *(points / np.linalg.norm(points, axis=1)[:, None]).T)
     parts = [harmonics[l, m].imag if imaginary else harmonics[l, m].real for l, m, imaginary in keys]
     return np.stack([norm(l, m) * part for (l, m, _), part in zip(keys, parts, strict=True)], axis=1)
 
 
-def parity(key: tuple[int, int, bool], axis: int) -> int:
+def harmonic_parity(key: tuple[int, int, bool], axis: int) -> int:
     """Whether a real harmonic is even (+1) or odd (-1) at the plane across a coordinate axis."""
     l, m, imaginary = key
     odd = ((m + imaginary) % 2, int(imaginary), (l + m) % 2)[axis]
     return -1 if odd else 1
 
 
-def mirrored(coefficients: Coefficients, axis: int) -> Coefficients:
+def mirrored_harmonics(coefficients: Coefficients, axis: int) -> Coefficients:
     """Coefficients of f(S x), with S the mirror at the plane across a coordinate axis, of f = Σ c_lm Θ_lm."""
     l, m = np.indices(coefficients.shape)
     if axis == 2:
@@ -69,7 +69,7 @@ def amplitudes_of(coefficients: Coefficients, keys: Keys) -> Array:
     return np.array(values)
 
 
-def turned(coefficients: Coefficients, axes: Array) -> Coefficients:
+def rotated_harmonics(coefficients: Coefficients, axes: Array) -> Coefficients:
     """Coefficients of f(axesᵀ x) of f = Σ c_lm Θ_lm: from a frame with the columns of `axes` as axes to the outer one.
 
     By values on the unit sphere, where the harmonics are orthonormal: exact but for round-off.

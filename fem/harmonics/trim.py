@@ -18,7 +18,7 @@ ROUNDS = 6
 """Of reweighting in a fit."""
 
 
-def trimmed(
+def trimmed_expansions(
     expansions: Sequence[MultipoleExpansion], points: Array, allowed: Array
 ) -> tuple[list[MultipoleExpansion], list[MultipoleExpansion]]:
     """The coefficients that matter, and what they leave out: at most `allowed` (n,) T at points (n, 3) m.

@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...geometry.basics import Array
-from ...geometry.bodies import SAME, Magnet, mirror
+from ...geometry.bodies import SAME_PLACE, Magnet, mirror
 from ..elements import surface_points, volume_points
-from ..harmonics import Coefficients, curvature_moments, mirrored, moments_of_magnetization
+from ..harmonics import Coefficients, curvature_moments, mirrored_harmonics, moments_of_magnetization
 from .solver import Solution
 
 
@@ -49,8 +49,8 @@ def images(
     """Centres and coefficients of a body and its mirror images, from the share on the positive side of the planes."""
     found = [(center, coefficients)]
     for plane, sign in zip(planes, signs, strict=True):
-        reflected = [(place * mirror(plane), sign * mirrored(part, plane)) for place, part in found]
-        if abs(center[plane]) < SAME:
+        reflected = [(place * mirror(plane), sign * mirrored_harmonics(part, plane)) for place, part in found]
+        if abs(center[plane]) < SAME_PLACE:
             found = [(place, part + other) for (place, part), (_, other) in zip(found, reflected, strict=True)]
         else:
             found += reflected
@@ -87,7 +87,7 @@ def _faces(solution: Solution) -> tuple[Array, Array, Array]:
 def _normals(magnet: Magnet, points: Array) -> tuple[Array, NDArray[np.bool_]]:
     """Outward normals at those of the points that lie on the faces of a magnet, and which these are (mask)."""
     box = magnet.box
-    mine = np.abs(box.distance(points)) < SAME * box.circumradius
+    mine = np.abs(box.distance(points)) < SAME_PLACE * box.circumradius
     body = box.to_body(points[mine])
     axis = np.argmax(np.abs(body) / box.half_edges, axis=1)
     return box.rotation.T[axis] * np.sign(np.take_along_axis(body, axis[:, None], axis=1)), mine

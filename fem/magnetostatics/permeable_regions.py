@@ -4,7 +4,7 @@ With the given field H0 (sources outside or remanence, in T) and μ0 H = H0 - �
 
     ∫ ∇v·μ∇ψ = ∫_bodies ∇v·(μ - 1) H0,        μ0 M = (μ - 1)(H0 - ∇ψ),
 
-as in `magnetostatics`, and open space outside the ball. H0 enters and M leaves at integration points.
+as in `solver`, and open space outside the ball. H0 enters and M leaves at integration points.
 """
 
 from __future__ import annotations

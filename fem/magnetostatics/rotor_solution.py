@@ -9,9 +9,9 @@ from itertools import product
 import numpy as np
 
 from ...geometry.basics import Array, Box
-from ...geometry.bodies import Magnet, Symmetry, closing_shifts, find_symmetry, moved, parity_parts
+from ...geometry.bodies import Magnet, Symmetry, closing_shifts, find_symmetry, parity_parts, shifted_magnet
 from ...geometry.meshes import MagnetMesh, MeshSettings, mesh_magnets
-from ..harmonics import Coefficients, MultipoleExpansion, turned
+from ..harmonics import Coefficients, MultipoleExpansion, rotated_harmonics
 from .moments import reaction_moments, trace_moments
 from .solver import Formulation, MeshError, System, assemble, solve
 
@@ -87,12 +87,12 @@ def solve_rotor(
     """
     cut = pieces or [(magnet,) for magnet in magnets]
     shifts = closing_shifts(magnets)
-    closed = [moved(magnet, shift) for magnet, shift in zip(magnets, shifts, strict=True)]
+    closed = [shifted_magnet(magnet, shift) for magnet, shift in zip(magnets, shifts, strict=True)]
     symmetry = find_symmetry(closed)
     planes = symmetry.planes if use_symmetry else ()
     seen = [symmetry.to_frame(magnet) for magnet in closed]
     bodies = [piece for whole in cut for piece in whole]
-    meshed = [symmetry.to_frame(moved(p, s)) for whole, s in zip(cut, shifts, strict=True) for p in whole]
+    meshed = [symmetry.to_frame(shifted_magnet(p, s)) for whole, s in zip(cut, shifts, strict=True) for p in whole]
     mesh, system, layers = _meshed_system(meshed, refinement, planes, [magnet.box for magnet in seen])
     total: list[Coefficients] = []
     area_error = 0.0
@@ -109,7 +109,7 @@ def solve_rotor(
     if formulation == "direct":
         spheres, size = ((symmetry.center + symmetry.axes @ mesh.center, mesh.unit),), refinement.boundary_degree
     nothing = [np.zeros((size + 1, size + 1), complex)] * len(spheres)
-    coefficients = tuple(turned(c, symmetry.axes) for c in total or nothing)
+    coefficients = tuple(rotated_harmonics(c, symmetry.axes) for c in total or nothing)
     return RotorSolution(coefficients, spheres, mesh, system.unknowns, area_error, layers)
 
 

@@ -9,8 +9,8 @@ The unknown is ψ in H1, with μ0 H = H0 - ∇ψ (all in T). Two formulations sh
       ∫ ∇v·μ∇ψ = ∫_magnets J·∇v,                   M = J - (μ - 1) ∇ψ.
 
 M is the magnetisation μ0 M (T) that makes the outer field, in `split` beside the closed form. The space outside the
-ball is exact (`open_boundary`). Where the bodies have mirror planes the mesh is one side of them, and one matrix
-serves polarisations of every parity: ψ = 0 on a plane where it is odd.
+ball is exact (`elements.open_boundary`). Where the bodies have mirror planes the mesh is one side of them, and one
+matrix serves polarisations of every parity: ψ = 0 on a plane where it is odd.
 """
 
 from __future__ import annotations

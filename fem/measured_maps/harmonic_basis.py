@@ -8,7 +8,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...geometry.basics import Array
-from ..harmonics import Coefficients, field_sizes, irregular_gradient, irregular_values, regular, regular_gradient
+from ..harmonics import (
+    Coefficients,
+    field_sizes,
+    irregular_gradient,
+    irregular_values,
+    regular_gradient,
+    regular_values,
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,7 +53,7 @@ class HarmonicBasis:
         """Fields (unknowns, 3, n) at points (n, 3) m."""
         result = np.empty((self.count(self.degree), 3, len(points)))
         scaled = ((points - self.centers[0]) / self.extent).T
-        harmonics = regular(self.background_degree, *scaled)
+        harmonics = regular_values(self.background_degree, *scaled)
         sizes = regular_field_sizes(self.background_degree)
         for row, l, m in _terms(0, self.background_degree, 1):
             _fill(result, row, m, regular_gradient(harmonics, l, m), sizes[l, m])

@@ -16,7 +16,7 @@ import numpy as np
 from ...geometry.basics import Array, ComputationError
 from ...geometry.bodies import TOUCHING, sphere_overlap
 from ...geometry.scenes import Floater
-from ..harmonics import Ball, Coefficients, force, torque
+from ..harmonics import Ball, Coefficients, multipole_force, multipole_torque
 from .degree_needed import enough_degree, singular_ratio
 from .permeable_sphere import induced_sources, permanent_sources
 from .rotor_response import RotorResponse
@@ -136,4 +136,4 @@ def two_body_ladder(
 
 
 def _wrench(incident: Coefficients, sources: Coefficients, ball: Ball) -> Wrench:
-    return Wrench(force(incident, sources, ball), torque(incident, sources, ball))
+    return Wrench(multipole_force(incident, sources, ball), multipole_torque(incident, sources, ball))

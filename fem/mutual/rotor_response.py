@@ -17,7 +17,7 @@ from ...geometry.basics import Array
 from ...geometry.bodies import Magnet
 from ...geometry.meshes import MagnetMesh, MeshSettings, mesh_magnets
 from ..closed_forms import remanent_field, volume_rule
-from ..harmonics import Ball, Coefficients, derivative, from_magnetization, outer_sums, projected
+from ..harmonics import Ball, Coefficients, derivative, from_magnetization, interior_coefficients, outer_sums
 from ..magnetostatics import PermeableRegions, assemble_regions
 
 NODES = 24
@@ -44,7 +44,7 @@ class RotorResponse:
 
     def own_field(self, ball: Ball, degree: int) -> Coefficients:
         """Coefficients a_lm (T) of the rotor's field alone, its permeability included, about the ball's centre."""
-        closed = projected(lambda points: remanent_field(self.magnets, points), ball, degree)
+        closed = interior_coefficients(lambda points: remanent_field(self.magnets, points), ball, degree)
         return closed + from_magnetization(*self.remanent_dipoles, ball, degree)
 
     def answer(self, sources: Coefficients, ball: Ball, degree: int) -> Coefficients:

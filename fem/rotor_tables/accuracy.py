@@ -40,7 +40,7 @@ class Accuracy:
         return self.nearest or 0.8 * max(magnet.box.volume for magnet in magnets) ** (1 / 3)
 
 
-def places(magnets: tuple[Magnet, ...], clearance: float) -> tuple[Array, Array]:
+def error_points(magnets: tuple[Magnet, ...], clearance: float) -> tuple[Array, Array]:
     """Points (n, 3) m at which errors are looked at, and the scale (n,) of B (T) there.
 
     They lie at a distance `clearance` from the magnets and farther out. The scale is that of the magnets' dipoles with
@@ -48,12 +48,12 @@ def places(magnets: tuple[Magnet, ...], clearance: float) -> tuple[Array, Array]
     fields cancel; 1 T if nothing is magnetised.
     """
     size = max(float(np.linalg.norm(m.box.corners - magnets[0].box.center, axis=1).max()) for m in magnets)
-    shells = [shell(magnets, clearance + factor * size) for factor in OFFSETS]
+    shells = [points_around(magnets, clearance + factor * size) for factor in OFFSETS]
     points, scales = zip(*[(points, typical_field(magnets, points)) for points in shells], strict=True)
     return np.concatenate(points), np.concatenate(scales)
 
 
-def shell(magnets: tuple[Magnet, ...], offset: float) -> Array:
+def points_around(magnets: tuple[Magnet, ...], offset: float) -> Array:
     """Points (n, 3) m at a distance `offset` (m) from the nearest of the magnets' faces, all around them."""
     directions = np.random.default_rng(0).normal(size=(150, 3))
     directions /= np.linalg.norm(directions, axis=1)[:, None]
@@ -63,7 +63,7 @@ def shell(magnets: tuple[Magnet, ...], offset: float) -> Array:
 
 
 def typical_field(magnets: tuple[Magnet, ...], points: Array) -> Array:
-    """B (n,) T to which errors at points (n, 3) m, all about as far away, are relative: see `places`."""
+    """B (n,) T to which errors at points (n, 3) m, all about as far away, are relative: see `error_points`."""
     dipoles = [uniform_moments(carrier(magnet), 1) for magnet in magnets]
     field = np.linalg.norm(sum(dipole.evaluate(points)[0] for dipole in dipoles), axis=1)
     return np.maximum(field, np.median(field) / 3) if field.any() else np.ones(len(field))
@@ -72,8 +72,8 @@ def typical_field(magnets: tuple[Magnet, ...], points: Array) -> Array:
 def guards(magnets: tuple[Magnet, ...], clearance: float) -> tuple[Array, Array]:
     """Points (n, 3) m nearer to edges and corners than `clearance`, as far from a magnet's centre as its faces' places.
 
-    They see to it that a fit, which need only hold at `places`, does not run wild beside them. With the scale (n,) of B
-    (T) there.
+    They see to it that a fit, which need only hold at `error_points`, does not run wild beside them. With the scale
+    (n,) of B (T) there.
     """
     directions = np.random.default_rng(2).normal(size=(150, 3))
     directions /= np.linalg.norm(directions, axis=1)[:, None]

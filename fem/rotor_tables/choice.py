@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 
 from ...geometry.bodies import Magnet
-from .accuracy import Accuracy, places
+from .accuracy import Accuracy, error_points
 from .fem_model import fem_table
 from .simple_models import cuboid_table, dipole_table, moments_table
 from .table import RotorTable
@@ -71,7 +71,7 @@ def rotor_table(
 
 def _cheapest(rotor: tuple[Magnet, ...], accuracy: Accuracy) -> tuple[str, str]:
     clearance = accuracy.clearance(rotor)
-    points, scale = places(rotor, clearance)
+    points, scale = error_points(rotor, clearance)
     where = f"at {clearance * 1e3:.3g} mm from the magnets' faces and beyond, where {accuracy.rtol:.1e} is asked for"
     cuboid = cuboid_table(rotor, accuracy)
     permeability = float(np.max(cuboid.absolute_error(points)[0] / scale))

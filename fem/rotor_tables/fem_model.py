@@ -20,9 +20,9 @@ from ...geometry.basics import Array
 from ...geometry.bodies import CONVERGENCE, Magnet, cut_magnets, largest_shift
 from ...geometry.meshes import MeshSettings
 from ..closed_forms import carrier, closed_part
-from ..harmonics import MultipoleExpansion, trimmed, without_noise
+from ..harmonics import MultipoleExpansion, trimmed_expansions, without_noise
 from ..magnetostatics import RotorSolution, climb, rung, solve_rotor, strongest
-from .accuracy import Accuracy, guards, places
+from .accuracy import Accuracy, error_points, guards
 from .table import KNOWN, RotorTable
 
 HIGHEST_DEGREE = 44
@@ -50,7 +50,7 @@ def fem_table(
     accuracy, settings, start = accuracy or Accuracy(), settings or MeshSettings(), time.perf_counter()
     cut = cut_magnets(magnets, accuracy.clearance(magnets))
     pieces = [piece for whole in cut for piece in whole]
-    points, scale = places(magnets, accuracy.clearance(magnets))
+    points, scale = error_points(magnets, accuracy.clearance(magnets))
     degree = _degree(pieces, points, accuracy.rtol)
     carriers = tuple(carrier(magnet) for magnet in magnets)
     closed, unsure = closed_part(cut, magnets, carriers, degree)
@@ -64,21 +64,21 @@ def fem_table(
         [without_noise(a + b, 1e-15) for a, b in zip(closed, solution.coefficients, strict=True)]
     )
     doubts = {
-        **{cause: used(step) for cause, step in steps.items()},
-        "quadrature": used(solution.expansions(unsure)),
-        "tail": used(tail(whole)),
-        "gap": used(gap_doubt(magnets, solution)),
+        **{cause: nonzero(step) for cause, step in steps.items()},
+        "quadrature": nonzero(solution.expansions(unsure)),
+        "tail": nonzero(extrapolated_tail(whole)),
+        "gap": nonzero(gap_doubt(magnets, solution)),
     }
     doubts = {cause: parts for cause, parts in doubts.items() if parts}
     rest = RotorTable("fem", magnets, carriers, (), doubts).absolute_error(points)[0]
     allowed = 0.99 * np.maximum(scale * accuracy.rtol - rest, scale * accuracy.rtol / 20)
     beside, scale_beside = guards(magnets, accuracy.clearance(magnets))
-    kept, dropped = trimmed(
+    kept, dropped = trimmed_expansions(
         whole, np.concatenate([points, beside]), np.concatenate([allowed, BESIDE * accuracy.rtol * scale_beside])
     )
     if any(part.coefficients.any() for part in dropped):
-        doubts[KNOWN] = used(dropped)
-    table = RotorTable("fem", magnets, carriers, used(kept), doubts)
+        doubts[KNOWN] = nonzero(dropped)
+    table = RotorTable("fem", magnets, carriers, nonzero(kept), doubts)
     reached = float(np.max(table.absolute_error(points)[0] / scale))
     if reached > accuracy.rtol:
         warnings.warn(
@@ -100,12 +100,12 @@ def _degree(pieces: Sequence[Magnet], points: Array, rtol: float) -> int:
     return int(min(np.ceil(needed), HIGHEST_DEGREE))
 
 
-def used(expansions: Sequence[MultipoleExpansion]) -> tuple[MultipoleExpansion, ...]:
+def nonzero(expansions: Sequence[MultipoleExpansion]) -> tuple[MultipoleExpansion, ...]:
     """Those of the expansions that are not zero."""
     return tuple(expansion for expansion in expansions if expansion.coefficients.any())
 
 
-def tail(expansions: Sequence[MultipoleExpansion]) -> list[MultipoleExpansion]:
+def extrapolated_tail(expansions: Sequence[MultipoleExpansion]) -> list[MultipoleExpansion]:
     """What lies beyond the highest degree: the last two degrees, continued as a geometric series."""
     found = []
     for expansion in expansions:

@@ -10,9 +10,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..harmonics import trimmed
-from .accuracy import Accuracy, guards, places
-from .fem_model import BESIDE, used
+from ..harmonics import trimmed_expansions
+from .accuracy import Accuracy, error_points, guards
+from .fem_model import BESIDE, nonzero
 from .table import KNOWN, RotorTable
 
 AT_LEAST = 0.5
@@ -27,14 +27,14 @@ def distant(table: RotorTable, accuracy: Accuracy) -> RotorTable:
     """
     if not table.expansions:
         return table
-    points, scale = places(table.magnets, accuracy.clearance(table.magnets))
+    points, scale = error_points(table.magnets, accuracy.clearance(table.magnets))
     beside, scale_beside = guards(table.magnets, accuracy.clearance(table.magnets))
     rest = table.absolute_error(points)[0]
     allowed = np.maximum(0.99 * (scale * accuracy.rtol - rest), AT_LEAST * scale * accuracy.rtol)
-    kept, dropped = trimmed(
+    kept, dropped = trimmed_expansions(
         table.expansions,
         np.concatenate([points, beside]),
         np.concatenate([allowed, AT_LEAST * BESIDE * accuracy.rtol * scale_beside]),
     )
-    doubts = {**table.doubts, KNOWN: (*table.doubts.get(KNOWN, ()), *used(dropped))}
-    return replace(table, expansions=used(kept), doubts={cause: parts for cause, parts in doubts.items() if parts})
+    doubts = {**table.doubts, KNOWN: (*table.doubts.get(KNOWN, ()), *nonzero(dropped))}
+    return replace(table, expansions=nonzero(kept), doubts={cause: parts for cause, parts in doubts.items() if parts})

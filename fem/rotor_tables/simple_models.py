@@ -8,8 +8,8 @@ import numpy as np
 
 from ...geometry.bodies import Magnet, cut_magnets
 from ..closed_forms import first_order_moments
-from ..harmonics import MultipoleExpansion, trimmed, uniform_moments
-from .accuracy import Accuracy, places
+from ..harmonics import MultipoleExpansion, trimmed_expansions, uniform_moments
+from .accuracy import Accuracy, error_points
 from .table import RotorTable
 
 DEGREE = 25
@@ -30,10 +30,10 @@ def dipole_table(rotor: Rotor, accuracy: Accuracy) -> RotorTable:
 def moments_table(rotor: Rotor, accuracy: Accuracy) -> RotorTable:
     """As many moments of the remanence about the magnets' pieces as the accuracy needs."""
     start = time.perf_counter()
-    points, scale = places(rotor, accuracy.clearance(rotor))
+    points, scale = error_points(rotor, accuracy.clearance(rotor))
     pieces = [piece for whole in cut_magnets(rotor, accuracy.clearance(rotor)) for piece in whole]
     full = [uniform_moments(piece, 2 * DEGREE - 1) for piece in pieces]
-    kept, dropped = trimmed(full, points, scale * accuracy.rtol / 2)
+    kept, dropped = trimmed_expansions(full, points, scale * accuracy.rtol / 2)
     return _finished("moments", rotor, (), tuple(kept), {"truncation": tuple(dropped)}, accuracy, start)
 
 

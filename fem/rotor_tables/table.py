@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from ...geometry.basics import Array, InputError, counted
 from ...geometry.bodies import Magnet
 from ..closed_forms import UniformField, squared_distance
-from ..harmonics import CompiledField, FieldExpressions, MultipoleExpansion, as_columns, unpacked
+from ..harmonics import CompiledField, FieldExpressions, MultipoleExpansion, as_columns, field_and_gradient
 
 BLUR = 0.5
 """Share of the root mean square of a doubt that is added to its field."""
@@ -120,13 +120,13 @@ class RotorTable:
                 f"Input points must lie outside the magnets{self._beyond()}; instead received a point at ({where}) mm."
             )
         if not any(form.is_far(columns).any() for form in self._closed_forms):
-            return unpacked(self._near.rows(columns))
+            return field_and_gradient(self._near.rows(columns))
         rows = np.zeros((12, columns.shape[1]))
         for form in self._closed_forms:
             rows += form.rows(columns)
         for part in self._far:
             rows += part.rows(columns)
-        return unpacked(rows)
+        return field_and_gradient(rows)
 
     @property
     def moment(self) -> Array:

@@ -12,7 +12,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from ...geometry.basics import Array
-from ..harmonics import Coefficients, turned, without_noise
+from ..harmonics import Coefficients, rotated_harmonics, without_noise
 from ..plate_tables import Fit, Multipoles, fit_multipoles, tensor_error
 from .frame import SlabFrame
 from .reduction import SlabNetwork, local_dipoles, meridian
@@ -118,6 +118,6 @@ def _kinds(degree: int, order: int, factor: complex, axes: Array) -> list[tuple[
     """What kinds of multipoles the real part of `factor` Θ_lm along some axes is, and how much of each."""
     single: Coefficients = np.zeros((degree + 1, degree + 1), complex)
     single[degree, order] = factor
-    row = without_noise(turned(single, axes), ROUND_OFF)[degree]
+    row = without_noise(rotated_harmonics(single, axes), ROUND_OFF)[degree]
     parts = [((degree, m, i), float(c)) for m, value in enumerate(row) for i, c in enumerate((value.real, value.imag))]
     return [(kind, share) for kind, share in parts if abs(share) > ROUND_OFF * np.abs(row).max()]

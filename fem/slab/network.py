@@ -5,7 +5,7 @@ Every wave number k and order m has the horizontal shapes J_m(kρ) cos mφ and J
     ∫ J_m(kρ) J_m(k'ρ) ρ dρ = δ(k - k')/k,
 
 a quadrature ∫ dk → Σ w_k makes each a state with the signal γ √(k w_k / a_m) times what a source gives to the wave;
-a_m = π, or 2π for m = 0.  The trapezoidal rule in ln k converges geometrically, see `slab`; N modes of the slab
+a_m = π, or 2π for m = 0.  The trapezoidal rule in ln k converges geometrically, see `reaction`; N modes of the slab
 leave an error as 1/N³.  This full network is exact but for these two sums.  It is reduced order by
 order: snapshots of both shapes together, since a turn makes one the other, so that their states are alike.
 """

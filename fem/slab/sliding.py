@@ -1,7 +1,7 @@
 """A steady dipole that moves over an infinite slab: drag and lift.
 
 In the frame of the slab a Fourier part k of the field of a dipole with velocity v has the frequency -k·v, so that
-with q = (i k_x, i k_y, -k) and the reflection Γ(k, ω) of `slab`
+with q = (i k_x, i k_y, -k) and the reflection Γ(k, ω) of `reaction`
 
     F = -(μ0/8π²) ∫ d²k/k  q |m·q|² e^{-2kh} Γ(k, -k·v).
 

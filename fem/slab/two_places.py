@@ -1,4 +1,4 @@
-"""The slab's reaction at one place to a dipole at another, by Hankel transforms; symbols as in `slab`."""
+"""The slab's reaction at one place to a dipole at another, by Hankel transforms; symbols as in `reaction`."""
 
 from __future__ import annotations
 

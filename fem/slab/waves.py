@@ -5,7 +5,7 @@ expansion gives, with a± = a_x ± i a_y and lengths in units of its radius, fro
 
     ψ_lm = a_z^(l-m) (-a₋)^m,    ψ_l(-m) = a_z^(l-m) a₊^m    (m ≥ 0):
 
-the derivatives of Υ_lm, see `harmonics`, make each side a_i times itself.
+the derivatives of Υ_lm, see `harmonics.solid`, make each side a_i times itself.
 
 Turning waves add up to the waves of a cylinder, by DLMF 10.9.2:
 

@@ -16,12 +16,12 @@ from ..harmonics import (
     Ball,
     derivative,
     dipole_sources,
-    force,
     from_magnetization,
+    interior_coefficients,
     moments_of_magnetization,
+    multipole_force,
+    multipole_torque,
     outer_sums,
-    projected,
-    torque,
 )
 from ..magnetostatics import assemble_regions
 from ..mutual import Wrench, closed_dipoles, permeability_tensor
@@ -52,7 +52,7 @@ def solve_both_bodies(
     from_rotor = {n: remanent_field(mesh.magnets, points) for n, points in places.items()}
     fields = {n: from_floater[n] + from_rotor[n] for n in names} | {"floater": from_rotor["floater"] - polarization / 3}
     induced = regions.magnetization(fields)
-    incident = projected(lambda points: remanent_field(mesh.magnets, points), ball, degree)
+    incident = interior_coefficients(lambda points: remanent_field(mesh.magnets, points), ball, degree)
     for name in names:
         closed = from_rotor[name] @ regions.susceptibility[name]
         rest = weights[name][:, None] * (induced[name] - closed)
@@ -62,4 +62,4 @@ def solve_both_bodies(
         places["floater"], weights["floater"], induced["floater"], ball.center, ball.radius, degree
     )
     sources[:2, :2] += whole
-    return Wrench(force(incident, sources, ball), torque(incident, sources, ball))
+    return Wrench(multipole_force(incident, sources, ball), multipole_torque(incident, sources, ball))

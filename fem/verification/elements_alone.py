@@ -10,7 +10,7 @@ from ...geometry.bodies import Magnet
 from ...geometry.meshes import MeshSettings
 from ..harmonics import without_noise
 from ..magnetostatics import Refinement, RotorSolution, climb, rung, solve_rotor, strongest
-from ..rotor_tables import Accuracy, RotorTable, places, provenance, tail, used
+from ..rotor_tables import Accuracy, RotorTable, error_points, extrapolated_tail, nonzero, provenance
 
 SETTINGS = MeshSettings(ball_radius=1.15)
 DEGREE = 24
@@ -24,20 +24,20 @@ def direct_table(magnets: tuple[Magnet, ...], accuracy: Accuracy | None = None) 
     would add near the magnets is stated by the table.
     """
     accuracy, start = accuracy or Accuracy(), time.perf_counter()
-    points, scale = places(magnets, accuracy.clearance(magnets))
+    points, scale = error_points(magnets, accuracy.clearance(magnets))
 
     def whole(order: int) -> RotorSolution:
         return solve_rotor(magnets, Refinement(order, rung(order, SETTINGS, strongest(magnets)).mesh, DEGREE), "direct")
 
     solution, order, steps = climb(whole, points, scale, accuracy.rtol / 2, SETTINGS)
     coefficients = without_noise(solution.coefficients[0], 1e-15)
-    expansions = used(solution.expansions([coefficients]))
+    expansions = nonzero(solution.expansions([coefficients]))
     # a radius that is wrong by ε, as the meshed sphere's is by half its area error, changes degree l by (l + 1) ε
     roundness = solution.area_error / 2 * np.arange(1, len(coefficients) + 1)[:, None] * coefficients
     doubts = {
-        "tail": used(tail(expansions)),
-        **{cause: used(step) for cause, step in steps.items()},
-        "roundness": used(solution.expansions([roundness])),
+        "tail": nonzero(extrapolated_tail(expansions)),
+        **{cause: nonzero(step) for cause, step in steps.items()},
+        "roundness": nonzero(solution.expansions([roundness])),
     }
     table = RotorTable("fem", magnets, (), expansions, doubts)
     reached = float(np.max(table.absolute_error(points)[0] / scale))

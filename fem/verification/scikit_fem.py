@@ -18,7 +18,7 @@ from ..magnetostatics import Formulation
 
 
 def magnet_dipoles(mesh: MagnetMesh, formulation: Formulation = "split") -> Array:
-    """∫ M dV (n, 3), T m³, of every magnet, M as in `magnetostatics`: the whole (`direct`) or the correction (`split`).
+    """∫ M dV (n, 3), T m³, of every magnet, M as in `magnetostatics.solver`: whole (`direct`) or correction (`split`).
 
     The error falls as the square of that of ∇ψ: about h² with elements of size h at the edges, where ∇ψ is logarithmic.
 

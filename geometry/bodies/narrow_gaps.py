@@ -16,7 +16,7 @@ NARROW = 2e-3
 """Gaps below this part of the smallest edge are closed for the mesh."""
 
 
-def moved(magnet: Magnet, shift: Array) -> Magnet:
+def shifted_magnet(magnet: Magnet, shift: Array) -> Magnet:
     """The magnet moved by `shift` (3,) m."""
     box = magnet.box
     return replace(magnet, box=Box(box.size, box.center + shift, box.rotation)) if shift.any() else magnet
@@ -27,7 +27,7 @@ def closing_shifts(magnets: Sequence[Magnet]) -> Array:
     shifts = np.zeros((len(magnets), 3))
     narrow = NARROW * min(float(magnet.box.size.min()) for magnet in magnets)
     for i, j in combinations(range(len(magnets)), 2):
-        gap, axis = separation(moved(magnets[i], shifts[i]).box, moved(magnets[j], shifts[j]).box)
+        gap, axis = separation(shifted_magnet(magnets[i], shifts[i]).box, shifted_magnet(magnets[j], shifts[j]).box)
         if TOUCHING < gap < narrow:
             shifts[j] -= gap * axis
     return shifts

@@ -15,7 +15,7 @@ import numpy as np
 from ..basics import Array, Box
 from .magnet import Magnet
 
-SAME = 1e-9
+SAME_PLACE = 1e-9
 """Positions that differ by less than this part of the bodies' size are the same."""
 NARROW_SIDE = 0.04
 """A plane in a gap is left out if corners lie nearer to it than this part of the shortest edge: elements at the plane
@@ -62,7 +62,7 @@ def _in_narrow_gap(magnets: Sequence[Magnet], axis: int) -> bool:
     """Whether the plane across a coordinate axis runs close by a corner of a body, but not through it."""
     heights = np.abs([magnet.box.corners[:, axis] for magnet in magnets])
     shortest = min(float(magnet.box.size.min()) for magnet in magnets)
-    return bool(np.any((heights > SAME * shortest) & (heights < NARROW_SIDE * shortest)))
+    return bool(np.any((heights > SAME_PLACE * shortest) & (heights < NARROW_SIDE * shortest)))
 
 
 def mirror_images(magnets: Sequence[Magnet], axis: int) -> list[int] | None:
@@ -85,7 +85,7 @@ def _mirrored(magnet: Magnet, other: Magnet, axis: int) -> bool:
     flip = mirror(axis)
     size = max(magnet.box.circumradius, float(np.linalg.norm(magnet.box.center)))
     distance = np.linalg.norm((magnet.box.corners * flip)[:, None] - other.box.corners, axis=-1)
-    if distance.min(axis=1).max() > SAME * size:
+    if distance.min(axis=1).max() > SAME_PLACE * size:
         return False
     permeability = magnet.permeability_in_rotor * flip[:, None] * flip
     return bool(np.allclose(permeability, other.permeability_in_rotor, rtol=0, atol=1e-12))

@@ -14,12 +14,17 @@ from .article import (
     article_table,
     axis_label,
     by_configuration,
-    label,
-    levitated,
-    stable,
+    levitated_rotors,
+    rotor_label,
+    stable_in_flight,
 )
-from .article_figure import TITLES, branch, name, shade, values_of
+from .article_figure import TITLES, legend_name, plot_branch, rotor_color, values_of
 from .article_formulas import side_radius
+from .field_components import STUDY as FIELD_COMPONENTS
+from .force_curve import STUDY as FORCE_CURVE
+from .levitation_distance import STUDY as LEVITATION_DISTANCE
+
+STUDIES = (FIELD_COMPONENTS, FORCE_CURVE, LEVITATION_DISTANCE)
 
 __all__ = [
     "CONFIGURATIONS",
@@ -31,17 +36,18 @@ __all__ = [
     "PLATE_SIZE",
     "QUICK",
     "REMANENCE",
+    "STUDIES",
     "TITLES",
     "article_scene",
     "article_table",
     "axis_label",
-    "branch",
     "by_configuration",
-    "label",
-    "levitated",
-    "name",
-    "shade",
+    "legend_name",
+    "levitated_rotors",
+    "plot_branch",
+    "rotor_color",
+    "rotor_label",
     "side_radius",
-    "stable",
+    "stable_in_flight",
     "values_of",
 ]

@@ -13,14 +13,16 @@ import xarray as xr
 from numpy.typing import ArrayLike, NDArray
 
 from ...fem.rotor_tables import RotorTable, cached_rotor_table, rotor_table
-from ...geometry.bodies import article_rotors as rotor
+from ...geometry.bodies import Magnet, horizontal, tilt, vertical
 from ...geometry.scenes import Drag, Floater, Scene
-from ..results import Point, chosen
+from ..results import Point, cases_with
 from ..terminal import note
 
 EDGE, REMANENCE, PERMEABILITY = 10e-3, 1.305, 1.05
 """Of the rotor's cubes: m; T, the middle of 1.29 to 1.32; recoil permeability usual for NdFeB, which is not given."""
 FLOATER = Floater(6.35e-3, REMANENCE, PERMEABILITY, 7500.0)
+WEIGHT = FLOATER.mass * 9.81
+"""Of the floater, N."""
 PLATE_SIZE, PLATE_CONDUCTIVITY = (0.1, 0.24, 0.03), 3.5e7
 """Of the aluminium plate: edges, m; S/m."""
 CONTACT = EDGE / 2 + FLOATER.radius
@@ -46,7 +48,7 @@ class Configuration:
     levitated : those of them that levitated in the experiment
     """
 
-    make: Callable[..., rotor.Rotor]
+    make: Callable[..., tuple[Magnet, ...]]
     symbol: str
     unit: str
     scale: float
@@ -60,13 +62,13 @@ class Configuration:
 
 CONFIGURATIONS = {
     "horizontal": Configuration(
-        rotor.horizontal, "δx", "mm", 1e-3, tuple(float(x) for x in range(1, 9)), (1.0, 2.0, 3.0, 4.0)
+        horizontal, "δx", "mm", 1e-3, tuple(float(x) for x in range(1, 9)), (1.0, 2.0, 3.0, 4.0)
     ),
     "vertical": Configuration(
-        rotor.vertical, "δz", "mm", 1e-3, (10.0, 12.0, 14.0, 16.0, 18.0, 20.0), (10.0, 12.0, 14.0, 16.0)
+        vertical, "δz", "mm", 1e-3, (10.0, 12.0, 14.0, 16.0, 18.0, 20.0), (10.0, 12.0, 14.0, 16.0)
     ),
     "tilt": Configuration(
-        rotor.tilt, "δθ", "°", np.pi / 180, tuple(float(x) for x in range(5, 50, 5)), (5.0, 10.0, 15.0, 20.0)
+        tilt, "δθ", "°", np.pi / 180, tuple(float(x) for x in range(5, 50, 5)), (5.0, 10.0, 15.0, 20.0)
     ),
 }
 
@@ -75,7 +77,7 @@ QUICK = {"horizontal": (1.0,), "vertical": (14.0,), "tilt": (10.0,)}
 """One rotor of each configuration, for the quick settings of studies."""
 
 
-def levitated(quick: bool) -> list[Point]:
+def levitated_rotors(quick: bool) -> list[Point]:
     """A point for each rotor that levitated in the experiment; `quick` has one of each configuration."""
     return [
         {"configuration": configuration, "measure": measure}
@@ -116,7 +118,7 @@ def article_table(scene: Scene, model: str) -> RotorTable:
     return cached_rotor_table(scene.rotor, model, RTOL, note, FLOATER.radius)[0]
 
 
-def label(configuration: str, value: float) -> str:
+def rotor_label(configuration: str, value: float) -> str:
     """A rotor's parameter with its symbol and unit."""
     kind = CONFIGURATIONS[configuration]
     return f"{kind.symbol} = {value:g}{'' if kind.unit == '°' else ' '}{kind.unit}"
@@ -131,11 +133,11 @@ def axis_label(configuration: str) -> str:
 def by_configuration(result: xr.Dataset) -> Iterator[tuple[str, xr.Dataset]]:
     """Each configuration that a joined result has, with its rotors by ascending displacement or tilt."""
     for configuration in CONFIGURATIONS:
-        part = chosen(result, configuration=configuration).sortby("measure")
+        part = cases_with(result, configuration=configuration).sortby("measure")
         if part.sizes["case"]:
             yield configuration, part
 
 
-def stable(growth: ArrayLike) -> NDArray[np.bool_]:
+def stable_in_flight(growth: ArrayLike) -> NDArray[np.bool_]:
     """Where no disturbance grows e-fold within `FLIGHT`; False where there is no equilibrium (NaN)."""
     return np.asarray(np.asarray(growth) <= 1 / FLIGHT)

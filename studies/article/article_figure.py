@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
 from ...geometry.basics import Array
-from .article import CONFIGURATIONS, label
+from .article import CONFIGURATIONS, rotor_label
 
 TITLES = {
     "horizontal": "Horizontal displacement δx",
@@ -20,16 +20,16 @@ TITLES = {
 }
 
 
-def shade(configuration: str, value: float) -> tuple[float, ...]:
+def rotor_color(configuration: str, value: float) -> tuple[float, ...]:
     """Colour of a rotor: dark to bright along viridis, which all kinds of colour vision tell apart."""
     tested = CONFIGURATIONS[configuration].tested
     place = (value - tested[0]) / (tested[-1] - tested[0])
     return tuple(mpl.colormaps["viridis"](0.92 * float(np.clip(place, 0, 1))))
 
 
-def name(configuration: str, value: float) -> str:
+def legend_name(configuration: str, value: float) -> str:
     """A rotor in a legend; with a star if it levitated in the experiment."""
-    return label(configuration, value) + ("*" if value in CONFIGURATIONS[configuration].levitated else "")
+    return rotor_label(configuration, value) + ("*" if value in CONFIGURATIONS[configuration].levitated else "")
 
 
 def values_of(result: xr.Dataset, configuration: str) -> list[float]:
@@ -37,7 +37,7 @@ def values_of(result: xr.Dataset, configuration: str) -> list[float]:
     return sorted(set(result["value"].values[result["configuration"].values == configuration].tolist()))
 
 
-def branch(axes: Axes, x: Array, y: Array, solid: NDArray[np.bool_], **style: Any) -> None:
+def plot_branch(axes: Axes, x: Array, y: Array, solid: NDArray[np.bool_], **style: Any) -> None:
     """A curve, solid where `solid`, else dashed, without a gap between."""
     inside = solid & np.append(solid[1:], True) & np.append(True, solid[:-1])
     axes.plot(x, np.where(inside, np.nan, y), "--", **{**style, "label": None})

@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 import xarray as xr
 
-from ..results import Point, one_case, variable
+from ..results import Point, Study, by_case, one_case, variable
 from .article import CONFIGURATIONS, article_scene, article_table
 from .article_formulas import field
+from .field_components_figure import components_figure, components_lines
 
 DISTANCES = (15e-3, 20e-3, 25e-3, 30e-3, 40e-3)
 """Places of the floater on the axis below the rotor, m; the article's text does not give its own."""
@@ -53,3 +54,14 @@ def field_components(point: Point) -> xr.Dataset:
             {"distance": variable(("distance",), distance, "m", "distance below the rotor's origin")},
         ),
     )
+
+
+STUDY = Study(
+    name="field-components",
+    summary="off-axis and on-axis field against the parameter of each rotor of the article, by four models",
+    points=field_points,
+    compute=field_components,
+    gather=by_case,
+    draw=components_figure,
+    report=components_lines,
+)

@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, NullFormatter
 
 from ...geometry.basics import Array
-from ..results import DASHES, NAMES, PALETTE, chosen, panels, styled
+from ..results import DASHES, NAMES, PALETTE, cases_with, panels, styled
 from .article import CONFIGURATIONS
 from .article_figure import TITLES
 
@@ -21,7 +21,7 @@ def components_figure(result: xr.Dataset) -> Figure:
     """Both components against the parameter of each configuration, and how far the simpler models are off."""
     figure, axes = panels(3, 3, (10.0, 8.6))
     for row, (configuration, kind) in zip(axes, CONFIGURATIONS.items(), strict=True):
-        part = chosen(result, configuration=configuration)
+        part = cases_with(result, configuration=configuration)
         for axis, (quantity, text) in zip(row, PARTS.items(), strict=False):
             _components(axis, part, quantity)
             axis.set(ylabel=text, yscale="log")
@@ -81,7 +81,7 @@ def difference(part: xr.Dataset, model: str, k: int) -> Array:
 
 
 def _curve(part: xr.Dataset, model: str, quantity: str, k: int) -> tuple[Array, Array]:
-    rows = chosen(part, model=model).sortby("value")
+    rows = cases_with(part, model=model).sortby("value")
     return rows["value"].values, rows[quantity].values[:, k]
 
 
@@ -89,7 +89,7 @@ def components_lines(result: xr.Dataset) -> list[str]:
     """How each component goes with the parameter, and how far the simpler models are off, at each distance."""
     lines = []
     for configuration, kind in CONFIGURATIONS.items():
-        part = chosen(result, configuration=configuration)
+        part = cases_with(result, configuration=configuration)
         for k, distance in enumerate(result["distance"].values):
             value, across = _curve(part, "fem", "off_axis", k)
             along = _curve(part, "fem", "on_axis", k)[1]

@@ -12,17 +12,15 @@ from ...dynamics.steady import ForceCurve
 from ...fem.rotor_tables import RotorTable
 from ...geometry.basics import Array
 from ...geometry.scenes import Scene
-from ..results import Point, one_case, variable
-from .article import CONTACT, FLOATER, article_scene, article_table
+from ..results import Point, Study, by_case, one_case, variable
+from .article import CONTACT, FLOATER, WEIGHT, article_scene, article_table
 from .article_formulas import force
+from .force_curve_figure import force_figure, force_lines
 
 CONFIGURATION, VALUE = "horizontal", 1.0
 """The rotor of the article's figure; its text does not give the frequency."""
 FREQUENCIES = (165.0, 170.0, 185.0, 200.0)
-WEIGHT = FLOATER.mass * 9.81
 MODELS = ("semi-analytic", "small angles", "dipole", "fem")
-TOLD_ANGLE, TOLD_DISTANCE = np.radians(9.0), 0.04
-"""θ at the tipping point nearest to the rotor, in the article's text, and where that calls it almost zero, m."""
 
 
 def force_points(quick: bool) -> list[Point]:
@@ -112,3 +110,15 @@ def balance_points(distance: Array, magnetic: Array, angle: Array) -> tuple[floa
     near = float(brentq(lambda d: work(far) - work(d), low, high)) if work(far) < work(low) else np.nan
     theta = PchipInterpolator(distance[known], angle[known])
     return stable, far, near, float(theta(near)), float(theta(stable))
+
+
+STUDY = Study(
+    name="force-curve",
+    summary="force along the axis with its two parts, stable and tipping points; the"
+    " article's formulas and full fields",
+    points=force_points,
+    compute=force_curve,
+    gather=by_case,
+    draw=force_figure,
+    report=force_lines,
+)

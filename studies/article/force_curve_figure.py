@@ -7,9 +7,11 @@ import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from ..results import PALETTE, chosen, panels, styled
-from .force_curve import TOLD_ANGLE, TOLD_DISTANCE, WEIGHT
+from ..results import PALETTE, cases_with, panels, styled
+from .article import WEIGHT
 
+TOLD_ANGLE, TOLD_DISTANCE = np.radians(9.0), 0.04
+"""θ at the tipping point nearest to the rotor, in the article's text, and where that calls it almost zero, m."""
 STYLES = {"fem": "-", "dipole": "--", "semi-analytic": ":", "small angles": "-."}
 TEXTS = {
     "fem": "finite elements",
@@ -31,7 +33,7 @@ def force_figure(result: xr.Dataset) -> Figure:
     left.set_title(f"δx = 1 mm, {frequency:g} Hz")
     for k, color in zip(range(result.sizes["frequency"]), PALETTE, strict=False):
         _net(right, result.isel(frequency=k), color)
-        here = chosen(result.isel(frequency=k), model="fem").isel(case=0)
+        here = cases_with(result.isel(frequency=k), model="fem").isel(case=0)
         angle.plot(_mm(result), np.degrees(here["polar_angle"]), color=color)
     right.set(ylabel="net force, with gravity (mN)", ylim=(-60, 40), title="Finite elements; dipole dashed")
     right.legend()
@@ -50,7 +52,7 @@ def _mm(result: xr.Dataset) -> np.ndarray:
 
 def _parts(axes: Axes, one: xr.Dataset) -> None:
     for model, style in STYLES.items():
-        found = chosen(one, model=model).isel(case=0)
+        found = cases_with(one, model=model).isel(case=0)
         for part, color in (("attracting", PALETTE[0]), ("repelling", PALETTE[1])):
             axes.plot(_mm(one), 1e3 * found[part], style, color=color, lw=1.0)
         total = 1e3 * (found["attracting"] + found["repelling"] - WEIGHT)
@@ -78,7 +80,7 @@ def _arrows(axes: Axes, found: xr.Dataset) -> None:
 
 def _net(axes: Axes, one: xr.Dataset, color: str) -> None:
     for model in ("fem", "dipole"):
-        found = chosen(one, model=model).isel(case=0)
+        found = cases_with(one, model=model).isel(case=0)
         label = f"{float(one['frequency']):g} Hz" if model == "fem" else None
         axes.plot(
             _mm(one), 1e3 * (found["attracting"] + found["repelling"] - WEIGHT), STYLES[model], color=color, label=label
@@ -90,9 +92,9 @@ def _net(axes: Axes, one: xr.Dataset, color: str) -> None:
 
 
 def _differences(axes: Axes, one: xr.Dataset) -> None:
-    true = chosen(one, model="fem").isel(case=0)
+    true = cases_with(one, model="fem").isel(case=0)
     for model, color in (("dipole", PALETTE[0]), ("semi-analytic", PALETTE[1]), ("small angles", PALETTE[3])):
-        found = chosen(one, model=model).isel(case=0)
+        found = cases_with(one, model=model).isel(case=0)
         for part, style in (("attracting", "-"), ("repelling", "--")):
             label = f"{TEXTS[model]}, {part}"
             axes.plot(_mm(one), 100 * (found[part] / true[part] - 1), style, color=color, label=label)
@@ -105,7 +107,7 @@ def force_lines(result: xr.Dataset) -> list[str]:
     lines = []
     for k, frequency in enumerate(result["frequency"].values):
         for model in STYLES:
-            found = chosen(result, model=model).isel(case=0, frequency=k)
+            found = cases_with(result, model=model).isel(case=0, frequency=k)
             far_angle = np.interp(TOLD_DISTANCE, result["distance"].values, found["polar_angle"].values)
             lines.append(
                 f"{frequency:g} Hz, {TEXTS[model]}: stable at {1e3 * float(found['equilibrium']):.3f} mm "

@@ -6,15 +6,16 @@ import numpy as np
 import xarray as xr
 
 from ...dynamics.branches import Family, distance_error, kicked, levitating_branch
-from ...dynamics.branches import Point as Equilibrium
+from ...dynamics.branches import Point as BranchPoint
 from ...dynamics.flights import simulate
 from ...dynamics.motion import Rates
 from ...fem.rotor_tables import RotorTable
 from ...geometry.basics import Array
 from ...geometry.scenes import Scene
-from ..results import Point, one_case, variable
-from .article import CONFIGURATIONS, FLOATER, HIGHEST, LOWEST, QUICK, article_scene, article_table, stable
+from ..results import Point, Study, by_case, one_case, variable
+from .article import CONFIGURATIONS, HIGHEST, LOWEST, QUICK, WEIGHT, article_scene, article_table, stable_in_flight
 from .article_formulas import analytic_distance, balanced
+from .levitation_distance_figure import distance_figure, distance_lines
 
 SIDES = ("near", "far")
 FORMULAS, FIELDS = ("semi-analytic", "analytic"), ("dipole", "fem")
@@ -58,8 +59,7 @@ def _by_formula(point: Point, grid: Array) -> xr.Dataset:
         near = analytic_distance(configuration, value, grid)
         distance = np.stack([near, np.full(near.shape, np.nan)], axis=1)
     else:
-        weight = FLOATER.mass * 9.81
-        distance = np.array([balanced(configuration, value, frequency, weight) for frequency in grid])
+        distance = np.array([balanced(configuration, value, frequency, WEIGHT) for frequency in grid])
     unknown = np.full(distance.shape, np.nan)
     return _dataset(distance, unknown, unknown, unknown, (np.nan, np.nan), np.full((3, point["flights"]), np.nan))
 
@@ -73,7 +73,7 @@ def _in_field(point: Point, grid: Array) -> xr.Dataset:
     distance, error, growth, angle = (rows[..., k].T for k in range(4))
     fold = branch.fold
     flown = found[0] if point["model"] == FLOWN else []
-    known = [p for p in flown if p is not None and stable(p.growth_per_s)]
+    known = [p for p in flown if p is not None and stable_in_flight(p.growth_per_s)]
     places = np.unique(np.linspace(0, len(known) - 1, point["flights"] if known else 0).astype(int))
     flights = np.full((3, point["flights"]), np.nan)
     for k, place in enumerate(places):
@@ -81,14 +81,14 @@ def _in_field(point: Point, grid: Array) -> xr.Dataset:
     return _dataset(distance, error, growth, angle, (fold.parameter, -fold.position[2]), flights)
 
 
-def _row(scene: Scene, table: RotorTable, family: Family, point: Equilibrium | None) -> list[float]:
+def _row(scene: Scene, table: RotorTable, family: Family, point: BranchPoint | None) -> list[float]:
     if point is None:
         return [np.nan] * 4
     angle = float(np.arctan2(np.hypot(*point.state[6:8]), point.state[8]))
     return [-point.position[2], distance_error(scene, table, family, point), point.growth_per_s, angle]
 
 
-def mean_height(scene: Scene, table: RotorTable, point: Equilibrium) -> tuple[float, float]:
+def mean_height(scene: Scene, table: RotorTable, point: BranchPoint) -> tuple[float, float]:
     """Mean distance along the axis (m) of a flight that a kick began, and by how much its halves differ.
 
     Means are weighted by sin², which takes out the bounce; NaN where the flight did not last.
@@ -122,3 +122,14 @@ def _dataset(
             "flight_error": variable(flight, flights[2], "m", "difference between the flight's halves"),
         }
     )
+
+
+STUDY = Study(
+    name="levitation-distance",
+    summary="distance against frequency for every rotor of the article: equilibria, its formulas, simulated flights",
+    points=distance_points,
+    compute=levitation_distance,
+    gather=by_case,
+    draw=distance_figure,
+    report=distance_lines,
+)

@@ -10,9 +10,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from ...geometry.basics import Array
-from ..results import chosen, panels, styled
-from .article import CONFIGURATIONS, label, stable
-from .article_figure import TITLES, branch, name, shade, values_of
+from ..results import cases_with, panels, styled
+from .article import CONFIGURATIONS, rotor_label, stable_in_flight
+from .article_figure import TITLES, legend_name, plot_branch, rotor_color, values_of
 
 LIMITS = (8.0, 66.0)
 """Of the axis of distances, mm."""
@@ -25,9 +25,14 @@ def distance_figure(result: xr.Dataset) -> Figure:
     for (left, right), configuration in zip(axes, CONFIGURATIONS, strict=True):
         for value in values_of(result, configuration):
             rotor = {"configuration": configuration, "value": value}
-            _fields(left, chosen(result, **rotor), color=shade(configuration, value), label=name(configuration, value))
+            _fields(
+                left,
+                cases_with(result, **rotor),
+                color=rotor_color(configuration, value),
+                label=legend_name(configuration, value),
+            )
             if value in CONFIGURATIONS[configuration].levitated:
-                _formulas(right, chosen(result, **rotor), color=shade(configuration, value))
+                _formulas(right, cases_with(result, **rotor), color=rotor_color(configuration, value))
         for axis in (left, right):
             axis.set(
                 xlabel="frequency of the rotor (Hz)", ylabel="levitation distance (mm)", xlim=(25, 255), ylim=LIMITS
@@ -57,14 +62,18 @@ def _fields(axes: Axes, rotor: xr.Dataset, **style: Any) -> None:
     frequency = rotor["frequency"].values
     for side in ("near", "far"):
         distance, growth = _side(rotor, "fem", side)
-        branch(
-            axes, frequency, 1e3 * distance, stable(growth), **(style if side == "near" else {**style, "label": None})
+        plot_branch(
+            axes,
+            frequency,
+            1e3 * distance,
+            stable_in_flight(growth),
+            **(style if side == "near" else {**style, "label": None}),
         )
         other, _ = _side(rotor, "dipole", side)
         axes.plot(frequency, 1e3 * other, ":", color=style["color"], lw=0.8)
-    fold = chosen(rotor, model="fem")[["fold_frequency", "fold_distance"]].isel(case=0)
+    fold = cases_with(rotor, model="fem")[["fold_frequency", "fold_distance"]].isel(case=0)
     axes.plot(float(fold["fold_frequency"]), 1e3 * float(fold["fold_distance"]), "o", color=style["color"], ms=3)
-    error = 1e3 * chosen(rotor, model="fem")["distance_error"].sel(side="near").values[0]
+    error = 1e3 * cases_with(rotor, model="fem")["distance_error"].sel(side="near").values[0]
     near, _ = _side(rotor, "fem", "near")
     axes.fill_between(frequency, 1e3 * near - error, 1e3 * near + error, color=style["color"], alpha=0.3, lw=0)
 
@@ -72,17 +81,17 @@ def _fields(axes: Axes, rotor: xr.Dataset, **style: Any) -> None:
 def _formulas(axes: Axes, rotor: xr.Dataset, **style: Any) -> None:
     frequency = rotor["frequency"].values
     distance, growth = _side(rotor, "dipole", "near")
-    branch(axes, frequency, 1e3 * distance, stable(growth), lw=0.8, **style)
+    plot_branch(axes, frequency, 1e3 * distance, stable_in_flight(growth), lw=0.8, **style)
     axes.plot(frequency, 1e3 * _side(rotor, "semi-analytic", "near")[0], ":", lw=1.6, **style)
     if "analytic" in rotor["model"].values:
         axes.plot(frequency, 1e3 * _side(rotor, "analytic", "near")[0], "-.", lw=0.6, **style)
-    flights = chosen(rotor, model="dipole")
+    flights = cases_with(rotor, model="dipole")
     axes.plot(flights["flight_frequency"].values[0], 1e3 * flights["flight_distance"].values[0], "x", ms=4, **style)
 
 
 def _side(rotor: xr.Dataset, model: str, side: str) -> tuple[Array, Array]:
     """Distance (m) and growth (1/s) on one side, by one model."""
-    found = chosen(rotor, model=model).isel(case=0).sel(side=side)
+    found = cases_with(rotor, model=model).isel(case=0).sel(side=side)
     return found["distance"].values, found["growth"].values
 
 
@@ -92,23 +101,23 @@ def distance_lines(result: xr.Dataset) -> list[str]:
     for configuration, kind in CONFIGURATIONS.items():
         values = values_of(result, configuration)
         for model, text in (("fem", "finite elements"), ("dipole", "dipole")):
-            found = chosen(result, configuration=configuration, model=model).sortby("value")
+            found = cases_with(result, configuration=configuration, model=model).sortby("value")
             flown = found.isel(case=np.isin(found["value"].values, kind.levitated))["fold_frequency"].values
             if len(flown) > 1:
                 words = f"{configuration}, {text}: from {flown.max():.1f} down to {flown.min():.1f} Hz"
                 lines.append(f"{words} by the parameters that levitated, a factor of {flown.max() / flown.min():.2f}.")
         for value in values:
-            rotor = chosen(result, configuration=configuration, value=value)
-            lines.append(f"{label(configuration, value)}: " + "; ".join(_sentences(rotor)) + ".")
+            rotor = cases_with(result, configuration=configuration, value=value)
+            lines.append(f"{rotor_label(configuration, value)}: " + "; ".join(_sentences(rotor)) + ".")
     return lines
 
 
 def _sentences(rotor: xr.Dataset) -> list[str]:
     words = []
     for model, text in (("fem", "finite elements"), ("dipole", "dipole")):
-        found = chosen(rotor, model=model).isel(case=0)
+        found = cases_with(rotor, model=model).isel(case=0)
         near, growth = _side(rotor, model, "near")
-        good = stable(growth)
+        good = stable_in_flight(growth)
         fold = f"{text}: none below {float(found['fold_frequency']):.2f} Hz"
         if good.any():
             kept = rotor["frequency"].values[good]
@@ -118,7 +127,7 @@ def _sentences(rotor: xr.Dataset) -> list[str]:
                 fold += f", d ~ f^{np.polyfit(np.log(kept), np.log(near[good]), 1)[0]:.2f}"
         words.append(fold if good.any() else fold + ", stable nowhere")
     near, growth = _side(rotor, "dipole", "near")
-    good = stable(growth)
+    good = stable_in_flight(growth)
     true = _side(rotor, "fem", "near")[0]
     if good.any():
         words.append(f"dipole less finite elements {_range(1e3 * (near - true)[good])} mm")
@@ -126,7 +135,7 @@ def _sentences(rotor: xr.Dataset) -> list[str]:
             if model in rotor["model"].values:
                 off = 100 * (_side(rotor, model, "near")[0] / near - 1)[good]
                 words.append(f"{model} off the dipole by {_range(off)} %")
-    flights = chosen(rotor, model="dipole").isel(case=0)
+    flights = cases_with(rotor, model="dipole").isel(case=0)
     apart = flights["flight_distance"].values - np.interp(
         flights["flight_frequency"].values, rotor["frequency"].values, near
     )

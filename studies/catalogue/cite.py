@@ -37,10 +37,10 @@ STATIC = ("dipole-validity", "speed-accuracy", "field-hard-cases", "field-compon
 
 def cite_job(path: Path) -> list[str]:
     """References of what a result used, a line each. Raises InputError where the file is no result."""
-    return [REFERENCES[key] for key in used(read_result(path))]
+    return [REFERENCES[key] for key in used_references(read_result(path))]
 
 
-def used(result: xr.Dataset) -> list[str]:
+def used_references(result: xr.Dataset) -> list[str]:
     """Keys of `REFERENCES` that a result used, told from its attributes."""
     study, attrs = str(result.attrs["study"]), result.attrs
     keys = {"effect", "program", *STUDIES.get(study, ())}

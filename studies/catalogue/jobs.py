@@ -22,7 +22,7 @@ from .entries import CATALOGUE
 def study_job(name: str, quick: bool, engine: Workers, out: Path) -> Job:
     """Compute a study of the catalogue; writes NAME.nc, NAME.png and NAME.pdf. Errors are those of `swept`."""
     study = CATALOGUE[name]
-    return _studied(name, study, study.points(quick), engine, out)
+    return _studied(study, study.points(quick), engine, out)
 
 
 def question_job(question: Question, values: dict[str, list[Any]], engine: Workers, out: Path) -> Job:
@@ -32,7 +32,7 @@ def question_job(question: Question, values: dict[str, list[Any]], engine: Worke
     ------
     SceneError : the scene does not take the first of the values
     """
-    return _studied(QUESTION, question_study(question, values), combinations(values), engine, out)
+    return _studied(question_study(question, values), combinations(values), engine, out)
 
 
 def question_study(question: Question, values: Mapping[str, Sequence[Any]]) -> Study:
@@ -43,6 +43,7 @@ def question_study(question: Question, values: Mapping[str, Sequence[Any]]) -> S
             question.levitation({**points[0], key: value})
     question.levitation(points[0])
     return Study(
+        QUESTION,
         f"{question.ask} over {', '.join(values)}",
         lambda quick: points,
         question,
@@ -53,7 +54,8 @@ def question_study(question: Question, values: Mapping[str, Sequence[Any]]) -> S
     )
 
 
-def _studied(name: str, study: Study, points: Sequence[Point], engine: Workers, out: Path) -> Job:
+def _studied(study: Study, points: Sequence[Point], engine: Workers, out: Path) -> Job:
+    name = study.name
     result = swept(name, study, dict(enumerate(points)), engine, out)
     path = out / f"{name}.nc"
     write_dataset(result, path)

@@ -18,7 +18,7 @@ import xarray as xr
 from ...fem.storage import write_whole
 from ...geometry.basics import InputError
 from ..pictures import question_lines
-from ..results import drawn
+from ..results import figure_bytes
 from .drawings import QUESTION, figures_of, read_result
 from .entries import CATALOGUE
 from .jobs import failure_lines
@@ -69,7 +69,7 @@ def _part(path: Path) -> Part:
     result = read_result(path)
     kind = str(result.attrs["study"])
     study = CATALOGUE.get(kind)
-    pictures = [(name, _embedded(drawn(figure, "png"), "png")) for name, figure in figures_of(result).items()]
+    pictures = [(name, _embedded(figure_bytes(figure, "png"), "png")) for name, figure in figures_of(result).items()]
     beside = [path.parent / "scene.png"] if kind == "run" else []
     beside += [path.parent / f"{path.stem}-{name}" for name in ("scene.png", "flight.gif")]
     pictures += [(f.stem, _embedded(f.read_bytes(), f.suffix[1:])) for f in beside if f.exists()]

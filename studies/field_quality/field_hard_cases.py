@@ -16,12 +16,13 @@ import xarray as xr
 
 from ...fem.closed_forms import added_by_closed_form, carrier, oblique_contact
 from ...fem.magnetostatics import Refinement, solve_rotor
-from ...fem.rotor_tables import Accuracy, AccuracyWarning, RotorTable, fem_table, shell, typical_field
+from ...fem.rotor_tables import Accuracy, AccuracyWarning, RotorTable, fem_table, points_around, typical_field
 from ...fem.verification import coulomb_field
 from ...geometry.basics import Array
 from ...geometry.bodies import cut_magnets
-from ..results import variable
+from ..results import study_of_one, variable
 from ..terminal import progress
+from .field_hard_cases_figure import hard_case_figure, hard_case_lines
 from .hard_cases import CASES, HardCase
 
 RTOL = 1e-5
@@ -58,7 +59,7 @@ def case_errors(case: HardCase, places: int) -> xr.Dataset:
         table = fem_table(case.magnets, Accuracy(RTOL, case.nearest))
     seconds = time.process_time() - start
     distance = np.geomspace(case.clearance, FARTHEST, places)
-    points = [extensions(case, d) if case.extensions else shell(case.magnets, d) for d in distance]
+    points = [extensions(case, d) if case.extensions else points_around(case.magnets, d) for d in distance]
     before, truth = reference(case, np.concatenate(points))
     ends = np.cumsum([len(p) for p in points])[:-1]
     rows = [
@@ -124,22 +125,11 @@ def _errors(table: RotorTable, case: HardCase, points: Array, before: Array, tru
     return float(true.max()), float(stated.max()), float(own.max()), float((true / (stated + own)).max())
 
 
-def hard_case_lines(result: xr.Dataset) -> list[str]:
-    """The study's table."""
-    ends = f"{'at the nearest distance':27}  {'10 cm and farther':27}"
-    lines = [
-        "Largest relative error of B: true / stated / last step of the reference",
-        f"{'case':30} {'mm':>6}  {ends} {'cover':>6} {'order':>5} {'CPU s':>6}",
-    ]
-    for name in result["case"].values:
-        row = result.sel(case=name)
-        near, far = row.isel(place=0), row.where(row["distance"] >= 0.1).max()
-        lines.append(
-            f"{name:30} {1e3 * float(near['distance']):6.2f}  {_three(near)}  {_three(far)} "
-            f"{float(row['shortfall'].max()):6.2f} {int(row['order']):5d} {float(row['seconds']):6.1f}"
-        )
-    return [*lines, "cover: true error over stated error and reference's step; above 1 the table states too little."]
-
-
-def _three(row: xr.Dataset) -> str:
-    return " / ".join(f"{float(row[key]):7.1e}" for key in ("true_error", "stated_error", "reference_step"))
+STUDY = study_of_one(
+    name="field-hard-cases",
+    summary="true and stated error of the rotor's table in hard cases: contact,"
+    " extensions, flat, touching, strong, many",
+    compute=field_hard_cases,
+    draw=hard_case_figure,
+    report=hard_case_lines,
+)

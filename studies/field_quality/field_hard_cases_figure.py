@@ -1,4 +1,4 @@
-"""Figure of the study of hard cases, from its result alone."""
+"""Figure and table of the study of hard cases, from its result alone."""
 
 from __future__ import annotations
 
@@ -42,3 +42,24 @@ def hard_case_figure(result: xr.Dataset) -> Figure:
     figure.supylabel("largest relative error of B", fontsize=9)
     figure.legend(*axes.flat[0].get_legend_handles_labels(), loc="outside upper center", ncols=4, fontsize=8)
     return figure
+
+
+def hard_case_lines(result: xr.Dataset) -> list[str]:
+    """The study's table."""
+    ends = f"{'at the nearest distance':27}  {'10 cm and farther':27}"
+    lines = [
+        "Largest relative error of B: true / stated / last step of the reference",
+        f"{'case':30} {'mm':>6}  {ends} {'cover':>6} {'order':>5} {'CPU s':>6}",
+    ]
+    for name in result["case"].values:
+        row = result.sel(case=name)
+        near, far = row.isel(place=0), row.where(row["distance"] >= 0.1).max()
+        lines.append(
+            f"{name:30} {1e3 * float(near['distance']):6.2f}  {_three(near)}  {_three(far)} "
+            f"{float(row['shortfall'].max()):6.2f} {int(row['order']):5d} {float(row['seconds']):6.1f}"
+        )
+    return [*lines, "cover: true error over stated error and reference's step; above 1 the table states too little."]
+
+
+def _three(row: xr.Dataset) -> str:
+    return " / ".join(f"{float(row[key]):7.1e}" for key in ("true_error", "stated_error", "reference_step"))

@@ -8,16 +8,26 @@ from dataclasses import dataclass, replace
 import numpy as np
 import xarray as xr
 
-from ...dynamics.branches import Family, Point, StableRange, at_frequency, by_frequency, reference_state, with_answers
-from ...dynamics.branches import stable_range as range_of
+from ...dynamics.branches import (
+    Family,
+    StableRange,
+    at_frequency,
+    by_frequency,
+    reference_state,
+    stable_range,
+    with_answers,
+)
+from ...dynamics.branches import Point as BranchPoint
 from ...dynamics.motion import Rates
 from ...dynamics.steady import EquilibriumError, named_modes
 from ...fem.rotor_tables import cached_rotor_table, rotor_table
 from ...geometry.basics import Array
 from ...geometry.scenes import Scene
-from ..article import article_scene, levitated
-from ..results import study, variable
+from ..article import article_scene, levitated_rotors
+from ..results import Point, Study, by_case, variable
 from ..terminal import note
+from .dipole_vs_fem_figure import dipole_figure
+from .dipole_vs_fem_report import dipole_lines
 
 MODELS = ("article", "dipole", "cuboid", "fem", "mutual")
 """Point dipoles of the full remanence; the floater's moment lowered by its own permeability; the rotor's shape; its
@@ -30,16 +40,16 @@ ROUND_OFF = 1e-10
 """Relative error of what needs no finite elements."""
 
 
-def points(quick: bool) -> list[study.Point]:
+def points(quick: bool) -> list[Point]:
     """The rotors that levitated; quick: one frequency, coarser answers of the bodies and no limits with them (NaN)."""
     settings = (
         {"steps": 1, "orders": [1, 2], "limits": False} if quick else {"steps": 4, "orders": [2, 3], "limits": True}
     )
-    return [{**point, **settings} for point in levitated(quick)]
+    return [{**point, **settings} for point in levitated_rotors(quick)]
 
 
 @dataclass(frozen=True, eq=False)
-class Levitation:
+class InOneField:
     """A scene in the field of one model, and the frequencies at which it levitates."""
 
     scene: Scene
@@ -51,12 +61,12 @@ class Levitation:
         """Its equilibria against frequency."""
         return by_frequency(self.scene, self.rates)
 
-    def at(self, frequency: float) -> Point:
+    def at(self, frequency: float) -> BranchPoint:
         """The equilibrium at a frequency, Hz."""
         return at_frequency(self.scene, self.rates, self.range.near(frequency), frequency)
 
 
-def compute(point: study.Point) -> xr.Dataset:
+def compute(point: Point) -> xr.Dataset:
     """Distance, polar angle, modes and limits of stability of one rotor, by every model and with errors."""
     scene = article_scene(point["configuration"], point["measure"], drag=False)
     bare = replace(scene, floater=replace(scene.floater, recoil_permeability=1.0))
@@ -87,18 +97,20 @@ def compute(point: study.Point) -> xr.Dataset:
     return _dataset(point, grid, rows, errors, kinds)
 
 
-def _levitation(scene: Scene, rates: Rates, start: tuple[Array, float]) -> Levitation:
-    found = range_of(scene, rates, *start)
+def _levitation(scene: Scene, rates: Rates, start: tuple[Array, float]) -> InOneField:
+    found = stable_range(scene, rates, *start)
     if found is None:
         raise EquilibriumError("There is no stable levitation on the branch of the point dipoles.")
-    return Levitation(scene, rates, found)
+    return InOneField(scene, rates, found)
 
 
 def _by_elements(scene: Scene, rtol: float) -> Rates:
     return Rates.of(scene, cached_rotor_table(scene.rotor, "fem", rtol, note, scene.floater.radius)[0])
 
 
-def _described(at: Callable[[float], Point], low: Point | None, high: Point | None, grid: Array) -> dict[str, Array]:
+def _described(
+    at: Callable[[float], BranchPoint], low: BranchPoint | None, high: BranchPoint | None, grid: Array
+) -> dict[str, Array]:
     found = [at(float(frequency)) for frequency in grid]
     moment = np.array([point.state[6:9] for point in found])
     modes = [named_modes(point.motion, point.time_unit) for point in found]
@@ -121,7 +133,7 @@ LABELS: dict[str, tuple[tuple[str, ...], str, str]] = {
 
 
 def _dataset(
-    point: study.Point,
+    point: Point,
     grid: Array,
     rows: dict[str, dict[str, Array]],
     errors: dict[str, dict[str, Array]],
@@ -138,3 +150,15 @@ def _dataset(
     data["measure"] = variable(("case",), np.array([point["measure"]]), "mm or °", "displacement or tilt")
     data["configuration"] = xr.Variable(("case",), np.array([point["configuration"]]))
     return xr.Dataset(data, {"model": list(MODELS), "mode": list(MODES)})
+
+
+STUDY = Study(
+    name="dipole-vs-fem",
+    summary="what true fields change in distance, angle, modes and limits, split"
+    " into shape, permeability, mutual answers",
+    points=points,
+    compute=compute,
+    gather=by_case,
+    draw=dipole_figure,
+    report=dipole_lines,
+)

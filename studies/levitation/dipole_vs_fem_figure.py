@@ -8,7 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from ...geometry.basics import Array
-from ..article import axis_label, by_configuration, label
+from ..article import axis_label, by_configuration, rotor_label
 from ..results import PALETTE, panels, styled
 
 CAUSES = {
@@ -54,7 +54,7 @@ def _distances(axes: Axes, part: xr.Dataset) -> None:
         one = part.isel(case=k)
         for model, style in (("article", "--"), ("mutual", "-")):
             distance = 1e3 * one["distance"].sel(model=model).values
-            text = label(kind, float(one["measure"])) if model == "mutual" else None
+            text = rotor_label(kind, float(one["measure"])) if model == "mutual" else None
             axes.plot(
                 one["frequency"].values,
                 distance,

@@ -6,7 +6,7 @@ import numpy as np
 import xarray as xr
 
 from ...geometry.basics import Array
-from ..article import by_configuration, label
+from ..article import by_configuration, rotor_label
 from .dipole_vs_fem_figure import CAUSES, TOTAL, change
 
 
@@ -25,16 +25,16 @@ def _quantities(part: xr.Dataset, models: tuple[str, str]) -> list[str]:
     names = {"distance": ("distance", 1e3, "mm"), "polar_angle": ("polar angle", 1.0, "°")}
     names |= {"lowest": ("lowest", 1.0, "Hz"), "highest": ("highest", 1.0, "Hz")}
     words = [
-        f"{word} {spanned(*change(part, name, models), scale)} {unit}" for name, (word, scale, unit) in names.items()
+        f"{word} {range_text(*change(part, name, models), scale)} {unit}" for name, (word, scale, unit) in names.items()
     ]
     value, error = change(part, "mode_frequency", models)
     relative = 100 / part["mode_frequency"].sel(model=models[0])
     bounce = {"mode": "bounce"}
-    words.append(f"bounce {spanned((value * relative).sel(bounce), (error * relative).sel(bounce))} %")
+    words.append(f"bounce {range_text((value * relative).sel(bounce), (error * relative).sel(bounce))} %")
     return words
 
 
-def spanned(value: xr.DataArray, error: xr.DataArray, scale: float = 1.0) -> str:
+def range_text(value: xr.DataArray, error: xr.DataArray, scale: float = 1.0) -> str:
     """A range of values and the largest error."""
     known: Array = scale * value.values[np.isfinite(value.values)]
     if not known.size:
@@ -52,7 +52,7 @@ def _limits(one: xr.Dataset) -> str:
                 for n, k in (("lowest", one["low_kind"].sel(model=model).item()),
                              ("highest", one["high_kind"].sel(model=model).item()))]  # fmt: skip
         words.append(f"{model} {ends[0]} to {ends[1]} Hz")
-    return f"{label(kind, float(one['measure']))}: " + "; ".join(words)
+    return f"{rotor_label(kind, float(one['measure']))}: " + "; ".join(words)
 
 
 def sentence(result: xr.Dataset) -> str:
@@ -60,7 +60,7 @@ def sentence(result: xr.Dataset) -> str:
 
     def wrong(name: str, models: tuple[str, str], scale: float = 1.0) -> str:
         value, error = change(result, name, models)
-        return spanned(-value, error, scale)
+        return range_text(-value, error, scale)
 
     limits = TOTAL if result["highest"].sel(model=TOTAL[1]).notnull().all() else (TOTAL[0], "fem")
     known = "" if limits == TOTAL else " (the latter two without mutual magnetisation)"

@@ -13,8 +13,10 @@ from ...dynamics.steady import Equilibrium
 from ...fem.mutual import RotorResponse, TwoBody, Wrench, rotor_ladder, two_body, two_body_ladder
 from ...fem.rotor_tables import rotor_table
 from ...geometry.basics import Array
-from ...geometry.scenes import Floater, Scene
-from ..results import AXIS, variable
+from ...geometry.scenes import Floater, Scene, load_scene
+from ..results import AXIS, study_of_one, variable
+from ..terminal import default_scene
+from .floater_permeability_figure import floater_figure, floater_lines
 
 LEVELS = (0.1, 0.01, 1e-3, 1e-4)
 FARTHEST = 0.05
@@ -44,7 +46,7 @@ def floater_permeability(scene: Scene, distances: Sequence[float] | None = None,
     balance = PerturbedBalance.of(scene, table)
     places = np.stack([0 * depths, 0 * depths, -depths], axis=1)
     start, guess = (stable.distance, stable.state.moment) if stable else (FARTHEST, np.array([-1.0, 0.0, 0.0]))
-    dataset = missed(rotors, scene.floater, places, _directions(balance, places, start, guess))
+    dataset = missed(rotors, scene.floater, places, balance.directions(places, start, guess))
     weight = scene.floater.mass * float(np.linalg.norm(scene.gravity))
     dataset = dataset.merge(sufficient(dataset)).assign_attrs(weight_N=weight)
     return dataset.merge(levitation(rotors, scene.floater, balance, stable)) if stable else dataset
@@ -132,19 +134,6 @@ def _depths(scene: Scene, number: int) -> Array:
     return np.geomspace(nearest, FARTHEST, number)
 
 
-def _directions(balance: PerturbedBalance, places: Array, start: float, guess: Array) -> Array:
-    """Balanced moment directions (n, 3), each followed from its neighbour, outwards and inwards from `start`."""
-    result = np.zeros_like(places)
-    depths = -places[:, 2]
-    outwards = [k for k in np.argsort(depths) if depths[k] >= start]
-    inwards = [k for k in np.argsort(-depths) if depths[k] < start]
-    for chain in (outwards, inwards):
-        direction = guess
-        for k in chain:
-            direction = result[k] = balance.direction(places[k], direction)
-    return result
-
-
 def _last_crossing(distance: Array, values: Array, level: float) -> float:
     above = np.nonzero(values > level)[0]
     if not len(above):
@@ -154,3 +143,17 @@ def _last_crossing(distance: Array, values: Array, level: float) -> float:
         return float("nan")
     share = np.log(values[k] / level) / np.log(values[k] / values[k + 1])
     return float(distance[k] * (distance[k + 1] / distance[k]) ** share)
+
+
+def in_the_default_scene(quick: bool) -> xr.Dataset:
+    """What the rigid dipole misses in the scene that comes with the program."""
+    return floater_permeability(load_scene(default_scene()), quick=quick)
+
+
+STUDY = study_of_one(
+    name="floater-permeability",
+    summary="what the rigid dipole misses once rotor and floater magnetise each other, in the default scene",
+    compute=in_the_default_scene,
+    draw=floater_figure,
+    report=floater_lines,
+)

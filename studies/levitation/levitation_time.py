@@ -17,16 +17,23 @@ from ...dynamics.steady import EquilibriumError
 from ...fem.rotor_tables import FieldTable, rotor_table
 from ...geometry.basics import Array
 from ...geometry.scenes import Scene
-from ..results import Point, variable
-from .drift_cases import CASES, QUICK, QUICK_VARIANTS, VARIANTS, Variant, scene_of
+from ..results import Point, Study, variable
+from .levitation_time_cases import (
+    CASES,
+    LEVITATES,
+    NO_EQUILIBRIUM,
+    OUTCOMES,
+    QUICK,
+    QUICK_VARIANTS,
+    VARIANTS,
+    Variant,
+    scene_of,
+)
+from .levitation_time_figure import time_figure, time_lines
 
 CAP, SHORTEST = 250.0, 3.0
 """The article stopped a flight after 250 s, and did not count one of less than 3 s."""
 SAMPLES = 60
-KEPT, NONE = 3, 4
-OUTCOMES = ("contact", "fold", "instability", "levitates", "no equilibrium")
-
-
 QUANTITIES = {
     "levitation_time": ("s", f"time until the loss, at most {CAP:g} s"),
     "outcome": ("1", "how it ended: " + ", ".join(f"{k} {name}" for k, name in enumerate(OUTCOMES))),
@@ -40,14 +47,14 @@ QUANTITIES = {
 }
 
 
-def drift_points(quick: bool) -> list[Point]:
+def time_points(quick: bool) -> list[Point]:
     """Every case with every variant; `quick` has two cases, fewer frequencies and variants, and point dipoles."""
     names, variants = (QUICK, QUICK_VARIANTS) if quick else (tuple(CASES), tuple(VARIANTS))
     steps, model = (11, "dipole") if quick else (36, "cuboid")
     return [{"case": c, "variant": v, "steps": steps, "model": model} for c in names for v in variants]
 
 
-def drift_row(point: Point) -> xr.Dataset:
+def levitation_times(point: Point) -> xr.Dataset:
     """Levitation time, start and end of the averaged flights of one rotor with one variant, over `step` of frequency.
 
     Recoil permeability is 1.05 in the floater and left out in the rotor.
@@ -68,7 +75,7 @@ def drift_row(point: Point) -> xr.Dataset:
     return xr.Dataset(data, coordinates, {"model": point["model"], "cap_s": CAP, "shortest_s": SHORTEST})
 
 
-def drift_result(parts: Sequence[xr.Dataset]) -> xr.Dataset:
+def gather_times(parts: Sequence[xr.Dataset]) -> xr.Dataset:
     """All rows by `case` and `variant`; NaN where one is missing."""
     together: dict[str, list[xr.Dataset]] = {}
     for part in parts:
@@ -120,11 +127,22 @@ def _flights(
 
 def _row(flight: Drift | None) -> list[float]:
     if flight is None:
-        return [0.0, NONE, *[np.nan] * 7]
+        return [0.0, NO_EQUILIBRIUM, *[np.nan] * 7]
     kept = flight.ended_by in ("duration", "balance")
-    outcome = KEPT if kept else OUTCOMES.index(flight.ended_by)
+    outcome = LEVITATES if kept else OUTCOMES.index(flight.ended_by)
     rates = [flight.fall_rate(*part) for part in ((0.0, 0.9), (0.6, 0.9), (0.0, 0.3))]
     return [
         CAP if kept else min(flight.levitated_s, CAP), outcome, flight.distance[0], flight.distance[-1],
         flight.spin[-1], rates[0], rates[1] / rates[2], flight.balance_spin, flight.growth_per_s.max(),
     ]  # fmt: skip
+
+
+STUDY = Study(
+    name="levitation-time",
+    summary="levitation time against frequency by the slow drift of the floater's spin",
+    points=time_points,
+    compute=levitation_times,
+    gather=gather_times,
+    draw=time_figure,
+    report=time_lines,
+)

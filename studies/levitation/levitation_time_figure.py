@@ -8,7 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from ..results import PALETTE, panels, styled
-from .levitation_time import KEPT, OUTCOMES
+from .levitation_time_cases import LEVITATES, OUTCOMES
 
 MARKS = dict(zip(OUTCOMES, ("v", "o", "X", "^", "|"), strict=True))
 MEANINGS = {
@@ -35,7 +35,7 @@ FLOWN = {
 
 
 @styled
-def drift_figure(result: xr.Dataset) -> Figure:
+def time_figure(result: xr.Dataset) -> Figure:
     """For each rotor: levitation time against frequency with its bands, and some nominal flights."""
     cases = result["case"].values.tolist()
     rows = -(-len(cases) // 2)
@@ -86,8 +86,8 @@ def _flights(axes: Axes, result: xr.Dataset) -> None:
     nominal = result.sel(variant="nominal")
     frequency = result["frequency"].values
     flown = np.flatnonzero(nominal["levitation_time"].values >= float(result.attrs["shortest_s"]))
-    falls = flown[nominal["outcome"].values[flown] != KEPT]
-    lasts = flown[nominal["outcome"].values[flown] == KEPT]
+    falls = flown[nominal["outcome"].values[flown] != LEVITATES]
+    lasts = flown[nominal["outcome"].values[flown] == LEVITATES]
     shown = np.unique([*falls[:: max(1, -(-len(falls) // 4))], *lasts[:: max(1, -(-len(lasts) // 3))]]).astype(int)
     for number, k in enumerate(shown):
         color = PALETTE[number % len(PALETTE)]
@@ -98,7 +98,7 @@ def _flights(axes: Axes, result: xr.Dataset) -> None:
     axes.set(xlabel="time (s)", ylabel="distance (mm)", xlim=(0, 310))
 
 
-def drift_lines(result: xr.Dataset) -> list[str]:
+def time_lines(result: xr.Dataset) -> list[str]:
     """For each rotor: where flights end in the fold, where they last and where they are unstable."""
     lines = []
     for case in result["case"].values.tolist():
@@ -121,7 +121,7 @@ def _line(nominal: xr.Dataset, number: int) -> str:
     words += f"from {_span(1e3 * chosen['distance_start'])} to {_span(1e3 * chosen['distance_end'])} mm"
     if name == "fold":
         words += f", falling {_span(1e3 * chosen['fall_rate'])} mm/s, late over early {_span(chosen['fall_ratio'])}"
-    if number == KEPT:
+    if number == LEVITATES:
         endless = np.isfinite(chosen["balance_spin"].values)
         words += f"; with a balance ahead: {endless.sum()} of {len(endless)}, s* {_span(chosen['balance_spin'])}"
         words += f"; largest growth {_span(chosen['growth'])} /s"

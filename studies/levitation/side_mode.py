@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import xarray as xr
 
-from ...dynamics.branches import Point as Equilibrium
+from ...dynamics.branches import Point as BranchPoint
 from ...dynamics.branches import kicked, levitating_branch
 from ...dynamics.flights import simulate
 from ...dynamics.motion import Rates
@@ -13,13 +13,12 @@ from ...fem.rotor_tables import RotorTable
 from ...geometry.basics import Array
 from ...geometry.scenes import Scene
 from ..article import CONFIGURATIONS, HIGHEST, LOWEST, QUICK, article_scene, article_table, side_radius
-from ..results import Point, one_case, variable
+from ..results import Point, Study, by_case, one_case, variable
+from .side_mode_figure import FLOWN_HZ, TURNS, side_figure, side_lines
 
 MODELS = ("dipole", "fem")
-FLIGHT = 170.0
-"""Frequency of the flight in the article's figure, Hz, for δx = 1 mm."""
-KICK, SECONDS, TURNS, SAMPLES = 0.01, 2.0, 3, 400
-"""Speed upwards with which the flight begins, m/s; its duration, s; turns of it that are kept, and samples of them."""
+KICK, SECONDS, SAMPLES = 0.01, 2.0, 400
+"""Speed upwards with which the flight begins, m/s; its duration, s; samples of its last turns that are kept."""
 
 
 def side_points(quick: bool) -> list[Point]:
@@ -39,7 +38,7 @@ def side_mode(point: Point) -> xr.Dataset:
     Returns
     -------
     Dataset over `frequency`: radius of the equilibrium, the article's radius at the same distance, growth of small
-    motions; for δx = 1 mm over `sample`: the floater in the laboratory and its distance from the axis at `FLIGHT`.
+    motions; for δx = 1 mm over `sample`: the floater in the laboratory and its distance from the axis at `FLOWN_HZ`.
     """
     grid = np.arange(LOWEST, HIGHEST + 1e-9, point["step_hz"])
     scene = article_scene(point["configuration"], point["value"], HIGHEST)
@@ -48,7 +47,7 @@ def side_mode(point: Point) -> xr.Dataset:
     rows = np.array([_row(p) for p in branch.side("near", grid)])
     flown = np.full((4, SAMPLES), np.nan)
     if (point["configuration"], point["value"]) == ("horizontal", 1.0):
-        start = branch.side("near", np.array([FLIGHT]))[0]
+        start = branch.side("near", np.array([FLOWN_HZ]))[0]
         if start is not None:
             flown = _flight(scene, table, start)
     row, sample = ("frequency",), ("sample",)
@@ -65,15 +64,26 @@ def side_mode(point: Point) -> xr.Dataset:
     return one_case(point, xr.Dataset(data, {"frequency": variable(row, grid, "Hz", "frequency of the rotor")}))
 
 
-def _row(point: Equilibrium | None) -> list[float]:
+def _row(point: BranchPoint | None) -> list[float]:
     if point is None:
         return [np.nan] * 3
     return [float(np.hypot(*point.position[:2])), -point.position[2], point.growth_per_s]
 
 
-def _flight(scene: Scene, table: RotorTable, point: Equilibrium) -> Array:
+def _flight(scene: Scene, table: RotorTable, point: BranchPoint) -> Array:
     """Angle of the rotor and place of the floater (4, sample) in the last turns of a flight that a kick began."""
     flight = simulate(kicked(scene, point, KICK), table, SECONDS, [])
-    times = flight.time[-1] - np.linspace(TURNS / FLIGHT, 0.0, SAMPLES)
+    times = flight.time[-1] - np.linspace(TURNS / FLOWN_HZ, 0.0, SAMPLES)
     place = [np.interp(times, flight.time, column) for column in flight.lab.position.T]
-    return np.array([2 * np.pi * FLIGHT * times, *place])
+    return np.array([2 * np.pi * FLOWN_HZ * times, *place])
+
+
+STUDY = Study(
+    name="side-mode",
+    summary="the circle on which the floater goes with the rotor, and the article's formula for its radius",
+    points=side_points,
+    compute=side_mode,
+    gather=by_case,
+    draw=side_figure,
+    report=side_lines,
+)

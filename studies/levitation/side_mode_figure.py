@@ -7,10 +7,21 @@ import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from ..article import CONFIGURATIONS, TITLES, branch, label, name, shade, side_radius, stable, values_of
-from ..results import PALETTE, chosen, panels, styled
-from .side_mode import FLIGHT, TURNS
+from ..article import (
+    CONFIGURATIONS,
+    TITLES,
+    legend_name,
+    plot_branch,
+    rotor_color,
+    rotor_label,
+    side_radius,
+    stable_in_flight,
+    values_of,
+)
+from ..results import PALETTE, cases_with, panels, styled
 
+FLOWN_HZ, TURNS = 170.0, 3
+"""Of the flight in the article's figure, for δx = 1 mm: Hz, and how many of its last turns are shown."""
 TOLD = (0.1, 0.3)
 """Radii that the article calls typical, mm."""
 
@@ -19,22 +30,22 @@ TOLD = (0.1, 0.3)
 def side_figure(result: xr.Dataset) -> Figure:
     """Above the orbit of rotor and floater and their coordinates; below the radius against frequency."""
     figure, axes = panels(2, 3, (11.0, 7.0))
-    flown = chosen(result, configuration="horizontal", value=1.0, model="fem").isel(case=0)
+    flown = cases_with(result, configuration="horizontal", value=1.0, model="fem").isel(case=0)
     _orbit(axes[0, 0], flown)
     _coordinates(axes[0, 1], flown, "x", np.cos)
     _coordinates(axes[0, 2], flown, "y", np.sin)
     for panel, configuration in zip(axes[1], CONFIGURATIONS, strict=True):
         panel.axhspan(*TOLD, color="0.92", lw=0, label="0.1–0.3 mm, article")
         for value in values_of(result, configuration):
-            found = chosen(result, configuration=configuration, value=value, model="fem").isel(case=0)
-            style = {"color": shade(configuration, value)}
-            solid = stable(found["growth"].values)
-            branch(
+            found = cases_with(result, configuration=configuration, value=value, model="fem").isel(case=0)
+            style = {"color": rotor_color(configuration, value)}
+            solid = stable_in_flight(found["growth"].values)
+            plot_branch(
                 panel,
                 found["frequency"].values,
                 1e3 * found["radius"].values,
                 solid,
-                label=name(configuration, value),
+                label=legend_name(configuration, value),
                 **style,
             )
             panel.plot(found["frequency"], 1e3 * found["article_radius"], ":", lw=1.6, **style)
@@ -56,14 +67,14 @@ def _orbit(axes: Axes, flown: xr.Dataset) -> None:
     last = float(flown["flight_angle"][-1])
     axes.plot(np.cos(last), np.sin(last), "o", color=PALETTE[1], ms=4)
     axes.plot(1e3 * float(flown["flight_x"][-1]), 1e3 * float(flown["flight_y"][-1]), "o", color=PALETTE[0], ms=4)
-    axes.set(xlabel="x (mm)", ylabel="y (mm)", title=f"Seen from above, δx = 1 mm, {FLIGHT:g} Hz", aspect="equal")
+    axes.set(xlabel="x (mm)", ylabel="y (mm)", title=f"Seen from above, δx = 1 mm, {FLOWN_HZ:g} Hz", aspect="equal")
     axes.set(xlim=(-1.3, 1.3), ylim=(-1.3, 1.8))
     axes.legend(loc="upper right")
 
 
 def _coordinates(axes: Axes, flown: xr.Dataset, axis: str, turn: np.ufunc) -> None:
     angle = flown["flight_angle"].values
-    time = 1e3 * (angle - angle[0]) / (2 * np.pi * FLIGHT)
+    time = 1e3 * (angle - angle[0]) / (2 * np.pi * FLOWN_HZ)
     radius = 1e3 * _predicted(flown)
     axes.plot(time, turn(angle), color=PALETTE[1], label=f"${axis}_r$, rotor")
     axes.plot(time, 1e3 * flown[f"flight_{axis}"], color=PALETTE[0], label=f"${axis}_f$, floater")
@@ -75,17 +86,17 @@ def _coordinates(axes: Axes, flown: xr.Dataset, axis: str, turn: np.ufunc) -> No
 
 def _predicted(flown: xr.Dataset) -> float:
     """The article's radius at the mean distance of the flight, m."""
-    return float(side_radius(-float(flown["flight_z"].mean()), FLIGHT))
+    return float(side_radius(-float(flown["flight_z"].mean()), FLOWN_HZ))
 
 
 def side_lines(result: xr.Dataset) -> list[str]:
     """The flight, and for each rotor the range of radii and how far the formula is off where it is stable."""
     lines = []
     for model, text in (("fem", "finite elements"), ("dipole", "dipole")):
-        flown = chosen(result, configuration="horizontal", value=1.0, model=model).isel(case=0)
+        flown = cases_with(result, configuration="horizontal", value=1.0, model=model).isel(case=0)
         radius = 1e3 * np.hypot(flown["flight_x"].values, flown["flight_y"].values)
         lines.append(
-            f"Flight of δx = 1 mm at {FLIGHT:g} Hz, {text}: radius {radius.mean():.4f} mm "
+            f"Flight of δx = 1 mm at {FLOWN_HZ:g} Hz, {text}: radius {radius.mean():.4f} mm "
             f"({radius.min():.4f} to {radius.max():.4f}) at {-1e3 * float(flown['flight_z'].mean()):.3f} mm; "
             f"𝒢/(μ_f ω²) = {1e3 * _predicted(flown):.4f} mm."
         )
@@ -93,8 +104,8 @@ def side_lines(result: xr.Dataset) -> list[str]:
         for value in values_of(result, configuration):
             words = []
             for model, text in (("fem", "finite elements"), ("dipole", "dipole")):
-                found = chosen(result, configuration=configuration, value=value, model=model).isel(case=0)
-                good = stable(found["growth"].values)
+                found = cases_with(result, configuration=configuration, value=value, model=model).isel(case=0)
+                good = stable_in_flight(found["growth"].values)
                 radius, formula = 1e3 * found["radius"].values[good], 1e3 * found["article_radius"].values[good]
                 if not len(radius):
                     words.append(f"{text}: stable nowhere")
@@ -102,5 +113,5 @@ def side_lines(result: xr.Dataset) -> list[str]:
                 off = 100 * (formula / radius - 1)
                 span = f"{radius.min():.3f} to {radius.max():.3f} mm"
                 words.append(f"{text}: {span}, formula off by {off.min():+.1f} to {off.max():+.1f} %")
-            lines.append(f"{label(configuration, value)}, where it is stable, {'; '.join(words)}.")
+            lines.append(f"{rotor_label(configuration, value)}, where it is stable, {'; '.join(words)}.")
     return lines

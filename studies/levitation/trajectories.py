@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 import xarray as xr
 
-from ...dynamics.branches import Point as Equilibrium
+from ...dynamics.branches import Point as BranchPoint
 from ...dynamics.branches import kicked, levitating_branch
 from ...dynamics.flights import Trajectory, flight_kind, simulate
 from ...dynamics.motion import Rates, Scales
@@ -21,17 +21,15 @@ from ...fem.rotor_tables import RotorTable
 from ...geometry.basics import MAGNET_CONDUCTIVITY, Array
 from ...geometry.scenes import Scene
 from ..article import FLIGHT, FLOATER, HIGHEST, article_scene, article_table
-from ..results import Point, one_case, variable
+from ..results import Point, Study, by_case, one_case, variable
+from .trajectories_figure import NONE, SHORT, flight_figure, flight_lines
 
-TOLD = {115.0: "linear fall", 140.0: "stable", 150.0: "oscillating loss"}
-"""The article's three flights, by frequency in Hz."""
 FREQUENCIES = (115.0, 140.0, 150.0, 160.0, 170.0, 200.0)
 DISPLACEMENTS = (1.0, 1.5, 2.0)
 """δx in mm: as in the experiment, what gives its fall at 115 Hz, and what is lost in oscillations within these."""
 KICK = 1e-3
 """Speed with which a flight begins upwards, m/s."""
 PARTS, SAMPLES = 400, 100
-NONE, SHORT = "no equilibrium", "lost within 3 s"
 SHORTEST = 3.0
 """What stays up for less, the article does not call levitation, s."""
 
@@ -82,7 +80,7 @@ LENGTHS = {"part": PARTS, "sample": SAMPLES}
 
 
 def _row(
-    scene: Scene, table: RotorTable, rates: Rates, start: Equilibrium | None, seconds: float
+    scene: Scene, table: RotorTable, rates: Rates, start: BranchPoint | None, seconds: float
 ) -> dict[str, Array | str]:
     if start is None:
         empty = {name: np.full([LENGTHS[d] for d in dims], np.nan) for name, (dims, _, _) in COLUMNS.items()}
@@ -120,3 +118,14 @@ def _parts(flight: Trajectory) -> dict[str, Array]:
 def _kind(flight: Trajectory) -> str:
     lost_at_once = flight.ended_by != "duration" and flight.levitated_s < SHORTEST
     return SHORT if lost_at_once else flight_kind(flight)
+
+
+STUDY = Study(
+    name="trajectories",
+    summary="linear fall, stable and unstable flight: the distance against time, simulated and averaged",
+    points=flight_points,
+    compute=trajectories,
+    gather=by_case,
+    draw=flight_figure,
+    report=flight_lines,
+)

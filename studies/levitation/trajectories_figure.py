@@ -7,10 +7,13 @@ import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from ..article import label
+from ..article import rotor_label
 from ..results import PALETTE, panels, styled
-from .trajectories import NONE, SHORT, TOLD
 
+TOLD = {115.0: "linear fall", 140.0: "stable", 150.0: "oscillating loss"}
+"""The article's three flights, by frequency in Hz."""
+NONE, SHORT = "no equilibrium", "lost within 3 s"
+"""Of a flight that is none."""
 LOST = (SHORT, "linear fall", "oscillating loss")
 
 
@@ -23,7 +26,7 @@ def flight_figure(result: xr.Dataset) -> Figure:
         for one, color in zip(range(rotor.sizes["frequency"]), PALETTE, strict=False):
             _flight(panel, rotor.isel(frequency=one), color)
         panel.set(xlabel="time (s)", ylabel="levitation distance (mm)", ylim=(11, 35))
-        panel.set_title(label("horizontal", float(rotor["value"])))
+        panel.set_title(rotor_label("horizontal", float(rotor["value"])))
         panel.plot([], [], "--", color="0.3", label="averaged flight")
         panel.legend(loc="upper right")
     return figure
@@ -53,7 +56,7 @@ def flight_lines(result: xr.Dataset) -> list[str]:
         for frequency in rotor["frequency"].values:
             one = rotor.sel(frequency=frequency)
             told = f"; the article, δx = 1 mm: {TOLD[frequency]}" if frequency in TOLD else ""
-            where = f"{label('horizontal', float(rotor['value']))}, {frequency:g} Hz: {one['kind'].values}"
+            where = f"{rotor_label('horizontal', float(rotor['value']))}, {frequency:g} Hz: {one['kind'].values}"
             if str(one["kind"].values) == NONE:
                 lines.append(f"{where}{told}.")
                 continue

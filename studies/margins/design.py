@@ -10,8 +10,9 @@ from ...dynamics.steady import EquilibriumError
 from ...fem.rotor_tables import cached_rotor_table
 from ...geometry.basics import Array
 from ..article import CONFIGURATIONS, FLOATER, article_scene
-from ..results import study, variable
+from ..results import Point, Study, by_case, variable
 from ..terminal import note
+from .design_figure import design_figure, design_lines
 from .design_search import designed
 
 EDGES = (6.0, 8.0, 10.0, 12.7, 16.0)
@@ -21,7 +22,7 @@ CLOSE_ENOUGH = 1e-6
 """To which the true field shall meet the wanted distance, m."""
 
 
-def points(quick: bool) -> list[study.Point]:
+def points(quick: bool) -> list[Point]:
     """Wanted distances (mm) and frequencies (Hz) for each configuration."""
     wanted = [(20.0, 120.0)] if quick else [(d, f) for d in (20.0, 25.0, 30.0) for f in (80.0, 120.0)]
     edges = [10.0] if quick else list(EDGES)
@@ -81,7 +82,7 @@ CHECKED = {
 }
 
 
-def compute(point: study.Point) -> xr.Dataset:
+def compute(point: Point) -> xr.Dataset:
     """Measures and margins for each edge, and a forward check of the best of them by finite elements."""
     name, distance, frequency = point["configuration"], 1e-3 * point["distance_mm"], point["frequency"]
     rows = np.array([_row(name, 1e-3 * edge, distance, frequency) for edge in point["edges_mm"]])
@@ -111,3 +112,14 @@ def _row(configuration: str, edge: float, distance: float, frequency: float) -> 
     angle = float(np.degrees(np.arctan2(np.hypot(moment[0], moment[1]), moment[2])))
     ends = found.low.parameter, found.high.parameter
     return [found.measure, found.margin, *ends, found.here.growth_per_s, angle]
+
+
+STUDY = Study(
+    name="design",
+    summary="which displacement, tilt and magnet size give a wanted distance and frequency with the largest margin",
+    points=points,
+    compute=compute,
+    gather=by_case,
+    draw=design_figure,
+    report=design_lines,
+)

@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import PercentFormatter
 
 from ..article import CONFIGURATIONS, axis_label
-from ..results import PALETTE, chosen, panels, styled
+from ..results import PALETTE, cases_with, panels, styled
 
 
 def wanted(result: xr.Dataset) -> list[tuple[float, float]]:
@@ -20,7 +20,7 @@ def wanted(result: xr.Dataset) -> list[tuple[float, float]]:
 
 def _wish(result: xr.Dataset, distance: float, frequency: float) -> list[xr.Dataset]:
     """What each configuration answers to one of them."""
-    found = chosen(result, wanted_distance=distance, wanted_frequency=frequency)
+    found = cases_with(result, wanted_distance=distance, wanted_frequency=frequency)
     return [found.isel(case=k) for k in range(found.sizes["case"])]
 
 

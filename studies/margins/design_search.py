@@ -6,7 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...dynamics.branches import HIGHEST, LOWEST, Point, by_frequency, is_stable, stability_end
+from ...dynamics.branches import HIGHEST, LOWEST, by_frequency, is_stable, stability_end
+from ...dynamics.branches import Point as BranchPoint
 from ...dynamics.motion import Rates, Scales, parameters, rotor_gap
 from ...dynamics.steady import AXIAL, LATERAL, Balance, EquilibriumError, solve
 from ...fem.rotor_tables import rotor_table
@@ -27,9 +28,9 @@ class Design:
     """
 
     measure: float
-    here: Point
-    low: Point
-    high: Point
+    here: BranchPoint
+    low: BranchPoint
+    high: BranchPoint
 
     @property
     def margin(self) -> float:

@@ -14,8 +14,9 @@ from ...dynamics.equilibria import find_equilibria
 from ...dynamics.motion import Rates
 from ...fem.rotor_tables import rotor_table
 from ...geometry.basics import Array
-from ..article import levitated
-from ..results import study, variable
+from ..article import levitated_rotors
+from ..results import Point, Study, by_case, variable
+from .sensitivity_figure import sensitivity_figure, sensitivity_lines
 from .tolerances import (
     FRACTIONS,
     MODEL,
@@ -23,6 +24,7 @@ from .tolerances import (
     PLACE,
     QUANTITIES,
     TILT_SPREAD,
+    TILTS,
     Nominal,
     levitation,
     nominal,
@@ -31,17 +33,17 @@ from .tolerances import (
 
 STEP = 1e-3
 """Relative step of the central differences; twice that for their error."""
-TILTS = (1.0, 2.0)
-"""Of the axis from the vertical, degrees."""
 SEED = 20250706
 
 
-def points(quick: bool) -> list[study.Point]:
+def points(quick: bool) -> list[Point]:
     """The rotors that levitated, how many samples of the tolerances are drawn, and steps of the differences.
 
     One step alone gives derivatives without an estimate of their error, which is then NaN.
     """
-    return [{**point, "samples": 4 if quick else 32, "steps": [1] if quick else [1, 2]} for point in levitated(quick)]
+    return [
+        {**point, "samples": 4 if quick else 32, "steps": [1] if quick else [1, 2]} for point in levitated_rotors(quick)
+    ]
 
 
 def derivatives(base: Nominal, factors: Sequence[int] = (1, 2)) -> tuple[Array, Array]:
@@ -102,7 +104,7 @@ def leaning(base: Nominal) -> tuple[Array, Array]:
     return distance, growth
 
 
-def compute(point: study.Point) -> xr.Dataset:
+def compute(point: Point) -> xr.Dataset:
     """Derivatives, tolerance band and tilt of one rotor."""
     base = nominal(point["configuration"], point["measure"])
     slopes, errors = derivatives(base, point["steps"])
@@ -124,3 +126,14 @@ def compute(point: study.Point) -> xr.Dataset:
     lean = variable(("lean",), np.array([0.0, *TILTS]), "°", "tilt of the axis from the vertical")
     axes = {"parameter": list(PARAMETERS), "quantity": list(QUANTITIES), "fraction": list(FRACTIONS), "lean": lean}
     return xr.Dataset(found, axes)
+
+
+STUDY = Study(
+    name="sensitivity",
+    summary="which parameter matters: derivatives of distance and limits, and bands of realistic tolerances",
+    points=points,
+    compute=compute,
+    gather=by_case,
+    draw=sensitivity_figure,
+    report=sensitivity_lines,
+)

@@ -8,10 +8,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from ...geometry.basics import Array
-from ..article import CONFIGURATIONS, axis_label, by_configuration, label
+from ..article import CONFIGURATIONS, axis_label, by_configuration, rotor_label
 from ..results import PALETTE, panels, styled
-from .sensitivity import TILTS
-from .tolerances import FRACTIONS, PARAMETERS, QUANTITIES, TILT_SPREAD
+from .tolerances import FRACTIONS, PARAMETERS, QUANTITIES, TILT_SPREAD, TILTS
 
 WORDS = {
     "measure": "displacement or tilt",
@@ -64,7 +63,7 @@ def _contributions(axes: Axes, part: xr.Dataset, quantity: str, scale: float, wo
         kind = str(one["configuration"].values)
         axes.barh(
             places + (k - (count - 1) / 2) * 0.8 / count, value, 0.8 / count, xerr=error, color=PALETTE[k],
-            label=label(kind, float(one["measure"])), error_kw={"lw": 0.7},
+            label=rotor_label(kind, float(one["measure"])), error_kw={"lw": 0.7},
         )  # fmt: skip
     axes.set_yticks(places, [WORDS[name] for name in names])
     axes.invert_yaxis()
@@ -105,7 +104,7 @@ def sensitivity_lines(result: xr.Dataset) -> list[str]:
     for configuration, part in by_configuration(result):
         for k in range(part.sizes["case"]):
             one = part.isel(case=k)
-            unit, head = CONFIGURATIONS[configuration].unit, label(configuration, float(one["measure"]))
+            unit, head = CONFIGURATIONS[configuration].unit, rotor_label(configuration, float(one["measure"]))
             lines += [f"{head}: {line}" for line in (_by_measure(one, unit), _all(one), _leading(one), _lean(one))]
     return lines
 

@@ -16,8 +16,9 @@ from ...geometry.basics import Box
 from ...geometry.scenes import Plate, Scene
 from ..article import CONFIGURATIONS, FLOATER, PLATE_CONDUCTIVITY, PLATE_SIZE, article_scene
 from ..one_scene import plate_memory
-from ..results import study, variable
+from ..results import Point, Study, by_case, variable
 from ..terminal import note
+from .stability_map_figure import FACE, MODELS, map_figure, map_lines
 
 MEASURES = {
     "horizontal": (0.5, 1.0, 1.5, 2.0, 2.5, 3.0, 3.5, 4.0, 5.0, 6.0, 7.0, 8.0),
@@ -25,17 +26,14 @@ MEASURES = {
     "tilt": (2.5, 5.0, 7.5, 10.0, 12.5, 15.0, 17.5, 20.0, 25.0, 30.0, 35.0, 40.0, 45.0),
 }
 """Displacements (mm) and tilts (degrees): the article's tested ones and some between."""
-MODELS = ("dipole", "fem")
 RTOL, PLATE_RTOL = 1e-4, 1e-2
 MOST = 4
 """Intervals of stability that are kept of one rotor."""
-FACE = -0.045
-"""Height of the plate's upper face below the rotor's origin, m: no floater that levitates touches it."""
 BEYOND = 1.15
 """How far above the last stable frequency the plate is tried."""
 
 
-def points(quick: bool) -> list[study.Point]:
+def points(quick: bool) -> list[Point]:
     """All rotors with both models; frequencies with the plate for the rotors of the article's figures."""
     rotors = {"horizontal": (2.0,), "vertical": (14.0,), "tilt": (10.0,)} if quick else MEASURES
     return [
@@ -45,7 +43,7 @@ def points(quick: bool) -> list[study.Point]:
     ]  # fmt: skip
 
 
-def compute(point: study.Point) -> xr.Dataset:
+def compute(point: Point) -> xr.Dataset:
     """Intervals of stable frequencies of one rotor, and growth with a plate below at some frequencies."""
     scene = article_scene(point["configuration"], point["measure"], drag=False)
     table = _table(scene, point["model"])
@@ -99,7 +97,7 @@ def _with_plate(
 
 
 def _dataset(
-    point: study.Point,
+    point: Point,
     rows: np.ndarray[tuple[int, int], np.dtype[np.float64]],
     kinds: np.ndarray[tuple[int, int], np.dtype[np.str_]],
     plate: np.ndarray[tuple[int, int], np.dtype[np.float64]],
@@ -128,3 +126,14 @@ def _dataset(
     data["configuration"] = xr.Variable(("case",), np.array([point["configuration"]]))
     data["model"] = xr.Variable(("case",), np.array([point["model"]]))
     return xr.Dataset(data)
+
+
+STUDY = Study(
+    name="stability-map",
+    summary="regions of stable levitation in frequency and displacement, their boundaries, with and without a plate",
+    points=points,
+    compute=compute,
+    gather=by_case,
+    draw=map_figure,
+    report=map_lines,
+)

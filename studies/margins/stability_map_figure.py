@@ -7,10 +7,12 @@ import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from ..article import axis_label, by_configuration, label
-from ..results import COLORS, NAMES, PALETTE, chosen, panels, styled
-from .stability_map import FACE, MODELS
+from ..article import axis_label, by_configuration, rotor_label
+from ..results import COLORS, NAMES, PALETTE, cases_with, panels, styled
 
+MODELS = ("dipole", "fem")
+FACE = -0.045
+"""Height of the plate's upper face below the rotor's origin, m: no floater that levitates touches it."""
 MARKERS = {"fold": "^", "oscillatory": "o", "real": "D", "contact": "v", "border": "_"}
 MEANINGS = {
     "fold": "fold: no equilibrium beyond",
@@ -27,8 +29,8 @@ def map_figure(result: xr.Dataset) -> Figure:
     figure, axes = panels(1, 3, (11.0, 4.6))
     for place, (configuration, rotors) in zip(axes[0], by_configuration(result), strict=False):
         for model in MODELS:
-            _region(place, chosen(rotors, model=model), model)
-        _plate(place, chosen(rotors, model=MODELS[-1]))
+            _region(place, cases_with(rotors, model=model), model)
+        _plate(place, cases_with(rotors, model=MODELS[-1]))
         place.set(
             xlabel=axis_label(configuration), ylabel="frequency of the rotor (Hz)",
             title=configuration, ylim=(20, 410),
@@ -73,11 +75,11 @@ def map_lines(result: xr.Dataset) -> list[str]:
     lines = []
     for configuration, rotors in by_configuration(result):
         for measure in np.unique(rotors["measure"].values):
-            rows = chosen(rotors, measure=measure)
+            rows = cases_with(rotors, measure=measure)
             found = {str(m): rows.isel(case=k) for k, m in enumerate(rows["model"].values)}
             words = [f"{model} {_intervals(one)}" for model, one in found.items()]
             verdicts = "".join(_verdicts(one) for one in found.values())
-            lines.append(f"{label(configuration, measure)}: {'; '.join(words)}{verdicts}")
+            lines.append(f"{rotor_label(configuration, measure)}: {'; '.join(words)}{verdicts}")
     return lines
 
 

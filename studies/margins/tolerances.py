@@ -54,6 +54,8 @@ PARAMETERS = {
 }
 """Remanence: the article's 1.29 to 1.32 T. Size: what makers of magnets give. Place of the cube: 0.1 mm, tilt 0.5°."""
 TILT_SPREAD = 0.5
+TILTS = (1.0, 2.0)
+"""Of the axis from the vertical, degrees."""
 QUANTITIES = ("lowest", "highest", *(f"distance at {f:.0%}" for f in FRACTIONS))
 PLACE = "frequency"
 

@@ -30,7 +30,7 @@ ROTORS = ("rotors, below", "rotors, beside")
 
 
 @dataclass(frozen=True)
-class Case:
+class PlateCase:
     """One plate and rotor.
 
     Parameters
@@ -67,21 +67,23 @@ class Case:
         return Plate(Box(size, np.array([0.0, 0.0, place[2] - away])), self.conductivity)
 
 
-def cases(quick: bool) -> list[Case]:
+def cases(quick: bool) -> list[PlateCase]:
     """The plates and rotors of the study."""
     few, real = (3, ()) if quick else (10, REAL)
-    found = [Case("below", d, distance=d) for d in (*np.geomspace(0.0085, 0.06, few).tolist(), *real)]
-    found += [Case("beside", d, upright=True, distance=d) for d in (*np.geomspace(0.01, 0.06, few).tolist(), *real)]
-    found += [Case("conductivity", s, conductivity=s) for s in np.geomspace(1e6, 6e7, few).tolist()]
-    found += [Case("thickness", t, thickness=t) for t in np.geomspace(1e-3, 5e-2, few).tolist()]
-    found += [Case("frequency", p, part=p) for p in np.linspace(0.02, 0.98, 2 if quick else 9).tolist()]
+    found = [PlateCase("below", d, distance=d) for d in (*np.geomspace(0.0085, 0.06, few).tolist(), *real)]
+    found += [
+        PlateCase("beside", d, upright=True, distance=d) for d in (*np.geomspace(0.01, 0.06, few).tolist(), *real)
+    ]
+    found += [PlateCase("conductivity", s, conductivity=s) for s in np.geomspace(1e6, 6e7, few).tolist()]
+    found += [PlateCase("thickness", t, thickness=t) for t in np.geomspace(1e-3, 5e-2, few).tolist()]
+    found += [PlateCase("frequency", p, part=p) for p in np.linspace(0.02, 0.98, 2 if quick else 9).tolist()]
     for sweep in ROTORS:
         for name, kind in CONFIGURATIONS.items():
             some = kind.levitated[1:2] if quick else kind.levitated
             beside = sweep == ROTORS[1]
-            found += [Case(sweep, m, upright=beside, configuration=name, measure=m, part=MIDDLE) for m in some]
-    found += [Case("below, real plate", d, "reduced", distance=d) for d in real]
-    found += [Case("beside, real plate", d, "reduced", upright=True, distance=d) for d in real]
+            found += [PlateCase(sweep, m, upright=beside, configuration=name, measure=m, part=MIDDLE) for m in some]
+    found += [PlateCase("below, real plate", d, "reduced", distance=d) for d in real]
+    found += [PlateCase("beside, real plate", d, "reduced", upright=True, distance=d) for d in real]
     return found
 
 

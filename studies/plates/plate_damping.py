@@ -15,8 +15,10 @@ from ...fem.rotor_tables import RotorTable
 from ...geometry.basics import Array
 from ...geometry.scenes import Scene
 from ..one_scene import plate_memory
-from ..results import AXIS, MODES, Point, variable
-from .plate_cases import Case, cases, without_plate
+from ..results import AXIS, MODES, Point, Study, variable
+from .plate_cases import PlateCase, cases, without_plate
+from .plate_damping_figure import damping_figure
+from .plate_damping_report import damping_lines
 
 RTOL = 3e-3
 
@@ -38,7 +40,7 @@ def plate_damping(point: Point) -> xr.Dataset:
     ------
     EquilibriumError : nothing levitates even without the plate
     """
-    case = Case(**point)
+    case = PlateCase(**point)
     scene, table, rates, start = without_plate(case.configuration, case.measure, case.part)
     row = _row(replace(scene, plate=case.plate(start.position)), case, table, rates, start)
     return xr.Dataset(
@@ -81,7 +83,7 @@ UNITS = {
 }
 
 
-def _row(scene: Scene, case: Case, table: RotorTable, rates: Rates, start: Equilibrium) -> dict[str, Array]:
+def _row(scene: Scene, case: PlateCase, table: RotorTable, rates: Rates, start: Equilibrium) -> dict[str, Array]:
     assert scene.plate is not None
     memory, _ = plate_memory(scene, scene.plate, case.model, table, start.position, RTOL)
     found = with_plate(scene, table, Survey((start,), ()), memory, rates).equilibria
@@ -100,3 +102,14 @@ def _row(scene: Scene, case: Case, table: RotorTable, rates: Rates, start: Equil
         "loss": np.array(action.loss),
         "error": np.array(max(memory.table.errors.total, memory.share.error)),
     }
+
+
+STUDY = Study(
+    name="plate-damping",
+    summary="what a plate does to each small motion, against its place, conductivity and thickness",
+    points=damping_points,
+    compute=plate_damping,
+    gather=gather_damping,
+    draw=damping_figure,
+    report=damping_lines,
+)

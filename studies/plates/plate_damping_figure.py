@@ -11,8 +11,8 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import NullLocator
 
 from ...geometry.basics import Array
-from ..article import label
-from ..results import PALETTE, chosen, panels, styled
+from ..article import rotor_label
+from ..results import PALETTE, cases_with, panels, styled
 from .plate_cases import ROTORS
 
 SWEEPS = {
@@ -83,7 +83,7 @@ def damping_figure(result: xr.Dataset) -> Figure:
 
 def part_of(result: xr.Dataset, sweep: str) -> xr.Dataset:
     """The cases of one sweep, in ascending order of what is varied."""
-    part = chosen(result, sweep=sweep)
+    part = cases_with(result, sweep=sweep)
     return part if sweep in ROTORS else part.sortby("value")
 
 
@@ -113,7 +113,7 @@ def _rotors(axes: Axes, result: xr.Dataset) -> None:
         gone = places[np.isnan(worst)]
         axes.plot(gone, 0 * gone, "x", color=color, label="no equilibrium is left" if len(gone) else None)
         rotors = zip(part["configuration"].values, part["value"].values, strict=True)
-        names = [label(str(configuration), float(value)) for configuration, value in rotors]
+        names = [rotor_label(str(configuration), float(value)) for configuration, value in rotors]
         axes.set_xticks(places, names, rotation=90, fontsize=7)
     axes.set_yscale("symlog", linthresh=LINEAR)
     axes.axhline(0.0, color="0.3", lw=0.8)

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import xarray as xr
 
-from ..article import label
-from ..levitation import spanned
+from ..article import rotor_label
+from ..levitation import range_text
 from .plate_cases import DISTANCE, ROTORS
 from .plate_damping_figure import SWEEPS, part_of
 
@@ -26,7 +26,7 @@ def damping_lines(result: xr.Dataset) -> list[str]:
 def _line(one: xr.Dataset, sweep: str) -> str:
     value, configuration = float(one["value"]), str(one["configuration"].values)
     if sweep in ROTORS:
-        where = f"{label(configuration, value)}, plate {sweep.split(', ')[1]}"
+        where = f"{rotor_label(configuration, value)}, plate {sweep.split(', ')[1]}"
     elif sweep == "frequency":
         where = "Plate 18 mm below"
     else:
@@ -72,10 +72,10 @@ def sentence(result: xr.Dataset) -> str:
         kept, gone = int((worst < 0).sum()), int(worst.isnull().sum())
         lost = f", {gone} without an equilibrium" if gone else ""
         words.append(
-            f"{place} to {spanned(worst, abs(worst) * error)} /s ({kept} of {part.sizes['case']} stable{lost}), moving "
-            f"it by {spanned(moved, moved * error, 1e3)} mm, with a mean force up of "
-            f"{spanned(lift, abs(lift) * error)} % of its weight and a braking torque of "
-            f"{spanned(torque, abs(torque) * error)} µN m"
+            f"{place} to {range_text(worst, abs(worst) * error)} /s ({kept} of {part.sizes['case']} stable{lost}), "
+            f"moving it by {range_text(moved, moved * error, 1e3)} mm, with a mean force up of "
+            f"{range_text(lift, abs(lift) * error)} % of its weight and a braking torque of "
+            f"{range_text(torque, abs(torque) * error)} µN m"
         )
     before = result["growth_without"].max("mode").values
     return (

@@ -14,15 +14,19 @@ from functools import partial
 from importlib.resources import files
 
 import numpy as np
+import xarray as xr
 
 from ...fem.closed_forms import Dipole, Racetrack
 from ...fem.eddy_currents import solve_eddy
 from ...geometry.basics import Array
 from ...geometry.meshes import Block, ConductorMesh, graded_partition, hex_mesh, skin_depth
+from ..results import study_of_one, variable
+from .team7_figure import team7_figure, team7_lines
 
 CONDUCTIVITY = 3.526e7
 COIL = Racetrack(np.array([0.194, 0.100, 0.099]), (0.2, 0.2), 0.1, 0.025, 0.05, 2742.0)
 FREQUENCIES = (50.0, 200.0)
+CURVES = ("50 Hz, ωt = 0", "50 Hz, ωt = 90°", "200 Hz, ωt = 0", "200 Hz, ωt = 90°")
 FACES = (np.array([0.0, 18.0, 126.0, 294.0]), np.array([0.0, 18.0, 126.0, 294.0]), np.array([0.0, 19.0]))
 """Faces of plate and hole across each axis, mm."""
 REACH = 1500.0
@@ -92,3 +96,30 @@ def team7(order: int = 3) -> Team7Comparison:
     x, measured = measured_line()
     computed = np.hstack([compute_line(f, x, team7_mesh(f), order) for f in FREQUENCIES])
     return Team7Comparison(x, measured, computed)
+
+
+def team7_study(quick: bool) -> xr.Dataset:
+    """Measured and computed B_z on the line, in T, and their deviation in units of the line's peak."""
+    return team7_dataset(team7(order=2 if quick else 3))
+
+
+def team7_dataset(compared: Team7Comparison) -> xr.Dataset:
+    """A comparison with names and units."""
+    dims = ("x", "curve")
+    return xr.Dataset(
+        {
+            "measured": variable(dims, compared.measured, "T", "measured B_z"),
+            "computed": variable(dims, compared.computed, "T", "computed B_z"),
+            "deviation": variable(dims, compared.deviation, "1", "deviation over the line's peak"),
+        },
+        {"x": variable(("x",), compared.x, "m", "x"), "curve": list(CURVES)},
+    )
+
+
+STUDY = study_of_one(
+    name="team7",
+    summary="eddy currents against the measurement of TEAM workshop problem 7",
+    compute=team7_study,
+    draw=team7_figure,
+    report=team7_lines,
+)

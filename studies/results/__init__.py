@@ -18,15 +18,15 @@ from .figures import (
     DASHES,
     NAMES,
     PALETTE,
-    drawn,
     field_figure,
+    figure_bytes,
     force_figure,
     panels,
     save_figure,
     styled,
     trajectory_figure,
 )
-from .study import Point, Study, by_case, chosen, one_case, study_of_one
+from .study import Point, Study, by_case, cases_with, one_case, study_of_one
 
 __all__ = [
     "AXIS",
@@ -41,11 +41,11 @@ __all__ = [
     "Study",
     "axis_dataset",
     "by_case",
-    "chosen",
+    "cases_with",
     "curve_dataset",
-    "drawn",
     "equilibria_dataset",
     "field_figure",
+    "figure_bytes",
     "force_figure",
     "found_dataset",
     "one_case",

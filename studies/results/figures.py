@@ -66,10 +66,10 @@ def panels(rows: int, columns: int, size: tuple[float, float]) -> tuple[Figure, 
 
 def save_figure(figure: Figure, path: Path) -> None:
     """Write a figure; the format follows the suffix."""
-    write_whole(path, drawn(figure, path.suffix[1:]))
+    write_whole(path, figure_bytes(figure, path.suffix[1:]))
 
 
-def drawn(figure: Figure, kind: str) -> bytes:
+def figure_bytes(figure: Figure, kind: str) -> bytes:
     """The figure as the content of a file of the kind `png` or `pdf`."""
     stream = io.BytesIO()
     with mpl.rc_context(STYLE):

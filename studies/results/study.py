@@ -26,7 +26,7 @@ def one_case(point: Point, dataset: xr.Dataset) -> xr.Dataset:
     return dataset.assign(labels).expand_dims("case")
 
 
-def chosen(result: xr.Dataset, **labels: object) -> xr.Dataset:
+def cases_with(result: xr.Dataset, **labels: object) -> xr.Dataset:
     """The cases of a joined result with the given labels."""
     found = np.ones(result.sizes["case"], bool)
     for name, wanted in labels.items():
@@ -40,6 +40,7 @@ class Study:
 
     Parameters
     ----------
+    name : by which it is asked for, and which its files have
     summary : what it gives, in a line
     points : takes `quick` and returns the points
     compute : takes a point and returns its labelled result, the same whoever computes it
@@ -50,6 +51,7 @@ class Study:
     settings : what all points have in common, if they do not say it themselves
     """
 
+    name: str
     summary: str
     points: Callable[[bool], Sequence[Point]]
     compute: Callable[[Point], xr.Dataset]
@@ -61,6 +63,7 @@ class Study:
 
 
 def study_of_one(
+    name: str,
     summary: str,
     compute: Callable[[bool], xr.Dataset],
     draw: Callable[[xr.Dataset], Figure],
@@ -68,7 +71,7 @@ def study_of_one(
     timed: bool = False,
 ) -> Study:
     """A study that is computed as a whole: its only point says whether it is quick."""
-    return Study(summary, _settings, _Whole(compute), itemgetter(0), draw, report, timed)
+    return Study(name, summary, _settings, _Whole(compute), itemgetter(0), draw, report, timed)
 
 
 def _settings(quick: bool) -> list[Point]:

@@ -1,0 +1,57 @@
+"""Which model of the plate a motion takes: by what would be felt, and by what lies beyond the edges."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from places import HORIZONTAL
+
+from spinlev.fem.slab import resolve_plate_model
+from spinlev.geometry.basics import Box
+from spinlev.geometry.scenes import Plate, load_scene
+from spinlev.studies.one_scene import plate_job
+
+SCENE = load_scene(HORIZONTAL)
+PLACE = np.array([0.0, 0.0, -0.02])
+
+
+def chosen(size, center, model="auto", rtol=3e-3, place=PLACE):
+    scene = replace(SCENE, plate=Plate(Box(size, center), 3.5e7))
+    return resolve_plate_model(scene, model, place, rtol)
+
+
+@pytest.mark.parametrize(
+    ("size", "center", "model", "reason"),
+    [
+        ((2.0, 2.0, 0.01), (0.0, 0.0, -0.04), "slab", "edges take at most 2"),
+        ((0.05, 0.05, 0.01), (0.0, 0.0, -0.04), "reduced", "of an infinite slab's reaction, 3.0e-03 is allowed"),
+        ((0.05, 0.05, 0.01), (0.06, 0.0, -0.02), "reduced", "beside the plate's edge"),
+        ((0.05, 0.05, 0.01), (0.0, 0.0, -1.0), "none", "of the weight"),
+    ],
+)
+def test_auto(size, center, model, reason):
+    name, said = chosen(size, center)
+    assert name == model
+    assert reason in said
+
+
+def test_more_is_asked_of_the_slab_where_the_tolerance_is_smaller():
+    """Beyond the edges lies about the square of the depth over their distance: (2.5/30)² = 0.7 %."""
+    wide = ((0.6, 0.6, 0.01), (0.0, 0.0, -0.04))
+    assert chosen(*wide, rtol=5e-2)[0] == "slab"
+    assert chosen(*wide, rtol=1e-2)[0] == "reduced"
+
+
+def test_as_asked_or_nothing_to_model():
+    plate = ((0.3, 0.3, 0.01), (0.0, 0.0, -0.04))
+    assert chosen(*plate, model="slab") == ("slab", "as asked")
+    assert chosen(*plate, model="fem")[0] == "reduced"
+    assert chosen(*plate, place=None)[0] == "none"
+    assert resolve_plate_model(replace(SCENE, plate=None), "auto", PLACE, 1e-3)[0] == "none"
+
+
+def test_the_command_takes_the_slab_where_it_will_do(tmp_path):
+    scene = replace(SCENE, plate=Plate(Box((2.0, 2.0, 0.01), (0.0, 0.0, -0.04)), 3.5e7))
+    slab, auto = (plate_job(scene, PLACE, 50.0, model, 1e-2, tmp_path)[0] for model in ("slab", "auto"))
+    assert auto["model"] == "slab"
+    np.testing.assert_array_equal(auto["G_T_per_A_m2"]["imag"], slab["G_T_per_A_m2"]["imag"])

@@ -1,0 +1,73 @@
+"""Results that earlier runs wrote (`study NAME --quick`, in tests/data/quick) still open, are drawn and reported."""
+
+import re
+import shutil
+
+import matplotlib.pyplot as plt
+import numpy as np
+import pytest
+from places import QUICK
+
+from spinlev.studies.catalogue import CATALOGUE, cite_job, figures_of, report_job
+from spinlev.studies.catalogue.drawings import read_result
+from spinlev.studies.results import figure_bytes
+
+STORED = sorted(QUICK.glob("*.nc"))
+
+
+@pytest.mark.parametrize("path", STORED, ids=lambda path: path.stem)
+def test_a_stored_result_is_drawn_and_reported_from_its_file_alone(path):
+    result = read_result(path)
+    assert result.attrs["study"] == path.stem
+    (figure,) = figures_of(result).values()
+    try:
+        shown = [axes for axes in figure.axes if axes.has_data()]
+        assert shown
+        for axes in shown:
+            for label in (axes.get_xlabel(), axes.get_ylabel()):
+                assert not re.search(r"\bnan\b|None", label)
+        assert any(axes.get_xlabel() or axes.get_title() for axes in shown)
+        assert figure_bytes(figure, "png").startswith(b"\x89PNG")
+    finally:
+        plt.close(figure)
+    lines = CATALOGUE[path.stem].report(result)
+    assert any(re.search(r"\d", line) for line in lines)
+    assert cite_job(path)
+
+
+def test_stored_results_make_one_report(tmp_path):
+    chosen = [path for path in STORED if path.stem in ("design", "sensitivity")]
+    for path in chosen:
+        shutil.copy(path, tmp_path)
+    page, names = report_job(tmp_path, tmp_path)
+    assert names == ["design", "sensitivity"]
+    assert page.read_text().count("data:image/png;base64,") == 2
+
+
+MOVING = re.compile("error|shortfall|second|memory|per_point")
+"""What is estimated of a result, or what it took."""
+ERRORS_OF_THE_DIPOLE = ("field_error", "gradient_error")
+"""Of `dipole-validity`: these are its answer."""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("path", STORED, ids=lambda path: path.stem)
+def test_the_first_point_of_a_study_is_still_what_was_stored(path):
+    """To 1e-4 of the largest value of a quantity.
+
+    What earlier versions stored differed by up to 7e-12, averaged motions by 3e-8; the plate's compact table was made
+    otherwise since, which moved its quantities by 1.4e-5, less than a hundredth of their estimated error. Growth rates
+    of motions without friction are zero, as round-off shows them.
+    """
+    study, stored = CATALOGUE[path.stem], read_result(path)
+    found = study.gather([study.compute(study.points(True)[0])])
+    assert set(found.data_vars) == set(stored.data_vars)
+    compared = 0
+    for name, values in found.data_vars.items():
+        known = stored[name].isel({dim: slice(size) for dim, size in values.sizes.items()})  # of the first point
+        answer = path.stem == "dipole-validity" and name in ERRORS_OF_THE_DIPOLE
+        if values.dtype.kind == "f" and (answer or not MOVING.search(str(name))):
+            scale = np.nanmax(np.abs(known.values), initial=0.0)
+            np.testing.assert_allclose(values, known, rtol=0, atol=max(1e-4 * scale, 1e-12), err_msg=str(name))
+            compared += 1
+    assert compared

@@ -1,0 +1,162 @@
+"""A sweep: the same numbers whoever computes, nothing finished is computed twice, what fails is named."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+from distributed import LocalCluster
+from matplotlib.figure import Figure
+
+from spinlev.fem.storage import read_checked, write_checked
+from spinlev.geometry.basics import InputError
+from spinlev.studies.results import Study, by_case, write_dataset
+from spinlev.studies.sweeps import forget, swept
+from spinlev.studies.sweeps.running import SweepError
+from spinlev.studies.terminal import Workers
+
+
+def root(point):
+    """A point that writes down that it was computed, and fails where it is told to."""
+    if "log" in point:
+        with Path(point["log"]).open("a") as log:
+            log.write(f"{point['x']}\n")
+    if point.get("kill") and not Path(point["kill"]).exists():
+        Path(point["kill"]).touch()
+        os.kill(os.getpid(), signal.SIGKILL)
+    time.sleep(point.get("pause", 0.0))
+    if point["x"] < 0:
+        raise ValueError("no root")
+    return xr.Dataset({"root": ("case", [np.sqrt(point["x"])])}, {"x": ("case", [point["x"]])})
+
+
+STUDY = Study("roots", "square roots", lambda quick: [], root, by_case, lambda result: Figure(), lambda result: [])
+
+
+def points(*values, **more):
+    return {k: {"x": x, **more} for k, x in enumerate(values)}
+
+
+def bytes_of(result, path):
+    write_dataset(result, path)
+    return path.read_bytes()
+
+
+def kept(point):
+    """A point that makes a table's file on its way, as those do that need a new field."""
+    write_checked(root(point), Path(point["file"]))
+    return read_checked(point["file"])
+
+
+def test_workers_of_a_cluster_write_tables(tmp_path):
+    asked = {k: {**point, "file": str(tmp_path / f"{k}.nc")} for k, point in points(4.0, 9.0).items()}
+    found = swept("roots", replace(STUDY, compute=kept), asked, Workers(workers=2), tmp_path)
+    np.testing.assert_array_equal(found["root"], [2.0, 3.0])
+
+
+def test_serial_local_cluster_and_a_scheduler_give_the_same_file(tmp_path):
+    asked = points(*np.linspace(0.0, 7.0, 8).tolist())
+    files = [bytes_of(swept("roots", STUDY, asked, Workers(workers=n), tmp_path), tmp_path / f"{n}.nc") for n in (1, 2)]
+    with LocalCluster(n_workers=2, threads_per_worker=1, host="127.0.0.1", dashboard_address="127.0.0.1:0") as cluster:
+        there = swept("roots", STUDY, asked, Workers(scheduler=cluster.scheduler_address), tmp_path / "there")
+    files.append(bytes_of(there, tmp_path / "there.nc"))
+    assert files[0] == files[1] == files[2]
+    np.testing.assert_array_equal(there["root"], np.sqrt(np.linspace(0.0, 7.0, 8)))
+
+
+def test_finished_points_are_not_computed_again(tmp_path):
+    log = tmp_path / "log"
+    asked = points(1.0, 4.0, 9.0, log=str(log))
+    first = swept("roots", STUDY, asked, Workers(workers=1), tmp_path)
+    second = swept("roots", STUDY, asked, Workers(workers=1), tmp_path)
+    assert log.read_text().split() == ["1.0", "4.0", "9.0"]
+    assert bytes_of(first, tmp_path / "a.nc") == bytes_of(second, tmp_path / "b.nc")
+    forget("roots", tmp_path)
+    assert not (tmp_path / "roots.points").exists()
+
+
+def test_a_killed_sweep_goes_on_where_it_was(tmp_path):
+    log = tmp_path / "log"
+    asked = points(*map(float, range(6)), log=str(log), pause=0.3)
+    code = (
+        "import json, sys; from pathlib import Path; sys.path.insert(0, sys.argv[1])\n"
+        "import test_sweep as t; points = {int(k): p for k, p in json.loads(sys.argv[2]).items()}\n"
+        "t.swept('roots', t.STUDY, points, t.Workers(workers=1), Path(sys.argv[3]))"
+    )
+    folder = tmp_path / "killed"
+    command = [sys.executable, "-c", code, str(Path(__file__).parent), json.dumps(asked), str(folder)]
+    with subprocess.Popen(command) as process:
+        while len(list(folder.glob("roots.points/0*.nc"))) < 2:
+            assert process.poll() is None
+            time.sleep(0.02)
+        process.kill()
+    kept = len(list(folder.glob("roots.points/0*.nc")))
+    assert 2 <= kept < 6
+    swept("roots", STUDY, asked, Workers(workers=1), folder)
+    done = log.read_text().split()
+    assert sorted(set(done)) == [str(float(x)) for x in range(6)]
+    assert len(done) <= 7  # at most the one point that was under way was begun twice
+
+
+def test_a_damaged_point_is_computed_anew(tmp_path, capsys):
+    log = tmp_path / "log"
+    asked = points(1.0, 4.0, log=str(log))
+    swept("roots", STUDY, asked, Workers(workers=1), tmp_path)
+    damaged = tmp_path / "roots.points" / "000001.nc"
+    damaged.write_bytes(damaged.read_bytes()[:-40])
+    result = swept("roots", STUDY, asked, Workers(workers=1), tmp_path)
+    assert "damaged" in capsys.readouterr().err
+    assert log.read_text().split() == ["1.0", "4.0", "4.0"]
+    np.testing.assert_array_equal(result["root"], [1.0, 2.0])
+
+
+def test_points_of_another_sweep_are_not_used(tmp_path, capsys):
+    swept("roots", STUDY, points(1.0, 4.0), Workers(workers=1), tmp_path)
+    result = swept("roots", STUDY, points(9.0, 4.0), Workers(workers=1), tmp_path)
+    assert "another sweep" in capsys.readouterr().err
+    np.testing.assert_array_equal(result["root"], [3.0, 2.0])
+
+
+@pytest.mark.parametrize("workers", [1, 2])
+def test_a_failed_point_is_named_and_the_rest_goes_on(tmp_path, workers):
+    result = swept("roots", STUDY, points(4.0, -1.0, 9.0), Workers(workers=workers), tmp_path)
+    np.testing.assert_array_equal(result["root"], [2.0, 3.0])
+    (failed,) = json.loads(result.attrs["failed_points"])["failed"]
+    assert failed == {"point": {"x": -1.0}, "reason": "ValueError: no root"}
+
+
+def test_all_points_failed(tmp_path):
+    with pytest.raises(SweepError, match="All 2 points failed; the first: ValueError: no root"):
+        swept("roots", STUDY, points(-1.0, -2.0), Workers(workers=1), tmp_path)
+
+
+def test_a_killed_worker_does_not_stop_the_sweep(tmp_path):
+    asked = {**points(1.0, 4.0, 9.0), 3: {"x": 16.0, "kill": str(tmp_path / "killed")}}
+    result = swept("roots", STUDY, asked, Workers(workers=2), tmp_path)
+    assert (tmp_path / "killed").exists()
+    np.testing.assert_array_equal(result["root"], [1.0, 2.0, 3.0, 4.0])
+
+
+@pytest.mark.parametrize(
+    ("engine", "message"),
+    [
+        (Workers(workers=0), "--workers must be between 1 and 1024"),
+        (Workers(workers=2, scheduler="tcp://127.0.0.1:1"), "--workers must be left out"),
+    ],
+)
+def test_a_wrong_engine(engine, message):
+    with pytest.raises(InputError, match=message):
+        engine.checked()
+
+
+def test_a_scheduler_that_does_not_answer(monkeypatch, tmp_path):
+    monkeypatch.setattr("spinlev.studies.sweeps.workers.CONNECTING", 1)
+    with pytest.raises(InputError, match="--scheduler must be the address of a dask scheduler that answers"):
+        swept("roots", STUDY, points(1.0), Workers(scheduler="tcp://127.0.0.1:1"), tmp_path)

@@ -1,0 +1,59 @@
+"""What the documentation names is there: modules, tests, pictures; the dependencies are all accounted for."""
+
+import pkgutil
+import re
+import runpy
+import tomllib
+
+import pytest
+from places import ROOT
+
+from spinlev.studies.terminal.system_libraries import PACKAGES
+
+PAGES = sorted([ROOT / "README.md", *(ROOT / "docs").glob("*.md")])
+NAMED = re.compile(r"`((?:geometry|fem|dynamics|studies|tests|benchmarks|scenes|docs)/[\w/.-]+\.(?:py|toml|md))")
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+def test_files_that_are_named_exist(page):
+    text = page.read_text(encoding="utf-8")
+    links = re.findall(r"\]\((?!https?:)([^)#]+)", text)
+    missing = [name for name in NAMED.findall(text) if not (ROOT / name).is_file()]
+    missing += [link for link in links if not (page.parent / link).exists()]
+    assert not missing
+
+
+@pytest.mark.parametrize("page", [*PAGES, *(ROOT / "docs" / "examples").glob("*.py")], ids=lambda page: page.name)
+def test_modules_that_are_named_exist(page):
+    for name in set(re.findall(r"\bspinlev(?:\.[A-Za-z_]\w*)+", page.read_text(encoding="utf-8"))):
+        pkgutil.resolve_name(name)
+
+
+def test_every_section_of_the_mathematics_names_the_code_that_is_it():
+    text = (ROOT / "docs" / "mathematics.md").read_text(encoding="utf-8")
+    sections = re.split(r"^## ", text, flags=re.MULTILINE)[1:]
+    assert len(sections) >= 5
+    assert [section.splitlines()[0] for section in sections if not NAMED.search(section)] == []
+
+
+def test_dependencies_are_listed_with_reason_and_licence():
+    """The list is what its script writes; nothing lacks a reason or a licence."""
+    listing = runpy.run_path(str(ROOT / "docs" / "list_dependencies.py"))
+    said = (ROOT / "docs" / "dependencies.md").read_text(encoding="utf-8")
+    assert said == listing["page"]()
+    rows = [line.split(" | ") for line in said.splitlines() if line.startswith("| ") and "---" not in line]
+    declared = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    names = {row[0].strip("| ") for row in rows}
+    wanted = [*declared["dependencies"], *declared["optional-dependencies"]["dev"]]
+    assert {re.split(r"[><=~]", text)[0] for text in wanted} <= names
+    assert [row[0] for row in rows if any(not cell.strip(" |") for cell in row)] == []
+    assert "see its files" not in said
+
+
+def test_the_container_has_what_it_copies_and_what_the_program_asks_for():
+    recipe = (ROOT / "Containerfile").read_text(encoding="utf-8")
+    copied = [name for line in re.findall(r"^COPY (.+)$", recipe, re.MULTILINE) for name in line.split()[:-1]]
+    assert [name for name in copied if not (ROOT / name).exists()] == []
+    assert set(copied) > {"geometry", "fem", "dynamics", "studies", "scenes", "requirements.txt"}
+    for command in PACKAGES["Debian or Ubuntu"].values():
+        assert set(command.removeprefix("apt-get install ").split()) <= set(recipe.split())

@@ -1,0 +1,489 @@
+"""Faults injected into the program itself: nothing is lost, no number is wrong, the next run repairs (docs/faults.md).
+
+The same with signals to real processes is in test_faults_processes.py.
+"""
+
+import errno
+import json
+import os
+import re
+import shutil
+import subprocess
+import sys
+import threading
+from contextlib import contextmanager
+from pathlib import Path
+
+import h5py
+import meshio
+import numpy as np
+import places
+import pytest
+import xarray as xr
+
+from spinlev.fem.elements import memory
+from spinlev.fem.measured_maps import FieldMapError
+from spinlev.fem.measured_maps.readers import read_field_map
+from spinlev.fem.storage import foreign, read_checked, write_checked, write_whole
+from spinlev.fem.storage.whole_files import replacing
+from spinlev.studies.command_line.cli import _status
+from spinlev.studies.rendering import renderer
+from spinlev.studies.terminal import Models
+
+SCENE, OVER_PLATE = str(places.HORIZONTAL), str(places.OVER_PLATE)
+DIPOLE = ("--model", "dipole", "--plate-model", "none")
+FIELD = ("field", SCENE, "--points", "points.csv", "--model", "fem", "--rtol", "1e-2")
+TIMES = ("seconds", "realtime_factor", "tables_from_cache")
+
+
+@pytest.fixture(scope="module")
+def table(tmp_path_factory):
+    """A cache that has the table of `FIELD`."""
+    folder = tmp_path_factory.mktemp("cache")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("SPINLEV_CACHE", str(folder))
+        (folder / "points.csv").write_text("x_mm,y_mm,z_mm\n0,0,-20\n3,1,-25\n")
+        patch.chdir(folder)
+        assert _status([*FIELD, "--out", str(folder / "out")], sys.stderr) == 0
+    return next(folder.glob("rotor-*.nc"))
+
+
+@pytest.fixture
+def spinlev(tmp_path, monkeypatch, capsys):
+    """Run the command line in this process in an empty folder; gives exit status, answer and messages."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("SPINLEV_CACHE", str(tmp_path / "cache"))
+    monkeypatch.setattr("sys.argv", ["spinlev", "test"])
+    Path("points.csv").write_text("x_mm,y_mm,z_mm\n0,0,-20\n3,1,-25\n")
+
+    def run(*arguments):
+        with Path("answer").open("w") as out:
+            status = _status([*map(str, arguments), "--json"], out)
+        said = Path("answer").read_text()
+        answer = {key: value for key, value in json.loads(said).items() if key not in TIMES} if said else None
+        return status, answer, capsys.readouterr().err
+
+    return run
+
+
+def same(answer, expected):
+    """Numbers of a table made anew: to round-off; estimated errors are differences of such numbers, which cancel."""
+    assert answer.keys() == expected.keys()
+    for key, value in expected.items():
+        if "error" in key:
+            np.testing.assert_allclose(answer[key], value, rtol=1e-8)
+        elif key in ("B_T", "dB_T_per_m"):
+            np.testing.assert_allclose(answer[key], value, rtol=1e-12, atol=1e-12 * np.abs(value).max())
+        else:
+            assert str(answer[key]).replace("out/", "undisturbed/") == str(value).replace("out/", "undisturbed/")
+
+
+def hidden(folder):
+    """Files that were begun and not finished."""
+    return [path for path in Path(folder).rglob(".*") if path.is_file()]
+
+
+def flipped(content, chance):
+    found = bytearray(content)
+    found[chance.integers(len(found))] ^= 1 << chance.integers(8)
+    return bytes(found)
+
+
+def of_another_version(path):
+    dataset = read_checked(path)
+    write_checked(dataset.assign_attrs(format="spinlev rotor table 0"), path)
+
+
+def in_its_place_a_folder(path):
+    path.unlink()
+    path.mkdir()
+
+
+def quick(cases, *names):
+    """All cases, of which only the named ones are in the fast suite."""
+    return [case if case in names else pytest.param(case, marks=pytest.mark.slow) for case in cases]
+
+
+DAMAGES = {
+    "cut off": lambda path: path.write_bytes(path.read_bytes()[:1000]),
+    "cut off by the checksum": lambda path: path.write_bytes(path.read_bytes()[:-79]),
+    "empty": lambda path: path.write_bytes(b""),
+    "other bytes": lambda path: path.write_bytes(b"\x89HDF" * 500),
+    "a bit": lambda path: path.write_bytes(flipped(path.read_bytes(), np.random.default_rng(1))),
+    "another bit": lambda path: path.write_bytes(flipped(path.read_bytes(), np.random.default_rng(2))),
+    "of another version": of_another_version,
+    "a folder": in_its_place_a_folder,
+}
+
+
+@pytest.mark.parametrize("damage", quick(DAMAGES, "cut off", "a bit", "of another version", "a folder"))
+def test_a_damaged_cache_entry_is_named_and_made_anew(spinlev, table, damage):
+    Path("cache").mkdir()
+    entry = Path(shutil.copy(table, "cache"))
+    whole = spinlev(*FIELD)
+    assert whole[0] == 0
+    assert "from the cache" in whole[2]
+    DAMAGES[damage](entry)
+    status, answer, said = spinlev(*FIELD)
+    assert status == 0
+    assert "damaged and is computed anew" in said
+    same(answer, whole[1])
+    if damage != "a folder":
+        assert "from the cache" in spinlev(*FIELD)[2]
+    assert hidden(".") == []
+
+
+def test_every_flipped_bit_is_found(table, tmp_path):
+    content, chance = table.read_bytes(), np.random.default_rng(0)
+    for _ in range(300):
+        (tmp_path / "t.nc").write_bytes(flipped(content, chance))
+        with pytest.raises(ValueError, match="checksum"):
+            read_checked(tmp_path / "t.nc", "spinlev rotor table 1")
+
+
+def test_a_cache_that_cannot_be_written_costs_time_only(spinlev, monkeypatch, table):
+    Path("cache").mkdir()
+    shutil.copy(table, "cache")
+    expected = spinlev(*FIELD)[1]
+    for place in (Path("points.csv", "below-a-file").absolute(), "/sys/spinlev"):
+        monkeypatch.setenv("SPINLEV_CACHE", str(place))
+        status, answer, said = spinlev(*FIELD)
+        assert status == 0
+        same(answer, expected)
+        assert "could not be cached" in said
+
+
+VARY = ("study", SCENE, "--vary", "frequency_hz=100,110", "--workers", "1")
+SWEEP = (*VARY, "--ask", "field", "--model", "cuboid")
+WRITERS = {
+    "field.csv": ("field", SCENE, "--points", "points.csv", "--model", "dipole"),
+    "equilibria.json": ("equilibria", SCENE, *DIPOLE),
+    "trajectory.nc": ("simulate", SCENE, "--duration-s", "0.1", *DIPOLE),
+    "plate.json": ("plate", OVER_PLATE, "--at", "0,0,-20", "--frequency-hz", "50", "--model", "slab"),
+    "identity.json": SWEEP,
+    "000000.nc": SWEEP,
+    "question.nc": SWEEP,
+    "question.png": SWEEP,
+}
+
+
+@pytest.mark.parametrize("name", quick(WRITERS, "field.csv", "000000.nc"))
+def test_a_full_disk(spinlev, monkeypatch, name):
+    """Half of a file is written, then there is no space: named, nothing of that file is left, the next run is whole."""
+    write = Path.write_bytes
+
+    def full(path, content):
+        if re.match(rf"\.{Path(name).stem}-", path.name) and path.suffix == Path(name).suffix:
+            write(path, content[: len(content) // 2])
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+        return write(path, content)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(Path, "write_bytes", full)
+        status, answer, said = spinlev(*WRITERS[name])
+    assert status == 1
+    assert answer is None
+    assert f"{name}: No space left on device" in said.replace("\n", "")
+    assert not list(Path("out").rglob(name))
+    assert hidden("out") == []
+    assert spinlev(*WRITERS[name])[0] == 0
+    assert Path("out", "question.pdf" if WRITERS[name] == SWEEP else name).exists()
+
+
+def test_results_go_to_memory_before_the_disk_since_hdf5_crashes_on_a_full_one(tmp_path):
+    """A child that may write 20 kB: an error in words (HDF5 itself, on a real full disk, ended with SIGSEGV)."""
+    code = (
+        "import resource, sys, numpy, xarray; from spinlev.fem.storage.checked_files import write_checked\n"
+        "resource.setrlimit(resource.RLIMIT_FSIZE, (20000, 20000))\n"
+        "write_checked(xarray.Dataset({'a': ('x', numpy.arange(9999.0))}), sys.argv[1])\n"
+    )
+    command = [sys.executable, "-c", code, str(tmp_path / "r.nc")]
+    unmeasured = {key: value for key, value in os.environ.items() if not key.startswith("COVERAGE")}  # it writes a file
+    done = subprocess.run(command, capture_output=True, text=True, check=False, env=unmeasured)
+    assert done.returncode == 1
+    assert done.stderr.strip().endswith(f"OSError: [Errno 27] File too large: '{tmp_path / 'r.nc'}'")
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("place", ["points.csv", "points.csv/below", "/sys/spinlev"])
+def test_an_output_folder_that_cannot_be_written(spinlev, place):
+    """A file in its place, and a file system that even root may not write."""
+    status, answer, said = spinlev(*WRITERS["field.csv"], "--out", place)
+    assert (status, answer) == (1, None)
+    assert "failed to write or read" in said
+    assert "--out" in said
+
+
+def test_a_full_disk_behind_standard_output(spinlev, capsys):
+    with Path("/dev/full").open("w") as full:
+        status = _status([*WRITERS["field.csv"]], full)
+        assert status == 1
+        assert "standard output: No space left on device" in capsys.readouterr().err
+        os.dup2(os.open("/dev/null", os.O_WRONLY), full.fileno())  # so that it can be closed
+
+
+PHASES = {
+    "table": ("spinlev.fem.rotor_tables.cache.rotor_table", FIELD),
+    "table, when it is written": ("spinlev.fem.storage.checked_files.write_whole", FIELD),
+    "equilibria": ("spinlev.studies.one_scene.levitation.survey", WRITERS["equilibria.json"]),
+    "files": ("spinlev.studies.one_scene.single.write_whole", WRITERS["equilibria.json"]),
+    "sweep": ("spinlev.studies.one_scene.levitation.rotor_table", SWEEP),
+    "sweep, when a point is kept": ("spinlev.studies.sweeps.finished_points.write_checked", SWEEP),
+    "sweep, when all are joined": ("spinlev.studies.catalogue.jobs.write_dataset", SWEEP),
+    "figures": ("spinlev.studies.catalogue.jobs.save_figures", SWEEP),
+}
+
+
+@pytest.mark.parametrize("phase", quick(PHASES, "table, when it is written", "sweep"))
+def test_ctrl_c_in_every_phase(spinlev, monkeypatch, phase):
+    """Exit status 1 with a word, nothing half done, and the next run says what an undisturbed one does."""
+    place, arguments = PHASES[phase]
+    undisturbed = spinlev(*arguments, "--out", "undisturbed")
+    shutil.rmtree("cache", ignore_errors=True)
+    calls = []
+
+    def pressed(*_, **__):
+        calls.append(1)
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as patch:
+        patch.setattr(place, pressed)
+        status, answer, said = spinlev(*arguments)
+    assert calls
+    assert (status, answer) == (1, None)
+    assert "stopped; what was finished is kept" in said
+    assert hidden(".") == []
+    status, answer, _ = spinlev(*arguments)
+    assert status == 0
+    same(answer, undisturbed[1])
+
+
+@pytest.mark.parametrize(("library", "blow"), [("cyclopts", "SIGTERM"), ("numpy", "SIGINT"), ("matplotlib", "SIGINT")])
+def test_ctrl_c_while_the_program_is_loaded(library, blow):
+    """When it first looks for a library, which may make something else of it."""
+    code = (
+        "import os, signal, sys\n"
+        "class Pressed:\n"
+        "    def find_spec(self, name, *_):\n"
+        f"        if name == '{library}': os.kill(os.getpid(), signal.{blow})\n"
+        "sys.meta_path.insert(0, Pressed())\n"
+        "from spinlev.studies.command_line.start import main\n"
+        "main()\n"
+    )
+    done = subprocess.run([sys.executable, "-c", code, "cite"], capture_output=True, text=True, check=False)
+    assert done.returncode == 1, done.stderr
+    assert done.stderr == "spinlev: stopped; what was finished is kept.\n"
+
+
+def test_ctrl_c_that_falls_into_a_destructor_is_not_lost():
+    """Python drops what is raised there; the program would go on."""
+    code = (
+        "import os, signal, threading\n"
+        "from spinlev.studies import cli, start\n"
+        "class Dropped:\n"
+        "    def __del__(self):\n"
+        "        os.kill(os.getpid(), signal.SIGINT)\n"
+        "def answer(*_):\n"
+        "    Dropped()\n"
+        "    threading.Event().wait(60)\n"
+        "cli._answer = answer\n"
+        "start.main()\n"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert done.returncode == 1
+    assert done.stderr.strip() == "spinlev: stopped; what was finished is kept."
+
+
+def test_ctrl_c_that_a_library_takes_for_its_own_failure(spinlev, monkeypatch, capsys):
+    """vtk makes an ImportError of a KeyboardInterrupt while it is loaded."""
+    stop = threading.Event()
+
+    def pressed(*_):
+        stop.set()
+        raise ImportError("No module named vtk")
+
+    monkeypatch.setattr("spinlev.studies.one_scene.single.write_whole", pressed)
+    assert _status([*WRITERS["field.csv"]], sys.stderr, stop) == 1
+    assert "stopped; what was finished is kept" in capsys.readouterr().err
+
+
+def pressing(monkeypatch, after):
+    """Ctrl-C in the flights, after a number of looks at what has been flown."""
+    looks = []
+
+    def advance(done):
+        looks.append(done)
+        if len(looks) > after:
+            raise KeyboardInterrupt
+
+    @contextmanager
+    def progress(label):
+        yield advance
+
+    monkeypatch.setattr("spinlev.studies.one_scene.levitation.progress", progress)
+
+
+def test_ctrl_c_in_a_flight_keeps_it_and_it_goes_on_to_the_last_bit(spinlev, monkeypatch):
+    arguments = ("simulate", SCENE, "--duration-s", "3", *DIPOLE)
+    undisturbed = spinlev(*arguments, "--out", "undisturbed")[1]
+    with monkeypatch.context() as patch:
+        pressing(patch, 2)
+        status, answer, said = spinlev(*arguments)
+    assert (status, answer) == (1, None)
+    assert "--resume goes on" in said
+    begun = read_checked("out/trajectory.nc")
+    assert begun.attrs["ended_by"] == "stopped"
+    status, answer, _ = spinlev(*arguments, "--resume")
+    assert status == 0
+    assert answer["energy_error"] == undisturbed["energy_error"]
+    whole, resumed = (read_checked(f"{folder}/trajectory.nc") for folder in ("undisturbed", "out"))
+    xr.testing.assert_equal(whole, resumed)
+    assert 0 < begun.attrs["levitated_s"] < 3
+    assert not Path("out/checkpoint.npz").exists()
+
+
+def test_a_stopped_flight_is_no_point_of_a_sweep(spinlev, monkeypatch):
+    """Ctrl-C in the second of two flights: the first is kept, the second is flown anew, not taken as it was."""
+    arguments = (*VARY, "--ask", "flight", "--duration-s", "0.5", *DIPOLE)
+    assert spinlev(*arguments, "--out", "undisturbed")[0] == 0
+    looks = []
+
+    def pressed(done):
+        looks.append(done)
+        if looks.count(1.0) and done < 1.0:
+            raise KeyboardInterrupt
+
+    @contextmanager
+    def progress(label):
+        yield pressed
+
+    with monkeypatch.context() as patch:
+        patch.setattr("spinlev.studies.one_scene.levitation.progress", progress)
+        assert spinlev(*arguments)[0] == 1
+    assert [path.name for path in Path("out/question.points").glob("0*.nc")] == ["000000.nc"]
+    status, _, said = spinlev(*arguments)
+    assert status == 0
+    assert "1 of 2 points are there" in said
+    xr.testing.assert_equal(*(read_checked(f"{folder}/question.nc") for folder in ("undisturbed", "out")))
+
+
+def test_no_solve_is_begun_that_the_memory_does_not_hold(spinlev, monkeypatch):
+    with monkeypatch.context() as patch:
+        patch.setattr(memory, "free_memory", lambda: 2e6)
+        status, answer, said = spinlev(*FIELD)
+    assert (status, answer) == (1, None)
+    assert re.search(
+        r"need about 0\.\d+ GB of memory for \d+ coupled unknowns; 0\.002 GB are free\. Allow .*--rtol", said
+    )
+    assert spinlev(*FIELD)[0] == 0
+
+
+def test_files_of_killed_processes_are_tidied_and_those_of_living_ones_are_not(tmp_path):
+    """A process that dies between two bytes leaves a file under a temporary name; the next writer removes it."""
+    code = (
+        "import os, signal, sys; from spinlev.fem.storage.whole_files import replacing\n"
+        "with replacing(sys.argv[1]) as temporary:\n"
+        "    temporary.write_text('half')\n"
+        "    os.kill(os.getpid(), signal.SIGKILL)\n"
+    )
+    path = tmp_path / "result.nc"
+    for _ in range(2):
+        subprocess.run([sys.executable, "-c", code, str(path)], check=False)
+    assert len(hidden(tmp_path)) == 1  # the second has tidied up after the first
+    other = tmp_path / ".result-another-machine-12-x.nc"
+    other.write_text("of another machine, which may be alive")
+    with replacing(path) as mine:
+        mine.write_bytes(b"half of mine")
+        write_whole(path, b"whole")
+        assert mine.exists()
+        mine.write_bytes(b"whole of mine")
+    assert path.read_bytes() == b"whole of mine"
+    assert hidden(tmp_path) == [other]
+
+
+@pytest.mark.slow
+def test_a_result_and_its_summary_are_of_the_same_run(spinlev, monkeypatch):
+    """A run that dies after its result is written leaves no summary of the run before."""
+    Path("out").mkdir()
+    Path("out/summary.json").write_text("{}")
+    monkeypatch.setattr(
+        "spinlev.studies.one_scene.run.write_dataset", lambda *_: (_ for _ in ()).throw(KeyboardInterrupt)
+    )
+    status, _, said = spinlev("run", SCENE, "--duration-s", "0.1", "--rtol", "1e-2", *DIPOLE)
+    assert status == 1
+    assert "stopped" in said
+    assert not Path("out/summary.json").exists()
+
+
+def test_a_renderer_that_dies_takes_no_result_with_it(spinlev, monkeypatch):
+    """As VTK makes it without graphics libraries: a line on the console; all but these pictures is whole."""
+    dies = "import os, signal; os.kill(os.getpid(), signal.SIGSEGV)"
+    arguments = ("run", SCENE, "--duration-s", "0.1", "--rtol", "1e-2", *DIPOLE)
+    Path("out").mkdir()
+    Path("out/scene.png").write_text("of an older result")
+    with monkeypatch.context() as patch:
+        patch.setattr(renderer, "COMMAND", (sys.executable, "-c", dies))
+        patch.setattr("spinlev.studies.catalogue.show.Models", lambda: Models("dipole"))
+        patch.setattr("spinlev.studies.catalogue.show.plate_currents", lambda *given: np.zeros_like(given[-1]))
+        status, answer, said = spinlev(*arguments)
+        shown = spinlev("show", "out/result.nc")
+    assert status == 0
+    (line,) = [line for line in said.splitlines() if "3-D" in line]
+    assert line.startswith("The 3-D pictures are left out (scene.png): the process that draws them died (Segmentation")
+    assert sorted(path.name for path in Path("out").glob("*.png")) == ["field.png", "force.png", "trajectory.png"]
+    assert len(read_checked("out/result.nc")["time"]) > 10
+    summary = json.loads(Path("out/summary.json").read_text())
+    assert answer["levitated_s"] == summary["levitated_s"] == 0.1
+    assert shown[:2] == (1, None)
+    assert "result-scene.png, result-flight.gif" in shown[2]
+    assert spinlev("report", "out")[0] == 0
+
+
+@pytest.mark.parametrize("step", [970, pytest.param(97, marks=pytest.mark.slow)])
+def test_files_that_others_wrote_are_read_as_far_as_they_are_whole(spinlev, step):
+    """Without our checksum HDF5 must find the damage: a message, whatever it raises."""
+    with h5py.File("r.nc", "w") as file:
+        file.attrs["study"] = "run"
+    content = Path("r.nc").read_bytes()
+    for length in range(0, len(content), step):
+        Path("r.nc").write_bytes(content[:length])
+        status, _, said = spinlev("cite", "r.nc")
+        assert status == 2
+        assert "Traceback" not in said
+
+
+def foreign_file(name):
+    """A result as another program may write it, and where its attributes' texts are (HDF5's global heap)."""
+    with h5py.File(name, "w") as file:
+        file.attrs["study"] = "run"
+    return Path(name).read_bytes(), Path(name).read_bytes().index(b"GCOL")
+
+
+def test_a_foreign_file_that_hdf5_does_not_return_from_is_given_up(spinlev, monkeypatch):
+    """An object of no length in the heap: HDF5 goes round in a loop that no signal ends."""
+    monkeypatch.setattr(foreign, "LONGEST", 2.0)
+    content, heap = foreign_file("r.nc")
+    Path("r.nc").write_bytes(content[: heap + 16] + bytes(16) + content[heap + 32 :])
+    status, _, said = spinlev("cite", "r.nc")
+    assert status == 2
+    assert "HDF5 does not come to an end with it" in said.replace("\n", " ")
+
+
+def test_a_foreign_file_that_hdf5_crashes_on_is_refused(spinlev, monkeypatch, tmp_path):
+    """The process that looks through it dies, as HDF5 has made it on damaged files; the program does not."""
+    foreign_file("r.nc")
+    monkeypatch.setattr(foreign, "SCRIPT", tmp_path / "dies.py")
+    (tmp_path / "dies.py").write_text("import os, signal; os.kill(os.getpid(), signal.SIGSEGV)")
+    status, _, said = spinlev("cite", "r.nc")
+    assert status == 2
+    assert "HDF5 crashes on it" in said.replace("\n", " ")
+
+
+def test_hdf5_of_a_mesh_is_looked_through_too(monkeypatch, tmp_path):
+    points = np.random.default_rng(0).uniform(-1e-2, 1e-2, (8, 3))
+    meshio.Mesh(points, [("vertex", np.arange(8)[:, None])], {"B": points}).write(tmp_path / "map.xdmf")
+    np.testing.assert_array_equal(read_field_map(tmp_path / "map.xdmf").field, points)
+    monkeypatch.setattr(foreign, "SCRIPT", tmp_path / "dies.py")
+    (tmp_path / "dies.py").write_text("import os, signal; os.kill(os.getpid(), signal.SIGSEGV)")
+    with pytest.raises(FieldMapError, match="HDF5 crashes on it"):
+        read_field_map(tmp_path / "map.xdmf")

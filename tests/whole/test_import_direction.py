@@ -1,0 +1,91 @@
+"""Imports go one way: between floors, between the rooms of a floor, and through the faces of rooms."""
+
+import ast
+from pathlib import Path
+
+import pytest
+from places import ROOT, TESTS
+
+FLOORS = {
+    "geometry": ["basics", "bodies", "scenes", "meshes"],
+    "fem": [
+        *("storage", "harmonics", "closed_forms", "elements", "magnetostatics", "rotor_tables", "measured_maps"),
+        *("mutual", "eddy_currents", "plate_network", "plate_tables", "slab", "verification"),
+    ],
+    "dynamics": ["motion", "steady", "equilibria", "branches", "maps", "flights", "slow_drift"],
+    "studies": [
+        *(
+            "terminal",
+            "rendering",
+            "results",
+            "pictures",
+            "one_scene",
+            "sweeps",
+            "article",
+            "field_quality",
+            "levitation",
+        ),
+        *("margins", "plates", "catalogue", "interface", "command_line"),
+    ],
+}
+ORDER = [(floor, room) for floor, rooms in FLOORS.items() for room in rooms]
+LARGEST = 12
+"""Modules in a room, its face not counted."""
+SOURCES = [path for floor in FLOORS for path in sorted((ROOT / floor).glob("*/*.py"))]
+
+
+def imported(path: Path) -> set[tuple[str, ...]]:
+    """Modules of the house that a module imports, as (floor, room) or (floor, room, file)."""
+    package, found = ["spinlev", *path.relative_to(ROOT).parts[:-1]], set()
+    for node in ast.walk(ast.parse(path.read_text())):
+        names = [alias.name.split(".") for alias in node.names] if isinstance(node, ast.Import) else []
+        if isinstance(node, ast.ImportFrom):
+            base = package[: len(package) - node.level + 1] if node.level else []
+            base += node.module.split(".") if node.module else []
+            names = [base] if len(base) > 2 else [[*base, alias.name] for alias in node.names]
+        found |= {tuple(name[1:]) for name in names if name[0] == "spinlev"}
+    return found
+
+
+def test_the_rooms_are_known():
+    there = {tuple(path.relative_to(ROOT).parts[:-1]) for path in SOURCES}
+    assert there == set(ORDER)
+    assert [path for floor in FLOORS for path in (ROOT / floor).glob("*.py") if path.name != "__init__.py"] == []
+
+
+def test_the_tests_mirror_the_rooms():
+    """Each test in its room's folder, in its floor's if several rooms are in it, or in `whole`; names are unique."""
+    files = list(TESTS.rglob("test_*.py"))
+    known = {*ORDER, *((floor,) for floor in FLOORS), ("whole",)}
+    assert {path.relative_to(TESTS).parts[:-1] for path in files} <= known
+    assert len({path.name for path in files}) == len(files)
+
+
+@pytest.mark.parametrize("path", SOURCES, ids=lambda p: "/".join(p.relative_to(ROOT).parts))
+def test_a_module_imports_only_from_rooms_before_its_own_and_from_their_faces(path):
+    own = tuple(path.relative_to(ROOT).parts[:-1])
+    for module in imported(path):
+        assert len(module) >= 2, f"{module}: from a room, not from a floor"
+        if module[:2] != own:
+            assert ORDER.index(module[:2]) < ORDER.index(own)
+            assert len(module) == 2, f"{module}: from the face of the room"
+
+
+@pytest.mark.parametrize("room", ORDER, ids="/".join)
+def test_a_room_says_its_question_and_is_not_crowded(room):
+    face = ast.parse((ROOT / Path(*room) / "__init__.py").read_text())
+    assert (ast.get_docstring(face) or "").partition("\n")[0].count("?") == 1
+    modules = {path.stem for path in (ROOT / Path(*room)).glob("*.py")} - {"__init__"}
+    assert len(modules) <= LARGEST
+    public = {alias.name for node in face.body if isinstance(node, ast.ImportFrom) for alias in node.names}
+    assert not public & modules, "a module has the name of a function that its room gives out"
+
+
+def test_dynamics_knows_no_mesh_and_geometry_and_dynamics_no_solver():
+    for path in SOURCES:
+        text, floor = path.read_text(), path.relative_to(ROOT).parts[0]
+        if floor in ("dynamics", "studies"):
+            assert "import ngsolve" not in text
+            assert "from ngsolve" not in text
+        if floor == "dynamics":
+            assert ("geometry", "meshes") not in imported(path)

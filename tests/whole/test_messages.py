@@ -1,0 +1,83 @@
+"""All messages of the program, in two grammars: of bad input, and of a computation that found no answer.
+
+Input X must be RULE; instead received VALUE.  Way out.
+What happened, as a sentence.  Way out.
+"""
+
+import ast
+import builtins
+import re
+from importlib import import_module
+
+import pytest
+from places import ROOT
+
+from spinlev.geometry.basics import ComputationError
+
+FILES = sorted(path for folder in ("geometry", "fem", "dynamics", "studies") for path in (ROOT / folder).rglob("*.py"))
+INPUT = re.compile(r"(\{\}: )?Input \S.* must .+; instead[ :].+", re.DOTALL)
+SENTENCE = re.compile(r"[A-Z].*[.}]", re.DOTALL)
+OTHER_FORMS = {
+    "Input {} must be a known key; {}.": "of a scene file: the likeliest keys instead of a value",
+}
+RELAYED = {
+    "faults": "scenes/file: found by the rules between keys and by overlaps, whose sentences are literals here too",
+    "[describe_fault(detail) for detail in error.errors()]": "scenes/file: sentences of scenes/faults",
+    "refusal(plate, frequency, rtol, best)": "plate_network/reaction: a sentence of limits",
+    "str(error)": "an error's own sentence, with another class",
+    "str(path)": "whole_files: the system's own error, with the name of the file",
+    "way_out(scene, table, known)": "simulation: says what would levitate",
+}
+
+
+def literal(node):
+    """A string as it stands in the source, with {} for what is put in; None if it is no string."""
+    if isinstance(node, ast.Constant) and isinstance(node.value, str):
+        return node.value
+    if isinstance(node, ast.JoinedStr):
+        return "".join(part.value if isinstance(part, ast.Constant) else "{}" for part in node.values)
+    if isinstance(node, ast.List) and len(node.elts) == 1:
+        return literal(node.elts[0])
+    return None
+
+
+def raised(path):
+    """Every error that a module makes: its class and the last argument."""
+    module = import_module(".".join(("spinlev", *path.relative_to(ROOT).with_suffix("").parts)))
+    for node in ast.walk(ast.parse(path.read_text())):
+        if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.args:
+            kind = getattr(module, node.func.id, getattr(builtins, node.func.id, None))
+            if isinstance(kind, type) and issubclass(kind, Exception):
+                yield kind, node.args[-1], f"{path.parent.name}/{path.name}:{node.lineno}"
+
+
+ERRORS = [error for path in FILES for error in raised(path)]
+
+
+def test_the_errors_are_found():
+    assert len(ERRORS) > 100
+    kinds = {kind.__name__ for kind, _, _ in ERRORS}
+    assert {"InputError", "SceneError", "RangeError", "TableFileError", "EquilibriumError"} <= kinds
+
+
+@pytest.mark.parametrize(("kind", "message", "place"), ERRORS, ids=[place for *_, place in ERRORS])
+def test_every_error_has_a_message_of_its_kind(kind, message, place):
+    text = literal(message)
+    if text is None:
+        assert ast.unparse(message) in RELAYED, f"{place}: {ast.unparse(message)}"
+    elif text != "{}: {}":  # the file's name before a sentence
+        about_input = issubclass(kind, ValueError | TypeError | ArithmeticError) or text.startswith("Input ")
+        assert about_input or issubclass(kind, ComputationError), f"{place}: {kind.__name__} is no error for a user"
+        assert (INPUT if about_input else SENTENCE).fullmatch(text), f"{place}: {text}"
+
+
+@pytest.mark.parametrize("path", FILES, ids=lambda path: f"{path.parent.name}/{path.stem}")
+def test_every_sentence_about_input_follows_the_grammar(path):
+    """Also those that functions give back to be raised elsewhere."""
+    inner = set()
+    for node in ast.walk(ast.parse(path.read_text())):
+        if isinstance(node, ast.JoinedStr):
+            inner.update(node.values)
+        text = None if node in inner else literal(node)
+        if text and text.startswith("Input ") and text not in OTHER_FORMS:
+            assert INPUT.fullmatch(text), f"{path.name}:{node.lineno}: {text}"
