@@ -2,9 +2,9 @@ from .branches import BoundaryPoint as BoundaryPoint
 from .branches import Family as Family
 from .branches import Plane as Plane
 from .branches import Point as Point
-from .branches import Steps as Steps
 from .branches import follow_boundary as follow_boundary
 from .branches import follow_branch as follow_branch
+from .equilibria import Steps as Steps
 from .equilibria import find_equilibria as find_equilibria
 from .equilibria import survey as survey
 from .equilibria import with_plate as with_plate

@@ -1,6 +1,7 @@
 """How does an equilibrium go with one or two parameters, and where does it end?"""
 
-from .arclength import Steps, follow_branch
+from .advice import way_out
+from .arclength import follow_branch
 from .boundary import follow_boundary
 from .boundary_equations import BoundaryPoint, Plane
 from .branch import FOLD, Family, Point, Problem, frequencies, spins
@@ -30,7 +31,6 @@ __all__ = [
     "Point",
     "Problem",
     "StableRange",
-    "Steps",
     "at_frequency",
     "by_frequency",
     "distance_error",
@@ -45,5 +45,6 @@ __all__ = [
     "spins",
     "stability_end",
     "stable_range",
+    "way_out",
     "with_answers",
 ]

@@ -10,13 +10,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from ...geometry.basics import Array
+from ..equilibria import AtRest
 from ..motion import Rates
-from ..steady import Balance, moved, spectra
+from ..steady import Balance, Indices, moved, spectra
 from .branch import FOLD
 
 COLLISION, CROSSING = "collision", "crossing"
@@ -67,8 +68,11 @@ class BoundaryPoint:
 
 
 @dataclass(frozen=True, eq=False)
-class Boundary:
+class Boundary(AtRest):
     """What vanishes on a boundary.
+
+    Unknown are place, direction of the moment, the two parameters by their units, and the angular frequency of the
+    motion that becomes unstable: (9,).
 
     Parameters
     ----------
@@ -81,15 +85,23 @@ class Boundary:
     kind: str
     scale: float
 
-    def residual(self, at: BoundaryPoint, change: Array) -> tuple[Array, Array]:
-        """What shall vanish (n, 6) after changes (n, 7) of a point, and the imaginary part (n,) that is followed."""
+    def linear(self, points: Array, which: Indices) -> tuple[Array, Array]:
+        """Balance, test, frequency and |m̂| = 1 (1, 8) at one point (1, 9), and their derivatives (1, 8, 9)."""
+        values = self._after(
+            points[0], np.concatenate([np.zeros((1, 7)), DIFFERENCE * np.eye(7), -DIFFERENCE * np.eye(7)])
+        )
+        values[:, 6] -= points[0, 8]
+        slope = np.column_stack([(values[1:8] - values[8:]).T / (2 * DIFFERENCE), -np.eye(7)[6]])
+        return self.extended(values[:1], slope[None], points[:, 3:6])
+
+    def _after(self, at: Array, change: Array) -> Array:
+        """Balance, test and frequency (n, 7) after changes (n, 7) of position, tilts and parameters at a point (9,)."""
         here = np.zeros((len(change), 3))
-        position, moment = moved(here + at.position, here + at.moment, change[:, :5])
-        place = at.place + change[:, 5:] * self.plane.units
+        position, moment = moved(here + at[:3], here + at[3:6], change[:, :5])
+        place = (at[6:8] + change[:, 5:]) * self.plane.units
         balance = Balance(self.plane.rates, self.plane.values(*place.T), self.plane.spin)
         value, slope = balance(position, moment)
-        test, frequency = self._test(balance, position, moment, slope, at.angular_frequency)
-        return np.column_stack([value, test]), frequency
+        return np.column_stack([value, *self._test(balance, position, moment, slope, at[8])])
 
     def _test(self, balance: Balance, position: Array, moment: Array, slope: Array, near: float) -> tuple[Array, Array]:
         if self.kind == FOLD:
@@ -101,14 +113,3 @@ class Boundary:
         if self.kind == CROSSING:
             return first.real, first.imag
         return -np.real((first - second) ** 2), (first + second).imag / 2
-
-    def linear(self, at: BoundaryPoint) -> tuple[Array, Array, float]:
-        """Residual (6,), its derivatives (6, 7) and the frequency at a point."""
-        changes = np.concatenate([np.zeros((1, 7)), DIFFERENCE * np.eye(7), -DIFFERENCE * np.eye(7)])
-        values, frequencies = self.residual(at, changes)
-        return values[0], (values[1:8] - values[8:]).T / (2 * DIFFERENCE), float(frequencies[0])
-
-    def stepped(self, at: BoundaryPoint, change: Array) -> BoundaryPoint:
-        """The point after a change (7,) of its unknowns."""
-        position, moment = moved(at.position[None], at.moment[None], change[None, :5])
-        return replace(at, position=position[0], moment=moment[0], place=at.place + change[5:] * self.plane.units)

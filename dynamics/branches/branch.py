@@ -4,19 +4,23 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import ClassVar
 
 import numpy as np
 
 from ...geometry.basics import Array
 from ...geometry.scenes import Scene
+from ..equilibria import AtRest, directions
 from ..motion import Parameter, Rates, Scales, parameters
-from ..steady import Balance, Modes, modes, tangent_basis
+from ..steady import EVERY, Balance, Indices, Modes, modes, solve
 
 Problem = Callable[[float], tuple[Array, float]]
 """Parameter -> values of the runtime parameters, with the drag along the moment left out, and body spin s."""
 
 FOLD, OSCILLATORY, REAL = "fold", "oscillatory", "real"
 """Kinds of marked points; `REAL` is a real eigenvalue through zero away from a fold (a crossing of branches)."""
+DIFFERENCE = 1e-5
+"""Step of the central difference by the parameter, in its units."""
 
 
 def scenes(make: Callable[[float], Scene], spin: float = 0.0) -> Problem:
@@ -40,35 +44,24 @@ def spins(scene: Scene) -> Problem:
     return lambda spin: (values, spin)
 
 
-@dataclass(frozen=True, eq=False)
-class Point:
-    """One equilibrium of a branch.
+@dataclass(frozen=True, eq=False, kw_only=True)
+class BranchPoint:
+    """One solution of a branch.
 
     Parameters
     ----------
     parameter : where on the axis of the parameter
-    spin : body spin s
-    position : (3,) m, rotor's frame
-    state : (12,) scaled
-    tangent : (7,) unit direction of the branch: place and direction of the moment, scaled; the parameter by its unit
+    tangent : (k + 1,) unit direction of the branch in its unknowns, the last of which is the parameter by its unit
     motion : small motions, in scaled time
     time_unit : s
     kind : what is marked here: "fold", "oscillatory", "real"; "" at an ordinary point
     """
 
     parameter: float
-    spin: float
-    position: Array
-    state: Array
     tangent: Array
     motion: Modes
     time_unit: float
     kind: str = ""
-
-    @property
-    def distance(self) -> float:
-        """Distance from the rotor's origin, m."""
-        return float(np.linalg.norm(self.position))
 
     @property
     def growth_per_s(self) -> float:
@@ -86,9 +79,39 @@ class Point:
         leading = self.motion.eigenvalues[np.argmax(self.motion.eigenvalues.real)]
         return float(abs(leading.imag)) / (2 * np.pi * self.time_unit)
 
+    def excess(self, tolerated: float) -> float:
+        """Growth beyond its error and beyond what is tolerated, 1/s."""
+        return self.growth_per_s - max(tolerated, self.doubt_per_s)
+
+    @property
+    def loss(self) -> str:
+        """Kind of the point at which the motion that grows fastest begins to grow."""
+        return OSCILLATORY if self.leading_hz * self.time_unit > 1e-6 else REAL
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Point(BranchPoint):
+    """One equilibrium of a branch; unknown are its place and the direction of its moment, scaled, (6,).
+
+    Parameters
+    ----------
+    spin : body spin s
+    position : (3,) m, rotor's frame
+    state : (12,) scaled
+    """
+
+    spin: float
+    position: Array
+    state: Array
+
+    @property
+    def distance(self) -> float:
+        """Distance from the rotor's origin, m."""
+        return float(np.linalg.norm(self.position))
+
 
 @dataclass(frozen=True, eq=False)
-class Family:
+class Family(AtRest):
     """The balance of a floater in a problem with one parameter.
 
     Parameters
@@ -101,38 +124,49 @@ class Family:
     rates: Rates
     problem: Problem
     unit: float = 1.0
+    what: ClassVar[str] = "an equilibrium"
 
     def balance(self, parameter: float) -> Balance:
         """Forces and torques at one value of the parameter."""
         values, spin = self.problem(parameter)
         return Balance(self.rates, values, spin)
 
-    def slope(self, position: Array, moment: Array, parameter: float) -> tuple[Array, Array]:
-        """Balance (5,) at scaled position and moment (3,), and its derivatives (5, 6), the last by parameter/unit.
+    def linear(self, points: Array, which: Indices) -> tuple[Array, Array]:
+        """Balance and |m̂| = 1 (1, 6) at one point (1, 7), and their derivatives (1, 6, 7).
 
-        That by the parameter is a central difference, good to 1e-9; a fold is found where the other five columns are
+        That by the parameter is a central difference, good to 1e-9; a fold is found where the other columns are
         singular, which does not depend on it.
         """
-        value, exact = self.balance(parameter)(position[None], moment[None])
-        step = 1e-5
-        ends = [self.balance(parameter + s * step * self.unit)(position[None], moment[None])[0][0] for s in (1, -1)]
-        return value[0], np.column_stack([exact[0], (ends[0] - ends[1]) / (2 * step)])
+        position, moment, parameter = points[:, :3], points[:, 3:6], float(points[0, 6]) * self.unit
+        value, slope = self.balance(parameter)(position, moment)
+        ends = [self.balance(parameter + s * DIFFERENCE * self.unit)(position, moment)[0] for s in (1, -1)]
+        along = (ends[0] - ends[1]) / (2 * DIFFERENCE)
+        return self.extended(value, np.concatenate([slope, along[:, :, None]], axis=2), moment)
 
-    def point(self, position: Array, moment: Array, parameter: float, before: Array | None = None) -> Point:
-        """The equilibrium at a solution of the balance; its tangent goes on in the direction of `before` (7,)."""
+    def guess(self, state: Array) -> Array:
+        """Place and moment (6,) of a scaled state (12,)."""
+        return state[[0, 1, 2, 6, 7, 8]]
+
+    def solution(self, guess: Array, parameter: float) -> Array | None:
+        """Unknowns (7,) of the equilibrium near a place and moment (6,) at one value of the parameter."""
+        position, moment, size = solve(self.balance(parameter), guess[None, :3], guess[None, 3:], EVERY)
+        return np.concatenate([position[0], moment[0], [parameter / self.unit]]) if size[0] < 1e-8 else None
+
+    def at(self, unknowns: Array, tangent: Array, parameter: float) -> Point:
+        """The equilibrium at a solution (7,)."""
         balance = self.balance(parameter)
-        slope = self.slope(position, moment, parameter)[1]
-        along = np.linalg.svd(slope)[2][5]
-        tangent = np.concatenate([along[:3], along[3:5] @ tangent_basis(moment[None])[0], along[5:]])
-        reference = tangent[6] if before is None else tangent @ before
-        state = balance.states(position[None], moment[None])
-        motion = modes(state[0], self.rates(state, balance.values)[1][0])
+        state = balance.states(unknowns[None, :3], unknowns[None, 3:6])
         return Point(
             parameter=parameter,
             spin=balance.spin,
-            position=position * balance.values[Parameter.LENGTH],
+            position=unknowns[:3] * balance.values[Parameter.LENGTH],
             state=state[0],
-            tangent=tangent if reference > 0 else -tangent,
-            motion=motion,
+            tangent=tangent,
+            motion=modes(state[0], self.rates(state, balance.values)[1][0]),
             time_unit=float(balance.values[Parameter.TIME]),
         )
+
+    def point(self, position: Array, moment: Array, parameter: float) -> Point:
+        """The same at scaled place and moment (3,), with the tangent towards growing values of the parameter."""
+        unknowns = np.concatenate([position, moment, [parameter / self.unit]])
+        return self.at(unknowns, directions(self, unknowns[None], np.eye(7)[6:])[0], parameter)

@@ -15,9 +15,10 @@ from scipy.optimize import brentq
 from ...fem.rotor_tables import RotorTable
 from ...geometry.basics import Array
 from ...geometry.scenes import AbsoluteStart, Scene
+from ..equilibria import Steps
 from ..motion import Parameter, Rates, Scales, parameters, rotor_gap
 from ..steady import EVERY, EquilibriumError, solve
-from .arclength import Steps, follow_branch
+from .arclength import follow_branch
 from .branch import FOLD, Family, Point, frequencies
 
 UP = np.array([0.0, 0.0, 1.0])

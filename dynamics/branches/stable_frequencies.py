@@ -11,9 +11,10 @@ from scipy.optimize import brentq
 from ...fem.rotor_tables import RotorTable, rotor_table
 from ...geometry.basics import Array
 from ...geometry.scenes import Scene
+from ..equilibria import Steps
 from ..motion import Rates, rotor_gap
 from ..steady import EquilibriumError
-from .arclength import Steps, follow_branch
+from .arclength import follow_branch
 from .branch import FOLD, Family, Point
 from .levitation_branch import by_frequency, levitating_branch
 
@@ -23,9 +24,8 @@ CONTACT, BORDER = "contact", "border"
 """Ends beside those of `branch`: the floater touches the rotor; the end of what was looked at."""
 TOLERATED = 0.02
 """Growth that counts as stable, 1/s: more than what the error of finite elements makes of undamped motion."""
-STEPS = Steps(longest=0.1, turn=0.15, tolerated=TOLERATED)
-LONG_STEPS = Steps(longest=0.4, turn=0.3, tolerated=TOLERATED)
-"""For a branch that is known from one that is near."""
+STEPS, LONG_STEPS = Steps(longest=0.1, turn=0.15), Steps(longest=0.4, turn=0.3)
+"""Along a branch, and along one that is known from one that is near."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,7 +104,7 @@ def at_frequency(scene: Scene, rates: Rates, near: Point, frequency: float, step
     family = by_frequency(scene, rates)
     if frequency == near.parameter:
         return family.point(near.state[:3], near.state[6:9], frequency)
-    last = follow_branch(family, near.state, near.parameter, frequency, steps)[-1]
+    last = follow_branch(family, near.state, near.parameter, frequency, steps, tolerated=TOLERATED)[-1]
     if last.parameter != frequency:
         raise EquilibriumError(f"The branch of equilibria ends before {frequency:g} Hz.")
     return last
@@ -135,7 +135,7 @@ def _side(
     def over(point: Point) -> bool:
         return point.kind == FOLD or rotor_gap(scene, point.position) < 0
 
-    points = follow_branch(family, start, frequency, end, steps, over)
+    points = follow_branch(family, start, frequency, end, steps, over, TOLERATED)
     for k, point in enumerate(points):
         if point.kind == FOLD:
             return points[: k + 1]
@@ -146,8 +146,7 @@ def _side(
 
 def _touching(scene: Scene, family: Family, before: Point, after: Point) -> Point:
     def there(frequency: float) -> Point:
-        ahead = follow_branch(family, before.state, before.parameter, frequency, STEPS)
-        return ahead[-1]
+        return follow_branch(family, before.state, before.parameter, frequency, STEPS, tolerated=TOLERATED)[-1]
 
     ends = before.parameter, after.parameter
     inside = ends[0] + 1e-9 * (ends[1] - ends[0])

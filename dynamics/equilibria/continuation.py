@@ -1,135 +1,157 @@
-"""Curves along which everything but the axial force is balanced, followed by their arc length.
+"""Curves of solutions followed by their arc length: the one predictor and corrector for all of them.
 
-Four balances in five unknowns leave curves in the space of positions and moment directions.  Equilibria are the points
-of these curves at which the axial force vanishes too, so that following each curve once finds all of its equilibria,
-folds included.  Predictor along the tangent, corrector by Newton's method across it (H. B. Keller, 1977; E. L. Allgower
-and K. Georg, Numerical Continuation Methods, 1990, ch. 2 and 6).
+k equations in k + 1 unknowns leave a curve.  From a point x₀ of it with the unit tangent t a step of length ℓ is
+
+    f(x) = 0,     t·(x - x₀) = ℓ,
+
+solved by Newton's method from x₀ + ℓt, so that a fold in any of the unknowns is a point like others (H. B. Keller,
+Applications of Bifurcation Theory, 1977; E. L. Allgower and K. Georg, Numerical Continuation Methods, 1990, ch. 2, 6).
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...geometry.basics import Array
-from ..steady import AXIAL, LATERAL, Balance, moved, solve, tangent_basis
-from .curve import Curve
-from .search import SearchRange
+from ..steady import Indices, tangent_basis
 
-LONGEST_STEP, SHORTEST_STEP = 0.1, 1e-6
-SHARPEST_TURN = 0.15
-"""Steps along a curve (floater radii and rad) and the largest angle between its tangents at their ends (rad)."""
-MOST_STEPS = 5000
-
-
-@dataclass(frozen=True, eq=False)
-class _Point:
-    position: Array
-    moment: Array
-    tangent: Array
-    force: float
-    slope: float
+Truth = NDArray[np.bool_]
+ON, SHORTER, END = 0, 1, 2
+"""What may be said of a step: go on from it, try a shorter one instead, or it is the last."""
+GROWTH = 1.4
+"""Ratio of a step to the one before that succeeded."""
+CLOSE, CORRECTIONS = 1e-10, 8
+"""A point is on its curve when Newton's method moves it less than this, and how often it may move it."""
+ONE: Indices = np.zeros(1, int)
+"""The number of a curve that is followed alone."""
 
 
-def follow(balance: Balance, position: Array, moment: Array, where: SearchRange) -> Curve | None:
-    """The curve through a point (3,), (3,) both ways, until it leaves the range or closes.
+class Equations(Protocol):
+    """k equations in k + 1 unknowns, at points of many curves in one call."""
 
-    None where four balances do not fix a curve (a field of revolution about the axis).
+    def linear(self, points: Array, which: Indices) -> tuple[Array, Array]:
+        """What shall vanish (n, k) at points (n, k + 1) of curves `which` (n,), and its derivatives (n, k, k + 1)."""
+
+    def onto(self, points: Array) -> Array:
+        """The points, with what shall be a unit vector made one."""
+
+
+class AtRest:
+    """Unknowns of a floater at rest: position (3), unit vector of the moment (3), and any further numbers."""
+
+    def onto(self, points: Array) -> Array:
+        """The points (n, 6 + e), their moments of unit length."""
+        points = points.copy()
+        points[:, 3:6] /= np.linalg.norm(points[:, 3:6], axis=1, keepdims=True)
+        return points
+
+    @staticmethod
+    def extended(value: Array, slope: Array, moment: Array) -> tuple[Array, Array]:
+        """Equations (n, k) and derivatives (n, k, 5 + e) by position, tilts, the rest; one more keeps |m̂| = 1."""
+        n, k, unknowns = slope.shape
+        values, slopes = np.zeros((n, k + 1)), np.zeros((n, k + 1, unknowns + 1))
+        values[:, :k], slopes[:, k, 3:6] = value, moment
+        slopes[:, :k, :3], slopes[:, :k, 6:] = slope[:, :, :3], slope[:, :, 5:]
+        slopes[:, :k, 3:6] = slope[:, :, 3:5] @ tangent_basis(moment)
+        return values, slopes
+
+
+@dataclass(frozen=True)
+class Steps:
+    """How a curve is followed.
+
+    Parameters
+    ----------
+    longest, shortest : steps along the curve, in floater radii, rad and units of the parameters
+    turn : largest angle between the tangents at the ends of a step, rad
+    most : how many steps are tried at most
+    first : the first step, as a part of the longest
     """
-    start = _point(balance, position, moment, None)
-    if start is None:
-        return None
-    ahead, closed = _half(balance, start, where)
-    if closed:
-        return _curve([start, *ahead])
-    back = _Point(start.position, start.moment, -start.tangent, start.force, -start.slope)
-    behind, _ = _half(balance, back, where)
-    reverse = [_Point(p.position, p.moment, -p.tangent, p.force, -p.slope) for p in behind[::-1]]
-    points = [*reverse, start, *ahead]
-    return _curve(points) if len(points) > 1 else None
+
+    longest: float = 0.05
+    shortest: float = 1e-7
+    turn: float = 0.1
+    most: int = 2000
+    first: float = 1 / 8
 
 
-def _half(balance: Balance, start: _Point, where: SearchRange) -> tuple[list[_Point], bool]:
-    """Points after `start` along its tangent, the first one outside included, and whether they came back to it."""
-    points, step, here = [start], LONGEST_STEP / 4, start
-    while len(points) < MOST_STEPS and step > SHORTEST_STEP:
-        new = _stepped(balance, here, step)
-        if new is None:
-            step /= 2
-            continue
-        points.append(new)
-        if new.position not in where:
+Watch = Callable[[Indices, Array, Array, Array], int | NDArray[np.int_]]
+"""Told which curves (n,) have come to what points (n, k + 1) with what tangents (n, k + 1) by steps (n,), all of which
+came out well; says of them `ON`, `SHORTER` or `END`: one answer, or one of each."""
+
+
+def follow(equations: Equations, points: Array, tangents: Array, steps: Steps, watch: Watch) -> None:
+    """Follow curves from points (n, k + 1) along tangents (n, k + 1), all at once, each with its own steps.
+
+    A curve ends where `watch` says so, or where no step that is long enough succeeds.
+    """
+    which, length = np.arange(len(points)), np.full(len(points), steps.first * steps.longest)
+    for _ in range(steps.most):
+        if not len(which):
+            return
+        ahead, turned, good = stepped(equations, points, tangents, length, which)
+        good &= np.sum(turned * tangents, axis=1) > np.cos(steps.turn)
+        said = np.full(len(which), SHORTER)
+        if good.any():
+            said[good] = watch(which[good], ahead[good], turned[good], length[good])
+        went = said != SHORTER
+        points, tangents = np.where(went[:, None], ahead, points), np.where(went[:, None], turned, tangents)
+        length = np.where(went, np.minimum(GROWTH * length, steps.longest), length / 2)
+        kept = (said != END) & (length > steps.shortest)
+        which, points, tangents, length = which[kept], points[kept], tangents[kept], length[kept]
+
+
+def stepped(
+    equations: Equations, points: Array, tangents: Array, lengths: Array, which: Indices = ONE
+) -> tuple[Array, Array, Truth]:
+    """Points and tangents (n, k + 1) at steps (n,) along the curves, and where Newton's method found these again."""
+    ahead = equations.onto(points + lengths[:, None] * tangents)
+    ahead, good = corrected(equations, ahead, tangents, np.maximum(lengths / 2, 1e-8), which)
+    turned = np.full(tangents.shape, np.nan)
+    turned[good] = directions(equations, ahead[good], tangents[good], which[good])
+    return ahead, turned, good & np.isfinite(turned).all(axis=1)
+
+
+def corrected(
+    equations: Equations, points: Array, across: Array, reach: Array, which: Indices = ONE
+) -> tuple[Array, Truth]:
+    """Solutions in the planes through guesses (n, k + 1) across directions, and where one was within reach (n,)."""
+    points, good, active = points.copy(), np.zeros(len(points), bool), np.arange(len(points))
+    for _ in range(CORRECTIONS):
+        value, slope = equations.linear(points[active], which[active])
+        change = _solved(slope, across[active], -value, 0.0)
+        size = np.linalg.norm(change, axis=1)
+        near = size <= reach[active]  # not a number is not near
+        active, change, size = active[near], change[near], size[near]
+        points[active] = equations.onto(points[active] + change)
+        good[active[size < CLOSE]] = True
+        active = active[size >= CLOSE]
+        if not len(active):
             break
-        travelled, gap = _apart(new, here), _apart(new, start)
-        if len(points) > 3 and gap < travelled and new.tangent @ start.tangent > 0.9:
-            return [*points[1:-1], start], True
-        here, step = new, min(1.4 * step, LONGEST_STEP)
-    return points[1:], False
+    return points, good
 
 
-def _apart(a: _Point, b: _Point) -> float:
-    return float(np.linalg.norm(np.concatenate([a.position - b.position, a.moment - b.moment])))
+def directions(equations: Equations, points: Array, before: Array, which: Indices = ONE) -> Array:
+    """Unit tangents (n, k + 1) of the curves that go on as `before` (n, k + 1); not a number where there is none."""
+    slope = equations.linear(points, which)[1]
+    along = _solved(slope, before, np.zeros(slope.shape[:2]), 1.0)
+    return np.asarray(along / np.linalg.norm(along, axis=1, keepdims=True))
 
 
-def _stepped(balance: Balance, here: _Point, step: float) -> _Point | None:
-    """The next point of the curve, or None where the step is too long."""
-    position = here.position[None] + step * here.tangent[:3]
-    moment = here.moment[None] + step * here.tangent[3:]
-    moment = moment / np.linalg.norm(moment)
-    for _ in range(5):
-        value, slope = balance(position, moment)
-        if not np.isfinite(slope).all():
-            return None
-        along = np.concatenate([here.tangent[:3], tangent_basis(moment)[0] @ here.tangent[3:]])
-        try:
-            change = np.linalg.solve(np.vstack([slope[0, LATERAL], along]), -np.append(value[0, LATERAL], 0.0))
-        except np.linalg.LinAlgError:
-            return None
-        if np.linalg.norm(change) > step / 2:
-            return None
-        position, moment = moved(position, moment, change[None])
-        if np.linalg.norm(change) < 1e-9:
-            new = _point(balance, position[0], moment[0], here.tangent)
-            turn = 0.0 if new is None else float(new.tangent @ here.tangent)
-            return new if turn > np.cos(SHARPEST_TURN) else None
-    return None
-
-
-def _point(balance: Balance, position: Array, moment: Array, before: Array | None) -> _Point | None:
-    """Tangent and axial force at a point of the curve; the tangent goes on in the direction of `before`."""
-    value, slope = balance(position[None], moment[None])
-    _, sizes, rows = np.linalg.svd(slope[0, LATERAL])
-    if sizes[3] < 1e-12 * sizes[0]:
-        return None
-    along = rows[4]
-    tangent = np.concatenate([along[:3], along[3:] @ tangent_basis(moment[None])[0]])
-    sign = 1.0 if before is None or tangent @ before > 0 else -1.0
-    return _Point(position, moment, sign * tangent, float(value[0, AXIAL]), sign * float(slope[0, AXIAL] @ along))
-
-
-def _curve(points: list[_Point]) -> Curve:
-    position, moment, tangent = (np.array([getattr(p, k) for p in points]) for k in ("position", "moment", "tangent"))
-    chords = np.linalg.norm(np.diff(np.concatenate([position, moment], axis=1), axis=0), axis=1)
-    force, slope = np.array([p.force for p in points]), np.array([p.slope for p in points])
-    return Curve(np.append(0.0, np.cumsum(chords)), position, moment, tangent, force, slope)
-
-
-def all_curves(balance: Balance, where: SearchRange) -> list[Curve]:
-    """Every curve that is met in the range, from its starts at their own heights."""
-    position, moment, step = solve(balance, *where.starts(), LATERAL)
-    curves: list[Curve] = []
-    for r, m in _distinct(position[step < 1e-8], moment[step < 1e-8]):
-        if r not in where or any(curve.passes(r, m) for curve in curves):
-            continue
-        curve = follow(balance, r, m, where)
-        if curve is not None:
-            curves.append(curve)
-    return curves
-
-
-def _distinct(position: Array, moment: Array) -> list[tuple[Array, Array]]:
-    """Points that differ by more than 1e-6, lowest first."""
-    _, first = np.unique(np.round(np.concatenate([position, moment], axis=1), 6), axis=0, return_index=True)
-    order = first[np.argsort(position[first, 2])]
-    return [(position[i], moment[i]) for i in order]
+def _solved(slope: Array, row: Array, value: Array, last: float) -> Array:
+    """What has the products (n, k) with derivatives (n, k, k + 1) and `last` with a row (n, k + 1); or not a number."""
+    matrices = np.concatenate([slope, row[:, None]], axis=1)
+    found = np.full((*row.shape, 1), last)
+    found[:, :-1, 0] = value
+    try:
+        found = np.linalg.solve(matrices, found)
+    except np.linalg.LinAlgError:  # one of them is singular to the last bit
+        good = np.isfinite(matrices).all(axis=(1, 2))
+        good[good] = np.linalg.slogdet(matrices[good])[0] != 0
+        found[good], found[~good] = np.linalg.solve(matrices[good], found[good]), np.nan
+    return np.asarray(found[..., 0])

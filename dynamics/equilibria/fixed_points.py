@@ -6,8 +6,7 @@ import numpy as np
 
 from ...geometry.basics import Array
 from ..steady import EVERY, Balance, solve
-from .continuation import all_curves
-from .curve import Curve
+from .curve import Curve, all_curves
 from .search import SearchRange
 
 

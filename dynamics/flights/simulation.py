@@ -10,7 +10,8 @@ import numpy as np
 from ...fem.rotor_tables import FieldTable
 from ...geometry.basics import Array, InputError
 from ...geometry.scenes import AbsoluteStart, Scene
-from ..equilibria import find_equilibria, way_out
+from ..branches import way_out
+from ..equilibria import find_equilibria
 from ..motion import Parameter, PlateForce, PlateMemory, Scales, State, clearance, parameters, plate_depth
 from ..steady import Equilibrium, EquilibriumError
 from .checkpoint import Checkpoint

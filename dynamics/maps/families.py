@@ -92,6 +92,7 @@ def rotor_family(
     rtol: float = 3e-6,
     nearest: float | None = None,
     measures: tuple[float, float] | None = None,
+    tables: int = NODES,
 ) -> RotorFamily:
     """The family of one of the article's rotors, with the magnets of `scene`.
 
@@ -101,7 +102,8 @@ def rotor_family(
         +z, m) or "tilt" (of the cube, rad)
     model, rtol, nearest : of the field, see `fem.rotor_table`
     measures : between which "vertical" with "fem" shall hold: how the cubes magnetise each other changes with their
-        distance and is interpolated between `NODES` tables, about two seconds each
+        distance and is interpolated
+    tables : between which it is, about two seconds each
 
     A rotor that moves as a whole keeps its table, whatever the model: the family is as good as its scenes' tables.
 
@@ -117,7 +119,7 @@ def rotor_family(
     moves = MOVES[configuration]
     rotor = tuple(_unmoved(magnet, move) for magnet, move in zip(scene.rotor, moves, strict=True))
     if len(rotor) > 1 and model == "fem":
-        return RotorFamily(scene, rotor, moves, _mutual(rotor, moves, rtol, nearest, measures))
+        return RotorFamily(scene, rotor, moves, _mutual(rotor, moves, rtol, nearest, measures, tables))
     parts = [(rotor_table((m,), model, rtol, nearest), move) for m, move in zip(rotor, moves, strict=True)]
     return RotorFamily(scene, rotor, moves, MovableField(tuple(parts)))
 
@@ -128,6 +130,7 @@ def _mutual(
     rtol: float,
     nearest: float | None,
     measures: tuple[float, float] | None,
+    number: int,
 ) -> MovableField:
     """Closed forms that move, and expansions that also change."""
     if measures is None:
@@ -135,7 +138,7 @@ def _mutual(
             "Input measures must be given for magnets that magnetise each other and move against each other, such as "
             "(0.010, 0.020) m; instead received None."
         )
-    places = chebyshev_points(*measures, NODES)
+    places = chebyshev_points(*measures, number)
     shifts = [move if isinstance(move, Translation) else None for move in moves]
     pairs = list(zip(rotor, shifts, strict=True))
     tables = [

@@ -12,8 +12,8 @@ import numpy as np
 
 from ...fem.rotor_tables import FieldTable
 from ...geometry.scenes import Scene
-from ..branches import FOLD, Family, Point, Steps, follow_branch, spins
-from ..equilibria import find_equilibria
+from ..branches import FOLD, Family, Point, follow_branch, spins
+from ..equilibria import Steps, find_equilibria
 from ..motion import Rates, Scales, State, rotor_gap
 from ..steady import Equilibrium, EquilibriumError
 from .averaged import BALANCE, CONTACT, E_FOLDS, Drift, flown, steady

@@ -3,7 +3,7 @@
 from .balance import AXIAL, EVERY, LATERAL, Balance, Indices, moved, solve, tangent_basis
 from .equilibrium import Equilibrium, EquilibriumError, ForceCurve, Survey
 from .floquet import floquet_modes
-from .harmonic_balance import Orbit, OrbitProblem, kept, periodic_orbit
+from .harmonic_balance import Orbit, OrbitProblem, kept, orbit_near, periodic_orbit
 from .mode_names import SIDE, TILT, named_modes
 from .stability import Modes, is_stable, modes, spectra
 
@@ -28,6 +28,7 @@ __all__ = [
     "modes",
     "moved",
     "named_modes",
+    "orbit_near",
     "periodic_orbit",
     "solve",
     "spectra",

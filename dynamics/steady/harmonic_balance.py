@@ -62,14 +62,15 @@ def periodic_orbit(rates: Rates, values: Array, spin: float, plate: PlateForce |
     count = FEWEST
     states = np.broadcast_to(guess, (count, 12)) if guess.ndim == 1 else resampled(guess, count)
     while True:
-        found = _newton(rates, values, spin, plate, states)
+        found = orbit_near(rates, values, spin, plate, states)
         if found is None or found.error < TAIL or count >= MOST:
             return found
         count = 2 * count - 1
         states = resampled(found.states, count)
 
 
-def _newton(rates: Rates, values: Array, spin: float, plate: PlateForce | None, states: Array) -> Orbit | None:
+def orbit_near(rates: Rates, values: Array, spin: float, plate: PlateForce | None, states: Array) -> Orbit | None:
+    """The orbit near a turn (n, 12) of states, at as many instants; see `periodic_orbit`."""
     problem = OrbitProblem(rates, values, plate, len(states))
     states, size = states.copy(), np.inf
     for _ in range(25):

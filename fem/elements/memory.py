@@ -76,20 +76,20 @@ def require_memory(space: ngsolve.FESpace, free: ngsolve.BitArray, way_out: str)
         )
 
 
-def free_memory() -> float:
+def free_memory(group: Path = GROUP) -> float:
     """Bytes that this process can still have: of the machine, of its container or batch job, of its own limit."""
     own, _ = resource.getrlimit(resource.RLIMIT_AS)
-    limits = [float(psutil.virtual_memory().available), _group_memory()]
+    limits = [float(psutil.virtual_memory().available), _group_memory(group)]
     if own != resource.RLIM_INFINITY:
         limits.append(float(own - psutil.Process().memory_info().vms - HEAP))
     return max(min(limits), 0.0)
 
 
-def _group_memory() -> float:
+def _group_memory(group: Path) -> float:
     """Bytes left in the control group; infinite where there is none with a limit."""
     try:
-        limit = (GROUP / "memory.max").read_text().strip()
-        used = dict(line.split() for line in (GROUP / "memory.stat").read_text().splitlines())
+        limit = (group / "memory.max").read_text().strip()
+        used = dict(line.split() for line in (group / "memory.stat").read_text().splitlines())
     except OSError:
         return float("inf")
     return float("inf") if limit == "max" else float(int(limit) - int(used["anon"]))

@@ -1,5 +1,7 @@
-"""The error of a computation that did not reach the accuracy asked for."""
+"""The error of a tolerance that is not reached."""
+
+from ...geometry.basics import InputError
 
 
-class AccuracyError(ArithmeticError):
-    """A computation did not reach the accuracy asked for."""
+class AccuracyError(InputError):
+    """A tolerance below what can be reached; the message names it and the smallest that can."""

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ...geometry.basics import MU_0, Array
+from ..rotor_tables import AccuracyError
 from .reaction import PlaneConductor, Slab, checked, wave_numbers
 
 PRECISION = 1e-11
@@ -51,7 +52,7 @@ def sliding_force(conductor: PlaneConductor, height: float, velocity: ArrayLike,
     Raises
     ------
     ValueError : height not positive
-    ArithmeticError : the force does not settle (speeds far above 2/(μ0σt), where drag is all but gone)
+    AccuracyError : the force does not settle (speeds far above 2/(μ0σt), where drag is all but gone)
     """
     checked(height, 0.0)
     moment, velocity = np.asarray(moment, float), np.asarray(velocity, float)
@@ -61,7 +62,7 @@ def sliding_force(conductor: PlaneConductor, height: float, velocity: ArrayLike,
         if np.linalg.norm(force - previous) <= PRECISION * np.linalg.norm(force):
             return force
         previous, directions = force, 2 * directions
-    raise ArithmeticError(f"Input velocity_m_s must be slower for a settled force; instead received {velocity!r}.")
+    raise AccuracyError(f"Input velocity_m_s must be slower for a settled force; instead received {velocity!r}.")
 
 
 def _force(conductor: PlaneConductor, height: float, velocity: Array, moment: Array, directions: int) -> Array:

@@ -9,6 +9,7 @@ from typing import Any
 import dask
 import xarray as xr
 
+from ...geometry.basics import InputError
 from . import foreign
 from .checksum import seal, sealed
 from .whole_files import write_whole
@@ -17,7 +18,7 @@ Variables = Mapping[str, tuple[tuple[str, ...], Any, str]]
 """Dimensions, values and unit by name."""
 
 
-class TableFileError(ValueError):
+class TableFileError(InputError):
     """A table file that is damaged, or is not one."""
 
 

@@ -3,7 +3,7 @@
 from .arrays import Array, frozen_array
 from .box import Box, rotation_matrix
 from .constants import MU_0
-from .errors import ComputationError, InputError
+from .errors import ComputationError, InputError, SpinlevError
 from .materials import MAGNET_CONDUCTIVITY
 from .text import counted, listed, millimetres
 
@@ -14,6 +14,7 @@ __all__ = [
     "Box",
     "ComputationError",
     "InputError",
+    "SpinlevError",
     "counted",
     "frozen_array",
     "listed",

@@ -8,7 +8,7 @@ from pathlib import Path
 import xarray as xr
 from matplotlib.figure import Figure
 
-from ...fem.storage import TableFileError, read_checked
+from ...fem.storage import read_checked
 from ...geometry.basics import InputError
 from ..pictures import drawable, modes_figure, question_figure
 from ..results import field_figure, force_figure, save_figure, trajectory_figure
@@ -41,8 +41,6 @@ def read_result(path: Path) -> xr.Dataset:
         result = read_checked(path)
     except FileNotFoundError:
         raise InputError(f"Input {path} must be a file that exists; instead it is missing.") from None
-    except TableFileError as error:
-        raise InputError(str(error)) from None
     except OSError as error:
         raise InputError(f"Input {path} must be a readable file; instead: {error.strerror}.") from None
     if "study" not in result.attrs:

@@ -16,7 +16,7 @@ from typing import Any
 
 from cyclopts import App, CycloptsError
 
-from ...geometry.basics import ComputationError, InputError
+from ...geometry.basics import SpinlevError
 from ..terminal import FORTRAN, Answer, answers_only, heard, is_missing_library, note, to_json, way_out
 from .result_commands import add_result_commands
 from .scene_commands import add_scene_commands
@@ -51,12 +51,9 @@ def _heard_status(arguments: list[str], out: Any, stop: threading.Event | None) 
     except CycloptsError as error:
         note(f"spinlev: {error}\nTry: spinlev --help")
         return 2
-    except InputError as error:
+    except SpinlevError as error:
         note(f"spinlev: {error}")
-        return 2
-    except ComputationError as error:
-        note(f"spinlev: {error}")
-        return 1
+        return error.exit_status
     except OSError as error:
         where = error.filename or "standard output"
         note(f"spinlev: the computation failed to write or read {where}: {error.strerror or error}; see --out.")

@@ -9,7 +9,7 @@ from functools import partial
 import numpy as np
 import xarray as xr
 
-from ...dynamics.branches import Family, Steps, follow_branch, frequencies, spins
+from ...dynamics.branches import Family, follow_branch, frequencies, spins
 from ...dynamics.equilibria import find_equilibria
 from ...dynamics.motion import Rates, Scales
 from ...dynamics.slow_drift import Drift, drift
@@ -108,7 +108,7 @@ def _flights(
     """Flights at those frequencies that the branch of equilibria reaches, from the scene's own frequency both ways."""
     begin = follow_branch(Family(rates, spins(scene)), start, 0.0, variant.spin)[-1] if variant.spin else None
     start = begin.state if begin else start
-    walk = partial(follow_branch, Family(rates, frequencies(scene, variant.spin), 50.0), steps=Steps(tolerated=np.inf))
+    walk = partial(follow_branch, Family(rates, frequencies(scene, variant.spin), 50.0), tolerated=np.inf)
     for side in (grid[grid <= scene.frequency][::-1], grid[grid > scene.frequency]):
         state, here = start, scene.frequency
         for frequency in side:

@@ -32,7 +32,15 @@ def points(quick: bool) -> list[Point]:
     ]  # fmt: skip
 
 
-def checked_by_elements(configuration: str, edge: float, distance: float, frequency: float, first: float) -> Array:
+def checked_by_elements(
+    configuration: str,
+    edge: float,
+    distance: float,
+    frequency: float,
+    first: float,
+    rtol: float = RTOL,
+    close: float = CLOSE_ENOUGH,
+) -> Array:
     """Measure corrected for the true field, and what a forward search then gives.
 
     Returns
@@ -47,12 +55,12 @@ def checked_by_elements(configuration: str, edge: float, distance: float, freque
     measure, slope = first, _shifted(configuration, edge, distance, frequency, first)
     for _ in range(5):
         scene = article_scene(configuration, measure, frequency, drag=False, edge=edge)
-        table = cached_rotor_table(scene.rotor, "fem", RTOL, note, FLOATER.radius)[0]
+        table = cached_rotor_table(scene.rotor, "fem", rtol, note, FLOATER.radius)[0]
         found = find_equilibria(scene, table)
         if not found:
             raise EquilibriumError("The true field has no equilibrium there.")
         best = min(found, key=lambda e: abs(e.distance - distance))
-        if abs(best.distance - distance) < CLOSE_ENOUGH:
+        if abs(best.distance - distance) < close:
             found_there = best.distance, best.position_error, float(best.stable), best.growth_per_s
             return np.array([measure, *found_there])
         measure -= (best.distance - distance) / slope
@@ -82,7 +90,7 @@ CHECKED = {
 }
 
 
-def compute(point: Point) -> xr.Dataset:
+def compute(point: Point, rtol: float = RTOL, close: float = CLOSE_ENOUGH) -> xr.Dataset:
     """Measures and margins for each edge, and a forward check of the best of them by finite elements."""
     name, distance, frequency = point["configuration"], 1e-3 * point["distance_mm"], point["frequency"]
     rows = np.array([_row(name, 1e-3 * edge, distance, frequency) for edge in point["edges_mm"]])
@@ -91,7 +99,8 @@ def compute(point: Point) -> xr.Dataset:
     true = np.full(len(CHECKED), np.nan)
     if best >= 0 and margin[best] > 0:
         try:
-            true = checked_by_elements(name, 1e-3 * point["edges_mm"][best], distance, frequency, rows[best, 0])
+            edge = 1e-3 * point["edges_mm"][best]
+            true = checked_by_elements(name, edge, distance, frequency, rows[best, 0], rtol, close)
         except EquilibriumError as error:
             note(str(error))
     data = {k: variable(("case", "edge"), rows[None, :, i], *NAMES[k]) for i, k in enumerate(NAMES)}

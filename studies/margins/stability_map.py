@@ -43,10 +43,10 @@ def points(quick: bool) -> list[Point]:
     ]  # fmt: skip
 
 
-def compute(point: Point) -> xr.Dataset:
+def compute(point: Point, rtol: float = RTOL) -> xr.Dataset:
     """Intervals of stable frequencies of one rotor, and growth with a plate below at some frequencies."""
     scene = article_scene(point["configuration"], point["measure"], drag=False)
-    table = _table(scene, point["model"])
+    table = _table(scene, point["model"], rtol)
     rates = Rates.of(scene, table)
     try:
         found = levitating_ranges(scene, table, rates)
@@ -63,9 +63,9 @@ def compute(point: Point) -> xr.Dataset:
     return _dataset(point, rows, kinds, plate)
 
 
-def _table(scene: Scene, model: str) -> RotorTable:
+def _table(scene: Scene, model: str, rtol: float) -> RotorTable:
     if model == "fem":
-        return cached_rotor_table(scene.rotor, model, RTOL, note, FLOATER.radius)[0]
+        return cached_rotor_table(scene.rotor, model, rtol, note, FLOATER.radius)[0]
     return rotor_table(scene.rotor, model)
 
 

@@ -87,12 +87,10 @@ def test_a_small_tilt_of_the_axis_moves_the_floater_in_second_order(derived):
     assert np.all(derived["leaning_growth"].values < 1e-6)
 
 
-def test_a_design_is_stable_up_to_its_margin(monkeypatch):
+def test_a_design_is_stable_up_to_its_margin():
     """Half a hertz beyond its ends a search finds nothing stable; cubes of 2 mm are too weak."""
-    monkeypatch.setattr(design, "RTOL", 1e-2)
-    monkeypatch.setattr(design, "CLOSE_ENOUGH", 1e-5)
     asked = {"configuration": "tilt", "distance_mm": 25.0, "frequency": 100.0, "edges_mm": [2.0, 12.7]}
-    found = design.compute(asked).isel(case=0)
+    found = design.compute(asked, rtol=1e-2, close=1e-5).isel(case=0)
     weak, chosen = (found.isel(edge=k) for k in (0, 1))
     assert np.isnan(weak["measure"])
     assert int(found["best"]) == 1
@@ -222,11 +220,10 @@ def test_with_answers_stability_ends_where_the_bodies_touch():
     assert abs(rotor_gap(scene, high.position)) < 1e-7
 
 
-def test_a_plate_below_damps_what_is_neutral_without_it(monkeypatch):
+def test_a_plate_below_damps_what_is_neutral_without_it():
     """Without drag nothing decays. Beside the fold the bounce is soft: the place moves by a millimetre or two."""
-    monkeypatch.setattr(stability_map, "RTOL", 1e-2)
     asked = {"configuration": "vertical", "measure": 14.0, "model": "fem", "with_plate": 1}
-    found = stability_map.compute(asked).isel(case=0)
+    found = stability_map.compute(asked, rtol=1e-2).isel(case=0)
     assert 60 < float(found["lowest"][0]) < 65
     assert found["high_kind"].values[0] == "oscillatory"
     tried = found.isel(tried=0)

@@ -220,12 +220,10 @@ def test_the_reduced_plate_is_that_of_the_finite_elements():
     assert reduced.error <= 0.1
 
 
-def test_the_study_of_hard_cases_is_its_cases(monkeypatch):
+def test_the_study_of_hard_cases_is_its_cases():
     """Quick: those that are marked so, each as alone."""
     names = "extensions, μr = 1", "no polarisation", "long"
-    monkeypatch.setattr(field_hard_cases, "CASES", {name: CASES[name] for name in names})
-    monkeypatch.setattr(field_hard_cases, "PLACES", 4)
-    result = field_hard_cases.field_hard_cases(quick=True)
+    result = field_hard_cases.field_hard_cases(quick=True, cases={name: CASES[name] for name in names}, places=4)
     assert list(result["case"].values) == list(names[:2])
     alone = field_hard_cases.case_errors(CASES[names[0]], 2)
     np.testing.assert_array_equal(result["true_error"].sel(case=names[0]), alone["true_error"])

@@ -66,7 +66,7 @@ def test_every_error_has_a_message_of_its_kind(kind, message, place):
     if text is None:
         assert ast.unparse(message) in RELAYED, f"{place}: {ast.unparse(message)}"
     elif text != "{}: {}":  # the file's name before a sentence
-        about_input = issubclass(kind, ValueError | TypeError | ArithmeticError) or text.startswith("Input ")
+        about_input = issubclass(kind, ValueError | TypeError) or text.startswith("Input ")
         assert about_input or issubclass(kind, ComputationError), f"{place}: {kind.__name__} is no error for a user"
         assert (INPUT if about_input else SENTENCE).fullmatch(text), f"{place}: {text}"
 

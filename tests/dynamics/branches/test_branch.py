@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from spinlev.dynamics.branches import FOLD, Family, Steps, follow_branch, frequencies, spins
+from spinlev.dynamics.branches import FOLD, Family, follow_branch, frequencies, spins
 from spinlev.dynamics.branches.branch import OSCILLATORY, scenes
-from spinlev.dynamics.equilibria import find_equilibria
+from spinlev.dynamics.equilibria import Steps, find_equilibria
 from spinlev.dynamics.motion import Rates, Scales
 from spinlev.dynamics.steady import EquilibriumError
 from spinlev.fem.rotor_tables import rotor_table

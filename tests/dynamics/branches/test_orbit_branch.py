@@ -5,10 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from spinlev.dynamics.branches import FOLD
+from spinlev.dynamics.branches import FOLD, follow_branch
 from spinlev.dynamics.branches.branch import REAL
-from spinlev.dynamics.branches.orbit_branch import DOUBLING, TORUS, follow_orbits, kind_of
-from spinlev.dynamics.branches.orbit_family import OrbitFamily
+from spinlev.dynamics.branches.orbit_family import DOUBLING, ORBIT_STEPS, TORUS, OrbitFamily, kind_of
 from spinlev.dynamics.equilibria import find_equilibria, survey, with_plate
 from spinlev.dynamics.flights.compiled_flight import compile_flight
 from spinlev.dynamics.flights.integration import integrate
@@ -41,7 +40,7 @@ def leaning():
     start = next(e for e in find_equilibria(VERTICAL, table, rates=rates) if e.stable)
     family = OrbitFamily(rates, lambda a: (parameters(tilted(a), scales, frozen_spin=True), None), 0.0, 0.1)
     states = np.tile(scales.pack(start.state), (17, 1))
-    return table, rates, family, follow_orbits(family, states, 0.0, 0.1)
+    return table, rates, family, follow_branch(family, states, 0.0, 0.1, ORBIT_STEPS)
 
 
 @pytest.mark.slow
@@ -74,7 +73,7 @@ def test_a_point_of_the_branch_is_a_periodic_motion(leaning):
     alone = periodic_orbit(rates, family.problem(point.parameter)[0], 0.0, None, point.states[0])
     np.testing.assert_allclose(resampled(point.states, len(alone.states)), alone.states, atol=1e-7)
     with pytest.raises(EquilibriumError, match="near a periodic motion"):
-        follow_orbits(family, point.states + 3.0, 0.0, 0.1)
+        follow_branch(family, point.states + 3.0, 0.0, 0.1, ORBIT_STEPS)
 
 
 def test_kinds_of_loss():
@@ -106,7 +105,7 @@ def test_distance_of_the_plate_as_parameter(over_slab):
         return values, PlateForce(memory, values)
 
     start = np.tile(scales.pack(found.equilibria[0].state), (9, 1))
-    points = follow_orbits(OrbitFamily(rates, problem, 0.0, 5e-3), start, 0.0, 2e-3)
+    points = follow_branch(OrbitFamily(rates, problem, 0.0, 5e-3), start, 0.0, 2e-3, ORBIT_STEPS)
     assert points[-1].parameter == 2e-3
     values, plate = problem(2e-3)
     alone = periodic_orbit(rates, values, 0.0, plate, start[0])

@@ -90,16 +90,15 @@ def test_a_memory_that_runs_out_all_the_same_is_no_fault_of_the_mesh(monkeypatch
 
 
 def test_the_limit_of_a_container_counts(monkeypatch, tmp_path):
-    monkeypatch.setattr(memory, "GROUP", tmp_path)
-    whole = free_memory()
+    whole = free_memory(tmp_path)
     assert whole > 1e7
     (tmp_path / "memory.max").write_text("1500000\n")
     (tmp_path / "memory.stat").write_text("anon 500000\nfile 900000\n")
-    assert free_memory() == 1e6
+    assert free_memory(tmp_path) == 1e6
     (tmp_path / "memory.max").write_text("max\n")
-    assert free_memory() > 1e6
+    assert free_memory(tmp_path) > 1e6
     monkeypatch.setattr(resource, "getrlimit", lambda kind: (1000, 1000))
-    assert free_memory() == 0.0
+    assert free_memory(tmp_path) == 0.0
 
 
 def test_nothing_is_counted_where_nothing_is_coupled():

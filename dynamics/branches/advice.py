@@ -1,0 +1,98 @@
+"""Where there is no stable equilibrium: which frequency has one."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
+from itertools import groupby
+
+import numpy as np
+
+from ...fem.rotor_tables import FieldTable
+from ...geometry.basics import Array
+from ...geometry.scenes import Scene
+from ..equilibria import SearchRange, Steps, find_equilibria, scattered
+from ..motion import Rates, Scales
+from ..steady import Equilibrium, EquilibriumError
+from .arclength import follow_branch
+from .branch import Family, Point, frequencies
+
+WIDEST = 2.0
+"""Ratio of frequencies, up and down, within which one that works is looked for."""
+INSIDE = 0.05
+"""How far inside a window of frequencies the one that is named lies, as a part of the window."""
+FARTHEST = 0.1
+"""Of the equilibria that count, m."""
+STEPS = Steps(longest=0.4, turn=0.3)
+SAME = 1e-4
+"""Equilibria nearer to each other than this, in radii and rad together, are one."""
+
+
+def way_out(scene: Scene, table: FieldTable, equilibria: Sequence[Equilibrium], widest: float = WIDEST) -> str:
+    """What is wrong with a scene of which these are all equilibria, and what would help.
+
+    Branches are followed in frequency from these equilibria, and from those of one search at each end of what is looked
+    at, up to `widest` times the scene's frequency and down to as small a part of it: of the frequencies between which
+    one of them is stable the nearest ones count.
+    """
+    kinds = dict.fromkeys(f"{1e3 * e.distance:.2f} mm (grows e-fold in {1 / e.growth_per_s:.2g} s)" for e in equilibria)
+    found = f"only unstable ones at {', '.join(kinds)}" if kinds else "nor any unstable one below the rotor"
+    other = _levitating_frequency(scene, table, equilibria, widest)
+    advice = f"About {other:.4g} Hz has one; or" if other else f"None was found within a factor of {widest:g};"
+    return f"At {scene.frequency:g} Hz the floater has no stable equilibrium, {found}. {advice} give start.position_mm."
+
+
+def _levitating_frequency(
+    scene: Scene, table: FieldTable, equilibria: Sequence[Equilibrium], widest: float
+) -> float | None:
+    """A frequency (Hz) in the nearest window in which a branch is stable."""
+    rates, own = Rates.of(scene, table), scene.frequency
+    where = SearchRange(scene, FARTHEST)
+
+    def counts(point: Point) -> bool:
+        return point.motion.stable and point.state[:3] in where and bool(table.in_range(point.position)[0])
+
+    known = [Scales.of(scene).pack((e.without or e).state) for e in equilibria]
+    branches = _branches(scene, Family(rates, frequencies(scene), own / 2), known, where, widest)
+    windows = [window for branch in branches for window in _windows(branch, counts)]
+    for low, high in sorted(windows, key=lambda window: abs(np.log(np.clip(own, *window) / own))):
+        near, far = (low, high) if low > own else (high, low)
+        frequency = near + INSIDE * (far - near)
+        there = replace(scene, frequency=float(frequency))
+        across = np.any(scene.gravity[:2])  # then equilibria are periodic motions, and a search says
+        if not across or any(e.stable for e in find_equilibria(there, table, rates=rates)):
+            return there.frequency
+    return None
+
+
+def _branches(
+    scene: Scene, family: Family, known: Sequence[Array], where: SearchRange, widest: float
+) -> Iterator[list[Point]]:
+    """Branches through known states (12,) both ways, and those through what is found at either end, each once."""
+    own, ends, seen = scene.frequency, (scene.frequency * widest, scene.frequency / widest), list[tuple[bool, Point]]()
+    for begin, end in ((own, ends[0]), (own, ends[1]), ends, ends[::-1]):
+        balance = family.balance(begin)
+        for start in known if begin == own else balance.states(*scattered(balance, where)):
+            if any(up == (end > begin) and begin == p.parameter and _apart(p.state, start) < SAME for up, p in seen):
+                continue
+            try:
+                branch = follow_branch(family, start, begin, end, STEPS)
+            except EquilibriumError:
+                continue
+            seen.append((branch[-1].parameter < (begin + end) / 2, branch[-1]))
+            yield branch
+
+
+def _apart(a: Array, b: Array) -> float:
+    return float(np.linalg.norm((a - b)[[0, 1, 2, 6, 7, 8]]))
+
+
+def _windows(branch: Sequence[Point], counts: Callable[[Point], bool]) -> list[tuple[float, float]]:
+    """Frequencies between which the points of a branch count, up to where stability is lost."""
+    found = list[tuple[float, float]]()
+    for good, run in groupby(branch, lambda point: bool(point.kind) or counts(point)):
+        points = list(run)
+        if good and any(not point.kind for point in points):
+            values = [point.parameter for point in points]
+            found.append((min(values), max(values)))
+    return found
