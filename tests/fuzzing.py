@@ -235,8 +235,9 @@ VALUES = ["", "0", "1", "-1", "3.5", "1e-5", "nan", "inf", "dipole", "slab", "au
           "/nonexistent", "../..", "ä", "9" * 400,
           "-1,0,-40"]  # fmt: skip
 JOBS = [
-    "run.main_job", "single.field_job", "single.equilibria_job", "single.simulate_job", "plate_job.plate_job",
-    "study_job.study_job", "study_job.question_job", "drawings.draw_result", "show.show_job", "report.report_job",
+    "one_scene.main_job", "one_scene.field_job", "one_scene.equilibria_job", "one_scene.simulate_job",
+    "one_scene.plate_job", "catalogue.study_job", "catalogue.question_job", "catalogue.draw_result",
+    "catalogue.show_job", "catalogue.report_job",
 ]  # fmt: skip
 
 
@@ -248,7 +249,7 @@ def command(chance: random.Random, folder: Path) -> int:
         arguments.append(chance.choice([*COMMANDS.get(name, ["--json"]), *VALUES]))
     with contextlib.ExitStack() as stack:
         for job in JOBS:
-            pair = ((), []) if job.startswith(("show", "drawings")) else ({}, [])
+            pair = ((), []) if job.endswith(("show_job", "draw_result")) else ({}, [])
             stack.enter_context(mock.patch(f"spinlev.studies.{job}", return_value=pair[0] or pair))
         stack.enter_context(contextlib.redirect_stdout(io.StringIO()))
         return answered(arguments)

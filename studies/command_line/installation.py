@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib
 import sys
 
+from ..rendering import unavailable
 from ..terminal import FORTRAN, lend_quadmath, way_out
 
 MODULES = ("ngsolve", "netgen.occ", "heyoka", "h5py", "matplotlib.figure", "distributed", "spinlev.studies.interface")
@@ -26,8 +27,6 @@ def main() -> int:
             return 1
     if lent:
         print(f"NOTE: NGSolve uses the libquadmath that came with {lent.resolve().parent.name.removesuffix('.libs')}.")
-    from ..rendering import unavailable
-
     without = unavailable()
     if without:
         print(f"NOTE: {without}")

@@ -33,18 +33,18 @@ def parse_vary(asked: Sequence[str]) -> dict[str, list[Any]]:
         if key in found:
             raise InputError(f"Input --vary must give each key once; instead received {key} twice.")
         found[key] = [part.strip() for part in values.split(",")] if key in NAMED else _values(text, values)
-    return checked_values(found)
+    return checked_values(found, "--vary")
 
 
-def checked_values(values: Mapping[str, Sequence[Any]]) -> dict[str, list[Any]]:
-    """Values by key as lists of floats and, for `NAMED` keys, of texts.
+def checked_values(values: Mapping[str, Sequence[Any]], name: str = "values") -> dict[str, list[Any]]:
+    """Values by key as lists of floats and, for `NAMED` keys, of texts; `name` is what messages call them.
 
     Raises
     ------
     InputError : no key, no value, one that is no finite number, one that is given twice, or too many points
     """
     if not values:
-        raise InputError("Input values must have at least one key; instead received none.")
+        raise InputError(f"Input {name} must have at least one key; instead received none.")
     found = {}
     for key, given in values.items():
         listed = list(given) if isinstance(given, Iterable) and not isinstance(given, str) else [given]
@@ -53,11 +53,11 @@ def checked_values(values: Mapping[str, Sequence[Any]]) -> dict[str, list[Any]]:
             what = "names" if key in NAMED else "finite numbers"
             raise InputError(f"Input {key} must be varied over {what}; instead received {given!r}.")
         if len(set(listed)) < len(listed):
-            raise InputError(f"Input {key} must be given each value once; instead received {given!r}.")
+            raise InputError(f"Input {name} must give {key} each value once; instead received {given!r}.")
         found[key] = listed if key in NAMED else [float(value) for value in listed]
     points = math.prod(len(each) for each in found.values())
     if points > MOST:
-        raise InputError(f"Input values must make at most {MOST} points; instead received {points}.")
+        raise InputError(f"Input {name} must make at most {MOST} points; instead received {points}.")
     return found
 
 

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from places import SCENES
+from places import SCENES, TESTS
 
 from spinlev.dynamics.equilibria import find_equilibria
 from spinlev.dynamics.flights import simulate
@@ -59,7 +59,7 @@ class Endless:
 @pytest.fixture(autouse=True)
 def tests_are_found(monkeypatch):
     """The pictures of this file, by the other process."""
-    monkeypatch.setenv("PYTHONPATH", str(Path(__file__).parent))
+    monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(Path(__file__).parent), str(TESTS)]))
 
 
 def test_pictures_are_drawn_by_one_process_in_a_group_of_its_own(tmp_path):
