@@ -1,6 +1,7 @@
 """A sweep: the same numbers whoever computes, nothing finished is computed twice, what fails is named."""
 
 import json
+import logging
 import os
 import signal
 import subprocess
@@ -14,6 +15,7 @@ import pytest
 import xarray as xr
 from distributed import LocalCluster
 from matplotlib.figure import Figure
+from places import TESTS
 
 from spinlev.fem.storage import read_checked, write_checked
 from spinlev.geometry.basics import InputError
@@ -86,12 +88,13 @@ def test_a_killed_sweep_goes_on_where_it_was(tmp_path):
     log = tmp_path / "log"
     asked = points(*map(float, range(6)), log=str(log), pause=0.3)
     code = (
-        "import json, sys; from pathlib import Path; sys.path.insert(0, sys.argv[1])\n"
+        "import json, sys; from pathlib import Path; sys.path[:0] = json.loads(sys.argv[1])\n"
         "import test_sweep as t; points = {int(k): p for k, p in json.loads(sys.argv[2]).items()}\n"
         "t.swept('roots', t.STUDY, points, t.Workers(workers=1), Path(sys.argv[3]))"
     )
     folder = tmp_path / "killed"
-    command = [sys.executable, "-c", code, str(Path(__file__).parent), json.dumps(asked), str(folder)]
+    ways = json.dumps([str(Path(__file__).parent), str(TESTS)])
+    command = [sys.executable, "-c", code, ways, json.dumps(asked), str(folder)]
     with subprocess.Popen(command) as process:
         while len(list(folder.glob("roots.points/0*.nc"))) < 2:
             assert process.poll() is None
@@ -105,22 +108,24 @@ def test_a_killed_sweep_goes_on_where_it_was(tmp_path):
     assert len(done) <= 7  # at most the one point that was under way was begun twice
 
 
-def test_a_damaged_point_is_computed_anew(tmp_path, capsys):
+def test_a_damaged_point_is_computed_anew(tmp_path, caplog):
+    caplog.set_level(logging.INFO, "spinlev")
     log = tmp_path / "log"
     asked = points(1.0, 4.0, log=str(log))
     swept("roots", STUDY, asked, Workers(workers=1), tmp_path)
     damaged = tmp_path / "roots.points" / "000001.nc"
     damaged.write_bytes(damaged.read_bytes()[:-40])
     result = swept("roots", STUDY, asked, Workers(workers=1), tmp_path)
-    assert "damaged" in capsys.readouterr().err
+    assert "damaged" in caplog.text
     assert log.read_text().split() == ["1.0", "4.0", "4.0"]
     np.testing.assert_array_equal(result["root"], [1.0, 2.0])
 
 
-def test_points_of_another_sweep_are_not_used(tmp_path, capsys):
+def test_points_of_another_sweep_are_not_used(tmp_path, caplog):
+    caplog.set_level(logging.INFO, "spinlev")
     swept("roots", STUDY, points(1.0, 4.0), Workers(workers=1), tmp_path)
     result = swept("roots", STUDY, points(9.0, 4.0), Workers(workers=1), tmp_path)
-    assert "another sweep" in capsys.readouterr().err
+    assert "another sweep" in caplog.text
     np.testing.assert_array_equal(result["root"], [3.0, 2.0])
 
 
