@@ -13,11 +13,11 @@ from ..geometry.scene import Plate
 from .accuracy_error import AccuracyError
 from .field_functions import HIGHEST_DEGREE, candidates
 from .multipole_fit import fit_multipoles
-from .plate_reduction import STRICT, PlateNetwork, reduce_plate
+from .plate_reduction import PlateNetwork, reduce_plate
 from .plate_region import Region
+from .plate_solution import STRICT
 from .plate_table import PlateErrors, PlateTable
 from .plate_training import OtherSources
-from .sources import unit_dipoles
 
 FUNCTION_SHARE = 0.1
 """Share of the tolerance for the field functions; what the other errors leave of it comes on top."""
@@ -82,8 +82,7 @@ def tabulate(network: PlateNetwork, rtol: float) -> PlateTable:
     provenance: dict[str, str | float] = {
         "ngsolve": version("ngsolve"),
         "order": float(network.space.order),
-        "cells": float(network.space.conductors.mesh.ne),
-        "solved_hz": ", ".join(f"{f:.6g}" for f in network.solved),
+        "cells": float(network.space.cells),
         "rtol": rtol,
         "seconds": network.seconds + time.perf_counter() - start,
     }
@@ -102,7 +101,7 @@ def surface_counts(region: Region) -> tuple[int, int, int]:
 
 def field_values(network: PlateNetwork, points: Array) -> Array:
     """b_i (states, n, 3), T/√J, of the finite elements themselves."""
-    couplings = np.concatenate([part.T for part in network.couplings(unit_dipoles(points))])
+    couplings = np.concatenate([part.T for part in network.dipole_couplings(points)])
     return couplings.reshape(len(couplings), -1, 3)
 
 

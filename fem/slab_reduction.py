@@ -15,12 +15,13 @@ import numpy as np
 from ..geometry.box import Array
 from ..geometry.scene import Plate
 from .accuracy_error import AccuracyError
+from .current_training import unit_power
 from .eddy_space import Source
 from .network_error import coupling_error, truncated
 from .phasor import ComplexArray
 from .plate_reduction import NETWORK_SHARE, checked_ranges
 from .plate_region import Region
-from .plate_training import OtherSources, probe_places, unit_power
+from .plate_training import OtherSources, probe_places
 from .pod import OrderedBasis
 from .slab import reaction_tensor
 from .slab_frame import SlabFrame, corners, slab_frame

@@ -12,7 +12,7 @@ from netgen.meshing import NgException
 
 from spinlev.fem import memory
 from spinlev.fem.climb import rung
-from spinlev.fem.eddy import FrequencySystem
+from spinlev.fem.eddy import ShiftedSystem
 from spinlev.fem.eddy_space import EddySpace
 from spinlev.fem.magnetostatics import assemble
 from spinlev.fem.memory import TooLargeError, free_memory, memory_need
@@ -31,7 +31,7 @@ def magnets():
 
 def plate():
     conductors = plate_mesh((0.1, 0.24, 0.03), 3.5e7, [[0.03, 0.02, 0.04]], 100.0)
-    system = FrequencySystem(EddySpace(conductors, 2), 100.0)
+    system = ShiftedSystem(EddySpace(conductors, 2), 628j)
     return system.fes, system.fes.FreeDofs(True), system.form.mat
 
 

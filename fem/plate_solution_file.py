@@ -1,0 +1,106 @@
+"""A plate's currents in many states as one netCDF file in the cache: the finite elements' part of a table.
+
+Rows are kept in single precision: what couplings lose by it, about 1e-8, is far below any tolerance, and the fields of
+the rounded rows make a passive network as well.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from ..geometry.plate_mesh import MeshRule
+from ..geometry.scene import Plate
+from .current_space import CurrentSpace
+from .parity import Parity
+from .plate_region import Region
+from .plate_solution import PlateSolution, solve_currents
+from .plate_training import OtherSources
+from .table_store import described, from_cache, read_checked, write_checked
+
+FORMAT = "spinlev plate currents 1"
+
+
+def save_solution(solution: PlateSolution, path: Path) -> None:
+    """Write a solution; the file is whole or absent."""
+    space = solution.space
+    sizes = np.array([len(part) for part in space.fields])
+    variables = {
+        "box": (("number", "bound", "axis"), np.array([[b.lower, b.upper] for b in solution.boxes]), "m"),
+        "frequency": (("bound",), np.array(solution.frequencies), "Hz"),
+        "mirror": (("plane",), np.array(space.parity.mirrors, int), "1"),
+        "point": (("node", "axis"), space.points, "m"),
+        "root": (("component",), space.root, "S^1/2 m"),
+        "size": (("class",), sizes, "1"),
+        "field": (("state", "component"), np.concatenate(space.fields).astype(np.float32), "1"),
+        "inductance": (("entry",), np.concatenate([part.ravel() for part in space.inductances]), "s"),
+        "order_cells": (("order_cells",), np.array([space.order, space.cells]), "1"),
+        "error": (("mesh_states",), np.array([solution.mesh_error, solution.space_error]), "1"),
+        "probe": (("place", "axis"), solution.probes, "m"),
+        "angular_frequency": (("trial",), solution.angular_frequencies, "rad/s"),
+        "residual": (
+            ("part", "trial", "source", "other"),
+            np.stack([solution.residuals.real, solution.residuals.imag]),
+            "J s",
+        ),
+        "seconds": ((), solution.seconds, "s"),
+    }
+    write_checked(described(variables, {"format": FORMAT, "title": "Currents of a plate by finite elements"}), path)
+
+
+def load_solution(path: Path) -> PlateSolution:
+    """Read a solution.
+
+    Raises
+    ------
+    TableFileError : the file is not one of this format, or its content is not what was written
+    """
+    data = {str(name): part.values for name, part in read_checked(path, FORMAT).data_vars.items()}
+    sizes = data["size"]
+    squares = np.split(data["inductance"], np.cumsum(sizes**2)[:-1])
+    space = CurrentSpace(
+        Parity(tuple(int(axis) for axis in data["mirror"])),
+        data["point"],
+        data["root"],
+        tuple(np.split(data["field"].astype(float), np.cumsum(sizes)[:-1])),
+        tuple(part.reshape(n, n) for part, n in zip(squares, sizes, strict=True)),
+        *(int(number) for number in data["order_cells"]),
+    )
+    low, high = (float(f) for f in data["frequency"])
+    mesh, states = (float(error) for error in data["error"])
+    return PlateSolution(
+        tuple(Region(*box) for box in data["box"]), (low, high), space, mesh, states,
+        data["probe"], data["angular_frequency"], data["residual"][0] + 1j * data["residual"][1],
+        float(data["seconds"]),
+    )  # fmt: skip
+
+
+def cached_solver(key: Callable[..., str], report: Callable[[str], None]) -> Callable[..., PlateSolution]:
+    """`solve_currents` that looks into the cache first.
+
+    Parameters
+    ----------
+    key : of a solution, from the arguments of `solve_currents` without the mesh rule
+    """
+
+    def solve(
+        plate: Plate,
+        boxes: Sequence[Region],
+        frequencies: tuple[float, float],
+        rtol: float,
+        rule: MeshRule | None = None,
+        others: OtherSources | None = None,
+    ) -> PlateSolution:
+        if rule:
+            return solve_currents(plate, boxes, frequencies, rtol, rule, others)
+        return from_cache(
+            f"plate-currents-{key(plate, boxes, frequencies, rtol, others)}.nc",
+            load_solution,
+            lambda: solve_currents(plate, boxes, frequencies, rtol, None, others),
+            save_solution,
+            report,
+        )[0]
+
+    return solve
