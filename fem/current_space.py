@@ -18,7 +18,7 @@ from .eddy_space import Source
 from .parity import Parity
 from .phasor import ComplexArray
 
-CHUNK = 24
+CHUNK = 16
 """Sources handled at a time: bounds the memory."""
 
 
@@ -46,15 +46,16 @@ class CurrentSpace:
 
     def couplings(self, sources: Sequence[Source]) -> list[Array]:
         """b (sources, states) of each parity class."""
-        return self._products(source_images(self.parity, self.points, sources))
+        return self.image_couplings(source_images(self.parity, self.points, sources))
 
     def dipole_couplings(self, places: ArrayLike) -> list[Array]:
         """b (3 × places, states) of each parity class, of unit moments along x, y and z at places (m, 3), m."""
         places = np.asarray(places, float).reshape(-1, 3)
         images = dipole_images(self.parity, self.points, places)
-        return self._products(part.reshape(len(part), -1, *part.shape[3:]) for part in images)
+        return self.image_couplings(part.reshape(len(part), -1, *part.shape[3:]) for part in images)
 
-    def _products(self, images: Iterable[Array]) -> list[Array]:
+    def image_couplings(self, images: Iterable[Array]) -> list[Array]:
+        """b (sources, states) of each parity class, of parts of potentials as `source_images` makes them."""
         weighted = [field * self.root for field in self.fields]
         found: list[list[Array]] = [[np.zeros((0, len(field)))] for field in weighted]
         for part in images:
@@ -66,9 +67,10 @@ class CurrentSpace:
 def source_images(parity: Parity, points: Array, sources: Sequence[Source]) -> Iterable[Array]:
     """(classes, some sources, n, 3) parity parts of the sources' potentials at `points` (n, 3), T m."""
     flips = parity.flips
+    mirrored = (points * flips[:, None]).reshape(-1, 3)
     for start in range(0, len(sources), CHUNK):
-        some = sources[start : start + CHUNK]
-        yield parity.project(np.array([[flip * s.vector_potential(points * flip) for s in some] for flip in flips]))
+        some = [s.vector_potential(mirrored).reshape(len(flips), -1, 3) for s in sources[start : start + CHUNK]]
+        yield parity.project(np.stack(some, axis=1) * flips[:, None, None])
 
 
 def space_couplings(b: Sequence[Array], inductances: Sequence[Array], angular_frequency: float) -> ComplexArray:

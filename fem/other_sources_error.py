@@ -30,9 +30,10 @@ def error_of(solution: PlateSolution, sources: Sequence[Source]) -> float:
     """
     inside = solution.boxes[0].contains(solution.probes)
     standing = solution.boxes[1].contains(solution.probes)
-    amplitudes, rest = _fitted(solution.space, solution.probes[standing], sources)
+    images = np.concatenate(list(source_images(solution.space.parity, solution.space.points, sources)), axis=1)
+    amplitudes, rest = _fitted(solution.space, solution.probes[standing], images)
     stands, hears = np.repeat(standing, 3), np.repeat(inside, 3)
-    driving = solution.space.couplings(sources)
+    driving = solution.space.image_couplings([images])
     testing = solution.space.dipole_couplings(solution.probes[inside])
     worst = 0.0
     for omega, residuals in zip(solution.angular_frequencies, solution.residuals, strict=True):
@@ -48,13 +49,11 @@ def error_of(solution: PlateSolution, sources: Sequence[Source]) -> float:
     return worst
 
 
-def _fitted(space: CurrentSpace, places: Array, sources: Sequence[Source]) -> tuple[Array, Array]:
+def _fitted(space: CurrentSpace, places: Array, images: Array) -> tuple[Array, Array]:
     """Amplitudes (sources, 3 × places) of dipoles that stand for the sources, and norms (sources,) of the rest."""
+    wanted = images.reshape(*images.shape[:2], -1)
     standing = np.concatenate(
         [p.reshape(len(p), -1, space.root.size) for p in dipole_images(space.parity, space.points, places)], axis=1
-    )
-    wanted = np.concatenate(
-        [p.reshape(*p.shape[:2], -1) for p in source_images(space.parity, space.points, sources)], axis=1
     )
     squares = space.root**2
     products = sum((part * squares) @ part.T for part in standing)
@@ -62,7 +61,7 @@ def _fitted(space: CurrentSpace, places: Array, sources: Sequence[Source]) -> tu
     energies, vectors = np.linalg.eigh(np.asarray(products))
     kept = energies > INDEPENDENT * energies[-1]
     amplitudes = (vectors[:, kept] / energies[kept] @ vectors[:, kept].T @ np.asarray(overlaps)).T
-    powers = np.zeros(len(sources))
+    powers = np.zeros(images.shape[1])
     for part, other in zip(standing, wanted, strict=True):
         powers += ((other - amplitudes @ part) ** 2) @ squares
     return amplitudes, np.sqrt(powers)

@@ -36,7 +36,7 @@ def save_solution(solution: PlateSolution, path: Path) -> None:
         "size": (("class",), sizes, "1"),
         "field": (("state", "component"), np.concatenate(space.fields).astype(np.float32), "1"),
         "inductance": (("entry",), np.concatenate([part.ravel() for part in space.inductances]), "s"),
-        "order_cells": (("order_cells",), np.array([space.order, space.cells]), "1"),
+        "order_cells": (("whole_number",), np.array([space.order, space.cells]), "1"),
         "error": (("mesh_states",), np.array([solution.mesh_error, solution.space_error]), "1"),
         "probe": (("place", "axis"), solution.probes, "m"),
         "angular_frequency": (("trial",), solution.angular_frequencies, "rad/s"),

@@ -98,7 +98,7 @@ def test_the_bound_for_a_rotor_that_was_not_trained_holds(solution, rotor):
 
 
 def test_one_solution_serves_other_rotors_and_nearby_places(boxes, solution):
-    """Another rotor of the same box and a place half a millimetre off ask for the same boxes, and the network is made."""
+    """Another rotor in the same box and a place half a millimetre off ask for the same boxes."""
     shifted = Region(REGION.lower + 5e-4, REGION.upper + 5e-4)
     other = rotor_table(horizontal(0.0021, 0.01, 1.3, 1.0), "dipole")
     asked = []
