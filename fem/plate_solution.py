@@ -13,22 +13,17 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..geometry.box import Array
-from ..geometry.plate_mesh import MeshRule, plate_mesh
+from ..geometry.plate_mesh import MeshRule
 from ..geometry.scene import Plate
-from .accuracy_error import AccuracyError
 from .current_space import CurrentSpace, space_couplings
 from .current_training import SourceSet, train
-from .eddy import solve_eddy
-from .eddy_space import EddySpace
+from .order_ladder import MESH_SHARE, Ladder
 from .phasor import ComplexArray
-from .plate import BEST_REDUCTION, STALLED, order_error, own_tensors, truncation_error
-from .plate_limits import highest_order
 from .plate_region import Region
 from .plate_training import OtherSources, grid_counts, probe_places
-from .sources import unit_dipoles
 
-MESH_SHARE, SPACE_SHARE = 0.6, 0.1
-"""Shares of the tolerance for the finite elements, and for what the current space misses of their currents."""
+SPACE_SHARE = 0.1
+"""Share of the tolerance for what the current space misses of the finite elements' currents."""
 STRICT = 5e-4
 """Tolerances below this have a finer mesh."""
 HOPEFUL = 1.5
@@ -104,66 +99,3 @@ def solve_currents(
         tuple(boxes), frequencies, space, ladder.error, missing.worst, probes.places, missing.angular_frequencies,
         missing.residuals[:, : 3 * len(probes.places), : 3 * len(probes.places)], time.perf_counter() - start,
     )  # fmt: skip
-
-
-class Ladder:
-    """Orders of the finite elements on one mesh, one after the other, and the error of each.
-
-    Parameters
-    ----------
-    corners : (n, 3) m, places of the dipoles whose tensors are compared, plate's frame
-    frequency : Hz
-    allowed : relative error
-    """
-
-    def __init__(self, plate: Plate, corners: Array, frequency: float, rule: MeshRule, allowed: float) -> None:
-        self.mesh = plate_mesh(plate.box.size, plate.conductivity, corners, frequency, rule)
-        self.highest = highest_order(self.mesh.mesh.ne)
-        self.corners, self.frequency, self.rule, self.allowed = corners, frequency, rule, allowed
-        self.reach = rule.reach * float(plate.box.size.max())
-        self.order, self.error, self.change, self.truncation = 0, np.inf, np.ones(len(corners)), np.zeros(len(corners))
-        self.last = self.change
-        self.tensors: ComplexArray = np.zeros((len(corners), 3, 3), complex)
-        self.climb(self.solved())
-
-    def next_space(self) -> EddySpace:
-        """Of the next order."""
-        return EddySpace(self.mesh, self.order + 1)
-
-    def solved(self) -> ComplexArray:
-        """Couplings of the corners' dipoles at the next order."""
-        response = solve_eddy(self.mesh, self.order + 1, self.frequency, unit_dipoles(self.corners))
-        self.truncation = truncation_error(response, self.reach)
-        return response.couplings
-
-    def climb(self, couplings: ComplexArray) -> None:
-        """Take the next order's couplings."""
-        tensors = own_tensors(couplings)
-        self.order += 1
-        if self.order > 1:
-            size = np.linalg.norm(tensors, axis=(1, 2))
-            self.last, self.change = self.change, np.linalg.norm(tensors - self.tensors, axis=(1, 2)) / size
-            self.error = float(np.max(order_error(self.change, self.last) + self.truncation / size))
-        self.tensors = tensors
-
-    def expected(self) -> float:
-        """Error of the next order, if it helps as the last did; nothing is expected of the first two."""
-        if self.order < 2 or self.error <= self.allowed:
-            return np.inf if self.order < 2 else 0.0
-        reduction = self.change / self.last
-        return float(np.max(order_error(self.change * reduction, self.change)))
-
-    def refuse(self) -> None:
-        """Go on only where that can help.
-
-        Raises
-        ------
-        AccuracyError : the mesh is too coarse
-        """
-        hopeless = self.error * BEST_REDUCTION ** (self.highest - self.order) > self.allowed
-        stalled = self.order > 2 and float(np.max(self.change / self.last)) > STALLED
-        if self.order > 1 and (hopeless or stalled) and self.error > self.allowed:
-            raise AccuracyError(
-                f"Input rtol must be at least {self.error / MESH_SHARE:.1e} for the mesh rule {self.rule}; instead "
-                f"received {self.allowed / MESH_SHARE:.1e}."
-            )

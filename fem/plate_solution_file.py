@@ -6,10 +6,14 @@ the rounded rows make a passive network as well.
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Callable, Sequence
+from importlib.metadata import version
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import ArrayLike
+from scipy.stats import qmc
 
 from ..geometry.plate_mesh import MeshRule
 from ..geometry.scene import Plate
@@ -21,6 +25,8 @@ from .plate_training import OtherSources
 from .table_store import described, from_cache, read_checked, write_checked
 
 FORMAT = "spinlev plate currents 1"
+LOOKS = 20
+"""Places in the plate at which the potential of a source is looked at to tell it from others."""
 
 
 def save_solution(solution: PlateSolution, path: Path) -> None:
@@ -45,13 +51,12 @@ def save_solution(solution: PlateSolution, path: Path) -> None:
             np.stack([solution.residuals.real, solution.residuals.imag]),
             "J s",
         ),
-        "seconds": ((), solution.seconds, "s"),
     }
     write_checked(described(variables, {"format": FORMAT, "title": "Currents of a plate by finite elements"}), path)
 
 
 def load_solution(path: Path) -> PlateSolution:
-    """Read a solution.
+    """Read a solution; no time is spent on it.
 
     Raises
     ------
@@ -73,17 +78,35 @@ def load_solution(path: Path) -> PlateSolution:
     return PlateSolution(
         tuple(Region(*box) for box in data["box"]), (low, high), space, mesh, states,
         data["probe"], data["angular_frequency"], data["residual"][0] + 1j * data["residual"][1],
-        float(data["seconds"]),
+        0.0,
     )  # fmt: skip
 
 
-def cached_solver(key: Callable[..., str], report: Callable[[str], None]) -> Callable[..., PlateSolution]:
-    """`solve_currents` that looks into the cache first.
+def currents_key(
+    plate: Plate, boxes: Sequence[Region], frequencies: tuple[float, float], rtol: float, others: OtherSources | None
+) -> str:
+    """SHA-256 of what decides a solution of the finite elements; other sources by their potential in the plate."""
+    numbers: list[ArrayLike] = [plate.box.size, [plate.conductivity, rtol], frequencies]
+    numbers += [bound for box in boxes for bound in (box.lower, box.upper)]
+    if others:
+        places = qmc.scale(qmc.Halton(3, seed=1).random(LOOKS), -plate.box.half_edges, plate.box.half_edges)
+        numbers.append(np.round(others.places, 9))
+        for source in (*others.training, *others.probes):
+            potential = source.vector_potential(places)
+            numbers.append(np.round(potential / np.abs(potential).max(), 9))
+    return digest(FORMAT, numbers)
 
-    Parameters
-    ----------
-    key : of a solution, from the arguments of `solve_currents` without the mesh rule
-    """
+
+def digest(name: str, parts: Sequence[ArrayLike]) -> str:
+    """SHA-256 of a name, the programs and numbers."""
+    found = hashlib.sha256(f"{name} {version('spinlev')} {version('ngsolve')}".encode())
+    for part in parts:
+        found.update(np.ascontiguousarray(np.asarray(part) + 0.0, dtype="<f8").tobytes())
+    return found.hexdigest()
+
+
+def cached_solver(report: Callable[[str], None]) -> Callable[..., PlateSolution]:
+    """`solve_currents` that looks into the cache first."""
 
     def solve(
         plate: Plate,
@@ -96,7 +119,7 @@ def cached_solver(key: Callable[..., str], report: Callable[[str], None]) -> Cal
         if rule:
             return solve_currents(plate, boxes, frequencies, rtol, rule, others)
         return from_cache(
-            f"plate-currents-{key(plate, boxes, frequencies, rtol, others)}.nc",
+            f"plate-currents-{currents_key(plate, boxes, frequencies, rtol, others)}.nc",
             load_solution,
             lambda: solve_currents(plate, boxes, frequencies, rtol, None, others),
             save_solution,

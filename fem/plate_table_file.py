@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-import hashlib
 import json
 from collections.abc import Callable, Sequence
-from importlib.metadata import version
 from pathlib import Path
 
 import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike
-from scipy.stats import qmc
 
 from ..geometry.magnet import MU_0
 from ..geometry.scene import Plate
@@ -20,16 +17,13 @@ from .field_functions import Multipoles
 from .multipole import FOUR_PI
 from .plate_model import plate_table
 from .plate_region import Region
-from .plate_solution_file import cached_solver
+from .plate_solution_file import cached_solver, digest
 from .plate_table import PlateErrors, PlateTable
-from .plate_training import OtherSources
 from .rotor_share import RotorShare
 from .table import RotorTable
 from .table_store import TableFileError, described, from_cache, read_checked, write_checked
 
 FORMAT = "spinlev plate table 1"
-LOOKS = 20
-"""Places in the plate at which the potential of a source is looked at to tell it from others."""
 
 
 def save_plate_table(table: PlateTable, path: str | Path, share: RotorShare | None = None) -> None:
@@ -124,26 +118,8 @@ def driven_plate_key(
     return _hash(plate_key(plate, region, frequencies, rtol), numbers)
 
 
-def currents_key(
-    plate: Plate, boxes: Sequence[Region], frequencies: tuple[float, float], rtol: float, others: OtherSources | None
-) -> str:
-    """SHA-256 of what decides a solution of the finite elements; other sources by their potential in the plate."""
-    numbers: list[ArrayLike] = [plate.box.size, [plate.conductivity, rtol], frequencies]
-    numbers += [bound for box in boxes for bound in (box.lower, box.upper)]
-    if others:
-        places = qmc.scale(qmc.Halton(3, seed=1).random(LOOKS), -plate.box.half_edges, plate.box.half_edges)
-        numbers += [np.round(bound * 1e9) for bound in others.places]
-        for source in (*others.training, *others.probes):
-            potential = source.vector_potential(places)
-            numbers.append(np.round(potential / np.abs(potential).max(), 9))
-    return _hash("currents", numbers)
-
-
 def _hash(name: str, parts: Sequence[ArrayLike]) -> str:
-    digest = hashlib.sha256(f"{FORMAT} {version('spinlev')} {version('ngsolve')} {name}".encode())
-    for part in parts:
-        digest.update(np.ascontiguousarray(np.asarray(part) + 0.0, dtype="<f8").tobytes())
-    return digest.hexdigest()
+    return digest(f"{FORMAT} {name}", parts)
 
 
 def cached_plate_table(
@@ -172,7 +148,7 @@ def cached_driven_plate(
         f"driven-plate-{driven_plate_key(plate, rotor, region, frequencies, rtol)}.nc",
         load_driven_plate,
         lambda: plate_and_rotor_table(
-            plate, rotor, region, frequencies, rtol, solve=cached_solver(currents_key, report)
+            plate, rotor, region, frequencies, rtol, solve=cached_solver(report)
         ),
         lambda made, path: save_plate_table(made[0], path, made[1]),
         report,
