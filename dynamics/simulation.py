@@ -16,8 +16,9 @@ from .equations import parameters
 from .equilibria import find_equilibria
 from .equilibrium import Equilibrium, EquilibriumError
 from .events import clearance, plate_depth
-from .flight import TOLERANCE, compile_flight
+from .flight import TOLERANCE
 from .integration import integrate
+from .local_flight import compile_local_flight
 from .memory import PlateMemory
 from .plate_force import PlateForce
 from .state import Scales, State
@@ -51,7 +52,7 @@ def simulate(
     Parameters
     ----------
     equilibria : of this scene, if they are already known
-    tolerance, compact : see `compile_flight`
+    tolerance, compact : see `compile_local_flight`
     progress : called with the finished part, 0 to 1, a few times a second
     memory : the plate's currents; left out, the plate is only an obstacle
     checkpoint : where the flight is kept while it lasts; it goes on from there if there is something
@@ -67,7 +68,7 @@ def simulate(
     start, currents = initial_state(scene, table, equilibria, memory)
     if memory is not None:
         tolerance = max(tolerance, PLATE_TOLERANCE)
-    flight = compile_flight(scene, table, duration, tolerance, compact, memory)
+    flight = compile_local_flight(scene, table, duration, tolerance, compact, memory)
     flown = integrate(scene, flight, start, duration, progress, currents, checkpoint)
     return flown if memory is None else replace(flown, beyond_plate_table=_beyond(memory, flown))
 
