@@ -61,6 +61,7 @@ class Progress:
         integrator = flight.part(self.values).integrator
         integrator.dtime = (float(self.time[0]), float(self.time[1]))
         integrator.state[:] = self.state
+        integrator.reset_cooldowns()
         recorder.times, recorder.states, recorder.interval = self.times, self.states, self.interval
         count, *rest = self.changes.tolist()
         return self.values.copy(), self.steps, FieldChanges(int(count), *rest)

@@ -6,7 +6,7 @@ import heyoka as hy
 import numpy as np
 import pytest
 
-from spinlev.dynamics import Checkpoint, FlightStopped, integration, simulate
+from spinlev.dynamics import Checkpoint, FlightStopped, PlateMemory, integration, simulate
 from spinlev.dynamics.balls import ERROR
 from spinlev.dynamics.flight import compile_flight
 from spinlev.dynamics.integration import integrate
@@ -15,9 +15,12 @@ from spinlev.dynamics.simulation import initial_state
 from spinlev.fem.ball_field import BallField
 from spinlev.fem.local_field import Ball
 from spinlev.fem.multipole import uniform_moments
+from spinlev.fem.plate_region import Region
+from spinlev.fem.slab_table import slab_and_rotor_table
 from spinlev.fem.table import RotorTable
 from spinlev.geometry import rotor
-from spinlev.geometry.scene import AbsoluteStart, Drag, Floater, Scene
+from spinlev.geometry.box import Box
+from spinlev.geometry.scene import AbsoluteStart, Drag, Floater, Lowering, Plate, Scene
 
 MAGNETS = rotor.horizontal(2e-3, 10e-3, 1.305, 1.0)
 TABLE = RotorTable("moments", MAGNETS, (), tuple(uniform_moments(m, 21) for m in MAGNETS))
@@ -120,6 +123,22 @@ def test_a_stopped_flight_with_changes_goes_on_to_the_last_bit(start, tmp_path, 
         np.testing.assert_array_equal(found, exact)
     assert second.field_changes == whole.field_changes
     assert second.energy_error == whole.energy_error
+
+
+def test_over_a_plate_that_is_lowered_it_flies_as_in_the_table(start):
+    """Changes of the ball while the plate moves; the ledger of currents and motion closes as without balls."""
+    plate = Plate(Box((0.1, 0.24, 0.03), (0.0, 0.0, -0.047)), 3.5e7, Lowering(0.05, 0.02, 4e-3))
+    region = Region(np.array([-3e-3, -3e-3, 0.024]), np.array([3e-3, 3e-3, 0.037]))
+    memory = PlateMemory(plate, *slab_and_rotor_table(plate, TABLE, region, rtol=1e-2), "slab")
+    scene, still = replace(SCENE, plate=plate), np.zeros(len(memory.table.rates))
+    state = replace(start, velocity=start.velocity + np.array([0.03, 0.02, 0.06]))
+    near, whole = [
+        integrate(scene, compile(scene, TABLE, 0.5, 1e-13, True, memory), state, 0.5, currents=still)
+        for compile in (compile_local_flight, compile_flight)
+    ]
+    assert near.field_changes.count >= 1
+    assert near.energy_error < 1e-9
+    assert np.abs(near.lab.position - whole.lab.position).max() < 1e-8
 
 
 def test_short_expressions_fly_by_themselves():
