@@ -6,8 +6,6 @@ import signal
 import sys
 import threading
 
-from ..terminal import make_readable
-
 STOPPED = "spinlev: stopped; what was finished is kept."
 AGAIN = 0.01
 """Seconds until an interrupt is raised again that fell where Python drops exceptions."""
@@ -17,8 +15,10 @@ def main() -> None:
     """Load the command line, run it, and leave with its exit status."""
     stop = threading.Event()
     _listen(stop)
-    make_readable()
     try:
+        from ..terminal import make_readable
+
+        make_readable()
         from .cli import run
 
         status = run(sys.argv[1:], stop)

@@ -28,7 +28,6 @@ from spinlev.fem.storage import foreign, read_checked, write_checked, write_whol
 from spinlev.fem.storage.whole_files import replacing
 from spinlev.studies.command_line.cli import _status
 from spinlev.studies.rendering import renderer
-from spinlev.studies.terminal import Models
 
 SCENE, OVER_PLATE = str(places.HORIZONTAL), str(places.OVER_PLATE)
 DIPOLE = ("--model", "dipole", "--plate-model", "none")
@@ -270,7 +269,7 @@ def test_ctrl_c_while_the_program_is_loaded(library, blow):
         "from spinlev.studies.command_line.start import main\n"
         "main()\n"
     )
-    done = subprocess.run([sys.executable, "-c", code, "cite"], capture_output=True, text=True, check=False)
+    done = subprocess.run([sys.executable, "-c", code, "study", "--list"], capture_output=True, text=True, check=False)
     assert done.returncode == 1, done.stderr
     assert done.stderr == "spinlev: stopped; what was finished is kept.\n"
 
@@ -279,7 +278,7 @@ def test_ctrl_c_that_falls_into_a_destructor_is_not_lost():
     """Python drops what is raised there; the program would go on."""
     code = (
         "import os, signal, threading\n"
-        "from spinlev.studies import cli, start\n"
+        "from spinlev.studies.command_line import cli, start\n"
         "class Dropped:\n"
         "    def __del__(self):\n"
         "        os.kill(os.getpid(), signal.SIGINT)\n"
@@ -423,7 +422,6 @@ def test_a_renderer_that_dies_takes_no_result_with_it(spinlev, monkeypatch):
     Path("out/scene.png").write_text("of an older result")
     with monkeypatch.context() as patch:
         patch.setattr(renderer, "COMMAND", (sys.executable, "-c", dies))
-        patch.setattr("spinlev.studies.catalogue.show.Models", lambda: Models("dipole"))
         patch.setattr("spinlev.studies.catalogue.show.plate_currents", lambda *given: np.zeros_like(given[-1]))
         status, answer, said = spinlev(*arguments)
         shown = spinlev("show", "out/result.nc")
