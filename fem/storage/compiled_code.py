@@ -7,6 +7,7 @@ number.  What it has compiled can be pickled with the code in it, which is read 
 from __future__ import annotations
 
 import hashlib
+import logging
 import os
 import pickle
 import zlib
@@ -68,8 +69,8 @@ def _keep(made: object, path: Path) -> None:
     try:
         write_whole(path, seal(zlib.compress(pickle.dumps(made), 1)))
         make_room(path.parent)
-    except OSError:  # costs time only
-        pass
+    except OSError as error:  # costs time only
+        logging.getLogger("spinlev").debug("Compiled code could not be kept: %s", error)
 
 
 def make_room(folder: Path, limit: int = LIMIT) -> None:
