@@ -14,7 +14,7 @@ from ..catalogue import CATALOGUE, QUESTION, figures_of, question_study
 from ..one_scene import Question, given_scene
 from ..results import Study
 from ..sweeps import forget, swept
-from ..terminal import FieldModel, Models, PlateModel, Quantity, Workers, checked_values, combinations, heard
+from ..terminal import FieldModel, Models, PlateModel, Quantity, Workers, checked_values, combinations, finite, heard
 
 Values = Mapping[str, Sequence[float] | Sequence[str]]
 
@@ -58,8 +58,10 @@ def sweep(
     """
     loaded = given_scene(scene)
     models = Models(model, plate_model, rtol, plate_rtol).checked()
-    where = tuple(float(c) for c in place)
-    question = Question(loaded, "scene", ask, models, float(spin), float(duration), where)
+    where = tuple(finite("place", coordinate) for coordinate in place)
+    if len(where) != 3:
+        raise InputError(f"Input place must be three numbers, m; instead received {place!r}.")
+    question = Question(loaded, "scene", ask, models, finite("spin", spin), finite("duration", duration), where)
     grid = checked_values(values)
     with heard(progress):
         return _computed(QUESTION, question_study(question, grid), combinations(grid), (workers, scheduler), out)

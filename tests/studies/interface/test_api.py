@@ -183,6 +183,12 @@ def test_a_wrong_sweep(values, said, tmp_path):
         sl.sweep(HORIZONTAL, values, out=tmp_path)
 
 
+@pytest.mark.parametrize("wrong", [{"spin": "fast"}, {"duration": "long"}, {"duration": -1.0}, {"place": (0.0, 0.0)}])
+def test_a_sweep_of_wrong_arguments(wrong, tmp_path):
+    with pytest.raises(sl.InputError, match=f"Input {next(iter(wrong))} must be"):
+        sl.sweep(HORIZONTAL, {"frequency_hz": [110.0]}, out=tmp_path, **wrong)
+
+
 def test_a_flight_from_a_place_needs_no_equilibrium(tmp_path):
     """Nor a turning rotor, by whatever way it is asked for."""
     falling = sl.scene(
