@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from ...geometry.basics import Array
-from ..equilibria import Steps, near_curve, whole_curve
+from ..equilibria import Steps, near_curve, whole_curves
 from ..motion import Parameter
 from ..steady import Balance, EquilibriumError
 from .boundary_equations import COLLISION, CROSSING, Boundary, BoundaryPoint, Plane
@@ -46,8 +46,12 @@ def follow_boundary(plane: Plane, start: Point, place: Array, kind: str | None =
     frequency = 0.0 if kind == FOLD else 2 * np.pi * start.leading_hz * start.time_unit
     guess = np.concatenate([state[:3], state[6:9], place / plane.units, [frequency]])
     first = near_curve(boundary, guess, 1.0)
-    found = None if first is None else whole_curve(boundary, first, STEPS, lambda x: plane.holds(x[6:8] * plane.units))
+    found = (
+        None
+        if first is None
+        else whole_curves(boundary, first[None], STEPS, lambda x: plane.holds(x[:, 6:8] * plane.units))[0]
+    )
     if found is None:
         raise EquilibriumError(f"Input start must lie on a {kind} of the plane; instead there was none near it.")
     points = [BoundaryPoint(x[6:8] * plane.units, x[:3], x[3:6], float(x[8])) for x in found[0]]
-    return [point for point in points if plane.holds(point.place)]
+    return [point for point in points if plane.holds(point.place[None])[0]]

@@ -13,6 +13,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...geometry.basics import Array
 from ..equilibria import AtRest
@@ -45,9 +46,9 @@ class Plane:
     lower: Array
     upper: Array
 
-    def holds(self, place: Array) -> bool:
-        """Whether a place (2,) lies in the part that is looked at."""
-        return bool(np.all((place >= self.lower) & (place <= self.upper)))
+    def holds(self, places: Array) -> NDArray[np.bool_]:
+        """Which places (n, 2) lie in the part that is looked at."""
+        return np.asarray(((places >= self.lower) & (places <= self.upper)).all(axis=1))
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,24 +87,24 @@ class Boundary(AtRest):
     scale: float
 
     def linear(self, points: Array, which: Indices) -> tuple[Array, Array]:
-        """Balance, test, frequency and |m̂| = 1 (1, 8) at one point (1, 9), and their derivatives (1, 8, 9)."""
-        values = self._after(
-            points[0], np.concatenate([np.zeros((1, 7)), DIFFERENCE * np.eye(7), -DIFFERENCE * np.eye(7)])
-        )
-        values[:, 6] -= points[0, 8]
-        slope = np.column_stack([(values[1:8] - values[8:]).T / (2 * DIFFERENCE), -np.eye(7)[6]])
-        return self.extended(values[:1], slope[None], points[:, 3:6])
+        """Balance, test, frequency and |m̂| = 1 (n, 8) at points (n, 9), and their derivatives (n, 8, 9)."""
+        changes = np.concatenate([np.zeros((1, 7)), DIFFERENCE * np.eye(7), -DIFFERENCE * np.eye(7)])
+        values = self._after(np.repeat(points, 15, axis=0), np.tile(changes, (len(points), 1))).reshape(-1, 15, 7)
+        values[:, :, 6] -= points[:, None, 8]
+        slope = np.zeros((len(points), 7, 8))
+        slope[:, :, :7] = np.swapaxes(values[:, 1:8] - values[:, 8:], 1, 2) / (2 * DIFFERENCE)
+        slope[:, 6, 7] = -1.0
+        return self.extended(values[:, 0], slope, points[:, 3:6])
 
     def _after(self, at: Array, change: Array) -> Array:
-        """Balance, test and frequency (n, 7) after changes (n, 7) of position, tilts and parameters at a point (9,)."""
-        here = np.zeros((len(change), 3))
-        position, moment = moved(here + at[:3], here + at[3:6], change[:, :5])
-        place = (at[6:8] + change[:, 5:]) * self.plane.units
+        """Balance, test, frequency (n, 7) after changes (n, 7) of position, tilts, parameters at points (n, 9)."""
+        position, moment = moved(at[:, :3], at[:, 3:6], change[:, :5])
+        place = (at[:, 6:8] + change[:, 5:]) * self.plane.units
         balance = Balance(self.plane.rates, self.plane.values(*place.T), self.plane.spin)
         value, slope = balance(position, moment)
-        return np.column_stack([value, *self._test(balance, position, moment, slope, at[8])])
+        return np.column_stack([value, *self._test(balance, position, moment, slope, at[:, 8:])])
 
-    def _test(self, balance: Balance, position: Array, moment: Array, slope: Array, near: float) -> tuple[Array, Array]:
+    def _test(self, balance: Balance, position: Array, moment: Array, slope: Array, near: Array) -> tuple[Array, Array]:
         if self.kind == FOLD:
             return np.linalg.det(slope) / self.scale, np.zeros(len(slope))
         states = balance.states(position, moment)

@@ -6,7 +6,7 @@ from .full_search import find_equilibria, survey, with_plate
 from .perturbed import PerturbedBalance, Shift
 from .plate_effect import plate_action
 from .search import SearchRange
-from .tracing import near_curve, whole_curve
+from .tracing import near_curve, whole_curves
 
 __all__ = [
     "END",
@@ -26,6 +26,6 @@ __all__ = [
     "scattered",
     "stepped",
     "survey",
-    "whole_curve",
+    "whole_curves",
     "with_plate",
 ]

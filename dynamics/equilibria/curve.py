@@ -8,6 +8,7 @@ folds included.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from scipy.interpolate import CubicHermiteSpline
@@ -16,9 +17,11 @@ from ...geometry.basics import Array
 from ..steady import AXIAL, LATERAL, Balance, Indices, solve
 from .continuation import AtRest, Steps
 from .search import SearchRange
-from .tracing import whole_curve
+from .tracing import whole_curves
 
 STEPS = Steps(longest=0.1, shortest=1e-6, turn=0.15, most=5000, first=1 / 4)
+TOGETHER = 8
+"""Curves that are followed at once; some may turn out to be the same."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,27 +44,26 @@ class Curve:
     force: Array
     slope: Array
 
-    def passes(self, position: Array, moment: Array) -> bool:
-        """Whether the curve goes through a point, judged by cubic interpolation at the point's own height."""
-        spline = CubicHermiteSpline(self.arc, self._points, self.tangent)
-        height = CubicHermiteSpline(self.arc, self._points[:, 2] - position[2], self.tangent[:, 2])
-        crossings = height.roots(extrapolate=False)
-        crossings = crossings[np.isfinite(crossings)]
-        if not len(crossings):
-            return False
-        apart = spline(crossings) - np.concatenate([position, moment])
-        return bool(np.min(np.linalg.norm(apart, axis=1)) < 1e-3)
+    def passes(self, point: Array) -> bool:
+        """Whether the curve goes through a point (6,), judged by cubic interpolation at the point's own height."""
+        crossings = self._height.solve(point[2], extrapolate=False)
+        apart = self._spline(crossings[np.isfinite(crossings)]) - point
+        return bool(np.min(np.linalg.norm(apart, axis=1), initial=np.inf) < 1e-3)
 
     def balanced(self) -> tuple[Array, Array]:
         """Estimates (k, 3) of positions and moments where the axial force vanishes as well."""
         crossings = CubicHermiteSpline(self.arc, self.force, self.slope).roots(extrapolate=False)
-        points = CubicHermiteSpline(self.arc, self._points, self.tangent)(crossings[np.isfinite(crossings)])
+        points = self._spline(crossings[np.isfinite(crossings)])
         moment = points[:, 3:]
         return points[:, :3], moment / np.linalg.norm(moment, axis=1, keepdims=True)
 
-    @property
-    def _points(self) -> Array:
-        return np.concatenate([self.position, self.moment], axis=1)
+    @cached_property
+    def _spline(self) -> CubicHermiteSpline:
+        return CubicHermiteSpline(self.arc, np.concatenate([self.position, self.moment], axis=1), self.tangent)
+
+    @cached_property
+    def _height(self) -> CubicHermiteSpline:
+        return CubicHermiteSpline(self.arc, self.position[:, 2], self.tangent[:, 2])
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,16 +78,16 @@ class Lateral(AtRest):
         return self.extended(value[:, LATERAL], slope[:, LATERAL], points[:, 3:])
 
 
-def curve_through(balance: Balance, position: Array, moment: Array, where: SearchRange) -> Curve | None:
-    """The curve through a point (3,), (3,) both ways, until it leaves the range or closes.
+def curves_through(balance: Balance, points: Array, where: SearchRange) -> list[Curve | None]:
+    """The curves through points (n, 6), both ways, until they leave the range or close.
 
     None where four balances do not fix a curve (a field of revolution about the axis).
     """
-    start = np.concatenate([position, moment])
-    found = whole_curve(Lateral(balance), start, STEPS, lambda point: point[:3] in where)
-    if found is None or len(found[0]) < 2:
-        return None
-    points, tangents = found
+    found = whole_curves(Lateral(balance), points, STEPS, lambda points: where.holds(points[:, :3]))
+    return [None if one is None or len(one[0]) < 2 else _curve(balance, *one) for one in found]
+
+
+def _curve(balance: Balance, points: Array, tangents: Array) -> Curve:
     value, slope = balance(points[:, :3], points[:, 3:])
     slope = AtRest.extended(value, slope, points[:, 3:])[1][:, AXIAL]
     chords = np.linalg.norm(np.diff(points, axis=0), axis=1)
@@ -96,18 +98,19 @@ def curve_through(balance: Balance, position: Array, moment: Array, where: Searc
 def all_curves(balance: Balance, where: SearchRange) -> list[Curve]:
     """Every curve that is met in the range, from its starts at their own heights."""
     position, moment, step = solve(balance, *where.starts(), LATERAL)
+    met = (step < 1e-8) & where.holds(position)
+    seeds = _distinct(np.concatenate([position[met], moment[met]], axis=1))
     curves: list[Curve] = []
-    for r, m in _distinct(position[step < 1e-8], moment[step < 1e-8]):
-        if r not in where or any(curve.passes(r, m) for curve in curves):
-            continue
-        curve = curve_through(balance, r, m, where)
-        if curve is not None:
-            curves.append(curve)
+    while len(seeds):
+        chosen = np.arange(len(seeds)) % -(-len(seeds) // TOGETHER) == 0
+        for seed, curve in zip(seeds[chosen], curves_through(balance, seeds[chosen], where), strict=True):
+            if curve is not None and not any(known.passes(seed) for known in curves):
+                curves.append(curve)
+        seeds = np.array([seed for seed in seeds[~chosen] if not any(curve.passes(seed) for curve in curves)])
     return curves
 
 
-def _distinct(position: Array, moment: Array) -> list[tuple[Array, Array]]:
-    """Points that differ by more than 1e-6, lowest first."""
-    _, first = np.unique(np.round(np.concatenate([position, moment], axis=1), 6), axis=0, return_index=True)
-    order = first[np.argsort(position[first, 2])]
-    return [(position[i], moment[i]) for i in order]
+def _distinct(points: Array) -> Array:
+    """Points (n, 6) that differ by more than 1e-6, lowest first."""
+    _, first = np.unique(np.round(points, 6), axis=0, return_index=True)
+    return np.asarray(points[first[np.argsort(points[first, 2])]])

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from functools import cached_property
+from typing import Any
+
 import heyoka as hy
 import numpy as np
 from numpy.typing import ArrayLike
@@ -10,6 +13,7 @@ from ...fem.rotor_tables import FieldFormula
 from ...fem.storage import compiled
 from ...geometry.basics import Array
 from ...geometry.scenes import Scene
+from .at_rest import balances
 from .equations import equations_of_motion
 
 
@@ -25,12 +29,12 @@ class Rates:
 
     def __init__(self, table: FieldFormula, conducting: bool = False, optimised: bool = False) -> None:
         equations = equations_of_motion(table, conducting=conducting)
+        self._equations, self._level = equations, 1 if optimised else 0
         variables = list(equations.variables)
         tensors = hy.diff_tensors(list(equations.rates), diff_args=variables, diff_order=1)
         outputs = [*equations.rates, *np.asarray(tensors.jacobian).ravel()]
         # Unoptimised code is compiled three times as fast, and a search is over before faster code would be ready.
-        level = 1 if optimised else 0
-        self._function = compiled(hy.cfunc, outputs, variables, compact_mode=True, opt_level=level)
+        self._function = compiled(hy.cfunc, outputs, variables, compact_mode=True, opt_level=self._level)
 
     @classmethod
     def of(cls, scene: Scene, table: FieldFormula) -> Rates:
@@ -42,8 +46,29 @@ class Rates:
 
         `values` of the parameters: (p,) for all states or (n, p), one row for each.
         """
-        states = np.asarray(states, float)
-        rows = np.broadcast_to(values[..., : self._function.nparams], (len(states), self._function.nparams))
-        pars = np.ascontiguousarray(rows.T)
-        found = self._function(np.ascontiguousarray(states.T), pars=pars).T
+        found = _called(self._function, np.asarray(states, float).T, values).T
         return found[:, :12], found[:, 12:].reshape(-1, 12, 12)
+
+    def balance(
+        self, position: Array, moment: Array, tangents: Array, spin: Array, values: Array
+    ) -> tuple[Array, Array]:
+        """What has to vanish at rest in the rotor's frame (n, 5), and its derivatives (n, 5, 5), see `at_rest`.
+
+        At scaled positions and moments (n, 3) with their tangents (n, 2, 3) and body spins (n,); `values` as above.
+        """
+        given = np.empty((13, len(position)))
+        given[:3], given[3:6], given[12] = position.T, moment.T, spin
+        given[6:12] = tangents.reshape(-1, 6).T
+        found = _called(self._balances, given, values)
+        return found[:5].T, np.moveaxis(found[5:].reshape(5, 5, -1), 2, 0)
+
+    @cached_property
+    def _balances(self) -> Any:
+        given, outputs = balances(self._equations)
+        return compiled(hy.cfunc, outputs, given, compact_mode=True, opt_level=self._level)
+
+
+def _called(function: Any, given: Array, values: Array) -> Array:
+    """Machine code (k, n) at variables (v, n) with the parameters that it has of `values` (p,) or (n, p)."""
+    pars = np.broadcast_to(values[..., : function.nparams], (given.shape[1], function.nparams)).T
+    return np.asarray(function(np.ascontiguousarray(given), pars=np.ascontiguousarray(pars)))

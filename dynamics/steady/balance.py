@@ -60,29 +60,7 @@ class Balance:
 
         The derivatives are by x, y, z and by tilts of the moment along the same two tangents.
         """
-        rates, slopes = self.rates(self.states(position, moment), self.values)
-        tangents = tangent_basis(moment)
-        along = self._directions(moment, tangents)
-        changes = slopes @ along
-        torque, torque_change = rates[:, 9:], changes[:, 9:]
-        balance = np.concatenate([rates[:, 3:6], np.einsum("nka,na->nk", tangents, torque)], axis=1)
-        slope = np.concatenate([changes[:, 3:6], tangents @ torque_change], axis=1)
-        held = np.einsum("na,na->n", moment, torque)
-        slope[:, 3, 3] -= held  # the tangents turn with the moment
-        slope[:, 4, 4] -= held
-        return balance, slope
-
-    def _directions(self, moment: Array, tangents: Array) -> Array:
-        """Change of the state (n, 12, 5) by each unknown."""
-        rate = self.rate
-        change = np.zeros((len(moment), 12, 5))
-        change[:, [0, 1, 2], [0, 1, 2]] = 1.0
-        change[:, 4, 0], change[:, 3, 1] = rate[..., 0], -rate[..., 0]
-        change[:, 6:9, 3:] = np.swapaxes(tangents, 1, 2)
-        for k in range(2):
-            tilt = tangents[:, k]
-            change[:, 9:, 3 + k] = rate * ((self.spin - moment[:, 2:]) * tilt - tilt[:, 2:] * moment)
-        return change
+        return self.rates.balance(position, moment, tangent_basis(moment), np.asarray(self.spin), self.values)
 
 
 def tangent_basis(moment: Array) -> Array:
