@@ -27,8 +27,7 @@ from spinlev.fem.measured_maps import FieldMapError
 from spinlev.fem.measured_maps.readers import read_field_map
 from spinlev.fem.rotor_tables import rotor_table
 from spinlev.fem.rotor_tables.table_file import TableFileError, load_table, save_table
-from spinlev.fem.storage import checksum as seal
-from spinlev.fem.storage import foreign, write_checked
+from spinlev.fem.storage import checksum as seal, foreign, write_checked
 from spinlev.fem.storage.look_through import look_through
 from spinlev.geometry.bodies import horizontal
 from spinlev.studies.command_line import cli

@@ -8,8 +8,7 @@ from typing import Any
 
 import ngsolve
 import numpy as np
-from netgen.occ import Box as OccBox
-from netgen.occ import Glue, OCCGeometry, Pnt
+from netgen.occ import Box as OccBox, Glue, OCCGeometry, Pnt
 
 from .conductors import ConductorMesh
 

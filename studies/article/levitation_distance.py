@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 import xarray as xr
 
-from ...dynamics.branches import Family, distance_error, kicked, levitating_branch
-from ...dynamics.branches import Point as BranchPoint
+from ...dynamics.branches import Family, Point as BranchPoint, distance_error, kicked, levitating_branch
 from ...dynamics.flights import simulate
 from ...dynamics.motion import Rates
 from ...fem.rotor_tables import RotorTable

@@ -10,6 +10,7 @@ import xarray as xr
 
 from ...dynamics.branches import (
     Family,
+    Point as BranchPoint,
     StableRange,
     at_frequency,
     by_frequency,
@@ -17,7 +18,6 @@ from ...dynamics.branches import (
     stable_range,
     with_answers,
 )
-from ...dynamics.branches import Point as BranchPoint
 from ...dynamics.motion import Rates
 from ...dynamics.steady import EquilibriumError, named_modes
 from ...fem.rotor_tables import cached_rotor_table, rotor_table

@@ -12,8 +12,7 @@ from dataclasses import replace
 import numpy as np
 import xarray as xr
 
-from ...dynamics.branches import Point as BranchPoint
-from ...dynamics.branches import kicked, levitating_branch
+from ...dynamics.branches import Point as BranchPoint, kicked, levitating_branch
 from ...dynamics.flights import Trajectory, flight_kind, simulate
 from ...dynamics.motion import Rates, Scales
 from ...dynamics.slow_drift import drift

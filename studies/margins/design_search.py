@@ -6,8 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...dynamics.branches import HIGHEST, LOWEST, by_frequency, is_stable, stability_end
-from ...dynamics.branches import Point as BranchPoint
+from ...dynamics.branches import HIGHEST, LOWEST, Point as BranchPoint, by_frequency, is_stable, stability_end
 from ...dynamics.motion import Rates, Scales, parameters, rotor_gap
 from ...dynamics.steady import AXIAL, LATERAL, Balance, EquilibriumError, solve
 from ...fem.rotor_tables import rotor_table

@@ -5,8 +5,7 @@ from __future__ import annotations
 import meshio
 import numpy as np
 import pytest
-from netgen.occ import Box as OccBox
-from netgen.occ import Pnt, Sphere
+from netgen.occ import Box as OccBox, Pnt, Sphere
 from ngsolve import SetNumThreads
 
 from spinlev.fem.closed_forms import HomogeneousField, unit_dipoles
