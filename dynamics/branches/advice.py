@@ -1,7 +1,5 @@
 """Where there is no stable equilibrium: which frequency has one."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from itertools import groupby

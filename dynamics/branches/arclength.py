@@ -3,8 +3,6 @@
 W. J. F. Govaerts, Numerical Methods for Bifurcations of Dynamical Equilibria, 2000, ch. 1 and 3.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Generic, Protocol, TypeVar

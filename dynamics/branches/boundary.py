@@ -5,8 +5,6 @@ parameters then leave a curve (W. J. F. Govaerts, Numerical Methods for Bifurcat
 ch. 4).
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from ...geometry.basics import Array

@@ -7,8 +7,6 @@
   beyond it one of the two motions grows.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """An equilibrium as a function of one parameter of its problem: points of a branch, and what happens along it."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import ClassVar

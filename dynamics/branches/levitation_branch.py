@@ -5,8 +5,6 @@ at one far distance, an unstable equilibrium.  From there the branch goes down i
 equilibrium meets the near one, and up again along the near one until floater and rotor touch.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Levitation at all frequencies of a rotor and a floater that magnetise each other, from that of the rigid dipole."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 

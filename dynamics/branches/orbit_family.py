@@ -5,8 +5,6 @@ Floquet multiplier leaves the unit circle: at +1 (a fold, or a crossing of branc
 pair (Neimark-Sacker).
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import ClassVar

@@ -1,7 +1,5 @@
 """From which to which frequency of the rotor a floater levitates stably, and what ends it at either side."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial

@@ -1,7 +1,5 @@
 """All synchronous equilibria of a floater: fixed points in the frame that turns with the rotor."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from ...fem.rotor_tables import FieldTable

@@ -1,7 +1,5 @@
 """Equilibria at many points of a map, each kept once."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 

@@ -1,7 +1,5 @@
 """Scenes that differ in the rotor's frequency and in one measure of the rotor: what a map or a curve runs over."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from functools import cached_property
 

@@ -1,7 +1,5 @@
 """The points of a map, frequency by measure of the rotor, and the balances there."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cached_property
 

@@ -1,7 +1,5 @@
 """Equilibria of a map with the stability of each."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -8,8 +8,6 @@ points, or of a sheet that meets it in a fold, is found by a search; only one th
 grid, and meets no other, can be missed.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

@@ -17,8 +17,6 @@ torque that is in phase with Ω is, over Stokes' and with q = R/δ,
 eight at 60 Hz for the article's floater.  The air is far from walls, and the rotor does not stir it.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import ArrayLike
 

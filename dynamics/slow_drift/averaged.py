@@ -10,8 +10,6 @@ The floater does not notice the fold at once.  Near it the slow mode obeys ẍ =
 whose solution on the branch escapes at t = 3.40922 (αβ)^(-1/5); the mode's frequency tells αβ: Ω⁴ = 4αβ (-t).
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 

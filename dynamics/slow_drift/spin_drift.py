@@ -6,8 +6,6 @@ its equilibria in s (`averaged`), to a balance, a fold or a loss of stability.
 The model leaves out what a flight does within the time of a bounce, 0.1 s.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from ...fem.rotor_tables import FieldTable

@@ -1,7 +1,5 @@
 """Stability of a periodic motion: what small deviations have become after one turn (Floquet multipliers)."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from ...geometry.basics import Array

@@ -1,7 +1,5 @@
 """Names of the small motions about an equilibrium, told from their shapes."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Linear stability of a synchronous equilibrium."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any
 

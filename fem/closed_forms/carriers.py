@@ -5,8 +5,6 @@ is about J' = (1 + (μ - 1) N)⁻¹ J (exact for an ellipsoid). Split off with J
 little to the elements: for μr = 1000 a thousandth.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from ...geometry.basics import Array, Box

@@ -1,7 +1,5 @@
 """Moments of what the permeability adds that need no elements: those of the closed form H0 of the carriers."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -4,8 +4,6 @@ To first order a permeability adds the magnetisation (μ - 1) H0. Its moments ar
 H0 = -grad φ and harmonic Υ, ∫ H0·grad Υ dV = -∮ φ ∂Υ/∂n dS, and φ is continuous.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

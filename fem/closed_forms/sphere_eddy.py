@@ -9,8 +9,6 @@ and where skin depth is large against R: α = -iω (2π/15) σ R⁵.  In a field
 it feels the torque -Im α B⊥² along the turn, and loses the power ω times that.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import ArrayLike
 

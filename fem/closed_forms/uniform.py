@@ -1,7 +1,5 @@
 """The field of one uniformly polarised magnet in any pose, accurate near and far."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from functools import cached_property
 

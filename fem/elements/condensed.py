@@ -1,7 +1,5 @@
 """Solution of a system whose element-inner unknowns are condensed out: the factor holds the coupling ones only."""
 
-from __future__ import annotations
-
 from typing import TypeVar
 
 import ngsolve

@@ -1,7 +1,5 @@
 """Potentials in open space: static condensation, a sparse factor, and conjugate gradients for the boundary on top."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import ngsolve as ng

@@ -1,7 +1,5 @@
 """The field of a whole rotor at one level of refinement: symmetry, parity parts, moments."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import product

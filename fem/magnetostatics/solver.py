@@ -13,8 +13,6 @@ ball is exact (`elements.open_boundary`). Where the bodies have mirror planes th
 matrix serves polarisations of every parity: ψ = 0 on a plane where it is odd.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Literal

@@ -1,7 +1,5 @@
 """Spread of equally likely expansions: the error bar of a fitted field at any point."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from ...geometry.basics import Array

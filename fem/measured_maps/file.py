@@ -1,7 +1,5 @@
 """A gridded table as one self-describing netCDF file."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import xarray as xr

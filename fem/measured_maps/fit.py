@@ -1,7 +1,5 @@
 """From a map of B to a field table."""
 
-from __future__ import annotations
-
 import time
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """A field table that stands for any map of B."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property

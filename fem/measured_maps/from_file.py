@@ -1,7 +1,5 @@
 """A rotor's field as it was measured: a map from a file, fitted about the rotor's magnets."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from pathlib import Path
 

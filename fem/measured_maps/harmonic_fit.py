@@ -1,7 +1,5 @@
 """Least-squares fit of harmonic functions to observed field components; degree and error bar from held-out groups."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

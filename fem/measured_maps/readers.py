@@ -1,7 +1,5 @@
 """Maps of B from files: a probe's CSV, netCDF grids, and meshes with point data."""
 
-from __future__ import annotations
-
 import csv
 import io
 from collections.abc import Mapping

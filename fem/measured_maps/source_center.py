@@ -1,7 +1,5 @@
 """Where the sources of a map of B have their middle."""
 
-from __future__ import annotations
-
 import numpy as np
 from scipy.optimize import least_squares
 

@@ -10,8 +10,6 @@ J. D. Jackson, Classical Electrodynamics (3rd ed. 1999), sections 4.4 and 5.11; 
 Electricity (3rd ed. 1968), section 5.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from ...geometry.basics import Array

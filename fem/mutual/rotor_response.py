@@ -5,8 +5,6 @@ magnetisation (μ - 1)(H0 - ∇ψ) comes from finite elements on a mesh of the m
 the ball. Its field in the ball is a volume integral over the magnets, whose error is the square of that of ∇ψ.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property

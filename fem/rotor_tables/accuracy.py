@@ -1,7 +1,5 @@
 """What a table must reach, and where."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

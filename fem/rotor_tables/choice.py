@@ -1,7 +1,5 @@
 """The field models of a rotor, and the choice between them."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

@@ -4,8 +4,6 @@ An expansion that is to hold close to the magnets needs several times the coeffi
 costs time at every step.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Tables of the models that leave something out, and what they leave out as their doubts."""
 
-from __future__ import annotations
-
 import time
 
 import numpy as np

@@ -1,7 +1,5 @@
 """A rotor table as one self-describing netCDF file."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """Which model of the plate a scene needs."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from ...geometry.basics import MU_0, Array

@@ -1,7 +1,5 @@
 """What the edges of a plate change of an infinite slab's reaction."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from ...geometry.basics import Array

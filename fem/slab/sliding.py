@@ -9,8 +9,6 @@ For slow motion in any direction F = -C v with the constant drag tensor C.
 J. R. Reitz, J. Appl. Phys. 41 (1970) 2067, eqs. 20-25; the tensor is derived here from Γ ≈ iωμ0σ(1 - e^{-2kt})/4k².
 """
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import ArrayLike
 

@@ -1,7 +1,5 @@
 """The slab's reaction at one place to a dipole at another, by Hankel transforms; symbols as in `reaction`."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.special import jv

@@ -1,7 +1,5 @@
 """Data on disk: one self-describing netCDF file with a checksum."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any

@@ -3,8 +3,6 @@
 HDF5 ignores what comes after its own end; given a damaged file it may print, raise anything, or not return at all.
 """
 
-from __future__ import annotations
-
 import hashlib
 from pathlib import Path
 

@@ -4,8 +4,6 @@ heyoka can keep machine code by itself, in a database without checksums: one fli
 number.  What it has compiled can be pickled with the code in it, which is read again in hundredths of a second.
 """
 
-from __future__ import annotations
-
 import hashlib
 import logging
 import os

@@ -3,8 +3,6 @@
 HDF5 does not return from some damaged files, whatever signal comes, and may crash on others.
 """
 
-from __future__ import annotations
-
 import subprocess
 import sys
 from pathlib import Path

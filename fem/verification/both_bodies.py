@@ -4,8 +4,6 @@ Nothing is known beforehand of the sphere's answer and no series is summed: H0 i
 polarisations, and one finite-element solution gives the magnetisation that the permeability adds in either body.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from ...geometry.basics import Array

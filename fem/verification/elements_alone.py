@@ -1,7 +1,5 @@
 """The whole field by finite elements, without any closed form: one expansion about the common centre."""
 
-from __future__ import annotations
-
 import time
 
 import numpy as np

@@ -9,8 +9,6 @@ implicit Runge-Kutta method (R. Alexander, SIAM J. Numer. Anal. 14 (1977) 1006):
 (M + γ Δt K) A = W - f with one factor, and it holds in air too, where there is no mass.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Sequence
 
 import ngsolve

@@ -1,7 +1,5 @@
 """Constants of nature."""
 
-from __future__ import annotations
-
 import math
 
 MU_0 = 4e-7 * math.pi

@@ -1,7 +1,5 @@
 """Gaps between magnets that are too narrow for elements."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 from itertools import combinations

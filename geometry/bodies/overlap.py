@@ -1,7 +1,5 @@
 """Exact overlap of boxes and spheres in any pose."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """One-dimensional graded partitions: where the grid lines of a structured mesh lie."""
 
-from __future__ import annotations
-
 import itertools
 from collections.abc import Callable, Sequence
 

@@ -1,7 +1,5 @@
 """Structured hexahedral meshes of boxes on a tensor-product grid."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Tetrahedral meshes of conductors of any shape, from OpenCASCADE solids."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any

@@ -1,7 +1,5 @@
 """A finite-element mesh of magnets and a floating sphere together in one ball of air."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any

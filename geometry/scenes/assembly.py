@@ -1,7 +1,5 @@
 """From the keys of a scene file to the scene in SI units."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any

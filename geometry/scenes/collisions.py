@@ -1,7 +1,5 @@
 """Bodies of a scene must not overlap: rotor magnets, plate, and the floater where it starts."""
 
-from __future__ import annotations
-
 from ..bodies import TOUCHING, deepest_overlap_in_a_turn, overlapping_magnets, sphere_overlap
 from .contents import AbsoluteStart, Scene
 

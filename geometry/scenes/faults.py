@@ -1,7 +1,5 @@
 """What is wrong with a scene file, in one grammar: Input KEY must be RULE; instead received VALUE."""
 
-from __future__ import annotations
-
 import difflib
 from collections.abc import Sequence
 from typing import Any

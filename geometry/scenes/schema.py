@@ -1,7 +1,5 @@
 """The scene file's keys, types and ranges; every key carries its unit."""
 
-from __future__ import annotations
-
 from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Discriminator, Field, Tag

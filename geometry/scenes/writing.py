@@ -1,7 +1,5 @@
 """A scene as the keys of a scene file: what is written beside a result, also of a scene that was made in Python."""
 
-from __future__ import annotations
-
 import json
 import tomllib
 import warnings

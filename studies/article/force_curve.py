@@ -1,7 +1,5 @@
 """Force along the axis against distance, with its repelling and its attracting part: the article's second figure."""
 
-from __future__ import annotations
-
 import numpy as np
 import xarray as xr
 from scipy.interpolate import PchipInterpolator

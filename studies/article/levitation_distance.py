@@ -1,7 +1,5 @@
 """Distance at which the floater levitates against frequency, for every rotor of the article: its third figure."""
 
-from __future__ import annotations
-
 import numpy as np
 import xarray as xr
 

@@ -1,7 +1,5 @@
 """Figure and sentences of the study of the levitation distance, from its dataset alone."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The command `report`: one page of all results in a folder, which opens without a network."""
 
-from __future__ import annotations
-
 import base64
 import json
 import os

@@ -1,7 +1,5 @@
 """The commands about many scenes and about results: study, figure, show, report, cite."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Annotated
 

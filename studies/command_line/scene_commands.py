@@ -3,8 +3,6 @@
 The numeric libraries are imported once the input has been found good: a wrong scene is answered at once.
 """
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Annotated, Literal
 

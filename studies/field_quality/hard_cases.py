@@ -1,7 +1,5 @@
 """Rotors whose field is hard to compute, and how fine an independent solution must be to judge a table of them."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 

@@ -4,8 +4,6 @@ Every method runs in a process of its own, so that its time and memory are its o
 moments, table, compilation) to the field at points.
 """
 
-from __future__ import annotations
-
 import os
 import tempfile
 import time

@@ -1,7 +1,5 @@
 """How wrong is the dipole? Levitation of the article's rotors by point dipoles and by true fields, cause by cause."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 

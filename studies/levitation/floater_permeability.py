@@ -1,7 +1,5 @@
 """When is the floater a rigid dipole? Force and torque with and without the answers of both bodies."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from functools import partial
 

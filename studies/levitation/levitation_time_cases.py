@@ -1,7 +1,5 @@
 """The rotors whose drift is studied, and what is not known of the experiment."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """The small circle on which the floater goes with the rotor: its radius in the true field, in flight and by formula."""
 
-from __future__ import annotations
-
 import numpy as np
 import xarray as xr
 

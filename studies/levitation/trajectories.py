@@ -5,8 +5,6 @@ is simulated in full, from equilibrium with spin s = 0, with drag and the floate
 the averaged flight along the branch of equilibria.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The inverse question: which rotor holds the floater at a wanted distance and frequency, with the most to spare?"""
 
-from __future__ import annotations
-
 import numpy as np
 import xarray as xr
 

@@ -1,7 +1,5 @@
 """The search for the displacement or tilt that holds the floater at a wanted distance and frequency."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Which parameter matters? Derivatives of distance and limits of stability, and what tolerances make of them."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 

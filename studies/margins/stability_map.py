@@ -1,7 +1,5 @@
 """Regions of stable levitation in frequency and displacement, what bounds them, and what a plate makes of them."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

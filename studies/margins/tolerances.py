@@ -1,7 +1,5 @@
 """What is not known exactly of a rotor and its floater, and what they do with other values of it."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The plate of a scene as a table: which model, for which region, and from where."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The commands that answer one question: field, equilibria, simulate."""
 
-from __future__ import annotations
-
 import csv
 import io
 from collections.abc import Mapping

@@ -1,7 +1,5 @@
 """The eddy currents in the plate at one instant, for pictures."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from ...dynamics.motion import State

@@ -1,7 +1,5 @@
 """From a flight and its tables to what is shown of it in three dimensions."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from ...dynamics.motion import State

@@ -1,7 +1,5 @@
 """The plates and rotors of the study of the plate's damping, and where the floater levitates without a plate."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from functools import cache
 

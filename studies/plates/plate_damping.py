@@ -1,7 +1,5 @@
 """What a plate does to levitation: damping of each small motion, drag, lift and loss against its place and material."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import asdict, replace
 

@@ -1,7 +1,5 @@
 """Results as labelled data with units and provenance, in netCDF."""
 
-from __future__ import annotations
-
 import shlex
 import sys
 from collections.abc import Mapping, Sequence

@@ -1,7 +1,5 @@
 """Figures of a run, drawn from its result file alone."""
 
-from __future__ import annotations
-
 import io
 from collections.abc import Callable
 from functools import wraps

@@ -1,7 +1,5 @@
 """What a study is: a pure function of one point, and the points at which it is asked."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from operator import itemgetter

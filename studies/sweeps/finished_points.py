@@ -1,7 +1,5 @@
 """The finished points of a sweep on disk, so that one that is stopped goes on where it was."""
 
-from __future__ import annotations
-
 import shutil
 from collections.abc import Callable
 from pathlib import Path

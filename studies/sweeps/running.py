@@ -1,7 +1,5 @@
 """Runs a study: its points one by one on the engine, kept as they come, then joined, written, drawn and reported."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from importlib.metadata import version
 from pathlib import Path

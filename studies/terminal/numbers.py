@@ -1,7 +1,5 @@
 """Numbers given on the command line."""
 
-from __future__ import annotations
-
 from numbers import Real
 
 import numpy as np

@@ -1,7 +1,5 @@
 """What every command says and where its files go."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Points to evaluate a field at, from a CSV file."""
 
-from __future__ import annotations
-
 import csv
 from pathlib import Path
 
