@@ -8,8 +8,7 @@ from numpy.typing import NDArray
 from ...geometry.basics import Array
 from ..motion import Parameter
 from ..steady import Indices, is_stable, spectra
-from .atlas import Atlas
-from .grid import Grid
+from .grid import Atlas, Grid
 
 
 @dataclass(frozen=True, eq=False)

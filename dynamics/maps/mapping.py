@@ -15,10 +15,9 @@ from numpy.typing import ArrayLike
 
 from ...geometry.basics import Array
 from ..steady import EVERY, EquilibriumError, Indices, solve
-from .atlas import Atlas
 from .between import between
 from .families import RotorFamily
-from .grid import Grid
+from .grid import Atlas, Grid
 from .map_stability import EquilibriumMap, judged
 
 SPACING = 5

@@ -24,5 +24,12 @@ from .harmonic_balance import (
     orbit_near as orbit_near,
     periodic_orbit as periodic_orbit,
 )
-from .mode_names import SIDE as SIDE, TILT as TILT, named_modes as named_modes
-from .stability import Modes as Modes, is_stable as is_stable, modes as modes, spectra as spectra
+from .stability import (
+    SIDE as SIDE,
+    TILT as TILT,
+    Modes as Modes,
+    is_stable as is_stable,
+    modes as modes,
+    named_modes as named_modes,
+    spectra as spectra,
+)

@@ -8,7 +8,7 @@ import numpy as np
 
 from ...geometry.basics import Array, ComputationError
 from ..motion import State
-from .mode_names import Mode
+from .stability import Mode
 
 
 class EquilibriumError(ComputationError):

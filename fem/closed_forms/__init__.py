@@ -1,12 +1,15 @@
 """Which fields, potentials and losses are known without any elements?"""
 
 from .carriers import carrier as carrier
-from .closed_moments import added_by_closed_form as added_by_closed_form, closed_part as closed_part
+from .closed_moments import (
+    added_by_closed_form as added_by_closed_form,
+    closed_part as closed_part,
+    first_order_moments as first_order_moments,
+)
 from .demagnetization import remanent_field as remanent_field
 from .phasor import ComplexArray as ComplexArray
 from .quadrature import oblique_contact as oblique_contact, volume_rule as volume_rule
 from .racetrack import Racetrack as Racetrack
-from .remanent import first_order_moments as first_order_moments
 from .sphere_eddy import rotating_torque as rotating_torque
 from .uniform import UniformField as UniformField, squared_distance as squared_distance
 from .vector_potentials import (

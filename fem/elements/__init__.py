@@ -1,6 +1,6 @@
 """What do all finite-element solvers of the program share?"""
 
-from .condensed import solve_condensed as solve_condensed
+from .condensed import solve_condensed as solve_condensed, solve_open as solve_open
 from .gauge import edge_vertices as edge_vertices, region_edges as region_edges, tree_edges as tree_edges
 from .integration_points import (
     IntegrationPoints as IntegrationPoints,
@@ -9,5 +9,4 @@ from .integration_points import (
 )
 from .memory import TooLargeError as TooLargeError, require_memory as require_memory
 from .open_boundary import OpenBoundary as OpenBoundary
-from .open_solve import solve_open as solve_open
 from .parity import Parity as Parity

@@ -2,11 +2,11 @@
 
 from .accuracy import (
     Accuracy as Accuracy,
+    AccuracyError as AccuracyError,
     error_points as error_points,
     points_around as points_around,
     typical_field as typical_field,
 )
-from .accuracy_error import AccuracyError as AccuracyError
 from .cache import cached_rotor_table as cached_rotor_table
 from .choice import resolve_model as resolve_model, rotor_table as rotor_table
 from .fem_model import (

@@ -4,10 +4,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...geometry.basics import Array, Box
+from ...geometry.basics import Array, Box, InputError
 from ...geometry.bodies import Magnet
 from ..closed_forms import carrier
 from ..harmonics import uniform_moments
+
+
+class AccuracyError(InputError):
+    """A tolerance below what can be reached; the message names it and the smallest that can."""
+
 
 OFFSETS = (0.0, 1.0, 3.0, 10.0, 100.0)
 """Errors are looked at this far out, beyond the nearest distance, in sizes of the rotor."""

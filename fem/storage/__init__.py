@@ -8,5 +8,6 @@ from .checked_files import (
     write_checked as write_checked,
 )
 from .compiled_code import compiled as compiled
+from .foreign import hdf5_fault as hdf5_fault, is_hdf5 as is_hdf5
 from .program_text import digest_of as digest_of, program_of as program_of
 from .whole_files import write_whole as write_whole

@@ -15,8 +15,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from .cache import cache_folder
-from .checksum import seal, unsealed
-from .whole_files import write_whole
+from .whole_files import seal, unsealed, write_whole
 
 LIMIT = 2**29
 """Size of all that is kept, bytes; what was not used for the longest time makes room."""

@@ -23,7 +23,7 @@ def is_hdf5(path: Path) -> bool:
         return stream.read(len(SIGNATURE)) == SIGNATURE
 
 
-def fault(path: Path) -> str | None:
+def hdf5_fault(path: Path) -> str | None:
     """What is wrong with an HDF5 file, as the end of a sentence; None if all of it can be read."""
     command = [sys.executable, "-P", str(SCRIPT), str(path)]  # without this package's folder on the path
     try:

@@ -2,16 +2,14 @@
 
 from .article_rotors import horizontal as horizontal, tilt as tilt, vertical as vertical
 from .magnet import Magnet as Magnet
-from .narrow_gaps import (
-    closing_shifts as closing_shifts,
-    largest_shift as largest_shift,
-    shifted_magnet as shifted_magnet,
-)
 from .overlap import (
     TOUCHING as TOUCHING,
+    closing_shifts as closing_shifts,
     deepest_overlap_in_a_turn as deepest_overlap_in_a_turn,
+    largest_shift as largest_shift,
     overlapping_magnets as overlapping_magnets,
     separation as separation,
+    shifted_magnet as shifted_magnet,
     sphere_overlap as sphere_overlap,
 )
 from .pieces import CONVERGENCE as CONVERGENCE, cut_magnets as cut_magnets

@@ -22,7 +22,7 @@ from ...fem.rotor_tables import cached_rotor_table, rotor_table
 from ...geometry.basics import Array
 from ...geometry.scenes import Scene
 from ..article import article_scene, levitated_rotors
-from ..results import Point, Study, by_case, variable
+from ..results import Point, Study, by_case, one_case, variable
 from ..terminal import note
 from .dipole_vs_fem_figure import dipole_figure
 from .dipole_vs_fem_report import dipole_lines
@@ -40,10 +40,8 @@ ROUND_OFF = 1e-10
 
 def points(quick: bool) -> list[Point]:
     """The rotors that levitated; quick: one frequency, coarser answers of the bodies and no limits with them (NaN)."""
-    settings = (
-        {"steps": 1, "orders": [1, 2], "limits": False} if quick else {"steps": 4, "orders": [2, 3], "limits": True}
-    )
-    return [{**point, **settings} for point in levitated_rotors(quick)]
+    steps, orders = (1, [1, 2]) if quick else (4, [2, 3])
+    return [{**rotor, "steps": steps, "orders": orders, "limits": not quick} for rotor in levitated_rotors(quick)]
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,10 +87,15 @@ def compute(point: Point) -> xr.Dataset:
     errors["mutual"] = {
         key: doubt * np.abs(value - rows["fem"][key]) + errors["fem"][key] for key, value in rows["mutual"].items()
     }
-    kinds = {side: [getattr(made[m].range, side).kind for m in MODELS[:-1]] for side in SIDES}
+    data = {"frequency": variable(("step",), grid, "Hz", "frequency of the rotor")}
+    for name, (dims, units, words) in LABELS.items():
+        for suffix, source, what in (("", rows, ""), ("_error", errors, "estimated error of the ")):
+            values = np.array([source[model][name] for model in MODELS])
+            data[name + suffix] = variable(("model", *dims), values, units, what + words)
     for side, end in zip(SIDES, ends, strict=True):
-        kinds[side].append(end.kind if end else "")
-    return _dataset(point, grid, rows, errors, kinds)
+        kinds = [*(getattr(made[m].range, side).kind for m in MODELS[:-1]), end.kind if end else ""]
+        data[f"{side}_kind"] = xr.Variable(("model",), kinds)
+    return one_case(point, xr.Dataset(data, {"model": list(MODELS), "mode": list(MODES)}))
 
 
 def _levitation(scene: Scene, rates: Rates, start: tuple[Array, float]) -> InOneField:
@@ -128,26 +131,6 @@ LABELS: dict[str, tuple[tuple[str, ...], str, str]] = {
     "lowest": ((), "Hz", "lowest frequency of stable levitation"),
     "highest": ((), "Hz", "highest frequency of stable levitation"),
 }
-
-
-def _dataset(
-    point: Point,
-    grid: Array,
-    rows: dict[str, dict[str, Array]],
-    errors: dict[str, dict[str, Array]],
-    kinds: dict[str, list[str]],
-) -> xr.Dataset:
-    data: dict[str, xr.Variable] = {}
-    for name, (dims, units, words) in LABELS.items():
-        for suffix, source, what in (("", rows, ""), ("_error", errors, "estimated error of the ")):
-            values = np.array([source[model][name] for model in MODELS])
-            data[name + suffix] = variable(("case", "model", *dims), values[None], units, what + words)
-    for side, names in kinds.items():
-        data[f"{side}_kind"] = xr.Variable(("case", "model"), np.array([names]))
-    data["frequency"] = variable(("case", "step"), grid[None], "Hz", "frequency of the rotor")
-    data["measure"] = variable(("case",), np.array([point["measure"]]), "mm or °", "displacement or tilt")
-    data["configuration"] = xr.Variable(("case",), np.array([point["configuration"]]))
-    return xr.Dataset(data, {"model": list(MODELS), "mode": list(MODES)})
 
 
 STUDY = Study(

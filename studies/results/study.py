@@ -18,9 +18,18 @@ def by_case(parts: Sequence[xr.Dataset]) -> xr.Dataset:
     return xr.concat(parts, "case", data_vars="all", coords="different", compat="equals", join="outer")
 
 
+LABELS = {
+    "configuration": {},
+    "value": {},
+    "measure": {"units": "mm or °", "long_name": "displacement or tilt"},
+    "model": {},
+}
+"""What may tell a point from the others, with units."""
+
+
 def one_case(point: Point, dataset: xr.Dataset) -> xr.Dataset:
-    """A point's result with what tells it from the others (texts and numbers), ready to be joined along `case`."""
-    labels = {name: xr.Variable((), point[name]) for name in ("configuration", "value", "model")}
+    """A point's result with those of `LABELS` that the point has, ready to be joined along `case`."""
+    labels = {name: xr.Variable((), point[name], attrs) for name, attrs in LABELS.items() if name in point}
     return dataset.assign(labels).expand_dims("case")
 
 

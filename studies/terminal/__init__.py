@@ -8,11 +8,23 @@ from .console import (
     silence as silence,
     to_json as to_json,
 )
-from .models import FieldModel as FieldModel, Models as Models, PlateModel as PlateModel, Quantity as Quantity
-from .numbers import finite as finite, positive as positive, three_numbers as three_numbers
-from .output import Answer as Answer, Output as Output
+from .numbers import (
+    COLUMNS as COLUMNS,
+    finite as finite,
+    positive as positive,
+    read_points as read_points,
+    three_numbers as three_numbers,
+)
+from .options import (
+    Answer as Answer,
+    FieldModel as FieldModel,
+    Models as Models,
+    Output as Output,
+    PlateModel as PlateModel,
+    Quantity as Quantity,
+    Workers as Workers,
+)
 from .plain_text import make_readable as make_readable
-from .points_file import COLUMNS as COLUMNS, read_points as read_points
 from .shipped_scenes import default_scene as default_scene
 from .system_libraries import (
     DRAWING as DRAWING,
@@ -22,4 +34,3 @@ from .system_libraries import (
     way_out as way_out,
 )
 from .vary import checked_values as checked_values, combinations as combinations, parse_vary as parse_vary
-from .workers import Workers as Workers

@@ -6,7 +6,7 @@ import ngsolve as ng
 import numpy as np
 import pytest
 
-from spinlev.fem.closed_forms.remanent import induced_moments
+from spinlev.fem.closed_forms.closed_moments import induced_moments
 from spinlev.fem.elements import OpenBoundary
 from spinlev.fem.harmonics import MultipoleExpansion
 from spinlev.fem.magnetostatics import rung, solve_rotor

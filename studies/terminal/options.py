@@ -1,9 +1,11 @@
-"""Which tables a command is asked for; read by the command line before the numeric libraries are imported."""
+"""What every command is asked: which tables, who computes, and where its answers go."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Literal, get_args
+from pathlib import Path
+from typing import Annotated, Any, Literal, get_args
 
 from cyclopts import Parameter
 
@@ -52,4 +54,60 @@ class Models:
             raise InputError(
                 f"Input --plate-rtol must be at least 1e-5 and at most 0.1; instead received {self.plate_rtol}."
             )
+        return self
+
+
+@Parameter(name="*")
+@dataclass(frozen=True)
+class Output:
+    """Where answers go.
+
+    Parameters
+    ----------
+    json
+        Print one JSON object and nothing else on standard output.
+    out
+        Folder for the files.
+    """
+
+    json: Annotated[bool, Parameter(negative="")] = False
+    out: Path = Path("out")
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What a command says: numbers for a program, lines for a person."""
+
+    values: Mapping[str, Any]
+    lines: Sequence[str]
+    json: bool
+
+
+@Parameter(name="*")
+@dataclass(frozen=True)
+class Workers:
+    """Who computes.
+
+    Parameters
+    ----------
+    workers
+        Processes of a local cluster; 1 computes in this process. Left out: one for each core.
+    scheduler
+        Address of a dask scheduler that is already there, such as tcp://127.0.0.1:8786.
+    """
+
+    workers: Annotated[int | None, Parameter(negative="")] = None
+    scheduler: str | None = None
+
+    def checked(self) -> Workers:
+        """Itself.
+
+        Raises
+        ------
+        InputError : no number of workers, or both a number and a scheduler
+        """
+        if self.workers is not None and not 1 <= self.workers <= 1024:
+            raise InputError(f"Input --workers must be between 1 and 1024; instead received {self.workers}.")
+        if self.workers is not None and self.scheduler is not None:
+            raise InputError("Input --workers must be left out where --scheduler is given; instead received both.")
         return self
