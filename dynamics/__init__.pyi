@@ -1,8 +1,8 @@
 from .branches import (
     BoundaryPoint as BoundaryPoint,
+    BranchPoint as BranchPoint,
     Family as Family,
     Plane as Plane,
-    Point as Point,
     follow_boundary as follow_boundary,
     follow_branch as follow_branch,
 )

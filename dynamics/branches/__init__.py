@@ -6,8 +6,8 @@ from .boundary import follow_boundary as follow_boundary
 from .boundary_equations import BoundaryPoint as BoundaryPoint, Plane as Plane
 from .branch import (
     FOLD as FOLD,
+    BranchPoint as BranchPoint,
     Family as Family,
-    Point as Point,
     Problem as Problem,
     frequencies as frequencies,
     spins as spins,
@@ -25,7 +25,7 @@ from .stable_frequencies import (
     LOWEST as LOWEST,
     StableRange as StableRange,
     at_frequency as at_frequency,
-    is_stable as is_stable,
+    levitates as levitates,
     levitating_ranges as levitating_ranges,
     reference_state as reference_state,
     stability_end as stability_end,

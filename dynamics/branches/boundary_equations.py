@@ -15,7 +15,7 @@ import numpy as np
 from ...geometry.basics import Array
 from ..equilibria import AtRest
 from ..motion import Rates
-from ..steady import Balance, Indices, moved, spectra
+from ..steady import Balance, Indices, moved_pose, spectra
 from .branch import FOLD
 
 COLLISION, CROSSING = "collision", "crossing"
@@ -95,7 +95,7 @@ class Boundary(AtRest):
     def _after(self, at: Array, change: Array) -> Array:
         """Balance, test and frequency (n, 7) after changes (n, 7) of position, tilts and parameters at a point (9,)."""
         here = np.zeros((len(change), 3))
-        position, moment = moved(here + at[:3], here + at[3:6], change[:, :5])
+        position, moment = moved_pose(here + at[:3], here + at[3:6], change[:, :5])
         place = (at[6:8] + change[:, 5:]) * self.plane.units
         balance = Balance(self.plane.rates, self.plane.values(*place.T), self.plane.spin)
         value, slope = balance(position, moment)

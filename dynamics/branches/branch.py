@@ -43,7 +43,7 @@ def spins(scene: Scene) -> Problem:
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class BranchPoint:
+class Solution:
     """One solution of a branch.
 
     Parameters
@@ -88,7 +88,7 @@ class BranchPoint:
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Point(BranchPoint):
+class BranchPoint(Solution):
     """One equilibrium of a branch; unknown are its place and the direction of its moment, scaled, (6,).
 
     Parameters
@@ -150,11 +150,11 @@ class Family(AtRest):
         position, moment, size = solve(self.balance(parameter), guess[None, :3], guess[None, 3:], EVERY)
         return np.concatenate([position[0], moment[0], [parameter / self.unit]]) if size[0] < 1e-8 else None
 
-    def at(self, unknowns: Array, tangent: Array, parameter: float) -> Point:
+    def at(self, unknowns: Array, tangent: Array, parameter: float) -> BranchPoint:
         """The equilibrium at a solution (7,)."""
         balance = self.balance(parameter)
         state = balance.states(unknowns[None, :3], unknowns[None, 3:6])
-        return Point(
+        return BranchPoint(
             parameter=parameter,
             spin=balance.spin,
             position=unknowns[:3] * balance.values[Parameter.LENGTH],
@@ -164,7 +164,7 @@ class Family(AtRest):
             time_unit=float(balance.values[Parameter.TIME]),
         )
 
-    def point(self, position: Array, moment: Array, parameter: float) -> Point:
+    def point(self, position: Array, moment: Array, parameter: float) -> BranchPoint:
         """The same at scaled place and moment (3,), with the tangent towards growing values of the parameter."""
         unknowns = np.concatenate([position, moment, [parameter / self.unit]])
         return self.at(unknowns, directions(self, unknowns[None], np.eye(7)[6:])[0], parameter)

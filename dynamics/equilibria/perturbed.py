@@ -11,7 +11,7 @@ from ...fem.rotor_tables import FieldTable
 from ...geometry.basics import Array
 from ...geometry.scenes import Scene
 from ..motion import Rates, Scales, parameters
-from ..steady import Balance, moved, solve, tangent_basis
+from ..steady import Balance, moved_pose, solve, tangent_basis
 
 Extra = Callable[[Array, Array], tuple[Array, Array]]
 """Position (3,) m and moment direction (3,) -> additional force (3,) N and torque (3,) N m, rotor's frame."""
@@ -87,7 +87,7 @@ class PerturbedBalance:
         step = -inverse @ residual
         linear = step[:3] * self.scales.length
         for iteration in range(1, most + 1):
-            places, moments = moved(position[None], moment[None], step[None])
+            places, moments = moved_pose(position[None], moment[None], step[None])
             position, moment = places[0], moments[0]
             if np.linalg.norm(step) < tolerance:
                 return Shift(linear, position * self.scales.length, moment, iteration)

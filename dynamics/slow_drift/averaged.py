@@ -18,7 +18,7 @@ from scipy.integrate import solve_ivp
 from scipy.interpolate import CubicHermiteSpline, CubicSpline, PchipInterpolator
 
 from ...geometry.basics import Array
-from ..branches import FOLD, Point
+from ..branches import FOLD, BranchPoint
 from .slow_torque import SlowTorque
 
 BALANCE, DURATION, INSTABILITY, CONTACT = "balance", "duration", "instability", "contact"
@@ -68,7 +68,7 @@ class Drift:
         return float((ends[1] - ends[0]) / (times[1] - times[0]))
 
 
-def steady(start: Point, duration: float, e_folds: float = E_FOLDS) -> Drift:
+def steady(start: BranchPoint, duration: float, e_folds: float = E_FOLDS) -> Drift:
     """A flight on which nothing moves the spin."""
     growth = max(0.0, start.growth_per_s - start.doubt_per_s)
     ended = INSTABILITY if growth * duration > e_folds else DURATION
@@ -77,7 +77,7 @@ def steady(start: Point, duration: float, e_folds: float = E_FOLDS) -> Drift:
     return Drift(time, spin, distance, rate, ended, np.nan, np.nan)
 
 
-def flown(torque: SlowTorque, points: list[Point], duration: float, end: str, e_folds: float = E_FOLDS) -> Drift:
+def flown(torque: SlowTorque, points: list[BranchPoint], duration: float, end: str, e_folds: float = E_FOLDS) -> Drift:
     """The flight along the points of a branch, to its `end` or to what comes first."""
     arc, course = _course(points)
     pace = CubicSpline(arc, [torque(p.state) for p in points])
@@ -121,7 +121,7 @@ def flown(torque: SlowTorque, points: list[Point], duration: float, end: str, e_
     )
 
 
-def _course(points: list[Point]) -> tuple[Array, CubicHermiteSpline]:
+def _course(points: list[BranchPoint]) -> tuple[Array, CubicHermiteSpline]:
     """Length along the branch (n,), and spin and distance as functions of it."""
     places = np.array([np.concatenate([p.state[:3], p.state[6:9], [p.spin]]) for p in points])
     arc = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(places, axis=0), axis=1)))
@@ -130,7 +130,7 @@ def _course(points: list[Point]) -> tuple[Array, CubicHermiteSpline]:
     return arc, CubicHermiteSpline(arc, values, slopes)
 
 
-def _escape(points: list[Point], arc: Array, bend: float) -> float:
+def _escape(points: list[BranchPoint], arc: Array, bend: float) -> float:
     """Time from the fold to the loss, s; `bend` is d²s/dℓ² over ds/dt there."""
     before = next(k for k in range(len(points) - 2, -1, -1) if arc[-1] - arc[k] > 0.01 or k == 0)
     slowest = float(points[before].motion.angular_frequencies[0]) / points[before].time_unit

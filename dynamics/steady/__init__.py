@@ -6,7 +6,7 @@ from .balance import (
     LATERAL as LATERAL,
     Balance as Balance,
     Indices as Indices,
-    moved as moved,
+    moved_pose as moved_pose,
     solve as solve,
     tangent_basis as tangent_basis,
 )
@@ -20,7 +20,7 @@ from .floquet import floquet_modes as floquet_modes
 from .harmonic_balance import (
     Orbit as Orbit,
     OrbitProblem as OrbitProblem,
-    kept as kept,
+    conserved as conserved,
     orbit_near as orbit_near,
     periodic_orbit as periodic_orbit,
 )

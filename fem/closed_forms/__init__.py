@@ -7,10 +7,9 @@ from .closed_moments import (
     first_order_moments as first_order_moments,
 )
 from .demagnetization import remanent_field as remanent_field
-from .phasor import ComplexArray as ComplexArray
 from .quadrature import oblique_contact as oblique_contact, volume_rule as volume_rule
 from .racetrack import Racetrack as Racetrack
-from .sphere_eddy import rotating_torque as rotating_torque
+from .sphere_eddy import ComplexArray as ComplexArray, rotating_torque as rotating_torque
 from .uniform import UniformField as UniformField, squared_distance as squared_distance
 from .vector_potentials import (
     Dipole as Dipole,

@@ -10,10 +10,11 @@ it feels the torque -Im α B⊥² along the turn, and loses the power ω times t
 """
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from ...geometry.basics import MU_0, Array
-from .phasor import ComplexArray
+
+ComplexArray = NDArray[np.complex128]
 
 SERIES = 0.02
 """|x²| below which four terms of the series are used: there they and the closed form are both good to 3e-11."""

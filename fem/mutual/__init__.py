@@ -8,9 +8,4 @@ from .forces import (
     two_body as two_body,
     two_body_ladder as two_body_ladder,
 )
-from .rotor_response import (
-    RotorResponse as RotorResponse,
-    closed_dipoles as closed_dipoles,
-    permeability_tensor as permeability_tensor,
-    rotor_ladder as rotor_ladder,
-)
+from .rotor_response import RotorResponse as RotorResponse, rotor_ladder as rotor_ladder

@@ -3,20 +3,13 @@
 from .accuracy import (
     Accuracy as Accuracy,
     AccuracyError as AccuracyError,
-    error_points as error_points,
     points_around as points_around,
     typical_field as typical_field,
 )
 from .cache import cached_rotor_table as cached_rotor_table
 from .choice import resolve_model as resolve_model, rotor_table as rotor_table
-from .fem_model import (
-    AccuracyWarning as AccuracyWarning,
-    extrapolated_tail as extrapolated_tail,
-    fem_table as fem_table,
-    nonzero as nonzero,
-    provenance as provenance,
-)
-from .shortened import distant as distant
+from .fem_model import AccuracyWarning as AccuracyWarning, fem_table as fem_table
+from .shortened import shortened_table as shortened_table
 from .table import (
     FieldFormula as FieldFormula,
     FieldTable as FieldTable,

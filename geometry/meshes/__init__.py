@@ -5,4 +5,3 @@ from .export import to_meshio as to_meshio
 from .hexahedra import Block as Block, graded_partition as graded_partition, hex_mesh as hex_mesh
 from .magnets import MagnetMesh as MagnetMesh, MeshSettings as MeshSettings, mesh_magnets as mesh_magnets
 from .plate import MeshRule as MeshRule, plate_mesh as plate_mesh, skin_depth as skin_depth
-from .two_bodies import TwoBodyMesh as TwoBodyMesh

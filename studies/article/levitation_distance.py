@@ -3,7 +3,7 @@
 import numpy as np
 import xarray as xr
 
-from ...dynamics.branches import Family, Point as BranchPoint, distance_error, kicked, levitating_branch
+from ...dynamics.branches import BranchPoint, Family, distance_error, kicked, levitating_branch
 from ...dynamics.flights import simulate
 from ...dynamics.motion import Rates
 from ...fem.rotor_tables import RotorTable

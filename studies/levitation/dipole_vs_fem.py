@@ -7,8 +7,8 @@ import numpy as np
 import xarray as xr
 
 from ...dynamics.branches import (
+    BranchPoint,
     Family,
-    Point as BranchPoint,
     StableRange,
     at_frequency,
     by_frequency,

@@ -10,7 +10,7 @@ from dataclasses import replace
 import numpy as np
 import xarray as xr
 
-from ...dynamics.branches import Point as BranchPoint, kicked, levitating_branch
+from ...dynamics.branches import BranchPoint, kicked, levitating_branch
 from ...dynamics.flights import Trajectory, flight_kind, simulate
 from ...dynamics.motion import Rates, Scales
 from ...dynamics.slow_drift import drift

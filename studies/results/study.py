@@ -69,16 +69,9 @@ class Study:
     settings: Point = field(default_factory=dict)
 
 
-def study_of_one(
-    name: str,
-    summary: str,
-    compute: Callable[[bool], xr.Dataset],
-    draw: Callable[[xr.Dataset], Figure],
-    report: Callable[[xr.Dataset], list[str]],
-    timed: bool = False,
-) -> Study:
-    """A study that is computed as a whole: its only point says whether it is quick."""
-    return Study(name, summary, _settings, _Whole(compute), itemgetter(0), draw, report, timed)
+def study_of_one(compute: Callable[[bool], xr.Dataset], **more: Any) -> Study:
+    """A study that is computed as a whole: its only point says whether it is quick; `more` as of a `Study`."""
+    return Study(points=_settings, compute=_Whole(compute), gather=itemgetter(0), **more)
 
 
 def _settings(quick: bool) -> list[Point]:
@@ -87,6 +80,8 @@ def _settings(quick: bool) -> list[Point]:
 
 @dataclass(frozen=True)
 class _Whole:
+    """Can be sent to a worker, unlike a function that is made here."""
+
     compute: Callable[[bool], xr.Dataset]
 
     def __call__(self, point: Point) -> xr.Dataset:

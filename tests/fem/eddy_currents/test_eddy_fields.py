@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 from netgen.occ import Box as OccBox, Pnt, Sphere
 from ngsolve import SetNumThreads
+from second_opinions.phasor import mean_loss
 
 from spinlev.fem.closed_forms import HomogeneousField, unit_dipoles
-from spinlev.fem.closed_forms.phasor import mean_loss
 from spinlev.fem.closed_forms.sphere_eddy import polarizability
 from spinlev.fem.eddy_currents import current_density, solve_eddy
 from spinlev.fem.eddy_currents.export import write_vtu

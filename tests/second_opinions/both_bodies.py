@@ -6,11 +6,9 @@ polarisations, and one finite-element solution gives the magnetisation that the 
 
 import numpy as np
 
-from ...geometry.basics import Array
-from ...geometry.meshes import TwoBodyMesh
-from ...geometry.scenes import Floater
-from ..closed_forms import remanent_field
-from ..harmonics import (
+from second_opinions.two_bodies import TwoBodyMesh
+from spinlev.fem.closed_forms import remanent_field
+from spinlev.fem.harmonics import (
     Ball,
     derivative,
     dipole_sources,
@@ -21,8 +19,11 @@ from ..harmonics import (
     multipole_torque,
     outer_sums,
 )
-from ..magnetostatics import assemble_regions
-from ..mutual import Wrench, closed_dipoles, permeability_tensor
+from spinlev.fem.magnetostatics import assemble_regions
+from spinlev.fem.mutual import Wrench
+from spinlev.fem.mutual.rotor_response import closed_dipoles, permeability_tensor
+from spinlev.geometry.basics import Array
+from spinlev.geometry.scenes import Floater
 
 
 def solve_both_bodies(

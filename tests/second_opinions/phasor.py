@@ -10,11 +10,9 @@ J. D. Jackson, Classical Electrodynamics (3rd ed. 1999), sections 5.16 and 6.9.
 """
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from ...geometry.basics import Array
-
-ComplexArray = NDArray[np.complex128]
+from spinlev.geometry.basics import Array
 
 
 def mean_torque(reaction: ArrayLike, moment: ArrayLike) -> Array:

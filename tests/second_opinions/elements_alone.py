@@ -4,11 +4,13 @@ import time
 
 import numpy as np
 
-from ...geometry.bodies import Magnet
-from ...geometry.meshes import MeshSettings
-from ..harmonics import without_noise
-from ..magnetostatics import Refinement, RotorSolution, climb, rung, solve_rotor, strongest
-from ..rotor_tables import Accuracy, RotorTable, error_points, extrapolated_tail, nonzero, provenance
+from spinlev.fem.harmonics import without_noise
+from spinlev.fem.magnetostatics import Refinement, RotorSolution, climb, rung, solve_rotor, strongest
+from spinlev.fem.rotor_tables import Accuracy, RotorTable
+from spinlev.fem.rotor_tables.accuracy import error_points
+from spinlev.fem.rotor_tables.fem_model import extrapolated_tail, nonzero, provenance
+from spinlev.geometry.bodies import Magnet
+from spinlev.geometry.meshes import MeshSettings
 
 SETTINGS = MeshSettings(ball_radius=1.15)
 DEGREE = 24

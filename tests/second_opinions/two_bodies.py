@@ -8,8 +8,8 @@ import netgen.occ as occ
 import ngsolve as ng
 import numpy as np
 
-from ..basics import Array, Box, frozen_array
-from ..bodies import Magnet
+from spinlev.geometry.basics import Array, Box, frozen_array
+from spinlev.geometry.bodies import Magnet
 
 
 @dataclass(frozen=True, eq=False)
