@@ -88,10 +88,12 @@ def stable_ranges(scene: Scene, rates: Rates, start: Array, frequency: float) ->
     return [StableRange(run[0], run[-1], tuple(run)) for run in runs if _holds(run)]
 
 
-def stable_range(scene: Scene, rates: Rates, start: Array, frequency: float) -> StableRange | None:
-    """The one of these intervals that holds the frequency or is nearest to it; None without any."""
+def stable_range(scene: Scene, rates: Rates, start: Array, frequency: float) -> StableRange:
+    """The one of these intervals that holds the frequency or is nearest to it. Raises EquilibriumError without any."""
     found = stable_ranges(scene, rates, start, frequency)
-    return min(found, key=lambda run: max(run.low.parameter - frequency, frequency - run.high.parameter), default=None)
+    if not found:
+        raise EquilibriumError("There is no stable levitation on the branch of the point dipoles.")
+    return min(found, key=lambda run: max(run.low.parameter - frequency, frequency - run.high.parameter))
 
 
 def at_frequency(scene: Scene, rates: Rates, near: BranchPoint, frequency: float, steps: Steps = STEPS) -> BranchPoint:

@@ -75,14 +75,8 @@ def spectra(states: Array, slopes: Array) -> tuple[Array, Array, Array]:
     return values.astype(complex), np.minimum(round_off * condition, 1e-6), tangents @ right
 
 
-def tangent_space(state: Array) -> tuple[Array, Array]:
-    """Ten directions (12, 10) and the projection (10, 12) on their coordinates."""
-    tangents, projections = tangent_spaces(state[None])
-    return tangents[0], projections[0]
-
-
 def tangent_spaces(states: Array) -> tuple[Array, Array]:
-    """The same of many states: (n, 12, 10) and (n, 10, 12)."""
+    """Ten directions (n, 12, 10) at states (n, 12), and the projections (n, 10, 12) on their coordinates."""
     moment, spin = states[:, 6:9], states[:, 9:]
     across = tangent_basis(moment)
     tangents, projections = np.zeros((len(states), 12, 10)), np.zeros((len(states), 10, 12))

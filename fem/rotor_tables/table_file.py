@@ -10,10 +10,8 @@ import xarray as xr
 from ...geometry.basics import Array, Box
 from ...geometry.bodies import Magnet
 from ..harmonics import MultipoleExpansion
-from ..storage import TableFileError, described, read_checked, write_checked
+from ..storage import described, read_checked, write_checked
 from .table import RotorTable
-
-__all__ = ["FORMAT", "TableFileError", "load_table", "save_table"]
 
 FORMAT = "spinlev rotor table 4"
 

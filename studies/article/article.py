@@ -109,11 +109,11 @@ def article_scene(
     return Scene(frequency, magnets, floater, Drag.stokes(floater.radius) if drag else Drag(0.0, 0.0))
 
 
-def article_table(scene: Scene, model: str) -> RotorTable:
+def article_table(scene: Scene, model: str, rtol: float = RTOL) -> RotorTable:
     """The field of a scene's rotor; finite elements from the cache if they are there."""
     if model != "fem":
-        return rotor_table(scene.rotor, model, RTOL, FLOATER.radius)
-    return cached_rotor_table(scene.rotor, model, RTOL, note, FLOATER.radius)[0]
+        return rotor_table(scene.rotor, model, rtol, FLOATER.radius)
+    return cached_rotor_table(scene.rotor, model, rtol, note, FLOATER.radius)[0]
 
 
 def rotor_label(configuration: str, value: float) -> str:

@@ -17,13 +17,12 @@ from ...dynamics.branches import (
     with_answers,
 )
 from ...dynamics.motion import Rates
-from ...dynamics.steady import EquilibriumError, named_modes
-from ...fem.rotor_tables import cached_rotor_table, rotor_table
+from ...dynamics.steady import named_modes
+from ...fem.rotor_tables import rotor_table
 from ...geometry.basics import Array
 from ...geometry.scenes import Scene
-from ..article import article_scene, levitated_rotors
+from ..article import article_scene, article_table, levitated_rotors
 from ..results import Point, Study, by_case, one_case, variable
-from ..terminal import note
 from .dipole_vs_fem_figure import dipole_figure
 from .dipole_vs_fem_report import dipole_lines
 
@@ -72,8 +71,8 @@ def compute(point: Point) -> xr.Dataset:
         "article": _levitation(bare, dipole, start),
         "dipole": _levitation(scene, dipole, start),
         "cuboid": _levitation(scene, Rates.of(scene, rotor_table(scene.rotor, "cuboid")), start),
-        "fem": _levitation(scene, _by_elements(scene, RTOL), start),
-        "coarse": _levitation(scene, _by_elements(scene, COARSE), start),
+        "fem": _levitation(scene, Rates.of(scene, article_table(scene, "fem", RTOL)), start),
+        "coarse": _levitation(scene, Rates.of(scene, article_table(scene, "fem", COARSE)), start),
     }
     low = max(each.range.low.parameter for each in made.values())
     high = min(each.range.high.parameter for each in made.values())
@@ -99,14 +98,7 @@ def compute(point: Point) -> xr.Dataset:
 
 
 def _levitation(scene: Scene, rates: Rates, start: tuple[Array, float]) -> InOneField:
-    found = stable_range(scene, rates, *start)
-    if found is None:
-        raise EquilibriumError("There is no stable levitation on the branch of the point dipoles.")
-    return InOneField(scene, rates, found)
-
-
-def _by_elements(scene: Scene, rtol: float) -> Rates:
-    return Rates.of(scene, cached_rotor_table(scene.rotor, "fem", rtol, note, scene.floater.radius)[0])
+    return InOneField(scene, rates, stable_range(scene, rates, *start))
 
 
 def _described(

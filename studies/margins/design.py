@@ -5,9 +5,8 @@ import xarray as xr
 
 from ...dynamics.equilibria import find_equilibria
 from ...dynamics.steady import EquilibriumError
-from ...fem.rotor_tables import cached_rotor_table
 from ...geometry.basics import Array
-from ..article import CONFIGURATIONS, FLOATER, article_scene
+from ..article import CONFIGURATIONS, article_scene, article_table
 from ..results import Point, Study, by_case, one_case, variable
 from ..terminal import note
 from .design_figure import design_figure, design_lines
@@ -53,8 +52,7 @@ def checked_by_elements(
     measure, slope = first, _shifted(configuration, edge, distance, frequency, first)
     for _ in range(5):
         scene = article_scene(configuration, measure, frequency, drag=False, edge=edge)
-        table = cached_rotor_table(scene.rotor, "fem", rtol, note, FLOATER.radius)[0]
-        found = find_equilibria(scene, table)
+        found = find_equilibria(scene, article_table(scene, "fem", rtol))
         if not found:
             raise EquilibriumError("The true field has no equilibrium there.")
         best = min(found, key=lambda e: abs(e.distance - distance))

@@ -9,10 +9,10 @@ from ...dynamics.branches import HIGHEST, StableRange, at_frequency, levitating_
 from ...dynamics.equilibria import survey, with_plate
 from ...dynamics.motion import Rates
 from ...dynamics.steady import EquilibriumError, Survey
-from ...fem.rotor_tables import RotorTable, cached_rotor_table, rotor_table
+from ...fem.rotor_tables import RotorTable
 from ...geometry.basics import Array, Box
 from ...geometry.scenes import Plate, Scene
-from ..article import CONFIGURATIONS, FLOATER, PLATE_CONDUCTIVITY, PLATE_SIZE, article_scene
+from ..article import CONFIGURATIONS, PLATE_CONDUCTIVITY, PLATE_SIZE, article_scene, article_table
 from ..one_scene import plate_memory
 from ..results import Point, Study, by_case, one_case, variable
 from ..terminal import note
@@ -44,7 +44,7 @@ def points(quick: bool) -> list[Point]:
 def compute(point: Point, rtol: float = RTOL) -> xr.Dataset:
     """Intervals of stable frequencies of one rotor, and growth with a plate below at some frequencies."""
     scene = article_scene(point["configuration"], point["measure"], drag=False)
-    table = _table(scene, point["model"], rtol)
+    table = article_table(scene, point["model"], rtol)
     rates = Rates.of(scene, table)
     try:
         found = levitating_ranges(scene, table, rates)
@@ -63,12 +63,6 @@ def compute(point: Point, rtol: float = RTOL) -> xr.Dataset:
     data |= {name: variable(("tried",), row, *words) for (name, words), row in zip(PLATE.items(), plate.T, strict=True)}
     data |= {name: xr.Variable(("interval",), row) for name, row in zip(("low_kind", "high_kind"), kinds, strict=True)}
     return one_case(point, xr.Dataset(data))
-
-
-def _table(scene: Scene, model: str, rtol: float) -> RotorTable:
-    if model == "fem":
-        return cached_rotor_table(scene.rotor, model, rtol, note, FLOATER.radius)[0]
-    return rotor_table(scene.rotor, model)
 
 
 INTERVAL = {

@@ -96,8 +96,6 @@ def nominal(configuration: str, measure: float) -> Nominal:
     values = {name: known.nominal for name, known in PARAMETERS.items() if name != PLACE} | {"measure": measure}
     scene = scene_of(configuration, values)
     found = stable_range(scene, Rates.of(scene, rotor_table(scene.rotor, MODEL)), *reference_state(scene))
-    if found is None:
-        raise EquilibriumError("There is no stable levitation on the branch of the point dipoles.")
     return Nominal(configuration, measure, values, found)
 
 

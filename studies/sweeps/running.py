@@ -36,7 +36,7 @@ class Journal:
         label = self.folder / "identity.json"
         if not label.exists() or label.read_bytes() != self.identity.encode():
             self.report(f"{self.folder} is of another sweep or another version of the program: all is computed anew.")
-            self.remove()
+            shutil.rmtree(self.folder, ignore_errors=True)
             return {}
         found = {int(path.stem): self._read(path) for path in sorted(self.folder.glob("[0-9]*.nc"))}
         return {number: point for number, point in found.items() if point is not None}
@@ -56,10 +56,6 @@ class Journal:
         if not label.exists():
             write_whole(label, self.identity.encode())
         write_checked(result.assign_attrs(format=FORMAT), self.folder / f"{number:06}.nc")
-
-    def remove(self) -> None:
-        """Forget the points."""
-        shutil.rmtree(self.folder, ignore_errors=True)
 
 
 FLOORS = ("spinlev.geometry", "spinlev.fem", "spinlev.dynamics", "spinlev.studies")
@@ -82,7 +78,10 @@ def swept(name: str, study: Study, points: Mapping[int, Point], engine: Workers,
     InputError : the scheduler does not answer
     OSError : `out` cannot be written
     """
-    journal = _journal(name, study, points, out)
+    versions = {library: version(library) for library in LIBRARIES}
+    asked = {"study": name, "settings": study.settings, "points": list(points.values())}
+    identity = to_json({**asked, **versions, "program": digest_of(*FLOORS)})
+    journal = Journal(out / f"{name}.points", identity, note)
     finished = {k: point for k, point in journal.finished().items() if k in points}
     if finished:
         note(f"{len(finished)} of {len(points)} points are there from an earlier run.")
@@ -108,10 +107,4 @@ def swept(name: str, study: Study, points: Mapping[int, Point], engine: Workers,
 
 def forget(name: str, out: Path) -> None:
     """Remove the finished points of a sweep whose result is safe."""
-    Journal(out / f"{name}.points", "", note).remove()
-
-
-def _journal(name: str, study: Study, points: Mapping[int, Point], out: Path) -> Journal:
-    versions = {library: version(library) for library in LIBRARIES}
-    asked = {"study": name, "settings": study.settings, "points": list(points.values())}
-    return Journal(out / f"{name}.points", to_json({**asked, **versions, "program": digest_of(*FLOORS)}), note)
+    shutil.rmtree(out / f"{name}.points", ignore_errors=True)

@@ -21,7 +21,7 @@ from spinlev.fem.harmonics import (
 )
 from spinlev.fem.magnetostatics import assemble_regions
 from spinlev.fem.mutual import Wrench
-from spinlev.fem.mutual.rotor_response import closed_dipoles, permeability_tensor
+from spinlev.fem.mutual.rotor_response import closed_dipoles
 from spinlev.geometry.basics import Array
 from spinlev.geometry.scenes import Floater
 
@@ -39,7 +39,7 @@ def solve_both_bodies(
     """
     ball = Ball(np.asarray(position, float), floater.radius)
     names = [f"magnet{k}" for k in range(len(mesh.magnets))]
-    permeability = {n: permeability_tensor(magnet) for n, magnet in zip(names, mesh.magnets, strict=True)}
+    permeability = {n: magnet.permeability_in_rotor for n, magnet in zip(names, mesh.magnets, strict=True)}
     permeability["floater"] = floater.recoil_permeability * np.eye(3)
     regions = assemble_regions(mesh.mesh, permeability, mesh.ball_radius, order)
     places = {name: mesh.to_meter(points.points) for name, points in regions.points.items()}

@@ -8,6 +8,7 @@ import pytest
 from netgen.occ import Box as OccBox, Pnt, Sphere
 from ngsolve import SetNumThreads
 from second_opinions.phasor import mean_loss
+from second_opinions.solids import Conductor, occ_mesh
 
 from spinlev.fem.closed_forms import HomogeneousField, unit_dipoles
 from spinlev.fem.closed_forms.sphere_eddy import polarizability
@@ -15,7 +16,6 @@ from spinlev.fem.eddy_currents import current_density, solve_eddy
 from spinlev.fem.eddy_currents.export import write_vtu
 from spinlev.fem.eddy_currents.fields import joule_loss, reaction_flux_density
 from spinlev.geometry.meshes import MeshRule, plate_mesh
-from spinlev.geometry.meshes.solids import Conductor, occ_mesh
 
 SetNumThreads(1)
 SIZE, SIGMA, FREQUENCY = (0.1, 0.24, 0.03), 3.5e7, 100.0

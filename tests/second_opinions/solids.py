@@ -1,4 +1,4 @@
-"""Tetrahedral meshes of conductors of any shape, from OpenCASCADE solids."""
+"""Tetrahedral meshes of conductors of any shape, from OpenCASCADE solids: for those whose eddy currents are known."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -8,7 +8,7 @@ import ngsolve
 import numpy as np
 from netgen.occ import Box as OccBox, Glue, OCCGeometry, Pnt
 
-from .conductors import ConductorMesh
+from spinlev.geometry.meshes import ConductorMesh
 
 
 @dataclass(frozen=True, eq=False)
