@@ -27,7 +27,7 @@ from spinlev.fem.measured_maps import FieldMapError, readers
 from spinlev.fem.rotor_tables import rotor_table
 from spinlev.fem.rotor_tables.table_file import load_table, save_table
 from spinlev.fem.storage import TableFileError, checked_files, whole_files, write_checked
-from spinlev.fem.storage.look_through import look_through
+from spinlev.fem.storage.foreign import look_through
 from spinlev.geometry.bodies import horizontal
 from spinlev.studies.command_line import cli
 

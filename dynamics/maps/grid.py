@@ -11,6 +11,9 @@ from ..equilibria import SearchRange
 from ..steady import Balance, Indices
 from .families import RotorFamily
 
+SAME = 1e-6
+"""Equilibria nearer to each other than this, in radii and rad together, are one."""
+
 
 @dataclass(frozen=True, eq=False)
 class Grid:
@@ -79,10 +82,6 @@ class Grid:
             for n in (len(self.frequencies), len(self.measures))
         )
         return np.asarray((rows[:, None] * len(self.measures) + columns).ravel())
-
-
-SAME = 1e-6
-"""Equilibria nearer to each other than this, in radii and rad together, are one."""
 
 
 class Atlas:

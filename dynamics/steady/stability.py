@@ -9,6 +9,9 @@ from numpy.typing import NDArray
 from ...geometry.basics import Array
 from .balance import tangent_basis
 
+SIDE, TILT = ("side, backward", "side, forward"), ("precession", "nutation")
+"""The slower and the faster of each kind, in the rotor's frame."""
+
 
 @dataclass(frozen=True, eq=False)
 class Modes:
@@ -86,10 +89,6 @@ def tangent_spaces(states: Array) -> tuple[Array, Array]:
     tangents[:, 9:, 6:8] = -moment[:, :, None] * lost[:, None, :]
     projections[:, 6:8, 6:9] = projections[:, 8:, 9:] = across
     return tangents, projections
-
-
-SIDE, TILT = ("side, backward", "side, forward"), ("precession", "nutation")
-"""The slower and the faster of each kind, in the rotor's frame."""
 
 
 @dataclass(frozen=True)

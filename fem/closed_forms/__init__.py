@@ -1,8 +1,8 @@
 """Which fields, potentials and losses are known without any elements?"""
 
-from .carriers import carrier as carrier
 from .closed_moments import (
     added_by_closed_form as added_by_closed_form,
+    carrier as carrier,
     closed_part as closed_part,
     first_order_moments as first_order_moments,
 )

@@ -14,6 +14,9 @@ from pathlib import Path
 
 import psutil
 
+MARK = b"\nspinlev sha256 "
+LENGTH = len(MARK) + 64
+
 
 def write_whole(path: str | Path, content: bytes) -> None:
     """Write a file at once. Raises OSError, which names the file.
@@ -60,10 +63,6 @@ def _tidy(path: Path) -> None:
         owner = left.name.removeprefix(prefix).partition("-")[0] if left.name.startswith(prefix) else ""
         if owner.isdecimal() and not psutil.pid_exists(int(owner)):
             left.unlink(missing_ok=True)
-
-
-MARK = b"\nspinlev sha256 "
-LENGTH = len(MARK) + 64
 
 
 def seal(content: bytes) -> bytes:

@@ -13,6 +13,8 @@ from .magnet import Magnet
 
 TOUCHING = 1e-9
 """Bodies that overlap by less than this (m) only touch: it is far above round-off and far below any tolerance."""
+NARROW = 2e-3
+"""Gaps below this part of the smallest edge are closed for the mesh."""
 
 
 def separation(first: Box, second: Box) -> tuple[float, Array]:
@@ -64,10 +66,6 @@ def overlapping_magnets(magnets: Sequence[Magnet]) -> list[tuple[int, int, float
     """Pairs of magnets that overlap (touching is allowed) with their depth, m."""
     pairs = [(i, j, box_overlap(magnets[i].box, magnets[j].box)) for j in range(len(magnets)) for i in range(j)]
     return [(i, j, depth) for i, j, depth in pairs if depth > TOUCHING]
-
-
-NARROW = 2e-3
-"""Gaps below this part of the smallest edge are closed for the mesh."""
 
 
 def shifted_magnet(magnet: Magnet, shift: Array) -> Magnet:

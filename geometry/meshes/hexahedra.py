@@ -13,6 +13,8 @@ from .conductors import PLANES
 
 SizeFunction = Callable[[Array], Array]
 SAMPLES = 4000
+HEXAHEDRON = ((0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 0, 1), (1, 0, 1), (1, 1, 1), (0, 1, 1))
+SQUARE = ((0, 0), (1, 0), (1, 1), (0, 1))
 
 
 def graded_partition(breakpoints: Sequence[float], size: SizeFunction) -> Array:
@@ -35,10 +37,6 @@ def graded_partition(breakpoints: Sequence[float], size: SizeFunction) -> Array:
         lines.extend(np.interp(np.arange(1, cells) * count[-1] / cells, count, fine))
         lines.append(float(end))
     return np.array(lines)
-
-
-HEXAHEDRON = ((0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 0, 1), (1, 0, 1), (1, 1, 1), (0, 1, 1))
-SQUARE = ((0, 0), (1, 0), (1, 1), (0, 1))
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,9 +9,8 @@ from pydantic import ValidationError
 
 from ..basics import Array, Box, rotation_matrix
 from ..bodies import Magnet, horizontal, tilt, vertical
-from .collisions import overlap_faults
 from .contents import AbsoluteStart, Drag, Floater, Lowering, OffsetStart, Plate, Scene
-from .faults import SceneError, describe_fault
+from .faults import SceneError, describe_fault, overlap_faults
 from .schema import ExplicitRotor, PlateSection, Rotor, SceneSection, StartSection, TiltRotor
 
 MILLI = 1e-3

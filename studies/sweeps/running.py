@@ -14,6 +14,8 @@ from ..terminal import Workers, note, progress, to_json
 from .workers import Failure, computed
 
 FORMAT = "spinlev point 1"
+FLOORS = ("spinlev.geometry", "spinlev.fem", "spinlev.dynamics", "spinlev.studies")
+"""What another program has computed is not mixed into a result."""
 
 
 class Journal:
@@ -56,10 +58,6 @@ class Journal:
         if not label.exists():
             write_whole(label, self.identity.encode())
         write_checked(result.assign_attrs(format=FORMAT), self.folder / f"{number:06}.nc")
-
-
-FLOORS = ("spinlev.geometry", "spinlev.fem", "spinlev.dynamics", "spinlev.studies")
-"""What another program has computed is not mixed into a result."""
 
 
 class SweepError(ComputationError):

@@ -23,9 +23,9 @@ from .options import (
     PlateModel as PlateModel,
     Quantity as Quantity,
     Workers as Workers,
+    default_scene as default_scene,
 )
 from .plain_text import make_readable as make_readable
-from .shipped_scenes import default_scene as default_scene
 from .system_libraries import (
     DRAWING as DRAWING,
     FORTRAN as FORTRAN,

@@ -8,6 +8,8 @@ import numpy as np
 
 from ...geometry.basics import Array, InputError
 
+COLUMNS = ("x_mm", "y_mm", "z_mm")
+
 
 def three_numbers(name: str, text: str) -> Array:
     """(3,) from X,Y,Z. Raises InputError where they are not three finite numbers."""
@@ -31,9 +33,6 @@ def finite(name: str, value: float) -> float:
     if not (isinstance(value, Real) and abs(value) < float("inf")):
         raise InputError(f"Input {name} must be a finite number; instead received {value!r}.")
     return float(value)
-
-
-COLUMNS = ("x_mm", "y_mm", "z_mm")
 
 
 def read_points(path: Path) -> Array:

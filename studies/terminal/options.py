@@ -1,9 +1,10 @@
-"""What every command is asked: which tables, who computes, and where its answers go."""
+"""What every command is asked: which scene and tables, who computes, and where its answers go."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from importlib.resources import files
 from pathlib import Path
 from typing import Annotated, Any, Literal, get_args
 
@@ -14,6 +15,16 @@ from ...geometry.basics import InputError
 FieldModel = Literal["dipole", "cuboid", "fem", "map", "auto"]
 Quantity = Literal["equilibria", "flight", "field"]
 PlateModel = Literal["none", "slab", "fem", "reduced", "auto"]
+
+
+def default_scene() -> Path:
+    """The scene that is meant where none is named: `horizontal`."""
+    return shipped_scene("horizontal")
+
+
+def shipped_scene(name: str) -> Path:
+    """The file of a scene that comes with the program."""
+    return Path(str(files("spinlev.scenes").joinpath(f"{name}.toml")))
 
 
 @Parameter(name="*")
