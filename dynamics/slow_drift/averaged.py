@@ -43,7 +43,6 @@ class Drift:
     growth_per_s : (n,) largest growth of a small motion
     ended_by : "balance", "fold", "instability", "contact" or "duration"
     balance_spin : the spin s* at which the slow torques balance, if the branch reaches it, else NaN
-    fold_spin : where the branch ends in a fold, if that is known, else NaN
     last_fall_s : time from the fold to the loss, s; 0 unless the flight ended by a fold
     """
 
@@ -53,7 +52,6 @@ class Drift:
     growth_per_s: Array
     ended_by: str
     balance_spin: float
-    fold_spin: float
     last_fall_s: float = 0.0
 
     @property
@@ -74,7 +72,7 @@ def steady(start: BranchPoint, duration: float, e_folds: float = E_FOLDS) -> Dri
     ended = INSTABILITY if growth * duration > e_folds else DURATION
     time = np.array([0.0, e_folds / growth if ended == INSTABILITY else duration])
     spin, distance, rate = (np.full(2, value) for value in (start.spin, start.distance, start.growth_per_s))
-    return Drift(time, spin, distance, rate, ended, np.nan, np.nan)
+    return Drift(time, spin, distance, rate, ended, np.nan)
 
 
 def flown(torque: SlowTorque, points: list[BranchPoint], duration: float, end: str, e_folds: float = E_FOLDS) -> Drift:
@@ -116,7 +114,6 @@ def flown(torque: SlowTorque, points: list[BranchPoint], duration: float, end: s
         growth_per_s=growth(lengths),
         ended_by=ended,
         balance_spin=float(course(balances[0])[0]) if len(balances) else np.nan,
-        fold_spin=points[-1].spin if end == FOLD else np.nan,
         last_fall_s=_escape(points, arc, float(course(arc[-1], 2)[0] / pace(arc[-1]))) if ended == FOLD else 0.0,
     )
 
