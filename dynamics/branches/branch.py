@@ -14,7 +14,6 @@ from ..steady import EVERY, Balance, Indices, Modes, modes, solve
 
 Problem = Callable[[float], tuple[Array, float]]
 """Parameter -> values of the runtime parameters, with the drag along the moment left out, and body spin s."""
-
 FOLD, OSCILLATORY, REAL = "fold", "oscillatory", "real"
 """Kinds of marked points; `REAL` is a real eigenvalue through zero away from a fold (a crossing of branches)."""
 DIFFERENCE = 1e-5

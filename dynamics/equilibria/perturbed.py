@@ -15,7 +15,6 @@ from ..steady import Balance, moved_pose, solve, tangent_basis
 
 Extra = Callable[[Array, Array], tuple[Array, Array]]
 """Position (3,) m and moment direction (3,) -> additional force (3,) N and torque (3,) N m, rotor's frame."""
-
 TILTS = np.array([3, 4])
 
 

@@ -31,7 +31,6 @@ MOVES: dict[str, tuple[Move | None, ...]] = {
     "tilt": (Rotation(),),
 }
 """How each magnet of the article's rotors moves with displacement (m) or tilt (rad)."""
-
 NODES = 7
 """Tables between which changing moments are interpolated."""
 

@@ -15,7 +15,6 @@ from numpy.typing import ArrayLike, NDArray
 from ...geometry.basics import MU_0, Array
 
 ComplexArray = NDArray[np.complex128]
-
 SERIES = 0.02
 """|x²| below which four terms of the series are used: there they and the closed form are both good to 3e-11."""
 COEFFICIENTS = (1 / 15, -2 / 315, 1 / 1575, -2 / 31185)

@@ -17,7 +17,6 @@ MODELS: dict[str, Callable[[tuple[Magnet, ...], Accuracy], RotorTable]] = {
     "fem": fem_table,
 }
 """From the cheapest to the dearest in evaluation."""
-
 FEW_MOMENTS = 16
 """Coefficients per magnet up to which moments are quicker to evaluate than the closed form."""
 

@@ -69,8 +69,6 @@ CONFIGURATIONS = {
         tilt, "δθ", "°", np.pi / 180, tuple(float(x) for x in range(5, 50, 5)), (5.0, 10.0, 15.0, 20.0)
     ),
 }
-
-
 QUICK = {"horizontal": (1.0,), "vertical": (14.0,), "tilt": (10.0,)}
 """One rotor of each configuration, for the quick settings of studies."""
 

@@ -86,7 +86,6 @@ EIGHT = tuple(
 )
 OBLIQUE = (_magnet(_box(CUBE, rotation=rotation_matrix((15, 40, 70))), (1, 0, 0), 1.05, 1.15),)
 LONG = (_magnet(_box((0.005, 0.005, 0.04)), (1.3, 0, 0), PERMEABILITY),)
-
 CASES = {
     "contact distance": HardCase(_cube(PERMEABILITY), CONTACT, quick=True),
     "extensions of edges and faces": HardCase(_cube(PERMEABILITY), extensions=True),

@@ -123,8 +123,6 @@ LABELS: dict[str, tuple[tuple[str, ...], str, str]] = {
     "lowest": ((), "Hz", "lowest frequency of stable levitation"),
     "highest": ((), "Hz", "highest frequency of stable levitation"),
 }
-
-
 STUDY = Study(
     name="dipole-vs-fem",
     summary="what true fields change in distance, angle, modes and limits, split"

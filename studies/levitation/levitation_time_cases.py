@@ -38,8 +38,6 @@ CASES = {
 }
 """Rotors of the article, and two whose displacement is chosen so that they fly where the article's did."""
 QUICK = ("horizontal 1 mm", "vertical 14 mm")
-
-
 OUTCOMES = ("contact", "fold", "instability", "levitates", "no equilibrium")
 """How a flight may end."""
 LEVITATES, NO_EQUILIBRIUM = 3, 4
