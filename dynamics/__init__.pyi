@@ -1,30 +1,33 @@
-from .branches import BoundaryPoint as BoundaryPoint
-from .branches import Family as Family
-from .branches import Plane as Plane
-from .branches import Point as Point
-from .branches import follow_boundary as follow_boundary
-from .branches import follow_branch as follow_branch
-from .equilibria import Steps as Steps
-from .equilibria import find_equilibria as find_equilibria
-from .equilibria import survey as survey
-from .equilibria import with_plate as with_plate
-from .flights import Checkpoint as Checkpoint
-from .flights import FlightStopped as FlightStopped
-from .flights import StartError as StartError
-from .flights import Trajectory as Trajectory
-from .flights import flight_kind as flight_kind
-from .flights import initial_state as initial_state
-from .flights import simulate as simulate
-from .flights import starting_point as starting_point
-from .maps import EquilibriumMap as EquilibriumMap
-from .maps import RotorFamily as RotorFamily
-from .maps import equilibrium_map as equilibrium_map
-from .maps import rotor_family as rotor_family
-from .motion import PlateMemory as PlateMemory
-from .motion import Rates as Rates
-from .slow_drift import Drift as Drift
-from .slow_drift import drift as drift
-from .steady import Equilibrium as Equilibrium
-from .steady import EquilibriumError as EquilibriumError
-from .steady import ForceCurve as ForceCurve
-from .steady import Survey as Survey
+from .branches import (
+    BoundaryPoint as BoundaryPoint,
+    BranchPoint as BranchPoint,
+    Family as Family,
+    Plane as Plane,
+    follow_boundary as follow_boundary,
+    follow_branch as follow_branch,
+)
+from .equilibria import Steps as Steps, find_equilibria as find_equilibria, survey as survey, with_plate as with_plate
+from .flights import (
+    Checkpoint as Checkpoint,
+    FlightStopped as FlightStopped,
+    StartError as StartError,
+    Trajectory as Trajectory,
+    flight_kind as flight_kind,
+    initial_state as initial_state,
+    simulate as simulate,
+    starting_point as starting_point,
+)
+from .maps import (
+    EquilibriumMap as EquilibriumMap,
+    RotorFamily as RotorFamily,
+    equilibrium_map as equilibrium_map,
+    rotor_family as rotor_family,
+)
+from .motion import PlateMemory as PlateMemory, Rates as Rates
+from .slow_drift import Drift as Drift, drift as drift
+from .steady import (
+    Equilibrium as Equilibrium,
+    EquilibriumError as EquilibriumError,
+    ForceCurve as ForceCurve,
+    Survey as Survey,
+)

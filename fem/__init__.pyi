@@ -1,9 +1,8 @@
-from .harmonics import MultipoleExpansion as MultipoleExpansion
-from .harmonics import uniform_moments as uniform_moments
-from .measured_maps import FieldMap as FieldMap
-from .measured_maps import FieldMapError as FieldMapError
-from .measured_maps import GriddedTable as GriddedTable
-from .measured_maps import fit_field_map as fit_field_map
-from .rotor_tables import FieldTable as FieldTable
-from .rotor_tables import RangeError as RangeError
-from .rotor_tables import RotorTable as RotorTable
+from .harmonics import MultipoleExpansion as MultipoleExpansion, uniform_moments as uniform_moments
+from .measured_maps import (
+    FieldMap as FieldMap,
+    FieldMapError as FieldMapError,
+    GriddedTable as GriddedTable,
+    fit_field_map as fit_field_map,
+)
+from .rotor_tables import FieldTable as FieldTable, RangeError as RangeError, RotorTable as RotorTable

@@ -1,18 +1,14 @@
-from .basics import MU_0 as MU_0
-from .basics import Box as Box
-from .basics import InputError as InputError
-from .basics import rotation_matrix as rotation_matrix
-from .bodies import Magnet as Magnet
-from .bodies import horizontal as horizontal
-from .bodies import tilt as tilt
-from .bodies import vertical as vertical
-from .scenes import AbsoluteStart as AbsoluteStart
-from .scenes import Drag as Drag
-from .scenes import Floater as Floater
-from .scenes import Lowering as Lowering
-from .scenes import OffsetStart as OffsetStart
-from .scenes import Plate as Plate
-from .scenes import Scene as Scene
-from .scenes import SceneError as SceneError
-from .scenes import load_scene as load_scene
-from .scenes import parse_scene as parse_scene
+from .basics import MU_0 as MU_0, Box as Box, InputError as InputError, rotation_matrix as rotation_matrix
+from .bodies import Magnet as Magnet, horizontal as horizontal, tilt as tilt, vertical as vertical
+from .scenes import (
+    AbsoluteStart as AbsoluteStart,
+    Drag as Drag,
+    Floater as Floater,
+    Lowering as Lowering,
+    OffsetStart as OffsetStart,
+    Plate as Plate,
+    Scene as Scene,
+    SceneError as SceneError,
+    load_scene as load_scene,
+    parse_scene as parse_scene,
+)

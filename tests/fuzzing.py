@@ -23,13 +23,11 @@ import numpy as np
 import places
 import xarray as xr
 
-from spinlev.fem.measured_maps import FieldMapError
-from spinlev.fem.measured_maps.readers import read_field_map
+from spinlev.fem.measured_maps import FieldMapError, readers
 from spinlev.fem.rotor_tables import rotor_table
-from spinlev.fem.rotor_tables.table_file import TableFileError, load_table, save_table
-from spinlev.fem.storage import checksum as seal
-from spinlev.fem.storage import foreign, write_checked
-from spinlev.fem.storage.look_through import look_through
+from spinlev.fem.rotor_tables.table_file import load_table, save_table
+from spinlev.fem.storage import TableFileError, checked_files, whole_files, write_checked
+from spinlev.fem.storage.foreign import look_through
 from spinlev.geometry.bodies import horizontal
 from spinlev.studies.command_line import cli
 
@@ -124,7 +122,7 @@ def answered(arguments: list[str]) -> int:
 
 
 def fault_in_fork(path: Path) -> str | None:
-    """`foreign.fault` with a copy of this process instead of a new one, and less patience: 50 times as fast."""
+    """`hdf5_fault` with a copy of this process instead of a new one, and less patience: 50 times as fast."""
     with warnings.catch_warnings():  # the copy of a process with threads that it does not use
         warnings.simplefilter("ignore", DeprecationWarning)
         child = os.fork()
@@ -180,7 +178,7 @@ def result(chance: random.Random, folder: Path) -> int:
     path.parent.mkdir(exist_ok=True)
     content = whole.read_bytes()
     if chance.random() < 0.5:  # as another program would have written it: HDF5 must find the damage
-        content = content[: -seal.LENGTH]
+        content = content[: -whole_files.LENGTH]
     path.write_bytes(damaged(content, chance))
     command = chance.choice(["figure", "show", "cite", "report"])
     with mock.patch("spinlev.studies.catalogue.drawings.save_figures", return_value=[]):
@@ -198,7 +196,7 @@ def field_map(chance: random.Random, folder: Path) -> int:
     else:
         path.write_bytes(damaged(whole.read_bytes(), chance))
     try:
-        read_field_map(path)
+        readers.read_field_map(path)
     except FieldMapError:
         return 2
     return 0
@@ -276,7 +274,8 @@ def fuzz(kind: str, number: int, seed: int = 0) -> Counter[int]:
     with (
         tempfile.TemporaryDirectory() as name,
         mock.patch.dict(os.environ, SPINLEV_CACHE=f"{name}/cache"),
-        mock.patch.object(foreign, "fault", fault_in_fork),
+        mock.patch.object(checked_files, "hdf5_fault", fault_in_fork),
+        mock.patch.object(readers, "hdf5_fault", fault_in_fork),
     ):
         folder = Path(name)
         try:

@@ -1,7 +1,5 @@
 """Where there is no stable equilibrium: which frequency has one."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from itertools import groupby
@@ -15,7 +13,7 @@ from ..equilibria import SearchRange, Steps, find_equilibria, scattered
 from ..motion import Rates, Scales
 from ..steady import Equilibrium, EquilibriumError
 from .arclength import follow_branch
-from .branch import Family, Point, frequencies
+from .branch import BranchPoint, Family, frequencies
 
 WIDEST = 2.0
 """Ratio of frequencies, up and down, within which one that works is looked for."""
@@ -49,7 +47,7 @@ def _levitating_frequency(
     rates, own = Rates.of(scene, table), scene.frequency
     where = SearchRange(scene, FARTHEST)
 
-    def counts(point: Point) -> bool:
+    def counts(point: BranchPoint) -> bool:
         return point.motion.stable and point.state[:3] in where and bool(table.in_range(point.position)[0])
 
     known = [Scales.of(scene).pack((e.without or e).state) for e in equilibria]
@@ -67,9 +65,10 @@ def _levitating_frequency(
 
 def _branches(
     scene: Scene, family: Family, known: Sequence[Array], where: SearchRange, widest: float
-) -> Iterator[list[Point]]:
+) -> Iterator[list[BranchPoint]]:
     """Branches through known states (12,) both ways, and those through what is found at either end, each once."""
-    own, ends, seen = scene.frequency, (scene.frequency * widest, scene.frequency / widest), list[tuple[bool, Point]]()
+    own, ends = scene.frequency, (scene.frequency * widest, scene.frequency / widest)
+    seen: list[tuple[bool, BranchPoint]] = []
     for begin, end in ((own, ends[0]), (own, ends[1]), ends, ends[::-1]):
         balance = family.balance(begin)
         for start in known if begin == own else balance.states(*scattered(balance, where)):
@@ -87,7 +86,7 @@ def _apart(a: Array, b: Array) -> float:
     return float(np.linalg.norm((a - b)[[0, 1, 2, 6, 7, 8]]))
 
 
-def _windows(branch: Sequence[Point], counts: Callable[[Point], bool]) -> list[tuple[float, float]]:
+def _windows(branch: Sequence[BranchPoint], counts: Callable[[BranchPoint], bool]) -> list[tuple[float, float]]:
     """Frequencies between which the points of a branch count, up to where stability is lost."""
     found = list[tuple[float, float]]()
     for good, run in groupby(branch, lambda point: bool(point.kind) or counts(point)):

@@ -3,8 +3,6 @@
 W. J. F. Govaerts, Numerical Methods for Bifurcations of Dynamical Equilibria, 2000, ch. 1 and 3.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Generic, Protocol, TypeVar
@@ -15,10 +13,10 @@ from scipy.optimize import brentq
 from ...geometry.basics import Array
 from ..equilibria import END, ON, SHORTER, Equations, Steps, directions, follow, stepped
 from ..steady import EquilibriumError, Indices
-from .branch import FOLD, REAL, BranchPoint
+from .branch import FOLD, REAL, Solution
 
-P = TypeVar("P", bound=BranchPoint)
-P_co = TypeVar("P_co", bound=BranchPoint, covariant=True)
+P = TypeVar("P", bound=Solution)
+P_co = TypeVar("P_co", bound=Solution, covariant=True)
 
 
 class Parametric(Equations, Protocol[P_co]):

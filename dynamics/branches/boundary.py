@@ -5,8 +5,6 @@ parameters then leave a curve (W. J. F. Govaerts, Numerical Methods for Bifurcat
 ch. 4).
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from ...geometry.basics import Array
@@ -14,13 +12,13 @@ from ..equilibria import Steps, near_curve, whole_curves
 from ..motion import Parameter
 from ..steady import Balance, EquilibriumError
 from .boundary_equations import COLLISION, CROSSING, Boundary, BoundaryPoint, Plane
-from .branch import FOLD, Point
+from .branch import FOLD, BranchPoint
 
 DISSIPATIVE = [Parameter.LINEAR_DRAG, Parameter.TILT_DRAG, Parameter.TILT_EDDY]
 STEPS = Steps(longest=0.1, shortest=1e-6, turn=0.2, most=500)
 
 
-def follow_boundary(plane: Plane, start: Point, place: Array, kind: str | None = None) -> list[BoundaryPoint]:
+def follow_boundary(plane: Plane, start: BranchPoint, place: Array, kind: str | None = None) -> list[BoundaryPoint]:
     """The boundary through a marked point of a branch, both ways, until it leaves the plane's part or closes.
 
     Parameters

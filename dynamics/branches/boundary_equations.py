@@ -7,8 +7,6 @@
   beyond it one of the two motions grows.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -18,7 +16,7 @@ from numpy.typing import NDArray
 from ...geometry.basics import Array
 from ..equilibria import AtRest
 from ..motion import Rates
-from ..steady import Balance, Indices, moved, spectra
+from ..steady import Balance, Indices, moved_pose, spectra
 from .branch import FOLD
 
 COLLISION, CROSSING = "collision", "crossing"
@@ -98,7 +96,7 @@ class Boundary(AtRest):
 
     def _after(self, at: Array, change: Array) -> Array:
         """Balance, test, frequency (n, 7) after changes (n, 7) of position, tilts, parameters at points (n, 9)."""
-        position, moment = moved(at[:, :3], at[:, 3:6], change[:, :5])
+        position, moment = moved_pose(at[:, :3], at[:, 3:6], change[:, :5])
         place = (at[:, 6:8] + change[:, 5:]) * self.plane.units
         balance = Balance(self.plane.rates, self.plane.values(*place.T), self.plane.spin)
         value, slope = balance(position, moment)

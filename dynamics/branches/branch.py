@@ -1,7 +1,5 @@
 """An equilibrium as a function of one parameter of its problem: points of a branch, and what happens along it."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import ClassVar
@@ -16,7 +14,6 @@ from ..steady import EVERY, Balance, Indices, Modes, modes, solve
 
 Problem = Callable[[float], tuple[Array, float]]
 """Parameter -> values of the runtime parameters, with the drag along the moment left out, and body spin s."""
-
 FOLD, OSCILLATORY, REAL = "fold", "oscillatory", "real"
 """Kinds of marked points; `REAL` is a real eigenvalue through zero away from a fold (a crossing of branches)."""
 DIFFERENCE = 1e-5
@@ -45,7 +42,7 @@ def spins(scene: Scene) -> Problem:
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class BranchPoint:
+class Solution:
     """One solution of a branch.
 
     Parameters
@@ -90,7 +87,7 @@ class BranchPoint:
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Point(BranchPoint):
+class BranchPoint(Solution):
     """One equilibrium of a branch; unknown are its place and the direction of its moment, scaled, (6,).
 
     Parameters
@@ -152,11 +149,11 @@ class Family(AtRest):
         position, moment, size = solve(self.balance(parameter), guess[None, :3], guess[None, 3:], EVERY)
         return np.concatenate([position[0], moment[0], [parameter / self.unit]]) if size[0] < 1e-8 else None
 
-    def at(self, unknowns: Array, tangent: Array, parameter: float) -> Point:
+    def at(self, unknowns: Array, tangent: Array, parameter: float) -> BranchPoint:
         """The equilibrium at a solution (7,)."""
         balance = self.balance(parameter)
         state = balance.states(unknowns[None, :3], unknowns[None, 3:6])
-        return Point(
+        return BranchPoint(
             parameter=parameter,
             spin=balance.spin,
             position=unknowns[:3] * balance.values[Parameter.LENGTH],
@@ -166,7 +163,7 @@ class Family(AtRest):
             time_unit=float(balance.values[Parameter.TIME]),
         )
 
-    def point(self, position: Array, moment: Array, parameter: float) -> Point:
+    def point(self, position: Array, moment: Array, parameter: float) -> BranchPoint:
         """The same at scaled place and moment (3,), with the tangent towards growing values of the parameter."""
         unknowns = np.concatenate([position, moment, [parameter / self.unit]])
         return self.at(unknowns, directions(self, unknowns[None], np.eye(7)[6:])[0], parameter)

@@ -5,8 +5,6 @@ at one far distance, an unstable equilibrium.  From there the branch goes down i
 equilibrium meets the near one, and up again along the near one until floater and rotor touch.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -19,7 +17,7 @@ from ..equilibria import Steps
 from ..motion import Parameter, Rates, Scales, parameters, rotor_gap
 from ..steady import EVERY, EquilibriumError, solve
 from .arclength import follow_branch
-from .branch import FOLD, Family, Point, frequencies
+from .branch import FOLD, BranchPoint, Family, frequencies
 
 UP = np.array([0.0, 0.0, 1.0])
 UNIT = 50.0
@@ -43,20 +41,20 @@ class Branch:
     """
 
     family: Family
-    far: tuple[Point, ...]
-    near: tuple[Point, ...]
+    far: tuple[BranchPoint, ...]
+    near: tuple[BranchPoint, ...]
 
     @property
-    def fold(self) -> Point:
+    def fold(self) -> BranchPoint:
         """The lowest frequency at which there is an equilibrium."""
         return self.near[0]
 
-    def side(self, name: str, grid: Array) -> list[Point | None]:
+    def side(self, name: str, grid: Array) -> list[BranchPoint | None]:
         """The equilibrium on a side ("near", "far") at each frequency of `grid` to round-off; None beyond its end."""
         points = {"near": self.near, "far": self.far}[name]
         return [self._at(points, float(frequency)) for frequency in grid]
 
-    def _at(self, points: tuple[Point, ...], frequency: float) -> Point | None:
+    def _at(self, points: tuple[BranchPoint, ...], frequency: float) -> BranchPoint | None:
         known = np.array([point.parameter for point in points])
         if not known[0] <= frequency <= known[-1]:
             return None
@@ -86,7 +84,7 @@ def levitating_branch(scene: Scene, table: RotorTable, rates: Rates, highest: fl
     family = by_frequency(scene, rates)
     start = _hanging(replace(scene, frequency=highest), table, family)
 
-    def over(point: Point) -> bool:
+    def over(point: BranchPoint) -> bool:
         return rotor_gap(scene, point.position) < 0
 
     points = follow_branch(family, start, highest, SLOWEST, Steps(longest=0.1), over)
@@ -97,7 +95,7 @@ def levitating_branch(scene: Scene, table: RotorTable, rates: Rates, highest: fl
     return Branch(family, tuple(points[folds[0] :: -1]), tuple(points[folds[0] : end]))
 
 
-def kicked(scene: Scene, point: Point, speed: float) -> Scene:
+def kicked(scene: Scene, point: BranchPoint, speed: float) -> Scene:
     """The scene at the frequency of an equilibrium, beginning there with `speed` (m/s) upwards."""
     there = replace(scene, frequency=point.parameter)
     state = Scales.of(there).unpack(point.state)
@@ -125,7 +123,7 @@ def _hanging(scene: Scene, table: RotorTable, family: Family) -> Array:
     return np.asarray(family.balance(scene.frequency).states(-distance / scales.length * upright, upright)[0])
 
 
-def distance_error(scene: Scene, table: RotorTable, family: Family, point: Point) -> float:
+def distance_error(scene: Scene, table: RotorTable, family: Family, point: BranchPoint) -> float:
     """What the table's own stated error may change of the distance along the axis, to first order, m."""
     here = replace(scene, frequency=point.parameter)
     scales = Scales.of(here)

@@ -18,8 +18,8 @@ from ...fem.mutual import RotorResponse, enough_degree, two_body
 from ...geometry.basics import Array
 from ...geometry.scenes import Floater
 from ..motion import Parameter, Rates
-from ..steady import EquilibriumError, moved, tangent_basis
-from .branch import Family, Point
+from ..steady import EquilibriumError, moved_pose, tangent_basis
+from .branch import BranchPoint, Family
 
 STEP, SHORTEST = 0.02, 1e-3
 """Of the central differences, in floater radii and rad; their error is of its square, 1e-4 of the slope."""
@@ -62,7 +62,7 @@ class Mutual:
         """Value and slopes by central differences, whose steps are shorter where the bodies are about to touch."""
         columns, size = [], float(np.clip(0.9 * self._gap(position), SHORTEST, STEP))
         for step in np.eye(5) * size:
-            ends = [moved(position[None], moment[None], sign * step[None]) for sign in (1, -1)]
+            ends = [moved_pose(position[None], moment[None], sign * step[None]) for sign in (1, -1)]
             columns.append((self(*(part[0] for part in ends[0])) - self(*(part[0] for part in ends[1]))) / (2 * size))
         across = np.zeros((5, 6))
         across[:3, :3], across[3:, 3:] = np.eye(3), tangent_basis(moment[None])[0]
@@ -111,10 +111,10 @@ class _Answered(Rates):
 def settled(
     family: Family,
     mutual: Mutual,
-    start: Point,
-    find: Callable[[Family, Point], Point],
+    start: BranchPoint,
+    find: Callable[[Family, BranchPoint], BranchPoint],
     expansion: Expansion | None = None,
-) -> Point:
+) -> BranchPoint:
     """What `find` finds once force and torque are expanded about it.
 
     Parameters
@@ -141,6 +141,6 @@ def settled(
     raise EquilibriumError("The answers of rotor and floater to each other did not settle on an equilibrium.")
 
 
-def pose(point: Point) -> tuple[Array, Array]:
+def pose(point: BranchPoint) -> tuple[Array, Array]:
     """Scaled place and direction of the moment, (3,) each."""
     return point.state[:3], point.state[6:9]

@@ -1,7 +1,5 @@
 """Levitation at all frequencies of a rotor and a floater that magnetise each other, from that of the rigid dipole."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -12,7 +10,7 @@ from ...geometry.basics import Array
 from ...geometry.scenes import Scene
 from ..steady import EVERY, EquilibriumError, solve
 from .arclength import follow_branch
-from .branch import Family, Point
+from .branch import BranchPoint, Family
 from .mutual_equilibria import Mutual, pose, settled
 from .stable_frequencies import (
     BORDER,
@@ -22,7 +20,7 @@ from .stable_frequencies import (
     STEPS,
     StableRange,
     at_frequency,
-    is_stable,
+    levitates,
     stability_end,
 )
 
@@ -50,14 +48,14 @@ class Answered:
     range: StableRange
     mutual: Mutual
 
-    def at(self, frequency: float) -> Point:
+    def at(self, frequency: float) -> BranchPoint:
         """The equilibrium at a frequency, Hz. Raises EquilibriumError where there is none."""
         return self._settled(self._rigid(frequency), frequency)
 
-    def _rigid(self, frequency: float) -> Point:
+    def _rigid(self, frequency: float) -> BranchPoint:
         return at_frequency(self.scene, self.family.rates, self.range.near(frequency), frequency)
 
-    def end(self, side: str) -> Point:
+    def end(self, side: str) -> BranchPoint:
         """Where stability ends on the "low" or "high" side.
 
         Raises EquilibriumError where no stable equilibrium is found to begin with.
@@ -66,14 +64,14 @@ class Answered:
         close = None if rigid.kind in (BORDER, CONTACT) else self._close(rigid, way)
         return close or self._stepwise(rigid, way)
 
-    def _close(self, rigid: Point, way: int) -> Point | None:
+    def _close(self, rigid: BranchPoint, way: int) -> BranchPoint | None:
         """An end near the rigid dipole's, if there is one, by expansions about it alone."""
         inside, border = (rigid.parameter * (1 + part * way) for part in (-INSIDE[1], INSIDE[1]))
         begin = self._rigid(inside)
 
-        def find(family: Family, last: Point) -> Point:
+        def find(family: Family, last: BranchPoint) -> BranchPoint:
             found = stability_end(self.scene, family, begin.state, inside, border)
-            if found.kind in (BORDER, CONTACT) or not is_stable(family.point(*_start(family, begin, inside), inside)):
+            if found.kind in (BORDER, CONTACT) or not levitates(family.point(*_start(family, begin, inside), inside)):
                 raise EquilibriumError("There is no end of stability near the rigid dipole's.")
             return found
 
@@ -82,14 +80,16 @@ class Answered:
         except (EquilibriumError, TwoBodyError):
             return None
 
-    def _stepwise(self, rigid: Point, way: int) -> Point:
+    def _stepwise(self, rigid: BranchPoint, way: int) -> BranchPoint:
         """An end anywhere, in steps over which one expansion is trusted; shorter ones up to contact with the rotor."""
         here, stride = self._inside(rigid, way), TRUSTED
         for _ in range(MOST):
             expansion = self.mutual.expanded(*pose(here))
             border = float(np.clip(here.parameter * (1 + stride * way), LOWEST, HIGHEST))
 
-            def find(family: Family, last: Point, here: Point = here, border: float = border) -> Point:
+            def find(
+                family: Family, last: BranchPoint, here: BranchPoint = here, border: float = border
+            ) -> BranchPoint:
                 return stability_end(self.scene, family, here.state, here.parameter, border)
 
             found = find(replace(self.family, rates=expansion.added(self.family.rates)), here)
@@ -105,25 +105,25 @@ class Answered:
                 stride /= 2
         raise EquilibriumError("The end of stability was not reached.")
 
-    def _settled(self, near: Point, frequency: float) -> Point:
-        def find(family: Family, last: Point) -> Point:
+    def _settled(self, near: BranchPoint, frequency: float) -> BranchPoint:
+        def find(family: Family, last: BranchPoint) -> BranchPoint:
             return follow_branch(family, last.state, frequency, frequency * (1 + 1e-9), STEPS)[0]
 
         return settled(self.family, self.mutual, near, find)
 
-    def _inside(self, rigid: Point, way: int) -> Point:
+    def _inside(self, rigid: BranchPoint, way: int) -> BranchPoint:
         """A stable equilibrium near an end of the rigid dipole's stability."""
         for part in INSIDE:
             try:
                 here = self.at(rigid.parameter * (1 - part * way))
             except (EquilibriumError, TwoBodyError):
                 continue
-            if is_stable(here):
+            if levitates(here):
                 return here
         raise EquilibriumError("No stable equilibrium was found near the rigid dipole's.")
 
 
-def _start(family: Family, near: Point, frequency: float) -> tuple[Array, Array]:
+def _start(family: Family, near: BranchPoint, frequency: float) -> tuple[Array, Array]:
     place, moment = pose(near)
     places, moments, _ = solve(family.balance(frequency), place[None], moment[None], EVERY)
     return places[0], moments[0]

@@ -5,8 +5,6 @@ Floquet multiplier leaves the unit circle: at +1 (a fold, or a crossing of branc
 pair (Neimark-Sacker).
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import ClassVar
@@ -16,8 +14,8 @@ import numpy as np
 from ...geometry.basics import Array
 from ..equilibria import Steps
 from ..motion import Parameter, PlateForce, Rates
-from ..steady import Indices, Orbit, OrbitProblem, floquet_modes, kept, orbit_near
-from .branch import DIFFERENCE, REAL, BranchPoint
+from ..steady import Indices, Orbit, OrbitProblem, conserved, floquet_modes, orbit_near
+from .branch import DIFFERENCE, REAL, Solution
 
 DOUBLING, TORUS = "period doubling", "Neimark-Sacker"
 ORBIT_STEPS = Steps(longest=0.05, shortest=1e-6, turn=0.2, most=300)
@@ -32,7 +30,7 @@ def kind_of(multiplier: complex) -> str:
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class OrbitPoint(BranchPoint):
+class OrbitPoint(Solution):
     """One periodic motion of a branch; its unknowns are the states, divided by √n.
 
     Parameters
@@ -89,7 +87,7 @@ class OrbitFamily:
         problem = self._at(states, parameter)
         residual, slope = problem(states)
         ends = [self._at(states, parameter + s * DIFFERENCE * self.unit)(states)[0] for s in (1, -1)]
-        rows, aims = kept(states, self.spin * abs(problem.values[Parameter.RATE]))
+        rows, aims = conserved(states, self.spin * abs(problem.values[Parameter.RATE]))
         column = np.append((ends[0] - ends[1]) / (2 * DIFFERENCE), [0.0, 0.0])
         every = np.column_stack([np.vstack([slope, rows]) * np.sqrt(len(states)), column])
         if not np.isfinite(every).all():

@@ -1,7 +1,5 @@
 """From which to which frequency of the rotor a floater levitates stably, and what ends it at either side."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
@@ -15,7 +13,7 @@ from ..equilibria import Steps
 from ..motion import Rates, rotor_gap
 from ..steady import EquilibriumError
 from .arclength import follow_branch
-from .branch import FOLD, Family, Point
+from .branch import FOLD, BranchPoint, Family
 from .levitation_branch import by_frequency, levitating_branch
 
 LOWEST, HIGHEST = 25.0, 400.0
@@ -38,11 +36,11 @@ class StableRange:
     points : the equilibria between them, by ascending frequency
     """
 
-    low: Point
-    high: Point
-    points: tuple[Point, ...]
+    low: BranchPoint
+    high: BranchPoint
+    points: tuple[BranchPoint, ...]
 
-    def near(self, frequency: float) -> Point:
+    def near(self, frequency: float) -> BranchPoint:
         """The point that is nearest in frequency."""
         return min(self.points, key=lambda point: abs(point.parameter - frequency))
 
@@ -82,21 +80,23 @@ def stable_ranges(scene: Scene, rates: Rates, start: Array, frequency: float) ->
     """
     walk = partial(_side, replace(scene, plate=None), by_frequency(scene, rates), start, frequency)
     below, above = walk(LOWEST), walk(HIGHEST)
-    runs: list[list[Point]] = [[]]
+    runs: list[list[BranchPoint]] = [[]]
     for point in [*below[:0:-1], *above]:
         runs[-1].append(point)
         if point.kind:
             runs.append([point])
-    return [StableRange(run[0], run[-1], tuple(run)) for run in runs if _is_stable(run)]
+    return [StableRange(run[0], run[-1], tuple(run)) for run in runs if _holds(run)]
 
 
-def stable_range(scene: Scene, rates: Rates, start: Array, frequency: float) -> StableRange | None:
-    """The one of these intervals that holds the frequency or is nearest to it; None without any."""
+def stable_range(scene: Scene, rates: Rates, start: Array, frequency: float) -> StableRange:
+    """The one of these intervals that holds the frequency or is nearest to it. Raises EquilibriumError without any."""
     found = stable_ranges(scene, rates, start, frequency)
-    return min(found, key=lambda run: max(run.low.parameter - frequency, frequency - run.high.parameter), default=None)
+    if not found:
+        raise EquilibriumError("There is no stable levitation on the branch of the point dipoles.")
+    return min(found, key=lambda run: max(run.low.parameter - frequency, frequency - run.high.parameter))
 
 
-def at_frequency(scene: Scene, rates: Rates, near: Point, frequency: float, steps: Steps = STEPS) -> Point:
+def at_frequency(scene: Scene, rates: Rates, near: BranchPoint, frequency: float, steps: Steps = STEPS) -> BranchPoint:
     """The equilibrium at one frequency (Hz) on the branch through another.
 
     Raises EquilibriumError where the branch does not reach it.
@@ -112,27 +112,27 @@ def at_frequency(scene: Scene, rates: Rates, near: Point, frequency: float, step
 
 def stability_end(
     scene: Scene, family: Family, start: Array, frequency: float, towards: float, steps: Steps = STEPS
-) -> Point:
+) -> BranchPoint:
     """The first fold, change of stability, contact or border that is met from `frequency` towards another (Hz)."""
     return next(point for point in _side(scene, family, start, frequency, towards, steps) if point.kind)
 
 
-def is_stable(point: Point) -> bool:
+def levitates(point: BranchPoint) -> bool:
     """Whether no small motion grows faster than what is tolerated."""
     return point.growth_per_s <= max(TOLERATED, point.doubt_per_s)
 
 
-def _is_stable(run: Sequence[Point]) -> bool:
+def _holds(run: Sequence[BranchPoint]) -> bool:
     inner = [point for point in run if not point.kind]
-    return bool(inner) and all(is_stable(point) for point in inner)
+    return bool(inner) and all(levitates(point) for point in inner)
 
 
 def _side(
     scene: Scene, family: Family, start: Array, frequency: float, end: float, steps: Steps = STEPS
-) -> list[Point]:
+) -> list[BranchPoint]:
     """The branch from `frequency` towards `end`, to its first fold, contact or the border, which is marked."""
 
-    def over(point: Point) -> bool:
+    def over(point: BranchPoint) -> bool:
         return point.kind == FOLD or rotor_gap(scene, point.position) < 0
 
     points = follow_branch(family, start, frequency, end, steps, over, TOLERATED)
@@ -144,8 +144,8 @@ def _side(
     return [*points[:-1], replace(points[-1], kind=points[-1].kind or BORDER)]
 
 
-def _touching(scene: Scene, family: Family, before: Point, after: Point) -> Point:
-    def there(frequency: float) -> Point:
+def _touching(scene: Scene, family: Family, before: BranchPoint, after: BranchPoint) -> BranchPoint:
+    def there(frequency: float) -> BranchPoint:
         return follow_branch(family, before.state, before.parameter, frequency, STEPS, tolerated=TOLERATED)[-1]
 
     ends = before.parameter, after.parameter

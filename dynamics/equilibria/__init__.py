@@ -1,31 +1,19 @@
 """Which equilibria does a scene have, all of them?"""
 
-from .continuation import END, ON, SHORTER, AtRest, Equations, Steps, directions, follow, stepped
-from .fixed_points import scattered
-from .full_search import find_equilibria, survey, with_plate
-from .perturbed import PerturbedBalance, Shift
-from .plate_effect import plate_action
-from .search import SearchRange
-from .tracing import near_curve, whole_curves
-
-__all__ = [
-    "END",
-    "ON",
-    "SHORTER",
-    "AtRest",
-    "Equations",
-    "PerturbedBalance",
-    "SearchRange",
-    "Shift",
-    "Steps",
-    "directions",
-    "find_equilibria",
-    "follow",
-    "near_curve",
-    "plate_action",
-    "scattered",
-    "stepped",
-    "survey",
-    "whole_curves",
-    "with_plate",
-]
+from .continuation import (
+    END as END,
+    ON as ON,
+    SHORTER as SHORTER,
+    AtRest as AtRest,
+    Equations as Equations,
+    Steps as Steps,
+    directions as directions,
+    follow as follow,
+    stepped as stepped,
+)
+from .fixed_points import scattered as scattered
+from .full_search import find_equilibria as find_equilibria, survey as survey, with_plate as with_plate
+from .perturbed import PerturbedBalance as PerturbedBalance, Shift as Shift
+from .plate_effect import plate_action as plate_action
+from .search import SearchRange as SearchRange
+from .tracing import near_curve as near_curve, whole_curves as whole_curves

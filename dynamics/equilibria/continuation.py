@@ -8,8 +8,6 @@ solved by Newton's method from x₀ + ℓt, so that a fold in any of the unknown
 Applications of Bifurcation Theory, 1977; E. L. Allgower and K. Georg, Numerical Continuation Methods, 1990, ch. 2, 6).
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Protocol

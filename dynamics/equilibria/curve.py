@@ -5,8 +5,6 @@ of these curves at which the axial force vanishes too, so that following each cu
 folds included.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cached_property
 

@@ -1,7 +1,5 @@
 """Where all five balances vanish: along the curves of lateral balance, and directly from many starts."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from ...geometry.basics import Array

@@ -1,7 +1,5 @@
 """All synchronous equilibria of a floater: fixed points in the frame that turns with the rotor."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from ...fem.rotor_tables import FieldTable
@@ -140,4 +138,4 @@ def _field_doubt(table: FieldTable, values: Array, position: Array) -> Array:
 def _force_curve(scene: Scene, scales: Scales, curve: Curve) -> ForceCurve:
     weight = scene.floater.mass * float(scene.gravity[2])
     unit = scene.floater.mass * scales.length / scales.time**2
-    return ForceCurve(curve.position * scales.length, curve.moment, curve.force * unit - weight, weight)
+    return ForceCurve(curve.position * scales.length, curve.moment, curve.force * unit - weight)

@@ -1,7 +1,5 @@
 """Synchronous equilibria as periodic motions: what a plate or tilted gravity makes of the fixed points without them."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -11,11 +11,10 @@ from ...fem.rotor_tables import FieldTable
 from ...geometry.basics import Array
 from ...geometry.scenes import Scene
 from ..motion import Rates, Scales, parameters
-from ..steady import Balance, moved, solve, tangent_basis
+from ..steady import Balance, moved_pose, solve, tangent_basis
 
 Extra = Callable[[Array, Array], tuple[Array, Array]]
 """Position (3,) m and moment direction (3,) -> additional force (3,) N and torque (3,) N m, rotor's frame."""
-
 TILTS = np.array([3, 4])
 
 
@@ -27,13 +26,11 @@ class Shift:
     ----------
     linear : (3,) m, by the additional force and torque at the old place and the rigidity of the old balance
     position, moment : (3,) m and (3,) the new equilibrium; NaN if none was reached
-    iterations : steps it took
     """
 
     linear: Array
     position: Array
     moment: Array
-    iterations: int
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,18 +83,18 @@ class PerturbedBalance:
         residual = self._residual(position, moment, extra)
         step = -inverse @ residual
         linear = step[:3] * self.scales.length
-        for iteration in range(1, most + 1):
-            places, moments = moved(position[None], moment[None], step[None])
+        for _ in range(most):
+            places, moments = moved_pose(position[None], moment[None], step[None])
             position, moment = places[0], moments[0]
             if np.linalg.norm(step) < tolerance:
-                return Shift(linear, position * self.scales.length, moment, iteration)
+                return Shift(linear, position * self.scales.length, moment)
             if np.linalg.norm(step) > 1.0 or not self._free(position):
                 break
             new = self._residual(position, moment, extra)
             change = inverse @ (new - residual)
             inverse = inverse + np.outer(step - change, step @ inverse) / (step @ change)
             residual, step = new, -inverse @ new
-        return Shift(linear, np.full(3, np.nan), np.full(3, np.nan), most)
+        return Shift(linear, np.full(3, np.nan), np.full(3, np.nan))
 
     def _free(self, position: Array) -> bool:
         place = position * self.scales.length

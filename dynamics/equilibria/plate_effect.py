@@ -1,7 +1,5 @@
 """What a plate does to a floater in synchronous motion, as a mean over a turn."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Where equilibria are looked for: the range, and the starts of the search."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from itertools import product
 

@@ -1,7 +1,5 @@
 """A curve of solutions near a point, and whole curves through points of them."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

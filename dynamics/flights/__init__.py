@@ -1,17 +1,11 @@
 """How does the floater fly?"""
 
-from .checkpoint import Checkpoint
-from .kind import flight_kind
-from .simulation import StartError, initial_state, simulate, starting_point
-from .trajectory import FlightStopped, Trajectory
-
-__all__ = [
-    "Checkpoint",
-    "FlightStopped",
-    "StartError",
-    "Trajectory",
-    "flight_kind",
-    "initial_state",
-    "simulate",
-    "starting_point",
-]
+from .checkpoint import Checkpoint as Checkpoint
+from .kind import flight_kind as flight_kind
+from .simulation import (
+    StartError as StartError,
+    initial_state as initial_state,
+    simulate as simulate,
+    starting_point as starting_point,
+)
+from .trajectory import FlightStopped as FlightStopped, Trajectory as Trajectory

@@ -4,8 +4,6 @@ The parameter is the way λ from one point to the next: a branch ends where it c
 a fold, back to its own point (λ = 0), or leaves the range.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

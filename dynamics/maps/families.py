@@ -1,7 +1,5 @@
 """Scenes that differ in the rotor's frequency and in one measure of the rotor: what a map or a curve runs over."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -33,7 +31,6 @@ MOVES: dict[str, tuple[Move | None, ...]] = {
     "tilt": (Rotation(),),
 }
 """How each magnet of the article's rotors moves with displacement (m) or tilt (rad)."""
-
 NODES = 7
 """Tables between which changing moments are interpolated."""
 

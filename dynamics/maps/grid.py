@@ -1,6 +1,4 @@
-"""The points of a map, frequency by measure of the rotor, and the balances there."""
-
-from __future__ import annotations
+"""The points of a map, frequency by measure of the rotor, the balances there, and the equilibria that are known."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -12,6 +10,9 @@ from ...geometry.basics import Array
 from ..equilibria import SearchRange
 from ..steady import Balance, Indices
 from .families import RotorFamily
+
+SAME = 1e-6
+"""Equilibria nearer to each other than this, in radii and rad together, are one."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,3 +82,40 @@ class Grid:
             for n in (len(self.frequencies), len(self.measures))
         )
         return np.asarray((rows[:, None] * len(self.measures) + columns).ravel())
+
+
+class Atlas:
+    """Positions and moments known at each point of a map.
+
+    Parameters
+    ----------
+    points : how many points the map has
+    """
+
+    def __init__(self, points: int) -> None:
+        self._known = np.full((points, 8, 6), np.nan)
+        self._count = np.zeros(points, int)
+
+    def add(self, point: Indices, position: Array, moment: Array) -> NDArray[np.bool_]:
+        """Keep equilibria (n, 3), (n, 3) of the points (n,); says which of them were new."""
+        places, new = np.concatenate([position, moment], axis=1), np.zeros(len(point), bool)
+        order = np.argsort(point, kind="stable")
+        first = np.searchsorted(point[order], point[order])
+        rank = np.empty(len(point), int)
+        rank[order] = np.arange(len(point)) - first
+        for k in range(rank.max(initial=-1) + 1):  # one of each point at a time
+            chosen = np.flatnonzero(rank == k)
+            apart = np.linalg.norm(self._known[point[chosen]] - places[chosen, None], axis=2)
+            fresh = chosen[~(apart < SAME).any(axis=1)]
+            if self._count[point[fresh]].max(initial=0) == self._known.shape[1]:
+                self._known = np.concatenate([self._known, np.full_like(self._known, np.nan)], axis=1)
+            self._known[point[fresh], self._count[point[fresh]]] = places[fresh]
+            self._count[point[fresh]] += 1
+            new[fresh] = True
+        return new
+
+    def all(self) -> tuple[Indices, Array, Array]:
+        """Points (k,) in order, positions and moments (k, 3)."""
+        point, slot = np.nonzero(np.arange(self._known.shape[1]) < self._count[:, None])
+        found = self._known[point, slot]
+        return point, found[:, :3], found[:, 3:]

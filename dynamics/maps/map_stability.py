@@ -1,7 +1,5 @@
 """Equilibria of a map with the stability of each."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,8 +8,7 @@ from numpy.typing import NDArray
 from ...geometry.basics import Array
 from ..motion import Parameter
 from ..steady import Indices, is_stable, spectra
-from .atlas import Atlas
-from .grid import Grid
+from .grid import Atlas, Grid
 
 
 @dataclass(frozen=True, eq=False)

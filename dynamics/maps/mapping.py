@@ -8,8 +8,6 @@ points, or of a sheet that meets it in a fold, is found by a search; only one th
 grid, and meets no other, can be missed.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np
@@ -17,10 +15,9 @@ from numpy.typing import ArrayLike
 
 from ...geometry.basics import Array
 from ..steady import EVERY, EquilibriumError, Indices, solve
-from .atlas import Atlas
 from .between import between
 from .families import RotorFamily
-from .grid import Grid
+from .grid import Atlas, Grid
 from .map_stability import EquilibriumMap, judged
 
 SPACING = 5

@@ -4,8 +4,6 @@ Position r and moment m̂ with velocity W × r and spin Ω = W ẑ + (s - cos θ
 the torque along two tangents of m̂; their derivatives are by r and by tilts of m̂ along the same tangents.
 """
 
-from __future__ import annotations
-
 import heyoka as hy
 import numpy as np
 

@@ -1,6 +1,4 @@
 """What becomes of a flight in minutes and hours?"""
 
-from .averaged import E_FOLDS, Drift
-from .spin_drift import drift
-
-__all__ = ["E_FOLDS", "Drift", "drift"]
+from .averaged import E_FOLDS as E_FOLDS, Drift as Drift
+from .spin_drift import drift as drift

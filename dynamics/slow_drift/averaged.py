@@ -10,8 +10,6 @@ The floater does not notice the fold at once.  Near it the slow mode obeys ẍ =
 whose solution on the branch escapes at t = 3.40922 (αβ)^(-1/5); the mode's frequency tells αβ: Ω⁴ = 4αβ (-t).
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -20,7 +18,7 @@ from scipy.integrate import solve_ivp
 from scipy.interpolate import CubicHermiteSpline, CubicSpline, PchipInterpolator
 
 from ...geometry.basics import Array
-from ..branches import FOLD, Point
+from ..branches import FOLD, BranchPoint
 from .slow_torque import SlowTorque
 
 BALANCE, DURATION, INSTABILITY, CONTACT = "balance", "duration", "instability", "contact"
@@ -45,7 +43,6 @@ class Drift:
     growth_per_s : (n,) largest growth of a small motion
     ended_by : "balance", "fold", "instability", "contact" or "duration"
     balance_spin : the spin s* at which the slow torques balance, if the branch reaches it, else NaN
-    fold_spin : where the branch ends in a fold, if that is known, else NaN
     last_fall_s : time from the fold to the loss, s; 0 unless the flight ended by a fold
     """
 
@@ -55,7 +52,6 @@ class Drift:
     growth_per_s: Array
     ended_by: str
     balance_spin: float
-    fold_spin: float
     last_fall_s: float = 0.0
 
     @property
@@ -70,16 +66,16 @@ class Drift:
         return float((ends[1] - ends[0]) / (times[1] - times[0]))
 
 
-def steady(start: Point, duration: float, e_folds: float = E_FOLDS) -> Drift:
+def steady(start: BranchPoint, duration: float, e_folds: float = E_FOLDS) -> Drift:
     """A flight on which nothing moves the spin."""
     growth = max(0.0, start.growth_per_s - start.doubt_per_s)
     ended = INSTABILITY if growth * duration > e_folds else DURATION
     time = np.array([0.0, e_folds / growth if ended == INSTABILITY else duration])
     spin, distance, rate = (np.full(2, value) for value in (start.spin, start.distance, start.growth_per_s))
-    return Drift(time, spin, distance, rate, ended, np.nan, np.nan)
+    return Drift(time, spin, distance, rate, ended, np.nan)
 
 
-def flown(torque: SlowTorque, points: list[Point], duration: float, end: str, e_folds: float = E_FOLDS) -> Drift:
+def flown(torque: SlowTorque, points: list[BranchPoint], duration: float, end: str, e_folds: float = E_FOLDS) -> Drift:
     """The flight along the points of a branch, to its `end` or to what comes first."""
     arc, course = _course(points)
     pace = CubicSpline(arc, [torque(p.state) for p in points])
@@ -118,12 +114,11 @@ def flown(torque: SlowTorque, points: list[Point], duration: float, end: str, e_
         growth_per_s=growth(lengths),
         ended_by=ended,
         balance_spin=float(course(balances[0])[0]) if len(balances) else np.nan,
-        fold_spin=points[-1].spin if end == FOLD else np.nan,
         last_fall_s=_escape(points, arc, float(course(arc[-1], 2)[0] / pace(arc[-1]))) if ended == FOLD else 0.0,
     )
 
 
-def _course(points: list[Point]) -> tuple[Array, CubicHermiteSpline]:
+def _course(points: list[BranchPoint]) -> tuple[Array, CubicHermiteSpline]:
     """Length along the branch (n,), and spin and distance as functions of it."""
     places = np.array([np.concatenate([p.state[:3], p.state[6:9], [p.spin]]) for p in points])
     arc = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(places, axis=0), axis=1)))
@@ -132,7 +127,7 @@ def _course(points: list[Point]) -> tuple[Array, CubicHermiteSpline]:
     return arc, CubicHermiteSpline(arc, values, slopes)
 
 
-def _escape(points: list[Point], arc: Array, bend: float) -> float:
+def _escape(points: list[BranchPoint], arc: Array, bend: float) -> float:
     """Time from the fold to the loss, s; `bend` is d²s/dℓ² over ds/dt there."""
     before = next(k for k in range(len(points) - 2, -1, -1) if arc[-1] - arc[k] > 0.01 or k == 0)
     slowest = float(points[before].motion.angular_frequencies[0]) / points[before].time_unit

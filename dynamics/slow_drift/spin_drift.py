@@ -6,13 +6,11 @@ its equilibria in s (`averaged`), to a balance, a fold or a loss of stability.
 The model leaves out what a flight does within the time of a bounce, 0.1 s.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from ...fem.rotor_tables import FieldTable
 from ...geometry.scenes import Scene
-from ..branches import FOLD, Family, Point, follow_branch, spins
+from ..branches import FOLD, BranchPoint, Family, follow_branch, spins
 from ..equilibria import Steps, find_equilibria
 from ..motion import Rates, Scales, State, rotor_gap
 from ..steady import Equilibrium, EquilibriumError
@@ -55,7 +53,7 @@ def drift(
         return steady(family.point(state[:3], state[6:9], spin), duration, e_folds)
     towards = spin + np.copysign(3.0, torque(state))
 
-    def over(point: Point) -> bool:
+    def over(point: BranchPoint) -> bool:
         return point.kind == FOLD or torque(point.state) * (towards - spin) <= 0 or rotor_gap(scene, point.position) < 0
 
     points = follow_branch(family, state, spin, towards, Steps(longest=0.03, turn=0.05), over)

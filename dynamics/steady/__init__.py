@@ -1,36 +1,35 @@
 """Where is the floater at rest in the rotor's frame, and what do small motions there do?"""
 
-from .balance import AXIAL, EVERY, LATERAL, Balance, Indices, moved, solve, tangent_basis
-from .equilibrium import Equilibrium, EquilibriumError, ForceCurve, Survey
-from .floquet import floquet_modes
-from .harmonic_balance import Orbit, OrbitProblem, kept, orbit_near, periodic_orbit
-from .mode_names import SIDE, TILT, named_modes
-from .stability import Modes, is_stable, modes, spectra
-
-__all__ = [
-    "AXIAL",
-    "EVERY",
-    "LATERAL",
-    "SIDE",
-    "TILT",
-    "Balance",
-    "Equilibrium",
-    "EquilibriumError",
-    "ForceCurve",
-    "Indices",
-    "Modes",
-    "Orbit",
-    "OrbitProblem",
-    "Survey",
-    "floquet_modes",
-    "is_stable",
-    "kept",
-    "modes",
-    "moved",
-    "named_modes",
-    "orbit_near",
-    "periodic_orbit",
-    "solve",
-    "spectra",
-    "tangent_basis",
-]
+from .balance import (
+    AXIAL as AXIAL,
+    EVERY as EVERY,
+    LATERAL as LATERAL,
+    Balance as Balance,
+    Indices as Indices,
+    moved_pose as moved_pose,
+    solve as solve,
+    tangent_basis as tangent_basis,
+)
+from .equilibrium import (
+    Equilibrium as Equilibrium,
+    EquilibriumError as EquilibriumError,
+    ForceCurve as ForceCurve,
+    Survey as Survey,
+)
+from .floquet import floquet_modes as floquet_modes
+from .harmonic_balance import (
+    Orbit as Orbit,
+    OrbitProblem as OrbitProblem,
+    conserved as conserved,
+    orbit_near as orbit_near,
+    periodic_orbit as periodic_orbit,
+)
+from .stability import (
+    SIDE as SIDE,
+    TILT as TILT,
+    Modes as Modes,
+    is_stable as is_stable,
+    modes as modes,
+    named_modes as named_modes,
+    spectra as spectra,
+)

@@ -77,7 +77,7 @@ def tangent_basis(moment: Array) -> Array:
     return basis
 
 
-def moved(position: Array, moment: Array, step: Array) -> tuple[Array, Array]:
+def moved_pose(position: Array, moment: Array, step: Array) -> tuple[Array, Array]:
     """Positions and moments (n, 3) after a step (n, 5) of the unknowns; the moments stay unit vectors."""
     moment = moment + np.einsum("nk,nka->na", step[:, 3:], tangent_basis(moment))
     return position + step[:, :3], moment / np.linalg.norm(moment, axis=1, keepdims=True)
@@ -111,7 +111,7 @@ def solve(
         step[np.ix_(good, free)] = -_divided(slope[good][:, free[:, None], free], value[good][:, free])
         size = np.maximum(np.linalg.norm(step[:, :3], axis=1), np.linalg.norm(step[:, 3:], axis=1))
         step *= np.minimum(1.0, reach / np.maximum(size, reach))[:, None]
-        position[active], moment[active] = moved(position[active], moment[active], step)
+        position[active], moment[active] = moved_pose(position[active], moment[active], step)
         done = ~good | (size < 1e-11)
         length[active] = np.where(good, size, np.inf)
         active = active[~done]

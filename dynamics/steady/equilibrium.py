@@ -8,7 +8,7 @@ import numpy as np
 
 from ...geometry.basics import Array, ComputationError
 from ..motion import State
-from .mode_names import Mode
+from .stability import Mode
 
 
 class EquilibriumError(ComputationError):
@@ -96,13 +96,11 @@ class ForceCurve:
     position : (n, 3) m, rotor's frame
     moment : (n, 3) direction
     magnetic_force : (n,) along +z, N
-    weight : the force that it has to balance, along +z, N
     """
 
     position: Array
     moment: Array
     magnetic_force: Array
-    weight: float
 
 
 @dataclass(frozen=True, eq=False)

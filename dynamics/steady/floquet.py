@@ -1,12 +1,10 @@
 """Stability of a periodic motion: what small deviations have become after one turn (Floquet multipliers)."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from ...geometry.basics import Array
 from .harmonic_balance import Orbit
-from .stability import Modes, tangent_space
+from .stability import Modes, tangent_spaces
 
 STEPS = 48
 """Steps in a turn, doubled once for the error."""
@@ -31,7 +29,7 @@ def floquet_modes(orbit: Orbit) -> Modes:
     """
     size = orbit.derivatives.shape[1]
     tangent, projection = np.zeros((size, size - 2)), np.zeros((size - 2, size))
-    tangent[:12, :10], projection[:10, :12] = tangent_space(orbit.states[0])
+    tangent[:12, :10], projection[:10, :12] = (found[0] for found in tangent_spaces(orbit.states[:1]))
     tangent[12:, 10:] = projection[10:, 12:] = np.eye(size - 12)
     coarse = _propagated(orbit.derivatives, STEPS)[-1]
     matrices = _propagated(orbit.derivatives, 2 * STEPS)

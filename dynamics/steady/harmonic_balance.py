@@ -8,8 +8,6 @@ time domain: J. P. Boyd, Chebyshev and Fourier Spectral Methods, 2001, ch. 6 and
 The equations keep |m̂| and the body spin s = Ω·m̂/ω; both are prescribed beside them.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np
@@ -75,7 +73,7 @@ def orbit_near(rates: Rates, values: Array, spin: float, plate: PlateForce | Non
     states, size = states.copy(), np.inf
     for _ in range(25):
         residual, slope = problem(states)
-        rows, aims = kept(states, spin * abs(values[Parameter.RATE]))
+        rows, aims = conserved(states, spin * abs(values[Parameter.RATE]))
         if not np.isfinite(slope).all():
             return None
         matrix, target = np.vstack([slope, rows]), -np.append(residual, aims)
@@ -91,7 +89,7 @@ def orbit_near(rates: Rates, values: Array, spin: float, plate: PlateForce | Non
     return Orbit(states, *problem.whole(states), max(size, tail))
 
 
-def kept(states: Array, spin: float) -> tuple[Array, Array]:
+def conserved(states: Array, spin: float) -> tuple[Array, Array]:
     """Derivatives (2, 12 n) and values (2,) of |m̂|²/2 - 1/2 and Ω·m̂ - s at the first instant."""
     moment, turning = states[0, 6:9], states[0, 9:]
     rows = np.zeros((2, states.size))

@@ -16,8 +16,6 @@ Formulas: potential of a uniformly charged segment and rectangle, e.g. O. D. Kel
 Potential Theory (1929), ch. III; for magnets see Z. J. Yang et al., Supercond. Sci. Technol. 3 (1990) 591.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import product

@@ -5,8 +5,6 @@ the potential of the box's charged faces. NumPy, for the many points inside the 
 polarisation. Sources as in `cuboid`; the potential of a charged rectangle also in D. Nagy, Geophysics 31 (1966) 362.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from itertools import product
 

@@ -10,8 +10,6 @@ O. D. Kellogg, Foundations of Potential Theory (1929), ch. III;
 W. D. MacMillan, The Theory of the Potential (1930), § 43.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from ...geometry.basics import Array

@@ -1,7 +1,5 @@
 """Gauss rules pressed towards the places where closed-form fields of boxes have kinks and logarithms."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from itertools import combinations
 

@@ -6,8 +6,6 @@ follows the arc; their integral over the height is closed, and the other two are
     A = (μ0 j/4π) ∫∫ φ̂' [asinh(ζ/D)] ρ' dρ' dφ'     with D the horizontal distance and ζ from end to end.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass
 

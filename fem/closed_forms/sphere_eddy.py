@@ -9,14 +9,12 @@ and where skin depth is large against R: α = -iω (2π/15) σ R⁵.  In a field
 it feels the torque -Im α B⊥² along the turn, and loses the power ω times that.
 """
 
-from __future__ import annotations
-
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from ...geometry.basics import MU_0, Array
-from .phasor import ComplexArray
 
+ComplexArray = NDArray[np.complex128]
 SERIES = 0.02
 """|x²| below which four terms of the series are used: there they and the closed form are both good to 3e-11."""
 COEFFICIENTS = (1 / 15, -2 / 315, 1 / 1575, -2 / 31185)

@@ -1,7 +1,5 @@
 """The field of one uniformly polarised magnet in any pose, accurate near and far."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from functools import cached_property
 
@@ -16,7 +14,6 @@ from .cuboid import cuboid_field
 
 FAR = 5.0
 """From this many circumradii on, moments are as exact as the closed form, whose terms cancel more and more."""
-
 FAR_DEGREE = 17
 """The first moments left out are of degree 19 (the even ones of a box vanish): 5^-19 is 5e-14."""
 

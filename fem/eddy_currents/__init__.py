@@ -1,7 +1,5 @@
 """Which currents does an alternating field drive in a conductor?"""
 
-from .fields import current_density
-from .solver import EddyResponse, FrequencySystem, solve_eddy
-from .space import EddySpace, Source
-
-__all__ = ["EddyResponse", "EddySpace", "FrequencySystem", "Source", "current_density", "solve_eddy"]
+from .fields import current_density as current_density
+from .solver import EddyResponse as EddyResponse, FrequencySystem as FrequencySystem, solve_eddy as solve_eddy
+from .space import EddySpace as EddySpace, Source as Source

@@ -1,24 +1,12 @@
 """What do all finite-element solvers of the program share?"""
 
-from .condensed import solve_condensed
-from .gauge import edge_vertices, region_edges, tree_edges
-from .integration_points import IntegrationPoints, surface_points, volume_points
-from .memory import TooLargeError, require_memory
-from .open_boundary import OpenBoundary
-from .open_solve import solve_open
-from .parity import Parity
-
-__all__ = [
-    "IntegrationPoints",
-    "OpenBoundary",
-    "Parity",
-    "TooLargeError",
-    "edge_vertices",
-    "region_edges",
-    "require_memory",
-    "solve_condensed",
-    "solve_open",
-    "surface_points",
-    "tree_edges",
-    "volume_points",
-]
+from .condensed import solve_condensed as solve_condensed, solve_open as solve_open
+from .gauge import edge_vertices as edge_vertices, region_edges as region_edges, tree_edges as tree_edges
+from .integration_points import (
+    IntegrationPoints as IntegrationPoints,
+    surface_points as surface_points,
+    volume_points as volume_points,
+)
+from .memory import TooLargeError as TooLargeError, require_memory as require_memory
+from .open_boundary import OpenBoundary as OpenBoundary
+from .parity import Parity as Parity

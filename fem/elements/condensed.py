@@ -1,12 +1,15 @@
-"""Solution of a system whose element-inner unknowns are condensed out: the factor holds the coupling ones only."""
+"""Systems whose element-inner unknowns are condensed out: the factor holds the coupling ones only."""
 
-from __future__ import annotations
-
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import ngsolve
+import ngsolve as ng
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse.linalg import LinearOperator, cg
+
+from ...geometry.basics import Array, ComputationError
+from .open_boundary import OpenBoundary
 
 Number = TypeVar("Number", np.float64, np.complex128)
 
@@ -30,3 +33,45 @@ def solve_condensed(form: ngsolve.BilinearForm, inverse: ngsolve.BaseMatrix, loa
         solution.vec.data += form.harmonic_extension * solution.vec
         row[:] = solution.vec.FV().NumPy()
     return found
+
+
+class ConvergenceError(ComputationError):
+    """The linear solver did not reach its tolerance."""
+
+
+def solve_open(stiffness: Any, inverse: Any, free_dofs: Any, load: Any, boundary: OpenBoundary) -> Any:
+    """The potential, an NGSolve function.
+
+    Parameters
+    ----------
+    stiffness, load : condensed forms, without what harmonics beyond the Robin term do at the boundary
+    inverse : of the stiffness on the free unknowns
+    free_dofs : the unknowns that are not zero, without those that are condensed
+
+    Raises
+    ------
+    ConvergenceError : the iteration for the open boundary stalls
+    """
+    potential = ng.GridFunction(stiffness.space)
+    load.vec.data += stiffness.harmonic_extension_trans * load.vec
+    free = np.array(free_dofs)
+    source, target = load.vec.CreateVector(), load.vec.CreateVector()
+
+    def multiply(operator: Any, values: Array) -> Array:
+        source.FV().NumPy()[:] = values
+        target.data = operator * source
+        return np.where(free, target.FV().NumPy(), 0.0)
+
+    shape = (len(free), len(free))
+    full = LinearOperator(
+        shape, matvec=lambda x: multiply(stiffness.mat, x) + np.where(free, boundary.apply(x), 0.0), dtype=float
+    )
+    preconditioner = LinearOperator(shape, matvec=lambda x: multiply(inverse, x), dtype=float)
+    right_hand_side = np.where(free, load.vec.FV().NumPy(), 0.0)
+    result, failed = cg(full, right_hand_side, rtol=1e-12, maxiter=100, M=preconditioner)
+    if failed:
+        raise ConvergenceError(f"The open boundary did not converge in {failed} iterations; use a larger ball of air.")
+    potential.vec.FV().NumPy()[:] = result
+    potential.vec.data += stiffness.harmonic_extension * potential.vec
+    potential.vec.data += stiffness.inner_solve * load.vec
+    return potential

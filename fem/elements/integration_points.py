@@ -4,8 +4,6 @@ Functions that exist as NumPy code (closed forms, solid harmonics) enter and lea
 formula has to be written a second time. Works on every element shape, those of hp-refinement included.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any
 

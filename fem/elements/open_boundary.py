@@ -5,8 +5,6 @@ is exact for l = 1; what other degrees lack is a matrix of low rank, (l-1)/R on 
 of the sphere that mirror planes cut out, only harmonics of the potential's parity take part.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import ngsolve as ng

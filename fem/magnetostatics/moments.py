@@ -3,8 +3,6 @@
 Either moments of the magnetisation about every magnet, or the harmonics of ψ on the outer sphere about the centre.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 

@@ -10,8 +10,6 @@ A step in order cannot tell what the layers leave: about factor^(2λ) a layer, w
 and λ falls from 1 to 2/3 as μ grows. From `STRONG` on there are more of them, so that this is small beside the step.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """The field of a whole rotor at one level of refinement: symmetry, parity parts, moments."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import product
@@ -98,7 +96,7 @@ def solve_rotor(
     area_error = 0.0
     owners = [k for k, whole in enumerate(cut) for _ in whole]
     for signs, (own, carried) in parity_parts(seen, planes, _polarizations(magnets, carriers, symmetry)):
-        sources = [_polarized(magnet, j) for magnet, j in zip(seen, carried, strict=True)]
+        sources = [Magnet(m.box, m.box.rotation.T @ j) for m, j in zip(seen, carried, strict=True)]
         rest = (own - carried)[owners]
         solution = solve(system, sources, formulation, refinement.boundary_degree, signs, rest)
         area_error = solution.boundary.area_error
@@ -135,15 +133,3 @@ def _polarizations(magnets: Sequence[Magnet], carriers: Sequence[Magnet] | None,
     """(2, n, 3) T in the mirrors' frame: of the magnets and of their carriers."""
     groups = (magnets, carriers or magnets)
     return np.array([[magnet.polarization_in_rotor for magnet in group] for group in groups]) @ symmetry.axes
-
-
-def _polarized(magnet: Magnet, polarization: Array) -> Magnet:
-    """A source of the same shape with another polarisation (3,) T, in the frame of the box's pose."""
-    box = Box(magnet.box.size, magnet.box.center, magnet.box.rotation)
-    return replace(
-        magnet,
-        box=box,
-        polarization=box.rotation.T @ polarization,
-        recoil_permeability=1.0,
-        transverse_permeability=None,
-    )

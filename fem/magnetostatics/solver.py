@@ -13,8 +13,6 @@ ball is exact (`elements.open_boundary`). Where the bodies have mirror planes th
 matrix serves polarisations of every parity: ψ = 0 on a plane where it is odd.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
@@ -65,14 +63,12 @@ class Solution:
 
     Parameters
     ----------
-    system, formulation, sources, signs : as given to `solve`
+    system, signs : as given to `solve`
     potential : ψ, T times mesh unit (an NGSolve function)
     boundary : the open boundary
     """
 
     system: System
-    formulation: Formulation
-    sources: tuple[Magnet, ...]
     signs: tuple[int, ...]
     potential: Any
     boundary: OpenBoundary
@@ -142,7 +138,7 @@ def solve(
             free = free & ~space.GetDofs(mesh.mesh.Boundaries(f"plane{plane}"))
     inverse = system.stiffness.mat.Inverse(free, inverse="sparsecholesky")
     potential = solve_open(system.stiffness, inverse, free, load, boundary)
-    return Solution(system, formulation, tuple(sources), signs, potential, boundary)
+    return Solution(system, signs, potential, boundary)
 
 
 def _add_source(

@@ -1,16 +1,39 @@
-"""A gridded table as one self-describing netCDF file."""
+"""Files of measured fields: a table from a map that was measured, and a fitted table kept as netCDF."""
 
-from __future__ import annotations
-
+from collections.abc import Sequence
 from pathlib import Path
 
+import numpy as np
 import xarray as xr
 
+from ...geometry.bodies import Magnet
 from ..rotor_tables import from_dataset, to_dataset
 from ..storage import read_checked, write_checked
+from .field_map import FieldMapError
+from .fit import fit_field_map
 from .fitted_table import GriddedTable
+from .readers import read_field_map
 
 FORMAT = "spinlev gridded table 1"
+
+
+def map_table(path: Path | None, magnets: Sequence[Magnet]) -> GriddedTable:
+    """Table of a map of B in the rotor's frame; the sources lie in the smallest spheres about the magnets.
+
+    What the map holds inside those spheres is left out. Only the magnets' shapes and places matter, not their strength.
+
+    Raises
+    ------
+    FieldMapError : no map, a file that is none, or too few values outside the spheres
+    """
+    if path is None:
+        raise FieldMapError("Input rotor.field_map must name a file for the model map; instead it is missing.")
+    field_map = read_field_map(path)
+    radius = max(magnet.box.circumradius for magnet in magnets)
+    centers = np.array([magnet.box.center for magnet in magnets])
+    for center in centers:
+        field_map = field_map.outside(center, radius)
+    return fit_field_map(field_map, centers, radius)
 
 
 def save_gridded(table: GriddedTable, path: str | Path) -> None:

@@ -1,7 +1,5 @@
 """From a map of B to a field table."""
 
-from __future__ import annotations
-
 import time
 from dataclasses import replace
 
@@ -20,13 +18,10 @@ from .source_center import find_center
 
 TAIL = 45
 """Degree to which the part left out is continued."""
-
 EDGE = 1.1
 """Points nearer than so many times the nearest one's distance tell how large the part left out is."""
-
 EDGE_POINTS = 2000
 """At most so many of them."""
-
 EDGE_SAFETY = 2.0
 
 

@@ -1,7 +1,5 @@
 """Fields of single solid harmonics at many points: the columns of a least-squares fit."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Least-squares fit of harmonic functions to observed field components; degree and error bar from held-out groups."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,18 +11,13 @@ from .harmonic_basis import HarmonicBasis
 
 GROUPS = 12
 """Groups of points, each of which is held out once: they choose the degree, and the fits without them differ."""
-
 MARGIN = 4
 """Degrees beyond the chosen one that the error bar takes into account."""
-
 NEGLIGIBLE = 0.1
 """Unknowns are left out that change the fit by less than so many standard errors: symmetry makes most of them zero."""
-
 FLOOR = 1e-8
 """Smallest misfit that normal equations in double precision can tell, relative to the observations."""
-
 ROUND_OFF = 16 * np.finfo(float).eps
-
 CHUNK = 2000
 """Points whose columns are held in memory at once."""
 

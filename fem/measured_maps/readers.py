@@ -1,7 +1,5 @@
 """Maps of B from files: a probe's CSV, netCDF grids, and meshes with point data."""
 
-from __future__ import annotations
-
 import csv
 import io
 from collections.abc import Mapping
@@ -13,7 +11,7 @@ import numpy as np
 import xarray as xr
 
 from ...geometry.basics import Array
-from ..storage import TableFileError, foreign, read_checked
+from ..storage import TableFileError, hdf5_fault, is_hdf5, read_checked
 from .field_map import FieldMap, FieldMapError
 
 AXES = ("x", "y", "z")
@@ -130,7 +128,7 @@ def _components(vector: xr.DataArray, name: str) -> dict[str, xr.DataArray]:
 
 def _mesh_columns(path: Path, length: float, field: float) -> dict[str, Array]:
     for part in (path, path.with_suffix(".h5")):  # where XDMF has its numbers
-        if foreign.is_hdf5(part) and (fault := foreign.fault(part)):
+        if is_hdf5(part) and (fault := hdf5_fault(part)):
             raise FieldMapError(f"Input map must be a readable HDF5 file; instead: {fault}.")
     said = io.StringIO()
     try:

@@ -1,7 +1,5 @@
 """Where the sources of a map of B have their middle."""
 
-from __future__ import annotations
-
 import numpy as np
 from scipy.optimize import least_squares
 
@@ -11,7 +9,6 @@ from .harmonic_basis import HarmonicBasis
 
 SUBSET = 2000
 """Map points that are enough to find a centre."""
-
 EXPLAINED = 0.7
 """A dipole that leaves more than this part of the field's root mean square does not tell where its sources are."""
 

@@ -1,7 +1,5 @@
 """How many degrees the expansion of the magnets' field about the floater's centre needs."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

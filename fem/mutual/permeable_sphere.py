@@ -10,8 +10,6 @@ J. D. Jackson, Classical Electrodynamics (3rd ed. 1999), sections 4.4 and 5.11; 
 Electricity (3rd ed. 1968), section 5.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from ...geometry.basics import Array
@@ -34,12 +32,3 @@ def induced_sources(incident: Coefficients, permeability: float) -> Coefficients
 def permanent_sources(floater: Floater, direction: Array, ball: Ball, degree: int) -> Coefficients:
     """c_lm (T) of the floater's remanent polarisation along a unit vector (3,): a dipole."""
     return dipole_sources(floater.moment * np.asarray(direction, float), ball, degree)
-
-
-def inner_field(incident: Array, permeability: float, polarization: Array) -> tuple[Array, Array]:
-    """B and μ0 H (3,), T, in a sphere with remanent polarisation (3,) T in a uniform field (3,) T.
-
-    μ0 H = (3 B0 - J)/(μr + 2), B = μr μ0 H + J.
-    """
-    h = (3 * np.asarray(incident, float) - np.asarray(polarization, float)) / (permeability + 2)
-    return permeability * h + polarization, h

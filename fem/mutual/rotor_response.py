@@ -5,8 +5,6 @@ magnetisation (μ - 1)(H0 - ∇ψ) comes from finite elements on a mesh of the m
 the ball. Its field in the ball is a volume integral over the magnets, whose error is the square of that of ∇ψ.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -93,15 +91,10 @@ class RotorResponse:
 
 def rotor_response(mesh: MagnetMesh, order: int = 3) -> RotorResponse:
     """Assemble and factorise a rotor on a mesh of `mesh_magnets`, with elements of degree `order`."""
-    permeability = {f"magnet{k}": permeability_tensor(magnet) for k, magnet in enumerate(mesh.magnets)}
+    permeability = {f"magnet{k}": magnet.permeability_in_rotor for k, magnet in enumerate(mesh.magnets)}
     if all(np.array_equal(mu, np.eye(3)) for mu in permeability.values()):
         return RotorResponse(mesh, None)
     return RotorResponse(mesh, assemble_regions(mesh.mesh, permeability, mesh.ball_radius, order))
-
-
-def permeability_tensor(magnet: Magnet) -> Array:
-    """(3, 3) relative permeability of a magnet."""
-    return magnet.recoil_permeability * np.eye(3)
 
 
 def closed_dipoles(magnets: Sequence[Magnet]) -> tuple[Array, Array]:
@@ -113,7 +106,7 @@ def closed_dipoles(magnets: Sequence[Magnet]) -> tuple[Array, Array]:
     points, moments = [], []
     for magnet in magnets:
         places, weights = volume_rule(magnet.box, boxes, NODES)
-        field = remanent_field(magnets, places) @ (permeability_tensor(magnet) - np.eye(3))
+        field = remanent_field(magnets, places) @ (magnet.permeability_in_rotor - np.eye(3))
         points.append(places)
         moments.append(weights[:, None] * field)
     return np.concatenate(points), np.concatenate(moments)

@@ -1,25 +1,14 @@
 """How do a plate's currents become a network of few states?"""
 
-from .energy_basis import OrderedBasis, ordered_basis
-from .network_error import coupling_error, truncated
-from .reaction import plate_reaction
-from .reduction import NETWORK_SHARE, STRICT, PlateNetwork, checked_ranges, reduce_plate
-from .region import Region
-from .training import OtherSources, probe_places, unit_power
-
-__all__ = [
-    "NETWORK_SHARE",
-    "STRICT",
-    "OrderedBasis",
-    "OtherSources",
-    "PlateNetwork",
-    "Region",
-    "checked_ranges",
-    "coupling_error",
-    "ordered_basis",
-    "plate_reaction",
-    "probe_places",
-    "reduce_plate",
-    "truncated",
-    "unit_power",
-]
+from .energy_basis import OrderedBasis as OrderedBasis, ordered_basis as ordered_basis
+from .network_error import coupling_error as coupling_error, truncated as truncated
+from .reaction import plate_reaction as plate_reaction
+from .reduction import (
+    NETWORK_SHARE as NETWORK_SHARE,
+    STRICT as STRICT,
+    PlateNetwork as PlateNetwork,
+    checked_ranges as checked_ranges,
+    reduce_plate as reduce_plate,
+)
+from .region import Region as Region
+from .training import OtherSources as OtherSources, probe_places as probe_places, unit_power as unit_power

@@ -1,35 +1,17 @@
 """What does a plate do to a floater, as a table for the motion?"""
 
-from .driven_plate import SHARE_PART, reachable_region, turning_rotor
-from .field_functions import Multipoles
-from .file import cached_driven_plate, cached_plate_table
-from .multipole_fit import Fit, fit_multipoles
-from .plate_table import PlateErrors, PlateTable
-from .rotor_source import DOWN, ExpansionSource, RotorSource, posed_rotor, rotor_parts
-from .share import RotorShare, rotor_share
-from .share_trim import MISSED, trimmed
-from .tabulate import FUNCTION_SHARE, tensor_error
-
-__all__ = [
-    "DOWN",
-    "FUNCTION_SHARE",
-    "MISSED",
-    "SHARE_PART",
-    "ExpansionSource",
-    "Fit",
-    "Multipoles",
-    "PlateErrors",
-    "PlateTable",
-    "RotorShare",
-    "RotorSource",
-    "cached_driven_plate",
-    "cached_plate_table",
-    "fit_multipoles",
-    "posed_rotor",
-    "reachable_region",
-    "rotor_parts",
-    "rotor_share",
-    "tensor_error",
-    "trimmed",
-    "turning_rotor",
-]
+from .driven_plate import SHARE_PART as SHARE_PART, reachable_region as reachable_region, turning_rotor as turning_rotor
+from .field_functions import Multipoles as Multipoles
+from .file import cached_driven_plate as cached_driven_plate, cached_plate_table as cached_plate_table
+from .multipole_fit import Fit as Fit, fit_multipoles as fit_multipoles
+from .plate_table import PlateErrors as PlateErrors, PlateTable as PlateTable
+from .rotor_source import (
+    DOWN as DOWN,
+    ExpansionSource as ExpansionSource,
+    RotorSource as RotorSource,
+    posed_rotor as posed_rotor,
+    rotor_parts as rotor_parts,
+)
+from .share import RotorShare as RotorShare, rotor_share as rotor_share
+from .share_trim import MISSED as MISSED, trimmed as trimmed
+from .tabulate import FUNCTION_SHARE as FUNCTION_SHARE, tensor_error as tensor_error

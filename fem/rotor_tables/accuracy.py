@@ -1,18 +1,20 @@
 """What a table must reach, and where."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np
 
-from ...geometry.basics import Array, Box
+from ...geometry.basics import Array, Box, InputError
 from ...geometry.bodies import Magnet
 from ..closed_forms import carrier
 from ..harmonics import uniform_moments
 
 OFFSETS = (0.0, 1.0, 3.0, 10.0, 100.0)
 """Errors are looked at this far out, beyond the nearest distance, in sizes of the rotor."""
+
+
+class AccuracyError(InputError):
+    """A tolerance below what can be reached; the message names it and the smallest that can."""
 
 
 @dataclass(frozen=True)

@@ -1,7 +1,5 @@
 """Tables that were computed before, kept on disk under a hash of all that decides them."""
 
-from __future__ import annotations
-
 import hashlib
 from collections.abc import Callable
 

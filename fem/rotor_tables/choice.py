@@ -1,7 +1,5 @@
 """The field models of a rotor, and the choice between them."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np
@@ -19,7 +17,6 @@ MODELS: dict[str, Callable[[tuple[Magnet, ...], Accuracy], RotorTable]] = {
     "fem": fem_table,
 }
 """From the cheapest to the dearest in evaluation."""
-
 FEW_MOMENTS = 16
 """Coefficients per magnet up to which moments are quicker to evaluate than the closed form."""
 

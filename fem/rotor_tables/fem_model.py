@@ -5,8 +5,6 @@ the discretisation.
 The closed part of the moments is exact; what is cut off the expansions is known and kept as the doubt "truncation".
 """
 
-from __future__ import annotations
-
 import importlib.metadata
 import resource
 import time

@@ -4,8 +4,6 @@ An expansion that is to hold close to the magnets needs several times the coeffi
 costs time at every step.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
@@ -19,7 +17,7 @@ AT_LEAST = 0.5
 """Share of the tolerance that what is left out may always have, even if the table itself does not meet it."""
 
 
-def distant(table: RotorTable, accuracy: Accuracy) -> RotorTable:
+def shortened_table(table: RotorTable, accuracy: Accuracy) -> RotorTable:
     """The same field within `accuracy.rtol` from `accuracy.nearest` off the magnets' faces on.
 
     What is left out is known and a doubt of the new table, which still says how wrong it is, nearer too.  A table

@@ -1,8 +1,7 @@
 """Tables of the models that leave something out, and what they leave out as their doubts."""
 
-from __future__ import annotations
-
 import time
+from dataclasses import replace
 
 import numpy as np
 
@@ -10,7 +9,7 @@ from ...geometry.bodies import Magnet, cut_magnets
 from ..closed_forms import first_order_moments
 from ..harmonics import MultipoleExpansion, trimmed_expansions, uniform_moments
 from .accuracy import Accuracy, error_points
-from .table import RotorTable
+from .table import KNOWN, RotorTable
 
 DEGREE = 25
 """Degree up to which the part that a model leaves out is computed."""
@@ -24,7 +23,7 @@ def dipole_table(rotor: Rotor, accuracy: Accuracy) -> RotorTable:
     start = time.perf_counter()
     dipoles = tuple(uniform_moments(magnet, 1) for magnet in rotor)
     doubts = {"shape": tuple(_without_dipole(uniform_moments(magnet, DEGREE)) for magnet in rotor)}
-    return _finished("dipole", rotor, (), dipoles, doubts, accuracy, start)
+    return _finished(RotorTable("dipole", rotor, (), dipoles, doubts), accuracy, start)
 
 
 def moments_table(rotor: Rotor, accuracy: Accuracy) -> RotorTable:
@@ -34,26 +33,18 @@ def moments_table(rotor: Rotor, accuracy: Accuracy) -> RotorTable:
     pieces = [piece for whole in cut_magnets(rotor, accuracy.clearance(rotor)) for piece in whole]
     full = [uniform_moments(piece, 2 * DEGREE - 1) for piece in pieces]
     kept, dropped = trimmed_expansions(full, points, scale * accuracy.rtol / 2)
-    return _finished("moments", rotor, (), tuple(kept), {"truncation": tuple(dropped)}, accuracy, start)
+    return _finished(RotorTable("moments", rotor, (), tuple(kept), {KNOWN: tuple(dropped)}), accuracy, start)
 
 
 def cuboid_table(rotor: Rotor, accuracy: Accuracy) -> RotorTable:
     """The closed form of the remanence."""
-    return _finished("cuboid", rotor, rotor, (), {}, accuracy, time.perf_counter())
+    return _finished(RotorTable("cuboid", rotor, rotor), accuracy, time.perf_counter())
 
 
-def _finished(
-    model: str,
-    rotor: Rotor,
-    uniform: Rotor,
-    expansions: tuple[MultipoleExpansion, ...],
-    doubts: dict[str, tuple[MultipoleExpansion, ...]],
-    accuracy: Accuracy,
-    start: float,
-) -> RotorTable:
-    permeability = neglected_permeability(rotor, accuracy)
-    causes = {cause: parts for cause, parts in {**doubts, "permeability": permeability}.items() if parts}
-    return RotorTable(model, rotor, uniform, expansions, causes, {"seconds": time.perf_counter() - start})
+def _finished(table: RotorTable, accuracy: Accuracy, start: float) -> RotorTable:
+    doubts = {**table.doubts, "permeability": neglected_permeability(table.magnets, accuracy)}
+    known = {cause: parts for cause, parts in doubts.items() if parts}
+    return replace(table, doubts=known, provenance={"seconds": time.perf_counter() - start})
 
 
 def neglected_permeability(rotor: Rotor, accuracy: Accuracy) -> tuple[MultipoleExpansion, ...]:

@@ -1,7 +1,5 @@
 """The rotor's field as a table: where `fem` ends and `dynamics` begins."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property

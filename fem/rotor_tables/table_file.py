@@ -1,7 +1,5 @@
 """A rotor table as one self-describing netCDF file."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 from typing import Any
@@ -12,10 +10,8 @@ import xarray as xr
 from ...geometry.basics import Array, Box
 from ...geometry.bodies import Magnet
 from ..harmonics import MultipoleExpansion
-from ..storage import TableFileError, described, read_checked, write_checked
+from ..storage import described, read_checked, write_checked
 from .table import RotorTable
-
-__all__ = ["FORMAT", "TableFileError", "load_table", "save_table"]
 
 FORMAT = "spinlev rotor table 4"
 

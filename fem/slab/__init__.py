@@ -1,8 +1,5 @@
 """What would the plate do if it had no edges?"""
 
-from .choice import resolve_plate_model
-from .edges import edge_error
-from .reaction import Slab, reaction_tensor
-from .table import slab_and_rotor_table
-
-__all__ = ["Slab", "edge_error", "reaction_tensor", "resolve_plate_model", "slab_and_rotor_table"]
+from .choice import edge_error as edge_error, resolve_plate_model as resolve_plate_model
+from .reaction import Slab as Slab, reaction_tensor as reaction_tensor
+from .table import slab_and_rotor_table as slab_and_rotor_table

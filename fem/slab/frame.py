@@ -6,8 +6,6 @@ axis, that is the cylinder's, and a turning rotor only turns the phases of its w
 middle of the region.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

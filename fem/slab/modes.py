@@ -16,8 +16,6 @@ A mode of unit inductance, ∫ σλ |A|² dV = 1, has above the slab the field B
 Its terms fall as 1/j⁴.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -5,8 +5,6 @@ same weights, on Re Θ_lm and on Im Θ_lm.  On the meridian where cos mφ = sin 
 so that one fit there, on the surface of the region's cylinder, does for both.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

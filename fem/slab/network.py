@@ -10,8 +10,6 @@ leave an error as 1/N³.  This full network is exact but for these two sums.  It
 order: snapshots of both shapes together, since a turn makes one the other, so that their states are alike.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 

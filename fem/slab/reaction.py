@@ -16,8 +16,6 @@ at d = 0.15.  No scale of the problem (1/h, 1/t, 1/δ, ωμ0σt) needs to be kno
 J. R. Reitz, J. Appl. Phys. 41 (1970) 2067; W. R. Smythe, Static and Dynamic Electricity (3rd ed.), ch. X.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np
@@ -62,25 +60,6 @@ class Slab:
         return np.asarray(diffusion * filling / (4 * k * kappa + excess * excess * filling))
 
 
-@dataclass(frozen=True)
-class ThinSheet:
-    """A sheet whose thickness is small against everything else, of given `conductance` σt (S)."""
-
-    conductance: float
-
-    def __post_init__(self) -> None:
-        if not self.conductance > 0:
-            raise ValueError(f"Input conductance_S must be positive; instead received {self.conductance!r}.")
-
-    def reflection(self, wave_number: ArrayLike, frequency: ArrayLike) -> ComplexArray:
-        """Γ = iωμ0σt / (2k + iωμ0σt) at wave numbers (1/m) and frequencies (Hz)."""
-        rate = 2j * np.pi * MU_0 * self.conductance * np.asarray(frequency, float)
-        return np.asarray(rate / (2 * np.asarray(wave_number, float) + rate))
-
-
-PlaneConductor = Slab | ThinSheet
-
-
 def checked(height: ArrayLike, frequency: ArrayLike) -> tuple[Array, Array]:
     """Heights (m) and frequencies (Hz) as arrays of one shape.
 
@@ -104,14 +83,14 @@ def wave_numbers(height: Array, aperture: float = np.pi / 4) -> tuple[Array, Arr
     return k, step * k
 
 
-def power_integral(conductor: PlaneConductor, height: Array, frequency: Array, power: int) -> ComplexArray:
+def power_integral(slab: Slab, height: Array, frequency: Array, power: int) -> ComplexArray:
     """∫ k^power e^{-2kh} Γ dk of the shape of `height` and `frequency`, 1/m^(power+1)."""
     k, weight = wave_numbers(height)
     return np.asarray(np.sum(weight * k**power * np.exp(-2 * k * height[..., None])
-                             * conductor.reflection(k, frequency[..., None]), axis=-1))  # fmt: skip
+                             * slab.reflection(k, frequency[..., None]), axis=-1))  # fmt: skip
 
 
-def reaction_tensor(conductor: PlaneConductor, height: ArrayLike, frequency: ArrayLike) -> ComplexArray:
+def reaction_tensor(slab: Slab, height: ArrayLike, frequency: ArrayLike) -> ComplexArray:
     """G (..., 3, 3), T/(A m²): B = G m at a dipole `height` (m) over the face, phasors e^{+iωt}.
 
     Heights and frequencies (Hz) are broadcast.  Relative error below 1e-12 from 0 to beyond 1 MHz; G = 0 at 0 Hz.
@@ -121,19 +100,5 @@ def reaction_tensor(conductor: PlaneConductor, height: ArrayLike, frequency: Arr
     ValueError : height not positive, or frequency negative
     """
     h, f = checked(height, frequency)
-    normal = -MU_0 / (4 * np.pi) * power_integral(conductor, h, f, 2)
+    normal = -MU_0 / (4 * np.pi) * power_integral(slab, h, f, 2)
     return normal[..., None, None] * np.diag([0.5, 0.5, 1.0])
-
-
-def reaction_gradient(conductor: PlaneConductor, height: ArrayLike, frequency: ArrayLike) -> ComplexArray:
-    """T (..., 3, 3, 3), T/(A m³): ∂_l B_i = T_lij m_j of the reaction field at the dipole that causes it.
-
-    It is symmetric and without trace in its first two indices.  Accuracy and errors as `reaction_tensor`.
-    """
-    h, f = checked(height, frequency)
-    pattern = np.zeros((3, 3, 3))
-    pattern[2, 2, 2] = 1.0
-    for a in (0, 1):
-        pattern[2, a, a] = pattern[a, 2, a] = 0.5
-        pattern[a, a, 2] = -0.5
-    return MU_0 / (4 * np.pi) * power_integral(conductor, h, f, 3)[..., None, None, None] * pattern

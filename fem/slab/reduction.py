@@ -4,8 +4,6 @@ Snapshots are answers to dipoles on a meridian of the region and to the rotor, a
 are dipoles and rotors elsewhere, at these frequencies and at those between.
 """
 
-from __future__ import annotations
-
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass

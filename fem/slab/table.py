@@ -1,7 +1,5 @@
 """The infinite slab as a plate table, with the rotor's share: exact modes instead of finite elements."""
 
-from __future__ import annotations
-
 import time
 from dataclasses import replace
 

@@ -1,19 +1,15 @@
 """The slab's reaction at one place to a dipole at another, by Hankel transforms; symbols as in `reaction`."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.special import jv
 
 from ...geometry.basics import MU_0, Array
 from ..closed_forms import ComplexArray
-from .reaction import PlaneConductor, checked, wave_numbers
+from .reaction import Slab, checked, wave_numbers
 
 
-def mutual_tensor(
-    conductor: PlaneConductor, points: ArrayLike, source: ArrayLike, frequency: ArrayLike
-) -> ComplexArray:
+def mutual_tensor(slab: Slab, points: ArrayLike, source: ArrayLike, frequency: ArrayLike) -> ComplexArray:
     """G (..., 3, 3), T/(A m²): reaction B = G m at `points` (..., 3) to a dipole m at `source` (..., 3), m.
 
     The face is z = 0.  Shapes broadcast, with `frequency` (Hz) against the leading ones.  Relative error below
@@ -26,7 +22,7 @@ def mutual_tensor(
     aperture = min(np.pi / 4, 0.8 * float(np.min(np.arctan2(2 * h, distance))))
     h, distance, f = np.broadcast_arrays(h, distance, f)
     k, weight = wave_numbers(h, aperture)
-    spectrum = weight * k * k * np.exp(-2 * k * h[..., None]) * conductor.reflection(k, f[..., None])
+    spectrum = weight * k * k * np.exp(-2 * k * h[..., None]) * slab.reflection(k, f[..., None])
     even, first, second = (np.sum(spectrum * jv(n, k * distance[..., None]), axis=-1) for n in (0, 1, 2))
     return -MU_0 / (4 * np.pi) * _angular(even, first, second, offset)
 

@@ -12,8 +12,6 @@ Turning waves add up to the waves of a cylinder, by DLMF 10.9.2:
     J_m(kρ) e^{imφ} e^{-kz} = (-i)^m (1/2π) ∫ e^{a·x} e^{imα} dα,    a = k (i cos α, i sin α, -1).
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from functools import singledispatch
 

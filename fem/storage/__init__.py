@@ -1,19 +1,13 @@
 """How is a file kept whole, found again, and known to be damaged?"""
 
-from .cache import from_cache
-from .checked_files import TableFileError, described, read_checked, write_checked
-from .compiled_code import compiled
-from .program_text import digest_of, program_of
-from .whole_files import write_whole
-
-__all__ = [
-    "TableFileError",
-    "compiled",
-    "described",
-    "digest_of",
-    "from_cache",
-    "program_of",
-    "read_checked",
-    "write_checked",
-    "write_whole",
-]
+from .cache import from_cache as from_cache
+from .checked_files import (
+    TableFileError as TableFileError,
+    described as described,
+    read_checked as read_checked,
+    write_checked as write_checked,
+)
+from .compiled_code import compiled as compiled
+from .foreign import hdf5_fault as hdf5_fault, is_hdf5 as is_hdf5
+from .program_text import digest_of as digest_of, program_of as program_of
+from .whole_files import write_whole as write_whole

@@ -1,7 +1,5 @@
 """A folder of what was computed before: found again by its name, made by one process at a time."""
 
-from __future__ import annotations
-
 import errno
 import os
 from collections.abc import Callable, Iterator

@@ -1,7 +1,5 @@
 """Data on disk: one self-describing netCDF file with a checksum."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -10,9 +8,8 @@ import dask
 import xarray as xr
 
 from ...geometry.basics import InputError
-from . import foreign
-from .checksum import seal, sealed
-from .whole_files import write_whole
+from .foreign import hdf5_fault
+from .whole_files import seal, sealed, write_whole
 
 Variables = Mapping[str, tuple[tuple[str, ...], Any, str]]
 """Dimensions, values and unit by name."""
@@ -51,7 +48,7 @@ def read_checked(path: str | Path, file_format: str | None = None) -> xr.Dataset
         raise TableFileError(f"Input {path} must be as it was written; instead its checksum does not match.")
     if whole is None and file_format:
         raise TableFileError(f"Input {path} must be a whole '{file_format}'; instead it does not end in its checksum.")
-    if whole is None and (reason := foreign.fault(Path(path))):
+    if whole is None and (reason := hdf5_fault(Path(path))):
         raise TableFileError(f"Input {path} must be a readable netCDF file; instead: {reason}.")
     try:
         with xr.open_dataset(path, engine="h5netcdf") as opened:

@@ -4,8 +4,6 @@ heyoka can keep machine code by itself, in a database without checksums: one fli
 number.  What it has compiled can be pickled with the code in it, which is read again in hundredths of a second.
 """
 
-from __future__ import annotations
-
 import hashlib
 import logging
 import os
@@ -17,8 +15,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from .cache import cache_folder
-from .checksum import seal, unsealed
-from .whole_files import write_whole
+from .whole_files import seal, unsealed, write_whole
 
 LIMIT = 2**29
 """Size of all that is kept, bytes; what was not used for the longest time makes room."""

@@ -1,15 +1,14 @@
 """HDF5 files without our checksum: looked through by a process of its own before this one reads them.
 
-HDF5 does not return from some damaged files, whatever signal comes, and may crash on others.
+HDF5 does not return from some damaged files, whatever signal comes, and may crash on others. That process runs this
+file as a script, which therefore imports nothing of the package.
 """
-
-from __future__ import annotations
 
 import subprocess
 import sys
 from pathlib import Path
 
-SCRIPT = Path(__file__).with_name("look_through.py")
+SCRIPT = Path(__file__)
 SIGNATURE = b"\x89HDF\r\n\x1a\n"
 LONGEST = 20.0
 """Seconds to look through a small file, which takes a fraction of one."""
@@ -25,7 +24,7 @@ def is_hdf5(path: Path) -> bool:
         return stream.read(len(SIGNATURE)) == SIGNATURE
 
 
-def fault(path: Path) -> str | None:
+def hdf5_fault(path: Path) -> str | None:
     """What is wrong with an HDF5 file, as the end of a sentence; None if all of it can be read."""
     command = [sys.executable, "-P", str(SCRIPT), str(path)]  # without this package's folder on the path
     try:
@@ -40,3 +39,21 @@ def fault(path: Path) -> str | None:
 def allowed(path: Path) -> float:
     """Seconds after which a file is taken for one that HDF5 cannot finish."""
     return LONGEST + path.stat().st_size / PACE
+
+
+def look_through(path: str | Path) -> None:
+    """Read every attribute and every dataset of an HDF5 file. Raises whatever HDF5 makes of a damaged one."""
+    import h5py
+
+    def read(_: str, item: h5py.Group | h5py.Dataset) -> None:
+        dict(item.attrs)
+        if isinstance(item, h5py.Dataset):
+            item[()]
+
+    with h5py.File(path, "r") as file:
+        dict(file.attrs)
+        file.visititems(read)
+
+
+if __name__ == "__main__":
+    look_through(sys.argv[1])

@@ -1,7 +1,5 @@
 """Which program a file is of: the text of the rooms that make it, and the versions of the libraries that compute it."""
 
-from __future__ import annotations
-
 import hashlib
 import re
 from functools import cache

@@ -1,7 +1,10 @@
-"""Files that are whole or absent: written under a temporary name, then renamed."""
+"""Files that are whole or absent: written under a temporary name, then renamed; and a checksum at their end.
 
-from __future__ import annotations
+With it damage is known before any library tries to make sense of the content: HDF5 ignores what comes after its own
+end; given a damaged file it may print, raise anything, or not return at all.
+"""
 
+import hashlib
 import os
 import platform
 import tempfile
@@ -10,6 +13,9 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import psutil
+
+MARK = b"\nspinlev sha256 "
+LENGTH = len(MARK) + 64
 
 
 def write_whole(path: str | Path, content: bytes) -> None:
@@ -57,3 +63,22 @@ def _tidy(path: Path) -> None:
         owner = left.name.removeprefix(prefix).partition("-")[0] if left.name.startswith(prefix) else ""
         if owner.isdecimal() and not psutil.pid_exists(int(owner)):
             left.unlink(missing_ok=True)
+
+
+def seal(content: bytes) -> bytes:
+    """The content with its checksum."""
+    return content + MARK + hashlib.sha256(content).hexdigest().encode()
+
+
+def sealed(path: Path) -> bool | None:
+    """Whether the file is as it was when it was sealed; None if it never was. Raises OSError if it cannot be read."""
+    content = path.read_bytes()
+    if content[-LENGTH:-64] != MARK:
+        return None
+    return seal(content[:-LENGTH]) == content
+
+
+def unsealed(path: Path) -> bytes | None:
+    """What was sealed, if the file is as it was then, else None. Raises OSError if it cannot be read."""
+    content = path.read_bytes()
+    return content[:-LENGTH] if content == seal(content[:-LENGTH]) else None

@@ -1,7 +1,5 @@
 """The field of magnets without permeability by Coulomb's law, in 80-bit numbers: slow, and without cancellation."""
 
-from __future__ import annotations
-
 from itertools import product
 
 import numpy as np

@@ -4,8 +4,6 @@ Quadratic tetrahedra, and a Robin condition that is exact for a dipole at the ce
 (through meshio) and the closed form of H0 with its mean are shared with the NGSolve solver.
 """
 
-from __future__ import annotations
-
 import numpy as np
 import skfem
 from skfem.helpers import dot, grad, mul

@@ -1,7 +1,5 @@
 """Arrays that frozen objects hold."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 

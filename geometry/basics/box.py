@@ -1,7 +1,5 @@
 """A rectangular box in any pose: the shape of every magnet and of the plate."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 
 import numpy as np

@@ -1,30 +1,22 @@
 """Which magnets are there, and how do they lie to each other?"""
 
-from .article_rotors import horizontal, tilt, vertical
-from .magnet import Magnet
-from .narrow_gaps import closing_shifts, largest_shift, shifted_magnet
-from .overlap import TOUCHING, deepest_overlap_in_a_turn, overlapping_magnets, separation, sphere_overlap
-from .pieces import CONVERGENCE, cut_magnets
-from .symmetry import SAME_PLACE, Symmetry, find_symmetry, mirror, parity_parts
-
-__all__ = [
-    "CONVERGENCE",
-    "SAME_PLACE",
-    "TOUCHING",
-    "Magnet",
-    "Symmetry",
-    "closing_shifts",
-    "cut_magnets",
-    "deepest_overlap_in_a_turn",
-    "find_symmetry",
-    "horizontal",
-    "largest_shift",
-    "mirror",
-    "overlapping_magnets",
-    "parity_parts",
-    "separation",
-    "shifted_magnet",
-    "sphere_overlap",
-    "tilt",
-    "vertical",
-]
+from .article_rotors import horizontal as horizontal, tilt as tilt, vertical as vertical
+from .magnet import Magnet as Magnet
+from .overlap import (
+    TOUCHING as TOUCHING,
+    closing_shifts as closing_shifts,
+    deepest_overlap_in_a_turn as deepest_overlap_in_a_turn,
+    largest_shift as largest_shift,
+    overlapping_magnets as overlapping_magnets,
+    separation as separation,
+    shifted_magnet as shifted_magnet,
+    sphere_overlap as sphere_overlap,
+)
+from .pieces import CONVERGENCE as CONVERGENCE, cut_magnets as cut_magnets
+from .symmetry import (
+    SAME_PLACE as SAME_PLACE,
+    Symmetry as Symmetry,
+    find_symmetry as find_symmetry,
+    mirror as mirror,
+    parity_parts as parity_parts,
+)

@@ -8,7 +8,6 @@ from ..basics import Array, Box, rotation_matrix
 from .magnet import Magnet
 
 X, Z = np.array([1.0, 0.0, 0.0]), np.array([0.0, 0.0, 1.0])
-
 Rotor = tuple[Magnet, ...]
 
 

@@ -1,7 +1,5 @@
 """A uniformly polarised permanent magnet in the shape of a box."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

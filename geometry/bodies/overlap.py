@@ -1,8 +1,8 @@
-"""Exact overlap of boxes and spheres in any pose."""
-
-from __future__ import annotations
+"""Exact overlap of boxes and spheres in any pose, and gaps that are too narrow for elements."""
 
 from collections.abc import Sequence
+from dataclasses import replace
+from itertools import combinations
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -13,6 +13,8 @@ from .magnet import Magnet
 
 TOUCHING = 1e-9
 """Bodies that overlap by less than this (m) only touch: it is far above round-off and far below any tolerance."""
+NARROW = 2e-3
+"""Gaps below this part of the smallest edge are closed for the mesh."""
 
 
 def separation(first: Box, second: Box) -> tuple[float, Array]:
@@ -64,3 +66,25 @@ def overlapping_magnets(magnets: Sequence[Magnet]) -> list[tuple[int, int, float
     """Pairs of magnets that overlap (touching is allowed) with their depth, m."""
     pairs = [(i, j, box_overlap(magnets[i].box, magnets[j].box)) for j in range(len(magnets)) for i in range(j)]
     return [(i, j, depth) for i, j, depth in pairs if depth > TOUCHING]
+
+
+def shifted_magnet(magnet: Magnet, shift: Array) -> Magnet:
+    """The magnet moved by `shift` (3,) m."""
+    box = magnet.box
+    return replace(magnet, box=Box(box.size, box.center + shift, box.rotation)) if shift.any() else magnet
+
+
+def closing_shifts(magnets: Sequence[Magnet]) -> Array:
+    """(n, 3) m: how to move the magnets so that narrow gaps close; the first of a pair stays."""
+    shifts = np.zeros((len(magnets), 3))
+    narrow = NARROW * min(float(magnet.box.size.min()) for magnet in magnets)
+    for i, j in combinations(range(len(magnets)), 2):
+        gap, axis = separation(shifted_magnet(magnets[i], shifts[i]).box, shifted_magnet(magnets[j], shifts[j]).box)
+        if TOUCHING < gap < narrow:
+            shifts[j] -= gap * axis
+    return shifts
+
+
+def largest_shift(magnets: Sequence[Magnet]) -> float:
+    """Length of the longest of the `closing_shifts`, m."""
+    return float(np.linalg.norm(closing_shifts(magnets), axis=1).max())

@@ -1,7 +1,5 @@
 """Magnets cut into pieces so compact that a multipole expansion about each converges where it is needed."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from itertools import product
 

@@ -4,8 +4,6 @@ A mirror plane of the bodies need not be one of their polarisation: any polarisa
 or odd at every plane (`parity_parts`), and each part needs but the bodies' share on one side of all planes.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import product

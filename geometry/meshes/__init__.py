@@ -1,26 +1,7 @@
 """What do the finite elements stand on?"""
 
-from .conductors import MILLIMETRE, PLANES, ConductorMesh
-from .export import to_meshio
-from .grading import graded_partition
-from .hexahedra import Block, hex_mesh
-from .magnets import MagnetMesh, MeshSettings, mesh_magnets
-from .plate import MeshRule, plate_mesh, skin_depth
-from .two_bodies import TwoBodyMesh
-
-__all__ = [
-    "MILLIMETRE",
-    "PLANES",
-    "Block",
-    "ConductorMesh",
-    "MagnetMesh",
-    "MeshRule",
-    "MeshSettings",
-    "TwoBodyMesh",
-    "graded_partition",
-    "hex_mesh",
-    "mesh_magnets",
-    "plate_mesh",
-    "skin_depth",
-    "to_meshio",
-]
+from .conductors import MILLIMETRE as MILLIMETRE, PLANES as PLANES, ConductorMesh as ConductorMesh
+from .export import to_meshio as to_meshio
+from .hexahedra import Block as Block, graded_partition as graded_partition, hex_mesh as hex_mesh
+from .magnets import MagnetMesh as MagnetMesh, MeshSettings as MeshSettings, mesh_magnets as mesh_magnets
+from .plate import MeshRule as MeshRule, plate_mesh as plate_mesh, skin_depth as skin_depth

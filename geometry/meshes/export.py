@@ -1,7 +1,5 @@
 """Meshes of magnets for other programs, by meshio."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import meshio

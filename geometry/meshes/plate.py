@@ -15,8 +15,7 @@ from numpy.typing import ArrayLike
 
 from ..basics import MU_0, Array
 from .conductors import MILLIMETRE, ConductorMesh
-from .grading import graded_partition
-from .hexahedra import Block, hex_mesh
+from .hexahedra import Block, graded_partition, hex_mesh
 
 
 @dataclass(frozen=True)

@@ -1,30 +1,24 @@
 """What is in the scene file, and is it a scene that can exist?"""
 
-from .building import horizontal, magnets, plate, scene, sphere, tilt, vertical
-from .contents import AIR_VISCOSITY, AbsoluteStart, Drag, Floater, Lowering, OffsetStart, Plate, Scene
-from .faults import SceneError
-from .file import changed, load_scene, parse_scene
-from .writing import scene_text
-
-__all__ = [
-    "AIR_VISCOSITY",
-    "AbsoluteStart",
-    "Drag",
-    "Floater",
-    "Lowering",
-    "OffsetStart",
-    "Plate",
-    "Scene",
-    "SceneError",
-    "changed",
-    "horizontal",
-    "load_scene",
-    "magnets",
-    "parse_scene",
-    "plate",
-    "scene",
-    "scene_text",
-    "sphere",
-    "tilt",
-    "vertical",
-]
+from .building import (
+    horizontal as horizontal,
+    magnets as magnets,
+    plate as plate,
+    scene as scene,
+    sphere as sphere,
+    tilt as tilt,
+    vertical as vertical,
+)
+from .contents import (
+    AIR_VISCOSITY as AIR_VISCOSITY,
+    AbsoluteStart as AbsoluteStart,
+    Drag as Drag,
+    Floater as Floater,
+    Lowering as Lowering,
+    OffsetStart as OffsetStart,
+    Plate as Plate,
+    Scene as Scene,
+)
+from .faults import SceneError as SceneError
+from .file import changed as changed, load_scene as load_scene, parse_scene as parse_scene
+from .writing import scene_text as scene_text

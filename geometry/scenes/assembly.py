@@ -1,7 +1,5 @@
 """From the keys of a scene file to the scene in SI units."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -11,9 +9,8 @@ from pydantic import ValidationError
 
 from ..basics import Array, Box, rotation_matrix
 from ..bodies import Magnet, horizontal, tilt, vertical
-from .collisions import overlap_faults
 from .contents import AbsoluteStart, Drag, Floater, Lowering, OffsetStart, Plate, Scene
-from .faults import SceneError, describe_fault
+from .faults import SceneError, describe_fault, overlap_faults
 from .schema import ExplicitRotor, PlateSection, Rotor, SceneSection, StartSection, TiltRotor
 
 MILLI = 1e-3
@@ -60,23 +57,16 @@ def _start_faults(start: StartSection | None) -> list[str]:
 
 
 def _scene(table: SceneSection, folder: Path) -> Scene:
-    floater = Floater(
-        radius=table.floater.diameter_mm * MILLI / 2,
-        remanence=table.floater.remanence_T,
-        recoil_permeability=table.floater.recoil_permeability,
-        density=table.floater.density_kg_m3,
-        conductivity=table.floater.conductivity_S_m,
-    )
-    drag = Drag.stokes(floater.radius)
-    if table.drag:
-        drag = Drag(table.drag.linear_N_s_m, table.drag.angular_N_m_s)
+    sphere, drag = table.floater, table.drag
+    material = (sphere.remanence_T, sphere.recoil_permeability, sphere.density_kg_m3, sphere.conductivity_S_m)
+    floater = Floater(sphere.diameter_mm * MILLI / 2, *material)
     return Scene(
         frequency=table.frequency_hz,
         gravity=np.array(table.gravity_m_s2),
         rotor=_rotor(table.rotor),
         floater=floater,
         plate=_plate(table.plate) if table.plate else None,
-        drag=drag,
+        drag=Drag(drag.linear_N_s_m, drag.angular_N_m_s) if drag else Drag.stokes(floater.radius),
         start=_start(table.start),
         field_map=folder / table.rotor.field_map if table.rotor.field_map else None,
     )

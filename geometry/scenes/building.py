@@ -1,7 +1,5 @@
 """Scenes made in Python, with the keys, units and defaults of the scene file."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Any
 

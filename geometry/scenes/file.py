@@ -1,7 +1,5 @@
 """Reads a scene file and tells every fault of it at once."""
 
-from __future__ import annotations
-
 import os
 import tomllib
 from collections.abc import Mapping

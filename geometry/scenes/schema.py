@@ -1,7 +1,5 @@
 """The scene file's keys, types and ranges; every key carries its unit."""
 
-from __future__ import annotations
-
 from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Discriminator, Field, Tag
@@ -20,7 +18,6 @@ Sizes = Annotated[list[Length], Field(min_length=3, max_length=3)]
 Coordinates = Annotated[list[Coordinate], Field(min_length=3, max_length=3)]
 Angles = Annotated[list[Angle], Field(min_length=3, max_length=3)]
 Polarizations = Annotated[list[Polarization], Field(min_length=3, max_length=3)]
-
 RECOIL_PERMEABILITY = 1.05
 """Default: sintered NdFeB."""
 

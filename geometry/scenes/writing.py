@@ -1,7 +1,5 @@
 """A scene as the keys of a scene file: what is written beside a result, also of a scene that was made in Python."""
 
-from __future__ import annotations
-
 import json
 import tomllib
 import warnings
@@ -14,7 +12,7 @@ import numpy as np
 from ..basics import Array, Box
 from ..bodies import Magnet, horizontal, tilt, vertical
 from .assembly import assemble
-from .contents import AbsoluteStart, Drag, Lowering, Plate, Scene
+from .contents import AbsoluteStart, Drag, Plate, Scene
 from .faults import SceneError
 
 SAME = 1e-12
@@ -113,12 +111,11 @@ def _permeability(magnet: Magnet) -> float | list[float]:
 
 
 def _plate(plate: Plate) -> dict[str, Any]:
-    keys = {**_box(plate.box), "conductivity_S_m": _number(plate.conductivity)}
-    return keys | ({"lowering": _lowering(plate.lowering)} if plate.lowering else {})
-
-
-def _lowering(down: Lowering) -> dict[str, Any]:
-    return {"start_s": _number(down.start), "speed_mm_s": _milli(down.speed), "distance_mm": _milli(down.distance)}
+    keys, down = {**_box(plate.box), "conductivity_S_m": _number(plate.conductivity)}, plate.lowering
+    if not down:
+        return keys
+    way = {"start_s": _number(down.start), "speed_mm_s": _milli(down.speed), "distance_mm": _milli(down.distance)}
+    return {**keys, "lowering": way}
 
 
 def _start(scene: Scene) -> dict[str, Any]:

@@ -3,8 +3,6 @@
 J. M. Hermansen, F. L. Durhuus and R. Bjørk, Appl. Phys. Lett. 127 (2025) 012402.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
@@ -71,8 +69,6 @@ CONFIGURATIONS = {
         tilt, "δθ", "°", np.pi / 180, tuple(float(x) for x in range(5, 50, 5)), (5.0, 10.0, 15.0, 20.0)
     ),
 }
-
-
 QUICK = {"horizontal": (1.0,), "vertical": (14.0,), "tilt": (10.0,)}
 """One rotor of each configuration, for the quick settings of studies."""
 
@@ -111,11 +107,11 @@ def article_scene(
     return Scene(frequency, magnets, floater, Drag.stokes(floater.radius) if drag else Drag(0.0, 0.0))
 
 
-def article_table(scene: Scene, model: str) -> RotorTable:
+def article_table(scene: Scene, model: str, rtol: float = RTOL) -> RotorTable:
     """The field of a scene's rotor; finite elements from the cache if they are there."""
     if model != "fem":
-        return rotor_table(scene.rotor, model, RTOL, FLOATER.radius)
-    return cached_rotor_table(scene.rotor, model, RTOL, note, FLOATER.radius)[0]
+        return rotor_table(scene.rotor, model, rtol, FLOATER.radius)
+    return cached_rotor_table(scene.rotor, model, rtol, note, FLOATER.radius)[0]
 
 
 def rotor_label(configuration: str, value: float) -> str:

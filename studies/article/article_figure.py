@@ -1,7 +1,5 @@
 """What the figures after the article have in common: a colour for each value of a rotor's parameter, and branches."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import matplotlib as mpl

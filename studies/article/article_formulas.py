@@ -5,8 +5,6 @@ has the opposite sign of B_x, and all of it is multiplied by m_f; in the horizon
 the supplement has δx/d B⊥ (and m_f,z = -cos θ, +cos θ in the main text).  m_r is a cube's moment by remanence alone.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """On-axis and off-axis field at several places of the floater against the parameter of each of the article's rotors."""
 
-from __future__ import annotations
-
 import numpy as np
 import xarray as xr
 

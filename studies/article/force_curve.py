@@ -1,14 +1,11 @@
 """Force along the axis against distance, with its repelling and its attracting part: the article's second figure."""
 
-from __future__ import annotations
-
 import numpy as np
 import xarray as xr
 from scipy.interpolate import PchipInterpolator
 from scipy.optimize import brentq
 
 from ...dynamics.equilibria import survey
-from ...dynamics.steady import ForceCurve
 from ...fem.rotor_tables import RotorTable
 from ...geometry.basics import Array
 from ...geometry.scenes import Scene
@@ -76,8 +73,8 @@ def _formula(point: Point, grid: Array, frequency: float) -> list[Array]:
 
 def _full(scene: Scene, table: RotorTable, grid: Array) -> list[Array]:
     """The columns on the curve that holds the stable equilibrium; NaN beyond its ends."""
-    known = survey(scene, table)
-    curve = _levitating(known.curves)
+    # along the axis the moment comes nearest to upright on the curve that holds the stable equilibrium
+    curve = max(survey(scene, table).curves, key=lambda curve: float(curve.moment[:, 2].max()))
     field_gradient = table.evaluate(curve.position)[1][:, :, 2]
     parts = FLOATER.moment * curve.moment * field_gradient
     error = FLOATER.moment * table.absolute_error(curve.position)[1]
@@ -86,11 +83,6 @@ def _full(scene: Scene, table: RotorTable, grid: Array) -> list[Array]:
     order = np.argsort(depth)
     columns = (parts[:, 2], parts[:, 0] + parts[:, 1], error, angle)
     return [PchipInterpolator(depth[order], column[order], extrapolate=False)(grid) for column in columns]
-
-
-def _levitating(curves: tuple[ForceCurve, ...]) -> ForceCurve:
-    """The curve along the axis on which the moment comes nearest to upright."""
-    return max(curves, key=lambda curve: float(curve.moment[:, 2].max()))
 
 
 def balance_points(distance: Array, magnetic: Array, angle: Array) -> tuple[float, float, float, float, float]:

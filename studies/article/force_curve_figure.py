@@ -1,7 +1,5 @@
 """Figure and sentences of the study of the force along the axis, from its dataset alone."""
 
-from __future__ import annotations
-
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
@@ -82,9 +80,8 @@ def _net(axes: Axes, one: xr.Dataset, color: str) -> None:
     for model in ("fem", "dipole"):
         found = cases_with(one, model=model).isel(case=0)
         label = f"{float(one['frequency']):g} Hz" if model == "fem" else None
-        axes.plot(
-            _mm(one), 1e3 * (found["attracting"] + found["repelling"] - WEIGHT), STYLES[model], color=color, label=label
-        )
+        net = 1e3 * (found["attracting"] + found["repelling"] - WEIGHT)
+        axes.plot(_mm(one), net, STYLES[model], color=color, label=label)
         if model == "fem":
             for mark, (symbol, _) in POINTS.items():
                 axes.plot(1e3 * float(found[mark]), 0.0, symbol, color=color, ms=4)

@@ -1,18 +1,15 @@
 """Distance at which the floater levitates against frequency, for every rotor of the article: its third figure."""
 
-from __future__ import annotations
-
 import numpy as np
 import xarray as xr
 
-from ...dynamics.branches import Family, distance_error, kicked, levitating_branch
-from ...dynamics.branches import Point as BranchPoint
+from ...dynamics.branches import BranchPoint, Family, distance_error, kicked, levitating_branch
 from ...dynamics.flights import simulate
 from ...dynamics.motion import Rates
 from ...fem.rotor_tables import RotorTable
 from ...geometry.basics import Array
 from ...geometry.scenes import Scene
-from ..results import Point, Study, by_case, one_case, variable
+from ..results import Columns, Point, Study, by_case, columns, one_case, variable
 from .article import CONFIGURATIONS, HIGHEST, LOWEST, QUICK, WEIGHT, article_scene, article_table, stable_in_flight
 from .article_formulas import analytic_distance, balanced
 from .levitation_distance_figure import distance_figure, distance_lines
@@ -23,6 +20,18 @@ FLOWN = "dipole"
 """The field of the simulated flights, which are spread over a rotor's stable frequencies."""
 KICK, SECONDS = 0.01, 1.0
 """Speed with which a simulated floater leaves its equilibrium upwards, m/s, and duration of the flight."""
+BOTH: tuple[str, ...] = ("frequency", "side")
+COLUMNS: Columns = {
+    "distance": (BOTH, "m", "levitation distance"),
+    "distance_error": (BOTH, "m", "what the field's estimated error changes of the distance"),
+    "growth": (BOTH, "1/s", "largest growth rate of a small motion"),
+    "polar_angle": (BOTH, "rad", "polar angle of the moment"),
+    "fold_frequency": ((), "Hz", "lowest frequency with an equilibrium"),
+    "fold_distance": ((), "m", "levitation distance there"),
+    "flight_frequency": (("flight",), "Hz", "frequency of a simulated flight"),
+    "flight_distance": (("flight",), "m", "mean levitation distance of a simulated flight"),
+    "flight_error": (("flight",), "m", "difference between the flight's halves"),
+}
 
 
 def distance_points(quick: bool) -> list[Point]:
@@ -48,29 +57,26 @@ def levitation_distance(point: Point) -> xr.Dataset:
     meet; in the dipole's field some simulations.
     """
     grid = np.arange(LOWEST, HIGHEST + 1e-9, point["step_hz"])
-    made = _by_formula(point, grid) if point["model"] in FORMULAS else _in_field(point, grid)
+    found = _by_formula(point, grid) if point["model"] in FORMULAS else _in_field(point, grid)
+    data = columns(COLUMNS, found, frequency=len(grid), side=len(SIDES), flight=point["flights"])
     frequency = variable(("frequency",), grid, "Hz", "frequency of the rotor")
-    return one_case(point, made.assign_coords(side=list(SIDES), frequency=frequency))
+    return one_case(point, xr.Dataset(data, {"side": list(SIDES), "frequency": frequency}))
 
 
-def _by_formula(point: Point, grid: Array) -> xr.Dataset:
+def _by_formula(point: Point, grid: Array) -> dict[str, Array]:
     configuration, value = point["configuration"], point["value"]
-    if point["model"] == "analytic":
-        near = analytic_distance(configuration, value, grid)
-        distance = np.stack([near, np.full(near.shape, np.nan)], axis=1)
-    else:
-        distance = np.array([balanced(configuration, value, frequency, WEIGHT) for frequency in grid])
-    unknown = np.full(distance.shape, np.nan)
-    return _dataset(distance, unknown, unknown, unknown, (np.nan, np.nan), np.full((3, point["flights"]), np.nan))
+    if point["model"] == "semi-analytic":
+        return {"distance": np.array([balanced(configuration, value, frequency, WEIGHT) for frequency in grid])}
+    near = analytic_distance(configuration, value, grid)
+    return {"distance": np.stack([near, np.full(near.shape, np.nan)], axis=1)}
 
 
-def _in_field(point: Point, grid: Array) -> xr.Dataset:
+def _in_field(point: Point, grid: Array) -> dict[str, Array]:
     scene = article_scene(point["configuration"], point["value"], HIGHEST)
     table = article_table(scene, point["model"])
     branch = levitating_branch(scene, table, Rates.of(scene, table), HIGHEST)
     found = [branch.side(side, grid) for side in SIDES]
     rows = np.array([[_row(scene, table, branch.family, p) for p in side] for side in found])
-    distance, error, growth, angle = (rows[..., k].T for k in range(4))
     fold = branch.fold
     flown = found[0] if point["model"] == FLOWN else []
     known = [p for p in flown if p is not None and stable_in_flight(p.growth_per_s)]
@@ -78,7 +84,7 @@ def _in_field(point: Point, grid: Array) -> xr.Dataset:
     flights = np.full((3, point["flights"]), np.nan)
     for k, place in enumerate(places):
         flights[:, k] = known[place].parameter, *mean_height(scene, table, known[place])
-    return _dataset(distance, error, growth, angle, (fold.parameter, -fold.position[2]), flights)
+    return dict(zip(COLUMNS, (*rows.T, fold.parameter, -fold.position[2], *flights), strict=True))
 
 
 def _row(scene: Scene, table: RotorTable, family: Family, point: BranchPoint | None) -> list[float]:
@@ -103,25 +109,6 @@ def mean_height(scene: Scene, table: RotorTable, point: BranchPoint) -> tuple[fl
 
 def _smooth_mean(values: Array) -> float:
     return float(np.average(values, weights=np.sin(np.pi * (np.arange(len(values)) + 0.5) / len(values)) ** 2))
-
-
-def _dataset(
-    distance: Array, error: Array, growth: Array, angle: Array, fold: tuple[float, float], flights: Array
-) -> xr.Dataset:
-    rows, flight = ("frequency", "side"), ("flight",)
-    return xr.Dataset(
-        {
-            "distance": variable(rows, distance, "m", "levitation distance"),
-            "distance_error": variable(rows, error, "m", "what the field's estimated error changes of the distance"),
-            "growth": variable(rows, growth, "1/s", "largest growth rate of a small motion"),
-            "polar_angle": variable(rows, angle, "rad", "polar angle of the moment"),
-            "fold_frequency": variable((), fold[0], "Hz", "lowest frequency with an equilibrium"),
-            "fold_distance": variable((), fold[1], "m", "levitation distance there"),
-            "flight_frequency": variable(flight, flights[0], "Hz", "frequency of a simulated flight"),
-            "flight_distance": variable(flight, flights[1], "m", "mean levitation distance of a simulated flight"),
-            "flight_error": variable(flight, flights[2], "m", "difference between the flight's halves"),
-        }
-    )
 
 
 STUDY = Study(

@@ -1,7 +1,5 @@
 """Figure and sentences of the study of the levitation distance, from its dataset alone."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np
@@ -24,19 +22,14 @@ def distance_figure(result: xr.Dataset) -> Figure:
     figure, axes = panels(3, 2, (8.2, 9.6))
     for (left, right), configuration in zip(axes, CONFIGURATIONS, strict=True):
         for value in values_of(result, configuration):
-            rotor = {"configuration": configuration, "value": value}
-            _fields(
-                left,
-                cases_with(result, **rotor),
-                color=rotor_color(configuration, value),
-                label=legend_name(configuration, value),
-            )
+            rotor = cases_with(result, configuration=configuration, value=value)
+            color = rotor_color(configuration, value)
+            _fields(left, rotor, color, legend_name(configuration, value))
             if value in CONFIGURATIONS[configuration].levitated:
-                _formulas(right, cases_with(result, **rotor), color=rotor_color(configuration, value))
+                _formulas(right, rotor, color=color)
         for axis in (left, right):
-            axis.set(
-                xlabel="frequency of the rotor (Hz)", ylabel="levitation distance (mm)", xlim=(25, 255), ylim=LIMITS
-            )
+            axis.set(xlabel="frequency of the rotor (Hz)", ylabel="levitation distance (mm)")
+            axis.set(xlim=(25, 255), ylim=LIMITS)
         left.set_title(TITLES[configuration])
         left.plot([], [], ":", color="0.3", lw=0.8, label="dipole")
         left.plot([], [], "o", color="0.3", ms=3, label="fold")
@@ -58,24 +51,16 @@ def _key(axes: Axes) -> None:
     axes.legend()
 
 
-def _fields(axes: Axes, rotor: xr.Dataset, **style: Any) -> None:
+def _fields(axes: Axes, rotor: xr.Dataset, color: Any, label: str) -> None:
     frequency = rotor["frequency"].values
-    for side in ("near", "far"):
+    for side, name in (("near", label), ("far", None)):
         distance, growth = _side(rotor, "fem", side)
-        plot_branch(
-            axes,
-            frequency,
-            1e3 * distance,
-            stable_in_flight(growth),
-            **(style if side == "near" else {**style, "label": None}),
-        )
-        other, _ = _side(rotor, "dipole", side)
-        axes.plot(frequency, 1e3 * other, ":", color=style["color"], lw=0.8)
-    fold = cases_with(rotor, model="fem")[["fold_frequency", "fold_distance"]].isel(case=0)
-    axes.plot(float(fold["fold_frequency"]), 1e3 * float(fold["fold_distance"]), "o", color=style["color"], ms=3)
-    error = 1e3 * cases_with(rotor, model="fem")["distance_error"].sel(side="near").values[0]
-    near, _ = _side(rotor, "fem", "near")
-    axes.fill_between(frequency, 1e3 * near - error, 1e3 * near + error, color=style["color"], alpha=0.3, lw=0)
+        plot_branch(axes, frequency, 1e3 * distance, stable_in_flight(growth), color=color, label=name)
+        axes.plot(frequency, 1e3 * _side(rotor, "dipole", side)[0], ":", color=color, lw=0.8)
+    found = cases_with(rotor, model="fem").isel(case=0)
+    axes.plot(float(found["fold_frequency"]), 1e3 * float(found["fold_distance"]), "o", color=color, ms=3)
+    near, error = (1e3 * found[name].sel(side="near").values for name in ("distance", "distance_error"))
+    axes.fill_between(frequency, near - error, near + error, color=color, alpha=0.3, lw=0)
 
 
 def _formulas(axes: Axes, rotor: xr.Dataset, **style: Any) -> None:

@@ -1,7 +1,5 @@
 """The papers behind a result."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import xarray as xr

@@ -1,7 +1,5 @@
 """The figures of any result, from its file alone."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from pathlib import Path
 

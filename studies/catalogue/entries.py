@@ -1,7 +1,5 @@
 """The studies that the program knows, in the order in which they are listed."""
 
-from __future__ import annotations
-
 from ..article import STUDIES as ARTICLE
 from ..field_quality import STUDIES as FIELD_QUALITY
 from ..levitation import STUDIES as LEVITATION

@@ -1,7 +1,5 @@
 """The command `study`: computes, writes, draws and tells."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Mapping, Sequence
 from functools import partial

@@ -1,12 +1,8 @@
 """The command `report`: one page of all results in a folder, which opens without a network."""
 
-from __future__ import annotations
-
 import base64
 import json
 import os
-from collections.abc import Mapping
-from dataclasses import dataclass
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
@@ -32,20 +28,6 @@ LONGEST = 400
 """Characters of a value that are shown."""
 
 
-@dataclass(frozen=True)
-class Part:
-    """What the page says of one result."""
-
-    name: str
-    summary: str
-    lines: list[str]
-    failures: list[str]
-    pictures: list[tuple[str, str]]
-    answers: Mapping[str, str]
-    variables: list[Mapping[str, str]]
-    provenance: Mapping[str, str]
-
-
 def report_job(folder: Path, out: Path) -> tuple[Path, list[str]]:
     """Write report.html about every result in `folder`; returns it and the names of the results.
 
@@ -62,10 +44,11 @@ def report_job(folder: Path, out: Path) -> tuple[Path, list[str]]:
     template = files(__package__).joinpath("report.html").read_text(encoding="utf-8")
     page = jinja2.Environment(autoescape=True).from_string(template).render(folder=folder.resolve().name, parts=parts)
     write_whole(out / "report.html", page.encode())
-    return out / "report.html", [part.name for part in parts]
+    return out / "report.html", [part["name"] for part in parts]
 
 
-def _part(path: Path) -> Part:
+def _part(path: Path) -> dict[str, Any]:
+    """What the page says of one result."""
     result = read_result(path)
     kind = str(result.attrs["study"])
     study = CATALOGUE.get(kind)
@@ -73,18 +56,16 @@ def _part(path: Path) -> Part:
     beside = [path.parent / "scene.png"] if kind == "run" else []
     beside += [path.parent / f"{path.stem}-{name}" for name in ("scene.png", "flight.gif")]
     pictures += [(f.stem, _embedded(f.read_bytes(), f.suffix[1:])) for f in beside if f.exists()]
-    lines = study.report(result) if study else question_lines(result) if kind == QUESTION else []
-    summary = study.summary if study else SUMMARIES.get(kind, "")
-    return Part(
-        path.stem,
-        summary,
-        lines,
-        failure_lines(result) if "failed_points" in result.attrs else [],
-        pictures,
-        _answers(path) if kind == "run" else {},
-        [_row(name, values) for name, values in result.data_vars.items()],
-        {str(key): str(value) for key, value in result.attrs.items() if key != "failed_points"},
-    )
+    return {
+        "name": path.stem,
+        "summary": study.summary if study else SUMMARIES.get(kind, ""),
+        "lines": study.report(result) if study else question_lines(result) if kind == QUESTION else [],
+        "failures": failure_lines(result) if "failed_points" in result.attrs else [],
+        "pictures": pictures,
+        "answers": _answers(path) if kind == "run" else {},
+        "variables": [_row(name, values) for name, values in result.data_vars.items()],
+        "provenance": {key: str(value) for key, value in result.attrs.items() if key != "failed_points"},
+    }
 
 
 def _embedded(content: bytes, kind: str) -> str:

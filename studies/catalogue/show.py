@@ -1,7 +1,5 @@
 """The command `show`: three-dimensional pictures and an animation of a result."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 

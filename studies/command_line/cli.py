@@ -3,8 +3,6 @@
 Exit status 0: done; 2: bad input, with one message that says what is allowed; 1: the computation failed.
 """
 
-from __future__ import annotations
-
 import os
 import sys
 import threading

@@ -1,7 +1,5 @@
 """Completes an installation and tries what the program will use."""
 
-from __future__ import annotations
-
 import importlib
 import sys
 

@@ -1,7 +1,5 @@
 """The commands about many scenes and about results: study, figure, show, report, cite."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Annotated
 
@@ -61,14 +59,13 @@ def study(
 
     if list:
         summaries = {key: entry.summary for key, entry in CATALOGUE.items()}
-        return Answer({"studies": summaries}, tuple(f"{k:22} {v}" for k, v in summaries.items()), output.json)
+        return Answer({"studies": summaries}, [f"{k:22} {v}" for k, v in summaries.items()], output.json)
     if name not in CATALOGUE:
         scene = " A scene needs --vary." if name and name.endswith(".toml") else ""
         raise InputError(f"Input name must be one of {', '.join(CATALOGUE)}; instead received {name}.{scene}")
     from ..catalogue import study_job
 
-    values, lines = study_job(name, quick, engine.checked(), output.out)
-    return Answer(values, tuple(lines), output.json)
+    return Answer(*study_job(name, quick, engine.checked(), output.out), output.json)
 
 
 def _own_question(
@@ -90,8 +87,7 @@ def _own_question(
     from ..one_scene import Question
 
     question = Question(loaded, scene, what[0], asked.checked(), what[2], what[3], tuple(1e-3 * place))
-    answer, lines = question_job(question, values, engine.checked(), output.out)
-    return Answer(answer, tuple(lines), output.json)
+    return Answer(*question_job(question, values, engine.checked(), output.out), output.json)
 
 
 def figure(result: Path, *, output: Output = Output()) -> Answer:
@@ -105,7 +101,7 @@ def figure(result: Path, *, output: Output = Output()) -> Answer:
     from ..catalogue import draw_result
 
     files = draw_result(result, output.out)
-    return Answer({"figures": files}, tuple(f"Figure in {file}" for file in files), output.json)
+    return Answer({"figures": files}, [f"Figure in {file}" for file in files], output.json)
 
 
 def show(result: Path, *, output: Output = Output()) -> Answer:
@@ -119,7 +115,7 @@ def show(result: Path, *, output: Output = Output()) -> Answer:
     from ..catalogue import show_job
 
     files = show_job(result, output.out)
-    return Answer({"pictures": files}, tuple(f"Picture in {file}" for file in files), output.json)
+    return Answer({"pictures": files}, [f"Picture in {file}" for file in files], output.json)
 
 
 def report(folder: Path, *, output: Output = Output()) -> Answer:
@@ -133,7 +129,7 @@ def report(folder: Path, *, output: Output = Output()) -> Answer:
     from ..catalogue import report_job
 
     page, names = report_job(folder, output.out)
-    return Answer({"report": str(page), "results": names}, (f"{', '.join(names)}: {page}",), output.json)
+    return Answer({"report": str(page), "results": names}, [f"{', '.join(names)}: {page}"], output.json)
 
 
 def cite(result: Path, *, output: Output = Output()) -> Answer:
@@ -147,4 +143,4 @@ def cite(result: Path, *, output: Output = Output()) -> Answer:
     from ..catalogue import cite_job
 
     references = cite_job(result)
-    return Answer({"references": references}, tuple(references), output.json)
+    return Answer({"references": references}, references, output.json)

@@ -3,15 +3,16 @@
 The numeric libraries are imported once the input has been found good: a wrong scene is answered at once.
 """
 
-from __future__ import annotations
-
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 from cyclopts import App, Parameter
 
 from ...geometry.basics import InputError
 from ..terminal import Answer, FieldModel, Models, Output, default_scene, positive, read_points, three_numbers
+
+if TYPE_CHECKING:
+    from ...geometry.scenes import Scene
 
 ReactionModel = Literal["slab", "fem", "reduced", "auto"]
 
@@ -20,6 +21,12 @@ def add_scene_commands(app: App) -> None:
     """Let the command line know these commands."""
     for command in (run, field, plate, equilibria, simulate):
         app.command(command)
+
+
+def _loaded(scene: Path) -> "Scene":
+    from ...geometry.scenes import load_scene
+
+    return load_scene(scene)
 
 
 def run(
@@ -39,13 +46,10 @@ def run(
         Simulated time, s.
     """
     positive("--duration-s", duration_s)
-    from ...geometry.scenes import load_scene
-
-    loaded = load_scene(scene or default_scene())
+    loaded = _loaded(scene or default_scene())
     from ..one_scene import main_job
 
-    values, lines = main_job(loaded, asked.checked(), duration_s, output.out)
-    return Answer(values, tuple(lines), output.json)
+    return Answer(*main_job(loaded, asked.checked(), duration_s, output.out), output.json)
 
 
 def field(
@@ -70,13 +74,10 @@ def field(
         Relative accuracy asked of the field wherever the floater can be.
     """
     asked = Models(model, rtol=rtol).checked()
-    from ...geometry.scenes import load_scene
-
-    loaded, places = load_scene(scene), read_points(points)
+    loaded, places = _loaded(scene), read_points(points)
     from ..one_scene import field_job
 
-    values, lines = field_job(loaded, places, asked, output.out)
-    return Answer(values, tuple(lines), output.json)
+    return Answer(*field_job(loaded, places, asked, output.out), output.json)
 
 
 def equilibria(
@@ -97,13 +98,10 @@ def equilibria(
     """
     if not -1e3 <= spin <= 1e3:
         raise InputError(f"Input --spin must be between -1000 and 1000; instead received {spin}.")
-    from ...geometry.scenes import load_scene
-
-    loaded = load_scene(scene)
+    loaded = _loaded(scene)
     from ..one_scene import equilibria_job
 
-    values, lines = equilibria_job(loaded, asked.checked(), spin, output.out)
-    return Answer(values, tuple(lines), output.json)
+    return Answer(*equilibria_job(loaded, asked.checked(), spin, output.out), output.json)
 
 
 def simulate(
@@ -126,13 +124,10 @@ def simulate(
         Go on from the checkpoint of the same flight in --out, if one is there.
     """
     positive("--duration-s", duration_s)
-    from ...geometry.scenes import load_scene
-
-    loaded = load_scene(scene)
+    loaded = _loaded(scene)
     from ..one_scene import simulate_job
 
-    values, lines = simulate_job(loaded, asked.checked(), duration_s, output.out, resume)
-    return Answer(values, tuple(lines), output.json)
+    return Answer(*simulate_job(loaded, asked.checked(), duration_s, output.out, resume), output.json)
 
 
 def plate(
@@ -161,10 +156,7 @@ def plate(
     """
     positive("--rtol", rtol)
     place = three_numbers("--at", at)
-    from ...geometry.scenes import load_scene
-
-    loaded = load_scene(scene)
+    loaded = _loaded(scene)
     from ..one_scene import plate_job
 
-    values, lines = plate_job(loaded, place * 1e-3, frequency_hz, model, rtol, output.out)
-    return Answer(values, tuple(lines), output.json)
+    return Answer(*plate_job(loaded, place * 1e-3, frequency_hz, model, rtol, output.out), output.json)

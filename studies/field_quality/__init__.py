@@ -5,5 +5,3 @@ from .field_hard_cases import STUDY as FIELD_HARD_CASES
 from .speed_accuracy import STUDY as SPEED_ACCURACY
 
 STUDIES = (DIPOLE_VALIDITY, SPEED_ACCURACY, FIELD_HARD_CASES)
-
-__all__ = ["STUDIES"]

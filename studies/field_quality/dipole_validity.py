@@ -4,8 +4,6 @@ Region: distance below the lower magnet's centre × lateral offset, worst azimut
 Truth: the finite-element table, whose own error is stored beside.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

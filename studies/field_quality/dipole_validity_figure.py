@@ -1,7 +1,5 @@
 """Figure and table of the study of the dipole's validity, from its dataset alone."""
 
-from __future__ import annotations
-
 import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure

@@ -4,8 +4,6 @@ The reference has another mesh with smaller elements, a higher order and all mom
 What it is worth its own last step in order tells.
 """
 
-from __future__ import annotations
-
 import time
 import warnings
 from collections.abc import Mapping

@@ -1,7 +1,5 @@
 """Figure and table of the study of hard cases, from its result alone."""
 
-from __future__ import annotations
-
 import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure

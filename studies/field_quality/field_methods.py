@@ -1,7 +1,5 @@
 """Every way to compute the rotor's field, by name, for the study of speed against error."""
 
-from __future__ import annotations
-
 import warnings
 from collections.abc import Callable
 from dataclasses import dataclass, replace

@@ -1,7 +1,5 @@
 """Rotors whose field is hard to compute, and how fine an independent solution must be to judge a table of them."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -88,7 +86,6 @@ EIGHT = tuple(
 )
 OBLIQUE = (_magnet(_box(CUBE, rotation=rotation_matrix((15, 40, 70))), (1, 0, 0), 1.05, 1.15),)
 LONG = (_magnet(_box((0.005, 0.005, 0.04)), (1.3, 0, 0), PERMEABILITY),)
-
 CASES = {
     "contact distance": HardCase(_cube(PERMEABILITY), CONTACT, quick=True),
     "extensions of edges and faces": HardCase(_cube(PERMEABILITY), extensions=True),

@@ -4,11 +4,10 @@ Every method runs in a process of its own, so that its time and memory are its o
 moments, table, compilation) to the field at points.
 """
 
-from __future__ import annotations
-
 import os
 import tempfile
 import time
+import timeit
 from collections.abc import Callable
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
@@ -97,12 +96,7 @@ def _pace(table: FieldTable) -> float:
 
 
 def _fastest(work: Callable[[], object]) -> float:
-    times = []
-    for _ in range(5):
-        began = time.process_time()
-        work()
-        times.append(time.process_time() - began)
-    return min(times)
+    return min(timeit.repeat(work, timer=time.process_time, number=1))
 
 
 def _many() -> Array:

@@ -4,8 +4,6 @@ Two problems have a known answer: one cube with μr = 1, whose closed form is ex
 is a table of far finer tolerance, whose own error is stored.
 """
 
-from __future__ import annotations
-
 import warnings
 
 import numpy as np

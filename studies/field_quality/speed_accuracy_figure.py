@@ -1,7 +1,5 @@
 """Table and figure of the study of speed against error, from its result alone."""
 
-from __future__ import annotations
-
 import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure

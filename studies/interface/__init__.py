@@ -1,6 +1,10 @@
 """How does a program or a notebook call the program?"""
 
-from .many_points import draw, run_study, sweep
-from .one_scene import equilibria, plate_table, rotor_table, simulate, stability
-
-__all__ = ["draw", "equilibria", "plate_table", "rotor_table", "run_study", "simulate", "stability", "sweep"]
+from .many_points import draw as draw, run_study as run_study, sweep as sweep
+from .one_scene import (
+    equilibria as equilibria,
+    plate_table as plate_table,
+    rotor_table as rotor_table,
+    simulate as simulate,
+    stability as stability,
+)

@@ -1,7 +1,5 @@
 """Studies and sweeps of one's own from Python."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 

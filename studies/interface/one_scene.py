@@ -1,7 +1,5 @@
 """What one scene does, as labelled data: the command line's answers for programs and notebooks."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import xarray as xr

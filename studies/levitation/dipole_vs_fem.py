@@ -1,7 +1,5 @@
 """How wrong is the dipole? Levitation of the article's rotors by point dipoles and by true fields, cause by cause."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
@@ -9,6 +7,7 @@ import numpy as np
 import xarray as xr
 
 from ...dynamics.branches import (
+    BranchPoint,
     Family,
     StableRange,
     at_frequency,
@@ -17,15 +16,13 @@ from ...dynamics.branches import (
     stable_range,
     with_answers,
 )
-from ...dynamics.branches import Point as BranchPoint
 from ...dynamics.motion import Rates
-from ...dynamics.steady import EquilibriumError, named_modes
-from ...fem.rotor_tables import cached_rotor_table, rotor_table
+from ...dynamics.steady import named_modes
+from ...fem.rotor_tables import rotor_table
 from ...geometry.basics import Array
 from ...geometry.scenes import Scene
-from ..article import article_scene, levitated_rotors
-from ..results import Point, Study, by_case, variable
-from ..terminal import note
+from ..article import article_scene, article_table, levitated_rotors
+from ..results import Point, Study, by_case, one_case, variable
 from .dipole_vs_fem_figure import dipole_figure
 from .dipole_vs_fem_report import dipole_lines
 
@@ -42,10 +39,8 @@ ROUND_OFF = 1e-10
 
 def points(quick: bool) -> list[Point]:
     """The rotors that levitated; quick: one frequency, coarser answers of the bodies and no limits with them (NaN)."""
-    settings = (
-        {"steps": 1, "orders": [1, 2], "limits": False} if quick else {"steps": 4, "orders": [2, 3], "limits": True}
-    )
-    return [{**point, **settings} for point in levitated_rotors(quick)]
+    steps, orders = (1, [1, 2]) if quick else (4, [2, 3])
+    return [{**rotor, "steps": steps, "orders": orders, "limits": not quick} for rotor in levitated_rotors(quick)]
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,8 +71,8 @@ def compute(point: Point) -> xr.Dataset:
         "article": _levitation(bare, dipole, start),
         "dipole": _levitation(scene, dipole, start),
         "cuboid": _levitation(scene, Rates.of(scene, rotor_table(scene.rotor, "cuboid")), start),
-        "fem": _levitation(scene, _by_elements(scene, RTOL), start),
-        "coarse": _levitation(scene, _by_elements(scene, COARSE), start),
+        "fem": _levitation(scene, Rates.of(scene, article_table(scene, "fem", RTOL)), start),
+        "coarse": _levitation(scene, Rates.of(scene, article_table(scene, "fem", COARSE)), start),
     }
     low = max(each.range.low.parameter for each in made.values())
     high = min(each.range.high.parameter for each in made.values())
@@ -91,21 +86,19 @@ def compute(point: Point) -> xr.Dataset:
     errors["mutual"] = {
         key: doubt * np.abs(value - rows["fem"][key]) + errors["fem"][key] for key, value in rows["mutual"].items()
     }
-    kinds = {side: [getattr(made[m].range, side).kind for m in MODELS[:-1]] for side in SIDES}
+    data = {"frequency": variable(("step",), grid, "Hz", "frequency of the rotor")}
+    for name, (dims, units, words) in LABELS.items():
+        for suffix, source, what in (("", rows, ""), ("_error", errors, "estimated error of the ")):
+            values = np.array([source[model][name] for model in MODELS])
+            data[name + suffix] = variable(("model", *dims), values, units, what + words)
     for side, end in zip(SIDES, ends, strict=True):
-        kinds[side].append(end.kind if end else "")
-    return _dataset(point, grid, rows, errors, kinds)
+        kinds = [*(getattr(made[m].range, side).kind for m in MODELS[:-1]), end.kind if end else ""]
+        data[f"{side}_kind"] = xr.Variable(("model",), kinds)
+    return one_case(point, xr.Dataset(data, {"model": list(MODELS), "mode": list(MODES)}))
 
 
 def _levitation(scene: Scene, rates: Rates, start: tuple[Array, float]) -> InOneField:
-    found = stable_range(scene, rates, *start)
-    if found is None:
-        raise EquilibriumError("There is no stable levitation on the branch of the point dipoles.")
-    return InOneField(scene, rates, found)
-
-
-def _by_elements(scene: Scene, rtol: float) -> Rates:
-    return Rates.of(scene, cached_rotor_table(scene.rotor, "fem", rtol, note, scene.floater.radius)[0])
+    return InOneField(scene, rates, stable_range(scene, rates, *start))
 
 
 def _described(
@@ -130,28 +123,6 @@ LABELS: dict[str, tuple[tuple[str, ...], str, str]] = {
     "lowest": ((), "Hz", "lowest frequency of stable levitation"),
     "highest": ((), "Hz", "highest frequency of stable levitation"),
 }
-
-
-def _dataset(
-    point: Point,
-    grid: Array,
-    rows: dict[str, dict[str, Array]],
-    errors: dict[str, dict[str, Array]],
-    kinds: dict[str, list[str]],
-) -> xr.Dataset:
-    data: dict[str, xr.Variable] = {}
-    for name, (dims, units, words) in LABELS.items():
-        for suffix, source, what in (("", rows, ""), ("_error", errors, "estimated error of the ")):
-            values = np.array([source[model][name] for model in MODELS])
-            data[name + suffix] = variable(("case", "model", *dims), values[None], units, what + words)
-    for side, names in kinds.items():
-        data[f"{side}_kind"] = xr.Variable(("case", "model"), np.array([names]))
-    data["frequency"] = variable(("case", "step"), grid[None], "Hz", "frequency of the rotor")
-    data["measure"] = variable(("case",), np.array([point["measure"]]), "mm or °", "displacement or tilt")
-    data["configuration"] = xr.Variable(("case",), np.array([point["configuration"]]))
-    return xr.Dataset(data, {"model": list(MODELS), "mode": list(MODES)})
-
-
 STUDY = Study(
     name="dipole-vs-fem",
     summary="what true fields change in distance, angle, modes and limits, split"

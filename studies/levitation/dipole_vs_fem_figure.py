@@ -1,7 +1,5 @@
 """Figure of the study that compares the point dipole with true fields, from its dataset alone."""
 
-from __future__ import annotations
-
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
@@ -53,17 +51,10 @@ def _distances(axes: Axes, part: xr.Dataset) -> None:
     for k, color in zip(range(part.sizes["case"]), PALETTE, strict=False):
         one = part.isel(case=k)
         for model, style in (("article", "--"), ("mutual", "-")):
-            distance = 1e3 * one["distance"].sel(model=model).values
+            frequency, distance = one["frequency"], 1e3 * one["distance"].sel(model=model)
             text = rotor_label(kind, float(one["measure"])) if model == "mutual" else None
-            axes.plot(
-                one["frequency"].values,
-                distance,
-                f"o{style}",
-                ms=2.5,
-                mfc=color if text else "white",
-                color=color,
-                label=text,
-            )
+            fill = color if text else "white"
+            axes.plot(frequency, distance, f"o{style}", ms=2.5, mfc=fill, color=color, label=text)
     axes.plot([], [], "--", color="0.3", label="point dipoles")
     axes.plot([], [], "-", color="0.3", label="true fields")
     axes.set(xlabel="frequency of the rotor (Hz)", ylabel="levitation distance (mm)")

@@ -1,7 +1,5 @@
 """Sentences of the study that compares the point dipole with true fields, from its dataset alone."""
 
-from __future__ import annotations
-
 import numpy as np
 import xarray as xr
 

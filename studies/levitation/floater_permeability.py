@@ -1,16 +1,14 @@
 """When is the floater a rigid dipole? Force and torque with and without the answers of both bodies."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from functools import partial
 
 import numpy as np
 import xarray as xr
 
-from ...dynamics.equilibria import PerturbedBalance, Shift, find_equilibria
+from ...dynamics.equilibria import PerturbedBalance, find_equilibria
 from ...dynamics.steady import Equilibrium
-from ...fem.mutual import RotorResponse, TwoBody, Wrench, rotor_ladder, two_body, two_body_ladder
+from ...fem.mutual import RotorResponse, rotor_ladder, two_body, two_body_ladder
 from ...fem.rotor_tables import rotor_table
 from ...geometry.basics import Array
 from ...geometry.scenes import Floater, Scene, load_scene
@@ -64,12 +62,11 @@ def missed(rotors: Sequence[RotorResponse], floater: Floater, places: Array, dir
         ratio = np.linalg.norm(values[:, -1] - values[:, 0], axis=1) / size
         data[quantity] = variable(("distance", "part", "axis"), values, units, f"{quantity} on the floater")
         data[f"{quantity}_error"] = variable(("distance", "axis"), errors, units, f"estimated error of the {quantity}")
-        data[f"{quantity}_missed"] = variable(
-            ("distance",), ratio, "1", f"share of the {quantity} that a dipole misses"
-        )
-        data[f"{quantity}_missed_error"] = variable(
-            ("distance",), np.linalg.norm(errors, axis=1) / size, "1", f"estimated error of the share of the {quantity}"
-        )
+        for name, share, words in (
+            ("missed", ratio, f"share of the {quantity} that a dipole misses"),
+            ("missed_error", np.linalg.norm(errors, axis=1) / size, f"estimated error of the share of the {quantity}"),
+        ):
+            data[f"{quantity}_{name}"] = variable(("distance",), share, "1", words)
     return xr.Dataset(data, {"distance": distance, "part": list(PARTS), "axis": list(AXIS)})
 
 
@@ -99,29 +96,19 @@ def levitation(
         return extra.force, extra.torque
 
     both, error = two_body_ladder(rotors, floater, stable.position, stable.state.moment)
-    shifts = [balance.shift(stable.position, stable.state.moment, partial(added, rotor)) for rotor in rotors[-2:]]
-    return _levitation_dataset(stable, both, error, shifts)
-
-
-def _levitation_dataset(stable: Equilibrium, both: TwoBody, error: Wrench, shifts: list[Shift]) -> xr.Dataset:
-    extra, fine = both.total - both.rigid, shifts[-1]
-    return xr.Dataset(
-        {
-            "rigid_position": variable(("axis",), stable.position, "m", "stable equilibrium of the rigid dipole"),
-            "missed_force": variable(("axis",), extra.force, "N", "force that the rigid dipole misses there"),
-            "missed_force_error": variable(("axis",), error.force, "N", "its estimated error"),
-            "missed_torque": variable(("axis",), extra.torque, "N m", "torque that the rigid dipole misses there"),
-            "linear_shift": variable(("axis",), fine.linear, "m", "shift of the equilibrium, linearised"),
-            "shift": variable(("axis",), fine.position - stable.position, "m", "shift of the equilibrium"),
-            "shift_error": variable(
-                ("axis",),
-                np.abs(fine.position - shifts[0].position) + stable.position_error,
-                "m",
-                "its estimated error",
-            ),
-        },
-        {"axis": list(AXIS)},
-    )
+    place, moment, extra = stable.position, stable.state.moment, both.total - both.rigid
+    coarse, fine = (balance.shift(place, moment, partial(added, rotor)) for rotor in rotors[-2:])
+    doubt = np.abs(fine.position - coarse.position) + stable.position_error
+    rows = {
+        "rigid_position": (place, "m", "stable equilibrium of the rigid dipole"),
+        "missed_force": (extra.force, "N", "force that the rigid dipole misses there"),
+        "missed_force_error": (error.force, "N", "its estimated error"),
+        "missed_torque": (extra.torque, "N m", "torque that the rigid dipole misses there"),
+        "linear_shift": (fine.linear, "m", "shift of the equilibrium, linearised"),
+        "shift": (fine.position - place, "m", "shift of the equilibrium"),
+        "shift_error": (doubt, "m", "its estimated error"),
+    }
+    return xr.Dataset({name: variable(("axis",), *row) for name, row in rows.items()}, {"axis": list(AXIS)})
 
 
 def _depths(scene: Scene, number: int) -> Array:

@@ -1,7 +1,5 @@
 """Figure of the study of the floater's permeability, drawn from its dataset alone."""
 
-from __future__ import annotations
-
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes

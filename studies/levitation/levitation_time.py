@@ -1,7 +1,5 @@
 """How long does the floater stay up? Levitation time against frequency by the slow drift of its spin."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from functools import partial

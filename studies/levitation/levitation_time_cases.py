@@ -1,7 +1,5 @@
 """The rotors whose drift is studied, and what is not known of the experiment."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -40,8 +38,6 @@ CASES = {
 }
 """Rotors of the article, and two whose displacement is chosen so that they fly where the article's did."""
 QUICK = ("horizontal 1 mm", "vertical 14 mm")
-
-
 OUTCOMES = ("contact", "fold", "instability", "levitates", "no equilibrium")
 """How a flight may end."""
 LEVITATES, NO_EQUILIBRIUM = 3, 4

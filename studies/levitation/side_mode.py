@@ -1,19 +1,16 @@
 """The small circle on which the floater goes with the rotor: its radius in the true field, in flight and by formula."""
 
-from __future__ import annotations
-
 import numpy as np
 import xarray as xr
 
-from ...dynamics.branches import Point as BranchPoint
-from ...dynamics.branches import kicked, levitating_branch
+from ...dynamics.branches import BranchPoint, kicked, levitating_branch
 from ...dynamics.flights import simulate
 from ...dynamics.motion import Rates
 from ...fem.rotor_tables import RotorTable
 from ...geometry.basics import Array
 from ...geometry.scenes import Scene
 from ..article import CONFIGURATIONS, HIGHEST, LOWEST, QUICK, article_scene, article_table, side_radius
-from ..results import Point, Study, by_case, one_case, variable
+from ..results import Columns, Point, Study, by_case, columns, one_case, variable
 from .side_mode_figure import FLOWN_HZ, TURNS, side_figure, side_lines
 
 MODELS = ("dipole", "fem")
@@ -50,18 +47,21 @@ def side_mode(point: Point) -> xr.Dataset:
         start = branch.side("near", np.array([FLOWN_HZ]))[0]
         if start is not None:
             flown = _flight(scene, table, start)
-    row, sample = ("frequency",), ("sample",)
-    data = {
-        "radius": variable(row, rows[:, 0], "m", "radius of the floater's circle"),
-        "article_radius": variable(row, side_radius(rows[:, 1], grid), "m", "𝒢/(μ_f ω²) at the same distance"),
-        "distance": variable(row, rows[:, 1], "m", "levitation distance"),
-        "growth": variable(row, rows[:, 2], "1/s", "largest growth rate of a small motion"),
-        "flight_angle": variable(sample, flown[0], "rad", "angle of the rotor"),
-        "flight_x": variable(sample, flown[1], "m", "x of the floater in flight, laboratory frame"),
-        "flight_y": variable(sample, flown[2], "m", "y of the floater in flight, laboratory frame"),
-        "flight_z": variable(sample, flown[3], "m", "z of the floater in flight"),
-    }
-    return one_case(point, xr.Dataset(data, {"frequency": variable(row, grid, "Hz", "frequency of the rotor")}))
+    found = dict(zip(COLUMNS, (*rows.T, side_radius(rows[:, 1], grid), *flown), strict=True))
+    frequency = variable(("frequency",), grid, "Hz", "frequency of the rotor")
+    return one_case(point, xr.Dataset(columns(COLUMNS, found), {"frequency": frequency}))
+
+
+COLUMNS: Columns = {
+    "radius": (("frequency",), "m", "radius of the floater's circle"),
+    "distance": (("frequency",), "m", "levitation distance"),
+    "growth": (("frequency",), "1/s", "largest growth rate of a small motion"),
+    "article_radius": (("frequency",), "m", "𝒢/(μ_f ω²) at the same distance"),
+    "flight_angle": (("sample",), "rad", "angle of the rotor"),
+    "flight_x": (("sample",), "m", "x of the floater in flight, laboratory frame"),
+    "flight_y": (("sample",), "m", "y of the floater in flight, laboratory frame"),
+    "flight_z": (("sample",), "m", "z of the floater in flight"),
+}
 
 
 def _row(point: BranchPoint | None) -> list[float]:

@@ -1,7 +1,5 @@
 """Figure and sentences of the study of the side mode, from its dataset alone."""
 
-from __future__ import annotations
-
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
@@ -38,17 +36,14 @@ def side_figure(result: xr.Dataset) -> Figure:
         panel.axhspan(*TOLD, color="0.92", lw=0, label="0.1–0.3 mm, article")
         for value in values_of(result, configuration):
             found = cases_with(result, configuration=configuration, value=value, model="fem").isel(case=0)
-            style = {"color": rotor_color(configuration, value)}
-            solid = stable_in_flight(found["growth"].values)
-            plot_branch(
-                panel,
+            frequency, radius, solid = (
                 found["frequency"].values,
-                1e3 * found["radius"].values,
-                solid,
-                label=legend_name(configuration, value),
-                **style,
+                found["radius"].values,
+                stable_in_flight(found["growth"]),
             )
-            panel.plot(found["frequency"], 1e3 * found["article_radius"], ":", lw=1.6, **style)
+            color, label = rotor_color(configuration, value), legend_name(configuration, value)
+            plot_branch(panel, frequency, 1e3 * radius, solid, color=color, label=label)
+            panel.plot(frequency, 1e3 * found["article_radius"], ":", lw=1.6, color=color)
         panel.plot([], [], ":", lw=1.6, color="0.3", label="$\\mathcal{G}/\\mu_f\\omega^2$")
         panel.plot([], [], "--", color="0.3", label="unstable")
         panel.set(xlabel="frequency of the rotor (Hz)", ylabel="radius of the side mode (mm)")

@@ -5,15 +5,12 @@ is simulated in full, from equilibrium with spin s = 0, with drag and the floate
 the averaged flight along the branch of equilibria.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
 import xarray as xr
 
-from ...dynamics.branches import Point as BranchPoint
-from ...dynamics.branches import kicked, levitating_branch
+from ...dynamics.branches import BranchPoint, kicked, levitating_branch
 from ...dynamics.flights import Trajectory, flight_kind, simulate
 from ...dynamics.motion import Rates, Scales
 from ...dynamics.slow_drift import drift

@@ -5,5 +5,3 @@ from .sensitivity import STUDY as SENSITIVITY
 from .stability_map import STUDY as STABILITY_MAP
 
 STUDIES = (SENSITIVITY, DESIGN, STABILITY_MAP)
-
-__all__ = ["STUDIES"]

@@ -1,16 +1,13 @@
 """The inverse question: which rotor holds the floater at a wanted distance and frequency, with the most to spare?"""
 
-from __future__ import annotations
-
 import numpy as np
 import xarray as xr
 
 from ...dynamics.equilibria import find_equilibria
 from ...dynamics.steady import EquilibriumError
-from ...fem.rotor_tables import cached_rotor_table
 from ...geometry.basics import Array
-from ..article import CONFIGURATIONS, FLOATER, article_scene
-from ..results import Point, Study, by_case, variable
+from ..article import CONFIGURATIONS, article_scene, article_table
+from ..results import Point, Study, by_case, one_case, variable
 from ..terminal import note
 from .design_figure import design_figure, design_lines
 from .design_search import designed
@@ -55,14 +52,12 @@ def checked_by_elements(
     measure, slope = first, _shifted(configuration, edge, distance, frequency, first)
     for _ in range(5):
         scene = article_scene(configuration, measure, frequency, drag=False, edge=edge)
-        table = cached_rotor_table(scene.rotor, "fem", rtol, note, FLOATER.radius)[0]
-        found = find_equilibria(scene, table)
+        found = find_equilibria(scene, article_table(scene, "fem", rtol))
         if not found:
             raise EquilibriumError("The true field has no equilibrium there.")
         best = min(found, key=lambda e: abs(e.distance - distance))
         if abs(best.distance - distance) < close:
-            found_there = best.distance, best.position_error, float(best.stable), best.growth_per_s
-            return np.array([measure, *found_there])
+            return np.array([measure, best.distance, best.position_error, float(best.stable), best.growth_per_s])
         measure -= (best.distance - distance) / slope
     raise EquilibriumError("The correction of the measure for the true field did not settle.")
 
@@ -103,13 +98,13 @@ def compute(point: Point, rtol: float = RTOL, close: float = CLOSE_ENOUGH) -> xr
             true = checked_by_elements(name, edge, distance, frequency, rows[best, 0], rtol, close)
         except EquilibriumError as error:
             note(str(error))
-    data = {k: variable(("case", "edge"), rows[None, :, i], *NAMES[k]) for i, k in enumerate(NAMES)}
-    data |= {k: variable(("case",), true[None, i], *CHECKED[k]) for i, k in enumerate(CHECKED)}
-    data["wanted_distance"] = variable(("case",), np.array([distance]), "m", "wanted distance")
-    data["wanted_frequency"] = variable(("case",), np.array([frequency]), "Hz", "wanted frequency")
-    data["best"] = variable(("case",), np.array([best]), "1", "which edge has the largest margin; -1 if none")
-    data["configuration"] = xr.Variable(("case",), np.array([name]))
-    return xr.Dataset(data, {"edge": variable(("edge",), 1e-3 * np.array(point["edges_mm"]), "m", "edge of the cubes")})
+    data = {k: variable(("edge",), column, *words) for (k, words), column in zip(NAMES.items(), rows.T, strict=True)}
+    data |= {k: variable((), value, *words) for (k, words), value in zip(CHECKED.items(), true, strict=True)}
+    data["wanted_distance"] = variable((), distance, "m", "wanted distance")
+    data["wanted_frequency"] = variable((), frequency, "Hz", "wanted frequency")
+    data["best"] = variable((), best, "1", "which edge has the largest margin; -1 if none")
+    edge = variable(("edge",), 1e-3 * np.array(point["edges_mm"]), "m", "edge of the cubes")
+    return one_case(point, xr.Dataset(data, {"edge": edge}))
 
 
 def _row(configuration: str, edge: float, distance: float, frequency: float) -> list[float]:

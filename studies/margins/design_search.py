@@ -1,13 +1,10 @@
 """The search for the displacement or tilt that holds the floater at a wanted distance and frequency."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np
 
-from ...dynamics.branches import HIGHEST, LOWEST, by_frequency, is_stable, stability_end
-from ...dynamics.branches import Point as BranchPoint
+from ...dynamics.branches import HIGHEST, LOWEST, BranchPoint, by_frequency, levitates, stability_end
 from ...dynamics.motion import Rates, Scales, parameters, rotor_gap
 from ...dynamics.steady import AXIAL, LATERAL, Balance, EquilibriumError, solve
 from ...fem.rotor_tables import rotor_table
@@ -116,7 +113,7 @@ def _judged(scene: Scene, rates: Rates, measure: float, place: Array, moment: Ar
     here = family.point(place / scene.floater.radius, moment, scene.frequency)
     if rotor_gap(scene, here.position) < 0:
         raise EquilibriumError("The floater would overlap with the rotor.")
-    if not is_stable(here):
+    if not levitates(here):
         return Design(measure, here, here, here)
     low, high = (stability_end(scene, family, here.state, scene.frequency, end) for end in (LOWEST, HIGHEST))
     return Design(measure, here, low, high)

@@ -1,7 +1,5 @@
 """Which parameter matters? Derivatives of distance and limits of stability, and what tolerances make of them."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -15,7 +13,7 @@ from ...dynamics.motion import Rates
 from ...fem.rotor_tables import rotor_table
 from ...geometry.basics import Array
 from ..article import levitated_rotors
-from ..results import Point, Study, by_case, variable
+from ..results import Point, Study, by_case, one_case, variable
 from .sensitivity_figure import sensitivity_figure, sensitivity_lines
 from .tolerances import (
     FRACTIONS,
@@ -119,13 +117,10 @@ def compute(point: Point) -> xr.Dataset:
         "frequency": (("fraction",), base.grid, "Hz", "frequency at which the distance is asked for"),
         "leaning_distance": (("lean",), distance, "m", "mean distance with the axis tilted from the vertical"),
         "leaning_growth": (("lean",), growth, "1/s", "largest growth rate with the axis tilted"),
-        "measure": ((), base.measure, "mm or °", "displacement or tilt"),
     }
-    found = {k: variable(("case", *dims), np.asarray(v)[None], u, w) for k, (dims, v, u, w) in data.items()}
-    found["configuration"] = xr.Variable(("case",), np.array([base.configuration]))
     lean = variable(("lean",), np.array([0.0, *TILTS]), "°", "tilt of the axis from the vertical")
     axes = {"parameter": list(PARAMETERS), "quantity": list(QUANTITIES), "fraction": list(FRACTIONS), "lean": lean}
-    return xr.Dataset(found, axes)
+    return one_case(point, xr.Dataset({name: variable(*column) for name, column in data.items()}, axes))
 
 
 STUDY = Study(

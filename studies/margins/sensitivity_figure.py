@@ -1,7 +1,5 @@
 """Figure and sentences of the study of sensitivities, from its dataset alone."""
 
-from __future__ import annotations
-
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes

@@ -1,7 +1,5 @@
 """Regions of stable levitation in frequency and displacement, what bounds them, and what a plate makes of them."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
@@ -11,12 +9,12 @@ from ...dynamics.branches import HIGHEST, StableRange, at_frequency, levitating_
 from ...dynamics.equilibria import survey, with_plate
 from ...dynamics.motion import Rates
 from ...dynamics.steady import EquilibriumError, Survey
-from ...fem.rotor_tables import RotorTable, cached_rotor_table, rotor_table
-from ...geometry.basics import Box
+from ...fem.rotor_tables import RotorTable
+from ...geometry.basics import Array, Box
 from ...geometry.scenes import Plate, Scene
-from ..article import CONFIGURATIONS, FLOATER, PLATE_CONDUCTIVITY, PLATE_SIZE, article_scene
+from ..article import CONFIGURATIONS, PLATE_CONDUCTIVITY, PLATE_SIZE, article_scene, article_table
 from ..one_scene import plate_memory
-from ..results import Point, Study, by_case, variable
+from ..results import Point, Study, by_case, one_case, variable
 from ..terminal import note
 from .stability_map_figure import FACE, MODELS, map_figure, map_lines
 
@@ -46,32 +44,43 @@ def points(quick: bool) -> list[Point]:
 def compute(point: Point, rtol: float = RTOL) -> xr.Dataset:
     """Intervals of stable frequencies of one rotor, and growth with a plate below at some frequencies."""
     scene = article_scene(point["configuration"], point["measure"], drag=False)
-    table = _table(scene, point["model"], rtol)
+    table = article_table(scene, point["model"], rtol)
     rates = Rates.of(scene, table)
     try:
         found = levitating_ranges(scene, table, rates)
     except EquilibriumError as error:
         note(str(error))
         found = []
-    rows, kinds = np.full((MOST, 5), np.nan), np.full((MOST, 2), "", dtype="U12")
+    rows, kinds = np.full((len(INTERVAL), MOST), np.nan), np.full((2, MOST), "", dtype="U12")
     for k, run in enumerate(found[:MOST]):
         ends = run.low, run.high
-        rows[k] = [*(e.parameter for e in ends), *(e.distance for e in ends), run.low.leading_hz]
-        rows[k, 4] = run.high.leading_hz
-        kinds[k] = [e.kind for e in ends]
+        rows[:, k] = [*(e.parameter for e in ends), *(e.distance for e in ends), run.high.leading_hz]
+        kinds[:, k] = [e.kind for e in ends]
     plate = _with_plate(scene, table, rates, found[0] if found else None, point["with_plate"])
-    return _dataset(point, rows, kinds, plate)
+    data = {
+        name: variable(("interval",), row, *words) for (name, words), row in zip(INTERVAL.items(), rows, strict=True)
+    }
+    data |= {name: variable(("tried",), row, *words) for (name, words), row in zip(PLATE.items(), plate.T, strict=True)}
+    data |= {name: xr.Variable(("interval",), row) for name, row in zip(("low_kind", "high_kind"), kinds, strict=True)}
+    return one_case(point, xr.Dataset(data))
 
 
-def _table(scene: Scene, model: str, rtol: float) -> RotorTable:
-    if model == "fem":
-        return cached_rotor_table(scene.rotor, model, rtol, note, FLOATER.radius)[0]
-    return rotor_table(scene.rotor, model)
+INTERVAL = {
+    "lowest": ("Hz", "lower end of an interval of stability"),
+    "highest": ("Hz", "upper end of an interval of stability"),
+    "distance_lowest": ("m", "distance at the lower end"),
+    "distance_highest": ("m", "distance at the upper end"),
+    "leading_highest": ("Hz", "frequency of the motion that becomes unstable at the upper end"),
+}
+PLATE = {
+    "plate_frequency": ("Hz", "frequency at which a plate below is tried"),
+    "plate_growth": ("1/s", "largest growth rate with a plate below"),
+    "plate_distance": ("m", "distance with a plate below"),
+    "plate_error": ("1", "estimated relative error of the plate's table"),
+}
 
 
-def _with_plate(
-    scene: Scene, table: RotorTable, rates: Rates, stable: StableRange | None, number: int
-) -> np.ndarray[tuple[int, int], np.dtype[np.float64]]:
+def _with_plate(scene: Scene, table: RotorTable, rates: Rates, stable: StableRange | None, number: int) -> Array:
     """Frequency (Hz), growth (1/s), distance (m) and error of the plate's table (number, 4); NaN where it fails."""
     rows = np.full((6, 4), np.nan)
     if stable is None or not number:
@@ -94,38 +103,6 @@ def _with_plate(
         if moved and moved[0].currents is not None:
             rows[k, 1:] = moved[0].growth_per_s, moved[0].distance, max(memory.table.errors.total, memory.share.error)
     return rows
-
-
-def _dataset(
-    point: Point,
-    rows: np.ndarray[tuple[int, int], np.dtype[np.float64]],
-    kinds: np.ndarray[tuple[int, int], np.dtype[np.str_]],
-    plate: np.ndarray[tuple[int, int], np.dtype[np.float64]],
-) -> xr.Dataset:
-    interval, tried = ("case", "interval"), ("case", "tried")
-    columns = {
-        "lowest": (interval, rows[:, 0], "Hz", "lower end of an interval of stability"),
-        "highest": (interval, rows[:, 1], "Hz", "upper end of an interval of stability"),
-        "distance_lowest": (interval, rows[:, 2], "m", "distance at the lower end"),
-        "distance_highest": (interval, rows[:, 3], "m", "distance at the upper end"),
-        "leading_highest": (
-            interval,
-            rows[:, 4],
-            "Hz",
-            "frequency of the motion that becomes unstable at the upper end",
-        ),
-        "plate_frequency": (tried, plate[:, 0], "Hz", "frequency at which a plate below is tried"),
-        "plate_growth": (tried, plate[:, 1], "1/s", "largest growth rate with a plate below"),
-        "plate_distance": (tried, plate[:, 2], "m", "distance with a plate below"),
-        "plate_error": (tried, plate[:, 3], "1", "estimated relative error of the plate's table"),
-    }
-    data = {name: variable(dims, values[None], units, words) for name, (dims, values, units, words) in columns.items()}
-    data["low_kind"] = xr.Variable(interval, kinds[None, :, 0])
-    data["high_kind"] = xr.Variable(interval, kinds[None, :, 1])
-    data["measure"] = variable(("case",), np.array([point["measure"]]), "mm or °", "displacement or tilt")
-    data["configuration"] = xr.Variable(("case",), np.array([point["configuration"]]))
-    data["model"] = xr.Variable(("case",), np.array([point["model"]]))
-    return xr.Dataset(data)
 
 
 STUDY = Study(

@@ -1,7 +1,5 @@
 """What is not known exactly of a rotor and its floater, and what they do with other values of it."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -98,8 +96,6 @@ def nominal(configuration: str, measure: float) -> Nominal:
     values = {name: known.nominal for name, known in PARAMETERS.items() if name != PLACE} | {"measure": measure}
     scene = scene_of(configuration, values)
     found = stable_range(scene, Rates.of(scene, rotor_table(scene.rotor, MODEL)), *reference_state(scene))
-    if found is None:
-        raise EquilibriumError("There is no stable levitation on the branch of the point dipoles.")
     return Nominal(configuration, measure, values, found)
 
 

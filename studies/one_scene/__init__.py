@@ -1,22 +1,8 @@
 """What does one scene do?"""
 
-from .levitation import Levitation, given_scene, sources
-from .plate_of_scene import plate_memory
-from .question import Question
-from .reaction import Job, plate_job
-from .run import main_job
-from .single import equilibria_job, field_job, simulate_job
-
-__all__ = [
-    "Job",
-    "Levitation",
-    "Question",
-    "equilibria_job",
-    "field_job",
-    "given_scene",
-    "main_job",
-    "plate_job",
-    "plate_memory",
-    "simulate_job",
-    "sources",
-]
+from .levitation import Levitation as Levitation, given_scene as given_scene, sources as sources
+from .plate_of_scene import plate_memory as plate_memory
+from .question import Question as Question
+from .reaction import Job as Job, plate_job as plate_job
+from .run import main_job as main_job
+from .single import equilibria_job as equilibria_job, field_job as field_job, simulate_job as simulate_job

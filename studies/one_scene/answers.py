@@ -1,7 +1,5 @@
 """What the commands answer, as mappings ready for JSON."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 

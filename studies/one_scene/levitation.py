@@ -1,7 +1,5 @@
 """One scene from its field to its flight: each step is computed once, when it is first asked for."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from functools import cached_property
 from pathlib import Path

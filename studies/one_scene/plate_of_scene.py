@@ -1,7 +1,5 @@
 """The plate of a scene as a table: which model, for which region, and from where."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
@@ -9,7 +7,7 @@ import numpy as np
 from ...dynamics.motion import PlateMemory
 from ...fem.plate_network import Region
 from ...fem.plate_tables import cached_driven_plate, reachable_region
-from ...fem.rotor_tables import Accuracy, RotorTable, distant
+from ...fem.rotor_tables import Accuracy, RotorTable, shortened_table
 from ...fem.slab import edge_error, slab_and_rotor_table
 from ...geometry.basics import Array, InputError
 from ...geometry.bodies import TOUCHING, sphere_overlap
@@ -53,7 +51,7 @@ def plate_memory(
 def table_in_flight(scene: Scene, table: RotorTable, place: Array, rtol: float) -> RotorTable:
     """The rotor's table with the coefficients that count from `REACH` nearer to the magnets than `place` (3,) m on."""
     gap = min(float(magnet.box.distance(place)) for magnet in scene.rotor) - REACH
-    return distant(table, Accuracy(rtol, max(gap, scene.floater.radius)))
+    return shortened_table(table, Accuracy(rtol, max(gap, scene.floater.radius)))
 
 
 def _rastered(region: Region) -> Region:

@@ -1,7 +1,5 @@
 """One's own question: any quantity of a scene over any of its parameters."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from typing import Any

@@ -1,7 +1,5 @@
 """The command `plate`: reaction tensor of the scene's plate at one place and frequency."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The main job: fields, tables, equilibria, motion, and what the dipole picture gets wrong."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any

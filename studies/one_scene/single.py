@@ -1,12 +1,12 @@
 """The commands that answer one question: field, equilibria, simulate."""
 
-from __future__ import annotations
-
 import csv
 import io
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 from ...dynamics.flights import Checkpoint, FlightStopped, Trajectory
 from ...fem.storage import program_of, write_whole
@@ -25,26 +25,17 @@ def field_job(scene: Scene, points: Array, asked: Models, out: Path) -> Job:
     """B and its gradient at points (n, 3) m; writes field.csv."""
     levitation = Levitation(scene, asked)
     values = field_answer(levitation.table, points)
-    header = [
-        *COLUMNS,
-        "Bx_T",
-        "By_T",
-        "Bz_T",
-        *(f"dB{i}_d{j}_T_per_m" for i in "xyz" for j in "xyz"),
-        "B_relative_error",
-    ]
-    rows = zip(
-        points * 1e3, values["B_T"], values["dB_T_per_m"].reshape(-1, 9), values["B_relative_error"], strict=True
-    )
+    b, gradient, error = values["B_T"], values["dB_T_per_m"].reshape(-1, 9), values["B_relative_error"]
+    slopes = (f"dB{i}_d{j}_T_per_m" for i in "xyz" for j in "xyz")
     stream = io.StringIO(newline="")
     writer = csv.writer(stream)
-    writer.writerow(header)
-    writer.writerows([*place, *b, *gradient, error] for place, b, gradient, error in rows)
+    writer.writerow([*COLUMNS, "Bx_T", "By_T", "Bz_T", *slopes, "B_relative_error"])
+    writer.writerows(np.column_stack([points * 1e3, b, gradient, error]))
     write_whole(out / "field.csv", stream.getvalue().encode())
     lines = [f"{'x':>9} {'y':>9} {'z':>9} mm {'Bx':>14} {'By':>14} {'Bz':>14} T   relative error"]
     lines += [
         f"{x:9.3f} {y:9.3f} {z:9.3f}    {b[0]:14.6e} {b[1]:14.6e} {b[2]:14.6e}     {error:.1e}"
-        for (x, y, z), b, error in zip(points[:20] * 1e3, values["B_T"], values["B_relative_error"], strict=False)
+        for (x, y, z), b, error in zip(points[:20] * 1e3, b, error, strict=False)
     ]
     lines.append(f"Model {values['model']}; {len(points)} points with gradients in {out / 'field.csv'}")
     return {**values, "tables_from_cache": levitation.from_cache}, lines

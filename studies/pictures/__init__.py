@@ -1,16 +1,5 @@
 """What does a result look like?"""
 
-from .currents import plate_currents
-from .flight_view import flight_frames, last_view
-from .modes import modes_figure
-from .question import drawable, question_figure, question_lines
-
-__all__ = [
-    "drawable",
-    "flight_frames",
-    "last_view",
-    "modes_figure",
-    "plate_currents",
-    "question_figure",
-    "question_lines",
-]
+from .flight_view import flight_frames as flight_frames, last_view as last_view, plate_currents as plate_currents
+from .modes import modes_figure as modes_figure
+from .question import drawable as drawable, question_figure as question_figure, question_lines as question_lines

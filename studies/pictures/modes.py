@@ -1,7 +1,5 @@
 """The small motions about equilibria: how fast each grows or dies out, and its frequency."""
 
-from __future__ import annotations
-
 import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure

@@ -1,7 +1,5 @@
 """Figure and report of one's own question, from its result alone."""
 
-from __future__ import annotations
-
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes

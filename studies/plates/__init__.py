@@ -4,5 +4,3 @@ from .plate_damping import STUDY as PLATE_DAMPING
 from .team7 import STUDY as TEAM7
 
 STUDIES = (PLATE_DAMPING, TEAM7)
-
-__all__ = ["STUDIES"]

@@ -1,7 +1,5 @@
 """The plates and rotors of the study of the plate's damping, and where the floater levitates without a plate."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from functools import cache
 
@@ -11,11 +9,10 @@ from ...dynamics.branches import StableRange, at_frequency, reference_state, sta
 from ...dynamics.equilibria import survey
 from ...dynamics.motion import Rates
 from ...dynamics.steady import Equilibrium, EquilibriumError
-from ...fem.rotor_tables import RotorTable, cached_rotor_table
+from ...fem.rotor_tables import RotorTable
 from ...geometry.basics import Array, Box, rotation_matrix
 from ...geometry.scenes import Plate, Scene
-from ..article import CONFIGURATIONS, PLATE_CONDUCTIVITY, PLATE_SIZE, article_scene
-from ..terminal import note
+from ..article import CONFIGURATIONS, PLATE_CONDUCTIVITY, PLATE_SIZE, article_scene, article_table
 
 DISTANCE = 0.018
 """Face below or beside the floater's centre in the sweeps over all else, m."""
@@ -91,17 +88,14 @@ def cases(quick: bool) -> list[PlateCase]:
 def _in_field(configuration: str, measure: float) -> tuple[Scene, RotorTable, Rates]:
     """A rotor in air, its field and compiled motion, once for all points that a process computes."""
     scene = article_scene(configuration, measure, FREQUENCY)
-    table, _ = cached_rotor_table(scene.rotor, "fem", FIELD_RTOL, note, scene.floater.radius)
+    table = article_table(scene, "fem", FIELD_RTOL)
     return scene, table, Rates.of(scene, table)
 
 
 @cache
 def _stable_range(configuration: str, measure: float) -> StableRange:
     scene, _, rates = _in_field(configuration, measure)
-    found = stable_range(scene, rates, *reference_state(scene))
-    if found is None:
-        raise EquilibriumError("There is no stable levitation without the plate.")
-    return found
+    return stable_range(scene, rates, *reference_state(scene))
 
 
 @cache

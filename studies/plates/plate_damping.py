@@ -1,21 +1,18 @@
 """What a plate does to levitation: damping of each small motion, drag, lift and loss against its place and material."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import asdict, replace
 
-import numpy as np
 import xarray as xr
+from numpy.typing import ArrayLike
 
 from ...dynamics.equilibria import plate_action, with_plate
 from ...dynamics.motion import Rates
 from ...dynamics.steady import Equilibrium, Survey
 from ...fem.rotor_tables import RotorTable
-from ...geometry.basics import Array
 from ...geometry.scenes import Scene
 from ..one_scene import plate_memory
-from ..results import AXIS, MODES, Point, Study, variable
+from ..results import AXIS, MODES, Columns, Point, Study, columns, variable
 from .plate_cases import PlateCase, cases, without_plate
 from .plate_damping_figure import damping_figure
 from .plate_damping_report import damping_lines
@@ -45,15 +42,15 @@ def plate_damping(point: Point) -> xr.Dataset:
     row = _row(replace(scene, plate=case.plate(start.position)), case, table, rates, start)
     return xr.Dataset(
         {
-            **{n: variable(("case", *dims), np.array([row[n]]), *UNITS[n]) for n, dims in COLUMNS.items()},
-            "sweep": (("case",), [case.sweep]),
-            "configuration": (("case",), [case.configuration]),
-            "value": variable(("case",), [case.value], "SI, mm or °", "what is varied in the sweep"),
-            "rotor_frequency": variable(("case",), [scene.frequency], "Hz", "frequency of the rotor"),
+            **columns(COLUMNS, row, mode=len(MODES), axis=len(AXIS)),
+            "sweep": ((), case.sweep),
+            "configuration": ((), case.configuration),
+            "value": variable((), case.value, "SI, mm or °", "what is varied in the sweep"),
+            "rotor_frequency": variable((), scene.frequency, "Hz", "frequency of the rotor"),
         },
         {"mode": list(MODES), "axis": list(AXIS)},
         {"weight_N": scene.floater.mass * 9.81, "plate_rtol": RTOL},
-    )
+    ).expand_dims("case")
 
 
 def gather_damping(parts: Sequence[xr.Dataset]) -> xr.Dataset:
@@ -61,46 +58,32 @@ def gather_damping(parts: Sequence[xr.Dataset]) -> xr.Dataset:
     return xr.concat(parts, "case", data_vars="minimal", coords="minimal", compat="override", join="exact")
 
 
-COLUMNS: dict[str, tuple[str, ...]] = {
-    "growth": ("mode",),
-    "growth_without": ("mode",),
-    "frequency": ("mode",),
-    "shift": ("axis",),
-    "force": ("axis",),
-    "torque": ("axis",),
-    "loss": (),
-    "error": (),
-}
-UNITS = {
-    "growth": ("1/s", "growth rate of a small motion"),
-    "growth_without": ("1/s", "growth rate without a plate"),
-    "frequency": ("Hz", "frequency of a small motion, rotor's frame"),
-    "shift": ("m", "displacement of the equilibrium by the plate"),
-    "force": ("N", "mean force of the plate on the floater"),
-    "torque": ("N m", "mean torque of the plate on the floater"),
-    "loss": ("W", "heat in the plate, by floater and rotor"),
-    "error": ("1", "estimated relative error of the plate's table"),
+COLUMNS: Columns = {
+    "growth": (("mode",), "1/s", "growth rate of a small motion"),
+    "growth_without": (("mode",), "1/s", "growth rate without a plate"),
+    "frequency": (("mode",), "Hz", "frequency of a small motion, rotor's frame"),
+    "shift": (("axis",), "m", "displacement of the equilibrium by the plate"),
+    "force": (("axis",), "N", "mean force of the plate on the floater"),
+    "torque": (("axis",), "N m", "mean torque of the plate on the floater"),
+    "loss": ((), "W", "heat in the plate, by floater and rotor"),
+    "error": ((), "1", "estimated relative error of the plate's table"),
 }
 
 
-def _row(scene: Scene, case: PlateCase, table: RotorTable, rates: Rates, start: Equilibrium) -> dict[str, Array]:
+def _row(scene: Scene, case: PlateCase, table: RotorTable, rates: Rates, start: Equilibrium) -> dict[str, ArrayLike]:
     assert scene.plate is not None
     memory, _ = plate_memory(scene, scene.plate, case.model, table, start.position, RTOL)
     found = with_plate(scene, table, Survey((start,), ()), memory, rates).equilibria
-    sizes = {"mode": 5, "axis": 3}
-    row = {name: np.full([sizes[d] for d in dims], np.nan) for name, dims in COLUMNS.items()}
-    row["growth_without"] = np.array([mode.growth_per_s for mode in start.modes])
+    row: dict[str, ArrayLike] = {"growth_without": [mode.growth_per_s for mode in start.modes]}
     if not found or found[0].currents is None:
         return row
-    action = plate_action(scene, memory, found[0])
-    return row | {
-        "growth": np.array([mode.growth_per_s for mode in found[0].modes]),
-        "frequency": np.array([mode.frequency_hz for mode in found[0].modes]),
+    return {
+        **row,
+        "growth": [mode.growth_per_s for mode in found[0].modes],
+        "frequency": [mode.frequency_hz for mode in found[0].modes],
         "shift": found[0].position - start.position,
-        "force": action.force,
-        "torque": action.torque,
-        "loss": np.array(action.loss),
-        "error": np.array(max(memory.table.errors.total, memory.share.error)),
+        **vars(plate_action(scene, memory, found[0])),
+        "error": max(memory.table.errors.total, memory.share.error),
     }
 
 

@@ -1,7 +1,5 @@
 """Figure of the study of the plate's damping, from its dataset alone."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

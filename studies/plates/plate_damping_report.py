@@ -1,7 +1,5 @@
 """Sentences of the study of the plate's damping, from its dataset alone."""
 
-from __future__ import annotations
-
 import numpy as np
 import xarray as xr
 

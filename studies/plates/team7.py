@@ -7,8 +7,6 @@ with phasors e^{+iωt} and the current I cos ωt these are Re B and -Im B.
 K. Fujiwara, T. Nakata, COMPEL 9 (1990) 137-154, doi 10.1108/eb010071.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import partial
 from importlib.resources import files

@@ -1,7 +1,5 @@
 """Table and figure of TEAM workshop problem 7, from its dataset alone."""
 
-from __future__ import annotations
-
 import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure

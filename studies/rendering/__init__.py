@@ -1,16 +1,11 @@
 """How is a picture in three dimensions drawn, in a process whose end is not the program's?"""
 
-from .renderer import RenderError, render, unavailable
-from .view import Currents, FieldPlane, Frames, View, current_places, frame_times
-
-__all__ = [
-    "Currents",
-    "FieldPlane",
-    "Frames",
-    "RenderError",
-    "View",
-    "current_places",
-    "frame_times",
-    "render",
-    "unavailable",
-]
+from .renderer import RenderError as RenderError, render as render, unavailable as unavailable
+from .view import (
+    Currents as Currents,
+    FieldPlane as FieldPlane,
+    Frames as Frames,
+    View as View,
+    current_places as current_places,
+    frame_times as frame_times,
+)

@@ -1,7 +1,5 @@
 """A flight as an animation, in the laboratory frame and in slow motion."""
 
-from __future__ import annotations
-
 import io
 from collections.abc import Callable
 from typing import Any

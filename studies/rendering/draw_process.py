@@ -4,8 +4,6 @@ Started by `renderer`; what goes to and fro is pickled. An answer is a finished 
 done (float), or the reason why there is no more (str).
 """
 
-from __future__ import annotations
-
 import os
 import pickle
 import sys

@@ -3,8 +3,6 @@
 VTK ends the process that calls it, without a word, where it finds no graphics library: a computation must survive that.
 """
 
-from __future__ import annotations
-
 import os
 import pickle
 import signal

@@ -1,7 +1,5 @@
 """A 3-D picture of rotor, floater, field and path, rendered off screen."""
 
-from __future__ import annotations
-
 import io
 
 import numpy as np

@@ -1,7 +1,5 @@
 """What is shown in three dimensions: numbers only, which go to the process that draws them."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 

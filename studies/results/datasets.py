@@ -1,7 +1,5 @@
 """Results as labelled data with units and provenance, in netCDF."""
 
-from __future__ import annotations
-
 import shlex
 import sys
 from collections.abc import Mapping, Sequence
@@ -22,6 +20,8 @@ from .equilibrium_fields import EQUILIBRIUM_FIELDS, Field
 
 AXIS = ("x", "y", "z")
 MODES = ("bounce", *SIDE, *TILT)
+Columns = Mapping[str, tuple[tuple[str, ...], str, str]]
+"""Dimensions, unit and a name for an axis label, by name."""
 LIBRARIES = ("spinlev", "ngsolve", "heyoka", "numpy", "scipy", "xarray")
 
 
@@ -40,6 +40,15 @@ def write_dataset(dataset: xr.Dataset, path: Path, scene: Scene | None = None) -
 def variable(dims: Sequence[str], values: Any, units: str, long_name: str) -> xr.Variable:
     """A variable with its units and a name for an axis label."""
     return xr.Variable(dims, values, {"units": units, "long_name": long_name})
+
+
+def columns(table: Columns, found: Mapping[str, Any], **sizes: int) -> dict[str, xr.Variable]:
+    """Variables by name as a table of columns has them; NaN, in these sizes, where nothing was found."""
+
+    def values(name: str, dims: tuple[str, ...]) -> Any:
+        return found[name] if name in found else np.full([sizes[dim] for dim in dims], np.nan)
+
+    return {name: variable(dims, values(name, dims), unit, label) for name, (dims, unit, label) in table.items()}
 
 
 def axis_dataset(tables: Mapping[str, FieldTable], heights: Array) -> xr.Dataset:

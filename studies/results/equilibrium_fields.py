@@ -1,7 +1,5 @@
 """What is told of an equilibrium: listed once, for labelled data and for JSON."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any

@@ -1,7 +1,5 @@
 """Figures of a run, drawn from its result file alone."""
 
-from __future__ import annotations
-
 import io
 from collections.abc import Callable
 from functools import wraps
@@ -19,7 +17,6 @@ from ...fem.storage import write_whole
 
 PALETTE = ["#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9"]
 """Colours of M. Okabe and K. Ito, which all kinds of colour vision tell apart."""
-
 STYLE: Any = {
     "font.size": 8.5,
     "axes.titlesize": 10,
@@ -32,7 +29,6 @@ STYLE: Any = {
     "savefig.dpi": 160,
     "figure.constrained_layout.use": True,
 }
-
 NAMES = {
     "dipole": "point dipole",
     "cuboid": "cuboid, closed form (μr = 1)",
@@ -42,8 +38,6 @@ NAMES = {
 }
 COLORS = dict(zip(NAMES, PALETTE, strict=False))
 DASHES = {"dipole": "--", "cuboid": "-.", "fem": "-", "moments": ":", "map": "-"}
-
-
 Draw = TypeVar("Draw", bound=Callable[..., Figure])
 
 

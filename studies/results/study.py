@@ -1,7 +1,5 @@
 """What a study is: a pure function of one point, and the points at which it is asked."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from operator import itemgetter
@@ -20,9 +18,18 @@ def by_case(parts: Sequence[xr.Dataset]) -> xr.Dataset:
     return xr.concat(parts, "case", data_vars="all", coords="different", compat="equals", join="outer")
 
 
+LABELS = {
+    "configuration": {},
+    "value": {},
+    "measure": {"units": "mm or °", "long_name": "displacement or tilt"},
+    "model": {},
+}
+"""What may tell a point from the others, with units."""
+
+
 def one_case(point: Point, dataset: xr.Dataset) -> xr.Dataset:
-    """A point's result with what tells it from the others (texts and numbers), ready to be joined along `case`."""
-    labels = {name: xr.Variable((), point[name]) for name in ("configuration", "value", "model")}
+    """A point's result with those of `LABELS` that the point has, ready to be joined along `case`."""
+    labels = {name: xr.Variable((), point[name], attrs) for name, attrs in LABELS.items() if name in point}
     return dataset.assign(labels).expand_dims("case")
 
 
@@ -62,16 +69,9 @@ class Study:
     settings: Point = field(default_factory=dict)
 
 
-def study_of_one(
-    name: str,
-    summary: str,
-    compute: Callable[[bool], xr.Dataset],
-    draw: Callable[[xr.Dataset], Figure],
-    report: Callable[[xr.Dataset], list[str]],
-    timed: bool = False,
-) -> Study:
-    """A study that is computed as a whole: its only point says whether it is quick."""
-    return Study(name, summary, _settings, _Whole(compute), itemgetter(0), draw, report, timed)
+def study_of_one(compute: Callable[[bool], xr.Dataset], **more: Any) -> Study:
+    """A study that is computed as a whole: its only point says whether it is quick; `more` as of a `Study`."""
+    return Study(points=_settings, compute=_Whole(compute), gather=itemgetter(0), **more)
 
 
 def _settings(quick: bool) -> list[Point]:
@@ -80,6 +80,8 @@ def _settings(quick: bool) -> list[Point]:
 
 @dataclass(frozen=True)
 class _Whole:
+    """Can be sent to a worker, unlike a function that is made here."""
+
     compute: Callable[[bool], xr.Dataset]
 
     def __call__(self, point: Point) -> xr.Dataset:

@@ -1,5 +1,3 @@
 """How are many points computed, kept and gone on with?"""
 
-from .running import forget, swept
-
-__all__ = ["forget", "swept"]
+from .running import forget as forget, swept as swept

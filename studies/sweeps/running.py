@@ -1,22 +1,63 @@
-"""Runs a study: its points one by one on the engine, kept as they come, then joined, written, drawn and reported."""
+"""Runs a study: its points one by one on the engine, kept as they come on disk, then joined."""
 
-from __future__ import annotations
-
-from collections.abc import Mapping
+import shutil
+from collections.abc import Callable, Mapping
 from importlib.metadata import version
 from pathlib import Path
 
 import xarray as xr
 
-from ...fem.storage import digest_of
+from ...fem.storage import TableFileError, digest_of, read_checked, write_checked, write_whole
 from ...geometry.basics import ComputationError
 from ..results import LIBRARIES, Point, Study
 from ..terminal import Workers, note, progress, to_json
-from .finished_points import Journal
 from .workers import Failure, computed
 
+FORMAT = "spinlev point 1"
 FLOORS = ("spinlev.geometry", "spinlev.fem", "spinlev.dynamics", "spinlev.studies")
 """What another program has computed is not mixed into a result."""
+
+
+class Journal:
+    """A folder with one checked file for each finished point.
+
+    Parameters
+    ----------
+    folder : made when the first point is kept
+    identity : tells this sweep from every other; points that another one left in the folder are not used
+    report : told about what is thrown away
+    """
+
+    def __init__(self, folder: Path, identity: str, report: Callable[[str], None]) -> None:
+        self.folder, self.identity, self.report = folder, identity, report
+
+    def finished(self) -> dict[int, xr.Dataset]:
+        """The points that an earlier run of the same sweep has finished."""
+        if not self.folder.exists():
+            return {}
+        label = self.folder / "identity.json"
+        if not label.exists() or label.read_bytes() != self.identity.encode():
+            self.report(f"{self.folder} is of another sweep or another version of the program: all is computed anew.")
+            shutil.rmtree(self.folder, ignore_errors=True)
+            return {}
+        found = {int(path.stem): self._read(path) for path in sorted(self.folder.glob("[0-9]*.nc"))}
+        return {number: point for number, point in found.items() if point is not None}
+
+    def _read(self, path: Path) -> xr.Dataset | None:
+        try:
+            dataset = read_checked(path, FORMAT)
+        except TableFileError as error:
+            self.report(f"A finished point is damaged and is computed anew: {error}")
+            return None
+        del dataset.attrs["format"]
+        return dataset
+
+    def keep(self, number: int, result: xr.Dataset) -> None:
+        """Keep the result of a point. Raises OSError where the folder cannot be written."""
+        label = self.folder / "identity.json"
+        if not label.exists():
+            write_whole(label, self.identity.encode())
+        write_checked(result.assign_attrs(format=FORMAT), self.folder / f"{number:06}.nc")
 
 
 class SweepError(ComputationError):
@@ -35,7 +76,10 @@ def swept(name: str, study: Study, points: Mapping[int, Point], engine: Workers,
     InputError : the scheduler does not answer
     OSError : `out` cannot be written
     """
-    journal = _journal(name, study, points, out)
+    versions = {library: version(library) for library in LIBRARIES}
+    asked = {"study": name, "settings": study.settings, "points": list(points.values())}
+    identity = to_json({**asked, **versions, "program": digest_of(*FLOORS)})
+    journal = Journal(out / f"{name}.points", identity, note)
     finished = {k: point for k, point in journal.finished().items() if k in points}
     if finished:
         note(f"{len(finished)} of {len(points)} points are there from an earlier run.")
@@ -61,10 +105,4 @@ def swept(name: str, study: Study, points: Mapping[int, Point], engine: Workers,
 
 def forget(name: str, out: Path) -> None:
     """Remove the finished points of a sweep whose result is safe."""
-    Journal(out / f"{name}.points", "", note).remove()
-
-
-def _journal(name: str, study: Study, points: Mapping[int, Point], out: Path) -> Journal:
-    versions = {library: version(library) for library in LIBRARIES}
-    asked = {"study": name, "settings": study.settings, "points": list(points.values())}
-    return Journal(out / f"{name}.points", to_json({**asked, **versions, "program": digest_of(*FLOORS)}), note)
+    shutil.rmtree(out / f"{name}.points", ignore_errors=True)

@@ -1,43 +1,36 @@
 """What does a user ask for, and what does the program say?"""
 
-from .console import answers_only, heard, note, progress, silence, to_json
-from .models import FieldModel, Models, PlateModel, Quantity
-from .numbers import finite, positive, three_numbers
-from .output import Answer, Output
-from .plain_text import make_readable
-from .points_file import COLUMNS, read_points
-from .shipped_scenes import default_scene
-from .system_libraries import DRAWING, FORTRAN, is_missing_library, lend_quadmath, way_out
-from .vary import checked_values, combinations, parse_vary
-from .workers import Workers
-
-__all__ = [
-    "COLUMNS",
-    "DRAWING",
-    "FORTRAN",
-    "Answer",
-    "FieldModel",
-    "Models",
-    "Output",
-    "PlateModel",
-    "Quantity",
-    "Workers",
-    "answers_only",
-    "checked_values",
-    "combinations",
-    "default_scene",
-    "finite",
-    "heard",
-    "is_missing_library",
-    "lend_quadmath",
-    "make_readable",
-    "note",
-    "parse_vary",
-    "positive",
-    "progress",
-    "read_points",
-    "silence",
-    "three_numbers",
-    "to_json",
-    "way_out",
-]
+from .console import (
+    answers_only as answers_only,
+    heard as heard,
+    note as note,
+    progress as progress,
+    silence as silence,
+    to_json as to_json,
+)
+from .numbers import (
+    COLUMNS as COLUMNS,
+    finite as finite,
+    positive as positive,
+    read_points as read_points,
+    three_numbers as three_numbers,
+)
+from .options import (
+    Answer as Answer,
+    FieldModel as FieldModel,
+    Models as Models,
+    Output as Output,
+    PlateModel as PlateModel,
+    Quantity as Quantity,
+    Workers as Workers,
+    default_scene as default_scene,
+)
+from .plain_text import make_readable as make_readable
+from .system_libraries import (
+    DRAWING as DRAWING,
+    FORTRAN as FORTRAN,
+    is_missing_library as is_missing_library,
+    lend_quadmath as lend_quadmath,
+    way_out as way_out,
+)
+from .vary import checked_values as checked_values, combinations as combinations, parse_vary as parse_vary

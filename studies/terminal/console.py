@@ -1,7 +1,5 @@
 """What a person and what a program sees: messages and progress on standard error, answers on standard output."""
 
-from __future__ import annotations
-
 import json
 import logging
 import os

@@ -1,12 +1,14 @@
-"""Numbers given on the command line."""
+"""Numbers given on the command line, and points to evaluate a field at, from a CSV file."""
 
-from __future__ import annotations
-
+import csv
 from numbers import Real
+from pathlib import Path
 
 import numpy as np
 
 from ...geometry.basics import Array, InputError
+
+COLUMNS = ("x_mm", "y_mm", "z_mm")
 
 
 def three_numbers(name: str, text: str) -> Array:
@@ -31,3 +33,40 @@ def finite(name: str, value: float) -> float:
     if not (isinstance(value, Real) and abs(value) < float("inf")):
         raise InputError(f"Input {name} must be a finite number; instead received {value!r}.")
     return float(value)
+
+
+def read_points(path: Path) -> Array:
+    """Points (n, 3) in m from a CSV file with a header that has the columns x_mm, y_mm, z_mm.
+
+    Raises `InputError` where the file is missing, empty, lacks a column or has an entry that is no finite number.
+    """
+    try:
+        with path.open(newline="", encoding="utf-8-sig") as stream:
+            rows = list(csv.reader(stream, skipinitialspace=True))
+    except FileNotFoundError:
+        raise InputError(
+            f"{path}: Input points must be a CSV file with {', '.join(COLUMNS)}; instead there is no such file."
+        ) from None
+    except (OSError, UnicodeDecodeError, csv.Error) as error:
+        raise InputError(f"{path}: Input points must be a readable CSV text; instead: {error}.") from None
+    header = [name.strip() for name in rows[0]] if rows else []
+    if any(column not in header for column in COLUMNS):
+        raise InputError(
+            f"{path}: Input header must have the columns {', '.join(COLUMNS)}; instead received {', '.join(header)!r}."
+        )
+    where = [header.index(column) for column in COLUMNS]
+    filled = [(line, row) for line, row in enumerate(rows[1:], start=2) if any(cell.strip() for cell in row)]
+    if not filled:
+        raise InputError(f"{path}: Input points must be at least one line below the header; instead received none.")
+    return np.array([[_number(path, line, row, i) for i in where] for line, row in filled]) * 1e-3
+
+
+def _number(path: Path, line: int, row: list[str], column: int) -> float:
+    text = row[column].strip() if column < len(row) else ""
+    try:
+        value = float(text)
+    except ValueError:
+        value = np.nan
+    if not np.isfinite(value):
+        raise InputError(f"{path}: Input line {line} must have three finite numbers; instead received {text!r}.")
+    return value

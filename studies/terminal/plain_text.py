@@ -1,7 +1,5 @@
 """Text for terminals that do not know all characters: ω is written omega there, µ is u, … is three dots."""
 
-from __future__ import annotations
-
 import codecs
 import io
 import sys

@@ -1,7 +1,5 @@
 """The system's libraries that Python's packages need, and what they are called on each system."""
 
-from __future__ import annotations
-
 import ctypes
 import importlib.util
 import platform

@@ -1,7 +1,5 @@
 """Which values a scene's parameters take: `KEY=FIRST:LAST:STEP` or `KEY=VALUE,VALUE,...`."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from itertools import product

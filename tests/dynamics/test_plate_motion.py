@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from ngsolve import SetNumThreads
 from scipy.integrate import solve_ivp
+from second_opinions.phasor import mean_force, mean_torque
 
 from spinlev.dynamics.equilibria import find_equilibria, plate_action, survey, with_plate
 from spinlev.dynamics.flights import simulate
@@ -14,7 +15,6 @@ from spinlev.dynamics.flights.integration import integrate
 from spinlev.dynamics.motion import Parameter, PlateForce, PlateMemory, Rates, Scales, parameters
 from spinlev.dynamics.steady import Survey, floquet_modes, periodic_orbit
 from spinlev.dynamics.steady.harmonic_balance import differentiation, resampled
-from spinlev.fem.closed_forms.phasor import mean_force, mean_torque
 from spinlev.fem.plate_network import Region
 from spinlev.fem.plate_tables import RotorShare
 from spinlev.fem.plate_tables.driven_plate import plate_and_rotor_table

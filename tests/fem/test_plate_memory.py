@@ -10,15 +10,15 @@ import numpy as np
 import pytest
 from ngsolve import SetNumThreads
 from scipy.integrate import solve_ivp
+from second_opinions.dipole_derivative import DipoleDerivative
+from second_opinions.phasor import mean_force, mean_loss, mean_torque
+from second_opinions.time_stepping import TimeStepper, work_on
 
 from spinlev.fem.closed_forms import Dipole, unit_dipoles
-from spinlev.fem.closed_forms.phasor import mean_force, mean_loss, mean_torque
-from spinlev.fem.closed_forms.vector_potentials import DipoleDerivative
 from spinlev.fem.plate_network import Region, reduce_plate
 from spinlev.fem.plate_tables.tabulate import tabulate
 from spinlev.fem.rotor_tables import rotor_table
 from spinlev.fem.slab import slab_and_rotor_table
-from spinlev.fem.verification.time_stepping import TimeStepper, work_on
 from spinlev.geometry.basics import Box
 from spinlev.geometry.bodies import horizontal
 from spinlev.geometry.scenes import Lowering, Plate

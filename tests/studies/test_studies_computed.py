@@ -5,9 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from spinlev.dynamics.branches import FOLD, by_frequency, reference_state
-from spinlev.dynamics.branches import mutual_levitation as answered
-from spinlev.dynamics.branches import stable_frequencies as stable_range
+from spinlev.dynamics.branches import (
+    FOLD,
+    by_frequency,
+    mutual_levitation as answered,
+    reference_state,
+    stable_frequencies as stable_range,
+)
 from spinlev.dynamics.branches.mutual_equilibria import pose
 from spinlev.dynamics.branches.stable_frequencies import BORDER
 from spinlev.dynamics.equilibria import find_equilibria

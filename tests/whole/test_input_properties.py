@@ -5,8 +5,7 @@ import re
 
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, example, given, settings
-from hypothesis import strategies as st
+from hypothesis import HealthCheck, example, given, settings, strategies as st
 from places import HORIZONTAL
 
 from spinlev.geometry.basics import InputError

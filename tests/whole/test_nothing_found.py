@@ -6,6 +6,7 @@ from pathlib import Path
 import heyoka as hy
 import numpy as np
 import pytest
+from second_opinions.solids import Conductor, occ_mesh
 
 from spinlev.dynamics.branches import FOLD, Family, Plane, follow_boundary, follow_branch, way_out
 from spinlev.dynamics.equilibria import PerturbedBalance, find_equilibria
@@ -18,10 +19,8 @@ from spinlev.fem.closed_forms import Racetrack
 from spinlev.fem.eddy_currents.export import write_vtu
 from spinlev.fem.rotor_tables import rotor_table
 from spinlev.geometry.basics import MU_0, Box, rotation_matrix
-from spinlev.geometry.bodies import CONVERGENCE, Magnet, cut_magnets
-from spinlev.geometry.bodies import article_rotors as rotor
+from spinlev.geometry.bodies import CONVERGENCE, Magnet, article_rotors as rotor, cut_magnets
 from spinlev.geometry.meshes import Block, ConductorMesh, graded_partition, hex_mesh
-from spinlev.geometry.meshes.solids import Conductor, occ_mesh
 from spinlev.geometry.scenes import Drag, Floater, Scene
 
 FLOATER = Floater(6.35e-3, 1.305, 1.0, 7500.0)

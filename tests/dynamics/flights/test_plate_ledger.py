@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from second_opinions.phasor import mean_force, mean_loss, mean_torque
 
 from spinlev.dynamics.equilibria import find_equilibria, with_plate
 from spinlev.dynamics.flights import initial_state, starting_point
@@ -11,7 +12,6 @@ from spinlev.dynamics.flights.compiled_flight import compile_flight
 from spinlev.dynamics.flights.integration import integrate
 from spinlev.dynamics.motion import PlateMemory, Rates, State
 from spinlev.dynamics.steady import Survey
-from spinlev.fem.closed_forms.phasor import mean_force, mean_loss, mean_torque
 from spinlev.fem.plate_network import Region
 from spinlev.fem.rotor_tables import rotor_table
 from spinlev.fem.slab import slab_and_rotor_table

@@ -11,8 +11,7 @@ from spinlev.dynamics.flights.compiled_flight import compile_flight
 from spinlev.dynamics.flights.integration import integrate
 from spinlev.dynamics.motion import Rates, Scales, State
 from spinlev.dynamics.slow_drift import drift
-from spinlev.dynamics.slow_drift.air_torque import reynolds, spinning, swinging
-from spinlev.dynamics.slow_drift.slow_torque import SlowTorque
+from spinlev.dynamics.slow_drift.slow_torque import SlowTorque, reynolds, spinning, swinging
 from spinlev.fem.rotor_tables import rotor_table
 from spinlev.geometry.bodies import article_rotors as rotor
 from spinlev.geometry.scenes import AIR_VISCOSITY, Drag, Floater, Scene

@@ -2,8 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 
 from spinlev.fem.closed_forms import UniformField
 from spinlev.fem.harmonics import CompiledField, uniform_moments

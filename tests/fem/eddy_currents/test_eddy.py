@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from ngsolve import SetNumThreads
+from second_opinions.dipole_derivative import DipoleDerivative
+from second_opinions.phasor import mean_loss
 
 from spinlev.fem.closed_forms import Dipole, PolarizedCuboid, unit_dipoles
-from spinlev.fem.closed_forms.phasor import mean_loss
-from spinlev.fem.closed_forms.vector_potentials import DipoleDerivative
 from spinlev.fem.eddy_currents import solve_eddy
 from spinlev.fem.elements import Parity, tree_edges
 from spinlev.fem.slab import Slab, reaction_tensor

@@ -5,18 +5,17 @@ from __future__ import annotations
 import meshio
 import numpy as np
 import pytest
-from netgen.occ import Box as OccBox
-from netgen.occ import Pnt, Sphere
+from netgen.occ import Box as OccBox, Pnt, Sphere
 from ngsolve import SetNumThreads
+from second_opinions.phasor import mean_loss
+from second_opinions.solids import Conductor, occ_mesh
 
 from spinlev.fem.closed_forms import HomogeneousField, unit_dipoles
-from spinlev.fem.closed_forms.phasor import mean_loss
 from spinlev.fem.closed_forms.sphere_eddy import polarizability
 from spinlev.fem.eddy_currents import current_density, solve_eddy
 from spinlev.fem.eddy_currents.export import write_vtu
 from spinlev.fem.eddy_currents.fields import joule_loss, reaction_flux_density
 from spinlev.geometry.meshes import MeshRule, plate_mesh
-from spinlev.geometry.meshes.solids import Conductor, occ_mesh
 
 SetNumThreads(1)
 SIZE, SIGMA, FREQUENCY = (0.1, 0.24, 0.03), 3.5e7, 100.0

@@ -5,15 +5,15 @@ from itertools import pairwise
 import ngsolve as ng
 import numpy as np
 import pytest
+from second_opinions.elements_alone import direct_table
 
-from spinlev.fem.closed_forms.remanent import induced_moments
+from spinlev.fem.closed_forms.closed_moments import induced_moments
 from spinlev.fem.elements import OpenBoundary
 from spinlev.fem.harmonics import MultipoleExpansion
 from spinlev.fem.magnetostatics import rung, solve_rotor
 from spinlev.fem.magnetostatics.moments import trace_moments
 from spinlev.fem.magnetostatics.solver import assemble, solve
 from spinlev.fem.rotor_tables import Accuracy, fem_table, resolve_model, rotor_table
-from spinlev.fem.verification.elements_alone import direct_table
 from spinlev.geometry.basics import Box, rotation_matrix
 from spinlev.geometry.bodies import Magnet, find_symmetry, horizontal, parity_parts, tilt, vertical
 from spinlev.geometry.meshes import MeshSettings, mesh_magnets

@@ -8,7 +8,8 @@ from spinlev.fem.measured_maps import FieldMap, FieldMapError, fit_field_map
 from spinlev.fem.measured_maps.file import load_gridded, save_gridded
 from spinlev.fem.measured_maps.source_center import find_center
 from spinlev.fem.rotor_tables import RangeError, RotorTable
-from spinlev.fem.rotor_tables.table_file import TableFileError, load_table
+from spinlev.fem.rotor_tables.table_file import load_table
+from spinlev.fem.storage import TableFileError
 from spinlev.geometry.basics import Box
 from spinlev.geometry.bodies import Magnet, horizontal, vertical
 

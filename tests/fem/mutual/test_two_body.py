@@ -2,6 +2,9 @@
 
 import numpy as np
 import pytest
+from second_opinions.both_bodies import solve_both_bodies
+from second_opinions.permeable_sphere import inner_field
+from second_opinions.two_bodies import mesh_two_bodies
 
 from spinlev.fem.closed_forms import remanent_field
 from spinlev.fem.harmonics import (
@@ -17,12 +20,10 @@ from spinlev.fem.harmonics import (
 )
 from spinlev.fem.harmonics.interior import field_at_center, moment
 from spinlev.fem.mutual import TwoBodyError, enough_degree, rotor_ladder, two_body, two_body_ladder
-from spinlev.fem.mutual.permeable_sphere import induced_sources, inner_field, permanent_sources
+from spinlev.fem.mutual.permeable_sphere import induced_sources, permanent_sources
 from spinlev.fem.rotor_tables import rotor_table
-from spinlev.fem.verification.both_bodies import solve_both_bodies
 from spinlev.geometry.basics import MU_0
 from spinlev.geometry.bodies import horizontal, vertical
-from spinlev.geometry.meshes.two_bodies import mesh_two_bodies
 from spinlev.geometry.scenes import Floater
 
 RADIUS = 0.00635

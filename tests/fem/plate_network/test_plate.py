@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from ngsolve import SetNumThreads
+from second_opinions.phasor import mean_loss
 
-from spinlev.fem.closed_forms.phasor import mean_loss
 from spinlev.fem.plate_network import plate_reaction
 from spinlev.fem.rotor_tables import AccuracyError
 from spinlev.fem.slab import Slab, reaction_tensor

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from spinlev.fem.harmonics import uniform_moments
-from spinlev.fem.rotor_tables import Accuracy, distant, points_around, rotor_table, typical_field
+from spinlev.fem.rotor_tables import Accuracy, points_around, rotor_table, shortened_table, typical_field
 from spinlev.geometry.bodies import horizontal
 from spinlev.geometry.scenes import Drag, Floater, Scene
 from spinlev.studies.one_scene.plate_of_scene import table_in_flight
@@ -20,7 +20,7 @@ def coefficients(table):
 def test_fewer_coefficients_do_from_farther_on():
     """From 12 mm on to the same accuracy as the whole table, and beyond; nearer as wrong as it says."""
     whole = rotor_table(ROTOR, "moments", RTOL, CONTACT)
-    table = distant(whole, Accuracy(RTOL, FAR))
+    table = shortened_table(whole, Accuracy(RTOL, FAR))
     exact = uniform_moments(ROTOR[0], 49)
     assert coefficients(table) < coefficients(whole) / 2
     for offset in (CONTACT, FAR, 1.7 * FAR, 5 * FAR):
@@ -34,7 +34,7 @@ def test_fewer_coefficients_do_from_farther_on():
 
 def test_a_closed_form_stays_as_it_is():
     table = rotor_table(ROTOR, "cuboid")
-    assert distant(table, Accuracy(RTOL, FAR)) is table
+    assert shortened_table(table, Accuracy(RTOL, FAR)) is table
 
 
 def test_a_flight_takes_the_table_for_its_place():

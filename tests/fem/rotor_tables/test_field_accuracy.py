@@ -9,7 +9,8 @@ import pytest
 from spinlev.fem.closed_forms import added_by_closed_form, carrier
 from spinlev.fem.harmonics import trimmed_expansions, uniform_moments
 from spinlev.fem.magnetostatics import Refinement, solve_rotor
-from spinlev.fem.rotor_tables import Accuracy, AccuracyWarning, RotorTable, error_points, fem_table, rotor_table
+from spinlev.fem.rotor_tables import Accuracy, AccuracyWarning, RotorTable, fem_table, rotor_table
+from spinlev.fem.rotor_tables.accuracy import error_points
 from spinlev.geometry.basics import Box
 from spinlev.geometry.bodies import Magnet, cut_magnets, horizontal, vertical
 from spinlev.geometry.meshes import MeshSettings

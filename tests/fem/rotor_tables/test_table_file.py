@@ -8,7 +8,8 @@ from spinlev.fem.closed_forms import carrier
 from spinlev.fem.harmonics import MultipoleExpansion, uniform_moments
 from spinlev.fem.rotor_tables import RotorTable, cached_rotor_table
 from spinlev.fem.rotor_tables.cache import rotor_key
-from spinlev.fem.rotor_tables.table_file import TableFileError, load_table, save_table
+from spinlev.fem.rotor_tables.table_file import load_table, save_table
+from spinlev.fem.storage import TableFileError
 from spinlev.geometry.bodies import horizontal, vertical
 
 ROTOR = vertical(0.012, 0.01, 1.305, 1.05)

@@ -5,11 +5,11 @@ from __future__ import annotations
 import mpmath
 import numpy as np
 import pytest
+from second_opinions.phasor import mean_force, mean_loss, mean_torque
+from second_opinions.plane_conductors import ThinSheet, reaction_gradient
+from second_opinions.sliding import drag_tensor, sliding_force
 
-from spinlev.fem.closed_forms.phasor import mean_force, mean_loss, mean_torque
 from spinlev.fem.slab import Slab, reaction_tensor
-from spinlev.fem.slab.reaction import ThinSheet, reaction_gradient
-from spinlev.fem.slab.sliding import drag_tensor, sliding_force
 from spinlev.fem.slab.two_places import mutual_tensor
 from spinlev.geometry.basics import MU_0
 

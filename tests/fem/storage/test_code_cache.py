@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from spinlev.fem.storage import compiled, compiled_code
-from spinlev.fem.storage.checksum import seal, unsealed
+from spinlev.fem.storage.whole_files import seal, unsealed
 
 CONSTANT = 3.1640625
 VALUE = CONSTANT * np.sin(1.0) + np.exp(1.0)

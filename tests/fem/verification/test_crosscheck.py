@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from spinlev.fem.closed_forms.remanent import induced_moments
+from spinlev.fem.closed_forms.closed_moments import induced_moments
 from spinlev.fem.harmonics import MultipoleExpansion, uniform_moments
 from spinlev.fem.magnetostatics import Refinement, solve_rotor
 from spinlev.fem.magnetostatics.moments import reaction_moments

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from ngsolve import SetNumThreads
+from second_opinions.time_stepping import TimeStepper, work_on
 
 from spinlev.fem.closed_forms import Dipole, unit_dipoles
 from spinlev.fem.eddy_currents import EddySpace, solve_eddy
-from spinlev.fem.verification.time_stepping import TimeStepper, work_on
 from spinlev.geometry.meshes import MeshRule, plate_mesh
 
 SetNumThreads(1)

@@ -7,13 +7,16 @@ from spinlev.dynamics.equilibria import find_equilibria
 from spinlev.fem.rotor_tables import rotor_table
 from spinlev.fem.verification import coulomb_field
 from spinlev.geometry.scenes import Scene
-from spinlev.studies.article import CONFIGURATIONS, FLOATER, article_scene, stable_in_flight
-from spinlev.studies.article import article_formulas as formulas
+from spinlev.studies.article import (
+    CONFIGURATIONS,
+    FLOATER,
+    article_formulas as formulas,
+    article_scene,
+    stable_in_flight,
+)
 from spinlev.studies.article.article import WEIGHT
-from spinlev.studies.article.field_components import MODELS as FIELD_MODELS
-from spinlev.studies.article.field_components import field_components
-from spinlev.studies.article.force_curve import MODELS as FORCE_MODELS
-from spinlev.studies.article.force_curve import force_curve
+from spinlev.studies.article.field_components import MODELS as FIELD_MODELS, field_components
+from spinlev.studies.article.force_curve import MODELS as FORCE_MODELS, force_curve
 from spinlev.studies.article.levitation_distance import levitation_distance
 from spinlev.studies.catalogue import CATALOGUE
 from spinlev.studies.levitation.side_mode import side_mode

@@ -4,15 +4,11 @@ Nothing is known beforehand of the sphere's answer and no series is summed: H0 i
 polarisations, and one finite-element solution gives the magnetisation that the permeability adds in either body.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
-from ...geometry.basics import Array
-from ...geometry.meshes import TwoBodyMesh
-from ...geometry.scenes import Floater
-from ..closed_forms import remanent_field
-from ..harmonics import (
+from second_opinions.two_bodies import TwoBodyMesh
+from spinlev.fem.closed_forms import remanent_field
+from spinlev.fem.harmonics import (
     Ball,
     derivative,
     dipole_sources,
@@ -23,8 +19,11 @@ from ..harmonics import (
     multipole_torque,
     outer_sums,
 )
-from ..magnetostatics import assemble_regions
-from ..mutual import Wrench, closed_dipoles, permeability_tensor
+from spinlev.fem.magnetostatics import assemble_regions
+from spinlev.fem.mutual import Wrench
+from spinlev.fem.mutual.rotor_response import closed_dipoles
+from spinlev.geometry.basics import Array
+from spinlev.geometry.scenes import Floater
 
 
 def solve_both_bodies(
@@ -40,7 +39,7 @@ def solve_both_bodies(
     """
     ball = Ball(np.asarray(position, float), floater.radius)
     names = [f"magnet{k}" for k in range(len(mesh.magnets))]
-    permeability = {n: permeability_tensor(magnet) for n, magnet in zip(names, mesh.magnets, strict=True)}
+    permeability = {n: magnet.permeability_in_rotor for n, magnet in zip(names, mesh.magnets, strict=True)}
     permeability["floater"] = floater.recoil_permeability * np.eye(3)
     regions = assemble_regions(mesh.mesh, permeability, mesh.ball_radius, order)
     places = {name: mesh.to_meter(points.points) for name, points in regions.points.items()}

@@ -1,6 +1,4 @@
-"""Tetrahedral meshes of conductors of any shape, from OpenCASCADE solids."""
-
-from __future__ import annotations
+"""Tetrahedral meshes of conductors of any shape, from OpenCASCADE solids: for those whose eddy currents are known."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -8,10 +6,9 @@ from typing import Any
 
 import ngsolve
 import numpy as np
-from netgen.occ import Box as OccBox
-from netgen.occ import Glue, OCCGeometry, Pnt
+from netgen.occ import Box as OccBox, Glue, OCCGeometry, Pnt
 
-from .conductors import ConductorMesh
+from spinlev.geometry.meshes import ConductorMesh
 
 
 @dataclass(frozen=True, eq=False)

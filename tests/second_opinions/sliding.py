@@ -9,14 +9,13 @@ For slow motion in any direction F = -C v with the constant drag tensor C.
 J. R. Reitz, J. Appl. Phys. 41 (1970) 2067, eqs. 20-25; the tensor is derived here from Γ ≈ iωμ0σ(1 - e^{-2kt})/4k².
 """
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...geometry.basics import MU_0, Array
-from ..rotor_tables import AccuracyError
-from .reaction import PlaneConductor, Slab, checked, wave_numbers
+from second_opinions.plane_conductors import PlaneConductor
+from spinlev.fem.rotor_tables import AccuracyError
+from spinlev.fem.slab.reaction import Slab, checked, wave_numbers
+from spinlev.geometry.basics import MU_0, Array
 
 PRECISION = 1e-11
 MOST_DIRECTIONS = 2**16

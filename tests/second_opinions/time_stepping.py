@@ -9,17 +9,15 @@ implicit Runge-Kutta method (R. Alexander, SIAM J. Numer. Anal. 14 (1977) 1006):
 (M + γ Δt K) A = W - f with one factor, and it holds in air too, where there is no mass.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Sequence
 
 import ngsolve
 import numpy as np
 
-from ...geometry.basics import MU_0, Array
-from ...geometry.meshes import MILLIMETRE
-from ..eddy_currents import EddySpace, Source
-from ..elements import solve_condensed
+from spinlev.fem.eddy_currents import EddySpace, Source
+from spinlev.fem.elements import solve_condensed
+from spinlev.geometry.basics import MU_0, Array
+from spinlev.geometry.meshes import MILLIMETRE
 
 GAMMA = 1 - np.sqrt(0.5)
 """Diagonal entry of the method, and time of its first stage."""

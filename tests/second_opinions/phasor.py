@@ -9,14 +9,10 @@ The loss is the power that the source of m hands to the conductor, the mean of m
 J. D. Jackson, Classical Electrodynamics (3rd ed. 1999), sections 5.16 and 6.9.
 """
 
-from __future__ import annotations
-
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from ...geometry.basics import Array
-
-ComplexArray = NDArray[np.complex128]
+from spinlev.geometry.basics import Array
 
 
 def mean_torque(reaction: ArrayLike, moment: ArrayLike) -> Array:

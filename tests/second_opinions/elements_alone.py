@@ -1,16 +1,16 @@
 """The whole field by finite elements, without any closed form: one expansion about the common centre."""
 
-from __future__ import annotations
-
 import time
 
 import numpy as np
 
-from ...geometry.bodies import Magnet
-from ...geometry.meshes import MeshSettings
-from ..harmonics import without_noise
-from ..magnetostatics import Refinement, RotorSolution, climb, rung, solve_rotor, strongest
-from ..rotor_tables import Accuracy, RotorTable, error_points, extrapolated_tail, nonzero, provenance
+from spinlev.fem.harmonics import without_noise
+from spinlev.fem.magnetostatics import Refinement, RotorSolution, climb, rung, solve_rotor, strongest
+from spinlev.fem.rotor_tables import Accuracy, RotorTable
+from spinlev.fem.rotor_tables.accuracy import error_points
+from spinlev.fem.rotor_tables.fem_model import extrapolated_tail, nonzero, provenance
+from spinlev.geometry.bodies import Magnet
+from spinlev.geometry.meshes import MeshSettings
 
 SETTINGS = MeshSettings(ball_radius=1.15)
 DEGREE = 24

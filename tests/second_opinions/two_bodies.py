@@ -1,7 +1,5 @@
 """A finite-element mesh of magnets and a floating sphere together in one ball of air."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -10,8 +8,8 @@ import netgen.occ as occ
 import ngsolve as ng
 import numpy as np
 
-from ..basics import Array, Box, frozen_array
-from ..bodies import Magnet
+from spinlev.geometry.basics import Array, Box, frozen_array
+from spinlev.geometry.bodies import Magnet
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,0 +1,124 @@
+"""What every command is asked: which scene and tables, who computes, and where its answers go."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from importlib.resources import files
+from pathlib import Path
+from typing import Annotated, Any, Literal, get_args
+
+from cyclopts import Parameter
+
+from ...geometry.basics import InputError
+
+FieldModel = Literal["dipole", "cuboid", "fem", "map", "auto"]
+Quantity = Literal["equilibria", "flight", "field"]
+PlateModel = Literal["none", "slab", "fem", "reduced", "auto"]
+
+
+def default_scene() -> Path:
+    """The scene that is meant where none is named: `horizontal`."""
+    return shipped_scene("horizontal")
+
+
+def shipped_scene(name: str) -> Path:
+    """The file of a scene that comes with the program."""
+    return Path(str(files("spinlev.scenes").joinpath(f"{name}.toml")))
+
+
+@Parameter(name="*")
+@dataclass(frozen=True)
+class Models:
+    """Which tables are asked for.
+
+    Parameters
+    ----------
+    model
+        Field model of the motion.
+    plate_model
+        none, slab (infinite), fem or reduced (the network of the finite elements), or auto.
+    rtol
+        Relative accuracy asked of the field wherever the floater can be.
+    plate_rtol
+        Relative accuracy asked of the plate's reaction.
+    """
+
+    model: FieldModel = "auto"
+    plate_model: PlateModel = "auto"
+    rtol: float = 3e-6
+    plate_rtol: float = 3e-3
+
+    def checked(self) -> Models:
+        """Itself.
+
+        Raises
+        ------
+        InputError : a model that does not exist, or a tolerance out of range
+        """
+        for name, known in (("model", get_args(FieldModel)), ("plate_model", get_args(PlateModel))):
+            if (value := getattr(self, name)) not in known:
+                raise InputError(f"Input {name} must be one of {', '.join(known)}; instead received {value}.")
+        if not 1e-13 <= self.rtol < 1:
+            raise InputError(f"Input --rtol must be at least 1e-13 and less than 1; instead received {self.rtol}.")
+        if not 1e-5 <= self.plate_rtol <= 0.1:
+            raise InputError(
+                f"Input --plate-rtol must be at least 1e-5 and at most 0.1; instead received {self.plate_rtol}."
+            )
+        return self
+
+
+@Parameter(name="*")
+@dataclass(frozen=True)
+class Output:
+    """Where answers go.
+
+    Parameters
+    ----------
+    json
+        Print one JSON object and nothing else on standard output.
+    out
+        Folder for the files.
+    """
+
+    json: Annotated[bool, Parameter(negative="")] = False
+    out: Path = Path("out")
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What a command says: numbers for a program, lines for a person."""
+
+    values: Mapping[str, Any]
+    lines: Sequence[str]
+    json: bool
+
+
+@Parameter(name="*")
+@dataclass(frozen=True)
+class Workers:
+    """Who computes.
+
+    Parameters
+    ----------
+    workers
+        Processes of a local cluster; 1 computes in this process. Left out: one for each core.
+    scheduler
+        Address of a dask scheduler that is already there, such as tcp://127.0.0.1:8786.
+    """
+
+    workers: Annotated[int | None, Parameter(negative="")] = None
+    scheduler: str | None = None
+
+    def checked(self) -> Workers:
+        """Itself.
+
+        Raises
+        ------
+        InputError : no number of workers, or both a number and a scheduler
+        """
+        if self.workers is not None and not 1 <= self.workers <= 1024:
+            raise InputError(f"Input --workers must be between 1 and 1024; instead received {self.workers}.")
+        if self.workers is not None and self.scheduler is not None:
+            raise InputError("Input --workers must be left out where --scheduler is given; instead received both.")
+        return self
