@@ -12,7 +12,13 @@ from .continuation import (
     stepped as stepped,
 )
 from .fixed_points import scattered as scattered
-from .full_search import find_equilibria as find_equilibria, survey as survey, with_plate as with_plate
+from .full_search import (
+    find_equilibria as find_equilibria,
+    survey as survey,
+    told as told,
+    turning as turning,
+    with_plate as with_plate,
+)
 from .perturbed import PerturbedBalance as PerturbedBalance, Shift as Shift
 from .plate_effect import plate_action as plate_action
 from .search import SearchRange as SearchRange

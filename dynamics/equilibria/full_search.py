@@ -1,5 +1,7 @@
 """All synchronous equilibria of a floater: fixed points in the frame that turns with the rotor."""
 
+from collections.abc import Iterable
+
 import numpy as np
 
 from ...fem.rotor_tables import FieldTable
@@ -56,16 +58,27 @@ def survey(
     ------
     EquilibriumError : the rotor is at rest
     """
-    _check(scene)
+    turning(scene)
     scales = Scales.of(scene)
-    values, rates = parameters(scene, scales, frozen_spin=True), rates or Rates.of(scene, table)
-    balance = Balance(rates, values, spin)
+    balance = Balance(rates or Rates.of(scene, table), parameters(scene, scales, frozen_spin=True), spin)
     curves, points = fixed_points(balance, SearchRange(scene, farthest))
+    return told(scene, table, balance, points, tuple(_force_curve(scene, scales, curve) for curve in curves))
+
+
+def told(
+    scene: Scene,
+    table: FieldTable,
+    balance: Balance,
+    points: Iterable[tuple[Array, Array]],
+    curves: tuple[ForceCurve, ...] = (),
+) -> Survey:
+    """The survey of a scene of which all fixed points are known: scaled positions and moments, good to round-off."""
+    scales = Scales.of(scene)
     known = [(r, m) for r, m in points if table.in_range(r * scales.length)[0]]
     found = [_equilibrium(table, scales, balance, r, m) for r, m in known]
     if np.any(scene.gravity[:2]):
-        found = _shaken(Shaken(scene, rates, values, None), found)
-    return Survey(_in_order(found), tuple(_force_curve(scene, scales, curve) for curve in curves))
+        found = _shaken(Shaken(scene, balance.rates, balance.values, None), found)
+    return Survey(_in_order(found), curves)
 
 
 def with_plate(
@@ -86,7 +99,8 @@ def _in_order(found: list[Equilibrium]) -> tuple[Equilibrium, ...]:
     return tuple(sorted(found, key=lambda equilibrium: (not equilibrium.stable, equilibrium.distance)))
 
 
-def _check(scene: Scene) -> None:
+def turning(scene: Scene) -> None:
+    """Raises EquilibriumError for a rotor at rest."""
     if not scene.frequency:
         raise EquilibriumError(
             "At 0 Hz nothing levitates: a magnet has no stable equilibrium in a static field and gravity "
@@ -115,7 +129,7 @@ def _equilibrium(table: FieldTable, scales: Scales, balance: Balance, position: 
     gravity = abs(float(balance.values[Parameter.GRAVITY_Z]))
     return Equilibrium(
         state=scales.unpack(state[0]),
-        spin=balance.spin,
+        spin=float(balance.spin),
         residual=float(np.abs(value).max() / (gravity or 1.0)),
         position_error=error * scales.length,
         stable=motion.stable,

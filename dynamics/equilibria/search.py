@@ -23,6 +23,11 @@ class SearchRange:
     scene: Scene
     farthest: float
 
+    @property
+    def bound(self) -> float:
+        """Largest depth, and distance from the axis, in floater radii."""
+        return self.farthest / self.scene.floater.radius
+
     def __contains__(self, position: Array) -> bool:
         """Whether a scaled position (3,) belongs to the range."""
         return bool(self.holds(position[None])[0])
@@ -30,7 +35,7 @@ class SearchRange:
     def holds(self, position: Array, margin: float = 0.0) -> NDArray[np.bool_]:
         """Which of the scaled positions (n, 3) belong to the range, or lie at most a margin (radii) outside: (n,)."""
         radius = self.scene.floater.radius
-        bound, height = self.farthest / radius + margin, position[:, 2]
+        bound, height = self.bound + margin, position[:, 2]
         inside = (-bound <= height) & (height <= margin) & (np.hypot(position[:, 0], position[:, 1]) <= bound)
         for magnet in self.scene.rotor:
             inside &= magnet.box.distance(position * radius) > (1 - margin) * radius
@@ -41,7 +46,7 @@ class SearchRange:
         corners = [magnet.box.corners / self.scene.floater.radius for magnet in self.scene.rotor]
         nearest = 1.0 + max((-c[:, 2].min() for c in corners), default=0.0)
         beside = 1.0 + np.array([1.0, 1.1, 1.3, 2.0]) * max((np.abs(c[:, :2]).max() for c in corners), default=0.0)
-        below = -np.geomspace(nearest, max(self.farthest / self.scene.floater.radius, nearest), 16)
+        below = -np.geomspace(nearest, max(self.bound, nearest), 16)
         places = np.concatenate(
             [_rings(below, np.array([0.0, 0.15, 0.7]), 4), _rings(np.array([-0.01, -0.1, -0.4, -0.9]), beside, 12)]
         )

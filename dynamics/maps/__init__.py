@@ -3,3 +3,4 @@
 from .families import RotorFamily as RotorFamily, rotor_family as rotor_family
 from .map_stability import EquilibriumMap as EquilibriumMap
 from .mapping import equilibrium_map as equilibrium_map
+from .surveys import surveys as surveys

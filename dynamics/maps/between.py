@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from ...geometry.basics import Array
 from ..equilibria import END, ON, AtRest, Steps, directions, follow
-from ..steady import EVERY, Balance, Indices, solve
+from ..steady import EVERY, Indices, solve
 from .grid import Grid
 
 UNIT = 0.1
@@ -32,14 +32,11 @@ class _Ways(AtRest):
     def linear(self, points: Array, which: Indices) -> tuple[Array, Array]:
         """Balances and |m̂| = 1 (n, 6), and their derivatives (n, 6, 7); that along the way by a difference: 1e-6."""
         position, moment, way = points[:, :3], points[:, 3:6], points[:, 6] / UNIT
-        value, slope = self._balance(which, way)(position, moment)
-        ahead = self._balance(which, way + 1e-6)(position, moment)[0]
+        start, end = self.start[which], self.end[which]
+        value, slope = self.grid.balance(start, end, way)(position, moment)
+        ahead = self.grid.balance(start, end, way + 1e-6)(position, moment)[0]
         along = (ahead - value) / (1e-6 * UNIT)
         return self.extended(value, np.concatenate([slope, along[:, :, None]], axis=2), moment)
-
-    def _balance(self, which: Indices, way: Array) -> Balance:
-        family, (f, m), (g, n) = self.grid.family, self.grid.place(self.start[which]), self.grid.place(self.end[which])
-        return Balance(family.rates, family.values(f + way * (g - f), m + way * (n - m)), self.grid.spin)
 
 
 def between(grid: Grid, start: Indices, end: Indices, position: Array, moment: Array) -> tuple[Indices, Array, Array]:
@@ -49,7 +46,7 @@ def between(grid: Grid, start: Indices, end: Indices, position: Array, moment: A
     -------
     Points (k,), positions and moments (k, 3) of the equilibria in which they ended.
     """
-    ways, bound = _Ways(grid, start, end), FAR * grid.farthest / grid.family.scene.floater.radius
+    ways, bound = _Ways(grid, start, end), FAR * max(where.bound for where in grid.ranges)
     points = np.column_stack([position, moment, np.zeros(len(start))])
     tangents = directions(ways, points, np.eye(7)[6] + np.zeros((len(start), 1)), np.arange(len(start)))
     ended: list[tuple[Indices, Array]] = [(start[:0], points[:0])]

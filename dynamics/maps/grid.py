@@ -1,5 +1,6 @@
-"""The points of a map, frequency by measure of the rotor, the balances there, and the equilibria that are known."""
+"""The points of a map or a sweep, the balances there, and the equilibria that are known."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -8,8 +9,8 @@ from numpy.typing import NDArray
 
 from ...geometry.basics import Array
 from ..equilibria import SearchRange
+from ..motion import Rates
 from ..steady import Balance, Indices
-from .families import RotorFamily
 
 SAME = 1e-6
 """Equilibria nearer to each other than this, in radii and rad together, are one."""
@@ -17,71 +18,90 @@ SAME = 1e-6
 
 @dataclass(frozen=True, eq=False)
 class Grid:
-    """A map's points, numbered row by row.
+    """Problems at points with whole-numbered coordinates, all in one rotor's field.
 
     Parameters
     ----------
-    family : its scenes
-    frequencies, measures : (n,) Hz and (m,) m or rad
-    spin : body spin s
-    farthest : of the range in which equilibria are looked for, m
+    rates : compiled for that field
+    values : (n, p) runtime parameters of the points
+    spin : (n,) body spin s
+    ranges : in which equilibria are looked for
+    region : (n,) which of them is the point's
+    places : (n, axes) coordinates; not every place of the grid need have a point
     """
 
-    family: RotorFamily
-    frequencies: Array
-    measures: Array
-    spin: float
-    farthest: float
+    rates: Rates
+    values: Array
+    spin: Array
+    ranges: Sequence[SearchRange]
+    region: Indices
+    places: Indices
 
     def __len__(self) -> int:
-        return len(self.frequencies) * len(self.measures)
+        return len(self.values)
 
-    @cached_property
-    def _ranges(self) -> list[SearchRange]:
-        return [SearchRange(self.family.at(self.frequencies[0], m), self.farthest) for m in self.measures]
-
-    def place(self, point: Indices) -> tuple[Array, Array]:
-        """Frequencies and measures (n,) of points (n,)."""
-        row, column = np.divmod(point, len(self.measures))
-        return self.frequencies[row], self.measures[column]
-
-    def balance(self, point: Indices) -> Balance:
-        """The balance in which every point has its own problem."""
-        return Balance(self.family.rates, self.family.values(*self.place(point)), self.spin)
+    def balance(self, point: Indices, end: Indices | None = None, way: Array | None = None) -> Balance:
+        """The balance in which every point has its own problem, or one on the way (n,), 0 to 1, to a point `end`."""
+        values, spin = self.values[point], self.spin[point]
+        if end is not None and way is not None:
+            values = values + way[:, None] * (self.values[end] - values)
+            spin = spin + way * (self.spin[end] - spin)
+        return Balance(self.rates, values, spin)
 
     def alone(self, point: int) -> Balance:
         """The balance of one point, for any number of positions."""
-        return Balance(self.family.rates, self.family.values(*self.place(np.array([point])))[0], self.spin)
+        return Balance(self.rates, self.values[point], float(self.spin[point]))
 
     def range(self, point: int) -> SearchRange:
         """Where equilibria of one point are looked for."""
-        return self._ranges[point % len(self.measures)]
+        return self.ranges[self.region[point]]
 
     def holds(self, point: Indices, position: Array, margin: float = 0.0) -> NDArray[np.bool_]:
         """Which of the scaled positions (n, 3) lie in the range of their points (n,), or at most a margin outside."""
-        inside, column = np.zeros(len(point), bool), point % len(self.measures)
-        for k in np.unique(column):
-            chosen = column == k
-            inside[chosen] = self._ranges[k].holds(position[chosen], margin)
+        inside = np.zeros(len(point), bool)
+        for k in np.unique(self.region[point]):
+            chosen = self.region[point] == k
+            inside[chosen] = self.ranges[k].holds(position[chosen], margin)
         return inside
 
     def neighbours(self, point: Indices) -> tuple[Indices, Indices]:
-        """Pairs of a place in `point` and one of the up to four points beside it."""
-        row, column = np.divmod(point, len(self.measures))
-        pairs = []
-        for along, across in ((1, 0), (-1, 0), (0, 1), (0, -1)):
-            r, c = row + along, column + across
-            inside = (r >= 0) & (r < len(self.frequencies)) & (c >= 0) & (c < len(self.measures))
-            pairs.append((np.flatnonzero(inside), (r * len(self.measures) + c)[inside]))
-        return np.concatenate([p[0] for p in pairs]), np.concatenate([p[1] for p in pairs])
+        """Pairs of a place in `point` and one of the points beside it, up to two along each axis."""
+        which, beside = [np.zeros(0, int)], [np.zeros(0, int)]
+        for axis in range(self.places.shape[1]):
+            for step in (1, -1):
+                found = self._at(self.places[point] + step * np.eye(self.places.shape[1], dtype=int)[axis])
+                which.append(np.flatnonzero(found >= 0))
+                beside.append(found[found >= 0])
+        return np.concatenate(which), np.concatenate(beside)
 
     def coarse(self, spacing: int) -> Indices:
-        """Points of a coarse grid with at most `spacing` steps between, the borders included."""
-        rows, columns = (
-            np.unique(np.linspace(0, n - 1, -(-(n - 1) // spacing) + 1).round().astype(int))
-            for n in (len(self.frequencies), len(self.measures))
-        )
-        return np.asarray((rows[:, None] * len(self.measures) + columns).ravel())
+        """Points of a coarse grid with at most `spacing` steps between along each axis, the borders included."""
+        chosen = np.ones(len(self), bool)
+        for column in self.places.T:
+            last = int(column.max())
+            chosen &= np.isin(column, np.linspace(0, last, -(-last // spacing) + 1).round().astype(int))
+        if len(self) < np.prod(self._shape):  # where its points are missing, others stand in for them
+            for point in range(len(self)):
+                apart = np.abs(self.places[chosen] - self.places[point]).max(axis=1, initial=0)
+                chosen[point] |= not len(apart) or apart.min() > spacing
+        return np.flatnonzero(chosen)
+
+    @cached_property
+    def _shape(self) -> tuple[int, ...]:
+        return tuple(self.places.max(axis=0) + 1)
+
+    @cached_property
+    def _numbers(self) -> Indices:
+        numbers = np.full(self._shape, -1)
+        numbers[tuple(self.places.T)] = np.arange(len(self))
+        return numbers
+
+    def _at(self, places: Indices) -> Indices:
+        """Numbers (n,) of the points at places (n, axes); -1 where there is none."""
+        inside = ((places >= 0) & (places < self._shape)).all(axis=1)
+        found = np.full(len(places), -1)
+        found[inside] = self._numbers[tuple(places[inside].T)]
+        return found
 
 
 class Atlas:
@@ -114,8 +134,9 @@ class Atlas:
             new[fresh] = True
         return new
 
-    def all(self) -> tuple[Indices, Array, Array]:
-        """Points (k,) in order, positions and moments (k, 3)."""
+    def within(self, grid: Grid) -> tuple[Indices, Array, Array]:
+        """Points (k,) in order, positions and moments (k, 3) of the equilibria that lie in the ranges of a grid."""
         point, slot = np.nonzero(np.arange(self._known.shape[1]) < self._count[:, None])
         found = self._known[point, slot]
-        return point, found[:, :3], found[:, 3:]
+        inside = grid.holds(point, found[:, :3])
+        return point[inside], found[inside, :3], found[inside, 3:]

@@ -51,25 +51,22 @@ class EquilibriumMap:
         return every.reshape(shape), stable.reshape(shape)
 
 
-def judged(grid: Grid, atlas: Atlas, searches: int) -> EquilibriumMap:
+def judged(grid: Grid, atlas: Atlas, axes: tuple[Array, Array], searches: int) -> EquilibriumMap:
     """What an atlas knows within the range, all spectra in one call."""
-    point, position, moment = atlas.all()
-    inside = grid.holds(point, position)
-    point, position, moment = point[inside], position[inside], moment[inside]
-    row, column = np.divmod(point, len(grid.measures))
-    time = np.zeros((0, 1))
+    point, position, moment = atlas.within(grid)
+    row, column = grid.places[point].T
+    balance = grid.balance(point)
+    time, length = balance.values[:, [Parameter.TIME]], balance.values[:, [Parameter.LENGTH]]
     values, errors = np.zeros((0, 10), complex), np.zeros((0, 10))
     if len(point):
-        balance = grid.balance(point)
         states = balance.states(position, moment)
         values, errors, _ = spectra(states, balance.rates(states, balance.values)[1])
-        time = balance.values[:, [Parameter.TIME]]
     return EquilibriumMap(
-        frequencies=grid.frequencies,
-        measures=grid.measures,
+        frequencies=axes[0],
+        measures=axes[1],
         row=row,
         column=column,
-        position=position * grid.family.scene.floater.radius,
+        position=position * length,
         moment=moment,
         eigenvalues=np.asarray(values / time, complex),
         errors=errors.max(axis=1, initial=0.0) / time[:, 0],

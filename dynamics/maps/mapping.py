@@ -1,12 +1,4 @@
-"""All equilibria and their stability over a grid of frequencies and measures of the rotor.
-
-On a coarse grid Newton's method searches from the starts of `equilibria.search`, all of them at some points and a
-random quarter at others.  From what is found each equilibrium is carried to the points beside it, all at once, until
-nothing new is found.  Where that does not lead to the neighbour the branch is followed by its arc length, around the
-fold and back on the other side if there is one (`between`).  So a sheet of equilibria is found whole if one of its
-points, or of a sheet that meets it in a fold, is found by a search; only one that fits between the points of the coarse
-grid, and meets no other, can be missed.
-"""
+"""All equilibria and their stability over frequencies and measures of the rotor."""
 
 from collections.abc import Callable
 
@@ -14,20 +6,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ...geometry.basics import Array
-from ..steady import EVERY, EquilibriumError, Indices, solve
-from .between import between
+from ..equilibria import SearchRange
+from ..steady import EquilibriumError
 from .families import RotorFamily
-from .grid import Atlas, Grid
+from .filling import SPACING, filled
+from .grid import Grid
 from .map_stability import EquilibriumMap, judged
-
-SPACING = 5
-"""Points of the map between two searches."""
-WHOLE, PART = 8, 4
-"""Every eighth search has all starts, the others a quarter of them."""
-MARGIN = 0.3
-"""Sheets are followed so far beyond the range (radii): what its border cuts into pieces is whole there."""
-JUMP = 0.15
-"""A neighbour farther away than this (radii and rad) may be another branch's."""
 
 
 def equilibrium_map(
@@ -60,46 +44,19 @@ def equilibrium_map(
             "Equilibria are fixed points only where the rotor turns and gravity is along its axis. Elsewhere use "
             "find_equilibria."
         )
-    grid = Grid(family, *axes, spin, farthest)
-    atlas, nodes = Atlas(len(grid)), grid.coarse(spacing)
-    seeds, random = [], np.random.default_rng(0)
-    for number, point in enumerate(nodes):
-        seeds.append(_searched(grid, int(point), None if number % WHOLE == 0 else random))
-        if progress is not None:
-            progress(0.9 * (number + 1) / len(nodes))
-    point, position, moment = (np.concatenate(part) for part in zip(*seeds, strict=True))
-    _spread(grid, atlas, point, position, moment)
-    return judged(grid, atlas, len(nodes))
+    grid = family_grid(family, *axes, spin, farthest)
+    nodes = grid.coarse(spacing)
+    return judged(grid, filled(grid, nodes, progress), axes, len(nodes))
 
 
-def _searched(grid: Grid, point: int, random: np.random.Generator | None) -> tuple[Indices, Array, Array]:
-    """Equilibria of one point, from all starts or from some; each perhaps many times."""
-    where = grid.range(point)
-    position, moment = where.starts()
-    if random is not None:
-        chosen = random.choice(len(position), len(position) // PART, replace=False)
-        position, moment = position[chosen], moment[chosen]
-    with np.errstate(all="ignore"):  # many of these starts run away
-        position, moment, step = solve(grid.alone(point), position, moment, EVERY, 25)
-    good = (step < 1e-8) & where.holds(position, MARGIN)
-    return np.full(good.sum(), point), position[good], moment[good]
-
-
-def _spread(grid: Grid, atlas: Atlas, point: Indices, position: Array, moment: Array) -> None:
-    """Carry equilibria from point to point until nothing new is found."""
-    while len(point):
-        new = atlas.add(point, position, moment)
-        point, position, moment = point[new], position[new], moment[new]
-        source, target = grid.neighbours(point)
-        if not len(source):
-            return
-        arrived, turned, size = solve(grid.balance(target), position[source], moment[source], EVERY, 12)
-        apart = np.linalg.norm(np.concatenate([arrived - position[source], turned - moment[source]], axis=1), axis=1)
-        good = (size < 1e-8) & (apart < JUMP)
-        rest = source[~good]
-        walked = between(grid, point[rest], target[~good], position[rest], moment[rest])
-        point = np.concatenate([target[good], walked[0]])
-        position = np.concatenate([arrived[good], walked[1]])
-        moment = np.concatenate([turned[good], walked[2]])
-        inside = grid.holds(point, position, MARGIN)
-        point, position, moment = point[inside], position[inside], moment[inside]
+def family_grid(family: RotorFamily, frequencies: Array, measures: Array, spin: float, farthest: float) -> Grid:
+    """The points of a map, numbered row by row."""
+    row, column = (part.ravel() for part in np.indices((len(frequencies), len(measures))))
+    return Grid(
+        rates=family.rates,
+        values=family.values(frequencies[row], measures[column]),
+        spin=np.full(len(row), spin),
+        ranges=[SearchRange(family.at(frequencies[0], measure), farthest) for measure in measures],
+        region=column,
+        places=np.column_stack([row, column]),
+    )

@@ -32,12 +32,12 @@ class Balance:
     ----------
     rates : compiled rates and their derivatives
     values : their parameters, with the drag along the moment left out: (p,), or (n, p) where every point has its own
-    spin : body spin s = Ω·m̂/ω
+    spin : body spin s = Ω·m̂/ω, of all points or (n,)
     """
 
     rates: Rates
     values: Array
-    spin: float
+    spin: float | Array
 
     @property
     def rate(self) -> Array:
@@ -46,13 +46,16 @@ class Balance:
 
     def at(self, rows: NDArray[Any]) -> Balance:
         """The balance of some of the points only."""
-        return self if self.values.ndim == 1 else replace(self, values=self.values[rows])
+        if self.values.ndim == 1:
+            return self
+        spin = self.spin if np.ndim(self.spin) == 0 else np.asarray(self.spin)[rows]
+        return replace(self, values=self.values[rows], spin=spin)
 
     def states(self, position: Array, moment: Array) -> Array:
         """States (n, 12) at rest in the rotor's frame at positions and moments (n, 3)."""
         rate = self.rate
         velocity = rate * np.stack([-position[:, 1], position[:, 0], 0 * position[:, 0]], axis=1)
-        spin = rate * ((self.spin - moment[:, 2:]) * moment + np.array([0.0, 0.0, 1.0]))
+        spin = rate * ((np.asarray(self.spin)[..., None] - moment[:, 2:]) * moment + np.array([0.0, 0.0, 1.0]))
         return np.concatenate([position, velocity, moment, spin], axis=1)
 
     def __call__(self, position: Array, moment: Array) -> tuple[Array, Array]:

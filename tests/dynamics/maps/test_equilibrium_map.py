@@ -7,7 +7,7 @@ import pytest
 from spinlev.dynamics.equilibria import find_equilibria
 from spinlev.dynamics.equilibria.fixed_points import fixed_points
 from spinlev.dynamics.maps import equilibrium_map, rotor_family
-from spinlev.dynamics.maps.grid import Grid
+from spinlev.dynamics.maps.mapping import family_grid
 from spinlev.dynamics.motion import Parameter, Rates
 from spinlev.dynamics.steady import EquilibriumError
 from spinlev.fem.rotor_tables import rotor_table
@@ -65,7 +65,7 @@ def test_map_equals_searches_at_random_points(name, model):
 def test_map_misses_nothing_that_a_search_finds(name, model):
     """At thirty random points; sheets that leave the range, such as z > 0, and come back are followed outside it."""
     family, measures = rotor_family(scene_of(name), name, model, 1e-4), ROTORS[name][1]
-    grid = Grid(family, FREQUENCIES, measures, 0.0, 0.1)
+    grid = family_grid(family, FREQUENCIES, measures, 0.0, 0.1)
     found = equilibrium_map(family, FREQUENCIES, measures, spacing=3)
     places = np.concatenate([found.position / FLOATER.radius, found.moment], axis=1)
     for point in np.random.default_rng(5).choice(len(grid), 30, replace=False):
