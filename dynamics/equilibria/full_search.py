@@ -75,7 +75,8 @@ def told(
     """The survey of a scene of which all fixed points are known: scaled positions and moments, good to round-off."""
     scales = Scales.of(scene)
     known = [(r, m) for r, m in points if table.in_range(r * scales.length)[0]]
-    found = [_equilibrium(table, scales, balance, r, m) for r, m in known]
+    doubts = _field_doubts(table, np.array([r for r, _ in known]) * scales.length) if known else []
+    found = [_equilibrium(scales, balance, *point, doubt) for point, doubt in zip(known, doubts, strict=True)]
     if np.any(scene.gravity[:2]):
         found = _shaken(Shaken(scene, balance.rates, balance.values, None), found)
     return Survey(_in_order(found), curves)
@@ -120,12 +121,13 @@ def _shaken(problem: Shaken, found: list[Equilibrium]) -> list[Equilibrium]:
     return kept
 
 
-def _equilibrium(table: FieldTable, scales: Scales, balance: Balance, position: Array, moment: Array) -> Equilibrium:
+def _equilibrium(scales: Scales, balance: Balance, position: Array, moment: Array, doubt: Array) -> Equilibrium:
     state = balance.states(position[None], moment[None])
     value, slope = balance(position[None], moment[None])
     motion = modes(state[0], balance.rates(state, balance.values)[1][0])
-    doubt = np.abs(value[0]) + _field_doubt(table, balance.values, position * scales.length)
-    error = float(np.linalg.norm((np.abs(np.linalg.inv(slope[0])) @ doubt)[:3]))
+    torque, length, inertia = balance.values[[Parameter.TORQUE, Parameter.LENGTH, Parameter.INERTIA]]
+    unsure = np.abs(value[0]) + torque * np.array([inertia * length * doubt[1]] * 3 + [doubt[0]] * 2)
+    error = float(np.linalg.norm((np.abs(np.linalg.inv(slope[0])) @ unsure)[:3]))
     gravity = abs(float(balance.values[Parameter.GRAVITY_Z]))
     return Equilibrium(
         state=scales.unpack(state[0]),
@@ -140,13 +142,11 @@ def _equilibrium(table: FieldTable, scales: Scales, balance: Balance, position: 
     )
 
 
-def _field_doubt(table: FieldTable, values: Array, position: Array) -> Array:
-    """What the table's own error may add to the three forces and two torques at `position` (m), scaled."""
+def _field_doubts(table: FieldTable, position: Array) -> Array:
+    """Estimated errors (n, 2) of B, T, and of its gradient, T/m, at positions (n, 3) m."""
     field, gradient = table.evaluate(position)
     error_b, error_g = table.relative_error(position)
-    torque = values[Parameter.TORQUE] * np.linalg.norm(field) * error_b[0]
-    force = np.prod(values[[Parameter.TORQUE, Parameter.INERTIA, Parameter.LENGTH]]) * np.linalg.norm(gradient)
-    return np.array([force * error_g[0]] * 3 + [torque] * 2)
+    return np.column_stack([error_b * np.linalg.norm(field, axis=1), error_g * np.linalg.norm(gradient, axis=(1, 2))])
 
 
 def _force_curve(scene: Scene, scales: Scales, curve: Curve) -> ForceCurve:

@@ -51,6 +51,9 @@ def turned(box: Box, angle: float) -> Box:
 
 def deepest_overlap_in_a_turn(rotating: Box, fixed: Box) -> float:
     """Largest penetration depth of a box that turns about z into a fixed one, m; negative if always apart."""
+    apart = float(fixed.distance(np.zeros(3))) - float(np.linalg.norm(rotating.corners, axis=1).max())
+    if apart > 0:  # it never leaves a sphere that does not reach the fixed one
+        return -apart
 
     def gap(angle: float) -> float:
         return -box_overlap(turned(rotating, angle), fixed)

@@ -48,6 +48,8 @@ def question_study(question: Question, values: Mapping[str, Sequence[Any]]) -> S
         partial(question.gather, values=values),
         question_figure,
         question_lines,
+        prepared=question.prepared,
+        batches=question.batches,
         settings=question.settings,
     )
 

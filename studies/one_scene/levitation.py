@@ -1,5 +1,7 @@
 """One scene from its field to its flight: each step is computed once, when it is first asked for."""
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 from functools import cached_property
 from pathlib import Path
@@ -44,7 +46,18 @@ class Levitation:
         self.spin = finite("spin", spin)
         self.from_cache: list[str] = []
         """Names of the tables that were found in the cache."""
+        self.searched = True
+        """Whether the equilibria were searched for; else they were carried here from scenes nearby."""
         self._fields: dict[str, RotorField] = {}
+        self._equations: dict[str, Rates] = {}
+
+    def share(self, other: Levitation) -> None:
+        """Take over the fields and the compiled equations of another scene with the same rotor, made or yet to make."""
+        self._fields, self._equations = other._fields, other._equations
+
+    def adopt(self, known: Survey, searched: bool) -> None:
+        """Take over the equilibria without plate that are known from a search here or from scenes nearby."""
+        self.without_plate, self.searched = known, searched
 
     @property
     def table(self) -> RotorField:
@@ -55,7 +68,7 @@ class Levitation:
     def without_plate(self) -> Survey:
         """All equilibria as if there were no plate. Raises EquilibriumError for a rotor at rest."""
         note("Equilibria ...")
-        return survey(self.scene, self.table, self.spin, rates=self._rates)
+        return survey(self.scene, self.table, self.spin, rates=self.rates)
 
     @cached_property
     def plate(self) -> PlateMemory | None:
@@ -84,7 +97,7 @@ class Levitation:
     def survey(self) -> Survey:
         """All equilibria, the stable ones first, with the plate where its currents are modelled."""
         found = self.without_plate
-        return found if self.plate is None else with_plate(self.scene, self.table, found, self.plate, self._rates)
+        return found if self.plate is None else with_plate(self.scene, self.table, found, self.plate, self.rates)
 
     @property
     def equilibria(self) -> tuple[Equilibrium, ...]:
@@ -147,9 +160,13 @@ class Levitation:
         """What a result says of its models."""
         return {"model": self.table.model, "plate_model": self.plate.model if self.plate else "none"}
 
-    @cached_property
-    def _rates(self) -> Rates:
-        return Rates.of(self.scene, self.table)
+    @property
+    def rates(self) -> Rates:
+        """The equations of motion in the rotor's field, compiled."""
+        name = self.table.model
+        if name not in self._equations:
+            self._equations[name] = Rates.of(self.scene, self.table)
+        return self._equations[name]
 
     @property
     def absolute(self) -> bool:

@@ -1,21 +1,28 @@
 """One's own question: any quantity of a scene over any of its parameters."""
 
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import asdict, dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
 import xarray as xr
 
-from ...geometry.basics import Array, InputError
+from ...geometry.basics import Array, InputError, SpinlevError
 from ...geometry.scenes import Scene, changed, scene_text
 from ..results import AXIS, Point, found_dataset, variable
 from ..terminal import Models, Quantity, positive
 from .answers import flight_answer
 from .levitation import Levitation
+from .together import share
 
 CHOICES = ("model", "plate_model", "spin")
 """What can be varied beside the keys of the scene file."""
+ROTOR = ("rotor", "model", "floater.diameter")
+"""How keys begin whose values need a table of their own."""
+LARGEST: Mapping[Quantity, int] = {"equilibria": 60, "flight": 12, "field": 60}
+"""How many points are answered together at most, and lost together if the program is killed among them."""
 
 
 @dataclass(frozen=True)
@@ -63,7 +70,31 @@ class Question:
 
     def __call__(self, point: Point) -> xr.Dataset:
         """The answer at a point: a dataset over `case`, whose coordinates are the values varied."""
-        answer = ANSWERS[self.ask](self, self.levitation(point))
+        return self._answer(point, self.levitation(point))
+
+    def prepared(self, points: Sequence[Point]) -> list[Callable[[], xr.Dataset]]:
+        """How to answer at each of the points, which share what they can; a point that cannot be says so when asked."""
+        jobs: list[Callable[[], xr.Dataset]] = [partial(self, point) for point in points]
+        made = {}
+        for k, point in enumerate(points):
+            with suppress(SpinlevError):
+                made[k] = self.levitation(point)
+        axes = [sorted({point[key] for point in points}) for key in points[0]]
+        places = [tuple(axis.index(value) for axis, value in zip(axes, points[k].values(), strict=True)) for k in made]
+        share(list(made.values()), places, self.ask != "field")
+        for k, levitation in made.items():
+            jobs[k] = partial(self._answer, points[k], levitation)
+        return jobs
+
+    def batches(self, points: Mapping[int, Point], workers: int) -> list[list[int]]:
+        """Points that are answered together: neighbours, those with the same rotor first, some for every worker."""
+        keys = [key for key in next(iter(points.values())) if key.startswith(ROTOR)]
+        order = sorted(points, key=lambda k: [points[k][key] for key in keys])
+        size = min(LARGEST[self.ask], -(-len(order) // workers))
+        return [order[k : k + size] for k in range(0, len(order), size)]
+
+    def _answer(self, point: Point, levitation: Levitation) -> xr.Dataset:
+        answer = ANSWERS[self.ask](self, levitation)
         return answer.expand_dims("case").assign_coords({key: ("case", [value]) for key, value in point.items()})
 
     def gather(self, parts: Sequence[xr.Dataset], values: Mapping[str, Sequence[Any]]) -> xr.Dataset:
@@ -87,7 +118,8 @@ class Question:
 
 
 def _equilibria(question: Question, levitation: Levitation) -> xr.Dataset:
-    return found_dataset(levitation.equilibria).assign_attrs(levitation.labels)
+    found_by = "search" if levitation.searched else "neighbours"
+    return found_dataset(levitation.equilibria).assign(found_by=((), found_by)).assign_attrs(levitation.labels)
 
 
 def _flight(question: Question, levitation: Levitation) -> xr.Dataset:

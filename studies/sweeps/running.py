@@ -88,7 +88,7 @@ def swept(name: str, study: Study, points: Mapping[int, Point], engine: Workers,
     engine = Workers(workers=1) if study.timed else engine
     with progress(f"{name}: {len(points)} points") as advance:
         advance(len(finished) / len(points))
-        for k, result in computed(engine, study.compute, missing) if missing else ():
+        for k, result in computed(engine, study, missing) if missing else ():
             if isinstance(result, Failure):
                 failed[k] = result.reason
                 note(f"Point {to_json(points[k])} failed: {result.reason}")

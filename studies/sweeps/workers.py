@@ -5,22 +5,24 @@ from __future__ import annotations
 import logging
 import os
 import signal
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
+from functools import partial
 from multiprocessing import resource_tracker
 from typing import TYPE_CHECKING, Any
 
 import xarray as xr
 
 from ...geometry.basics import InputError
-from ..results import Point
+from ..results import Point, Study
 from ..terminal import Workers, silence
 
 if TYPE_CHECKING:
     from distributed import Client, Future
 
 Compute = Callable[[Point], xr.Dataset]
+Prepared = Callable[[Sequence[Point]], Sequence[Callable[[], xr.Dataset]]] | None
 CONNECTING = 20
 """Seconds that a scheduler may take to answer."""
 
@@ -32,44 +34,68 @@ class Failure:
     reason: str
 
 
-def computed(by: Workers, compute: Compute, points: Mapping[int, Point]) -> Iterator[tuple[int, xr.Dataset | Failure]]:
+Attempt = tuple[int, xr.Dataset | Failure]
+"""The number of a point, and its result."""
+
+
+def computed(by: Workers, study: Study, points: Mapping[int, Point]) -> Iterator[Attempt]:
     """The results as they come, each with the number of its point.
 
     A point that raises, or whose worker dies again and again, is a `Failure`; the others go on.
     Raises InputError if the scheduler does not answer.
     """
     number = min(by.workers or os.cpu_count() or 1, len(points))
+    batches = study.batches(points, number) if study.batches else [[k] for k in points]
     if by.scheduler is None and number <= 1:
-        yield from ((k, attempt(compute, point)) for k, point in points.items())
+        for batch in batches:
+            yield from attempts(study.compute, study.prepared, {k: points[k] for k in batch})
         return
     from distributed import as_completed
 
     with _client(by.scheduler, number) as client:
-        futures = {client.submit(_silently, compute, point, pure=False): k for k, point in points.items()}
-        for future in as_completed(list(futures), loop=client.loop):
-            yield futures[future], _collected(future)
+
+        def begin(batch: Sequence[int]) -> Future[Any]:
+            return client.submit(_silently, study.compute, study.prepared, {k: points[k] for k in batch}, pure=False)
+
+        futures = {begin(batch): batch for batch in batches}
+        running = as_completed(list(futures), loop=client.loop)
+        for future in running:
+            batch, found = futures.pop(future), _collected(future)
             future.release()
+            if not isinstance(found, Failure):
+                yield from found
+            elif len(batch) == 1:
+                yield batch[0], found
+            else:  # one of its points killed the worker: which?
+                alone = {begin([k]): [k] for k in batch}
+                futures |= alone
+                running.update(list(alone))
 
 
-def attempt(compute: Compute, point: Point) -> xr.Dataset | Failure:
-    """The result of a point, or why there is none."""
-    try:
-        return compute(point)
-    except Exception as error:  # a sweep lives longer than its points: the reason is kept with the result
-        return Failure(f"{type(error).__name__}: {error}")
+def attempts(compute: Compute, prepared: Prepared, points: Mapping[int, Point]) -> Iterator[Attempt]:
+    """The results of points that are computed together, or why there is none."""
+    asked = list(points.values())
+    jobs: Sequence[Callable[[], xr.Dataset]] = [partial(compute, point) for point in asked]
+    if prepared is not None and len(asked) > 1:
+        jobs = prepared(asked)
+    for k, job in zip(points, jobs, strict=True):
+        try:
+            yield k, job()
+        except Exception as error:  # a sweep lives longer than its points: the reason is kept with the result
+            yield k, Failure(f"{type(error).__name__}: {error}")
 
 
-def _silently(compute: Compute, point: Point) -> xr.Dataset | Failure:
-    """An attempt in a worker, whose messages would come in between those of the others."""
+def _silently(compute: Compute, prepared: Prepared, points: Mapping[int, Point]) -> list[Attempt]:
+    """Attempts in a worker, whose messages would come in between those of the others."""
     with silence():
-        return attempt(compute, point)
+        return list(attempts(compute, prepared, points))
 
 
-def _collected(future: Future[Any]) -> xr.Dataset | Failure:
+def _collected(future: Future[Any]) -> list[Attempt] | Failure:
     from distributed.scheduler import KilledWorker
 
     try:
-        result: xr.Dataset | Failure = future.result()
+        result: list[Attempt] = future.result()
     except KilledWorker as error:
         return Failure(f"its worker died {error.allowed_failures + 1} times (out of memory?)")
     return result
