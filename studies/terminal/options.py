@@ -1,12 +1,10 @@
 """What every command is asked: which scene and tables, who computes, and where its answers go."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from importlib.resources import files
 from pathlib import Path
-from typing import Annotated, Any, Literal, get_args
+from typing import Annotated, Any, Literal, Self, get_args
 
 from cyclopts import Parameter
 
@@ -49,7 +47,7 @@ class Models:
     rtol: float = 3e-6
     plate_rtol: float = 3e-3
 
-    def checked(self) -> Models:
+    def checked(self) -> Self:
         """Itself.
 
         Raises
@@ -110,7 +108,7 @@ class Workers:
     workers: Annotated[int | None, Parameter(negative="")] = None
     scheduler: str | None = None
 
-    def checked(self) -> Workers:
+    def checked(self) -> Self:
         """Itself.
 
         Raises
