@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ...geometry.basics import Array, frozen_array, millimetres
 from ..closed_forms import ComplexArray
-from ..plate_network import Region
+from ..plate_currents import Region
 from ..rotor_tables import RangeError
 from .field_functions import Multipoles
 

@@ -114,7 +114,7 @@ def rotor_share(
     """
     parts = rotor_parts(rotor, plate)
     distance = plate.lowering.distance if plate.lowering else 0.0
-    harmonics, depths = 3, 4 if distance else 1
+    harmonics, depths = 5, 4 if distance else 1
     while True:
         series, samples = _sampled(network, plate, parts, distance, harmonics, depths)
         size = np.abs(samples).max()

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from ...dynamics.motion import PlateMemory
-from ...fem.plate_network import Region
+from ...fem.plate_currents import Region
 from ...fem.plate_tables import cached_driven_plate, reachable_region
 from ...fem.rotor_tables import Accuracy, RotorTable, distant
 from ...fem.slab import edge_error, slab_and_rotor_table

@@ -14,7 +14,8 @@ from scipy.integrate import solve_ivp
 from spinlev.fem.closed_forms import Dipole, unit_dipoles
 from spinlev.fem.closed_forms.phasor import mean_force, mean_loss, mean_torque
 from spinlev.fem.closed_forms.vector_potentials import DipoleDerivative
-from spinlev.fem.plate_network import Region, reduce_plate
+from spinlev.fem.plate_currents import Region
+from spinlev.fem.plate_network import reduce_plate
 from spinlev.fem.plate_tables.tabulate import tabulate
 from spinlev.fem.rotor_tables import rotor_table
 from spinlev.fem.slab import slab_and_rotor_table
