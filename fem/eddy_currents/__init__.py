@@ -3,7 +3,8 @@
 from .field_rows import FieldRows
 from .fields import current_density
 from .mirrored_dipoles import dipole_images
-from .solver import ClassFactor, EddyResponse, ShiftedSystem, solve_eddy
+from .shifted_system import ClassFactor, ShiftedSystem
+from .solver import EddyResponse, solve_eddy, solve_shifted
 from .space import EddySpace, Source
 
 __all__ = [
@@ -16,4 +17,5 @@ __all__ = [
     "current_density",
     "dipole_images",
     "solve_eddy",
+    "solve_shifted",
 ]

