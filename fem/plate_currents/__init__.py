@@ -8,6 +8,7 @@ from .region import Region
 from .solution import STRICT, PlateSolution, solve_currents
 from .solution_file import cached_solver, digest
 from .sources import OtherSources, grid_counts, probe_places
+from .watch import Watch, unwatched
 
 __all__ = [
     "STRICT",
@@ -15,6 +16,7 @@ __all__ = [
     "OtherSources",
     "PlateSolution",
     "Region",
+    "Watch",
     "cached_solver",
     "digest",
     "error_of",
@@ -24,4 +26,5 @@ __all__ = [
     "solve_currents",
     "space_couplings",
     "unit_power",
+    "unwatched",
 ]

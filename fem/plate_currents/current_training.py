@@ -17,6 +17,7 @@ from ..eddy_currents import ClassFactor, EddySpace, FieldRows, ShiftedSystem
 from .current_space import CurrentSpace
 from .shift_basis import Residuals, class_basis
 from .sources import SourceSet
+from .watch import Watch, unwatched
 
 SHIFT = 0.25
 """The real shift in units of the highest angular frequency; a second one gave the same states for more work."""
@@ -55,26 +56,35 @@ class Missing:
 
 
 def train(
-    space: EddySpace, training: SourceSet, probes: SourceSet, frequencies: tuple[float, float], allowed: float
+    space: EddySpace,
+    training: SourceSet,
+    probes: SourceSet,
+    frequencies: tuple[float, float],
+    allowed: float,
+    watch: Watch = unwatched,
 ) -> tuple[CurrentSpace, Missing]:
     """Currents of the `training` sources at all frequencies (Hz) between the two, and what is missing of the `probes`.
 
     Parameters
     ----------
     allowed : |ρ|² of a source relative to what it drives, and thus relative error of its coupling with itself
+    watch : hears of the progress
     """
+    watch("potentials of sources", 0.0)
     rows = FieldRows(space)
     omegas = 2 * np.pi * np.geomspace(*frequencies, FREQUENCIES)
     system = ShiftedSystem(space, SHIFT * omegas[-1])
     sources, tests = (part.rows(space, rows.root) for part in (training, probes))
-    for part, other, parity_class in zip(sources, tests, space.parity.classes, strict=True):
+    for done, (part, other, parity_class) in enumerate(zip(sources, tests, space.parity.classes, strict=True)):
+        watch("potentials of sources", 0.3 + 0.7 * done / len(sources))
         both = rows.without_gradients(np.concatenate([part, other]), parity_class)
         part[:], other[:] = both[: len(part)], both[len(part) :]
     scale = unit_power(np.einsum("csw,csw->s", sources, sources), len(training.others))
     fields, inductances = [], []
     couplings = np.zeros((len(omegas), *[tests.shape[1]] * 2), complex)
     residuals = np.zeros_like(couplings)
-    for parity_class, driving, testing in zip(space.parity.classes, sources, tests, strict=True):
+    for done, (parity_class, driving, testing) in enumerate(zip(space.parity.classes, sources, tests, strict=True)):
+        watch(f"currents at order {space.order}", done / len(sources))
         solve = partial(_solved, rows, system.factor(parity_class))
         basis = class_basis(driving * scale[:, None], solve, omegas, allowed / len(sources))
         left = Residuals.of(testing, basis)

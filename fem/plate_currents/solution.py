@@ -21,6 +21,7 @@ from .current_training import train
 from .order_ladder import MESH_SHARE, Ladder
 from .region import Region
 from .sources import OtherSources, SourceSet, grid_counts, probe_places
+from .watch import Watch, unwatched
 
 SPACE_SHARE = 0.1
 """Share of the tolerance for what the current space misses of the finite elements' currents."""
@@ -66,6 +67,7 @@ def solve_currents(
     rtol: float,
     rule: MeshRule | None = None,
     others: OtherSources | None = None,
+    watch: Watch = unwatched,
 ) -> PlateSolution:
     """Currents for dipoles in `boxes` and for `others`, at all frequencies between the two (Hz).
 
@@ -79,7 +81,7 @@ def solve_currents(
     rule = rule or (MeshRule() if rtol >= STRICT else MeshRule(1.0, 1.6, 1.4))
     half = plate.box.half_edges
     corners = np.concatenate([*(box.grid((2, 2, 2), fold=True) for box in boxes), others.places])
-    ladder = Ladder(plate, corners, frequencies[1], rule, MESH_SHARE * rtol)
+    ladder = Ladder(plate, corners, frequencies[1], rule, MESH_SHARE * rtol, watch)
     training = SourceSet(
         np.concatenate([box.grid(grid_counts(box, half), fold=True) for box in boxes]), others.training
     )
@@ -87,7 +89,7 @@ def solve_currents(
     allowed = SPACE_SHARE * rtol
     while True:
         if ladder.expected() <= HOPEFUL * ladder.allowed or ladder.order + 1 == ladder.highest:
-            space, missing = train(ladder.next_space(), training, probes, frequencies, allowed)
+            space, missing = train(ladder.next_space(), training, probes, frequencies, allowed, watch)
             couplings = space_couplings(space.dipole_couplings(corners), space.inductances, ladder.shift)
             ladder.climb(couplings)
             if ladder.error <= ladder.allowed:

@@ -22,6 +22,7 @@ from .current_space import CurrentSpace
 from .region import Region
 from .solution import PlateSolution, solve_currents
 from .sources import OtherSources
+from .watch import Watch, unwatched
 
 FORMAT = "spinlev plate currents 1"
 LOOKS = 20
@@ -104,7 +105,7 @@ def digest(name: str, parts: Sequence[ArrayLike]) -> str:
     return found.hexdigest()
 
 
-def cached_solver(report: Callable[[str], None]) -> Callable[..., PlateSolution]:
+def cached_solver(report: Callable[[str], None], watch: Watch = unwatched) -> Callable[..., PlateSolution]:
     """`solve_currents` that looks into the cache first."""
 
     def solve(
@@ -116,11 +117,11 @@ def cached_solver(report: Callable[[str], None]) -> Callable[..., PlateSolution]
         others: OtherSources | None = None,
     ) -> PlateSolution:
         if rule:
-            return solve_currents(plate, boxes, frequencies, rtol, rule, others)
+            return solve_currents(plate, boxes, frequencies, rtol, rule, others, watch)
         return from_cache(
             f"plate-currents-{currents_key(plate, boxes, frequencies, rtol, others)}.nc",
             load_solution,
-            lambda: solve_currents(plate, boxes, frequencies, rtol, None, others),
+            lambda: solve_currents(plate, boxes, frequencies, rtol, None, others, watch),
             save_solution,
             report,
         )[0]

@@ -8,7 +8,7 @@ components as the reaction tensors of dipoles off the grid need, at frequencies 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -20,7 +20,7 @@ from ..eddy_currents import Source
 from ..plate_currents import STRICT, CurrentSpace, OtherSources, PlateSolution, Region, grid_counts, solve_currents
 from ..rotor_tables import AccuracyError
 from .network_error import truncated
-from .training import Group, joined, prepare_training
+from .training import Group, prepare_training
 
 NETWORK_SHARE, STRICT_SHARE = 0.9, 0.8
 """Share of the tolerance for the finite elements and the states left out together; the rest is the field functions',
@@ -36,10 +36,9 @@ class PlateNetwork:
     plate : the conductor; fields and region are in its own frame
     region : where the floater may be
     frequencies : lowest and highest, Hz
-    space : of the currents
+    space : of the currents, with the fields e_i (of unit inductance) and the inductances of each parity class's part
     groups : parity groups
     rates : (states,) λ_i, 1/s, for each group
-    fields : (states, n) of e_i, of unit inductance, in the coordinates of the space, for each group
     mesh_error, state_error : estimated relative errors of reaction tensors
     seconds : time spent on the finite elements
     """
@@ -50,7 +49,6 @@ class PlateNetwork:
     space: CurrentSpace
     groups: tuple[Group, ...]
     rates: tuple[Array, ...]
-    fields: tuple[Array, ...]
     mesh_error: float
     state_error: float
     seconds: float
@@ -64,7 +62,7 @@ class PlateNetwork:
         return self._by_group(self.space.dipole_couplings(places))
 
     def _by_group(self, parts: Sequence[Array]) -> list[Array]:
-        return [b @ fields.T for b, fields in zip(joined(parts, self.groups), self.fields, strict=True)]
+        return [np.sum([parts[number] for number in group.classes], axis=0) for group in self.groups]
 
 
 def reduce_plate(
@@ -123,12 +121,22 @@ def reduce_currents(
             f"Input rtol must be larger: the states leave {state_error:.1e}, allowed is {allowed:.1e}; "
             f"instead received {rtol:.1e}."
         )
-    diagonal = [part.diagonalised() for part in chosen]
+    rates, fields = zip(*[part.diagonalised() for part in chosen], strict=True)
     return PlateNetwork(
-        plate, region, frequencies, solution.space, tuple(training.groups),
-        tuple(d[0] for d in diagonal), tuple(d[1] for d in diagonal),
-        solution.mesh_error, state_error + space_error, solution.seconds,
+        plate, region, frequencies, part_of_space(solution.space, training.groups, fields), tuple(training.groups),
+        rates, solution.mesh_error, state_error + space_error, solution.seconds,
     )  # fmt: skip
+
+
+def part_of_space(space: CurrentSpace, groups: Sequence[Group], fields: Sequence[Array]) -> CurrentSpace:
+    """The space that holds, in each class, the part there of `fields` (states, coordinates) of each group."""
+    rows, inductances = list(space.fields), list(space.inductances)
+    for group, states in zip(groups, fields, strict=True):
+        ends = np.cumsum([len(space.inductances[number]) for number in group.classes])
+        for number, part in zip(group.classes, np.split(states, ends[:-1], axis=1), strict=True):
+            rows[number] = part @ space.fields[number]
+            inductances[number] = part @ space.inductances[number] @ part.T
+    return replace(space, fields=tuple(rows), inductances=tuple(inductances))
 
 
 def checked_ranges(frequencies: tuple[float, float], rtol: float) -> tuple[float, float]:

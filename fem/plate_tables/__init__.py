@@ -6,7 +6,8 @@ from .file import cached_driven_plate, cached_plate_table
 from .multipole_fit import Fit, fit_multipoles
 from .plate_table import PlateErrors, PlateTable
 from .rotor_source import DOWN, ExpansionSource, RotorSource, posed_rotor, rotor_parts
-from .share import RotorShare, rotor_share
+from .sampled_share import rotor_share
+from .share import RotorShare
 from .share_trim import MISSED, trimmed
 from .tabulate import FUNCTION_SHARE, tensor_error
 

@@ -10,13 +10,14 @@ from numpy.typing import ArrayLike
 from ...geometry.basics import InputError
 from ...geometry.meshes import MeshRule
 from ...geometry.scenes import Plate
-from ..plate_currents import OtherSources, PlateSolution, Region, error_of, solve_currents
+from ..plate_currents import OtherSources, PlateSolution, Region, Watch, error_of, solve_currents, unwatched
 from ..plate_network import reduce_currents
 from ..rotor_tables import RotorTable
 from .outer_box import outer_box, outer_frequencies
 from .plate_table import PlateTable
 from .rotor_source import DOWN, posed_rotor, rotor_parts
-from .share import RotorShare, rotor_share
+from .sampled_share import rotor_share
+from .share import RotorShare
 from .share_trim import MISSED, trimmed
 from .tabulate import tabulate
 
@@ -38,6 +39,7 @@ def plate_and_rotor_table(
     rtol: float = 1e-3,
     rule: MeshRule | None = None,
     solve: Callable[..., PlateSolution] = solve_currents,
+    watch: Watch = unwatched,
 ) -> tuple[PlateTable, RotorShare]:
     """Table of `plate` and the rotor's share of its signals, of one network.
 
@@ -51,7 +53,8 @@ def plate_and_rotor_table(
         6 per cent and the third below 4e-3: then the highest should be twice the rotor's
     rtol : relative accuracy of reaction tensors in the region, and there of the field of the rotor's currents
     rule : mesh (default by `rtol`)
-    solve : finite elements; `plate_solution_file` has them from the cache
+    solve : finite elements; `cached_solver` has them from the cache
+    watch : hears of the progress
 
     The finite elements are solved for dipoles in boxes around the region and around the rotor, on a coarse raster, so
     that neighbours of the scene and other models of the rotor need the same ones.  A rotor that these dipoles do not
@@ -68,12 +71,16 @@ def plate_and_rotor_table(
     boxes = [outer_box(region, half), outer_box(rotor_box(plate, rotor), half)]
     outer = outer_frequencies(frequencies)
     solution = solve(plate, boxes, outer, rtol, rule)
+    watch("network of the scene", 0.0)
     error = error_of(solution, others.probes)
     if error > OTHERS_SHARE * rtol:
         solution = solve(plate, boxes, outer, rtol, rule, others)
         error = solution.space_error
+    watch("network of the scene", 0.5)
     network = reduce_currents(plate, solution, region, frequencies, rtol, others, max(error, solution.space_error))
+    watch("signals of the rotor", 0.0)
     share = rotor_share(network, plate, rotor, SHARE_PART * rtol)
+    watch("field functions", 0.0)
     table = tabulate(network, rtol)
     return table, trimmed(share, table, MISSED * rtol)
 

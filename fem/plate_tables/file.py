@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from ...geometry.basics import MU_0
 from ...geometry.scenes import Plate
 from ..harmonics import FOUR_PI
-from ..plate_currents import Region, cached_solver, digest
+from ..plate_currents import Region, Watch, cached_solver, digest, unwatched
 from ..rotor_tables import RotorTable
 from ..storage import TableFileError, described, from_cache, program_of, read_checked, write_checked
 from .driven_plate import plate_and_rotor_table
@@ -141,12 +141,15 @@ def cached_driven_plate(
     frequencies: tuple[float, float],
     rtol: float,
     report: Callable[[str], None],
+    watch: Watch = unwatched,
 ) -> tuple[PlateTable, RotorShare, bool]:
     """`plate_and_rotor_table` from the cache if it is there, and whether it was."""
     (table, share), found = from_cache(
         f"driven-plate-{driven_plate_key(plate, rotor, region, frequencies, rtol)}.nc",
         load_driven_plate,
-        lambda: plate_and_rotor_table(plate, rotor, region, frequencies, rtol, solve=cached_solver(report)),
+        lambda: plate_and_rotor_table(
+            plate, rotor, region, frequencies, rtol, solve=cached_solver(report, watch), watch=watch
+        ),
         lambda made, path: save_plate_table(made[0], path, made[1]),
         report,
     )

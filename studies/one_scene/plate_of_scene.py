@@ -14,7 +14,7 @@ from ...fem.slab import edge_error, slab_and_rotor_table
 from ...geometry.basics import Array, InputError
 from ...geometry.bodies import TOUCHING, sphere_overlap
 from ...geometry.scenes import Plate, Scene
-from ..terminal import note
+from ..terminal import note, stages
 
 REACH = 0.003
 """The floater may move so far from where it begins, along each axis, m."""
@@ -45,7 +45,8 @@ def plate_memory(
         made, share = slab_and_rotor_table(plate, table, region, frequencies, rtol)
         found = False
     else:
-        made, share, found = cached_driven_plate(plate, table, region, frequencies, rtol, note)
+        with stages("Plate's currents") as watch:
+            made, share, found = cached_driven_plate(plate, table, region, frequencies, rtol, note, watch)
     note("  from the cache." if found else f"  {len(made.rates)} states in {made.provenance['seconds']:.1f} s.")
     return PlateMemory(plate, made, share, model, edge_error(plate, place) if model == "slab" else 0.0), found
 

@@ -1,6 +1,6 @@
 """What does a user ask for, and what does the program say?"""
 
-from .console import answers_only, heard, note, progress, silence, to_json
+from .console import answers_only, heard, note, progress, silence, stages, to_json
 from .models import FieldModel, Models, PlateModel, Quantity
 from .numbers import finite, positive, three_numbers
 from .output import Answer, Output
@@ -37,6 +37,7 @@ __all__ = [
     "progress",
     "read_points",
     "silence",
+    "stages",
     "three_numbers",
     "to_json",
     "way_out",
