@@ -25,8 +25,8 @@ from .watch import Watch, unwatched
 
 SPACE_SHARE = 0.1
 """Share of the tolerance for what the current space misses of the finite elements' currents."""
-STRICT = 5e-4
-"""Tolerances below this have a finer mesh."""
+STRICT, LOOSE = 5e-4, 2e-3
+"""Tolerances below the first have a finer mesh, from the second on less air: its truncation takes a part of them."""
 HOPEFUL = 1.5
 """An order whose expected error is at most so many times what is allowed is trained at once."""
 
@@ -78,7 +78,7 @@ def solve_currents(
     """
     start = time.perf_counter()
     others = others or OtherSources()
-    rule = rule or (MeshRule() if rtol >= STRICT else MeshRule(1.0, 1.6, 1.4))
+    rule = rule or mesh_rule(rtol)
     half = plate.box.half_edges
     corners = np.concatenate([*(box.grid((2, 2, 2), fold=True) for box in boxes), others.places])
     ladder = Ladder(plate, corners, frequencies[1], rule, MESH_SHARE * rtol, watch)
@@ -101,3 +101,10 @@ def solve_currents(
         tuple(boxes), frequencies, space, ladder.error, missing.worst, probes.places, missing.angular_frequencies,
         missing.residuals[:, : 3 * len(probes.places), : 3 * len(probes.places)], time.perf_counter() - start,
     )  # fmt: skip
+
+
+def mesh_rule(rtol: float) -> MeshRule:
+    """Mesh that has been found to need the least work for a tolerance."""
+    if rtol < STRICT:
+        return MeshRule(1.0, 1.6, 1.4)
+    return MeshRule(reach=3.0) if rtol >= LOOSE else MeshRule()
