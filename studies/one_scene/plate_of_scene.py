@@ -27,9 +27,13 @@ PLUMB = 1e-9
 
 
 def plate_memory(
-    scene: Scene, plate: Plate, model: str, table: RotorTable, place: Array, rtol: float
+    scene: Scene, plate: Plate, model: str, table: RotorTable, place: Array, rtol: float, edges: float | None = None
 ) -> tuple[PlateMemory, bool]:
     """The plate's currents for a floater about `place` (3,) m that turns with the rotor; whether they were cached.
+
+    Parameters
+    ----------
+    edges : relative error by edges that the model leaves out; default for a slab is its bound
 
     Raises
     ------
@@ -48,7 +52,9 @@ def plate_memory(
         with stages("Plate's currents") as watch:
             made, share, found = cached_driven_plate(plate, table, region, frequencies, rtol, note, watch)
     note("  from the cache." if found else f"  {len(made.rates)} states in {made.provenance['seconds']:.1f} s.")
-    return PlateMemory(plate, made, share, model, edge_error(plate, place) if model == "slab" else 0.0), found
+    if edges is None:
+        edges = edge_error(plate, place) if model == "slab" else 0.0
+    return PlateMemory(plate, made, share, model, edges), found
 
 
 def table_in_flight(scene: Scene, table: RotorTable, place: Array, rtol: float) -> RotorTable:
