@@ -9,8 +9,7 @@ import numpy as np
 
 from ...geometry.basics import MU_0, Array
 from ...geometry.scenes import Scene
-from .edges import edge_error
-from .measured_edges import cached_edge_error
+from .edges import cached_edge_error, edge_error
 
 NEGLIGIBLE = 1e-6
 """Part of the floater's weight below which the largest conceivable force of the plate is left out."""
