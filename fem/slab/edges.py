@@ -28,6 +28,8 @@ with finite elements at most 1.4 at 100 Hz, 1.9 at 5 Hz and, where resistance al
 ORDER, RULE = 2, MeshRule(reach=4.0)
 LOW = 10.0
 """Hz, of the floater's slow motions: edges count more there than at the rotor's frequency."""
+DOUBT = 1.5
+"""Against converged elements at iω, what was measured was 0.75 and 0.81 times the truth at 10 Hz, 1.14 to 1.34 at 110 Hz."""
 FORMAT = "spinlev edges 1"
 
 
@@ -53,10 +55,10 @@ def measured_edge_error(plate: Plate, places: Array, frequency: float) -> float:
     """Relative error of an infinite slab's reaction at `places` (n, 3) m, for a plate with edges.
 
     The first place's own tensor at a low frequency and at `frequency` (Hz), where also the field there of dipoles at
-    the others.  In three comparisons with converged elements at 110 Hz it was 1.14 to 1.34 times the truth.
+    the others.
     """
     body = plate.box.to_body(places)
-    return max(_change(plate, body[:1], LOW), _change(plate, body, frequency))
+    return DOUBT * max(_change(plate, body[:1], LOW), _change(plate, body, frequency))
 
 
 def _change(plate: Plate, body: Array, frequency: float) -> float:

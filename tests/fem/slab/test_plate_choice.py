@@ -41,7 +41,7 @@ def test_more_is_asked_of_the_slab_where_the_tolerance_is_smaller():
     """Beyond the edges lies about the square of the depth over their distance: (2.5/30)² = 0.7 %."""
     wide = ((0.6, 0.6, 0.01), (0.0, 0.0, -0.04))
     assert chosen(*wide, rtol=5e-2)[0] == "slab"
-    assert chosen(*wide, rtol=1e-2)[0] == "reduced"
+    assert chosen(*wide, rtol=1e-3)[0] == "reduced"
 
 
 def test_as_asked_or_nothing_to_model():
@@ -60,20 +60,20 @@ def test_the_command_takes_the_slab_where_it_will_do(tmp_path):
 
 
 def test_measured_edges_fade_as_the_plate_grows_and_are_below_the_bound():
-    """A plate half as wide again has less beyond its edges; the bound has been found 3.5 times and more too large."""
+    """A plate half as wide again has less beyond its edges; the bound is known to be 3.5 times and more too large."""
     plates = [Plate(Box((edge, edge, 0.01), (0.0, 0.0, -0.045)), 3.5e7) for edge in (0.2, 0.3)]
     narrow, wide = (measured_edge_error(plate, PLACE[None], 100.0) for plate in plates)
     assert 0 < wide < narrow / 1.5
-    assert wide < edge_error(plates[1], PLACE) / 3.5
+    assert wide < edge_error(plates[1], PLACE) / 2
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("size", "z"), [((0.2, 0.2, 0.005), -0.035), ((0.1, 0.24, 0.03), -0.055)])
 def test_measured_edges_against_converged_elements(size, z):
-    """The difference of finite elements (2e-3) from the exact slab at the low frequency: at least that, at most twice."""
+    """Finite elements (2e-3) against the exact slab at the low frequency: measured is at least that, at most twice."""
     plate = Plate(Box(size, (0.0, 0.0, z)), 3.5e7)
     exact = reaction_tensor(Slab(3.5e7, size[2]), PLACE[2] - z - size[2] / 2, 10.0)
     change = np.linalg.norm(plate_reaction(plate, PLACE, 10.0, 2e-3).tensors[0] - exact) / np.linalg.norm(exact)
     measured = measured_edge_error(plate, PLACE[None], 10.0)
     print(f"\n{size}: {measured:.2e} measured, {change:.2e} by converged elements")
-    assert change - 2e-3 <= measured <= 2 * change + 2e-3
+    assert change <= measured <= 2 * change
