@@ -29,7 +29,7 @@ ORDER, RULE = 2, MeshRule(reach=4.0)
 LOW = 10.0
 """Hz, of the floater's slow motions: edges count more there than at the rotor's frequency."""
 DOUBT = 1.5
-"""Against converged elements at iω, what was measured was 0.75 and 0.81 times the truth at 10 Hz, 1.14 to 1.34 at 110 Hz."""
+"""Against converged elements at iω, changes were 0.75 and 0.81 times the truth at 10 Hz, 1.14 to 1.34 at 110 Hz."""
 FORMAT = "spinlev edges 1"
 
 
