@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from ...fem.closed_forms import ComplexArray
-from ...fem.plate_network import Region, plate_reaction
+from ...fem.plate_currents import Region, plate_reaction
 from ...fem.plate_tables import cached_plate_table
 from ...fem.slab import Slab, edge_error, reaction_tensor
 from ...fem.storage import write_whole

@@ -7,7 +7,7 @@ import pytest
 from ngsolve import SetNumThreads
 from second_opinions.phasor import mean_loss
 
-from spinlev.fem.plate_network import plate_reaction
+from spinlev.fem.plate_currents import plate_reaction
 from spinlev.fem.rotor_tables import AccuracyError
 from spinlev.fem.slab import Slab, reaction_tensor
 from spinlev.geometry.basics import Box, rotation_matrix
