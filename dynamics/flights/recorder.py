@@ -1,7 +1,5 @@
 """Samples of a long motion: evenly spaced, and never more than fit."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from ...geometry.basics import Array

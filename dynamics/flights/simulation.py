@@ -1,7 +1,5 @@
 """From a scene to a flight: where it starts, and the flight itself."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """A simulated flight."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from ...geometry.basics import Array

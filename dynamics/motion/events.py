@@ -4,8 +4,6 @@ The distance of the floater's centre from a box is exact, faces, edges and corne
 of the box that was nearest when it began; a contact that this may miss is found by `clearance` at the samples.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import heyoka as hy

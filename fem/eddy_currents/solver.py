@@ -13,8 +13,6 @@ symmetric and superconvergent (its error is the square of the energy error).  A.
 Electromagnetism (1998), ch. 8; O. Bíró, Comput. Methods Appl. Mech. Engrg. 169 (1999) 391.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

@@ -6,8 +6,6 @@ their vector potential at the quadrature points of the conductors, so that any f
 S. Zaglmayr, High order finite element methods for electromagnetic field computation, thesis, Linz 2006 (the space).
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Protocol
 

@@ -8,8 +8,6 @@ potential is u = Σ conj a_lm Υ_lm(r̃) and that of the sphere's own sources u 
 because 1/|r - s| = Σ conj Υ_lm(r) Θ_lm(s) makes a charge's c_lm = conj Υ_lm its weight in U.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 

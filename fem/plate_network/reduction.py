@@ -6,8 +6,6 @@ the network takes as many states as their reaction tensors need.  Then all is re
 used; where the error is too large there, it joins the snapshots, and another is tried.
 """
 
-from __future__ import annotations
-
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass

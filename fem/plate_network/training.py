@@ -1,7 +1,5 @@
 """Training of a plate's network: sources on a grid of the region, probes off it, and the error of a basis for them."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 

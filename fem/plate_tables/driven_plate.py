@@ -1,7 +1,5 @@
 """A plate that both the floater's dipole and the turning rotor drive: one network, with field functions and share."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import ArrayLike
 

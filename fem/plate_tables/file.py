@@ -1,7 +1,5 @@
 """A plate table as one self-describing netCDF file, and its place in the cache."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 from collections.abc import Callable, Sequence

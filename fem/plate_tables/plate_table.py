@@ -1,7 +1,5 @@
 """A plate as a table: a passive network whose field functions are harmonic where the floater is."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 

@@ -8,8 +8,6 @@ of degree -(l+1), so that curl (r × ∇Ψ_l) = l ∇Ψ_l, and B = -∇Ψ is the
 What the table knows of recoil permeability and mutual demagnetisation thus reaches the plate with all its moments.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property

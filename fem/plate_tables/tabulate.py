@@ -1,7 +1,5 @@
 """The table of a plate: the network of its currents, then its field functions."""
 
-from __future__ import annotations
-
 import time
 from importlib.metadata import version
 
