@@ -7,8 +7,6 @@ truncation: a sphere of radius R without normal field answers a moment with the 
 on the plate's induced moment α m, so that G is off by up to |α|² μ0/(2πR³), with R the half edge of the air box.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np
