@@ -6,7 +6,7 @@ A. Jorba and M. Zou, Exp. Math. 14 (2005) 99; heyoka: F. Biscani and D. Izzo, MN
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from time import perf_counter
 
 import heyoka as hy
@@ -17,8 +17,9 @@ from ...geometry.scenes import Scene
 from ..motion import CONTACT, Parameter, State, clearance, plate_legs, plate_places
 from .checkpoint import Checkpoint, Progress
 from .compiled_flight import Flight
+from .local_flight import LEFT, LocalFlight
 from .recorder import Recorder
-from .trajectory import DURATION, STOPPED, FlightStopped, Trajectory
+from .trajectory import DURATION, STOPPED, FieldChanges, FlightStopped, Trajectory
 
 PIECE_TURNS, PIECE_SAMPLES = 256, 256
 """The most turns and samples between two looks at what has been flown.
@@ -42,11 +43,12 @@ class _Log:
     ended_by: str = DURATION
     steps: int = 0
     latest: Progress | None = None
+    changes: FieldChanges = field(default_factory=FieldChanges)
 
 
 def integrate(
     scene: Scene,
-    flight: Flight,
+    flight: Flight | LocalFlight,
     start: State,
     duration: float,
     progress: Callable[[float], None] | None = None,
@@ -71,51 +73,76 @@ def integrate(
     FlightStopped : by a keyboard interrupt; it has what is finished, and so has the checkpoint
     IntegrationError : the state became infinite
     """
-    scales = flight.scales
-    values = _begin(flight, start, np.zeros(0) if currents is None else currents)
+    scales, log, began = flight.scales, _Log(), perf_counter()
+    values = _begin(flight, start, np.zeros(0) if currents is None else currents, log)
     turn = 1 / abs(scene.frequency) if scene.frequency else np.inf
     interval = min(turn / SAMPLES_PER_TURN, duration / 1000) / scales.time
-    recorder, log, began = Recorder(flight.integrator.state, interval, MOST_SAMPLES), _Log(), perf_counter()
+    first = _booked(scene, flight.part(values), values, np.zeros(1), flight.part(values).integrator.state[None])
+    scale = _scale(scene, flight.part(values), values)
+    recorder = Recorder(first[0], interval, MOST_SAMPLES)
     known = checkpoint.read() if checkpoint else None
     if known is not None:
-        values, log.steps = known.restore(flight, recorder)
-    first = recorder.times[-1]
+        values, log.steps, log.changes = known.restore(flight, recorder)
+    began_at, compiled = recorder.times[-1], flight.compile_seconds
     try:
         _fly(scene, flight, values, duration, recorder, log, progress, checkpoint)
     except KeyboardInterrupt:
         log.ended_by = STOPPED
         if checkpoint and log.latest:
             checkpoint.write(log.latest)
-    seconds = perf_counter() - began
+    seconds = perf_counter() - began - (flight.compile_seconds - compiled)
     time = np.minimum(recorder.times * scales.time, duration)
     flown = Trajectory(
         time=time,
         lab=scales.unpack(recorder.states).to_lab(scene.angular_velocity * time),
         angular_velocity=scene.angular_velocity,
         ended_by=log.ended_by,
-        energy_error=flight.energy_error(recorder.times, recorder.states, plate_places(scene, values, recorder.times)),
-        realtime_factor=float((recorder.times[-1] - first) * scales.time / seconds),
+        energy_error=_violation(recorder.states, scale),
+        realtime_factor=float((recorder.times[-1] - began_at) * scales.time / seconds),
         steps=log.steps,
         compile_seconds=flight.compile_seconds,
+        field_changes=log.changes.relative(scale),
     )
     if log.ended_by == STOPPED:
         raise FlightStopped(flown)
     return flown
 
 
-def _begin(flight: Flight, start: State, currents: Array) -> Array:
+def _begin(flight: Flight | LocalFlight, start: State, currents: Array, log: _Log) -> Array:
     """Set the integrator to the start; the runtime parameters with the distance at which the floater is lost."""
-    flight.integrator.time = 0.0
     values = flight.values.copy()
-    flight.integrator.state[:] = flight.state(start, currents)
-    flight.integrator.reset_cooldowns()
     values[Parameter.LOST_DISTANCE] = max(0.1, 2 * float(np.linalg.norm(start.position))) / flight.scales.length
+    log.changes = FieldChanges(error=flight.enter(start, values))
+    integrator = flight.part(values).integrator
+    integrator.time = 0.0
+    integrator.state[:] = flight.state(start, currents)
+    integrator.reset_cooldowns()
     return values
+
+
+def _booked(scene: Scene, flight: Flight, values: Array, times: Array, states: Array) -> Array:
+    """States whose last is the ledger's sum, at scaled times."""
+    needed = values[: max(len(Parameter), flight.ledger.nparams)]
+    return flight.books(times, states, plate_places(scene, needed, times))
+
+
+def _scale(scene: Scene, flight: Flight, values: Array) -> float:
+    """Of the ledger, at the start: its sum, or its largest term where the terms nearly cancel."""
+    start = np.zeros(1)
+    terms = flight.terms(start, flight.integrator.state[None], plate_places(scene, values, start))
+    largest, whole = float(np.abs(terms).max()), abs(float(terms.sum()))
+    return whole if whole > 1e-3 * largest else largest
+
+
+def _violation(states: Array, scale: float) -> float:
+    """Largest relative violation of J - work = constant or of |m̂| = 1."""
+    length = np.linalg.norm(states[:, 6:9], axis=1)
+    return float(max(np.abs(states[:, -1] - states[0, -1]).max() / scale, np.abs(length - 1).max()))
 
 
 def _fly(
     scene: Scene,
-    flight: Flight,
+    flight: Flight | LocalFlight,
     values: Array,
     duration: float,
     recorder: Recorder,
@@ -124,21 +151,17 @@ def _fly(
     checkpoint: Checkpoint | None,
 ) -> None:
     """Propagate in pieces until something ends the flight."""
-    integrator, scales, kept = flight.integrator, flight.scales, perf_counter()
+    scales, kept = flight.scales, perf_counter()
     for end, depth, speed in plate_legs(scene.plate, duration):
         values[Parameter.PLATE_DEPTH] = depth / scales.length
         values[Parameter.PLATE_SPEED] = speed * scales.time / scales.length
-        integrator.pars[:] = values[: len(integrator.pars)]
-        while integrator.time < end / scales.time:
-            count = int(np.clip(PIECE_TURNS * 2 * np.pi / recorder.interval, 1, PIECE_SAMPLES))
-            grid = recorder.grid(integrator.time, end / scales.time, count)
-            outcome, _, _, steps, _, states = integrator.propagate_grid(grid)
-            times, states, log.ended_by = _ending(scene, flight, outcome, grid, states)
-            log.steps += steps
-            over = log.ended_by != DURATION or times[-1] * scales.time >= duration * (1 - 1e-12)
+        while flight.part(values).integrator.time < end / scales.time:
+            log.changes = flight.onward(values, log.changes)
+            times, states = _piece(scene, flight.part(values), values, end / scales.time, recorder, log)
+            over = log.ended_by not in (DURATION, LEFT) or times[-1] * scales.time >= duration * (1 - 1e-12)
             recorder.add(times[1:], states[1:], over)
             if checkpoint:
-                log.latest = Progress.of(flight, values, recorder, log.steps)
+                log.latest = Progress.of(flight.part(values), values, recorder, log.steps, log.changes)
             if progress is not None:
                 progress(min(1.0, times[-1] * scales.time / duration))
             if over:
@@ -146,6 +169,19 @@ def _fly(
             if checkpoint and log.latest and perf_counter() - kept > CHECKPOINT_SECONDS:
                 checkpoint.write(log.latest)
                 kept = perf_counter()
+
+
+def _piece(
+    scene: Scene, flight: Flight, values: Array, end: float, recorder: Recorder, log: _Log
+) -> tuple[Array, Array]:
+    """Fly on to the end of a piece or to an event: scaled times and states, of which the last is the ledger's sum."""
+    flight.integrator.pars[:] = values[: len(flight.integrator.pars)]
+    count = int(np.clip(PIECE_TURNS * 2 * np.pi / recorder.interval, 1, PIECE_SAMPLES))
+    grid = recorder.grid(flight.integrator.time, end, count)
+    outcome, _, _, steps, _, states = flight.integrator.propagate_grid(grid)
+    times, states, log.ended_by = _ending(scene, flight, outcome, grid, states)
+    log.steps += steps
+    return times, _booked(scene, flight, values, times, states)
 
 
 def _ending(
@@ -162,6 +198,8 @@ def _ending(
         times = np.append(times, flight.integrator.time)
         states = np.vstack([states, flight.integrator.state])
         ended_by = flight.meanings[-outcome.value - 1]
+    if flight.meanings == [LEFT]:
+        return times, states, ended_by
     gap = clearance(scene, times * flight.scales.time, states[:, :3] * flight.scales.length)
     touching = np.flatnonzero(gap < -1e-9)
     if len(touching):

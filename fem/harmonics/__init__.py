@@ -1,5 +1,6 @@
 """How is a field outside or between its sources written as a sum of solid harmonics?"""
 
+from .ball_field import BallField
 from .compiled import CompiledField, FieldExpressions, as_columns, field_and_gradient
 from .expressions import harmonic_sums
 from .interior import (
@@ -46,6 +47,7 @@ __all__ = [
     "FOUR_PI",
     "UPPER",
     "Ball",
+    "BallField",
     "Coefficients",
     "CompiledField",
     "FieldExpressions",
