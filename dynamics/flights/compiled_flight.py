@@ -78,11 +78,6 @@ class Flight:
         pars = np.ascontiguousarray(values.T[: self.ledger.nparams])
         return np.asarray(self.ledger(np.ascontiguousarray(states[:, :-1].T), pars=pars, time=times))
 
-    def books(self, times: Array, states: Array, values: Array) -> Array:
-        """The states with J - work, which never changes, in the place of the work; arguments as of `terms`."""
-        found = self.terms(times, states, values).sum(axis=0) - states[:, -1]
-        return np.concatenate([states[:, :-1], found[:, None]], axis=1)
-
 
 def compile_flight(
     scene: Scene,

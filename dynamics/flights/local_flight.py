@@ -13,59 +13,31 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-import heyoka as hy
 import numpy as np
 
 from ...fem.harmonics import BallField
 from ...fem.rotor_tables import FieldTable
 from ...geometry.basics import Array
 from ...geometry.scenes import Scene
-from ..motion import Parameter, PlateMemory, Scales, State, equations_of_motion, parameters
+from ..motion import Parameter, PlateMemory, Scales, State, parameters
+from .ball_parts import DEGREE, LARGE, SMALL, Parts, is_long
 from .balls import Balls
-from .compiled_flight import TOLERANCE, Flight, compile_flight, flight_of
+from .compiled_flight import TOLERANCE, Flight, compile_flight
 from .trajectory import FieldChanges
 
-LEFT = "left"
-DEGREE = len(Parameter)
-"""Number of the runtime parameter that says of which degree the ball is: 0 where there is none."""
-SMALL, LARGE = BallField(DEGREE + 1, 7), BallField(DEGREE + 1, 9)
-"""The second kind, twice as wide and half again as slow, is for a floater that has left a small ball."""
 INSIDE = 1 - 1e-9
 """Square of the distance from a ball's centre, in radii, from which on the floater has left it."""
-LOOSER = 300
-"""A step's error is relative to the largest of states and events: 250 and more by the event of loss, 3 in a ball.
-
-Measured: in a ball J drifts by 3e-14 in 1100 turns at 3e-14, and by 2e-14 in the table's field at 1e-16.
-"""
 STAY = 4.0
 """A ball is worth its making if the floater needs so many radians of the rotor's turn for its radius."""
-STRAIGHT_TURNS = 1.5e5
-"""Turns from which on straight code saves more time (15 of 36 µs a step) than its compilation takes (13 s)."""
-WORTH = 200
-"""Length of a field's decomposed expressions from which on balls are faster.
-
-A dipole has 41, a cuboid's closed form 113, two of them 189, a cube's table 206 from 11.5 mm off the faces on and 390
-from contact on; small balls 87, with more coefficients.
-"""
 
 
 @dataclass(frozen=True, eq=False)
 class LocalFlight:
-    """A flight in balls, and beside bodies in the table's own field.
-
-    Parameters
-    ----------
-    scene, table : the problem
-    duration, tolerance, compact, memory : as of `compile_flight`
-    """
+    """A flight of `scene` in the field of `table`: its `parts` fly in balls, and beside bodies in the table's own field."""
 
     scene: Scene
     table: FieldTable
-    duration: float
-    tolerance: float
-    compact: bool | None
-    memory: PlateMemory | None
-    _parts: dict[int, Flight] = field(default_factory=dict)
+    parts: Parts
     _balls: dict[tuple[int, float], Balls] = field(default_factory=dict)
 
     @property
@@ -81,15 +53,15 @@ class LocalFlight:
     @property
     def compile_seconds(self) -> float:
         """Time that compilation took so far."""
-        return sum(part.compile_seconds for part in self._parts.values())
+        return self.parts.compile_seconds
 
     def state(self, start: State, currents: Array) -> Array:
         """See `Flight.state`."""
-        return self.compile(SMALL.degree).state(start, currents)
+        return self.parts.of(SMALL.degree).state(start, currents)
 
     def part(self, values: Array) -> Flight:
         """What flies on with these runtime parameters."""
-        return self.compile(int(values[DEGREE]))
+        return self.parts.of(int(values[DEGREE]))
 
     def enter(self, start: State, values: Array) -> float:
         """Set the runtime parameters to the small ball of where the flight starts, if it has one; its error."""
@@ -153,25 +125,6 @@ class LocalFlight:
         following.integrator.reset_cooldowns()
         return jump
 
-    def compile(self, degree: int) -> Flight:
-        """The part for balls of a degree, or for none; compiled once."""
-        if degree not in self._parts:
-            self._parts[degree] = self._compiled(degree)
-        return self._parts[degree]
-
-    def _compiled(self, degree: int) -> Flight:
-        scene, memory = self.scene, self.memory
-        if not degree:
-            return compile_flight(scene, self.table, self.duration, self.tolerance, True, memory)
-        formula = BallField(DEGREE + 1, degree)
-        tilted, conducting = bool(np.any(scene.gravity[:2])), bool(scene.floater.conductivity)
-        equations = equations_of_motion(formula, tilted, memory, conducting, scene.angular_velocity)
-        offset = formula.offset([hy.par[Parameter.LENGTH] * x for x in equations.variables[:3]])
-        leaves = hy.t_event(1.0 - hy.sum([t * t for t in offset]), direction=hy.event_direction.negative)
-        long = memory is None and degree == SMALL.degree and scene.frequency * self.duration > STRAIGHT_TURNS
-        straight = long if self.compact is None else not self.compact
-        return flight_of(scene, equations, ([leaves], [LEFT]), LOOSER * self.tolerance, not straight, memory)
-
 
 def compile_local_flight(
     scene: Scene,
@@ -187,14 +140,6 @@ def compile_local_flight(
     """
     if not is_long(table):
         return compile_flight(scene, table, duration, tolerance, compact, memory)
-    flight = LocalFlight(scene, table, duration, tolerance, compact, memory)
-    flight.compile(SMALL.degree)
-    return flight
-
-
-def is_long(table: FieldTable) -> bool:
-    """Whether a field's expressions are longer than those of a ball."""
-    position = hy.make_vars("x", "y", "z")
-    b, gradient = table.expressions(position)
-    outputs = [*b, *(e for row in gradient for e in row)]
-    return len(hy.cfunc(outputs, position, compact_mode=True, opt_level=0).dc) > WORTH
+    parts = Parts(scene, table, duration, tolerance, compact, memory)
+    parts.of(SMALL.degree)
+    return LocalFlight(scene, table, parts)
