@@ -33,7 +33,7 @@ STAY = 4.0
 
 @dataclass(frozen=True, eq=False)
 class LocalFlight:
-    """A flight of `scene` in the field of `table`: its `parts` fly in balls, and beside bodies in the table's own field."""
+    """A flight of a scene in a table's field: its parts fly in balls, and beside bodies in the table's own field."""
 
     scene: Scene
     table: FieldTable

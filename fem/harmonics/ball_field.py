@@ -11,18 +11,17 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import cache, cached_property
+from functools import cache
 
 import heyoka as hy
 import numpy as np
-from numpy.typing import NDArray
 
 from ...geometry.basics import Array
 from .compiled import FieldExpressions
-from .interior import Ball, factorials, gradient_coefficients, sphere
+from .interior import Ball
 from .multipole import UPPER
-from .regular_sums import real_weights, regular_harmonics, weighted
-from .solid import Coefficients, regular_values
+from .regular_sums import regular_harmonics, weighted
+from .sphere_fit import derivatives, sphere_fit
 
 
 @dataclass(frozen=True)
@@ -63,74 +62,26 @@ class BallField:
 
         The error is the largest on the surface, of B or of its gradient, by the root mean square there.
         """
-        fitting = _fitting(self.degree)
+        fitting, (size, less) = sphere_fit(self.degree), (self.degree**2, (self.degree - 1) ** 2)
         field, gradient = evaluate(ball.center + ball.radius * fitting.normals)
-        weights = fitting.weights @ np.einsum("na,na->n", field, fitting.normals)
-        weights[3 * self.degree**2 :] /= ball.radius
-        misses = fitting.values(weights) - np.vstack([field.T, *(gradient[:, i, j] for i, j in UPPER)])
-        error = max(
-            _relative(misses[:3], field.T), _relative(misses[3:], np.array([gradient[:, i, j] for i, j in UPPER]))
-        )
-        return np.concatenate([ball.center, [1 / ball.radius], weights]), error
-
-
-@dataclass(frozen=True, eq=False)
-class _Fitting:
-    """From the normal component of B on the unit sphere to the weights of B and its gradient, and to values there.
-
-    Parameters
-    ----------
-    degree : of the potential
-    normals : (n, 3) points
-    """
-
-    degree: int
-    normals: Array
-
-    @cached_property
-    def weights(self) -> Array:
-        """(3 degree² + 5 (degree - 1)², n)"""
-        return np.stack([self._of(row) for row in self._potentials], axis=1)
-
-    @property
-    def _potentials(self) -> NDArray[np.complex128]:
-        """(n, L+1, L+1) a_lm by a unit normal component at one of the points."""
-        harmonics, result = (
-            regular_values(self.degree, *self.normals.T),
-            np.zeros((len(self.normals), *2 * [self.degree + 1]), complex),
-        )
-        _, areas = sphere(self.degree)
-        for (l, m), values in harmonics.items():
-            if l:
-                result[:, l, m] = -(2 * l + 1) / (4 * np.pi * l) * values * areas
-        return np.asarray(factorials(self.degree) * result, complex)
-
-    @staticmethod
-    def _of(potential: Coefficients) -> Array:
-        slopes = [-gradient_coefficients(potential, axis) for axis in range(3)]
-        return np.concatenate(
-            [real_weights(s) for s in slopes] + [real_weights(gradient_coefficients(slopes[i], j)) for i, j in UPPER]
-        )
-
-    @cached_property
-    def _basis(self) -> Array:
-        x = hy.make_vars("x", "y", "z")
-        outputs = regular_harmonics(self.degree - 1, x, hy.sum([t * t for t in x]))
-        return np.asarray(hy.cfunc(outputs, x, compact_mode=True)(np.ascontiguousarray(self.normals.T)))
-
-    def values(self, weights: Array) -> Array:
-        """The three components of B and the five of its gradient, (8, n)."""
-        size, less = self.degree**2, (self.degree - 1) ** 2
-        field = weights[: 3 * size].reshape(3, size) @ self._basis
-        return np.vstack([field, weights[3 * size :].reshape(5, less) @ self._basis[:less]])
+        slopes = np.array([gradient[:, i, j] for i, j in UPPER])
+        weights = _weights(self.degree) @ np.einsum("na,na->n", field, fitting.normals)
+        weights[3 * size :] /= ball.radius
+        field_error = _relative_miss(weights[: 3 * size].reshape(3, size) @ fitting.basis - field.T, field.T)
+        slope_error = _relative_miss(weights[3 * size :].reshape(5, less) @ fitting.basis[:less] - slopes, slopes)
+        return np.concatenate([ball.center, [1 / ball.radius], weights]), max(field_error, slope_error)
 
 
 @cache
-def _fitting(degree: int) -> _Fitting:
-    return _Fitting(degree, sphere(degree)[0])
+def _weights(degree: int) -> Array:
+    """(3 degree² + 5 (degree - 1)², n): those of B and of its gradient by the normal component of B on the sphere."""
+    first, second, potential = derivatives(degree), derivatives(degree - 1), sphere_fit(degree).potential
+    field = [-slope @ potential for slope in first]
+    return np.concatenate([*field, *(second[j] @ field[i] for i, j in UPPER)])
 
 
-def _relative(missed: Array, values: Array) -> float:
+def _relative_miss(missed: Array, values: Array) -> float:
+    """Largest norm of what is missed (k, n) by the root mean square of the norm of the values (k, n)."""
     size = float(np.sqrt(np.mean(np.sum(values**2, axis=0))))
     worst = float(np.sqrt(np.max(np.sum(missed**2, axis=0))))
     return worst / size if size else worst
