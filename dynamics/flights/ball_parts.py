@@ -10,7 +10,7 @@ import numpy as np
 from ...fem.harmonics import BallField
 from ...fem.rotor_tables import FieldTable
 from ...geometry.scenes import Scene
-from ..motion import Parameter, PlateMemory, equations_of_motion
+from ..motion import Equations, Parameter, PlateMemory, equations_of_motion
 from .compiled_flight import Flight, compile_flight, flight_of
 
 LEFT = "left"
@@ -66,14 +66,21 @@ class Parts:
         scene, memory = self.scene, self.memory
         if not degree:
             return compile_flight(scene, self.table, self.duration, self.tolerance, True, memory)
-        formula = BallField(DEGREE + 1, degree)
-        tilted, conducting = bool(np.any(scene.gravity[:2])), bool(scene.floater.conductivity)
-        equations = equations_of_motion(formula, tilted, memory, conducting, scene.angular_velocity)
-        offset = formula.offset([hy.par[Parameter.LENGTH] * x for x in equations.variables[:3]])
-        leaves = hy.t_event(1.0 - hy.sum([t * t for t in offset]), direction=hy.event_direction.negative)
+        equations, inside = ball_equations(scene, BallField(DEGREE + 1, degree), memory)
+        leaves = hy.t_event(inside, direction=hy.event_direction.negative)
         long = memory is None and degree == SMALL.degree and scene.frequency * self.duration > STRAIGHT_TURNS
         straight = long if self.compact is None else not self.compact
         return flight_of(scene, equations, ([leaves], [LEFT]), LOOSER * self.tolerance, not straight, memory)
+
+
+def ball_equations(
+    scene: Scene, formula: BallField, memory: PlateMemory | None = None
+) -> tuple[Equations, hy.expression]:
+    """The motion in a ball, and what becomes negative outside of it."""
+    tilted, conducting = bool(np.any(scene.gravity[:2])), bool(scene.floater.conductivity)
+    equations = equations_of_motion(formula, tilted, memory, conducting, scene.angular_velocity)
+    offset = formula.offset([hy.par[Parameter.LENGTH] * x for x in equations.variables[:3]])
+    return equations, 1.0 - hy.sum([t * t for t in offset])
 
 
 def is_long(table: FieldTable) -> bool:

@@ -12,7 +12,7 @@ import numpy as np
 
 from ...geometry.basics import Array
 from ...geometry.scenes import Scene
-from ..motion import Parameter, State, plate_legs
+from ..motion import Parameter, State, lost_distance, plate_legs
 from .ball_parts import LEFT
 from .checkpoint import Checkpoint, Progress
 from .compiled_flight import Flight
@@ -67,7 +67,7 @@ def integrate(
         values, log.steps, log.changes = known.restore(flight, recorder)
     began_at, compiled = recorder.times[-1], flight.compile_seconds
     try:
-        _fly(scene, flight, values, duration, recorder, log, progress, checkpoint)
+        fly(scene, flight, values, duration, recorder, log, progress, checkpoint)
     except KeyboardInterrupt:
         log.ended_by = STOPPED
         if checkpoint and log.latest:
@@ -93,7 +93,7 @@ def integrate(
 def _begin(flight: Flight | LocalFlight, start: State, currents: Array, log: Log) -> Array:
     """Set the integrator to the start; the runtime parameters with the distance at which the floater is lost."""
     values = flight.values.copy()
-    values[Parameter.LOST_DISTANCE] = max(0.1, 2 * float(np.linalg.norm(start.position))) / flight.scales.length
+    values[Parameter.LOST_DISTANCE] = lost_distance(start.position) / flight.scales.length
     log.changes = FieldChanges(error=flight.enter(start, values))
     integrator = flight.part(values).integrator
     integrator.time = 0.0
@@ -102,7 +102,7 @@ def _begin(flight: Flight | LocalFlight, start: State, currents: Array, log: Log
     return values
 
 
-def _fly(
+def fly(
     scene: Scene,
     flight: Flight | LocalFlight,
     values: Array,
@@ -131,3 +131,19 @@ def _fly(
             if checkpoint and log.latest and perf_counter() - kept > CHECKPOINT_SECONDS:
                 checkpoint.write(log.latest)
                 kept = perf_counter()
+
+
+def fly_on(
+    scene: Scene, flight: Flight | LocalFlight, values: Array, time: float, state: Array, duration: float
+) -> tuple[str, float, Array]:
+    """Fly from a scaled time and state (12,) on until `duration` (s) after t = 0: the end, scaled time and state then.
+
+    The runtime parameters `values` change as the flight does.
+    """
+    integrator = flight.part(values).integrator
+    integrator.time = time
+    integrator.state[:] = np.append(state, 0.0)
+    integrator.reset_cooldowns()
+    log, recorder = Log(), Recorder(integrator.state, duration / flight.scales.time / MOST_SAMPLES, MOST_SAMPLES)
+    fly(scene, flight, values, duration, recorder, log, None, None)
+    return log.ended_by, float(recorder.times[-1]), recorder.states[-1, :12]

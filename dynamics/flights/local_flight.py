@@ -65,7 +65,7 @@ class LocalFlight:
 
     def enter(self, start: State, values: Array) -> float:
         """Set the runtime parameters to the small ball of where the flight starts, if it has one; its error."""
-        return self._enter(SMALL, start.position, self.scales.pack(start), values)
+        return self.enter_ball(SMALL, start.position, self.scales.pack(start), values)
 
     def onward(self, values: Array, changes: FieldChanges) -> FieldChanges:
         """Go over to another ball once the floater has left its own; what has been done of that.
@@ -78,7 +78,7 @@ class LocalFlight:
             return changes
         after = values.copy()
         asked = np.array(center) if degree == SMALL.degree else place
-        error = self._enter(LARGE, asked, before.integrator.state, after)
+        error = self.enter_ball(LARGE, asked, before.integrator.state, after)
         if degree == after[DEGREE] == 0:
             return changes
         jump = self._change(before, values, after)
@@ -87,7 +87,7 @@ class LocalFlight:
             changes.count + 1, changes.energy + jump, changes.total + abs(jump), max(changes.error, error)
         )
 
-    def _enter(self, formula: BallField, asked: Array, state: Array, values: Array) -> float:
+    def enter_ball(self, formula: BallField, asked: Array, state: Array, values: Array) -> float:
         """Set the ball of the place `asked` if it holds a scaled state, else that of its place, else none; its error.
 
         None either for a floater that would leave it at once.

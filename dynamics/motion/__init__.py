@@ -2,7 +2,7 @@
 
 from .blend import blend_tables, chebyshev_points
 from .equations import Equations, equations_of_motion, parameters
-from .events import CONTACT, clearance, flight_events, plate_depth, plate_legs, plate_places, rotor_gap
+from .events import CONTACT, clearance, flight_events, lost_distance, plate_depth, plate_legs, plate_places, rotor_gap
 from .movable import MovableField, Move, Rotation, Translation
 from .plate_force import PlateForce
 from .plate_terms import PlateMemory
@@ -28,6 +28,7 @@ __all__ = [
     "clearance",
     "equations_of_motion",
     "flight_events",
+    "lost_distance",
     "parameters",
     "plate_depth",
     "plate_legs",
