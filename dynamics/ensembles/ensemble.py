@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -11,10 +12,10 @@ import numpy as np
 from ...fem.rotor_tables import FieldTable
 from ...geometry.basics import InputError
 from ...geometry.scenes import Scene
-from ..flights import TOLERANCE, LocalFlight, Parts
-from ..motion import State
+from ..flights import DEGREE, LARGE, SMALL, TOLERANCE, LocalFlight, Parts, fly_on
+from ..motion import CONTACT, Parameter, State, clearance, lost_distance
 from .endings import Endings
-from .lanes import Lanes
+from .lanes import Flying, Lanes
 
 TOGETHER = 512
 """Flights that a worker gets at once."""
@@ -56,13 +57,36 @@ def ensemble(
 
 
 def _flown(scene: Scene, table: FieldTable, duration: float, starts: State) -> Endings:
-    moment = starts.moment / np.linalg.norm(starts.moment, axis=1, keepdims=True)
-    starts = State(starts.position, starts.velocity, moment, starts.spin)
+    """In lanes, in small balls first, then in large ones; at last one by one near bodies, and where it is too fast."""
     flight = LocalFlight(scene, table, Parts(scene, table, duration, TOLERANCE, True, None))
-    ends = Lanes(flight, duration).fly(starts)
+    flights = [_begun(flight, k, State(*(v[k] for v in starts.vectors))) for k in range(len(starts.position))]
+    over: list[Flying] = []
+    for formula in (SMALL, LARGE):
+        here = [f for f in flights if not f.ended_by and f.values[DEGREE] == formula.degree]
+        over += [f for f in flights if f.ended_by]
+        rest = [f for f in flights if not f.ended_by and f.values[DEGREE] != formula.degree]
+        flights = rest + Lanes(flight, formula, duration).fly(here)
+    over += [f if f.ended_by else _alone(flight, f, duration) for f in flights]
+    over.sort(key=lambda f: f.number)
     return Endings(
-        np.array([end.ended_by for end in ends]),
-        np.minimum([end.time * flight.scales.time for end in ends], duration),
-        flight.scales.unpack(np.array([end.state for end in ends])),
-        np.array([end.changes for end in ends]),
+        np.array([f.ended_by for f in over]),
+        np.minimum([f.time * flight.scales.time for f in over], duration),
+        flight.scales.unpack(np.array([f.state for f in over])),
+        np.array([f.changes for f in over]),
     )
+
+
+def _begun(flight: LocalFlight, number: int, start: State) -> Flying:
+    """A flight at t = 0; over if it begins in contact."""
+    start = replace(start, moment=start.moment / np.linalg.norm(start.moment))
+    values, state = flight.values, flight.scales.pack(start)
+    values[Parameter.LOST_DISTANCE] = lost_distance(start.position) / flight.scales.length
+    free = clearance(flight.scene, np.zeros(1), start.position[None])[0] >= 0
+    if free:
+        flight.enter(start, values)
+    return Flying(number, values, 0.0, state, ended_by="" if free else CONTACT)
+
+
+def _alone(flight: LocalFlight, flying: Flying, duration: float) -> Flying:
+    ended_by, time, state = fly_on(flight.scene, flight, flying.values, flying.time, flying.state, duration)
+    return replace(flying, time=time, state=state, ended_by=ended_by)

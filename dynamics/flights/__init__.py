@@ -1,6 +1,6 @@
 """How does the floater fly?"""
 
-from .ball_parts import DEGREE, LOOSER, SMALL, Parts, ball_equations
+from .ball_parts import DEGREE, LARGE, LOOSER, SMALL, Parts, ball_equations
 from .checkpoint import Checkpoint
 from .compiled_flight import TOLERANCE
 from .integration import fly_on
@@ -13,6 +13,7 @@ from .trajectory import DURATION, FlightStopped, Trajectory
 __all__ = [
     "DEGREE",
     "DURATION",
+    "LARGE",
     "LOOSER",
     "SMALL",
     "TOLERANCE",

@@ -57,8 +57,7 @@ def integrate(
     """
     scales, log, began = flight.scales, Log(), perf_counter()
     values = _begin(flight, start, np.zeros(0) if currents is None else currents, log)
-    turn = 1 / abs(scene.frequency) if scene.frequency else np.inf
-    interval = min(turn / SAMPLES_PER_TURN, duration / 1000) / scales.time
+    interval = _interval(scene, flight, duration)
     first = booked(scene, flight.part(values), values, np.zeros(1), flight.part(values).integrator.state[None])
     scale = ledger_scale(scene, flight.part(values), values)
     recorder = Recorder(first[0], interval, MOST_SAMPLES)
@@ -133,6 +132,12 @@ def fly(
                 kept = perf_counter()
 
 
+def _interval(scene: Scene, flight: Flight | LocalFlight, duration: float) -> float:
+    """First scaled time between samples."""
+    turn = 1 / abs(scene.frequency) if scene.frequency else np.inf
+    return min(turn / SAMPLES_PER_TURN, duration / 1000) / flight.scales.time
+
+
 def fly_on(
     scene: Scene, flight: Flight | LocalFlight, values: Array, time: float, state: Array, duration: float
 ) -> tuple[str, float, Array]:
@@ -144,6 +149,6 @@ def fly_on(
     integrator.time = time
     integrator.state[:] = np.append(state, 0.0)
     integrator.reset_cooldowns()
-    log, recorder = Log(), Recorder(integrator.state, duration / flight.scales.time / MOST_SAMPLES, MOST_SAMPLES)
+    log, recorder = Log(), Recorder(integrator.state, _interval(scene, flight, duration), MOST_SAMPLES)
     fly(scene, flight, values, duration, recorder, log, None, None)
     return log.ended_by, float(recorder.times[-1]), recorder.states[-1, :12]
