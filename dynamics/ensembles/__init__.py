@@ -1,6 +1,6 @@
 """How do very many flights of one scene end?"""
 
 from .endings import Endings
-from .ensemble import ensemble
+from .many_flights import ensemble
 
 __all__ = ["Endings", "ensemble"]

@@ -15,7 +15,7 @@ import numpy as np
 from ...fem.harmonics import BallField
 from ...fem.storage import compiled
 from ...geometry.basics import Array
-from ..flights import DEGREE, DURATION, LARGE, LOOSER, SMALL, TOLERANCE, IntegrationError, LocalFlight, ball_equations
+from ..flights import DEGREE, DURATION, LARGE, LOOSER, TOLERANCE, IntegrationError, LocalFlight, ball_equations
 
 LANES = 8
 """Measured: a flight in eight lanes takes a quarter of the time of one alone, in four a half, in 16 a third."""
@@ -119,6 +119,5 @@ class Lanes:
             raise IntegrationError(f"A floater's state became infinite at t = {time * scales.time:.6g} s.")
         if outcome == hy.taylor_outcome.time_limit:
             return replace(before, time=time, state=state, ended_by=DURATION)
-        asked = values[DEGREE + 1 : DEGREE + 4] if self.formula == SMALL else state[:3] * scales.length
-        self.flight.enter_ball(LARGE, asked.copy(), state, values)
+        self.flight.enter_ball(LARGE, state, values)
         return replace(before, values=values, time=time, state=state, changes=before.changes + 1)

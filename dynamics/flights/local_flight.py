@@ -28,7 +28,9 @@ from .trajectory import FieldChanges
 INSIDE = 1 - 1e-9
 """Square of the distance from a ball's centre, in radii, from which on the floater has left it."""
 STAY = 4.0
-"""A ball is worth its making if the floater needs so many radians of the rotor's turn for its radius."""
+"""A ball is worth its making if the floater needs so many radians of the rotor's turn for its radius, up or down."""
+SNUG = 0.97
+"""Largest part of a ball's radius to which the circle may reach on which the rotor sees the floater."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,21 +66,22 @@ class LocalFlight:
         return self.parts.of(int(values[DEGREE]))
 
     def enter(self, start: State, values: Array) -> float:
-        """Set the runtime parameters to the small ball of where the flight starts, if it has one; its error."""
-        return self.enter_ball(SMALL, start.position, self.scales.pack(start), values)
+        """Set the runtime parameters to a ball, a small one if it will do, for where the flight starts; its error."""
+        state = self.scales.pack(start)
+        error = self.enter_ball(SMALL, state, values)
+        return error if values[DEGREE] else self.enter_ball(LARGE, state, values)
 
     def onward(self, values: Array, changes: FieldChanges) -> FieldChanges:
         """Go over to another ball once the floater has left its own; what has been done of that.
 
-        From a small ball to the large one of the same place, later to that of the floater's place.
+        To a large one, from a small ball as well.
         """
         before, (degree, *center, inverse) = self.part(values), values[DEGREE : DEGREE + 5]
         place = before.integrator.state[:3] * self.scales.length
         if degree and np.sum((place - center) ** 2) * inverse**2 < INSIDE:
             return changes
         after = values.copy()
-        asked = np.array(center) if degree == SMALL.degree else place
-        error = self.enter_ball(LARGE, asked, before.integrator.state, after)
+        error = self.enter_ball(LARGE, before.integrator.state, after)
         if degree == after[DEGREE] == 0:
             return changes
         jump = self._change(before, values, after)
@@ -87,26 +90,26 @@ class LocalFlight:
             changes.count + 1, changes.energy + jump, changes.total + abs(jump), max(changes.error, error)
         )
 
-    def enter_ball(self, formula: BallField, asked: Array, state: Array, values: Array) -> float:
-        """Set the ball of the place `asked` if it holds a scaled state, else that of its place, else none; its error.
+    def enter_ball(self, formula: BallField, state: Array, values: Array) -> float:
+        """Set the ball of the circle on which the rotor sees a floater in a scaled state, if there is one; its error.
 
-        None either for a floater that would leave it at once.
+        A floater that turns less than the rotor, or not at all, goes round such a circle once a turn, backwards.
         """
-        length, (x, y, _) = self.scales.length, state[:3]
-        drift = state[3:6] - values[Parameter.RATE] * np.array([-y, x, 0.0])
-        place, way = state[:3] * length, STAY * float(np.linalg.norm(drift)) * length
-        balls = self._balls_of(formula, float(values[Parameter.LOST_DISTANCE]) * length)
+        length, rate, (x, y, _) = self.scales.length, values[Parameter.RATE], state[:3]
+        drift = state[3:6] - rate * np.array([-y, x, 0.0])
+        arm = rate * np.array([-drift[1], drift[0], 0.0])
+        middle, way = (state[:3] - arm) * length, float(abs(drift[2]) if rate else np.linalg.norm(drift)) * length
+        found = self._balls_of(formula, float(values[Parameter.LOST_DISTANCE]) * length).at(middle)
         values[DEGREE:] = 0.0
-        for where in (asked, place):
-            found = balls.at(where)
-            if found is None:
-                continue
-            (*center, inverse), error = found[0][:4], found[1]
-            if np.sum((place - center) ** 2) * inverse**2 < INSIDE and way * inverse < 1:
-                values[DEGREE] = formula.degree
-                values[DEGREE + 1 : DEGREE + 1 + formula.count] = found[0]
-                return error
-        return 0.0
+        if found is None:
+            return 0.0
+        (*center, inverse), error = found[0][:4], found[1]
+        reach = float(np.linalg.norm(arm)) * length + float(np.linalg.norm(middle - center))
+        if reach * inverse > SNUG or STAY * way * inverse > 1:
+            return 0.0
+        values[DEGREE] = formula.degree
+        values[DEGREE + 1 : DEGREE + 1 + formula.count] = found[0]
+        return error
 
     def _balls_of(self, formula: BallField, reach: float) -> Balls:
         key = formula.degree, reach
