@@ -89,6 +89,18 @@ def test_a_kicked_floater_changes_its_ball_and_the_ledger_says_so(start):
     assert (sums[-1] - sums[0]) / abs(sums[0]) == pytest.approx(changes.energy, abs=3e-8)
 
 
+def test_a_ball_holds_the_circle_of_a_floater_that_was_displaced(start):
+    """Let go at rest in the turning frame, it flies off in the laboratory's; the table's own field is never needed."""
+    offset = np.array([1e-4, 0.0, 0.0])
+    turning = np.cross([0.0, 0.0, SCENE.angular_velocity], offset)
+    flight = compile_local_flight(SCENE, TABLE, 0.5, compact=True)
+    begun = replace(start, position=start.position + offset, velocity=start.velocity + turning)
+    flown = integrate(SCENE, flight, begun, 0.5)
+    assert np.ptp(flown.rotor.position[:, 0]) > 5e-4
+    assert 1 <= flown.field_changes.count <= 3
+    assert list(flight.parts._known) == [7, 9]
+
+
 def test_contact_is_that_of_the_tables_own_flight():
     """Drawn to the magnet; near it there is no room for a ball, and the table's own field takes over."""
     place, turning = np.array([2e-3, 0.0, -16e-3]), np.array([0.0, 0.0, SCENE.angular_velocity])
