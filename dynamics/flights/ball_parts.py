@@ -23,8 +23,8 @@ LOOSER = 300
 
 Measured: in a ball J drifts by 3e-14 in 1100 turns at 3e-14, and by 2e-14 in the table's field at 1e-16.
 """
-STRAIGHT_TURNS = 1.5e5
-"""Turns from which on straight code saves more time (15 of 36 µs a step) than its compilation takes (13 s)."""
+STRAIGHT_TURNS = 8e4
+"""Turns from which on straight code saves more time (21 of 47 µs a step) than its compilation takes (10 s)."""
 WORTH = 5e6
 """Length of a field's expressions, written out, from which on balls are faster.
 
