@@ -51,6 +51,11 @@ def _plate_view(position: Vector) -> Vector:
     return [cosine * x - sine * y, sine * x + cosine * y, z + depth]
 
 
+def lost_distance(start: Array) -> float:
+    """Distance from the rotor's origin at which a floater that began at a place (3,) m is lost, m."""
+    return max(0.1, 2 * float(np.linalg.norm(start)))
+
+
 def clearance(scene: Scene, time: Array, position: Array) -> Array:
     """Smallest gap (n,) in m between the floater and any body; `time` (n,) s, `position` (n, 3) m, rotor's frame."""
     gaps = [magnet.box.distance(position) for magnet in scene.rotor]
