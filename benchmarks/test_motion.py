@@ -7,10 +7,13 @@ import pytest
 from peer_flight import fly
 from peers import SCENE, magpylib_rotor
 
+from spinlev.dynamics.ensembles import ensemble
 from spinlev.dynamics.flights import initial_state
 from spinlev.dynamics.flights.compiled_flight import compile_flight
 from spinlev.dynamics.flights.integration import integrate
+from spinlev.dynamics.flights.local_flight import compile_local_flight
 from spinlev.dynamics.flights.simulation import PLATE_TOLERANCE
+from spinlev.dynamics.motion import State
 from spinlev.fem.rotor_tables import rotor_table
 from spinlev.studies.one_scene import plate_memory
 from spinlev.studies.one_scene.plate_of_scene import table_in_flight
@@ -54,6 +57,30 @@ def test_flight(benchmark, start, model, compact):
     print(f"\n{model}: compiled in {flight.compile_seconds:.1f} s, {trajectory.realtime_factor:.0f} x real time")
     benchmark.extra_info["error"] = f"ledger {trajectory.energy_error:.0e} in 110 turns"
     assert trajectory.ended_by == "duration"
+
+
+@pytest.mark.benchmark(group="a simulated second at 110 Hz")
+@pytest.mark.parametrize("compact", [True, False], ids=["loops", "straight code"])
+def test_flight_in_balls(benchmark, start, compact):
+    """As `simulate` flies with finite elements."""
+    table = rotor_table(SCENE.rotor, "fem", nearest=SCENE.floater.radius)
+    flight = compile_local_flight(FREE, table, 1.0, compact=compact)
+    trajectory = benchmark.pedantic(lambda: integrate(FREE, flight, start, 1.0, None), rounds=3, warmup_rounds=1)
+    benchmark.extra_info["error"] = f"ledger {trajectory.energy_error:.0e} in 110 turns"
+    assert trajectory.ended_by == "duration"
+
+
+@pytest.mark.benchmark(group="a simulated second at 110 Hz")
+def test_flights_side_by_side(benchmark, start):
+    """64 flights in the lanes of one core, with finite elements."""
+    table = rotor_table(SCENE.rotor, "fem", nearest=SCENE.floater.radius)
+    offset = 3e-5 * np.random.default_rng(0).normal(size=(64, 3))
+    turning = np.cross([0.0, 0.0, SCENE.angular_velocity], offset)
+    same = (np.tile(v, (64, 1)) for v in (start.moment, start.spin))
+    starts = State(start.position + offset, start.velocity + turning, *same)
+    benchmark.extra_info.update(count=64.0)
+    flown = benchmark.pedantic(lambda: ensemble(FREE, table, starts, 1.0), rounds=2, warmup_rounds=1)
+    assert set(flown.ended_by) == {"duration"}
 
 
 @pytest.mark.benchmark(group="a simulated second at 110 Hz")

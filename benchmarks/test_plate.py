@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from peers import PLATE, SLAB, scipy_slab
 
-from spinlev.fem.plate_network import Region, plate_reaction
+from spinlev.fem.plate_currents import Region, plate_reaction
 from spinlev.fem.plate_tables.tabulate import plate_table
 from spinlev.fem.slab import reaction_tensor
 

@@ -1,9 +1,8 @@
 """Where a synchronous equilibrium moves to when more acts on the floater than the field of its table."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Self
 
 import numpy as np
 
@@ -16,6 +15,8 @@ from ..steady import Balance, moved_pose, solve, tangent_basis
 Extra = Callable[[Array, Array], tuple[Array, Array]]
 """Position (3,) m and moment direction (3,) -> additional force (3,) N and torque (3,) N m, rotor's frame."""
 TILTS = np.array([3, 4])
+MOST = 20
+"""Steps of the quasi-Newton method."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,14 +43,10 @@ class PerturbedBalance:
     scene: Scene
 
     @classmethod
-    def of(cls, scene: Scene, table: FieldTable, spin: float = 0.0) -> PerturbedBalance:
+    def of(cls, scene: Scene, table: FieldTable, spin: float = 0.0) -> Self:
         """The balance in a table's field, for body spin s."""
         scales = Scales.of(scene)
-        return cls(
-            Balance(Rates.of(scene, table), parameters(scene, scales, frozen_spin=True), spin),
-            scales,
-            scene,
-        )
+        return cls(Balance(Rates.of(scene, table), parameters(scene, scales, frozen_spin=True), spin), scales, scene)
 
     def direction(self, position: Array, guess: Array) -> Array:
         """Moment direction (3,) whose torque is balanced at a place (3,) m; `guess` itself if none is near."""
@@ -72,7 +69,7 @@ class PerturbedBalance:
                 direction = result[k] = self.direction(places[k], direction)
         return result
 
-    def shift(self, position: Array, moment: Array, extra: Extra, most: int = 20, tolerance: float = 1e-7) -> Shift:
+    def shift(self, position: Array, moment: Array, extra: Extra, tolerance: float = 1e-7) -> Shift:
         """Follow an equilibrium, position (3,) m and moment direction (3,), to where the additional forces put it.
 
         Quasi-Newton from the table's own Jacobian (C. G. Broyden, Math. Comp. 19 (1965) 577), to `tolerance` of the
@@ -83,7 +80,7 @@ class PerturbedBalance:
         residual = self._residual(position, moment, extra)
         step = -inverse @ residual
         linear = step[:3] * self.scales.length
-        for _ in range(most):
+        for _ in range(MOST):
             places, moments = moved_pose(position[None], moment[None], step[None])
             position, moment = places[0], moments[0]
             if np.linalg.norm(step) < tolerance:

@@ -9,7 +9,7 @@ from __future__ import annotations
 import hashlib
 import io
 import zipfile
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass
 from pathlib import Path
 
 import numpy as np
@@ -17,7 +17,9 @@ import numpy as np
 from ...fem.storage import write_whole
 from ...geometry.basics import Array, InputError
 from .compiled_flight import Flight
+from .local_flight import LocalFlight
 from .recorder import Recorder
+from .trajectory import FieldChanges
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,6 +34,7 @@ class Progress:
     times, states : samples so far
     interval : of the samples
     steps : Taylor steps so far
+    changes : (4,) numbers of `FieldChanges` so far, energies scaled
     """
 
     time: Array
@@ -41,22 +44,26 @@ class Progress:
     states: Array
     interval: float
     steps: int
+    changes: Array
 
     @classmethod
-    def of(cls, flight: Flight, values: Array, recorder: Recorder, steps: int) -> Progress:
+    def of(cls, flight: Flight, values: Array, recorder: Recorder, steps: int, changes: FieldChanges) -> Progress:
         """Where a flight is now."""
         integrator = flight.integrator
         return cls(
-            np.array(integrator.dtime), integrator.state.copy(), values, recorder.times, recorder.states,
-            recorder.interval, steps,
+            np.array(integrator.dtime), integrator.state.copy(), values.copy(), recorder.times, recorder.states,
+            recorder.interval, steps, np.array(astuple(changes)),
         )  # fmt: skip
 
-    def restore(self, flight: Flight, recorder: Recorder) -> tuple[Array, int]:
-        """Put everything back to where it was; the runtime parameters and the steps so far."""
-        flight.integrator.dtime = (float(self.time[0]), float(self.time[1]))
-        flight.integrator.state[:] = self.state
+    def restore(self, flight: Flight | LocalFlight, recorder: Recorder) -> tuple[Array, int, FieldChanges]:
+        """Put everything back to where it was; the runtime parameters, the steps and the changes so far."""
+        integrator = flight.part(self.values).integrator
+        integrator.dtime = (float(self.time[0]), float(self.time[1]))
+        integrator.state[:] = self.state
+        integrator.reset_cooldowns()
         recorder.times, recorder.states, recorder.interval = self.times, self.states, self.interval
-        return self.values.copy(), self.steps
+        count, *rest = self.changes.tolist()
+        return self.values.copy(), self.steps, FieldChanges(int(count), *rest)
 
 
 @dataclass(frozen=True)

@@ -1,7 +1,5 @@
 """A scene's motion compiled to machine code: integrator, events and the ledger of energy."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from time import perf_counter
 
@@ -23,6 +21,7 @@ from ..motion import (
     parameters,
     plate_depth,
 )
+from .trajectory import FieldChanges
 
 TOLERANCE = 1e-16
 """Of a Taylor step. Measured over 1300 turns: J drifts by 3e-13 at 1e-15, by 1e-14 at 1e-16 with 1 % more steps."""
@@ -60,19 +59,22 @@ class Flight:
         plate = (currents - self.left) * self.values[Parameter.PLATE_SHARE]
         return np.concatenate([self.scales.pack(start), plate, [0.0]])
 
+    def part(self, values: Array) -> Flight:
+        """What flies on with these runtime parameters: itself (see `LocalFlight`)."""
+        return self
+
+    def enter(self, start: State, values: Array) -> float:
+        """Set the runtime parameters for a flight from a start; error of the representation chosen."""
+        return 0.0
+
+    def onward(self, values: Array, changes: FieldChanges) -> FieldChanges:
+        """Go over to another representation of the field where it must; what has been done of that."""
+        return changes
+
     def terms(self, times: Array, states: Array, values: Array) -> Array:
         """Terms (k, n) of the Jacobi integral at scaled times (n,), states (n, s) and runtime parameters (n, p)."""
-        pars = np.ascontiguousarray(values[:, : self.ledger.nparams].T)
+        pars = np.ascontiguousarray(values.T[: self.ledger.nparams])
         return np.asarray(self.ledger(np.ascontiguousarray(states[:, :-1].T), pars=pars, time=times))
-
-    def energy_error(self, times: Array, states: Array, values: Array) -> float:
-        """Largest relative violation of J - work = constant or of |m̂| = 1; arguments as of `terms`."""
-        terms = self.terms(times, states, values)
-        books = terms.sum(axis=0) - states[:, -1]
-        largest = float(np.abs(terms[:, 0]).max())
-        scale = abs(books[0]) if abs(books[0]) > 1e-3 * largest else largest
-        length = np.linalg.norm(states[:, 6:9], axis=1)
-        return float(max(np.abs(books - books[0]).max() / scale, np.abs(length - 1).max()))
 
 
 def compile_flight(
@@ -93,30 +95,41 @@ def compile_flight(
     compact : compile loops instead of straight code: sooner ready, two to three times slower; None to choose
     memory : the plate's currents, if they are modelled
     """
-    started = perf_counter()
-    scales = Scales.of(scene)
-    values = parameters(scene, scales)
     tilted, conducting = bool(np.any(scene.gravity[:2])), bool(scene.floater.conductivity)
     equations = equations_of_motion(table, tilted, memory, conducting, scene.angular_velocity)
-    events, meanings = flight_events(scene, equations.variables[:3])
-    work = hy.expression("work")
+    events = flight_events(scene, equations.variables[:3])
     if compact is None:
         compact = not _worth_compiling(equations, scene, duration)
+    return flight_of(scene, equations, events, tolerance, compact, memory)
+
+
+def flight_of(
+    scene: Scene,
+    equations: Equations,
+    events: tuple[list[hy.t_event], list[str]],
+    tolerance: float,
+    compact: bool,
+    memory: PlateMemory | None,
+) -> Flight:
+    """Compile equations of motion with their terminal events and what these mean; else as `compile_flight`."""
+    started = perf_counter()
+    scales = Scales.of(scene)
     integrator = compiled(
         hy.taylor_adaptive,
-        [*zip(equations.variables, equations.rates, strict=True), (work, equations.power)],
+        [*zip(equations.variables, equations.rates, strict=True), (hy.expression("work"), equations.power)],
         np.zeros(len(equations.variables) + 1),
         tol=tolerance,
         compact_mode=compact,
         opt_level=OPTIMISATION,
-        t_events=events,
+        t_events=events[0],
     )
     ledger = compiled(hy.cfunc, list(equations.jacobi), list(equations.variables), compact_mode=True)
     left = np.zeros(0)
     if memory is not None:
         depth = float(plate_depth(memory.plate, np.zeros(1))[0])
         left = memory.driven(scene.angular_velocity).left.signals(0.0, depth)
-    return Flight(integrator, meanings, ledger, values, scales, left, perf_counter() - started)
+    values = parameters(scene, scales)
+    return Flight(integrator, events[1], ledger, values, scales, left, perf_counter() - started)
 
 
 def _worth_compiling(equations: Equations, scene: Scene, duration: float) -> bool:

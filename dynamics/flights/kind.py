@@ -1,7 +1,5 @@
 """How a flight went, told from its places: the article's three kinds, and those that a simulation also has."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from ...geometry.basics import Array

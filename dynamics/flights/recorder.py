@@ -1,7 +1,5 @@
 """Samples of a long motion: evenly spaced, and never more than fit."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from ...geometry.basics import Array
@@ -30,7 +28,7 @@ class Recorder:
 
     def add(self, times: Array, states: Array, last: bool) -> None:
         """Keep samples at multiples of the interval; of the `last` ones all."""
-        on_grid = np.abs(times / self.interval - np.round(times / self.interval)) < 1e-6
+        on_grid = np.abs(times / self.interval - np.round(times / self.interval)) < 1e-9
         keep = on_grid | last
         self.times = np.concatenate([self.times, times[keep]])
         self.states = np.concatenate([self.states, states[keep]])

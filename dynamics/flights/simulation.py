@@ -1,7 +1,5 @@
 """From a scene to a flight: where it starts, and the flight itself."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
@@ -15,8 +13,9 @@ from ..equilibria import find_equilibria
 from ..motion import Parameter, PlateForce, PlateMemory, Scales, State, clearance, parameters, plate_depth
 from ..steady import Equilibrium, EquilibriumError
 from .checkpoint import Checkpoint
-from .compiled_flight import TOLERANCE, compile_flight
+from .compiled_flight import TOLERANCE
 from .integration import integrate
+from .local_flight import compile_local_flight
 from .trajectory import Trajectory
 
 PLATE_TOLERANCE = 1e-13
@@ -45,7 +44,7 @@ def simulate(
     Parameters
     ----------
     equilibria : of this scene, if they are already known
-    tolerance, compact : see `compile_flight`
+    tolerance, compact : see `compile_local_flight`
     progress : called with the finished part, 0 to 1, a few times a second
     memory : the plate's currents; left out, the plate is only an obstacle
     checkpoint : where the flight is kept while it lasts; it goes on from there if there is something
@@ -61,7 +60,7 @@ def simulate(
     start, currents = initial_state(scene, table, equilibria, memory)
     if memory is not None:
         tolerance = max(tolerance, PLATE_TOLERANCE)
-    flight = compile_flight(scene, table, duration, tolerance, compact, memory)
+    flight = compile_local_flight(scene, table, duration, tolerance, compact, memory)
     flown = integrate(scene, flight, start, duration, progress, currents, checkpoint)
     return flown if memory is None else replace(flown, beyond_plate_table=_beyond(memory, flown))
 

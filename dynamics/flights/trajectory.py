@@ -1,13 +1,34 @@
 """A simulated flight."""
 
-from __future__ import annotations
-
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from typing import Self
 
 from ...geometry.basics import Array
 from ..motion import State
 
 DURATION, STOPPED = "duration", "stopped"
+
+
+@dataclass(frozen=True)
+class FieldChanges:
+    """What changes of the field's representation did in a flight through small balls (`fem.ball_field`).
+
+    Parameters
+    ----------
+    count : of the changes
+    energy : their sum U_new - U_old, each at the place of the change; relative, as the ledger's error
+    total : sum of |U_new - U_old|, relative
+    error : largest error of a ball's field or gradient against the table, relative
+    """
+
+    count: int = 0
+    energy: float = 0.0
+    total: float = 0.0
+    error: float = 0.0
+
+    def relative(self, scale: float) -> Self:
+        """With energies in units of `scale`."""
+        return type(self)(self.count, self.energy / scale, self.total / scale, self.error)
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,6 +46,8 @@ class Trajectory:
     steps : number of Taylor steps
     compile_seconds : time spent on compilation (little where heyoka's cache knows the system)
     beyond_plate_table : part of the samples at which the floater was out of the range of the plate's table
+    field_changes : from one representation of the rotor's field to another; the ledger is that of the motion between
+        them
     """
 
     time: Array
@@ -36,6 +59,7 @@ class Trajectory:
     steps: int
     compile_seconds: float
     beyond_plate_table: float = 0.0
+    field_changes: FieldChanges = field(default_factory=FieldChanges)
 
     def __repr__(self) -> str:
         place = ", ".join(f"{1e3 * value:.4f}" for value in self.lab.position[-1])

@@ -6,6 +6,7 @@ from .events import (
     CONTACT as CONTACT,
     clearance as clearance,
     flight_events as flight_events,
+    lost_distance as lost_distance,
     plate_depth as plate_depth,
     plate_legs as plate_legs,
     plate_places as plate_places,

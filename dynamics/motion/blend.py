@@ -1,7 +1,5 @@
 """Moments of a magnet that change with a measure of the rotor, interpolated between a few tables."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any

@@ -19,8 +19,6 @@ further states (`plate_terms`) and their energy to J. Every number that a sweep 
 the tables' own geometry is compiled in.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import heyoka as hy

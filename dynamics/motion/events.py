@@ -4,8 +4,6 @@ The distance of the floater's centre from a box is exact, faces, edges and corne
 of the box that was nearest when it began; a contact that this may miss is found by `clearance` at the samples.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import heyoka as hy
@@ -51,6 +49,11 @@ def _plate_view(position: Vector) -> Vector:
     cosine, sine = hy.cos(angle), hy.sin(angle)
     x, y, z = position
     return [cosine * x - sine * y, sine * x + cosine * y, z + depth]
+
+
+def lost_distance(start: Array) -> float:
+    """Distance from the rotor's origin at which a floater that began at a place (3,) m is lost, m."""
+    return max(0.1, 2 * float(np.linalg.norm(start)))
 
 
 def clearance(scene: Scene, time: Array, position: Array) -> Array:

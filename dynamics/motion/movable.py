@@ -1,7 +1,5 @@
 """A rotor's field with one measure of the rotor as a runtime parameter, so that a map needs one compilation."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Protocol

@@ -4,8 +4,6 @@ Everything that the plate does to the floater goes through few numbers: the stre
 weights W of the table (states × multipoles) they are c = Wᵀỹ, and the signals are W h, h_k = μ̃ m̂·B_k.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -12,8 +12,6 @@ down, so that time enters.  Stored energy ½ Σ ỹ² and Jacobi integral togeth
     F·(W × r + u ẑ) + i W·τ + Σ ỹ_i ∂s̃_i/∂t (rotor's share),    u: speed of the plate's descent.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import heyoka as hy

@@ -18,8 +18,6 @@ loses, beside its work on the floater,
     Σ [λ y_f² + y_f (2λ y_r + ∂r/∂t) + u y_r ∂q/∂d],    and 2λ y_r + ∂r/∂t = (λ - ihω) y_rh harmonic by harmonic.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 

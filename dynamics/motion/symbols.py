@@ -1,7 +1,5 @@
 """Runtime parameters of the equations of motion, and vectors of expressions."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 from enum import IntEnum, auto
 

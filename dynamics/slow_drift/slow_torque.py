@@ -18,9 +18,8 @@ torque that is in phase with Ω is, over Stokes' and with q = R/δ,
 eight at 60 Hz for the article's floater.  The air is far from walls, and the rotor does not stir it.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
+from typing import Self
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -84,7 +83,7 @@ class SlowTorque:
     stokes: bool
 
     @classmethod
-    def of(cls, scene: Scene, rates: Rates, stokes: bool = False) -> SlowTorque:
+    def of(cls, scene: Scene, rates: Rates, stokes: bool = False) -> Self:
         """The slow torques of a scene."""
         return cls(rates, parameters(scene, Scales.of(scene)), scene.floater.radius, stokes)
 

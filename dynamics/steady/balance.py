@@ -6,10 +6,8 @@ a synchronous floater with body spin s.  What remains to vanish are three forces
 The torque of drag along the moment is left out: it moves s, slowly; s is what the caller fixes.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -44,7 +42,7 @@ class Balance:
         """The rotor's rate, (1,) or (n, 1)."""
         return np.asarray(self.values[..., [Parameter.RATE]])
 
-    def at(self, rows: NDArray[Any]) -> Balance:
+    def at(self, rows: NDArray[Any]) -> Self:
         """The balance of some of the points only."""
         if self.values.ndim == 1:
             return self

@@ -1,8 +1,7 @@
 """Vector potentials of sources in free space: dipole, uniformly polarised cuboid, uniform field."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
+from typing import Self
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -61,7 +60,7 @@ class PolarizedCuboid:
     polarization: Array
 
     @classmethod
-    def of_magnet(cls, magnet: Magnet) -> PolarizedCuboid:
+    def of_magnet(cls, magnet: Magnet) -> Self:
         """The magnet with its remanent polarisation (μr = 1)."""
         return cls(magnet.box, magnet.polarization_in_rotor)
 

@@ -1,7 +1,5 @@
 """Export of eddy-current fields to VTU on a regular grid of points, for ParaView and PyVista."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from pathlib import Path
 

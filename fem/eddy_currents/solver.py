@@ -13,18 +13,15 @@ symmetric and superconvergent (its error is the square of the energy error).  A.
 Electromagnetism (1998), ch. 8; O. Bíró, Comput. Methods Appl. Mech. Engrg. 169 (1999) 391.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
-import ngsolve
 import numpy as np
 
 from ...geometry.basics import MU_0, Array
-from ...geometry.meshes import MILLIMETRE, ConductorMesh
+from ...geometry.meshes import ConductorMesh
 from ..closed_forms import ComplexArray
-from ..elements import require_memory, solve_condensed
+from .shifted_system import ShiftedSystem
 from .space import EddySpace, Source
 
 RESISTIVE = 1e-2
@@ -45,20 +42,25 @@ class ClassResponse:
 
 @dataclass(frozen=True, eq=False)
 class EddyResponse:
-    """Eddy currents of several sources at one frequency.
+    """Eddy currents of several sources at one shift.
 
     Parameters
     ----------
     space : the finite-element space
-    frequency : Hz
+    shift : s, rad/s: iω at a frequency
     classes : responses by number of the parity class; silent ones are missing
     coupling_unknowns : size of the factorised matrix, of the largest class
     """
 
     space: EddySpace
-    frequency: float
+    shift: complex
     classes: dict[int, ClassResponse]
     coupling_unknowns: int
+
+    @property
+    def frequency(self) -> float:
+        """Hz, of phasors e^{+iωt}."""
+        return float(np.imag(self.shift)) / (2 * np.pi)
 
     @property
     def couplings(self) -> ComplexArray:
@@ -71,7 +73,7 @@ class EddyResponse:
         return self._sum({number: (images[number], self.space.loads(images[number])) for number in self.classes})
 
     def _sum(self, tests: dict[int, tuple[Array, Array]]) -> ComplexArray:
-        factor = -2j * np.pi * self.frequency * self.space.conductors.images
+        factor = -self.shift * self.space.conductors.images
         total: ComplexArray = np.zeros((0, 0), complex)
         for number, (potentials, loads) in tests.items():
             c = self.classes[number]
@@ -87,7 +89,7 @@ def solve_eddy(
     """Eddy currents of all `sources` at `frequency` (Hz), with one factorisation for each parity class that they touch.
 
     Any frequency from 0 up is safe: the gauge needs no parameter, and below ωμ0σL² = 1e-2 the resistive limit
-    is used, exact to 1e-8.  At high frequency the mesh must resolve the skin depth; `plate_network` estimates whether
+    is used, exact to 1e-8.  At high frequency the mesh must resolve the skin depth; `plate_currents` estimates whether
     it does.
 
     Raises
@@ -101,7 +103,22 @@ def solve_eddy(
         raise ValueError("Input sources must hold at least one source; instead received none.")
     space = space or EddySpace(conductors, order)
     solved = max(frequency, _resistive_frequency(space))
-    system = FrequencySystem(space, solved)
+    response = solve_shifted(space, 2j * np.pi * solved, sources)
+    scaled = {
+        number: replace(part, solutions=part.solutions.real + 1j * part.solutions.imag * (frequency / solved))
+        for number, part in response.classes.items()
+    }
+    return replace(response, shift=2j * np.pi * frequency, classes=scaled)
+
+
+def solve_shifted(space: EddySpace, shift: complex, sources: Sequence[Source]) -> EddyResponse:
+    """The answers of all `sources` where iω is `shift`, rad/s: a real one is that of fields that grow as e^{st}.
+
+    Raises
+    ------
+    TooLargeError : the memory does not hold the system
+    """
+    system = ShiftedSystem(space, shift)
     images = space.class_images(sources)
     size = np.sqrt(np.einsum("csqa->cs", images**2 * space.weights[:, None]))
     classes, coupling = {}, 0
@@ -109,41 +126,13 @@ def solve_eddy(
         if np.all(size[number] <= SILENT * np.linalg.norm(size, axis=0)):
             continue
         loads = space.loads(images[number])
-        solutions, unknowns = system.solve(parity_class, loads)
-        scaled = solutions.real + 1j * solutions.imag * (frequency / solved)
-        classes[number] = ClassResponse(images[number], loads, scaled)
-        coupling = max(coupling, unknowns)
-    return EddyResponse(space, frequency, classes, coupling)
+        factor = system.factor(parity_class)
+        classes[number] = ClassResponse(images[number], loads, factor.solve(loads))
+        coupling = max(coupling, factor.unknowns)
+    return EddyResponse(space, shift, classes, coupling)
 
 
 def _resistive_frequency(space: EddySpace) -> float:
     extent = 2 * float(np.abs(space.points).max())
     conductivity = max(space.conductors.conductivity.values())
     return RESISTIVE / (2 * np.pi * MU_0 * conductivity * extent**2)
-
-
-class FrequencySystem:
-    """Condensed matrix of one frequency, factorised once for each parity class."""
-
-    def __init__(self, space: EddySpace, frequency: float) -> None:
-        self.space = space
-        self.fes = space.complex_space()
-        require_memory(
-            self.fes,
-            self.fes.FreeDofs(True),
-            "Allow a larger error of the plate (--plate-rtol, or --rtol of the command plate)",
-        )
-        trial, test = self.fes.TnT()
-        self.rate = 2j * np.pi * frequency * MU_0
-        form = ngsolve.BilinearForm(self.fes, symmetric=True, condense=True)
-        form += ngsolve.curl(trial) * ngsolve.curl(test) * ngsolve.dx
-        form += self.rate * MILLIMETRE**2 * space.sigma * trial * test * ngsolve.dx(definedon=space.region)
-        form.Assemble()
-        self.form = form
-
-    def solve(self, parity_class: Sequence[int], loads: Array) -> tuple[ComplexArray, int]:
-        """Solutions (sources, unknowns), T m, and the number of coupling unknowns."""
-        free = self.space.free_unknowns(parity_class, self.fes)
-        inverse = self.form.mat.Inverse(free, inverse="sparsecholesky")
-        right = np.asarray(-self.rate / MILLIMETRE * loads, np.complex128)
-        return solve_condensed(self.form, inverse, right), sum(free)

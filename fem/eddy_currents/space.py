@@ -6,8 +6,6 @@ their vector potential at the quadrature points of the conductors, so that any f
 S. Zaglmayr, High order finite element methods for electromagnetic field computation, thesis, Linz 2006 (the space).
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Protocol
 
@@ -15,6 +13,7 @@ import ngsolve
 import numpy as np
 from ngsolve.comp import IntegrationRuleSpace
 from numpy.typing import NDArray
+from scipy.sparse import csr_matrix
 
 from ...geometry.basics import Array
 from ...geometry.meshes import MILLIMETRE, PLANES, ConductorMesh
@@ -102,6 +101,18 @@ class EddySpace:
         """(n, 3) values of a real function of this space at the quadrature points."""
         self._carrier.Interpolate(function, definedon=self.region)
         return np.stack([c.vec.FV().NumPy() for c in self._carrier.components], axis=1)
+
+    def value_matrix(self, space: ngsolve.FESpace, basis: ngsolve.CoefficientFunction) -> csr_matrix:
+        """(3n, unknowns) values of a space's `basis` at the quadrature points, the components of one point together."""
+        points = IntegrationRuleSpace(self.conductors.mesh, order=self.order + 2, definedon=self.region) ** 3
+        form = ngsolve.BilinearForm(trialspace=space, testspace=points)
+        integrand = self.sigma * basis * ngsolve.CF(tuple(points.TestFunction()))
+        form += integrand * ngsolve.dx(definedon=self.region, intrules=self._rules)
+        form.Assemble()
+        rows, columns, values = (np.asarray(part) for part in form.mat.COO())
+        component, point = np.divmod(rows, len(self.points))
+        values = values / (self.weights[point] / MILLIMETRE**3)
+        return csr_matrix((values, (3 * point + component, columns)), shape=(form.mat.height, form.mat.width))
 
     def free_unknowns(self, parity_class: Sequence[int], space: ngsolve.FESpace) -> ngsolve.BitArray:
         """Coupling unknowns of one parity class: without odd planes, the far boundary and a spanning tree in air."""

@@ -1,5 +1,6 @@
 """How is a field outside or between its sources written as a sum of solid harmonics?"""
 
+from .ball_field import BallField as BallField
 from .compiled import (
     CompiledField as CompiledField,
     FieldExpressions as FieldExpressions,

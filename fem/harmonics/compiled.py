@@ -1,7 +1,5 @@
 """Field expressions compiled to machine code, evaluated at many points in one call."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 
 import heyoka as hy

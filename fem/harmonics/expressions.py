@@ -8,8 +8,6 @@ Each sum is taken over l first, at fixed m, and then over m: real and imaginary 
 every operation costs, so that this saves time as well as compilation.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Any
 

@@ -8,8 +8,6 @@ potential is u = Σ conj a_lm Υ_lm(r̃) and that of the sphere's own sources u 
 because 1/|r - s| = Σ conj Υ_lm(r) Θ_lm(s) makes a charge's c_lm = conj Υ_lm its weight in U.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -36,20 +34,24 @@ def factorials(degree: int) -> Array:
     return np.where(m <= l, np.exp(gammaln(np.maximum(l - m, 0) + 1) + gammaln(l + m + 1)), 1.0)
 
 
+def sphere(degree: int) -> tuple[Array, Array]:
+    """Points (n, 3) on the unit sphere and their areas (n,), exact for products of two harmonics up to `degree` + 5."""
+    nodes = degree + 6
+    height, weights = np.polynomial.legendre.leggauss(nodes)
+    angle = np.pi * np.arange(2 * nodes) / nodes
+    across = np.sqrt(1 - height**2)[:, None]
+    grid = np.broadcast_arrays(across * np.cos(angle), across * np.sin(angle), height[:, None])
+    return np.stack(grid, axis=-1).reshape(-1, 3), np.repeat(weights * np.pi / nodes, 2 * nodes)
+
+
 def interior_coefficients(field: Callable[[Array], Array], ball: Ball, degree: int) -> Coefficients:
     """Coefficients a_lm (T) of a field given as a function, points (n, 3) m -> B (n, 3) T, without sources in the ball.
 
     By the normal component on the surface. Aliasing is a part ρ^(degree + 10) of the field, ρ the radius over the
     distance of the centre from the nearest singularity.
     """
-    nodes = degree + 6
-    height, weights = np.polynomial.legendre.leggauss(nodes)
-    angle = np.pi * np.arange(2 * nodes) / nodes
-    across = np.sqrt(1 - height**2)[:, None]
-    grid = np.broadcast_arrays(across * np.cos(angle), across * np.sin(angle), height[:, None])
-    normals = np.stack(grid, axis=-1).reshape(-1, 3)
-    radial = np.sum(field(ball.center + ball.radius * normals) * normals, axis=1)
-    radial *= np.repeat(weights * np.pi / nodes, 2 * nodes)
+    normals, areas = sphere(degree)
+    radial = areas * np.sum(field(ball.center + ball.radius * normals) * normals, axis=1)
     result = np.zeros((degree + 1, degree + 1), complex)
     for (l, m), values in regular_values(degree, *normals.T).items():
         if l:

@@ -1,7 +1,5 @@
 """The field of a multipole expansion about one centre."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property

@@ -9,8 +9,6 @@ irregular ones Θ_lm,
 A real harmonic function outside a sphere is Σ_lm c_lm Θ_lm with c_l(-m) = (-1)^m conj c_lm; only m ≥ 0 is kept.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Spherical harmonics: orthonormal on the unit sphere, and what mirrors and turns do to expansion coefficients."""
 
-from __future__ import annotations
-
 import numpy as np
 from scipy.special import gammaln
 

@@ -1,7 +1,5 @@
 """Expansions shortened to the coefficients that matter."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

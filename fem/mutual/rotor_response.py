@@ -13,7 +13,7 @@ import numpy as np
 
 from ...geometry.basics import Array
 from ...geometry.bodies import Magnet
-from ...geometry.meshes import MagnetMesh, MeshSettings, mesh_magnets
+from ...geometry.meshes import MagnetMesh, mesh_magnets
 from ..closed_forms import remanent_field, volume_rule
 from ..harmonics import Ball, Coefficients, derivative, from_magnetization, interior_coefficients, outer_sums
 from ..magnetostatics import PermeableRegions, assemble_regions
@@ -112,9 +112,7 @@ def closed_dipoles(magnets: Sequence[Magnet]) -> tuple[Array, Array]:
     return np.concatenate(points), np.concatenate(moments)
 
 
-def rotor_ladder(
-    rotor: tuple[Magnet, ...], orders: tuple[int, ...] = (3, 4), settings: MeshSettings | None = None
-) -> tuple[RotorResponse, ...]:
+def rotor_ladder(rotor: tuple[Magnet, ...], orders: tuple[int, ...] = (3, 4)) -> tuple[RotorResponse, ...]:
     """The same rotor on one mesh with elements of several degrees, from coarse to fine."""
-    mesh = mesh_magnets(rotor, settings)
+    mesh = mesh_magnets(rotor)
     return tuple(rotor_response(mesh, order) for order in orders)

@@ -84,3 +84,18 @@ def ordered_basis(
     kept = np.flatnonzero(energies > NEGLIGIBLE * energies.max(initial=0.0))[::-1]
     mixed = vectors[:, kept] / np.sqrt(energies[kept])
     return OrderedBasis(energies[kept], mixed.T @ e, mixed.T @ resistance @ mixed, mixed.T @ inductance @ mixed)
+
+
+def leading_fields(snapshots: Array, inductance: Array, reference: float) -> OrderedBasis:
+    """Basis from snapshots (m, n) in coordinates in which the resistance is 1.
+
+    Parameters
+    ----------
+    inductance : (n, n) in these coordinates
+    reference : angular frequency (rad/s) at which energy and power count alike
+    """
+    root = np.linalg.cholesky(np.eye(len(inductance)) + reference * inductance)
+    energies, vectors = np.linalg.eigh(root.T @ (snapshots.T @ snapshots) @ root)
+    kept = np.flatnonzero(energies > NEGLIGIBLE * energies.max(initial=0.0))[::-1]
+    fields = scipy.linalg.solve_triangular(root, vectors[:, kept], lower=True, trans="T").T
+    return OrderedBasis(energies[kept], fields, fields @ fields.T, fields @ inductance @ fields.T)

@@ -1,7 +1,5 @@
 """The error of a network of currents, and how many of its fields a tolerance needs."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 
 import numpy as np

@@ -1,36 +1,28 @@
 """Reduction of a box-shaped plate to a passive network, to a wanted accuracy in a region and a range of frequencies.
 
-Sources for training stand on a grid in the region; their potentials in the plate are compressed to few modes, which
-are solved at a low, a middle and the highest frequency.  Dipoles at places off the grid are solved along, as probes:
-the network takes as many states as their reaction tensors need.  Then all is repeated at a frequency that was not
-used; where the error is too large there, it joins the snapshots, and another is tried.
+The finite elements give a space of many currents (`plate_solution`), in which dipoles on a grid of the region and other
+sources drive snapshots at a low, a middle and the highest frequency.  The network takes as many of their principal
+components as the reaction tensors of dipoles off the grid need, at frequencies between as well.
 """
 
-from __future__ import annotations
-
-import time
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ...geometry.basics import Array
 from ...geometry.meshes import MeshRule
 from ...geometry.scenes import Plate
-from ..eddy_currents import EddySpace, Source
+from ..eddy_currents import Source
+from ..plate_currents import STRICT, CurrentSpace, OtherSources, PlateSolution, Region, grid_counts, solve_currents
 from ..rotor_tables import AccuracyError
 from .network_error import truncated
-from .reaction import raise_order
-from .region import Region
-from .snapshots import Group, group_rows
-from .training import OtherSources, prepare_training
+from .training import Group, prepare_training
 
-MESH_SHARE, NETWORK_SHARE = 0.6, 0.9
-"""Shares of the tolerance for the finite elements, and for them and the truncated basis together; the rest is the
-field functions'."""
-STRICT, STRICT_SHARES = 5e-4, (0.6, 0.8)
-"""Tolerances below this have a finer mesh, and leave more to the field functions."""
-MOST_FREQUENCIES = 8
+NETWORK_SHARE, STRICT_SHARE = 0.9, 0.8
+"""Share of the tolerance for the finite elements and the states left out together; the rest is the field functions',
+and that is more of a strict tolerance."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,31 +34,33 @@ class PlateNetwork:
     plate : the conductor; fields and region are in its own frame
     region : where the floater may be
     frequencies : lowest and highest, Hz
-    space : finite-element space
+    space : of the currents, with the fields e_i (of unit inductance) and the inductances of each parity class's part
     groups : parity groups
     rates : (states,) λ_i, 1/s, for each group
-    fields : (states, width) weighted rows of e_i, of unit inductance, for each group
     mesh_error, state_error : estimated relative errors of reaction tensors
-    solved : frequencies of the finite-element solutions, Hz
-    seconds : time spent
+    seconds : time spent on the finite elements
     """
 
     plate: Plate
     region: Region
     frequencies: tuple[float, float]
-    space: EddySpace
+    space: CurrentSpace
     groups: tuple[Group, ...]
     rates: tuple[Array, ...]
-    fields: tuple[Array, ...]
     mesh_error: float
     state_error: float
-    solved: tuple[float, ...]
     seconds: float
 
     def couplings(self, sources: Sequence[Source]) -> list[Array]:
         """s_i = ∫ σ e_i·A_s dV, √J, of sources in the plate's frame: (sources, states) for each group."""
-        rows = group_rows(self.space, self.groups, sources)
-        return [row @ fields.T for row, fields in zip(rows, self.fields, strict=True)]
+        return self._by_group(self.space.couplings(sources))
+
+    def dipole_couplings(self, places: ArrayLike) -> list[Array]:
+        """The same of unit moments along x, y and z at `places` (n, 3), m."""
+        return self._by_group(self.space.dipole_couplings(places))
+
+    def _by_group(self, parts: Sequence[Array]) -> list[Array]:
+        return [np.sum([parts[number] for number in group.classes], axis=0) for group in self.groups]
 
 
 def reduce_plate(
@@ -90,44 +84,57 @@ def reduce_plate(
     ValueError : region in the plate, frequencies not 0 < lowest < highest, or rtol not between 0 and 1
     AccuracyError : the mesh is too coarse for `rtol`, or the frequencies do not suffice
     """
-    start = time.perf_counter()
-    low, high = checked_ranges(frequencies, rtol)
-    rule = rule or (MeshRule() if rtol >= STRICT else MeshRule(1.0, 1.6, 1.4))
-    mesh_share, network_share = (MESH_SHARE, NETWORK_SHARE) if rtol >= STRICT else STRICT_SHARES
+    checked_ranges(frequencies, rtol)
     others = others or OtherSources()
-    places = np.concatenate([region.grid((2, 2, 2), fold=True), others.places])
-    response, error = raise_order(plate, places, high, mesh_share * rtol, rule)
-    if error.max() > mesh_share * rtol:
-        raise AccuracyError(
-            f"Input rtol must be at least {error.max() / mesh_share:.1e} for the mesh rule {rule}; instead received "
-            f"{rtol:.1e}."
-        )
-    allowed = network_share * rtol - float(error.max())
-    training = prepare_training(response.space, region, rtol, others)
-    middle = low**0.25 * high**0.75
-    used, tried = [low, middle, high], [np.sqrt(middle * high), np.sqrt(low * middle)]
-    for frequency in used:
-        training.solve(frequency)
-    while len(training.reactions) < MOST_FREQUENCIES:
-        training.solve(tried[0])
-        basis = training.basis(used)
-        if training.error(basis, tried[0]) <= allowed / 2:
-            break
-        used = sorted([*used, tried.pop(0)])
-        tried += [float(np.sqrt(used[-1] * used[-2])), float(np.sqrt(used[-2] * used[-3]))]
-    chosen, state_error = truncated(training.worst, basis, allowed)
+    solution = solve_currents(plate, [region], frequencies, rtol, rule, others)
+    return reduce_currents(plate, solution, region, frequencies, rtol, others, solution.space_error)
+
+
+def reduce_currents(
+    plate: Plate,
+    solution: PlateSolution,
+    region: Region,
+    frequencies: tuple[float, float],
+    rtol: float,
+    others: OtherSources,
+    space_error: float,
+) -> PlateNetwork:
+    """The network for a region within the boxes and frequencies within those of a `solution`.
+
+    Parameters
+    ----------
+    space_error : what the solution's states miss of reaction tensors and of the others' fields, relative
+
+    Raises
+    ------
+    AccuracyError : all of the solution's states do not suffice
+    """
+    share = NETWORK_SHARE if rtol >= STRICT else STRICT_SHARE
+    allowed = share * rtol - solution.mesh_error - space_error
+    counts = grid_counts(region, plate.box.half_edges)
+    training = prepare_training(solution.space, region, counts, frequencies, others)
+    chosen, state_error = truncated(training.worst, training.basis(), allowed)
     if state_error > allowed:
         raise AccuracyError(
             f"Input rtol must be larger: the states leave {state_error:.1e}, allowed is {allowed:.1e}; "
             f"instead received {rtol:.1e}."
         )
-    diagonal = [part.diagonalised() for part in chosen]
+    rates, fields = zip(*[part.diagonalised() for part in chosen], strict=True)
     return PlateNetwork(
-        plate, region, frequencies, response.space, tuple(m.group for m in training.modes),
-        tuple(d[0] for d in diagonal), tuple(d[1] for d in diagonal),
-        float(error.max()), state_error, tuple(sorted(training.reactions)),
-        time.perf_counter() - start,
+        plate, region, frequencies, part_of_space(solution.space, training.groups, fields), tuple(training.groups),
+        rates, solution.mesh_error, state_error + space_error, solution.seconds,
     )  # fmt: skip
+
+
+def part_of_space(space: CurrentSpace, groups: Sequence[Group], fields: Sequence[Array]) -> CurrentSpace:
+    """The space that holds, in each class, the part there of `fields` (states, coordinates) of each group."""
+    rows, inductances = list(space.fields), list(space.inductances)
+    for group, states in zip(groups, fields, strict=True):
+        ends = np.cumsum([len(space.inductances[number]) for number in group.classes])
+        for number, part in zip(group.classes, np.split(states, ends[:-1], axis=1), strict=True):
+            rows[number] = part @ space.fields[number]
+            inductances[number] = part @ space.inductances[number] @ part.T
+    return replace(space, fields=tuple(rows), inductances=tuple(inductances))
 
 
 def checked_ranges(frequencies: tuple[float, float], rtol: float) -> tuple[float, float]:

@@ -12,6 +12,7 @@ from .rotor_source import (
     posed_rotor as posed_rotor,
     rotor_parts as rotor_parts,
 )
-from .share import RotorShare as RotorShare, rotor_share as rotor_share
+from .sampled_share import rotor_share as rotor_share
+from .share import RotorShare as RotorShare
 from .share_trim import MISSED as MISSED, trimmed as trimmed
 from .tabulate import FUNCTION_SHARE as FUNCTION_SHARE, tensor_error as tensor_error

@@ -1,6 +1,6 @@
 """A plate that both the floater's dipole and the turning rotor drive: one network, with field functions and share."""
 
-from __future__ import annotations
+from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -8,11 +8,14 @@ from numpy.typing import ArrayLike
 from ...geometry.basics import InputError
 from ...geometry.meshes import MeshRule
 from ...geometry.scenes import Plate
-from ..plate_network import OtherSources, Region, reduce_plate
+from ..plate_currents import OtherSources, PlateSolution, Region, Watch, error_of, solve_currents, unwatched
+from ..plate_network import reduce_currents
 from ..rotor_tables import RotorTable
+from .outer_box import outer_box, outer_frequencies
 from .plate_table import PlateTable
 from .rotor_source import DOWN, posed_rotor, rotor_parts
-from .share import RotorShare, rotor_share
+from .sampled_share import rotor_share
+from .share import RotorShare
 from .share_trim import MISSED, trimmed
 from .tabulate import tabulate
 
@@ -20,6 +23,10 @@ ANGLES, DEPTHS = 8, 5
 """Training: the rotor at so many angles of a turn and depths of the plate; probes stand between them."""
 SHARE_PART = 0.1
 """Share of the tolerance for the series of the rotor's signals."""
+OTHERS_SHARE = 0.1
+"""Share of the tolerance for what dipoles around the rotor miss of it; above, the rotor itself is solved for."""
+INNER = 0.25
+"""Part of a magnet's edges about its centre in which those dipoles are."""
 
 
 def plate_and_rotor_table(
@@ -29,6 +36,8 @@ def plate_and_rotor_table(
     frequencies: tuple[float, float] = (0.5, 250.0),
     rtol: float = 1e-3,
     rule: MeshRule | None = None,
+    solve: Callable[..., PlateSolution] = solve_currents,
+    watch: Watch = unwatched,
 ) -> tuple[PlateTable, RotorShare]:
     """Table of `plate` and the rotor's share of its signals, of one network.
 
@@ -42,6 +51,12 @@ def plate_and_rotor_table(
         6 per cent and the third below 4e-3: then the highest should be twice the rotor's
     rtol : relative accuracy of reaction tensors in the region, and there of the field of the rotor's currents
     rule : mesh (default by `rtol`)
+    solve : finite elements; `cached_solver` has them from the cache
+    watch : hears of the progress
+
+    The finite elements are solved for dipoles in boxes around the region and around the rotor, on a coarse raster, so
+    that neighbours of the scene and other models of the rotor need the same ones.  A rotor that these dipoles do not
+    stand for gets its own.
 
     Raises
     ------
@@ -50,8 +65,20 @@ def plate_and_rotor_table(
     AccuracyError : `rtol` not reached
     """
     others = turning_rotor(plate, rotor)
-    network = reduce_plate(plate, region, frequencies, rtol, rule, others)
+    half = plate.box.half_edges
+    boxes = [outer_box(region, half), outer_box(rotor_box(plate, rotor), half)]
+    outer = outer_frequencies(frequencies)
+    solution = solve(plate, boxes, outer, rtol, rule)
+    watch("network of the scene", 0.0)
+    error = error_of(solution, others.probes)
+    if error > OTHERS_SHARE * rtol:
+        solution = solve(plate, boxes, outer, rtol, rule, others)
+        error = solution.space_error
+    watch("network of the scene", 0.5)
+    network = reduce_currents(plate, solution, region, frequencies, rtol, others, max(error, solution.space_error))
+    watch("signals of the rotor", 0.0)
     share = rotor_share(network, plate, rotor, SHARE_PART * rtol)
+    watch("field functions", 0.0)
     table = tabulate(network, rtol)
     return table, trimmed(share, table, MISSED * rtol)
 
@@ -68,6 +95,19 @@ def turning_rotor(plate: Plate, rotor: RotorTable) -> OtherSources:
     probes = [posed_rotor(parts, plate, angle + step / 2, depth) for depth in between for angle in angles[:3]]
     centers = np.array([magnet.box.center for magnet in rotor.magnets])
     return OtherSources(training, probes, plate.box.to_body(centers))
+
+
+def rotor_box(plate: Plate, rotor: RotorTable) -> Region:
+    """Where the inner parts of the turning magnets are, in the plate's frame, on all of its way."""
+    boxes = [magnet.box for magnet in rotor.magnets]
+    inner = [INNER * float(box.size.max()) for box in boxes]
+    radius = max(float(np.hypot(*box.center[:2])) + r for box, r in zip(boxes, inner, strict=True))
+    low = min(float(box.center[2]) - r for box, r in zip(boxes, inner, strict=True))
+    high = max(float(box.center[2]) + r for box, r in zip(boxes, inner, strict=True))
+    way = plate.lowering.distance if plate.lowering else 0.0
+    corners = np.stack(np.meshgrid((-radius, radius), (-radius, radius), (low, high + way)), -1).reshape(8, 3)
+    body = plate.box.to_body(corners)
+    return Region(body.min(axis=0), body.max(axis=0))
 
 
 def reachable_region(plate: Plate, center: ArrayLike, half_edges: ArrayLike, radius: float = 0.0) -> Region:

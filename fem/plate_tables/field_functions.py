@@ -17,7 +17,7 @@ import numpy as np
 
 from ...geometry.basics import Array, frozen_array
 from ..harmonics import FieldExpressions, MultipoleExpansion, derivative, outer_sums
-from ..plate_network import Region
+from ..plate_currents import Region
 from ..storage import compiled
 
 DEPTHS = (0.0, 0.3, 0.6, 1.0, 1.6, 2.5, 4.0, 6.0, 10.0, 18.0)

@@ -1,8 +1,5 @@
 """A plate table as one self-describing netCDF file, and its place in the cache."""
 
-from __future__ import annotations
-
-import hashlib
 import json
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -14,7 +11,7 @@ from numpy.typing import ArrayLike
 from ...geometry.basics import MU_0
 from ...geometry.scenes import Plate
 from ..harmonics import FOUR_PI
-from ..plate_network import Region
+from ..plate_currents import Region, Watch, cached_solver, digest, unwatched
 from ..rotor_tables import RotorTable
 from ..storage import TableFileError, described, from_cache, program_of, read_checked, write_checked
 from .driven_plate import plate_and_rotor_table
@@ -119,10 +116,7 @@ def driven_plate_key(
 
 
 def _hash(name: str, parts: Sequence[ArrayLike]) -> str:
-    digest = hashlib.sha256(f"{FORMAT} {program_of(__package__)} {name}".encode())
-    for part in parts:
-        digest.update(np.ascontiguousarray(np.asarray(part) + 0.0, dtype="<f8").tobytes())
-    return digest.hexdigest()
+    return digest(f"{FORMAT} {program_of(__package__)} {name}", parts)
 
 
 def cached_plate_table(
@@ -145,12 +139,15 @@ def cached_driven_plate(
     frequencies: tuple[float, float],
     rtol: float,
     report: Callable[[str], None],
+    watch: Watch = unwatched,
 ) -> tuple[PlateTable, RotorShare, bool]:
     """`plate_and_rotor_table` from the cache if it is there, and whether it was."""
     (table, share), found = from_cache(
         f"driven-plate-{driven_plate_key(plate, rotor, region, frequencies, rtol)}.nc",
         load_driven_plate,
-        lambda: plate_and_rotor_table(plate, rotor, region, frequencies, rtol),
+        lambda: plate_and_rotor_table(
+            plate, rotor, region, frequencies, rtol, solve=cached_solver(report, watch), watch=watch
+        ),
         lambda made, path: save_plate_table(made[0], path, made[1]),
         report,
     )

@@ -7,8 +7,6 @@ highest degree among the candidates, and the finite elements, whose currents are
 that their field is harmonic only to their own accuracy.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 

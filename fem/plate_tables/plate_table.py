@@ -1,7 +1,5 @@
 """A plate as a table: a passive network whose field functions are harmonic where the floater is."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
@@ -10,7 +8,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ...geometry.basics import Array, frozen_array, millimetres
 from ..closed_forms import ComplexArray
-from ..plate_network import Region
+from ..plate_currents import Region
 from ..rotor_tables import RangeError
 from .field_functions import Multipoles
 

@@ -8,8 +8,6 @@ of degree -(l+1), so that curl (r × ∇Ψ_l) = l ∇Ψ_l, and B = -∇Ψ is the
 What the table knows of recoil permeability and mutual demagnetisation thus reaches the plate with all its moments.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -25,7 +23,7 @@ from ..rotor_tables import RotorTable
 
 DOWN = np.array([0.0, 0.0, -1.0])
 INAUDIBLE = 1e-7
-"""Degrees whose field at the plate is below this share of the rotor's are left out."""
+"""Share of the rotor's field at the plate that is left out where no tolerance says another."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,8 +66,12 @@ class RotorSource:
         return np.asarray(total @ self.turn.T)
 
 
-def rotor_parts(table: RotorTable, plate: Plate) -> list[Source]:
+def rotor_parts(table: RotorTable, plate: Plate, inaudible: float = INAUDIBLE) -> list[Source]:
     """The parts of a rotor's table that the plate hears, in the rotor's frame.
+
+    Parameters
+    ----------
+    inaudible : degrees whose field at the plate is below this share of the rotor's are left out
 
     Raises
     ------
@@ -86,7 +88,7 @@ def rotor_parts(table: RotorTable, plate: Plate) -> list[Source]:
         degrees = np.arange(expansion.degree + 1)
         sizes = field_spectrum(expansion.coefficients) * (expansion.radius / nearest) ** (degrees + 2)
         whole = MU_0 / (4 * np.pi) * np.linalg.norm(table.moment) / nearest**3
-        heard = np.flatnonzero(sizes > INAUDIBLE * whole)
+        heard = np.flatnonzero(sizes > inaudible * whole)
         if len(heard):
             end = heard[-1] + 1
             parts.append(ExpansionSource(replace(expansion, coefficients=expansion.coefficients[:end, :end])))

@@ -19,29 +19,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Protocol
 
 import heyoka as hy
 import numpy as np
 
 from ...geometry.basics import Array, frozen_array
-from ...geometry.scenes import Plate
 from ..closed_forms import ComplexArray
-from ..eddy_currents import Source
-from ..rotor_tables import AccuracyError, RotorTable
-from .rotor_source import posed_rotor, rotor_parts
-
-MOST_TERMS = 15
-"""Highest number of harmonics, and of points along the way."""
-NOISE = 1e-10
-"""Amplitudes below this share of the largest signal are what symmetry forbids."""
-
-
-class Network(Protocol):
-    """Currents as states that listen to sources."""
-
-    def couplings(self, sources: Sequence[Source]) -> list[Array]:
-        """s_i, √J, of sources in the plate's frame: (sources, states) for each group of states."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,7 +49,7 @@ class RotorShare:
     def signals(self, angle: float, depth: float) -> Array:
         """s_i (states,), √J, at a rotor's angle (rad) and a depth of the plate (m)."""
         factors = np.polynomial.chebyshev.chebvander(np.array([self._place(depth)]), self.series.shape[2] - 1)[0]
-        return np.asarray(_harmonics(angle, len(self.series)) @ (self.series @ factors))
+        return np.asarray(turn_harmonics(angle, len(self.series)) @ (self.series @ factors))
 
     def filtered(self, factors: ComplexArray) -> RotorShare:
         """What a linear system makes of the share, with the response (H+1, states) to cos hφ → Re(… e^{ihφ})."""
@@ -97,64 +80,7 @@ class RotorShare:
         return [hy.sum([float(c) * m for c, m in zip(row, members, strict=True) if c]) for row in columns]
 
 
-def rotor_share(
-    network: Network, plate: Plate, rotor: RotorTable, tolerance: float = 1e-4, most: int = MOST_TERMS
-) -> RotorShare:
-    """Signals of a rotor for the pose and the way of `plate`.
-
-    Parameters
-    ----------
-    network : of a plate of the same size and conductivity, or of what stands for it
-    tolerance : for the estimated error; harmonics and depths are added until it is met
-    most : highest number of either
-
-    Raises
-    ------
-    AccuracyError : the tolerance is not met with the most terms
-    """
-    parts = rotor_parts(rotor, plate)
-    distance = plate.lowering.distance if plate.lowering else 0.0
-    harmonics, depths = 3, 4 if distance else 1
-    while True:
-        series, samples = _sampled(network, plate, parts, distance, harmonics, depths)
-        size = np.abs(samples).max()
-        turns = float(np.abs(series[-4:]).max() / size)  # of two harmonics: symmetry may forbid one
-        ways = float(np.abs(series[..., -1]).max() / size) if distance else 0.0
-        if max(turns, ways) <= tolerance / 2:
-            return _trimmed(distance, series, turns + ways, tolerance / 2, float(size))
-        if max(harmonics, depths) >= most:
-            raise AccuracyError(
-                f"Input tolerance must be at least {turns + ways:.1e} for this rotor and this way; instead received "
-                f"{tolerance:.1e}."
-            )
-        harmonics += 2 * (turns > tolerance / 2)
-        depths += 2 * (ways > tolerance / 2)
-
-
-def _trimmed(distance: float, series: Array, error: float, tolerance: float, size: float) -> RotorShare:
-    """The share without its highest harmonics, whose sum no signal misses by more than the tolerance."""
-    tails = np.cumsum(np.abs(series).sum(axis=2).max(axis=1)[::-1])[::-1] / size
-    kept = max(3, int(np.argmax(np.append(tails, 0.0) <= tolerance)) | 1)
-    part = series[:kept]
-    small = np.abs(part) < NOISE * size
-    return RotorShare(distance, np.where(small, 0.0, part), error + float(np.append(tails, [0.0, 0.0])[kept]))
-
-
-def _sampled(
-    network: Network, plate: Plate, parts: Sequence[Source], distance: float, harmonics: int, depths: int
-) -> tuple[Array, Array]:
-    """Series (2H+1, states, depths) through samples (depths, 2H+1, states) at equidistant angles, Chebyshev depths."""
-    turns = 2 * harmonics + 1
-    nodes = np.cos(np.pi * (np.arange(depths) + 0.5) / depths)
-    angles = 2 * np.pi * np.arange(turns) / turns
-    ways = distance * (1 + nodes) / 2
-    sources = [posed_rotor(parts, plate, angle, depth) for depth in ways for angle in angles]
-    samples = np.concatenate(network.couplings(sources), axis=1).reshape(depths, turns, -1)
-    fourier = np.linalg.inv(np.array([_harmonics(angle, turns) for angle in angles]))
-    chebyshev = np.linalg.inv(np.polynomial.chebyshev.chebvander(nodes, depths - 1))
-    return np.einsum("ha,kn,nas->hsk", fourier, chebyshev, samples, optimize=True), samples
-
-
-def _harmonics(angle: float, count: int) -> Array:
+def turn_harmonics(angle: float, count: int) -> Array:
+    """(count,) 1, cos φ, sin φ, cos 2φ, … of an angle, rad."""
     h = np.arange(1, count // 2 + 1) * angle
     return np.concatenate([[1.0], np.stack([np.cos(h), np.sin(h)], axis=1).ravel()])

@@ -5,8 +5,6 @@ signals, and their field decays fast on the way to the floater; in the integrati
 since the fastest motion among all states decides how long a step may be.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

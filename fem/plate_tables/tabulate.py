@@ -1,7 +1,5 @@
 """The table of a plate: the network of its currents, then its field functions."""
 
-from __future__ import annotations
-
 import time
 from importlib.metadata import version
 
@@ -10,8 +8,8 @@ import numpy as np
 from ...geometry.basics import Array
 from ...geometry.meshes import MeshRule
 from ...geometry.scenes import Plate
-from ..closed_forms import unit_dipoles
-from ..plate_network import STRICT, OtherSources, PlateNetwork, Region, reduce_plate
+from ..plate_currents import STRICT, OtherSources, Region
+from ..plate_network import PlateNetwork, reduce_plate
 from ..rotor_tables import AccuracyError
 from .field_functions import HIGHEST_DEGREE, candidates
 from .multipole_fit import fit_multipoles
@@ -80,8 +78,7 @@ def tabulate(network: PlateNetwork, rtol: float) -> PlateTable:
     provenance: dict[str, str | float] = {
         "ngsolve": version("ngsolve"),
         "order": float(network.space.order),
-        "cells": float(network.space.conductors.mesh.ne),
-        "solved_hz": ", ".join(f"{f:.6g}" for f in network.solved),
+        "cells": float(network.space.cells),
         "rtol": rtol,
         "seconds": network.seconds + time.perf_counter() - start,
     }
@@ -100,7 +97,7 @@ def surface_counts(region: Region) -> tuple[int, int, int]:
 
 def field_values(network: PlateNetwork, points: Array) -> Array:
     """b_i (states, n, 3), T/√J, of the finite elements themselves."""
-    couplings = np.concatenate([part.T for part in network.couplings(unit_dipoles(points))])
+    couplings = np.concatenate([part.T for part in network.dipole_couplings(points)])
     return couplings.reshape(len(couplings), -1, 3)
 
 

@@ -38,7 +38,6 @@ def fem_table(
     magnets: tuple[Magnet, ...],
     accuracy: Accuracy | None = None,
     settings: MeshSettings | None = None,
-    use_symmetry: bool = True,
 ) -> RotorTable:
     """Field of magnets with recoil permeability: closed form of the remanence, and expansions of what is added to it.
 
@@ -55,7 +54,7 @@ def fem_table(
 
     def reaction(order: int) -> RotorSolution:
         refinement = rung(order, settings, strongest(magnets))
-        return solve_rotor(magnets, refinement, "split", degree, cut, use_symmetry, carriers)
+        return solve_rotor(magnets, refinement, "split", degree, cut, carriers=carriers)
 
     solution, order, steps = climb(reaction, points, scale, accuracy.rtol / 3, settings)
     whole = solution.expansions(

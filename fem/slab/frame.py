@@ -12,7 +12,7 @@ import numpy as np
 
 from ...geometry.basics import Array, InputError, rotation_matrix
 from ...geometry.scenes import Plate
-from ..plate_network import Region
+from ..plate_currents import Region
 from ..plate_tables import DOWN
 from ..rotor_tables import RotorTable
 from .reaction import Slab

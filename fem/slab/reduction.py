@@ -14,16 +14,13 @@ from ...geometry.basics import Array
 from ...geometry.scenes import Plate
 from ..closed_forms import ComplexArray, Dipole
 from ..eddy_currents import Source
+from ..plate_currents import OtherSources, Region, probe_places, unit_power
 from ..plate_network import (
     NETWORK_SHARE,
     OrderedBasis,
-    OtherSources,
-    Region,
     checked_ranges,
     coupling_error,
-    probe_places,
     truncated,
-    unit_power,
 )
 from ..rotor_tables import AccuracyError
 from .frame import SlabFrame, corners, slab_frame

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from ...geometry.scenes import Plate
-from ..plate_network import Region
+from ..plate_currents import Region
 from ..plate_tables import (
     FUNCTION_SHARE,
     MISSED,

@@ -1,7 +1,5 @@
 """The three rotors of the article, as magnets in the rotor's frame at t = 0."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from ..basics import Array, Box, rotation_matrix

@@ -47,9 +47,18 @@ def skin_depth(conductivity: float, frequency: float) -> float:
 
 
 def plate_mesh(
-    size: ArrayLike, conductivity: float, positions: ArrayLike, frequency: float, rule: MeshRule | None = None
+    size: ArrayLike,
+    conductivity: float,
+    positions: ArrayLike,
+    frequency: float,
+    rule: MeshRule | None = None,
+    endless: bool = False,
 ) -> ConductorMesh:
     """Mesh for a plate with edges `size` (3,) m and dipoles at `positions` (n, 3) m in the plate's own frame.
+
+    Parameters
+    ----------
+    endless : on the same cells, the plate reaches to the end of the air along its two longer edges
 
     Raises
     ------
@@ -71,7 +80,8 @@ def plate_mesh(
     for axis in range(3):
         size_along = partial(_cell_size, axis=axis, half=half, places=places, depth=depth, rule=rule)
         lines.append(graded_partition([0.0, half[axis], far], size_along) / MILLIMETRE)
-    mesh = hex_mesh(lines, [Block("plate", np.full(3, -1.0), half / MILLIMETRE)], mirrors=(0, 1, 2))
+    ends = np.where(np.arange(3) == np.argmin(half), half, far) if endless else half
+    mesh = hex_mesh(lines, [Block("plate", np.full(3, -1.0), ends / MILLIMETRE)], mirrors=(0, 1, 2))
     return ConductorMesh(mesh, {"plate": conductivity}, mirrors=(0, 1, 2))
 
 

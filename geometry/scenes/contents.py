@@ -1,9 +1,8 @@
 """The scene: rotor, floater, plate and what acts on them, all in SI units."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Self
 
 import numpy as np
 
@@ -96,7 +95,7 @@ class Drag:
     angular: float
 
     @classmethod
-    def stokes(cls, radius: float) -> Drag:
+    def stokes(cls, radius: float) -> Self:
         """Stokes drag of a sphere in air: 6πηR and 8πηR³."""
         return cls(6 * np.pi * AIR_VISCOSITY * radius, 8 * np.pi * AIR_VISCOSITY * radius**3)
 

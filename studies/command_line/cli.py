@@ -37,13 +37,9 @@ def run(arguments: list[str], stop: threading.Event) -> int:
         return _status(arguments, out, stop)
 
 
+@heard()
 def _status(arguments: list[str], out: Any, stop: threading.Event | None = None) -> int:
     """The exit status; `stop` tells that the user has stopped the program, whatever a library made of that."""
-    with heard():
-        return _heard_status(arguments, out, stop)
-
-
-def _heard_status(arguments: list[str], out: Any, stop: threading.Event | None) -> int:
     try:
         _answer(arguments, out)
     except CycloptsError as error:

@@ -70,11 +70,7 @@ def _plate(polarization: tuple[float, float, float]) -> tuple[Magnet, ...]:
 
 EDGE_WITHIN_A_FACE = (
     _magnet(_box(CUBE), (1, 0, 0), PERMEABILITY),
-    _magnet(
-        _box((0.006,) * 3, (0.001, 0.0015, 0.008), rotation_matrix((0, 0, 30))),
-        (0, 0.5, 1),
-        PERMEABILITY,
-    ),
+    _magnet(_box((0.006,) * 3, (0.001, 0.0015, 0.008), rotation_matrix((0, 0, 30))), (0, 0.5, 1), PERMEABILITY),
 )
 EIGHT = tuple(
     _magnet(

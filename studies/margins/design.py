@@ -49,7 +49,8 @@ def checked_by_elements(
     ------
     EquilibriumError : there is none, or the corrections do not settle
     """
-    measure, slope = first, _shifted(configuration, edge, distance, frequency, first)
+    measure, step = first, 1e-5
+    slope = step / (designed(configuration, edge, distance + step, frequency).measure - first)  # by the closed form
     for _ in range(5):
         scene = article_scene(configuration, measure, frequency, drag=False, edge=edge)
         found = find_equilibria(scene, article_table(scene, "fem", rtol))
@@ -60,12 +61,6 @@ def checked_by_elements(
             return np.array([measure, best.distance, best.position_error, float(best.stable), best.growth_per_s])
         measure -= (best.distance - distance) / slope
     raise EquilibriumError("The correction of the measure for the true field did not settle.")
-
-
-def _shifted(configuration: str, edge: float, distance: float, frequency: float, measure: float) -> float:
-    """Change of the distance by the measure (m by mm or °), from the closed form."""
-    step = 1e-5
-    return step / (designed(configuration, edge, distance + step, frequency).measure - measure)
 
 
 NAMES = {

@@ -66,7 +66,10 @@ def designed(configuration: str, edge: float, distance: float, frequency: float)
     place, moment = np.array([radius, 0.0, -distance]), np.array([np.sin(angle), 0.0, np.cos(angle)])
     known: list[tuple[float, float]] = []
     for _ in range(30):
-        scene = _checked(_closed_form(configuration, measure, frequency, edge), configuration, measure)
+        least = 1e3 * edge if configuration == "vertical" else 0.0
+        if not least <= measure < (90 if configuration == "tilt" else 100) or measure == 0:
+            raise EquilibriumError(f"The rotor would need a measure of {measure:.3g}.")
+        scene = article_scene(configuration, measure, frequency, drag=False, edge=edge, permeability=1.0)
         rates = Rates.of(scene, rotor_table(scene.rotor, "cuboid"))
         place, moment, force = _lateral(scene, rates, place * distance / np.linalg.norm(place), moment)
         if known and abs(measure - known[-1][0]) < 1e-9 * measure:
@@ -76,10 +79,6 @@ def designed(configuration: str, edge: float, distance: float, frequency: float)
     raise EquilibriumError("The search for the measure did not settle.")
 
 
-def _closed_form(configuration: str, measure: float, frequency: float, edge: float) -> Scene:
-    return article_scene(configuration, measure, frequency, drag=False, edge=edge, permeability=1.0)
-
-
 def _secant(known: list[tuple[float, float]]) -> float:
     here, miss = known[-1]
     if len(known) == 1:
@@ -87,13 +86,6 @@ def _secant(known: list[tuple[float, float]]) -> float:
     before, missed = known[-2]
     step = -miss * (here - before) / (miss - missed)
     return here + float(np.clip(step, -0.2 * here, 0.2 * here))
-
-
-def _checked(scene: Scene, configuration: str, measure: float) -> Scene:
-    edge = 1e3 * float(scene.rotor[0].box.size[0])
-    if not 0 < measure < (90 if configuration == "tilt" else 100) or (configuration == "vertical" and measure < edge):
-        raise EquilibriumError(f"The rotor would need a measure of {measure:.3g}.")
-    return scene
 
 
 def _lateral(scene: Scene, rates: Rates, place: Array, moment: Array) -> tuple[Array, Array, float]:

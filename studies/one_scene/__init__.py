@@ -3,6 +3,6 @@
 from .levitation import Levitation as Levitation, given_scene as given_scene, sources as sources
 from .plate_of_scene import plate_memory as plate_memory
 from .question import Question as Question
-from .reaction import Job as Job, plate_job as plate_job
+from .reaction import plate_job as plate_job
 from .run import main_job as main_job
-from .single import equilibria_job as equilibria_job, field_job as field_job, simulate_job as simulate_job
+from .single import Job as Job, equilibria_job as equilibria_job, field_job as field_job, simulate_job as simulate_job

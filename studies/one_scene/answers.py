@@ -86,6 +86,7 @@ def flight_answer(levitation: Levitation, flight: Trajectory) -> dict[str, Any]:
         "ended_by": flight.ended_by,
         "kind": flight_kind(flight),
         "energy_error": flight.energy_error,
+        "field_changes": vars(flight.field_changes),
         "realtime_factor": flight.realtime_factor,
     }
 
@@ -145,9 +146,14 @@ def _plate_lines(equilibria: Sequence[Equilibrium], memory: PlateMemory) -> list
 
 def flight_lines(flight: Trajectory) -> list[str]:
     """How a flight went, for a person."""
-    beyond = flight.beyond_plate_table
+    beyond, changes = flight.beyond_plate_table, flight.field_changes
+    told = (
+        f"The floater changed {changes.count} times from one ball with an expansion of the field to another "
+        f"(error up to {changes.error:.0e}); that changed its energy by {changes.energy:.1e}, beside the ledger."
+    )
     return [
         f"Flight of {flight.levitated_s:.4g} s ({flight_kind(flight)}), ended by {flight.ended_by}; violation of the "
         f"energy ledger and of unit length {flight.energy_error:.1e}; {flight.realtime_factor:.3g} times real time.",
         *([f"For {beyond:.1%} of the flight the floater was beyond the range of the plate's table."] if beyond else []),
+        *([told] if changes.count else []),
     ]

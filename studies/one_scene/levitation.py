@@ -83,12 +83,14 @@ class Levitation:
         place = self._place(() if alone else self.without_plate.equilibria)
         if place is not None:
             check_room(scene, place)
-        name, reason = resolve_plate_model(scene, self.models.plate_model, place, self.models.plate_rtol)
+        choice = resolve_plate_model(scene, self.models.plate_model, place, self.models.plate_rtol, note)
         if scene.plate is not None:
-            note(f"Plate model: {name} ({reason})")
-        if name == "none" or scene.plate is None or place is None:
+            note(f"Plate model: {choice.model} ({choice.reason})")
+        if choice.model == "none" or scene.plate is None or place is None:
             return None
-        memory, found = plate_memory(scene, scene.plate, name, sources(self.table), place, self.models.plate_rtol)
+        memory, found = plate_memory(
+            scene, scene.plate, choice.model, sources(self.table), place, self.models.plate_rtol, choice.edges
+        )
         if found:
             self.from_cache.append("plate")
         return memory

@@ -5,14 +5,14 @@ from dataclasses import replace
 import numpy as np
 
 from ...dynamics.motion import PlateMemory
-from ...fem.plate_network import Region
+from ...fem.plate_currents import Region
 from ...fem.plate_tables import cached_driven_plate, reachable_region
 from ...fem.rotor_tables import Accuracy, RotorTable, shortened_table
 from ...fem.slab import edge_error, slab_and_rotor_table
 from ...geometry.basics import Array, InputError
 from ...geometry.bodies import TOUCHING, sphere_overlap
 from ...geometry.scenes import Plate, Scene
-from ..terminal import note
+from ..terminal import note, stages
 
 REACH = 0.003
 """The floater may move so far from where it begins, along each axis, m."""
@@ -25,9 +25,13 @@ PLUMB = 1e-9
 
 
 def plate_memory(
-    scene: Scene, plate: Plate, model: str, table: RotorTable, place: Array, rtol: float
+    scene: Scene, plate: Plate, model: str, table: RotorTable, place: Array, rtol: float, edges: float | None = None
 ) -> tuple[PlateMemory, bool]:
     """The plate's currents for a floater about `place` (3,) m that turns with the rotor; whether they were cached.
+
+    Parameters
+    ----------
+    edges : relative error by edges that the model leaves out; default for a slab is its bound
 
     Raises
     ------
@@ -43,9 +47,12 @@ def plate_memory(
         made, share = slab_and_rotor_table(plate, table, region, frequencies, rtol)
         found = False
     else:
-        made, share, found = cached_driven_plate(plate, table, region, frequencies, rtol, note)
+        with stages("Plate's currents") as watch:
+            made, share, found = cached_driven_plate(plate, table, region, frequencies, rtol, note, watch)
     note("  from the cache." if found else f"  {len(made.rates)} states in {made.provenance['seconds']:.1f} s.")
-    return PlateMemory(plate, made, share, model, edge_error(plate, place) if model == "slab" else 0.0), found
+    if edges is None:
+        edges = edge_error(plate, place) if model == "slab" else 0.0
+    return PlateMemory(plate, made, share, model, edges), found
 
 
 def table_in_flight(scene: Scene, table: RotorTable, place: Array, rtol: float) -> RotorTable:

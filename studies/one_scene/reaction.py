@@ -1,22 +1,21 @@
 """The command `plate`: reaction tensor of the scene's plate at one place and frequency."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from ...fem.closed_forms import ComplexArray
-from ...fem.plate_network import Region, plate_reaction
+from ...fem.plate_currents import Region, plate_reaction
 from ...fem.plate_tables import cached_plate_table
 from ...fem.slab import Slab, edge_error, reaction_tensor
 from ...fem.storage import write_whole
 from ...geometry.basics import Array, InputError
 from ...geometry.scenes import Plate, Scene
 from ..terminal import note, to_json
+from .single import Job
 
-Job = tuple[Mapping[str, Any], list[str]]
 NEARBY = 0.15
 """Half edge of the region of a reduced table, in units of the place's distance from the plate."""
 NEAREST = 1e-3

@@ -1,7 +1,5 @@
 """Figure of the study of the plate's damping, from its dataset alone."""
 
-from collections.abc import Callable
-
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
@@ -25,31 +23,19 @@ MODELS = {"": ("infinite slab", "o-", 3.0), ", real plate": ("real plate", "s", 
 """By the ending of a sweep's name: what the plate is, its marks and their size."""
 LINEAR = 0.1
 """Growth rates below this are drawn on a linear scale, 1/s."""
-Measure = Callable[[xr.Dataset], Array]
+MEANS = (
+    ("Equilibrium moved by", "displacement (mm)"),
+    ("Mean force along the axis", "up, of the weight (%)"),
+    ("Braking torque (filled) and loss (open)", "torque on the floater (µN m)"),
+)
+"""Titles and labels of what `means` gives."""
 
 
-def _length(part: xr.Dataset) -> Array:
-    return np.asarray(1e3 * np.linalg.norm(part["shift"].values, axis=1))
-
-
-def _lift(part: xr.Dataset) -> Array:
-    return np.asarray(100 * part["force"].sel(axis="z").values / float(part.attrs["weight_N"]))
-
-
-def _loss(part: xr.Dataset) -> Array:
-    return np.asarray(1e3 * part["loss"].values)
-
-
-def _torque(part: xr.Dataset) -> Array:
-    return np.asarray(-1e6 * part["torque"].sel(axis="z").values)
-
-
-MEANS: dict[str, tuple[str, str, Measure]] = {
-    "displacement": ("Equilibrium moved by", "displacement (mm)", _length),
-    "lift": ("Mean force along the axis", "up, of the weight (%)", _lift),
-    "torque": ("Braking torque (filled) and loss (open)", "torque on the floater (µN m)", _torque),
-}
-"""What a plate does on average: title, label and how it comes from the dataset."""
+def means(part: xr.Dataset) -> tuple[Array, Array, Array]:
+    """What a plate does on average: displacement (mm), force up (% of the weight) and braking torque (µN m)."""
+    moved = 1e3 * np.linalg.norm(part["shift"].values, axis=-1)
+    lift = 100 * part["force"].sel(axis="z").values / float(part.attrs["weight_N"])
+    return np.asarray(moved), lift, -1e6 * part["torque"].sel(axis="z").values
 
 
 @styled
@@ -66,8 +52,8 @@ def damping_figure(result: xr.Dataset) -> Figure:
     axes[0, 0].legend(loc="lower right")
     axes[0, 1].legend(loc="lower right")
     _rotors(axes[1, 2], result)
-    for place, (title, words, measure) in zip(axes[2], MEANS.values(), strict=True):
-        _mean(place, result, measure)
+    for number, (place, (title, words)) in enumerate(zip(axes[2], MEANS, strict=True)):
+        _mean(place, result, number)
         place.set(title=title, xlabel="distance of the face (mm)", ylabel=words)
     _loss_beside(axes[2, 2], result)
     axes[2, 0].set_yscale("log")
@@ -120,12 +106,12 @@ def _rotors(axes: Axes, result: xr.Dataset) -> None:
     axes.legend()
 
 
-def _mean(axes: Axes, result: xr.Dataset, measure: Measure) -> None:
+def _mean(axes: Axes, result: xr.Dataset, number: int) -> None:
     for sweep, style, color in (("below", "o-", PALETTE[0]), ("beside", "s--", PALETTE[1])):
         for ending, fill, line in (("", color, style), (", real plate", "none", style[0])):
             part = part_of(result, sweep + ending)
             if part.sizes["case"]:
-                values, error = measure(part), part["error"].values
+                values, error = means(part)[number], part["error"].values
                 axes.errorbar(
                     part["value"].values * 1e3, values, np.abs(values) * error, fmt=line, ms=6 if ending else 3,
                     color=color, mfc=fill, label=f"{sweep}{ending}",
@@ -137,7 +123,7 @@ def _loss_beside(axes: Axes, result: xr.Dataset) -> None:
     twin = axes.twinx()
     for sweep, style, color in (("below", "o:", PALETTE[2]), ("beside", "s:", PALETTE[3])):
         part = part_of(result, sweep)
-        distance, loss = part["value"].values * 1e3, _loss(part)
+        distance, loss = part["value"].values * 1e3, 1e3 * part["loss"].values
         twin.plot(distance, loss, style, ms=3, mfc="white", color=color, label=f"loss, {sweep}")
     twin.set(yscale="log", ylabel="loss in the plate (mW)")
     axes.set_yscale("log")

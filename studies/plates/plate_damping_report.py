@@ -6,7 +6,7 @@ import xarray as xr
 from ..article import rotor_label
 from ..levitation import range_text
 from .plate_cases import DISTANCE, ROTORS
-from .plate_damping_figure import SWEEPS, part_of
+from .plate_damping_figure import SWEEPS, means, part_of
 
 PLACES = ("below", "beside")
 REAL = ", real plate"
@@ -34,13 +34,12 @@ def _line(one: xr.Dataset, sweep: str) -> str:
     if np.isnan(worst):
         return f"{where}no equilibrium is left."
     mode = str(one["mode"].values[int(one["growth"].argmax("mode"))])
-    torque, loss = -1e6 * float(one["torque"].sel(axis="z")), 1e3 * float(one["loss"])
-    lift = 100 * float(one["force"].sel(axis="z")) / float(one.attrs["weight_N"])
+    moved, lift, torque = means(one)
     return (
         f"{where}{'stable' if worst < 0 else 'UNSTABLE'}, least damped motion {mode} {worst:+.3g} ± "
         f"{abs(worst) * float(one['error']):.1g} /s (without the plate {float(one['growth_without'].max()):+.1g} /s); "
-        f"moved {float(np.linalg.norm(one['shift'])) * 1e3:.3f} mm; mean force up {lift:+.3g} % of the "
-        f"weight; braking torque {torque:.3g} µN m; loss {loss:.3g} mW."
+        f"moved {moved:.3f} mm; mean force up {lift:+.3g} % of the weight; braking torque {torque:.3g} µN m; "
+        f"loss {1e3 * float(one['loss']):.3g} mW."
     )
 
 

@@ -7,7 +7,6 @@ with phasors e^{+iωt} and the current I cos ωt these are Re B and -Im B.
 K. Fujiwara, T. Nakata, COMPEL 9 (1990) 137-154, doi 10.1108/eb010071.
 """
 
-from dataclasses import dataclass
 from functools import partial
 from importlib.resources import files
 
@@ -30,27 +29,6 @@ FACES = (np.array([0.0, 18.0, 126.0, 294.0]), np.array([0.0, 18.0, 126.0, 294.0]
 REACH = 1500.0
 """Distance from the plate to the outer boundary, mm."""
 GAUSS = 1e-4
-
-
-@dataclass(frozen=True, eq=False)
-class Team7Comparison:
-    """Measured and computed B_z on the line.
-
-    Parameters
-    ----------
-    x : (17,) m
-    measured, computed : (17, 4) T; columns 50 Hz ωt = 0, 50 Hz ωt = 90°, 200 Hz ωt = 0, 200 Hz ωt = 90°
-    """
-
-    x: Array
-    measured: Array
-    computed: Array
-
-    @property
-    def deviation(self) -> Array:
-        """(17, 4) computed minus measured, in units of the line's peak: the largest measured |B| of that frequency."""
-        amplitude = np.hypot(self.measured[:, 0::2], self.measured[:, 1::2]).max(axis=0)
-        return np.asarray((self.computed - self.measured) / np.repeat(amplitude, 2))
 
 
 def team7_mesh(frequency: float, cell: float = 70.0, skin_share: float = 2.0, growth: float = 2.0) -> ConductorMesh:
@@ -89,29 +67,27 @@ def compute_line(frequency: float, x: Array, mesh: ConductorMesh, order: int = 3
     return np.column_stack([total.real, -total.imag])
 
 
-def team7(order: int = 3) -> Team7Comparison:
+def team7(order: int = 3) -> xr.Dataset:
     """Both frequencies against the measurement."""
     x, measured = measured_line()
-    computed = np.hstack([compute_line(f, x, team7_mesh(f), order) for f in FREQUENCIES])
-    return Team7Comparison(x, measured, computed)
+    return compared(x, measured, np.hstack([compute_line(f, x, team7_mesh(f), order) for f in FREQUENCIES]))
+
+
+def compared(x: Array, measured: Array, computed: Array) -> xr.Dataset:
+    """B_z (17, 4), T, at x (17,), m, by `CURVES`; deviation in units of the largest measured |B| of that frequency."""
+    amplitude = np.hypot(measured[:, 0::2], measured[:, 1::2]).max(axis=0)
+    columns = {
+        "measured": (measured, "T", "measured B_z"),
+        "computed": (computed, "T", "computed B_z"),
+        "deviation": ((computed - measured) / np.repeat(amplitude, 2), "1", "deviation over the line's peak"),
+    }
+    data = {name: variable(("x", "curve"), *column) for name, column in columns.items()}
+    return xr.Dataset(data, {"x": variable(("x",), x, "m", "x"), "curve": list(CURVES)})
 
 
 def team7_study(quick: bool) -> xr.Dataset:
     """Measured and computed B_z on the line, in T, and their deviation in units of the line's peak."""
-    return team7_dataset(team7(order=2 if quick else 3))
-
-
-def team7_dataset(compared: Team7Comparison) -> xr.Dataset:
-    """A comparison with names and units."""
-    dims = ("x", "curve")
-    return xr.Dataset(
-        {
-            "measured": variable(dims, compared.measured, "T", "measured B_z"),
-            "computed": variable(dims, compared.computed, "T", "computed B_z"),
-            "deviation": variable(dims, compared.deviation, "1", "deviation over the line's peak"),
-        },
-        {"x": variable(("x",), compared.x, "m", "x"), "curve": list(CURVES)},
-    )
+    return team7(order=2 if quick else 3)
 
 
 STUDY = study_of_one(

@@ -6,6 +6,7 @@ from .console import (
     note as note,
     progress as progress,
     silence as silence,
+    stages as stages,
     to_json as to_json,
 )
 from .numbers import (

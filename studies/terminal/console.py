@@ -4,9 +4,10 @@ import json
 import logging
 import os
 import sys
+import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
-from typing import Any, TextIO
+from typing import Any, Protocol, TextIO
 
 import numpy as np
 from rich.console import Console
@@ -15,7 +16,16 @@ from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, T
 from .plain_text import READABLE
 
 LOG = logging.getLogger("spinlev")
+PAUSE = 2.0
+"""Between lines of progress, s."""
 ERRORS = Console(stderr=True, highlight=False, soft_wrap=True)
+
+
+class Progressed(Protocol):
+    """Moves a progress bar."""
+
+    def __call__(self, fraction: float, text: str = ...) -> None:
+        """To the finished fraction, with another label if one is given."""
 
 
 def note(text: str) -> None:
@@ -57,12 +67,41 @@ def silence() -> Iterator[None]:
 
 
 @contextmanager
-def progress(label: str) -> Iterator[Callable[[float], None]]:
-    """A progress bar where messages are heard; gives a function that takes the finished fraction."""
+def progress(label: str) -> Iterator[Progressed]:
+    """A progress bar where messages are heard; gives a function that takes the finished fraction and a new label."""
     columns = (TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(), TimeRemainingColumn())
     with Progress(*columns, console=ERRORS, transient=True, disable=not LOG.handlers) as bar:
         task = bar.add_task(label, total=1.0)
-        yield lambda fraction: bar.update(task, completed=fraction)
+
+        def advance(fraction: float, text: str = label) -> None:
+            if text != bar.tasks[task].description:
+                bar.reset(task, description=text)
+            bar.update(task, completed=fraction)
+
+        yield advance
+
+
+@contextmanager
+def stages(label: str) -> Iterator[Callable[[str, float], None]]:
+    """A progress bar for work in stages; gives a function that takes a stage's name and its finished fraction.
+
+    Where no terminal shows the bar, lines say the same, every few seconds at most.
+    """
+    stage, began, said = "", 0.0, time.monotonic()
+    with progress(label) as advance:
+
+        def watch(name: str, fraction: float) -> None:
+            nonlocal stage, began, said
+            now = time.monotonic()
+            if name != stage:
+                stage, began = name, now
+            advance(fraction, f"{label}: {name}")
+            if not ERRORS.is_terminal and now - said > PAUSE:
+                left = f", {(now - began) * (1 / fraction - 1):.0f} s left" if fraction else ""
+                note(f"  {name}, {fraction:.0%}{left}")
+                said = now
+
+        yield watch
 
 
 @contextmanager

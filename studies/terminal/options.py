@@ -1,12 +1,10 @@
 """What every command is asked: which scene and tables, who computes, and where its answers go."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from importlib.resources import files
 from pathlib import Path
-from typing import Annotated, Any, Literal, get_args
+from typing import Annotated, Any, Literal, Self, get_args
 
 from cyclopts import Parameter
 
@@ -19,12 +17,7 @@ PlateModel = Literal["none", "slab", "fem", "reduced", "auto"]
 
 def default_scene() -> Path:
     """The scene that is meant where none is named: `horizontal`."""
-    return shipped_scene("horizontal")
-
-
-def shipped_scene(name: str) -> Path:
-    """The file of a scene that comes with the program."""
-    return Path(str(files("spinlev.scenes").joinpath(f"{name}.toml")))
+    return Path(str(files("spinlev.scenes").joinpath("horizontal.toml")))
 
 
 @Parameter(name="*")
@@ -49,7 +42,7 @@ class Models:
     rtol: float = 3e-6
     plate_rtol: float = 3e-3
 
-    def checked(self) -> Models:
+    def checked(self) -> Self:
         """Itself.
 
         Raises
@@ -110,7 +103,7 @@ class Workers:
     workers: Annotated[int | None, Parameter(negative="")] = None
     scheduler: str | None = None
 
-    def checked(self) -> Workers:
+    def checked(self) -> Self:
         """Itself.
 
         Raises

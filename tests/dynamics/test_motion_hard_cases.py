@@ -15,7 +15,7 @@ from spinlev.dynamics.flights.compiled_flight import compile_flight
 from spinlev.dynamics.flights.integration import integrate
 from spinlev.dynamics.motion import PlateMemory, Rates, Scales
 from spinlev.dynamics.steady import EquilibriumError, Survey
-from spinlev.fem.plate_network import Region
+from spinlev.fem.plate_currents import Region
 from spinlev.fem.rotor_tables import rotor_table
 from spinlev.fem.slab import slab_and_rotor_table
 from spinlev.geometry.basics import Box

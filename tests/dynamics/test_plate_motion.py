@@ -15,7 +15,7 @@ from spinlev.dynamics.flights.integration import integrate
 from spinlev.dynamics.motion import Parameter, PlateForce, PlateMemory, Rates, Scales, parameters
 from spinlev.dynamics.steady import Survey, floquet_modes, periodic_orbit
 from spinlev.dynamics.steady.harmonic_balance import differentiation, resampled
-from spinlev.fem.plate_network import Region
+from spinlev.fem.plate_currents import Region
 from spinlev.fem.plate_tables import RotorShare
 from spinlev.fem.plate_tables.driven_plate import plate_and_rotor_table
 from spinlev.fem.rotor_tables import RotorTable

@@ -15,12 +15,15 @@ from second_opinions.phasor import mean_force, mean_loss, mean_torque
 from second_opinions.time_stepping import TimeStepper, work_on
 
 from spinlev.fem.closed_forms import Dipole, unit_dipoles
-from spinlev.fem.plate_network import Region, reduce_plate
+from spinlev.fem.eddy_currents import EddySpace
+from spinlev.fem.plate_currents import Region
+from spinlev.fem.plate_network import reduce_plate
 from spinlev.fem.plate_tables.tabulate import tabulate
 from spinlev.fem.rotor_tables import rotor_table
 from spinlev.fem.slab import slab_and_rotor_table
 from spinlev.geometry.basics import Box
 from spinlev.geometry.bodies import horizontal
+from spinlev.geometry.meshes import MeshRule, plate_mesh
 from spinlev.geometry.scenes import Lowering, Plate
 
 SetNumThreads(1)
@@ -130,7 +133,9 @@ def test_finite_elements_step_by_step_have_the_same_memory():
         return np.array([8e-2 * np.cos(80 * t), 0, 2.5e-3 * bounce * np.cos(bounce * t) + 0.02])
 
     _, dense = flight(table, place, speed, moment, lambda t: np.array([0, 0, omega]), turns / 100)
-    stepper = TimeStepper(network.space, step)
+    mesh = plate_mesh(PLATE.box.size, PLATE.conductivity, REGION.grid((2, 2, 2), fold=True), 250.0, MeshRule())
+    space = EddySpace(mesh, network.space.order)
+    stepper = TimeStepper(space, step)
 
     def source(t):
         return Dipole(place(t), moment(t))
@@ -141,7 +146,7 @@ def test_finite_elements_step_by_step_have_the_same_memory():
         time = history[number][0]
         receivers = unit_dipoles(place(time)) + [DipoleDerivative(place(time), moment(time), a) for a in np.eye(3)]
         reactions = [reaction for _, reaction in history[number - 2 : number + 3]]
-        exact.append(work_on(network.space, receivers, source, time, reactions, step))
+        exact.append(work_on(space, receivers, source, time, reactions, step))
         b, gradient = (part[0] for part in table.field_functions(place(time)))
         y = dense(time)[: len(table.rates)] - b @ moment(time)
         found.append(np.concatenate([y @ b, np.einsum("i,iac,a->c", y, gradient, moment(time))]))

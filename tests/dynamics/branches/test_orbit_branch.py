@@ -14,7 +14,7 @@ from spinlev.dynamics.flights.integration import integrate
 from spinlev.dynamics.motion import Parameter, PlateForce, PlateMemory, Rates, Scales, parameters
 from spinlev.dynamics.steady import EquilibriumError, Survey, periodic_orbit
 from spinlev.dynamics.steady.harmonic_balance import resampled
-from spinlev.fem.plate_network import Region
+from spinlev.fem.plate_currents import Region
 from spinlev.fem.rotor_tables import rotor_table
 from spinlev.fem.slab import slab_and_rotor_table
 from spinlev.geometry.basics import Box

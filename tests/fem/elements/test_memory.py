@@ -10,7 +10,7 @@ import ngsolve
 import pytest
 from netgen.meshing import NgException
 
-from spinlev.fem.eddy_currents import EddySpace, FrequencySystem
+from spinlev.fem.eddy_currents import EddySpace, ShiftedSystem
 from spinlev.fem.elements import TooLargeError, memory
 from spinlev.fem.elements.memory import free_memory, memory_need
 from spinlev.fem.magnetostatics import rung
@@ -29,7 +29,7 @@ def magnets():
 
 def plate():
     conductors = plate_mesh((0.1, 0.24, 0.03), 3.5e7, [[0.03, 0.02, 0.04]], 100.0)
-    system = FrequencySystem(EddySpace(conductors, 2), 100.0)
+    system = ShiftedSystem(EddySpace(conductors, 2), 628j)
     return system.fes, system.fes.FreeDofs(True), system.form.mat
 
 

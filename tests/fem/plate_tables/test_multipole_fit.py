@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from spinlev.fem.plate_network import Region
+from spinlev.fem.plate_currents import Region
 from spinlev.fem.plate_tables import Multipoles, fit_multipoles
 from spinlev.fem.plate_tables.field_functions import candidates
 

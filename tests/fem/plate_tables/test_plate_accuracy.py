@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from ngsolve import SetNumThreads
 
-from spinlev.fem.plate_network import Region, plate_reaction
+from spinlev.fem.plate_currents import Region, plate_reaction
 from spinlev.fem.plate_tables.tabulate import plate_table
 from spinlev.geometry.basics import Box
 from spinlev.geometry.meshes import MeshRule

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 from ngsolve import SetNumThreads
 
-from spinlev.fem.plate_network import Region, reduce_plate
+from spinlev.fem.plate_currents import Region
+from spinlev.fem.plate_network import reduce_plate
 from spinlev.fem.plate_tables import cached_plate_table, posed_rotor, rotor_parts, rotor_share, trimmed
 from spinlev.fem.plate_tables.file import load_plate_table, plate_key, save_plate_table
 from spinlev.fem.plate_tables.tabulate import field_values, tabulate

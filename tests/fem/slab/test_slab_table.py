@@ -10,7 +10,7 @@ from scipy.special import jv
 
 from spinlev.fem.closed_forms import Dipole, HomogeneousField, PolarizedCuboid
 from spinlev.fem.harmonics import uniform_moments
-from spinlev.fem.plate_network import Region
+from spinlev.fem.plate_currents import Region
 from spinlev.fem.plate_tables import DOWN, ExpansionSource, posed_rotor, rotor_parts
 from spinlev.fem.rotor_tables import rotor_table
 from spinlev.fem.slab import Slab, reaction_tensor, slab_and_rotor_table

@@ -138,7 +138,7 @@ def test_more_of_the_field_is_right_nearer_to_the_rotor(validity):
 
 def test_team_problem_7_with_coarse_elements():
     """Elements of order 1 are within 10 % of the peak that was measured, where order 3 is within 5 %."""
-    result = team7.team7_dataset(team7.team7(order=1))
+    result = team7.team7(order=1)
     assert result["measured"].sizes == {"x": 17, "curve": 4}
     size = np.abs(result["deviation"].values)
     assert 0 < size.max() < 0.1

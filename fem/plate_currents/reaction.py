@@ -7,8 +7,6 @@ truncation: a sphere of radius R without normal field answers a moment with the 
 on the plate's induced moment α m, so that G is off by up to |α|² μ0/(2πR³), with R the half edge of the air box.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np
@@ -114,29 +112,32 @@ def raise_order(plate: Plate, body: Array, frequency: float, rtol: float, rule: 
     highest = highest_order(mesh.mesh.ne)
     sources = unit_dipoles(body)
     response = solve_eddy(mesh, 1, frequency, sources)
-    tensors, change = own_tensors(response), np.ones(len(body))
+    tensors, change = own_tensors(response.couplings), np.ones(len(body))
     error = change
     for order in range(2, highest + 1):
         response = solve_eddy(mesh, order, frequency, sources)
-        previous, tensors = tensors, own_tensors(response)
+        previous, tensors = tensors, own_tensors(response.couplings)
         size = np.linalg.norm(tensors, axis=(1, 2))
         last, change = change, np.linalg.norm(tensors - previous, axis=(1, 2)) / size
-        reduction = np.clip(change / last, LEAST_REDUCTION, 1.0)
-        error = change * reduction + _truncation(response, rule.reach * plate.box.size.max()) / size
+        error = order_error(change, last) + truncation_error(response, rule.reach * plate.box.size.max()) / size
         hopeless = error.max() * BEST_REDUCTION ** (highest - order) > rtol
         if error.max() <= rtol or hopeless or (order > 2 and np.max(change / last) > STALLED):
             break
     return response, error
 
 
-def own_tensors(response: EddyResponse) -> ComplexArray:
-    """G (n, 3, 3), T/(A m²), of a response to `unit_dipoles`, each at its own place."""
-    couplings = response.couplings
+def order_error(change: Array, last: Array) -> Array:
+    """Error left by an order, from its change of the tensors and that of the order before."""
+    return np.asarray(change * np.clip(change / last, LEAST_REDUCTION, 1.0))
+
+
+def own_tensors(couplings: ComplexArray) -> ComplexArray:
+    """G (n, 3, 3), T/(A m²), from the couplings of `unit_dipoles`, each at its own place."""
     n = len(couplings) // 3
     return np.asarray(np.einsum("iaib->iab", couplings.reshape(n, 3, n, 3)))
 
 
-def _truncation(response: EddyResponse, reach: float) -> Array:
+def truncation_error(response: EddyResponse, reach: float) -> Array:
     """Error bound (n,) of the own tensors, T/(A m²): induced moment against the box of half edge `reach`, m."""
     induced = response.couplings_to([HomogeneousField(axis) for axis in np.eye(3)])
     moment = np.linalg.norm(induced.reshape(3, -1, 3), axis=(0, 2))

@@ -1,7 +1,5 @@
 """How large a plate's finite-element problem may be, and what is said of one that is larger."""
 
-from __future__ import annotations
-
 from ...geometry.meshes import skin_depth
 from ...geometry.scenes import Plate
 from ..rotor_tables import AccuracyError

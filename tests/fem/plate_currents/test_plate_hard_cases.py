@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from spinlev.fem.plate_network import plate_reaction
+from spinlev.fem.plate_currents import plate_reaction
 from spinlev.fem.slab import Slab, reaction_tensor
 from spinlev.geometry.basics import Box
 from spinlev.geometry.meshes import MeshRule

@@ -7,13 +7,13 @@ import pytest
 from ngsolve import SetNumThreads
 from second_opinions.phasor import mean_loss
 
-from spinlev.fem.plate_network import plate_reaction
+from spinlev.fem.plate_currents import plate_reaction
 from spinlev.fem.rotor_tables import AccuracyError
 from spinlev.fem.slab import Slab, reaction_tensor
 from spinlev.geometry.basics import Box, rotation_matrix
 from spinlev.geometry.meshes import MeshRule
 from spinlev.geometry.scenes import Plate
-from spinlev.studies.plates.team7 import Team7Comparison, compute_line, measured_line, team7, team7_dataset, team7_mesh
+from spinlev.studies.plates.team7 import compared, compute_line, measured_line, team7, team7_mesh
 from spinlev.studies.plates.team7_figure import team7_lines
 
 SetNumThreads(1)
@@ -116,7 +116,7 @@ def test_team7_report_finds_a_common_phase():
     x, measured = measured_line()
     turned = (measured[:, 0] - 1j * measured[:, 1]) * np.exp(-1j * np.radians(5.0))
     computed = np.column_stack([turned.real, -turned.imag, measured[:, 2:]])
-    lines = team7_lines(team7_dataset(Team7Comparison(x, measured, computed)))
+    lines = team7_lines(compared(x, measured, computed))
     assert "50 Hz, all phases turned by +5.00°: largest 0.00, mean 0.00" in lines[-2]
     assert "200 Hz, all phases turned by +0.00°: largest 0.00, mean 0.00" in lines[-1]
 
@@ -124,6 +124,6 @@ def test_team7_report_finds_a_common_phase():
 @pytest.mark.slow
 def test_team7_measured():
     """All 68 measured values (Fujiwara, Nakata 1990) within 5 % of the line's peak, 1.5 % in the mean."""
-    deviation = abs(team7().deviation)
+    deviation = abs(team7()["deviation"].values)
     assert deviation.max() < 0.05
     assert deviation.mean() < 0.015

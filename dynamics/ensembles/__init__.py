@@ -1,0 +1,4 @@
+"""How do very many flights of one scene end?"""
+
+from .endings import Endings as Endings
+from .many_flights import ensemble as ensemble

@@ -1,0 +1,87 @@
+"""The compiled parts of a flight through balls: one for balls of each degree, and one for the table's own field."""
+
+from dataclasses import dataclass, field
+
+import heyoka as hy
+import numpy as np
+
+from ...fem.harmonics import BallField
+from ...fem.rotor_tables import FieldTable
+from ...geometry.scenes import Scene
+from ..motion import Equations, Parameter, PlateMemory, equations_of_motion
+from .compiled_flight import Flight, compile_flight, flight_of
+
+LEFT = "left"
+DEGREE = len(Parameter)
+"""Number of the runtime parameter that says of which degree the ball is: 0 where there is none."""
+SMALL, LARGE = BallField(DEGREE + 1, 7), BallField(DEGREE + 1, 9)
+"""The second kind, twice as wide and half again as slow, is for a floater that has left a small ball."""
+LOOSER = 300
+"""A step's error is relative to the largest of states and events: 250 and more by the event of loss, 3 in a ball.
+
+Measured: in a ball J drifts by 3e-14 in 1100 turns at 3e-14, and by 2e-14 in the table's field at 1e-16.
+"""
+STRAIGHT_TURNS = 8e4
+"""Turns from which on straight code saves more time (21 of 47 µs a step) than its compilation takes (10 s)."""
+WORTH = 5e6
+"""Length of a field's expressions, written out, from which on balls are faster.
+
+A dipole has 6e3, a cuboid's closed form 2e4, two of them 4e4, moments up to degree 9 4e6 (as fast as a ball), a cube's
+table by finite elements 9e6 from 3 mm off contact on and 1e8 from contact on.
+"""
+
+
+@dataclass(frozen=True, eq=False)
+class Parts:
+    """What flies in balls of a degree, or in the table's own field; compiled when it is first needed.
+
+    Parameters
+    ----------
+    scene, table : the problem
+    duration, tolerance, compact, memory : as of `compile_flight`
+    """
+
+    scene: Scene
+    table: FieldTable
+    duration: float
+    tolerance: float
+    compact: bool | None
+    memory: PlateMemory | None
+    _known: dict[int, Flight] = field(default_factory=dict)
+
+    def of(self, degree: int) -> Flight:
+        """The part for balls of a degree; 0: in no ball."""
+        if degree not in self._known:
+            self._known[degree] = self._compiled(degree)
+        return self._known[degree]
+
+    @property
+    def compile_seconds(self) -> float:
+        """Time that compilation took so far."""
+        return sum(part.compile_seconds for part in self._known.values())
+
+    def _compiled(self, degree: int) -> Flight:
+        scene, memory = self.scene, self.memory
+        if not degree:
+            return compile_flight(scene, self.table, self.duration, self.tolerance, True, memory)
+        equations, inside = ball_equations(scene, BallField(DEGREE + 1, degree), memory)
+        leaves = hy.t_event(inside, direction=hy.event_direction.negative)
+        long = memory is None and degree == SMALL.degree and scene.frequency * self.duration > STRAIGHT_TURNS
+        straight = long if self.compact is None else not self.compact
+        return flight_of(scene, equations, ([leaves], [LEFT]), LOOSER * self.tolerance, not straight, memory)
+
+
+def ball_equations(
+    scene: Scene, formula: BallField, memory: PlateMemory | None = None
+) -> tuple[Equations, hy.expression]:
+    """The motion in a ball, and what becomes negative outside of it."""
+    tilted, conducting = bool(np.any(scene.gravity[:2])), bool(scene.floater.conductivity)
+    equations = equations_of_motion(formula, tilted, memory, conducting, scene.angular_velocity)
+    offset = formula.offset([hy.par[Parameter.LENGTH] * x for x in equations.variables[:3]])
+    return equations, 1.0 - hy.sum([t * t for t in offset])
+
+
+def is_long(table: FieldTable) -> bool:
+    """Whether a field's expressions are longer than those of a ball."""
+    field, gradient = table.expressions(hy.make_vars("x", "y", "z"))
+    return sum(len(e) for e in [*field, *(e for row in gradient for e in row)]) > WORTH

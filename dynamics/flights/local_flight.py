@@ -1,0 +1,146 @@
+"""A flight through small balls in which the rotor's field is an expansion with runtime parameters as coefficients.
+
+The same compiled code flies everywhere.  A floater that leaves its ball goes over to another one, by an event; where
+a body is so near that there is no room for one, or where it does not turn with the rotor, to the full table, which
+alone knows contact and loss.
+
+Each change moves the floater's energy by U_new - U_old = -m·(B_new - B_old) at the same state, about 1e-8 of it.
+It goes into the integrated work, so that the ledger tells what the motion between changes does, and is summed up by
+itself in `FieldChanges`.
+"""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from ...fem.harmonics import BallField
+from ...fem.rotor_tables import FieldTable
+from ...geometry.basics import Array
+from ...geometry.scenes import Scene
+from ..motion import Parameter, PlateMemory, Scales, State, parameters
+from .ball_parts import DEGREE, LARGE, SMALL, Parts, is_long
+from .balls import Balls
+from .compiled_flight import TOLERANCE, Flight, compile_flight
+from .trajectory import FieldChanges
+
+INSIDE = 1 - 1e-9
+"""Square of the distance from a ball's centre, in radii, from which on the floater has left it."""
+STAY = 4.0
+"""A ball is worth its making if the floater needs so many radians of the rotor's turn for its radius, up or down."""
+SNUG = 0.97
+"""Largest part of a ball's radius to which the circle may reach on which the rotor sees the floater."""
+
+
+@dataclass(frozen=True, eq=False)
+class LocalFlight:
+    """A flight of a scene in a table's field: its parts fly in balls, and beside bodies in the table's own field."""
+
+    scene: Scene
+    table: FieldTable
+    parts: Parts
+    _balls: dict[tuple[int, float], Balls] = field(default_factory=dict)
+
+    @property
+    def scales(self) -> Scales:
+        """Units of the state."""
+        return Scales.of(self.scene)
+
+    @property
+    def values(self) -> Array:
+        """Runtime parameters, without a ball."""
+        return np.concatenate([parameters(self.scene, self.scales), np.zeros(1 + LARGE.count)])
+
+    @property
+    def compile_seconds(self) -> float:
+        """Time that compilation took so far."""
+        return self.parts.compile_seconds
+
+    def state(self, start: State, currents: Array) -> Array:
+        """See `Flight.state`."""
+        return self.parts.of(SMALL.degree).state(start, currents)
+
+    def part(self, values: Array) -> Flight:
+        """What flies on with these runtime parameters."""
+        return self.parts.of(int(values[DEGREE]))
+
+    def enter(self, start: State, values: Array) -> float:
+        """Set the runtime parameters to a ball, a small one if it will do, for where the flight starts; its error."""
+        state = self.scales.pack(start)
+        error = self.enter_ball(SMALL, state, values)
+        return error if values[DEGREE] else self.enter_ball(LARGE, state, values)
+
+    def onward(self, values: Array, changes: FieldChanges) -> FieldChanges:
+        """Go over to another ball once the floater has left its own; what has been done of that.
+
+        To a large one, from a small ball as well.
+        """
+        before, (degree, *center, inverse) = self.part(values), values[DEGREE : DEGREE + 5]
+        place = before.integrator.state[:3] * self.scales.length
+        if degree and np.sum((place - center) ** 2) * inverse**2 < INSIDE:
+            return changes
+        after = values.copy()
+        error = self.enter_ball(LARGE, before.integrator.state, after)
+        if degree == after[DEGREE] == 0:
+            return changes
+        jump = self._change(before, values, after)
+        values[:] = after
+        return FieldChanges(
+            changes.count + 1, changes.energy + jump, changes.total + abs(jump), max(changes.error, error)
+        )
+
+    def enter_ball(self, formula: BallField, state: Array, values: Array) -> float:
+        """Set the ball of the circle on which the rotor sees a floater in a scaled state, if there is one; its error.
+
+        A floater that turns less than the rotor, or not at all, goes round such a circle once a turn, backwards.
+        """
+        length, rate, (x, y, _) = self.scales.length, values[Parameter.RATE], state[:3]
+        drift = state[3:6] - rate * np.array([-y, x, 0.0])
+        arm = rate * np.array([-drift[1], drift[0], 0.0])
+        middle, way = (state[:3] - arm) * length, float(abs(drift[2]) if rate else np.linalg.norm(drift)) * length
+        found = self._balls_of(formula, float(values[Parameter.LOST_DISTANCE]) * length).at(middle)
+        values[DEGREE:] = 0.0
+        if found is None:
+            return 0.0
+        (*center, inverse), error = found[0][:4], found[1]
+        reach = float(np.linalg.norm(arm)) * length + float(np.linalg.norm(middle - center))
+        if reach * inverse > SNUG or STAY * way * inverse > 1:
+            return 0.0
+        values[DEGREE] = formula.degree
+        values[DEGREE + 1 : DEGREE + 1 + formula.count] = found[0]
+        return error
+
+    def _balls_of(self, formula: BallField, reach: float) -> Balls:
+        key = formula.degree, reach
+        if key not in self._balls:
+            self._balls[key] = Balls(self.scene, self.table.evaluate, formula, reach)
+        return self._balls[key]
+
+    def _change(self, before: Flight, values: Array, after: Array) -> float:
+        """Hand the state over to the part for the runtime parameters `after`; U_new - U_old."""
+        time, state, following = before.integrator.dtime, before.integrator.state.copy(), self.part(after)
+        now, row = np.array([sum(time)]), state[None]
+        jump = float(following.terms(now, row, after[None]).sum() - before.terms(now, row, values[None]).sum())
+        state[-1] += jump
+        following.integrator.dtime = time
+        following.integrator.state[:] = state
+        following.integrator.reset_cooldowns()
+        return jump
+
+
+def compile_local_flight(
+    scene: Scene,
+    table: FieldTable,
+    duration: float,
+    tolerance: float = TOLERANCE,
+    compact: bool | None = None,
+    memory: PlateMemory | None = None,
+) -> Flight | LocalFlight:
+    """Compile the motion of a scene in balls, if its table's own expressions are longer than theirs.
+
+    Parameters as of `compile_flight`.
+    """
+    if not is_long(table):
+        return compile_flight(scene, table, duration, tolerance, compact, memory)
+    parts = Parts(scene, table, duration, tolerance, compact, memory)
+    parts.of(SMALL.degree)
+    return LocalFlight(scene, table, parts)

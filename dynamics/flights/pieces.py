@@ -1,0 +1,72 @@
+"""A flight's next piece: to its end, or to what ends it."""
+
+from dataclasses import dataclass, field
+
+import heyoka as hy
+import numpy as np
+
+from ...geometry.basics import Array, ComputationError
+from ...geometry.scenes import Scene
+from ..motion import CONTACT, clearance
+from .ball_parts import LEFT
+from .checkpoint import Progress
+from .compiled_flight import Flight
+from .ledger import booked
+from .recorder import Recorder
+from .trajectory import DURATION, FieldChanges
+
+PIECE_TURNS, PIECE_SAMPLES = 256, 256
+"""The most turns and samples between two looks at what has been flown.
+
+A step ends where a piece does, so that pieces must not depend on how fast the machine is.
+"""
+
+
+class IntegrationError(ComputationError):
+    """The motion could not be integrated."""
+
+
+@dataclass
+class Log:
+    """What is known of a flight while it lasts."""
+
+    ended_by: str = DURATION
+    steps: int = 0
+    latest: Progress | None = None
+    changes: FieldChanges = field(default_factory=FieldChanges)
+
+
+def fly_piece(
+    scene: Scene, flight: Flight, values: Array, end: float, recorder: Recorder, log: Log
+) -> tuple[Array, Array]:
+    """Fly on to the end of a piece or to an event: scaled times and states, of which the last is the ledger's sum."""
+    flight.integrator.pars[:] = values[: len(flight.integrator.pars)]
+    count = int(np.clip(PIECE_TURNS * 2 * np.pi / recorder.interval, 1, PIECE_SAMPLES))
+    grid = recorder.grid(flight.integrator.time, end, count)
+    outcome, _, _, steps, _, states = flight.integrator.propagate_grid(grid)
+    times, states, log.ended_by = _ending(scene, flight, outcome, grid, states)
+    log.steps += steps
+    return times, booked(scene, flight, values, times, states)
+
+
+def _ending(
+    scene: Scene, flight: Flight, outcome: hy.taylor_outcome, grid: Array, states: Array
+) -> tuple[Array, Array, str]:
+    """Times and states of a finished piece up to its end, and what ended it."""
+    if outcome == hy.taylor_outcome.err_nf_state:
+        raise IntegrationError(
+            f"The floater's state became infinite at t = {flight.integrator.time * flight.scales.time:.6g} s. "
+            "Look whether the start lies inside a magnet or the table's range is too small."
+        )
+    times, ended_by = grid[: len(states)], DURATION
+    if outcome != hy.taylor_outcome.time_limit:
+        times = np.append(times, flight.integrator.time)
+        states = np.vstack([states, flight.integrator.state])
+        ended_by = flight.meanings[-outcome.value - 1]
+    if flight.meanings == [LEFT]:
+        return times, states, ended_by
+    gap = clearance(scene, times * flight.scales.time, states[:, :3] * flight.scales.length)
+    touching = np.flatnonzero(gap < -1e-9)
+    if len(touching):
+        return times[: touching[0] + 1], states[: touching[0] + 1], CONTACT
+    return times, states, ended_by

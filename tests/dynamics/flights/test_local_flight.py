@@ -1,0 +1,158 @@
+"""Flights through small balls: the field in a ball, agreement with the table's own flight, the ledger of changes."""
+
+from dataclasses import replace
+
+import heyoka as hy
+import numpy as np
+import pytest
+
+from spinlev.dynamics.flights import Checkpoint, FlightStopped, initial_state, integration, simulate
+from spinlev.dynamics.flights.balls import ERROR
+from spinlev.dynamics.flights.compiled_flight import compile_flight
+from spinlev.dynamics.flights.integration import integrate
+from spinlev.dynamics.flights.local_flight import LocalFlight, compile_local_flight
+from spinlev.dynamics.motion import PlateMemory
+from spinlev.fem.harmonics import Ball, BallField, uniform_moments
+from spinlev.fem.plate_network import Region
+from spinlev.fem.rotor_tables import RotorTable
+from spinlev.fem.slab import slab_and_rotor_table
+from spinlev.geometry.basics import Box
+from spinlev.geometry.bodies import article_rotors as rotor
+from spinlev.geometry.scenes import AbsoluteStart, Drag, Floater, Lowering, Plate, Scene
+
+MAGNETS = rotor.horizontal(2e-3, 10e-3, 1.305, 1.0)
+TABLE = RotorTable("moments", MAGNETS, (), tuple(uniform_moments(m, 21) for m in MAGNETS))
+SCENE = Scene(110.0, MAGNETS, Floater(6.35e-3, 1.305, 1.0, 7500.0), Drag(0.0, 0.0))
+
+
+@pytest.fixture(scope="module")
+def start():
+    return initial_state(SCENE, TABLE)[0]
+
+
+def kicked(start):
+    """So that it leaves its small ball."""
+    return replace(start, velocity=start.velocity + np.array([0.05, 0.03, 0.12]))
+
+
+def both(start, duration, scene=SCENE):
+    """The flight in balls and the one in the table's own field."""
+    flights = (compile(scene, TABLE, duration, compact=True) for compile in (compile_local_flight, compile_flight))
+    return [integrate(scene, flight, start, duration) for flight in flights]
+
+
+@pytest.mark.parametrize("degree", [7, 9])
+@pytest.mark.parametrize("place", [(0.5e-3, 0.0, -19.6e-3), (2e-3, 1e-3, -13e-3)])
+def test_a_ball_misses_no_more_than_it_says(degree, place):
+    """Inside, against the table; what is missed is harmonic, so that the surface has the largest error."""
+    formula, ball = BallField(0, degree), Ball(np.array(place), 0.7e-3)
+    values, error = formula.fit(TABLE.evaluate, ball)
+    position = hy.make_vars("x", "y", "z")
+    field, gradient = formula.expressions(position)
+    compiled = hy.cfunc([*field, *(e for row in gradient for e in row)], position, compact_mode=True)
+    generator = np.random.default_rng(0)
+    points = generator.normal(size=(200, 3))
+    points *= (generator.uniform(size=200) / np.linalg.norm(points, axis=1))[:, None]
+    points = ball.center + ball.radius * points
+    found = compiled(np.ascontiguousarray(points.T), pars=np.tile(values[:, None], 200))
+    exact, slopes = TABLE.evaluate(points)
+    apart = np.linalg.norm(found[:3].T - exact, axis=1), np.linalg.norm(found[3:].T - slopes.reshape(-1, 9), axis=1)
+    sizes = np.linalg.norm(exact, axis=1).mean(), np.linalg.norm(slopes, axis=(1, 2)).mean()
+    assert max(a.max() / s for a, s in zip(apart, sizes, strict=True)) < 1.2 * error < 1e-4
+    tensor = found[3:].reshape(3, 3, -1)
+    np.testing.assert_array_equal(tensor, tensor.swapaxes(0, 1))
+    assert np.abs(np.trace(tensor)).max() < 1e-14 * np.abs(tensor).max()
+
+
+def test_a_resting_floater_stays_in_one_ball_and_flies_as_in_the_table(start):
+    near, whole = both(start, 1.0)
+    assert near.field_changes.count == 0
+    assert 0 < near.field_changes.error <= ERROR
+    assert near.energy_error < 1e-13
+    assert np.abs(near.lab.position - whole.lab.position).max() < 1e-9
+
+
+def test_a_kicked_floater_changes_its_ball_and_the_ledger_says_so(start):
+    """The table's own Jacobi integral drifts by the sum of the changes, but for the balls' error at the two ends."""
+    flown, whole = both(kicked(start), 1.0)
+    changes = flown.field_changes
+    assert changes.count >= 1
+    assert abs(changes.energy) <= changes.total < 1e-6
+    assert flown.energy_error < 1e-12
+    assert np.abs(flown.lab.position - whole.lab.position).max() < 1e-6
+    compiled = compile_flight(SCENE, TABLE, 1.0, compact=True)
+    packed = compiled.scales.pack(flown.rotor)
+    states = np.concatenate([packed, np.zeros((len(packed), 1))], axis=1)
+    sums = compiled.terms(flown.time / compiled.scales.time, states, np.tile(compiled.values, (len(packed), 1))).sum(
+        axis=0
+    )
+    assert (sums[-1] - sums[0]) / abs(sums[0]) == pytest.approx(changes.energy, abs=3e-8)
+
+
+def test_a_ball_holds_the_circle_of_a_floater_that_was_displaced(start):
+    """Let go at rest in the turning frame, it flies off in the laboratory's; the table's own field is never needed."""
+    offset = np.array([1e-4, 0.0, 0.0])
+    turning = np.cross([0.0, 0.0, SCENE.angular_velocity], offset)
+    flight = compile_local_flight(SCENE, TABLE, 0.5, compact=True)
+    begun = replace(start, position=start.position + offset, velocity=start.velocity + turning)
+    flown = integrate(SCENE, flight, begun, 0.5)
+    assert np.ptp(flown.rotor.position[:, 0]) > 5e-4
+    assert 1 <= flown.field_changes.count <= 3
+    assert list(flight.parts._known) == [7, 9]
+
+
+def test_contact_is_that_of_the_tables_own_flight():
+    """Drawn to the magnet; near it there is no room for a ball, and the table's own field takes over."""
+    place, turning = np.array([2e-3, 0.0, -16e-3]), np.array([0.0, 0.0, SCENE.angular_velocity])
+    drawn = AbsoluteStart(place, np.cross(turning, place), np.array([-1.0, 0.0, 0.0]), turning)
+    scene = replace(SCENE, start=drawn)
+    flown, whole = both(initial_state(scene, TABLE)[0], 1.0, scene)
+    assert flown.ended_by == whole.ended_by == "contact"
+    assert flown.field_changes.count >= 1
+    assert flown.levitated_s == pytest.approx(whole.levitated_s, rel=1e-7)
+    assert np.abs(flown.lab.position[-1] - whole.lab.position[-1]).max() < 1e-8
+    assert flown.energy_error < 1e-12
+
+
+def test_a_stopped_flight_with_changes_goes_on_to_the_last_bit(start, tmp_path, monkeypatch):
+    monkeypatch.setattr(integration, "CHECKPOINT_SECONDS", 0.0)
+    state = kicked(start)
+    scene = replace(SCENE, start=AbsoluteStart(*state.vectors))
+    checkpoint = Checkpoint(tmp_path / "checkpoint.npz", "this flight")
+
+    def stop(done):
+        if done > 0.3:
+            raise KeyboardInterrupt
+
+    whole = simulate(scene, TABLE, 1.0, compact=True)
+    assert whole.field_changes.count >= 1
+    with pytest.raises(FlightStopped):
+        simulate(scene, TABLE, 1.0, compact=True, progress=stop, checkpoint=checkpoint)
+    second = simulate(scene, TABLE, 1.0, compact=True, checkpoint=checkpoint)
+    for found, exact in zip(second.lab.vectors, whole.lab.vectors, strict=True):
+        np.testing.assert_array_equal(found, exact)
+    assert second.field_changes == whole.field_changes
+    assert second.energy_error == whole.energy_error
+
+
+def test_over_a_plate_that_is_lowered_it_flies_as_in_the_table(start):
+    """Changes of the ball while the plate moves; the ledger of currents and motion closes as without balls."""
+    plate = Plate(Box((0.1, 0.24, 0.03), (0.0, 0.0, -0.047)), 3.5e7, Lowering(0.05, 0.02, 4e-3))
+    region = Region(np.array([-3e-3, -3e-3, 0.024]), np.array([3e-3, 3e-3, 0.037]))
+    memory = PlateMemory(plate, *slab_and_rotor_table(plate, TABLE, region, rtol=1e-2), "slab")
+    scene, still = replace(SCENE, plate=plate), np.zeros(len(memory.table.rates))
+    state = replace(start, velocity=start.velocity + np.array([0.03, 0.02, 0.06]))
+    near, whole = [
+        integrate(scene, compile(scene, TABLE, 0.5, 1e-13, True, memory), state, 0.5, currents=still)
+        for compile in (compile_local_flight, compile_flight)
+    ]
+    assert near.field_changes.count >= 1
+    assert near.energy_error < 1e-9
+    assert np.abs(near.lab.position - whole.lab.position).max() < 1e-8
+
+
+def test_short_expressions_fly_by_themselves():
+    assert not isinstance(
+        compile_local_flight(SCENE, RotorTable("cuboid", MAGNETS, MAGNETS), 1.0, compact=True), LocalFlight
+    )
+    assert isinstance(compile_local_flight(SCENE, TABLE, 1.0, compact=True), LocalFlight)
