@@ -1,5 +1,7 @@
 """A scene's motion compiled to machine code: integrator, events and the ledger of energy."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass
 from time import perf_counter
 
