@@ -155,7 +155,7 @@ class Family(AtRest):
         state = balance.states(unknowns[None, :3], unknowns[None, 3:6])
         return BranchPoint(
             parameter=parameter,
-            spin=balance.spin,
+            spin=float(balance.spin),
             position=unknowns[:3] * balance.values[Parameter.LENGTH],
             state=state[0],
             tangent=tangent,

@@ -75,7 +75,8 @@ def told(
     """The survey of a scene of which all fixed points are known: scaled positions and moments, good to round-off."""
     scales = Scales.of(scene)
     known = [(r, m) for r, m in points if table.in_range(r * scales.length)[0]]
-    doubts = _field_doubts(table, np.array([r for r, _ in known]) * scales.length) if known else []
+    places = np.reshape([r for r, _ in known], (-1, 3)) * scales.length
+    doubts = _field_doubts(table, places) if known else np.zeros((0, 2))
     found = [_equilibrium(scales, balance, *point, doubt) for point, doubt in zip(known, doubts, strict=True)]
     if np.any(scene.gravity[:2]):
         found = _shaken(Shaken(scene, balance.rates, balance.values, None), found)

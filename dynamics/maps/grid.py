@@ -54,7 +54,7 @@ class Grid:
 
     def range(self, point: int) -> SearchRange:
         """Where equilibria of one point are looked for."""
-        return self.ranges[self.region[point]]
+        return self.ranges[int(self.region[point])]
 
     def holds(self, point: Indices, position: Array, margin: float = 0.0) -> NDArray[np.bool_]:
         """Which of the scaled positions (n, 3) lie in the range of their points (n,), or at most a margin outside."""

@@ -96,11 +96,11 @@ def test_a_killed_sweep_goes_on_where_it_was(tmp_path):
     ways = json.dumps([str(Path(__file__).parent), str(TESTS)])
     command = [sys.executable, "-c", code, ways, json.dumps(asked), str(folder)]
     with subprocess.Popen(command) as process:
-        while len(list(folder.glob("roots.points/0*.nc"))) < 2:
+        while len(list(folder.glob("roots.points/0*.json"))) < 2:
             assert process.poll() is None
             time.sleep(0.02)
         process.kill()
-    kept = len(list(folder.glob("roots.points/0*.nc")))
+    kept = len(list(folder.glob("roots.points/0*.json")))
     assert 2 <= kept < 6
     swept("roots", STUDY, asked, Workers(workers=1), folder)
     done = log.read_text().split()
@@ -113,7 +113,7 @@ def test_a_damaged_point_is_computed_anew(tmp_path, caplog):
     log = tmp_path / "log"
     asked = points(1.0, 4.0, log=str(log))
     swept("roots", STUDY, asked, Workers(workers=1), tmp_path)
-    damaged = tmp_path / "roots.points" / "000001.nc"
+    damaged = tmp_path / "roots.points" / "000001.json"
     damaged.write_bytes(damaged.read_bytes()[:-40])
     result = swept("roots", STUDY, asked, Workers(workers=1), tmp_path)
     assert "damaged" in caplog.text
