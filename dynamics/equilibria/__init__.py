@@ -13,6 +13,7 @@ from .continuation import (
 )
 from .fixed_points import scattered as scattered
 from .full_search import (
+    field_doubts as field_doubts,
     find_equilibria as find_equilibria,
     survey as survey,
     told as told,

@@ -1,8 +1,7 @@
 """All synchronous equilibria of a floater: fixed points in the frame that turns with the rotor."""
 
-from collections.abc import Iterable
-
 import numpy as np
+from numpy.typing import NDArray
 
 from ...fem.rotor_tables import FieldTable
 from ...geometry.basics import Array
@@ -62,25 +61,36 @@ def survey(
     scales = Scales.of(scene)
     balance = Balance(rates or Rates.of(scene, table), parameters(scene, scales, frozen_spin=True), spin)
     curves, points = fixed_points(balance, SearchRange(scene, farthest))
-    return told(scene, table, balance, points, tuple(_force_curve(scene, scales, curve) for curve in curves))
+    where = np.reshape([np.concatenate(point) for point in points], (-1, 6))
+    known, doubts = field_doubts(table, where[:, :3] * scales.length)
+    return told(scene, balance, where[known], doubts, tuple(_force_curve(scene, scales, curve) for curve in curves))
 
 
-def told(
-    scene: Scene,
-    table: FieldTable,
-    balance: Balance,
-    points: Iterable[tuple[Array, Array]],
-    curves: tuple[ForceCurve, ...] = (),
-) -> Survey:
-    """The survey of a scene of which all fixed points are known: scaled positions and moments, good to round-off."""
+def told(scene: Scene, balance: Balance, points: Array, doubts: Array, curves: tuple[ForceCurve, ...] = ()) -> Survey:
+    """The survey of a scene of which all fixed points are known.
+
+    Parameters
+    ----------
+    points : (n, 6) scaled positions and moments, good to round-off
+    doubts : (n, 2) of the field there, see `field_doubts`
+    """
     scales = Scales.of(scene)
-    known = [(r, m) for r, m in points if table.in_range(r * scales.length)[0]]
-    places = np.reshape([r for r, _ in known], (-1, 3)) * scales.length
-    doubts = _field_doubts(table, places) if known else np.zeros((0, 2))
-    found = [_equilibrium(scales, balance, *point, doubt) for point, doubt in zip(known, doubts, strict=True)]
+    rows = zip(points, doubts, strict=True)
+    found = [_equilibrium(scales, balance, point[:3], point[3:], doubt) for point, doubt in rows]
     if np.any(scene.gravity[:2]):
         found = _shaken(Shaken(scene, balance.rates, balance.values, None), found)
     return Survey(_in_order(found), curves)
+
+
+def field_doubts(table: FieldTable, places: Array) -> tuple[NDArray[np.bool_], Array]:
+    """Which places (n, 3) m a table knows, and its estimated errors (k, 2) there: of B, T, and its gradient, T/m."""
+    known = table.in_range(places) if len(places) else np.zeros(0, bool)
+    if not known.any():
+        return known, np.zeros((0, 2))
+    field, gradient = table.evaluate(places[known])
+    error_b, error_g = table.relative_error(places[known])
+    sizes = np.linalg.norm(field, axis=1), np.linalg.norm(gradient, axis=(1, 2))
+    return known, np.column_stack([error_b * sizes[0], error_g * sizes[1]])
 
 
 def with_plate(
@@ -141,13 +151,6 @@ def _equilibrium(scales: Scales, balance: Balance, position: Array, moment: Arra
         frequencies_hz=motion.angular_frequencies / (2 * np.pi * scales.time),
         modes=named_modes(motion, scales.time),
     )
-
-
-def _field_doubts(table: FieldTable, position: Array) -> Array:
-    """Estimated errors (n, 2) of B, T, and of its gradient, T/m, at positions (n, 3) m."""
-    field, gradient = table.evaluate(position)
-    error_b, error_g = table.relative_error(position)
-    return np.column_stack([error_b * np.linalg.norm(field, axis=1), error_g * np.linalg.norm(gradient, axis=(1, 2))])
 
 
 def _force_curve(scene: Scene, scales: Scales, curve: Curve) -> ForceCurve:

@@ -16,7 +16,12 @@ IMPORT = re.compile(r"^\s*from (\.+)([\w.]+) import", re.MULTILINE)
 
 def program_of(package: str) -> str:
     """The versions of what computes a package's tables: digest of the text, and libraries."""
-    return " ".join([digest_of(package), *(f"{name} {version(name)}" for name in LIBRARIES)])
+    return " ".join([digest_of(package), _libraries()])
+
+
+@cache
+def _libraries() -> str:
+    return " ".join(f"{name} {version(name)}" for name in LIBRARIES)
 
 
 @cache

@@ -86,11 +86,11 @@ class Question:
             jobs[k] = partial(self._answer, points[k], levitation)
         return jobs
 
-    def batches(self, points: Mapping[int, Point], workers: int) -> list[list[int]]:
-        """Points that are answered together: neighbours, those with the same rotor first, some for every worker."""
+    def batches(self, points: Mapping[int, Point]) -> list[list[int]]:
+        """Points that are answered together: neighbours with the same rotor, the same ones whoever computes them."""
         keys = [key for key in next(iter(points.values())) if key.startswith(ROTOR)]
         order = sorted(points, key=lambda k: [points[k][key] for key in keys])
-        size = min(LARGEST[self.ask], -(-len(order) // workers))
+        size = min(max(-(-len(order) // 8), 6), LARGEST[self.ask])
         return [order[k : k + size] for k in range(0, len(order), size)]
 
     def _answer(self, point: Point, levitation: Levitation) -> xr.Dataset:

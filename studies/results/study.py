@@ -55,7 +55,7 @@ class Study:
     draw : the figure, from the joined result alone
     report : what it says, in lines, from the joined result alone
     prepared : how to compute each of several points that help each other; None where they do not
-    batches : which of the numbered points are to be computed together by so many workers, with `prepared`
+    batches : which of the numbered points are computed together, with `prepared`
     timed : whether it measures times, for which its points must have the machine for themselves
     settings : what all points have in common, if they do not say it themselves
     """
@@ -68,7 +68,7 @@ class Study:
     draw: Callable[[xr.Dataset], Figure]
     report: Callable[[xr.Dataset], list[str]]
     prepared: Callable[[Sequence[Point]], Sequence[Callable[[], xr.Dataset]]] | None = None
-    batches: Callable[[Mapping[int, Point], int], Sequence[Sequence[int]]] | None = None
+    batches: Callable[[Mapping[int, Point]], Sequence[Sequence[int]]] | None = None
     timed: bool = False
     settings: Point = field(default_factory=dict)
 

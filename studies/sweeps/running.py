@@ -105,11 +105,11 @@ def swept(name: str, study: Study, points: Mapping[int, Point], engine: Workers,
     if finished:
         note(f"{len(finished)} of {len(points)} points are there from an earlier run.")
     failed: dict[int, str] = {}
-    missing = {k: point for k, point in points.items() if k not in finished}
+    missing = frozenset(points) - frozenset(finished)
     engine = Workers(workers=1) if study.timed else engine
     with progress(f"{name}: {len(points)} points") as advance:
         advance(len(finished) / len(points))
-        for k, result in computed(engine, study, missing) if missing else ():
+        for k, result in computed(engine, study, points, missing) if missing else ():
             if isinstance(result, Failure):
                 failed[k] = result.reason
                 note(f"Point {to_json(points[k])} failed: {result.reason}")

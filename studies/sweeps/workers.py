@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 import os
 import signal
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence, Set
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from functools import partial
@@ -38,24 +38,26 @@ Attempt = tuple[int, xr.Dataset | Failure]
 """The number of a point, and its result."""
 
 
-def computed(by: Workers, study: Study, points: Mapping[int, Point]) -> Iterator[Attempt]:
-    """The results as they come, each with the number of its point.
+def computed(by: Workers, study: Study, points: Mapping[int, Point], missing: Set[int]) -> Iterator[Attempt]:
+    """The results of the missing points as they come, each with its number; the others only help them.
 
     A point that raises, or whose worker dies again and again, is a `Failure`; the others go on.
     Raises InputError if the scheduler does not answer.
     """
-    number = min(by.workers or os.cpu_count() or 1, len(points))
-    batches = study.batches(points, number) if study.batches else [[k] for k in points]
+    grouped = study.batches(points) if study.batches else [[k] for k in points]
+    batches = [batch for batch in grouped if not missing.isdisjoint(batch)]
+    number = min(by.workers or os.cpu_count() or 1, len(batches))
     if by.scheduler is None and number <= 1:
         for batch in batches:
-            yield from attempts(study.compute, study.prepared, {k: points[k] for k in batch})
+            yield from attempts(study.compute, study.prepared, {k: points[k] for k in batch}, missing)
         return
     from distributed import as_completed
 
     with _client(by.scheduler, number) as client:
 
         def begin(batch: Sequence[int]) -> Future[Any]:
-            return client.submit(_silently, study.compute, study.prepared, {k: points[k] for k in batch}, pure=False)
+            asked = {k: points[k] for k in batch}
+            return client.submit(_silently, study.compute, study.prepared, asked, missing, pure=False)
 
         futures = {begin(batch): batch for batch in batches}
         running = as_completed(list(futures), loop=client.loop)
@@ -67,28 +69,30 @@ def computed(by: Workers, study: Study, points: Mapping[int, Point]) -> Iterator
             elif len(batch) == 1:
                 yield batch[0], found
             else:  # one of its points killed the worker: which?
-                alone = {begin([k]): [k] for k in batch}
+                alone = {begin([k]): [k] for k in batch if k in missing}
                 futures |= alone
                 running.update(list(alone))
 
 
-def attempts(compute: Compute, prepared: Prepared, points: Mapping[int, Point]) -> Iterator[Attempt]:
-    """The results of points that are computed together, or why there is none."""
+def attempts(compute: Compute, prepared: Prepared, points: Mapping[int, Point], missing: Set[int]) -> Iterator[Attempt]:
+    """The results of the missing ones of points that are computed together, or why there is none."""
     asked = list(points.values())
     jobs: Sequence[Callable[[], xr.Dataset]] = [partial(compute, point) for point in asked]
     if prepared is not None and len(asked) > 1:
         jobs = prepared(asked)
     for k, job in zip(points, jobs, strict=True):
+        if k not in missing:
+            continue
         try:
             yield k, job()
         except Exception as error:  # a sweep lives longer than its points: the reason is kept with the result
             yield k, Failure(f"{type(error).__name__}: {error}")
 
 
-def _silently(compute: Compute, prepared: Prepared, points: Mapping[int, Point]) -> list[Attempt]:
+def _silently(compute: Compute, prepared: Prepared, points: Mapping[int, Point], missing: Set[int]) -> list[Attempt]:
     """Attempts in a worker, whose messages would come in between those of the others."""
     with silence():
-        return list(attempts(compute, prepared, points))
+        return list(attempts(compute, prepared, points, missing))
 
 
 def _collected(future: Future[Any]) -> list[Attempt] | Failure:

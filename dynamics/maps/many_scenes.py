@@ -7,8 +7,8 @@ import numpy as np
 from ...fem.rotor_tables import FieldTable
 from ...geometry.basics import Array
 from ...geometry.scenes import Scene
-from ..equilibria import SearchRange, told, turning
-from ..motion import Rates, Scales, parameters
+from ..equilibria import SearchRange, field_doubts, told, turning
+from ..motion import Parameter, Rates, Scales, parameters
 from ..steady import Indices, Survey
 from .filling import SPACING, filled
 from .grid import Grid
@@ -45,8 +45,9 @@ def surveys(
     grid = Grid(rates, values, spin, ranges, np.arange(len(scenes)), places)
     nodes = grid.coarse(spacing)
     point, position, moment = filled(grid, nodes).within(grid)
-    found = []
-    for k, scene in enumerate(scenes):
-        here = zip(position[point == k], moment[point == k], strict=True)
-        found.append((told(scene, table, grid.alone(k), here), bool(np.isin(k, nodes))))
-    return found
+    known, doubts = field_doubts(table, position * values[point, Parameter.LENGTH, None])
+    point, points = point[known], np.concatenate([position, moment], axis=1)[known]
+    return [
+        (told(scene, grid.alone(k), points[point == k], doubts[point == k]), k in nodes)
+        for k, scene in enumerate(scenes)
+    ]

@@ -1,0 +1,87 @@
+"""Points of a sweep that help each other have the values that each has alone."""
+
+import numpy as np
+import xarray as xr
+
+import spinlev as sl
+from spinlev.studies.catalogue import question_study
+from spinlev.studies.one_scene import Levitation, Question
+from spinlev.studies.sweeps import forget, swept
+from spinlev.studies.terminal import Models, Workers, combinations
+
+SCENE = sl.scene(
+    frequency_hz=120.0,
+    rotor=sl.horizontal(displacement_mm=2.0, edge_mm=10.0, remanence_T=1.305),
+    floater=sl.sphere(diameter_mm=12.7, remanence_T=1.305, density_kg_m3=7500.0),
+)
+ALONE = {"plate_model": "none", "model": "dipole"}
+
+
+def question(**values):
+    return Question(SCENE, "scene", "equilibria", Models(**ALONE), 0.0, 3.0, (0.0, 0.0, -0.02)), combinations(values)
+
+
+def test_many_points_have_what_each_has_alone():
+    """Two axes through folds: as many equilibria, places and growth rates to 1e-10; most points are not searched."""
+    asked, points = question(frequency_hz=list(np.linspace(85.0, 175.0, 7)), spin=[-0.2, 0.0, 0.3])
+    together = [job() for job in asked.prepared(points)]
+    assert {str(found["found_by"].values[0]) for found in together} == {"search", "neighbours"}
+    assert len({found.sizes["equilibrium"] for found in together}) > 1
+    for point, found in zip(points, together, strict=True):
+        expected = asked(point)
+        assert found.sizes == expected.sizes
+        np.testing.assert_allclose(found["position"], expected["position"], rtol=0, atol=1e-12)
+        np.testing.assert_allclose(found["moment"], expected["moment"], rtol=0, atol=1e-10)
+        unsure = 1e-9 + 3 * expected["growth_error"].values.max(initial=0.0)
+        np.testing.assert_allclose(found["growth"], expected["growth"], rtol=1e-10, atol=unsure)
+        np.testing.assert_array_equal(found["stable"], expected["stable"])
+
+
+def test_rotors_that_differ_share_nothing_but_the_sweep():
+    asked, points = question(**{"rotor.displacement_mm": [1.5, 2.5], "frequency_hz": [120.0, 130.0, 140.0]})
+    for point, job in zip(points, asked.prepared(points), strict=True):
+        np.testing.assert_allclose(job()["position"], asked(point)["position"], rtol=0, atol=1e-12)
+
+
+def test_a_point_that_cannot_be_leaves_the_others_alone(tmp_path):
+    """A rotor at rest, and a density that no scene may have."""
+    found = sl.sweep(
+        SCENE, {"frequency_hz": [0.0, 120.0, 130.0], "floater.density_kg_m3": [7500.0, -1.0]}, out=tmp_path, **ALONE
+    )
+    there = np.isfinite(found["distance"]).any("equilibrium")
+    np.testing.assert_array_equal(there, [[False, False], [True, False], [True, False]])
+    assert "Earnshaw" in found.attrs["failed_points"]
+    assert "density_kg_m3" in found.attrs["failed_points"]
+
+
+def test_batches_hold_every_point_once_and_rotors_together():
+    asked, points = question(
+        **{"frequency_hz": [100.0 + k for k in range(50)], "rotor.displacement_mm": [1.0, 2.0, 3.0]}
+    )
+    batches = asked.batches(dict(enumerate(points)))
+    assert sorted(k for batch in batches for k in batch) == list(range(len(points)))
+    changes = [points[k]["rotor.displacement_mm"] for batch in batches for k in batch]
+    assert changes == sorted(changes)
+    assert len(batches) == 8
+
+
+def test_a_sweep_that_goes_on_has_the_same_bits(tmp_path):
+    """Two of its eight points are there from before; so it is by two workers."""
+    values = {"frequency_hz": list(np.linspace(100.0, 170.0, 8))}
+    asked, points = question(**values)
+    study, numbered = question_study(asked, values), dict(enumerate(points))
+    whole = swept("question", study, numbered, Workers(workers=1), tmp_path)
+    for k in set(numbered) - {2, 3}:
+        (tmp_path / "question.points" / f"{k:06}.json").unlink()
+    xr.testing.assert_identical(swept("question", study, numbered, Workers(workers=1), tmp_path), whole)
+    forget("question", tmp_path)
+    xr.testing.assert_identical(swept("question", study, numbered, Workers(workers=2), tmp_path), whole)
+
+
+def test_what_is_shared_is_made_once():
+    asked, points = question(frequency_hz=[120.0, 125.0])
+    first, second = (asked.levitation(point) for point in points)
+    second.share(first)
+    assert isinstance(first, Levitation)
+    assert first.table is second.table
+    assert first.rates is second.rates
