@@ -14,11 +14,11 @@ from ...dynamics.motion import PlateMemory, Rates
 from ...dynamics.steady import Equilibrium, EquilibriumError, Survey
 from ...fem.measured_maps import GriddedTable, map_table
 from ...fem.rotor_tables import RotorTable, cached_rotor_table, resolve_model, rotor_table
-from ...fem.slab import resolve_plate_model
+from ...fem.slab import resolve_plate_model, rotor_nearby
 from ...geometry.basics import Array, InputError
 from ...geometry.scenes import AbsoluteStart, Scene, load_scene
 from ..terminal import Models, finite, note, positive, progress
-from .plate_of_scene import check_room, plate_memory, table_in_flight
+from .plate_of_scene import check_room, plate_memory
 
 RotorField = RotorTable | GriddedTable
 """A rotor's table: computed, or from a map."""
@@ -136,7 +136,9 @@ class Levitation:
         if self.plate is None or not isinstance(table, RotorTable):
             return table
         place = self._place(() if self.absolute else self.equilibria)
-        return table if place is None else table_in_flight(self.scene, table, place, self.models.rtol)
+        if place is None:
+            return table
+        return rotor_nearby(table, self.scene.rotor, place, self.scene.floater.radius, self.models.rtol)
 
     def flight(self, duration: float, checkpoint: Checkpoint | None = None) -> Trajectory:
         """The motion for `duration` (s) from where the scene says, kept in `checkpoint` while it lasts.
