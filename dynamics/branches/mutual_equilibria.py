@@ -101,11 +101,28 @@ class _Answered(Rates):
     def __call__(self, states: ArrayLike, values: Array) -> tuple[Array, Array]:
         states = np.asarray(states, float)
         rates, slopes = self._rates(states, values)
-        scale = np.broadcast_to(values[..., Parameter.TIME], len(states))[:, None] ** 2 * self._per_unit
-        poses = states[:, POSE] - self._extra.center
-        rates[:, ACCELERATED] += scale * (self._extra.value + poses @ self._extra.slope.T)
-        slopes[:, ACCELERATED[:, None], POSE] += scale[:, :, None] * self._extra.slope
+        push, change = self._added(states[:, POSE], values)
+        rates[:, ACCELERATED] += push
+        slopes[:, ACCELERATED[:, None], POSE] += change
         return rates, slopes
+
+    def balance(
+        self, position: Array, moment: Array, tangents: Array, spin: Array, values: Array
+    ) -> tuple[Array, Array]:
+        value, slope = self._rates.balance(position, moment, tangents, spin, values)
+        push, change = self._added(np.concatenate([position, moment], axis=1), values)
+        across = np.swapaxes(tangents, 1, 2)
+        change = np.concatenate([change[:, :, :3], change[:, :, 3:] @ across], axis=2)
+        value = value + np.concatenate([push[:, :3], (push[:, None, 3:] @ across)[:, 0]], axis=1)
+        slope = slope + np.concatenate([change[:, :3], tangents @ change[:, 3:]], axis=1)
+        slope[:, [3, 4], [3, 4]] -= np.sum(moment * push[:, 3:], axis=1)[:, None]  # the tangents turn with the moment
+        return value, slope
+
+    def _added(self, poses: Array, values: Array) -> tuple[Array, Array]:
+        """Accelerations (n, 6) at poses (n, 6), scaled, and their derivatives (n, 6, 6)."""
+        scale = np.broadcast_to(values[..., Parameter.TIME], len(poses))[:, None] ** 2 * self._per_unit
+        push = scale * (self._extra.value + (poses - self._extra.center) @ self._extra.slope.T)
+        return push, scale[:, :, None] * self._extra.slope
 
 
 def settled(

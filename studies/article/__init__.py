@@ -11,10 +11,10 @@ from .article import (
     QUICK as QUICK,
     REMANENCE as REMANENCE,
     article_scene as article_scene,
-    article_table as article_table,
     axis_label as axis_label,
     by_configuration as by_configuration,
     levitated_rotors as levitated_rotors,
+    levitation_of as levitation_of,
     rotor_label as rotor_label,
     stable_in_flight as stable_in_flight,
 )

@@ -10,11 +10,11 @@ import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike, NDArray
 
-from ...fem.rotor_tables import RotorTable, cached_rotor_table, rotor_table
 from ...geometry.bodies import Magnet, horizontal, tilt, vertical
 from ...geometry.scenes import Drag, Floater, Scene
+from ..one_scene import Levitation
 from ..results import Point, cases_with
-from ..terminal import note
+from ..terminal import FieldModel, Models
 
 EDGE, REMANENCE, PERMEABILITY = 10e-3, 1.305, 1.05
 """Of the rotor's cubes: m; T, the middle of 1.29 to 1.32; recoil permeability usual for NdFeB, which is not given."""
@@ -107,11 +107,9 @@ def article_scene(
     return Scene(frequency, magnets, floater, Drag.stokes(floater.radius) if drag else Drag(0.0, 0.0))
 
 
-def article_table(scene: Scene, model: str, rtol: float = RTOL) -> RotorTable:
-    """The field of a scene's rotor; finite elements from the cache if they are there."""
-    if model != "fem":
-        return rotor_table(scene.rotor, model, rtol, FLOATER.radius)
-    return cached_rotor_table(scene.rotor, model, rtol, note, FLOATER.radius)[0]
+def levitation_of(scene: Scene, model: FieldModel, rtol: float = RTOL) -> Levitation:
+    """A scene in one model's field, its plate left out."""
+    return Levitation(scene, Models(model, "none", rtol))
 
 
 def rotor_label(configuration: str, value: float) -> str:

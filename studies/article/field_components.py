@@ -3,8 +3,9 @@
 import numpy as np
 import xarray as xr
 
+from ..one_scene import sources
 from ..results import Point, Study, by_case, one_case, variable
-from .article import CONFIGURATIONS, article_scene, article_table
+from .article import CONFIGURATIONS, article_scene, levitation_of
 from .article_formulas import field
 from .field_components_figure import components_figure, components_lines
 
@@ -37,7 +38,7 @@ def field_components(point: Point) -> xr.Dataset:
         error = np.zeros_like(distance)
     else:
         scene = article_scene(point["configuration"], point["value"])
-        table = article_table(scene, point["model"])
+        table = sources(levitation_of(scene, point["model"]).table)
         places = distance[:, None] * np.array([0.0, 0.0, -1.0])
         b, _ = table.evaluate(places)
         across, along, error = np.hypot(b[:, 0], b[:, 1]), b[:, 2], table.absolute_error(places)[0]

@@ -5,12 +5,10 @@ import xarray as xr
 from scipy.interpolate import PchipInterpolator
 from scipy.optimize import brentq
 
-from ...dynamics.equilibria import survey
-from ...fem.rotor_tables import RotorTable
 from ...geometry.basics import Array
-from ...geometry.scenes import Scene
+from ..one_scene import Levitation, sources
 from ..results import Point, Study, by_case, one_case, variable
-from .article import CONTACT, FLOATER, WEIGHT, article_scene, article_table
+from .article import CONTACT, FLOATER, WEIGHT, article_scene, levitation_of
 from .article_formulas import force
 from .force_curve_figure import force_figure, force_lines
 
@@ -41,8 +39,8 @@ def force_curve(point: Point) -> xr.Dataset:
         rows = np.array([_formula(point, grid, frequency) for frequency in frequencies])
     else:
         scene = article_scene(CONFIGURATION, VALUE, frequencies[0])
-        table = article_table(scene, point["model"])
-        rows = np.array([_full(article_scene(CONFIGURATION, VALUE, f), table, grid) for f in frequencies])
+        shared = levitation_of(scene, point["model"])
+        rows = np.array([_full(shared.elsewhere(frequency=float(f)), grid) for f in frequencies])
     marks = np.array([balance_points(grid, row[0] + row[1], row[3]) for row in rows])
     frequency = variable(("frequency",), frequencies, "Hz", "frequency of the rotor")
     distance = variable(("distance",), grid, "m", "distance along the axis")
@@ -71,10 +69,11 @@ def _formula(point: Point, grid: Array, frequency: float) -> list[Array]:
     return [found.attracting, found.repelling, np.zeros_like(grid), found.polar_angle]
 
 
-def _full(scene: Scene, table: RotorTable, grid: Array) -> list[Array]:
+def _full(levitation: Levitation, grid: Array) -> list[Array]:
     """The columns on the curve that holds the stable equilibrium; NaN beyond its ends."""
     # along the axis the moment comes nearest to upright on the curve that holds the stable equilibrium
-    curve = max(survey(scene, table).curves, key=lambda curve: float(curve.moment[:, 2].max()))
+    table, curves = sources(levitation.table), levitation.without_plate.curves
+    curve = max(curves, key=lambda curve: float(curve.moment[:, 2].max()))
     field_gradient = table.evaluate(curve.position)[1][:, :, 2]
     parts = FLOATER.moment * curve.moment * field_gradient
     error = FLOATER.moment * table.absolute_error(curve.position)[1]

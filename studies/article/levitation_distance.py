@@ -5,12 +5,12 @@ import xarray as xr
 
 from ...dynamics.branches import BranchPoint, Family, distance_error, kicked, levitating_branch
 from ...dynamics.flights import simulate
-from ...dynamics.motion import Rates
 from ...fem.rotor_tables import RotorTable
 from ...geometry.basics import Array
 from ...geometry.scenes import Scene
+from ..one_scene import sources
 from ..results import Columns, Point, Study, by_case, columns, one_case, variable
-from .article import CONFIGURATIONS, HIGHEST, LOWEST, QUICK, WEIGHT, article_scene, article_table, stable_in_flight
+from .article import CONFIGURATIONS, HIGHEST, LOWEST, QUICK, WEIGHT, article_scene, levitation_of, stable_in_flight
 from .article_formulas import analytic_distance, balanced
 from .levitation_distance_figure import distance_figure, distance_lines
 
@@ -73,8 +73,9 @@ def _by_formula(point: Point, grid: Array) -> dict[str, Array]:
 
 def _in_field(point: Point, grid: Array) -> dict[str, Array]:
     scene = article_scene(point["configuration"], point["value"], HIGHEST)
-    table = article_table(scene, point["model"])
-    branch = levitating_branch(scene, table, Rates.of(scene, table), HIGHEST)
+    levitation = levitation_of(scene, point["model"])
+    table = sources(levitation.table)
+    branch = levitating_branch(scene, table, levitation.rates, HIGHEST)
     found = [branch.side(side, grid) for side in SIDES]
     rows = np.array([[_row(scene, table, branch.family, p) for p in side] for side in found])
     fold = branch.fold

@@ -18,10 +18,9 @@ from ...dynamics.branches import (
 )
 from ...dynamics.motion import Rates
 from ...dynamics.steady import named_modes
-from ...fem.rotor_tables import rotor_table
 from ...geometry.basics import Array
 from ...geometry.scenes import Scene
-from ..article import article_scene, article_table, levitated_rotors
+from ..article import article_scene, levitated_rotors, levitation_of
 from ..results import Point, Study, by_case, one_case, variable
 from .dipole_vs_fem_figure import dipole_figure
 from .dipole_vs_fem_report import dipole_lines
@@ -66,13 +65,13 @@ def compute(point: Point) -> xr.Dataset:
     scene = article_scene(point["configuration"], point["measure"], drag=False)
     bare = replace(scene, floater=replace(scene.floater, recoil_permeability=1.0))
     start = reference_state(scene)
-    dipole = Rates.of(scene, rotor_table(scene.rotor, "dipole"))
+    dipole = levitation_of(scene, "dipole").rates
     made = {
         "article": _levitation(bare, dipole, start),
         "dipole": _levitation(scene, dipole, start),
-        "cuboid": _levitation(scene, Rates.of(scene, rotor_table(scene.rotor, "cuboid")), start),
-        "fem": _levitation(scene, Rates.of(scene, article_table(scene, "fem", RTOL)), start),
-        "coarse": _levitation(scene, Rates.of(scene, article_table(scene, "fem", COARSE)), start),
+        "cuboid": _levitation(scene, levitation_of(scene, "cuboid").rates, start),
+        "fem": _levitation(scene, levitation_of(scene, "fem", RTOL).rates, start),
+        "coarse": _levitation(scene, levitation_of(scene, "fem", COARSE).rates, start),
     }
     low = max(each.range.low.parameter for each in made.values())
     high = min(each.range.high.parameter for each in made.values())

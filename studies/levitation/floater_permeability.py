@@ -6,14 +6,14 @@ from functools import partial
 import numpy as np
 import xarray as xr
 
-from ...dynamics.equilibria import PerturbedBalance, find_equilibria
+from ...dynamics.equilibria import PerturbedBalance
 from ...dynamics.steady import Equilibrium
 from ...fem.mutual import RotorResponse, rotor_ladder, two_body, two_body_ladder
-from ...fem.rotor_tables import rotor_table
 from ...geometry.basics import Array
 from ...geometry.scenes import Floater, Scene, load_scene
+from ..one_scene import Levitation
 from ..results import AXIS, study_of_one, variable
-from ..terminal import default_scene
+from ..terminal import Models, default_scene
 from .floater_permeability_figure import floater_figure, floater_lines
 
 LEVELS = (0.1, 0.01, 1e-3, 1e-4)
@@ -38,10 +38,10 @@ def floater_permeability(scene: Scene, distances: Sequence[float] | None = None,
     stable equilibrium (along -x if there is none) and held where no balance is near.
     """
     rotors = rotor_ladder(scene.rotor, (2, 3) if quick else (3, 4))
-    table = rotor_table(scene.rotor, "auto", 1e-4 if quick else 1e-6)
+    alone = Levitation(scene, Models("auto", "none", 1e-4 if quick else 1e-6))
     depths = np.array(distances if distances is not None else _depths(scene, 8 if quick else 24))
-    stable = next((e for e in find_equilibria(scene, table) if e.stable), None)
-    balance = PerturbedBalance.of(scene, table)
+    stable = next((e for e in alone.equilibria if e.stable), None)
+    balance = PerturbedBalance.of(scene, alone.table)
     places = np.stack([0 * depths, 0 * depths, -depths], axis=1)
     start, guess = (stable.distance, stable.state.moment) if stable else (FARTHEST, np.array([-1.0, 0.0, 0.0]))
     dataset = missed(rotors, scene.floater, places, balance.directions(places, start, guess))

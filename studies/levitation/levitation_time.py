@@ -8,14 +8,15 @@ import numpy as np
 import xarray as xr
 
 from ...dynamics.branches import Family, follow_branch, frequencies, spins
-from ...dynamics.equilibria import find_equilibria
 from ...dynamics.motion import Rates, Scales
 from ...dynamics.slow_drift import Drift, drift
 from ...dynamics.steady import EquilibriumError
-from ...fem.rotor_tables import FieldTable, rotor_table
+from ...fem.rotor_tables import FieldTable
 from ...geometry.basics import Array
 from ...geometry.scenes import Scene
+from ..article import levitation_of
 from ..results import Point, Study, variable
+from ..terminal import FieldModel
 from .levitation_time_cases import (
     CASES,
     LEVITATES,
@@ -84,12 +85,11 @@ def gather_times(parts: Sequence[xr.Dataset]) -> xr.Dataset:
     return xr.concat(cases, "case", data_vars="all", coords="different", compat="equals", join="outer")
 
 
-def _compiled(scene: Scene, model: str) -> tuple[FieldTable, Rates, Array]:
+def _compiled(scene: Scene, model: FieldModel) -> tuple[FieldTable, Rates, Array]:
     """Table and rates of a scene, and the scaled state of the equilibrium at which small motions grow the slowest."""
-    table = rotor_table(scene.rotor, model)
-    rates = Rates.of(scene, table)
-    found = min(find_equilibria(scene, table, rates=rates), key=lambda e: e.growth_per_s)
-    return table, rates, Scales.of(scene).pack(found.state)
+    levitation = levitation_of(scene, model)
+    found = min(levitation.equilibria, key=lambda e: e.growth_per_s)
+    return levitation.table, levitation.rates, Scales.of(scene).pack(found.state)
 
 
 def _course(flight: Drift | None) -> Array:

@@ -5,11 +5,11 @@ import xarray as xr
 
 from ...dynamics.branches import BranchPoint, kicked, levitating_branch
 from ...dynamics.flights import simulate
-from ...dynamics.motion import Rates
 from ...fem.rotor_tables import RotorTable
 from ...geometry.basics import Array
 from ...geometry.scenes import Scene
-from ..article import CONFIGURATIONS, HIGHEST, LOWEST, QUICK, article_scene, article_table, side_radius
+from ..article import CONFIGURATIONS, HIGHEST, LOWEST, QUICK, article_scene, levitation_of, side_radius
+from ..one_scene import sources
 from ..results import Columns, Point, Study, by_case, columns, one_case, variable
 from .side_mode_figure import FLOWN_HZ, TURNS, side_figure, side_lines
 
@@ -39,8 +39,9 @@ def side_mode(point: Point) -> xr.Dataset:
     """
     grid = np.arange(LOWEST, HIGHEST + 1e-9, point["step_hz"])
     scene = article_scene(point["configuration"], point["value"], HIGHEST)
-    table = article_table(scene, point["model"])
-    branch = levitating_branch(scene, table, Rates.of(scene, table), HIGHEST)
+    levitation = levitation_of(scene, point["model"])
+    table = sources(levitation.table)
+    branch = levitating_branch(scene, table, levitation.rates, HIGHEST)
     rows = np.array([_row(p) for p in branch.side("near", grid)])
     flown = np.full((4, SAMPLES), np.nan)
     if (point["configuration"], point["value"]) == ("horizontal", 1.0):

@@ -17,7 +17,8 @@ from ...dynamics.slow_drift import drift
 from ...fem.rotor_tables import RotorTable
 from ...geometry.basics import MAGNET_CONDUCTIVITY, Array
 from ...geometry.scenes import Scene
-from ..article import FLIGHT, FLOATER, HIGHEST, article_scene, article_table
+from ..article import FLIGHT, FLOATER, HIGHEST, article_scene, levitation_of
+from ..one_scene import sources
 from ..results import Point, Study, by_case, one_case, variable
 from .trajectories_figure import NONE, SHORT, flight_figure, flight_lines
 
@@ -48,8 +49,8 @@ def trajectories(point: Point) -> xr.Dataset:
     """
     scene = article_scene(point["configuration"], point["value"], HIGHEST)
     scene = replace(scene, floater=replace(FLOATER, conductivity=MAGNET_CONDUCTIVITY))
-    table = article_table(scene, point["model"])
-    rates = Rates.of(scene, table)
+    levitation = levitation_of(scene, point["model"])
+    table, rates = sources(levitation.table), levitation.rates
     starts = levitating_branch(scene, table, rates, HIGHEST).side("near", np.array(FREQUENCIES))
     rows = [_row(scene, table, rates, start, point["duration_s"]) for start in starts]
     data = {

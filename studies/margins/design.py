@@ -3,10 +3,9 @@
 import numpy as np
 import xarray as xr
 
-from ...dynamics.equilibria import find_equilibria
 from ...dynamics.steady import EquilibriumError
 from ...geometry.basics import Array
-from ..article import CONFIGURATIONS, article_scene, article_table
+from ..article import CONFIGURATIONS, article_scene, levitation_of
 from ..results import Point, Study, by_case, one_case, variable
 from ..terminal import note
 from .design_figure import design_figure, design_lines
@@ -53,7 +52,7 @@ def checked_by_elements(
     slope = step / (designed(configuration, edge, distance + step, frequency).measure - first)  # by the closed form
     for _ in range(5):
         scene = article_scene(configuration, measure, frequency, drag=False, edge=edge)
-        found = find_equilibria(scene, article_table(scene, "fem", rtol))
+        found = levitation_of(scene, "fem", rtol).equilibria
         if not found:
             raise EquilibriumError("The true field has no equilibrium there.")
         best = min(found, key=lambda e: abs(e.distance - distance))

@@ -7,10 +7,9 @@ import numpy as np
 from ...dynamics.branches import HIGHEST, LOWEST, BranchPoint, by_frequency, levitates, stability_end
 from ...dynamics.motion import Rates, Scales, parameters, rotor_gap
 from ...dynamics.steady import AXIAL, LATERAL, Balance, EquilibriumError, solve
-from ...fem.rotor_tables import rotor_table
 from ...geometry.basics import MU_0, Array
 from ...geometry.scenes import Scene
-from ..article import FLOATER, REMANENCE, article_scene
+from ..article import FLOATER, REMANENCE, article_scene, levitation_of
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,7 +69,7 @@ def designed(configuration: str, edge: float, distance: float, frequency: float)
         if not least <= measure < (90 if configuration == "tilt" else 100) or measure == 0:
             raise EquilibriumError(f"The rotor would need a measure of {measure:.3g}.")
         scene = article_scene(configuration, measure, frequency, drag=False, edge=edge, permeability=1.0)
-        rates = Rates.of(scene, rotor_table(scene.rotor, "cuboid"))
+        rates = levitation_of(scene, "cuboid").rates
         place, moment, force = _lateral(scene, rates, place * distance / np.linalg.norm(place), moment)
         if known and abs(measure - known[-1][0]) < 1e-9 * measure:
             return _judged(scene, rates, measure, place, moment)

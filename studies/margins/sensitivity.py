@@ -1,18 +1,14 @@
 """Which parameter matters? Derivatives of distance and limits of stability, and what tolerances make of them."""
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 import xarray as xr
 from scipy.special import ndtri
 
 from ...dynamics.branches import at_frequency
-from ...dynamics.equilibria import find_equilibria
-from ...dynamics.motion import Rates
-from ...fem.rotor_tables import rotor_table
 from ...geometry.basics import Array
-from ..article import levitated_rotors
+from ..article import levitated_rotors, levitation_of
 from ..results import Point, Study, by_case, one_case, variable
 from .sensitivity_figure import sensitivity_figure, sensitivity_lines
 from .tolerances import (
@@ -87,14 +83,13 @@ def drawn(base: Nominal, samples: int) -> tuple[Array, Array]:
 def leaning(base: Nominal) -> tuple[Array, Array]:
     """Distance (m) and largest growth (1/s) in the middle of the range, upright and with the axis tilted by `TILTS`."""
     scene = scene_of(base.configuration, base.values, float(base.grid[1]))
-    table = rotor_table(scene.rotor, MODEL)
-    rates = Rates.of(scene, table)
-    here = at_frequency(scene, rates, base.range.near(scene.frequency), scene.frequency)
+    levitation = levitation_of(scene, MODEL)
+    here = at_frequency(scene, levitation.rates, base.range.near(scene.frequency), scene.frequency)
     found = []
     for tilt in np.radians([0.0, *TILTS]):
         gravity = 9.81 * np.array([np.sin(tilt), 0.0, -np.cos(tilt)])
         near = [
-            e for e in find_equilibria(replace(scene, gravity=gravity), table, rates=rates)
+            e for e in levitation.elsewhere(gravity=gravity).equilibria
             if abs(e.distance - here.distance) < 1e-3
         ]  # fmt: skip
         found.append((near[0].distance, near[0].growth_per_s) if near else (np.nan, np.nan))

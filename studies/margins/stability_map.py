@@ -6,14 +6,11 @@ import numpy as np
 import xarray as xr
 
 from ...dynamics.branches import HIGHEST, StableRange, at_frequency, levitating_ranges
-from ...dynamics.equilibria import survey, with_plate
-from ...dynamics.motion import Rates
 from ...dynamics.steady import EquilibriumError, Survey
-from ...fem.rotor_tables import RotorTable
 from ...geometry.basics import Array, Box
-from ...geometry.scenes import Plate, Scene
-from ..article import CONFIGURATIONS, PLATE_CONDUCTIVITY, PLATE_SIZE, article_scene, article_table
-from ..one_scene import plate_memory
+from ...geometry.scenes import Plate
+from ..article import CONFIGURATIONS, PLATE_CONDUCTIVITY, PLATE_SIZE, article_scene, levitation_of
+from ..one_scene import Levitation, sources
 from ..results import Point, Study, by_case, one_case, variable
 from ..terminal import note
 from .stability_map_figure import FACE, MODELS, map_figure, map_lines
@@ -44,10 +41,9 @@ def points(quick: bool) -> list[Point]:
 def compute(point: Point, rtol: float = RTOL) -> xr.Dataset:
     """Intervals of stable frequencies of one rotor, and growth with a plate below at some frequencies."""
     scene = article_scene(point["configuration"], point["measure"], drag=False)
-    table = article_table(scene, point["model"], rtol)
-    rates = Rates.of(scene, table)
+    levitation = levitation_of(scene, point["model"], rtol)
     try:
-        found = levitating_ranges(scene, table, rates)
+        found = levitating_ranges(scene, sources(levitation.table), levitation.rates)
     except EquilibriumError as error:
         note(str(error))
         found = []
@@ -56,7 +52,7 @@ def compute(point: Point, rtol: float = RTOL) -> xr.Dataset:
         ends = run.low, run.high
         rows[:, k] = [*(e.parameter for e in ends), *(e.distance for e in ends), run.high.leading_hz]
         kinds[:, k] = [e.kind for e in ends]
-    plate = _with_plate(scene, table, rates, found[0] if found else None, point["with_plate"])
+    plate = _with_plate(levitation, found[0] if found else None, point["with_plate"])
     data = {
         name: variable(("interval",), row, *words) for (name, words), row in zip(INTERVAL.items(), rows, strict=True)
     }
@@ -80,7 +76,7 @@ PLATE = {
 }
 
 
-def _with_plate(scene: Scene, table: RotorTable, rates: Rates, stable: StableRange | None, number: int) -> Array:
+def _with_plate(alone: Levitation, stable: StableRange | None, number: int) -> Array:
     """Frequency (Hz), growth (1/s), distance (m) and error of the plate's table (number, 4); NaN where it fails."""
     rows = np.full((6, 4), np.nan)
     if stable is None or not number:
@@ -89,18 +85,19 @@ def _with_plate(scene: Scene, table: RotorTable, rates: Rates, stable: StableRan
     center = np.array([0.0, 0.0, FACE - PLATE_SIZE[2] / 2])
     plate = Plate(Box(np.array(PLATE_SIZE), center), PLATE_CONDUCTIVITY)
     for k, frequency in enumerate(np.linspace(1.01 * stable.low.parameter, last, number)):
-        there = replace(scene, frequency=float(frequency), plate=plate)
+        models = replace(alone.models, plate_model="slab", plate_rtol=PLATE_RTOL)
+        there = alone.elsewhere(models, frequency=float(frequency), plate=plate)
         rows[k, 0] = frequency
         try:
-            near = at_frequency(scene, rates, stable.near(frequency), float(frequency))
+            near = at_frequency(alone.scene, alone.rates, stable.near(frequency), float(frequency))
         except EquilibriumError:
             continue
-        known = [e for e in survey(there, table, rates=rates).equilibria if abs(e.distance - near.distance) < 1e-6]
+        known = [e for e in there.without_plate.equilibria if abs(e.distance - near.distance) < 1e-6]
         if not known:
             continue
-        memory, _ = plate_memory(there, plate, "slab", table, known[0].position, PLATE_RTOL)
-        moved = with_plate(there, table, Survey((known[0],), ()), memory, rates).equilibria
-        if moved and moved[0].currents is not None:
+        there.adopt(Survey((known[0],), ()))
+        memory, moved = there.plate, there.equilibria
+        if memory is not None and moved and moved[0].currents is not None:
             rows[k, 1:] = moved[0].growth_per_s, moved[0].distance, max(memory.table.errors.total, memory.share.error)
     return rows
 

@@ -15,14 +15,13 @@ from ...dynamics.branches import (
     stability_end,
     stable_range,
 )
-from ...dynamics.motion import Rates
 from ...dynamics.steady import EquilibriumError
-from ...fem.rotor_tables import rotor_table
 from ...geometry.basics import Array
 from ...geometry.scenes import Floater, Scene
-from ..article import article_scene
+from ..article import article_scene, levitation_of
+from ..terminal import FieldModel
 
-MODEL = "cuboid"
+MODEL: FieldModel = "cuboid"
 FRACTIONS = (0.1, 0.5, 0.9)
 """Places in the range of stable frequencies at which the distance is asked for."""
 
@@ -95,7 +94,7 @@ def nominal(configuration: str, measure: float) -> Nominal:
     """The rotor as it should be. Raises EquilibriumError where it does not levitate."""
     values = {name: known.nominal for name, known in PARAMETERS.items() if name != PLACE} | {"measure": measure}
     scene = scene_of(configuration, values)
-    found = stable_range(scene, Rates.of(scene, rotor_table(scene.rotor, MODEL)), *reference_state(scene))
+    found = stable_range(scene, levitation_of(scene, MODEL).rates, *reference_state(scene))
     return Nominal(configuration, measure, values, found)
 
 
@@ -107,7 +106,7 @@ def levitation(base: Nominal, values: dict[str, float], shift: float = 0.0) -> A
     shift : of the frequencies at which the distance is asked for, Hz
     """
     scene = scene_of(base.configuration, values)
-    rates = Rates.of(scene, rotor_table(scene.rotor, MODEL))
+    rates = levitation_of(scene, MODEL).rates
     middle = base.range.near(base.grid[1])
     family = by_frequency(scene, rates)
     row = np.full(len(QUANTITIES), np.nan)

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
+from typing import Any
 
 from ...dynamics.equilibria import survey, with_plate
 from ...dynamics.flights import Checkpoint, Trajectory, simulate, starting_point
@@ -12,11 +14,11 @@ from ...dynamics.motion import PlateMemory, Rates
 from ...dynamics.steady import Equilibrium, EquilibriumError, Survey
 from ...fem.measured_maps import GriddedTable, map_table
 from ...fem.rotor_tables import RotorTable, cached_rotor_table, resolve_model, rotor_table
-from ...fem.slab import resolve_plate_model
+from ...fem.slab import resolve_plate_model, rotor_nearby
 from ...geometry.basics import Array, InputError
 from ...geometry.scenes import AbsoluteStart, Scene, load_scene
 from ..terminal import Models, finite, note, positive, progress
-from .plate_of_scene import check_room, plate_memory, table_in_flight
+from .plate_of_scene import check_room, plate_memory
 
 RotorField = RotorTable | GriddedTable
 """A rotor's table: computed, or from a map."""
@@ -49,13 +51,19 @@ class Levitation:
         self.searched = True
         """Whether the equilibria were searched for; else they were carried here from scenes nearby."""
         self._fields: dict[str, RotorField] = {}
-        self._equations: dict[str, Rates] = {}
+        self._equations: dict[tuple[str, bool], Rates] = {}
+
+    def elsewhere(self, models: Models | None = None, **changes: Any) -> Levitation:
+        """Another scene with the same rotor, which shares its field; `changes` are fields of `Scene`, SI units."""
+        other = Levitation(replace(self.scene, **changes), models or self.models, self.spin)
+        other.share(self)
+        return other
 
     def share(self, other: Levitation) -> None:
         """Take over the fields and the compiled equations of another scene with the same rotor, made or yet to make."""
         self._fields, self._equations = other._fields, other._equations
 
-    def adopt(self, known: Survey, searched: bool) -> None:
+    def adopt(self, known: Survey, searched: bool = True) -> None:
         """Take over the equilibria without plate that are known from a search here or from scenes nearby."""
         self.without_plate, self.searched = known, searched
 
@@ -128,7 +136,9 @@ class Levitation:
         if self.plate is None or not isinstance(table, RotorTable):
             return table
         place = self._place(() if self.absolute else self.equilibria)
-        return table if place is None else table_in_flight(self.scene, table, place, self.models.rtol)
+        if place is None:
+            return table
+        return rotor_nearby(table, self.scene.rotor, place, self.scene.floater.radius, self.models.rtol)
 
     def flight(self, duration: float, checkpoint: Checkpoint | None = None) -> Trajectory:
         """The motion for `duration` (s) from where the scene says, kept in `checkpoint` while it lasts.
@@ -165,10 +175,10 @@ class Levitation:
     @property
     def rates(self) -> Rates:
         """The equations of motion in the rotor's field, compiled."""
-        name = self.table.model
-        if name not in self._equations:
-            self._equations[name] = Rates.of(self.scene, self.table)
-        return self._equations[name]
+        kind = self.table.model, bool(self.scene.floater.conductivity)
+        if kind not in self._equations:
+            self._equations[kind] = Rates.of(self.scene, self.table)
+        return self._equations[kind]
 
     @property
     def absolute(self) -> bool:

@@ -1,18 +1,17 @@
 """The plates and rotors of the study of the plate's damping, and where the floater levitates without a plate."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
 
 from ...dynamics.branches import StableRange, at_frequency, reference_state, stable_range
-from ...dynamics.equilibria import survey
-from ...dynamics.motion import Rates
 from ...dynamics.steady import Equilibrium, EquilibriumError
-from ...fem.rotor_tables import RotorTable
 from ...geometry.basics import Array, Box, rotation_matrix
-from ...geometry.scenes import Plate, Scene
-from ..article import CONFIGURATIONS, PLATE_CONDUCTIVITY, PLATE_SIZE, article_scene, article_table
+from ...geometry.scenes import Plate
+from ..article import CONFIGURATIONS, PLATE_CONDUCTIVITY, PLATE_SIZE, article_scene, levitation_of
+from ..one_scene import Levitation
+from ..terminal import PlateModel
 
 DISTANCE = 0.018
 """Face below or beside the floater's centre in the sweeps over all else, m."""
@@ -45,7 +44,7 @@ class PlateCase:
 
     sweep: str
     value: float
-    model: str = "slab"
+    model: PlateModel = "slab"
     upright: bool = False
     distance: float = DISTANCE
     thickness: float = PLATE_SIZE[2]
@@ -85,38 +84,34 @@ def cases(quick: bool) -> list[PlateCase]:
 
 
 @cache
-def _in_field(configuration: str, measure: float) -> tuple[Scene, RotorTable, Rates]:
+def _in_field(configuration: str, measure: float) -> Levitation:
     """A rotor in air, its field and compiled motion, once for all points that a process computes."""
     scene = article_scene(configuration, measure, FREQUENCY)
-    table = article_table(scene, "fem", FIELD_RTOL)
-    return scene, table, Rates.of(scene, table)
+    return levitation_of(scene, "fem", FIELD_RTOL)
 
 
 @cache
 def _stable_range(configuration: str, measure: float) -> StableRange:
-    scene, _, rates = _in_field(configuration, measure)
-    return stable_range(scene, rates, *reference_state(scene))
+    levitation = _in_field(configuration, measure)
+    return stable_range(levitation.scene, levitation.rates, *reference_state(levitation.scene))
 
 
 @cache
-def without_plate(
-    configuration: str, measure: float, part: float | None
-) -> tuple[Scene, RotorTable, Rates, Equilibrium]:
-    """A scene without plate, the rotor's field, the compiled motion and the stable equilibrium.
+def without_plate(configuration: str, measure: float, part: float | None) -> tuple[Levitation, Equilibrium]:
+    """A scene without plate, and its stable equilibrium.
 
     Raises
     ------
     EquilibriumError : nothing levitates there
     """
-    scene, table, rates = _in_field(configuration, measure)
-    near = None
+    levitation, near = _in_field(configuration, measure), None
     if part is not None:
         stable = _stable_range(configuration, measure)
         frequency = stable.low.parameter + part * (stable.high.parameter - stable.low.parameter)
-        scene = replace(scene, frequency=frequency)
-        near = at_frequency(scene, rates, stable.near(frequency), frequency).distance
-    found = survey(scene, table, rates=rates).equilibria
+        levitation = levitation.elsewhere(frequency=frequency)
+        near = at_frequency(levitation.scene, levitation.rates, stable.near(frequency), frequency).distance
+    found = levitation.equilibria
     known = [e for e in found if (e.stable if near is None else abs(e.distance - near) < 1e-6)]
     if not known:
         raise EquilibriumError("There is no stable levitation without the plate.")
-    return scene, table, rates, known[0]
+    return levitation, known[0]

@@ -6,12 +6,9 @@ from dataclasses import asdict, replace
 import xarray as xr
 from numpy.typing import ArrayLike
 
-from ...dynamics.equilibria import plate_action, with_plate
-from ...dynamics.motion import Rates
+from ...dynamics.equilibria import plate_action
 from ...dynamics.steady import Equilibrium, Survey
-from ...fem.rotor_tables import RotorTable
-from ...geometry.scenes import Scene
-from ..one_scene import plate_memory
+from ..one_scene import Levitation
 from ..results import AXIS, MODES, Columns, Point, Study, columns, variable
 from .plate_cases import PlateCase, cases, without_plate
 from .plate_damping_figure import damping_figure
@@ -38,8 +35,11 @@ def plate_damping(point: Point) -> xr.Dataset:
     EquilibriumError : nothing levitates even without the plate
     """
     case = PlateCase(**point)
-    scene, table, rates, start = without_plate(case.configuration, case.measure, case.part)
-    row = _row(replace(scene, plate=case.plate(start.position)), case, table, rates, start)
+    alone, start = without_plate(case.configuration, case.measure, case.part)
+    models = replace(alone.models, plate_model=case.model, plate_rtol=RTOL)
+    beside = alone.elsewhere(models, plate=case.plate(start.position))
+    beside.adopt(Survey((start,), ()))
+    row, scene = _row(beside, start), alone.scene
     return xr.Dataset(
         {
             **columns(COLUMNS, row, mode=len(MODES), axis=len(AXIS)),
@@ -70,19 +70,17 @@ COLUMNS: Columns = {
 }
 
 
-def _row(scene: Scene, case: PlateCase, table: RotorTable, rates: Rates, start: Equilibrium) -> dict[str, ArrayLike]:
-    assert scene.plate is not None
-    memory, _ = plate_memory(scene, scene.plate, case.model, table, start.position, RTOL)
-    found = with_plate(scene, table, Survey((start,), ()), memory, rates).equilibria
+def _row(levitation: Levitation, start: Equilibrium) -> dict[str, ArrayLike]:
+    memory, found = levitation.plate, levitation.equilibria
     row: dict[str, ArrayLike] = {"growth_without": [mode.growth_per_s for mode in start.modes]}
-    if not found or found[0].currents is None:
+    if memory is None or not found or found[0].currents is None:
         return row
     return {
         **row,
         "growth": [mode.growth_per_s for mode in found[0].modes],
         "frequency": [mode.frequency_hz for mode in found[0].modes],
         "shift": found[0].position - start.position,
-        **vars(plate_action(scene, memory, found[0])),
+        **vars(plate_action(levitation.scene, memory, found[0])),
         "error": max(memory.table.errors.total, memory.share.error),
     }
 

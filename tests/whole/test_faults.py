@@ -160,13 +160,13 @@ WRITERS = {
     "trajectory.nc": ("simulate", SCENE, "--duration-s", "0.1", *DIPOLE),
     "plate.json": ("plate", OVER_PLATE, "--at", "0,0,-20", "--frequency-hz", "50", "--model", "slab"),
     "identity.json": SWEEP,
-    "000000.nc": SWEEP,
+    "000000.json": SWEEP,
     "question.nc": SWEEP,
     "question.png": SWEEP,
 }
 
 
-@pytest.mark.parametrize("name", quick(WRITERS, "field.csv", "000000.nc"))
+@pytest.mark.parametrize("name", quick(WRITERS, "field.csv", "000000.json"))
 def test_a_full_disk(spinlev, monkeypatch, name):
     """Half of a file is written, then there is no space: named, nothing of that file is left, the next run is whole."""
     write = Path.write_bytes

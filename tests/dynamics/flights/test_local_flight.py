@@ -13,7 +13,7 @@ from spinlev.dynamics.flights.integration import integrate
 from spinlev.dynamics.flights.local_flight import LocalFlight, compile_local_flight
 from spinlev.dynamics.motion import PlateMemory
 from spinlev.fem.harmonics import Ball, BallField, uniform_moments
-from spinlev.fem.plate_network import Region
+from spinlev.fem.plate_currents import Region
 from spinlev.fem.rotor_tables import RotorTable
 from spinlev.fem.slab import slab_and_rotor_table
 from spinlev.geometry.basics import Box

@@ -5,9 +5,8 @@ import pytest
 
 from spinlev.fem.harmonics import uniform_moments
 from spinlev.fem.rotor_tables import Accuracy, points_around, rotor_table, shortened_table, typical_field
+from spinlev.fem.slab import rotor_nearby
 from spinlev.geometry.bodies import horizontal
-from spinlev.geometry.scenes import Drag, Floater, Scene
-from spinlev.studies.one_scene.plate_of_scene import table_in_flight
 
 ROTOR = horizontal(2e-3, 10e-3, 1.305, 1.0)
 RTOL, CONTACT, FAR = 1e-4, 6.35e-3, 12e-3
@@ -39,9 +38,8 @@ def test_a_closed_form_stays_as_it_is():
 
 def test_a_flight_takes_the_table_for_its_place():
     """At 22 mm below the cube it holds from 14 mm off the faces on, next to contact from contact on."""
-    scene = Scene(110.0, ROTOR, Floater(CONTACT, 1.305, 1.0, 7500.0), Drag(0.0, 0.0))
     whole = rotor_table(ROTOR, "moments", RTOL, CONTACT)
-    far, near = (table_in_flight(scene, whole, np.array([2e-3, 0.0, z]), RTOL) for z in (-22e-3, -13e-3))
+    far, near = (rotor_nearby(whole, ROTOR, np.array([2e-3, 0.0, z]), CONTACT, RTOL) for z in (-22e-3, -13e-3))
     points = points_around(ROTOR, 14e-3)
     assert np.all(far.absolute_error(points)[0] <= RTOL * typical_field(ROTOR, points))
     assert coefficients(far) < coefficients(near) <= coefficients(whole)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from ngsolve import SetNumThreads
 
-from spinlev.fem.slab.choice import EDGES
+from spinlev.fem.slab.edges import EDGES
 from spinlev.geometry.basics import Box, InputError, rotation_matrix
 from spinlev.geometry.scenes import Plate, load_scene
 from spinlev.studies.command_line.cli import app

@@ -1,0 +1,72 @@
+"""The tables of a plate for a floater about one place: where it may go, and which frequencies it hears."""
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from ...geometry.basics import Array
+from ...geometry.bodies import Magnet
+from ...geometry.scenes import Plate
+from ..plate_currents import Region, Watch, unwatched
+from ..plate_tables import PlateTable, RotorShare, cached_driven_plate, reachable_region
+from ..rotor_tables import Accuracy, RotorTable, shortened_table
+from .table import slab_and_rotor_table
+
+REACH = 0.003
+"""The floater may move so far from where it begins, along each axis, m."""
+RASTER = 0.001
+"""Bounds of regions are multiples of this, m, so that scenes that differ little share a table."""
+LOWEST, HIGHEST, HARMONICS = 0.5, 250.0, 2.0
+"""Frequencies of a table, Hz, at least; and the multiple of the rotor's that it must hold."""
+PLUMB = 1e-9
+"""Cosine of the angle between a slab's normal and the vertical below which it stands upright."""
+
+
+def plate_around(
+    plate: Plate,
+    model: str,
+    table: RotorTable,
+    place: Array,
+    radius: float,
+    frequency: float,
+    rtol: float,
+    report: Callable[[str], None],
+    watch: Watch = unwatched,
+) -> tuple[Plate, PlateTable, RotorShare, bool]:
+    """The plate, its table, the rotor's share in it, and whether they were cached, for a floater about a place.
+
+    Parameters
+    ----------
+    model : "slab", or "reduced" for the network of the finite elements
+    table : the rotor's field
+    place : (3,) m, in the frame that turns with the rotor
+    radius, frequency : of the floater, m, and of the rotor, Hz
+
+    Raises
+    ------
+    InputError : the plate leaves the floater no room, or is no slab for the floater and the rotor
+    """
+    if model == "slab" and plate.lowering and abs(plate.box.rotation[2, np.argmin(plate.box.size)]) < PLUMB:
+        plate = replace(plate, lowering=None)  # an infinite slab that moves along itself stays where it is
+    sideways = float(np.hypot(place[0], place[1])) + REACH
+    region = _rastered(reachable_region(plate, [0.0, 0.0, place[2]], [sideways, sideways, REACH], radius))
+    frequencies = (LOWEST, max(HIGHEST, HARMONICS * frequency))
+    if model == "slab":
+        return plate, *slab_and_rotor_table(plate, table, region, frequencies, rtol), False
+    return plate, *cached_driven_plate(plate, table, region, frequencies, rtol, report, watch)
+
+
+def rotor_nearby(table: RotorTable, rotor: tuple[Magnet, ...], place: Array, radius: float, rtol: float) -> RotorTable:
+    """The rotor's table with the coefficients that count from `REACH` nearer to the magnets than `place` (3,) m on."""
+    gap = min(float(magnet.box.distance(place)) for magnet in rotor) - REACH
+    return shortened_table(table, Accuracy(rtol, max(gap, radius)))
+
+
+def _rastered(region: Region) -> Region:
+    """The region with bounds on the raster; what is nearly symmetric becomes so, which halves the work."""
+    lower, upper = np.floor(region.lower / RASTER + 1e-6), np.ceil(region.upper / RASTER - 1e-6)
+    for axis in np.flatnonzero((lower < 0) & (upper > 0)):
+        upper[axis] = max(-lower[axis], upper[axis])
+        lower[axis] = -upper[axis]
+    return Region(lower * RASTER, upper * RASTER)
