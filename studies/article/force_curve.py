@@ -2,7 +2,7 @@
 
 import numpy as np
 import xarray as xr
-from scipy.interpolate import PchipInterpolator
+from scipy.interpolate import CubicSpline, PchipInterpolator
 from scipy.optimize import brentq
 
 from ...geometry.basics import Array
@@ -81,7 +81,7 @@ def _full(levitation: Levitation, grid: Array) -> list[Array]:
     depth = -curve.position[:, 2]
     order = np.argsort(depth)
     columns = (parts[:, 2], parts[:, 0] + parts[:, 1], error, angle)
-    return [PchipInterpolator(depth[order], column[order], extrapolate=False)(grid) for column in columns]
+    return [CubicSpline(depth[order], column[order], extrapolate=False)(grid) for column in columns]
 
 
 def balance_points(distance: Array, magnetic: Array, angle: Array) -> tuple[float, float, float, float, float]:
