@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from cyclopts import App, CycloptsError
+from rich.console import Console
 
 from ...geometry.basics import SpinlevError
 from ..terminal import FORTRAN, Answer, answers_only, heard, is_missing_library, note, to_json, way_out
@@ -78,7 +79,9 @@ def _unforeseen(error: Exception) -> str:
 
 def _answer(arguments: list[str], out: Any) -> None:
     began = time.perf_counter()
-    answer = app(arguments, exit_on_error=False, print_error=False, result_action="return_value")
+    said_of_itself = Console(file=out)  # help and version
+    how: dict[str, Any] = {"exit_on_error": False, "print_error": False, "result_action": "return_value"}
+    answer = app(arguments, console=said_of_itself, **how)
     if isinstance(answer, Answer):
         values = {**answer.values, "seconds": time.perf_counter() - began}
         said = to_json(values, getattr(out, "encoding", None)) if answer.json else "\n".join(answer.lines)
