@@ -17,9 +17,6 @@ from ..motion import CONTACT, Parameter, State, clearance, lost_distance
 from .endings import Endings
 from .lanes import Flying, Lanes
 
-TOGETHER = 512
-"""Flights that a worker gets at once."""
-
 
 def ensemble(
     scene: Scene,
@@ -27,6 +24,7 @@ def ensemble(
     starts: State,
     duration: float,
     mapped: Callable[[Callable[[State], Endings], Iterable[State]], Iterable[Any]] = map,
+    together: int = 512,
 ) -> Endings:
     """Fly a scene's floater from many starts for `duration` (s) each, or until contact or loss.
 
@@ -38,6 +36,7 @@ def ensemble(
     scene, table : the problem
     starts : states (n, 3) at t = 0, SI units; the moments are made unit vectors
     mapped : as the built-in `map`; `concurrent.futures.ProcessPoolExecutor(2).map` uses two cores
+    together : flights that a worker gets at once
 
     Accuracy: that of a flight in balls, whose field errs by 1e-6 of its gradient.
 
@@ -51,7 +50,7 @@ def ensemble(
         raise InputError(f"Input duration must be positive; instead received {duration} s.")
     if not count:
         raise InputError("Input starts must have one state at least; instead received none.")
-    pieces = [slice(first, first + TOGETHER) for first in range(0, count, TOGETHER)]
+    pieces = [slice(first, first + together) for first in range(0, count, together)]
     parts = mapped(partial(_flown, scene, table, duration), [State(*(v[p] for v in starts.vectors)) for p in pieces])
     return Endings.joined(list(parts))
 

@@ -74,10 +74,12 @@ class Checkpoint:
     ----------
     path : where it is
     identity : everything that the flight depends on, as text; another flight's checkpoint is refused
+    every : seconds between two writings
     """
 
     path: Path
     identity: str
+    every: float = 5.0
 
     @property
     def _key(self) -> str:

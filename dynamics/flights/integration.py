@@ -20,8 +20,6 @@ from .pieces import Log, fly_piece
 from .recorder import Recorder
 from .trajectory import DURATION, STOPPED, FieldChanges, FlightStopped, Trajectory
 
-CHECKPOINT_SECONDS = 5.0
-"""Wall time between two checkpoints."""
 MOST_SAMPLES = 20000
 SAMPLES_PER_TURN = 32
 
@@ -125,7 +123,7 @@ def fly(
                 progress(min(1.0, times[-1] * scales.time / duration))
             if over:
                 return
-            if checkpoint and log.latest and perf_counter() - kept > CHECKPOINT_SECONDS:
+            if checkpoint and log.latest and perf_counter() - kept > checkpoint.every:
                 checkpoint.write(log.latest)
                 kept = perf_counter()
 

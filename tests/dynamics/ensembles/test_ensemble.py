@@ -7,7 +7,7 @@ from multiprocessing import get_context
 import numpy as np
 import pytest
 
-from spinlev.dynamics.ensembles import ensemble, many_flights
+from spinlev.dynamics.ensembles import ensemble
 from spinlev.dynamics.flights import initial_state, simulate
 from spinlev.dynamics.motion import State
 from spinlev.fem.harmonics import uniform_moments
@@ -62,10 +62,9 @@ def test_the_company_does_not_matter(starts, flown):
     same(ensemble(SCENE, TABLE, State(*(v[order] for v in starts.vectors)), DURATION), flown, order)
 
 
-def test_the_number_of_workers_does_not_matter(starts, flown, monkeypatch):
-    monkeypatch.setattr(many_flights, "TOGETHER", 10)
+def test_the_number_of_workers_does_not_matter(starts, flown):
     with ProcessPoolExecutor(2, get_context("spawn")) as pool:
-        same(ensemble(SCENE, TABLE, starts, DURATION, pool.map), flown, np.arange(len(starts.position)))
+        same(ensemble(SCENE, TABLE, starts, DURATION, pool.map, together=10), flown, np.arange(len(starts.position)))
 
 
 def test_what_cannot_be_flown_is_said(starts):

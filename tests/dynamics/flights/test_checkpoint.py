@@ -1,9 +1,11 @@
 """A flight that is stopped and goes on is the flight that was not stopped, to the last bit; bad files are refused."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from spinlev.dynamics.flights import Checkpoint, FlightStopped, integration, simulate
+from spinlev.dynamics.flights import Checkpoint, FlightStopped, simulate
 from spinlev.fem.harmonics import uniform_moments
 from spinlev.fem.rotor_tables import RotorTable
 from spinlev.geometry.basics import InputError
@@ -16,9 +18,8 @@ SCENE = Scene(110.0, MAGNETS, Floater(6.35e-3, 1.305, 1.0, 7500.0), Drag(2.2e-6,
 
 
 @pytest.fixture
-def checkpoint(tmp_path, monkeypatch):
-    monkeypatch.setattr(integration, "CHECKPOINT_SECONDS", 0.0)
-    return Checkpoint(tmp_path / "checkpoint.npz", "this flight")
+def checkpoint(tmp_path):
+    return Checkpoint(tmp_path / "checkpoint.npz", "this flight", 0.0)
 
 
 def stopped_at(part):
@@ -37,9 +38,9 @@ def begun(part, checkpoint):
 
 
 @pytest.mark.parametrize("seconds", [0.0, 1e9])
-def test_a_stopped_flight_goes_on_to_the_last_bit(checkpoint, monkeypatch, seconds):
+def test_a_stopped_flight_goes_on_to_the_last_bit(checkpoint, seconds):
     """Also where no checkpoint was due before the stop: then that of the stop itself."""
-    monkeypatch.setattr(integration, "CHECKPOINT_SECONDS", seconds)
+    checkpoint = replace(checkpoint, every=seconds)
     whole = simulate(SCENE, DIPOLE, 4.0, compact=True)
     first = begun(0.3, checkpoint)
     assert first.ended_by == "stopped"

@@ -6,7 +6,7 @@ import heyoka as hy
 import numpy as np
 import pytest
 
-from spinlev.dynamics.flights import Checkpoint, FlightStopped, initial_state, integration, simulate
+from spinlev.dynamics.flights import Checkpoint, FlightStopped, initial_state, simulate
 from spinlev.dynamics.flights.balls import ERROR
 from spinlev.dynamics.flights.compiled_flight import compile_flight
 from spinlev.dynamics.flights.integration import integrate
@@ -114,11 +114,10 @@ def test_contact_is_that_of_the_tables_own_flight():
     assert flown.energy_error < 1e-12
 
 
-def test_a_stopped_flight_with_changes_goes_on_to_the_last_bit(start, tmp_path, monkeypatch):
-    monkeypatch.setattr(integration, "CHECKPOINT_SECONDS", 0.0)
+def test_a_stopped_flight_with_changes_goes_on_to_the_last_bit(start, tmp_path):
     state = kicked(start)
     scene = replace(SCENE, start=AbsoluteStart(*state.vectors))
-    checkpoint = Checkpoint(tmp_path / "checkpoint.npz", "this flight")
+    checkpoint = Checkpoint(tmp_path / "checkpoint.npz", "this flight", 0.0)
 
     def stop(done):
         if done > 0.3:
