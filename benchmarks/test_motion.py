@@ -15,8 +15,8 @@ from spinlev.dynamics.flights.local_flight import compile_local_flight
 from spinlev.dynamics.flights.simulation import PLATE_TOLERANCE
 from spinlev.dynamics.motion import State
 from spinlev.fem.rotor_tables import rotor_table
+from spinlev.fem.slab import rotor_nearby
 from spinlev.studies.one_scene import plate_memory
-from spinlev.studies.one_scene.plate_of_scene import table_in_flight
 
 FREE = replace(SCENE, plate=None, drag=replace(SCENE.drag, linear=0.0, angular=0.0))
 TURNS = 2
@@ -90,7 +90,7 @@ def test_flight_with_plate(benchmark, start, model, plate_model, rtol):
     """A floater that does not rest over the plate's currents, at the tolerance that `simulate` uses."""
     table = rotor_table(SCENE.rotor, model, nearest=SCENE.floater.radius)
     memory, _ = plate_memory(SCENE, SCENE.plate, plate_model, table, start.position, rtol)
-    table = table_in_flight(SCENE, table, start.position, 3e-6)
+    table = rotor_nearby(table, SCENE.rotor, start.position, SCENE.floater.radius, 3e-6)
     flight = compile_flight(SCENE, table, 0.5, PLATE_TOLERANCE, True, memory)
     still = np.zeros(len(memory.table.rates))
     integrate(SCENE, flight, start, 0.05, currents=still)

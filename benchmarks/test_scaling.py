@@ -34,6 +34,7 @@ def test_points(benchmark, points):
 @pytest.mark.benchmark(group="scaling: unknowns of the rotor's field")
 @pytest.mark.parametrize("order", [3, 4, 5, 6, 7, 8])
 def test_field_unknowns(benchmark, order):
+    """Assembly and solution of the permeable magnets by elements of rising order."""
     carriers = tuple(carrier(magnet) for magnet in SCENE.rotor)
 
     def solved():
@@ -45,6 +46,7 @@ def test_field_unknowns(benchmark, order):
 @pytest.mark.benchmark(group="scaling: unknowns of the plate's currents, one place, 100 Hz")
 @pytest.mark.parametrize("order", [1, 2, 3, 4])
 def test_plate_unknowns(benchmark, order):
+    """Assembly and solution of the eddy currents by elements of rising order."""
     body = np.array([[0.003, 0.002, 0.035]])
     mesh = plate_mesh(PLATE.box.size, PLATE.conductivity, body, 100.0, MeshRule())
     found = benchmark.pedantic(solve_eddy, (mesh, order, 100.0, unit_dipoles(body)), rounds=1)
@@ -54,6 +56,7 @@ def test_plate_unknowns(benchmark, order):
 @pytest.mark.benchmark(group="scaling: states of the plate in a flight of 0.2 s")
 @pytest.mark.parametrize("rtol", [1e-1, 3e-2, 1e-2, 3e-3, 1e-3, 3e-4])
 def test_states(benchmark, rtol):
+    """A flight over a plate whose network has more and more states."""
     table = rotor_table(SCENE.rotor, "cuboid", nearest=SCENE.floater.radius)
     start, _ = initial_state(FREE, table)
     memory, _ = plate_memory(SCENE, SCENE.plate, "slab", table, start.position, rtol)
@@ -67,6 +70,7 @@ def test_states(benchmark, rtol):
 @pytest.mark.benchmark(group="scaling: turns of a flight (dipole)")
 @pytest.mark.parametrize("turns", [100, 1_000, 10_000, 100_000])
 def test_turns(benchmark, turns):
+    """Flights that last longer and longer."""
     table = rotor_table(SCENE.rotor, "dipole")
     start, _ = initial_state(FREE, table)
     duration = turns / FREE.frequency
@@ -79,6 +83,7 @@ def test_turns(benchmark, turns):
 @pytest.mark.benchmark(group="scaling: points of a map of equilibria (dipole)")
 @pytest.mark.parametrize("side", [10, 20, 40, 80])
 def test_grid(benchmark, side):
+    """Maps with more and more points."""
     family = rotor_family(SCENE, "horizontal", "dipole", nearest=SCENE.floater.radius)
     axes = np.linspace(50.0, 250.0, side), np.linspace(1e-3, 8e-3, side)
     assert family.rates is not None  # compiled

@@ -29,7 +29,7 @@ def ensemble(
     """Fly a scene's floater from many starts for `duration` (s) each, or until contact or loss.
 
     A plate is an obstacle only: its currents are not modelled.  A flight's numbers are the same to the last bit
-    whichever flights fly beside it, in one worker or in many.
+    whichever flights fly beside it, in one worker or in many, where BLAS has one thread (the default).
 
     Parameters
     ----------

@@ -7,7 +7,7 @@ the torque along two tangents of m̂; their derivatives are by r and by tilts of
 import heyoka as hy
 import numpy as np
 
-from .equations import Equations
+from .equations import NAMES, Equations
 from .symbols import Parameter, Vector, dot
 
 GIVEN = ("x", "y", "z", "m_x", "m_y", "m_z", "t_x", "t_y", "t_z", "u_x", "u_y", "u_z", "body_spin")
@@ -20,9 +20,7 @@ def balances(equations: Equations) -> tuple[list[hy.expression], list[hy.express
     given, tilts = list(hy.make_vars(*GIVEN)), list(hy.make_vars(*TILTS))
     position, tangents, spin = given[:3], (given[6:9], given[9:12]), given[12]
     moment = [given[3 + i] + tilts[0] * tangents[0][i] + tilts[1] * tangents[1][i] for i in range(3)]
-    rates = hy.subs(
-        list(equations.rates[:12]), dict(zip(_names(equations), _state(position, moment, spin), strict=True))
-    )
+    rates = hy.subs(list(equations.rates[:12]), dict(zip(NAMES, _state(position, moment, spin), strict=True)))
     force, torque = rates[3:6], rates[9:12]
     values = [*force, *(dot(tangent, torque) for tangent in tangents)]
     free = [*position, *tilts]
@@ -38,7 +36,3 @@ def _state(position: Vector, moment: Vector, spin: hy.expression) -> list[hy.exp
     along = rate * (spin - moment[2])
     velocity = [-rate * position[1], rate * position[0], hy.expression(0.0)]
     return [*position, *velocity, *moment, along * moment[0], along * moment[1], along * moment[2] + rate]
-
-
-def _names(equations: Equations) -> list[str]:
-    return [str(variable) for variable in equations.variables[:12]]

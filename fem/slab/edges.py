@@ -54,11 +54,14 @@ def edge_error(plate: Plate, place: Array) -> float:
 def measured_edge_error(plate: Plate, places: Array, frequency: float) -> float:
     """Relative error of an infinite slab's reaction at `places` (n, 3) m, for a plate with edges.
 
-    The first place's own tensor at a low frequency and at `frequency` (Hz), where also the field there of dipoles at
-    the others.
+    The first place's own tensor at a low frequency and, of a rotor that turns, at `frequency` (Hz), where also the
+    field there of dipoles at the others.
     """
     body = plate.box.to_body(places)
-    return DOUBT * max(_change(plate, body[:1], LOW), _change(plate, body, frequency))
+    changes = [_change(plate, body[:1], LOW)]
+    if frequency:
+        changes.append(_change(plate, body, frequency))
+    return DOUBT * max(changes)
 
 
 def _change(plate: Plate, body: Array, frequency: float) -> float:
@@ -76,11 +79,10 @@ def _change(plate: Plate, body: Array, frequency: float) -> float:
 
 
 def cached_edge_error(plate: Plate, places: Array, frequency: float, report: Callable[[str], None]) -> float:
-    """`measured_edge_error`, from the cache if it is there; places count to a tenth of a millimetre."""
-    rounded = np.round(plate.box.to_body(places), 4)
-    key = digest(
-        f"{FORMAT} {program_of(__package__)}", [plate.box.size, [plate.conductivity, round(frequency)], rounded]
-    )
+    """`measured_edge_error` at places and frequency rounded to 0.1 mm and 1 Hz, from the cache if it is there."""
+    places, frequency = np.round(places, 4), float(round(frequency))
+    body = plate.box.to_body(places)
+    key = digest(f"{FORMAT} {program_of(__package__)}", [plate.box.size, [plate.conductivity, frequency], body])
 
     def save(error: float, path: Path) -> None:
         write_checked(described({"error": ((), error, "1")}, {"format": FORMAT}), path)

@@ -1,6 +1,7 @@
 """What does one scene do?"""
 
 from .levitation import Levitation as Levitation, given_scene as given_scene, sources as sources
+from .plate_of_scene import plate_memory as plate_memory
 from .question import Question as Question
 from .reaction import plate_job as plate_job
 from .run import main_job as main_job

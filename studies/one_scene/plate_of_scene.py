@@ -4,7 +4,7 @@ import numpy as np
 
 from ...dynamics.motion import PlateMemory
 from ...fem.rotor_tables import RotorTable
-from ...fem.slab import edge_error, plate_around
+from ...fem.slab import plate_around
 from ...geometry.basics import Array, InputError
 from ...geometry.bodies import TOUCHING, sphere_overlap
 from ...geometry.scenes import Plate, Scene
@@ -12,12 +12,11 @@ from ..terminal import note, stages
 
 
 def plate_memory(
-    scene: Scene, plate: Plate, model: str, table: RotorTable, place: Array, rtol: float, edges: float | None = None
+    scene: Scene, plate: Plate, model: str, table: RotorTable, place: Array, rtol: float, edges: float = 0.0
 ) -> tuple[PlateMemory, bool]:
     """The plate's currents for a floater about `place` (3,) m that turns with the rotor; whether they were cached.
 
-    `edges`: relative error by edges that the model leaves out; default for a slab is its bound. Errors are those of
-    `plate_around`.
+    `edges`: relative error by edges that the model leaves out. Errors are those of `plate_around`.
     """
     note("Plate's currents ...")
     with stages("Plate's currents") as watch:
@@ -25,8 +24,6 @@ def plate_memory(
             plate, model, table, place, scene.floater.radius, scene.frequency, rtol, note, watch
         )
     note("  from the cache." if found else f"  {len(made.rates)} states in {made.provenance['seconds']:.1f} s.")
-    if edges is None:
-        edges = edge_error(plate, place) if model == "slab" else 0.0
     return PlateMemory(plate, made, share, model, edges), found
 
 

@@ -16,7 +16,7 @@ import xarray as xr
 
 from ...geometry.basics import InputError
 from ..results import Point, Study
-from ..terminal import Workers, silence
+from ..terminal import Workers, note, silence
 
 if TYPE_CHECKING:
     from distributed import Client, Future
@@ -79,7 +79,10 @@ def attempts(compute: Compute, prepared: Prepared, points: Mapping[int, Point], 
     asked = list(points.values())
     jobs: Sequence[Callable[[], xr.Dataset]] = [partial(compute, point) for point in asked]
     if prepared is not None and len(asked) > 1:
-        jobs = prepared(asked)
+        try:
+            jobs = prepared(asked)
+        except Exception as error:  # each for itself then, so that the others go on
+            note(f"{len(asked)} points cannot help each other: {type(error).__name__}: {error}")
     for k, job in zip(points, jobs, strict=True):
         if k not in missing:
             continue

@@ -67,6 +67,12 @@ def test_measured_edges_fade_as_the_plate_grows_and_are_below_the_bound():
     assert wide < edge_error(plates[1], PLACE) / 2
 
 
+def test_a_rotor_at_rest_leaves_the_slow_motions_to_measure():
+    plate = Plate(Box((0.2, 0.2, 0.01), (0.0, 0.0, -0.045)), 3.5e7)
+    slow = measured_edge_error(plate, PLACE[None], 10.0)
+    assert measured_edge_error(plate, PLACE[None], 0.0) == pytest.approx(slow, rel=1e-9)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize(("size", "z"), [((0.2, 0.2, 0.005), -0.035), ((0.1, 0.24, 0.03), -0.055)])
 def test_measured_edges_against_converged_elements(size, z):

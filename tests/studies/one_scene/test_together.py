@@ -7,6 +7,7 @@ import spinlev as sl
 from spinlev.studies.catalogue import question_study
 from spinlev.studies.one_scene import Levitation, Question
 from spinlev.studies.sweeps import forget, swept
+from spinlev.studies.sweeps.workers import attempts
 from spinlev.studies.terminal import Models, Workers, combinations
 
 SCENE = sl.scene(
@@ -35,6 +36,18 @@ def test_many_points_have_what_each_has_alone():
         unsure = 1e-9 + 3 * expected["growth_error"].values.max(initial=0.0)
         np.testing.assert_allclose(found["growth"], expected["growth"], rtol=1e-10, atol=unsure)
         np.testing.assert_array_equal(found["stable"], expected["stable"])
+
+
+def test_points_that_cannot_be_prepared_are_computed_alone(caplog):
+    caplog.set_level("INFO", "spinlev")
+    asked, points = question(frequency_hz=[120.0, 130.0])
+
+    def broken(points):
+        raise FloatingPointError("no way")
+
+    found = dict(attempts(asked, broken, dict(enumerate(points)), frozenset({0, 1})))
+    assert "no way" in caplog.text
+    assert [float(found[k]["frequency_hz"][0]) for k in (0, 1)] == [120.0, 130.0]
 
 
 def test_rotors_that_differ_share_nothing_but_the_sweep():
