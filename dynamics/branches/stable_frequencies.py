@@ -9,6 +9,7 @@ import scipy
 from ...fem.rotor_tables import RotorTable, rotor_table
 from ...geometry.basics import Array
 from ...geometry.scenes import Scene
+from ..effects import with_effects
 from ..equilibria import Steps
 from ..motion import Rates, rotor_gap
 from ..steady import EquilibriumError
@@ -53,7 +54,7 @@ def reference_state(scene: Scene) -> tuple[Array, float]:
     EquilibriumError : there is none up to `HIGHEST`
     """
     table = rotor_table(scene.rotor, "dipole")
-    found = levitating_ranges(scene, table, Rates.of(scene, table))
+    found = levitating_ranges(scene, table, Rates(with_effects(scene, table)))
     if not found:
         raise EquilibriumError("Point dipoles levitate stably at none of the frequencies that are looked at.")
     lowest = found[0]
