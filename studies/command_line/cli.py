@@ -34,11 +34,10 @@ add_result_commands(app)
 
 def run(arguments: list[str], stop: threading.Event) -> int:
     """Answer on standard output; the exit status."""
-    with answers_only() as out:
+    with answers_only() as out, heard(verbose="--verbose" in arguments):
         return _status(arguments, out, stop)
 
 
-@heard()
 def _status(arguments: list[str], out: Any, stop: threading.Event | None = None) -> int:
     """The exit status; `stop` tells that the user has stopped the program, whatever a library made of that."""
     try:

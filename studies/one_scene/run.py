@@ -27,9 +27,10 @@ from ..results import (
     write_dataset,
 )
 from ..terminal import Models, note, to_json
-from .answers import equilibria_answer, equilibria_lines, flight_answer, flight_lines
+from .answers import equilibria_answer, flight_answer
 from .levitation import Levitation
 from .single import Job
+from .words import bracketed, equilibria_words, flight_words, headline, left_out, tell_details
 
 MODELS = ("dipole", "cuboid", "fem")
 DEEPEST = 0.05
@@ -44,10 +45,12 @@ def main_job(scene: Scene, asked: Models, duration: float, out: Path) -> Job:
     """
     levitation = Levitation(scene, asked)
     exact = "cuboid" if all(magnet.contrast == 0 for magnet in scene.rotor) else "fem"
-    chosen, best = levitation.table, levitation.field(exact)
-    tables = {name: levitation.field(name) for name in MODELS}
+    chosen = levitation.table
     failure: EquilibriumError | FlightStopped | None = None
+    surveys: dict[str, Survey] = {}
     try:
+        _tell_first(levitation)
+        best = levitation.field(exact)
         alone = {
             model: levitation.without_plate if model == chosen.model else survey(scene, levitation.field(model))
             for model in dict.fromkeys(("dipole", best.model, chosen.model))
@@ -55,33 +58,45 @@ def main_job(scene: Scene, asked: Models, duration: float, out: Path) -> Job:
         surveys = alone | {chosen.model: levitation.survey}
     except EquilibriumError as error:
         failure = error
-        surveys = alone = {table.model: Survey((), ()) for table in (tables["dipole"], best, chosen)}
+        best = levitation.field(exact)
+        surveys = alone = {name: Survey((), ()) for name in ("dipole", best.model, chosen.model)}
+    found = surveys[chosen.model].equilibria
     compared = comparison(alone["dipole"], alone[best.model], best.model)
     values: dict[str, Any] = {
-        **equilibria_answer(levitation, surveys[chosen.model].equilibria),
+        **equilibria_answer(levitation, found),
         "comparison": compared,
         "tables_from_cache": levitation.from_cache,
     }
-    lines = [*equilibria_lines(levitation, surveys[chosen.model].equilibria), *comparison_lines(compared)]
-    lines += values["not_modelled"]
+    lines = [*equilibria_words(levitation, found), *comparison_lines(compared)]
     flight = None
     if failure is None or isinstance(scene.start, AbsoluteStart):
         try:
             flight = levitation.flight(duration)
             values |= flight_answer(levitation, flight)
-            lines += flight_lines(flight)
+            lines.append(flight_words(levitation, flight))
+            tell_details(flight)
         except EquilibriumError as error:
             failure = error
         except FlightStopped as stop:
             flight = (failure := stop).flown
+    lines += left_out(levitation, found)
     if failure:
         values["failed"] = str(failure)
         lines.append(str(failure))
+    tables = {name: levitation.field(name) for name in MODELS}
     result = _static_dataset(scene, tables, surveys, best.model).assign_attrs(levitation.labels)
     _write(scene, chosen, result, values, flight, out)
     if failure and (flight is None or isinstance(failure, FlightStopped)):
         raise failure
     return values, [*lines, f"Results and figures in {out}/"]
+
+
+def _tell_first(levitation: Levitation) -> None:
+    """The answer without the plate, which is there in seconds; the plate's currents can take minutes."""
+    found = levitation.without_plate.equilibria
+    if levitation.scene.plate is not None:
+        said = headline(levitation, found)
+        note(f"Without the plate: {said[0].lower()}{said[1:]}")
 
 
 def comparison(dipole: Survey, best: Survey, name: str) -> Mapping[str, Any] | None:
@@ -103,12 +118,10 @@ def comparison(dipole: Survey, best: Survey, name: str) -> Mapping[str, Any] | N
 def comparison_lines(compared: Mapping[str, Any] | None) -> list[str]:
     """The same for a person."""
     if compared is None:
-        return ["Dipole against the true field: not both have a stable equilibrium."]
-    return [
-        f"Levitation distance: dipole {compared['dipole_distance_mm']:.4f} mm, {compared['true_model']} "
-        f"{compared['true_distance_mm']:.4f} mm; the dipole is off by {compared['difference_mm']:+.4f} ± "
-        f"{compared['difference_error_mm']:.1g} mm."
-    ]
+        return []
+    apart, error = compared["difference_mm"], compared["difference_error_mm"]
+    where = "lower" if apart > 0 else "higher"
+    return [f"A point dipole in the rotor's place would hold it {bracketed(abs(apart), error, 2)} mm {where}."]
 
 
 def _static_dataset(

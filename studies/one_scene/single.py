@@ -14,8 +14,9 @@ from ...geometry.basics import Array
 from ...geometry.scenes import OffsetStart, Scene, scene_text
 from ..results import trajectory_dataset, write_dataset
 from ..terminal import COLUMNS, Models, note, to_json
-from .answers import equilibria_answer, equilibria_lines, field_answer, flight_answer, flight_lines, omissions
+from .answers import equilibria_answer, field_answer, flight_answer, omissions
 from .levitation import Levitation
+from .words import equilibria_words, flight_words, left_out, tell_details
 
 Job = tuple[Mapping[str, Any], list[str]]
 """Numbers for a program, lines for a person."""
@@ -46,7 +47,7 @@ def equilibria_job(scene: Scene, asked: Models, spin: float, out: Path) -> Job:
     levitation = Levitation(scene, asked, spin)
     values = {**equilibria_answer(levitation), "tables_from_cache": levitation.from_cache}
     write_whole(out / "equilibria.json", f"{to_json(values)}\n".encode())
-    return values, [*equilibria_lines(levitation), *values["not_modelled"]]
+    return values, [*equilibria_words(levitation), *left_out(levitation, levitation.equilibria)]
 
 
 def simulate_job(scene: Scene, asked: Models, duration: float, out: Path, resume: bool) -> Job:
@@ -74,10 +75,13 @@ def simulate_job(scene: Scene, asked: Models, duration: float, out: Path, resume
         raise
     keep(flight)
     checkpoint.remove()
+    known = () if levitation.absolute else levitation.equilibria
     values = {
         **flight_answer(levitation, flight),
-        "not_modelled": omissions(levitation, () if levitation.absolute else levitation.equilibria),
+        "not_modelled": list(omissions(levitation, known).values()),
         "trajectory": str(out / "trajectory.nc"),
         "tables_from_cache": levitation.from_cache,
     }
-    return values, [*flight_lines(flight), *values["not_modelled"], f"Trajectory in {values['trajectory']}"]
+    tell_details(flight)
+    told = [flight_words(levitation, flight), *left_out(levitation, known)]
+    return values, [*told, f"Trajectory in {values['trajectory']}"]

@@ -2,6 +2,7 @@
 
 from .console import (
     answers_only as answers_only,
+    detail as detail,
     heard as heard,
     note as note,
     progress as progress,
@@ -25,6 +26,7 @@ from .options import (
     Quantity as Quantity,
     Workers as Workers,
     default_scene as default_scene,
+    shipped_scene as shipped_scene,
 )
 from .plain_text import make_readable as make_readable
 from .system_libraries import (
