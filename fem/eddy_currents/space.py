@@ -107,7 +107,7 @@ class EddySpace:
         points = IntegrationRuleSpace(self.conductors.mesh, order=self.order + 2, definedon=self.region) ** 3
         form = ngsolve.BilinearForm(trialspace=space, testspace=points)
         integrand = self.sigma * basis * ngsolve.CF(tuple(points.TestFunction()))
-        # Not vectorised: NGSolve's vectorised integrals are wrong where an element has more than 256 points (order 4 on).
+        # Not vectorised: NGSolve's vectorised integrals are wrong beyond 256 points an element (order 4 on).
         integral = ngsolve.SymbolicBFI(integrand, definedon=self.region, simd_evaluate=False)
         for element, rule in self._rules.items():
             integral.SetIntegrationRule(element, rule)
