@@ -34,12 +34,17 @@ add_result_commands(app)
 
 def run(arguments: list[str], stop: threading.Event) -> int:
     """Answer on standard output; the exit status."""
-    with answers_only() as out, heard(verbose="--verbose" in arguments):
+    with answers_only() as out:
         return _status(arguments, out, stop)
 
 
 def _status(arguments: list[str], out: Any, stop: threading.Event | None = None) -> int:
     """The exit status; `stop` tells that the user has stopped the program, whatever a library made of that."""
+    with heard(verbose="--verbose" in arguments):
+        return _answered(arguments, out, stop)
+
+
+def _answered(arguments: list[str], out: Any, stop: threading.Event | None) -> int:
     try:
         _answer(arguments, out)
     except CycloptsError as error:

@@ -21,7 +21,8 @@ from ..results import (
     equilibria_dataset,
     field_figure,
     force_figure,
-    save_figure,
+    lowering_times,
+    save_figures,
     trajectory_dataset,
     trajectory_figure,
     write_dataset,
@@ -84,7 +85,7 @@ def main_job(scene: Scene, asked: Models, duration: float, out: Path) -> Job:
         values["failed"] = str(failure)
         lines.append(str(failure))
     tables = {name: levitation.field(name) for name in MODELS}
-    result = _static_dataset(scene, tables, surveys, best.model).assign_attrs(levitation.labels)
+    result = _static_dataset(scene, tables, surveys, alone, best.model).assign_attrs(levitation.labels)
     _write(scene, chosen, result, values, flight, out)
     if failure and (flight is None or isinstance(failure, FlightStopped)):
         raise failure
@@ -125,14 +126,24 @@ def comparison_lines(compared: Mapping[str, Any] | None) -> list[str]:
 
 
 def _static_dataset(
-    scene: Scene, tables: Mapping[str, FieldTable], surveys: Mapping[str, Survey], best: str
+    scene: Scene,
+    tables: Mapping[str, FieldTable],
+    surveys: Mapping[str, Survey],
+    alone: Mapping[str, Survey],
+    best: str,
 ) -> xr.Dataset:
+    """Field, force and equilibria: with the plate's currents where they act, and all without them."""
     lowest = min(float(corner[2]) for magnet in scene.rotor for corner in magnet.box.corners)
     heights = np.linspace(min(lowest - scene.floater.radius, -1e-3), min(lowest - 1e-3, -DEEPEST), 200)
     parts = [
         axis_dataset(tables, heights),
         curve_dataset({name: found.curves for name, found in surveys.items()}),
-        equilibria_dataset({name: found.equilibria for name, found in surveys.items()}),
+        equilibria_dataset(
+            {
+                name: [*(e for e in surveys[name].equilibria if e.currents is not None), *found.equilibria]
+                for name, found in alone.items()
+            }
+        ),
     ]
     return xr.merge(parts).assign_attrs(
         study="run", best_model=best, weight_N=scene.floater.mass * float(scene.gravity[2])
@@ -146,14 +157,13 @@ def _write(
     note("Files and figures ...")
     (out / "summary.json").unlink(missing_ok=True)  # an older one must not stand beside the new result
     if flight:
-        flown = trajectory_dataset(flight).assign_attrs(study="run")
+        flown = trajectory_dataset(flight).assign_attrs(study="run", **lowering_times(scene))
         result = xr.merge([result, flown], combine_attrs="no_conflicts")
     write_dataset(result, out / "result.nc", scene)
     write_whole(out / "summary.json", f"{to_json(values)}\n".encode())
-    save_figure(field_figure(result), out / "field.png")
-    save_figure(force_figure(result), out / "force.png")
+    save_figures({"field": field_figure(result), "force": force_figure(result)}, out)
     if flight:
-        save_figure(trajectory_figure(result), out / "trajectory.png")
+        save_figures({"trajectory": trajectory_figure(result)}, out)
         try:
             render({out / "scene.png": last_view(scene, table, flight.rotor)})
         except RenderError as error:

@@ -12,7 +12,7 @@ from ...dynamics.flights import Checkpoint, FlightStopped, Trajectory
 from ...fem.storage import program_of, write_whole
 from ...geometry.basics import Array
 from ...geometry.scenes import OffsetStart, Scene, scene_text
-from ..results import trajectory_dataset, write_dataset
+from ..results import lowering_times, save_figures, trajectory_dataset, trajectory_figure, write_dataset
 from ..terminal import COLUMNS, Models, note, to_json
 from .answers import equilibria_answer, field_answer, flight_answer, omissions
 from .levitation import Levitation
@@ -51,7 +51,7 @@ def equilibria_job(scene: Scene, asked: Models, spin: float, out: Path) -> Job:
 
 
 def simulate_job(scene: Scene, asked: Models, duration: float, out: Path, resume: bool) -> Job:
-    """The motion; writes trajectory.nc, and keeps a checkpoint while it lasts."""
+    """The motion; writes trajectory.nc and its figure, and keeps a checkpoint while it lasts."""
     asked_of = {"scene": scene_text(scene), "duration_s": duration, **vars(asked)}
     identity = to_json({**asked_of, "program": program_of(__package__)})
     checkpoint = Checkpoint(out / "checkpoint.npz", identity)
@@ -65,7 +65,10 @@ def simulate_job(scene: Scene, asked: Models, duration: float, out: Path, resume
         note(f"The flight begins at an unstable equilibrium: e-fold in {1 / growth:.2g} s.")
 
     def keep(flight: Trajectory) -> None:
-        write_dataset(trajectory_dataset(flight).assign_attrs(levitation.labels), out / "trajectory.nc", scene)
+        labels = {**levitation.labels, **lowering_times(scene)}
+        flown = trajectory_dataset(flight).assign_attrs(labels)
+        write_dataset(flown, out / "trajectory.nc", scene)
+        save_figures({"trajectory": trajectory_figure(flown)}, out)
 
     try:
         flight = levitation.flight(duration, checkpoint)
@@ -84,4 +87,4 @@ def simulate_job(scene: Scene, asked: Models, duration: float, out: Path, resume
     }
     tell_details(flight)
     told = [flight_words(levitation, flight), *left_out(levitation, known)]
-    return values, [*told, f"Trajectory in {values['trajectory']}"]
+    return values, [*told, f"Trajectory in {values['trajectory']}, figure in {out / 'trajectory.png'}"]
