@@ -17,6 +17,7 @@ from rich.console import Console
 
 from ...geometry.basics import SpinlevError
 from ..terminal import FORTRAN, Answer, answers_only, heard, is_missing_library, note, to_json, way_out
+from .file_commands import add_file_commands
 from .result_commands import add_result_commands
 from .scene_commands import add_scene_commands
 from .start import STOPPED
@@ -30,6 +31,7 @@ app = App(
 )
 add_scene_commands(app)
 add_result_commands(app)
+add_file_commands(app)
 
 
 def run(arguments: list[str], stop: threading.Event) -> int:
