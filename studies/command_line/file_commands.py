@@ -4,7 +4,7 @@ from pathlib import Path
 
 from cyclopts import App
 
-from ..terminal import Answer, Models, Output
+from ..terminal import Answer, Models, Output, new_scene
 
 
 def add_file_commands(app: App) -> None:
@@ -23,8 +23,6 @@ def new(name: str, file: Path, *, output: Output = Output()) -> Answer:
     file
         Where to write it; an existing file is left alone.
     """
-    from ..exchange import new_scene
-
     path = new_scene(name, file)
     said = f"Written: {path}. Next: spinlev run {path}"
     return Answer({"file": str(path)}, [said], output.json)

@@ -29,6 +29,7 @@ from .options import (
     shipped_scene as shipped_scene,
 )
 from .plain_text import make_readable as make_readable
+from .scene_file import KINDS as KINDS, new_scene as new_scene
 from .system_libraries import (
     DRAWING as DRAWING,
     FORTRAN as FORTRAN,

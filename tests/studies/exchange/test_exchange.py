@@ -10,8 +10,8 @@ from scipy.spatial.transform import Rotation
 
 import spinlev as sl
 from spinlev.geometry.basics import MU_0, InputError
-from spinlev.studies.exchange import KINDS, export_job, from_magpylib, new_scene, to_magpylib
-from spinlev.studies.terminal import Models
+from spinlev.studies.exchange import export_job, from_magpylib, to_magpylib
+from spinlev.studies.terminal import KINDS, Models, new_scene
 
 POINTS = np.random.default_rng(0).normal(size=(50, 3)) * 0.01 + [0.0, 0.0, -0.04]
 BALL = sl.sphere(diameter_mm=12.7, remanence_T=1.305, density_kg_m3=7500.0)

@@ -3,9 +3,8 @@
 from collections.abc import Mapping
 from pathlib import Path
 
-from ...fem.storage import write_whole
 from ...geometry.basics import InputError
-from ..terminal import shipped_scene
+from .options import shipped_scene
 
 KINDS: Mapping[str, str] = {
     "tilt": "tilt-over-plate",
@@ -27,5 +26,7 @@ def new_scene(name: str, path: Path) -> Path:
         raise InputError(f"Input NAME must be one of {', '.join(KINDS)}; instead received {name}.")
     if path.exists():
         raise InputError(f"Input FILE must not exist yet; instead {path} is there. Choose another name.")
+    from ...fem.storage import write_whole  # the other commands have no need of it before their input is found good
+
     write_whole(path, shipped_scene(KINDS[name]).read_bytes())
     return path
