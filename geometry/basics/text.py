@@ -1,5 +1,8 @@
 """Numbers as a person reads them."""
 
+from collections.abc import Mapping
+from html import escape
+
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -22,3 +25,9 @@ def listed(values: ArrayLike) -> str:
 def counted(number: int, thing: str) -> str:
     """The number with its noun, in the plural unless it is one."""
     return f"{number} {thing}" if number == 1 else f"{number} {thing}s"
+
+
+def html_table(title: str, rows: Mapping[str, str]) -> str:
+    """A small table for a notebook, two columns."""
+    lines = "".join(f"<tr><th>{escape(k)}</th><td>{escape(v)}</td></tr>" for k, v in rows.items())
+    return f"<table><caption>{escape(title)}</caption>{lines}</table>"
