@@ -22,6 +22,7 @@ html_theme_options = {
     "footer_start": ["copyright"],
     "footer_end": [],
 }
+html_context = {"default_mode": "auto"}
 html_sidebars = {"index": []}
 html_static_path = ["static"]
 html_css_files = ["narrow.css"]

@@ -112,7 +112,8 @@ def test_run_writes_everything_and_finds_its_table_again(spinlev, tmp_path):
     assert "A point dipole in the rotor's place would hold it 0.06(1) mm lower." in out
     made = {path.name for path in (tmp_path / "out").iterdir()}
     drawn = set() if unavailable() else {"scene.png"}
-    assert made == {"result.nc", "summary.json", "field.png", "force.png", "trajectory.png", *drawn}
+    figures = {f"{name}.{kind}" for name in ("field", "force", "trajectory") for kind in ("png", "pdf")}
+    assert made == {"result.nc", "summary.json", *figures, *drawn}
     summary = json.loads((tmp_path / "out" / "summary.json").read_text())
     assert summary["comparison"]["difference_error_mm"] < 0.01 * abs(summary["comparison"]["difference_mm"])
     status, out, err = spinlev("field", SCENES / "horizontal.toml", "--points", points_file(tmp_path), "--json")
