@@ -32,7 +32,8 @@ def surveys(
     spin : (n,) body spin s
     places : (n, axes) whole-numbered coordinates by which scenes are neighbours
     farthest : largest depth, and distance from the axis, m
-    spacing : steps between two searches, None for 5, and 10 along a single axis; a sheet between them is missed if it meets no other in a fold
+    spacing : steps between two searches, None for 5, and 10 along a single axis; a sheet between them is missed if it
+        meets no other in a fold
 
     Returns
     -------
