@@ -30,7 +30,7 @@ $(VENV)/installed: $(VENV)/dependencies $(SOURCES)
 	@touch $@
 
 run: install
-	$(BIN)/spinlev run scenes/horizontal.toml
+	$(BIN)/spinlev run scenes/tilt-over-plate.toml
 
 lint: install
 	$(BIN)/ruff check .

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import matplotlib as mpl
 
-from spinlev.studies.results.figures import STYLE
+from spinlev.studies.results.style import STYLE
 
 DOCS = Path(__file__).parent
 

@@ -15,6 +15,7 @@ from .geometry.scenes import (
     tilt as tilt,
     vertical as vertical,
 )
+from .studies.exchange import from_magpylib as from_magpylib, to_magpylib as to_magpylib
 from .studies.interface import (
     draw as draw,
     equilibria as equilibria,

@@ -11,7 +11,7 @@ from .ball_parts import (
 from .checkpoint import Checkpoint as Checkpoint
 from .compiled_flight import TOLERANCE as TOLERANCE
 from .integration import fly_on as fly_on
-from .kind import flight_kind as flight_kind
+from .kind import GROWING as GROWING, STABLE as STABLE, flight_kind as flight_kind
 from .local_flight import LocalFlight as LocalFlight
 from .pieces import IntegrationError as IntegrationError
 from .simulation import (

@@ -3,7 +3,7 @@
 from dataclasses import dataclass, field
 from typing import Self
 
-from ...geometry.basics import Array
+from ...geometry.basics import Array, html_table, millimetres
 from ..motion import State
 
 DURATION, STOPPED = "duration", "stopped"
@@ -68,6 +68,15 @@ class Trajectory:
             f"Trajectory of {self.levitated_s:.4g} s ({len(self.time)} samples), "
             f"ended by {self.ended_by} at ({place}) mm\n  energy ledger to {self.energy_error:.1e}; {speed}"
         )
+
+    def _repr_html_(self) -> str:
+        rows = {
+            "ended by": self.ended_by,
+            "at": millimetres(self.lab.position[-1]),
+            "samples": str(len(self.time)),
+            "energy ledger": f"{self.energy_error:.1e}",
+        }
+        return html_table(f"Flight of {self.levitated_s:.4g} s", rows)
 
     @property
     def levitated_s(self) -> float:

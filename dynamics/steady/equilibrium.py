@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...geometry.basics import Array, ComputationError
+from ...geometry.basics import Array, ComputationError, html_table, millimetres
 from ..motion import State
 from .stability import Mode
 
@@ -85,6 +85,16 @@ class Equilibrium:
         place = f"({x:.4f}, {y:.4f}, {z:.4f}) ± {1e3 * self.position_error:.1g} mm"
         kind = "stable" if self.stable else f"unstable, e-fold in {1 / self.growth_per_s:.2g} s"
         return f"Equilibrium at {place}, polar angle {self.polar_angle_deg:.3f}°, spin {self.spin:g}, {kind}"
+
+    def _repr_html_(self) -> str:
+        rows = {
+            "position": f"{millimetres(self.position)} ± {1e3 * self.position_error:.1g} mm",
+            "polar angle": f"{self.polar_angle_deg:.3f}°",
+            "body spin": f"{self.spin:g}",
+            "growth": f"{self.growth_per_s:.3g} /s",
+            "small motions": ", ".join(f"{mode.name} {mode.frequency_hz:.4g} Hz" for mode in self.modes),
+        }
+        return html_table(f"Equilibrium, {'stable' if self.stable else 'unstable'}", rows)
 
 
 @dataclass(frozen=True, eq=False)

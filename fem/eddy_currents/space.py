@@ -107,7 +107,11 @@ class EddySpace:
         points = IntegrationRuleSpace(self.conductors.mesh, order=self.order + 2, definedon=self.region) ** 3
         form = ngsolve.BilinearForm(trialspace=space, testspace=points)
         integrand = self.sigma * basis * ngsolve.CF(tuple(points.TestFunction()))
-        form += integrand * ngsolve.dx(definedon=self.region, intrules=self._rules)
+        # Not vectorised: NGSolve's vectorised integrals are wrong beyond 256 points an element (order 4 on).
+        integral = ngsolve.SymbolicBFI(integrand, definedon=self.region, simd_evaluate=False)
+        for element, rule in self._rules.items():
+            integral.SetIntegrationRule(element, rule)
+        form += integral
         form.Assemble()
         rows, columns, values = (np.asarray(part) for part in form.mat.COO())
         component, point = np.divmod(rows, len(self.points))

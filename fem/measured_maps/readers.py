@@ -1,6 +1,5 @@
 """Maps of B from files: a probe's CSV, netCDF grids, and meshes with point data."""
 
-import csv
 import io
 from collections.abc import Mapping
 from contextlib import redirect_stderr, redirect_stdout
@@ -12,12 +11,11 @@ import xarray as xr
 
 from ...geometry.basics import Array
 from ..storage import TableFileError, hdf5_fault, is_hdf5, read_checked
+from .csv_files import csv_columns
 from .field_map import FieldMap, FieldMapError
+from .units import AXES, unit_scale
 
-AXES = ("x", "y", "z")
-METERS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3}
-TESLAS = {"T": 1.0, "mT": 1e-3, "uT": 1e-6, "µT": 1e-6, "G": 1e-4}
-UNITS = {**METERS, **TESLAS}
+VALID = "Valid: the header x_mm,y_mm,z_mm,Bx_mT,By_mT,Bz_mT of a CSV file, or point data B (n, 3) of a mesh."
 
 
 def read_field_map(path: str | Path, length_unit: str = "m", field_unit: str = "T") -> FieldMap:
@@ -25,6 +23,8 @@ def read_field_map(path: str | Path, length_unit: str = "m", field_unit: str = "
 
     - `.csv`: a header with x_mm, y_mm, z_mm and some of Bx_T, By_T, Bz_T, Bx_err_T, By_err_T, Bz_err_T; other units of
       `METERS` and `TESLAS` by name; an empty cell or `nan` is a component not observed.
+      COMSOL's export of mf.Bx, mf.By, mf.Bz, comma-separated, is read as it is: header lines that begin with %, units
+      among them.
     - `.nc`: variables Bx, By, Bz (and Bx_err ...), or B (and B_err) with one more dimension of three components, over
       coordinates x, y, z, each with its `units`; grids and lists of points alike.
     - all that meshio reads (`.vtu`, `.vtk`, `.msh`, `.xdmf`): point data B (n, 3), or Bx, By, Bz. Such files carry no
@@ -41,11 +41,11 @@ def read_field_map(path: str | Path, length_unit: str = "m", field_unit: str = "
     suffix = path.suffix.lower()
     try:
         if suffix == ".csv":
-            columns = _csv_columns(path)
+            columns = csv_columns(path)
         elif suffix in (".nc", ".nc4"):
             columns = _netcdf_columns(path)
         else:
-            columns = _mesh_columns(path, _scale("length_unit", length_unit), _scale("field_unit", field_unit))
+            columns = _mesh_columns(path, unit_scale("length_unit", length_unit), unit_scale("field_unit", field_unit))
         return _assemble(columns)
     except FieldMapError as error:
         raise FieldMapError(f"{path}: {error}") from None
@@ -56,47 +56,14 @@ def _assemble(columns: Mapping[str, Array]) -> FieldMap:
     missing = [axis for axis in AXES if axis not in columns]
     if missing or not any(f"B{axis}" in columns for axis in AXES):
         needed = "x, y, z and at least one of Bx, By, Bz"
-        raise FieldMapError(f"Input columns must hold {needed}; instead received {', '.join(columns) or 'none'}.")
+        received = ", ".join(columns) or "none that is known"
+        raise FieldMapError(f"Input columns must hold {needed}; instead received {received}. {VALID}")
     points = np.stack([columns[axis] for axis in AXES], axis=-1)
     nothing = np.full(len(points), np.nan)
     field = np.stack([columns.get(f"B{axis}", nothing) for axis in AXES], axis=-1)
     if not any(f"B{axis}_err" in columns for axis in AXES):
         return FieldMap(points, field)
     return FieldMap(points, field, np.stack([columns.get(f"B{axis}_err", nothing) for axis in AXES], axis=-1))
-
-
-def _scale(name: str, unit: object) -> float:
-    """SI value of the unit of a column: of length for x, y, z and `length_unit`, of B for all others."""
-    allowed = METERS if name in (*AXES, "length_unit") else TESLAS
-    if unit not in allowed:
-        raise FieldMapError(f"Input unit of {name} must be one of {', '.join(allowed)}; instead received {unit!r}.")
-    return UNITS[str(unit)]
-
-
-def _csv_columns(path: Path) -> dict[str, Array]:
-    try:
-        with path.open(newline="", encoding="utf-8-sig") as stream:
-            rows = [row for row in csv.reader(stream, skipinitialspace=True) if any(cell.strip() for cell in row)]
-    except (OSError, UnicodeDecodeError, csv.Error) as error:
-        raise FieldMapError(f"Input map must be a readable CSV text; instead: {error}.") from None
-    header = [name.strip() for name in rows[0]] if rows else []
-    columns = {}
-    for index, title in enumerate(header):
-        name, _, unit = title.rpartition("_")
-        if name in AXES or name.removesuffix("_err") in ("Bx", "By", "Bz"):
-            scale = _scale(name, unit)
-            columns[name] = scale * np.array([_number(title, k, row, index) for k, row in enumerate(rows[1:], 1)])
-    return columns
-
-
-def _number(title: str, line: int, row: list[str], column: int) -> float:
-    text = row[column].strip() if column < len(row) else ""
-    try:
-        return float(text) if text else np.nan
-    except ValueError:
-        raise FieldMapError(
-            f"Input {title} in row {line} below the header must be a number or empty; instead received {text!r}."
-        ) from None
 
 
 def _netcdf_columns(path: Path) -> dict[str, Array]:
@@ -113,7 +80,8 @@ def _netcdf_columns(path: Path) -> dict[str, Array]:
             found[name] = dataset[name]
     whole = xr.broadcast(*found.values())
     return {
-        n: _scale(n, v.attrs.get("units")) * w.values.ravel() for (n, v), w in zip(found.items(), whole, strict=True)
+        n: unit_scale(n, v.attrs.get("units")) * w.values.ravel()
+        for (n, v), w in zip(found.items(), whole, strict=True)
     }
 
 

@@ -9,7 +9,7 @@ import heyoka as hy
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ...geometry.basics import Array, InputError, counted
+from ...geometry.basics import Array, InputError, counted, html_table
 from ...geometry.bodies import Magnet
 from ..closed_forms import UniformField, squared_distance
 from ..harmonics import CompiledField, FieldExpressions, MultipoleExpansion, as_columns, field_and_gradient
@@ -89,6 +89,10 @@ class RotorTable:
             elements = f"{made['elements']} elements of order {made['order']}, {made['unknowns']} unknowns"
             lines.append(f"  {elements}, made in {float(made['seconds']):.2g} s")
         return "\n".join(lines)
+
+    def _repr_html_(self) -> str:
+        first, *rest = repr(self).split("\n")
+        return html_table(first, {str(k): line.strip() for k, line in enumerate(rest, 1)})
 
     @cached_property
     def _closed_forms(self) -> tuple[UniformField, ...]:

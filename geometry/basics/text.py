@@ -1,5 +1,8 @@
 """Numbers as a person reads them."""
 
+from collections.abc import Mapping
+from html import escape
+
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -7,6 +10,11 @@ from numpy.typing import ArrayLike
 def millimetres(lengths: ArrayLike) -> str:
     """Lengths (n,) in m as `(x, y, z) mm`."""
     return f"({listed(np.asarray(lengths, float) * 1e3)}) mm"
+
+
+def millimetre_size(lengths: ArrayLike) -> str:
+    """Edges (n,) in m as `x × y × z mm`."""
+    return f"{' × '.join(f'{length:.4g}' for length in np.asarray(lengths, float) * 1e3)} mm"
 
 
 def listed(values: ArrayLike) -> str:
@@ -17,3 +25,9 @@ def listed(values: ArrayLike) -> str:
 def counted(number: int, thing: str) -> str:
     """The number with its noun, in the plural unless it is one."""
     return f"{number} {thing}" if number == 1 else f"{number} {thing}s"
+
+
+def html_table(title: str, rows: Mapping[str, str]) -> str:
+    """A small table for a notebook, two columns."""
+    lines = "".join(f"<tr><th>{escape(k)}</th><td>{escape(v)}</td></tr>" for k, v in rows.items())
+    return f"<table><caption>{escape(title)}</caption>{lines}</table>"

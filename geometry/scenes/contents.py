@@ -6,7 +6,7 @@ from typing import Self
 
 import numpy as np
 
-from ..basics import MU_0, Array, Box, frozen_array, listed, millimetres
+from ..basics import MU_0, Array, Box, frozen_array, html_table, listed, millimetres
 from ..bodies import Magnet
 
 AIR_VISCOSITY = 1.83e-5
@@ -157,3 +157,11 @@ class Scene:
         lines += [f"  {self.floater!r}"]
         lines += [f"  {self.plate!r}"] if self.plate else []
         return "\n".join(lines)
+
+    def _repr_html_(self) -> str:
+        rows = {f"magnet {k}": repr(magnet).removeprefix("Magnet ") for k, magnet in enumerate(self.rotor, 1)}
+        rows |= {"field": str(self.field_map)} if self.field_map else {}
+        rows["floater"] = repr(self.floater).removeprefix("Floater ")
+        rows |= {"plate": repr(self.plate).removeprefix("Plate ")} if self.plate else {}
+        rows["gravity"] = f"({listed(self.gravity)}) m/s²"
+        return html_table(f"Scene at {self.frequency:g} Hz", rows)

@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from ...fem.storage import read_checked
 from ...geometry.basics import InputError
 from ..pictures import drawable, modes_figure, question_figure
-from ..results import field_figure, force_figure, save_figure, trajectory_figure
+from ..results import field_figure, force_figure, save_figures, trajectory_figure
 from .entries import CATALOGUE
 
 QUESTION = "question"
@@ -57,11 +57,3 @@ def figures_of(result: xr.Dataset) -> Mapping[str, Figure]:
     if not found:
         raise InputError(f"Input study must be one that this version knows; instead the result is of '{kind}'.")
     return found
-
-
-def save_figures(figures: Mapping[str, Figure], out: Path) -> list[str]:
-    """Write each figure as PNG and PDF; returns the files."""
-    files = [out / f"{name}.{suffix}" for name in figures for suffix in ("png", "pdf")]
-    for file in files:
-        save_figure(figures[file.stem], file)
-    return [str(file) for file in files]

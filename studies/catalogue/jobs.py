@@ -10,10 +10,10 @@ import xarray as xr
 
 from ..one_scene import Job, Question
 from ..pictures import question_figure, question_lines
-from ..results import Point, Study, write_dataset
+from ..results import Point, Study, save_figures, write_dataset
 from ..sweeps import forget, swept
 from ..terminal import Workers, combinations
-from .drawings import QUESTION, figures_of, save_figures
+from .drawings import QUESTION, figures_of
 from .entries import CATALOGUE
 
 

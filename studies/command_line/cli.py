@@ -17,6 +17,7 @@ from rich.console import Console
 
 from ...geometry.basics import SpinlevError
 from ..terminal import FORTRAN, Answer, answers_only, heard, is_missing_library, note, to_json, way_out
+from .file_commands import add_file_commands
 from .result_commands import add_result_commands
 from .scene_commands import add_scene_commands
 from .start import STOPPED
@@ -30,6 +31,7 @@ app = App(
 )
 add_scene_commands(app)
 add_result_commands(app)
+add_file_commands(app)
 
 
 def run(arguments: list[str], stop: threading.Event) -> int:
@@ -38,9 +40,13 @@ def run(arguments: list[str], stop: threading.Event) -> int:
         return _status(arguments, out, stop)
 
 
-@heard()
 def _status(arguments: list[str], out: Any, stop: threading.Event | None = None) -> int:
     """The exit status; `stop` tells that the user has stopped the program, whatever a library made of that."""
+    with heard(verbose="--verbose" in arguments):
+        return _answered(arguments, out, stop)
+
+
+def _answered(arguments: list[str], out: Any, stop: threading.Event | None) -> int:
     try:
         _answer(arguments, out)
     except CycloptsError as error:

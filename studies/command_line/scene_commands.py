@@ -33,7 +33,7 @@ def run(
     scene: Path | None = None,
     *,
     asked: Models = Models(),
-    duration_s: float = 3.0,
+    duration_s: float = 10.0,
     output: Output = Output(),
 ) -> Answer:
     """The main job: fields, tables, equilibria, stability, motion, pictures, result.nc and summary.json.

@@ -8,7 +8,7 @@ from ...dynamics.motion import PlateMemory
 from ...fem.rotor_tables import FieldTable
 from ...geometry.scenes import Scene, scene_text
 from ..one_scene import Levitation
-from ..results import found_dataset, trajectory_dataset
+from ..results import found_dataset, lowering_times, trajectory_dataset
 from ..terminal import FieldModel, Models, PlateModel, heard
 
 
@@ -113,7 +113,8 @@ def simulate(
     """
     with heard(progress):
         levitation = Levitation(scene, Models(model, plate_model, rtol, plate_rtol))
-        return trajectory_dataset(levitation.flight(duration)).assign_attrs(_labels(levitation))
+        flown = trajectory_dataset(levitation.flight(duration))
+        return flown.assign_attrs(_labels(levitation), **lowering_times(levitation.scene))
 
 
 def _labels(levitation: Levitation) -> dict[str, str]:

@@ -13,7 +13,7 @@ from ...geometry.basics import Array
 from ...geometry.scenes import Floater, Scene, load_scene
 from ..one_scene import Levitation
 from ..results import AXIS, study_of_one, variable
-from ..terminal import Models, default_scene
+from ..terminal import Models, shipped_scene
 from .floater_permeability_figure import floater_figure, floater_lines
 
 LEVELS = (0.1, 0.01, 1e-3, 1e-4)
@@ -132,15 +132,15 @@ def _last_crossing(distance: Array, values: Array, level: float) -> float:
     return float(distance[k] * (distance[k + 1] / distance[k]) ** share)
 
 
-def in_the_default_scene(quick: bool) -> xr.Dataset:
-    """What the rigid dipole misses in the scene that comes with the program."""
-    return floater_permeability(load_scene(default_scene()), quick=quick)
+def in_the_horizontal_scene(quick: bool) -> xr.Dataset:
+    """What the rigid dipole misses in the scene `horizontal`."""
+    return floater_permeability(load_scene(shipped_scene("horizontal")), quick=quick)
 
 
 STUDY = study_of_one(
     name="floater-permeability",
-    summary="what the rigid dipole misses once rotor and floater magnetise each other, in the default scene",
-    compute=in_the_default_scene,
+    summary="what the rigid dipole misses once rotor and floater magnetise each other, in the scene horizontal",
+    compute=in_the_horizontal_scene,
     draw=floater_figure,
     report=floater_lines,
 )

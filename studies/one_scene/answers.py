@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from ...dynamics.flights import Trajectory, flight_kind
+from ...dynamics.flights import GROWING, STABLE, Trajectory, flight_kind
 from ...dynamics.motion import PlateMemory
 from ...dynamics.steady import Equilibrium
 from ...fem.closed_forms import rotating_torque
@@ -15,7 +15,11 @@ from ...geometry.scenes import Scene
 from ..results import EQUILIBRIUM_FIELDS
 from .levitation import Levitation
 
-MILLI = 1e-3
+PLATE, ANSWERS, CURRENTS = (
+    "the plate's eddy currents",
+    "the magnetisation of rotor and floater by each other",
+    "the floater's own eddy currents",
+)
 PLATE_NOT_MODELLED = "The plate's eddy currents are left out: the plate is only an obstacle."
 ANSWERS_NOT_MODELLED = (
     "The floater is a rigid dipole: that rotor and floater magnetise each other is not in the motion "
@@ -58,7 +62,7 @@ def equilibria_answer(levitation: Levitation, equilibria: Sequence[Equilibrium] 
         "error_estimate": float(levitation.table.relative_error(places)[0].max()) if len(places) else None,
         **plate_answer(levitation.plate),
         "equilibria": [equilibrium_answer(equilibrium) for equilibrium in found],
-        "not_modelled": omissions(levitation, found),
+        "not_modelled": list(omissions(levitation, found).values()),
     }
 
 
@@ -84,22 +88,28 @@ def flight_answer(levitation: Levitation, flight: Trajectory) -> dict[str, Any]:
         "beyond_plate_table": flight.beyond_plate_table,
         "levitated_s": flight.levitated_s,
         "ended_by": flight.ended_by,
-        "kind": flight_kind(flight),
+        "kind": kind_of_flight(levitation, flight),
         "energy_error": flight.energy_error,
         "field_changes": vars(flight.field_changes),
         "realtime_factor": flight.realtime_factor,
     }
 
 
-def omissions(levitation: Levitation, equilibria: Sequence[Equilibrium]) -> list[str]:
-    """What is in the scene but not in the computation."""
+def kind_of_flight(levitation: Levitation, flight: Trajectory) -> str:
+    """How a flight went; one that was still up, but had begun at an unstable equilibrium, is no stable one."""
+    kind = flight_kind(flight)
+    return kind if kind != STABLE or levitation.absolute or levitation.stability.stable else GROWING
+
+
+def omissions(levitation: Levitation, equilibria: Sequence[Equilibrium]) -> dict[str, str]:
+    """What is in the scene but not in the computation: its name and a sentence."""
     scene = levitation.scene
-    left_out = [PLATE_NOT_MODELLED] if scene.plate and levitation.plate is None else []
+    left_out = {PLATE: PLATE_NOT_MODELLED} if scene.plate and levitation.plate is None else {}
     permeabilities = [scene.floater.recoil_permeability, *(magnet.recoil_permeability for magnet in scene.rotor)]
     if any(permeability != 1 for permeability in permeabilities):
-        left_out.append(ANSWERS_NOT_MODELLED)
+        left_out[ANSWERS] = ANSWERS_NOT_MODELLED
     if scene.floater.conductivity is None and equilibria:
-        left_out.append(_floater_currents(scene, levitation.table, equilibria[0]))
+        left_out[CURRENTS] = _floater_currents(scene, levitation.table, equilibria[0])
     return left_out
 
 
@@ -113,47 +123,3 @@ def _floater_currents(scene: Scene, table: FieldTable, equilibrium: Equilibrium)
         f"The floater's own eddy currents are left out (no floater.conductivity_S_m): at {MAGNET_CONDUCTIVITY:.2g} S/m "
         f"they would drive its spin with about {torque:.1e} N m (drag at the rotor's rate: {drag:.1e} N m)."
     )
-
-
-def equilibria_lines(levitation: Levitation, equilibria: Sequence[Equilibrium] | None = None) -> list[str]:
-    """The equilibria, all or those given, as a table for a person."""
-    scene, memory = levitation.scene, levitation.plate
-    equilibria = levitation.equilibria if equilibria is None else equilibria
-    head = f"{'x':>9} {'y':>9} {'z (mm)':>9} {'± mm':>9} {'polar °':>8} {'lag °':>8}  stable   growth (1/s)"
-    lines = [f"Synchronous equilibria at {scene.frequency:g} Hz (rotor's frame): {len(equilibria)}"]
-    lines += [head] if equilibria else []
-    for e in equilibria:
-        x, y, z = e.position / MILLI
-        lines.append(
-            f"{x:9.4f} {y:9.4f} {z:9.4f} {e.position_error / MILLI:9.1e} {e.polar_angle_deg:8.3f} {e.lag_deg:8.3f}"
-            f"  {'yes' if e.stable else 'no ':6} {e.growth_per_s:12.3e}"
-            f"{'  (without the plate)' if memory is not None and e.currents is None else ''}"
-        )
-    return lines + ([] if memory is None else _plate_lines(equilibria, memory))
-
-
-def _plate_lines(equilibria: Sequence[Equilibrium], memory: PlateMemory) -> list[str]:
-    """What the plate does to the first equilibrium that feels it."""
-    first = next((e for e in equilibria if e.without is not None and e.currents is not None), None)
-    if first is None or first.without is None:
-        return ["The plate undoes the equilibria within its table's range."]
-    x, y, z = (first.position - first.without.position) / MILLI
-    return [
-        f"The plate (error {memory.error:.0e}) moves the first one by ({x:+.4f}, {y:+.4f}, {z:+.4f}) mm and takes its "
-        f"growth rate from {first.without.growth_per_s:.3g} to {first.growth_per_s:.3g} /s."
-    ]
-
-
-def flight_lines(flight: Trajectory) -> list[str]:
-    """How a flight went, for a person."""
-    beyond, changes = flight.beyond_plate_table, flight.field_changes
-    told = (
-        f"The floater changed {changes.count} times from one ball with an expansion of the field to another "
-        f"(error up to {changes.error:.0e}); that changed its energy by {changes.energy:.1e}, beside the ledger."
-    )
-    return [
-        f"Flight of {flight.levitated_s:.4g} s ({flight_kind(flight)}), ended by {flight.ended_by}; violation of the "
-        f"energy ledger and of unit length {flight.energy_error:.1e}; {flight.realtime_factor:.3g} times real time.",
-        *([f"For {beyond:.1%} of the flight the floater was beyond the range of the plate's table."] if beyond else []),
-        *([told] if changes.count else []),
-    ]

@@ -16,13 +16,18 @@ from ...dynamics.steady import Equilibrium, EquilibriumError, Survey
 from ...fem.measured_maps import GriddedTable, map_table
 from ...fem.rotor_tables import RotorTable, cached_rotor_table, resolve_model, rotor_table
 from ...fem.slab import resolve_plate_model, rotor_nearby
-from ...geometry.basics import Array, InputError
+from ...geometry.basics import Array, InputError, millimetre_size
 from ...geometry.scenes import AbsoluteStart, Scene, load_scene
-from ..terminal import Models, finite, note, positive, progress
+from ..terminal import Models, detail, finite, note, positive, progress
 from .plate_of_scene import check_room, plate_memory
 
 RotorField = RotorTable | GriddedTable
 """A rotor's table: computed, or from a map."""
+PLATE_WORDS = {
+    "none": "only an obstacle, without eddy currents",
+    "slab": "taken as an infinite slab, {thickness:.4g} mm thick",
+    "reduced": "finite, {size}",
+}
 
 
 class Levitation:
@@ -94,7 +99,10 @@ class Levitation:
             check_room(scene, place)
         choice = resolve_plate_model(scene, self.models.plate_model, place, self.models.plate_rtol, note)
         if scene.plate is not None:
-            note(f"Plate model: {choice.model} ({choice.reason})")
+            size = scene.plate.box.size
+            said = PLATE_WORDS[choice.model].format(size=millimetre_size(size), thickness=1e3 * min(size))
+            note(f"Plate: {said}")
+            detail(f"Plate model: {choice.model} ({choice.reason})")
         if choice.model == "none" or scene.plate is None or place is None:
             return None
         memory, found = plate_memory(
@@ -164,7 +172,7 @@ class Levitation:
             name, reason = resolve_model(self.scene.rotor, model, self.models.rtol, self.scene.floater.radius)
         if name not in self._fields:
             if model == "auto":
-                note(f"Field model: {name} ({reason})")
+                detail(f"Field model: {name} ({reason})")
             self._fields[name] = self._made(name)
         return self._fields[name]
 

@@ -8,7 +8,7 @@ from ...fem.slab import plate_around
 from ...geometry.basics import Array, InputError
 from ...geometry.bodies import TOUCHING, sphere_overlap
 from ...geometry.scenes import Plate, Scene
-from ..terminal import note, stages
+from ..terminal import detail, note, stages
 
 
 def plate_memory(
@@ -23,7 +23,8 @@ def plate_memory(
         plate, made, share, found = plate_around(
             plate, model, table, place, scene.floater.radius, scene.frequency, rtol, note, watch
         )
-    note("  from the cache." if found else f"  {len(made.rates)} states in {made.provenance['seconds']:.1f} s.")
+    note("  from the cache." if found else f"  done in {made.provenance['seconds']:.1f} s.")
+    detail(f"  {len(made.rates)} states, estimated relative error {made.errors.total:.1e}.")
     return PlateMemory(plate, made, share, model, edges), found
 
 

@@ -21,15 +21,17 @@ from ..results import (
     equilibria_dataset,
     field_figure,
     force_figure,
-    save_figure,
+    lowering_times,
+    save_figures,
     trajectory_dataset,
     trajectory_figure,
     write_dataset,
 )
 from ..terminal import Models, note, to_json
-from .answers import equilibria_answer, equilibria_lines, flight_answer, flight_lines
+from .answers import equilibria_answer, flight_answer
 from .levitation import Levitation
 from .single import Job
+from .words import bracketed, equilibria_words, flight_words, headline, left_out, tell_details
 
 MODELS = ("dipole", "cuboid", "fem")
 DEEPEST = 0.05
@@ -44,10 +46,12 @@ def main_job(scene: Scene, asked: Models, duration: float, out: Path) -> Job:
     """
     levitation = Levitation(scene, asked)
     exact = "cuboid" if all(magnet.contrast == 0 for magnet in scene.rotor) else "fem"
-    chosen, best = levitation.table, levitation.field(exact)
-    tables = {name: levitation.field(name) for name in MODELS}
+    chosen = levitation.table
     failure: EquilibriumError | FlightStopped | None = None
+    surveys: dict[str, Survey] = {}
     try:
+        _tell_first(levitation)
+        best = levitation.field(exact)
         alone = {
             model: levitation.without_plate if model == chosen.model else survey(scene, levitation.field(model))
             for model in dict.fromkeys(("dipole", best.model, chosen.model))
@@ -55,33 +59,45 @@ def main_job(scene: Scene, asked: Models, duration: float, out: Path) -> Job:
         surveys = alone | {chosen.model: levitation.survey}
     except EquilibriumError as error:
         failure = error
-        surveys = alone = {table.model: Survey((), ()) for table in (tables["dipole"], best, chosen)}
+        best = levitation.field(exact)
+        surveys = alone = {name: Survey((), ()) for name in ("dipole", best.model, chosen.model)}
+    found = surveys[chosen.model].equilibria
     compared = comparison(alone["dipole"], alone[best.model], best.model)
     values: dict[str, Any] = {
-        **equilibria_answer(levitation, surveys[chosen.model].equilibria),
+        **equilibria_answer(levitation, found),
         "comparison": compared,
         "tables_from_cache": levitation.from_cache,
     }
-    lines = [*equilibria_lines(levitation, surveys[chosen.model].equilibria), *comparison_lines(compared)]
-    lines += values["not_modelled"]
+    lines = [*equilibria_words(levitation, found), *comparison_lines(compared)]
     flight = None
     if failure is None or isinstance(scene.start, AbsoluteStart):
         try:
             flight = levitation.flight(duration)
             values |= flight_answer(levitation, flight)
-            lines += flight_lines(flight)
+            lines.append(flight_words(levitation, flight))
+            tell_details(flight)
         except EquilibriumError as error:
             failure = error
         except FlightStopped as stop:
             flight = (failure := stop).flown
+    lines += left_out(levitation, found)
     if failure:
         values["failed"] = str(failure)
         lines.append(str(failure))
-    result = _static_dataset(scene, tables, surveys, best.model).assign_attrs(levitation.labels)
+    tables = {name: levitation.field(name) for name in MODELS}
+    result = _static_dataset(scene, tables, surveys, alone, best.model).assign_attrs(levitation.labels)
     _write(scene, chosen, result, values, flight, out)
     if failure and (flight is None or isinstance(failure, FlightStopped)):
         raise failure
     return values, [*lines, f"Results and figures in {out}/"]
+
+
+def _tell_first(levitation: Levitation) -> None:
+    """The answer without the plate, which is there in seconds; the plate's currents can take minutes."""
+    found = levitation.without_plate.equilibria
+    if levitation.scene.plate is not None:
+        said = headline(levitation, found)
+        note(f"Without the plate: {said[0].lower()}{said[1:]}")
 
 
 def comparison(dipole: Survey, best: Survey, name: str) -> Mapping[str, Any] | None:
@@ -103,23 +119,31 @@ def comparison(dipole: Survey, best: Survey, name: str) -> Mapping[str, Any] | N
 def comparison_lines(compared: Mapping[str, Any] | None) -> list[str]:
     """The same for a person."""
     if compared is None:
-        return ["Dipole against the true field: not both have a stable equilibrium."]
-    return [
-        f"Levitation distance: dipole {compared['dipole_distance_mm']:.4f} mm, {compared['true_model']} "
-        f"{compared['true_distance_mm']:.4f} mm; the dipole is off by {compared['difference_mm']:+.4f} ± "
-        f"{compared['difference_error_mm']:.1g} mm."
-    ]
+        return []
+    apart, error = compared["difference_mm"], compared["difference_error_mm"]
+    where = "lower" if apart > 0 else "higher"
+    return [f"A point dipole in the rotor's place would hold it {bracketed(abs(apart), error, 2)} mm {where}."]
 
 
 def _static_dataset(
-    scene: Scene, tables: Mapping[str, FieldTable], surveys: Mapping[str, Survey], best: str
+    scene: Scene,
+    tables: Mapping[str, FieldTable],
+    surveys: Mapping[str, Survey],
+    alone: Mapping[str, Survey],
+    best: str,
 ) -> xr.Dataset:
+    """Field, force and equilibria: with the plate's currents where they act, and all without them."""
     lowest = min(float(corner[2]) for magnet in scene.rotor for corner in magnet.box.corners)
     heights = np.linspace(min(lowest - scene.floater.radius, -1e-3), min(lowest - 1e-3, -DEEPEST), 200)
     parts = [
         axis_dataset(tables, heights),
         curve_dataset({name: found.curves for name, found in surveys.items()}),
-        equilibria_dataset({name: found.equilibria for name, found in surveys.items()}),
+        equilibria_dataset(
+            {
+                name: [*(e for e in surveys[name].equilibria if e.currents is not None), *found.equilibria]
+                for name, found in alone.items()
+            }
+        ),
     ]
     return xr.merge(parts).assign_attrs(
         study="run", best_model=best, weight_N=scene.floater.mass * float(scene.gravity[2])
@@ -133,14 +157,13 @@ def _write(
     note("Files and figures ...")
     (out / "summary.json").unlink(missing_ok=True)  # an older one must not stand beside the new result
     if flight:
-        flown = trajectory_dataset(flight).assign_attrs(study="run")
+        flown = trajectory_dataset(flight).assign_attrs(study="run", **lowering_times(scene))
         result = xr.merge([result, flown], combine_attrs="no_conflicts")
     write_dataset(result, out / "result.nc", scene)
     write_whole(out / "summary.json", f"{to_json(values)}\n".encode())
-    save_figure(field_figure(result), out / "field.png")
-    save_figure(force_figure(result), out / "force.png")
+    save_figures({"field": field_figure(result), "force": force_figure(result)}, out)
     if flight:
-        save_figure(trajectory_figure(result), out / "trajectory.png")
+        save_figures({"trajectory": trajectory_figure(result)}, out)
         try:
             render({out / "scene.png": last_view(scene, table, flight.rotor)})
         except RenderError as error:

@@ -12,10 +12,11 @@ from ...dynamics.flights import Checkpoint, FlightStopped, Trajectory
 from ...fem.storage import program_of, write_whole
 from ...geometry.basics import Array
 from ...geometry.scenes import OffsetStart, Scene, scene_text
-from ..results import trajectory_dataset, write_dataset
+from ..results import lowering_times, save_figures, trajectory_dataset, trajectory_figure, write_dataset
 from ..terminal import COLUMNS, Models, note, to_json
-from .answers import equilibria_answer, equilibria_lines, field_answer, flight_answer, flight_lines, omissions
+from .answers import equilibria_answer, field_answer, flight_answer, omissions
 from .levitation import Levitation
+from .words import equilibria_words, flight_words, left_out, tell_details
 
 Job = tuple[Mapping[str, Any], list[str]]
 """Numbers for a program, lines for a person."""
@@ -46,11 +47,11 @@ def equilibria_job(scene: Scene, asked: Models, spin: float, out: Path) -> Job:
     levitation = Levitation(scene, asked, spin)
     values = {**equilibria_answer(levitation), "tables_from_cache": levitation.from_cache}
     write_whole(out / "equilibria.json", f"{to_json(values)}\n".encode())
-    return values, [*equilibria_lines(levitation), *values["not_modelled"]]
+    return values, [*equilibria_words(levitation), *left_out(levitation, levitation.equilibria)]
 
 
 def simulate_job(scene: Scene, asked: Models, duration: float, out: Path, resume: bool) -> Job:
-    """The motion; writes trajectory.nc, and keeps a checkpoint while it lasts."""
+    """The motion; writes trajectory.nc and its figure, and keeps a checkpoint while it lasts."""
     asked_of = {"scene": scene_text(scene), "duration_s": duration, **vars(asked)}
     identity = to_json({**asked_of, "program": program_of(__package__)})
     checkpoint = Checkpoint(out / "checkpoint.npz", identity)
@@ -64,7 +65,10 @@ def simulate_job(scene: Scene, asked: Models, duration: float, out: Path, resume
         note(f"The flight begins at an unstable equilibrium: e-fold in {1 / growth:.2g} s.")
 
     def keep(flight: Trajectory) -> None:
-        write_dataset(trajectory_dataset(flight).assign_attrs(levitation.labels), out / "trajectory.nc", scene)
+        labels = {**levitation.labels, **lowering_times(scene)}
+        flown = trajectory_dataset(flight).assign_attrs(labels)
+        write_dataset(flown, out / "trajectory.nc", scene)
+        save_figures({"trajectory": trajectory_figure(flown)}, out)
 
     try:
         flight = levitation.flight(duration, checkpoint)
@@ -74,10 +78,13 @@ def simulate_job(scene: Scene, asked: Models, duration: float, out: Path, resume
         raise
     keep(flight)
     checkpoint.remove()
+    known = () if levitation.absolute else levitation.equilibria
     values = {
         **flight_answer(levitation, flight),
-        "not_modelled": omissions(levitation, () if levitation.absolute else levitation.equilibria),
+        "not_modelled": list(omissions(levitation, known).values()),
         "trajectory": str(out / "trajectory.nc"),
         "tables_from_cache": levitation.from_cache,
     }
-    return values, [*flight_lines(flight), *values["not_modelled"], f"Trajectory in {values['trajectory']}"]
+    tell_details(flight)
+    told = [flight_words(levitation, flight), *left_out(levitation, known)]
+    return values, [*told, f"Trajectory in {values['trajectory']}, figure in {out / 'trajectory.png'}"]

@@ -6,7 +6,7 @@ from ...dynamics.motion import State
 from ...fem.closed_forms import unit_dipoles
 from ...fem.eddy_currents import Source, current_density, solve_eddy
 from ...fem.plate_tables import posed_rotor, rotor_parts
-from ...fem.rotor_tables import FieldTable, RotorTable
+from ...fem.rotor_tables import FieldTable, RotorTable, rotor_table
 from ...geometry.basics import Array
 from ...geometry.meshes import MeshRule, plate_mesh
 from ...geometry.scenes import Plate, Scene
@@ -21,15 +21,18 @@ ANGLES = 8
 def last_view(scene: Scene, table: FieldTable, motion: State) -> View:
     """The end of a flight (n, 3) along the rotor's axes, with its path and the field."""
     position, moment = motion.position[-1], motion.moment[-1]
-    return View(scene, position, moment, motion.position, _field_plane(table, -1e3 * float(position[2])))
+    return View(scene, position, moment, motion.position, _field_plane(scene, table, -1e3 * float(position[2])))
 
 
-def _field_plane(table: FieldTable, depth: float) -> FieldPlane:
-    width = max(1.2 * depth, 30.0)
+def _field_plane(scene: Scene, table: FieldTable, depth: float) -> FieldPlane:
+    """The field as the table has it and, nearer to the magnets than its range, by the closed form."""
+    depth = max(abs(depth), 10.0)
+    width = max(1.6 * depth, 30.0)
     points = 1e-3 * FieldPlane.points(width, depth)
     field = np.full(points.shape, np.nan)
-    known = table.in_range(points)
-    field[known] = table.evaluate(points[known])[0]
+    for source in (rotor_table(scene.rotor, "cuboid"), table):
+        known = source.in_range(points)
+        field[known] = source.evaluate(points[known])[0]
     return FieldPlane(width, depth, field)
 
 

@@ -8,9 +8,10 @@ from vtkmodules.vtkCommonCore import vtkLogger
 
 from ...geometry.basics import Array, Box
 from ...geometry.scenes import Scene
-from .view import Currents, FieldPlane, View
+from .field_lines import add_field
+from .marks import MILLI, add_path, add_turning, beside_the_rotor, corners_mm
+from .view import Currents, View
 
-MILLI = 1e-3
 NORTH = "#D55E00"
 METAL = "#9AA5B1"
 
@@ -18,16 +19,34 @@ METAL = "#9AA5B1"
 def scene_picture(view: View) -> bytes:
     """A PNG of rotor, floater, plate, field and path, seen in the rotor's frame."""
     plotter = new_plotter()
-    add_rotor(plotter, view.scene)
-    add_plate(plotter, view.scene, view.currents)
-    add_floater(plotter, view.scene, view.position, view.moment)
-    depth = float(-view.position[2]) / MILLI
-    if view.plane is not None:
-        _field(plotter, view.plane)
-    if len(view.path) > 1:
-        plotter.add_mesh(pv.MultipleLines(view.path / MILLI), color="#0072B2", line_width=2)
-    look(plotter, view.scene, depth)
+    draw_view(plotter, view)
     return _png(plotter)
+
+
+def draw_view(plotter: pv.Plotter, view: View) -> None:
+    """Draw rotor, floater, plate, field and path, with their names."""
+    scene, center = view.scene, view.position / MILLI
+    add_rotor(plotter, scene)
+    add_plate(plotter, scene, view.currents)
+    add_floater(plotter, scene, view.position, view.moment)
+    if view.plane is not None:
+        add_field(plotter, view.plane, scene)
+    radius = scene.floater.radius / MILLI
+    beside = center + np.array([1.2 * radius, 0.0, 0.0])
+    names = {"floater": beside, f"rotor, {scene.frequency:g} Hz": beside_the_rotor(scene)}
+    if scene.plate is not None:
+        corners = corners_mm(scene.plate.box)
+        names["plate"] = corners[corners[:, 1].argsort()[:4]].mean(axis=0)
+    if len(view.path) > 1:
+        times = add_path(plotter, view.path / MILLI, radius)
+        names[f"its path, {times:g} times enlarged"] = beside - np.array([0.0, 0.0, 0.8 * radius])
+    if scene.frequency:
+        add_turning(plotter, scene)
+    labels = {"font_size": 22, "text_color": "black", "shape_color": "white", "shape_opacity": 0.7, "margin": 4}
+    plotter.add_point_labels(
+        np.array(list(names.values())), list(names), show_points=False, always_visible=True, **labels
+    )
+    look(plotter, scene, -float(center[2]))
 
 
 def sample_picture() -> bytes:
@@ -56,7 +75,7 @@ def add_rotor(plotter: pv.Plotter, scene: Scene) -> list[pv.Actor]:
     """Draw the magnets with their polarisation; returns the actors, which turn together."""
     actors = []
     for magnet in scene.rotor:
-        actors.append(plotter.add_mesh(_box(magnet.box), color="#4C566A", show_edges=True, opacity=0.95))
+        actors.append(plotter.add_mesh(_box(magnet.box), color="#4C566A", show_edges=True))
         center, radius = magnet.box.center / MILLI, magnet.box.circumradius / MILLI
         actors += _arrow(plotter, center, magnet.polarization_in_rotor, radius)
     return actors
@@ -66,7 +85,7 @@ def add_floater(plotter: pv.Plotter, scene: Scene, position: Array, moment: Arra
     """Draw the sphere and its moment; positions m."""
     radius, center = scene.floater.radius / MILLI, position / MILLI
     sphere = pv.Sphere(radius=radius, center=center, theta_resolution=60, phi_resolution=60)
-    drawn = plotter.add_mesh(sphere, color=METAL, specular=0.6, opacity=0.6)
+    drawn = plotter.add_mesh(sphere, color=METAL, specular=0.6, opacity=0.45)
     return [drawn, *_arrow(plotter, center, moment, radius)]
 
 
@@ -74,7 +93,9 @@ def add_plate(plotter: pv.Plotter, scene: Scene, currents: Currents | None = Non
     """Draw the plate, with its currents where they are given."""
     if scene.plate is None:
         return
-    plotter.add_mesh(_box(scene.plate.box), color=METAL, opacity=0.25, show_edges=True)
+    box = _box(scene.plate.box)
+    plotter.add_mesh(box, color=METAL, opacity=0.2)
+    plotter.add_mesh(box.extract_feature_edges(), color="#4C566A", line_width=3)
     if currents is not None:
         _add_currents(plotter, currents)
 
@@ -92,9 +113,27 @@ def _add_currents(plotter: pv.Plotter, currents: Currents) -> None:
 
 
 def look(plotter: pv.Plotter, scene: Scene, depth: float) -> None:
-    """Look from the side where no plate stands in the way; `depth` of the floater, mm."""
+    """Look from the front, a little from above and from the side where no plate stands in the way, at everything.
+
+    `depth` of the floater below the rotor, mm.
+    """
     side = -1.0 if scene.plate and scene.plate.box.center[0] > 0 else 1.0
-    plotter.camera_position = [(side * (depth + 20), -2.2 * depth - 60, 0.6 * depth), (0, 0, -0.6 * depth), (0, 0, 1)]
+    away = np.array([side * 0.14, -1.0, 0.15])
+    away /= np.linalg.norm(away)
+    right = np.cross([0.0, 0.0, 1.0], away)
+    right /= np.linalg.norm(right)
+    upwards = np.cross(away, right)
+    seen = np.array([(s * 1.6 * depth, 0, z) for s in (-1, 1) for z in (-1.6 * depth, 0.8 * depth)])
+    if scene.plate is not None:
+        seen = np.concatenate([seen, corners_mm(scene.plate.box)])
+    across, up = seen @ right, seen @ upwards
+    across = np.append(across, across.max() + 0.16 * np.ptp(across))  # room for the scale of colours
+    middle = right * (across.max() + across.min()) / 2 + upwards * (up.max() + up.min()) / 2
+    wide, high = plotter.window_size
+    plotter.enable_parallel_projection()
+    plotter.camera_position = [middle + 1e3 * away, middle, (0, 0, 1)]
+    plotter.camera.parallel_scale = 0.54 * max(np.ptp(up), np.ptp(across) * high / wide)
+    plotter.camera.clipping_range = (1.0, 5e3)
     plotter.add_axes()
 
 
@@ -115,21 +154,3 @@ def _arrow(plotter: pv.Plotter, center: Array, direction: Array, radius: float) 
         start=center - 1.5 * radius * unit, direction=unit, scale=3.0 * radius, shaft_radius=0.03, tip_radius=0.09
     )
     return [plotter.add_mesh(arrow, color=NORTH)]
-
-
-def _field(plotter: pv.Plotter, shown: FieldPlane) -> None:
-    """|B| on the plane y = 0 below the rotor, and field lines in it."""
-    width, depth = shown.width, shown.depth
-    grid = pv.ImageData(dimensions=(81, 3, 81), spacing=(2 * width / 80, 0.5, 1.6 * depth / 80))
-    grid.origin = (-width, -0.5, -1.6 * depth - 2)
-    grid["B"] = np.nan_to_num(shown.field)
-    grid["|B| (mT)"] = 1e3 * np.linalg.norm(shown.field, axis=1)
-    plane = grid.slice(normal="y", origin=(0, 0, 0))
-    bar = {"title": "|B| (mT)", "color": "black", "fmt": "%.3g"}
-    plotter.add_mesh(
-        plane, scalars="|B| (mT)", log_scale=True, cmap="viridis", opacity=0.55, nan_opacity=0.0, scalar_bar_args=bar
-    )
-    seeds = [(x, 0.0, -depth * (0.5 + 0.25 * k)) for x in np.linspace(-width, width, 17) for k in range(3)]
-    lines = grid.streamlines_from_source(pv.PolyData(np.array(seeds)), vectors="B", max_length=4 * width)
-    if lines.n_points:
-        plotter.add_mesh(lines, color="black", line_width=1)

@@ -8,18 +8,21 @@ import numpy as np
 from ...geometry.basics import Array, Box
 from ...geometry.scenes import Scene
 
+FINE = 161
+"""Points of a plane of the field along each of its edges."""
 TURNS, FRAMES = 3, 16
 """Turns of the rotor that an animation shows at once, and frames for each."""
 
 
 @dataclass(frozen=True, eq=False)
 class FieldPlane:
-    """B at the points of a thin grid about the plane y = 0 below the rotor.
+    """B at the points of a thin grid about the plane y = 0 around the rotor.
 
     Parameters
     ----------
-    width, depth : of the view, mm: the grid reaches from -width to width and to 1.6 depth below the rotor's origin
-    field : (n, 3) T, x running fastest; NaN where the field's table does not reach
+    width, depth : of the view, mm: the grid reaches from -width to width, and from 1.6 depth below the rotor's origin
+        to 0.8 depth above it
+    field : (n, 3) T, x running fastest; NaN inside the magnets
     """
 
     width: float
@@ -29,7 +32,11 @@ class FieldPlane:
     @staticmethod
     def points(width: float, depth: float) -> Array:
         """The points of the grid, (n, 3) mm."""
-        axes = np.linspace(-1.6 * depth - 2, -2, 81), np.array([-0.5, 0.0, 0.5]), np.linspace(-width, width, 81)
+        axes = (
+            np.linspace(-1.6 * depth, 0.8 * depth, FINE),
+            np.array([-0.5, 0.0, 0.5]),
+            np.linspace(-width, width, FINE),
+        )
         z, y, x = np.meshgrid(*axes, indexing="ij")
         return np.stack([x, y, z], axis=-1).reshape(-1, 3)
 

@@ -10,24 +10,13 @@ from .datasets import (
     curve_dataset as curve_dataset,
     equilibria_dataset as equilibria_dataset,
     found_dataset as found_dataset,
+    lowering_times as lowering_times,
     trajectory_dataset as trajectory_dataset,
     variable as variable,
     write_dataset as write_dataset,
 )
 from .equilibrium_fields import EQUILIBRIUM_FIELDS as EQUILIBRIUM_FIELDS
-from .figures import (
-    COLORS as COLORS,
-    DASHES as DASHES,
-    NAMES as NAMES,
-    PALETTE as PALETTE,
-    field_figure as field_figure,
-    figure_bytes as figure_bytes,
-    force_figure as force_figure,
-    panels as panels,
-    save_figure as save_figure,
-    styled as styled,
-    trajectory_figure as trajectory_figure,
-)
+from .figures import field_figure as field_figure, force_figure as force_figure, trajectory_figure as trajectory_figure
 from .study import (
     Point as Point,
     Study as Study,
@@ -35,4 +24,15 @@ from .study import (
     cases_with as cases_with,
     one_case as one_case,
     study_of_one as study_of_one,
+)
+from .style import (
+    COLORS as COLORS,
+    DASHES as DASHES,
+    NAMES as NAMES,
+    PALETTE as PALETTE,
+    figure_bytes as figure_bytes,
+    panels as panels,
+    save_figure as save_figure,
+    save_figures as save_figures,
+    styled as styled,
 )

@@ -105,7 +105,13 @@ def equilibria_dataset(found: Mapping[str, Sequence[Equilibrium]]) -> xr.Dataset
     rows = found_dataset([equilibrium for equilibria in found.values() for equilibrium in equilibria])
     rows = rows.drop_vars(["number", "equilibrium"])
     named = rows.rename({name: f"equilibrium_{name}" for name in rows.data_vars})
-    return named.assign(equilibrium_model=(("equilibrium",), np.array(models, dtype=object).astype(str)))
+    felt = [e.currents is not None for equilibria in found.values() for e in equilibria]
+    return named.assign(
+        equilibrium_model=(("equilibrium",), np.array(models, dtype=object).astype(str)),
+        equilibrium_with_plate=variable(
+            ("equilibrium",), np.array(felt, bool), "1", "whether the plate's currents act"
+        ),
+    )
 
 
 def found_dataset(rows: Sequence[Equilibrium]) -> xr.Dataset:
@@ -159,4 +165,14 @@ def trajectory_dataset(flight: Trajectory) -> xr.Dataset:
             "levitated_s": flight.levitated_s,
             "energy_error": flight.energy_error,
         },
+    )
+
+
+def lowering_times(scene: Scene) -> dict[str, float]:
+    """When the scene's plate is lowered, s; nothing where it is not."""
+    down = scene.plate.lowering if scene.plate else None
+    return (
+        {}
+        if down is None
+        else {"lowered_from_s": down.start, "lowered_until_s": down.start + down.distance / down.speed}
     )

@@ -1,74 +1,13 @@
 """Figures of a run, drawn from its result file alone."""
 
-import io
-from collections.abc import Callable
-from functools import wraps
-from pathlib import Path
-from typing import Any, TypeVar, cast
-
-import matplotlib as mpl
 import numpy as np
 import xarray as xr
-from cycler import cycler
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from scipy.interpolate import CubicSpline
 
-from ...fem.storage import write_whole
-
-PALETTE = ["#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9"]
-"""Colours of M. Okabe and K. Ito, which all kinds of colour vision tell apart."""
-STYLE: Any = {
-    "font.size": 8.5,
-    "axes.titlesize": 10,
-    "legend.fontsize": 7,
-    "lines.linewidth": 1.2,
-    "axes.grid": True,
-    "grid.alpha": 0.3,
-    "axes.prop_cycle": cycler(color=PALETTE),
-    "legend.frameon": False,
-    "savefig.dpi": 160,
-    "figure.constrained_layout.use": True,
-}
-NAMES = {
-    "dipole": "point dipole",
-    "cuboid": "cuboid, closed form (μr = 1)",
-    "fem": "finite elements",
-    "moments": "moments",
-    "map": "map",
-}
-COLORS = dict(zip(NAMES, PALETTE, strict=False))
-DASHES = {"dipole": "--", "cuboid": "-.", "fem": "-", "moments": ":", "map": "-"}
-Draw = TypeVar("Draw", bound=Callable[..., Figure])
-
-
-def styled(draw: Draw) -> Draw:
-    """Let a function draw in the project's style."""
-
-    @wraps(draw)
-    def inside(*arguments: Any, **options: Any) -> Figure:
-        with mpl.rc_context(STYLE):
-            return draw(*arguments, **options)
-
-    return cast("Draw", inside)
-
-
-def panels(rows: int, columns: int, size: tuple[float, float]) -> tuple[Figure, Any]:
-    """A figure without a window and its axes (rows, columns); `size` in inches."""
-    figure = Figure(figsize=size)
-    return figure, figure.subplots(rows, columns, squeeze=False)
-
-
-def save_figure(figure: Figure, path: Path) -> None:
-    """Write a figure; the format follows the suffix."""
-    write_whole(path, figure_bytes(figure, path.suffix[1:]))
-
-
-def figure_bytes(figure: Figure, kind: str) -> bytes:
-    """The figure as the content of a file of the kind `png` or `pdf`."""
-    stream = io.BytesIO()
-    with mpl.rc_context(STYLE):
-        figure.savefig(stream, format=kind)
-    return stream.getvalue()
+from ...geometry.basics import Array
+from .style import COLORS, DASHES, NAMES, PALETTE, panels, styled
 
 
 @styled
@@ -90,8 +29,9 @@ def field_figure(result: xr.Dataset) -> Figure:
     error = result["axis_error"].sel(model=reference).values
     right.fill_between(distance, np.nanmin(error) / 3, error, color="0.85", label=f"error estimate, {NAMES[reference]}")
     for column, name in ((0, "off-axis $B_\\perp$"), (2, "on-axis $|B_z|$")):
-        place = (distance[-1], 1e3 * np.abs(true[-1, column]))
-        left.annotate(name, place, ha="right", va="bottom", xytext=(0, 6), textcoords="offset points")
+        k = len(distance) // 2
+        place = (distance[k], 1e3 * np.abs(true[k, column]))
+        left.annotate(name, place, ha="left", va="bottom", xytext=(4, 2), textcoords="offset points")
     left.set(xlabel="distance below the rotor (mm)", ylabel="B (mT)", title="Field on the axis")
     right.set(xlabel="distance below the rotor (mm)", ylabel="|ΔB| / |B|", title=f"Difference from {NAMES[reference]}")
     left.legend()
@@ -101,50 +41,122 @@ def field_figure(result: xr.Dataset) -> Figure:
 
 @styled
 def force_figure(result: xr.Dataset) -> Figure:
-    """Axial force against distance with its equilibria marked, for every model that has them."""
-    figure, ((axes,),) = panels(1, 1, (5.5, 3.8))
+    """Axial force against distance with its equilibria marked, for every model that has them; a zoom on the first."""
+    figure, ((axes, near),) = panels(1, 2, (8.0, 3.8))
     weight = -1e3 * float(result.attrs["weight_N"])
-    axes.axhline(weight, color="0.3", lw=0.8, label="weight of the floater")
-    for model in dict.fromkeys(result["curve_model"].values.tolist()):
-        on_model = result["curve_model"] == model
-        for number in np.unique(result["curve_number"].where(on_model, drop=True)):
-            points = result.where(on_model & (result["curve_number"] == number), drop=True)
-            distance = -1e3 * points["curve_position"].sel(axis="z")
-            axes.plot(distance, 1e3 * points["curve_force"], DASHES[model], color=COLORS[model])
-        axes.plot([], [], DASHES[model], color=COLORS[model], label=NAMES[model])
-        _mark_equilibria(axes, result, model, weight)
-    axes.plot([], [], "o", color="0.3", label="stable equilibrium")
-    axes.plot([], [], "o", color="0.3", mfc="white", label="unstable equilibrium")
-    axes.set(xlabel="distance below the rotor (mm)", ylabel="axial magnetic force (mN), up positive")
-    axes.set(xlim=(5, 60), title="Force where everything else is balanced")
+    for panel in (axes, near):
+        panel.axhline(weight, color="0.3", lw=0.8, label="weight of the floater")
+        for model in dict.fromkeys(result["curve_model"].values.tolist()):
+            _draw_curves(panel, result, model)
+            _mark_equilibria(panel, result, model, weight)
+        for marker, fill, label in MARKS if _with_plate(result).any() else MARKS[:2]:
+            panel.plot([], [], marker, color="0.3", mfc=fill or "0.3", label=label)
+        panel.set(xlabel="distance below the rotor (mm)")
+    axes.set(xlim=(5, 60), ylabel="axial magnetic force (mN), up positive", title="Force on the balanced floater")
     if weight > 0:
         axes.set_ylim(-2.5 * weight, 3.5 * weight)
-    axes.legend(loc="upper right")
+    first = _first_distance(result)
+    if first is None or weight <= 0:
+        near.set_axis_off()
+    else:
+        near.set(xlim=(first - 1.0, first + 1.0), ylim=(0.0, 2 * weight), title="Where it floats")
+    figure.legend(*axes.get_legend_handles_labels(), loc="outside lower center", ncols=3)
     return figure
 
 
+MARKS = (
+    ("o", None, "stable, no plate"),
+    ("o", "white", "unstable, no plate"),
+    ("D", None, "stable, with the plate"),
+    ("D", "white", "unstable, with the plate"),
+)
+
+
+def _draw_curves(axes: Axes, result: xr.Dataset, model: str) -> None:
+    on_model = result["curve_model"] == model
+    for number in np.unique(result["curve_number"].where(on_model, drop=True)):
+        points = result.where(on_model & (result["curve_number"] == number), drop=True)
+        distance, force = -1e3 * points["curve_position"].sel(axis="z").values, 1e3 * points["curve_force"].values
+        axes.plot(*_smooth(np.arange(len(force), dtype=float), distance, force), DASHES[model], color=COLORS[model])
+    axes.plot([], [], DASHES[model], color=COLORS[model], label=NAMES[model])
+
+
 def _mark_equilibria(axes: Axes, result: xr.Dataset, model: str, weight: float) -> None:
+    """Circles without the plate's currents, diamonds with them; filled where stable."""
     here = result["equilibrium_model"] == model
-    for stable, fill in ((1, COLORS[model]), (0, "white")):
-        chosen = result["equilibrium_position"].sel(axis="z").where(here & (result["equilibrium_stable"] == stable))
-        distance = -1e3 * chosen.dropna("equilibrium").values
-        axes.plot(distance, np.full(distance.shape, weight), "o", color=COLORS[model], mfc=fill, ms=5)
+    felt = _with_plate(result)
+    for plate, marker in ((False, "o"), (True, "D")):
+        for stable, fill in ((1, COLORS[model]), (0, "white")):
+            chosen = here & (felt == plate) & (result["equilibrium_stable"] == stable)
+            distance = -1e3 * result["equilibrium_position"].sel(axis="z").where(chosen).dropna("equilibrium").values
+            axes.plot(distance, np.full(distance.shape, weight), marker, color=COLORS[model], mfc=fill, ms=5)
+
+
+def _with_plate(result: xr.Dataset) -> xr.DataArray:
+    """Which equilibria feel the plate's currents; older results do not say."""
+    return xr.DataArray(result.get("equilibrium_with_plate", 0 * result["equilibrium_stable"]) == 1)
+
+
+def _first_distance(result: xr.Dataset) -> float | None:
+    """Where the first stable equilibrium is, mm."""
+    chosen = result["equilibrium_position"].sel(axis="z").where(result["equilibrium_stable"] == 1)
+    distances = -1e3 * chosen.dropna("equilibrium").values
+    return float(distances[0]) if len(distances) else None
+
+
+PARTS = 120
+"""Intervals of an envelope: more than a printed figure tells apart."""
+SHOWN = 200
+"""Samples of a flight that are drawn one by one."""
 
 
 @styled
 def trajectory_figure(result: xr.Dataset) -> Figure:
-    """Height, side orbit in the rotor's frame and in the laboratory's, and polar angle of a flight."""
-    figure, axes = panels(2, 2, (8.0, 5.6))
-    time = result["time"].values
-    position = 1e3 * result["position"].values
-    turned = 1e3 * result["position_rotor_frame"].values
-    moment = result["moment"].values
-    axes[0, 0].plot(time, -position[:, 2], lw=0.6)
-    axes[0, 0].set(xlabel="time (s)", ylabel="distance below the rotor (mm)", title="Height")
-    axes[0, 1].plot(time, np.degrees(np.arctan2(np.hypot(moment[:, 0], moment[:, 1]), moment[:, 2])), lw=0.6)
-    axes[0, 1].set(xlabel="time (s)", ylabel="polar angle of the moment (°)", title="Polar angle")
-    frames = ((axes[1, 0], position, "laboratory frame"), (axes[1, 1], turned, "rotor's frame"))
-    for panel, orbit, name in frames:
-        panel.plot(orbit[:, 0], orbit[:, 1], lw=0.4)
-        panel.set(xlabel="x (mm)", ylabel="y (mm)", title=f"Side orbit, {name}", aspect="equal", adjustable="datalim")
+    """Distance and polar angle of a flight as envelopes, and a closer look at its beginning, or at its end if lost."""
+    figure, axes = panels(2, 2, (8.0, 5.4))
+    time, moment = result["time"].values, result["moment"].values
+    distance = -1e3 * result["position"].sel(axis="z").values
+    angle = np.degrees(np.arctan2(np.hypot(moment[:, 0], moment[:, 1]), moment[:, 2]))
+    up = str(result.attrs.get("ended_by", "duration")) in ("duration", "stopped")
+    near = slice(0, SHOWN) if up else slice(-SHOWN, None)
+    _envelope(axes[0, 0], time, distance)
+    _envelope(axes[1, 0], time, angle)
+    for panel in axes[:, 0]:
+        panel.axvspan(time[near][0], time[near][-1], color=PALETTE[4], alpha=0.4, lw=0, label="shown on the right")
+        if "lowered_from_s" in result.attrs:
+            panel.axvspan(*_lowering(result, time), color="0.88", lw=0, zorder=0, label="plate is lowered")
+        panel.set_xlabel("time (s)")
+    axes[0, 0].legend(frameon=True, framealpha=0.9, edgecolor="none")
+    axes[0, 1].plot(*_smooth(time[near], time[near], distance[near]), lw=0.8)
+    turned = 1e3 * result["position_rotor_frame"].values[near]
+    axes[1, 1].plot(*_smooth(time[near], turned[:, 0], turned[:, 1]), lw=0.8)
+    axes[1, 1].plot(*turned[-1, :2], "o", color=PALETTE[1], ms=4, label="end of the curve")
+    axes[1, 1].legend()
+    axes[0, 0].set(ylabel="distance below the rotor (mm)", title="Distance: smallest, mean, largest")
+    axes[1, 0].set(ylabel="polar angle of the moment (°)", title="Polar angle: smallest, mean, largest")
+    axes[0, 1].set(xlabel="time (s)", ylabel="distance below the rotor (mm)", title="A closer look")
+    axes[1, 1].set(xlabel="x (mm)", ylabel="y (mm)", title="The same from above, rotor's frame")
+    axes[1, 1].set(aspect="equal", adjustable="datalim")
     return figure
+
+
+def _lowering(result: xr.Dataset, time: Array) -> tuple[float, float]:
+    begins, ends = (min(float(result.attrs[f"lowered_{word}_s"]), float(time[-1])) for word in ("from", "until"))
+    return begins, ends
+
+
+def _envelope(axes: Axes, time: Array, values: Array) -> None:
+    """Smallest, mean and largest value of each of many short intervals."""
+    parts = np.array_split(np.arange(len(time)), min(PARTS, max(1, len(time) // 8)))
+    middle, mean = (np.array([v[part].mean() for part in parts]) for v in (time, values))
+    low, high = (np.array([pick(values[part]) for part in parts]) for pick in (np.min, np.max))
+    axes.fill_between(middle, low, high, color=PALETTE[5], alpha=0.6, lw=0)
+    axes.plot(middle, mean, color=PALETTE[0], lw=1.0)
+
+
+def _smooth(parameter: Array, x: Array, y: Array) -> tuple[Array, Array]:
+    """Points of a smooth curve through samples (n,) at a growing parameter (n,)."""
+    if len(parameter) < 4:
+        return x, y
+    fine = np.linspace(parameter[0], parameter[-1], 12 * len(parameter))
+    return CubicSpline(parameter, x)(fine), CubicSpline(parameter, y)(fine)

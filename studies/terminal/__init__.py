@@ -2,6 +2,7 @@
 
 from .console import (
     answers_only as answers_only,
+    detail as detail,
     heard as heard,
     note as note,
     progress as progress,
@@ -25,8 +26,10 @@ from .options import (
     Quantity as Quantity,
     Workers as Workers,
     default_scene as default_scene,
+    shipped_scene as shipped_scene,
 )
 from .plain_text import make_readable as make_readable
+from .scene_file import KINDS as KINDS, new_scene as new_scene
 from .system_libraries import (
     DRAWING as DRAWING,
     FORTRAN as FORTRAN,

@@ -33,6 +33,11 @@ def note(text: str) -> None:
     LOG.info(text)
 
 
+def detail(text: str) -> None:
+    """A message that is heard only where the user wants to know everything (`--verbose`)."""
+    LOG.debug(text)
+
+
 class _Printed(logging.Handler):
     """Messages as they are, above a progress bar."""
 
@@ -41,14 +46,14 @@ class _Printed(logging.Handler):
 
 
 @contextmanager
-def heard(wanted: bool = True) -> Iterator[None]:
-    """Messages and progress on standard error inside the block, if they are wanted."""
+def heard(wanted: bool = True, verbose: bool = False) -> Iterator[None]:
+    """Messages and progress on standard error inside the block, if they are wanted; details too where `verbose`."""
     if not wanted or LOG.handlers:
         yield
         return
     handler, level = _Printed(), LOG.level
     LOG.addHandler(handler)
-    LOG.setLevel(logging.INFO)
+    LOG.setLevel(logging.DEBUG if verbose else logging.INFO)
     try:
         yield
     finally:

@@ -16,8 +16,13 @@ PlateModel = Literal["none", "slab", "fem", "reduced", "auto"]
 
 
 def default_scene() -> Path:
-    """The scene that is meant where none is named: `horizontal`."""
-    return Path(str(files("spinlev.scenes").joinpath("horizontal.toml")))
+    """The scene that is meant where none is named: `tilt-over-plate`."""
+    return shipped_scene("tilt-over-plate")
+
+
+def shipped_scene(name: str) -> Path:
+    """The file of a scene that comes with the program."""
+    return Path(str(files("spinlev.scenes").joinpath(f"{name}.toml")))
 
 
 @Parameter(name="*")
@@ -72,10 +77,13 @@ class Output:
         Print one JSON object and nothing else on standard output.
     out
         Folder for the files.
+    verbose
+        Say why each model was chosen, how large it is and how exactly the ledgers close.
     """
 
     json: Annotated[bool, Parameter(negative="")] = False
     out: Path = Path("out")
+    verbose: Annotated[bool, Parameter(negative="")] = False
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,7 @@ from places import DOCS, HORIZONTAL, ROOT
 from spinlev.geometry.basics import MU_0
 from spinlev.geometry.scenes import load_scene
 from spinlev.studies.catalogue import CATALOGUE
-from spinlev.studies.results.figures import STYLE
+from spinlev.studies.results.style import STYLE
 
 MOMENT = load_scene(HORIZONTAL).floater.moment * np.sin(np.radians(5.0))
 SLOW = 200 * np.pi * MOMENT**2 * MU_0**2 * 3.5e7 / (64 * np.pi) * (1 / 0.015 - 1 / 0.045) * 1e6

@@ -20,6 +20,7 @@ FLOORS = {
             "results",
             "pictures",
             "one_scene",
+            "exchange",
             "sweeps",
             "article",
             "field_quality",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import meshio
+import ngsolve
 import numpy as np
 import pytest
 from netgen.occ import Box as OccBox, Pnt, Sphere
@@ -12,7 +13,7 @@ from second_opinions.solids import Conductor, occ_mesh
 
 from spinlev.fem.closed_forms import HomogeneousField, unit_dipoles
 from spinlev.fem.closed_forms.sphere_eddy import polarizability
-from spinlev.fem.eddy_currents import current_density, solve_eddy
+from spinlev.fem.eddy_currents import EddySpace, current_density, solve_eddy
 from spinlev.fem.eddy_currents.export import write_vtu
 from spinlev.fem.eddy_currents.fields import joule_loss, reaction_flux_density
 from spinlev.geometry.meshes import MeshRule, plate_mesh
@@ -125,3 +126,14 @@ def test_tetrahedra_and_hexahedra_agree():
     hexes = plate_mesh(size, SIGMA, place, 100.0)
     tensors = [solve_eddy(mesh, 2, 100.0, unit_dipoles(place)).couplings for mesh in (tets, hexes)]
     assert abs(tensors[0] - tensors[1]).max() < 1e-2 * abs(tensors[1]).max()  # order 2, cells of the skin depth
+
+
+@pytest.mark.parametrize("order", [2, 4, 5])
+def test_values_of_a_function_from_its_coefficients_are_those_of_the_function(order):
+    """Two ways of NGSolve to evaluate one function; from order 4 on hexahedra have more than 256 points."""
+    space = EddySpace(plate_mesh((0.02, 0.02, 0.01), 3.5e7, np.array([[0.0, 0.0, 0.012]]), 50.0, MeshRule(3.0)), order)
+    function = ngsolve.GridFunction(space.real)
+    function.vec.FV().NumPy()[:] = np.random.default_rng(0).normal(size=space.real.ndof)
+    expected = space.point_values(function)
+    found = space.value_matrix(space.real, space.real.TrialFunction()) @ function.vec.FV().NumPy()
+    np.testing.assert_allclose(found.reshape(-1, 3), expected, atol=1e-12 * np.abs(expected).max())

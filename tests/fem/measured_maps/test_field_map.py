@@ -105,3 +105,24 @@ def test_faults_of_other_files_are_named(tmp_path):
 def test_shapes_are_checked():
     with pytest.raises(FieldMapError, match=r"field must have shape \(2, 3\); instead received \(2, 2\)"):
         FieldMap(np.zeros((2, 3)), np.zeros((2, 2)))
+
+
+def test_comsols_export_is_read_as_it_is(tmp_path):
+    """Header lines that begin with %, the unit of length among them, the units of B in the titles."""
+    head = (
+        "% Model,rotor.mph\n% Version,COMSOL 6.2.0.290\n% Dimension,3\n% Nodes,2\n% Expressions,3\n"
+        '% Description,"Magnetic flux density, x-component"\n% Length unit,mm\n'
+        "% x,y,z,mf.Bx (mT),mf.By (mT),mf.Bz (mT)\n"
+    )
+    (tmp_path / "m.csv").write_text(head + "0,0,-20,-12.5,0,2.5\n1,2,-30,NaN,1,2\n")
+    read = read_field_map(tmp_path / "m.csv")
+    np.testing.assert_allclose(read.points, [[0.0, 0.0, -0.02], [1e-3, 2e-3, -0.03]])
+    np.testing.assert_allclose(read.field, [[-0.0125, 0.0, 0.0025], [np.nan, 1e-3, 2e-3]])
+
+
+def test_a_wrong_header_is_answered_with_a_right_one(tmp_path):
+    (tmp_path / "m.csv").write_text("X,Y,Z,B\n0,0,-20,1\n")
+    with pytest.raises(
+        FieldMapError, match=r"none that is known\. Valid: the header x_mm,y_mm,z_mm,Bx_mT,By_mT,Bz_mT of a CSV file"
+    ):
+        read_field_map(tmp_path / "m.csv")

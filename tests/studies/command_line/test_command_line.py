@@ -121,10 +121,11 @@ def test_the_plate_is_in_the_equilibria_and_the_motion(spinlev):
 def test_run_writes_everything_and_finds_its_table_again(spinlev, tmp_path):
     status, out, err = spinlev("run", SCENES / "horizontal.toml", "--duration-s", "0.1", *NO_PLATE)
     assert status == 0, err
-    assert "the dipole is off by" in out
+    assert "A point dipole in the rotor's place would hold it 0.067(1) mm lower." in out
     made = {path.name for path in (tmp_path / "out").iterdir()}
     drawn = set() if unavailable() else {"scene.png"}
-    assert made == {"result.nc", "summary.json", "field.png", "force.png", "trajectory.png", *drawn}
+    figures = {f"{name}.{kind}" for name in ("field", "force", "trajectory") for kind in ("png", "pdf")}
+    assert made == {"result.nc", "summary.json", *figures, *drawn}
     summary = json.loads((tmp_path / "out" / "summary.json").read_text())
     assert summary["comparison"]["difference_error_mm"] < 0.01 * abs(summary["comparison"]["difference_mm"])
     status, out, err = spinlev("field", SCENES / "horizontal.toml", "--points", points_file(tmp_path), "--json")

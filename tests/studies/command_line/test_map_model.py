@@ -9,7 +9,7 @@ import pytest
 from spinlev.fem.rotor_tables import RotorTable
 from spinlev.geometry.scenes import SceneError, load_scene
 from spinlev.studies.command_line import cli
-from spinlev.studies.terminal import default_scene
+from spinlev.studies.terminal import shipped_scene
 
 GRID = np.arange(-0.036, 0.037, 0.006)
 HEADER = "x_mm,y_mm,z_mm,Bx_mT,By_mT,Bz_mT"
@@ -18,7 +18,7 @@ HEADER = "x_mm,y_mm,z_mm,Bx_mT,By_mT,Bz_mT"
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
     """A scene beside the map of its own rotor without permeability, with values inside the magnet too."""
-    path, scene = tmp_path_factory.mktemp("map"), load_scene(default_scene())
+    path, scene = tmp_path_factory.mktemp("map"), load_scene(shipped_scene("horizontal"))
     points = np.stack(np.meshgrid(GRID, GRID, GRID, indexing="ij"), -1).reshape(-1, 3)
     points = points[np.linalg.norm(points, axis=1) > 0.0075]
     values = RotorTable("cuboid", scene.rotor, scene.rotor).evaluate(points)[0]
@@ -73,6 +73,6 @@ def test_no_map(called, folder, capfd):
     (bare / "scene.toml").write_text((folder / "scene.toml").read_text())
     with pytest.raises(SceneError, match=r"Input rotor.field_map must be a file; instead there is no .*bare/map.csv"):
         load_scene(bare / "scene.toml")
-    (bare / "scene.toml").write_text(load_scene(default_scene()).text)
+    (bare / "scene.toml").write_text(load_scene(shipped_scene("horizontal")).text)
     assert called(bare, "field", "--points", str(folder / "points.csv"), "--model", "map") == 2
     assert "Input rotor.field_map must name a file" in capfd.readouterr().err

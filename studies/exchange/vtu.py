@@ -1,0 +1,148 @@
+"""The command `export`: the fields of a scene for ParaView and all that reads VTU.
+
+Rotor and floater as they are at t = 0, at the first equilibrium or where the scene says. Outside the magnets B is that
+of the field's table; inside them, and nearer than the table reaches, it is the closed form, with the magnetisation
+M = J/μ0 + (μr - 1) H to first order in the recoil permeability. The floater is a uniformly magnetised sphere. The field
+of the plate's currents is not in B.
+"""
+
+import tempfile
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import meshio
+import numpy as np
+
+from ...dynamics.motion import State
+from ...fem.closed_forms import remanent_field
+from ...fem.storage import write_whole
+from ...geometry.basics import MU_0, Array, Box, InputError
+from ...geometry.scenes import AbsoluteStart, Scene
+from ..one_scene import Levitation, sources
+from ..pictures import plate_currents
+from ..terminal import Models, note
+
+MARGIN = 8e-3
+"""Air around rotor and floater, m."""
+STEPS, PLATE_STEPS = 64, (41, 41, 9)
+"""Points along the longest edge of the grid about rotor and floater, and along the edges of the plate."""
+CORNERS = np.array([(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 0, 1), (1, 0, 1), (1, 1, 1), (0, 1, 1)])
+AIR, ROTOR, FLOATER, PLATE = range(4)
+
+
+def export_job(scene: Scene, asked: Models, path: Path) -> tuple[Mapping[str, Any], list[str]]:
+    """Write B (T), H and M (A/m), J (A/m²) and the body's number at the points of two grids.
+
+    Raises
+    ------
+    InputError : the file's name does not end in .vtu
+    """
+    if path.suffix != ".vtu":
+        raise InputError(f"Input OUT must end in .vtu; instead received {path}.")
+    levitation = Levitation(scene, asked)
+    state = _floater_state(levitation)
+    about, cells = _grid(*_bounds(scene, state), STEPS)
+    parts = [(about, cells, _fields(levitation, state, about))]
+    if scene.plate is not None and scene.frequency and state is not None:
+        note("Currents in the plate ...")
+        inside, cells = _plate_grid(scene.plate.box)
+        current = plate_currents(scene, scene.plate, sources(levitation.table), state, inside)
+        data = _fields(levitation, state, inside)
+        parts.append((inside, cells, {**data, "J": current, "body": np.full(len(inside), PLATE)}))
+    _write(path, parts)
+    count = sum(len(points) for points, _, _ in parts)
+    values = {
+        "model": levitation.table.model,
+        "error_estimate": max(magnet.contrast for magnet in scene.rotor),  # where the closed form stands in
+        "file": str(path),
+        "points": count,
+        "floater": state is not None,
+    }
+    return values, [f"B, H, M and J at {count} points in {path}"]
+
+
+def _floater_state(levitation: Levitation) -> State | None:
+    """The floater at t = 0, (3,) along the rotor's axes; None where the scene tells no place for it."""
+    start = levitation.scene.start
+    if isinstance(start, AbsoluteStart):
+        return State(start.position, start.velocity, start.moment, start.spin)
+    if not levitation.scene.frequency or not levitation.without_plate.equilibria:
+        note("There is no equilibrium: the floater is left out.")
+        return None
+    return levitation.without_plate.equilibria[0].state
+
+
+def _bounds(scene: Scene, state: State | None) -> tuple[Array, Array]:
+    corners = [magnet.box.corners for magnet in scene.rotor]
+    if state is not None:
+        corners += [state.position[None] + s * scene.floater.radius for s in (-1, 1)]
+    together = np.concatenate(corners)
+    return together.min(axis=0) - MARGIN, together.max(axis=0) + MARGIN
+
+
+def _grid(lower: Array, upper: Array, steps: int) -> tuple[Array, Array]:
+    """Points (n, 3) m of a grid with cubic cells, and the cells."""
+    counts = np.maximum(2, np.round(steps * (upper - lower) / (upper - lower).max()).astype(int))
+    return _lattice([np.linspace(lower[k], upper[k], counts[k]) for k in range(3)])
+
+
+def _plate_grid(box: Box) -> tuple[Array, Array]:
+    """Points a little inside the plate's faces, where the current is known from within."""
+    body, cells = _lattice(
+        [np.linspace(-0.499, 0.499, n) * size for n, size in zip(PLATE_STEPS, box.size, strict=True)]
+    )
+    return box.center + body @ box.rotation.T, cells
+
+
+def _lattice(axes: list[Array]) -> tuple[Array, Array]:
+    shape = tuple(len(axis) for axis in axes)
+    points = np.stack(np.meshgrid(*axes, indexing="ij"), -1).reshape(-1, 3)
+    numbers = np.arange(len(points)).reshape(shape)
+    corner = [tuple(slice(c, n - 1 + c) for c, n in zip(place, shape, strict=True)) for place in CORNERS]
+    return points, np.stack([numbers[part].ravel() for part in corner], axis=1)
+
+
+def _fields(levitation: Levitation, state: State | None, points: Array) -> dict[str, Array]:
+    """B, H, M, no J, and the number of the body at points (n, 3) m."""
+    scene, table = levitation.scene, levitation.table
+    h = remanent_field(scene.rotor, points) / MU_0
+    magnetization, body = np.zeros_like(points), np.full(len(points), AIR)
+    for magnet in scene.rotor:
+        inside = magnet.box.distance(points) <= 0
+        remanent = magnet.polarization_in_rotor / MU_0
+        magnetization[inside] = remanent + h[inside] @ (magnet.permeability_in_rotor - np.eye(3)).T
+        body[inside] = ROTOR
+    b = MU_0 * (h + magnetization)
+    known = (body == AIR) & table.in_range(points)
+    b[known] = table.evaluate(points[known])[0]
+    h[known] = b[known] / MU_0
+    if state is not None:
+        own, within = _sphere(scene, state, points)
+        magnetization[within] = scene.floater.moment * state.moment / scene.floater.volume
+        h += own
+        b = MU_0 * (h + magnetization)
+        body[within] = FLOATER
+    return {"B": b, "H": h, "M": magnetization, "J": np.zeros_like(points), "body": body}
+
+
+def _sphere(scene: Scene, state: State, points: Array) -> tuple[Array, Any]:
+    """H (n, 3) A/m of the floater: a dipole's outside, -M/3 inside; and which points are inside."""
+    moment, away = scene.floater.moment * state.moment, points - state.position
+    distance = np.maximum(np.linalg.norm(away, axis=1), 1e-9)[:, None]
+    unit = away / distance
+    outside = (3 * unit * (unit @ moment)[:, None] - moment) / (4 * np.pi * distance**3)
+    within = distance[:, 0] <= scene.floater.radius
+    return np.where(within[:, None], -moment / (3 * scene.floater.volume), outside), within
+
+
+def _write(path: Path, parts: list[tuple[Array, Array, dict[str, Array]]]) -> None:
+    """One file of all grids."""
+    starts = np.cumsum([0, *(len(points) for points, _, _ in parts)])
+    cells = np.concatenate([part + start for start, (_, part, _) in zip(starts, parts, strict=False)])
+    data = {name: np.concatenate([part[name] for _, _, part in parts]) for name in parts[0][2]}
+    mesh = meshio.Mesh(np.concatenate([points for points, _, _ in parts]), [("hexahedron", cells)], point_data=data)
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / "fields.vtu"
+        mesh.write(file)
+        write_whole(path, file.read_bytes())

@@ -1,0 +1,174 @@
+"""What the program found, in the words and digits of a physicist."""
+
+import math
+from collections.abc import Sequence
+
+from ...dynamics.flights import Trajectory
+from ...dynamics.steady import Equilibrium
+from ..terminal import detail
+from .answers import kind_of_flight, omissions
+from .levitation import Levitation
+
+MILLI = 1e-3
+DIGITS = 4
+"""Significant digits of a number, at most."""
+USELESS = 1.0
+"""Relative error of a distance from which on an equilibrium is not worth a row."""
+CLEAR = 0.5
+"""Share of the damping that must be gone without the plate before it is called the plate's."""
+
+SPOKEN = {"side, backward": "backward side motion", "side, forward": "forward side motion"}
+"""Names of small motions in a sentence, where they are others."""
+FINEST = 0.01
+"""Of distances from the axis, mm."""
+
+
+def bracketed(value: float, error: float, digits: int = DIGITS) -> str:
+    """A number with its uncertainty, rounded up, in units of the last digit; `digits` significant ones at most.
+
+    >>> bracketed(17.2138, 2e-6), bracketed(17.2138, 0.023), bracketed(-2.871, 0.12), bracketed(0.0, 0.0)
+    ('17.21(1)', '17.21(3)', '-2.9(2)', '0')
+    """
+    if not value or not math.isfinite(value):
+        return f"{value:g}"
+    places = digits - 1 - math.floor(math.log10(abs(value)))
+    if error > 0:
+        places = min(places, -math.floor(math.log10(error)))
+    places = max(places, 0)
+    last = max(1, math.ceil(error * 10**places - 1e-9))
+    return f"{value:.{places}f}({last})"
+
+
+def rate(value: float) -> str:
+    """A rate of growth or decay, /s, with two digits: nobody needs more of it."""
+    return f"{abs(value):.2g} /s"
+
+
+def headline(levitation: Levitation, equilibria: Sequence[Equilibrium]) -> str:
+    """Where the floater floats and whether it stays there, in one sentence."""
+    useful = worth_a_row(equilibria)
+    if not useful:
+        why = (
+            "the field model is too rough to tell where an equilibrium is" if equilibria else "there is no equilibrium"
+        )
+        return f"Nothing floats at {levitation.scene.frequency:g} Hz: {why}."
+    first = useful[0]
+    side = "below" if first.position[2] < 0 else "above"
+    place = f"{_distance(first).lstrip('-')} mm {side} the rotor, tilted {first.polar_angle_deg:.1f}°"
+    if first.stable:
+        return f"Floats {place}; stable, {_damping(first)}."
+    name, growing = slowest(first)
+    return (
+        f"Does not stay up: the equilibrium {place}, is unstable; the {name} grows at {rate(growing)}{_blame(first)}."
+    )
+
+
+def slowest(equilibrium: Equilibrium) -> tuple[str, float]:
+    """The small motion that decides: the one that grows fastest, or dies out most slowly; its rate, 1/s."""
+    if not equilibrium.modes:
+        return "a small motion", equilibrium.growth_per_s
+    worst = max(equilibrium.modes, key=lambda mode: mode.growth_per_s)
+    return SPOKEN.get(worst.name, worst.name), worst.growth_per_s
+
+
+def worth_a_row(equilibria: Sequence[Equilibrium]) -> list[Equilibrium]:
+    """Those whose place is known well enough to be told."""
+    return [e for e in equilibria if e.position_error < USELESS * e.distance]
+
+
+def _distance(equilibrium: Equilibrium) -> str:
+    return bracketed(-equilibrium.position[2] / MILLI, equilibrium.position_error / MILLI)
+
+
+def _damping(equilibrium: Equilibrium) -> str:
+    name, growth = slowest(equilibrium)
+    if growth >= -equilibrium.growth_error_per_s:
+        return "undamped"
+    by = "plate" if _the_plate_decides(equilibrium) else "air"
+    return f"slowest motion ({name}) damped at {rate(growth)} by the {by}"
+
+
+def _the_plate_decides(equilibrium: Equilibrium) -> bool:
+    alone = equilibrium.without
+    if equilibrium.currents is None or alone is None:
+        return False
+    return abs(equilibrium.growth_per_s - alone.growth_per_s) > CLEAR * abs(equilibrium.growth_per_s)
+
+
+def _blame(equilibrium: Equilibrium) -> str:
+    alone = equilibrium.without
+    by_plate = equilibrium.currents is not None and alone is not None and alone.stable
+    return " (without the plate it would be stable)" if by_plate else ""
+
+
+def equilibria_words(levitation: Levitation, equilibria: Sequence[Equilibrium] | None = None) -> list[str]:
+    """The headline, and the equilibria, all or those given, as a table."""
+    found = levitation.equilibria if equilibria is None else equilibria
+    return [headline(levitation, found), *equilibria_table(levitation, found)]
+
+
+def equilibria_table(levitation: Levitation, equilibria: Sequence[Equilibrium]) -> list[str]:
+    """The equilibria worth a row, as a table."""
+    useful = worth_a_row(equilibria)
+    if not useful:
+        return []
+    felt = levitation.plate is not None
+    rows = [("below (mm)", "aside (mm)", "tilt (°)", "lag (°)", "slowest motion", "growth (1/s)", "")]
+    for e in useful:
+        name, growth = slowest(e)
+        aside, doubt = math.hypot(*e.position[:2]) / MILLI, e.position_error / MILLI
+        angle = e.position_error / e.distance  # of a direction, rad: all that is known of its size
+        verdict = "stable" if e.stable else "unstable"
+        rows.append(
+            (
+                _distance(e),
+                bracketed(aside, max(doubt, FINEST)) if aside > FINEST / 2 else "0",
+                f"{e.polar_angle_deg:.2f}" if angle < 1e-4 else f"{e.polar_angle_deg:.1f}",
+                f"{e.lag_deg + 0.0:.2f}".replace("-0.00", "0.00"),
+                name,
+                f"{growth:.2g}",
+                verdict + ("" if e.currents is not None or not felt else ", without the plate"),
+            )
+        )
+    widths = [max(len(row[k]) for row in rows) for k in range(len(rows[0]))]
+    return ["  ".join(["", *map(str.rjust, row[:-1], widths), row[-1]]).rstrip() for row in rows]
+
+
+def flight_words(levitation: Levitation, flight: Trajectory) -> str:
+    """How a flight went, in one sentence."""
+    kind = kind_of_flight(levitation, flight)
+    if flight.ended_by == "contact":
+        return f"Flew {flight.levitated_s:.3g} s, then touched something ({kind})."
+    if flight.ended_by == "lost":
+        return f"Flew {flight.levitated_s:.3g} s, then fell ({kind})."
+    start = None if levitation.absolute else levitation.stability
+    how = {"stable": "", "drifting": "; it drifts slowly", "growing oscillation": "; the oscillation grows"}.get(
+        kind, ""
+    )
+    if start is not None and not start.stable:
+        how = f"; the oscillation grows (e-fold in {1 / start.growth_per_s:.2g} s)"
+    return f"Flew {flight.levitated_s:.4g} s, still up{how}."
+
+
+def left_out(levitation: Levitation, equilibria: Sequence[Equilibrium]) -> list[str]:
+    """One line for what the computation leaves out; the whole sentences are details."""
+    missing = omissions(levitation, equilibria)
+    for sentence in missing.values():
+        detail(sentence)
+    return [f"Left out: {'; '.join(missing)}."] if missing else []
+
+
+def tell_details(flight: Trajectory) -> None:
+    """How exactly a flight was integrated."""
+    beyond, changes = flight.beyond_plate_table, flight.field_changes
+    detail(
+        f"Energy ledger and unit length of the moment violated by {flight.energy_error:.1e} at most; "
+        f"{flight.realtime_factor:.3g} times real time."
+    )
+    if beyond:
+        detail(f"For {beyond:.1%} of the flight the floater was beyond the range of the plate's table.")
+    if changes.count:
+        detail(
+            f"The floater changed {changes.count} times from one ball with an expansion of the field to another "
+            f"(error up to {changes.error:.0e}); that changed its energy by {changes.energy:.1e}, beside the ledger."
+        )

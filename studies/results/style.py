@@ -1,0 +1,80 @@
+"""The style of every figure, and how figures are written."""
+
+import io
+from collections.abc import Callable, Mapping
+from functools import wraps
+from pathlib import Path
+from typing import Any, TypeVar, cast
+
+import matplotlib as mpl
+from cycler import cycler
+from matplotlib.figure import Figure
+
+from ...fem.storage import write_whole
+
+PALETTE = ["#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9"]
+"""Colours of M. Okabe and K. Ito, which all kinds of colour vision tell apart."""
+STYLE: Any = {
+    "font.size": 9,
+    "axes.titlesize": 9.5,
+    "axes.titleweight": "bold",
+    "axes.titlelocation": "left",
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "legend.fontsize": 8,
+    "lines.linewidth": 1.2,
+    "axes.grid": True,
+    "grid.alpha": 0.3,
+    "axes.prop_cycle": cycler(color=PALETTE),
+    "legend.frameon": False,
+    "savefig.dpi": 160,
+    "figure.constrained_layout.use": True,
+}
+NAMES = {
+    "dipole": "point dipole",
+    "cuboid": "cuboid, closed form (μr = 1)",
+    "fem": "finite elements",
+    "moments": "moments",
+    "map": "map",
+}
+COLORS = dict(zip(NAMES, PALETTE, strict=False))
+DASHES = {"dipole": "--", "cuboid": "-.", "fem": "-", "moments": ":", "map": "-"}
+Draw = TypeVar("Draw", bound=Callable[..., Figure])
+
+
+def styled(draw: Draw) -> Draw:
+    """Let a function draw in the project's style."""
+
+    @wraps(draw)
+    def inside(*arguments: Any, **options: Any) -> Figure:
+        with mpl.rc_context(STYLE):
+            return draw(*arguments, **options)
+
+    return cast("Draw", inside)
+
+
+def panels(rows: int, columns: int, size: tuple[float, float]) -> tuple[Figure, Any]:
+    """A figure without a window and its axes (rows, columns); `size` in inches."""
+    figure = Figure(figsize=size)
+    return figure, figure.subplots(rows, columns, squeeze=False)
+
+
+def save_figures(figures: Mapping[str, Figure], out: Path) -> list[str]:
+    """Write each figure as PNG and PDF; returns the files."""
+    files = [out / f"{name}.{suffix}" for name in figures for suffix in ("png", "pdf")]
+    for file in files:
+        save_figure(figures[file.stem], file)
+    return [str(file) for file in files]
+
+
+def save_figure(figure: Figure, path: Path) -> None:
+    """Write a figure; the format follows the suffix."""
+    write_whole(path, figure_bytes(figure, path.suffix[1:]))
+
+
+def figure_bytes(figure: Figure, kind: str) -> bytes:
+    """The figure as the content of a file of the kind `png` or `pdf`."""
+    stream = io.BytesIO()
+    with mpl.rc_context(STYLE):
+        figure.savefig(stream, format=kind)
+    return stream.getvalue()

@@ -1,0 +1,113 @@
+"""Scenes and fields that go to other programs and come back: magpylib, meshio, PyVista, a new scene file."""
+
+import magpylib
+import meshio
+import numpy as np
+import pytest
+import pyvista
+from places import SCENES
+from scipy.spatial.transform import Rotation
+
+import spinlev as sl
+from spinlev.geometry.basics import MU_0, InputError
+from spinlev.studies.exchange import export_job, from_magpylib, to_magpylib
+from spinlev.studies.terminal import KINDS, Models, new_scene
+
+POINTS = np.random.default_rng(0).normal(size=(50, 3)) * 0.01 + [0.0, 0.0, -0.04]
+BALL = sl.sphere(diameter_mm=12.7, remanence_T=1.305, density_kg_m3=7500.0)
+
+
+def collection():
+    turned = Rotation.from_euler("xyz", [20.0, -35.0, 70.0], degrees=True)
+    first = magpylib.magnet.Cuboid(position=(0.002, 0, 0), dimension=(0.01, 0.01, 0.01), polarization=(1.3, 0, 0))
+    second = magpylib.magnet.Cuboid(dimension=(0.004, 0.006, 0.008), polarization=(0.1, -0.5, 1.1), orientation=turned)
+    second.move((0.0, 0.001, 0.015))
+    return magpylib.Collection(first, magpylib.Collection(second))
+
+
+def test_magpylib_there_and_back():
+    """The field of magpylib's cuboids is that of the rotor made of them, and that of the cuboids made of its table."""
+    given = collection()
+    scene = sl.scene(frequency_hz=100.0, rotor=from_magpylib(given, recoil_permeability=1.0), floater=BALL)
+    table = sl.rotor_table(scene, model="cuboid")
+    expected = given.getB(POINTS)
+    size = np.abs(expected).max()
+    np.testing.assert_allclose(table.evaluate(POINTS)[0], expected, rtol=0, atol=1e-12 * size)
+    again = to_magpylib(table)
+    np.testing.assert_allclose(again.getB(POINTS), expected, rtol=0, atol=1e-12 * size)
+    back = from_magpylib(again, recoil_permeability=1.0)
+    for before, after in zip(from_magpylib(given, 1.0)["magnets"], back["magnets"], strict=True):
+        for key, value in before.items():
+            np.testing.assert_allclose(after[key], value, rtol=1e-12, atol=1e-12)
+
+
+def test_a_table_with_expansions_is_a_source_of_magpylib():
+    table = sl.rotor_table(SCENES / "tilt-over-plate.toml", model="dipole")
+    source = to_magpylib(table)
+    np.testing.assert_allclose(source.getB(POINTS), table.evaluate(POINTS)[0], rtol=1e-12)
+    np.testing.assert_allclose(MU_0 * source.getH(POINTS), table.evaluate(POINTS)[0], rtol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("wrong", "said"),
+    [
+        (magpylib.Collection(), "at least one magnet"),
+        (magpylib.magnet.Sphere(diameter=0.01, polarization=(0, 0, 1)), "cuboids only"),
+        (magpylib.magnet.Cuboid(), "with a size and a polarisation"),
+        (collection().children[0].copy(position=[(0, 0, 0), (0, 0, 1)]), "at rest"),
+    ],
+)
+def test_what_is_no_rotor_is_refused(wrong, said):
+    with pytest.raises(InputError, match=said):
+        from_magpylib(wrong)
+
+
+@pytest.mark.parametrize("name", KINDS)
+def test_a_new_scene_loads_and_is_commented(name, tmp_path):
+    path = new_scene(name, tmp_path / "my.toml")
+    assert sl.load_scene(path).frequency > 0
+    assert path.read_text().count("#") > 5
+    with pytest.raises(InputError, match="must not exist yet"):
+        new_scene(name, path)
+
+
+def test_an_unknown_kind_of_scene(tmp_path):
+    with pytest.raises(InputError, match="one of tilt, horizontal, vertical, magnets; instead received cube"):
+        new_scene("cube", tmp_path / "my.toml")
+
+
+@pytest.fixture(scope="module")
+def exported(tmp_path_factory):
+    path = tmp_path_factory.mktemp("vtu") / "fields.vtu"
+    values, _ = export_job(sl.load_scene(SCENES / "vertical-24h.toml"), Models("cuboid", "none"), path)
+    return path, values
+
+
+def test_fields_for_paraview_are_maxwells(exported):
+    """B = μ0 (H + M) everywhere; M of the rotor's cubes and of the floater has the right moment."""
+    path, values = exported
+    mesh = meshio.read(path)
+    data = mesh.point_data
+    assert values["points"] == len(mesh.points) == len(data["B"])
+    np.testing.assert_allclose(data["B"], MU_0 * (data["H"] + data["M"]), atol=1e-12)
+    scene = sl.load_scene(SCENES / "vertical-24h.toml")
+    sizes = np.linalg.norm(data["M"], axis=1)
+    assert sizes[data["body"] == 0].max() == 0.0
+    np.testing.assert_allclose(sizes[data["body"] == 2], scene.floater.moment / scene.floater.volume)
+    np.testing.assert_allclose(sizes[data["body"] == 1].mean(), 1.305 / MU_0, rtol=0.05)
+
+
+def test_the_fields_have_no_divergence_in_the_air(exported):
+    """The flux of B out of a box in the air between the bodies' outlines vanishes; PyVista reads and derives."""
+    grid = pyvista.read(exported[0])
+    derived = grid.compute_derivative(scalars="B", divergence=True, gradient="slope")
+    air = (grid["body"] == 0) & (grid.points[:, 2] < -0.008) & (grid.points[:, 2] > -0.016)
+    air &= np.hypot(grid.points[:, 0], grid.points[:, 1]) < 0.005
+    slope = np.linalg.norm(derived["slope"][air], axis=1)
+    assert air.sum() > 50
+    assert np.median(np.abs(derived["divergence"][air]) / slope) < 0.02  # second-order differences on a 0.9 mm grid
+
+
+def test_only_vtu(tmp_path):
+    with pytest.raises(InputError, match=r"must end in \.vtu"):
+        export_job(sl.load_scene(SCENES / "vertical-24h.toml"), Models("cuboid", "none"), tmp_path / "fields.csv")
