@@ -9,6 +9,7 @@ import numpy as np
 from ...fem.rotor_tables import FieldTable
 from ...geometry.basics import Array
 from ...geometry.scenes import Scene
+from ..effects import with_effects
 from ..equilibria import SearchRange, Steps, find_equilibria, scattered
 from ..motion import Rates, Scales
 from ..steady import Equilibrium, EquilibriumError
@@ -44,7 +45,7 @@ def _levitating_frequency(
     scene: Scene, table: FieldTable, equilibria: Sequence[Equilibrium], widest: float
 ) -> float | None:
     """A frequency (Hz) in the nearest window in which a branch is stable."""
-    rates, own = Rates.of(scene, table), scene.frequency
+    rates, own = Rates(with_effects(scene, table)), scene.frequency
     where = SearchRange(scene, FARTHEST)
 
     def counts(point: BranchPoint) -> bool:

@@ -4,11 +4,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
-from scipy.optimize import brentq
+import scipy
 
 from ...fem.rotor_tables import RotorTable, rotor_table
 from ...geometry.basics import Array
 from ...geometry.scenes import Scene
+from ..effects import with_effects
 from ..equilibria import Steps
 from ..motion import Rates, rotor_gap
 from ..steady import EquilibriumError
@@ -53,7 +54,7 @@ def reference_state(scene: Scene) -> tuple[Array, float]:
     EquilibriumError : there is none up to `HIGHEST`
     """
     table = rotor_table(scene.rotor, "dipole")
-    found = levitating_ranges(scene, table, Rates.of(scene, table))
+    found = levitating_ranges(scene, table, Rates(with_effects(scene, table)))
     if not found:
         raise EquilibriumError("Point dipoles levitate stably at none of the frequencies that are looked at.")
     lowest = found[0]
@@ -150,4 +151,6 @@ def _touching(scene: Scene, family: Family, before: BranchPoint, after: BranchPo
 
     ends = before.parameter, after.parameter
     inside = ends[0] + 1e-9 * (ends[1] - ends[0])
-    return there(float(brentq(lambda f: rotor_gap(scene, there(f).position), inside, ends[1], xtol=1e-6)))
+    return there(
+        float(scipy.optimize.brentq(lambda f: rotor_gap(scene, there(f).position), inside, ends[1], xtol=1e-6))
+    )

@@ -56,7 +56,7 @@ class Lanes:
     def __init__(self, flight: LocalFlight, formula: BallField, duration: float) -> None:
         self.flight, self.formula = flight, formula
         self._end = duration / flight.scales.time
-        equations, inside = ball_equations(flight.scene, formula)
+        equations, inside = ball_equations(flight.scene, flight.table, formula)
         self._integrator = compiled(
             hy.taylor_adaptive_batch,
             list(zip(equations.variables, equations.rates, strict=True)),

@@ -6,6 +6,7 @@ from numpy.typing import NDArray
 from ...fem.rotor_tables import FieldTable
 from ...geometry.basics import Array
 from ...geometry.scenes import Scene
+from ..effects import with_effects
 from ..motion import Parameter, PlateMemory, Rates, Scales, parameters
 from ..steady import Balance, Equilibrium, EquilibriumError, ForceCurve, Survey, modes, named_modes
 from .curve import Curve
@@ -23,7 +24,7 @@ def find_equilibria(
     memory: PlateMemory | None = None,
 ) -> list[Equilibrium]:
     """All synchronous equilibria below the rotor, the stable ones first, then by distance; see `survey`."""
-    rates = rates or Rates.of(scene, table)
+    rates = rates or Rates(with_effects(scene, table))
     found = survey(scene, table, spin, farthest, rates)
     return list((found if memory is None else with_plate(scene, table, found, memory, rates)).equilibria)
 
@@ -59,7 +60,7 @@ def survey(
     """
     turning(scene)
     scales = Scales.of(scene)
-    balance = Balance(rates or Rates.of(scene, table), parameters(scene, scales, frozen_spin=True), spin)
+    balance = Balance(rates or Rates(with_effects(scene, table)), parameters(scene, scales, frozen_spin=True), spin)
     curves, points = fixed_points(balance, SearchRange(scene, farthest))
     where = np.reshape([np.concatenate(point) for point in points], (-1, 6))
     known, doubts = field_doubts(table, where[:, :3] * scales.length)
@@ -103,7 +104,7 @@ def with_plate(
     """
     values = parameters(scene, Scales.of(scene), frozen_spin=True)
     fixed = [equilibrium.without or equilibrium for equilibrium in known.equilibria]
-    found = _shaken(Shaken(scene, rates or Rates.of(scene, table), values, memory), fixed)
+    found = _shaken(Shaken(scene, rates or Rates(with_effects(scene, table)), values, memory), fixed)
     return Survey(_in_order(found), known.curves)
 
 

@@ -9,6 +9,7 @@ import numpy as np
 from ...fem.rotor_tables import FieldTable
 from ...geometry.basics import Array
 from ...geometry.scenes import Scene
+from ..effects import with_effects
 from ..motion import Rates, Scales, parameters
 from ..steady import Balance, moved_pose, solve, tangent_basis
 
@@ -46,7 +47,9 @@ class PerturbedBalance:
     def of(cls, scene: Scene, table: FieldTable, spin: float = 0.0) -> Self:
         """The balance in a table's field, for body spin s."""
         scales = Scales.of(scene)
-        return cls(Balance(Rates.of(scene, table), parameters(scene, scales, frozen_spin=True), spin), scales, scene)
+        return cls(
+            Balance(Rates(with_effects(scene, table)), parameters(scene, scales, frozen_spin=True), spin), scales, scene
+        )
 
     def direction(self, position: Array, guess: Array) -> Array:
         """Moment direction (3,) whose torque is balanced at a place (3,) m; `guess` itself if none is near."""

@@ -1,6 +1,6 @@
 """The compiled parts of a flight through balls: one for balls of each degree, and one for the table's own field."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import heyoka as hy
 import numpy as np
@@ -8,6 +8,7 @@ import numpy as np
 from ...fem.harmonics import BallField
 from ...fem.rotor_tables import FieldTable
 from ...geometry.scenes import Scene
+from ..effects import with_effects
 from ..motion import Equations, Parameter, PlateMemory, equations_of_motion
 from .compiled_flight import Flight, compile_flight, flight_of
 
@@ -64,7 +65,7 @@ class Parts:
         scene, memory = self.scene, self.memory
         if not degree:
             return compile_flight(scene, self.table, self.duration, self.tolerance, True, memory)
-        equations, inside = ball_equations(scene, BallField(DEGREE + 1, degree), memory)
+        equations, inside = ball_equations(scene, self.table, BallField(DEGREE + 1, degree), memory)
         leaves = hy.t_event(inside, direction=hy.event_direction.negative)
         long = memory is None and degree == SMALL.degree and scene.frequency * self.duration > STRAIGHT_TURNS
         straight = long if self.compact is None else not self.compact
@@ -72,11 +73,11 @@ class Parts:
 
 
 def ball_equations(
-    scene: Scene, formula: BallField, memory: PlateMemory | None = None
+    scene: Scene, table: FieldTable, formula: BallField, memory: PlateMemory | None = None
 ) -> tuple[Equations, hy.expression]:
-    """The motion in a ball, and what becomes negative outside of it."""
-    tilted, conducting = bool(np.any(scene.gravity[:2])), bool(scene.floater.conductivity)
-    equations = equations_of_motion(formula, tilted, memory, conducting, scene.angular_velocity)
+    """The motion in a ball, with the effects of the table, and what becomes negative outside of it."""
+    tilted, inside = bool(np.any(scene.gravity[:2])), replace(with_effects(scene, table), field=formula)
+    equations = equations_of_motion(inside, tilted, memory, scene.angular_velocity)
     offset = formula.offset([hy.par[Parameter.LENGTH] * x for x in equations.variables[:3]])
     return equations, 1.0 - hy.sum([t * t for t in offset])
 

@@ -12,6 +12,7 @@ from ...fem.rotor_tables import FieldTable
 from ...fem.storage import compiled
 from ...geometry.basics import Array
 from ...geometry.scenes import Scene
+from ..effects import with_effects
 from ..motion import (
     Equations,
     Parameter,
@@ -97,8 +98,8 @@ def compile_flight(
     compact : compile loops instead of straight code: sooner ready, two to three times slower; None to choose
     memory : the plate's currents, if they are modelled
     """
-    tilted, conducting = bool(np.any(scene.gravity[:2])), bool(scene.floater.conductivity)
-    equations = equations_of_motion(table, tilted, memory, conducting, scene.angular_velocity)
+    tilted = bool(np.any(scene.gravity[:2]))
+    equations = equations_of_motion(with_effects(scene, table), tilted, memory, scene.angular_velocity)
     events = flight_events(scene, equations.variables[:3])
     if compact is None:
         compact = not _worth_compiling(equations, scene, duration)

@@ -12,7 +12,7 @@ WINDOWS = 20
 VISIBLE = 2e-5
 """Smallest drift or oscillation that counts while the floater is still up, m."""
 HELD = 0.5
-"""A loss before this time, s, is no flight: the floater had no time for a few bounces."""
+"""A loss before this time, s, is no flight: the floater had no time for a few bounces; nor is a trend seen in less."""
 
 
 def flight_kind(flight: Trajectory) -> str:
@@ -26,7 +26,7 @@ def flight_kind(flight: Trajectory) -> str:
     """
     lasted = flight.ended_by in (DURATION, STOPPED)
     distance = np.linalg.norm(flight.lab.position, axis=1)
-    if len(distance) < 4 * WINDOWS or not (lasted or flight.levitated_s > HELD):
+    if len(distance) < 4 * WINDOWS or flight.levitated_s <= HELD:
         return STABLE if lasted else NOT_HELD
     parts = np.array_split(np.arange(len(distance)), WINDOWS)[: WINDOWS if lasted else -1]
     means = np.array([distance[part].mean() for part in parts])

@@ -12,18 +12,10 @@ from ...geometry.basics import Array, Box
 from ...geometry.bodies import Magnet
 from ...geometry.scenes import Scene
 from ..branches import Problem
-from ..motion import (
-    MovableField,
-    Move,
-    Parameter,
-    Rates,
-    Rotation,
-    Scales,
-    Translation,
-    blend_tables,
-    chebyshev_points,
-    parameters,
-)
+from ..effects import with_effects
+from ..motion import Parameter, Rates, Scales, parameters
+from .blend import blend_tables, chebyshev_points
+from .movable import MovableField, Move, Rotation, Translation
 
 MOVES: dict[str, tuple[Move | None, ...]] = {
     "horizontal": (Translation((1.0, 0.0, 0.0)),),
@@ -79,7 +71,7 @@ class RotorFamily:
     @cached_property
     def rates(self) -> Rates:
         """Compiled once for all frequencies and measures."""
-        return Rates(self.field, bool(self.scene.floater.conductivity), optimised=True)
+        return Rates(with_effects(self.scene, self.field), optimised=True)
 
 
 def rotor_family(

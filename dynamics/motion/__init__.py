@@ -1,6 +1,14 @@
 """Which equations does the floater obey?"""
 
-from .blend import blend_tables as blend_tables, chebyshev_points as chebyshev_points
+from .effect import (
+    NOTHING as NOTHING,
+    ZERO as ZERO,
+    Added as Added,
+    Effect as Effect,
+    Motion as Motion,
+    conservative as conservative,
+    dissipative as dissipative,
+)
 from .equations import Equations as Equations, equations_of_motion as equations_of_motion, parameters as parameters
 from .events import (
     CONTACT as CONTACT,
@@ -12,9 +20,9 @@ from .events import (
     plate_places as plate_places,
     rotor_gap as rotor_gap,
 )
-from .movable import MovableField as MovableField, Move as Move, Rotation as Rotation, Translation as Translation
+from .interaction import Interaction as Interaction, interaction_of as interaction_of
 from .plate_force import PlateForce as PlateForce
 from .plate_terms import PlateMemory as PlateMemory
 from .rates import Rates as Rates
 from .state import Scales as Scales, State as State, turned_about_z as turned_about_z
-from .symbols import Parameter as Parameter
+from .symbols import Parameter as Parameter, Vector as Vector, cross as cross, dot as dot

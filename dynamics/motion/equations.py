@@ -13,10 +13,9 @@ along the axis everything is autonomous, and the Jacobi integral
 
 is conserved: the energy less ω times the angular momentum about the axis.  What drag and a horizontal part of gravity
 do in the rotating frame is integrated along as the last state, `work`, so that J - work never changes.
-A conducting floater is dragged along by the field that turns past it (`fem.closed_forms.sphere_eddy`): in a uniform
-field, and slowly enough for its skin depth, by the torque -κ [(Ω - W) B² - B B·(Ω - W)].  A plate adds its currents as
-further states (`plate_terms`) and their energy to J. Every number that a sweep may change is a runtime parameter; only
-the tables' own geometry is compiled in.
+Effects (`effect`) add what else acts on the floater: accelerations of position and spin, their energy to J, their
+power to `work`.  A plate adds its currents as further states (`plate_terms`) and their energy to J.  Every number that
+a sweep may change is a runtime parameter; only the tables' own geometry is compiled in.
 """
 
 from dataclasses import dataclass
@@ -28,6 +27,8 @@ from ...fem.closed_forms import rotating_torque
 from ...fem.rotor_tables import FieldFormula
 from ...geometry.basics import Array
 from ...geometry.scenes import Scene
+from .effect import Motion
+from .interaction import interaction_of
 from .plate_terms import PlateMemory, memory_terms
 from .state import Scales
 from .symbols import Parameter, Vector, cross, dot, subtract, turned
@@ -43,8 +44,8 @@ class Equations:
     ----------
     variables : the twelve of the floater, then the plate's
     rates : their derivatives with respect to scaled time
-    jacobi : the terms of the Jacobi integral: motion, turning, magnet, weight, swirl, and the plate's energy
-    power : its rate of change, by drag, by gravity across the axis and by the plate
+    jacobi : the terms of the Jacobi integral: motion, turning, magnet, weight, swirl, effects, and the plate's energy
+    power : its rate of change, by drag, by gravity across the axis, by effects and by the plate
     """
 
     variables: Vector
@@ -80,17 +81,15 @@ def equations_of_motion(
     table: FieldFormula,
     tilted_gravity: bool = False,
     memory: PlateMemory | None = None,
-    conducting: bool = False,
     angular_velocity: float = 0.0,
 ) -> Equations:
     """Rates of the scaled state in the field of a table.
 
     Parameters
     ----------
-    table : the rotor's field
+    table : the rotor's field, with effects if it is an `Interaction`
     tilted_gravity : whether gravity has a part across the axis; it turns in this frame, so that time enters
     memory : the plate's currents, if they are modelled
-    conducting : whether the floater has eddy currents of its own
     angular_velocity : of the rotor, rad/s; only `memory` needs it, in which it is compiled in
     """
     variables = hy.make_vars(*NAMES)
@@ -107,8 +106,6 @@ def equations_of_motion(
     drift = subtract(velocity, turned(position))
     lag = [spin[0], spin[1], spin[2] - hy.par[Parameter.RATE]]
     brake = _angular_drag(moment, spin)
-    if conducting:
-        brake = [a + b for a, b in zip(brake, _own_currents(moment, field, lag), strict=True)]
     jacobi = [
         0.5 * dot(velocity, velocity),
         0.5 * inertia * dot(spin, spin),
@@ -117,6 +114,13 @@ def equations_of_motion(
         -hy.par[Parameter.RATE] * (cross(position, velocity)[2] + inertia * spin[2]),
     ]
     power = dot(push, drift) + inertia * dot(brake, lag)
+    motion = Motion(position, velocity, moment, spin, drift, lag, field, gradient)
+    for effect in interaction_of(table).effects:
+        added = effect.added(motion)
+        force = [a + b for a, b in zip(force, added.force, strict=True)]
+        turn = [a + b for a, b in zip(turn, added.torque, strict=True)]
+        jacobi.append(added.energy)
+        power = power + added.power
     states: list[hy.expression] = []
     state_rates: Vector = []
     if memory is not None:
@@ -150,12 +154,3 @@ def _angular_drag(moment: Vector, spin: Vector) -> Vector:
     tilt, along = hy.par[Parameter.TILT_DRAG], hy.par[Parameter.SPIN_DRAG]
     excess = (tilt - along) * dot(spin, moment)
     return [excess * moment[i] - tilt * spin[i] for i in range(3)]
-
-
-def _own_currents(moment: Vector, field: Vector, lag: Vector) -> Vector:
-    """Acceleration of the spin by the floater's own eddy currents; across the moment and along it."""
-    tilt, along = hy.par[Parameter.TILT_EDDY], hy.par[Parameter.SPIN_EDDY]
-    square, turning = dot(field, field), dot(field, lag)
-    torque = [turning * field[i] - square * lag[i] for i in range(3)]
-    excess = (along - tilt) * dot(torque, moment)
-    return [tilt * torque[i] + excess * moment[i] for i in range(3)]

@@ -12,7 +12,6 @@ from numpy.typing import ArrayLike
 from ...fem.rotor_tables import FieldFormula
 from ...fem.storage import compiled
 from ...geometry.basics import Array
-from ...geometry.scenes import Scene
 from .at_rest import balances
 from .equations import equations_of_motion
 
@@ -22,24 +21,18 @@ class Rates:
 
     Parameters
     ----------
-    table : the rotor's field
-    conducting : whether the floater has eddy currents of its own
+    table : the rotor's field, with effects if it is an `Interaction`
     optimised : for very many states: faster, and compiled in twice the time
     """
 
-    def __init__(self, table: FieldFormula, conducting: bool = False, optimised: bool = False) -> None:
-        equations = equations_of_motion(table, conducting=conducting)
+    def __init__(self, table: FieldFormula, optimised: bool = False) -> None:
+        equations = equations_of_motion(table)
         self._equations, self._level = equations, 1 if optimised else 0
         variables = list(equations.variables)
         tensors = hy.diff_tensors(list(equations.rates), diff_args=variables, diff_order=1)
         outputs = [*equations.rates, *np.asarray(tensors.jacobian).ravel()]
         # Unoptimised code is compiled three times as fast, and a search is over before faster code would be ready.
         self._function = compiled(hy.cfunc, outputs, variables, compact_mode=True, opt_level=self._level)
-
-    @classmethod
-    def of(cls, scene: Scene, table: FieldFormula) -> Rates:
-        """The rates that a scene needs."""
-        return cls(table, bool(scene.floater.conductivity))
 
     def __call__(self, states: ArrayLike, values: Array) -> tuple[Array, Array]:
         """Rates (n, 12) and their derivatives (n, 12, 12) at scaled `states` (n, 12).

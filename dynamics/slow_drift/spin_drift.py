@@ -11,6 +11,7 @@ import numpy as np
 from ...fem.rotor_tables import FieldTable
 from ...geometry.scenes import Scene
 from ..branches import FOLD, BranchPoint, Family, follow_branch, spins
+from ..effects import with_effects
 from ..equilibria import Steps, find_equilibria
 from ..motion import Rates, Scales, State, rotor_gap
 from ..steady import Equilibrium, EquilibriumError
@@ -45,7 +46,7 @@ def drift(
     ------
     EquilibriumError : no equilibrium at the start
     """
-    rates = rates or Rates.of(scene, table)
+    rates = rates or Rates(with_effects(scene, table))
     torque = SlowTorque.of(scene, rates, stokes)
     family = Family(rates, spins(scene))
     state = Scales.of(scene).pack(start or _start(scene, table, spin, rates).state)

@@ -5,8 +5,8 @@ from dataclasses import replace
 from itertools import combinations
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike
-from scipy.optimize import minimize_scalar
 
 from ..basics import Array, Box, rotation_matrix
 from .magnet import Magnet
@@ -61,7 +61,9 @@ def deepest_overlap_in_a_turn(rotating: Box, fixed: Box) -> float:
     angles = np.linspace(0.0, 2 * np.pi, 73)
     best = angles[int(np.argmin([gap(angle) for angle in angles]))]
     step = angles[1]
-    refined = minimize_scalar(gap, bounds=(best - step, best + step), method="bounded", options={"xatol": 1e-9})
+    refined = scipy.optimize.minimize_scalar(
+        gap, bounds=(best - step, best + step), method="bounded", options={"xatol": 1e-9}
+    )
     return -min(gap(best), float(refined.fun))
 
 

@@ -8,6 +8,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
+from ...dynamics.effects import with_effects
 from ...dynamics.equilibria import survey, with_plate
 from ...dynamics.flights import Checkpoint, Trajectory, simulate, starting_point
 from ...dynamics.motion import PlateMemory, Rates
@@ -185,7 +186,7 @@ class Levitation:
         """The equations of motion in the rotor's field, compiled."""
         kind = self.table.model, bool(self.scene.floater.conductivity)
         if kind not in self._equations:
-            self._equations[kind] = Rates.of(self.scene, self.table)
+            self._equations[kind] = Rates(with_effects(self.scene, self.table))
         return self._equations[kind]
 
     @property

@@ -12,7 +12,7 @@ FLOORS = {
         *("storage", "harmonics", "closed_forms", "elements", "magnetostatics", "rotor_tables", "measured_maps"),
         *("mutual", "eddy_currents", "plate_currents", "plate_network", "plate_tables", "slab", "verification"),
     ],
-    "dynamics": ["motion", "steady", "equilibria", "branches", "maps", "flights", "ensembles", "slow_drift"],
+    "dynamics": ["motion", "effects", "steady", "equilibria", "branches", "maps", "flights", "ensembles", "slow_drift"],
     "studies": [
         *(
             "terminal",

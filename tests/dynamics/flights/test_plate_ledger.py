@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from second_opinions.phasor import mean_force, mean_loss, mean_torque
 
+from spinlev.dynamics.effects import with_effects
 from spinlev.dynamics.equilibria import find_equilibria, with_plate
 from spinlev.dynamics.flights import initial_state, starting_point
 from spinlev.dynamics.flights.compiled_flight import compile_flight
@@ -70,7 +71,7 @@ def test_ledger_of_ten_seconds():
     """Work = change of energy + loss in the plate, by drag and in the floater, after a kick: 1e-8 asked."""
     scene = replace(SCENE, floater=replace(FLOATER, conductivity=6.7e5))
     table = rotor_table(MAGNETS, "dipole")
-    rates, memory = Rates.of(scene, table), memory_of(table)
+    rates, memory = Rates(with_effects(scene, table)), memory_of(table)
     fixed = starting_point(find_equilibria(scene, table, rates=rates))
     found = with_plate(scene, table, Survey((fixed,), ()), memory, rates).equilibria[0]
     kicked = replace(found.start, velocity=found.start.velocity + np.array([0.03, 0.02, 0.05]))

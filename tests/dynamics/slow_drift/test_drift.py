@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from scipy.special import spherical_kn
 
+from spinlev.dynamics.effects import with_effects
 from spinlev.dynamics.equilibria import find_equilibria
 from spinlev.dynamics.flights.compiled_flight import compile_flight
 from spinlev.dynamics.flights.integration import integrate
@@ -25,7 +26,7 @@ VERTICAL_TABLE, HORIZONTAL_TABLE = (rotor_table(s.rotor, "dipole") for s in (VER
 
 @pytest.fixture(scope="module")
 def rates():
-    return Rates.of(VERTICAL, VERTICAL_TABLE)
+    return Rates(with_effects(VERTICAL, VERTICAL_TABLE))
 
 
 def nearest(scene, table, spin=0.0, rates=None):

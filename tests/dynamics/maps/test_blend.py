@@ -4,7 +4,9 @@ import heyoka as hy
 import numpy as np
 import pytest
 
-from spinlev.dynamics.motion import Parameter, Translation, blend_tables, chebyshev_points
+from spinlev.dynamics.maps.blend import blend_tables, chebyshev_points
+from spinlev.dynamics.maps.movable import Translation
+from spinlev.dynamics.motion import Parameter
 from spinlev.fem.harmonics import MultipoleExpansion
 
 RADIUS = 8e-3

@@ -9,8 +9,8 @@ import numpy as np
 
 from ...fem.harmonics import UPPER, FieldExpressions, MultipoleExpansion, harmonic_sums
 from ...geometry.basics import Array
+from ..motion import Parameter
 from .movable import Translation
-from .symbols import Parameter
 
 
 def chebyshev_points(lowest: float, highest: float, count: int) -> Array:

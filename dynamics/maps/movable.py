@@ -11,7 +11,7 @@ from ...fem.harmonics import FieldExpressions
 from ...fem.rotor_tables import FieldFormula
 from ...geometry.basics import Array, rotation_matrix
 from ...geometry.bodies import Magnet
-from .symbols import Parameter, Vector
+from ..motion import Parameter, Vector
 
 
 class Move(Protocol):

@@ -1,0 +1,87 @@
+"""What an effect is: something that acts on the floater beyond the rotor's field on a rigid dipole.
+
+All in the units of `Scales`, energies in M R²/T², along the axes that turn with the rotor.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Protocol
+
+import heyoka as hy
+
+from .symbols import Parameter, Vector, cross, dot
+
+ZERO = hy.expression(0.0)
+NOTHING = (ZERO, ZERO, ZERO)
+
+
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """The floater's motion, as expressions (3,) that effects are written with.
+
+    Parameters
+    ----------
+    position, velocity, moment, spin : the scaled state; moment is a unit vector
+    drift, lag : velocity and spin as seen from the rotor
+    field, gradient : the rotor's B (3) T and ∂B_i/∂x_j (3, 3) T/m at the floater's centre
+    """
+
+    position: Vector
+    velocity: Vector
+    moment: Vector
+    spin: Vector
+    drift: Vector
+    lag: Vector
+    field: Vector
+    gradient: list[list[hy.expression]]
+
+
+@dataclass(frozen=True, eq=False)
+class Added:
+    """What an effect adds to the equations of motion.
+
+    Parameters
+    ----------
+    force, torque : (3,) scaled accelerations of place and of spin
+    energy : term of the Jacobi integral
+    power : rate of change of the Jacobi integral by this effect
+    """
+
+    force: Vector = NOTHING
+    torque: Vector = NOTHING
+    energy: hy.expression = ZERO
+    power: hy.expression = ZERO
+
+
+class Effect(Protocol):
+    """Something that acts on the floater; a new effect is one class with these members."""
+
+    @property
+    def name(self) -> str:
+        """Its name in results."""
+
+    def added(self, motion: Motion) -> Added:
+        """Its part of the equations of motion; it may use every runtime `Parameter`."""
+
+
+def dissipative(force: Vector, torque: Vector, motion: Motion) -> Added:
+    """An effect that stores no energy, from its accelerations: its power is what they do to drift and lag."""
+    work = [f * v for f, v in zip(force, motion.drift, strict=True)]
+    turning = [t * w for t, w in zip(torque, motion.lag, strict=True)]
+    return Added(force, torque, power=hy.sum(work) + hy.par[Parameter.INERTIA] * hy.sum(turning))
+
+
+def conservative(energy: Callable[[Vector, Vector, Vector], hy.expression], motion: Motion) -> Added:
+    """An effect that has an energy, a function of scaled position, moment direction and the rotor's field (T) there.
+
+    Force and torque are its derivatives, the field's own change with the position included.
+    """
+    names = [f"{vector}_{k}" for vector in ("place", "pointing", "flux") for k in range(3)]
+    given = hy.make_vars(*names)
+    value = energy(given[:3], given[3:6], given[6:])
+    slopes = hy.diff_tensors([value], diff_args=given, diff_order=1).gradient
+    here = dict(zip(names, (*motion.position, *motion.moment, *motion.field), strict=True))
+    stored, *slopes = hy.subs([value, *slopes], here)
+    carried = [dot(slopes[6:], [motion.gradient[i][j] for i in range(3)]) for j in range(3)]
+    force = [-slopes[j] - hy.par[Parameter.LENGTH] * carried[j] for j in range(3)]
+    return Added(force, [t / hy.par[Parameter.INERTIA] for t in cross(slopes[3:6], motion.moment)], stored)
