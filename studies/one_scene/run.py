@@ -64,6 +64,7 @@ def main_job(scene: Scene, asked: Models, duration: float, out: Path) -> Job:
     found = surveys[chosen.model].equilibria
     compared = comparison(alone["dipole"], alone[best.model], best.model)
     values: dict[str, Any] = {
+        "headline": headline(levitation, found),
         **equilibria_answer(levitation, found),
         "comparison": compared,
         "tables_from_cache": levitation.from_cache,

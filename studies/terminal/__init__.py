@@ -19,6 +19,7 @@ from .numbers import (
 )
 from .options import (
     Answer as Answer,
+    Beside as Beside,
     FieldModel as FieldModel,
     Models as Models,
     Output as Output,

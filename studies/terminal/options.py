@@ -86,6 +86,26 @@ class Output:
     verbose: Annotated[bool, Parameter(negative="")] = False
 
 
+@Parameter(name="*")
+@dataclass(frozen=True)
+class Beside:
+    """Where answers about a file go.
+
+    Parameters
+    ----------
+    json
+        Print one JSON object and nothing else on standard output.
+    out
+        Folder for the files; left out: beside the input.
+    verbose
+        Say more.
+    """
+
+    json: Annotated[bool, Parameter(negative="")] = False
+    out: Path | None = None
+    verbose: Annotated[bool, Parameter(negative="")] = False
+
+
 @dataclass(frozen=True)
 class Answer:
     """What a command says: numbers for a program, lines for a person."""
