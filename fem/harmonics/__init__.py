@@ -41,6 +41,7 @@ from .surface import (
     Keys as Keys,
     harmonic_parity as harmonic_parity,
     mirrored_harmonics as mirrored_harmonics,
+    norm as norm,
     orthonormal as orthonormal,
     orthonormal_keys as orthonormal_keys,
     outer_coefficients as outer_coefficients,
