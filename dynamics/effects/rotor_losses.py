@@ -4,12 +4,19 @@ The floater's dipole m drives current pattern k by u_k = d/dt m·c_k(x), as seen
 field B = -Σ u_k c_k there, which acts on the floater by (m·∇)B and m × B and takes the power Σ u_k².
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import heyoka as hy
+import numpy as np
 
 from ...fem.rotor_losses import RotorLosses
-from ..motion import Added, Motion, Parameter, cross, dissipative, dot
+from ...fem.rotor_tables import FieldTable
+from ...geometry.basics import Array
+from ..motion import Added, Motion, Parameter, Vector, cross, dissipative, dot
+
+NAME = "rotor currents"
+UPPER = [(a, b) for a in range(6) for b in range(a, 6)]
 
 
 @dataclass(frozen=True, eq=False)
@@ -17,32 +24,75 @@ class RotorCurrents:
     """The brake of a table."""
 
     table: RotorLosses
-    name: str = "rotor currents"
+    name: str = NAME
 
     def added(self, motion: Motion) -> Added:
         """Its accelerations of place and spin."""
-        length = hy.par[Parameter.LENGTH]
-        # m T/√(M R²) per unit of turn: the square root of the power, in the unit of energy a unit of time
-        strength = hy.par[Parameter.PLATE_MOMENT] * (1.0 / hy.sqrt(hy.par[Parameter.TIME]))
+        length, weights = hy.par[Parameter.LENGTH], self.table.weights
+        strength = hy.par[Parameter.PLATE_MOMENT] * hy.pow(hy.par[Parameter.TIME], -0.5)  # m/√E per √T
         multipoles = self.table.multipoles.expressions([length * x for x in motion.position])
-        moment, drift = motion.moment, motion.drift
-        turning = cross(motion.lag, moment)
+        moment, drift, turning = motion.moment, motion.drift, cross(motion.lag, motion.moment)
         heard = []
         for field, slope in multipoles:
             carried = [dot(moment, [slope[i][j] for i in range(3)]) for j in range(3)]
             heard.append(length * dot(carried, drift) + dot(field, turning))
-        rates = [
-            strength * hy.sum([float(w) * h for w, h in zip(row, heard, strict=True) if w])
-            for row in self.table.weights
+        rates = [strength * _sum(row, heard) for row in weights]
+        answers = [-strength * _sum(column, rates) for column in weights.T]
+        field = [hy.sum([s * b[i] for s, (b, _) in zip(answers, multipoles, strict=True)]) for i in range(3)]
+        slopes = [
+            [hy.sum([s * g[i][j] for s, (_, g) in zip(answers, multipoles, strict=True)]) for j in range(3)]
+            for i in range(3)
         ]
-        answers = [-strength * hy.sum([float(w) * r for w, r in zip(column, rates, strict=True) if w])
-                   for column in self.table.weights.T]  # fmt: skip
-        field = _summed([b for b, _ in multipoles], answers)
-        slopes = [_summed([slope[i] for _, slope in multipoles], answers) for i in range(3)]
         force = [length * dot(moment, [slopes[i][j] for i in range(3)]) for j in range(3)]
-        torque = [t / hy.par[Parameter.INERTIA] for t in cross(moment, field)]
-        return dissipative(force, torque, motion)
+        return _braked(force, field, motion)
+
+    def placed(self, first: int) -> "RotorCurrentsAtPlace":
+        """The same about one pose."""
+        return RotorCurrentsAtPlace(self.table, first)
 
 
-def _summed(vectors: list[list[hy.expression]], strengths: list[hy.expression]) -> list[hy.expression]:
-    return [hy.sum([s * v[i] for s, v in zip(strengths, vectors, strict=True)]) for i in range(3)]
+@dataclass(frozen=True, eq=False)
+class RotorCurrentsAtPlace:
+    """The same with the matrix D of one pose: right there, and its derivatives where the floater is in step.
+
+    Parameters
+    ----------
+    table : of the losses
+    first : number of the first of its runtime parameters: D (21) by drift and by the rate of m̂, scaled
+    """
+
+    table: RotorLosses
+    first: int
+    name: str = NAME
+
+    @property
+    def count(self) -> int:
+        """Of the runtime parameters."""
+        return len(UPPER)
+
+    def added(self, motion: Motion) -> Added:
+        """Force and torque are -D of drift and turning."""
+        known = {pair: hy.par[self.first + k] for k, pair in enumerate(UPPER)}
+        rates = [*motion.drift, *cross(motion.lag, motion.moment)]
+        force = [-hy.sum([known[min(a, b), max(a, b)] * r for b, r in enumerate(rates)]) for a in range(6)]
+        return _braked(force[:3], force[3:], motion)
+
+    def numbers(self, field: FieldTable, position: Array, moment: Array, values: Array) -> Array:
+        """(n, count) for scaled positions and moments (n, 3), and runtime parameters (n, p)."""
+        length, strength, time = (
+            values[:, p, None, None] for p in (Parameter.LENGTH, Parameter.PLATE_MOMENT, Parameter.TIME)
+        )
+        fields, slopes = self.table.fields(position * length[:, 0])
+        rates = np.concatenate([length * np.einsum("ni,nkia->nka", moment, slopes), fields], axis=2)
+        scaled = rates * strength / np.sqrt(time)
+        matrix = np.einsum("nka,nkb->nab", scaled, scaled)
+        return np.array([matrix[:, a, b] for a, b in UPPER]).T
+
+
+def _braked(force: Vector, field: Vector, motion: Motion) -> Added:
+    torque = [t / hy.par[Parameter.INERTIA] for t in cross(motion.moment, field)]
+    return dissipative(force, torque, motion)
+
+
+def _sum(weights: Array, terms: Sequence[hy.expression]) -> hy.expression:
+    return hy.sum([float(w) * t for w, t in zip(weights, terms, strict=True) if w])

@@ -28,9 +28,10 @@ def check_slow_enough(pieces: Pieces, frequency: float) -> None:
         if (error := reaction**2 / 105) > ALLOWED:
             share = np.sqrt(ALLOWED / error)
             place = ", ".join(f"{c * 1e3:.4g}" for c in np.mean([body.center for body in bodies], axis=0))
+            depth, thickness = skin_depth(conductivity, 2 * frequency), 2 * radius
             raise InputError(
-                f"Input conductivity_S_m of the rotor's metal at ({place}) mm must leave its skin depth large against it; instead "
-                f"received {conductivity:.3g} S/m: {skin_depth(conductivity, 2 * frequency) * 1e3:.3g} mm at "
-                f"{2 * frequency:.4g} Hz, twice the rotor's frequency, beside {2e3 * radius:.3g} mm of metal. Take at "
-                f"most {share * conductivity:.2g} S/m or {share * frequency:.3g} Hz, or leave this piece out."
+                f"Input conductivity_S_m of the rotor's metal at ({place}) mm must leave its skin depth large against "
+                f"it; instead received {conductivity:.3g} S/m: {depth * 1e3:.3g} mm at {2 * frequency:.4g} Hz, twice "
+                f"the rotor's frequency, in {thickness * 1e3:.3g} mm of metal. Take at most "
+                f"{share * conductivity:.2g} S/m or {share * frequency:.3g} Hz, or leave this piece out."
             )

@@ -37,10 +37,13 @@ class RotorLosses:
     def rate_matrix(self, positions: ArrayLike, moments: ArrayLike) -> Array:
         """C (n, K, 6) √W s, for dipoles (n, 3) A m² at (n, 3) m: by velocity in m/s, then by turn in rad/s."""
         moments = np.asarray(moments, float)
+        fields, slopes = self.fields(positions)
+        return np.concatenate([np.einsum("ni,nkia->nka", moments, slopes), np.cross(moments[:, None], fields)], axis=2)
+
+    def fields(self, positions: ArrayLike) -> tuple[Array, Array]:
+        """c_k (n, K, 3) and ∂c_ki/∂x_j (n, K, 3, 3) at positions (n, 3) m."""
         fields, slopes = self.multipoles.evaluate(np.asarray(positions, float))
-        moved = np.einsum("ni,njia->nja", moments, slopes)
-        turned = np.cross(moments[:, None], fields)
-        return np.einsum("kj,nja->nka", self.weights, np.concatenate([moved, turned], axis=2))
+        return np.einsum("kj,nja->nka", self.weights, fields), np.einsum("kj,njab->nkab", self.weights, slopes)
 
     def dissipation(self, positions: ArrayLike, moments: ArrayLike) -> Array:
         """D (n, 6, 6) of dipoles (n, 3) A m² at (n, 3) m: N s/m, N s and N m s."""
