@@ -29,7 +29,7 @@ class RotorCurrents:
     def added(self, motion: Motion) -> Added:
         """Its accelerations of place and spin."""
         length, weights = hy.par[Parameter.LENGTH], self.table.weights
-        strength = hy.par[Parameter.PLATE_MOMENT] * hy.pow(hy.par[Parameter.TIME], -0.5)  # m/√E per √T
+        strength = hy.par[Parameter.PLATE_MOMENT] * hy.par[Parameter.TIME] ** -0.5  # m/√E per √T
         multipoles = self.table.multipoles.expressions([length * x for x in motion.position])
         moment, drift, turning = motion.moment, motion.drift, cross(motion.lag, motion.moment)
         heard = []

@@ -73,13 +73,16 @@ class Balls:
 
 def _room(scene: Scene, center: Array, reach: float) -> float:
     """Radius of a ball in the rotor's frame in which the floater neither touches a body nor is lost, m."""
-    rotor = rotor_gap(scene, center) if scene.rotor else np.inf
+    rotor = rotor_gap(scene, center) if scene.turning_bodies else np.inf
     room = min(rotor, reach - float(np.linalg.norm(center)))
     if scene.plate is None:
         return room
     angles = 2 * np.pi * np.arange(ANGLES) / ANGLES
     places, slack = turned_about_z(center, angles), float(np.hypot(*center[:2])) * np.pi / ANGLES
-    lowering, still = scene.plate.lowering, replace(scene, rotor=(), plate=replace(scene.plate, lowering=None))
+    lowering, still = (
+        scene.plate.lowering,
+        replace(scene, rotor=(), conductors=(), plate=replace(scene.plate, lowering=None)),
+    )
     way = lowering.distance if lowering else 0.0
     depths = np.linspace(0.0, way, DEPTHS if way else 1)
     seen = (places[:, None] + depths[:, None] * [0.0, 0.0, 1.0]).reshape(-1, 3)

@@ -19,7 +19,7 @@ from ..plate_tables import Multipoles
 from .table import RotorLosses
 
 DEGREE = 3
-CUBE = 0.6093
+CUBE = 0.6092
 """Radius of the ball with the losses of a cube in a uniform field, over the cube's edge."""
 
 

@@ -105,7 +105,11 @@ def metal_of(bodies: Sequence[Solid], conductivity: float, order: int) -> Metal:
     ------
     TooLargeError : the memory does not hold the system
     """
-    mesh = mesh_metal(bodies)
+    return metal_on(mesh_metal(bodies), conductivity, order)
+
+
+def metal_on(mesh: MetalMesh, conductivity: float, order: int) -> Metal:
+    """The same on a mesh that is there."""
     space = ng.H1(mesh.mesh, order=order)
     free = space.FreeDofs()
     free[0] = False

@@ -56,10 +56,10 @@ def body_overlap(first: Solid, second: Solid) -> float:
     across = np.vstack([offset, *(offset - (offset @ axis) * axis for axis in axes)])
     tried = np.vstack([axes, across, np.random.default_rng(0).normal(size=(200, 3))])
     tried = tried[np.linalg.norm(tried, axis=1) > 1e-12]
-    widest = tried[np.argsort(gap(tried))[-3:]]
+    widest = tried[int(np.argmax(gap(tried)))]
     scale = first.circumradius + second.circumradius
-    found = [minimize(lambda n: -gap(n[None])[0] / scale, start, method="Nelder-Mead", tol=1e-10) for start in widest]
-    return float(min(*(scale * f.fun for f in found), -gap(tried).max()))
+    found = minimize(lambda n: -gap(n[None])[0] / scale, widest, method="Nelder-Mead", tol=1e-9)
+    return float(min(scale * found.fun, -gap(tried).max()))
 
 
 def sphere_overlap(center: ArrayLike, radius: float, body: Solid) -> float:

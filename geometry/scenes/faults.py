@@ -35,6 +35,7 @@ RULES = {
     "finite_number": "a finite number",
     "float_type": "a number",
     "list_type": "a list",
+    "literal_error": "{expected}",
     "too_short": "a list of {min_length} or more entries",
     "too_long": "a list of {max_length} entries",
     "model_type": "a table",

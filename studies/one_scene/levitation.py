@@ -19,7 +19,7 @@ from ...fem.slab import resolve_plate_model, rotor_nearby
 from ...geometry.basics import Array, InputError
 from ...geometry.scenes import AbsoluteStart, Scene, load_scene
 from ..terminal import Models, finite, note, positive, progress
-from .plate_of_scene import check_room, plate_memory
+from .plate_of_scene import check_room, check_way, plate_memory
 
 RotorField = RotorTable | GriddedTable
 """A rotor's table: computed, or from a map."""
@@ -75,9 +75,18 @@ class Levitation:
 
     @cached_property
     def without_plate(self) -> Survey:
-        """All equilibria as if there were no plate. Raises EquilibriumError for a rotor at rest."""
+        """All equilibria as if there were no plate.
+
+        Raises
+        ------
+        EquilibriumError : the rotor is at rest
+        InputError : a conductor is in the floater's way, or the rotor turns too fast for its metal
+        """
         note("Equilibria ...")
-        return survey(self.scene, self.table, self.spin, rates=self.rates)
+        found = survey(self.scene, self.table, self.spin, rates=self.rates)
+        if (chosen := _first(found.equilibria)) is not None:
+            check_way(self.scene, chosen.position)
+        return found
 
     @cached_property
     def plate(self) -> PlateMemory | None:
