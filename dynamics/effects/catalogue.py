@@ -4,12 +4,13 @@ from ...fem.rotor_losses import cached_rotor_losses, pieces_of
 from ...fem.rotor_tables import FieldFormula
 from ...geometry.scenes import Scene
 from ..motion import Effect, Interaction, interaction_of
+from .air import RealAir
 from .floater_currents import FloaterCurrents
 from .rotor_losses import NAME, RotorCurrents
 
 
 def with_effects(scene: Scene, table: FieldFormula) -> Interaction:
-    """A table with the effects of a scene's conductivities, the table of the rotor's from the cache; others stay.
+    """A table with the effects of a scene's conductivities and air, that of the rotor's from the cache; others stay.
 
     Raises
     ------
@@ -17,6 +18,8 @@ def with_effects(scene: Scene, table: FieldFormula) -> Interaction:
     """
     whole = interaction_of(table)
     effects: list[Effect] = [FloaterCurrents()] if scene.floater.conductivity else []
+    if scene.drag.air:
+        effects.append(RealAir())
     if pieces_of(scene.rotor, scene.conductors) and NAME not in {effect.name for effect in whole.effects}:
         effects.append(RotorCurrents(cached_rotor_losses(scene, lambda _: None)[0]))
     return whole.joined(*effects)

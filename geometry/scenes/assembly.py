@@ -14,6 +14,7 @@ from .contents import AbsoluteStart, Drag, Floater, Lowering, OffsetStart, Plate
 from .faults import SceneError, describe_fault, overlap_faults
 from .schema import (
     ConductorSection,
+    DragSection,
     ExplicitRotor,
     HorizontalRotor,
     PlateSection,
@@ -38,7 +39,7 @@ def assemble(keys: Mapping[str, Any], source: str) -> Scene:
         table = SceneSection.model_validate(keys)
     except ValidationError as error:
         raise SceneError(source, [describe_fault(detail) for detail in error.errors()]) from None
-    faults = _start_faults(table.start) + _conductor_faults(table.rotor.conductors)
+    faults = _start_faults(table.start) + _drag_faults(table.drag) + _conductor_faults(table.rotor.conductors)
     if faults:
         raise SceneError(source, faults)
     scene = _scene(table, Path(source).parent)
@@ -67,6 +68,17 @@ def _start_faults(start: StartSection | None) -> list[str]:
     return faults
 
 
+def _drag_faults(drag: DragSection | None) -> list[str]:
+    """A model, or both numbers."""
+    if drag is None:
+        return []
+    numbers = {key: getattr(drag, key) for key in ("linear_N_s_m", "angular_N_m_s")}
+    given = [key for key, value in numbers.items() if value is not None]
+    if drag.model is not None:
+        return [f"Input drag.{key} must be left out beside drag.model; instead received both." for key in given]
+    return [f"Input drag.{key} must be given; instead it is missing." for key in numbers if key not in given]
+
+
 def _conductor_faults(conductors: list[ConductorSection]) -> list[str]:
     """Which sizes belong to which shape."""
     sizes = {"cuboid": ("size_mm",), "cylinder": ("diameter_mm", "height_mm")}
@@ -83,7 +95,7 @@ def _conductor_faults(conductors: list[ConductorSection]) -> list[str]:
 
 
 def _scene(table: SceneSection, folder: Path) -> Scene:
-    sphere, drag = table.floater, table.drag
+    sphere, drag = table.floater, table.drag or DragSection(model="stokes")
     material = (sphere.remanence_T, sphere.recoil_permeability, sphere.density_kg_m3, sphere.conductivity_S_m)
     floater = Floater(sphere.diameter_mm * MILLI / 2, *material)
     return Scene(
@@ -92,7 +104,7 @@ def _scene(table: SceneSection, folder: Path) -> Scene:
         rotor=_rotor(table.rotor),
         floater=floater,
         plate=_plate(table.plate) if table.plate else None,
-        drag=Drag(drag.linear_N_s_m, drag.angular_N_m_s) if drag else Drag.stokes(floater.radius),
+        drag=_drag(drag, floater.radius),
         start=_start(table.start),
         field_map=folder / table.rotor.field_map if table.rotor.field_map else None,
         conductors=tuple(Conductor(_solid(c), c.conductivity_S_m) for c in table.rotor.conductors),
@@ -101,6 +113,12 @@ def _scene(table: SceneSection, folder: Path) -> Scene:
 
 def _box(size_mm: list[float], center_mm: list[float], rotation_deg: list[float]) -> Box:
     return Box(_metres(size_mm), _metres(center_mm), rotation_matrix(rotation_deg))
+
+
+def _drag(drag: DragSection, radius: float) -> Drag:
+    if drag.linear_N_s_m is not None and drag.angular_N_m_s is not None:
+        return Drag(drag.linear_N_s_m, drag.angular_N_m_s)
+    return replace(Drag.stokes(radius), air=drag.model == "air")
 
 
 def _solid(conductor: ConductorSection) -> Solid:

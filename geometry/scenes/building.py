@@ -29,7 +29,8 @@ def scene(
     floater : `sphere`
     plate : `plate`, or None
     gravity_m_s2 : (3,) m/s², laboratory frame
-    drag : linear_N_s_m and angular_N_m_s; left out, Stokes drag in air
+    drag : model ("stokes", or "air": what a real sphere feels at its Reynolds number and frequency), or linear_N_s_m
+        and angular_N_m_s; left out, Stokes drag in air
     start : a mapping: "offset_mm" from the stable equilibrium (0.1 mm up), or "position_mm" with "velocity_mm_s",
         "moment" and "spin_hz"
 

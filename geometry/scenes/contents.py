@@ -89,10 +89,11 @@ class Plate:
 
 @dataclass(frozen=True)
 class Drag:
-    """Viscous drag: force -linear v (N s/m) and torque -angular Ω (N m s)."""
+    """Viscous drag: force -linear v (N s/m) and torque -angular Ω (N m s); `air`: the more of a real sphere in air."""
 
     linear: float
     angular: float
+    air: bool = False
 
     @classmethod
     def stokes(cls, radius: float) -> Self:
@@ -157,7 +158,7 @@ class Scene:
         return (*(magnet.box for magnet in self.rotor), *(conductor.body for conductor in self.conductors))
 
     def __repr__(self) -> str:
-        air = f"drag {self.drag.linear:.3g} N s/m, {self.drag.angular:.3g} N m s"
+        air = f"drag {self.drag.linear:.3g} N s/m, {self.drag.angular:.3g} N m s{' and more' if self.drag.air else ''}"
         lines = [f"Scene at {self.frequency:g} Hz, gravity ({listed(self.gravity)}) m/s², {air}"]
         lines += [f"  {magnet!r}" for magnet in self.rotor]
         lines += [f"  {conductor!r}" for conductor in self.conductors]

@@ -145,10 +145,11 @@ class PlateSection(_Table):
 
 
 class DragSection(_Table):
-    """Viscous drag on the floater."""
+    """Drag on the floater: of air by a model, or numbers."""
 
-    linear_N_s_m: NotNegative
-    angular_N_m_s: NotNegative
+    model: Literal["stokes", "air"] | None = None
+    linear_N_s_m: NotNegative | None = None
+    angular_N_m_s: NotNegative | None = None
 
 
 class StartSection(_Table):

@@ -4,6 +4,7 @@ import json
 import tomllib
 import warnings
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -59,7 +60,10 @@ def _keys(scene: Scene) -> dict[str, Any]:
         keys["rotor"]["conductors"] = [_conductor(conductor) for conductor in scene.conductors]
     if scene.plate:
         keys["plate"] = _plate(scene.plate)
-    if scene.drag != Drag.stokes(floater.radius):
+    stokes = Drag.stokes(floater.radius)
+    if scene.drag == replace(stokes, air=True):
+        keys["drag"] = {"model": "air"}
+    elif scene.drag != stokes:
         keys["drag"] = {"linear_N_s_m": scene.drag.linear, "angular_N_m_s": scene.drag.angular}
     start = _start(scene)
     return keys if start == DEFAULT_START else keys | {"start": start}

@@ -41,7 +41,7 @@ def test_it_meets_finite_elements_within_its_error(table):
         exact = sum(metal.dissipation(of_motion(place, moment)) for metal in metals)
         found = table.dissipation(place[None], moment[None])[0]
         assert np.linalg.norm(found - exact) < 3 * table.error_at(depth - 5e-3) * np.linalg.norm(exact)
-    assert np.all(np.diff(table.errors) < 0)
+    assert np.argmax(table.errors) == 0  # in contact
     assert table.error_at(14e-3) < 0.02
 
 
