@@ -13,7 +13,7 @@ from spinlev.dynamics.flights.simulation import PLATE_TOLERANCE
 from spinlev.dynamics.maps import equilibrium_map, rotor_family
 from spinlev.fem.closed_forms import carrier, unit_dipoles
 from spinlev.fem.eddy_currents import solve_eddy
-from spinlev.fem.magnetostatics import rung, solve_rotor
+from spinlev.fem.magnetostatics import refinement_of, solve_rotor
 from spinlev.fem.rotor_tables import rotor_table
 from spinlev.geometry.meshes import MeshRule, MeshSettings, plate_mesh
 from spinlev.studies.one_scene import plate_memory
@@ -38,7 +38,7 @@ def test_field_unknowns(benchmark, order):
     carriers = tuple(carrier(magnet) for magnet in SCENE.rotor)
 
     def solved():
-        return solve_rotor(SCENE.rotor, rung(order, MeshSettings()), "split", 6 + 4 * order, carriers=carriers)
+        return solve_rotor(SCENE.rotor, refinement_of(order, MeshSettings()), "split", 6 + 4 * order, carriers=carriers)
 
     benchmark.extra_info["size"] = benchmark.pedantic(solved, rounds=2).unknowns
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from typing import Generic, Protocol, TypeVar
 
 import numpy as np
-from scipy.optimize import brentq
+import scipy
 
 from ...geometry.basics import Array
 from ..equilibria import END, ON, SHORTER, Equations, Steps, directions, follow, stepped
@@ -146,5 +146,5 @@ class _Walk(Generic[P]):
             return points[0], tangents[0]
 
         if measure(*at(0.0)) * measure(*at(step)) <= 0:  # else a landed end: the change is beyond it
-            step = float(brentq(lambda length: measure(*at(length)), 0.0, step, xtol=1e-13, rtol=1e-12))
+            step = float(scipy.optimize.brentq(lambda length: measure(*at(length)), 0.0, step, xtol=1e-13, rtol=1e-12))
         return step, replace(self._at(*at(step)), kind=kind)

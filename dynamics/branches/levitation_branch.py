@@ -8,7 +8,7 @@ equilibrium meets the near one, and up again along the near one until floater an
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.optimize import brentq
+import scipy
 
 from ...fem.rotor_tables import RotorTable
 from ...geometry.basics import Array
@@ -119,7 +119,7 @@ def _hanging(scene: Scene, table: RotorTable, family: Family) -> Array:
         raise EquilibriumError(
             f"Nowhere from {1e3 * nearest:.3g} to {1e3 * REACH[1]:.3g} mm does the attraction carry the weight."
         )
-    distance = float(brentq(excess, grid[carried[-1]], grid[carried[-1] + 1]))
+    distance = float(scipy.optimize.brentq(excess, grid[carried[-1]], grid[carried[-1] + 1]))
     return np.asarray(family.balance(scene.frequency).states(-distance / scales.length * upright, upright)[0])
 
 

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
-from scipy.optimize import brentq
+import scipy
 
 from ...fem.rotor_tables import RotorTable, rotor_table
 from ...geometry.basics import Array
@@ -151,4 +151,6 @@ def _touching(scene: Scene, family: Family, before: BranchPoint, after: BranchPo
 
     ends = before.parameter, after.parameter
     inside = ends[0] + 1e-9 * (ends[1] - ends[0])
-    return there(float(brentq(lambda f: rotor_gap(scene, there(f).position), inside, ends[1], xtol=1e-6)))
+    return there(
+        float(scipy.optimize.brentq(lambda f: rotor_gap(scene, there(f).position), inside, ends[1], xtol=1e-6))
+    )

@@ -21,7 +21,7 @@ def surveys(
     places: Indices,
     rates: Rates,
     farthest: float = 0.1,
-    spacing: int = SPACING,
+    spacing: int | None = None,
 ) -> list[tuple[Survey, bool]]:
     """What `equilibria.survey` finds for each scene, without its curves; neighbours help each other as in a map.
 
@@ -32,7 +32,8 @@ def surveys(
     spin : (n,) body spin s
     places : (n, axes) whole-numbered coordinates by which scenes are neighbours
     farthest : largest depth, and distance from the axis, m
-    spacing : steps between two searches; a sheet between them is missed if it meets no other in a fold
+    spacing : steps between two searches, None for 5, and 10 along a single axis; a sheet between them is missed if it
+        meets no other in a fold
 
     Returns
     -------
@@ -43,7 +44,7 @@ def surveys(
     values = np.array([parameters(scene, Scales.of(scene), frozen_spin=True) for scene in scenes])
     ranges = [SearchRange(scene, farthest) for scene in scenes]
     grid = Grid(rates, values, spin, ranges, np.arange(len(scenes)), places)
-    nodes = grid.coarse(spacing)
+    nodes = grid.coarse(spacing or (SPACING if places.shape[1] > 1 else 2 * SPACING))
     point, position, moment = filled(grid, nodes).within(grid)
     known, doubts = field_doubts(table, position * values[point, Parameter.LENGTH, None])
     point, points = point[known], np.concatenate([position, moment], axis=1)[known]

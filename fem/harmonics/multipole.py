@@ -19,7 +19,6 @@ from .solid import (
     outer_sums,
     real_terms,
     regular_derivative,
-    regular_values,
     weighted_sums,
 )
 
@@ -107,9 +106,8 @@ def moments_of_magnetization(
 
     q_lm = ∫ M · ∇ conj Υ_lm dV, with `points` (n, 3) m, `weights` (n,) m³ and `magnetization` (n, 3) μ0 M in T.
     """
-    harmonics = regular_values(degree, *((points - center) / radius).T)
     weighted = (weights / (FOUR_PI * radius**3))[:, None] * magnetization
-    potentials = [weighted_sums(harmonics, weighted[:, axis], degree) for axis in range(3)]
+    potentials = weighted_sums(degree, (points - center) / radius, weighted)
     return np.asarray(sum(np.conj(regular_derivative(p, axis)) for axis, p in enumerate(potentials)))
 
 
@@ -117,8 +115,7 @@ def curvature_moments(
     points: Array, weights: Array, matrix: Array, center: Array, radius: float, degree: int
 ) -> Coefficients:
     """Coefficients (T) ∫ w Σ A_ij ∂_ij conj Υ_lm, with `weights` (n,) w in T m⁴ and `matrix` (3, 3) A, symmetric."""
-    harmonics = regular_values(degree, *((points - center) / radius).T)
-    sums = weighted_sums(harmonics, weights / (FOUR_PI * radius**4), degree)
+    (sums,) = weighted_sums(degree, (points - center) / radius, weights[:, None] / (FOUR_PI * radius**4))
     second = [[regular_derivative(regular_derivative(sums, i), j) for j in range(3)] for i in range(3)]
     return np.asarray(sum(np.conj(matrix[i, j] * second[i][j]) for i in range(3) for j in range(3)))
 

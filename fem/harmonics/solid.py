@@ -9,7 +9,7 @@ irregular ones Θ_lm,
 A real harmonic function outside a sphere is Σ_lm c_lm Θ_lm with c_l(-m) = (-1)^m conj c_lm; only m ≥ 0 is kept.
 """
 
-from collections.abc import Sequence
+from collections.abc import Container, Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -26,26 +26,43 @@ CHUNK = 4096
 """Points at once, so that the harmonics of all degrees fit in memory."""
 
 
-def regular_values(degree: int, x: Array, y: Array, z: Array) -> dict[tuple[int, int], Any]:
-    """Complex regular harmonics Υ_lm, 0 ≤ m ≤ l ≤ degree, at NumPy arrays x, y, z."""
-    found: dict[tuple[int, int], Any] = {(0, 0): np.ones_like(x) + 0j}
-    square = x * x + y * y + z * z
+def regular_orders(
+    degree: int, x: Array, y: Array, z: Array, orders: Container[int] | None = None
+) -> Iterator[tuple[int, Array, Any]]:
+    """Order by order m: Υ_lm = R_lm (x + iy)^m at arrays x, y, z (n,), as m, R (degree + 1 - m, n) and the power (n,).
+
+    `orders` are the m that are wanted; None for all up to the degree.
+    """
+    square, across = x * x + y * y + z * z, x + 1j * y
+    power, first = np.ones_like(across), 1.0
     for m in range(degree + 1):
         if m:
-            found[m, m] = -(x + 1j * y) / (2 * m) * found[m - 1, m - 1]
+            power, first = power * across, -first / (2 * m)
+        if orders is not None and m not in orders:
+            continue
+        rows = np.empty((degree + 1 - m, len(x)))
+        rows[0] = first
         for l in range(m + 1, degree + 1):
-            upper = (2 * l - 1) * z * found[l - 1, m]
+            upper = z * rows[l - 1 - m]
+            upper *= 2 * l - 1
             if l - 2 >= m:
-                upper = upper - square * found[l - 2, m]
-            found[l, m] = upper / ((l + m) * (l - m))
-    return found
+                upper -= square * rows[l - 2 - m]
+            np.divide(upper, (l + m) * (l - m), out=rows[l - m])
+        yield m, rows, power
 
 
-def weighted_sums(harmonics: dict[tuple[int, int], Any], weights: Array, degree: int) -> Coefficients:
-    """Σ_n weight_n Υ_lm(r_n), [l, m], from a dictionary made by `regular_values`."""
-    result = np.zeros((degree + 1, degree + 1), complex)
-    for (l, m), values in harmonics.items():
-        result[l, m] = values @ weights
+def regular_values(degree: int, x: Array, y: Array, z: Array) -> dict[tuple[int, int], Any]:
+    """Complex regular harmonics Υ_lm, 0 ≤ m ≤ l ≤ degree, at NumPy arrays x, y, z (n,)."""
+    orders = regular_orders(degree, x, y, z)
+    return {(m + k, m): row * power for m, rows, power in orders for k, row in enumerate(rows)}
+
+
+def weighted_sums(degree: int, points: Array, weights: Array) -> Coefficients:
+    """Σ_n weight_n Υ_lm(r_n), [k, l, m], at points (n, 3) with weights (n, k)."""
+    result = np.zeros((weights.shape[1], degree + 1, degree + 1), complex)
+    for m, rows, power in regular_orders(degree, *np.ascontiguousarray(points.T)):
+        turned = np.ascontiguousarray(power[:, None] * weights)
+        result[:, m:, m] = (rows @ turned.view(float)).view(complex).T
     return result
 
 
@@ -91,14 +108,18 @@ def regular_gradient(harmonics: dict[tuple[int, int], Any], l: int, m: int) -> l
 def outer_sums(coefficients: Sequence[Coefficients], points: Array) -> Array:
     """Σ c_lm Θ_lm (n, k) at points (n, 3), for k arrays c of one size."""
     stacked = np.stack(coefficients, axis=-1)
-    used = np.nonzero(stacked.any(axis=2))
-    weights = np.where(used[1] == 0, 1.0, 2.0)[:, None] * stacked[used]
+    degree, used = len(stacked) - 1, set(np.flatnonzero(stacked.any(axis=(0, 2))).tolist())
+    l = np.arange(degree + 1)
     result = np.zeros((len(points), stacked.shape[2]))
     for start in range(0, len(points), CHUNK):
         block = points[start : start + CHUNK]
-        harmonics = irregular_values(len(stacked) - 1, block)
-        values = np.array([harmonics[key] for key in zip(*used, strict=True)]).reshape(-1, len(block))
-        result[start : start + CHUNK] = np.real(values.T @ weights)
+        square = np.sum(block**2, axis=1)
+        for m, rows, power in regular_orders(degree, *np.ascontiguousarray((block / square[:, None]).T), used):
+            sizes = (1.0 if m == 0 else 2.0) * np.exp(gammaln(l[m:] - m + 1) + gammaln(l[m:] + m + 1))
+            parts = np.ascontiguousarray(sizes[:, None] * stacked[m:, m])
+            sums = np.ascontiguousarray(rows.T @ parts.view(float)).view(complex)
+            result[start : start + CHUNK] += np.real(power[:, None] * sums)
+        result[start : start + CHUNK] /= np.sqrt(square)[:, None]
     return result
 
 

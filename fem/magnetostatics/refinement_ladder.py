@@ -1,6 +1,6 @@
 """A ladder of refinements, and the error that its last step tells.
 
-From rung to rung the order of the elements, the layers at the edges, the quadrature, the curvature of the outer sphere
+From step to step the order of the elements, the layers at the edges, the quadrature, the curvature of the outer sphere
 and the degree of its open boundary all grow, and the coefficients of the expansions converge geometrically. The
 difference d_n of two rungs is the error of the lower one. With ρ the ratio of the last two differences where they are
 largest, that of the upper one is d_n ρ/(1 - ρ), and ρ d_(n-1) may stand for d_n there. Both are kept as fields, to be
@@ -38,22 +38,22 @@ def strongest(magnets: Sequence[Magnet]) -> float:
     return max(magnet.contrast for magnet in magnets)
 
 
-def rung(order: int, settings: MeshSettings, contrast: float = 0.0) -> Refinement:
+def refinement_of(order: int, settings: MeshSettings, contrast: float = 0.0) -> Refinement:
     """The refinement that belongs to an order of the elements and to the largest μ - 1 of the magnets."""
     layers = (LAYERS if contrast < STRONG else LAYERS_STRONG)[order] if settings.hp_layers else 0
     return Refinement(order, replace(settings, hp_layers=layers, curve_order=min(order + 1, 8)), 2 * order + 2)
 
 
-def climb(
+def refined(
     solve: Callable[[int], RotorSolution], points: Array, scale: Array, target: float, settings: MeshSettings
 ) -> tuple[RotorSolution, int, dict[str, list[MultipoleExpansion]]]:
-    """Climb the ladder until the error is below the target.
+    """The solution at the first order whose error is below the target.
 
     Parameters
     ----------
     solve : solution at an order
     points, scale : where (n, 3) m the error is looked at, and the field (n,) T to which it is relative
-    settings : of the mesh, as given to `rung`
+    settings : of the mesh, as given to `refinement_of`
 
     Returns
     -------
@@ -79,7 +79,7 @@ def climb(
 def _fastest(solution: RotorSolution, order: int, settings: MeshSettings) -> float:
     """Rate that may be trusted: slow where layers at the edges lack, since orders then converge slowly later on."""
     contrast = strongest(solution.mesh.magnets)
-    if solution.layers < rung(order, settings, contrast).mesh.hp_layers:
+    if solution.layers < refinement_of(order, settings, contrast).mesh.hp_layers:
         return FIRST_RATE
     return FASTEST_RATE if contrast < STRONG else FASTEST_RATE_STRONG
 

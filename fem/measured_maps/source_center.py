@@ -1,7 +1,7 @@
 """Where the sources of a map of B have their middle."""
 
 import numpy as np
-from scipy.optimize import least_squares
+import scipy
 
 from ...geometry.basics import Array
 from .field_map import FieldMap, FieldMapError
@@ -30,7 +30,7 @@ def find_center(field_map: FieldMap) -> Array:
         columns = basis.columns(some.points)[:, observed.T].T
         return np.asarray(columns @ np.linalg.lstsq(columns, values, rcond=None)[0] - values)
 
-    found = least_squares(residual, np.zeros(3), x_scale=0.1)
+    found = scipy.optimize.least_squares(residual, np.zeros(3), x_scale=0.1)
     if not np.linalg.norm(found.fun) < EXPLAINED * np.linalg.norm(values):
         raise FieldMapError("Input centers must be given; instead received None, and one dipole does not fit the map.")
     return np.asarray(found.x * scale).reshape(1, 3)

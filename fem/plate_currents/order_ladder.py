@@ -47,7 +47,7 @@ class Ladder:
         self.order, self.error, self.change, self.truncation = 0, np.inf, np.ones(len(corners)), np.zeros(len(corners))
         self.last = self.change
         self.tensors: ComplexArray = np.zeros((len(corners), 3, 3), complex)
-        self.climb(self.solved())
+        self.take(self.solved())
 
     def next_space(self) -> EddySpace:
         """Of the next order."""
@@ -60,7 +60,7 @@ class Ladder:
         self.truncation = MODULUS * truncation_error(response, self.reach)
         return response.couplings
 
-    def climb(self, couplings: ComplexArray) -> None:
+    def take(self, couplings: ComplexArray) -> None:
         """Take the next order's couplings."""
         tensors = own_tensors(couplings)
         self.order += 1

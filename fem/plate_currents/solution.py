@@ -91,11 +91,11 @@ def solve_currents(
         if ladder.expected() <= HOPEFUL * ladder.allowed or ladder.order + 1 == ladder.highest:
             space, missing = train(ladder.next_space(), training, probes, frequencies, allowed, watch)
             couplings = space_couplings(space.dipole_couplings(corners), space.inductances, ladder.shift)
-            ladder.climb(couplings)
+            ladder.take(couplings)
             if ladder.error <= ladder.allowed:
                 break
         else:
-            ladder.climb(ladder.solved())
+            ladder.take(ladder.solved())
         ladder.refuse()
     return PlateSolution(
         tuple(boxes), frequencies, space, ladder.error, missing.worst, probes.places, missing.angular_frequencies,

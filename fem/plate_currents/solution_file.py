@@ -12,8 +12,8 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.stats import qmc
 
+from ...geometry.basics import spread_points
 from ...geometry.meshes import MeshRule
 from ...geometry.scenes import Plate
 from ..elements import Parity
@@ -89,7 +89,7 @@ def currents_key(
     numbers: list[ArrayLike] = [plate.box.size, [plate.conductivity, rtol], frequencies]
     numbers += [bound for box in boxes for bound in (box.lower, box.upper)]
     if others:
-        places = qmc.scale(qmc.Halton(3, seed=1).random(LOOKS), -plate.box.half_edges, plate.box.half_edges)
+        places = spread_points(-plate.box.half_edges, plate.box.half_edges, LOOKS)
         numbers.append(np.round(others.places, 9))
         for source in (*others.training, *others.probes):
             potential = source.vector_potential(places)

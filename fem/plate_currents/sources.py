@@ -7,9 +7,8 @@ from dataclasses import dataclass, field
 from itertools import chain
 
 import numpy as np
-from scipy.stats import qmc
 
-from ...geometry.basics import Array
+from ...geometry.basics import Array, spread_points
 from ..eddy_currents import EddySpace, Source, dipole_images
 from .current_space import source_images
 from .region import Region
@@ -73,5 +72,5 @@ def grid_counts(region: Region, half_edges: Array) -> tuple[int, int, int]:
 
 def probe_places(region: Region, fold: bool = False) -> Array:
     """(n, 3) m: corners of the region, folded those not mirrored, and some places within."""
-    inside = qmc.scale(qmc.Halton(3, seed=1).random(PROBES), region.lower, region.upper)
+    inside = spread_points(region.lower, region.upper, PROBES)
     return np.concatenate([region.surface((2, 2, 2), fold), inside])

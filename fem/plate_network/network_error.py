@@ -29,7 +29,7 @@ def _relative(found: ComplexArray, truth: ComplexArray) -> Array:
     return np.asarray(np.linalg.norm(found - truth, axis=1) / np.linalg.norm(truth, axis=1))
 
 
-def truncated(
+def fewest_fields(
     worst: Callable[[Sequence[OrderedBasis]], float], basis: Sequence[OrderedBasis], tolerance: float
 ) -> tuple[list[OrderedBasis], float]:
     """The fewest leading fields whose `worst` error meets the tolerance, and that error."""

@@ -17,7 +17,7 @@ from ...geometry.scenes import Plate
 from ..eddy_currents import Source
 from ..plate_currents import STRICT, CurrentSpace, OtherSources, PlateSolution, Region, grid_counts, solve_currents
 from ..rotor_tables import AccuracyError
-from .network_error import truncated
+from .network_error import fewest_fields
 from .training import Group, prepare_training
 
 NETWORK_SHARE, STRICT_SHARE = 0.9, 0.8
@@ -113,7 +113,7 @@ def reduce_currents(
     allowed = share * rtol - solution.mesh_error - space_error
     counts = grid_counts(region, plate.box.half_edges)
     training = prepare_training(solution.space, region, counts, frequencies, others)
-    chosen, state_error = truncated(training.worst, training.basis(), allowed)
+    chosen, state_error = fewest_fields(training.worst, training.basis(), allowed)
     if state_error > allowed:
         raise AccuracyError(
             f"Input rtol must be larger: the states leave {state_error:.1e}, allowed is {allowed:.1e}; "

@@ -14,5 +14,5 @@ from .rotor_source import (
 )
 from .sampled_share import rotor_share as rotor_share
 from .share import RotorShare as RotorShare
-from .share_trim import MISSED as MISSED, trimmed as trimmed
+from .shorter_share import MISSED as MISSED, without_high_harmonics as without_high_harmonics
 from .tabulate import FUNCTION_SHARE as FUNCTION_SHARE, tensor_error as tensor_error

@@ -16,7 +16,7 @@ from .plate_table import PlateTable
 from .rotor_source import DOWN, posed_rotor, rotor_parts
 from .sampled_share import rotor_share
 from .share import RotorShare
-from .share_trim import MISSED, trimmed
+from .shorter_share import MISSED, without_high_harmonics
 from .tabulate import tabulate
 
 ANGLES, DEPTHS = 8, 5
@@ -80,7 +80,7 @@ def plate_and_rotor_table(
     share = rotor_share(network, plate, rotor, SHARE_PART * rtol)
     watch("field functions", 0.0)
     table = tabulate(network, rtol)
-    return table, trimmed(share, table, MISSED * rtol)
+    return table, without_high_harmonics(share, table, MISSED * rtol)
 
 
 def turning_rotor(plate: Plate, rotor: RotorTable) -> OtherSources:

@@ -36,7 +36,7 @@ class RotorShare:
     distance : how far the plate goes down, m
     series : (2H+1, states, k) Chebyshev coefficients over 0…distance, √J: constant, cos φ, sin φ, cos 2φ, …
     error : estimated largest error of a signal, relative to the largest signal; in it, of harmonics that were left out
-        because the floater does not feel them (`share_trim`), what they miss of the field of the rotor's currents
+        because the floater does not feel them (`shorter_share`), what they miss of the field of the rotor's currents
     """
 
     distance: float

@@ -6,7 +6,7 @@ from dataclasses import replace
 from itertools import product
 
 import numpy as np
-from scipy.linalg import qr
+import scipy
 
 from ...geometry.basics import Array, Box, Solid
 from ...geometry.bodies import Conductor, Magnet, cut_magnets, separate_pieces
@@ -79,7 +79,7 @@ def sparse(weights: Array) -> Array:
 
     Any orthogonal mix of the fields gives the same dissipation; that of a QR decomposition has the fewest terms.
     """
-    _, triangle, order = qr(weights / np.linalg.norm(weights, axis=0), mode="economic", pivoting=True)
+    _, triangle, order = scipy.linalg.qr(weights / np.linalg.norm(weights, axis=0), mode="economic", pivoting=True)
     small = np.abs(triangle) < NOISE
     found = np.zeros_like(triangle)
     found[:, order] = np.where(small, 0.0, triangle)

@@ -1,6 +1,6 @@
 """Tables of finite-element fields with a stated error.
 
-What the elements add comes from a ladder of refinements, see `climb`, whose last two steps give the doubts of
+What the elements add comes from a ladder of refinements, see `refined`, whose last two steps give the doubts of
 the discretisation.
 The closed part of the moments is exact; what is cut off the expansions is known and kept as the doubt "truncation".
 """
@@ -19,7 +19,7 @@ from ...geometry.bodies import CONVERGENCE, Magnet, cut_magnets, largest_shift
 from ...geometry.meshes import MeshSettings
 from ..closed_forms import carrier, closed_part
 from ..harmonics import MultipoleExpansion, trimmed_expansions, without_noise
-from ..magnetostatics import RotorSolution, climb, rung, solve_rotor, strongest
+from ..magnetostatics import RotorSolution, refined, refinement_of, solve_rotor, strongest
 from .accuracy import Accuracy, error_points, guards
 from .table import KNOWN, RotorTable
 
@@ -53,10 +53,10 @@ def fem_table(
     closed, unsure = closed_part(cut, magnets, carriers, degree)
 
     def reaction(order: int) -> RotorSolution:
-        refinement = rung(order, settings, strongest(magnets))
+        refinement = refinement_of(order, settings, strongest(magnets))
         return solve_rotor(magnets, refinement, "split", degree, cut, carriers=carriers)
 
-    solution, order, steps = climb(reaction, points, scale, accuracy.rtol / 3, settings)
+    solution, order, steps = refined(reaction, points, scale, accuracy.rtol / 3, settings)
     whole = solution.expansions(
         [without_noise(a + b, 1e-15) for a, b in zip(closed, solution.coefficients, strict=True)]
     )

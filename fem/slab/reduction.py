@@ -20,7 +20,7 @@ from ..plate_network import (
     OrderedBasis,
     checked_ranges,
     coupling_error,
-    truncated,
+    fewest_fields,
 )
 from ..rotor_tables import AccuracyError
 from .frame import SlabFrame, corners, slab_frame
@@ -102,7 +102,7 @@ def reduce_slab(
     def worst(chosen: Sequence[OrderedBasis]) -> float:
         return max(coupling_error(_couplings(chosen, probes, f), t, len(places)) for f, t in truth.items())
 
-    chosen, state_error = truncated(worst, basis, NETWORK_SHARE * rtol - sums_error)
+    chosen, state_error = fewest_fields(worst, basis, NETWORK_SHARE * rtol - sums_error)
     if sums_error + state_error > NETWORK_SHARE * rtol:
         raise AccuracyError(
             f"Input rtol must be larger: sums leave {sums_error:.1e}, the states {state_error:.1e}; instead received "

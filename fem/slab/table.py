@@ -15,8 +15,8 @@ from ..plate_tables import (
     PlateTable,
     RotorShare,
     rotor_share,
-    trimmed,
     turning_rotor,
+    without_high_harmonics,
 )
 from ..rotor_tables import AccuracyError, RotorTable
 from .frame import rotor_reach, slab_frame
@@ -50,7 +50,7 @@ def slab_and_rotor_table(
     endless = replace(plate, box=replace(plate.box, size=size))
     network = reduce_slab(plate, region, frequencies, rtol, turning_rotor(endless, rotor), far)
     share, table = rotor_share(network, endless, rotor, SHARE_PART * rtol), tabulate_slab(network, rtol)
-    return table, trimmed(share, table, MISSED * rtol)
+    return table, without_high_harmonics(share, table, MISSED * rtol)
 
 
 def tabulate_slab(network: SlabNetwork, rtol: float) -> PlateTable:

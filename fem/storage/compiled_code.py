@@ -9,6 +9,7 @@ import logging
 import os
 import pickle
 import zlib
+from collections import OrderedDict
 from collections.abc import Callable
 from functools import cache
 from pathlib import Path
@@ -19,7 +20,10 @@ from .whole_files import seal, unsealed, write_whole
 
 LIMIT = 2**29
 """Size of all that is kept, bytes; what was not used for the longest time makes room."""
+SHARED = 64
+"""Functions that this process keeps; integrators have a state, and are read anew each time."""
 Compiled = TypeVar("Compiled")
+_functions: OrderedDict[Path, Any] = OrderedDict()
 
 
 def compiled(compiler: Callable[..., Compiled], *arguments: Any, **options: Any) -> Compiled:
@@ -34,10 +38,14 @@ def compiled(compiler: Callable[..., Compiled], *arguments: Any, **options: Any)
     """
     asked = pickle.dumps((compiler, arguments, options))
     path = cache_folder() / "code" / f"{hashlib.sha256(_target() + asked).hexdigest()}.code"
-    found: Compiled | None = _read(path)
+    found: Compiled | None = _functions.pop(path, None) or _read(path)
     if found is None:
         found = compiler(*arguments, **options)
         _keep(found, path)
+    if compiler.__name__ == "cfunc":
+        _functions[path] = found
+        while len(_functions) > SHARED:
+            _functions.popitem(last=False)
     return found
 
 

@@ -24,11 +24,14 @@ def is_hdf5(path: Path) -> bool:
         return stream.read(len(SIGNATURE)) == SIGNATURE
 
 
-def hdf5_fault(path: Path) -> str | None:
-    """What is wrong with an HDF5 file, as the end of a sentence; None if all of it can be read."""
+def hdf5_fault(path: Path, longest: float = LONGEST) -> str | None:
+    """What is wrong with an HDF5 file, as the end of a sentence; None if all of it can be read.
+
+    A small file is given up after `longest` seconds.
+    """
     command = [sys.executable, "-P", str(SCRIPT), str(path)]  # without this package's folder on the path
     try:
-        done = subprocess.run(command, capture_output=True, text=True, timeout=allowed(path), check=False)
+        done = subprocess.run(command, capture_output=True, text=True, timeout=longest + _reading(path), check=False)
     except subprocess.TimeoutExpired:
         return "HDF5 does not come to an end with it"
     if done.returncode < 0:
@@ -36,9 +39,9 @@ def hdf5_fault(path: Path) -> str | None:
     return done.stderr.strip().rpartition("\n")[2] or "HDF5 cannot read it" if done.returncode else None
 
 
-def allowed(path: Path) -> float:
-    """Seconds after which a file is taken for one that HDF5 cannot finish."""
-    return LONGEST + path.stat().st_size / PACE
+def _reading(path: Path) -> float:
+    """Seconds to read a file of its size."""
+    return path.stat().st_size / PACE
 
 
 def look_through(path: str | Path) -> None:

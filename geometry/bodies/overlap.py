@@ -5,8 +5,8 @@ from dataclasses import replace
 from itertools import combinations
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike
-from scipy.optimize import minimize, minimize_scalar
 
 from ..basics import Array, Box, Solid, rotation_matrix
 from .magnet import Magnet
@@ -58,7 +58,7 @@ def body_overlap(first: Solid, second: Solid) -> float:
     tried = tried[np.linalg.norm(tried, axis=1) > 1e-12]
     widest = tried[int(np.argmax(gap(tried)))]
     scale = first.circumradius + second.circumradius
-    found = minimize(lambda n: -gap(n[None])[0] / scale, widest, method="Nelder-Mead", tol=1e-9)
+    found = scipy.optimize.minimize(lambda n: -gap(n[None])[0] / scale, widest, method="Nelder-Mead", tol=1e-9)
     return float(min(scale * found.fun, -gap(tried).max()))
 
 
@@ -85,7 +85,9 @@ def deepest_overlap_in_a_turn(rotating: Solid, fixed: Box) -> float:
     angles = np.linspace(0.0, 2 * np.pi, 73)
     best = angles[int(np.argmin([gap(angle) for angle in angles]))]
     step = angles[1]
-    refined = minimize_scalar(gap, bounds=(best - step, best + step), method="bounded", options={"xatol": 1e-9})
+    refined = scipy.optimize.minimize_scalar(
+        gap, bounds=(best - step, best + step), method="bounded", options={"xatol": 1e-9}
+    )
     return -min(gap(best), float(refined.fun))
 
 

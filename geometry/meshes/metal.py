@@ -11,7 +11,7 @@ import numpy as np
 from ..basics import Array, Box, Cylinder, Solid, frozen_array
 
 CURVED = 5
-"""Polynomial degree of the elements at a mantle; they leave 6e-6 of its volume."""
+"""Polynomial degree of the elements at a mantle; they leave 1e-4 of its volume and place."""
 ROUND = 1.0
 """Elements in a radius of curvature."""
 

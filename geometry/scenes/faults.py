@@ -55,7 +55,7 @@ def describe_fault(detail: ErrorDetails) -> str:
     """One fault found by the schema, as a sentence that says what to do."""
     place, kind, received = list(detail["loc"]), detail["type"], detail["input"]
     tag = place.pop(1) if place[0] == "rotor" and len(place) > 2 else None
-    key = "".join(f"[{p}]" if isinstance(p, int) else f".{p or repr(p)}" for p in place).lstrip(".")
+    key = "".join(f"[{p}]" if isinstance(p, int) else f".{_named(p)}" for p in place).removeprefix(".")
     if kind == "extra_forbidden":
         return f"Input {key} must be a known key; {_allowed(place, tag)}."
     if kind == "missing":
@@ -75,6 +75,11 @@ def describe_fault(detail: ErrorDetails) -> str:
         return f"Input {key} must be a list of exactly 3 numbers; instead received {_shown(received)}."
     rule = RULES.get(kind, detail["msg"]).format(**detail.get("ctx", {}))
     return f"Input {key} must be {rule}; instead received {_shown(received)}."
+
+
+def _named(key: str) -> str:
+    """A key as it stands in the file: in quotes where TOML wants them."""
+    return key if key.replace("_", "").replace("-", "").isalnum() else repr(key)
 
 
 def _allowed(place: list[Any], tag: Any) -> str:

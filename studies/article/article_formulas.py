@@ -8,8 +8,8 @@ the supplement has δx/d B⊥ (and m_f,z = -cos θ, +cos θ in the main text).  
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike
-from scipy.optimize import brentq
 
 from ...geometry.basics import MU_0, Array
 from .article import CONFIGURATIONS, CONTACT, EDGE, FLOATER, REMANENCE
@@ -116,7 +116,7 @@ def balanced(configuration: str, value: float, frequency: float, load: float) ->
 
     enough = excess(grid) >= 0
     steps = np.flatnonzero(enough[:-1] != enough[1:])
-    roots = [float(brentq(excess, grid[k], grid[k + 1])) for k in steps[-2:]]
+    roots = [float(scipy.optimize.brentq(excess, grid[k], grid[k + 1])) for k in steps[-2:]]
     if not len(roots):
         return np.nan, np.nan
     return (np.nan, roots[0]) if len(roots) == 1 else (roots[0], roots[1])

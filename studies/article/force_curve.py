@@ -1,9 +1,8 @@
 """Force along the axis against distance, with its repelling and its attracting part: the article's second figure."""
 
 import numpy as np
+import scipy
 import xarray as xr
-from scipy.interpolate import CubicSpline, PchipInterpolator
-from scipy.optimize import brentq
 
 from ...geometry.basics import Array
 from ..one_scene import Levitation, sources
@@ -81,7 +80,7 @@ def _full(levitation: Levitation, grid: Array) -> list[Array]:
     depth = -curve.position[:, 2]
     order = np.argsort(depth)
     columns = (parts[:, 2], parts[:, 0] + parts[:, 1], error, angle)
-    return [CubicSpline(depth[order], column[order], extrapolate=False)(grid) for column in columns]
+    return [scipy.interpolate.CubicSpline(depth[order], column[order], extrapolate=False)(grid) for column in columns]
 
 
 def balance_points(distance: Array, magnetic: Array, angle: Array) -> tuple[float, float, float, float, float]:
@@ -90,7 +89,7 @@ def balance_points(distance: Array, magnetic: Array, angle: Array) -> tuple[floa
     At the near one the force has done as much work up to the far one as is needed to come to rest there.
     """
     known = np.isfinite(magnetic)
-    rest = PchipInterpolator(distance[known], magnetic[known] - WEIGHT)
+    rest = scipy.interpolate.PchipInterpolator(distance[known], magnetic[known] - WEIGHT)
     roots = rest.roots(extrapolate=False)
     roots = roots[np.isfinite(roots)]
     if len(roots) < 2:
@@ -98,8 +97,8 @@ def balance_points(distance: Array, magnetic: Array, angle: Array) -> tuple[floa
     stable, far = float(roots[-2]), float(roots[-1])
     work = rest.antiderivative()
     low, high = distance[known][0], stable
-    near = float(brentq(lambda d: work(far) - work(d), low, high)) if work(far) < work(low) else np.nan
-    theta = PchipInterpolator(distance[known], angle[known])
+    near = float(scipy.optimize.brentq(lambda d: work(far) - work(d), low, high)) if work(far) < work(low) else np.nan
+    theta = scipy.interpolate.PchipInterpolator(distance[known], angle[known])
     return stable, far, near, float(theta(near)), float(theta(stable))
 
 

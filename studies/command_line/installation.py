@@ -2,6 +2,7 @@
 
 import importlib
 import sys
+from collections.abc import Sequence
 
 from ..rendering import unavailable
 from ..terminal import FORTRAN, lend_quadmath, way_out
@@ -10,14 +11,14 @@ MODULES = ("ngsolve", "netgen.occ", "heyoka", "h5py", "matplotlib.figure", "dist
 """Those with compiled code, and what stands on them."""
 
 
-def main() -> int:
-    """Exit status 0, with a note where only pictures cannot be drawn; 1 where the program cannot run."""
+def main(modules: Sequence[str] = MODULES) -> int:
+    """Exit status 0, with a note where only pictures cannot be drawn; 1 where a module cannot be loaded."""
     try:
         lent = lend_quadmath()
     except OSError as error:
         print(f"spinlev: NGSolve could not be given a libquadmath: {error}", file=sys.stderr)
         lent = None
-    for module in MODULES:
+    for module in modules:
         try:
             importlib.import_module(module)
         except ImportError as error:

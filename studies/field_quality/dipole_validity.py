@@ -4,6 +4,7 @@ Region: distance below the lower magnet's centre × lateral offset, worst azimut
 Truth: the finite-element table, whose own error is stored beside.
 """
 
+from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -25,12 +26,12 @@ ROTORS = {
 AZIMUTHS = np.radians(np.arange(0.0, 360.0, 30.0))
 
 
-def dipole_validity(quick: bool) -> xr.Dataset:
+def dipole_validity(quick: bool, rotors: Mapping[str, tuple[Magnet, ...]] = ROTORS) -> xr.Dataset:
     """Relative errors of B and of its gradient by rotor, model, distance and lateral offset."""
     distance = np.linspace(0.0115, 0.05, 12 if quick else 60)
     offset = np.linspace(0.0, 0.01, 5 if quick else 21)
     points = _points(distance, offset)
-    parts = [_errors(magnets, points, (len(distance), len(offset), len(AZIMUTHS))) for magnets in ROTORS.values()]
+    parts = [_errors(magnets, points, (len(distance), len(offset), len(AZIMUTHS))) for magnets in rotors.values()]
     dims = ("rotor", "model", "distance", "offset")
     errors, gradients, own = (np.stack(part) for part in zip(*parts, strict=True))
     return xr.Dataset(
@@ -40,8 +41,8 @@ def dipole_validity(quick: bool) -> xr.Dataset:
             "truth_error": variable(("rotor", "distance", "offset"), own, "1", "stated relative error of the truth"),
         },
         coords={
-            "rotor": list(ROTORS),
-            "model": list(models(ROTORS["horizontal, δx = 2 mm"], 1.0)),
+            "rotor": list(rotors),
+            "model": list(models(next(iter(rotors.values())), 1.0)),
             "distance": variable(("distance",), distance, "m", "distance below the lower magnet's centre"),
             "offset": variable(("offset",), offset, "m", "distance from the axis"),
         },

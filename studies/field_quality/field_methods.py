@@ -9,7 +9,7 @@ import numpy as np
 
 from ...fem.closed_forms import added_by_closed_form, carrier
 from ...fem.harmonics import uniform_moments, without_noise
-from ...fem.magnetostatics import Refinement, rung, solve_rotor
+from ...fem.magnetostatics import Refinement, refinement_of, solve_rotor
 from ...fem.measured_maps import FieldMap, fit_field_map
 from ...fem.rotor_tables import AccuracyWarning, FieldTable, RotorTable, rotor_table
 from ...fem.verification import magnet_dipoles
@@ -54,10 +54,10 @@ def _direct(order: int, magnets: Magnets) -> tuple[FieldTable, int]:
 
 
 def _split(order: int, magnets: Magnets) -> tuple[FieldTable, int]:
-    """One rung of the ladder: closed form of the remanence plus what the permeability adds."""
+    """One order of elements: closed form of the remanence plus what the permeability adds."""
     degree = 6 + 4 * order
     carriers = tuple(carrier(magnet) for magnet in magnets)
-    solution = solve_rotor(magnets, rung(order, MeshSettings()), "split", degree, carriers=carriers)
+    solution = solve_rotor(magnets, refinement_of(order, MeshSettings()), "split", degree, carriers=carriers)
     closed = added_by_closed_form([(magnet,) for magnet in magnets], magnets, carriers, degree)
     whole = [without_noise(a + b, 1e-15) for a, b in zip(closed, solution.coefficients, strict=True)]
     return RotorTable("fem", magnets, carriers, tuple(solution.expansions(whole))), solution.unknowns

@@ -64,8 +64,8 @@ def sphere_points(number: int = 200) -> Array:
     return np.asarray(np.array(DISTANCES)[:, None, None] * way / np.linalg.norm(way, axis=1)[:, None])
 
 
-def measure(name: str, quick: bool) -> Measured:
-    """Run one method of the catalogue; meant for a fresh process."""
+def measure(name: str, quick: bool, timed_points: int = TIMED_POINTS) -> Measured:
+    """Run one method of the catalogue, and its table at `timed_points`; meant for a fresh process."""
     catalogue = methods(quick)
     method = catalogue[name]
     magnets, points = cube(method.problem), sphere_points()
@@ -79,7 +79,16 @@ def measure(name: str, quick: bool) -> Measured:
     grown = _memory("VmHWM") - memory
     stated = table.relative_error(points.reshape(-1, 3))[0].reshape(points.shape[:2]).max(axis=1)
     shape = points.shape
-    return Measured(b.reshape(shape), g.reshape(*shape, 3), stated, unknowns, seconds, cpu_seconds, grown, _pace(table))
+    return Measured(
+        b.reshape(shape),
+        g.reshape(*shape, 3),
+        stated,
+        unknowns,
+        seconds,
+        cpu_seconds,
+        grown,
+        _pace(table, timed_points),
+    )
 
 
 def _memory(entry: str) -> float:
@@ -88,22 +97,22 @@ def _memory(entry: str) -> float:
     return 1024.0 * next(float(line.split()[1]) for line in lines if line.startswith(entry))
 
 
-def _pace(table: FieldTable) -> float:
+def _pace(table: FieldTable, number: int) -> float:
     """Seconds per point of the fastest of five evaluations."""
-    points = _many()
+    points = _many(number)
     table.evaluate(points)
-    return _fastest(lambda: table.evaluate(points)) / TIMED_POINTS
+    return _fastest(lambda: table.evaluate(points)) / number
 
 
 def _fastest(work: Callable[[], object]) -> float:
     return min(timeit.repeat(work, timer=time.process_time, number=1))
 
 
-def _many() -> Array:
+def _many(number: int = TIMED_POINTS) -> Array:
     """Where a floater may be: all around, 13 to 40 mm from the cube's centre."""
     rng = np.random.default_rng(0)
-    way = rng.normal(size=(TIMED_POINTS, 3))
-    return np.asarray(rng.uniform(0.013, 0.04, (TIMED_POINTS, 1)) * way / np.linalg.norm(way, axis=1)[:, None])
+    way = rng.normal(size=(number, 3))
+    return np.asarray(rng.uniform(0.013, 0.04, (number, 1)) * way / np.linalg.norm(way, axis=1)[:, None])
 
 
 def peer_pace() -> float:

@@ -5,6 +5,7 @@ is a table of far finer tolerance, whose own error is stored.
 """
 
 import warnings
+from collections.abc import Sequence
 
 import numpy as np
 import xarray as xr
@@ -21,10 +22,17 @@ TRUTH_TOLERANCE, QUICK_TRUTH = 1e-9, 1e-8
 """Asked of the reference, in 24 and in 4 s of processor time."""
 
 
-def speed_accuracy(quick: bool) -> xr.Dataset:
-    """Errors of B and of its gradient by method and distance, beside time, unknowns and memory."""
-    catalogue = methods(quick)
-    truths = {problem: _truth(problem, QUICK_TRUTH if quick else TRUTH_TOLERANCE) for problem in PERMEABILITIES}
+def speed_accuracy(quick: bool, names: Sequence[str] | None = None, truth: float | None = None) -> xr.Dataset:
+    """Errors of B and of its gradient by method and distance, beside time, unknowns and memory.
+
+    Parameters
+    ----------
+    names : of the methods; None for all
+    truth : tolerance of the reference; None for the one of the study
+    """
+    catalogue = {name: method for name, method in methods(quick).items() if names is None or name in names}
+    asked = truth or (QUICK_TRUTH if quick else TRUTH_TOLERANCE)
+    truths = {problem: _truth(problem, asked) for problem in PERMEABILITIES}
     rows = []
     for name in catalogue:
         note(f"  {name} ...")

@@ -31,8 +31,12 @@ class Picture(Protocol):
         """The file's content; called in the other process."""
 
 
-def render(pictures: Mapping[Path, Picture], progress: Callable[[float], None] = lambda fraction: None) -> None:
-    """Draw pictures, all in one process, and write each as soon as it is finished.
+def render(
+    pictures: Mapping[Path, Picture],
+    progress: Callable[[float], None] = lambda fraction: None,
+    command: Sequence[str] = COMMAND,
+) -> None:
+    """Draw pictures, all in one process, begun by `command`, and write each as soon as it is finished.
 
     Raises
     ------
@@ -44,7 +48,7 @@ def render(pictures: Mapping[Path, Picture], progress: Callable[[float], None] =
     for path in pictures:
         path.unlink(missing_ok=True)
     left = list(pictures)
-    for answer in _drawn(list(pictures.values()), progress):
+    for answer in _drawn(list(pictures.values()), progress, command):
         if isinstance(answer, str):
             names = ", ".join(path.name for path in left)
             raise RenderError(f"The 3-D pictures are left out ({names}): {answer}")
@@ -52,18 +56,20 @@ def render(pictures: Mapping[Path, Picture], progress: Callable[[float], None] =
 
 
 @cache
-def unavailable() -> str | None:
+def unavailable(command: Sequence[str] = COMMAND) -> str | None:
     """Why nothing can be drawn in three dimensions on this machine; None where a small picture can."""
-    (answer,) = _drawn([Sample()], lambda fraction: None)
+    (answer,) = _drawn([Sample()], lambda fraction: None, command)
     return f"No 3-D pictures can be drawn: {answer}" if isinstance(answer, str) else None
 
 
-def _drawn(pictures: Sequence[Picture], progress: Callable[[float], None]) -> Iterator[bytes | str]:
+def _drawn(
+    pictures: Sequence[Picture], progress: Callable[[float], None], command: Sequence[str]
+) -> Iterator[bytes | str]:
     """The files' contents, one after the other; where that fails, last the reason."""
     messages = None if "SPINLEV_TRACEBACK" in os.environ else subprocess.DEVNULL
     pipe = subprocess.PIPE
     # Ctrl-C at the terminal is for this process, which then ends the other: hence a group of its own.
-    with subprocess.Popen(COMMAND, stdin=pipe, stdout=pipe, stderr=messages, process_group=0) as process:
+    with subprocess.Popen(command, stdin=pipe, stdout=pipe, stderr=messages, process_group=0) as process:
         try:
             unfinished = len(pictures)
             for answer in _answers(process, pickle.dumps(pictures)):
@@ -76,6 +82,7 @@ def _drawn(pictures: Sequence[Picture], progress: Callable[[float], None]) -> It
                 yield _death(process.wait())
         except BaseException:
             process.kill()
+            process.wait()  # leaving the block would not, after Ctrl-C
             raise
 
 

@@ -23,8 +23,6 @@ if TYPE_CHECKING:
 
 Compute = Callable[[Point], xr.Dataset]
 Prepared = Callable[[Sequence[Point]], Sequence[Callable[[], xr.Dataset]]] | None
-CONNECTING = 20
-"""Seconds that a scheduler may take to answer."""
 
 
 @dataclass(frozen=True)
@@ -129,7 +127,7 @@ def _client(scheduler: str | None, number: int) -> Iterator[Client]:
 
     if scheduler is not None:
         try:
-            client = Client(scheduler, timeout=CONNECTING, set_as_default=False)
+            client = Client(scheduler, set_as_default=False)
         except (OSError, ValueError, TimeoutError) as error:
             raise InputError(
                 f"Input --scheduler must be the address of a dask scheduler that answers, such as "

@@ -5,7 +5,7 @@ import time
 import numpy as np
 
 from spinlev.fem.harmonics import without_noise
-from spinlev.fem.magnetostatics import Refinement, RotorSolution, climb, rung, solve_rotor, strongest
+from spinlev.fem.magnetostatics import Refinement, RotorSolution, refined, refinement_of, solve_rotor, strongest
 from spinlev.fem.rotor_tables import Accuracy, RotorTable
 from spinlev.fem.rotor_tables.accuracy import error_points
 from spinlev.fem.rotor_tables.fem_model import extrapolated_tail, nonzero, provenance
@@ -27,9 +27,11 @@ def direct_table(magnets: tuple[Magnet, ...], accuracy: Accuracy | None = None) 
     points, scale = error_points(magnets, accuracy.clearance(magnets))
 
     def whole(order: int) -> RotorSolution:
-        return solve_rotor(magnets, Refinement(order, rung(order, SETTINGS, strongest(magnets)).mesh, DEGREE), "direct")
+        return solve_rotor(
+            magnets, Refinement(order, refinement_of(order, SETTINGS, strongest(magnets)).mesh, DEGREE), "direct"
+        )
 
-    solution, order, steps = climb(whole, points, scale, accuracy.rtol / 2, SETTINGS)
+    solution, order, steps = refined(whole, points, scale, accuracy.rtol / 2, SETTINGS)
     coefficients = without_noise(solution.coefficients[0], 1e-15)
     expansions = nonzero(solution.expansions([coefficients]))
     # a radius that is wrong by ε, as the meshed sphere's is by half its area error, changes degree l by (l + 1) ε

@@ -24,10 +24,9 @@ import xarray as xr
 from spinlev.fem.elements import memory
 from spinlev.fem.measured_maps import FieldMapError
 from spinlev.fem.measured_maps.readers import read_field_map
-from spinlev.fem.storage import foreign, read_checked, write_checked, write_whole
+from spinlev.fem.storage import hdf5_fault, read_checked, write_checked, write_whole
 from spinlev.fem.storage.whole_files import replacing
 from spinlev.studies.command_line.cli import _status
-from spinlev.studies.rendering import renderer
 
 SCENE, OVER_PLATE = str(places.HORIZONTAL), str(places.OVER_PLATE)
 DIPOLE = ("--model", "dipole", "--plate-model", "none")
@@ -414,14 +413,24 @@ def test_a_result_and_its_summary_are_of_the_same_run(spinlev, monkeypatch):
     assert not Path("out/summary.json").exists()
 
 
-def test_a_renderer_that_dies_takes_no_result_with_it(spinlev, monkeypatch):
+def crashing(patch, folder, script):
+    """Python processes that run `script` die of a segmentation fault as they begin, while `patch` holds."""
+    folder.mkdir()
+    (folder / "sitecustomize.py").write_text(
+        "import os, signal, sys\n"
+        f"if any({script!r} in argument for argument in sys.orig_argv):\n"
+        "    os.kill(os.getpid(), signal.SIGSEGV)\n"
+    )
+    patch.setenv("PYTHONPATH", str(folder))
+
+
+def test_a_renderer_that_dies_takes_no_result_with_it(spinlev, monkeypatch, tmp_path):
     """As VTK makes it without graphics libraries: a line on the console; all but these pictures is whole."""
-    dies = "import os, signal; os.kill(os.getpid(), signal.SIGSEGV)"
     arguments = ("run", SCENE, "--duration-s", "0.1", "--rtol", "1e-2", *DIPOLE)
     Path("out").mkdir()
     Path("out/scene.png").write_text("of an older result")
     with monkeypatch.context() as patch:
-        patch.setattr(renderer, "COMMAND", (sys.executable, "-c", dies))
+        crashing(patch, tmp_path / "dies", "draw_process")
         patch.setattr("spinlev.studies.catalogue.show.plate_currents", lambda *given: np.zeros_like(given[-1]))
         status, answer, said = spinlev(*arguments)
         shown = spinlev("show", "out/result.nc")
@@ -457,21 +466,18 @@ def foreign_file(name):
     return Path(name).read_bytes(), Path(name).read_bytes().index(b"GCOL")
 
 
-def test_a_foreign_file_that_hdf5_does_not_return_from_is_given_up(spinlev, monkeypatch):
+def test_a_foreign_file_that_hdf5_does_not_return_from_is_given_up(tmp_path):
     """An object of no length in the heap: HDF5 goes round in a loop that no signal ends."""
-    monkeypatch.setattr(foreign, "LONGEST", 2.0)
-    content, heap = foreign_file("r.nc")
-    Path("r.nc").write_bytes(content[: heap + 16] + bytes(16) + content[heap + 32 :])
-    status, _, said = spinlev("cite", "r.nc")
-    assert status == 2
-    assert "HDF5 does not come to an end with it" in said.replace("\n", " ")
+    path = tmp_path / "r.nc"
+    content, heap = foreign_file(path)
+    path.write_bytes(content[: heap + 16] + bytes(16) + content[heap + 32 :])
+    assert hdf5_fault(path, longest=2.0) == "HDF5 does not come to an end with it"
 
 
 def test_a_foreign_file_that_hdf5_crashes_on_is_refused(spinlev, monkeypatch, tmp_path):
     """The process that looks through it dies, as HDF5 has made it on damaged files; the program does not."""
     foreign_file("r.nc")
-    monkeypatch.setattr(foreign, "SCRIPT", tmp_path / "dies.py")
-    (tmp_path / "dies.py").write_text("import os, signal; os.kill(os.getpid(), signal.SIGSEGV)")
+    crashing(monkeypatch, tmp_path / "dies", "foreign.py")
     status, _, said = spinlev("cite", "r.nc")
     assert status == 2
     assert "HDF5 crashes on it" in said.replace("\n", " ")
@@ -481,7 +487,6 @@ def test_hdf5_of_a_mesh_is_looked_through_too(monkeypatch, tmp_path):
     points = np.random.default_rng(0).uniform(-1e-2, 1e-2, (8, 3))
     meshio.Mesh(points, [("vertex", np.arange(8)[:, None])], {"B": points}).write(tmp_path / "map.xdmf")
     np.testing.assert_array_equal(read_field_map(tmp_path / "map.xdmf").field, points)
-    monkeypatch.setattr(foreign, "SCRIPT", tmp_path / "dies.py")
-    (tmp_path / "dies.py").write_text("import os, signal; os.kill(os.getpid(), signal.SIGSEGV)")
+    crashing(monkeypatch, tmp_path / "dies", "foreign.py")
     with pytest.raises(FieldMapError, match="HDF5 crashes on it"):
         read_field_map(tmp_path / "map.xdmf")

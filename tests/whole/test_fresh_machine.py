@@ -101,8 +101,7 @@ def test_an_installation_tells_what_is_missing(monkeypatch, capsys, tmp_path):
         raise PermissionError(13, "Permission denied", "libquadmath.so.0")
 
     monkeypatch.setattr(installation, "lend_quadmath", denied)
-    monkeypatch.setattr(installation, "MODULES", ("no_such_module",))
-    assert installation.main() == 1
+    assert installation.main(["no_such_module"]) == 1
     said = capsys.readouterr().err.splitlines()
     assert "could not be given a libquadmath: [Errno 13] Permission denied" in said[0]
     assert "no_such_module cannot be loaded" in said[1]

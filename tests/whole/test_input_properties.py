@@ -56,6 +56,8 @@ def test_any_value_of_a_key_is_taken_or_refused(key, value):
         assert scene.floater.radius > 0
 
 
+@example({".": 0})
+@example({"": 0, "a.b c": 1})
 @few
 @given(
     st.dictionaries(

@@ -1,4 +1,4 @@
-"""Air beyond Stokes in the motion: its closed forms, seen from the laboratory, and the ledger of a flight through it."""
+"""Air beyond Stokes in the motion: its closed forms, seen from the laboratory, and the ledger of a flight in it."""
 
 from dataclasses import replace
 

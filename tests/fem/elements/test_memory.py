@@ -13,7 +13,7 @@ from netgen.meshing import NgException
 from spinlev.fem.eddy_currents import EddySpace, ShiftedSystem
 from spinlev.fem.elements import TooLargeError, memory
 from spinlev.fem.elements.memory import free_memory, memory_need
-from spinlev.fem.magnetostatics import rung
+from spinlev.fem.magnetostatics import refinement_of
 from spinlev.fem.magnetostatics.solver import assemble
 from spinlev.fem.rotor_tables import rotor_table
 from spinlev.geometry.bodies import horizontal, vertical
@@ -23,7 +23,7 @@ ROTOR = vertical(0.014, 0.01, 1.305, 1.05)
 
 
 def magnets():
-    system = assemble(mesh_magnets(ROTOR, rung(3, MeshSettings(), 0.05).mesh), 3)
+    system = assemble(mesh_magnets(ROTOR, refinement_of(3, MeshSettings(), 0.05).mesh), 3)
     return system.space, system.space.FreeDofs(True), system.stiffness.mat
 
 
@@ -58,7 +58,7 @@ def test_a_limit_of_the_process_is_seen_before_it_is_hit():
     code = (
         "import resource, psutil, test_memory as t\n"
         "from spinlev.geometry.meshes.magnets import MeshSettings\n"
-        "mesh = t.mesh_magnets(t.ROTOR, t.rung(4, MeshSettings(), 0.05).mesh)\n"
+        "mesh = t.mesh_magnets(t.ROTOR, t.refinement_of(4, MeshSettings(), 0.05).mesh)\n"
         "size = psutil.Process().memory_info().vms + 360_000_000\n"
         "resource.setrlimit(resource.RLIMIT_AS, (size, size))\n"
         "t.assemble(mesh, 4)\n"

@@ -10,7 +10,7 @@ from second_opinions.elements_alone import direct_table
 from spinlev.fem.closed_forms.closed_moments import induced_moments
 from spinlev.fem.elements import OpenBoundary
 from spinlev.fem.harmonics import MultipoleExpansion
-from spinlev.fem.magnetostatics import rung, solve_rotor
+from spinlev.fem.magnetostatics import refinement_of, solve_rotor
 from spinlev.fem.magnetostatics.moments import trace_moments
 from spinlev.fem.magnetostatics.solver import assemble, solve
 from spinlev.fem.rotor_tables import Accuracy, fem_table, resolve_model, rotor_table
@@ -44,7 +44,7 @@ def relative(values, truth):
 
 def moments(rotor, order, degree, use_symmetry=True):
     """Expansions of what the permeability adds, about every magnet."""
-    solution = solve_rotor(rotor, rung(order, SETTINGS), "split", degree, use_symmetry=use_symmetry)
+    solution = solve_rotor(rotor, refinement_of(order, SETTINGS), "split", degree, use_symmetry=use_symmetry)
     closed = [induced_moments(magnet, rotor, degree) for magnet in rotor]
     return solution.expansions([a + b for a, b in zip(closed, solution.coefficients, strict=True)])
 
@@ -119,7 +119,7 @@ def test_moments_of_the_magnets_and_of_the_outer_sphere_agree():
     symmetry = find_symmetry(rotor)
     seen = [symmetry.to_frame(rotor[0])]
     signs, _ = parity_parts(seen, symmetry.planes)[0]
-    system = assemble(mesh_magnets(seen, rung(4, SETTINGS).mesh, symmetry.planes), 4)
+    system = assemble(mesh_magnets(seen, refinement_of(4, SETTINGS).mesh, symmetry.planes), 4)
     outside = trace_moments(solve(system, seen, "split", 8, signs))
     size = np.linalg.norm([np.linalg.norm(MultipoleExpansion(np.zeros(3), 1.0, outside).moment)])
     assert np.linalg.norm(MultipoleExpansion(np.zeros(3), 1.0, inside).moment) == pytest.approx(size, rel=1e-5)

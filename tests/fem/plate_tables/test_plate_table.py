@@ -9,7 +9,7 @@ from ngsolve import SetNumThreads
 
 from spinlev.fem.plate_currents import Region
 from spinlev.fem.plate_network import reduce_plate
-from spinlev.fem.plate_tables import cached_plate_table, posed_rotor, rotor_parts, rotor_share, trimmed
+from spinlev.fem.plate_tables import cached_plate_table, posed_rotor, rotor_parts, rotor_share, without_high_harmonics
 from spinlev.fem.plate_tables.file import load_plate_table, plate_key, save_plate_table
 from spinlev.fem.plate_tables.tabulate import field_values, tabulate
 from spinlev.fem.rotor_tables import RangeError, rotor_table
@@ -115,8 +115,8 @@ def test_harmonics_that_the_floater_does_not_feel_are_left_out(network, table):
     """At an unseen place, depth and frequency the rest misses no more of the force's gradient than is stated."""
     rotor = rotor_table(horizontal(4e-3, 0.01, 1.305, 1.0), "cuboid")
     share = rotor_share(network, PLATE, rotor, 1e-5)
-    assert trimmed(share, table, 0.0).error == share.error
-    few = trimmed(share, table, 1e-2)
+    assert without_high_harmonics(share, table, 0.0).error == share.error
+    few = without_high_harmonics(share, table, 1e-2)
     assert 1 < len(few.series) < len(share.series)
     left_out = few.error - share.error
     assert 0 < left_out <= 1e-2

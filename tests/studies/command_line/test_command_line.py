@@ -8,33 +8,35 @@ import numpy as np
 import pytest
 from places import SCENES
 
+from spinlev.studies.command_line.cli import _status
 from spinlev.studies.rendering import unavailable
 
 NO_PLATE = ("--plate-model", "none")
 GOOD = (SCENES / "horizontal.toml").read_text()
 
 
-@pytest.fixture(scope="module")
-def cache(tmp_path_factory):
-    return tmp_path_factory.mktemp("cache")
-
-
 @pytest.fixture
-def spinlev(tmp_path, cache, monkeypatch):
-    """Run the command in an empty folder; gives the exit status, standard output and standard error."""
-    monkeypatch.setenv("SPINLEV_CACHE", str(cache))
-    monkeypatch.setenv("OMP_NUM_THREADS", "1")
+def process(tmp_path):
+    """Run the command in a process of its own, in an empty folder; gives exit status, standard output and error."""
     call = "import sys; from spinlev.studies.command_line.start import main; sys.argv[0] = 'spinlev'; main()"
 
     def run(*arguments):
-        done = subprocess.run(
-            [sys.executable, "-c", call, *map(str, arguments)],
-            cwd=tmp_path,
-            capture_output=True,
-            text=True,
-            check=False,
-        )
+        command = [sys.executable, "-c", call, *map(str, arguments)]
+        done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
         return done.returncode, done.stdout, done.stderr
+
+    return run
+
+
+@pytest.fixture
+def spinlev(tmp_path, monkeypatch, capsys):
+    """The same within this process, whose libraries are loaded."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("sys.argv", ["spinlev", "test"])
+
+    def run(*arguments):
+        status = _status([str(argument) for argument in arguments], sys.stdout)
+        return status, *capsys.readouterr()
 
     return run
 
@@ -43,6 +45,16 @@ def points_file(folder, text="x_mm,y_mm,z_mm\n0,0,-20\n1,2,-30\n"):
     path = folder / "points.csv"
     path.write_text(text)
     return path
+
+
+def test_a_process_answers_on_standard_output_and_complains_on_the_other(process, tmp_path):
+    """One answer, and one message without a file."""
+    status, out, err = process("field", SCENES / "horizontal.toml", "--points", points_file(tmp_path), "--json")
+    assert status == 0, err
+    assert np.shape(json.loads(out)["B_T"]) == (2, 3)
+    status, out, err = process("run", "none.toml", "--out", "none")
+    assert (status, out, err.count("\n")) == (2, "", 1)
+    assert not (tmp_path / "none").exists()
 
 
 @pytest.mark.parametrize("model", ["dipole", "cuboid", "fem", "auto"])

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from spinlev.fem.rotor_tables import rotor_table
-from spinlev.studies.field_quality import dipole_validity, method_cost, speed_accuracy
+from spinlev.studies.field_quality import dipole_validity, speed_accuracy
 from spinlev.studies.field_quality.dipole_validity_figure import LEVELS
 from spinlev.studies.field_quality.field_methods import methods
 from spinlev.studies.field_quality.method_cost import DISTANCES, cube, measure, sphere_points
@@ -75,9 +75,8 @@ def test_a_table_keeps_what_it_states_and_unknowns_are_counted(errors):
         assert 0 < counted[0] < counted[1]
 
 
-def test_one_method_is_measured(truths, monkeypatch):
-    monkeypatch.setattr(method_cost, "TIMED_POINTS", 100)
-    found = measure("moments to 5", True)
+def test_one_method_is_measured(truths):
+    found = measure("moments to 5", True, timed_points=100)
     assert found.field.shape == (len(DISTANCES), 200, 3)
     apart = np.linalg.norm(found.field - truths["exact"].reshape(found.field.shape), axis=2)
     assert np.all(np.diff(apart.max(axis=1)) < 0)
@@ -87,12 +86,10 @@ def test_one_method_is_measured(truths, monkeypatch):
     assert found.stated.shape == (len(DISTANCES),)
 
 
-def test_the_study_measures_a_method_in_a_process_of_its_own(monkeypatch):
+def test_the_study_measures_a_method_in_a_process_of_its_own():
     """Errors are those of this process; only times and memory differ."""
     name = "closed form, μr left out"
-    monkeypatch.setattr(speed_accuracy, "methods", lambda quick: {name: QUICK[name]})
-    monkeypatch.setattr(speed_accuracy, "QUICK_TRUTH", 1e-4)
-    result = speed_accuracy.speed_accuracy(True).isel(approach=0)
+    result = speed_accuracy.speed_accuracy(True, [name], truth=1e-4).isel(approach=0)
     assert result["approach"].item() == name
     far = result.isel(distance=-1)
     assert 0.01 < float(far["field_error"]) < 0.02
@@ -106,9 +103,7 @@ def test_the_study_measures_a_method_in_a_process_of_its_own(monkeypatch):
 @pytest.fixture(scope="module")
 def validity():
     name = "horizontal, δx = 2 mm"
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(dipole_validity, "ROTORS", {name: dipole_validity.ROTORS[name]})
-        return dipole_validity.dipole_validity(quick=True).isel(rotor=0)
+    return dipole_validity.dipole_validity(True, {name: dipole_validity.ROTORS[name]}).isel(rotor=0)
 
 
 def test_far_away_only_the_moment_counts(validity):

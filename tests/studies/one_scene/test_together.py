@@ -75,7 +75,7 @@ def test_batches_hold_every_point_once_and_rotors_together():
     assert sorted(k for batch in batches for k in batch) == list(range(len(points)))
     changes = [points[k]["rotor.displacement_mm"] for batch in batches for k in batch]
     assert changes == sorted(changes)
-    assert len(batches) == 8
+    assert len(batches) == 4
 
 
 def test_a_sweep_that_goes_on_has_the_same_bits(tmp_path):

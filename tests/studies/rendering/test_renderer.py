@@ -19,7 +19,7 @@ from spinlev.dynamics.flights import simulate
 from spinlev.fem.rotor_tables import rotor_table
 from spinlev.geometry.scenes import load_scene
 from spinlev.studies.pictures import flight_frames, last_view
-from spinlev.studies.rendering import FieldPlane, RenderError, frame_times, render, renderer, unavailable
+from spinlev.studies.rendering import FieldPlane, RenderError, frame_times, render, unavailable
 from spinlev.studies.terminal import DRAWING, way_out
 
 
@@ -102,14 +102,12 @@ def test_what_was_finished_stays_and_the_rest_is_named(tmp_path, end, said):
         "import sys; sys.stdin.buffer.read(10)",
     ],
 )
-def test_a_process_that_does_not_know_what_it_is_for(tmp_path, monkeypatch, code):
+def test_a_process_that_does_not_know_what_it_is_for(tmp_path, code):
     """Ends at once, says other things, or half a thing, or hears half of the question."""
-    monkeypatch.setattr(renderer, "COMMAND", (sys.executable, "-c", code))
+    command = (sys.executable, "-c", code)
     with pytest.raises(RenderError, match="died"):
-        render({tmp_path / "a.png": Fails(ValueError("x" * 1_000_000))})
-    unavailable.cache_clear()
-    assert "died" in unavailable()
-    unavailable.cache_clear()
+        render({tmp_path / "a.png": Fails(ValueError("x" * 1_000_000))}, command=command)
+    assert "died" in unavailable(command)
 
 
 def test_who_stops_the_program_stops_the_drawing(tmp_path):

@@ -10,6 +10,7 @@ import time
 from dataclasses import replace
 from pathlib import Path
 
+import dask
 import numpy as np
 import pytest
 import xarray as xr
@@ -161,7 +162,7 @@ def test_a_wrong_engine(engine, message):
         engine.checked()
 
 
-def test_a_scheduler_that_does_not_answer(monkeypatch, tmp_path):
-    monkeypatch.setattr("spinlev.studies.sweeps.workers.CONNECTING", 1)
-    with pytest.raises(InputError, match="--scheduler must be the address of a dask scheduler that answers"):
+def test_a_scheduler_that_does_not_answer(tmp_path):
+    quickly = dask.config.set({"distributed.comm.timeouts.connect": "1s"})
+    with quickly, pytest.raises(InputError, match="--scheduler must be the address of a dask scheduler that answers"):
         swept("roots", STUDY, points(1.0), Workers(scheduler="tcp://127.0.0.1:1"), tmp_path)

@@ -21,7 +21,7 @@ MISSED = 0.2
 """Share of a table's tolerance for the harmonics left out."""
 
 
-def trimmed(share: RotorShare, table: PlateTable, allowed: float) -> RotorShare:
+def without_high_harmonics(share: RotorShare, table: PlateTable, allowed: float) -> RotorShare:
     """The share without its highest harmonics, as many as the floater may miss.
 
     Parameters
