@@ -9,8 +9,8 @@ Stokes is C = 16π/Re; the two meet at Re = 7.9, and the larger one is taken.  E
 (2008) 801), 1 + 5/(64π) (4 Re)^0.6 times Stokes, is 11 % higher at Re = 20 and agrees within 5 % from 100 to 2000.
 
 A small swing at the rotor's rate ω moves a layer of depth δ = √(2ν/ω), 0.28 mm at 60 Hz and 0.14 mm at 250 Hz.
-Exactly, to first order in its angle (L. D. Landau and E. M. Lifshitz, Fluid Mechanics, section 24, problem on the oscillating
-sphere), the part of the torque that is in phase with Ω is, over Stokes' and with q = R/δ,
+Exactly, to first order in its angle (L. D. Landau and E. M. Lifshitz, Fluid Mechanics, section 24, problem on the
+oscillating sphere), the part of the torque that is in phase with Ω is, over Stokes' and with q = R/δ,
 
     h = (3 + 6q + 6q² + 2q³) / (3 (1 + 2q + 2q²)),
 

@@ -56,9 +56,14 @@ def curvature(motion: Motion) -> list[Matrix]:
     slopes = hy.par[Parameter.LENGTH] * np.asarray(tensors.jacobian).reshape(5, 3)
     known = {(0, *pair): slopes[row, 0] for row, pair in enumerate(upper)}
     known |= {(1, 1, 1): slopes[3, 1], (1, 1, 2): slopes[4, 1]}
-    for k in range(3):
-        known[tuple(sorted((k, 2, 2)))] = -known[tuple(sorted((k, 0, 0)))] - known[tuple(sorted((k, 1, 1)))]
-    return [[[known[tuple(sorted((i, j, k)))] for k in range(3)] for j in range(3)] for i in range(3)]
+    known |= {(0, 2, 2): -known[0, 0, 0] - known[0, 1, 1], (1, 2, 2): -known[0, 0, 1] - known[1, 1, 1]}
+    known |= {(2, 2, 2): -known[0, 0, 2] - known[1, 1, 2]}
+    return [[[known[_sorted(i, j, k)] for k in range(3)] for j in range(3)] for i in range(3)]
+
+
+def _sorted(i: int, j: int, k: int) -> tuple[int, int, int]:
+    low, middle, high = sorted((i, j, k))
+    return low, middle, high
 
 
 def _commutator(turn: Vector, matrix: Matrix) -> Matrix:

@@ -47,7 +47,7 @@ class CurrentPatterns:
                 _flat(pattern).T @ _flat(sources(metal.places))
                 for metal, pattern in zip(self.metals, self.patterns, strict=True)
             ]
-            found.append(sum(parts).reshape(self.count, -1, 3))
+            found.append(np.sum(parts, axis=0).reshape(self.count, -1, 3))
         return np.concatenate(found, axis=1)
 
 
@@ -58,7 +58,7 @@ def current_patterns(metals: Sequence[Metal], positions: Array, left_out: float)
         parts = [metal.loads(of_places(positions[k : k + TOGETHER])) for k in range(0, len(positions), TOGETHER)]
         loads.append(np.concatenate(parts))
         grams.append(metal.dissipation(of_places(positions), loads[-1]))
-    gram = sum(grams)
+    gram = np.sum(grams, axis=0)
     scale = np.repeat(np.sqrt(1 / gram.diagonal().reshape(-1, 3).sum(axis=1)), 3)
     energy, vectors = np.linalg.eigh(scale[:, None] * gram * scale)
     energy, vectors = energy[::-1], vectors[:, ::-1]

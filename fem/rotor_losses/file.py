@@ -46,8 +46,8 @@ def load_losses(path: str | Path) -> RotorLosses:
     """
     data = read_checked(path, FORMAT)
     multipoles = Multipoles(data["center"].values, data["kind"].values, float(data.attrs["scale"]))
-    numbers = (data[name].values for name in ("weight", "distance", "error"))
-    return RotorLosses(multipoles, *numbers, json.loads(data.attrs["provenance"]))
+    weights, distances, errors = (data[name].values for name in ("weight", "distance", "error"))
+    return RotorLosses(multipoles, weights, distances, errors, json.loads(data.attrs["provenance"]))
 
 
 def losses_key(scene: Scene) -> str:

@@ -58,7 +58,7 @@ class Metal:
         """σ ∫ E_a·E_b dV (k, k) of the rates of k sources; their `loads`, if they are known."""
         loads = self.loads(sources) if loads is None else loads
         potentials = self.solutions(loads)
-        whole: Array = sum(a.T @ (np.repeat(w, 3)[:, None] * a) for a, w in self._blocks(sources))
+        whole = np.sum([a.T @ (np.repeat(w, 3)[:, None] * a) for a, w in self._blocks(sources)], axis=0)
         return np.asarray(whole - self.conductivity * self.mesh.unit**3 * loads @ potentials.T)
 
     def loads(self, sources: Potentials) -> Array:

@@ -48,7 +48,7 @@ class RotorLosses:
     def dissipation(self, positions: ArrayLike, moments: ArrayLike) -> Array:
         """D (n, 6, 6) of dipoles (n, 3) A m² at (n, 3) m: N s/m, N s and N m s."""
         rates = self.rate_matrix(positions, moments)
-        return np.einsum("nka,nkb->nab", rates, rates)
+        return np.asarray(np.einsum("nka,nkb->nab", rates, rates))
 
     def error_at(self, distance: float) -> float:
         """Relative error of D for a centre at this distance from the nearest face, m."""

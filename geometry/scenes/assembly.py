@@ -140,7 +140,7 @@ def _rotor(rotor: Rotor) -> tuple[Magnet, ...]:
                 _box(m.size_mm, m.center_mm, m.rotation_deg),
                 np.array(m.polarization_T),
                 *m.recoil_permeability,
-                rotor.conductivity_S_m if m.conductivity_S_m is None else m.conductivity_S_m,
+                conductivity=rotor.conductivity_S_m if m.conductivity_S_m is None else m.conductivity_S_m,
             )
             for m in rotor.magnets
         )
