@@ -114,7 +114,8 @@ def outer_sums(coefficients: Sequence[Coefficients], points: Array) -> Array:
     for start in range(0, len(points), CHUNK):
         block = points[start : start + CHUNK]
         square = np.sum(block**2, axis=1)
-        for m, rows, power in regular_orders(degree, *np.ascontiguousarray((block / square[:, None]).T), used):
+        x, y, z = np.ascontiguousarray((block / square[:, None]).T)
+        for m, rows, power in regular_orders(degree, x, y, z, used):
             sizes = (1.0 if m == 0 else 2.0) * np.exp(gammaln(l[m:] - m + 1) + gammaln(l[m:] + m + 1))
             parts = np.ascontiguousarray(sizes[:, None] * stacked[m:, m])
             sums = np.ascontiguousarray(rows.T @ parts.view(float)).view(complex)
