@@ -17,6 +17,7 @@ from .schema import (
     DragSection,
     ExplicitRotor,
     HorizontalRotor,
+    MagnetSection,
     PlateSection,
     Rotor,
     SceneSection,
@@ -135,16 +136,16 @@ def _metres(millimetres: list[float]) -> Array:
 
 def _rotor(rotor: Rotor) -> tuple[Magnet, ...]:
     if isinstance(rotor, ExplicitRotor):
-        return tuple(
-            Magnet(
-                _box(m.size_mm, m.center_mm, m.rotation_deg),
-                np.array(m.polarization_T),
-                *m.recoil_permeability,
-                conductivity=rotor.conductivity_S_m if m.conductivity_S_m is None else m.conductivity_S_m,
-            )
-            for m in rotor.magnets
-        )
+        return tuple(_magnet(magnet, rotor.conductivity_S_m) for magnet in rotor.magnets)
     return tuple(replace(magnet, conductivity=rotor.conductivity_S_m) for magnet in _of_article(rotor))
+
+
+def _magnet(magnet: MagnetSection, conductivity: float | None) -> Magnet:
+    """One of an explicit rotor; `conductivity` where it has none of its own."""
+    box = _box(magnet.size_mm, magnet.center_mm, magnet.rotation_deg)
+    along, across = magnet.recoil_permeability
+    own = magnet.conductivity_S_m
+    return Magnet(box, np.array(magnet.polarization_T), along, across, conductivity if own is None else own)
 
 
 def _of_article(rotor: HorizontalRotor | VerticalRotor | TiltRotor) -> tuple[Magnet, ...]:
