@@ -2,3 +2,4 @@
 
 from .catalogue import with_effects as with_effects
 from .floater_currents import FloaterCurrents as FloaterCurrents
+from .mutual import Mutual as Mutual
