@@ -28,6 +28,7 @@ from .multipole import (
     uniform_moments as uniform_moments,
     without_noise as without_noise,
 )
+from .regular_sums import regular_harmonics as regular_harmonics
 from .solid import (
     Coefficients as Coefficients,
     derivative as derivative,

@@ -19,6 +19,7 @@ from typing import Any
 
 import heyoka as hy
 import numpy as np
+from numpy.typing import NDArray
 
 from ...geometry.basics import MU_0, Array, Box
 
@@ -111,7 +112,7 @@ DIGITS = 7.2
 """-ln of the error of Gauss's rule, about: with the weights fitted, force and torque are met to 1e-3."""
 
 
-def orbits(grid_points: Array, mirrored: bool) -> Array:
+def orbits(grid_points: Array, mirrored: bool) -> NDArray[np.intp]:
     """Numbers (n,) of the classes of points (n, 3) that mirrors at the body's planes, or else its centre, exchange."""
     key = np.round(grid_points * 1e9).astype(int)
     if mirrored:

@@ -9,7 +9,15 @@ from ...geometry.basics import MU_0, Array
 from ...geometry.bodies import Magnet
 from ...geometry.scenes import Floater
 from ..closed_forms import remanent_field
-from ..harmonics import FOUR_PI, Ball, factorials, from_magnetization, interior_coefficients, multipole_force
+from ..harmonics import (
+    FOUR_PI,
+    Ball,
+    Coefficients,
+    factorials,
+    from_magnetization,
+    interior_coefficients,
+    multipole_force,
+)
 from .degree_needed import enough_degree
 from .permeable_sphere import induced_sources, reflection
 from .rotor_response import RotorResponse
@@ -94,7 +102,7 @@ def sphere_samples(rotor: RotorResponse, floater: Floater, places: Array) -> Sph
     return SphereSamples(places, energy, force, size, strength)
 
 
-def _energies(incident: Array, floater: Floater) -> Array:
+def _energies(incident: Coefficients, floater: Floater) -> Array:
     """Minus the energy (l,) J of each degree of the sphere's answer."""
     degree = len(incident) - 1
     twice = np.where(np.arange(degree + 1), 2.0, 1.0)
