@@ -9,12 +9,14 @@ import heyoka as hy
 
 from ..motion import NOTHING, Added, Motion, Parameter, dissipative, dot
 
+FLOATER_CURRENTS = "currents in the floater"
+
 
 @dataclass(frozen=True)
 class FloaterCurrents:
     """The floater's own eddy currents; how strong they are, the runtime parameters say."""
 
-    name: str = "floater currents"
+    name: str = FLOATER_CURRENTS
 
     def added(self, motion: Motion) -> Added:
         """Its acceleration of the spin; across the moment and along it."""

@@ -9,13 +9,13 @@ import heyoka as hy
 import numpy as np
 
 from ...fem.harmonics import BallField
-from ...fem.mutual import MutualTable
+from ...fem.mutual import MutualTable, answers
 from ...fem.rotor_tables import FieldTable
 from ...geometry.basics import Array
 from ..motion import Added, Motion, Parameter, Vector, conservative
 from .mutual_ball import MutualInBall
 
-NAME = "mutual magnetisation"
+MUTUAL = "mutual magnetisation"
 UPPER = [(a, b) for a in range(6) for b in range(a, 6)]
 
 
@@ -31,7 +31,7 @@ class Mutual:
 
     table: MutualTable
     moment: float
-    name: str = NAME
+    name: str = MUTUAL
 
     def added(self, motion: Motion) -> Added:
         """Force and torque are the derivatives of one energy."""
@@ -42,6 +42,22 @@ class Mutual:
             return self.table.energy(place, [strength * m for m in moment], [share * b for b in field], share)
 
         return conservative(energy, motion)
+
+    def wrench(self, place: Array, direction: Array, field: Array, gradient: Array) -> tuple[Array, Array]:
+        """Force (n, 3) N and torque (n, 3) N m at places and directions of the moment (n, 3) in B0 and ∇B0."""
+        _, force, torque = answers(self.table, place, self.moment * direction, field, gradient)
+        return force, torque
+
+    def doubt(self, points: Array, field: Array) -> tuple[Array, Array]:
+        """Errors of torque and force, over the moment, of the moment that turns the worst: (n,) T and (n,) T/m."""
+        force, torque = np.zeros(len(points)), np.zeros(len(points))
+        for direction in np.eye(3):
+            moments = np.broadcast_to(self.moment * direction, points.shape)
+            _, slope, _ = self.table.derivatives(points, moments + self.table.polarizability * field)
+            force = np.maximum(force, np.linalg.norm(slope[:, :3], axis=1))
+            torque = np.maximum(torque, np.linalg.norm(np.cross(moments, slope[:, 3:]), axis=1))
+        of_force, of_torque = self.table.relative_error(points)
+        return torque * of_torque / self.moment, force * of_force / self.moment
 
     def placed(self, first: int) -> MutualAtPlace:
         """The same about one pose."""
@@ -64,7 +80,7 @@ class MutualAtPlace:
 
     table: MutualTable
     first: int
-    name: str = NAME
+    name: str = MUTUAL
 
     @property
     def count(self) -> int:

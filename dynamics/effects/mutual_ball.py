@@ -16,7 +16,7 @@ from ...geometry.basics import Array
 from ..motion import Added, Motion, Parameter, cross, dot
 from .ball_polynomials import count, fitting, nodes, polynomials, slopes
 
-DEGREE = 4
+DEGREE = 3
 PARTS = 7
 """u, and xx, xy, xz, yy, yz, zz of H."""
 ENTRIES = [(a, b) for a in range(3) for b in range(a, 3)]

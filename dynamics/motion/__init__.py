@@ -10,6 +10,7 @@ from .effect import (
     Motion as Motion,
     Placeable as Placeable,
     Placed as Placed,
+    Unsure as Unsure,
     conservative as conservative,
     dissipative as dissipative,
 )

@@ -105,6 +105,14 @@ class Fittable(Effect, Protocol):
         """The same with numbers from the runtime parameter `first` on, in a ball that other parameters tell."""
 
 
+@runtime_checkable
+class Unsure(Effect, Protocol):
+    """An effect with an error that it states."""
+
+    def doubt(self, points: Array, field: Array) -> tuple[Array, Array]:
+        """Errors of torque and force at points (n, 3) m in B0 (n, 3) T, over the moment: (n,) T and (n,) T/m."""
+
+
 def dissipative(force: Vector, torque: Vector, motion: Motion) -> Added:
     """An effect that stores no energy, from its accelerations: its power is what they do to drift and lag."""
     work = [f * v for f, v in zip(force, motion.drift, strict=True)]

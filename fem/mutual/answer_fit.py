@@ -59,10 +59,16 @@ def mutual_table(magnets: tuple[Magnet, ...], floater: Floater, order: int = 2) 
     )
 
 
-def _empty(magnet: Magnet, floater: Floater, counts: tuple[int, int, int]) -> AnswerGrid:
-    turn, size = magnet.box.rotation, float(np.linalg.norm(magnet.polarization))
+def oblique(magnet: Magnet) -> bool:
+    """Whether the permeability has other axes than the body, which the points of a magnet cannot answer with."""
+    turn = magnet.box.rotation
     inside = turn.T @ magnet.permeability_in_rotor @ turn
-    if np.abs(inside - np.diag(np.diag(inside))).max() > PARALLEL:
+    return bool(np.abs(inside - np.diag(np.diag(inside))).max() > PARALLEL)
+
+
+def _empty(magnet: Magnet, floater: Floater, counts: tuple[int, int, int]) -> AnswerGrid:
+    size = float(np.linalg.norm(magnet.polarization))
+    if oblique(magnet):
         raise InputError(
             "Input transverse_permeability must belong to a magnet polarised along one of its edges where rotor and "
             "floater magnetise each other; instead its easy axis is oblique. Choose --interaction rigid."

@@ -109,7 +109,7 @@ def article_scene(
 
 def levitation_of(scene: Scene, model: FieldModel, rtol: float = RTOL) -> Levitation:
     """A scene in one model's field, its plate left out."""
-    return Levitation(scene, Models(model, "none", rtol))
+    return Levitation(scene, Models(model, "none", rtol, interaction="rigid"))
 
 
 def rotor_label(configuration: str, value: float) -> str:
