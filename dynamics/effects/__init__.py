@@ -1,6 +1,7 @@
 """What acts on the floater beyond the rotor's field on a rigid dipole?"""
 
 from .air import (
+    REAL_AIR as REAL_AIR,
     RealAir as RealAir,
     moving as moving,
     reynolds as reynolds,
@@ -8,5 +9,15 @@ from .air import (
     swinging as swinging,
 )
 from .catalogue import with_effects as with_effects
+<<<<<<< HEAD
 from .floater_currents import FloaterCurrents as FloaterCurrents
-from .rotor_losses import RotorCurrents as RotorCurrents
+from .rotor_losses import (
+    ROTOR_CURRENTS as ROTOR_CURRENTS,
+    RotorCurrents as RotorCurrents,
+    brake_slope as brake_slope,
+)
+=======
+from .floater_currents import FLOATER_CURRENTS as FLOATER_CURRENTS, FloaterCurrents as FloaterCurrents
+from .mutual import MUTUAL as MUTUAL, Mutual as Mutual
+from .rough_answer import rough_force as rough_force
+>>>>>>> bc3f03f

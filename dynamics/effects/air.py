@@ -34,6 +34,7 @@ from ...geometry.basics import Array
 from ...geometry.scenes import AIR_VISCOSITY
 from ..motion import Added, Motion, Parameter, dissipative, dot
 
+REAL_AIR = "air beyond Stokes"
 AIR_DENSITY = 1.19
 """kg/m³ at 20-25 °C."""
 BOUNDARY_LAYER, REST = 6.45, 32.1
@@ -68,7 +69,7 @@ def moving(reynolds_number: ArrayLike) -> Array:
 class RealAir:
     """What air does beyond the Stokes drag that the runtime parameters hold."""
 
-    name: str = "air beyond Stokes"
+    name: str = REAL_AIR
 
     def added(self, motion: Motion) -> Added:
         """Its accelerations of place and spin; the spin's across the moment and along it."""

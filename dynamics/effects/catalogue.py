@@ -6,7 +6,7 @@ from ...geometry.scenes import Scene
 from ..motion import Effect, Interaction, interaction_of
 from .air import RealAir
 from .floater_currents import FloaterCurrents
-from .rotor_losses import NAME, RotorCurrents
+from .rotor_losses import ROTOR_CURRENTS, RotorCurrents
 
 
 def with_effects(scene: Scene, table: FieldFormula) -> Interaction:
@@ -20,6 +20,6 @@ def with_effects(scene: Scene, table: FieldFormula) -> Interaction:
     effects: list[Effect] = [FloaterCurrents()] if scene.floater.conductivity else []
     if scene.drag.air:
         effects.append(RealAir())
-    if pieces_of(scene.rotor, scene.conductors) and NAME not in {effect.name for effect in whole.effects}:
+    if pieces_of(scene.rotor, scene.conductors) and ROTOR_CURRENTS not in {effect.name for effect in whole.effects}:
         effects.append(RotorCurrents(cached_rotor_losses(scene, lambda _: None)[0]))
     return whole.joined(*effects)

@@ -20,12 +20,14 @@ Matrix = list[list[hy.expression]]
 GRADIENT = 2 / 21
 """Share of a unit gradient in the loss, lengths in radii; κ is that of a unit field."""
 
+FLOATER_CURRENTS = "currents in the floater"
+
 
 @dataclass(frozen=True)
 class FloaterCurrents:
     """The floater's own eddy currents; how strong they are, the runtime parameters say."""
 
-    name: str = "floater currents"
+    name: str = FLOATER_CURRENTS
 
     def added(self, motion: Motion) -> Added:
         """Its accelerations of place and spin; the spin's across the moment and along it."""

@@ -13,9 +13,10 @@ import numpy as np
 from ...fem.rotor_losses import RotorLosses
 from ...fem.rotor_tables import FieldTable
 from ...geometry.basics import Array
-from ..motion import Added, Motion, Parameter, Vector, cross, dissipative, dot
+from ...geometry.scenes import Scene
+from ..motion import Added, Motion, Parameter, Scales, State, Vector, cross, dissipative, dot
 
-NAME = "rotor currents"
+ROTOR_CURRENTS = "currents in the rotor"
 UPPER = [(a, b) for a in range(6) for b in range(a, 6)]
 
 
@@ -24,7 +25,7 @@ class RotorCurrents:
     """The brake of a table."""
 
     table: RotorLosses
-    name: str = NAME
+    name: str = ROTOR_CURRENTS
 
     def added(self, motion: Motion) -> Added:
         """Its accelerations of place and spin."""
@@ -63,7 +64,7 @@ class RotorCurrentsAtPlace:
 
     table: RotorLosses
     first: int
-    name: str = NAME
+    name: str = ROTOR_CURRENTS
 
     @property
     def count(self) -> int:
@@ -96,3 +97,20 @@ def _braked(force: Vector, field: Vector, motion: Motion) -> Added:
 
 def _sum(weights: Array, terms: Sequence[hy.expression]) -> hy.expression:
     return hy.sum([float(w) * t for w, t in zip(weights, terms, strict=True) if w])
+
+
+def brake_slope(table: RotorLosses, scene: Scene, state: State) -> Array:
+    """(12, 12): what the currents add to the derivatives of the scaled rates of a floater in step with the rotor."""
+    scales, floater = Scales.of(scene), scene.floater
+    matrix = table.dissipation(state.position[None], floater.moment * state.moment[None])[0]
+    units = np.repeat([scales.length, 1.0], 3) / scales.time
+    masses = np.repeat([floater.mass * scales.length, floater.inertia], 3) / scales.time**2
+    spin = scales.pack(state)[9:] - [0.0, 0.0, scene.angular_velocity * scales.time]
+    rates = np.zeros((6, 12))
+    rates[:, 3:6], rates[:, 9:] = np.eye(6)[:, :3], np.eye(6)[:, 3:]
+    rates[0, 1] = scene.angular_velocity * scales.time
+    rates[1, 0] = -rates[0, 1]
+    rates[3:, 6:9] = -float(spin @ state.moment) * np.eye(3)  # turning m̂ in a spin about it is a turn as well
+    found = np.zeros((12, 12))
+    found[[3, 4, 5, 9, 10, 11]] = -(matrix * units / masses[:, None]) @ rates
+    return found

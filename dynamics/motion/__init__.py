@@ -5,7 +5,12 @@ from .effect import (
     ZERO as ZERO,
     Added as Added,
     Effect as Effect,
+    Fittable as Fittable,
+    InBall as InBall,
     Motion as Motion,
+    Placeable as Placeable,
+    Placed as Placed,
+    Unsure as Unsure,
     conservative as conservative,
     dissipative as dissipative,
 )

@@ -8,18 +8,17 @@ import numpy as np
 from ...dynamics.flights import Trajectory, flight_kind
 from ...dynamics.motion import PlateMemory
 from ...dynamics.steady import Equilibrium
-from ...fem.closed_forms import rotating_torque
 from ...fem.rotor_tables import FieldTable
-from ...geometry.basics import MAGNET_CONDUCTIVITY, Array
-from ...geometry.scenes import Scene
+from ...geometry.basics import Array
 from ..results import EQUILIBRIUM_FIELDS
+from .effects import effects_answer
 from .levitation import Levitation
 
 MILLI = 1e-3
 PLATE_NOT_MODELLED = "The plate's eddy currents are left out: the plate is only an obstacle."
 ANSWERS_NOT_MODELLED = (
     "The floater is a rigid dipole: that rotor and floater magnetise each other is not in the motion "
-    "(how much that is: spinlev study floater-permeability)."
+    "(--interaction mutual)."
 )
 
 
@@ -56,9 +55,10 @@ def equilibria_answer(levitation: Levitation, equilibria: Sequence[Equilibrium] 
     return {
         "model": levitation.table.model,
         "error_estimate": float(levitation.table.relative_error(places)[0].max()) if len(places) else None,
+        **effects_answer(levitation, found),
         **plate_answer(levitation.plate),
         "equilibria": [equilibrium_answer(equilibrium) for equilibrium in found],
-        "not_modelled": omissions(levitation, found),
+        "not_modelled": omissions(levitation),
     }
 
 
@@ -80,6 +80,7 @@ def flight_answer(levitation: Levitation, flight: Trajectory) -> dict[str, Any]:
     return {
         "model": table.model,
         "error_estimate": float(table.relative_error(places[table.in_range(places)])[0].max()),
+        **effects_answer(levitation, () if levitation.absolute else levitation.equilibria),
         **plate_answer(levitation.plate),
         "beyond_plate_table": flight.beyond_plate_table,
         "levitated_s": flight.levitated_s,
@@ -91,28 +92,14 @@ def flight_answer(levitation: Levitation, flight: Trajectory) -> dict[str, Any]:
     }
 
 
-def omissions(levitation: Levitation, equilibria: Sequence[Equilibrium]) -> list[str]:
+def omissions(levitation: Levitation) -> list[str]:
     """What is in the scene but not in the computation."""
     scene = levitation.scene
     left_out = [PLATE_NOT_MODELLED] if scene.plate and levitation.plate is None else []
     permeabilities = [scene.floater.recoil_permeability, *(magnet.recoil_permeability for magnet in scene.rotor)]
-    if any(permeability != 1 for permeability in permeabilities):
+    if any(permeability != 1 for permeability in permeabilities) and levitation.interaction_model == "rigid":
         left_out.append(ANSWERS_NOT_MODELLED)
-    if scene.floater.conductivity is None and equilibria:
-        left_out.append(_floater_currents(scene, levitation.table, equilibria[0]))
     return left_out
-
-
-def _floater_currents(scene: Scene, table: FieldTable, equilibrium: Equilibrium) -> str:
-    """How large the torque of the floater's own eddy currents would be."""
-    across = float(np.linalg.norm(np.cross(table.evaluate(equilibrium.position)[0][0], equilibrium.state.moment)))
-    relative = scene.frequency * (1 - equilibrium.spin)
-    torque = float(rotating_torque(scene.floater.radius, MAGNET_CONDUCTIVITY, relative, across))
-    drag = scene.drag.angular * scene.angular_velocity
-    return (
-        f"The floater's own eddy currents are left out (no floater.conductivity_S_m): at {MAGNET_CONDUCTIVITY:.2g} S/m "
-        f"they would drive its spin with about {torque:.1e} N m (drag at the rotor's rate: {drag:.1e} N m)."
-    )
 
 
 def equilibria_lines(levitation: Levitation, equilibria: Sequence[Equilibrium] | None = None) -> list[str]:

@@ -28,6 +28,7 @@ from ..results import (
 )
 from ..terminal import Models, note, to_json
 from .answers import equilibria_answer, equilibria_lines, flight_answer, flight_lines
+from .effects import effects_lines
 from .levitation import Levitation
 from .single import Job
 
@@ -63,7 +64,7 @@ def main_job(scene: Scene, asked: Models, duration: float, out: Path) -> Job:
         "tables_from_cache": levitation.from_cache,
     }
     lines = [*equilibria_lines(levitation, surveys[chosen.model].equilibria), *comparison_lines(compared)]
-    lines += values["not_modelled"]
+    lines += [*effects_lines(values["effects"]), *values["not_modelled"]]
     flight = None
     if failure is None or isinstance(scene.start, AbsoluteStart):
         try:

@@ -15,6 +15,7 @@ from ...geometry.scenes import OffsetStart, Scene, scene_text
 from ..results import trajectory_dataset, write_dataset
 from ..terminal import COLUMNS, Models, note, to_json
 from .answers import equilibria_answer, equilibria_lines, field_answer, flight_answer, flight_lines, omissions
+from .effects import effects_lines
 from .levitation import Levitation
 
 Job = tuple[Mapping[str, Any], list[str]]
@@ -46,7 +47,7 @@ def equilibria_job(scene: Scene, asked: Models, spin: float, out: Path) -> Job:
     levitation = Levitation(scene, asked, spin)
     values = {**equilibria_answer(levitation), "tables_from_cache": levitation.from_cache}
     write_whole(out / "equilibria.json", f"{to_json(values)}\n".encode())
-    return values, [*equilibria_lines(levitation), *values["not_modelled"]]
+    return values, [*equilibria_lines(levitation), *effects_lines(values["effects"]), *values["not_modelled"]]
 
 
 def simulate_job(scene: Scene, asked: Models, duration: float, out: Path, resume: bool) -> Job:
@@ -76,8 +77,9 @@ def simulate_job(scene: Scene, asked: Models, duration: float, out: Path, resume
     checkpoint.remove()
     values = {
         **flight_answer(levitation, flight),
-        "not_modelled": omissions(levitation, () if levitation.absolute else levitation.equilibria),
+        "not_modelled": omissions(levitation),
         "trajectory": str(out / "trajectory.nc"),
         "tables_from_cache": levitation.from_cache,
     }
-    return values, [*flight_lines(flight), *values["not_modelled"], f"Trajectory in {values['trajectory']}"]
+    lines = [*flight_lines(flight), *effects_lines(values["effects"]), *values["not_modelled"]]
+    return values, [*lines, f"Trajectory in {values['trajectory']}"]

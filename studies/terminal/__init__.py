@@ -19,6 +19,7 @@ from .numbers import (
 from .options import (
     Answer as Answer,
     FieldModel as FieldModel,
+    InteractionModel as InteractionModel,
     Models as Models,
     Output as Output,
     PlateModel as PlateModel,
