@@ -9,15 +9,11 @@ from .air import (
     swinging as swinging,
 )
 from .catalogue import with_effects as with_effects
-<<<<<<< HEAD
-from .floater_currents import FloaterCurrents as FloaterCurrents
+from .floater_currents import FLOATER_CURRENTS as FLOATER_CURRENTS, FloaterCurrents as FloaterCurrents
+from .mutual import MUTUAL as MUTUAL, Mutual as Mutual
 from .rotor_losses import (
     ROTOR_CURRENTS as ROTOR_CURRENTS,
     RotorCurrents as RotorCurrents,
     brake_slope as brake_slope,
 )
-=======
-from .floater_currents import FLOATER_CURRENTS as FLOATER_CURRENTS, FloaterCurrents as FloaterCurrents
-from .mutual import MUTUAL as MUTUAL, Mutual as Mutual
 from .rough_answer import rough_force as rough_force
->>>>>>> bc3f03f
