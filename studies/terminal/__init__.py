@@ -21,6 +21,7 @@ from .options import (
     Answer as Answer,
     Beside as Beside,
     FieldModel as FieldModel,
+    InteractionModel as InteractionModel,
     Models as Models,
     Output as Output,
     PlateModel as PlateModel,
