@@ -19,7 +19,6 @@ from ...dynamics.effects import (
 )
 from ...dynamics.motion import Parameter, Scales, parameters
 from ...dynamics.steady import Balance, Equilibrium, modes, tangent_basis
-from ...fem.closed_forms import rotating_torque
 from ...fem.rotor_losses import RotorLosses, ball_losses, pieces_of
 from ...geometry.basics import MAGNET_CONDUCTIVITY, Array
 from .levitation import Levitation
@@ -86,28 +85,21 @@ def _shift(levitation: Levitation, first: Equilibrium, force: Array, torque: Arr
 
 
 def _floater_currents(levitation: Levitation, first: Equilibrium | None) -> ListedEffect:
-    scene = levitation.scene
-    if scene.floater.conductivity:
-        growth = None
-        if first is not None:
-            fixed, values = first.without or first, parameters(scene, Scales.of(scene), frozen_spin=True)
-            state = Scales.of(scene).pack(fixed.state)
-            still = values.copy()
-            still[Parameter.TILT_EDDY] = 0.0
-            both = [modes(state, levitation.rates(state[None], v)[1][0]).growth for v in (values, still)]
-            growth = (both[0] - both[1]) / Scales.of(scene).time
-        return ListedEffect(FLOATER_CURRENTS, True, 0.0, growth, "floater.conductivity_S_m is given")
-    why = "no floater.conductivity_S_m"
-    if first is not None:
-        across = float(np.linalg.norm(np.cross(levitation.table.evaluate(first.position)[0][0], first.state.moment)))
-        relative = scene.frequency * (1 - first.spin)
-        torque = float(rotating_torque(scene.floater.radius, MAGNET_CONDUCTIVITY, relative, across))
-        drag = scene.drag.angular * scene.angular_velocity
-        why += (
-            f"; at {MAGNET_CONDUCTIVITY:.2g} S/m they would drive its spin with about {torque:.1e} N m "
-            f"(drag at the rotor's rate: {drag:.1e} N m)"
-        )
-    return ListedEffect(FLOATER_CURRENTS, False, 0.0, None, why)
+    """Those of the scene, or what those of a sintered magnet would be."""
+    floater = levitation.scene.floater
+    why, conducting = "floater.conductivity_S_m is given", levitation
+    if not floater.conductivity:
+        why = f"no floater.conductivity_S_m; about this at {MAGNET_CONDUCTIVITY:.2g} S/m"
+        conducting = levitation.elsewhere(floater=replace(floater, conductivity=MAGNET_CONDUCTIVITY))
+    growth = None
+    if first is not None and levitation.scene.frequency:
+        scene, fixed = conducting.scene, first.without or first
+        values, state = parameters(scene, Scales.of(scene), frozen_spin=True), Scales.of(scene).pack(fixed.state)
+        still = values.copy()
+        still[Parameter.TILT_EDDY] = 0.0
+        both = [modes(state, conducting.rates(state[None], v)[1][0]).growth for v in (values, still)]
+        growth = (both[0] - both[1]) / Scales.of(scene).time
+    return ListedEffect(FLOATER_CURRENTS, bool(floater.conductivity), 0.0, growth, why)
 
 
 def _rotor_currents(levitation: Levitation, first: Equilibrium | None) -> ListedEffect:
