@@ -1,10 +1,16 @@
 """The small motions about equilibria: how fast each grows or dies out, and its frequency."""
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import numpy as np
 import xarray as xr
-from matplotlib.figure import Figure
 
 from ..results import PALETTE, panels, styled
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 MARKERS = "osD^v"
 """One for each small motion."""

@@ -1,11 +1,17 @@
 """Figure and report of one's own question, from its result alone."""
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import numpy as np
 import xarray as xr
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 
 from ..results import PALETTE, panels, styled
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 SHOWN = {"equilibria": ("depth", "growth"), "flight": ("levitated", "height_spread"), "field": ("size", "B_error")}
 """Quantities drawn for each question."""

@@ -1,13 +1,19 @@
 """Figures of a run, drawn from its result file alone."""
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import numpy as np
+import scipy
 import xarray as xr
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
-from scipy.interpolate import CubicSpline
 
 from ...geometry.basics import Array
 from .style import COLORS, DASHES, NAMES, PALETTE, panels, styled
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 
 @styled
@@ -159,4 +165,4 @@ def _smooth(parameter: Array, x: Array, y: Array) -> tuple[Array, Array]:
     if len(parameter) < 4:
         return x, y
     fine = np.linspace(parameter[0], parameter[-1], 12 * len(parameter))
-    return CubicSpline(parameter, x)(fine), CubicSpline(parameter, y)(fine)
+    return scipy.interpolate.CubicSpline(parameter, x)(fine), scipy.interpolate.CubicSpline(parameter, y)(fine)

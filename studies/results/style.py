@@ -1,16 +1,17 @@
 """The style of every figure, and how figures are written."""
 
+from __future__ import annotations
+
 import io
 from collections.abc import Callable, Mapping
 from functools import wraps
 from pathlib import Path
-from typing import Any, TypeVar, cast
-
-import matplotlib as mpl
-from cycler import cycler
-from matplotlib.figure import Figure
+from typing import TYPE_CHECKING, Any, TypeVar, cast
 
 from ...fem.storage import write_whole
+
+if TYPE_CHECKING:  # loading matplotlib takes as long as many an answer
+    from matplotlib.figure import Figure
 
 PALETTE = ["#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9"]
 """Colours of M. Okabe and K. Ito, which all kinds of colour vision tell apart."""
@@ -25,7 +26,7 @@ STYLE: Any = {
     "lines.linewidth": 1.2,
     "axes.grid": True,
     "grid.alpha": 0.3,
-    "axes.prop_cycle": cycler(color=PALETTE),
+    "axes.prop_cycle": f"cycler('color', {PALETTE})",
     "legend.frameon": False,
     "savefig.dpi": 160,
     "figure.constrained_layout.use": True,
@@ -39,7 +40,7 @@ NAMES = {
 }
 COLORS = dict(zip(NAMES, PALETTE, strict=False))
 DASHES = {"dipole": "--", "cuboid": "-.", "fem": "-", "moments": ":", "map": "-"}
-Draw = TypeVar("Draw", bound=Callable[..., Figure])
+Draw = TypeVar("Draw", bound="Callable[..., Figure]")
 
 
 def styled(draw: Draw) -> Draw:
@@ -47,6 +48,8 @@ def styled(draw: Draw) -> Draw:
 
     @wraps(draw)
     def inside(*arguments: Any, **options: Any) -> Figure:
+        import matplotlib as mpl
+
         with mpl.rc_context(STYLE):
             return draw(*arguments, **options)
 
@@ -55,6 +58,8 @@ def styled(draw: Draw) -> Draw:
 
 def panels(rows: int, columns: int, size: tuple[float, float]) -> tuple[Figure, Any]:
     """A figure without a window and its axes (rows, columns); `size` in inches."""
+    from matplotlib.figure import Figure
+
     figure = Figure(figsize=size)
     return figure, figure.subplots(rows, columns, squeeze=False)
 
@@ -74,6 +79,8 @@ def save_figure(figure: Figure, path: Path) -> None:
 
 def figure_bytes(figure: Figure, kind: str) -> bytes:
     """The figure as the content of a file of the kind `png` or `pdf`."""
+    import matplotlib as mpl
+
     stream = io.BytesIO()
     with mpl.rc_context(STYLE):
         figure.savefig(stream, format=kind)

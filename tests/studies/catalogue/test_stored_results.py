@@ -26,7 +26,7 @@ def test_a_stored_result_is_drawn_and_reported_from_its_file_alone(path):
         for axes in shown:
             for label in (axes.get_xlabel(), axes.get_ylabel()):
                 assert not re.search(r"\bnan\b|None", label)
-        assert any(axes.get_xlabel() or axes.get_title() for axes in shown)
+        assert any(axes.get_xlabel() or axes.get_title("left") for axes in shown)
         assert figure_bytes(figure, "png").startswith(b"\x89PNG")
     finally:
         plt.close(figure)
