@@ -13,7 +13,7 @@ from .table import MutualTable
 GAPS, EACH = (0.03, 0.16, 0.5, 1.5), 3
 """Gaps at which both are compared, in floater radii, and at how many poses for each magnet."""
 DEGREE, SERIES = 14, 1e-6
-SAFETY = 1.5
+SAFETY = 2.5
 """For the poses that were not looked at, and for the finite elements."""
 
 
@@ -47,6 +47,6 @@ def answer_errors(table: MutualTable, rotor: RotorResponse, floater: Floater) ->
             missed = np.linalg.norm(force[0] - added.force), np.linalg.norm(torque[0] - added.torque)
             arm = floater.radius * np.linalg.norm(added.force)
             sizes = np.linalg.norm(added.force), max(float(np.linalg.norm(added.torque)), 0.1 * float(arm))
-            worst = np.maximum(worst, np.array(missed) / sizes)
+            worst = np.maximum(worst, np.array(missed) / np.maximum(np.array(sizes), np.finfo(float).tiny))
         errors.append(SAFETY * worst)
     return np.array(GAPS) * floater.radius, np.array(errors)

@@ -81,7 +81,7 @@ def test_in_a_ball_force_and_torque_come_from_one_energy(mutual, start, formula)
     exact = Rates(mutual)(states, parameters(SCENE, SCALES))[0]
     weight = values[Parameter.GRAVITY_Z]
     assert error < 1e-5
-    assert np.abs(found[:, -12:] - exact)[:, 3:6].max() < 1e-5 * abs(weight)
+    assert np.abs(found[:, -12:] - exact)[:, 3:6].max() < 1e-4 * abs(weight)  # 1e-4 mm at the default bounce
     np.testing.assert_allclose(found[:, -12:], exact, atol=1e-5 * np.abs(exact).max())
 
 
@@ -104,7 +104,7 @@ def test_a_floater_at_its_equilibrium_stays_there(mutual, start):
     ("rotor", "frequency"),
     [
         (horizontal(1.5e-3, 10e-3, 1.305, 1.05), 150.0),
-        (horizontal(4e-3, 10e-3, 1.305, 1.05), 110.0),
+        (horizontal(3e-3, 10e-3, 1.305, 1.05), 100.0),
         (tilt(np.radians(10.0), 10e-3, 1.305, 1.05), 120.0),
         (vertical(14e-3, 10e-3, 1.305, 1.05), 75.0),
         (vertical(10e-3, 10e-3, 1.305, 1.05), 90.0),

@@ -67,9 +67,7 @@ def test_written_out_and_by_points_the_energy_is_one(table):
         ends = [table.derivatives(place + s * step[:3], moment + s * step[3:]) for s in (1, -1)]
         change, bend = ((ends[0][k] - ends[1][k]) / (2 * step[axis]) for k in (0, 1))
         np.testing.assert_allclose(change, slope[:, axis], rtol=1e-5, atol=1e-6 * np.abs(slope[:, axis]).max())
-        np.testing.assert_allclose(
-            bend, second[:, axis], rtol=1e-5, atol=1e-6 * np.abs(second).max(axis=(1, 2))[:, None]
-        )
+        assert np.abs(bend - second[:, axis]).max() < 1e-5 * np.abs(second[:, axis]).max()
 
 
 def test_a_file_holds_all_of_it(table, tmp_path):
