@@ -49,7 +49,7 @@ class Models:
     model: FieldModel = "auto"
     plate_model: PlateModel = "auto"
     rtol: float = 3e-6
-    plate_rtol: float = 3e-3
+    plate_rtol: float = 5e-3
     interaction: InteractionModel = "auto"
 
     def checked(self) -> Self:
