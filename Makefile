@@ -8,7 +8,7 @@ OLD ?= benchmarks/measured.json
 NEW ?= out/benchmarks.json
 SOURCES := $(shell find spinlev geometry fem dynamics studies scenes -type f -not -name "*.pyc") setup.py pyproject.toml README.md LICENSE
 
-.PHONY: install run test lint types coverage bench bench-compare dist gallery docs validate fuzz lock clean
+.PHONY: install run test test-browser lint types coverage bench bench-compare dist gallery docs validate fuzz lock clean
 
 install: $(VENV)/installed
 
@@ -41,6 +41,10 @@ types: install
 
 test: lint types
 	$(BIN)/pytest -n 2 --dist worksteal -m "not slow"
+
+# Report and documentation in headless Chromium (Debian: apt-get install chromium); skipped where there is none.
+test-browser: docs
+	$(BIN)/pytest tests/whole/test_browser.py
 
 # Lines that the fast tests run, in child processes too; what a killed process has left of its own count is removed.
 coverage: install

@@ -5,13 +5,27 @@ from importlib.metadata import version as installed_version
 project = "spinlev"
 author = "The spinlev developers"
 version = release = installed_version("spinlev")
-extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon", "sphinx.ext.viewcode"]
+extensions = [
+    *("myst_parser", "sphinx.ext.autodoc", "numpydoc", "sphinx.ext.viewcode"),
+    *("sphinx_copybutton", "sphinx-mathjax-offline"),
+]
+numpydoc_show_class_members = False
 myst_enable_extensions = ["dollarmath", "deflist"]
 exclude_patterns = ["_build"]
 autodoc_typehints = "none"
 autodoc_member_order = "bysource"
-html_theme = "alabaster"
-html_theme_options = {"description": "Magnetic levitation by rotation, with full fields", "page_width": "1000px"}
+html_theme = "pydata_sphinx_theme"
+html_theme_options = {
+    "logo": {"text": "spinlev"},
+    "navbar_align": "left",
+    "secondary_sidebar_items": ["page-toc"],
+    "footer_start": ["copyright"],
+    "footer_end": [],
+}
+html_context = {"default_mode": "auto"}
+html_sidebars = {"index": []}
+html_static_path = ["static"]
+html_css_files = ["narrow.css"]
 
 
 def magnitudes(app, what, name, obj, options, lines):

@@ -18,7 +18,6 @@ from .levitation_branch import (
     kicked as kicked,
     levitating_branch as levitating_branch,
 )
-from .mutual_levitation import with_answers as with_answers
 from .stable_frequencies import (
     HIGHEST as HIGHEST,
     LONG_STEPS as LONG_STEPS,

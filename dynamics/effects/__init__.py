@@ -1,4 +1,19 @@
 """What acts on the floater beyond the rotor's field on a rigid dipole?"""
 
+from .air import (
+    REAL_AIR as REAL_AIR,
+    RealAir as RealAir,
+    moving as moving,
+    reynolds as reynolds,
+    spinning as spinning,
+    swinging as swinging,
+)
 from .catalogue import with_effects as with_effects
-from .floater_currents import FloaterCurrents as FloaterCurrents
+from .floater_currents import FLOATER_CURRENTS as FLOATER_CURRENTS, FloaterCurrents as FloaterCurrents
+from .mutual import MUTUAL as MUTUAL, Mutual as Mutual
+from .rotor_losses import (
+    ROTOR_CURRENTS as ROTOR_CURRENTS,
+    RotorCurrents as RotorCurrents,
+    brake_slope as brake_slope,
+)
+from .rough_answer import rough_force as rough_force

@@ -98,7 +98,7 @@ class PerturbedBalance:
 
     def _free(self, position: Array) -> bool:
         place = position * self.scales.length
-        return all(magnet.box.distance(place) > self.scene.floater.radius for magnet in self.scene.rotor)
+        return all(body.distance(place) > self.scene.floater.radius for body in self.scene.turning_bodies)
 
     def _residual(self, position: Array, moment: Array, extra: Extra) -> Array:
         value = self.balance(position[None], moment[None])[0][0]

@@ -1,6 +1,7 @@
 """The compiled parts of a flight through balls: one for balls of each degree, and one for the table's own field."""
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
+from typing import cast
 
 import heyoka as hy
 import numpy as np
@@ -9,7 +10,17 @@ from ...fem.harmonics import BallField
 from ...fem.rotor_tables import FieldTable
 from ...geometry.scenes import Scene
 from ..effects import with_effects
-from ..motion import Equations, Parameter, PlateMemory, equations_of_motion
+from ..motion import (
+    Effect,
+    Equations,
+    Fittable,
+    InBall,
+    Interaction,
+    Parameter,
+    PlateMemory,
+    equations_of_motion,
+    interaction_of,
+)
 from .compiled_flight import Flight, compile_flight, flight_of
 
 LEFT = "left"
@@ -17,6 +28,8 @@ DEGREE = len(Parameter)
 """Number of the runtime parameter that says of which degree the ball is: 0 where there is none."""
 SMALL, LARGE = BallField(DEGREE + 1, 7), BallField(DEGREE + 1, 9)
 """The second kind, twice as wide and half again as slow, is for a floater that has left a small ball."""
+FIRST = DEGREE + 1 + LARGE.count
+"""Number of the first runtime parameter of the effects in a ball."""
 LOOSER = 300
 """A step's error is relative to the largest of states and events: 250 and more by the event of loss, 3 in a ball.
 
@@ -76,13 +89,34 @@ def ball_equations(
     scene: Scene, table: FieldTable, formula: BallField, memory: PlateMemory | None = None
 ) -> tuple[Equations, hy.expression]:
     """The motion in a ball, with the effects of the table, and what becomes negative outside of it."""
-    tilted, inside = bool(np.any(scene.gravity[:2])), replace(with_effects(scene, table), field=formula)
+    tilted, inside = bool(np.any(scene.gravity[:2])), in_ball(with_effects(scene, table), formula)
     equations = equations_of_motion(inside, tilted, memory, scene.angular_velocity)
     offset = formula.offset([hy.par[Parameter.LENGTH] * x for x in equations.variables[:3]])
     return equations, 1.0 - hy.sum([t * t for t in offset])
 
 
+def in_ball(whole: Interaction, formula: BallField) -> Interaction:
+    """A field and its effects as they are in a ball."""
+    effects: list[Effect] = []
+    first = FIRST
+    for effect in whole.effects:
+        if isinstance(effect, Fittable):
+            effects.append(local := effect.in_ball(formula, first))
+            first += local.count
+        else:
+            effects.append(effect)
+    return Interaction(formula, tuple(effects))
+
+
+def fitted(whole: Interaction, formula: BallField) -> list[InBall]:
+    """Those of the effects in a ball that have numbers of their own."""
+    pairs = zip(whole.effects, in_ball(whole, formula).effects, strict=True)
+    return [cast(InBall, local) for effect, local in pairs if isinstance(effect, Fittable)]
+
+
 def is_long(table: FieldTable) -> bool:
-    """Whether a field's expressions are longer than those of a ball."""
+    """Whether a field's or an effect's expressions are longer than those of a ball."""
+    if any(isinstance(effect, Fittable) for effect in interaction_of(table).effects):
+        return True
     field, gradient = table.expressions(hy.make_vars("x", "y", "z"))
     return sum(len(e) for e in [*field, *(e for row in gradient for e in row)]) > WORTH

@@ -17,8 +17,9 @@ from ...fem.harmonics import BallField
 from ...fem.rotor_tables import FieldTable
 from ...geometry.basics import Array
 from ...geometry.scenes import Scene
+from ..effects import with_effects
 from ..motion import Parameter, PlateMemory, Scales, State, parameters
-from .ball_parts import DEGREE, LARGE, SMALL, Parts, is_long
+from .ball_parts import DEGREE, LARGE, SMALL, Parts, fitted, is_long
 from .balls import Balls
 from .compiled_flight import TOLERANCE, Flight, compile_flight
 from .trajectory import FieldChanges
@@ -48,7 +49,12 @@ class LocalFlight:
     @property
     def values(self) -> Array:
         """Runtime parameters, without a ball."""
-        return np.concatenate([parameters(self.scene, self.scales), np.zeros(1 + LARGE.count)])
+        return np.concatenate([parameters(self.scene, self.scales), np.zeros(1 + LARGE.count + self._further)])
+
+    @property
+    def _further(self) -> int:
+        """Number of the runtime parameters of effects in a ball."""
+        return sum(effect.count for effect in fitted(with_effects(self.scene, self.table), LARGE))
 
     @property
     def compile_seconds(self) -> float:
@@ -106,13 +112,14 @@ class LocalFlight:
         if reach * inverse > SNUG or STAY * way * inverse > 1:
             return 0.0
         values[DEGREE] = formula.degree
-        values[DEGREE + 1 : DEGREE + 1 + formula.count] = found[0]
+        values[DEGREE + 1 : DEGREE + 1 + len(found[0])] = found[0]
         return error
 
     def _balls_of(self, formula: BallField, reach: float) -> Balls:
         key = formula.degree, reach
         if key not in self._balls:
-            self._balls[key] = Balls(self.scene, self.table.evaluate, formula, reach)
+            effects = fitted(with_effects(self.scene, self.table), formula)
+            self._balls[key] = Balls(self.scene, self.table.evaluate, formula, reach, effects)
         return self._balls[key]
 
     def _change(self, before: Flight, values: Array, after: Array) -> float:

@@ -95,6 +95,7 @@ def rotor_family(
     tables : between which it is, about two seconds each
 
     A rotor that moves as a whole keeps its table, whatever the model: the family is as good as its scenes' tables.
+    Currents in the rotor's own metal are left out: their table holds for one rotor.
 
     Raises
     ------
@@ -106,6 +107,8 @@ def rotor_family(
             f"{len(scene.rotor)}; instead received {configuration!r}."
         )
     moves = MOVES[configuration]
+    magnets = tuple(replace(magnet, conductivity=None) for magnet in scene.rotor)
+    scene = replace(scene, rotor=magnets, conductors=())
     rotor = tuple(_unmoved(magnet, move) for magnet, move in zip(scene.rotor, moves, strict=True))
     if len(rotor) > 1 and model == "fem":
         return RotorFamily(scene, rotor, moves, _mutual(rotor, moves, rtol, nearest, measures, tables))

@@ -5,7 +5,12 @@ from .effect import (
     ZERO as ZERO,
     Added as Added,
     Effect as Effect,
+    Fittable as Fittable,
+    InBall as InBall,
     Motion as Motion,
+    Placeable as Placeable,
+    Placed as Placed,
+    Unsure as Unsure,
     conservative as conservative,
     dissipative as dissipative,
 )
@@ -25,4 +30,10 @@ from .plate_force import PlateForce as PlateForce
 from .plate_terms import PlateMemory as PlateMemory
 from .rates import Rates as Rates
 from .state import Scales as Scales, State as State, turned_about_z as turned_about_z
-from .symbols import Parameter as Parameter, Vector as Vector, cross as cross, dot as dot
+from .symbols import (
+    Parameter as Parameter,
+    Vector as Vector,
+    cross as cross,
+    dot as dot,
+    subtract as subtract,
+)

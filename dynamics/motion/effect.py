@@ -5,10 +5,13 @@ All in the units of `Scales`, energies in M R²/T², along the axes that turn wi
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import heyoka as hy
 
+from ...fem.harmonics import Ball, BallField
+from ...fem.rotor_tables import FieldTable
+from ...geometry.basics import Array
 from .symbols import Parameter, Vector, cross, dot
 
 ZERO = hy.expression(0.0)
@@ -62,6 +65,52 @@ class Effect(Protocol):
 
     def added(self, motion: Motion) -> Added:
         """Its part of the equations of motion; it may use every runtime `Parameter`."""
+
+
+class Placed(Effect, Protocol):
+    """An effect with numbers of its own among the runtime parameters; it and its first derivatives hold at one pose."""
+
+    @property
+    def count(self) -> int:
+        """Of the numbers."""
+
+    def numbers(self, field: FieldTable, position: Array, moment: Array, values: Array) -> Array:
+        """(n, count) for scaled positions and moments (n, 3) in a field, and runtime parameters (n, p)."""
+
+
+@runtime_checkable
+class Placeable(Effect, Protocol):
+    """An effect whose expressions are so long that `Rates` has it as a `Placed` one."""
+
+    def placed(self, first: int) -> Placed:
+        """The same with numbers from the runtime parameter `first` on."""
+
+
+class InBall(Effect, Protocol):
+    """An effect with numbers of its own among the runtime parameters, which hold in a ball of a flight."""
+
+    @property
+    def count(self) -> int:
+        """Of the numbers."""
+
+    def fit(self, ball: Ball, gradient: Array) -> tuple[Array, float]:
+        """The numbers (count,) in a ball; the error of the force by that of the rigid dipole in ∇B0 (3, 3) T/m."""
+
+
+@runtime_checkable
+class Fittable(Effect, Protocol):
+    """An effect whose expressions are so long that flights have it as an `InBall` one."""
+
+    def in_ball(self, ball: BallField, first: int) -> InBall:
+        """The same with numbers from the runtime parameter `first` on, in a ball that other parameters tell."""
+
+
+@runtime_checkable
+class Unsure(Effect, Protocol):
+    """An effect with an error that it states."""
+
+    def doubt(self, points: Array, field: Array) -> tuple[Array, Array]:
+        """Errors of torque and force at points (n, 3) m in B0 (n, 3) T, over the moment: (n,) T and (n,) T/m."""
 
 
 def dissipative(force: Vector, torque: Vector, motion: Motion) -> Added:

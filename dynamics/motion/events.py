@@ -9,7 +9,7 @@ from dataclasses import replace
 import heyoka as hy
 import numpy as np
 
-from ...geometry.basics import Array, Box
+from ...geometry.basics import Array, Box, Solid
 from ...geometry.scenes import Plate, Scene
 from .state import turned_about_z
 from .symbols import Parameter, Vector
@@ -21,7 +21,7 @@ def flight_events(scene: Scene, position: Vector) -> tuple[list[hy.t_event], lis
     """Terminal events of the scaled motion, and what each of them means."""
     length = hy.par[Parameter.LENGTH]
     metres = [length * p for p in position]
-    gaps = [_excess(magnet.box, metres) for magnet in scene.rotor]
+    gaps = [_excess(body, metres) for body in scene.turning_bodies]
     if scene.plate is not None:
         gaps.append(_excess(scene.plate.box, _plate_view(metres)))
     falling = hy.event_direction.negative
@@ -30,16 +30,17 @@ def flight_events(scene: Scene, position: Vector) -> tuple[list[hy.t_event], lis
     return [*events, hy.t_event(reach, direction=falling)], [CONTACT] * len(gaps) + [LOST]
 
 
-def _excess(box: Box, position: Vector) -> hy.expression:
-    """Squared distance of a point outside a box from its surface, m²."""
-    shifted = [position[i] - float(box.center[i]) for i in range(3)]
-    terms = []
-    for axis in range(3):
-        along = hy.sum([float(box.rotation[i, axis]) * shifted[i] for i in range(3) if box.rotation[i, axis]])
-        half = float(box.half_edges[axis])
-        beyond = hy.relu(along - half) + hy.relu(-along - half)
-        terms.append(beyond * beyond)
-    return hy.sum(terms)
+def _excess(body: Solid, position: Vector) -> hy.expression:
+    """Squared distance of a point outside a body from its surface, m²."""
+    shifted = [position[i] - float(body.center[i]) for i in range(3)]
+    turn, half = body.rotation, [float(size / 2) for size in body.size]
+    along = [hy.sum([float(turn[i, axis]) * shifted[i] for i in range(3) if turn[i, axis]]) for axis in range(3)]
+    beyond = [hy.relu(x - edge) + hy.relu(-x - edge) for x, edge in zip(along, half, strict=True)]
+    if not isinstance(body, Box):  # the root is never that of zero
+        radius = half[0]
+        outside = hy.relu(along[0] * along[0] + along[1] * along[1] - radius**2)
+        beyond = [hy.sqrt(radius**2 + outside) - radius, beyond[2]]
+    return hy.sum([b * b for b in beyond])
 
 
 def _plate_view(position: Vector) -> Vector:
@@ -58,7 +59,7 @@ def lost_distance(start: Array) -> float:
 
 def clearance(scene: Scene, time: Array, position: Array) -> Array:
     """Smallest gap (n,) in m between the floater and any body; `time` (n,) s, `position` (n, 3) m, rotor's frame."""
-    gaps = [magnet.box.distance(position) for magnet in scene.rotor]
+    gaps = [body.distance(position) for body in scene.turning_bodies]
     if scene.plate is not None:
         seen = turned_about_z(position, scene.angular_velocity * time)
         seen[:, 2] += plate_depth(scene.plate, time)

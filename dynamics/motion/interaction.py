@@ -7,12 +7,13 @@ from dataclasses import dataclass, replace
 from typing import cast
 
 import heyoka as hy
+import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ...fem.harmonics import FieldExpressions
 from ...fem.rotor_tables import FieldFormula, FieldTable
 from ...geometry.basics import Array
-from .effect import Effect
+from .effect import Effect, Unsure
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,8 +43,16 @@ class Interaction:
         return self._table.evaluate(points)
 
     def relative_error(self, points: ArrayLike) -> tuple[Array, Array]:
-        """Estimated relative errors (n,) of B and of its gradient."""
-        return self._table.relative_error(points)
+        """Estimated relative errors (n,) of B and its gradient, with what the effects' own errors are worth in them."""
+        errors = self._table.relative_error(points)
+        unsure = [effect for effect in self.effects if isinstance(effect, Unsure)]
+        if not unsure:
+            return errors
+        field, gradient = self._table.evaluate(points)
+        sizes = np.linalg.norm(field, axis=1), np.linalg.norm(gradient, axis=(1, 2))
+        more = [effect.doubt(np.asarray(points, float).reshape(-1, 3), field) for effect in unsure]
+        b, g = (e + np.sum(m, axis=0) / s for e, m, s in zip(errors, zip(*more, strict=True), sizes, strict=True))
+        return b, g
 
     def in_range(self, points: ArrayLike) -> NDArray:  # type: ignore[type-arg]
         """Which of the points (n, 3) m lie where the table knows the field: (n,)."""

@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 from functools import cached_property
-from typing import Any
+from typing import Any, cast
 
 import heyoka as hy
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...fem.rotor_tables import FieldFormula
+from ...fem.rotor_tables import FieldFormula, FieldTable
 from ...fem.storage import compiled
 from ...geometry.basics import Array
 from .at_rest import balances
+from .effect import Effect, Placeable, Placed
 from .equations import equations_of_motion
+from .interaction import Interaction, interaction_of
+from .symbols import Parameter
 
 
 class Rates:
@@ -26,7 +29,15 @@ class Rates:
     """
 
     def __init__(self, table: FieldFormula, optimised: bool = False) -> None:
-        equations = equations_of_motion(table)
+        whole = interaction_of(table)
+        self._field = whole.field
+        self._placed: list[Placed] = []
+        effects: list[Effect] = []
+        for effect in whole.effects:
+            if isinstance(effect, Placeable):
+                self._placed.append(effect.placed(len(Parameter) + sum(known.count for known in self._placed)))
+            effects.append(self._placed[-1] if isinstance(effect, Placeable) else effect)
+        equations = equations_of_motion(Interaction(whole.field, tuple(effects)))
         self._equations, self._level = equations, 1 if optimised else 0
         variables = list(equations.variables)
         tensors = hy.diff_tensors(list(equations.rates), diff_args=variables, diff_order=1)
@@ -39,7 +50,8 @@ class Rates:
 
         `values` of the parameters: (p,) for all states or (n, p), one row for each.
         """
-        found = _called(self._function, np.asarray(states, float).T, values).T
+        states = np.asarray(states, float)
+        found = _called(self._function, states.T, self._all(states[:, :3], states[:, 6:9], values)).T
         return found[:, :12], found[:, 12:].reshape(-1, 12, 12)
 
     def balance(
@@ -52,8 +64,16 @@ class Rates:
         given = np.empty((13, len(position)))
         given[:3], given[3:6], given[12] = position.T, moment.T, spin
         given[6:12] = tangents.reshape(-1, 6).T
-        found = _called(self._balances, given, values)
+        found = _called(self._balances, given, self._all(position, moment, values))
         return found[:5].T, np.moveaxis(found[5:].reshape(5, 5, -1), 2, 0)
+
+    def _all(self, position: Array, moment: Array, values: Array) -> Array:
+        """The runtime parameters with the numbers of effects that have some, at scaled positions and moments (n, 3)."""
+        if not self._placed:
+            return values
+        rows = np.broadcast_to(values, (len(position), values.shape[-1]))[:, : len(Parameter)]
+        field = cast(FieldTable, self._field)
+        return np.concatenate([rows, *(part.numbers(field, position, moment, rows) for part in self._placed)], axis=1)
 
     @cached_property
     def _balances(self) -> Any:

@@ -39,7 +39,7 @@ def drift(
     duration : at most, s; may be infinite where there is a slow torque
     rates : `Rates` of the same table, to compile them once for many scenes
     start : the equilibrium at `spin`, if it is known; else the one at which small motions grow the slowest
-    stokes : drag proportional to spin, as in `simulate`, instead of `air_torque`
+    stokes : drag proportional to spin unless the scene's drag is that of real air, as in `simulate`
     e_folds : growth of a small motion after which it has ended the flight
 
     Raises

@@ -13,7 +13,9 @@ from .interior import (
     Ball as Ball,
     dipole_sources as dipole_sources,
     factorials as factorials,
+    field_at_center as field_at_center,
     from_magnetization as from_magnetization,
+    gradient_at_center as gradient_at_center,
     interior_coefficients as interior_coefficients,
     multipole_force as multipole_force,
     multipole_torque as multipole_torque,
@@ -26,6 +28,7 @@ from .multipole import (
     uniform_moments as uniform_moments,
     without_noise as without_noise,
 )
+from .regular_sums import regular_harmonics as regular_harmonics
 from .solid import (
     Coefficients as Coefficients,
     derivative as derivative,
@@ -41,6 +44,7 @@ from .surface import (
     Keys as Keys,
     harmonic_parity as harmonic_parity,
     mirrored_harmonics as mirrored_harmonics,
+    norm as norm,
     orthonormal as orthonormal,
     orthonormal_keys as orthonormal_keys,
     outer_coefficients as outer_coefficients,

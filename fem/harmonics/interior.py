@@ -94,6 +94,11 @@ def gradient_coefficients(incident: Coefficients, axis: int) -> Coefficients:
     return np.asarray(((lower - upper) / 2, 0.5j * (lower + upper), above[:, :size])[axis])
 
 
+def gradient_at_center(incident: Coefficients, radius: float) -> Array:
+    """∂B_i/∂x_j (3, 3) T/m at the centre of a ball of a radius (m)."""
+    return np.stack([field_at_center(gradient_coefficients(incident, axis)) for axis in range(3)], axis=1) / radius
+
+
 def multipole_force(incident: Coefficients, sources: Coefficients, ball: Ball) -> Array:
     """Force (3,) N of the incident field a_lm on the sources c_lm (T) in the ball; exact."""
     factor = -FOUR_PI * ball.radius**2 / MU_0

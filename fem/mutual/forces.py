@@ -50,7 +50,7 @@ class TwoBody:
     floater_answer : what the sphere's answer to the rotor's own field adds
     rotor_answer : what the rotor's answer to the rigid dipole adds
     total : both bodies answer to both; the sum of the three but for products of two answers
-    incident, sources : a_lm and c_lm (T) of the total
+    own, incident, sources : a_lm (T) of the rotor alone, a_lm and c_lm (T) of the total
     terms : of the series
     tail : estimated relative error by the degrees left out, of what the answers add
     """
@@ -60,6 +60,7 @@ class TwoBody:
     floater_answer: Wrench
     rotor_answer: Wrench
     total: Wrench
+    own: Coefficients
     incident: Coefficients
     sources: Coefficients
     terms: int
@@ -115,6 +116,7 @@ def two_body(
         floater_answer=_wrench(own, induced, ball),
         rotor_answer=_wrench(reflected, permanent, ball),
         total=_wrench(incident, sources, ball),
+        own=own,
         incident=incident,
         sources=sources,
         terms=terms,

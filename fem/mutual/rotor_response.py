@@ -5,7 +5,7 @@ magnetisation (μ - 1)(H0 - ∇ψ) comes from finite elements on a mesh of the m
 the ball. Its field in the ball is a volume integral over the magnets, whose error is the square of that of ∇ψ.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -75,6 +75,26 @@ class RotorResponse:
         parts = [self._dipoles({name: total[name] - fields[name] @ chi[name] for name in total})]
         parts.append(closed_dipoles(self.magnets))
         return np.concatenate([p for p, _ in parts]), np.concatenate([m for _, m in parts])
+
+    def linear_response(self) -> tuple[Array, Array, Callable[[Array], Array]]:
+        """Points (n, 3) m and weights (n,) m³, and what makes μ0 M (n, 3) T there of a field H0 (n, 3) T."""
+        assert self.regions is not None
+        regions, names = self.regions, list(self._places)
+        ends = np.cumsum([len(self._places[name]) for name in names])[:-1]
+
+        def magnetized(field: Array) -> Array:
+            found = regions.magnetization(dict(zip(names, np.split(field, ends), strict=True)))
+            return np.concatenate([found[name] for name in names])
+
+        weights = np.concatenate([regions.points[name].weights for name in names]) * self.mesh.unit**3
+        return np.concatenate([self._places[name] for name in names]), weights, magnetized
+
+    def own_dipoles(self) -> tuple[Array, Array]:
+        """As `remanent_dipoles`, on the mesh's points alone: good to a hundredth of what the permeability adds."""
+        if self.regions is None:
+            return np.zeros((0, 3)), np.zeros((0, 3))
+        points, weights, magnetized = self.linear_response()
+        return points, weights[:, None] * magnetized(remanent_field(self.magnets, points))
 
     @cached_property
     def _places(self) -> dict[str, Array]:

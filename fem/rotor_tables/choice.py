@@ -52,6 +52,9 @@ def rotor_table(
     rtol, nearest : relative accuracy of B asked of "fem" and "moments", and the distance from the magnets' faces from
         which on it holds, m (None: 0.8 of the largest magnet's edge, if it were a cube)
 
+    "dipole", "moments" and "cuboid" have the moment J V/μ0 of the remanence alone, as the article does; a cube with
+    μr = 1.05 has 0.984 of it, so that their field is 1.6 % too strong by convention ("fem" has the true one, and the
+    floater's own moment always carries its 3/(μr + 2)).
     The table states its own error: `RotorTable.relative_error`. That of "dipole" and "cuboid" is their neglected part,
     shape and permeability, computed to first order in μr - 1.
 

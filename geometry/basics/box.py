@@ -60,6 +60,10 @@ class Box:
         """Coordinates of `points` (..., 3) along the body axes, from the centre, m."""
         return (np.asarray(points, float) - self.center) @ self.rotation
 
+    def reach(self, directions: Array) -> Array:
+        """How far (n,) it reaches from its centre along unit vectors (n, 3), m."""
+        return np.asarray(np.abs(directions @ self.rotation) @ self.half_edges)
+
     def distance(self, points: ArrayLike) -> Array:
         """Signed distance (...,) of `points` (..., 3) from the surface, m; negative inside."""
         excess = np.abs(self.to_body(points)) - self.half_edges

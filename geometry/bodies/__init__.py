@@ -1,9 +1,11 @@
 """Which magnets are there, and how do they lie to each other?"""
 
 from .article_rotors import horizontal as horizontal, tilt as tilt, vertical as vertical
+from .conductor import Conductor as Conductor, separate_pieces as separate_pieces
 from .magnet import Magnet as Magnet
 from .overlap import (
     TOUCHING as TOUCHING,
+    body_overlap as body_overlap,
     closing_shifts as closing_shifts,
     deepest_overlap_in_a_turn as deepest_overlap_in_a_turn,
     largest_shift as largest_shift,

@@ -17,6 +17,7 @@ class Magnet:
     polarization : (3,) remanent polarisation along the body axes, T; it turns with the body
     recoil_permeability : μr of the demagnetisation curve, along the easy axis, which is that of the polarisation
     transverse_permeability : μr across the easy axis; None: as along it
+    conductivity : S/m, or None where its eddy currents are not modelled
 
     Raises
     ------
@@ -27,6 +28,7 @@ class Magnet:
     polarization: Array
     recoil_permeability: float = 1.0
     transverse_permeability: float | None = None
+    conductivity: float | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "polarization", frozen_array(self.polarization, (3,)))
@@ -69,4 +71,5 @@ class Magnet:
         permeability = f"{along:g}" if self.isotropic else f"{along:g} along, {self.transverse_permeability:g} across"
         polarization = listed(self.polarization_in_rotor)
         place = f"{millimetres(self.box.size)} at {millimetres(self.box.center)}"
-        return f"Magnet {place}, ({polarization}) T, μr {permeability}"
+        text = f"Magnet {place}, ({polarization}) T, μr {permeability}"
+        return text if self.conductivity is None else f"{text}, {self.conductivity:.3g} S/m"

@@ -8,7 +8,7 @@ import numpy as np
 import scipy
 from numpy.typing import ArrayLike
 
-from ..basics import Array, Box, rotation_matrix
+from ..basics import Array, Box, Solid, rotation_matrix
 from .magnet import Magnet
 
 TOUCHING = 1e-9
@@ -38,25 +38,49 @@ def box_overlap(first: Box, second: Box) -> float:
     return -separation(first, second)[0]
 
 
-def sphere_overlap(center: ArrayLike, radius: float, box: Box) -> float:
-    """Penetration depth of a sphere into a box, m; negative if they are apart."""
-    return radius - float(box.distance(center))
+def body_overlap(first: Solid, second: Solid) -> float:
+    """Penetration depth of two convex bodies, m: the shortest shift that parts them; negative if they are apart.
+
+    Some direction shows the widest gap between them.  Where faces or mantles meet it is one of those that are tried
+    first, and the depth is exact; elsewhere it is found by a search, which can only tell too large a depth.
+    """
+    if isinstance(first, Box) and isinstance(second, Box):
+        return box_overlap(first, second)
+    offset = second.center - first.center
+
+    def gap(directions: Array) -> Array:
+        ways = directions / np.linalg.norm(directions, axis=1)[:, None]
+        return np.asarray(np.abs(ways @ offset) - first.reach(ways) - second.reach(ways))
+
+    axes = np.vstack([first.rotation.T, second.rotation.T])
+    across = np.vstack([offset, *(offset - (offset @ axis) * axis for axis in axes)])
+    tried = np.vstack([axes, across, np.random.default_rng(0).normal(size=(200, 3))])
+    tried = tried[np.linalg.norm(tried, axis=1) > 1e-12]
+    widest = tried[int(np.argmax(gap(tried)))]
+    scale = first.circumradius + second.circumradius
+    found = scipy.optimize.minimize(lambda n: -gap(n[None])[0] / scale, widest, method="Nelder-Mead", tol=1e-9)
+    return float(min(scale * found.fun, -gap(tried).max()))
 
 
-def turned(box: Box, angle: float) -> Box:
-    """The box after the rotor has turned by `angle` (rad) about z."""
+def sphere_overlap(center: ArrayLike, radius: float, body: Solid) -> float:
+    """Penetration depth of a sphere into a body, m; negative if they are apart."""
+    return radius - float(body.distance(center))
+
+
+def turned(body: Solid, angle: float) -> Solid:
+    """The body after the rotor has turned by `angle` (rad) about z."""
     turn = rotation_matrix((0.0, 0.0, np.degrees(angle)))
-    return Box(box.size, turn @ box.center, turn @ box.rotation)
+    return replace(body, center=turn @ body.center, rotation=turn @ body.rotation)
 
 
-def deepest_overlap_in_a_turn(rotating: Box, fixed: Box) -> float:
-    """Largest penetration depth of a box that turns about z into a fixed one, m; negative if always apart."""
-    apart = float(fixed.distance(np.zeros(3))) - float(np.linalg.norm(rotating.corners, axis=1).max())
+def deepest_overlap_in_a_turn(rotating: Solid, fixed: Box) -> float:
+    """Largest penetration depth of a body that turns about z into a fixed box, m; negative if always apart."""
+    apart = float(fixed.distance(np.zeros(3))) - _farthest(rotating)
     if apart > 0:  # it never leaves a sphere that does not reach the fixed one
         return -apart
 
     def gap(angle: float) -> float:
-        return -box_overlap(turned(rotating, angle), fixed)
+        return -body_overlap(turned(rotating, angle), fixed)
 
     angles = np.linspace(0.0, 2 * np.pi, 73)
     best = angles[int(np.argmin([gap(angle) for angle in angles]))]
@@ -65,6 +89,13 @@ def deepest_overlap_in_a_turn(rotating: Box, fixed: Box) -> float:
         gap, bounds=(best - step, best + step), method="bounded", options={"xatol": 1e-9}
     )
     return -min(gap(best), float(refined.fun))
+
+
+def _farthest(body: Solid) -> float:
+    """Distance from the origin that no point of the body exceeds, m."""
+    if isinstance(body, Box):
+        return float(np.linalg.norm(body.corners, axis=1).max())
+    return float(np.linalg.norm(body.center)) + body.circumradius
 
 
 def overlapping_magnets(magnets: Sequence[Magnet]) -> list[tuple[int, int, float]]:

@@ -4,4 +4,5 @@ from .conductors import MILLIMETRE as MILLIMETRE, PLANES as PLANES, ConductorMes
 from .export import to_meshio as to_meshio
 from .hexahedra import Block as Block, graded_partition as graded_partition, hex_mesh as hex_mesh
 from .magnets import MagnetMesh as MagnetMesh, MeshSettings as MeshSettings, mesh_magnets as mesh_magnets
+from .metal import MetalMesh as MetalMesh, mesh_metal as mesh_metal
 from .plate import MeshRule as MeshRule, plate_mesh as plate_mesh, skin_depth as skin_depth

@@ -1,17 +1,30 @@
 """From the keys of a scene file to the scene in SI units."""
 
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from pydantic import ValidationError
 
-from ..basics import Array, Box, rotation_matrix
-from ..bodies import Magnet, horizontal, tilt, vertical
+from ..basics import Array, Box, Cylinder, Solid, rotation_matrix
+from ..bodies import Conductor, Magnet, horizontal, tilt, vertical
 from .contents import AbsoluteStart, Drag, Floater, Lowering, OffsetStart, Plate, Scene
 from .faults import SceneError, describe_fault, overlap_faults
-from .schema import ExplicitRotor, PlateSection, Rotor, SceneSection, StartSection, TiltRotor
+from .schema import (
+    ConductorSection,
+    DragSection,
+    ExplicitRotor,
+    HorizontalRotor,
+    MagnetSection,
+    PlateSection,
+    Rotor,
+    SceneSection,
+    StartSection,
+    TiltRotor,
+    VerticalRotor,
+)
 
 MILLI = 1e-3
 
@@ -27,7 +40,7 @@ def assemble(keys: Mapping[str, Any], source: str) -> Scene:
         table = SceneSection.model_validate(keys)
     except ValidationError as error:
         raise SceneError(source, [describe_fault(detail) for detail in error.errors()]) from None
-    faults = _start_faults(table.start)
+    faults = _start_faults(table.start) + _drag_faults(table.drag) + _conductor_faults(table.rotor.conductors)
     if faults:
         raise SceneError(source, faults)
     scene = _scene(table, Path(source).parent)
@@ -56,8 +69,34 @@ def _start_faults(start: StartSection | None) -> list[str]:
     return faults
 
 
+def _drag_faults(drag: DragSection | None) -> list[str]:
+    """A model, or both numbers."""
+    if drag is None:
+        return []
+    numbers = {key: getattr(drag, key) for key in ("linear_N_s_m", "angular_N_m_s")}
+    given = [key for key, value in numbers.items() if value is not None]
+    if drag.model is not None:
+        return [f"Input drag.{key} must be left out beside drag.model; instead received both." for key in given]
+    return [f"Input drag.{key} must be given; instead it is missing." for key in numbers if key not in given]
+
+
+def _conductor_faults(conductors: list[ConductorSection]) -> list[str]:
+    """Which sizes belong to which shape."""
+    sizes = {"cuboid": ("size_mm",), "cylinder": ("diameter_mm", "height_mm")}
+    faults = []
+    for k, conductor in enumerate(conductors):
+        wanted = sizes[conductor.shape]
+        given = [key for keys in sizes.values() for key in keys if getattr(conductor, key) is not None]
+        if tuple(given) != wanted:
+            faults.append(
+                f"Input rotor.conductors[{k}] must have {' and '.join(wanted)}, as the shape is {conductor.shape!r}; "
+                f"instead received {' and '.join(given) or 'no size'}."
+            )
+    return faults
+
+
 def _scene(table: SceneSection, folder: Path) -> Scene:
-    sphere, drag = table.floater, table.drag
+    sphere, drag = table.floater, table.drag or DragSection(model="stokes")
     material = (sphere.remanence_T, sphere.recoil_permeability, sphere.density_kg_m3, sphere.conductivity_S_m)
     floater = Floater(sphere.diameter_mm * MILLI / 2, *material)
     return Scene(
@@ -66,14 +105,29 @@ def _scene(table: SceneSection, folder: Path) -> Scene:
         rotor=_rotor(table.rotor),
         floater=floater,
         plate=_plate(table.plate) if table.plate else None,
-        drag=Drag(drag.linear_N_s_m, drag.angular_N_m_s) if drag else Drag.stokes(floater.radius),
+        drag=_drag(drag, floater.radius),
         start=_start(table.start),
         field_map=folder / table.rotor.field_map if table.rotor.field_map else None,
+        conductors=tuple(Conductor(_solid(c), c.conductivity_S_m) for c in table.rotor.conductors),
     )
 
 
 def _box(size_mm: list[float], center_mm: list[float], rotation_deg: list[float]) -> Box:
     return Box(_metres(size_mm), _metres(center_mm), rotation_matrix(rotation_deg))
+
+
+def _drag(drag: DragSection, radius: float) -> Drag:
+    if drag.linear_N_s_m is not None and drag.angular_N_m_s is not None:
+        return Drag(drag.linear_N_s_m, drag.angular_N_m_s)
+    return replace(Drag.stokes(radius), air=drag.model == "air")
+
+
+def _solid(conductor: ConductorSection) -> Solid:
+    if conductor.size_mm is not None:
+        return _box(conductor.size_mm, conductor.center_mm, conductor.rotation_deg)
+    diameter, height = _metres([conductor.diameter_mm or 0.0, conductor.height_mm or 0.0])
+    pose = _metres(conductor.center_mm), rotation_matrix(conductor.rotation_deg)
+    return Cylinder(diameter / 2, float(height), *pose)
 
 
 def _metres(millimetres: list[float]) -> Array:
@@ -82,10 +136,19 @@ def _metres(millimetres: list[float]) -> Array:
 
 def _rotor(rotor: Rotor) -> tuple[Magnet, ...]:
     if isinstance(rotor, ExplicitRotor):
-        return tuple(
-            Magnet(_box(m.size_mm, m.center_mm, m.rotation_deg), np.array(m.polarization_T), *m.recoil_permeability)
-            for m in rotor.magnets
-        )
+        return tuple(_magnet(magnet, rotor.conductivity_S_m) for magnet in rotor.magnets)
+    return tuple(replace(magnet, conductivity=rotor.conductivity_S_m) for magnet in _of_article(rotor))
+
+
+def _magnet(magnet: MagnetSection, conductivity: float | None) -> Magnet:
+    """One of an explicit rotor; `conductivity` where it has none of its own."""
+    box = _box(magnet.size_mm, magnet.center_mm, magnet.rotation_deg)
+    along, across = magnet.recoil_permeability
+    own = magnet.conductivity_S_m
+    return Magnet(box, np.array(magnet.polarization_T), along, across, conductivity if own is None else own)
+
+
+def _of_article(rotor: HorizontalRotor | VerticalRotor | TiltRotor) -> tuple[Magnet, ...]:
     material = (rotor.edge_mm * MILLI, rotor.remanence_T, *rotor.recoil_permeability)
     if isinstance(rotor, TiltRotor):
         return tilt(float(np.radians(rotor.angle_deg)), *material)

@@ -29,7 +29,8 @@ def scene(
     floater : `sphere`
     plate : `plate`, or None
     gravity_m_s2 : (3,) m/s², laboratory frame
-    drag : linear_N_s_m and angular_N_m_s; left out, Stokes drag in air
+    drag : model ("stokes", or "air": what a real sphere feels at its Reynolds number and frequency), or linear_N_s_m
+        and angular_N_m_s; left out, Stokes drag in air
     start : a mapping: "offset_mm" from the stable equilibrium (0.1 mm up), or "position_mm" with "velocity_mm_s",
         "moment" and "spin_hz"
 
@@ -50,24 +51,29 @@ def scene(
 
 
 def horizontal(*, displacement_mm: float, edge_mm: float, remanence_T: float, **more: Any) -> Table:
-    """One cube magnetised along +x, `displacement_mm` off the axis; more: recoil_permeability, field_map."""
+    """One cube magnetised along +x, `displacement_mm` off the axis; more: see `magnets`."""
     material = {"edge_mm": edge_mm, "remanence_T": remanence_T}
     return {"configuration": "horizontal", "displacement_mm": displacement_mm, **material, **more}
 
 
 def vertical(*, displacement_mm: float, edge_mm: float, remanence_T: float, **more: Any) -> Table:
-    """A cube magnetised along +x and one `displacement_mm` above it along +z; more: recoil_permeability, field_map."""
+    """A cube magnetised along +x and one `displacement_mm` above it along +z; more: see `magnets`."""
     material = {"edge_mm": edge_mm, "remanence_T": remanence_T}
     return {"configuration": "vertical", "displacement_mm": displacement_mm, **material, **more}
 
 
 def tilt(*, angle_deg: float, edge_mm: float, remanence_T: float, **more: Any) -> Table:
-    """One cube, magnetised along (cos angle, 0, sin angle); more: recoil_permeability, field_map."""
+    """One cube, magnetised along (cos angle, 0, sin angle); more: see `magnets`."""
     return {"configuration": "tilt", "angle_deg": angle_deg, "edge_mm": edge_mm, "remanence_T": remanence_T, **more}
 
 
 def magnets(*cuboids: Table, **more: Any) -> Table:
-    """Cuboids with size_mm, center_mm, polarization_T, rotation_deg, recoil_permeability; more: field_map."""
+    """Cuboids with size_mm, center_mm, polarization_T, rotation_deg, recoil_permeability, conductivity_S_m.
+
+    More, for every rotor: recoil_permeability of the article's, conductivity_S_m of all magnets (their eddy currents,
+    else left out), field_map, and conductors, a list of tables with shape ("cuboid" or "cylinder"), size_mm or
+    diameter_mm and height_mm, center_mm, rotation_deg and conductivity_S_m: metal that turns with the rotor.
+    """
     return {"magnets": list(cuboids), **more}
 
 

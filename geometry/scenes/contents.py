@@ -6,8 +6,8 @@ from typing import Self
 
 import numpy as np
 
-from ..basics import MU_0, Array, Box, frozen_array, html_table, listed, millimetres
-from ..bodies import Magnet
+from ..basics import MU_0, Array, Box, Solid, frozen_array, html_table, listed, millimetres
+from ..bodies import Conductor, Magnet
 
 AIR_VISCOSITY = 1.83e-5
 """Dynamic viscosity of air at 20-25 °C, Pa s."""
@@ -89,10 +89,11 @@ class Plate:
 
 @dataclass(frozen=True)
 class Drag:
-    """Viscous drag: force -linear v (N s/m) and torque -angular Ω (N m s)."""
+    """Viscous drag: force -linear v (N s/m) and torque -angular Ω (N m s); `air`: the more of a real sphere in air."""
 
     linear: float
     angular: float
+    air: bool = False
 
     @classmethod
     def stokes(cls, radius: float) -> Self:
@@ -132,6 +133,7 @@ class Scene:
     start : where a simulation begins
     field_map : file of a map of the rotor's B in its frame, or None
     text : the scene file as it was read, for the record
+    conductors : metal beside the magnets that turns with the rotor
     """
 
     frequency: float
@@ -143,16 +145,23 @@ class Scene:
     start: OffsetStart | AbsoluteStart = field(default_factory=OffsetStart)
     field_map: Path | None = None
     text: str = ""
+    conductors: tuple[Conductor, ...] = ()
 
     @property
     def angular_velocity(self) -> float:
         """ω = 2π frequency, rad/s."""
         return 2 * np.pi * self.frequency
 
+    @property
+    def turning_bodies(self) -> tuple[Solid, ...]:
+        """The rotor's magnets and conductors."""
+        return (*(magnet.box for magnet in self.rotor), *(conductor.body for conductor in self.conductors))
+
     def __repr__(self) -> str:
-        air = f"drag {self.drag.linear:.3g} N s/m, {self.drag.angular:.3g} N m s"
+        air = f"drag {self.drag.linear:.3g} N s/m, {self.drag.angular:.3g} N m s{' and more' if self.drag.air else ''}"
         lines = [f"Scene at {self.frequency:g} Hz, gravity ({listed(self.gravity)}) m/s², {air}"]
         lines += [f"  {magnet!r}" for magnet in self.rotor]
+        lines += [f"  {conductor!r}" for conductor in self.conductors]
         lines += [f"  Field from {self.field_map}"] if self.field_map else []
         lines += [f"  {self.floater!r}"]
         lines += [f"  {self.plate!r}"] if self.plate else []

@@ -2,13 +2,14 @@
 
 import difflib
 from collections.abc import Sequence
+from itertools import combinations
 from typing import Any
 
 from pydantic import BaseModel
 from pydantic_core import ErrorDetails
 
-from ..basics import InputError
-from ..bodies import TOUCHING, deepest_overlap_in_a_turn, overlapping_magnets, sphere_overlap
+from ..basics import InputError, Solid
+from ..bodies import TOUCHING, body_overlap, deepest_overlap_in_a_turn, sphere_overlap
 from . import schema
 from .contents import AbsoluteStart, Scene
 
@@ -20,6 +21,7 @@ ROTORS: dict[str, type[BaseModel]] = {
 }
 TABLES: dict[str, type[BaseModel]] = {
     "magnets": schema.MagnetSection,
+    "conductors": schema.ConductorSection,
     "floater": schema.FloaterSection,
     "plate": schema.PlateSection,
     "lowering": schema.LoweringSection,
@@ -33,6 +35,7 @@ RULES = {
     "finite_number": "a finite number",
     "float_type": "a number",
     "list_type": "a list",
+    "literal_error": "{expected}",
     "too_short": "a list of {min_length} or more entries",
     "too_long": "a list of {max_length} entries",
     "model_type": "a table",
@@ -104,17 +107,19 @@ def overlap_faults(scene: Scene) -> list[str]:
 
     The plate is checked against the rotor over a whole turn; touching is allowed.
     """
+    bodies = named_bodies(scene)
     faults = [
-        f"Input rotor must have magnets that do not overlap; instead magnets {i + 1} and {j + 1} overlap by "
+        f"Input rotor must have magnets and conductors that do not overlap; instead {first} and {second} overlap by "
         f"{depth * 1e3:.4g} mm; move them apart by as much."
-        for i, j, depth in overlapping_magnets(scene.rotor)
+        for (first, one), (second, other) in combinations(bodies, 2)
+        if (depth := body_overlap(one, other)) > TOUCHING
     ]
     if scene.plate:
-        for i, magnet in enumerate(scene.rotor):
-            depth = deepest_overlap_in_a_turn(magnet.box, scene.plate.box)
+        for name, body in bodies:
+            depth = deepest_overlap_in_a_turn(body, scene.plate.box)
             if depth > TOUCHING:
                 faults.append(
-                    f"Input plate must stay clear of the turning rotor; instead it overlaps magnet {i + 1} by "
+                    f"Input plate must stay clear of the turning rotor; instead it overlaps {name} by "
                     f"{depth * 1e3:.4g} mm; move the plate away or make it thinner."
                 )
     if isinstance(scene.start, AbsoluteStart):
@@ -122,8 +127,14 @@ def overlap_faults(scene: Scene) -> list[str]:
     return faults
 
 
+def named_bodies(scene: Scene) -> list[tuple[str, Solid]]:
+    """Magnets and conductors with the words that messages have for them."""
+    magnets = [(f"magnet {i + 1}", magnet.box) for i, magnet in enumerate(scene.rotor)]
+    return [*magnets, *((f"conductor {i + 1}", part.body) for i, part in enumerate(scene.conductors))]
+
+
 def _start_overlaps(scene: Scene, start: AbsoluteStart) -> list[str]:
-    bodies = [(f"rotor magnet {i + 1}", magnet.box) for i, magnet in enumerate(scene.rotor)]
+    bodies = [(f"rotor {name}", body) for name, body in named_bodies(scene)]
     if scene.plate:
         bodies.append(("the plate", scene.plate.box))
     place = ", ".join(f"{c * 1e3:g}" for c in start.position)

@@ -13,6 +13,7 @@ Angle = Annotated[Number, Field(ge=-360.0, le=360.0)]
 Polarization = Annotated[Number, Field(ge=-100.0, le=100.0)]
 Remanence = Annotated[NotNegative, Field(le=100.0)]
 Permeability = Annotated[Number, Field(ge=1.0, le=1e6)]
+Conductivity = Annotated[NotNegative, Field(le=1e9)]
 Vector = Annotated[list[Number], Field(min_length=3, max_length=3)]
 Sizes = Annotated[list[Length], Field(min_length=3, max_length=3)]
 Coordinates = Annotated[list[Coordinate], Field(min_length=3, max_length=3)]
@@ -37,8 +38,22 @@ class _Table(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid")
 
 
+class ConductorSection(_Table):
+    """A piece of metal that turns with the rotor: a cuboid, or a cylinder with its axis along the body's z."""
+
+    shape: Literal["cuboid", "cylinder"] = "cuboid"
+    size_mm: Sizes | None = None
+    diameter_mm: Length | None = None
+    height_mm: Length | None = None
+    center_mm: Coordinates
+    rotation_deg: Angles = [0.0, 0.0, 0.0]
+    conductivity_S_m: Annotated[Positive, Field(le=1e9)]
+
+
 class _AnyRotor(_Table):
     field_map: Annotated[str, Field(min_length=1)] | None = None
+    conductivity_S_m: Conductivity | None = None
+    conductors: list[ConductorSection] = []
 
 
 class _ArticleRotor(_AnyRotor):
@@ -76,6 +91,7 @@ class MagnetSection(_Table):
     rotation_deg: Angles = [0.0, 0.0, 0.0]
     polarization_T: Polarizations
     recoil_permeability: MagnetPermeability = [RECOIL_PERMEABILITY, RECOIL_PERMEABILITY]
+    conductivity_S_m: Conductivity | None = None
 
 
 class ExplicitRotor(_AnyRotor):
@@ -107,7 +123,7 @@ class FloaterSection(_Table):
     remanence_T: Remanence
     recoil_permeability: Permeability = RECOIL_PERMEABILITY
     density_kg_m3: Annotated[Positive, Field(le=1e6)]
-    conductivity_S_m: Annotated[NotNegative, Field(le=1e9)] | None = None
+    conductivity_S_m: Conductivity | None = None
 
 
 class LoweringSection(_Table):
@@ -129,10 +145,11 @@ class PlateSection(_Table):
 
 
 class DragSection(_Table):
-    """Viscous drag on the floater."""
+    """Drag on the floater: of air by a model, or numbers."""
 
-    linear_N_s_m: NotNegative
-    angular_N_m_s: NotNegative
+    model: Literal["stokes", "air"] | None = None
+    linear_N_s_m: NotNegative | None = None
+    angular_N_m_s: NotNegative | None = None
 
 
 class StartSection(_Table):

@@ -4,13 +4,14 @@ import json
 import tomllib
 import warnings
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from ..basics import Array, Box
-from ..bodies import Magnet, horizontal, tilt, vertical
+from ..basics import Array, Box, Cylinder, Solid
+from ..bodies import Conductor, Magnet, horizontal, tilt, vertical
 from .assembly import assemble
 from .contents import AbsoluteStart, Drag, Plate, Scene
 from .faults import SceneError
@@ -55,16 +56,21 @@ def _keys(scene: Scene) -> dict[str, Any]:
     }
     if floater.conductivity is not None:
         keys["floater"]["conductivity_S_m"] = _number(floater.conductivity)
+    if scene.conductors:
+        keys["rotor"]["conductors"] = [_conductor(conductor) for conductor in scene.conductors]
     if scene.plate:
         keys["plate"] = _plate(scene.plate)
-    if scene.drag != Drag.stokes(floater.radius):
+    stokes = Drag.stokes(floater.radius)
+    if scene.drag == replace(stokes, air=True):
+        keys["drag"] = {"model": "air"}
+    elif scene.drag != stokes:
         keys["drag"] = {"linear_N_s_m": scene.drag.linear, "angular_N_m_s": scene.drag.angular}
     start = _start(scene)
     return keys if start == DEFAULT_START else keys | {"start": start}
 
 
 def _rotor(rotor: tuple[Magnet, ...]) -> dict[str, Any]:
-    """A rotor of the article by its name, any other as its magnets."""
+    """A rotor of the article by its name if its magnets conduct alike, any other as its magnets."""
     first = rotor[0]
     material = (float(first.box.size[0]), float(np.linalg.norm(first.polarization)), first.recoil_permeability)
     transverse = first.transverse_permeability
@@ -76,13 +82,15 @@ def _rotor(rotor: tuple[Magnet, ...]) -> dict[str, Any]:
         ("tilt", "angle_deg", _number(float(np.degrees(angle)))): tilt(angle, *material, transverse),
     }
     for (configuration, key, value), like in known.items():
-        if len(like) == len(rotor) and all(map(_same, like, rotor)) and value >= (0 if key != "angle_deg" else -90):
+        alike = len(like) == len(rotor) and len({magnet.conductivity for magnet in rotor}) == 1
+        if alike and all(map(_same, like, rotor)) and value >= (0 if key != "angle_deg" else -90):
             return {
                 "configuration": configuration,
                 key: value,
                 "edge_mm": _milli(material[0]),
                 "remanence_T": _number(material[1]),
                 "recoil_permeability": _permeability(first),
+                **_conductivity(first),
             }
     return {"magnets": [_magnet(magnet) for magnet in rotor]}
 
@@ -102,7 +110,19 @@ def _magnet(magnet: Magnet) -> dict[str, Any]:
         **_box(magnet.box),
         "polarization_T": _numbers(magnet.polarization),
         "recoil_permeability": _permeability(magnet),
+        **_conductivity(magnet),
     }
+
+
+def _conductivity(magnet: Magnet) -> dict[str, float]:
+    return {} if magnet.conductivity is None else {"conductivity_S_m": _number(magnet.conductivity)}
+
+
+def _conductor(conductor: Conductor) -> dict[str, Any]:
+    body, conductivity = conductor.body, {"conductivity_S_m": _number(conductor.conductivity)}
+    if isinstance(body, Box):
+        return {"shape": "cuboid", **_box(body), **conductivity}
+    return {"shape": "cylinder", **_cylinder(body), **conductivity}
 
 
 def _permeability(magnet: Magnet) -> float | list[float]:
@@ -131,12 +151,20 @@ def _start(scene: Scene) -> dict[str, Any]:
 
 
 def _box(box: Box) -> dict[str, Any]:
+    return {"size_mm": _millis(box.size), **_pose(box)}
+
+
+def _cylinder(body: Cylinder) -> dict[str, Any]:
+    return {"diameter_mm": _milli(2 * body.radius), "height_mm": _milli(body.height), **_pose(body)}
+
+
+def _pose(body: Solid) -> dict[str, Any]:
     from scipy.spatial.transform import Rotation  # slow to load
 
     with warnings.catch_warnings():  # where y is 90°, x and z are one turn, and SciPy says so
         warnings.simplefilter("ignore", UserWarning)
-        turned = Rotation.from_matrix(box.rotation).as_euler("xyz", degrees=True)
-    return {"size_mm": _millis(box.size), "center_mm": _millis(box.center), "rotation_deg": _numbers(turned)}
+        turned = Rotation.from_matrix(body.rotation).as_euler("xyz", degrees=True)
+    return {"center_mm": _millis(body.center), "rotation_deg": _numbers(turned)}
 
 
 def _number(value: float) -> float:

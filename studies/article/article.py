@@ -14,7 +14,7 @@ from ...geometry.bodies import Magnet, horizontal, tilt, vertical
 from ...geometry.scenes import Drag, Floater, Scene
 from ..one_scene import Levitation
 from ..results import Point, cases_with
-from ..terminal import FieldModel, Models
+from ..terminal import FieldModel, InteractionModel, Models
 
 EDGE, REMANENCE, PERMEABILITY = 10e-3, 1.305, 1.05
 """Of the rotor's cubes: m; T, the middle of 1.29 to 1.32; recoil permeability usual for NdFeB, which is not given."""
@@ -107,9 +107,11 @@ def article_scene(
     return Scene(frequency, magnets, floater, Drag.stokes(floater.radius) if drag else Drag(0.0, 0.0))
 
 
-def levitation_of(scene: Scene, model: FieldModel, rtol: float = RTOL) -> Levitation:
+def levitation_of(
+    scene: Scene, model: FieldModel, rtol: float = RTOL, interaction: InteractionModel = "rigid"
+) -> Levitation:
     """A scene in one model's field, its plate left out."""
-    return Levitation(scene, Models(model, "none", rtol))
+    return Levitation(scene, Models(model, "none", rtol, interaction=interaction))
 
 
 def rotor_label(configuration: str, value: float) -> str:

@@ -36,7 +36,7 @@ def question_job(question: Question, values: dict[str, list[Any]], engine: Worke
 def question_study(question: Question, values: Mapping[str, Sequence[Any]]) -> Study:
     """One's own question over a grid as a study. Raises InputError where the first point or a model cannot be."""
     points = combinations(values)
-    for key in ("plate_model", "model"):
+    for key in ("plate_model", "interaction", "model"):
         for value in values.get(key, ()):
             question.levitation({**points[0], key: value})
     question.levitation(points[0])

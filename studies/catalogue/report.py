@@ -18,6 +18,7 @@ from ..results import figure_bytes
 from .drawings import QUESTION, figures_of, read_result
 from .entries import CATALOGUE
 from .jobs import failure_lines
+from .turned_view import view_of
 
 SUMMARIES = {
     "run": "The main job: fields, force, equilibria and motion of a scene.",
@@ -26,6 +27,15 @@ SUMMARIES = {
 }
 LONGEST = 400
 """Characters of a value that are shown."""
+LARGEST = 2_500_000
+"""Bytes of pictures on a page; what comes later is named, not shown."""
+CAPTIONS = {
+    "field": "Field on the axis below the rotor by each model, and how far the models are apart.",
+    "force": "Axial force on the floater where all else is balanced. It floats where the curve meets its weight.",
+    "trajectory": "The flight: distance and polar angle as envelopes, and a closer look.",
+    "modes": "Growth and frequency of the small motions about each equilibrium; negative growth dies out.",
+    "scene": "Rotor, floater, plate and field, seen along with the rotor.",
+}
 
 
 def report_job(folder: Path, out: Path) -> tuple[Path, list[str]]:
@@ -41,6 +51,7 @@ def report_job(folder: Path, out: Path) -> tuple[Path, list[str]]:
     if not paths:
         raise InputError(f"Input DIR must have results (*.nc) in it; instead {folder} has none.")
     parts = [_part(path) for path in paths]
+    _fit(parts)
     template = files(__package__).joinpath("report.html").read_text(encoding="utf-8")
     page = jinja2.Environment(autoescape=True).from_string(template).render(folder=folder.resolve().name, parts=parts)
     write_whole(out / "report.html", page.encode())
@@ -52,17 +63,22 @@ def _part(path: Path) -> dict[str, Any]:
     result = read_result(path)
     kind = str(result.attrs["study"])
     study = CATALOGUE.get(kind)
-    pictures = [(name, _embedded(figure_bytes(figure, "png"), "png")) for name, figure in figures_of(result).items()]
+    drawn = figures_of(result).items()
+    pictures = [(_caption(name), _embedded(figure_bytes(figure, "png"), "png")) for name, figure in drawn]
     beside = [path.parent / "scene.png"] if kind == "run" else []
     beside += [path.parent / f"{path.stem}-{name}" for name in ("scene.png", "flight.gif")]
-    pictures += [(f.stem, _embedded(f.read_bytes(), f.suffix[1:])) for f in beside if f.exists()]
+    pictures += [(_caption(f.stem), _embedded(f.read_bytes(), f.suffix[1:])) for f in beside if f.exists()]
+    summary = _summary(path) if kind == "run" else {}
     return {
         "name": path.stem,
         "summary": study.summary if study else SUMMARIES.get(kind, ""),
         "lines": study.report(result) if study else question_lines(result) if kind == QUESTION else [],
         "failures": failure_lines(result) if "failed_points" in result.attrs else [],
         "pictures": pictures,
-        "answers": _answers(path) if kind == "run" else {},
+        "headline": summary.get("headline", ""),
+        "equilibria": summary.get("equilibria", []),
+        "answers": _answers(summary),
+        "view": view_of(result),
         "variables": [_row(name, values) for name, values in result.data_vars.items()],
         "provenance": {key: str(value) for key, value in result.attrs.items() if key != "failed_points"},
     }
@@ -72,16 +88,36 @@ def _embedded(content: bytes, kind: str) -> str:
     return f"data:image/{kind};base64,{base64.b64encode(content).decode()}"
 
 
-def _answers(path: Path) -> dict[str, str]:
-    """The numbers that `run` said, from the summary beside its result."""
+def _caption(name: str) -> str:
+    return next((text for word, text in CAPTIONS.items() if name == word or name.endswith(f"-{word}")), name)
+
+
+def _fit(parts: list[dict[str, Any]]) -> None:
+    """Leave out the pictures for which a page that can be sent has no room."""
+    room = LARGEST
+    for part in parts:
+        kept = []
+        for title, source in part["pictures"]:
+            room -= len(source)
+            kept.append((title, source) if room >= 0 else (f"{title} (left out here, in the folder)", ""))
+        part["pictures"] = kept
+
+
+def _summary(path: Path) -> dict[str, Any]:
+    """What `run` said, from the summary beside its result."""
     summary = path.parent / "summary.json"
     if not summary.exists():
         return {}
     try:
-        values: dict[str, Any] = dict(json.loads(summary.read_text(encoding="utf-8")))
+        return dict(json.loads(summary.read_text(encoding="utf-8")))
     except (ValueError, TypeError) as error:
         raise InputError(f"Input {summary} must be a JSON object; instead: {error}.") from None
-    texts = {key: json.dumps(value, ensure_ascii=False) for key, value in values.items()}
+
+
+def _answers(summary: dict[str, Any]) -> dict[str, str]:
+    """Its numbers as texts, but those that the page tells by themselves."""
+    told = {key: value for key, value in summary.items() if key not in ("headline", "equilibria")}
+    texts = {key: json.dumps(value, ensure_ascii=False) for key, value in told.items()}
     return {key: text if len(text) <= LONGEST else text[:LONGEST] + " …" for key, text in texts.items()}
 
 

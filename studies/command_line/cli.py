@@ -32,6 +32,7 @@ app = App(
 add_scene_commands(app)
 add_result_commands(app)
 add_file_commands(app)
+app.register_install_completion_command()
 
 
 def run(arguments: list[str], stop: threading.Event) -> int:

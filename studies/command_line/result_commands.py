@@ -6,7 +6,7 @@ from typing import Annotated
 from cyclopts import App, Parameter
 
 from ...geometry.basics import InputError
-from ..terminal import Answer, Models, Output, Quantity, Workers, parse_vary, positive, three_numbers
+from ..terminal import Answer, Beside, Models, Output, Quantity, Workers, parse_vary, positive, three_numbers
 
 
 def add_result_commands(app: App) -> None:
@@ -90,8 +90,8 @@ def _own_question(
     return Answer(*question_job(question, values, engine.checked(), output.out), output.json)
 
 
-def figure(result: Path, *, output: Output = Output()) -> Answer:
-    """The figures of a result as PNG and PDF, from its file alone.
+def figure(result: Path, *, output: Beside = Beside()) -> Answer:
+    """The figures of a result as PNG and PDF, from its file alone; beside it, unless --out is given.
 
     Parameters
     ----------
@@ -100,12 +100,12 @@ def figure(result: Path, *, output: Output = Output()) -> Answer:
     """
     from ..catalogue import draw_result
 
-    files = draw_result(result, output.out)
+    files = draw_result(result, output.out or result.parent)
     return Answer({"figures": files}, [f"Figure in {file}" for file in files], output.json)
 
 
-def show(result: Path, *, output: Output = Output()) -> Answer:
-    """Three-dimensional pictures of a flight: the scene with its field and the plate's currents, and an animation.
+def show(result: Path, *, output: Beside = Beside()) -> Answer:
+    """Three-dimensional pictures of a flight, beside its file: the scene with the plate's currents, and an animation.
 
     Parameters
     ----------
@@ -114,12 +114,12 @@ def show(result: Path, *, output: Output = Output()) -> Answer:
     """
     from ..catalogue import show_job
 
-    files = show_job(result, output.out)
+    files = show_job(result, output.out or result.parent)
     return Answer({"pictures": files}, [f"Picture in {file}" for file in files], output.json)
 
 
-def report(folder: Path, *, output: Output = Output()) -> Answer:
-    """One page, report.html, about all results in a folder: figures, numbers, errors, provenance.
+def report(folder: Path, *, output: Beside = Beside()) -> Answer:
+    """One page, report.html, about all results in a folder: figures, numbers, errors, provenance; in that folder.
 
     Parameters
     ----------
@@ -128,7 +128,7 @@ def report(folder: Path, *, output: Output = Output()) -> Answer:
     """
     from ..catalogue import report_job
 
-    page, names = report_job(folder, output.out)
+    page, names = report_job(folder, output.out or folder)
     return Answer({"report": str(page), "results": names}, [f"{', '.join(names)}: {page}"], output.json)
 
 

@@ -12,7 +12,18 @@ from ..catalogue import CATALOGUE, QUESTION, figures_of, question_study
 from ..one_scene import Question, given_scene
 from ..results import Study
 from ..sweeps import forget, swept
-from ..terminal import FieldModel, Models, PlateModel, Quantity, Workers, checked_values, combinations, finite, heard
+from ..terminal import (
+    FieldModel,
+    InteractionModel,
+    Models,
+    PlateModel,
+    Quantity,
+    Workers,
+    checked_values,
+    combinations,
+    finite,
+    heard,
+)
 
 Values = Mapping[str, Sequence[float] | Sequence[str]]
 
@@ -28,6 +39,7 @@ def sweep(
     place: Sequence[float] = (0.0, 0.0, -0.02),
     rtol: float = Models.rtol,
     plate_rtol: float = Models.plate_rtol,
+    interaction: InteractionModel = "auto",
     workers: int | None = 1,
     scheduler: str | None = None,
     out: str | Path = "out",
@@ -39,9 +51,9 @@ def sweep(
     ----------
     scene : a scene or the path of a scene file
     values : by key, numbers for keys of the scene file (`frequency_hz`, `rotor.angle_deg`, `plate.center_mm.2`) and for
-        `spin`, names for `model` and `plate_model`
+        `spin`, names for `model`, `plate_model` and `interaction`
     ask : "equilibria", "flight" or "field"
-    model, plate_model, spin, rtol, plate_rtol : of all points, unless they are varied
+    model, plate_model, spin, rtol, plate_rtol, interaction : of all points, unless they are varied
     duration : of a flight, s
     place : (3,) of the field, m, rotor's frame
     workers, scheduler : processes here, or the address of a dask scheduler; more than one worker needs the caller's
@@ -55,7 +67,7 @@ def sweep(
     a key, a value or a model that is not allowed, and SweepError if no point could be computed.
     """
     loaded = given_scene(scene)
-    models = Models(model, plate_model, rtol, plate_rtol).checked()
+    models = Models(model, plate_model, rtol, plate_rtol, interaction).checked()
     where = tuple(finite("place", coordinate) for coordinate in place)
     if len(where) != 3:
         raise InputError(f"Input place must be three numbers, m; instead received {place!r}.")

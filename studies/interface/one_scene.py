@@ -9,7 +9,7 @@ from ...fem.rotor_tables import FieldTable
 from ...geometry.scenes import Scene, scene_text
 from ..one_scene import Levitation
 from ..results import found_dataset, lowering_times, trajectory_dataset
-from ..terminal import FieldModel, Models, PlateModel, heard
+from ..terminal import FieldModel, InteractionModel, Models, PlateModel, heard
 
 
 def rotor_table(
@@ -30,6 +30,7 @@ def plate_table(
     plate_model: PlateModel = "auto",
     rtol: float = Models.rtol,
     plate_rtol: float = Models.plate_rtol,
+    interaction: InteractionModel = "auto",
     progress: bool = False,
 ) -> PlateMemory | None:
     """The plate's currents around the place where the floater levitates, or None where none are modelled.
@@ -37,7 +38,7 @@ def plate_table(
     Its `table` holds the network, its `share` what the rotor drives, its `error` the estimated relative error.
     """
     with heard(progress):
-        return Levitation(scene, Models(model, plate_model, rtol, plate_rtol)).plate
+        return Levitation(scene, Models(model, plate_model, rtol, plate_rtol, interaction)).plate
 
 
 def equilibria(
@@ -47,6 +48,7 @@ def equilibria(
     spin: float = 0.0,
     rtol: float = Models.rtol,
     plate_rtol: float = Models.plate_rtol,
+    interaction: InteractionModel = "auto",
     progress: bool = False,
 ) -> xr.Dataset:
     """All synchronous equilibria, the stable ones first, with errors, growth and frequency of each small motion.
@@ -57,6 +59,7 @@ def equilibria(
     model, plate_model : field model, and model of the plate
     spin : body spin S = Ω·m̂/ω
     rtol, plate_rtol : relative accuracy asked of the field and of the plate's reaction
+    interaction : "rigid", "mutual" (rotor and floater magnetise each other) or "auto"
     progress : whether messages go to standard error
 
     Returns
@@ -65,7 +68,7 @@ def equilibria(
     a model, tolerance or file that cannot be used.
     """
     with heard(progress):
-        levitation = Levitation(scene, Models(model, plate_model, rtol, plate_rtol), spin)
+        levitation = Levitation(scene, Models(model, plate_model, rtol, plate_rtol, interaction), spin)
         found = found_dataset(levitation.equilibria)
         return found.assign_attrs(study="equilibria", **_labels(levitation))
 
@@ -77,6 +80,7 @@ def stability(
     spin: float = 0.0,
     rtol: float = Models.rtol,
     plate_rtol: float = Models.plate_rtol,
+    interaction: InteractionModel = "auto",
     progress: bool = False,
 ) -> xr.Dataset:
     """The five small motions about the equilibrium at which a flight begins, the nearest stable one if there is one.
@@ -90,7 +94,7 @@ def stability(
     Raises EquilibriumError where there is no equilibrium to begin at.
     """
     with heard(progress):
-        levitation = Levitation(scene, Models(model, plate_model, rtol, plate_rtol), spin)
+        levitation = Levitation(scene, Models(model, plate_model, rtol, plate_rtol, interaction), spin)
         found = found_dataset((levitation.stability,)).isel(equilibrium=0, drop=True).drop_vars("number")
         return found.assign_attrs(study="stability", **_labels(levitation))
 
@@ -102,6 +106,7 @@ def simulate(
     plate_model: PlateModel = "auto",
     rtol: float = Models.rtol,
     plate_rtol: float = Models.plate_rtol,
+    interaction: InteractionModel = "auto",
     progress: bool = False,
 ) -> xr.Dataset:
     """The floater's motion for `duration` (s) from where the scene says; other parameters as for `equilibria`.
@@ -112,7 +117,7 @@ def simulate(
     EquilibriumError where the scene starts from an equilibrium and has none.
     """
     with heard(progress):
-        levitation = Levitation(scene, Models(model, plate_model, rtol, plate_rtol))
+        levitation = Levitation(scene, Models(model, plate_model, rtol, plate_rtol, interaction))
         flown = trajectory_dataset(levitation.flight(duration))
         return flown.assign_attrs(_labels(levitation), **lowering_times(levitation.scene))
 

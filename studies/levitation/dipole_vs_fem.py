@@ -14,7 +14,6 @@ from ...dynamics.branches import (
     by_frequency,
     reference_state,
     stable_range,
-    with_answers,
 )
 from ...dynamics.motion import Rates
 from ...dynamics.steady import named_modes
@@ -37,9 +36,8 @@ ROUND_OFF = 1e-10
 
 
 def points(quick: bool) -> list[Point]:
-    """The rotors that levitated; quick: one frequency, coarser answers of the bodies and no limits with them (NaN)."""
-    steps, orders = (1, [1, 2]) if quick else (4, [2, 3])
-    return [{**rotor, "steps": steps, "orders": orders, "limits": not quick} for rotor in levitated_rotors(quick)]
+    """The rotors that levitated; quick: one frequency."""
+    return [{**rotor, "steps": 1 if quick else 4} for rotor in levitated_rotors(quick)]
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,13 +71,15 @@ def compute(point: Point) -> xr.Dataset:
         "fem": _levitation(scene, levitation_of(scene, "fem", RTOL).rates, start),
         "coarse": _levitation(scene, levitation_of(scene, "fem", COARSE).rates, start),
     }
+    together = levitation_of(scene, "fem", RTOL, "mutual")
+    made["mutual"] = _levitation(scene, together.rates, start)
     low = max(each.range.low.parameter for each in made.values())
     high = min(each.range.high.parameter for each in made.values())
     grid = low + (high - low) * (np.arange(point["steps"]) + 0.5) / point["steps"]
     rows = {name: _described(each.at, each.range.low, each.range.high, grid) for name, each in made.items()}
-    answered, doubt = with_answers(made["fem"].scene, made["fem"].family, made["fem"].range, point["orders"])
-    ends = [answered.end(side) if point["limits"] else None for side in SIDES]
-    rows["mutual"] = _described(answered.at, ends[0], ends[1], grid)
+    middle = made["mutual"].range.near(float(grid[len(grid) // 2]))
+    answers = together.answers[0]
+    doubt = max(float(part[0]) for part in answers.relative_error(middle.position)) if answers else 0.0
     errors = {name: {key: ROUND_OFF * np.abs(value) for key, value in rows[name].items()} for name in MODELS[:3]}
     errors["fem"] = {key: np.abs(value - rows["coarse"][key]) for key, value in rows["fem"].items()}
     errors["mutual"] = {
@@ -90,9 +90,8 @@ def compute(point: Point) -> xr.Dataset:
         for suffix, source, what in (("", rows, ""), ("_error", errors, "estimated error of the ")):
             values = np.array([source[model][name] for model in MODELS])
             data[name + suffix] = variable(("model", *dims), values, units, what + words)
-    for side, end in zip(SIDES, ends, strict=True):
-        kinds = [*(getattr(made[m].range, side).kind for m in MODELS[:-1]), end.kind if end else ""]
-        data[f"{side}_kind"] = xr.Variable(("model",), kinds)
+    for side in SIDES:
+        data[f"{side}_kind"] = xr.Variable(("model",), [getattr(made[m].range, side).kind for m in MODELS])
     return one_case(point, xr.Dataset(data, {"model": list(MODELS), "mode": list(MODES)}))
 
 
@@ -101,7 +100,7 @@ def _levitation(scene: Scene, rates: Rates, start: tuple[Array, float]) -> InOne
 
 
 def _described(
-    at: Callable[[float], BranchPoint], low: BranchPoint | None, high: BranchPoint | None, grid: Array
+    at: Callable[[float], BranchPoint], low: BranchPoint, high: BranchPoint, grid: Array
 ) -> dict[str, Array]:
     found = [at(float(frequency)) for frequency in grid]
     moment = np.array([point.state[6:9] for point in found])
@@ -110,8 +109,8 @@ def _described(
         "distance": np.array([point.distance for point in found]),
         "polar_angle": np.degrees(np.arctan2(np.hypot(moment[:, 0], moment[:, 1]), moment[:, 2])),
         "mode_frequency": np.array([[mode.frequency_hz for mode in row] for row in modes]),
-        "lowest": np.array(low.parameter if low else np.nan),
-        "highest": np.array(high.parameter if high else np.nan),
+        "lowest": np.array(low.parameter),
+        "highest": np.array(high.parameter),
     }
 
 

@@ -5,7 +5,6 @@ import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from ...geometry.basics import Array
 from ..article import axis_label, by_configuration, rotor_label
 from ..results import PALETTE, panels, styled
 
@@ -79,11 +78,11 @@ def _ranges(axes: Axes, part: xr.Dataset) -> None:
         ("article", -0.2, PALETTE[5], "point dipoles"),
         ("mutual", 0.2, PALETTE[0], "true fields"),
     ):
-        low, high = (_best_known(part, name, model) for name in ("lowest", "highest"))
+        low, high = (part[name].sel(model=model).values for name in ("lowest", "highest"))
         places = np.arange(len(low)) + offset
         axes.bar(places, high - low, 0.35, bottom=low, color=color, label=name)
         for end, values in (("lowest", low), ("highest", high)):
-            error = _best_known(part, f"{end}_error", model)
+            error = part[f"{end}_error"].sel(model=model).values
             axes.errorbar(places, values, error, fmt="none", ecolor="0.1", lw=1)
         axes.use_sticky_edges = False
         for kind, (marker, words) in ENDS.items():
@@ -91,9 +90,3 @@ def _ranges(axes: Axes, part: xr.Dataset) -> None:
             axes.plot(places[ends], high[ends], marker, color="k", ms=4, label=words if model == "article" else None)
     axes.margins(y=0.08)
     axes.set(ylabel="frequencies of stable levitation (Hz)")
-
-
-def _best_known(part: xr.Dataset, name: str, model: str) -> Array:
-    """A limit by a model; where the mutual magnetisation was left out, by finite elements without it."""
-    value = part[name].sel(model=model)
-    return np.asarray(value.fillna(part[name].sel(model="fem")).values if model == "mutual" else value.values)

@@ -38,7 +38,7 @@ def floater_permeability(scene: Scene, distances: Sequence[float] | None = None,
     stable equilibrium (along -x if there is none) and held where no balance is near.
     """
     rotors = rotor_ladder(scene.rotor, (2, 3) if quick else (3, 4))
-    alone = Levitation(scene, Models("auto", "none", 1e-4 if quick else 1e-6))
+    alone = Levitation(scene, Models("auto", "none", 1e-4 if quick else 1e-6, interaction="rigid"))
     depths = np.array(distances if distances is not None else _depths(scene, 8 if quick else 24))
     stable = next((e for e in alone.equilibria if e.stable), None)
     balance = PerturbedBalance.of(scene, alone.table)

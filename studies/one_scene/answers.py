@@ -8,23 +8,11 @@ import numpy as np
 from ...dynamics.flights import GROWING, STABLE, Trajectory, flight_kind
 from ...dynamics.motion import PlateMemory
 from ...dynamics.steady import Equilibrium
-from ...fem.closed_forms import rotating_torque
 from ...fem.rotor_tables import FieldTable
-from ...geometry.basics import MAGNET_CONDUCTIVITY, Array
-from ...geometry.scenes import Scene
+from ...geometry.basics import Array
 from ..results import EQUILIBRIUM_FIELDS
+from .effects import effects_answer
 from .levitation import Levitation
-
-PLATE, ANSWERS, CURRENTS = (
-    "the plate's eddy currents",
-    "the magnetisation of rotor and floater by each other",
-    "the floater's own eddy currents",
-)
-PLATE_NOT_MODELLED = "The plate's eddy currents are left out: the plate is only an obstacle."
-ANSWERS_NOT_MODELLED = (
-    "The floater is a rigid dipole: that rotor and floater magnetise each other is not in the motion "
-    "(how much that is: spinlev study floater-permeability)."
-)
 
 
 def field_answer(table: FieldTable, points: Array) -> dict[str, Any]:
@@ -60,9 +48,9 @@ def equilibria_answer(levitation: Levitation, equilibria: Sequence[Equilibrium] 
     return {
         "model": levitation.table.model,
         "error_estimate": float(levitation.table.relative_error(places)[0].max()) if len(places) else None,
+        **effects_answer(levitation, found),
         **plate_answer(levitation.plate),
         "equilibria": [equilibrium_answer(equilibrium) for equilibrium in found],
-        "not_modelled": list(omissions(levitation, found).values()),
     }
 
 
@@ -84,6 +72,7 @@ def flight_answer(levitation: Levitation, flight: Trajectory) -> dict[str, Any]:
     return {
         "model": table.model,
         "error_estimate": float(table.relative_error(places[table.in_range(places)])[0].max()),
+        **effects_answer(levitation, () if levitation.absolute else levitation.equilibria),
         **plate_answer(levitation.plate),
         "beyond_plate_table": flight.beyond_plate_table,
         "levitated_s": flight.levitated_s,
@@ -99,27 +88,3 @@ def kind_of_flight(levitation: Levitation, flight: Trajectory) -> str:
     """How a flight went; one that was still up, but had begun at an unstable equilibrium, is no stable one."""
     kind = flight_kind(flight)
     return kind if kind != STABLE or levitation.absolute or levitation.stability.stable else GROWING
-
-
-def omissions(levitation: Levitation, equilibria: Sequence[Equilibrium]) -> dict[str, str]:
-    """What is in the scene but not in the computation: its name and a sentence."""
-    scene = levitation.scene
-    left_out = {PLATE: PLATE_NOT_MODELLED} if scene.plate and levitation.plate is None else {}
-    permeabilities = [scene.floater.recoil_permeability, *(magnet.recoil_permeability for magnet in scene.rotor)]
-    if any(permeability != 1 for permeability in permeabilities):
-        left_out[ANSWERS] = ANSWERS_NOT_MODELLED
-    if scene.floater.conductivity is None and equilibria:
-        left_out[CURRENTS] = _floater_currents(scene, levitation.table, equilibria[0])
-    return left_out
-
-
-def _floater_currents(scene: Scene, table: FieldTable, equilibrium: Equilibrium) -> str:
-    """How large the torque of the floater's own eddy currents would be."""
-    across = float(np.linalg.norm(np.cross(table.evaluate(equilibrium.position)[0][0], equilibrium.state.moment)))
-    relative = scene.frequency * (1 - equilibrium.spin)
-    torque = float(rotating_torque(scene.floater.radius, MAGNET_CONDUCTIVITY, relative, across))
-    drag = scene.drag.angular * scene.angular_velocity
-    return (
-        f"The floater's own eddy currents are left out (no floater.conductivity_S_m): at {MAGNET_CONDUCTIVITY:.2g} S/m "
-        f"they would drive its spin with about {torque:.1e} N m (drag at the rotor's rate: {drag:.1e} N m)."
-    )

@@ -8,18 +8,21 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from ...dynamics.effects import with_effects
+from ...dynamics.effects import Mutual, RotorCurrents, with_effects
 from ...dynamics.equilibria import survey, with_plate
 from ...dynamics.flights import Checkpoint, Trajectory, simulate, starting_point
-from ...dynamics.motion import PlateMemory, Rates
+from ...dynamics.motion import Interaction, PlateMemory, Rates, interaction_of
 from ...dynamics.steady import Equilibrium, EquilibriumError, Survey
 from ...fem.measured_maps import GriddedTable, map_table
+from ...fem.mutual import MutualTable, cached_mutual_table, mutual_key
+from ...fem.rotor_losses import RotorLosses, cached_rotor_losses, losses_key, pieces_of
 from ...fem.rotor_tables import RotorTable, cached_rotor_table, resolve_model, rotor_table
 from ...fem.slab import resolve_plate_model, rotor_nearby
 from ...geometry.basics import Array, InputError, millimetre_size
 from ...geometry.scenes import AbsoluteStart, Scene, load_scene
 from ..terminal import Models, detail, finite, note, positive, progress
-from .plate_of_scene import check_room, plate_memory
+from .mutual_choice import mutual_choice
+from .plate_of_scene import check_room, check_way, plate_memory
 
 RotorField = RotorTable | GriddedTable
 """A rotor's table: computed, or from a map."""
@@ -57,7 +60,59 @@ class Levitation:
         self.searched = True
         """Whether the equilibria were searched for; else they were carried here from scenes nearby."""
         self._fields: dict[str, RotorField] = {}
-        self._equations: dict[tuple[str, bool], Rates] = {}
+        self._equations: dict[tuple[str, bool, bool, str, str], Rates] = {}
+        self._mutual: dict[str, MutualTable] = {}
+
+    @cached_property
+    def interaction(self) -> Interaction:
+        """The rotor's field with what else acts on the floater.
+
+        Raises
+        ------
+        InputError : mutual magnetisation is asked for where it cannot be known
+        """
+        return self._with_effects(self.table)
+
+    @cached_property
+    def answers(self) -> tuple[MutualTable | None, str]:
+        """What rotor and floater do to each other's magnetisation, or None; and why."""
+        scene, asked = self.scene, self.models.interaction
+        known, why = mutual_choice(scene, self.table, asked, self.models.rtol)
+        if not known:
+            return None, why
+        key = f"mutual {mutual_key(scene.rotor, scene.floater)}"
+        if key not in self._mutual:
+            note("Answers of rotor and floater to each other ...")
+            self._mutual[key], found = cached_mutual_table(scene.rotor, scene.floater, note)
+            if found:
+                self.from_cache.append("mutual")
+            note("  from the cache." if found else f"  done in {self._mutual[key].provenance['seconds']:.1f} s.")
+        return self._mutual[key], why
+
+    def _with_effects(self, table: RotorField) -> Interaction:
+        answers, effects = self.answers[0], interaction_of(table)
+        if answers is not None:
+            effects = effects.joined(Mutual(answers, self.scene.floater.moment))
+        if self.losses is not None:
+            effects = effects.joined(RotorCurrents(self.losses))
+        return with_effects(self.scene, effects)
+
+    @cached_property
+    def losses(self) -> RotorLosses | None:
+        """The losses in the rotor's metal, or None where none has a conductivity.
+
+        Raises
+        ------
+        InputError : the rotor turns too fast for its metal
+        """
+        if not pieces_of(self.scene.rotor, self.scene.conductors):
+            return None
+        note("Currents in the rotor's metal ...")
+        table, found = cached_rotor_losses(self.scene, note)
+        if found:
+            self.from_cache.append("rotor losses")
+        note("  from the cache." if found else f"  done in {table.provenance['seconds']:.1f} s.")
+        return table
 
     def elsewhere(self, models: Models | None = None, **changes: Any) -> Levitation:
         """Another scene with the same rotor, which shares its field; `changes` are fields of `Scene`, SI units."""
@@ -67,7 +122,7 @@ class Levitation:
 
     def share(self, other: Levitation) -> None:
         """Take over the fields and the compiled equations of another scene with the same rotor, made or yet to make."""
-        self._fields, self._equations = other._fields, other._equations
+        self._fields, self._equations, self._mutual = other._fields, other._equations, other._mutual
 
     def adopt(self, known: Survey, searched: bool = True) -> None:
         """Take over the equilibria without plate that are known from a search here or from scenes nearby."""
@@ -80,9 +135,18 @@ class Levitation:
 
     @cached_property
     def without_plate(self) -> Survey:
-        """All equilibria as if there were no plate. Raises EquilibriumError for a rotor at rest."""
+        """All equilibria as if there were no plate.
+
+        Raises
+        ------
+        EquilibriumError : the rotor is at rest
+        InputError : a conductor is in the floater's way, or the rotor turns too fast for its metal
+        """
         note("Equilibria ...")
-        return survey(self.scene, self.table, self.spin, rates=self.rates)
+        found = survey(self.scene, self.interaction, self.spin, rates=self.rates)
+        if (chosen := _first(found.equilibria)) is not None:
+            check_way(self.scene, chosen.position)
+        return found
 
     @cached_property
     def plate(self) -> PlateMemory | None:
@@ -116,7 +180,7 @@ class Levitation:
     def survey(self) -> Survey:
         """All equilibria, the stable ones first, with the plate where its currents are modelled."""
         found = self.without_plate
-        return found if self.plate is None else with_plate(self.scene, self.table, found, self.plate, self.rates)
+        return found if self.plate is None else with_plate(self.scene, self.interaction, found, self.plate, self.rates)
 
     @property
     def equilibria(self) -> tuple[Equilibrium, ...]:
@@ -160,7 +224,7 @@ class Levitation:
         """
         positive("duration", duration)
         known = () if self.absolute else self.equilibria
-        table, plate = self.flight_table, self.plate
+        table, plate = self._with_effects(self.flight_table), self.plate
         note("Motion ...")
         with progress("Motion") as advance:
             return simulate(self.scene, table, duration, known, progress=advance, memory=plate, checkpoint=checkpoint)
@@ -179,14 +243,23 @@ class Levitation:
     @property
     def labels(self) -> dict[str, str]:
         """What a result says of its models."""
-        return {"model": self.table.model, "plate_model": self.plate.model if self.plate else "none"}
+        plate = self.plate.model if self.plate else "none"
+        return {"model": self.table.model, "plate_model": plate, "interaction": self.interaction_model}
+
+    @property
+    def interaction_model(self) -> str:
+        """ "mutual" where rotor and floater magnetise each other, else "rigid"."""
+        return "rigid" if self.answers[0] is None else "mutual"
 
     @property
     def rates(self) -> Rates:
         """The equations of motion in the rotor's field, compiled."""
-        kind = self.table.model, bool(self.scene.floater.conductivity)
+        scene = self.scene
+        answers = "" if self.answers[0] is None else mutual_key(scene.rotor, scene.floater)
+        metal = "" if self.losses is None else losses_key(scene)
+        kind = self.table.model, bool(scene.floater.conductivity), scene.drag.air, answers, metal
         if kind not in self._equations:
-            self._equations[kind] = Rates(with_effects(self.scene, self.table))
+            self._equations[kind] = Rates(self.interaction)
         return self._equations[kind]
 
     @property

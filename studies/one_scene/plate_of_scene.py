@@ -28,6 +28,23 @@ def plate_memory(
     return PlateMemory(plate, made, share, model, edges), found
 
 
+def check_way(scene: Scene, place: Array) -> None:
+    """A conductor of the rotor where the floater, at `place` (3,) m, would levitate is a wrong scene.
+
+    Raises
+    ------
+    InputError : it overlaps the floater
+    """
+    for k, conductor in enumerate(scene.conductors):
+        depth = sphere_overlap(place, scene.floater.radius, conductor.body)
+        if depth > TOUCHING:
+            raise InputError(
+                f"Input rotor.conductors[{k}] must leave the floater's way free; instead it overlaps the floater by "
+                f"{depth * 1e3:.4g} mm where it levitates, at {np.round(place * 1e3, 3).tolist()} mm; make it smaller "
+                "or move it away."
+            )
+
+
 def check_room(scene: Scene, place: Array) -> None:
     """A plate that leaves a floater at `place` (3,) m no room is a wrong scene.
 

@@ -17,9 +17,9 @@ from .answers import flight_answer
 from .levitation import Levitation
 from .together import share
 
-CHOICES = ("model", "plate_model", "spin")
+CHOICES = ("model", "plate_model", "interaction", "spin")
 """What can be varied beside the keys of the scene file."""
-ROTOR = ("rotor", "model", "floater.diameter")
+ROTOR = ("rotor", "model", "interaction", "floater")
 """How keys begin whose values need a table of their own."""
 LARGEST: Mapping[Quantity, int] = {"equilibria": 60, "flight": 12, "field": 60}
 """How many points are answered together at most, and lost together if the program is killed among them."""

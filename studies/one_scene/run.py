@@ -31,7 +31,7 @@ from ..terminal import Models, note, to_json
 from .answers import equilibria_answer, flight_answer
 from .levitation import Levitation
 from .single import Job
-from .words import bracketed, equilibria_words, flight_words, headline, left_out, tell_details
+from .words import bracketed, effects_words, equilibria_words, flight_words, headline, tell_details
 
 MODELS = ("dipole", "cuboid", "fem")
 DEEPEST = 0.05
@@ -64,6 +64,7 @@ def main_job(scene: Scene, asked: Models, duration: float, out: Path) -> Job:
     found = surveys[chosen.model].equilibria
     compared = comparison(alone["dipole"], alone[best.model], best.model)
     values: dict[str, Any] = {
+        "headline": headline(levitation, found),
         **equilibria_answer(levitation, found),
         "comparison": compared,
         "tables_from_cache": levitation.from_cache,
@@ -80,7 +81,7 @@ def main_job(scene: Scene, asked: Models, duration: float, out: Path) -> Job:
             failure = error
         except FlightStopped as stop:
             flight = (failure := stop).flown
-    lines += left_out(levitation, found)
+    lines += effects_words(values)
     if failure:
         values["failed"] = str(failure)
         lines.append(str(failure))

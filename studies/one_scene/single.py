@@ -14,9 +14,9 @@ from ...geometry.basics import Array
 from ...geometry.scenes import OffsetStart, Scene, scene_text
 from ..results import lowering_times, save_figures, trajectory_dataset, trajectory_figure, write_dataset
 from ..terminal import COLUMNS, Models, note, to_json
-from .answers import equilibria_answer, field_answer, flight_answer, omissions
+from .answers import equilibria_answer, field_answer, flight_answer
 from .levitation import Levitation
-from .words import equilibria_words, flight_words, left_out, tell_details
+from .words import effects_words, equilibria_words, flight_words, tell_details
 
 Job = tuple[Mapping[str, Any], list[str]]
 """Numbers for a program, lines for a person."""
@@ -47,7 +47,7 @@ def equilibria_job(scene: Scene, asked: Models, spin: float, out: Path) -> Job:
     levitation = Levitation(scene, asked, spin)
     values = {**equilibria_answer(levitation), "tables_from_cache": levitation.from_cache}
     write_whole(out / "equilibria.json", f"{to_json(values)}\n".encode())
-    return values, [*equilibria_words(levitation), *left_out(levitation, levitation.equilibria)]
+    return values, [*equilibria_words(levitation), *effects_words(values)]
 
 
 def simulate_job(scene: Scene, asked: Models, duration: float, out: Path, resume: bool) -> Job:
@@ -78,13 +78,11 @@ def simulate_job(scene: Scene, asked: Models, duration: float, out: Path, resume
         raise
     keep(flight)
     checkpoint.remove()
-    known = () if levitation.absolute else levitation.equilibria
     values = {
         **flight_answer(levitation, flight),
-        "not_modelled": list(omissions(levitation, known).values()),
         "trajectory": str(out / "trajectory.nc"),
         "tables_from_cache": levitation.from_cache,
     }
     tell_details(flight)
-    told = [flight_words(levitation, flight), *left_out(levitation, known)]
+    told = [flight_words(levitation, flight), *effects_words(values)]
     return values, [*told, f"Trajectory in {values['trajectory']}, figure in {out / 'trajectory.png'}"]

@@ -6,6 +6,7 @@ import numpy as np
 
 from ...dynamics.maps import surveys
 from ...dynamics.steady import Indices
+from ...fem.mutual import mutual_key
 from ...fem.rotor_tables import rotor_key
 from ...geometry.basics import SpinlevError
 from .levitation import Levitation
@@ -41,7 +42,7 @@ def _find_together(alike: Sequence[Levitation], places: Indices) -> None:
     spin = np.array([levitation.spin for levitation in chosen])
     try:
         first = chosen[0]
-        found = surveys([one.scene for one in chosen], first.table, spin, near, first.rates)
+        found = surveys([one.scene for one in chosen], first.interaction, spin, near, first.rates)
     except SpinlevError:
         return
     for levitation, (survey, searched) in zip(chosen, found, strict=True):
@@ -52,4 +53,5 @@ def _field_key(levitation: Levitation) -> str:
     scene, models = levitation.scene, levitation.models
     conducting = bool(scene.floater.conductivity)
     rotor = rotor_key(scene.rotor, models.model, models.rtol, scene.floater.radius)
-    return f"{rotor} {conducting} {scene.field_map}"
+    answers = "" if models.interaction == "rigid" else f"{models.interaction} {mutual_key(scene.rotor, scene.floater)}"
+    return f"{rotor} {conducting} {scene.field_map} {answers}"

@@ -1,12 +1,14 @@
 """What the program found, in the words and digits of a physicist."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 from ...dynamics.flights import Trajectory
 from ...dynamics.steady import Equilibrium
 from ..terminal import detail
-from .answers import kind_of_flight, omissions
+from .answers import kind_of_flight
+from .effects import PLATE_NOT_MODELLED
 from .levitation import Levitation
 
 MILLI = 1e-3
@@ -150,12 +152,18 @@ def flight_words(levitation: Levitation, flight: Trajectory) -> str:
     return f"Flew {flight.levitated_s:.4g} s, still up{how}."
 
 
-def left_out(levitation: Levitation, equilibria: Sequence[Equilibrium]) -> list[str]:
-    """One line for what the computation leaves out; the whole sentences are details."""
-    missing = omissions(levitation, equilibria)
-    for sentence in missing.values():
+def effects_words(values: Mapping[str, Any]) -> list[str]:
+    """Which effects are in the motion and about what each changes, as a table; the reasons are details."""
+    for sentence in values["not_modelled"]:
         detail(sentence)
-    return [f"Left out: {'; '.join(missing)}."] if missing else []
+    rows = [("beyond the rigid dipole", "in the motion", "shift (mm)", "growth (1/s)")]
+    for effect in values["effects"]:
+        sizes = ("" if effect[key] is None else f"{effect[key]:.2g}" for key in ("shift_mm", "growth_per_s"))
+        rows.append((effect["name"], "yes" if effect["included"] else "no", *sizes))
+    widths = [max(len(row[k]) for row in rows) for k in range(4)]
+    table = [f"  {row[0]:{widths[0]}}  " + "  ".join(map(str.rjust, row[1:], widths[1:])) for row in rows]
+    plate = [PLATE_NOT_MODELLED] if PLATE_NOT_MODELLED in values["not_modelled"] else []
+    return [*(line.rstrip() for line in table), *plate]
 
 
 def tell_details(flight: Trajectory) -> None:

@@ -19,7 +19,9 @@ from .numbers import (
 )
 from .options import (
     Answer as Answer,
+    Beside as Beside,
     FieldModel as FieldModel,
+    InteractionModel as InteractionModel,
     Models as Models,
     Output as Output,
     PlateModel as PlateModel,

@@ -11,6 +11,7 @@ from cyclopts import Parameter
 from ...geometry.basics import InputError
 
 FieldModel = Literal["dipole", "cuboid", "fem", "map", "auto"]
+InteractionModel = Literal["rigid", "mutual", "auto"]
 Quantity = Literal["equilibria", "flight", "field"]
 PlateModel = Literal["none", "slab", "fem", "reduced", "auto"]
 
@@ -36,6 +37,9 @@ class Models:
         Field model of the motion.
     plate_model
         none, slab (infinite), fem or reduced (the network of the finite elements), or auto.
+    interaction
+        rigid (the floater as a rigid dipole), mutual (rotor and floater magnetise each other), or auto: mutual where it
+        matters at the accuracy asked for, with the finite elements' field.
     rtol
         Relative accuracy asked of the field wherever the floater can be.
     plate_rtol
@@ -45,7 +49,8 @@ class Models:
     model: FieldModel = "auto"
     plate_model: PlateModel = "auto"
     rtol: float = 3e-6
-    plate_rtol: float = 3e-3
+    plate_rtol: float = 5e-3
+    interaction: InteractionModel = "auto"
 
     def checked(self) -> Self:
         """Itself.
@@ -54,7 +59,8 @@ class Models:
         ------
         InputError : a model that does not exist, or a tolerance out of range
         """
-        for name, known in (("model", get_args(FieldModel)), ("plate_model", get_args(PlateModel))):
+        choices = (("model", FieldModel), ("plate_model", PlateModel), ("interaction", InteractionModel))
+        for name, known in ((name, get_args(kind)) for name, kind in choices):
             if (value := getattr(self, name)) not in known:
                 raise InputError(f"Input {name} must be one of {', '.join(known)}; instead received {value}.")
         if not 1e-13 <= self.rtol < 1:
@@ -83,6 +89,26 @@ class Output:
 
     json: Annotated[bool, Parameter(negative="")] = False
     out: Path = Path("out")
+    verbose: Annotated[bool, Parameter(negative="")] = False
+
+
+@Parameter(name="*")
+@dataclass(frozen=True)
+class Beside:
+    """Where answers about a file go.
+
+    Parameters
+    ----------
+    json
+        Print one JSON object and nothing else on standard output.
+    out
+        Folder for the files; left out: beside the input.
+    verbose
+        Say more.
+    """
+
+    json: Annotated[bool, Parameter(negative="")] = False
+    out: Path | None = None
     verbose: Annotated[bool, Parameter(negative="")] = False
 
 

@@ -12,7 +12,7 @@ from ...geometry.basics import InputError
 
 MOST = 100_000
 """Points of a sweep, at most."""
-NAMED = ("model", "plate_model")
+NAMED = ("model", "plate_model", "interaction")
 """Keys whose values are names."""
 
 

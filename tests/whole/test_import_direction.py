@@ -10,7 +10,16 @@ FLOORS = {
     "geometry": ["basics", "bodies", "scenes", "meshes"],
     "fem": [
         *("storage", "harmonics", "closed_forms", "elements", "magnetostatics", "rotor_tables", "measured_maps"),
-        *("mutual", "eddy_currents", "plate_currents", "plate_network", "plate_tables", "slab", "verification"),
+        *(
+            "mutual",
+            "eddy_currents",
+            "plate_currents",
+            "plate_network",
+            "plate_tables",
+            "rotor_losses",
+            "slab",
+            "verification",
+        ),
     ],
     "dynamics": ["motion", "effects", "steady", "equilibria", "branches", "maps", "flights", "ensembles", "slow_drift"],
     "studies": [

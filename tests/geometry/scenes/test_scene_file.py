@@ -1,11 +1,13 @@
 """Scene files: what loads, and what is said of what does not."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from places import SCENES
 
 from spinlev.geometry.basics import MU_0
-from spinlev.geometry.scenes import AbsoluteStart, OffsetStart, SceneError, load_scene, parse_scene
+from spinlev.geometry.scenes import AbsoluteStart, Drag, OffsetStart, SceneError, load_scene, parse_scene, scene_text
 
 GOOD = (SCENES / "horizontal.toml").read_text()
 
@@ -139,3 +141,27 @@ def test_a_start_has_one_place_and_a_direction():
         "Input start must have offset_mm or position_mm; instead received both.",
         "Input start.moment must be a direction, not zero; instead received [0.0, 0.0, 0.0].",
     ]
+
+
+@pytest.mark.parametrize(
+    ("drag", "message"),
+    [
+        ('model = "water"', "drag.model must be 'stokes' or 'air'"),
+        ('model = "air"\nlinear_N_s_m = 1.0', "drag.linear_N_s_m must be left out beside drag.model"),
+        ("linear_N_s_m = 1.0", "drag.angular_N_m_s must be given"),
+    ],
+)
+def test_drag_is_a_model_or_two_numbers(drag, message):
+    assert any(message in fault for fault in faults(with_drag(drag)))
+
+
+def test_air_survives_writing():
+    stokes, air = (parse_scene(with_drag(f'model = "{model}"'), "s.toml") for model in ("stokes", "air"))
+    assert stokes.drag == Drag.stokes(stokes.floater.radius)
+    assert air.drag == replace(stokes.drag, air=True)
+    assert parse_scene(scene_text(replace(air, frequency=99.0)), "again").drag == air.drag
+
+
+def with_drag(text):
+    """The good scene with other keys under [drag], its last table."""
+    return GOOD.partition("[drag]")[0] + "[drag]\n" + text

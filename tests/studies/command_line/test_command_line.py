@@ -83,6 +83,35 @@ def test_equilibria(spinlev):
     assert all(keys <= set(e) for e in answer["equilibria"])
     assert any(e["stable"] and 25 < -e["position_mm"][2] < 29 for e in answer["equilibria"])
     assert answer["model"] == "cuboid"
+    assert answer["interaction"] == "rigid"
+    effects = {effect["name"]: effect for effect in answer["effects"]}
+    assert set(next(iter(effects.values()))) == {"name", "included", "shift_mm", "growth_per_s", "why"}
+    assert effects["mutual magnetisation"]["shift_mm"] > 0.01  # what it would do
+    assert "cuboid" in effects["mutual magnetisation"]["why"]
+
+
+def test_an_unknown_interaction_is_refused(spinlev):
+    status, _, err = spinlev("equilibria", SCENES / "horizontal.toml", "--interaction", "loud")
+    assert status == 2
+    assert "rigid" in err
+
+
+def test_rotor_and_floater_magnetise_each_other_if_asked(spinlev):
+    """Attraction lifts the floater by about a tenth of a millimetre, with any field; the flight has it too."""
+    options = (SCENES / "horizontal.toml", "--model", "cuboid", *NO_PLATE, "--json", "--interaction")
+    places = []
+    for asked in ("rigid", "mutual"):
+        status, out, err = spinlev("equilibria", *options, asked)
+        assert status == 0, err
+        answer = json.loads(out)
+        assert answer["interaction"] == asked
+        places.append(next(e["position_mm"][2] for e in answer["equilibria"] if e["stable"]))
+    assert places[1] - places[0] == pytest.approx(0.09, abs=0.02)
+    assert answer["effects"][0]["shift_mm"] == pytest.approx(places[1] - places[0], rel=0.1)
+    status, out, err = spinlev("simulate", *options, "mutual", "--duration-s", "0.05")
+    assert status == 0, err
+    assert json.loads(out)["energy_error"] < 1e-10
+    assert json.loads(out)["interaction"] == "mutual"
 
 
 def test_simulate(spinlev, tmp_path):

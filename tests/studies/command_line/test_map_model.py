@@ -76,3 +76,11 @@ def test_no_map(called, folder, capfd):
     (bare / "scene.toml").write_text(load_scene(shipped_scene("horizontal")).text)
     assert called(bare, "field", "--points", str(folder / "points.csv"), "--model", "map") == 2
     assert "Input rotor.field_map must name a file" in capfd.readouterr().err
+
+
+def test_a_map_does_not_tell_how_the_rotor_answers(folder, called, capsys):
+    assert called(folder, "equilibria", "--model", "map", "--interaction", "mutual", "--plate-model", "none") == 2
+    told = capsys.readouterr().err
+    assert "--interaction must be rigid or auto with a measured map" in told
+    assert "--model fem" in told
+    assert "Traceback" not in told

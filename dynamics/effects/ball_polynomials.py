@@ -1,0 +1,56 @@
+"""Polynomials in a ball as products of its harmonics with powers of r², which its field has computed anyway."""
+
+from collections.abc import Sequence
+from functools import cache
+
+import heyoka as hy
+import numpy as np
+
+from ...fem.harmonics import regular_harmonics
+from ...geometry.basics import Array
+
+NORMALS, RADII = 32, (0.35, 0.7, 1.0)
+
+
+def polynomials(degree: int, offset: Sequence[hy.expression]) -> list[hy.expression]:
+    """A basis of all polynomials up to a degree in the place in the ball (three expressions, radii); the first is 1."""
+    square = hy.sum([t * t for t in offset])
+    harmonics, found, power = regular_harmonics(degree, offset, square), [], hy.expression(1.0)
+    for lowered in range(0, degree + 1, 2):
+        found += [power * h if lowered else h for h in harmonics[: (degree - lowered + 1) ** 2]]
+        power = power * square
+    return found
+
+
+def count(degree: int) -> int:
+    """Of the polynomials."""
+    return (degree + 1) * (degree + 2) * (degree + 3) // 6
+
+
+@cache
+def nodes() -> Array:
+    """(n, 3) places in the unit ball at which functions are fitted."""
+    number = np.arange(NORMALS) + 0.5
+    height, angle = 1 - 2 * number / NORMALS, np.pi * (1 + 5**0.5) * number
+    across = np.sqrt(1 - height**2)
+    normals = np.stack([across * np.cos(angle), across * np.sin(angle), height], axis=1)
+    return np.concatenate([np.zeros((1, 3)), *(radius * normals for radius in RADII)])
+
+
+@cache
+def fitting(degree: int) -> tuple[Array, Array]:
+    """(count, n): weights by the values at the nodes; and (n, count): the values by the weights."""
+    x = hy.make_vars("x", "y", "z")
+    values = hy.cfunc(polynomials(degree, x), x, compact_mode=True)(np.ascontiguousarray(nodes().T)).T
+    return np.linalg.pinv(values), values
+
+
+@cache
+def slopes(degree: int) -> Array:
+    """(3, count of one degree less, count): weights of the derivatives by the weights, exact but for round-off."""
+    x = hy.make_vars("x", "y", "z")
+    tensors = hy.diff_tensors(polynomials(degree, x), diff_args=x, diff_order=1).jacobian
+    function = hy.cfunc(list(np.asarray(tensors).ravel()), x, compact_mode=True)
+    values = function(np.ascontiguousarray(nodes().T)).reshape(count(degree), 3, -1)
+    found = np.einsum("kn,pan->akp", fitting(degree - 1)[0], values)
+    return np.where(np.abs(found) < 1e-13, 0.0, found)

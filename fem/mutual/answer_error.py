@@ -1,0 +1,52 @@
+"""How far a `MutualTable` is from the magnetostatics of both bodies, by their gap."""
+
+import numpy as np
+
+from ...geometry.basics import Array
+from ...geometry.scenes import Floater
+from ..harmonics import field_at_center, gradient_at_center
+from .answer_samples import places_around
+from .forces import two_body
+from .rotor_response import RotorResponse
+from .table import MutualTable
+
+GAPS, EACH = (0.03, 0.16, 0.5, 1.5), 3
+"""Gaps at which both are compared, in floater radii, and at how many poses for each magnet."""
+DEGREE, SERIES = 14, 1e-6
+SAFETY = 2.5
+"""For the poses that were not looked at, and for the finite elements."""
+
+
+def answers(
+    table: MutualTable, places: Array, moments: Array, field: Array, gradient: Array
+) -> tuple[Array, Array, Array]:
+    """Energy (n,) J, force (n, 3) N and torque (n, 3) N m at places (n, 3) m of moments (n, 3) A m² in B0 and ∇B0."""
+    alpha = table.polarizability
+    energy, slope, _ = table.derivatives(places, moments + alpha * field)
+    by_place, by_moment = slope[:, :3], slope[:, 3:]
+    energy = energy - alpha / 2 * np.sum(field**2, axis=1)
+    force = -by_place + alpha * np.einsum("ni,nij->nj", field - by_moment, gradient)
+    return energy, force, -np.cross(moments, by_moment)
+
+
+def answer_errors(table: MutualTable, rotor: RotorResponse, floater: Floater) -> tuple[Array, Array]:
+    """Gaps (k,) m, and the largest relative errors (k, 2) of force and torque found at poses with these gaps."""
+    generator = np.random.default_rng(4)
+    errors = []
+    for gap in GAPS:
+        worst = np.zeros(2)
+        for place in places_around(rotor.magnets, floater.radius, (gap,), EACH, 3):
+            direction = generator.normal(size=3)
+            direction /= np.linalg.norm(direction)
+            both = two_body(rotor, floater, place, direction, DEGREE, SERIES)
+            added = both.total - both.rigid
+            field, gradient = field_at_center(both.own), gradient_at_center(both.own, floater.radius)
+            _, force, torque = answers(
+                table, place[None], floater.moment * direction[None], field[None], gradient[None]
+            )
+            missed = np.linalg.norm(force[0] - added.force), np.linalg.norm(torque[0] - added.torque)
+            arm = floater.radius * np.linalg.norm(added.force)
+            sizes = np.linalg.norm(added.force), max(float(np.linalg.norm(added.torque)), 0.1 * float(arm))
+            worst = np.maximum(worst, np.array(missed) / np.maximum(np.array(sizes), np.finfo(float).tiny))
+        errors.append(SAFETY * worst)
+    return np.array(GAPS) * floater.radius, np.array(errors)

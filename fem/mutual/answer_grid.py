@@ -1,0 +1,123 @@
+"""A magnet that answers to a floater, as few points: energies of harmonic fields, and of what they do to the sphere.
+
+A dipole m at x makes the field b_k = μ0/4π [3 d (m·d) d⁻⁵ - m d⁻³] at point k, d = x - x_k, along the body's axes.  The
+magnet answers with the energy
+
+    -½ Σ_k Σ_a λ_ka b_ka²,
+
+Gauss's rule for the energy of its magnetisation with weights that are fitted to finite elements (`answer_fit`).  The
+field that its own remanence, along ĵ, has beyond the uniform part in a permeable sphere about x costs
+
+    -Σ_k Σ_p (v_kp + w_kp (ĵ·d)²/d²) (R/d)^2p.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import product
+from typing import Any
+
+import heyoka as hy
+import numpy as np
+from numpy.typing import NDArray
+
+from ...geometry.basics import MU_0, Array, Box
+
+UNIT = MU_0 / (4 * np.pi)
+POWERS = (4, 6)
+"""p of the sphere's energy: two dipoles' begin with p = 4, those of degree 2."""
+
+
+@dataclass(frozen=True, eq=False)
+class AnswerGrid:
+    """Points of one magnet with their energies.
+
+    Parameters
+    ----------
+    box : of the magnet
+    axis : (3,) direction of its remanence along the body's axes; zero: none
+    radius : of the floater, m
+    counts : points along each body axis
+    strengths : (n, 3) λ, A m²/T, along the body's axes
+    degrees : (n, 2, 2) v and w of each power, J
+    """
+
+    box: Box
+    axis: Array
+    radius: float
+    counts: tuple[int, int, int]
+    strengths: Array
+    degrees: Array
+
+    @property
+    def nodes(self) -> list[Array]:
+        """Places of Gauss's points along each body axis, m."""
+        return [
+            h * np.polynomial.legendre.leggauss(n)[0] for h, n in zip(self.box.half_edges, self.counts, strict=True)
+        ]
+
+    @cached_property
+    def points(self) -> Array:
+        """(n, 3) m along the body's axes, from its centre."""
+        return np.array(list(product(*self.nodes)))
+
+    def energy(self, position: Sequence[Any], moment: Sequence[Any], share: Any) -> hy.expression:
+        """Energy at a position (3 expressions, m) of a moment (A m² times `share`); in J times share²."""
+        place = _along(self.box, [x - float(c) for x, c in zip(position, self.box.center, strict=True)])
+        pointing, parts = _along(self.box, moment), []
+        for point, strengths, degrees in zip(self.points, self.strengths, self.degrees.reshape(-1, 4), strict=True):
+            d = [x - float(t) for x, t in zip(place, point, strict=True)]
+            numbers = strengths.tolist(), (share * share * w for w in degrees.tolist())
+            parts.append(point_energy(d, pointing, numbers[0], list(numbers[1]), self.axis.tolist(), self.radius))
+        return hy.sum(parts)
+
+
+def point_energy(
+    d: Sequence[Any],
+    moment: Sequence[Any],
+    strengths: Sequence[Any],
+    degrees: Sequence[Any],
+    axis: Sequence[Any],
+    r: Any,
+) -> hy.expression:
+    """Energy of one point, from d (m), the moment, λ (3), v and w of both powers (4), ĵ and R, in the body's axes."""
+    inverse = 1.0 / hy.sum([x * x for x in d])
+    along = 3.0 * inverse * hy.sum([m * x for m, x in zip(moment, d, strict=True)])
+    field = [x * along - m for x, m in zip(d, moment, strict=True)]  # times 4π d³/μ0
+    square = hy.sum([s * (b * b) for s, b in zip(strengths, field, strict=True)])
+    answer = (0.5 * UNIT**2) * (inverse * inverse * inverse * square)
+    ratio, axial = r * r * inverse, hy.sum([j * x for j, x in zip(axis, d, strict=True)])
+    cosine, fourth = axial * axial * inverse, ratio * ratio * ratio * ratio
+    v, w, v_next, w_next = degrees
+    return -answer - fourth * (v + w * cosine + ratio * ratio * (v_next + w_next * cosine))
+
+
+def _along(box: Box, vector: Sequence[Any]) -> list[Any]:
+    """Components along the body's axes of a vector in the rotor's frame."""
+    exact = np.where(np.abs(box.rotation.T) < 1e-15, 0.0, box.rotation.T)
+    return [hy.sum([float(r) * v for r, v in zip(row, vector, strict=True) if r]) for row in exact]
+
+
+def point_counts(box: Box, clearance: float) -> tuple[int, int, int]:
+    """Gauss points along each edge for fields with sources no nearer than a clearance (m) to the faces.
+
+    Gauss's error falls as ρ^-2n, ρ the sum of the half axes of the ellipse about the edge that reaches the source.
+    """
+    z = 1 + clearance / box.half_edges
+    nx, ny, nz = (int(n) for n in np.ceil(DIGITS / np.log(z + np.sqrt(z * z - 1))))
+    return nx, ny, nz
+
+
+DIGITS = 7.2
+"""-ln of the error of Gauss's rule, about: with the weights fitted, force and torque are met to 1e-3."""
+
+
+def orbits(grid_points: Array, mirrored: bool) -> NDArray[np.intp]:
+    """Numbers (n,) of the classes of points (n, 3) that mirrors at the body's planes, or else its centre, exchange."""
+    key = np.round(grid_points * 1e9).astype(int)
+    if mirrored:
+        key = np.abs(key)
+    else:
+        first = np.array([next((v for v in row if v), 0) for row in key])
+        key = key * np.where(first < 0, -1, 1)[:, None]
+    return np.asarray(np.unique(key, axis=0, return_inverse=True)[1]).ravel()

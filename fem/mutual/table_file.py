@@ -1,0 +1,87 @@
+"""A `MutualTable` as one self-describing netCDF file, and those that were made before."""
+
+import hashlib
+import json
+from collections.abc import Callable
+
+import numpy as np
+import xarray as xr
+
+from ...geometry.basics import Box
+from ...geometry.bodies import Magnet
+from ...geometry.scenes import Floater
+from ..storage import described, from_cache, program_of, read_checked, write_checked
+from .answer_fit import mutual_table
+from .answer_grid import AnswerGrid
+from .table import MutualTable
+
+FORMAT = "spinlev mutual table 1"
+
+
+def cached_mutual_table(
+    magnets: tuple[Magnet, ...], floater: Floater, report: Callable[[str], None]
+) -> tuple[MutualTable, bool]:
+    """The answers of a rotor and a floater, see `mutual_table`, from the cache if they are there, and whether."""
+    return from_cache(
+        f"mutual-{mutual_key(magnets, floater)}.nc",
+        lambda path: from_dataset(read_checked(path, FORMAT), magnets),
+        lambda: mutual_table(magnets, floater),
+        lambda table, path: write_checked(to_dataset(table), path),
+        report,
+    )
+
+
+def mutual_key(magnets: tuple[Magnet, ...], floater: Floater) -> str:
+    """SHA-256 of all that decides the answers, and the programs that compute them."""
+    digest = hashlib.sha256(f"{FORMAT} {program_of(__package__)}".encode())
+    sphere = np.array([floater.radius, floater.remanence, floater.recoil_permeability])
+    for magnet in magnets:
+        for part in (magnet.box.size, magnet.box.center, magnet.box.rotation, magnet.polarization):
+            digest.update(np.ascontiguousarray(part + 0.0, dtype="<f8").tobytes())
+        digest.update(np.ascontiguousarray(magnet.permeability_in_rotor + 0.0, dtype="<f8").tobytes())
+    digest.update(np.ascontiguousarray(sphere, dtype="<f8").tobytes())
+    return digest.hexdigest()
+
+
+def to_dataset(table: MutualTable) -> xr.Dataset:
+    """All numbers of a table with their units; the magnets are known to who asks for it."""
+    grids = table.grids
+    variables = {
+        "axis": (("magnet", "body_axis"), np.array([grid.axis for grid in grids]), "1"),
+        "counts": (("magnet", "body_axis"), np.array([grid.counts for grid in grids]), "1"),
+        "strengths": (("point", "body_axis"), np.concatenate([grid.strengths for grid in grids]), "A m2/T"),
+        "degrees": (("point", "power", "kind"), np.concatenate([grid.degrees for grid in grids]), "J"),
+        "coupling": (("field", "other_field"), table.coupling, "A m2/T"),
+        "pairs": (("magnet", "other_magnet"), table.pairs, "J m8"),
+        "polarizability": ((), table.polarizability, "A m2/T"),
+        "radius": ((), grids[0].radius, "m"),
+        "gaps": (("gap",), table.gaps, "m"),
+        "errors": (("gap", "of_force_or_torque"), table.errors, "1"),
+    }
+    attrs = {
+        "format": FORMAT,
+        "title": "Energies of the mutual magnetisation of a rotor and a sphere",
+        "provenance": json.dumps(table.provenance, sort_keys=True),
+    }
+    return described(variables, attrs)
+
+
+def from_dataset(dataset: xr.Dataset, magnets: tuple[Magnet, ...]) -> MutualTable:
+    """The table of a data set that `to_dataset` made for these magnets."""
+    data = {str(name): variable.values for name, variable in dataset.data_vars.items()}
+    ends = np.cumsum(np.prod(data["counts"], axis=1))[:-1]
+    parts = (np.split(data[name], ends) for name in ("strengths", "degrees"))
+    grids = [
+        AnswerGrid(Box(m.box.size, m.box.center, m.box.rotation), axis, float(data["radius"]), tuple(counts), *rest)
+        for m, axis, counts, *rest in zip(magnets, data["axis"], data["counts"].tolist(), *parts, strict=True)
+    ]
+    return MutualTable(
+        magnets=magnets,
+        grids=tuple(grids),
+        coupling=data["coupling"],
+        pairs=data["pairs"],
+        polarizability=float(data["polarizability"]),
+        gaps=data["gaps"],
+        errors=data["errors"],
+        provenance=json.loads(dataset.attrs["provenance"]),
+    )

@@ -1,0 +1,96 @@
+"""The answers of rotor and floater as one energy, against the magnetostatics of both bodies at the same poses."""
+
+from dataclasses import replace
+
+import heyoka as hy
+import numpy as np
+import pytest
+
+from spinlev.fem.harmonics import field_at_center, gradient_at_center
+from spinlev.fem.mutual import answers, cached_mutual_table, mutual_table, rotor_ladder, two_body
+from spinlev.fem.mutual.answer_samples import places_around
+from spinlev.fem.mutual.table_file import FORMAT, from_dataset, to_dataset
+from spinlev.fem.storage import read_checked, write_checked
+from spinlev.geometry.basics import Box, InputError
+from spinlev.geometry.bodies import Magnet, horizontal
+from spinlev.geometry.scenes import Floater
+
+FLOATER = Floater(6.35e-3, 1.305, 1.05, 7500.0)
+MAGNETS = horizontal(2e-3, 10e-3, 1.305, 1.05)
+
+
+@pytest.fixture(scope="module")
+def table():
+    return cached_mutual_table(MAGNETS, FLOATER, print)[0]
+
+
+def poses(gap, number, seed):
+    """Places (n, 3) m at a gap (radii) that the fit has not seen, and directions (n, 3)."""
+    places = places_around(MAGNETS, FLOATER.radius, (gap,), number, seed)
+    directions = np.random.default_rng(seed).normal(size=places.shape)
+    return places, directions / np.linalg.norm(directions, axis=1)[:, None]
+
+
+@pytest.mark.parametrize(("gap", "seed"), [(0.16, 21), (0.5, 22), (1.0, 23), (2.0, 24)])
+def test_force_and_torque_are_those_of_both_bodies(table, gap, seed):
+    """Finite elements of a degree more than the fit's, at other poses; the stated error holds."""
+    (rotor,) = rotor_ladder(MAGNETS, (3,))
+    for place, direction in zip(*poses(gap, 2, seed), strict=True):
+        both = two_body(rotor, FLOATER, place, direction, 16, 1e-7)
+        added = both.total - both.rigid
+        field, gradient = field_at_center(both.own), gradient_at_center(both.own, FLOATER.radius)
+        given = (place[None], FLOATER.moment * direction[None], field[None], gradient[None])
+        _, force, torque = answers(table, *given)
+        of_force, of_torque = (float(part[0]) for part in table.relative_error(place))
+        size = float(np.linalg.norm(added.force))
+        assert np.linalg.norm(force[0] - added.force) < of_force * size
+        arm = max(float(np.linalg.norm(added.torque)), 0.1 * FLOATER.radius * size)
+        assert np.linalg.norm(torque[0] - added.torque) < of_torque * arm
+        if gap > 0.9:  # where floaters levitate
+            assert of_force < 2e-3
+
+
+def test_written_out_and_by_points_the_energy_is_one(table):
+    """The expression of the whole, and the kernel summed over points, with its derivatives by differences."""
+    names = [f"v_{k}" for k in range(9)]
+    given = hy.make_vars(*names)
+    whole = hy.cfunc([table.energy(given[:3], given[3:6], given[6:])], given, compact_mode=True)
+    place, direction = poses(0.6, 4, 5)
+    moment, flux = FLOATER.moment * direction, 0.02 * direction[:, ::-1]
+    energy = answers(table, place, moment, flux, np.zeros((4, 3, 3)))[0]
+    written = whole(np.ascontiguousarray(np.concatenate([place, moment, flux], axis=1).T))[0]
+    np.testing.assert_allclose(written, energy, rtol=1e-10)
+    _, slope, second = table.derivatives(place, moment)
+    for axis in range(6):
+        step = np.zeros(6)
+        step[axis] = 1e-6 if axis < 3 else 1e-5
+        ends = [table.derivatives(place + s * step[:3], moment + s * step[3:]) for s in (1, -1)]
+        change, bend = ((ends[0][k] - ends[1][k]) / (2 * step[axis]) for k in (0, 1))
+        np.testing.assert_allclose(change, slope[:, axis], rtol=1e-5, atol=1e-6 * np.abs(slope[:, axis]).max())
+        assert np.abs(bend - second[:, axis]).max() < 1e-5 * np.abs(second[:, axis]).max()
+
+
+def test_a_file_holds_all_of_it(table, tmp_path):
+    write_checked(to_dataset(table), tmp_path / "table.nc")
+    back = from_dataset(read_checked(tmp_path / "table.nc", FORMAT), MAGNETS)
+    place, direction = poses(0.6, 4, 6)
+    for before, after in zip(table.derivatives(place, direction), back.derivatives(place, direction), strict=True):
+        np.testing.assert_array_equal(after, before)
+    np.testing.assert_array_equal(back.relative_error(place), table.relative_error(place))
+    assert repr(back) == repr(table)
+
+
+def test_what_is_not_permeable_does_not_answer():
+    hard = tuple(replace(magnet, recoil_permeability=1.0) for magnet in MAGNETS)
+    table = mutual_table(hard, replace(FLOATER, recoil_permeability=1.0))
+    energy, slope, second = table.derivatives(*poses(0.5, 3, 7))
+    assert not energy.any()
+    assert not slope.any()
+    assert not second.any()
+    assert table.polarizability == 0
+
+
+def test_an_oblique_easy_axis_is_refused():
+    oblique = Magnet(Box(np.full(3, 10e-3)), np.array([1.0, 0.0, 1.0]), 1.05, 1.15)
+    with pytest.raises(InputError, match="--interaction rigid"):
+        mutual_table((oblique,), FLOATER)

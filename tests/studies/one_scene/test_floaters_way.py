@@ -1,0 +1,20 @@
+"""A conductor of the rotor where the floater would levitate is a wrong scene."""
+
+import numpy as np
+import pytest
+
+import spinlev as sl
+from spinlev.geometry.basics import InputError
+from spinlev.studies.one_scene.plate_of_scene import check_way
+
+BALL = sl.sphere(diameter_mm=12.7, remanence_T=1.305, density_kg_m3=7500.0)
+BLOCK = {"size_mm": [4.0, 4.0, 4.0], "center_mm": [0.0, 0.0, -8.0], "conductivity_S_m": 1.4e6}
+
+
+def test_a_conductor_in_the_floaters_way_is_said_with_its_depth():
+    """The block ends 10 mm below the axis of the cube; a floater at 17 mm begins at 10.65 mm, at 16 mm at 9.65 mm."""
+    rotor = sl.horizontal(displacement_mm=0.0, edge_mm=10.0, remanence_T=1.305, conductors=[BLOCK])
+    scene = sl.scene(frequency_hz=150.0, rotor=rotor, floater=BALL)
+    check_way(scene, np.array([0.0, 0.0, -17e-3]))
+    with pytest.raises(InputError, match=r"conductors\[0\] must leave the floater's way free.* by 0.35 mm"):
+        check_way(scene, np.array([0.0, 0.0, -16e-3]))
