@@ -3,6 +3,7 @@
 import hashlib
 import json
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import xarray as xr
@@ -21,14 +22,34 @@ FORMAT = "spinlev mutual table 1"
 def cached_mutual_table(
     magnets: tuple[Magnet, ...], floater: Floater, report: Callable[[str], None]
 ) -> tuple[MutualTable, bool]:
-    """The answers of a rotor and a floater, see `mutual_table`, from the cache if they are there, and whether."""
-    return from_cache(
-        f"mutual-{mutual_key(magnets, floater)}.nc",
-        lambda path: from_dataset(read_checked(path, FORMAT), magnets),
-        lambda: mutual_table(magnets, floater),
+    """The answers of a rotor and a floater, see `mutual_table`, from the cache if they are there, and whether.
+
+    A lone magnet answers in its own axes: one table serves it wherever it stands and however it is turned.
+    """
+    upright = _upright(magnets)
+    table, found = from_cache(
+        f"mutual-{mutual_key(upright, floater)}.nc",
+        lambda path: from_dataset(read_checked(path, FORMAT), upright),
+        lambda: mutual_table(upright, floater),
         lambda table, path: write_checked(to_dataset(table), path),
         report,
     )
+    return _posed(table, magnets), found
+
+
+def _upright(magnets: tuple[Magnet, ...]) -> tuple[Magnet, ...]:
+    """A lone magnet at the origin with its axes along the rotor's; several as they are."""
+    return magnets if len(magnets) > 1 else tuple(replace(magnet, box=Box(magnet.box.size)) for magnet in magnets)
+
+
+def _posed(table: MutualTable, magnets: tuple[Magnet, ...]) -> MutualTable:
+    """The table of a lone upright magnet where the magnet is; that of several as it is."""
+    if len(magnets) > 1:
+        return table
+    turns = [magnet.box.rotation for magnet in magnets]
+    coupling = turns[0] @ table.coupling @ turns[0].T if turns else table.coupling
+    grids = tuple(replace(grid, box=magnet.box) for grid, magnet in zip(table.grids, magnets, strict=True))
+    return replace(table, magnets=magnets, grids=grids, coupling=coupling)
 
 
 def mutual_key(magnets: tuple[Magnet, ...], floater: Floater) -> str:

@@ -7,16 +7,14 @@ import pytest
 
 from spinlev.dynamics.branches import (
     FOLD,
-    by_frequency,
-    mutual_levitation as answered,
     reference_state,
     stable_frequencies as stable_range,
 )
-from spinlev.dynamics.branches.mutual_equilibria import pose
-from spinlev.dynamics.branches.stable_frequencies import BORDER
+from spinlev.dynamics.effects import Mutual
 from spinlev.dynamics.equilibria import find_equilibria
-from spinlev.dynamics.motion import Rates, Scales, parameters, rotor_gap
+from spinlev.dynamics.motion import Interaction, Rates, Scales, parameters
 from spinlev.dynamics.steady import Balance, EquilibriumError
+from spinlev.fem.mutual import cached_mutual_table
 from spinlev.fem.rotor_tables import rotor_table
 from spinlev.studies.article import article_scene
 from spinlev.studies.levitation import dipole_vs_fem
@@ -166,60 +164,21 @@ def test_causes_go_the_way_that_physics_says(compared):
     assert np.all(compared["distance_error"].sel(model=["fem", "mutual"]) < 1e-4)
 
 
-@pytest.fixture(scope="module")
-def mutual():
-    """Levitation with answers of the cube tilted by 10°, about the equilibria of point dipoles below 130 Hz."""
-    with pytest.MonkeyPatch.context() as patch:
-        for module in (stable_range, answered):
-            patch.setattr(module, "HIGHEST", 130.0)
-        scene = article_scene("tilt", 10.0, drag=False)
-        rates = Rates(rotor_table(scene.rotor, "dipole"))
-        start, frequency = reference_state(scene)
-        rigid = stable_range.stable_range(scene, rates, start, frequency)
-        made, doubt = answered.with_answers(scene, by_frequency(scene, rates), rigid, (1, 2))
-        return made, doubt, {side: made.end(side) for side in ("low", "high")}
-
-
-def balanced(made, point):
-    """Unbalanced accelerations (5,) and their slopes (5, 5), with the answers expanded at the point itself."""
-    scene = replace(made.scene, frequency=point.parameter)
-    rates = made.mutual.expanded(*pose(point)).added(made.family.rates)
-    place, moment = pose(point)
-    value, slope = Balance(rates, parameters(scene, Scales.of(scene), frozen_spin=True), 0.0)(place[None], moment[None])
-    return value[0], slope[0]
-
-
-def test_with_answers_a_fold_is_where_the_balance_has_a_double_root(mutual):
+def test_with_mutual_magnetisation_a_fold_is_where_the_balance_has_a_double_root():
     """Force and torque vanish, and so does their change along one direction; it lies below the rigid dipole's."""
-    made, _, ends = mutual
-    low = ends["low"]
-    value, slope = balanced(made, low)
-    sizes = np.linalg.svd(slope)[1]
+    scene = article_scene("tilt", 10.0, drag=False)
+    table, start = rotor_table(scene.rotor, "dipole"), reference_state(scene)
+    answers = cached_mutual_table(scene.rotor, scene.floater, print)[0]
+    rates = Rates(Interaction(table, (Mutual(answers, scene.floater.moment),)))
+    low, rigid = (stable_range.stable_range(scene, r, *start).low for r in (rates, Rates(table)))
+    there = replace(scene, frequency=low.parameter)
+    balance = Balance(rates, parameters(there, Scales.of(there), frozen_spin=True), 0.0)
+    value, slope = balance(low.state[None, :3], low.state[None, 6:9])
+    sizes = np.linalg.svd(slope[0])[1]
     assert low.kind == FOLD
     assert np.abs(value).max() < 1e-6
     assert sizes[-1] < 1e-3 * sizes[-2]
-    assert 0 < made.range.low.parameter - low.parameter < 1
-
-
-def test_a_search_that_ends_at_the_border_gives_the_equilibrium_there(mutual):
-    """Of an expansion at most 8 % of the frequency away; the equilibrium itself is balanced to round-off."""
-    made, doubt, ends = mutual
-    high, there = ends["high"], made.at(130.0)
-    assert (high.kind, high.parameter) == (BORDER, 130.0)
-    np.testing.assert_allclose(high.position, there.position, atol=1e-6)
-    assert np.abs(balanced(made, there)[0]).max() < 1e-6
-    assert 0 < doubt < 0.1
-
-
-@pytest.mark.slow
-def test_with_answers_stability_ends_where_the_bodies_touch():
-    scene = article_scene("tilt", 10.0, drag=False)
-    rates = Rates(rotor_table(scene.rotor, "dipole"))
-    rigid = stable_range.stable_range(scene, rates, *reference_state(scene))
-    made, _ = answered.with_answers(scene, by_frequency(scene, rates), rigid, (1, 2))
-    high = made.end("high")
-    assert high.kind == "contact"
-    assert abs(rotor_gap(scene, high.position)) < 1e-7
+    assert 0 < rigid.parameter - low.parameter < 1
 
 
 def test_a_plate_below_damps_what_is_neutral_without_it():

@@ -18,7 +18,7 @@ SLOW = 200 * np.pi * MOMENT**2 * MU_0**2 * 3.5e7 / (64 * np.pi) * (1 / 0.015 - 1
 
 NUMBERS = {
     # name: variable, value, allowed difference, and how the value is known
-    "first_steps": ("depth_mm", 19.6114, 1e-4),  # `make run`, README
+    "first_steps": ("depth_mm", 19.5212, 2e-4),  # `make run`, README
     "own_scene": ("height_mm", -27.0, 0.05),  # an independent solution by least squares, told to 0.1 mm
     "field_map": ("off_axis_mT", 12.49, 0.005),  # the study field-components, which has the permeability too
     "dipole_error": ("dipole_error_percent", 1.3 + 1.55, 0.05),  # shape alone, and permeability alone

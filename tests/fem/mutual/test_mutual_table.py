@@ -11,7 +11,7 @@ from spinlev.fem.mutual import answers, cached_mutual_table, mutual_table, rotor
 from spinlev.fem.mutual.answer_samples import places_around
 from spinlev.fem.mutual.table_file import FORMAT, from_dataset, to_dataset
 from spinlev.fem.storage import read_checked, write_checked
-from spinlev.geometry.basics import Box, InputError
+from spinlev.geometry.basics import Box, InputError, rotation_matrix
 from spinlev.geometry.bodies import Magnet, horizontal
 from spinlev.geometry.scenes import Floater
 
@@ -94,3 +94,20 @@ def test_an_oblique_easy_axis_is_refused():
     oblique = Magnet(Box(np.full(3, 10e-3)), np.array([1.0, 0.0, 1.0]), 1.05, 1.15)
     with pytest.raises(InputError, match="--interaction rigid"):
         mutual_table((oblique,), FLOATER)
+
+
+def test_a_lone_magnet_has_one_table_wherever_it_stands():
+    """From the cache for another pose; energy, force and torque turn with the magnet."""
+    turn, shift = rotation_matrix((20.0, -35.0, 50.0)), np.array([1e-3, -2e-3, 5e-4])
+    (magnet,) = MAGNETS
+    turned = (replace(magnet, box=Box(magnet.box.size, shift, turn)),)
+    upright = (replace(magnet, box=Box(magnet.box.size)),)
+    (first, _), (second, found) = (cached_mutual_table(m, FLOATER, print) for m in (upright, turned))
+    assert found
+    place, direction = (values + 0.0 for values in poses(0.6, 4, 6))
+    flux, slope = 0.02 * direction[:, ::-1], np.zeros((4, 3, 3))
+    here = answers(first, place, FLOATER.moment * direction, flux, slope)
+    moved = (shift + place @ turn.T, FLOATER.moment * direction @ turn.T, flux @ turn.T, slope)
+    for there, value in zip(answers(second, *moved), here, strict=True):
+        expected = value if value.ndim == 1 else value @ turn.T
+        np.testing.assert_allclose(there, expected, rtol=1e-10, atol=1e-12 * np.abs(expected).max())

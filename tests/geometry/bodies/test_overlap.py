@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, strategies as st
+from hypothesis import given, settings, strategies as st
 from scipy.optimize import linprog
 
 from spinlev.geometry.basics import Box, rotation_matrix
@@ -30,6 +30,7 @@ def test_edge_against_edge_needs_the_crossed_axes():
     assert box_overlap(first, second) == pytest.approx(np.sqrt(2) - 1.5, abs=1e-12)
 
 
+@settings(deadline=None)
 @given(st.tuples(length, length, length), st.tuples(angle, angle, angle), st.tuples(shift, shift, shift))
 def test_overlap_agrees_with_linear_programming(size, turn, center):
     # A point common to both boxes exists exactly if this linear programme is feasible.

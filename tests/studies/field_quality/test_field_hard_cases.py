@@ -26,7 +26,7 @@ def test_a_cube_without_permeability_against_coulombs_law():
     assert float(errors["true_error"].max()) < 1e-13
     result = errors.expand_dims(case=["cube"])
     assert "cube" in hard_case_lines(result)[2]
-    assert [panel.get_title() for panel in hard_case_figure(result).axes if panel.get_visible()] == ["cube"]
+    assert [panel.get_title("left") for panel in hard_case_figure(result).axes if panel.get_visible()] == ["cube"]
 
 
 def test_a_coarse_reference_says_so():
