@@ -3,6 +3,7 @@
 import time
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 from itertools import product
 
 import numpy as np
@@ -49,8 +50,12 @@ def pieces_of(rotor: Sequence[Magnet], conductors: Sequence[Conductor]) -> Piece
     return [*magnets, *((tuple(part.body for part in group), group[0].conductivity) for group in groups)]
 
 
-def rotor_losses(rotor: Sequence[Magnet], conductors: Sequence[Conductor], nearest: float) -> RotorLosses:
+def rotor_losses(
+    rotor: Sequence[Magnet], conductors: Sequence[Conductor], nearest: float, directions: int = DIRECTIONS
+) -> RotorLosses:
     """Table of the dissipation for a floater whose centre is at least `nearest` (m) from every face.
+
+    It is fitted in so many `directions` of each octant.
 
     Raises
     ------
@@ -61,16 +66,17 @@ def rotor_losses(rotor: Sequence[Magnet], conductors: Sequence[Conductor], neare
     if not pieces:
         raise ValueError("Input rotor must have a conductivity; instead neither magnets nor conductors have one.")
     bodies = [magnet.box for magnet in rotor] + [conductor.body for conductor in conductors]
+    around = partial(places_around, bodies, directions=directions)
     metals = [metal_of(group, conductivity, ORDER) for group, conductivity in pieces]
-    found = current_patterns(metals, places_around(bodies, nearest), LEFT_OUT)
-    places = np.concatenate([places_around(bodies, share * nearest) for share in SHELLS])
+    found = current_patterns(metals, around(nearest), LEFT_OUT)
+    places = np.concatenate([around(share * nearest) for share in SHELLS])
     values = found.fields(places)
     scale = 1 / np.linalg.norm(values, axis=(0, 2))
     choice = _candidates([body for group, _ in pieces for body in group], nearest)
     fit = fit_multipoles(choice, places, values, np.ones(found.count), scale, FIT, lambda _: True)
     finer = [metal_of(group, conductivity, ORDER + 1) for group, conductivity in pieces]
     table = RotorLosses(fit.multipoles, sparse(fit.weights), nearest * np.array(CHECKED), np.zeros(len(CHECKED)))
-    errors = [_error(table, finer, places_around(bodies, distance, seed=1)) for distance in table.distances]
+    errors = [_error(table, finer, around(distance, seed=1)) for distance in table.distances]
     return replace(table, errors=np.array(errors), provenance=_made(found, start))
 
 
@@ -86,20 +92,20 @@ def sparse(weights: Array) -> Array:
     return np.asarray(found * np.linalg.norm(weights, axis=0))
 
 
-def places_around(bodies: Sequence[Solid], distance: float, seed: int = 0) -> Array:
+def places_around(bodies: Sequence[Solid], distance: float, seed: int = 0, directions: int = DIRECTIONS) -> Array:
     """Places (n, 3) m at a `distance` (m) from the nearest face of the bodies, all around them."""
-    octant = np.abs(np.random.default_rng(seed).normal(size=(DIRECTIONS, 3)))
+    octant = np.abs(np.random.default_rng(seed).normal(size=(directions, 3)))
     mirrored = np.concatenate([octant * signs for signs in product((1, -1), repeat=3)])
     mirrored /= np.linalg.norm(mirrored, axis=1)[:, None]
     found = []
     for body in bodies:
-        directions = mirrored @ body.rotation.T
-        low, high = np.zeros(len(directions)), np.full(len(directions), distance + body.circumradius)
+        ways = mirrored @ body.rotation.T
+        low, high = np.zeros(len(ways)), np.full(len(ways), distance + body.circumradius)
         for _ in range(50):
             middle = (low + high) / 2
-            near = body.distance(body.center + middle[:, None] * directions) < distance
+            near = body.distance(body.center + middle[:, None] * ways) < distance
             low, high = np.where(near, middle, low), np.where(near, high, middle)
-        found.append(body.center + high[:, None] * directions)
+        found.append(body.center + high[:, None] * ways)
     places = np.concatenate(found)
     clear = np.min([body.distance(places) for body in bodies], axis=0)
     return np.asarray(places[clear > distance * (1 - 1e-6)])

@@ -37,7 +37,7 @@ ROUND_OFF = 1e-10
 
 def points(quick: bool) -> list[Point]:
     """The rotors that levitated; quick: one frequency."""
-    return [{**rotor, "steps": 1 if quick else 4} for rotor in levitated_rotors(quick)]
+    return [{**rotor, "steps": 1 if quick else 4, "rtols": [RTOL, COARSE]} for rotor in levitated_rotors(quick)]
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,16 +62,16 @@ def compute(point: Point) -> xr.Dataset:
     """Distance, polar angle, modes and limits of stability of one rotor, by every model and with errors."""
     scene = article_scene(point["configuration"], point["measure"], drag=False)
     bare = replace(scene, floater=replace(scene.floater, recoil_permeability=1.0))
-    start = reference_state(scene)
+    start, (fine, coarse) = reference_state(scene), point["rtols"]
     dipole = levitation_of(scene, "dipole").rates
     made = {
         "article": _levitation(bare, dipole, start),
         "dipole": _levitation(scene, dipole, start),
         "cuboid": _levitation(scene, levitation_of(scene, "cuboid").rates, start),
-        "fem": _levitation(scene, levitation_of(scene, "fem", RTOL).rates, start),
-        "coarse": _levitation(scene, levitation_of(scene, "fem", COARSE).rates, start),
+        "fem": _levitation(scene, levitation_of(scene, "fem", fine).rates, start),
+        "coarse": _levitation(scene, levitation_of(scene, "fem", coarse).rates, start),
     }
-    together = levitation_of(scene, "fem", RTOL, "mutual")
+    together = levitation_of(scene, "fem", fine, "mutual")
     made["mutual"] = _levitation(scene, together.rates, start)
     low = max(each.range.low.parameter for each in made.values())
     high = min(each.range.high.parameter for each in made.values())

@@ -35,9 +35,8 @@ def points(quick: bool) -> list[Point]:
 
     One step alone gives derivatives without an estimate of their error, which is then NaN.
     """
-    return [
-        {**point, "samples": 4 if quick else 32, "steps": [1] if quick else [1, 2]} for point in levitated_rotors(quick)
-    ]
+    more = {"field": MODEL, "samples": 4 if quick else 32, "steps": [1] if quick else [1, 2]}
+    return [{**rotor, **more} for rotor in levitated_rotors(quick)]
 
 
 def derivatives(base: Nominal, factors: Sequence[int] = (1, 2)) -> tuple[Array, Array]:
@@ -83,7 +82,7 @@ def drawn(base: Nominal, samples: int) -> tuple[Array, Array]:
 def leaning(base: Nominal) -> tuple[Array, Array]:
     """Distance (m) and largest growth (1/s) in the middle of the range, upright and with the axis tilted by `TILTS`."""
     scene = scene_of(base.configuration, base.values, float(base.grid[1]))
-    levitation = levitation_of(scene, MODEL)
+    levitation = levitation_of(scene, base.model)
     here = at_frequency(scene, levitation.rates, base.range.near(scene.frequency), scene.frequency)
     found = []
     for tilt in np.radians([0.0, *TILTS]):
@@ -99,7 +98,7 @@ def leaning(base: Nominal) -> tuple[Array, Array]:
 
 def compute(point: Point) -> xr.Dataset:
     """Derivatives, tolerance band and tilt of one rotor."""
-    base = nominal(point["configuration"], point["measure"])
+    base = nominal(point["configuration"], point["measure"], point["field"])
     slopes, errors = derivatives(base, point["steps"])
     samples, draws = drawn(base, point["samples"])
     distance, growth = leaning(base)

@@ -64,12 +64,14 @@ class Nominal:
     Parameters
     ----------
     configuration, measure : of the rotor
+    model : of its field
     values : of the parameters
     range : its stable frequencies
     """
 
     configuration: str
     measure: float
+    model: FieldModel
     values: dict[str, float]
     range: StableRange
 
@@ -90,12 +92,12 @@ def scene_of(configuration: str, values: dict[str, float], frequency: float = 10
     return replace(scene, gravity=np.array([0.0, 0.0, -values["gravity"]]))
 
 
-def nominal(configuration: str, measure: float) -> Nominal:
+def nominal(configuration: str, measure: float, model: FieldModel = MODEL) -> Nominal:
     """The rotor as it should be. Raises EquilibriumError where it does not levitate."""
     values = {name: known.nominal for name, known in PARAMETERS.items() if name != PLACE} | {"measure": measure}
     scene = scene_of(configuration, values)
-    found = stable_range(scene, levitation_of(scene, MODEL).rates, *reference_state(scene))
-    return Nominal(configuration, measure, values, found)
+    found = stable_range(scene, levitation_of(scene, model).rates, *reference_state(scene))
+    return Nominal(configuration, measure, model, values, found)
 
 
 def levitation(base: Nominal, values: dict[str, float], shift: float = 0.0) -> Array:
@@ -106,7 +108,7 @@ def levitation(base: Nominal, values: dict[str, float], shift: float = 0.0) -> A
     shift : of the frequencies at which the distance is asked for, Hz
     """
     scene = scene_of(base.configuration, values)
-    rates = levitation_of(scene, MODEL).rates
+    rates = levitation_of(scene, base.model).rates
     middle = base.range.near(base.grid[1])
     family = by_frequency(scene, rates)
     row = np.full(len(QUANTITIES), np.nan)

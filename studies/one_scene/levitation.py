@@ -62,6 +62,7 @@ class Levitation:
         self._fields: dict[str, RotorField] = {}
         self._equations: dict[tuple[str, bool, bool, str, str], Rates] = {}
         self._mutual: dict[str, MutualTable] = {}
+        self._metal: dict[str, RotorLosses] = {}
 
     @cached_property
     def interaction(self) -> Interaction:
@@ -107,12 +108,14 @@ class Levitation:
         """
         if not pieces_of(self.scene.rotor, self.scene.conductors):
             return None
-        note("Currents in the rotor's metal ...")
-        table, found = cached_rotor_losses(self.scene, note)
-        if found:
-            self.from_cache.append("rotor losses")
-        note("  from the cache." if found else f"  done in {table.provenance['seconds']:.1f} s.")
-        return table
+        key = f"{losses_key(self.scene)} {self.scene.frequency}"  # how fast is too fast depends on it
+        if key not in self._metal:
+            note("Currents in the rotor's metal ...")
+            self._metal[key], found = cached_rotor_losses(self.scene, note)
+            if found:
+                self.from_cache.append("rotor losses")
+            note("  from the cache." if found else f"  done in {self._metal[key].provenance['seconds']:.1f} s.")
+        return self._metal[key]
 
     def elsewhere(self, models: Models | None = None, **changes: Any) -> Levitation:
         """Another scene with the same rotor, which shares its field; `changes` are fields of `Scene`, SI units."""
@@ -122,7 +125,8 @@ class Levitation:
 
     def share(self, other: Levitation) -> None:
         """Take over the fields and the compiled equations of another scene with the same rotor, made or yet to make."""
-        self._fields, self._equations, self._mutual = other._fields, other._equations, other._mutual
+        self._fields, self._equations = other._fields, other._equations
+        self._mutual, self._metal = other._mutual, other._metal
 
     def adopt(self, known: Survey, searched: bool = True) -> None:
         """Take over the equilibria without plate that are known from a search here or from scenes nearby."""

@@ -94,6 +94,7 @@ def test_distance_of_a_sample_is_that_of_a_survey(horizontal):
     assert set(values) | {"frequency"} == set(PARAMETERS)
 
 
+@pytest.mark.slow
 def test_a_design_holds_the_floater_where_it_was_wanted():
     found = designed("tilt", 12.7e-3, 25e-3, 100.0)
     scene = article_scene("tilt", found.measure, drag=False, edge=12.7e-3, permeability=1.0)

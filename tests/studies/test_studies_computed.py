@@ -18,7 +18,7 @@ from spinlev.fem.mutual import cached_mutual_table
 from spinlev.fem.rotor_tables import rotor_table
 from spinlev.studies.article import article_scene
 from spinlev.studies.levitation import dipole_vs_fem
-from spinlev.studies.margins import design, sensitivity, stability_map, tolerances
+from spinlev.studies.margins import design, sensitivity, stability_map
 from spinlev.studies.margins.design_search import designed
 
 
@@ -31,11 +31,8 @@ def nearest(scene, model, distance):
 @pytest.fixture(scope="module")
 def derived():
     """Derivatives and a sample of a rotor of point dipoles."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(tolerances, "MODEL", "dipole")
-        patch.setattr(sensitivity, "MODEL", "dipole")
-        point = {"configuration": "horizontal", "measure": 2.0, "samples": 1, "steps": [1]}
-        return sensitivity.compute(point).isel(case=0)
+    point = {"configuration": "horizontal", "measure": 2.0, "field": "dipole", "samples": 1, "steps": [1]}
+    return sensitivity.compute(point).isel(case=0)
 
 
 NOMINAL = {
@@ -133,11 +130,8 @@ def test_an_unstable_design_has_no_margin():
 @pytest.fixture(scope="module")
 def compared():
     """Levitation by every model, with finite elements of 1e-3 and answers of the lowest degrees."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(dipole_vs_fem, "RTOL", 1e-3)
-        patch.setattr(dipole_vs_fem, "COARSE", 1e-2)
-        point = {"configuration": "horizontal", "measure": 2.0, "steps": 1}
-        return dipole_vs_fem.compute(point).isel(case=0, step=0)
+    point = {"configuration": "horizontal", "measure": 2.0, "steps": 1, "rtols": [1e-3, 1e-2]}
+    return dipole_vs_fem.compute(point).isel(case=0, step=0)
 
 
 @pytest.mark.parametrize("model", ["dipole", "cuboid"])

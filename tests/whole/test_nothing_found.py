@@ -105,6 +105,7 @@ def test_an_additional_force_that_throws_the_floater_out_leaves_no_place(stable)
     assert np.isfinite(found.linear).all()
 
 
+@pytest.mark.slow
 def test_tables_of_magnets_that_magnetise_each_other_are_met_at_the_nodes():
     """Two coarse tables; at the displacement of one of them the family's field is that of the table."""
     shape = (10e-3, 1.305, 1.05)

@@ -92,6 +92,7 @@ def test_low_frequency_is_linear_down_to_zero(coarse):
     assert not zero.any()
 
 
+@pytest.mark.slow
 def test_high_frequency_shields_perfectly():
     """At 1 MHz (δ = 85 µm) the normal reaction of a plate much larger than the height is the image's."""
     height = 0.008

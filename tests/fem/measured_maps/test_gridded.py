@@ -73,7 +73,7 @@ ROTORS = {
 }
 
 
-FAST = [pytest.param(name, marks=pytest.mark.slow) if name in ("touching", "vertical") else name for name in ROTORS]
+FAST = [pytest.param(name, marks=pytest.mark.slow) if name != "centred" else name for name in ROTORS]
 
 
 @pytest.fixture(scope="module", params=FAST)

@@ -27,9 +27,7 @@ SPACER = (Conductor(Box((8e-3, 8e-3, 3e-3), (0.0, 0.0, 6.5e-3)), 1.4e6),)
 @pytest.fixture(scope="module")
 def table():
     """With fewer places than usual, which costs little beyond contact."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(tabulate, "DIRECTIONS", 8)
-        return rotor_losses(CUBE, SPACER, 6.35e-3)
+    return rotor_losses(CUBE, SPACER, 6.35e-3, directions=8)
 
 
 def test_it_meets_finite_elements_within_its_error(table):

@@ -63,7 +63,7 @@ def around(rotor, distance, count=100):
     return rotor[0].box.center + distance * way / np.linalg.norm(way, axis=1)[:, None]
 
 
-@pytest.fixture(scope="module", params=["cube", "pair"])
+@pytest.fixture(scope="module", params=["cube", pytest.param("pair", marks=pytest.mark.slow)])
 def known(request):
     rotor = {"cube": horizontal(0.002, 0.01, 1.305, 1.05), "pair": vertical(0.01, 0.01, 1.305, 1.05)}[request.param]
     return rotor, finer(rotor, 6 if request.param == "cube" else 5)
@@ -89,6 +89,7 @@ def test_default_table_meets_its_target(known):
     assert table.provenance["error_estimate"] <= 1e-5
 
 
+@pytest.mark.slow
 def test_a_cube_to_the_limit():
     """B to 1e-8 from 15 mm on and to 1e-7 at 13 mm, its gradient to 1e-7 from 15 mm on, the moment to 1e-9."""
     rotor = horizontal(0.002, 0.01, 1.305, 1.05)
@@ -128,6 +129,7 @@ def test_a_target_out_of_reach_is_reported():
 
 
 SLOW = {
+    "anisotropic, any angle",
     "long",
     "touching",
     "extensions, μr = 1",

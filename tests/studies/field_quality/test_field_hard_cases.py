@@ -29,6 +29,7 @@ def test_a_cube_without_permeability_against_coulombs_law():
     assert [panel.get_title("left") for panel in hard_case_figure(result).axes if panel.get_visible()] == ["cube"]
 
 
+@pytest.mark.slow
 def test_a_coarse_reference_says_so():
     """The step of a reference of order 3 is larger than that of order 5, by which the table is judged otherwise."""
     case = CASES["any angle"]

@@ -83,6 +83,7 @@ def test_additional_weight_moves_the_equilibrium_like_gravity(scene):
     np.testing.assert_allclose(shift.linear, places[1] - places[0], rtol=0, atol=0.1 * abs(places[1] - places[0]).max())
 
 
+@pytest.mark.slow
 def test_with_coarse_elements_the_study_tells_the_same(scene, monkeypatch):
     """Elements of the lowest degrees give the missed lift and the shift to some per cent; both are on the figure."""
     name = "spinlev.studies.levitation.floater_permeability.rotor_ladder"

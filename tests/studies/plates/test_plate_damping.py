@@ -27,6 +27,7 @@ def weak():
     return gather_damping([plate_damping(asdict(case)) for case in (*poor, *rotors)])
 
 
+@pytest.mark.slow
 def test_weak_currents_act_in_proportion_to_the_conductivity(weak):
     """To first order in σ: damping, torque and loss double with it."""
     one, two = weak.isel(case=0), weak.isel(case=1)
