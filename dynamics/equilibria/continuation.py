@@ -111,7 +111,8 @@ def stepped(
     ahead = equations.onto(points + lengths[:, None] * tangents)
     ahead, good = corrected(equations, ahead, tangents, np.maximum(lengths / 2, 1e-8), which)
     turned = np.full(tangents.shape, np.nan)
-    turned[good] = directions(equations, ahead[good], tangents[good], which[good])
+    if good.any():
+        turned[good] = directions(equations, ahead[good], tangents[good], which[good])
     return ahead, turned, good & np.isfinite(turned).all(axis=1)
 
 

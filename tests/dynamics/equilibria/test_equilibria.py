@@ -9,6 +9,7 @@ from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
 from spinlev.dynamics.equilibria import SearchRange, find_equilibria, survey
+from spinlev.dynamics.equilibria.continuation import stepped
 from spinlev.dynamics.motion import Rates, Scales, parameters
 from spinlev.dynamics.steady import EVERY, Balance, EquilibriumError, solve
 from spinlev.fem.harmonics import uniform_moments
@@ -160,3 +161,18 @@ def test_what_has_no_fixed_point_says_so():
     table = table_of(scene, "dipole")
     with pytest.raises(EquilibriumError, match="Earnshaw"):
         find_equilibria(replace(scene, frequency=0.0), table)
+
+
+def test_a_step_that_meets_no_solution_fails_and_asks_no_further():
+    """Equations without a solution: no direction is asked for at no point at all."""
+
+    class Nowhere:
+        def onto(self, points):
+            return points
+
+        def linear(self, points, which):
+            assert len(points)
+            return np.ones((len(points), 1)), np.zeros((len(points), 1, 2))
+
+    *_, good = stepped(Nowhere(), np.zeros((1, 2)), np.array([[1.0, 0.0]]), np.array([0.1]))
+    assert not good.any()
