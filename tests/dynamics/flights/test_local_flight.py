@@ -134,6 +134,7 @@ def test_a_stopped_flight_with_changes_goes_on_to_the_last_bit(start, tmp_path):
     assert second.energy_error == whole.energy_error
 
 
+@pytest.mark.slow
 def test_over_a_plate_that_is_lowered_it_flies_as_in_the_table(start):
     """Changes of the ball while the plate moves; the ledger of currents and motion closes as without balls."""
     plate = Plate(Box((0.1, 0.24, 0.03), (0.0, 0.0, -0.047)), 3.5e7, Lowering(0.05, 0.02, 4e-3))

@@ -61,6 +61,7 @@ def test_curl_of_the_rotors_potential_is_its_field(rotor):
     assert abs(curl - field).max() < 1e-7 * abs(field).max()
 
 
+@pytest.mark.slow
 def test_the_rotors_currents_are_in_the_network(made, rotor, region):
     """Field of the rotor's currents at unseen places, angle and depth: finite elements of higher order, to `rtol`."""
     table, share = made
@@ -86,6 +87,7 @@ def test_permeability_reaches_the_plate(rotor):
     assert sizes[0] / sizes[1] == pytest.approx(0.98367, abs=1e-3)
 
 
+@pytest.mark.slow
 def test_one_file_holds_table_and_share(made, rotor, region, tmp_path, monkeypatch):
     table, share = made
     monkeypatch.setenv("SPINLEV_CACHE", str(tmp_path))

@@ -20,6 +20,8 @@ from spinlev.fem.storage import TableFileError
 from spinlev.geometry.basics import Box, Cylinder, InputError
 from spinlev.geometry.bodies import Conductor, horizontal
 
+pytestmark = pytest.mark.slow
+
 CUBE = tuple(replace(magnet, conductivity=6.7e5) for magnet in horizontal(1.5e-3, 10e-3, 1.305, 1.05))
 SPACER = (Conductor(Box((8e-3, 8e-3, 3e-3), (0.0, 0.0, 6.5e-3)), 1.4e6),)
 

@@ -38,6 +38,7 @@ def test_a_ball_in_a_uniform_field(ball):
     )
 
 
+@pytest.mark.slow
 def test_a_ball_beside_a_dipole(ball):
     """All six motions of the dipole, against the closed form degree by degree: (5/16)^20 is left out at degree 10."""
     edge = 5e-3 / CUBE

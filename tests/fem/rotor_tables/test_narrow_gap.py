@@ -12,6 +12,8 @@ from magpylib.core import magnet_cuboid_Bfield
 from spinlev.fem.rotor_tables import Accuracy, fem_table
 from spinlev.geometry.bodies import vertical
 
+pytestmark = pytest.mark.slow
+
 GAP = 1e-6
 WAY = np.random.default_rng(1).normal(size=(60, 3))
 POINTS = 0.02 * WAY / np.linalg.norm(WAY, axis=1)[:, None]
