@@ -11,6 +11,11 @@ from .continuation import (
     follow as follow,
     stepped as stepped,
 )
+from .effect_sizes import (
+    growth_by_floater as growth_by_floater,
+    growth_by_rotor as growth_by_rotor,
+    shift_by_answers as shift_by_answers,
+)
 from .fixed_points import scattered as scattered
 from .full_search import (
     field_doubts as field_doubts,

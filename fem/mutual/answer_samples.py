@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...geometry.basics import MU_0, Array
+from ...geometry.basics import MU_0, Array, places_off
 from ...geometry.bodies import Magnet
 from ...geometry.scenes import Floater
 from ..closed_forms import remanent_field
@@ -35,19 +35,10 @@ def places_around(magnets: Sequence[Magnet], radius: float, gaps: Sequence[float
         for gap in gaps:
             directions = generator.normal(size=(number, 3))
             directions /= np.linalg.norm(directions, axis=1)[:, None]
-            found.append(_outside(magnet, directions, (1 + gap) * radius))
+            found.append(places_off(magnet.box, directions, (1 + gap) * radius))
     places = np.concatenate(found)
     clear = np.min([magnet.box.distance(places) for magnet in magnets], axis=0) >= (1 + min(gaps)) * radius * (1 - 1e-6)
     return np.asarray(places[clear])
-
-
-def _outside(magnet: Magnet, directions: Array, offset: float) -> Array:
-    low, high = np.zeros(len(directions)), np.full(len(directions), offset + magnet.box.circumradius)
-    for _ in range(50):
-        middle = (low + high) / 2
-        near = magnet.box.distance(magnet.box.center + middle[:, None] * directions) < offset
-        low, high = np.where(near, middle, low), np.where(near, high, middle)
-    return np.asarray(magnet.box.center + high[:, None] * directions)
 
 
 def unit_dipole_fields(points: Array, places: Array) -> Array:

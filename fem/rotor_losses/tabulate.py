@@ -9,7 +9,7 @@ from itertools import product
 import numpy as np
 import scipy
 
-from ...geometry.basics import Array, Box, Solid
+from ...geometry.basics import Array, Box, Solid, places_off
 from ...geometry.bodies import Conductor, Magnet, cut_magnets, separate_pieces
 from ..plate_tables import Multipoles, fit_multipoles
 from .current_patterns import CurrentPatterns, current_patterns
@@ -97,16 +97,7 @@ def places_around(bodies: Sequence[Solid], distance: float, seed: int = 0, direc
     octant = np.abs(np.random.default_rng(seed).normal(size=(directions, 3)))
     mirrored = np.concatenate([octant * signs for signs in product((1, -1), repeat=3)])
     mirrored /= np.linalg.norm(mirrored, axis=1)[:, None]
-    found = []
-    for body in bodies:
-        ways = mirrored @ body.rotation.T
-        low, high = np.zeros(len(ways)), np.full(len(ways), distance + body.circumradius)
-        for _ in range(50):
-            middle = (low + high) / 2
-            near = body.distance(body.center + middle[:, None] * ways) < distance
-            low, high = np.where(near, middle, low), np.where(near, high, middle)
-        found.append(body.center + high[:, None] * ways)
-    places = np.concatenate(found)
+    places = np.concatenate([places_off(body, mirrored @ body.rotation.T, distance) for body in bodies])
     clear = np.min([body.distance(places) for body in bodies], axis=0)
     return np.asarray(places[clear > distance * (1 - 1e-6)])
 

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...geometry.basics import Array, Box, InputError
+from ...geometry.basics import Array, InputError, places_off
 from ...geometry.bodies import Magnet
 from ..closed_forms import carrier
 from ..harmonics import uniform_moments
@@ -59,7 +59,7 @@ def points_around(magnets: tuple[Magnet, ...], offset: float) -> Array:
     """Points (n, 3) m at a distance `offset` (m) from the nearest of the magnets' faces, all around them."""
     directions = np.random.default_rng(0).normal(size=(150, 3))
     directions /= np.linalg.norm(directions, axis=1)[:, None]
-    points = np.concatenate([_offset_surface(magnet.box, offset, directions) for magnet in magnets])
+    points = np.concatenate([places_off(magnet.box, directions, offset) for magnet in magnets])
     outside = np.all([magnet.box.distance(points) >= offset * (1 - 1e-6) for magnet in magnets], axis=0)
     return np.asarray(points[outside])
 
@@ -84,13 +84,3 @@ def guards(magnets: tuple[Magnet, ...], clearance: float) -> tuple[Array, Array]
     gaps = np.min([magnet.box.distance(points) for magnet in magnets], axis=0)
     points = points[(gaps >= clearance / 2) & (gaps < clearance)]
     return points, typical_field(magnets, points)
-
-
-def _offset_surface(box: Box, offset: float, directions: Array) -> Array:
-    """Points at a distance from the faces, seen in the given directions from the centre."""
-    low, high = np.zeros(len(directions)), np.full(len(directions), offset + box.circumradius)
-    for _ in range(50):
-        middle = (low + high) / 2
-        near = box.distance(box.center + middle[:, None] * directions) < offset
-        low, high = np.where(near, middle, low), np.where(near, high, middle)
-    return np.asarray(box.center + high[:, None] * directions)

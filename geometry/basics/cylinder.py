@@ -6,7 +6,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .arrays import Array, frozen_array
-from .box import Box
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,7 +56,3 @@ class Cylinder:
         along = np.abs(directions @ self.rotation[:, 2])
         across = np.sqrt(np.maximum(1 - along**2, 0.0))
         return np.asarray(self.radius * across + self.height / 2 * along)
-
-
-Solid = Box | Cylinder
-"""A body's shape and pose."""

@@ -4,25 +4,20 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
-import numpy as np
-
 from ...dynamics.effects import (
     FLOATER_CURRENTS,
     MUTUAL,
+    NOTHING_ANSWERS,
     REAL_AIR,
     ROTOR_CURRENTS,
-    Mutual,
-    brake_slope,
     reynolds,
-    rough_force,
     swinging,
 )
-from ...dynamics.motion import Parameter, Scales, parameters
-from ...dynamics.steady import Balance, Equilibrium, modes, tangent_basis
-from ...fem.rotor_losses import RotorLosses, ball_losses, pieces_of
-from ...geometry.basics import MAGNET_CONDUCTIVITY, Array
+from ...dynamics.equilibria import growth_by_floater, growth_by_rotor, shift_by_answers
+from ...dynamics.steady import Equilibrium
+from ...fem.rotor_losses import ball_losses, pieces_of
+from ...geometry.basics import MAGNET_CONDUCTIVITY
 from .levitation import Levitation
-from .mutual_choice import NOTHING_ANSWERS
 
 PLATE_NOT_MODELLED = "The plate's eddy currents are left out: the plate is only an obstacle."
 
@@ -54,77 +49,36 @@ def listed_effects(levitation: Levitation, equilibria: Sequence[Equilibrium]) ->
 
 
 def _mutual(levitation: Levitation, first: Equilibrium | None) -> ListedEffect:
-    answers, why = levitation.answers
-    shift = None
+    (answers, why), shift = levitation.answers, None
     if first is not None and why != NOTHING_ANSWERS:
-        place, direction = first.position[None], first.state.moment[None]
-        field, gradient = levitation.table.evaluate(place)
-        if answers is not None:
-            effect = Mutual(answers, levitation.scene.floater.moment)
-            force, torque = (part[0] for part in effect.wrench(place, direction, field, gradient))
-        else:
-            scene = levitation.scene
-            force, torque = (
-                rough_force(scene.rotor, scene.floater, levitation.table, place[0], direction[0]),
-                np.zeros(3),
-            )
-        shift = _shift(levitation, first, force, torque) * 1e3
+        shift = 1e3 * shift_by_answers(levitation.scene, levitation.rates, levitation.table, first, answers)
     return ListedEffect(MUTUAL, answers is not None, shift, None, why)
-
-
-def _shift(levitation: Levitation, first: Equilibrium, force: Array, torque: Array) -> float:
-    """How far a force (3,) N and a torque (3,) N m move an equilibrium, m, to first order."""
-    scene, scales = levitation.scene, Scales.of(levitation.scene)
-    balance = Balance(levitation.rates, parameters(scene, scales, frozen_spin=True), first.spin)
-    fixed = first.without or first
-    position, moment = fixed.position[None] / scales.length, fixed.state.moment[None]
-    slope = balance(position, moment)[1][0]
-    units = scales.time**2 / np.array([scene.floater.mass * scales.length, scene.floater.inertia])
-    pushed = np.concatenate([force * units[0], tangent_basis(moment)[0] @ torque * units[1]])
-    return float(np.linalg.norm(np.linalg.solve(slope, pushed)[:3]) * scales.length)
 
 
 def _floater_currents(levitation: Levitation, first: Equilibrium | None) -> ListedEffect:
     """Those of the scene, or what those of a sintered magnet would be."""
-    floater = levitation.scene.floater
-    why, conducting = "floater.conductivity_S_m is given", levitation
+    floater, there = levitation.scene.floater, levitation
     if not floater.conductivity:
-        why = f"no floater.conductivity_S_m; about this at {MAGNET_CONDUCTIVITY:.2g} S/m"
-        conducting = levitation.elsewhere(floater=replace(floater, conductivity=MAGNET_CONDUCTIVITY))
-    growth = None
-    if first is not None and levitation.scene.frequency:
-        scene, fixed = conducting.scene, first.without or first
-        values, state = parameters(scene, Scales.of(scene), frozen_spin=True), Scales.of(scene).pack(fixed.state)
-        still = values.copy()
-        still[Parameter.TILT_EDDY] = 0.0
-        both = [modes(state, conducting.rates(state[None], v)[1][0]).growth for v in (values, still)]
-        growth = (both[0] - both[1]) / Scales.of(scene).time
-    return ListedEffect(FLOATER_CURRENTS, bool(floater.conductivity), 0.0, growth, why)
+        there = levitation.elsewhere(floater=replace(floater, conductivity=MAGNET_CONDUCTIVITY))
+    growth = growth_by_floater(there.scene, there.rates, first) if first and levitation.scene.frequency else None
+    return _conducting(FLOATER_CURRENTS, "floater.conductivity_S_m", bool(floater.conductivity), growth)
 
 
 def _rotor_currents(levitation: Levitation, first: Equilibrium | None) -> ListedEffect:
     """Those of the scene, or what those of sintered magnets, taken as balls, would be."""
-    scene, name, growth = levitation.scene, ROTOR_CURRENTS, None
+    scene, growth, included = levitation.scene, None, levitation.losses is not None
     magnets = [replace(magnet, conductivity=MAGNET_CONDUCTIVITY) for magnet in scene.rotor]
     losses = levitation.losses or (ball_losses(pieces_of(magnets, ())) if magnets else None)
-    if first is not None and losses is not None and scene.frequency:
-        growth = _growth_by(levitation, first, losses)
-    if levitation.losses is not None:
-        return ListedEffect(name, True, 0.0, growth, "conductivity_S_m of the rotor's metal is given")
-    why = f"no rotor.conductivity_S_m; about this at {MAGNET_CONDUCTIVITY:.2g} S/m"
-    return ListedEffect(name, False, 0.0, growth, why)
+    if first and losses and scene.frequency:
+        growth = growth_by_rotor(scene, levitation.rates, first, losses, included)
+    return _conducting(ROTOR_CURRENTS, "rotor.conductivity_S_m", included, growth)
 
 
-def _growth_by(levitation: Levitation, first: Equilibrium, losses: RotorLosses) -> float:
-    """What losses in the rotor add to the growth of what grows fastest, 1/s: eigenvalues with them and without."""
-    scene, scales, fixed = levitation.scene, Scales.of(levitation.scene), first.without or first
-    state, values = scales.pack(fixed.state), parameters(scene, Scales.of(scene), frozen_spin=True)
-    slope = levitation.rates(state[None], values)[1][0]
-    brake = brake_slope(losses, scene, fixed.state)
-    included = levitation.losses is not None
-    both = [modes(state, slope - brake).growth, modes(state, slope).growth] if included else [
-        modes(state, slope).growth, modes(state, slope + brake).growth]  # fmt: skip
-    return (both[1] - both[0]) / scales.time
+def _conducting(name: str, key: str, included: bool, growth: float | None) -> ListedEffect:
+    why = "a conductivity is given" if included else f"no {key}"
+    if not included and growth is not None:
+        why += f"; at {MAGNET_CONDUCTIVITY:.2g} S/m, as of sintered magnets, it would add {growth:.2g} /s to the growth"
+    return ListedEffect(name, included, 0.0, growth, why)
 
 
 def _air(levitation: Levitation, first: Equilibrium | None) -> ListedEffect:

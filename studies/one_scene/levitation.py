@@ -8,7 +8,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from ...dynamics.effects import Mutual, RotorCurrents, with_effects
+from ...dynamics.effects import Mutual, RotorCurrents, mutual_choice, with_effects
 from ...dynamics.equilibria import survey, with_plate
 from ...dynamics.flights import Checkpoint, Trajectory, simulate, starting_point
 from ...dynamics.motion import Interaction, PlateMemory, Rates, interaction_of
@@ -21,7 +21,6 @@ from ...fem.slab import resolve_plate_model, rotor_nearby
 from ...geometry.basics import Array, InputError, millimetre_size
 from ...geometry.scenes import AbsoluteStart, Scene, load_scene
 from ..terminal import Models, detail, finite, note, positive, progress
-from .mutual_choice import mutual_choice
 from .plate_of_scene import check_room, check_way, plate_memory
 
 RotorField = RotorTable | GriddedTable
@@ -83,7 +82,7 @@ class Levitation:
             return None, why
         key = f"mutual {mutual_key(scene.rotor, scene.floater)}"
         if key not in self._mutual:
-            note("Answers of rotor and floater to each other ...")
+            note("Mutual magnetisation of rotor and floater ...")
             self._mutual[key], found = cached_mutual_table(scene.rotor, scene.floater, note)
             if found:
                 self.from_cache.append("mutual")

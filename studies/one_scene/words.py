@@ -153,10 +153,10 @@ def flight_words(levitation: Levitation, flight: Trajectory) -> str:
 
 
 def effects_words(values: Mapping[str, Any]) -> list[str]:
-    """Which effects are in the motion and about what each changes, as a table; the reasons are details."""
+    """Which effects are in the motion and about what each changes, or would change, as a table; reasons are details."""
     for sentence in values["not_modelled"]:
         detail(sentence)
-    rows = [("beyond the rigid dipole", "in the motion", "shift (mm)", "growth (1/s)")]
+    rows = [("effect", "in the motion", "moves it by (mm)", "adds to growth (1/s)")]
     for effect in values["effects"]:
         sizes = ("" if effect[key] is None else f"{effect[key]:.2g}" for key in ("shift_mm", "growth_per_s"))
         rows.append((effect["name"], "yes" if effect["included"] else "no", *sizes))

@@ -2,11 +2,11 @@
 
 import numpy as np
 
-from ...dynamics.effects import rough_force
 from ...fem.mutual import oblique
 from ...fem.rotor_tables import FieldTable
 from ...geometry.basics import InputError
 from ...geometry.scenes import Scene
+from .rough_answer import rough_force
 
 NOTHING_ANSWERS = "neither rotor nor floater is permeable"
 NEAR = 2.0
@@ -44,8 +44,8 @@ def mutual_choice(scene: Scene, table: FieldTable, asked: str, rtol: float) -> t
         return False, "the answer of magnets with an oblique easy axis is not known"
     part = rough_part(scene, table)
     if part < rtol:
-        return False, f"about {part:.0e} of the largest force, less than asked for"
-    return True, f"about {part:.0e} of the largest force near the rotor"
+        return False, f"about {part:.0e} of the force near the rotor, less than --rtol asks for"
+    return True, f"about {part:.1%} of the force near the rotor"
 
 
 def rough_part(scene: Scene, table: FieldTable) -> float:

@@ -1,0 +1,66 @@
+"""What effects are said to change of an equilibrium, against the equilibrium with and without them."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from spinlev.dynamics.effects import Mutual, RotorCurrents, rough_force, with_effects
+from spinlev.dynamics.equilibria import find_equilibria, growth_by_floater, growth_by_rotor, shift_by_answers
+from spinlev.dynamics.motion import Interaction, Rates
+from spinlev.fem.mutual import cached_mutual_table
+from spinlev.fem.rotor_losses import ball_losses, pieces_of
+from spinlev.fem.rotor_tables import rotor_table
+from spinlev.geometry.bodies import horizontal
+from spinlev.geometry.scenes import Drag, Floater, Scene
+
+FLOATER = Floater(6.35e-3, 1.305, 1.05, 7500.0)
+SCENE = Scene(150.0, horizontal(1.5e-3, 10e-3, 1.305, 1.05), FLOATER, Drag(0.0, 0.0))
+CONDUCTING = replace(SCENE, floater=replace(FLOATER, conductivity=6.7e5))
+LOSSES = ball_losses(pieces_of([replace(magnet, conductivity=6.7e5) for magnet in SCENE.rotor], ()))
+
+
+@pytest.fixture(scope="module")
+def table():
+    return rotor_table(SCENE.rotor, "cuboid")
+
+
+@pytest.fixture(scope="module")
+def alone(table):
+    return find_equilibria(SCENE, table)[0]
+
+
+def test_shift_by_mutual_magnetisation(table, alone):
+    """To first order, 0.05 mm to a part in fifty; the rough force without the table to a factor of two."""
+    answers = cached_mutual_table(SCENE.rotor, FLOATER, print)[0]
+    effect = Mutual(answers, FLOATER.moment)
+    there = find_equilibria(SCENE, Interaction(table, (effect,)))[0]
+    moved = np.linalg.norm(there.position - alone.position)
+    rates = Rates(table)
+    assert shift_by_answers(SCENE, rates, table, alone, answers) == pytest.approx(moved, rel=0.02)
+    assert shift_by_answers(SCENE, rates, table, alone, None) == pytest.approx(moved, rel=1.0)
+    for depth in (15e-3, 20e-3, 30e-3):
+        place, direction = np.array([[1e-3, 0.0, -depth]]), np.array([[0.2, 0.0, 0.98]])
+        direction /= np.linalg.norm(direction)
+        force = effect.wrench(place, direction, *table.evaluate(place))[0][0]
+        rough = rough_force(SCENE.rotor, FLOATER, table, place[0], direction[0])
+        assert 0.5 < np.linalg.norm(rough) / np.linalg.norm(force) < 2
+
+
+def test_growth_by_the_currents_of_the_floater(table, alone):
+    """The same whether the equilibrium was found with them or without."""
+    whole = with_effects(CONDUCTING, table)
+    there = find_equilibria(CONDUCTING, whole)[0]
+    said = growth_by_floater(CONDUCTING, Rates(whole), alone)
+    assert 0.01 < said < 0.1
+    assert said == pytest.approx(there.growth_per_s - alone.growth_per_s, rel=0.02)
+
+
+def test_growth_by_the_currents_of_the_rotor(table, alone):
+    """By the eigenvalues of the motion with them; rates with and without them say the same."""
+    whole = Interaction(table, (RotorCurrents(LOSSES),))
+    there = find_equilibria(SCENE, whole)[0]
+    said = growth_by_rotor(SCENE, Rates(table), alone, LOSSES, False)
+    assert 0.01 < said < 0.1
+    assert growth_by_rotor(SCENE, Rates(whole), there, LOSSES, True) == pytest.approx(said, rel=1e-3)
+    assert said == pytest.approx(there.growth_per_s - alone.growth_per_s, rel=0.02)
