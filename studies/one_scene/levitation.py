@@ -62,6 +62,7 @@ class Levitation:
         self._equations: dict[tuple[str, bool, bool, str, str], Rates] = {}
         self._mutual: dict[str, MutualTable] = {}
         self._metal: dict[str, RotorLosses] = {}
+        self._flown: dict[float, Trajectory] = {}
 
     @cached_property
     def interaction(self) -> Interaction:
@@ -130,6 +131,10 @@ class Levitation:
     def adopt(self, known: Survey, searched: bool = True) -> None:
         """Take over the equilibria without plate that are known from a search here or from scenes nearby."""
         self.without_plate, self.searched = known, searched
+
+    def adopt_flight(self, duration: float, flown: Trajectory) -> None:
+        """Take over a flight of this duration (s) that was flown together with others."""
+        self._flown[duration] = flown
 
     @property
     def table(self) -> RotorField:
@@ -226,6 +231,8 @@ class Levitation:
         FlightStopped : the user stopped it; the error holds what was flown
         """
         positive("duration", duration)
+        if duration in self._flown:
+            return self._flown[duration]
         known = () if self.absolute else self.equilibria
         table, plate = self._with_effects(self.flight_table), self.plate
         note("Motion ...")
@@ -257,13 +264,17 @@ class Levitation:
     @property
     def rates(self) -> Rates:
         """The equations of motion in the rotor's field, compiled."""
+        if self.kind not in self._equations:
+            self._equations[self.kind] = Rates(self.interaction)
+        return self._equations[self.kind]
+
+    @property
+    def kind(self) -> tuple[str, bool, bool, str, str]:
+        """What tells its equations from those of other scenes with this rotor."""
         scene = self.scene
         answers = "" if self.answers[0] is None else mutual_key(scene.rotor, scene.floater)
         metal = "" if self.losses is None else losses_key(scene)
-        kind = self.table.model, bool(scene.floater.conductivity), scene.drag.air, answers, metal
-        if kind not in self._equations:
-            self._equations[kind] = Rates(self.interaction)
-        return self._equations[kind]
+        return self.table.model, bool(scene.floater.conductivity), scene.drag.air, answers, metal
 
     @property
     def absolute(self) -> bool:
