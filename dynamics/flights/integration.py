@@ -20,6 +20,7 @@ from .pieces import MOST_SAMPLES, Log, first_interval, flown, fly_piece
 from .recorder import Recorder
 from .trajectory import DURATION, STOPPED, FieldChanges, FlightStopped, Trajectory
 
+
 def integrate(
     scene: Scene,
     flight: Flight | LocalFlight,

@@ -13,8 +13,6 @@ from ...dynamics.ensembles import fly_together
 from ...dynamics.flights import initial_state, is_long
 from ...dynamics.maps import surveys
 from ...dynamics.steady import Indices
-from ...fem.mutual import mutual_key
-from ...fem.rotor_tables import rotor_key
 from ...geometry.basics import SpinlevError
 from ...geometry.scenes import OffsetStart, scene_text
 from .levitation import Levitation
@@ -31,7 +29,7 @@ def share(levitations: Sequence[Levitation], places: Sequence[tuple[int, ...]], 
     """
     groups: dict[str, list[int]] = {}
     for k, levitation in enumerate(levitations):
-        groups.setdefault(_field_key(levitation), []).append(k)
+        groups.setdefault(levitation.equations_key, []).append(k)
     for members in groups.values():
         for k in members[1:]:
             levitations[k].share(levitations[members[0]])
@@ -75,7 +73,7 @@ def fly(levitations: Sequence[Levitation], duration: float) -> None:
         with suppress(SpinlevError):
             if levitation.plate is None and is_long(levitation.interaction):
                 tilted = bool(np.any(levitation.scene.gravity[:2]))
-                key = _field_key(levitation), levitation.kind, tilted
+                key = levitation.equations_key, levitation.interaction_model, tilted
                 groups.setdefault(key, []).append(levitation)
     for alike in groups.values():
         if len(alike) > 1:
@@ -93,11 +91,3 @@ def _fly_together(alike: Sequence[Levitation], duration: float) -> None:
         for (levitation, _), flight in zip(ready, flown, strict=True):
             if flight is not None:
                 levitation.adopt_flight(duration, flight)
-
-
-def _field_key(levitation: Levitation) -> str:
-    scene, models = levitation.scene, levitation.models
-    conducting = bool(scene.floater.conductivity)
-    rotor = rotor_key(scene.rotor, models.model, models.rtol, scene.floater.radius)
-    answers = "" if models.interaction == "rigid" else f"{models.interaction} {mutual_key(scene.rotor, scene.floater)}"
-    return f"{rotor} {conducting} {scene.field_map} {answers}"
