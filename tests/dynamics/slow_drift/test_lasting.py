@@ -45,7 +45,6 @@ def test_flights_last_within_the_ends_and_not_beyond(rates):
     assert lasts(found.high)
     assert not lasts(found.low - 0.5)
     assert not lasts(found.high + 0.5)
-    assert found.growth_per_s < 7 / 250
 
 
 def test_where_nothing_lasts_there_is_no_interval(rates):
