@@ -6,8 +6,6 @@ import numpy as np
 
 from ...dynamics.maps import surveys
 from ...dynamics.steady import Indices
-from ...fem.mutual import mutual_key
-from ...fem.rotor_tables import rotor_key
 from ...geometry.basics import SpinlevError
 from .levitation import Levitation
 
@@ -23,7 +21,7 @@ def share(levitations: Sequence[Levitation], places: Sequence[tuple[int, ...]], 
     """
     groups: dict[str, list[int]] = {}
     for k, levitation in enumerate(levitations):
-        groups.setdefault(_field_key(levitation), []).append(k)
+        groups.setdefault(levitation.equations_key, []).append(k)
     for members in groups.values():
         alike = [levitations[k] for k in members]
         for other in alike[1:]:
@@ -47,11 +45,3 @@ def _find_together(alike: Sequence[Levitation], places: Indices) -> None:
         return
     for levitation, (survey, searched) in zip(chosen, found, strict=True):
         levitation.adopt(survey, searched)
-
-
-def _field_key(levitation: Levitation) -> str:
-    scene, models = levitation.scene, levitation.models
-    conducting = bool(scene.floater.conductivity)
-    rotor = rotor_key(scene.rotor, models.model, models.rtol, scene.floater.radius)
-    answers = "" if models.interaction == "rigid" else f"{models.interaction} {mutual_key(scene.rotor, scene.floater)}"
-    return f"{rotor} {conducting} {scene.field_map} {answers}"
