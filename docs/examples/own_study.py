@@ -55,7 +55,7 @@ STUDY = Study(
     points=points,
     compute=compute,
     gather=by_case,
-    draw=picture,
+    figures={"bounce": picture},
     report=report,
 )
 CATALOGUE[STUDY.name] = STUDY
