@@ -102,8 +102,8 @@ def solve(
     Returns
     -------
     position, moment : (n, 3)
-    step : (n,) estimate of the error: the length of the last step, or of the next one where the last two, by the
-        square that Newton's method promises, make it too short to be worth another look; infinite where it failed
+    step : (n,) estimate of the error: the length of the last step, or `NEGLIGIBLE` where by the last two, as Newton's
+        method squares its error, the next would be shorter and was not made; infinite where it failed
     """
     position, moment = position.copy(), moment.copy()
     length = np.full(len(position), np.inf)
@@ -121,7 +121,7 @@ def solve(
         following = np.where(np.isfinite(known), size * (size / known) ** 2, np.inf)
         before[active] = np.where(size < reach, size, np.inf)
         done = ~good | (size < 1e-11) | (following < NEGLIGIBLE)
-        length[active] = np.where(good, np.minimum(size, following), np.inf)
+        length[active] = np.where(good, np.where(following < NEGLIGIBLE, np.minimum(size, NEGLIGIBLE), size), np.inf)
         active = active[~done]
         if not len(active):
             break
