@@ -1,7 +1,7 @@
 """Where all five balances vanish: along the curves of lateral balance, and directly from many starts.
 
-Newton's method runs from all starts in the `rough` balance, where effects with numbers of their own cost nothing, and goes
-on in the whole one from what it found and from every eighth of the starts.
+Newton's method runs from all starts in the `rough` balance, where effects with numbers of their own cost nothing, and
+goes on in the whole one from what it found and from every eighth of the starts.
 """
 
 import numpy as np
