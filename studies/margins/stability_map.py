@@ -105,18 +105,15 @@ PLATE = {
 }
 
 
-def _flights(alone: Levitation, stable: StableRange | None) -> dict[str, xr.Variable | list[str]]:
+def _flights(alone: Levitation, stable: StableRange | None) -> dict[str, xr.Variable]:
     """Where flights last, without and with currents in the rotor's magnets."""
     found = [_lasting(alone, stable, metal) if stable else Lasting() for metal in METAL]
     data = {
         name: variable(("metal",), np.array([getattr(one, name) for one in found]), *words)
         for name, words in LASTING.items()
     }
-    return {
-        **data,
-        "ended_by": xr.Variable(("metal",), np.array([one.ended_by for one in found], "U12")),
-        "metal": list(METAL),
-    }
+    data["ended_by"] = xr.Variable(("metal",), np.array([one.ended_by for one in found], "U12"))
+    return {**data, "metal": xr.Variable(("metal",), list(METAL))}
 
 
 def _lasting(alone: Levitation, stable: StableRange, metal: str) -> Lasting:
