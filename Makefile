@@ -8,7 +8,7 @@ OLD ?= benchmarks/measured.json
 NEW ?= out/benchmarks.json
 SOURCES := $(shell find spinlev geometry fem dynamics studies scenes -type f -not -name "*.pyc") setup.py pyproject.toml README.md LICENSE
 
-.PHONY: install run test test-browser lint types coverage bench bench-compare dist gallery docs validate fuzz lock clean
+.PHONY: install run test test-browser lint types coverage bench bench-compare dist dependencies docs validate fuzz lock clean
 
 install: $(VENV)/installed
 
@@ -71,13 +71,13 @@ bench-compare: install
 fuzz: install
 	$(BIN)/python tests/fuzzing.py all 10000
 
+# Runs the gallery's programs too, those that have changed since.
 docs: install
 	$(BIN)/sphinx-build --fail-on-warning --quiet -b html docs docs/_build/html
 	@echo docs/_build/html/index.html
 
-# The examples' pictures, and the list of dependencies.
-gallery: install
-	$(BIN)/python docs/draw_gallery.py
+# The page that lists them, with licences.
+dependencies: install
 	$(BIN)/python docs/list_dependencies.py
 
 # Wheel and source distribution in dist/, without a network; then the wheel is tested outside the repository.
@@ -95,4 +95,4 @@ lock:
 	  --no-emit-trusted-host --no-emit-find-links --output-file requirements.txt pyproject.toml
 
 clean:
-	rm -rf $(VENV) build dist out .coverage*
+	rm -rf $(VENV) build dist out docs/_build docs/gallery .coverage*

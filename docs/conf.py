@@ -1,17 +1,35 @@
 """Sphinx configuration."""
 
+import sys
 from importlib.metadata import version as installed_version
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).parent))  # for gallery_pictures
 
 project = "spinlev"
 author = "The spinlev developers"
 version = release = installed_version("spinlev")
 extensions = [
     *("myst_parser", "sphinx.ext.autodoc", "numpydoc", "sphinx.ext.viewcode"),
-    *("sphinx_copybutton", "sphinx-mathjax-offline"),
+    *("sphinx_copybutton", "sphinx-mathjax-offline", "sphinx_gallery.gen_gallery"),
 ]
 numpydoc_show_class_members = False
 myst_enable_extensions = ["dollarmath", "deflist"]
-exclude_patterns = ["_build"]
+exclude_patterns = ["_build", "examples"]
+sphinx_gallery_conf = {
+    "examples_dirs": "examples",
+    "gallery_dirs": "gallery",
+    "filename_pattern": r"\.py$",
+    "within_subsection_order": "ExampleTitleSortKey",
+    "image_scrapers": ("gallery_pictures.picture",),
+    "reset_modules": ("gallery_pictures.style",),
+    "capture_repr": (),
+    "first_notebook_cell": "%matplotlib inline",
+    "remove_config_comments": True,
+    "download_all_examples": False,
+    "show_memory": False,
+    "min_reported_time": 1e9,
+}
 autodoc_typehints = "none"
 autodoc_member_order = "bysource"
 html_theme = "pydata_sphinx_theme"

@@ -1,16 +1,22 @@
-"""A map of the field: the two parts that hold and push the floater, for each displacement of the cube.
+"""
+A map of the field
+==================
+
+The two parts that hold and push the floater, for each displacement of the cube.
 
 Off-axis, the field turns with the rotor and drives the floater's tilt; on-axis, it stays and pulls or pushes (the
 article's supplementary figure 1). 20 mm below the rotor, by the closed form of the cube (lines) and by finite
 elements with its recoil permeability (points).
 """
 
+from importlib.resources import files
+
 import numpy as np
 
 from spinlev import load_scene, parse_scene, rotor_table
 from spinlev.studies.results import panels
 
-text = load_scene("scenes/horizontal.toml").text
+text = load_scene(files("spinlev.scenes") / "horizontal.toml").text
 place = np.array([[0.0, 0.0, -0.02]])  # m
 
 
@@ -34,3 +40,4 @@ axes.set(
     xlabel="displacement of the cube (mm)", ylabel="field 20 mm below the rotor (mT)", title="Two parts of the field"
 )
 axes.legend()
+figure

@@ -1,10 +1,15 @@
-"""A flight with a kick: the floater is hit upwards and bounces at the frequency that its stability foretells.
+"""
+A flight with a kick
+====================
+
+The floater is hit upwards and bounces at the frequency that its stability foretells.
 
 Any state may be the start of a flight. Here it is the equilibrium, to which 5 mm/s along the axis are added; the
 bounce is then counted from the flight and compared with the eigenvalue.
 """
 
 from dataclasses import replace
+from importlib.resources import files
 
 import numpy as np
 
@@ -12,7 +17,7 @@ from spinlev import draw, load_scene, rotor_table, simulate
 from spinlev.dynamics.equilibria import find_equilibria
 from spinlev.geometry.scenes import AbsoluteStart
 
-scene = replace(load_scene("scenes/horizontal.toml"), plate=None)
+scene = replace(load_scene(files("spinlev.scenes") / "horizontal.toml"), plate=None)
 rest = find_equilibria(scene, rotor_table(scene, "cuboid"))[0]
 kick = np.array([0.0, 0.0, 5e-3])  # m/s
 start = AbsoluteStart(rest.state.position, rest.state.velocity + kick, rest.state.moment, rest.state.spin)
@@ -29,3 +34,4 @@ bounce_hz = (len(crossing) - 1) / (crossing[-1] - crossing[0])
 foretold_hz = rest.modes[0].frequency_hz
 print(f"{rest.modes[0].name}: {bounce_hz:.2f} Hz seen, {foretold_hz:.2f} Hz foretold")
 figure = draw(flight)["trajectory"]
+figure

@@ -1,10 +1,16 @@
-"""A field model of your own: the cube as charges on two of its faces.
+"""
+A field model of your own
+=========================
+
+The cube as charges on two of its faces.
 
 A magnet polarised along its edge is, seen from outside, a sheet of positive magnetic charge on one face and one of
 negative charge on the other. Put at Gauss's points of both faces they are a field model with five members; the
-equations of motion are written with `expressions`, and nothing else has to know. At 20 mm this one is as good as
+equations of motion are written with ``expressions``, and nothing else has to know. At 20 mm this one is as good as
 the closed form.
 """
+
+from importlib.resources import files
 
 import heyoka as hy
 import numpy as np
@@ -61,7 +67,7 @@ def _sizes(values):
     return np.linalg.norm(values.reshape(len(values), -1), axis=1)
 
 
-scene = load_scene("scenes/horizontal.toml")
+scene = load_scene(files("spinlev.scenes") / "horizontal.toml")
 tables = {"charges": ChargeTable(scene.rotor[0], count=5), "closed form": rotor_table(scene, "cuboid")}
 found = {name: find_equilibria(scene, table)[0] for name, table in tables.items()}
 apart_um = 1e6 * np.linalg.norm(found["charges"].position - found["closed form"].position)
@@ -76,3 +82,4 @@ for count in (1, 2, 3, 5):
     axes.semilogy(1e3 * depth, np.linalg.norm(difference, axis=1) / np.linalg.norm(true, axis=1), label=f"2 × {count}²")
 axes.set(xlabel="distance below the rotor (mm)", ylabel="|ΔB| / |B|", title="Charges instead of the closed form")
 axes.legend(title="charges")
+figure

@@ -1,4 +1,8 @@
-"""Your own scene: two cubes of your choice, and a flight of half a second.
+"""
+Your own scene
+==============
+
+Two cubes of your choice, and a flight of half a second.
 
 A scene is a text (a file, or a string as here) in which every key carries its unit. These two cubes have recoil
 permeability 1, and the point dipole is asked for: an equilibrium that can be found with pencil and paper.
@@ -37,3 +41,4 @@ flight = simulate(scene, duration=0.5, model="dipole")
 print(f"Equilibrium at {height_mm:.2f} mm; the flight was ended by {flight.attrs['ended_by']}")
 
 figure = draw(flight)["trajectory"]
+figure

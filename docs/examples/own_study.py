@@ -1,11 +1,16 @@
-"""A study of your own: how the bounce depends on the floater's density.
+"""
+A study of your own
+===================
+
+How the bounce depends on the floater's density.
 
 A study is a pure function of a point, the points at which it is asked, and what is drawn and said of the joined
-result. One object joins them, and it is resumable and runs on any number of workers; put into `STUDIES` of a room of
-`studies`, the command line knows it too.
+result. One object joins them, and it is resumable and runs on any number of workers; put into ``STUDIES`` of a room of
+``studies``, the command line knows it too.
 """
 
 import tempfile
+from importlib.resources import files
 
 import numpy as np
 import xarray as xr
@@ -14,7 +19,7 @@ from spinlev import draw, load_scene, parse_scene, run_study, stability
 from spinlev.studies.catalogue import CATALOGUE
 from spinlev.studies.results import Study, by_case, panels, styled, variable
 
-TEXT = load_scene("scenes/horizontal.toml").text
+TEXT = load_scene(files("spinlev.scenes") / "horizontal.toml").text
 
 
 def points(quick):
@@ -55,7 +60,7 @@ STUDY = Study(
     points=points,
     compute=compute,
     gather=by_case,
-    draw=picture,
+    figures={"bounce": picture},
     report=report,
 )
 CATALOGUE[STUDY.name] = STUDY
@@ -65,3 +70,4 @@ with tempfile.TemporaryDirectory() as folder:
 print(*report(result), sep="\n")
 bounce_hz = float(result["bounce"].sel(case=2))
 figure = draw(result)[STUDY.name]
+figure

@@ -1,16 +1,22 @@
-"""Stability with a plate: its currents damp every small motion of the floater above it.
+"""
+Stability with a plate
+======================
 
-Without a plate only the air damps, and the floater swings for hours. The plate of the scene `tilt-over-plate` lies
+Its currents damp every small motion of the floater above it.
+
+Without a plate only the air damps, and the floater swings for hours. The plate of the scene ``tilt-over-plate`` lies
 18 mm below the floater; its memory enters the equations as some tens of states, and the slowest motion then dies
 out within a third of a second.
 """
+
+from importlib.resources import files
 
 import numpy as np
 
 from spinlev import load_scene, stability
 from spinlev.studies.results import panels
 
-scene = load_scene("scenes/tilt-over-plate.toml")
+scene = load_scene(files("spinlev.scenes") / "tilt-over-plate.toml")
 bare = stability(scene, model="cuboid", plate_model="none")
 damped = stability(scene, model="cuboid", plate_model="slab")
 print(damped)
@@ -23,3 +29,4 @@ for shift, result, name in ((-0.2, bare, "air alone"), (0.2, damped, "with the p
 axes.set_xticks(place, [name.replace(", ", ",\n") for name in bare["mode"].values])
 axes.set(yscale="log", ylabel="damping (1/s)", title="Small motions over a plate")
 axes.legend()
+figure

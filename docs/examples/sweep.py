@@ -1,16 +1,22 @@
-"""A sweep in a few lines: distance and polar angle over the frequency.
+"""
+A sweep
+=======
+
+Distance and polar angle over the frequency.
 
 Every number of a scene can be changed by its key, and results are labelled datasets, so that a loop and
-`xarray.concat` make a sweep. (`spinlev study SCENE --vary ...` does the same from the command line, on many cores
+``xarray.concat`` make a sweep. (``spinlev study SCENE --vary ...`` does the same from the command line, on many cores
 and resumable.)
 """
+
+from importlib.resources import files
 
 import xarray as xr
 
 from spinlev import equilibria, load_scene, parse_scene
 from spinlev.studies.results import panels
 
-text = load_scene("scenes/horizontal.toml").text
+text = load_scene(files("spinlev.scenes") / "horizontal.toml").text
 fixed = {"rotor.displacement_mm": 1.7, "rotor.recoil_permeability": 1.0, "floater.recoil_permeability": 1.0}
 frequencies = [106.0, 112.0, 118.0, 136.0, 160.0]
 rows = []
@@ -27,3 +33,4 @@ left.plot(frequencies, distance_mm, "o-")
 right.plot(frequencies, swept["polar_angle"], "o-")
 left.set(xlabel="frequency (Hz)", ylabel="distance (mm)", title="Where the floater hangs")
 right.set(xlabel="frequency (Hz)", ylabel="polar angle (°)", title="How far it is tilted")
+figure

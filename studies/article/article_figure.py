@@ -12,9 +12,9 @@ from ...geometry.basics import Array
 from .article import CONFIGURATIONS, rotor_label
 
 TITLES = {
-    "horizontal": "Horizontal displacement δx",
-    "vertical": "Vertical displacement δz",
-    "tilt": "Tilt δθ",
+    "horizontal": "Cube displaced by δx",
+    "vertical": "Two cubes, δz apart",
+    "tilt": "Cube tilted by δθ",
 }
 
 

@@ -7,7 +7,7 @@ from ..one_scene import sources
 from ..results import Point, Study, by_case, one_case, variable
 from .article import CONFIGURATIONS, article_scene, levitation_of
 from .article_formulas import field
-from .field_components_figure import components_figure, components_lines
+from .field_components_figure import FIGURES, components_lines
 
 DISTANCES = (15e-3, 20e-3, 25e-3, 30e-3, 40e-3)
 """Places of the floater on the axis below the rotor, m; the article's text does not give its own."""
@@ -61,6 +61,6 @@ STUDY = Study(
     points=field_points,
     compute=field_components,
     gather=by_case,
-    draw=components_figure,
+    figures=FIGURES,
     report=components_lines,
 )

@@ -1,60 +1,76 @@
-"""Figure and sentences of the study of the field's components, from its dataset alone."""
+"""Figures and sentences of the study of the field's components, from its dataset alone."""
+
+from collections.abc import Callable
+from functools import partial
+from typing import Any
 
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import FuncFormatter, NullFormatter
+from matplotlib.ticker import FuncFormatter
 
 from ...geometry.basics import Array
-from ..results import DASHES, NAMES, PALETTE, cases_with, panels, styled
+from ..results import DASHES, NAMES, PAGE, PALETTE, cases_with, panels, styled
 from .article import CONFIGURATIONS
 from .article_figure import TITLES
 
-PARTS = {"off_axis": "off-axis $B_\\perp$ (mT)", "on_axis": "on-axis $B_z$ (mT)"}
+PARTS = {"off_axis": "off-axis field $B_\\perp$ (mT)", "on_axis": "on-axis field $B_z$ (mT)"}
+MODELS = ("fem", "dipole", "article")
 
 
 @styled
-def components_figure(result: xr.Dataset) -> Figure:
-    """Both components against the parameter of each configuration, and how far the simpler models are off."""
-    figure, axes = panels(3, 3, (10.0, 8.6))
-    for row, (configuration, kind) in zip(axes, CONFIGURATIONS.items(), strict=True):
-        part = cases_with(result, configuration=configuration)
-        for axis, (quantity, text) in zip(row, PARTS.items(), strict=False):
-            _components(axis, part, quantity)
-            axis.set(ylabel=text, yscale="log")
-            axis.yaxis.set_major_formatter(FuncFormatter(lambda field, _: f"{field:g}"))
-            axis.yaxis.set_minor_formatter(NullFormatter())
-        _differences(row[2], part)
-        row[0].set_title(TITLES[configuration])
-        row[2].set(ylabel="|ΔB| / |B| (%)", yscale="log", title="Difference from finite elements")
-        for axis in row:
-            axis.set_xlabel(f"{kind.symbol} ({kind.unit})")
-    _keys(axes[0, 0], axes[0, 1], axes[0, 2], result["distance"].values)
+def component_figure(result: xr.Dataset, quantity: str) -> Figure:
+    """One component of the field below the rotor against the parameter of each configuration."""
+    figure, axes = _one_panel_each(result)
+    for panel, configuration in zip(axes, CONFIGURATIONS, strict=True):
+        _component(panel, cases_with(result, configuration=configuration), quantity)
+    axes[0].set(ylabel=PARTS[quantity], ylim=(0.02 if quantity == "on_axis" else 0.2, None))
+    axes[0].yaxis.set_major_formatter(FuncFormatter(lambda field, _: f"{field:g}"))
+    for model in ("fem", "dipole"):
+        axes[1].plot([], [], DASHES[model], color="0.3", label=NAMES[model])
+    axes[1].plot([], [], "+", color="0.3", label="article's formula")
+    axes[1].legend(loc="lower left")
     return figure
 
 
-def _keys(first: Axes, second: Axes, third: Axes, distances: Array) -> None:
-    for distance, color in zip(distances, PALETTE, strict=False):
-        first.plot([], [], color=color, label=f"{1e3 * distance:g} mm below")
-    first.legend(ncols=2, loc="lower left")
-    first.set_ylim(0.25, 45)
-    for model in ("fem", "dipole"):
-        second.plot([], [], DASHES[model], color="0.3", label=NAMES[model])
-    second.plot([], [], "+", color="0.3", label="article's formula")
-    second.legend(loc="lower right")
+@styled
+def differences_figure(result: xr.Dataset) -> Figure:
+    """How far the simpler models are from the finite elements."""
+    figure, axes = _one_panel_each(result)
+    for panel, configuration in zip(axes, CONFIGURATIONS, strict=True):
+        _differences(panel, cases_with(result, configuration=configuration))
+    axes[0].set(ylabel="difference |ΔB| / |B| (%)", ylim=(1e-4, 100))
     for model in ("dipole", "cuboid"):
-        third.plot([], [], DASHES[model], color="0.3", label=NAMES[model])
-    third.fill_between([], [], [], color="0.8", label="estimated error of the finite elements")
-    third.legend()
+        axes[1].plot([], [], DASHES[model], color="0.3", label=NAMES[model])
+    axes[1].fill_between([], [], [], color="0.8", label="error of the finite elements")
+    axes[1].legend(loc="lower left")
+    return figure
 
 
-def _components(axes: Axes, part: xr.Dataset, quantity: str) -> None:
+FIGURES: dict[str, Callable[[xr.Dataset], Figure]] = {
+    "field-components-off-axis": partial(component_figure, quantity="off_axis"),
+    "field-components-on-axis": partial(component_figure, quantity="on_axis"),
+    "field-components-differences": differences_figure,
+}
+
+
+def _one_panel_each(result: xr.Dataset) -> tuple[Figure, Any]:
+    """A logarithmic panel for each configuration; the first says the colours of the distances."""
+    figure, (axes,) = panels(1, 3, (PAGE, 2.7), sharey=True)
+    for panel, (configuration, kind) in zip(axes, CONFIGURATIONS.items(), strict=True):
+        panel.set(xlabel=f"{kind.symbol} ({kind.unit})", title=TITLES[configuration], yscale="log")
+    for distance, color in zip(result["distance"].values, PALETTE, strict=False):
+        axes[0].plot([], [], color=color, label=f"{1e3 * distance:g} mm below")
+    axes[0].legend(loc="lower left", ncols=2, columnspacing=1.0)
+    return figure, axes
+
+
+def _component(axes: Axes, part: xr.Dataset, quantity: str) -> None:
     for k, color in zip(range(part.sizes["distance"]), PALETTE, strict=False):
-        for model in ("fem", "dipole", "article"):
+        for model in MODELS:
             value, field = _curve(part, model, quantity, k)
-            style = {"article": "+"}.get(model, DASHES.get(model, "-"))
-            axes.plot(value, 1e3 * field, style, color=color, ms=5)
+            axes.plot(value, 1e3 * field, "+" if model == "article" else DASHES[model], color=color, ms=4)
         value, field = _curve(part, "fem", quantity, k)
         error = _curve(part, "fem", "field_error", k)[1]
         axes.fill_between(value, 1e3 * (field - error), 1e3 * (field + error), color=color, alpha=0.3, lw=0)

@@ -9,7 +9,7 @@ from ..one_scene import Levitation, sources
 from ..results import Point, Study, by_case, one_case, variable
 from .article import CONTACT, FLOATER, WEIGHT, article_scene, levitation_of
 from .article_formulas import force
-from .force_curve_figure import force_figure, force_lines
+from .force_curve_figure import FIGURES, force_lines
 
 CONFIGURATION, VALUE = "horizontal", 1.0
 """The rotor of the article's figure; its text does not give the frequency."""
@@ -109,6 +109,6 @@ STUDY = Study(
     points=force_points,
     compute=force_curve,
     gather=by_case,
-    draw=force_figure,
+    figures=FIGURES,
     report=force_lines,
 )

@@ -1,11 +1,11 @@
-"""Figure and sentences of the study of the force along the axis, from its dataset alone."""
+"""Figures and sentences of the study of the force along the axis, from its dataset alone."""
 
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from ..results import PALETTE, cases_with, panels, styled
+from ..results import PAGE, PALETTE, cases_with, panels, styled
 from .article import WEIGHT
 
 TOLD_ANGLE, TOLD_DISTANCE = np.radians(9.0), 0.04
@@ -21,27 +21,38 @@ POINTS = {"near_tipping": ("<", "tipping points"), "equilibrium": ("o", "stable 
 
 
 @styled
-def force_figure(result: xr.Dataset) -> Figure:
-    """Left the force and its parts at one frequency; right the net force at all of them; below θ."""
-    figure, ((left, right), (ratio, angle)) = panels(2, 2, (9.0, 7.0))
-    shown = min(1, result.sizes["frequency"] - 1)
-    frequency = float(result["frequency"][shown])
-    one = result.isel(frequency=shown)
+def parts_figure(result: xr.Dataset) -> Figure:
+    """Attraction, repulsion and net force at one frequency by each way of computing, and how far these are apart."""
+    figure, ((left, ratio),) = panels(1, 2, (PAGE, 3.5))
+    one = result.isel(frequency=min(1, result.sizes["frequency"] - 1))
     _parts(left, one)
-    left.set_title(f"δx = 1 mm, {frequency:g} Hz")
+    left.set_title(f"δx = 1 mm, {float(one['frequency']):g} Hz")
+    _differences(ratio, one)
+    for axes in (left, ratio):
+        axes.set(xlabel="distance along the axis (mm)", xlim=(11, 45))
+    return figure
+
+
+@styled
+def net_figure(result: xr.Dataset) -> Figure:
+    """The net force at every frequency, and the polar angle that goes with it."""
+    figure, ((right, angle),) = panels(1, 2, (PAGE, 2.9))
     for k, color in zip(range(result.sizes["frequency"]), PALETTE, strict=False):
         _net(right, result.isel(frequency=k), color)
         here = cases_with(result.isel(frequency=k), model="fem").isel(case=0)
         angle.plot(_mm(result), np.degrees(here["polar_angle"]), color=color)
-    right.set(ylabel="net force, with gravity (mN)", ylim=(-60, 40), title="Finite elements; dipole dashed")
+    right.plot([], [], STYLES["dipole"], color="0.3", label=TEXTS["dipole"])
+    right.set(ylabel="net force, with gravity (mN)", ylim=(-60, 40), title="Net force")
     right.legend()
-    angle.axhline(np.degrees(TOLD_ANGLE), color="0.4", lw=0.8, ls="--", label="9°: the article's near tipping point")
-    angle.set(ylabel="polar angle θ (°)", ylim=(0, 20), title="Polar angle, finite elements")
+    angle.axhline(np.degrees(TOLD_ANGLE), color="0.4", lw=0.8, ls="--", label="the article's near tipping point")
+    angle.set(ylabel="polar angle θ (°)", ylim=(0, 20), title="Polar angle")
     angle.legend()
-    _differences(ratio, one)
-    for axes in (left, right, ratio, angle):
+    for axes in (right, angle):
         axes.set(xlabel="distance along the axis (mm)", xlim=(11, 45))
     return figure
+
+
+FIGURES = {"force-curve-parts": parts_figure, "force-curve-net": net_figure}
 
 
 def _mm(result: xr.Dataset) -> np.ndarray:
@@ -64,8 +75,8 @@ def _parts(axes: Axes, one: xr.Dataset) -> None:
     for text, place, color in (("attracting part", (24, 165), PALETTE[0]), ("repelling part", (20, -225), PALETTE[1])):
         axes.annotate(text, place, color=color)
     axes.annotate("gravity", (40, -1e3 * WEIGHT - 30), color="0.4", fontsize=7)
-    axes.set(ylabel="force, upwards (mN)", ylim=(-350, 350))
-    axes.legend(title="black: net force", title_fontsize=7)
+    axes.set(ylabel="force, upwards (mN)", ylim=(-470, 350))
+    axes.legend(title="black: net force", loc="lower right")
 
 
 def _arrows(axes: Axes, found: xr.Dataset) -> None:

@@ -15,7 +15,7 @@ from ...geometry.scenes import Scene
 from ..results import Columns, Point, Study, by_case, columns, one_case, variable
 from .article import CONFIGURATIONS, HIGHEST, LOWEST, QUICK, WEIGHT, article_scene, levitation_of, stable_in_flight
 from .article_formulas import analytic_distance, balanced
-from .levitation_distance_figure import distance_figure, distance_lines
+from .levitation_distance_figure import FIGURES, distance_lines
 
 SIDES = ("near", "far")
 FORMULAS, FIELDS = ("semi-analytic", "analytic"), ("dipole", "fem")
@@ -131,6 +131,6 @@ STUDY = Study(
     points=distance_points,
     compute=levitation_distance,
     gather=by_case,
-    draw=distance_figure,
+    figures=FIGURES,
     report=distance_lines,
 )

@@ -1,4 +1,4 @@
-"""Figure and sentences of the study of the levitation distance, from its dataset alone."""
+"""Figures and sentences of the study of the levitation distance, from its dataset alone."""
 
 from typing import Any
 
@@ -8,7 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from ...geometry.basics import Array
-from ..results import cases_with, panels, styled
+from ..results import PAGE, cases_with, panels, styled
 from .article import CONFIGURATIONS, rotor_label, stable_in_flight
 from .article_figure import TITLES, legend_name, plot_branch, rotor_color, values_of
 
@@ -17,37 +17,56 @@ LIMITS = (8.0, 66.0)
 
 
 @styled
-def distance_figure(result: xr.Dataset) -> Figure:
-    """Left the finite elements and the dipole; right the dipole, the article's formulas and simulated flights."""
-    figure, axes = panels(3, 2, (8.2, 9.6))
-    for (left, right), configuration in zip(axes, CONFIGURATIONS, strict=True):
+def models_figure(result: xr.Dataset) -> Figure:
+    """The levitation distance of every rotor by finite elements and by the dipole."""
+    figure, axes = _one_panel_each()
+    for panel, configuration in zip(axes, CONFIGURATIONS, strict=True):
         for value in values_of(result, configuration):
             rotor = cases_with(result, configuration=configuration, value=value)
-            color = rotor_color(configuration, value)
-            _fields(left, rotor, color, legend_name(configuration, value))
-            if value in CONFIGURATIONS[configuration].levitated:
-                _formulas(right, rotor, color=color)
-        for axis in (left, right):
-            axis.set(xlabel="frequency of the rotor (Hz)", ylabel="levitation distance (mm)")
-            axis.set(xlim=(25, 255), ylim=LIMITS)
-        left.set_title(TITLES[configuration])
-        left.plot([], [], ":", color="0.3", lw=0.8, label="dipole")
-        left.plot([], [], "o", color="0.3", ms=3, label="fold")
-        left.legend(ncols=3, loc="upper right")
-        right.set_title("The article's formulas, for what levitated")
-    _key(axes[0, 1])
+            _fields(panel, rotor, rotor_color(configuration, value), legend_name(configuration, value))
+        panel.plot([], [], ":", color="0.3", lw=0.8, label="dipole")
+        panel.plot([], [], "o", color="0.3", ms=3, label="fold")
+        panel.legend(ncols=2, loc="upper right", columnspacing=1.0)
     return figure
+
+
+@styled
+def formulas_figure(result: xr.Dataset) -> Figure:
+    """The article's formulas and simulated flights beside the dipole's equilibrium, for the rotors that levitated."""
+    figure, axes = _one_panel_each()
+    for panel, configuration in zip(axes, CONFIGURATIONS, strict=True):
+        for value in values_of(result, configuration):
+            if value in CONFIGURATIONS[configuration].levitated:
+                rotor = cases_with(result, configuration=configuration, value=value)
+                color = rotor_color(configuration, value)
+                _formulas(panel, rotor, color=color)
+                panel.plot([], [], color=color, label=rotor_label(configuration, value))
+        if configuration != "horizontal":
+            panel.legend(loc="upper right")
+    _key(axes[0])
+    return figure
+
+
+FIGURES = {"levitation-distance-models": models_figure, "levitation-distance-formulas": formulas_figure}
+
+
+def _one_panel_each() -> tuple[Figure, Any]:
+    figure, (axes,) = panels(1, 3, (PAGE, 3.2), sharey=True)
+    for panel, configuration in zip(axes, CONFIGURATIONS, strict=True):
+        panel.set(xlabel="frequency of the rotor (Hz)", title=TITLES[configuration], xlim=(25, 255), ylim=LIMITS)
+    axes[0].set_ylabel("levitation distance (mm)")
+    return figure, axes
 
 
 def _key(axes: Axes) -> None:
     for style, text in (
-        ("-", "equilibrium of the dipole, stable"),
-        ("--", "the same, unstable"),
+        ("-", "dipole, stable"),
+        ("--", "dipole, unstable"),
         (":", "semi-analytic formula"),
         ("-.", "analytic formula, no gravity"),
     ):
         axes.plot([], [], style, color="0.3", lw=1.6 if style == ":" else 0.8, label=text)
-    axes.plot([], [], "x", color="0.3", label="mean height of a simulated flight, dipole")
+    axes.plot([], [], "x", color="0.3", label="simulated flight, mean")
     axes.legend()
 
 

@@ -50,7 +50,7 @@ def figures_of(result: xr.Dataset) -> Mapping[str, Figure]:
     """The figures of a result by name."""
     kind = str(result.attrs["study"])
     if kind in CATALOGUE:
-        return {kind: CATALOGUE[kind].draw(result)}
+        return {name: draw(result) for name, draw in CATALOGUE[kind].figures.items()}
     if kind == QUESTION:
         return {QUESTION: question_figure(result)} if drawable(result) else {}
     found = {name: draw(result) for key, (name, draw) in DRAWN.items() if key in result}

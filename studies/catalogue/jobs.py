@@ -18,7 +18,7 @@ from .entries import CATALOGUE
 
 
 def study_job(name: str, quick: bool, engine: Workers, out: Path) -> Job:
-    """Compute a study of the catalogue; writes NAME.nc, NAME.png and NAME.pdf. Errors are those of `swept`."""
+    """Compute a study of the catalogue; writes NAME.nc and its figures. Errors: those of `swept`."""
     study = CATALOGUE[name]
     return _studied(study, study.points(quick), engine, out)
 
@@ -46,7 +46,7 @@ def question_study(question: Question, values: Mapping[str, Sequence[Any]]) -> S
         lambda quick: points,
         question,
         partial(question.gather, values=values),
-        question_figure,
+        {QUESTION: question_figure},
         question_lines,
         prepared=question.prepared,
         batches=question.batches,

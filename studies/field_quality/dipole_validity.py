@@ -15,7 +15,7 @@ from ...fem.rotor_tables import RotorTable, rotor_table
 from ...geometry.basics import Array
 from ...geometry.bodies import Magnet, horizontal, tilt, vertical
 from ..results import study_of_one, variable
-from .dipole_validity_figure import validity_figure, validity_lines
+from .dipole_validity_figure import FIGURES, validity_lines
 
 EDGE, REMANENCE, PERMEABILITY = 0.01, 1.305, 1.05
 ROTORS = {
@@ -90,6 +90,6 @@ STUDY = study_of_one(
     name="dipole-validity",
     summary="where the dipole and each further model are good to 10, 1, 0.1 and 0.01 %",
     compute=dipole_validity,
-    draw=validity_figure,
+    figures=FIGURES,
     report=validity_lines,
 )

@@ -5,7 +5,7 @@ import xarray as xr
 from matplotlib.figure import Figure
 
 from ...geometry.basics import Array
-from ..results import panels, styled
+from ..results import PAGE, panels, styled
 
 LEVELS = (1e-1, 1e-2, 1e-3, 1e-4)
 
@@ -37,7 +37,7 @@ def _reach(distance: Array, error: Array, level: float) -> str:
 def validity_figure(result: xr.Dataset) -> Figure:
     """Regions in which each model is good to 10, 1, 0.1 and 0.01 %, rotor by rotor."""
     rotors, names = result["rotor"].values, result["model"].values
-    figure, axes = panels(len(rotors), len(names), (2.0 * len(names) + 0.8, 2.1 * len(rotors)))
+    figure, axes = panels(len(rotors), len(names), (PAGE, 1.5 * len(rotors) + 0.3), sharex=True, sharey=True)
     colors = ["#2c7bb6", "#92c5de", "#ffffbf", "#fdae61", "#d7191c"]
     bounds = [1e-9, *LEVELS[::-1], 1e3]
     for row, rotor in zip(axes, rotors, strict=True):
@@ -46,14 +46,17 @@ def validity_figure(result: xr.Dataset) -> Figure:
             shown = panel.contourf(
                 1e3 * result["offset"], 1e3 * result["distance"], np.clip(error, 1e-8, 1e2), bounds, colors=colors
             )
-            panel.invert_yaxis()
             panel.grid(visible=False)
             if rotor == rotors[0]:
-                panel.set_title(model.replace(", ", ",\n"), fontsize=8)
+                panel.set_title(model.replace(", ", ",\n"), fontsize="small")
             if rotor == rotors[-1]:
                 panel.set_xlabel("offset (mm)")
             if model == names[0]:
-                panel.set_ylabel(f"{rotor}\ndistance (mm)")
+                panel.set_ylabel(f"{rotor}\ndistance (mm)", fontsize="small")
+    axes[0, 0].invert_yaxis()
     bar = figure.colorbar(shown, ax=axes, shrink=0.7, ticks=LEVELS, label="relative error of B")
     bar.ax.set_yticklabels([f"{100 * level:g} %" for level in LEVELS])
     return figure
+
+
+FIGURES = {"dipole-validity": validity_figure}

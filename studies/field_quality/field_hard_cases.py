@@ -21,7 +21,7 @@ from ...geometry.basics import Array
 from ...geometry.bodies import cut_magnets
 from ..results import study_of_one, variable
 from ..terminal import progress
-from .field_hard_cases_figure import hard_case_figure, hard_case_lines
+from .field_hard_cases_figure import FIGURES, hard_case_lines
 from .hard_cases import CASES, HardCase
 
 RTOL = 1e-5
@@ -128,6 +128,6 @@ STUDY = study_of_one(
     summary="true and stated error of the rotor's table in hard cases: contact,"
     " extensions, flat, touching, strong, many",
     compute=field_hard_cases,
-    draw=hard_case_figure,
+    figures=FIGURES,
     report=hard_case_lines,
 )

@@ -5,7 +5,7 @@ import xarray as xr
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator
 
-from ..results import PALETTE, panels, styled
+from ..results import PAGE, PALETTE, panels, styled
 
 COLUMNS = 4
 SMALL = 1e-11
@@ -22,24 +22,26 @@ def hard_case_figure(result: xr.Dataset) -> Figure:
     """True and stated error over the distance, a panel for each case with a field."""
     names = [name for name in result["case"].values if float(result["true_error"].sel(case=name).max()) > 0]
     rows = -(-len(names) // COLUMNS)
-    figure, axes = panels(rows, COLUMNS, (2.3 * COLUMNS, 1.75 * rows + 0.7))
+    figure, axes = panels(rows, COLUMNS, (PAGE, 1.5 * rows + 0.7))
     for panel, name in zip(axes.flat, names, strict=False):
         row = result.sel(case=name)
         for key, (label, dash, color, marker) in LINES.items():
             values = np.where(row[key] > 0, np.maximum(row[key], 1e-17), np.nan)
             panel.loglog(1e3 * row["distance"], values, dash, color=color, marker=marker, ms=3, label=label)
         panel.axhline(1e-5, color="0.2", lw=0.7, label="tolerance asked for")
-        panel.set_title(name, fontsize=8.5)
+        panel.set_title(name)
         small = float(row["true_error"].min()) < SMALL
         panel.set(xlim=(4, 1300), ylim=(3e-17 if small else 1e-10, 1e-4))
         panel.yaxis.set_major_locator(LogLocator(numticks=6))
-        panel.tick_params(axis="y", labelsize=7)
     for panel in axes.flat[len(names) :]:
         panel.set_visible(False)
-    figure.supxlabel("distance from the magnets' faces (mm)", fontsize=9)
-    figure.supylabel("largest relative error of B", fontsize=9)
-    figure.legend(*axes.flat[0].get_legend_handles_labels(), loc="outside upper center", ncols=4, fontsize=8)
+    figure.supxlabel("distance from the magnets' faces (mm)", fontsize="medium")
+    figure.supylabel("largest relative error of B", fontsize="medium")
+    figure.legend(*axes.flat[0].get_legend_handles_labels(), loc="outside upper center", ncols=4)
     return figure
+
+
+FIGURES = {"field-hard-cases": hard_case_figure}
 
 
 def hard_case_lines(result: xr.Dataset) -> list[str]:

@@ -16,7 +16,7 @@ from ..results import study_of_one, variable
 from ..terminal import note
 from .field_methods import methods
 from .method_cost import DISTANCES, PERMEABILITIES, apart, cube, peer_pace, sphere_points
-from .speed_accuracy_figure import speed_figure, speed_lines
+from .speed_accuracy_figure import FIGURES, speed_lines
 
 TRUTH_TOLERANCE, QUICK_TRUTH = 1e-9, 1e-8
 """Asked of the reference, in 24 and in 4 s of processor time."""
@@ -87,7 +87,7 @@ STUDY = study_of_one(
     name="speed-accuracy",
     summary="error of B and of its gradient against time, unknowns and memory, for every way to the rotor's field",
     compute=speed_accuracy,
-    draw=speed_figure,
+    figures=FIGURES,
     report=speed_lines,
     timed=True,
 )

@@ -21,7 +21,7 @@ from ...geometry.basics import Array
 from ...geometry.scenes import Scene
 from ..article import article_scene, levitated_rotors, levitation_of
 from ..results import Point, Study, by_case, one_case, variable
-from .dipole_vs_fem_figure import dipole_figure
+from .dipole_vs_fem_figure import FIGURES
 from .dipole_vs_fem_report import dipole_lines
 
 MODELS = ("article", "dipole", "cuboid", "fem", "mutual")
@@ -128,6 +128,6 @@ STUDY = Study(
     points=points,
     compute=compute,
     gather=by_case,
-    draw=dipole_figure,
+    figures=FIGURES,
     report=dipole_lines,
 )

@@ -1,12 +1,15 @@
-"""Figure of the study that compares the point dipole with true fields, from its dataset alone."""
+"""Figures of the study that compares the point dipole with true fields, from its dataset alone."""
+
+from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from ..article import axis_label, by_configuration, rotor_label
-from ..results import PALETTE, panels, styled
+from ..article import TITLES, axis_label, by_configuration, rotor_label
+from ..results import PAGE, PALETTE, panels, styled
 
 CAUSES = {
     "floater's permeability": ("article", "dipole"),
@@ -28,21 +31,49 @@ def change(result: xr.Dataset, name: str, models: tuple[str, str]) -> tuple[xr.D
 
 
 @styled
-def dipole_figure(result: xr.Dataset) -> Figure:
-    """Distance by point dipoles and by true fields; the change of distance by cause; ranges of stable levitation."""
-    figure, axes = panels(3, 3, (10.0, 9.0))
-    for column, (configuration, part) in enumerate(by_configuration(result)):
-        _distances(axes[0, column], part)
-        _causes(axes[1, column], part)
-        _ranges(axes[2, column], part)
-        axes[0, column].set_title(configuration)
-        for row in (1, 2):
-            axes[row, column].set_xticks(range(part.sizes["case"]), [f"{m:g}" for m in part["measure"].values])
-            axes[row, column].set_xlabel(axis_label(configuration))
-            axes[row, column].set_xlim(-0.6, part.sizes["case"] - 0.4)
-    handles = [*axes[1, 0].get_legend_handles_labels()[0], *axes[2, 0].get_legend_handles_labels()[0]]
-    figure.legend(handles=handles, loc="outside lower center", ncols=4)
+def distances_figure(result: xr.Dataset) -> Figure:
+    """The levitation distance by point dipoles and by true fields."""
+    figure, (axes,) = panels(1, 3, (PAGE, 2.8), sharey=True)
+    for panel, (configuration, part) in zip(axes, by_configuration(result), strict=False):
+        _distances(panel, part)
+        panel.set(xlabel="frequency of the rotor (Hz)", title=TITLES[configuration])
+    axes[0].set_ylabel("levitation distance (mm)")
     return figure
+
+
+@styled
+def causes_figure(result: xr.Dataset) -> Figure:
+    """By how much each cause changes the distance: mean and range over the frequencies."""
+    figure, axes = _one_panel_each(result, _causes)
+    axes[0].set_ylabel("change of the distance (mm)")
+    axes[2].legend(loc="lower right")
+    return figure
+
+
+@styled
+def ranges_figure(result: xr.Dataset) -> Figure:
+    """The frequencies of stable levitation by point dipoles and by true fields."""
+    figure, axes = _one_panel_each(result, _ranges)
+    axes[0].set_ylabel("frequencies of stable levitation (Hz)")
+    axes[1].legend(loc="upper right")
+    return figure
+
+
+FIGURES = {
+    "dipole-vs-fem-distance": distances_figure,
+    "dipole-vs-fem-causes": causes_figure,
+    "dipole-vs-fem-ranges": ranges_figure,
+}
+
+
+def _one_panel_each(result: xr.Dataset, draw: Callable[[Axes, xr.Dataset], None]) -> tuple[Figure, Any]:
+    """A panel for each configuration, with a place for each rotor."""
+    figure, (axes,) = panels(1, 3, (PAGE, 2.8), sharey=True)
+    for panel, (configuration, part) in zip(axes, by_configuration(result), strict=False):
+        draw(panel, part)
+        panel.set_xticks(range(part.sizes["case"]), [f"{m:g}" for m in part["measure"].values])
+        panel.set(xlabel=axis_label(configuration), xlim=(-0.6, part.sizes["case"] - 0.4), title=TITLES[configuration])
+    return figure, axes
 
 
 def _distances(axes: Axes, part: xr.Dataset) -> None:
@@ -56,8 +87,7 @@ def _distances(axes: Axes, part: xr.Dataset) -> None:
             axes.plot(frequency, distance, f"o{style}", ms=2.5, mfc=fill, color=color, label=text)
     axes.plot([], [], "--", color="0.3", label="point dipoles")
     axes.plot([], [], "-", color="0.3", label="true fields")
-    axes.set(xlabel="frequency of the rotor (Hz)", ylabel="levitation distance (mm)")
-    axes.legend(fontsize=6)
+    axes.legend()
 
 
 def _causes(axes: Axes, part: xr.Dataset) -> None:
@@ -70,7 +100,6 @@ def _causes(axes: Axes, part: xr.Dataset) -> None:
         color = "0.3" if models == TOTAL else PALETTE[k]
         axes.bar(places, mean, width, color=color, label=cause, yerr=spread, error_kw={"lw": 0.7, "capsize": 1.5})
     axes.axhline(0.0, color="0.3", lw=0.8)
-    axes.set(ylabel="change of the distance (mm):\nmean and range over the frequencies")
 
 
 def _ranges(axes: Axes, part: xr.Dataset) -> None:
@@ -89,4 +118,3 @@ def _ranges(axes: Axes, part: xr.Dataset) -> None:
             ends = part["high_kind"].sel(model=model).values == kind
             axes.plot(places[ends], high[ends], marker, color="k", ms=4, label=words if model == "article" else None)
     axes.margins(y=0.08)
-    axes.set(ylabel="frequencies of stable levitation (Hz)")

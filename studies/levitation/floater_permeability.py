@@ -14,7 +14,7 @@ from ...geometry.scenes import Floater, Scene, load_scene
 from ..one_scene import Levitation
 from ..results import AXIS, study_of_one, variable
 from ..terminal import Models, shipped_scene
-from .floater_permeability_figure import floater_figure, floater_lines
+from .floater_permeability_figure import FIGURES, floater_lines
 
 LEVELS = (0.1, 0.01, 1e-3, 1e-4)
 FARTHEST = 0.05
@@ -141,6 +141,6 @@ STUDY = study_of_one(
     name="floater-permeability",
     summary="what the rigid dipole misses once rotor and floater magnetise each other, in the scene horizontal",
     compute=in_the_horizontal_scene,
-    draw=floater_figure,
+    figures=FIGURES,
     report=floater_lines,
 )

@@ -5,7 +5,7 @@ import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from ..results import PALETTE, panels, styled
+from ..results import PAGE, PALETTE, panels, styled
 
 LABELS = {
     "floater_answer": "floater answers to the rotor",
@@ -17,7 +17,7 @@ LABELS = {
 @styled
 def floater_figure(result: xr.Dataset) -> Figure:
     """What the rigid dipole misses against distance: share of force and torque; axial force by its two causes."""
-    figure, ((left, right),) = panels(1, 2, (8.0, 3.4))
+    figure, ((left, right),) = panels(1, 2, (PAGE, 2.9))
     _shares(left, result)
     _axial(right, result)
     if "rigid_position" in result:
@@ -27,6 +27,9 @@ def floater_figure(result: xr.Dataset) -> Figure:
     left.legend(loc="lower left", frameon=True, framealpha=1.0)
     right.legend(loc="upper right")
     return figure
+
+
+FIGURES = {"floater-permeability": floater_figure}
 
 
 def _shares(axes: Axes, result: xr.Dataset) -> None:

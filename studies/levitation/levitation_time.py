@@ -32,7 +32,7 @@ from .levitation_time_cases import (
     Variant,
     scene_of,
 )
-from .levitation_time_figure import time_figure, time_lines
+from .levitation_time_figure import FIGURES, time_lines
 
 CAP, SHORTEST = 250.0, 3.0
 """The article stopped a flight after 250 s, and did not count one of less than 3 s."""
@@ -150,6 +150,6 @@ STUDY = Study(
     points=time_points,
     compute=levitation_times,
     gather=gather_times,
-    draw=time_figure,
+    figures=FIGURES,
     report=time_lines,
 )

@@ -1,11 +1,13 @@
-"""Figure and report of the study of the slow drift, from its dataset alone."""
+"""Figures and report of the study of the slow drift, from its dataset alone."""
+
+from typing import Any
 
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from ..results import PALETTE, panels, styled
+from ..results import PAGE, PALETTE, panels, styled
 from .levitation_time_cases import LEVITATES, OUTCOMES
 
 MARKS = dict(zip(OUTCOMES, ("v", "o", "X", "^", "|"), strict=True))
@@ -37,26 +39,46 @@ FLOWN = {
 
 
 @styled
-def time_figure(result: xr.Dataset) -> Figure:
-    """For each rotor: levitation time against frequency with its bands, and some nominal flights."""
-    cases = result["case"].values.tolist()
-    rows = -(-len(cases) // 2)
-    figure, axes = panels(rows, 4, (13.0, 2.75 * rows + 0.8))
-    for place, case in enumerate(cases):
-        left, right = axes[place // 2, 2 * (place % 2) :][:2]
-        chosen = result.sel(case=case)
-        _times(left, chosen, FLOWN.get(case, {}))
-        _flights(right, chosen)
-        left.set_title(case.replace(" deg", "°"), loc="left", fontweight="bold")
-        right.set_title("nominal flights", loc="left")
-    for unused in axes.flat[2 * len(cases) :]:
-        unused.remove()
+def times_figure(result: xr.Dataset) -> Figure:
+    """Levitation time of each rotor against frequency, with the bands of what is not known well."""
+    figure, axes = _one_panel_each(result)
+    for panel, case in zip(axes.flat, result["case"].values.tolist(), strict=False):
+        _times(panel, result.sel(case=case), FLOWN.get(case, {}))
+    for row in axes:
+        row[0].set_ylabel("levitation time (s)")
     handles, labels = axes[0, 0].get_legend_handles_labels()
     for name in OUTCOMES:
         handles += axes[0, 0].plot([], [], MARKS[name], color=PALETTE[0], ms=5)
         labels.append(MEANINGS[name])
-    figure.legend(handles, labels, loc="outside lower center", ncols=4)
+    figure.legend(handles, labels, loc="outside lower center", ncols=3)
     return figure
+
+
+@styled
+def flights_figure(result: xr.Dataset) -> Figure:
+    """Distance against time in some nominal flights of each rotor."""
+    figure, axes = _one_panel_each(result)
+    for panel, case in zip(axes.flat, result["case"].values.tolist(), strict=False):
+        _flights(panel, result.sel(case=case))
+    for row in axes:
+        row[0].set_ylabel("distance (mm)")
+    return figure
+
+
+FIGURES = {"levitation-time": times_figure, "levitation-time-flights": flights_figure}
+
+
+def _one_panel_each(result: xr.Dataset) -> tuple[Figure, Any]:
+    """A panel for each rotor, three in a row."""
+    cases = result["case"].values.tolist()
+    columns = min(3, len(cases))
+    rows = -(-len(cases) // columns)
+    figure, axes = panels(rows, columns, (PAGE, 2.2 * rows + 0.7))
+    for panel, case in zip(axes.flat, cases, strict=False):
+        panel.set_title(case.replace(" deg", "°"))
+    for unused in axes.flat[len(cases) :]:
+        unused.remove()
+    return figure, axes
 
 
 def _times(axes: Axes, result: xr.Dataset, flown: dict[int, str]) -> None:
@@ -81,7 +103,7 @@ def _times(axes: Axes, result: xr.Dataset, flown: dict[int, str]) -> None:
         axes.axvline(seen, color=PALETTE[3], lw=0.8)
         words = axes.text(seen, 245, f"{seen} Hz {word}", rotation=90, ha="center", va="top", color=PALETTE[3], size=7)
         words.set_bbox({"facecolor": "white", "edgecolor": "none", "pad": 0.8, "alpha": 0.85})
-    axes.set(xlabel="frequency (Hz)", ylabel="levitation time (s)", ylim=(-8, 262), xlim=(frequency[0], frequency[-1]))
+    axes.set(xlabel="frequency (Hz)", ylim=(-8, 262), xlim=(frequency[0], frequency[-1]))
 
 
 def _flights(axes: Axes, result: xr.Dataset) -> None:
@@ -97,7 +119,7 @@ def _flights(axes: Axes, result: xr.Dataset) -> None:
         axes.plot(time, distance, color=color)
         words = f" {frequency[k]:.4g} Hz" if time[-1] > 200 else f"{frequency[k]:.4g} Hz"
         axes.annotate(words, (time[-1], distance[-1]), color=color, size=7, ha="left", va="center")
-    axes.set(xlabel="time (s)", ylabel="distance (mm)", xlim=(0, 310))
+    axes.set(xlabel="time (s)", xlim=(0, 330))
 
 
 def time_lines(result: xr.Dataset) -> list[str]:

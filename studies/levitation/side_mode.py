@@ -11,7 +11,7 @@ from ...geometry.scenes import Scene
 from ..article import CONFIGURATIONS, HIGHEST, LOWEST, QUICK, article_scene, levitation_of, side_radius
 from ..one_scene import sources
 from ..results import Columns, Point, Study, by_case, columns, one_case, variable
-from .side_mode_figure import FLOWN_HZ, TURNS, side_figure, side_lines
+from .side_mode_figure import FIGURES, FLOWN_HZ, TURNS, side_lines
 
 MODELS = ("dipole", "fem")
 KICK, SECONDS, SAMPLES = 0.01, 2.0, 400
@@ -85,6 +85,6 @@ STUDY = Study(
     points=side_points,
     compute=side_mode,
     gather=by_case,
-    draw=side_figure,
+    figures=FIGURES,
     report=side_lines,
 )

@@ -1,4 +1,4 @@
-"""Figure and sentences of the study of the side mode, from its dataset alone."""
+"""Figures and sentences of the study of the side mode, from its dataset alone."""
 
 import numpy as np
 import xarray as xr
@@ -16,7 +16,7 @@ from ..article import (
     stable_in_flight,
     values_of,
 )
-from ..results import PALETTE, cases_with, panels, styled
+from ..results import PAGE, PALETTE, cases_with, panels, styled
 
 FLOWN_HZ, TURNS = 170.0, 3
 """Of the flight in the article's figure, for δx = 1 mm: Hz, and how many of its last turns are shown."""
@@ -25,15 +25,22 @@ TOLD = (0.1, 0.3)
 
 
 @styled
-def side_figure(result: xr.Dataset) -> Figure:
-    """Above the orbit of rotor and floater and their coordinates; below the radius against frequency."""
-    figure, axes = panels(2, 3, (11.0, 7.0))
+def orbit_figure(result: xr.Dataset) -> Figure:
+    """The orbit of rotor and floater seen from above, and their coordinates, in one flight."""
+    figure, (axes,) = panels(1, 3, (PAGE, 2.6))
     flown = cases_with(result, configuration="horizontal", value=1.0, model="fem").isel(case=0)
-    _orbit(axes[0, 0], flown)
-    _coordinates(axes[0, 1], flown, "x", np.cos)
-    _coordinates(axes[0, 2], flown, "y", np.sin)
-    for panel, configuration in zip(axes[1], CONFIGURATIONS, strict=True):
-        panel.axhspan(*TOLD, color="0.92", lw=0, label="0.1–0.3 mm, article")
+    _orbit(axes[0], flown)
+    _coordinates(axes[1], flown, "x", np.cos)
+    _coordinates(axes[2], flown, "y", np.sin)
+    return figure
+
+
+@styled
+def radius_figure(result: xr.Dataset) -> Figure:
+    """The radius of the side mode against frequency for every rotor, and the article's formula."""
+    figure, (axes,) = panels(1, 3, (PAGE, 3.0), sharey=True)
+    for panel, configuration in zip(axes, CONFIGURATIONS, strict=True):
+        panel.axhspan(*TOLD, color="0.92", lw=0)
         for value in values_of(result, configuration):
             found = cases_with(result, configuration=configuration, value=value, model="fem").isel(case=0)
             frequency, radius, solid = (
@@ -44,26 +51,32 @@ def side_figure(result: xr.Dataset) -> Figure:
             color, label = rotor_color(configuration, value), legend_name(configuration, value)
             plot_branch(panel, frequency, 1e3 * radius, solid, color=color, label=label)
             panel.plot(frequency, 1e3 * found["article_radius"], ":", lw=1.6, color=color)
-        panel.plot([], [], ":", lw=1.6, color="0.3", label="$\\mathcal{G}/\\mu_f\\omega^2$")
-        panel.plot([], [], "--", color="0.3", label="unstable")
-        panel.set(xlabel="frequency of the rotor (Hz)", ylabel="radius of the side mode (mm)")
-        panel.set(xlim=(35, 255), ylim=(0, 2.1))
-        panel.set_title(TITLES[configuration])
-        panel.legend(ncols=2, loc="upper right", frameon=True, framealpha=0.95)
+        panel.set(xlabel="frequency of the rotor (Hz)", xlim=(35, 255), ylim=(0, 2.1), title=TITLES[configuration])
+        panel.legend(ncols=2, loc="upper right", columnspacing=1.0)
+    axes[0].set_ylabel("radius of the side mode (mm)")
+    key = [
+        axes[0].plot([], [], ":", lw=1.6, color="0.3", label="$\\mathcal{G}/\\mu_f\\omega^2$")[0],
+        axes[0].plot([], [], "--", color="0.3", label="unstable")[0],
+        axes[0].fill_between([], [], [], color="0.92", label="0.1–0.3 mm, called typical in the article"),
+    ]
+    figure.legend(handles=key, loc="outside lower center", ncols=3)
     return figure
+
+
+FIGURES = {"side-mode-orbit": orbit_figure, "side-mode-radius": radius_figure}
 
 
 def _orbit(axes: Axes, flown: xr.Dataset) -> None:
     angle = np.linspace(0, 2 * np.pi, 200)
-    axes.plot(np.cos(angle), np.sin(angle), color=PALETTE[1], label="centre of the rotor's cube")
-    axes.plot(1e3 * flown["flight_x"], 1e3 * flown["flight_y"], color=PALETTE[0], label="floater, simulated")
+    axes.plot(np.cos(angle), np.sin(angle), color=PALETTE[1], label="rotor's cube")
+    axes.plot(1e3 * flown["flight_x"], 1e3 * flown["flight_y"], color=PALETTE[0], label="floater")
     radius = 1e3 * _predicted(flown)
     axes.plot(radius * np.cos(angle), radius * np.sin(angle), ":", color="k", lw=1.6, label="circle of radius a")
     last = float(flown["flight_angle"][-1])
     axes.plot(np.cos(last), np.sin(last), "o", color=PALETTE[1], ms=4)
     axes.plot(1e3 * float(flown["flight_x"][-1]), 1e3 * float(flown["flight_y"][-1]), "o", color=PALETTE[0], ms=4)
-    axes.set(xlabel="x (mm)", ylabel="y (mm)", title=f"Seen from above, δx = 1 mm, {FLOWN_HZ:g} Hz", aspect="equal")
-    axes.set(xlim=(-1.3, 1.3), ylim=(-1.3, 1.8))
+    axes.set(xlabel="x (mm)", ylabel="y (mm)", title=f"From above, {FLOWN_HZ:g} Hz", aspect="equal")
+    axes.set(xlim=(-1.3, 1.3), ylim=(-1.2, 2.1))
     axes.legend(loc="upper right")
 
 
@@ -75,8 +88,8 @@ def _coordinates(axes: Axes, flown: xr.Dataset, axis: str, turn: np.ufunc) -> No
     axes.plot(time, 1e3 * flown[f"flight_{axis}"], color=PALETTE[0], label=f"${axis}_f$, floater")
     for sign in (-1, 1):
         axes.axhline(sign * radius, color="k", ls=":", lw=1.6, label="±a" if sign > 0 else None)
-    axes.set(xlabel="time (ms)", ylabel=f"{axis} (mm)", title=f"{TURNS} turns", ylim=(-1.2, 1.8))
-    axes.legend(ncols=3, loc="upper right")
+    axes.set(xlabel="time (ms)", ylabel=f"{axis} (mm)", title=f"{TURNS} turns", ylim=(-1.2, 2.1))
+    axes.legend(loc="upper right", ncols=2)
 
 
 def _predicted(flown: xr.Dataset) -> float:

@@ -20,7 +20,7 @@ from ...geometry.basics import Array
 from ...geometry.scenes import Scene
 from ..article import FLIGHT, HIGHEST, article_scene, conducting, levitation_of
 from ..results import Point, Study, by_case, one_case, variable
-from .trajectories_figure import NONE, SHORT, flight_figure, flight_lines
+from .trajectories_figure import FIGURES, NONE, SHORT, flight_lines
 
 FREQUENCIES = (115.0, 140.0, 150.0, 160.0, 170.0, 200.0)
 DISPLACEMENTS = (1.0, 1.5, 2.0)
@@ -125,6 +125,6 @@ STUDY = Study(
     points=flight_points,
     compute=trajectories,
     gather=by_case,
-    draw=flight_figure,
+    figures=FIGURES,
     report=flight_lines,
 )

@@ -6,7 +6,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from ..article import rotor_label
-from ..results import PALETTE, panels, styled
+from ..results import PAGE, PALETTE, panels, styled
 
 TOLD = {115.0: "linear fall", 140.0: "stable", 150.0: "oscillating loss"}
 """The article's three flights, by frequency in Hz."""
@@ -18,16 +18,20 @@ LOST = (SHORT, "linear fall", "oscillating loss")
 @styled
 def flight_figure(result: xr.Dataset) -> Figure:
     """The distance in each flight, one panel for each displacement."""
-    figure, (axes,) = panels(1, result.sizes["case"], (3.7 * result.sizes["case"], 3.8))
+    figure, (axes,) = panels(1, result.sizes["case"], (PAGE, 3.0), sharey=True)
     for panel, k in zip(axes, range(result.sizes["case"]), strict=True):
         rotor = result.isel(case=k)
         for one, color in zip(range(rotor.sizes["frequency"]), PALETTE, strict=False):
             _flight(panel, rotor.isel(frequency=one), color)
-        panel.set(xlabel="time (s)", ylabel="levitation distance (mm)", ylim=(11, 35))
+        panel.set(xlabel="time (s)", ylim=(11, 40))
         panel.set_title(rotor_label("horizontal", float(rotor["value"])))
         panel.plot([], [], "--", color="0.3", label="averaged flight")
         panel.legend(loc="upper right")
+    axes[0].set_ylabel("levitation distance (mm)")
     return figure
+
+
+FIGURES = {"trajectories": flight_figure}
 
 
 def _flight(axes: Axes, flight: xr.Dataset, color: str) -> None:

@@ -8,7 +8,7 @@ from ...geometry.basics import Array
 from ..article import CONFIGURATIONS, article_scene, levitation_of
 from ..results import Point, Study, by_case, one_case, variable
 from ..terminal import note
-from .design_figure import design_figure, design_lines
+from .design_figure import FIGURES, design_lines
 from .design_search import designed
 
 EDGES = (6.0, 8.0, 10.0, 12.7, 16.0)
@@ -118,6 +118,6 @@ STUDY = Study(
     points=points,
     compute=compute,
     gather=by_case,
-    draw=design_figure,
+    figures=FIGURES,
     report=design_lines,
 )

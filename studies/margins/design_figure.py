@@ -7,7 +7,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import PercentFormatter
 
 from ..article import CONFIGURATIONS, axis_label
-from ..results import PALETTE, cases_with, panels, styled
+from ..results import PAGE, PALETTE, cases_with, panels, styled
 
 
 def wanted(result: xr.Dataset) -> list[tuple[float, float]]:
@@ -27,16 +27,23 @@ def design_figure(result: xr.Dataset) -> Figure:
     """Stability margin against the cubes' edge for every configuration and wish, with the measure that it takes."""
     wishes = wanted(result)
     columns = len({f for _, f in wishes})
-    figure, axes = panels(len(wishes) // columns, columns, (3.4 * columns, 2.7 * len(wishes) // columns + 0.3))
+    figure, axes = panels(len(wishes) // columns, columns, (PAGE, 2.3 * len(wishes) / columns + 0.2))
     for place, (distance, frequency) in zip(axes.flat, wishes, strict=True):
         for one in _wish(result, distance, frequency):
             _margins(place, one)
         place.set_title(f"{1e3 * distance:g} mm at {frequency:g} Hz")
         place.yaxis.set_major_formatter(PercentFormatter(1.0, decimals=0))
         place.margins(y=0.15)
-        place.set(xlabel="edge of the cubes (mm)", ylabel="margin in frequency", ylim=(-0.02, None))
-        place.legend(fontsize=6, loc="upper left")
+        place.set(ylim=(-0.02, None))
+        place.legend(loc="upper left")
+    for place in axes[-1]:
+        place.set_xlabel("edge of the cubes (mm)")
+    for place in axes[:, 0]:
+        place.set_ylabel("margin in frequency")
     return figure
+
+
+FIGURES = {"design": design_figure}
 
 
 def _margins(place: Axes, one: xr.Dataset) -> None:

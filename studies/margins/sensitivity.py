@@ -10,7 +10,7 @@ from ...dynamics.branches import at_frequency
 from ...geometry.basics import Array
 from ..article import levitated_rotors, levitation_of
 from ..results import Point, Study, by_case, one_case, variable
-from .sensitivity_figure import sensitivity_figure, sensitivity_lines
+from .sensitivity_figure import FIGURES, sensitivity_lines
 from .tolerances import (
     FRACTIONS,
     MODEL,
@@ -123,6 +123,6 @@ STUDY = Study(
     points=points,
     compute=compute,
     gather=by_case,
-    draw=sensitivity_figure,
+    figures=FIGURES,
     report=sensitivity_lines,
 )

@@ -1,13 +1,18 @@
-"""Figure and sentences of the study of sensitivities, from its dataset alone."""
+"""Figures and sentences of the study of sensitivities, from its dataset alone."""
+
+from collections.abc import Callable
+from functools import partial
+from typing import Any
 
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
 
 from ...geometry.basics import Array
-from ..article import CONFIGURATIONS, axis_label, by_configuration, rotor_label
-from ..results import PALETTE, panels, styled
+from ..article import CONFIGURATIONS, TITLES, axis_label, by_configuration, rotor_label
+from ..results import PAGE, PALETTE, panels, styled
 from .tolerances import FRACTIONS, PARAMETERS, QUANTITIES, TILT_SPREAD, TILTS
 
 WORDS = {
@@ -34,21 +39,61 @@ def spreads(one: xr.Dataset) -> Array:
 
 
 @styled
-def sensitivity_figure(result: xr.Dataset) -> Figure:
-    """What the tolerance of each parameter does to distance and lowest frequency; bands of all tolerances together."""
-    figure, axes = panels(3, 3, (10.0, 9.0))
-    for column, (configuration, part) in enumerate(by_configuration(result)):
-        axes[0, column].set_title(configuration)
-        _contributions(axes[0, column], part, MIDDLE, 1e3, "distance in mid-range (mm)")
-        _contributions(axes[1, column], part, "lowest", 1.0, "lowest frequency (Hz)")
-        _bands(axes[2, column], part, configuration)
-    figure.legend(handles=axes[2, 0].get_legend_handles_labels()[0], loc="outside lower center", ncols=3)
-    for place in axes[:2, 1:].flat:
-        place.set_yticklabels([])
+def contributions_figure(result: xr.Dataset, quantity: str, scale: float, words: str) -> Figure:
+    """What one standard deviation of each parameter does to distance or lowest frequency."""
+    figure, (axes,) = panels(1, 3, (PAGE, 3.4), sharey=True)
+    for panel, (configuration, part) in zip(axes, by_configuration(result), strict=False):
+        panel.set(title=TITLES[configuration], xlabel=words)
+        _contributions(panel, part, quantity, scale)
+    axes[0].invert_yaxis()
     return figure
 
 
-def _contributions(axes: Axes, part: xr.Dataset, quantity: str, scale: float, words: str) -> None:
+@styled
+def frequency_bands_figure(result: xr.Dataset) -> Figure:
+    """Lowest and highest stable frequency of the rotors within all tolerances together."""
+    figure, axes = _bands(result)
+    for panel, (_, part) in zip(axes, by_configuration(result), strict=False):
+        places = np.arange(part.sizes["case"], dtype=float)
+        for name, color in (("lowest", PALETTE[0]), ("highest", PALETTE[1])):
+            _box(panel, part, name, places, color, 1.0, f"{name} frequency")
+    axes[0].set_ylabel(f"stable frequencies (Hz),\n{PERCENTILES[0]} to {PERCENTILES[1]} % of the rotors")
+    axes[0].legend()
+    return figure
+
+
+@styled
+def distance_bands_figure(result: xr.Dataset) -> Figure:
+    """Distance in mid-range of the rotors within all tolerances together."""
+    figure, axes = _bands(result)
+    for panel, (_, part) in zip(axes, by_configuration(result), strict=False):
+        _box(panel, part, MIDDLE, np.arange(part.sizes["case"], dtype=float), PALETTE[2], 1e3, "distance")
+    axes[0].set_ylabel(f"distance in mid-range (mm),\n{PERCENTILES[0]} to {PERCENTILES[1]} % of the rotors")
+    return figure
+
+
+FIGURES: dict[str, Callable[[xr.Dataset], Figure]] = {
+    "sensitivity-distance": partial(
+        contributions_figure, quantity=MIDDLE, scale=1e3, words="change of the distance (mm)"
+    ),
+    "sensitivity-frequency": partial(
+        contributions_figure, quantity="lowest", scale=1.0, words="change of the lowest\nstable frequency (Hz)"
+    ),
+    "sensitivity-distance-band": distance_bands_figure,
+    "sensitivity-frequency-band": frequency_bands_figure,
+}
+
+
+def _bands(result: xr.Dataset) -> tuple[Figure, Any]:
+    """A panel for each configuration, with a place for each rotor."""
+    figure, (axes,) = panels(1, 3, (PAGE, 2.5))
+    for panel, (configuration, part) in zip(axes, by_configuration(result), strict=False):
+        panel.set_xticks(range(part.sizes["case"]), [f"{m:g}" for m in part["measure"].values])
+        panel.set(xlabel=axis_label(configuration), xlim=(-0.5, part.sizes["case"] - 0.5), title=TITLES[configuration])
+    return figure, axes
+
+
+def _contributions(axes: Axes, part: xr.Dataset, quantity: str, scale: float) -> None:
     names = [name for name in PARAMETERS if name != "gravity"]
     places, count = np.arange(len(names)), part.sizes["case"]
     for k in range(count):
@@ -64,25 +109,8 @@ def _contributions(axes: Axes, part: xr.Dataset, quantity: str, scale: float, wo
             label=rotor_label(kind, float(one["measure"])), error_kw={"lw": 0.7},
         )  # fmt: skip
     axes.set_yticks(places, [WORDS[name] for name in names])
-    axes.invert_yaxis()
-    axes.legend(fontsize=6)
-    axes.set(xlabel=f"{words},\none standard deviation of the tolerance")
-
-
-def _bands(axes: Axes, part: xr.Dataset, configuration: str) -> None:
-    twin = axes.twinx()
-    places: Array = np.arange(part.sizes["case"], dtype=float)
-    for quantity, offset, color, on in (("lowest", -0.2, PALETTE[0], axes), ("highest", 0.0, PALETTE[1], axes)):
-        _box(on, part, quantity, places + offset, color, 1.0, f"{quantity} frequency")
-    _box(twin, part, MIDDLE, places + 0.2, PALETTE[2], 1e3, "distance")
-    axes.plot([], [], "s", color=PALETTE[2], label="distance (right)")
-    twin.grid(False)
-    twin.set_ylabel("distance in mid-range (mm)", color=PALETTE[2])
-    axes.set_xticks(places, [f"{m:g}" for m in part["measure"].values])
-    axes.set(
-        xlabel=axis_label(configuration),
-        ylabel=f"frequency (Hz): {PERCENTILES[0]} to {PERCENTILES[1]} % of\nthe rotors within tolerance",
-    )
+    axes.xaxis.set_major_locator(MaxNLocator(4))
+    axes.legend()
 
 
 def _box(axes: Axes, part: xr.Dataset, quantity: str, places: Array, color: str, scale: float, label: str) -> None:

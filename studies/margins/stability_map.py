@@ -27,7 +27,7 @@ from ..article import (
 from ..one_scene import Levitation
 from ..results import Point, Study, by_case, one_case, variable
 from ..terminal import note
-from .stability_map_figure import FACE, MODELS, map_figure, map_lines
+from .stability_map_figure import FACE, FIGURES, MODELS, map_lines
 
 MEASURES = {
     "horizontal": (0.5, 1.0, 1.5, 2.0, 2.5, 3.0, 3.5, 4.0, 5.0, 6.0, 7.0, 8.0),
@@ -158,6 +158,6 @@ STUDY = Study(
     points=points,
     compute=compute,
     gather=by_case,
-    draw=map_figure,
+    figures=FIGURES,
     report=map_lines,
 )

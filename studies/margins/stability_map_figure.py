@@ -5,8 +5,8 @@ import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from ..article import axis_label, by_configuration, rotor_label
-from ..results import COLORS, NAMES, PALETTE, cases_with, panels, styled
+from ..article import TITLES, axis_label, by_configuration, rotor_label
+from ..results import COLORS, NAMES, PAGE, PALETTE, cases_with, panels, styled
 
 MODELS = ("dipole", "fem")
 FACE = -0.045
@@ -26,15 +26,14 @@ MEANINGS = {
 @styled
 def map_figure(result: xr.Dataset) -> Figure:
     """Regions of stable levitation by dipole and by finite elements, kinds of boundary, and the plate's verdict."""
-    figure, axes = panels(1, 3, (11.0, 4.6))
+    figure, axes = panels(1, 3, (PAGE, 3.9), sharey=True)
     for place, (configuration, rotors) in zip(axes[0], by_configuration(result), strict=False):
         for model in MODELS:
             _region(place, cases_with(rotors, model=model), model)
         _plate(place, cases_with(rotors, model=MODELS[-1]))
         _lasting(place, cases_with(rotors, model=MODELS[-1]))
         place.set(
-            xlabel=axis_label(configuration), ylabel="frequency of the rotor (Hz)",
-            title=configuration, ylim=(20, 410),
+            xlabel=axis_label(configuration), title=TITLES[configuration], ylim=(20, 410),
         )  # fmt: skip
     handles = [
         *(axes[0, 0].plot([], [], "s", color=COLORS[m], alpha=0.5, label=f"stable: {NAMES[m]}")[0] for m in MODELS),
@@ -47,8 +46,12 @@ def map_figure(result: xr.Dataset) -> Figure:
         handles += [axes[0, 0].plot([], [], mark, color="k", label=words)[0] for mark, words in METAL.values()]
     for place in axes[0]:
         place.margins(x=0.08)
-    figure.legend(handles=handles, loc="outside lower center", ncols=5, fontsize=7)
+    axes[0, 0].set_ylabel("frequency of the rotor (Hz)")
+    figure.legend(handles=handles, loc="outside lower center", ncols=3)
     return figure
+
+
+FIGURES = {"stability-map": map_figure}
 
 
 def _region(axes: Axes, part: xr.Dataset, model: str) -> None:

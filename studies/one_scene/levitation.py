@@ -57,6 +57,7 @@ class Levitation:
         """Whether the equilibria were searched for; else they were carried here from scenes nearby."""
         self._tables = RotorTables()
         self._plate_cached = False
+        self._flown: dict[float, Trajectory] = {}
 
     @cached_property
     def interaction(self) -> Interaction:
@@ -110,6 +111,10 @@ class Levitation:
     def adopt(self, known: Survey, searched: bool = True) -> None:
         """Take over the equilibria without plate that are known from a search here or from scenes nearby."""
         self.without_plate, self.searched = known, searched
+
+    def adopt_flight(self, duration: float, flown: Trajectory) -> None:
+        """Take over a flight of this duration (s) that was flown together with others."""
+        self._flown[duration] = flown
 
     @cached_property
     def table(self) -> RotorField:
@@ -205,6 +210,8 @@ class Levitation:
         FlightStopped : the user stopped it; the error holds what was flown
         """
         positive("duration", duration)
+        if duration in self._flown:
+            return self._flown[duration]
         known = () if self.absolute else self.equilibria
         table, plate = self._with_effects(self.flight_table), self.plate
         note("Motion ...")

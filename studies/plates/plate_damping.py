@@ -15,7 +15,7 @@ from ...dynamics.steady import Equilibrium, Survey
 from ..one_scene import Levitation
 from ..results import AXIS, MODES, Columns, Point, Study, columns, variable
 from .plate_cases import PlateCase, cases, without_plate
-from .plate_damping_figure import damping_figure
+from .plate_damping_figure import FIGURES
 from .plate_damping_report import damping_lines
 
 RTOL = 3e-3
@@ -95,6 +95,6 @@ STUDY = Study(
     points=damping_points,
     compute=plate_damping,
     gather=gather_damping,
-    draw=damping_figure,
+    figures=FIGURES,
     report=damping_lines,
 )

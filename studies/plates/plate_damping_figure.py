@@ -1,4 +1,7 @@
-"""Figure of the study of the plate's damping, from its dataset alone."""
+"""Figures of the study of the plate's damping, from its dataset alone."""
+
+from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -8,15 +11,15 @@ from matplotlib.ticker import NullLocator
 
 from ...geometry.basics import Array
 from ..article import rotor_label
-from ..results import PALETTE, cases_with, panels, styled
+from ..results import PAGE, PALETTE, cases_with, panels, styled
 from .plate_cases import ROTORS
 
 SWEEPS = {
     "below": ("Plate below", "distance of the face from the floater's centre (mm)", 1e3),
     "beside": ("Plate standing beside", "distance of the face from the floater's centre (mm)", 1e3),
-    "frequency": ("Frequency, plate 18 mm below", "frequency of the rotor (Hz)", 1.0),
-    "conductivity": ("Conductivity, plate 18 mm below", "conductivity (MS/m)", 1e-6),
-    "thickness": ("Thickness, plate 18 mm below", "thickness (mm)", 1e3),
+    "frequency": ("Frequency", "frequency of the rotor (Hz)", 1.0),
+    "conductivity": ("Conductivity", "conductivity (MS/m)", 1e-6),
+    "thickness": ("Thickness", "thickness (mm)", 1e3),
 }
 DISTANCES = (10, 15, 20, 30, 40, 60)
 MODELS = {"": ("infinite slab", "o-", 3.0), ", real plate": ("real plate", "s", 6.0)}
@@ -25,44 +28,87 @@ LINEAR = 0.1
 """Growth rates below this are drawn on a linear scale, 1/s."""
 MEANS = (
     ("Equilibrium moved by", "displacement (mm)"),
-    ("Mean force along the axis", "up, of the weight (%)"),
-    ("Braking torque (filled) and loss (open)", "torque on the floater (µN m)"),
+    ("Mean force, up", "of the weight (%)"),
+    ("Braking torque on the floater", "torque (µN m)"),
+    ("Loss in the plate", "loss (mW)"),
 )
 """Titles and labels of what `means` gives."""
+LIFT = 1
+"""Which of them has both signs."""
 
 
-def means(part: xr.Dataset) -> tuple[Array, Array, Array]:
-    """What a plate does on average: displacement (mm), force up (% of the weight) and braking torque (µN m)."""
+def means(part: xr.Dataset) -> tuple[Array, Array, Array, Array]:
+    """What a plate does on average: displacement (mm), force up (% of the weight), braking torque (µN m), loss (mW)."""
     moved = 1e3 * np.linalg.norm(part["shift"].values, axis=-1)
     lift = 100 * part["force"].sel(axis="z").values / float(part.attrs["weight_N"])
-    return np.asarray(moved), lift, -1e6 * part["torque"].sel(axis="z").values
+    return np.asarray(moved), lift, -1e6 * part["torque"].sel(axis="z").values, 1e3 * part["loss"].values
 
 
 @styled
-def damping_figure(result: xr.Dataset) -> Figure:
-    """Growth of each small motion against place and material of the plate and over rotors; what it does on average."""
-    figure, axes = panels(3, 3, (11.5, 9.0))
-    places = (*axes[0], *axes[1, :2])
-    for (sweep, (title, words, scale)), place in zip(SWEEPS.items(), places, strict=True):
-        _growth(place, result, sweep, scale)
-        place.set(title=title, xlabel=words, ylabel="growth rate (1/s)")
+def places_figure(result: xr.Dataset) -> Figure:
+    """Growth of each small motion against the plate's distance, below the floater and beside it."""
+    figure, axes = _growths(result, ("below", "beside"))
     for ending, (name, style, size) in MODELS.items():
         if part_of(result, f"below{ending}").sizes["case"]:
-            axes[0, 1].plot([], [], style, ms=size, mfc="none" if ending else "0.3", color="0.3", label=name)
-    axes[0, 0].legend(loc="lower right")
-    axes[0, 1].legend(loc="lower right")
-    _rotors(axes[1, 2], result)
-    for number, (place, (title, words)) in enumerate(zip(axes[2], MEANS, strict=True)):
-        _mean(place, result, number)
-        place.set(title=title, xlabel="distance of the face (mm)", ylabel=words)
-    _loss_beside(axes[2, 2], result)
-    axes[2, 0].set_yscale("log")
-    for place in (axes[0, 0], axes[0, 1], *axes[2]):
-        place.set_xscale("log")
-        place.set_xticks(DISTANCES, [f"{d:g}" for d in DISTANCES])
-        place.xaxis.set_minor_locator(NullLocator())
-    axes[2, 0].legend(loc="upper right")
+            axes[1].plot([], [], style, ms=size, mfc="none" if ending else "0.3", color="0.3", label=name)
+    axes[1].legend(loc="lower right")
+    for panel in axes:
+        _mark_distances(panel)
     return figure
+
+
+@styled
+def materials_figure(result: xr.Dataset) -> Figure:
+    """Growth of each small motion against frequency, conductivity and thickness, plate 18 mm below the floater."""
+    return _growths(result, ("frequency", "conductivity", "thickness"))[0]
+
+
+@styled
+def rotors_figure(result: xr.Dataset) -> Figure:
+    """Growth of the least damped motion of every rotor of the article, plate below and beside."""
+    figure, ((axes,),) = panels(1, 1, (0.7 * PAGE, 3.0))
+    _rotors(axes, result)
+    return figure
+
+
+@styled
+def means_figure(result: xr.Dataset) -> Figure:
+    """What the plate does on average: it moves the floater, pushes it, brakes it and is warmed."""
+    figure, axes = panels(2, 2, (0.8 * PAGE, 4.4), sharex=True)
+    for number, (panel, (title, words)) in enumerate(zip(axes.flat, MEANS, strict=True)):
+        _mean(panel, result, number)
+        panel.set(title=title, ylabel=words, yscale="linear" if number == LIFT else "log")
+        _mark_distances(panel)
+    for panel in axes[1]:
+        panel.set_xlabel("distance of the face (mm)")
+    axes[0, 0].legend(loc="upper right")
+    return figure
+
+
+FIGURES = {
+    "plate-damping-distance": places_figure,
+    "plate-damping-material": materials_figure,
+    "plate-damping-rotors": rotors_figure,
+    "plate-damping-means": means_figure,
+}
+
+
+def _growths(result: xr.Dataset, sweeps: Sequence[str]) -> tuple[Figure, Any]:
+    """A panel for each sweep."""
+    figure, (axes,) = panels(1, len(sweeps), (PAGE, 3.0), sharey=True)
+    for panel, sweep in zip(axes, sweeps, strict=True):
+        title, words, scale = SWEEPS[sweep]
+        _growth(panel, result, sweep, scale)
+        panel.set(title=title, xlabel=words)
+    axes[0].set_ylabel("growth rate (1/s)")
+    axes[0].legend(loc="lower right")
+    return figure, axes
+
+
+def _mark_distances(axes: Axes) -> None:
+    axes.set_xscale("log")
+    axes.set_xticks(DISTANCES, [f"{d:g}" for d in DISTANCES])
+    axes.xaxis.set_minor_locator(NullLocator())
 
 
 def part_of(result: xr.Dataset, sweep: str) -> xr.Dataset:
@@ -79,7 +125,7 @@ def _growth(axes: Axes, result: xr.Dataset, sweep: str, scale: float) -> None:
             growth, error = part["growth"].sel(mode=mode).values, part["error"].values
             axes.errorbar(
                 varied, growth, yerr=np.abs(growth) * error, fmt=style, ms=size,
-                mfc="none" if ending else color, color=color, label=None if ending or sweep != "below" else str(mode),
+                mfc="none" if ending else color, color=color, label=None if ending else str(mode),
             )  # fmt: skip
     axes.set_xscale("linear" if sweep == "frequency" else "log")
     axes.set_yscale("symlog", linthresh=LINEAR)
@@ -101,7 +147,7 @@ def _rotors(axes: Axes, result: xr.Dataset) -> None:
         axes.set_xticks(places, names, rotation=90, fontsize=7)
     axes.set_yscale("symlog", linthresh=LINEAR)
     axes.axhline(0.0, color="0.3", lw=0.8)
-    axes.set(title="Rotors of the article, plate at 18 mm", ylabel="growth of the least damped motion (1/s)")
+    axes.set(title="Rotors of the article, plate at 18 mm", ylabel="growth of the least\ndamped motion (1/s)")
     axes.margins(x=0.08, y=0.12)
     axes.legend()
 
@@ -116,17 +162,3 @@ def _mean(axes: Axes, result: xr.Dataset, number: int) -> None:
                     part["value"].values * 1e3, values, np.abs(values) * error, fmt=line, ms=6 if ending else 3,
                     color=color, mfc=fill, label=f"{sweep}{ending}",
                 )  # fmt: skip
-
-
-def _loss_beside(axes: Axes, result: xr.Dataset) -> None:
-    """The loss on an axis of its own."""
-    twin = axes.twinx()
-    for sweep, style, color in (("below", "o:", PALETTE[2]), ("beside", "s:", PALETTE[3])):
-        part = part_of(result, sweep)
-        distance, loss = part["value"].values * 1e3, 1e3 * part["loss"].values
-        twin.plot(distance, loss, style, ms=3, mfc="white", color=color, label=f"loss, {sweep}")
-    twin.set(yscale="log", ylabel="loss in the plate (mW)")
-    axes.set_yscale("log")
-    twin.grid(False)
-    found = [each.get_legend_handles_labels() for each in (axes, twin)]
-    axes.legend([*found[0][0], *found[1][0]], [*found[0][1], *found[1][1]], loc="lower left")

@@ -34,12 +34,12 @@ def _line(one: xr.Dataset, sweep: str) -> str:
     if np.isnan(worst):
         return f"{where}no equilibrium is left."
     mode = str(one["mode"].values[int(one["growth"].argmax("mode"))])
-    moved, lift, torque = means(one)
+    moved, lift, torque, loss = means(one)
     return (
         f"{where}{'stable' if worst < 0 else 'UNSTABLE'}, least damped motion {mode} {worst:+.3g} ± "
         f"{abs(worst) * float(one['error']):.1g} /s (without the plate {float(one['growth_without'].max()):+.1g} /s); "
         f"moved {moved:.3f} mm; mean force up {lift:+.3g} % of the weight; braking torque {torque:.3g} µN m; "
-        f"loss {1e3 * float(one['loss']):.3g} mW."
+        f"loss {loss:.3g} mW."
     )
 
 

@@ -18,7 +18,7 @@ from ...fem.eddy_currents import solve_eddy
 from ...geometry.basics import Array
 from ...geometry.meshes import Block, ConductorMesh, graded_partition, hex_mesh, skin_depth
 from ..results import study_of_one, variable
-from .team7_figure import team7_figure, team7_lines
+from .team7_figure import FIGURES, team7_lines
 
 CONDUCTIVITY = 3.526e7
 COIL = Racetrack(np.array([0.194, 0.100, 0.099]), (0.2, 0.2), 0.1, 0.025, 0.05, 2742.0)
@@ -94,6 +94,6 @@ STUDY = study_of_one(
     name="team7",
     summary="eddy currents against the measurement of TEAM workshop problem 7",
     compute=team7_study,
-    draw=team7_figure,
+    figures=FIGURES,
     report=team7_lines,
 )

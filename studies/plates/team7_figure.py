@@ -4,7 +4,7 @@ import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
 
-from ..results import PALETTE, panels, styled
+from ..results import PAGE, PALETTE, panels, styled
 
 FIELDS = ("measured", "computed")
 
@@ -35,7 +35,7 @@ def _common_phase(result: xr.Dataset, number: int) -> str:
 @styled
 def team7_figure(result: xr.Dataset) -> Figure:
     """The four curves with what is measured, and their deviation."""
-    figure, ((left, right),) = panels(1, 2, (8.0, 3.6))
+    figure, ((left, right),) = panels(1, 2, (PAGE, 3.2))
     x = 1e3 * result["x"].values
     for curve, color in zip(result["curve"].values, PALETTE, strict=False):
         here = result.sel(curve=curve)
@@ -50,3 +50,6 @@ def team7_figure(result: xr.Dataset) -> Figure:
     left.legend(loc="upper left", ncols=2)
     right.legend(loc="upper left", ncols=2)
     return figure
+
+
+FIGURES = {"team7": team7_figure}

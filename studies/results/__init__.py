@@ -27,8 +27,10 @@ from .study import (
 )
 from .style import (
     COLORS as COLORS,
+    COLUMN as COLUMN,
     DASHES as DASHES,
     NAMES as NAMES,
+    PAGE as PAGE,
     PALETTE as PALETTE,
     figure_bytes as figure_bytes,
     panels as panels,

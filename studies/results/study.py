@@ -56,7 +56,7 @@ class Study:
     points : takes `quick` and returns the points
     compute : takes a point and returns its labelled result, the same whoever computes it
     gather : joins the results of the points into one
-    draw : the figure, from the joined result alone
+    figures : by the name of its files, what draws each figure from the joined result alone; one message a figure
     report : what it says, in lines, from the joined result alone
     prepared : how to compute each of several points that help each other; None where they do not
     batches : which of the numbered points are computed together, with `prepared`
@@ -69,7 +69,7 @@ class Study:
     points: Callable[[bool], Sequence[Point]]
     compute: Callable[[Point], xr.Dataset]
     gather: Callable[[Sequence[xr.Dataset]], xr.Dataset]
-    draw: Callable[[xr.Dataset], Figure]
+    figures: Mapping[str, Callable[[xr.Dataset], Figure]]
     report: Callable[[xr.Dataset], list[str]]
     prepared: Callable[[Sequence[Point]], Sequence[Callable[[], xr.Dataset]]] | None = None
     batches: Callable[[Mapping[int, Point]], Sequence[Sequence[int]]] | None = None

@@ -16,21 +16,25 @@ if TYPE_CHECKING:  # loading matplotlib takes as long as many an answer
 PALETTE = ["#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9"]
 """Colours of M. Okabe and K. Ito, which all kinds of colour vision tell apart."""
 STYLE: Any = {
-    "font.size": 9,
-    "axes.titlesize": 9.5,
+    "font.size": 8,
+    "axes.titlesize": 8.5,
     "axes.titleweight": "bold",
     "axes.titlelocation": "left",
     "axes.spines.top": False,
     "axes.spines.right": False,
-    "legend.fontsize": 8,
+    "legend.fontsize": 7,
+    "legend.handlelength": 1.6,
+    "legend.title_fontsize": 7,
     "lines.linewidth": 1.2,
     "axes.grid": True,
     "grid.alpha": 0.3,
     "axes.prop_cycle": f"cycler('color', {PALETTE})",
     "legend.frameon": False,
-    "savefig.dpi": 160,
+    "savefig.dpi": 180,
     "figure.constrained_layout.use": True,
 }
+COLUMN, PAGE = 3.4, 7.0
+"""Width of a figure in one column of a journal and across its page, inches."""
 NAMES = {
     "dipole": "point dipole",
     "cuboid": "cuboid, closed form (μr = 1)",
@@ -56,12 +60,12 @@ def styled(draw: Draw) -> Draw:
     return cast("Draw", inside)
 
 
-def panels(rows: int, columns: int, size: tuple[float, float]) -> tuple[Figure, Any]:
-    """A figure without a window and its axes (rows, columns); `size` in inches."""
+def panels(rows: int, columns: int, size: tuple[float, float], **shared: Any) -> tuple[Figure, Any]:
+    """A figure without a window and its axes (rows, columns); `size` in inches, `shared` as of `Figure.subplots`."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=size)
-    return figure, figure.subplots(rows, columns, squeeze=False)
+    return figure, figure.subplots(rows, columns, squeeze=False, **shared)
 
 
 def save_figures(figures: Mapping[str, Figure], out: Path) -> list[str]:

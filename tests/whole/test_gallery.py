@@ -1,17 +1,20 @@
 """Every example of the gallery runs as it stands, and one number of each is right."""
 
+import json
+import re
 import runpy
 
 import matplotlib as mpl
 import numpy as np
 import pytest
-from places import DOCS, HORIZONTAL, ROOT
+from places import DOCS, HORIZONTAL
 
 from spinlev.geometry.basics import MU_0
 from spinlev.geometry.scenes import load_scene
 from spinlev.studies.catalogue import CATALOGUE
 from spinlev.studies.results.style import STYLE
 
+EXAMPLES, BUILT = DOCS / "examples", DOCS / "_build" / "html"
 MOMENT = load_scene(HORIZONTAL).floater.moment * np.sin(np.radians(5.0))
 SLOW = 200 * np.pi * MOMENT**2 * MU_0**2 * 3.5e7 / (64 * np.pi) * (1 / 0.015 - 1 / 0.045) * 1e6
 """Braking torque at 100 Hz if it went on as at rest, closed form of an infinite slab, µN m."""
@@ -32,9 +35,9 @@ NUMBERS = {
 
 
 @pytest.fixture(autouse=True)
-def as_a_user(monkeypatch):
-    """In the repository's root, and the catalogue as it was."""
-    monkeypatch.chdir(ROOT)
+def as_a_user(monkeypatch, tmp_path):
+    """In a folder of one's own, and the catalogue as it was."""
+    monkeypatch.chdir(tmp_path)
     before = dict(CATALOGUE)
     yield
     CATALOGUE.clear()
@@ -47,18 +50,56 @@ LONG = ("own_field_model", "own_study", "stability_with_plate", "sweep")
 @pytest.mark.parametrize("name", [pytest.param(n, marks=pytest.mark.slow if n in LONG else ()) for n in NUMBERS])
 def test_example(name):
     with mpl.rc_context(STYLE):
-        found = runpy.run_path(str(DOCS / "examples" / f"{name}.py"))
+        found = runpy.run_path(str(EXAMPLES / f"{name}.py"))
     variable, value, allowed = NUMBERS[name]
     value = found[value] if isinstance(value, str) else value
     assert abs(found[variable] - value) < allowed
     assert found["figure"].axes[0].has_data()
 
 
-def test_all_examples_are_tested_and_shown():
-    examples = {path.stem for path in (DOCS / "examples").glob("*.py")}
-    assert examples == set(NUMBERS)
-    shown = (DOCS / "gallery.md").read_text(encoding="utf-8")
-    for name in examples:
-        assert f"examples/{name}.py" in shown
-        assert f"gallery-{name}.png" in shown
-        assert (DOCS / "pictures" / f"gallery-{name}.png").is_file()
+def test_all_examples_are_tested():
+    assert {path.stem for path in EXAMPLES.glob("*.py")} == set(NUMBERS)
+
+
+@pytest.mark.parametrize("name", NUMBERS)
+def test_every_page_shows_its_program_and_gives_it_as_notebook_too(name):
+    page = BUILT / "gallery" / f"{name}.html"
+    if not page.exists():
+        pytest.skip("the documentation is not built here (make docs)")
+    shown = page.read_text(encoding="utf-8")
+    assert "sphx-glr-script-out" in shown
+    assert f"sphx_glr_{name}_001.png" in shown
+    for suffix in ("py", "ipynb"):
+        assert re.search(rf'href="(\.\./_downloads/\w+/{name}\.{suffix})"', shown)
+    found = re.search(rf'href="\.\./(_downloads/\w+/{name}\.ipynb)"', shown)
+    notebook = json.loads((BUILT / found[1]).read_text(encoding="utf-8"))
+    cells = ["".join(cell["source"]) for cell in notebook["cells"] if cell["cell_type"] == "code"]
+    program = (EXAMPLES / f"{name}.py").read_text(encoding="utf-8")
+    assert cells[0] == "%matplotlib inline"
+    assert "\n".join(cells[1:]).strip() == program.split('"""', 2)[2].strip()
+
+
+def twelve_lines(changes):
+    """The distances of the program of the first steps, with some of its text changed."""
+    program = (DOCS / "twelve_lines.py").read_text(encoding="utf-8")
+    for old, new in changes.items():
+        assert old in program
+        program = program.replace(old, new)
+    found = {}
+    exec(program, found)
+    return found["distance"]
+
+
+def test_one_question_takes_twelve_lines():
+    lines = (DOCS / "twelve_lines.py").read_text(encoding="utf-8").split('"""', 2)[2].splitlines()
+    assert len([line for line in lines if line.strip()]) <= 12
+    quick = twelve_lines({"[8.0, 10.0, 12.0]": "[10.0]", '["dipole", "fem"]': '["dipole"]', '"slab"': '"none"'})
+    assert float(quick.squeeze()) == pytest.approx(17.28, abs=0.1)  # the plate moves it by less
+
+
+@pytest.mark.slow
+def test_the_first_steps_say_what_it_prints():
+    page = (DOCS / "first-steps.md").read_text(encoding="utf-8")
+    told = re.search(r"rotor.edge_mm\n((?:    [\d.]+ +[\d.]+ +[\d.]+\n)+)", page)[1]
+    rows = np.array([line.split() for line in told.splitlines()], dtype=float)
+    np.testing.assert_allclose(twelve_lines({}).values, rows[:, 1:], atol=0.006)

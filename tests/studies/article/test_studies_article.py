@@ -178,7 +178,8 @@ def test_figures_and_reports_come_from_the_result_alone(distances, forces, tmp_p
         ]
     )
     for name, result in {"levitation-distance": distances, "force-curve": forces, "field-components": field}.items():
-        save_figure(CATALOGUE[name].draw(result), tmp_path / f"{name}.png")
+        for figure, draw in CATALOGUE[name].figures.items():
+            save_figure(draw(result), tmp_path / f"{figure}.png")
         lines = CATALOGUE[name].report(result)
         assert lines
         assert not any("unknown" in line for line in lines)

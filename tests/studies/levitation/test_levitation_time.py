@@ -4,7 +4,7 @@ import numpy as np
 
 from spinlev.studies.levitation.levitation_time import gather_times, levitation_times, time_points
 from spinlev.studies.levitation.levitation_time_cases import OUTCOMES
-from spinlev.studies.levitation.levitation_time_figure import time_figure, time_lines
+from spinlev.studies.levitation.levitation_time_figure import FIGURES, time_lines
 
 
 def test_vertical_rotor_below_within_and_above_its_range():
@@ -22,7 +22,7 @@ def test_vertical_rotor_below_within_and_above_its_range():
     lines = time_lines(result)
     assert lines[0] == "vertical 14 mm:"
     assert len(lines) == 4
-    assert len(time_figure(result).axes) == 2
+    assert [len(draw(result).axes) for draw in FIGURES.values()] == [1, 1]
 
 
 def test_points_are_every_case_with_every_variant():
