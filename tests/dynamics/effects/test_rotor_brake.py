@@ -103,7 +103,7 @@ def test_its_power_is_the_loss_of_the_table():
 
 
 def test_metal_in_which_currents_have_memory_is_refused():
-    """Copper in the rotor: 9.2 mm of skin depth at twice 150 Hz."""
+    """Copper in the rotor: 3.8 mm of skin depth at twice 150 Hz."""
     copper = replace(BARE, rotor=tuple(replace(magnet, conductivity=6e7) for magnet in BARE.rotor))
     with pytest.raises(InputError, match="must leave its skin depth large"):
         with_effects(copper, FIELD)
