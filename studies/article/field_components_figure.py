@@ -1,5 +1,6 @@
 """Figures and sentences of the study of the field's components, from its dataset alone."""
 
+from collections.abc import Callable
 from functools import partial
 from typing import Any
 
@@ -47,7 +48,7 @@ def differences_figure(result: xr.Dataset) -> Figure:
     return figure
 
 
-FIGURES = {
+FIGURES: dict[str, Callable[[xr.Dataset], Figure]] = {
     "field-components-off-axis": partial(component_figure, quantity="off_axis"),
     "field-components-on-axis": partial(component_figure, quantity="on_axis"),
     "field-components-differences": differences_figure,

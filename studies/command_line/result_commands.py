@@ -104,17 +104,19 @@ def figure(result: Path, *, output: Beside = Beside()) -> Answer:
     return Answer({"figures": files}, [f"Figure in {file}" for file in files], output.json)
 
 
-def show(result: Path, *, output: Beside = Beside()) -> Answer:
+def show(result: Path, *, html: Annotated[bool, Parameter(negative="")] = False, output: Beside = Beside()) -> Answer:
     """Three-dimensional pictures of a flight, beside its file: the scene with the plate's currents, and an animation.
 
     Parameters
     ----------
     result
         result.nc of `run` or trajectory.nc of `simulate`.
+    html
+        Also write a page in which the scene is turned with the mouse.
     """
     from ..catalogue import show_job
 
-    files = show_job(result, output.out or result.parent)
+    files = show_job(result, output.out or result.parent, html)
     return Answer({"pictures": files}, [f"Picture in {file}" for file in files], output.json)
 
 

@@ -1,5 +1,6 @@
 """Figures and sentences of the study of sensitivities, from its dataset alone."""
 
+from collections.abc import Callable
 from functools import partial
 from typing import Any
 
@@ -71,7 +72,7 @@ def distance_bands_figure(result: xr.Dataset) -> Figure:
     return figure
 
 
-FIGURES = {
+FIGURES: dict[str, Callable[[xr.Dataset], Figure]] = {
     "sensitivity-distance": partial(
         contributions_figure, quantity=MIDDLE, scale=1e3, words="change of the distance (mm)"
     ),
