@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import scipy
 
-from ...fem.rotor_tables import RotorTable
+from ...fem.rotor_tables import FieldTable
 from ...geometry.basics import Array
 from ...geometry.scenes import AbsoluteStart, Scene
 from ..equilibria import Steps
@@ -74,7 +74,7 @@ def by_frequency(scene: Scene, rates: Rates) -> Family:
     return Family(rates, frequencies(scene), UNIT)
 
 
-def levitating_branch(scene: Scene, table: RotorTable, rates: Rates, highest: float) -> Branch:
+def levitating_branch(scene: Scene, table: FieldTable, rates: Rates, highest: float) -> Branch:
     """The branch of a scene's floater up to the frequency `highest` (Hz) or contact; gravity along the axis, s = 0.
 
     Raises
@@ -103,7 +103,7 @@ def kicked(scene: Scene, point: BranchPoint, speed: float) -> Scene:
     return replace(there, start=start)
 
 
-def _hanging(scene: Scene, table: RotorTable, family: Family) -> Array:
+def _hanging(scene: Scene, table: FieldTable, family: Family) -> Array:
     """Scaled state (12,) near the far equilibrium: on the axis, upright, where attraction carries the weight."""
     scales, upright = Scales.of(scene), UP[None]
     weight = scene.floater.mass * abs(float(scene.gravity[2]))
@@ -123,14 +123,16 @@ def _hanging(scene: Scene, table: RotorTable, family: Family) -> Array:
     return np.asarray(family.balance(scene.frequency).states(-distance / scales.length * upright, upright)[0])
 
 
-def distance_error(scene: Scene, table: RotorTable, family: Family, point: BranchPoint) -> float:
-    """What the table's own stated error may change of the distance along the axis, to first order, m."""
+def distance_error(scene: Scene, table: FieldTable, family: Family, point: BranchPoint) -> float:
+    """What the errors that a table and its effects state may change of the distance along the axis, first order, m."""
     here = replace(scene, frequency=point.parameter)
     scales = Scales.of(here)
     values = parameters(here, scales, frozen_spin=True)
-    error_field, error_gradient = table.absolute_error(point.position)
-    torque = values[Parameter.TORQUE] * error_field[0]
-    force = np.prod(values[[Parameter.TORQUE, Parameter.INERTIA, Parameter.LENGTH]]) * error_gradient[0]
+    place = point.position[None]
+    (field, gradient), (of_field, of_gradient) = table.evaluate(place), table.relative_error(place)
+    torque = values[Parameter.TORQUE] * of_field[0] * np.linalg.norm(field)
+    size = of_gradient[0] * np.linalg.norm(gradient)
+    force = np.prod(values[[Parameter.TORQUE, Parameter.INERTIA, Parameter.LENGTH]]) * size
     slope = family.balance(point.parameter)(point.state[None, :3], point.state[None, 6:9])[1][0]
     shares = np.abs(np.linalg.inv(slope)[2])
     return float(shares @ np.array([force] * 3 + [torque] * 2)) * scales.length

@@ -6,7 +6,7 @@ from functools import partial
 
 import scipy
 
-from ...fem.rotor_tables import RotorTable, rotor_table
+from ...fem.rotor_tables import FieldTable, rotor_table
 from ...geometry.basics import Array
 from ...geometry.scenes import Scene
 from ..effects import with_effects
@@ -62,7 +62,7 @@ def reference_state(scene: Scene) -> tuple[Array, float]:
     return middle.state, middle.parameter
 
 
-def levitating_ranges(scene: Scene, table: RotorTable, rates: Rates) -> list[StableRange]:
+def levitating_ranges(scene: Scene, table: FieldTable, rates: Rates) -> list[StableRange]:
     """All intervals of stability on the branch that levitates below the rotor, by ascending frequency.
 
     The branch is found without a search, see `levitation_branch`.  Raises EquilibriumError where there is no branch.

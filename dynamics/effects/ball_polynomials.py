@@ -1,4 +1,8 @@
-"""Polynomials in a ball as products of its harmonics with powers of r², which its field has computed anyway."""
+"""Polynomials in a ball as products of its harmonics with powers of r², which its field has computed anyway.
+
+What bodies do to each other falls steeply with their distance, but much the same in all its parts: they are q⁻³ times
+polynomials with one q of degree 2.  With degree 2 they err by a tenth of what polynomials of degree 3 alone do.
+"""
 
 from collections.abc import Sequence
 from functools import cache
@@ -10,6 +14,8 @@ from ...fem.harmonics import regular_harmonics
 from ...geometry.basics import Array
 
 NORMALS, RADII = 32, (0.35, 0.7, 1.0)
+FALL = 3
+"""Minus the power of q."""
 
 
 def polynomials(degree: int, offset: Sequence[hy.expression]) -> list[hy.expression]:
@@ -43,6 +49,18 @@ def fitting(degree: int) -> tuple[Array, Array]:
     x = hy.make_vars("x", "y", "z")
     values = hy.cfunc(polynomials(degree, x), x, compact_mode=True)(np.ascontiguousarray(nodes().T)).T
     return np.linalg.pinv(values), values
+
+
+def falling(size: Array) -> tuple[Array, Array]:
+    """Weights (10,) of q and q⁻³ (n,) for the size (n,) > 0, at the nodes, of what is told by it."""
+    solve, basis = fitting(2)
+    weights = solve @ (size / size[0]) ** (-1 / FALL)
+    return weights, (basis @ weights) ** -FALL
+
+
+def weighted_sum(first: int, basis: Sequence[hy.expression]) -> hy.expression:
+    """Σ weight · basis, the weights being runtime parameters from number `first` on; the basis begins with 1."""
+    return hy.sum([hy.par[first], *(hy.par[first + k] * p for k, p in enumerate(basis) if k)])
 
 
 @cache

@@ -4,17 +4,21 @@ The floater's dipole m drives current pattern k by u_k = d/dt m·c_k(x), as seen
 field B = -Σ u_k c_k there, which acts on the floater by (m·∇)B and m × B and takes the power Σ u_k².
 """
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import heyoka as hy
 import numpy as np
 
+from ...fem.harmonics import BallField
 from ...fem.rotor_losses import RotorLosses
 from ...fem.rotor_tables import FieldTable
 from ...geometry.basics import Array
 from ...geometry.scenes import Scene
-from ..motion import Added, Motion, Parameter, Scales, State, Vector, cross, dissipative, dot
+from ..motion import Added, Motion, Parameter, Scales, State, cross, dot
+from .rotor_losses_ball import RotorCurrentsInBall, braked
 
 ROTOR_CURRENTS = "currents in the rotor"
 UPPER = [(a, b) for a in range(6) for b in range(a, 6)]
@@ -45,11 +49,15 @@ class RotorCurrents:
             for i in range(3)
         ]
         force = [length * dot(moment, [slopes[i][j] for i in range(3)]) for j in range(3)]
-        return _braked(force, field, motion)
+        return braked(force, field, motion)
 
-    def placed(self, first: int) -> "RotorCurrentsAtPlace":
+    def placed(self, first: int) -> RotorCurrentsAtPlace:
         """The same about one pose."""
         return RotorCurrentsAtPlace(self.table, first)
+
+    def in_ball(self, ball: BallField, first: int) -> RotorCurrentsInBall:
+        """The same in a ball."""
+        return RotorCurrentsInBall(self.table, ball, first, self.name)
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,7 +84,7 @@ class RotorCurrentsAtPlace:
         known = {pair: hy.par[self.first + k] for k, pair in enumerate(UPPER)}
         rates = [*motion.drift, *cross(motion.lag, motion.moment)]
         force = [-hy.sum([known[min(a, b), max(a, b)] * r for b, r in enumerate(rates)]) for a in range(6)]
-        return _braked(force[:3], force[3:], motion)
+        return braked(force[:3], force[3:], motion)
 
     def numbers(self, field: FieldTable, position: Array, moment: Array, values: Array) -> Array:
         """(n, count) for scaled positions and moments (n, 3), and runtime parameters (n, p)."""
@@ -88,11 +96,6 @@ class RotorCurrentsAtPlace:
         scaled = rates * strength / np.sqrt(time)
         matrix = np.einsum("nka,nkb->nab", scaled, scaled)
         return np.array([matrix[:, a, b] for a, b in UPPER]).T
-
-
-def _braked(force: Vector, field: Vector, motion: Motion) -> Added:
-    torque = [t / hy.par[Parameter.INERTIA] for t in cross(motion.moment, field)]
-    return dissipative(force, torque, motion)
 
 
 def _sum(weights: Array, terms: Sequence[hy.expression]) -> hy.expression:

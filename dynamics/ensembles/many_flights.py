@@ -2,20 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from functools import partial
+from time import perf_counter
 from typing import Any
 
 import numpy as np
 
 from ...fem.rotor_tables import FieldTable
 from ...geometry.basics import InputError
-from ...geometry.scenes import Scene
-from ..flights import DEGREE, LARGE, SMALL, TOLERANCE, LocalFlight, Parts, fly_on
-from ..motion import CONTACT, Parameter, State, clearance, lost_distance
+from ...geometry.scenes import OffsetStart, Scene, scene_text
+from ..flights import LARGE, SMALL, TOLERANCE, LocalFlight, Parts, Trajectory
+from ..motion import State
 from .endings import Endings
-from .lanes import Flying, Lanes
+from .flying import Flying
+from .lanes import Lanes
 
 
 def ensemble(
@@ -51,41 +53,57 @@ def ensemble(
     if not count:
         raise InputError("Input starts must have one state at least; instead received none.")
     pieces = [slice(first, first + together) for first in range(0, count, together)]
-    parts = mapped(partial(_flown, scene, table, duration), [State(*(v[p] for v in starts.vectors)) for p in pieces])
+    parts = mapped(partial(_ended, scene, table, duration), [State(*(v[p] for v in starts.vectors)) for p in pieces])
     return Endings.joined(list(parts))
 
 
-def _flown(scene: Scene, table: FieldTable, duration: float, starts: State) -> Endings:
+def fly_together(
+    scenes: Sequence[Scene], table: FieldTable, starts: Sequence[State], duration: float
+) -> list[Trajectory | None]:
+    """Flights of scenes whose equations are the same but for runtime parameters, from one start each, with samples.
+
+    Each is what `simulate` gives without a plate's currents, but for round-off; None where the start is in contact.
+
+    Raises
+    ------
+    IntegrationError : a state became infinite
+    """
+    known: dict[str, LocalFlight] = {}
+    flights = []
+    began = perf_counter()
+    for scene, start in zip(scenes, starts, strict=True):
+        key = scene_text(replace(scene, start=OffsetStart()))
+        local = known.setdefault(key, local_flight(scene, table, duration))
+        flights.append(Flying.begun(local, start, duration, True))
+    fly_all(flights)
+    speed = sum(f.seconds for f in flights) / (perf_counter() - began)
+    return [None if f.recorder is None else f.trajectory(speed) for f in flights]
+
+
+def local_flight(scene: Scene, table: FieldTable, duration: float) -> LocalFlight:
+    """What flies in balls, without a plate's currents."""
+    return LocalFlight(scene, table, Parts(scene, table, duration, TOLERANCE, True, None))
+
+
+def fly_all(flights: Sequence[Flying]) -> None:
     """In lanes, in small balls first, then in large ones; at last one by one near bodies, and where it is too fast."""
-    flight = LocalFlight(scene, table, Parts(scene, table, duration, TOLERANCE, True, None))
-    flights = [_begun(flight, k, State(*(v[k] for v in starts.vectors))) for k in range(len(starts.position))]
-    over: list[Flying] = []
     for formula in (SMALL, LARGE):
-        here = [f for f in flights if not f.ended_by and f.values[DEGREE] == formula.degree]
-        over += [f for f in flights if f.ended_by]
-        rest = [f for f in flights if not f.ended_by and f.values[DEGREE] != formula.degree]
-        flights = rest + Lanes(flight, formula, duration).fly(here)
-    over += [f if f.ended_by else _alone(flight, f, duration) for f in flights]
-    over.sort(key=lambda f: f.number)
+        here = [f for f in flights if not f.over and f.degree == formula.degree]
+        if here:
+            Lanes(here[0].flight, formula).fly(here)
+    for flight in flights:
+        if not flight.over:
+            flight.alone()
+
+
+def _ended(scene: Scene, table: FieldTable, duration: float, starts: State) -> Endings:
+    flight = local_flight(scene, table, duration)
+    count = len(starts.position)
+    flights = [Flying.begun(flight, State(*(v[k] for v in starts.vectors)), duration, False) for k in range(count)]
+    fly_all(flights)
     return Endings(
-        np.array([f.ended_by for f in over]),
-        np.minimum([f.time * flight.scales.time for f in over], duration),
-        flight.scales.unpack(np.array([f.state for f in over])),
-        np.array([f.changes for f in over]),
+        np.array([f.log.ended_by for f in flights]),
+        np.minimum([f.seconds for f in flights], duration),
+        flight.scales.unpack(np.array([f.state[:12] for f in flights])),
+        np.array([f.log.changes.count for f in flights]),
     )
-
-
-def _begun(flight: LocalFlight, number: int, start: State) -> Flying:
-    """A flight at t = 0; over if it begins in contact."""
-    start = replace(start, moment=start.moment / np.linalg.norm(start.moment))
-    values, state = flight.values, flight.scales.pack(start)
-    values[Parameter.LOST_DISTANCE] = lost_distance(start.position) / flight.scales.length
-    free = clearance(flight.scene, np.zeros(1), start.position[None])[0] >= 0
-    if free:
-        flight.enter(start, values)
-    return Flying(number, values, 0.0, state, ended_by="" if free else CONTACT)
-
-
-def _alone(flight: LocalFlight, flying: Flying, duration: float) -> Flying:
-    ended_by, time, state = fly_on(flight.scene, flight, flying.values, flying.time, flying.state, duration)
-    return replace(flying, time=time, state=state, ended_by=ended_by)

@@ -2,14 +2,20 @@
 
 import numpy as np
 
+from ...fem.harmonics import Ball, BallField
 from ...fem.mutual import MutualTable
 from ...fem.rotor_losses import RotorLosses
 from ...fem.rotor_tables import FieldTable
 from ...geometry.basics import Array
 from ...geometry.scenes import Scene
-from ..effects import Mutual, brake_slope, rough_force
-from ..motion import Parameter, Rates, Scales, parameters
+from ..effects import FloaterCurrents, Mutual, brake_slope, rough_force
+from ..motion import Interaction, Parameter, Rates, Scales, State, parameters
 from ..steady import Balance, Equilibrium, modes, tangent_basis
+
+EXACT_SLOPES = 4
+"""Degree of a potential that has all derivatives which the slopes of the floater's currents ask for."""
+AROUND = 1 / 32
+"""Radius of the ball of that expansion, in radii of the floater."""
 
 
 def shift_by_answers(
@@ -37,14 +43,34 @@ def _shift(scene: Scene, rates: Rates, fixed: Equilibrium, force: Array, torque:
     return float(np.linalg.norm(np.linalg.solve(slope, pushed)[:3]) * scales.length)
 
 
-def growth_by_floater(scene: Scene, rates: Rates, equilibrium: Equilibrium) -> float:
-    """What the floater's own currents add to the growth of what grows fastest, 1/s; `rates` know of them."""
+def growth_by_floater(scene: Scene, rates: Rates, table: FieldTable, equilibrium: Equilibrium) -> float:
+    """What the floater's own currents add to the growth of what grows fastest, 1/s; `rates` may know of them or not."""
     scales, fixed = Scales.of(scene), equilibrium.without or equilibrium
-    values, state = parameters(scene, scales, frozen_spin=True), scales.pack(fixed.state)
+    state, still = scales.pack(fixed.state), parameters(scene, scales, frozen_spin=True)
+    without = rates(state[None], _without_currents(still))[1][0]
+    brake = floater_slope(scene, table, fixed.state)
+    return (modes(state, without + brake).growth - modes(state, without).growth) / scales.time
+
+
+def floater_slope(scene: Scene, table: FieldTable, state: State) -> Array:
+    """(12, 12): what the floater's currents add to the derivatives of the scaled rates at a state.
+
+    In the field's expansion about the place, whose derivatives there are the field's, code is compiled in a tenth
+    of the time that the table's own expressions take.
+    """
+    formula = BallField(len(Parameter), EXACT_SLOPES)
+    numbers, _ = formula.fit(table.evaluate, Ball(state.position, AROUND * scene.floater.radius))
+    scales = Scales.of(scene)
+    values = np.concatenate([parameters(scene, scales, frozen_spin=True), numbers])
+    rates = Rates(Interaction(formula, (FloaterCurrents(),)))
+    slopes = [rates(scales.pack(state)[None], each)[1][0] for each in (values, _without_currents(values))]
+    return np.asarray(slopes[0] - slopes[1])
+
+
+def _without_currents(values: Array) -> Array:
     still = values.copy()
     still[Parameter.TILT_EDDY] = 0.0
-    both = [modes(state, rates(state[None], each)[1][0]).growth for each in (values, still)]
-    return (both[0] - both[1]) / scales.time
+    return still
 
 
 def growth_by_rotor(scene: Scene, rates: Rates, equilibrium: Equilibrium, losses: RotorLosses, included: bool) -> float:

@@ -7,17 +7,31 @@ from .ball_parts import (
     SMALL as SMALL,
     Parts as Parts,
     ball_equations as ball_equations,
+    is_long as is_long,
 )
 from .checkpoint import Checkpoint as Checkpoint
 from .compiled_flight import TOLERANCE as TOLERANCE
 from .integration import fly_on as fly_on
 from .kind import GROWING as GROWING, STABLE as STABLE, flight_kind as flight_kind
+from .ledger import booked as booked, ledger_scale as ledger_scale
 from .local_flight import LocalFlight as LocalFlight
-from .pieces import IntegrationError as IntegrationError
+from .pieces import (
+    MOST_SAMPLES as MOST_SAMPLES,
+    IntegrationError as IntegrationError,
+    Log as Log,
+    first_interval as first_interval,
+    flown as flown,
+)
+from .recorder import Recorder as Recorder
 from .simulation import (
     StartError as StartError,
     initial_state as initial_state,
     simulate as simulate,
     starting_point as starting_point,
 )
-from .trajectory import DURATION as DURATION, FlightStopped as FlightStopped, Trajectory as Trajectory
+from .trajectory import (
+    DURATION as DURATION,
+    FieldChanges as FieldChanges,
+    FlightStopped as FlightStopped,
+    Trajectory as Trajectory,
+)

@@ -74,14 +74,16 @@ class Balls:
         return (values, error) if error <= ERROR else None
 
     def _fit(self, ball: Ball) -> tuple[Array, float]:
-        """Parameters of a ball, and the largest error; an effect may have ten times that of the field."""
+        """Parameters of a ball, and the largest error, those of effects by what they may have."""
         values, error = self.formula.fit(self.evaluate, ball)
         if not self.effects:
             return values, error
         gradient = self.evaluate(ball.center[None])[1][0]
         found = [effect.fit(ball, gradient) for effect in self.effects]
         padded = np.concatenate([values, np.zeros(FIRST - DEGREE - 1 - len(values))])
-        return np.concatenate([padded, *(numbers for numbers, _ in found)]), max(error, *(e / 10 for _, e in found))
+        return np.concatenate([padded, *(numbers for numbers, _ in found)]), max(
+            error, *(ERROR * share for _, share in found)
+        )
 
 
 def _room(scene: Scene, center: Array, reach: float) -> float:

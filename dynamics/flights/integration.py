@@ -14,14 +14,11 @@ from ..motion import Parameter, State, lost_distance, plate_legs
 from .ball_parts import LEFT
 from .checkpoint import Checkpoint, Progress
 from .compiled_flight import Flight
-from .ledger import booked, ledger_scale, violation
+from .ledger import booked, ledger_scale
 from .local_flight import LocalFlight
-from .pieces import Log, fly_piece
+from .pieces import MOST_SAMPLES, Log, first_interval, flown, fly_piece
 from .recorder import Recorder
 from .trajectory import DURATION, STOPPED, FieldChanges, FlightStopped, Trajectory
-
-MOST_SAMPLES = 20000
-SAMPLES_PER_TURN = 32
 
 
 def integrate(
@@ -53,9 +50,10 @@ def integrate(
     """
     scales, log, began = flight.scales, Log(), perf_counter()
     values = _begin(flight, start, np.zeros(0) if currents is None else currents, log)
-    interval = _interval(scene, flight, duration)
-    first = booked(scene, flight.part(values), values, np.zeros(1), flight.part(values).integrator.state[None])
-    scale = ledger_scale(scene, flight.part(values), values)
+    interval = first_interval(scene, duration)
+    begun = flight.part(values).integrator.state
+    first = booked(scene, flight.part(values), values, np.zeros(1), begun[None])
+    scale = ledger_scale(scene, flight.part(values), values, begun)
     recorder = Recorder(first[0], interval, MOST_SAMPLES)
     known = checkpoint.read() if checkpoint else None
     if known is not None:
@@ -68,21 +66,11 @@ def integrate(
         if checkpoint and log.latest:
             checkpoint.write(log.latest)
     seconds = perf_counter() - began - (flight.compile_seconds - compiled)
-    time = np.minimum(recorder.times * scales.time, duration)
-    flown = Trajectory(
-        time=time,
-        lab=scales.unpack(recorder.states).to_lab(scene.angular_velocity * time),
-        angular_velocity=scene.angular_velocity,
-        ended_by=log.ended_by,
-        energy_error=violation(recorder.states, scale),
-        realtime_factor=float((recorder.times[-1] - began_at) * scales.time / seconds),
-        steps=log.steps,
-        compile_seconds=flight.compile_seconds,
-        field_changes=log.changes.relative(scale),
-    )
+    speed = float((recorder.times[-1] - began_at) * scales.time / seconds)
+    found = flown(scene, recorder, log, duration, scale, speed, flight.compile_seconds)
     if log.ended_by == STOPPED:
-        raise FlightStopped(flown)
-    return flown
+        raise FlightStopped(found)
+    return found
 
 
 def _begin(flight: Flight | LocalFlight, start: State, currents: Array, log: Log) -> Array:
@@ -128,23 +116,22 @@ def fly(
                 kept = perf_counter()
 
 
-def _interval(scene: Scene, flight: Flight | LocalFlight, duration: float) -> float:
-    """First scaled time between samples."""
-    turn = 1 / abs(scene.frequency) if scene.frequency else np.inf
-    return min(turn / SAMPLES_PER_TURN, duration / 1000) / flight.scales.time
-
-
 def fly_on(
-    scene: Scene, flight: Flight | LocalFlight, values: Array, time: float, state: Array, duration: float
-) -> tuple[str, float, Array]:
-    """Fly from a scaled time and state (12,) on until `duration` (s) after t = 0: the end, scaled time and state then.
+    scene: Scene,
+    flight: Flight | LocalFlight,
+    values: Array,
+    time: float,
+    state: Array,
+    duration: float,
+    recorder: Recorder,
+    log: Log,
+) -> None:
+    """Fly from a scaled time and state (13,) on until `duration` (s) after t = 0.
 
-    The runtime parameters `values` change as the flight does.
+    The runtime parameters `values`, the samples and the log go on as well.
     """
     integrator = flight.part(values).integrator
     integrator.time = time
-    integrator.state[:] = np.append(state, 0.0)
+    integrator.state[:] = state
     integrator.reset_cooldowns()
-    log, recorder = Log(), Recorder(integrator.state, _interval(scene, flight, duration), MOST_SAMPLES)
     fly(scene, flight, values, duration, recorder, log, None, None)
-    return log.ended_by, float(recorder.times[-1]), recorder.states[-1, :12]

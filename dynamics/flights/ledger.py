@@ -15,10 +15,10 @@ def booked(scene: Scene, flight: Flight, values: Array, times: Array, states: Ar
     return np.concatenate([states[:, :-1], books[:, None]], axis=1)
 
 
-def ledger_scale(scene: Scene, flight: Flight, values: Array) -> float:
-    """Of the ledger, at the start: its sum, or its largest term where the terms nearly cancel."""
+def ledger_scale(scene: Scene, flight: Flight, values: Array, state: Array) -> float:
+    """Of the ledger, at the start in a state (s,): its sum, or its largest term where the terms nearly cancel."""
     start = np.zeros(1)
-    terms = flight.terms(start, flight.integrator.state[None], plate_places(scene, values, start))
+    terms = flight.terms(start, state[None], plate_places(scene, values, start))
     largest, whole = float(np.abs(terms).max()), abs(float(terms.sum()))
     return whole if whole > 1e-3 * largest else largest
 

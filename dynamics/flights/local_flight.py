@@ -81,14 +81,26 @@ class LocalFlight:
         To a large one, from a small ball as well.
         """
         before, (degree, *center, inverse) = self.part(values), values[DEGREE : DEGREE + 5]
-        place = before.integrator.state[:3] * self.scales.length
-        if degree and np.sum((place - center) ** 2) * inverse**2 < INSIDE:
+        time, state = before.integrator.dtime, before.integrator.state.copy()
+        if degree and np.sum((state[:3] * self.scales.length - center) ** 2) * inverse**2 < INSIDE:
             return changes
-        after = values.copy()
-        error = self.enter_ball(LARGE, before.integrator.state, after)
-        if degree == after[DEGREE] == 0:
+        changes = self.go_over(sum(time), state, values, changes)
+        if degree or values[DEGREE]:
+            following = self.part(values)
+            following.integrator.dtime = time
+            following.integrator.state[:] = state
+            following.integrator.reset_cooldowns()
+        return changes
+
+    def go_over(self, time: float, state: Array, values: Array, changes: FieldChanges) -> FieldChanges:
+        """Set the ball for a scaled state at a time, and book in its work what that does to the energy."""
+        before, after = self.part(values), values.copy()
+        error = self.enter_ball(LARGE, state, after)
+        if values[DEGREE] == after[DEGREE] == 0:
             return changes
-        jump = self._change(before, values, after)
+        now, row = np.array([time]), state[None]
+        jump = float(self.part(after).terms(now, row, after[None]).sum() - before.terms(now, row, values[None]).sum())
+        state[-1] += jump
         values[:] = after
         return FieldChanges(
             changes.count + 1, changes.energy + jump, changes.total + abs(jump), max(changes.error, error)
@@ -121,17 +133,6 @@ class LocalFlight:
             effects = fitted(with_effects(self.scene, self.table), formula)
             self._balls[key] = Balls(self.scene, self.table.evaluate, formula, reach, effects)
         return self._balls[key]
-
-    def _change(self, before: Flight, values: Array, after: Array) -> float:
-        """Hand the state over to the part for the runtime parameters `after`; U_new - U_old."""
-        time, state, following = before.integrator.dtime, before.integrator.state.copy(), self.part(after)
-        now, row = np.array([sum(time)]), state[None]
-        jump = float(following.terms(now, row, after[None]).sum() - before.terms(now, row, values[None]).sum())
-        state[-1] += jump
-        following.integrator.dtime = time
-        following.integrator.state[:] = state
-        following.integrator.reset_cooldowns()
-        return jump
 
 
 def compile_local_flight(

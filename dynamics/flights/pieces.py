@@ -1,4 +1,4 @@
-"""A flight's next piece: to its end, or to what ends it."""
+"""A flight's next piece, to its end or to what ends it; and what was recorded of all of them as a trajectory."""
 
 from dataclasses import dataclass, field
 
@@ -7,19 +7,21 @@ import numpy as np
 
 from ...geometry.basics import Array, ComputationError
 from ...geometry.scenes import Scene
-from ..motion import CONTACT, clearance
+from ..motion import CONTACT, Scales, clearance
 from .ball_parts import LEFT
 from .checkpoint import Progress
 from .compiled_flight import Flight
-from .ledger import booked
+from .ledger import booked, violation
 from .recorder import Recorder
-from .trajectory import DURATION, FieldChanges
+from .trajectory import DURATION, FieldChanges, Trajectory
 
 PIECE_TURNS, PIECE_SAMPLES = 256, 256
 """The most turns and samples between two looks at what has been flown.
 
 A step ends where a piece does, so that pieces must not depend on how fast the machine is.
 """
+MOST_SAMPLES = 20000
+SAMPLES_PER_TURN = 32
 
 
 class IntegrationError(ComputationError):
@@ -70,3 +72,36 @@ def _ending(
     if len(touching):
         return times[: touching[0] + 1], states[: touching[0] + 1], CONTACT
     return times, states, ended_by
+
+
+def flown(
+    scene: Scene, recorder: Recorder, log: Log, duration: float, scale: float, speed: float, compile_seconds: float
+) -> Trajectory:
+    """The trajectory of samples whose last column is the ledger's sum.
+
+    Parameters
+    ----------
+    duration : that was asked for, s
+    scale : of the ledger
+    speed : simulated seconds per second
+    compile_seconds : time that compilation took
+    """
+    scales = Scales.of(scene)
+    time = np.minimum(recorder.times * scales.time, duration)
+    return Trajectory(
+        time=time,
+        lab=scales.unpack(recorder.states).to_lab(scene.angular_velocity * time),
+        angular_velocity=scene.angular_velocity,
+        ended_by=log.ended_by,
+        energy_error=violation(recorder.states, scale),
+        realtime_factor=speed,
+        steps=log.steps,
+        compile_seconds=compile_seconds,
+        field_changes=log.changes.relative(scale),
+    )
+
+
+def first_interval(scene: Scene, duration: float) -> float:
+    """First scaled time between samples."""
+    turn = 1 / abs(scene.frequency) if scene.frequency else np.inf
+    return float(min(turn / SAMPLES_PER_TURN, duration / 1000) / Scales.of(scene).time)

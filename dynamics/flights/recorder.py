@@ -26,6 +26,12 @@ class Recorder:
         times = times[times < end - 1e-9 * self.interval]
         return np.concatenate([[now], times, [end] if len(times) < count else []])
 
+    def due(self, seen: float, now: float, end: float) -> Array:
+        """Multiples of the interval after `seen`, up to `now` and before `end`."""
+        first, last = (int(np.floor(time / self.interval + 1e-9)) for time in (seen, now))
+        times = self.interval * np.arange(first + 1, last + 1)
+        return np.asarray(times[times < end - 1e-9 * self.interval])
+
     def add(self, times: Array, states: Array, last: bool) -> None:
         """Keep samples at multiples of the interval; of the `last` ones all."""
         on_grid = np.abs(times / self.interval - np.round(times / self.interval)) < 1e-9

@@ -7,14 +7,16 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ...fem.closed_forms import carrier
+from ...fem.rotor_losses import check_slow_enough, pieces_of
 from ...fem.rotor_tables import RotorTable, rotor_table
 from ...geometry.basics import Array, Box
 from ...geometry.bodies import Magnet
 from ...geometry.scenes import Scene
 from ..branches import Problem
 from ..effects import with_effects
-from ..motion import Parameter, Rates, Scales, parameters
+from ..motion import Effect, Interaction, Parameter, Rates, Scales, parameters
 from .blend import blend_tables, chebyshev_points
+from .family_effects import family_effects
 from .movable import MovableField, Move, Rotation, Translation
 
 MOVES: dict[str, tuple[Move | None, ...]] = {
@@ -37,12 +39,14 @@ class RotorFamily:
     rotor : magnets as they are at measure zero
     moves : how each of them moves, None for one that stands still
     field : of the rotor, with `Parameter.MEASURE`
+    effects : mutual magnetisation and currents in the rotor's magnets, with `Parameter.MEASURE`
     """
 
     scene: Scene
     rotor: tuple[Magnet, ...]
     moves: tuple[Move | None, ...]
     field: MovableField
+    effects: tuple[Effect, ...] = ()
 
     def at(self, frequency: float, measure: float) -> Scene:
         """The scene at one frequency (Hz) and measure (m or rad)."""
@@ -54,6 +58,7 @@ class RotorFamily:
         """Runtime parameters (n, p), with the drag along the moment left out, at frequencies and measures (n,)."""
         frequency, measure = np.broadcast_arrays(np.atleast_1d(frequency), np.atleast_1d(measure))
         different, which = np.unique(frequency, return_inverse=True)
+        check_slow_enough(pieces_of(self.rotor, ()), float(different[-1]))
         scenes = [replace(self.scene, frequency=float(f)) for f in different]
         each = [parameters(scene, Scales.of(scene), frozen_spin=True) for scene in scenes]
         values = np.reshape(each, (-1, len(Parameter)))[which]
@@ -68,10 +73,16 @@ class RotorFamily:
         """The problem whose parameter is the measure, m or rad, at one frequency."""
         return lambda measure: (self.values(frequency, measure)[0], spin)
 
+    @property
+    def _bare(self) -> Scene:
+        """The scene without metal in its rotor, whose currents are among the effects."""
+        magnets = tuple(replace(magnet, conductivity=None) for magnet in self.scene.rotor)
+        return replace(self.scene, rotor=magnets)
+
     @cached_property
     def rates(self) -> Rates:
         """Compiled once for all frequencies and measures."""
-        return Rates(with_effects(self.scene, self.field), optimised=True)
+        return Rates(with_effects(self._bare, Interaction(self.field, self.effects)), optimised=True)
 
 
 def rotor_family(
@@ -82,6 +93,7 @@ def rotor_family(
     nearest: float | None = None,
     measures: tuple[float, float] | None = None,
     tables: int = NODES,
+    interaction: str = "auto",
 ) -> RotorFamily:
     """The family of one of the article's rotors, with the magnets of `scene`.
 
@@ -93,12 +105,13 @@ def rotor_family(
     measures : between which "vertical" with "fem" shall hold: how the cubes magnetise each other changes with their
         distance and is interpolated
     tables : between which it is, about two seconds each
+    interaction : "rigid", "mutual" or "auto", see `effects.mutual_choice`; "vertical" is rigid
 
-    A rotor that moves as a whole keeps its table, whatever the model: the family is as good as its scenes' tables.
-    Currents in the rotor's own metal are left out: their table holds for one rotor.
+    A rotor that moves as a whole keeps its tables, whatever the model: the family is as good as its scenes' tables.
 
     Raises
     ------
+    InputError : mutual magnetisation or conductors for which no table holds at every measure, see `family_effects`
     ValueError : unknown configuration or one of other magnets, or no `measures` where they are needed
     """
     if configuration not in MOVES or len(MOVES[configuration]) != len(scene.rotor):
@@ -107,16 +120,17 @@ def rotor_family(
             f"{len(scene.rotor)}; instead received {configuration!r}."
         )
     moves = MOVES[configuration]
-    magnets = tuple(replace(magnet, conductivity=None) for magnet in scene.rotor)
-    scene = replace(scene, rotor=magnets, conductors=())
     rotor = tuple(_unmoved(magnet, move) for magnet, move in zip(scene.rotor, moves, strict=True))
+    alone = [rotor_table((magnet,), model, rtol, nearest) for magnet in rotor]
+    effects = family_effects(scene, list(zip(rotor, moves, alone, strict=True)), interaction, rtol)
     if len(rotor) > 1 and model == "fem":
-        return RotorFamily(scene, rotor, moves, _mutual(rotor, moves, rtol, nearest, measures, tables))
-    parts = [(rotor_table((m,), model, rtol, nearest), move) for m, move in zip(rotor, moves, strict=True)]
-    return RotorFamily(scene, rotor, moves, MovableField(tuple(parts)))
+        field = _magnetised(rotor, moves, rtol, nearest, measures, tables)
+    else:
+        field = MovableField(tuple(zip(alone, moves, strict=True)))
+    return RotorFamily(scene, rotor, moves, field, effects)
 
 
-def _mutual(
+def _magnetised(
     rotor: tuple[Magnet, ...],
     moves: tuple[Move | None, ...],
     rtol: float,

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Protocol
+from typing import Any, Protocol
 
 import heyoka as hy
 import numpy as np
@@ -13,15 +13,24 @@ from ...geometry.basics import Array, rotation_matrix
 from ...geometry.bodies import Magnet
 from ..motion import Parameter, Vector
 
+Scalar = Any
+"""A heyoka expression, or an array (n,)."""
+
 
 class Move(Protocol):
-    """How a part of the rotor moves with the measure."""
+    """How a part of the rotor moves with the measure; its own frame is where it is at measure zero."""
 
     def moved(self, magnet: Magnet, measure: float) -> Magnet:
         """The magnet, from where it is at measure zero."""
 
-    def field(self, source: FieldFormula, position: Vector, measure: hy.expression) -> FieldExpressions:
-        """Field of the moved source."""
+    def place(self, position: Sequence[Scalar], measure: Scalar) -> list[Scalar]:
+        """A position (3) m in the part's own frame."""
+
+    def into(self, vector: Sequence[Scalar], measure: Scalar) -> list[Scalar]:
+        """A vector (3) along the axes of the part's own frame."""
+
+    def back(self, vector: Sequence[Scalar], measure: Scalar) -> list[Scalar]:
+        """A vector (3) of the part's own frame along the rotor's axes."""
 
 
 @dataclass(frozen=True)
@@ -39,9 +48,15 @@ class Translation:
         center = magnet.box.center + self.way_of(measure)
         return replace(magnet, box=replace(magnet.box, center=center))
 
-    def field(self, source: FieldFormula, position: Vector, measure: hy.expression) -> FieldExpressions:
-        """Field of the moved source."""
-        return source.expressions([p - w * measure if w else p for p, w in zip(position, self.way, strict=True)])
+    def place(self, position: Sequence[Scalar], measure: Scalar) -> list[Scalar]:
+        """A position (3) m in the part's own frame."""
+        return [p - w * measure if w else p for p, w in zip(position, self.way, strict=True)]
+
+    def into(self, vector: Sequence[Scalar], measure: Scalar) -> list[Scalar]:
+        """The vector itself."""
+        return list(vector)
+
+    back = into
 
 
 @dataclass(frozen=True)
@@ -53,18 +68,29 @@ class Rotation:
         turn, box = rotation_matrix((0.0, -np.degrees(measure), 0.0)), magnet.box
         return replace(magnet, box=replace(box, center=turn @ box.center, rotation=turn @ box.rotation))
 
-    def field(self, source: FieldFormula, position: Vector, measure: hy.expression) -> FieldExpressions:
-        """Field of the moved source."""
-        cosine, sine = hy.cos(measure), hy.sin(measure)
-        x, y, z = position
-        field, slope = source.expressions([cosine * x + sine * z, y, cosine * z - sine * x])
+    def into(self, vector: Sequence[Scalar], measure: Scalar) -> list[Scalar]:
+        """A vector (3) along the axes of the part's own frame."""
+        cosine, sine = _cosine_sine(measure)
+        return [cosine * vector[0] + sine * vector[2], vector[1], cosine * vector[2] - sine * vector[0]]
 
-        def back(vector: Vector) -> list[hy.expression]:
-            return [cosine * vector[0] - sine * vector[2], vector[1], sine * vector[0] + cosine * vector[2]]
+    place = into
 
-        half = [back(row) for row in slope]
-        columns = [back([half[i][j] for i in range(3)]) for j in range(3)]
-        return back(field), [[columns[j][i] for j in range(3)] for i in range(3)]
+    def back(self, vector: Sequence[Scalar], measure: Scalar) -> list[Scalar]:
+        """A vector (3) of the part's own frame along the rotor's axes."""
+        cosine, sine = _cosine_sine(measure)
+        return [cosine * vector[0] - sine * vector[2], vector[1], sine * vector[0] + cosine * vector[2]]
+
+
+def _cosine_sine(angle: Scalar) -> tuple[Scalar, Scalar]:
+    return (hy.cos(angle), hy.sin(angle)) if isinstance(angle, hy.expression) else (np.cos(angle), np.sin(angle))
+
+
+def moved_field(source: FieldFormula, move: Move, position: Vector, measure: hy.expression) -> FieldExpressions:
+    """Field at a position (m) of a source that has moved, and its gradient."""
+    field, slope = source.expressions(move.place(position, measure))
+    half = [move.back(row, measure) for row in slope]
+    columns = [move.back([half[i][j] for i in range(3)], measure) for j in range(3)]
+    return move.back(field, measure), [[columns[j][i] for j in range(3)] for i in range(3)]
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,7 +108,7 @@ class MovableField:
         """B and its gradient as expressions of a position (m, rotor's frame) and of `Parameter.MEASURE`."""
         measure = hy.par[Parameter.MEASURE]
         found = [
-            move.field(source, position, measure) if move else source.expressions(position)
+            moved_field(source, move, position, measure) if move else source.expressions(position)
             for source, move in self.parts
         ]
         return (

@@ -94,7 +94,7 @@ class InBall(Effect, Protocol):
         """Of the numbers."""
 
     def fit(self, ball: Ball, gradient: Array) -> tuple[Array, float]:
-        """The numbers (count,) in a ball; the error of the force by that of the rigid dipole in ∇B0 (3, 3) T/m."""
+        """The numbers (count,) in a ball, where the rotor's gradient is ∇B0 (3, 3) T/m; the error by that allowed."""
 
 
 @runtime_checkable

@@ -93,7 +93,7 @@ def plate_legs(plate: Plate | None, duration: float) -> list[tuple[float, float,
 
 def plate_places(scene: Scene, values: Array, times: Array) -> Array:
     """Runtime parameters (n, p) at scaled times (n,): where the plate is, as if it stood there."""
-    places = np.tile(values, (len(times), 1))
+    places = np.repeat(values[:, None], len(times), axis=1).T  # so in memory as compiled functions want it
     places[:, Parameter.PLATE_SPEED] = 0.0
     if scene.plate is not None:
         places[:, Parameter.PLATE_DEPTH] = plate_depth(scene.plate, times * values[Parameter.TIME])

@@ -11,7 +11,6 @@ from ...geometry.basics import Solid
 from ...geometry.scenes import Scene
 from ..plate_tables import Multipoles
 from ..storage import described, from_cache, program_of, read_checked, write_checked
-from .slow_enough import check_slow_enough
 from .table import RotorLosses
 from .tabulate import pieces_of, rotor_losses
 
@@ -63,11 +62,8 @@ def losses_key(scene: Scene) -> str:
 def cached_rotor_losses(scene: Scene, report: Callable[[str], None]) -> tuple[RotorLosses, bool]:
     """The losses in a scene's rotor, from the cache if they are there, and whether they were.
 
-    Raises
-    ------
-    InputError : the rotor turns too fast for its metal, see `check_slow_enough`
+    At which frequencies they hold, `check_slow_enough` says.
     """
-    check_slow_enough(pieces_of(scene.rotor, scene.conductors), scene.frequency)
     return from_cache(
         f"rotor-losses-{losses_key(scene)}.nc",
         load_losses,

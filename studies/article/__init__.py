@@ -13,6 +13,7 @@ from .article import (
     article_scene as article_scene,
     axis_label as axis_label,
     by_configuration as by_configuration,
+    conducting as conducting,
     levitated_rotors as levitated_rotors,
     levitation_of as levitation_of,
     rotor_label as rotor_label,

@@ -4,12 +4,13 @@ J. M. Hermansen, F. L. Durhuus and R. Bjørk, Appl. Phys. Lett. 127 (2025) 01240
 """
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike, NDArray
 
+from ...geometry.basics import MAGNET_CONDUCTIVITY
 from ...geometry.bodies import Magnet, horizontal, tilt, vertical
 from ...geometry.scenes import Drag, Floater, Scene
 from ..one_scene import Levitation
@@ -112,6 +113,12 @@ def levitation_of(
 ) -> Levitation:
     """A scene in one model's field, its plate left out."""
     return Levitation(scene, Models(model, "none", rtol, interaction=interaction))
+
+
+def conducting(scene: Scene, rotor: bool = True) -> Scene:
+    """The scene with eddy currents in the floater and, unless told otherwise, in the rotor's magnets."""
+    magnets = tuple(replace(m, conductivity=MAGNET_CONDUCTIVITY if rotor else None) for m in scene.rotor)
+    return replace(scene, rotor=magnets, floater=replace(scene.floater, conductivity=MAGNET_CONDUCTIVITY))
 
 
 def rotor_label(configuration: str, value: float) -> str:

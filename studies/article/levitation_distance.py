@@ -1,14 +1,17 @@
-"""Distance at which the floater levitates against frequency, for every rotor of the article: its third figure."""
+"""Distance at which the floater levitates against frequency, for every rotor of the article: its third figure.
+
+The motion has Stokes drag, and in the field of finite elements rotor and floater magnetise each other.  Currents in
+their metal do not move an equilibrium, and are left out.
+"""
 
 import numpy as np
 import xarray as xr
 
 from ...dynamics.branches import BranchPoint, Family, distance_error, kicked, levitating_branch
 from ...dynamics.flights import simulate
-from ...fem.rotor_tables import RotorTable
+from ...fem.rotor_tables import FieldTable
 from ...geometry.basics import Array
 from ...geometry.scenes import Scene
-from ..one_scene import sources
 from ..results import Columns, Point, Study, by_case, columns, one_case, variable
 from .article import CONFIGURATIONS, HIGHEST, LOWEST, QUICK, WEIGHT, article_scene, levitation_of, stable_in_flight
 from .article_formulas import analytic_distance, balanced
@@ -35,11 +38,21 @@ COLUMNS: Columns = {
 
 
 def distance_points(quick: bool) -> list[Point]:
-    """Every rotor of the article by every formula and field; `quick` takes three rotors and a coarser grid."""
-    step, flights = (10.0, 1) if quick else (2.5, 3)
+    """Every rotor of the article by every formula and field.
+
+    `quick` takes three rotors, a coarser grid and a rigid floater.
+    """
+    step, flights, interaction = (10.0, 1, "rigid") if quick else (2.5, 3, "auto")
     rotors = {name: QUICK[name] if quick else kind.tested for name, kind in CONFIGURATIONS.items()}
     return [
-        {"configuration": name, "value": value, "model": model, "step_hz": step, "flights": flights}
+        {
+            "configuration": name,
+            "value": value,
+            "model": model,
+            "step_hz": step,
+            "flights": flights,
+            "interaction": interaction,
+        }
         for name, values in rotors.items()
         for value in values
         for model in (*FORMULAS, *FIELDS)
@@ -73,8 +86,8 @@ def _by_formula(point: Point, grid: Array) -> dict[str, Array]:
 
 def _in_field(point: Point, grid: Array) -> dict[str, Array]:
     scene = article_scene(point["configuration"], point["value"], HIGHEST)
-    levitation = levitation_of(scene, point["model"])
-    table = sources(levitation.table)
+    levitation = levitation_of(scene, point["model"], interaction=point["interaction"])
+    table = levitation.interaction
     branch = levitating_branch(scene, table, levitation.rates, HIGHEST)
     found = [branch.side(side, grid) for side in SIDES]
     rows = np.array([[_row(scene, table, branch.family, p) for p in side] for side in found])
@@ -88,14 +101,14 @@ def _in_field(point: Point, grid: Array) -> dict[str, Array]:
     return dict(zip(COLUMNS, (*rows.T, fold.parameter, -fold.position[2], *flights), strict=True))
 
 
-def _row(scene: Scene, table: RotorTable, family: Family, point: BranchPoint | None) -> list[float]:
+def _row(scene: Scene, table: FieldTable, family: Family, point: BranchPoint | None) -> list[float]:
     if point is None:
         return [np.nan] * 4
     angle = float(np.arctan2(np.hypot(*point.state[6:8]), point.state[8]))
     return [-point.position[2], distance_error(scene, table, family, point), point.growth_per_s, angle]
 
 
-def mean_height(scene: Scene, table: RotorTable, point: BranchPoint) -> tuple[float, float]:
+def mean_height(scene: Scene, table: FieldTable, point: BranchPoint) -> tuple[float, float]:
     """Mean distance along the axis (m) of a flight that a kick began, and by how much its halves differ.
 
     Means are weighted by sin², which takes out the bounce; NaN where the flight did not last.

@@ -1,7 +1,7 @@
 """The rotors whose drift is studied, and what is not known of the experiment."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -56,6 +56,8 @@ class Variant:
     stokes : whether the air's drag is Stokes's
     e_folds : growth of an oscillation that ends the flight
     misplaced : error of the rotor's displacement, in units of its tolerance
+    rotor : "rigid": closed form of μr = 1, and no answers; "permeable": by finite elements with μr = 1.05, rotor and
+        floater magnetise each other; "conducting": and there are eddy currents in the rotor's magnets
     """
 
     spin: float = 0.0
@@ -64,6 +66,7 @@ class Variant:
     stokes: bool = False
     e_folds: float = E_FOLDS
     misplaced: float = 0.0
+    rotor: str = "rigid"
 
 
 VARIANTS = {
@@ -78,6 +81,8 @@ VARIANTS = {
     "conductivity +80 %": Variant(conductivity=1.8 * MAGNET_CONDUCTIVITY),
     "rough release": Variant(e_folds=np.log(30.0)),
     "Stokes drag": Variant(stokes=True),
+    "permeable": Variant(rotor="permeable"),
+    "complete": Variant(rotor="conducting"),
 }
 """Conductivity: makers' values; upwards a plating of nickel and copper, and the field's gradient (`SlowTorque`)."""
 QUICK_VARIANTS = ("nominal", "spin -0.1", "spin +0.1", "displacement smaller", "displacement larger", "Stokes drag")
@@ -86,5 +91,7 @@ QUICK_VARIANTS = ("nominal", "spin -0.1", "spin +0.1", "displacement smaller", "
 def scene_of(case: DriftCase, variant: Variant) -> Scene:
     """The scene of a case at its reference frequency."""
     floater = Floater(6.35e-3, variant.remanence, 1.05, 7500.0, variant.conductivity)
-    magnets = case.make(case.size + variant.misplaced * case.tolerance, 10e-3, variant.remanence, 1.0)
+    permeability, metal = 1.0 if variant.rotor == "rigid" else 1.05, variant.rotor == "conducting"
+    magnets = case.make(case.size + variant.misplaced * case.tolerance, 10e-3, variant.remanence, permeability)
+    magnets = tuple(replace(magnet, conductivity=MAGNET_CONDUCTIVITY if metal else None) for magnet in magnets)
     return Scene(case.reference, magnets, floater, Drag.stokes(floater.radius))

@@ -24,7 +24,11 @@ BANDS = {
     "conductivity": "conductivity −20 … +80 %",
     "remanence": "remanence 1.29 … 1.32 T",
 }
-LINES = {"rough release": ("--", "oscillation from 0.1 mm, not 3 µm"), "Stokes drag": (":", "air after Stokes")}
+LINES = {
+    "complete": ("-", "complete: mutual magnetisation, currents in the rotor too"),
+    "rough release": ("--", "oscillation from 0.1 mm, not 3 µm"),
+    "Stokes drag": (":", "air after Stokes"),
+}
 FLOWN = {
     "horizontal 1 mm": {115: "linear fall", 140: "stable", 150: "oscillating loss"},
     "horizontal 1.5 mm": {115: "linear fall", 140: "stable", 150: "oscillating loss"},
@@ -122,9 +126,12 @@ def time_lines(result: xr.Dataset) -> list[str]:
     """For each rotor: where flights end in the fold, where they last and where they are unstable."""
     lines = []
     for case in result["case"].values.tolist():
-        nominal = result.sel(case=case, variant="nominal")
-        lines.append(f"{case}:")
-        lines += [line for number in range(len(OUTCOMES)) if (line := _line(nominal, number))]
+        for variant in ("nominal", "permeable", "complete"):
+            if variant not in result["variant"]:
+                continue
+            chosen = result.sel(case=case, variant=variant)
+            lines.append(f"{case}{'' if variant == 'nominal' else f', {variant}'}:")
+            lines += [line for number in range(len(OUTCOMES)) if (line := _line(chosen, number))]
     return lines
 
 

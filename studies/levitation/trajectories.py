@@ -1,8 +1,9 @@
 """Linear fall, stable and unstable flight: levitation distance against time, the article's last supplementary figure.
 
 Its experiment had δx = 1 mm and fell at 115 Hz, stayed at 140 Hz and was lost in oscillations at 150 Hz.  Each flight
-is simulated in full, from equilibrium with spin s = 0, with drag and the floater's own eddy currents, and compared with
-the averaged flight along the branch of equilibria.
+is simulated in full, from equilibrium with spin s = 0, and compared with the averaged flight along the branch of
+equilibria.  In the motion are real air, eddy currents in floater and rotor, and that both magnetise each other; in that
+of `quick` Stokes drag and the floater's currents alone.
 """
 
 from dataclasses import replace
@@ -14,11 +15,10 @@ from ...dynamics.branches import BranchPoint, kicked, levitating_branch
 from ...dynamics.flights import Trajectory, flight_kind, simulate
 from ...dynamics.motion import Rates, Scales
 from ...dynamics.slow_drift import drift
-from ...fem.rotor_tables import RotorTable
-from ...geometry.basics import MAGNET_CONDUCTIVITY, Array
+from ...fem.rotor_tables import FieldTable
+from ...geometry.basics import Array
 from ...geometry.scenes import Scene
-from ..article import FLIGHT, FLOATER, HIGHEST, article_scene, levitation_of
-from ..one_scene import sources
+from ..article import FLIGHT, HIGHEST, article_scene, conducting, levitation_of
 from ..results import Point, Study, by_case, one_case, variable
 from .trajectories_figure import FIGURES, NONE, SHORT, flight_lines
 
@@ -35,7 +35,7 @@ SHORTEST = 3.0
 def flight_points(quick: bool) -> list[Point]:
     """The displacements, flown for 60 s in the field of finite elements, `quick` in the dipole's."""
     model, seconds = ("dipole" if quick else "fem"), 60.0
-    asked = {"configuration": "horizontal", "model": model, "duration_s": seconds}
+    asked = {"configuration": "horizontal", "model": model, "duration_s": seconds, "complete": not quick}
     return [{**asked, "value": value} for value in DISPLACEMENTS]
 
 
@@ -47,10 +47,11 @@ def trajectories(point: Point) -> xr.Dataset:
     Dataset over `frequency`: what became of the simulated flight and of the averaged one; over `part` of the flight:
     its time, and the least, mean and largest distance along the axis; over `sample`: the averaged flight.
     """
-    scene = article_scene(point["configuration"], point["value"], HIGHEST)
-    scene = replace(scene, floater=replace(FLOATER, conductivity=MAGNET_CONDUCTIVITY))
-    levitation = levitation_of(scene, point["model"])
-    table, rates = sources(levitation.table), levitation.rates
+    complete = point["complete"]
+    scene = conducting(article_scene(point["configuration"], point["value"], HIGHEST), rotor=complete)
+    scene = replace(scene, drag=replace(scene.drag, air=complete))
+    levitation = levitation_of(scene, point["model"], interaction="auto" if complete else "rigid")
+    table, rates = levitation.interaction, levitation.rates
     starts = levitating_branch(scene, table, rates, HIGHEST).side("near", np.array(FREQUENCIES))
     rows = [_row(scene, table, rates, start, point["duration_s"]) for start in starts]
     data = {
@@ -78,7 +79,7 @@ LENGTHS = {"part": PARTS, "sample": SAMPLES}
 
 
 def _row(
-    scene: Scene, table: RotorTable, rates: Rates, start: BranchPoint | None, seconds: float
+    scene: Scene, table: FieldTable, rates: Rates, start: BranchPoint | None, seconds: float
 ) -> dict[str, Array | str]:
     if start is None:
         empty = {name: np.full([LENGTHS[d] for d in dims], np.nan) for name, (dims, _, _) in COLUMNS.items()}

@@ -1,4 +1,9 @@
-"""Regions of stable levitation in frequency and displacement, what bounds them, and what a plate makes of them."""
+"""Regions of stable levitation in frequency and displacement, what bounds them, and what a plate makes of them.
+
+Regions: the motion without losses, of a rigid floater in the dipole's field, and in that of finite elements of one that
+rotor and floater magnetise.  Where flights last, every effect takes part: the currents in the floater, real air, and
+those in the rotor's magnets or not.
+"""
 
 from dataclasses import replace
 
@@ -6,11 +11,20 @@ import numpy as np
 import xarray as xr
 
 from ...dynamics.branches import HIGHEST, StableRange, at_frequency, levitating_ranges
+from ...dynamics.slow_drift import Lasting, lasting_frequencies
 from ...dynamics.steady import EquilibriumError, Survey
 from ...geometry.basics import Array, Box
-from ...geometry.scenes import Plate
-from ..article import CONFIGURATIONS, PLATE_CONDUCTIVITY, PLATE_SIZE, article_scene, levitation_of
-from ..one_scene import Levitation, sources
+from ...geometry.scenes import Drag, Plate
+from ..article import (
+    CONFIGURATIONS,
+    FLIGHT,
+    PLATE_CONDUCTIVITY,
+    PLATE_SIZE,
+    article_scene,
+    conducting,
+    levitation_of,
+)
+from ..one_scene import Levitation
 from ..results import Point, Study, by_case, one_case, variable
 from ..terminal import note
 from .stability_map_figure import FACE, FIGURES, MODELS, map_lines
@@ -29,21 +43,27 @@ BEYOND = 1.15
 
 
 def points(quick: bool) -> list[Point]:
-    """All rotors with both models; frequencies with the plate for the rotors of the article's figures."""
+    """All rotors with both models; with the plate, and flights, the rotors that levitated in the article.
+
+    `quick` leaves out the mutual magnetisation and the flights.
+    """
     rotors = {"horizontal": (2.0,), "vertical": (14.0,), "tilt": (10.0,)} if quick else MEASURES
     return [
-        {"configuration": c, "measure": m, "model": model, "with_plate": plates}
+        {
+            "configuration": c, "measure": m, "model": model, "with_plate": (2 if quick else 5) if known else 0,
+            "flights": known and not quick, "interaction": "rigid" if quick else "auto",
+        }
         for c, measures in rotors.items() for m in measures for model in MODELS
-        for plates in [(2 if quick else 5) if model == "fem" and m in CONFIGURATIONS[c].levitated else 0]
+        for known in [model == "fem" and m in CONFIGURATIONS[c].levitated]
     ]  # fmt: skip
 
 
 def compute(point: Point, rtol: float = RTOL) -> xr.Dataset:
     """Intervals of stable frequencies of one rotor, and growth with a plate below at some frequencies."""
     scene = article_scene(point["configuration"], point["measure"], drag=False)
-    levitation = levitation_of(scene, point["model"], rtol)
+    levitation = levitation_of(scene, point["model"], rtol, point["interaction"])
     try:
-        found = levitating_ranges(scene, sources(levitation.table), levitation.rates)
+        found = levitating_ranges(scene, levitation.interaction, levitation.rates)
     except EquilibriumError as error:
         note(str(error))
         found = []
@@ -57,10 +77,21 @@ def compute(point: Point, rtol: float = RTOL) -> xr.Dataset:
         name: variable(("interval",), row, *words) for (name, words), row in zip(INTERVAL.items(), rows, strict=True)
     }
     data |= {name: variable(("tried",), row, *words) for (name, words), row in zip(PLATE.items(), plate.T, strict=True)}
+    lasting = [_lasting(levitation, found[0], metal) if found and point["flights"] else Lasting() for metal in METAL]
+    for name, words in LASTING.items():
+        data[name] = variable(("metal",), np.array([getattr(one, name) for one in lasting]), *words)
+    data["ended_by"] = xr.Variable(("metal",), np.array([one.ended_by for one in lasting], "U12"))
     data |= {name: xr.Variable(("interval",), row) for name, row in zip(("low_kind", "high_kind"), kinds, strict=True)}
-    return one_case(point, xr.Dataset(data))
+    return one_case(point, xr.Dataset(data, {"metal": list(METAL)}))
 
 
+METAL = {"insulating": False, "conducting": True}
+"""The rotor's magnets: whether they have eddy currents."""
+LASTING = {
+    "low": ("Hz", "lowest frequency at which flights last"),
+    "high": ("Hz", "highest frequency up to which flights last"),
+    "growth_per_s": ("1/s", "largest growth rate of a small motion in the flight there"),
+}
 INTERVAL = {
     "lowest": ("Hz", "lower end of an interval of stability"),
     "highest": ("Hz", "upper end of an interval of stability"),
@@ -74,6 +105,16 @@ PLATE = {
     "plate_distance": ("m", "distance with a plate below"),
     "plate_error": ("1", "estimated relative error of the plate's table"),
 }
+
+
+def _lasting(alone: Levitation, stable: StableRange, metal: str) -> Lasting:
+    """Where flights of `FLIGHT` last from spin 0, with all effects."""
+    scene = conducting(alone.scene, METAL[metal])
+    scene = replace(scene, drag=replace(Drag.stokes(scene.floater.radius), air=True))
+    whole = Levitation(scene, alone.models)
+    whole.share(alone)
+    middle = stable.near((stable.low.parameter + stable.high.parameter) / 2)
+    return lasting_frequencies(scene, whole.table, whole.rates, middle.state, middle.parameter, FLIGHT)
 
 
 def _with_plate(alone: Levitation, stable: StableRange | None, number: int) -> Array:

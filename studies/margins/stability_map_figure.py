@@ -12,6 +12,8 @@ MODELS = ("dipole", "fem")
 FACE = -0.045
 """Height of the plate's upper face below the rotor's origin, m: no floater that levitates touches it."""
 MARKERS = {"fold": "^", "oscillatory": "o", "real": "D", "contact": "v", "border": "_"}
+METAL = {"insulating": ("_", "flights of 250 s last up to here"), "conducting": ("x", "… with currents in the rotor")}
+"""Marks of where averaged flights last, without and with eddy currents in the rotor's magnets."""
 MEANINGS = {
     "fold": "fold: no equilibrium beyond",
     "oscillatory": "growing oscillation (Hopf)",
@@ -29,6 +31,7 @@ def map_figure(result: xr.Dataset) -> Figure:
         for model in MODELS:
             _region(place, cases_with(rotors, model=model), model)
         _plate(place, cases_with(rotors, model=MODELS[-1]))
+        _lasting(place, cases_with(rotors, model=MODELS[-1]))
         place.set(
             xlabel=axis_label(configuration), title=TITLES[configuration], ylim=(20, 410),
         )  # fmt: skip
@@ -39,6 +42,7 @@ def map_figure(result: xr.Dataset) -> Figure:
         axes[0, 0].plot([], [], "x", color=PALETTE[3], label="unstable with it")[0],
         axes[0, 0].plot([], [], "1", color="0.2", label="no equilibrium is left with it")[0],
     ]
+    handles += [axes[0, 0].plot([], [], mark, color="k", label=words)[0] for mark, words in METAL.values()]
     for place in axes[0]:
         place.margins(x=0.08)
     axes[0, 0].set_ylabel("frequency of the rotor (Hz)")
@@ -71,8 +75,13 @@ def _plate(axes: Axes, part: xr.Dataset) -> None:
         axes.plot(measure[here], frequency[here], style, color=color, ms=4, mew=0.8)
 
 
+def _lasting(axes: Axes, part: xr.Dataset) -> None:
+    for metal, (mark, _) in METAL.items():
+        axes.plot(part["measure"], part["high"].sel(metal=metal), mark, color="k", ms=9, mew=1.2)
+
+
 def map_lines(result: xr.Dataset) -> list[str]:
-    """Every rotor's intervals by both models, and where the plate below keeps or undoes stability."""
+    """Every rotor's intervals by both models, where the plate below keeps or undoes stability, where flights last."""
     lines = []
     for configuration, rotors in by_configuration(result):
         for measure in np.unique(rotors["measure"].values):
@@ -80,7 +89,8 @@ def map_lines(result: xr.Dataset) -> list[str]:
             found = {str(m): rows.isel(case=k) for k, m in enumerate(rows["model"].values)}
             words = [f"{model} {_intervals(one)}" for model, one in found.items()]
             verdicts = "".join(_verdicts(one) for one in found.values())
-            lines.append(f"{rotor_label(configuration, measure)}: {'; '.join(words)}{verdicts}")
+            flights = "".join(_flights(one) for one in found.values())
+            lines.append(f"{rotor_label(configuration, measure)}: {'; '.join(words)}{verdicts}{flights}")
     return lines
 
 
@@ -96,3 +106,14 @@ def _verdicts(one: xr.Dataset) -> str:
     pairs = zip(one["plate_frequency"].values, one["plate_growth"].values, strict=True)
     words = [f"{f:.0f} Hz {f'{g:+.2g}' if np.isfinite(g) else 'no equilibrium'}" for f, g in pairs if np.isfinite(f)]
     return f"; growth with the plate (1/s): {', '.join(words)}" if words else ""
+
+
+def _flights(one: xr.Dataset) -> str:
+    words = [
+        f"{low:.1f} to {high:.1f} Hz ({metal} rotor; then {end})"
+        for metal, low, high, end in zip(
+            one["metal"].values, one["low"], one["high"], one["ended_by"].values, strict=True
+        )
+        if end
+    ]
+    return f"; flights of 250 s last from {' and '.join(words)}" if words else ""

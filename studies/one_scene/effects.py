@@ -57,10 +57,10 @@ def _mutual(levitation: Levitation, first: Equilibrium | None) -> ListedEffect:
 
 def _floater_currents(levitation: Levitation, first: Equilibrium | None) -> ListedEffect:
     """Those of the scene, or what those of a sintered magnet would be."""
-    floater, there = levitation.scene.floater, levitation
-    if not floater.conductivity:
-        there = levitation.elsewhere(floater=replace(floater, conductivity=MAGNET_CONDUCTIVITY))
-    growth = growth_by_floater(there.scene, there.rates, first) if first and levitation.scene.frequency else None
+    scene, floater, growth = levitation.scene, levitation.scene.floater, None
+    if first and scene.frequency:
+        there = replace(scene, floater=replace(floater, conductivity=floater.conductivity or MAGNET_CONDUCTIVITY))
+        growth = growth_by_floater(there, levitation.rates, levitation.table, first)
     return _conducting(FLOATER_CURRENTS, "floater.conductivity_S_m", bool(floater.conductivity), growth)
 
 

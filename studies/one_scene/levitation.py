@@ -13,18 +13,17 @@ from ...dynamics.equilibria import survey, with_plate
 from ...dynamics.flights import Checkpoint, Trajectory, simulate, starting_point
 from ...dynamics.motion import Interaction, PlateMemory, Rates, interaction_of
 from ...dynamics.steady import Equilibrium, EquilibriumError, Survey
-from ...fem.measured_maps import GriddedTable, map_table
-from ...fem.mutual import MutualTable, cached_mutual_table, mutual_key
-from ...fem.rotor_losses import RotorLosses, cached_rotor_losses, losses_key, pieces_of
-from ...fem.rotor_tables import RotorTable, cached_rotor_table, resolve_model, rotor_table
+from ...fem.measured_maps import GriddedTable
+from ...fem.mutual import MutualTable
+from ...fem.rotor_losses import RotorLosses, check_slow_enough, pieces_of
+from ...fem.rotor_tables import RotorTable, resolve_model
 from ...fem.slab import resolve_plate_model, rotor_nearby
 from ...geometry.basics import Array, InputError, millimetre_size
 from ...geometry.scenes import AbsoluteStart, Scene, load_scene
 from ..terminal import Models, detail, finite, note, positive, progress
 from .plate_of_scene import check_room, check_way, plate_memory
+from .rotor_of_scene import RotorField, RotorTables, equations_key
 
-RotorField = RotorTable | GriddedTable
-"""A rotor's table: computed, or from a map."""
 PLATE_WORDS = {
     "none": "only an obstacle, without eddy currents",
     "slab": "taken as an infinite slab, {thickness:.4g} mm thick",
@@ -54,14 +53,11 @@ class Levitation:
         self.scene = given_scene(scene)
         self.models = models.checked()
         self.spin = finite("spin", spin)
-        self.from_cache: list[str] = []
-        """Names of the tables that were found in the cache."""
         self.searched = True
         """Whether the equilibria were searched for; else they were carried here from scenes nearby."""
-        self._fields: dict[str, RotorField] = {}
-        self._equations: dict[tuple[str, bool, bool, str, str], Rates] = {}
-        self._mutual: dict[str, MutualTable] = {}
-        self._metal: dict[str, RotorLosses] = {}
+        self._tables = RotorTables()
+        self._plate_cached = False
+        self._flown: dict[float, Trajectory] = {}
 
     @cached_property
     def interaction(self) -> Interaction:
@@ -80,14 +76,7 @@ class Levitation:
         known, why = mutual_choice(scene, self.table, asked, self.models.rtol)
         if not known:
             return None, why
-        key = f"mutual {mutual_key(scene.rotor, scene.floater)}"
-        if key not in self._mutual:
-            note("Mutual magnetisation of rotor and floater ...")
-            self._mutual[key], found = cached_mutual_table(scene.rotor, scene.floater, note)
-            if found:
-                self.from_cache.append("mutual")
-            note("  from the cache." if found else f"  done in {self._mutual[key].provenance['seconds']:.1f} s.")
-        return self._mutual[key], why
+        return self._tables.answers(scene), why
 
     def _with_effects(self, table: RotorField) -> Interaction:
         answers, effects = self.answers[0], interaction_of(table)
@@ -105,33 +94,29 @@ class Levitation:
         ------
         InputError : the rotor turns too fast for its metal
         """
-        if not pieces_of(self.scene.rotor, self.scene.conductors):
-            return None
-        key = f"{losses_key(self.scene)} {self.scene.frequency}"  # how fast is too fast depends on it
-        if key not in self._metal:
-            note("Currents in the rotor's metal ...")
-            self._metal[key], found = cached_rotor_losses(self.scene, note)
-            if found:
-                self.from_cache.append("rotor losses")
-            note("  from the cache." if found else f"  done in {self._metal[key].provenance['seconds']:.1f} s.")
-        return self._metal[key]
+        pieces = pieces_of(self.scene.rotor, self.scene.conductors)
+        check_slow_enough(pieces, self.scene.frequency)
+        return self._tables.losses(self.scene) if pieces else None
 
     def elsewhere(self, models: Models | None = None, **changes: Any) -> Levitation:
-        """Another scene with the same rotor, which shares its field; `changes` are fields of `Scene`, SI units."""
+        """Another scene, which shares the tables that fit it; `changes` are fields of `Scene`, SI units."""
         other = Levitation(replace(self.scene, **changes), models or self.models, self.spin)
         other.share(self)
         return other
 
     def share(self, other: Levitation) -> None:
-        """Take over the fields and the compiled equations of another scene with the same rotor, made or yet to make."""
-        self._fields, self._equations = other._fields, other._equations
-        self._mutual, self._metal = other._mutual, other._metal
+        """Use the tables and the compiled equations of another scene where they fit, made or yet to make."""
+        self._tables = other._tables
 
     def adopt(self, known: Survey, searched: bool = True) -> None:
         """Take over the equilibria without plate that are known from a search here or from scenes nearby."""
         self.without_plate, self.searched = known, searched
 
-    @property
+    def adopt_flight(self, duration: float, flown: Trajectory) -> None:
+        """Take over a flight of this duration (s) that was flown together with others."""
+        self._flown[duration] = flown
+
+    @cached_property
     def table(self) -> RotorField:
         """The rotor's field by the model that was asked for; `auto` chooses and says why."""
         return self.field(self.models.model)
@@ -175,8 +160,7 @@ class Levitation:
         memory, found = plate_memory(
             scene, scene.plate, choice.model, sources(self.table), place, self.models.plate_rtol, choice.edges
         )
-        if found:
-            self.from_cache.append("plate")
+        self._plate_cached = found
         return memory
 
     @cached_property
@@ -226,6 +210,8 @@ class Levitation:
         FlightStopped : the user stopped it; the error holds what was flown
         """
         positive("duration", duration)
+        if duration in self._flown:
+            return self._flown[duration]
         known = () if self.absolute else self.equilibria
         table, plate = self._with_effects(self.flight_table), self.plate
         note("Motion ...")
@@ -234,14 +220,17 @@ class Levitation:
 
     def field(self, model: str) -> RotorField:
         """The rotor's field by any model, accurate wherever the floater can be: from its radius off the magnets on."""
-        name, reason = "map", ""
-        if model != "map":
-            name, reason = resolve_model(self.scene.rotor, model, self.models.rtol, self.scene.floater.radius)
-        if name not in self._fields:
-            if model == "auto":
-                detail(f"Field model: {name} ({reason})")
-            self._fields[name] = self._made(name)
-        return self._fields[name]
+        if model == "map":
+            return self._tables.field(self.scene, model, self.models.rtol)
+        name, reason = resolve_model(self.scene.rotor, model, self.models.rtol, self.scene.floater.radius)
+        if model == "auto":
+            detail(f"Field model: {name} ({reason})")
+        return self._tables.field(self.scene, name, self.models.rtol)
+
+    @property
+    def from_cache(self) -> list[str]:
+        """Names of the tables that were found in the user's cache."""
+        return [*self._tables.from_cache, *(["plate"] if self._plate_cached else [])]
 
     @property
     def labels(self) -> dict[str, str]:
@@ -257,13 +246,12 @@ class Levitation:
     @property
     def rates(self) -> Rates:
         """The equations of motion in the rotor's field, compiled."""
-        scene = self.scene
-        answers = "" if self.answers[0] is None else mutual_key(scene.rotor, scene.floater)
-        metal = "" if self.losses is None else losses_key(scene)
-        kind = self.table.model, bool(scene.floater.conductivity), scene.drag.air, answers, metal
-        if kind not in self._equations:
-            self._equations[kind] = Rates(self.interaction)
-        return self._equations[kind]
+        return self._tables.rates(self.equations_key, self.interaction)
+
+    @property
+    def equations_key(self) -> str:
+        """All that decides tables and equations; scenes where it is the same differ in parameters of the motion."""
+        return equations_key(self.scene, self.models)
 
     @property
     def absolute(self) -> bool:
@@ -276,20 +264,6 @@ class Levitation:
             return self.scene.start.position
         chosen = _first(known)
         return None if chosen is None else chosen.position
-
-    def _made(self, name: str) -> RotorField:
-        scene, rtol = self.scene, self.models.rtol
-        if name == "map":
-            note("Rotor's field from its map ...")
-            return map_table(scene.field_map, scene.rotor)
-        if name != "fem":  # closed forms are quicker to make than to read
-            return rotor_table(scene.rotor, name, rtol, scene.floater.radius)
-        note("Rotor's field by finite elements ...")
-        table, found = cached_rotor_table(scene.rotor, name, rtol, note, scene.floater.radius)
-        if found:
-            self.from_cache.append(name)
-        note("  from the cache." if found else f"  done in {table.provenance['seconds']:.1f} s.")
-        return table
 
 
 def given_scene(scene: Scene | str | Path) -> Scene:

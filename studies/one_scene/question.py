@@ -13,15 +13,15 @@ from ...geometry.basics import Array, InputError, SpinlevError
 from ...geometry.scenes import Scene, changed, scene_text
 from ..results import AXIS, Point, found_dataset, variable
 from ..terminal import Models, Quantity, positive
-from .answers import flight_answer
+from .answers import kind_of_flight
 from .levitation import Levitation
-from .together import share
+from .together import fly, share
 
 CHOICES = ("model", "plate_model", "interaction", "spin")
 """What can be varied beside the keys of the scene file."""
 ROTOR = ("rotor", "model", "interaction", "floater")
 """How keys begin whose values need a table of their own."""
-LARGEST: Mapping[Quantity, int] = {"equilibria": 60, "flight": 12, "field": 60}
+LARGEST: Mapping[Quantity, int] = {"equilibria": 60, "flight": 32, "field": 60}
 """How many points are answered together at most, and lost together if the program is killed among them."""
 PARTS = 4
 """Batches of a small sweep: as many workers share it."""
@@ -83,10 +83,17 @@ class Question:
                 made[k] = self.levitation(point)
         axes = [sorted({point[key] for point in points}) for key in points[0]]
         places = [tuple(axis.index(value) for axis, value in zip(axes, points[k].values(), strict=True)) for k in made]
-        share(list(made.values()), places, self.ask != "field")
+        share(list(made.values()), places, [self._needs_equilibria(one) for one in made.values()])
+        if self.ask == "flight":
+            fly(list(made.values()), self.duration)
         for k, levitation in made.items():
             jobs[k] = partial(self._answer, points[k], levitation)
         return jobs
+
+    def _needs_equilibria(self, levitation: Levitation) -> bool:
+        if self.ask == "flight":
+            return levitation.scene.plate is not None or not levitation.absolute
+        return self.ask == "equilibria"
 
     def batches(self, points: Mapping[int, Point]) -> list[list[int]]:
         """Points that are answered together: neighbours with the same rotor, the same ones whoever computes them."""
@@ -130,16 +137,15 @@ def _equilibria(question: Question, levitation: Levitation) -> xr.Dataset:
 
 def _flight(question: Question, levitation: Levitation) -> xr.Dataset:
     flight = levitation.flight(question.duration)
-    answer = flight_answer(levitation, flight)
     height = flight.lab.position[:, 2]
     return xr.Dataset(
         {
-            "levitated": variable((), answer["levitated_s"], "s", "levitation time"),
-            "ended_by": ((), answer["ended_by"]),
-            "kind": ((), answer["kind"]),
+            "levitated": variable((), flight.levitated_s, "s", "levitation time"),
+            "ended_by": ((), flight.ended_by),
+            "kind": ((), kind_of_flight(levitation, flight)),
             "mean_height": variable((), height.mean(), "m", "mean height"),
             "height_spread": variable((), np.ptp(height), "m", "highest less lowest height"),
-            "energy_error": variable((), answer["energy_error"], "1", "violation of the energy ledger"),
+            "energy_error": variable((), flight.energy_error, "1", "violation of the energy ledger"),
         },
         attrs=levitation.labels,
     )

@@ -1,57 +1,93 @@
-"""Levitations of many points at once: scenes with one rotor share its table, compiled equations and equilibria."""
+"""Levitations of many points at once: scenes with one rotor share its table, compiled equations and equilibria.
+
+Flights that begin in one field go side by side in a processor's lanes (`dynamics.ensembles`).
+"""
 
 from collections.abc import Sequence
+from contextlib import suppress
+from dataclasses import replace
 
 import numpy as np
 
+from ...dynamics.ensembles import fly_together
+from ...dynamics.flights import initial_state, is_long
 from ...dynamics.maps import surveys
 from ...dynamics.steady import Indices
-from ...fem.mutual import mutual_key
-from ...fem.rotor_tables import rotor_key
 from ...geometry.basics import SpinlevError
+from ...geometry.scenes import OffsetStart, scene_text
 from .levitation import Levitation
 
 
-def share(levitations: Sequence[Levitation], places: Sequence[tuple[int, ...]], equilibria: bool) -> None:
+def share(levitations: Sequence[Levitation], places: Sequence[tuple[int, ...]], equilibria: Sequence[bool]) -> None:
     """Let scenes whose rotors have the same field share what it takes; each ends as it would alone.
 
     Parameters
     ----------
     levitations : of the points
     places : their coordinates in the grid of what is varied
-    equilibria : whether those without the plate shall be found together, the neighbours' as guesses
+    equilibria : which of them need theirs without the plate: these are found together, the neighbours' as guesses
     """
     groups: dict[str, list[int]] = {}
     for k, levitation in enumerate(levitations):
-        groups.setdefault(_field_key(levitation), []).append(k)
+        groups.setdefault(levitation.equations_key, []).append(k)
     for members in groups.values():
-        alike = [levitations[k] for k in members]
-        for other in alike[1:]:
-            other.share(alike[0])
-        if equilibria and len(alike) > 1:
-            _find_together(alike, np.array([places[k] for k in members]))
+        for k in members[1:]:
+            levitations[k].share(levitations[members[0]])
+        asked = [k for k in members if equilibria[k]]
+        if len(asked) > 1:
+            _find_together([levitations[k] for k in asked], np.array([places[k] for k in asked]))
 
 
 def _find_together(alike: Sequence[Levitation], places: Indices) -> None:
-    """What cannot be found here is left to each scene, which says why."""
-    turning = [k for k, levitation in enumerate(alike) if levitation.scene.frequency]
-    chosen = [alike[k] for k in turning]
-    if not chosen:
+    """What cannot be found here is left to each scene, which says why; where a flight begins does not matter."""
+    same: dict[str, list[Levitation]] = {}
+    first_places = []
+    for levitation, place in zip(alike, places, strict=True):
+        if levitation.scene.frequency:
+            key = f"{scene_text(replace(levitation.scene, start=OffsetStart()))} {levitation.spin!r}"
+            if key not in same:
+                first_places.append(place)
+            same.setdefault(key, []).append(levitation)
+    if not same:
         return
-    near = np.array([np.unique(column, return_inverse=True)[1] for column in places[turning].T]).T
+    chosen = [some[0] for some in same.values()]
+    near = np.array([np.unique(column, return_inverse=True)[1] for column in np.array(first_places).T]).T
     spin = np.array([levitation.spin for levitation in chosen])
     try:
         first = chosen[0]
         found = surveys([one.scene for one in chosen], first.interaction, spin, near, first.rates)
     except SpinlevError:
         return
-    for levitation, (survey, searched) in zip(chosen, found, strict=True):
-        levitation.adopt(survey, searched)
+    for some, (survey, searched) in zip(same.values(), found, strict=True):
+        for levitation in some:
+            levitation.adopt(survey, searched)
 
 
-def _field_key(levitation: Levitation) -> str:
-    scene, models = levitation.scene, levitation.models
-    conducting = bool(scene.floater.conductivity)
-    rotor = rotor_key(scene.rotor, models.model, models.rtol, scene.floater.radius)
-    answers = "" if models.interaction == "rigid" else f"{models.interaction} {mutual_key(scene.rotor, scene.floater)}"
-    return f"{rotor} {conducting} {scene.field_map} {answers}"
+def fly(levitations: Sequence[Levitation], duration: float) -> None:
+    """Fly for `duration` (s) together what can be; what cannot be flown here is left to each scene, which says why.
+
+    Over a plate with currents, and in a field so short that balls do not pay, each flies alone.
+    """
+    groups: dict[tuple[object, ...], list[Levitation]] = {}
+    for levitation in levitations:
+        with suppress(SpinlevError):
+            if levitation.plate is None and is_long(levitation.interaction):
+                tilted = bool(np.any(levitation.scene.gravity[:2]))
+                key = levitation.equations_key, levitation.interaction_model, tilted
+                groups.setdefault(key, []).append(levitation)
+    for alike in groups.values():
+        if len(alike) > 1:
+            _fly_together(alike, duration)
+
+
+def _fly_together(alike: Sequence[Levitation], duration: float) -> None:
+    ready = []
+    for levitation in alike:
+        with suppress(SpinlevError):
+            known = () if levitation.absolute else levitation.equilibria
+            ready.append((levitation, initial_state(levitation.scene, levitation.interaction, known)[0]))
+    with suppress(SpinlevError):
+        flown = fly_together([one.scene for one, _ in ready], alike[0].interaction, [s for _, s in ready], duration)
+        for (levitation, _), flight in zip(ready, flown, strict=True):
+            if flight is not None:
+                levitation.adopt_flight(duration, flight)

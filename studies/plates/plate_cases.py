@@ -1,6 +1,6 @@
 """The plates and rotors of the study of the plate's damping, and where the floater levitates without a plate."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 
 import numpy as np
@@ -9,7 +9,7 @@ from ...dynamics.branches import StableRange, at_frequency, reference_state, sta
 from ...dynamics.steady import Equilibrium, EquilibriumError
 from ...geometry.basics import Array, Box, rotation_matrix
 from ...geometry.scenes import Plate
-from ..article import CONFIGURATIONS, PLATE_CONDUCTIVITY, PLATE_SIZE, article_scene, levitation_of
+from ..article import CONFIGURATIONS, PLATE_CONDUCTIVITY, PLATE_SIZE, article_scene, conducting, levitation_of
 from ..one_scene import Levitation
 from ..terminal import PlateModel
 
@@ -40,6 +40,7 @@ class PlateCase:
     conductivity : S/m
     configuration, measure : of the rotor
     part : place of the rotor's frequency in its range of stable frequencies, 0 to 1; None: `FREQUENCY`
+    complete : rotor and floater magnetise each other and have eddy currents, in real air; else Stokes drag alone
     """
 
     sweep: str
@@ -52,6 +53,7 @@ class PlateCase:
     configuration: str = CONFIGURATION
     measure: float = MEASURE
     part: float | None = None
+    complete: bool = False
 
     def plate(self, place: Array) -> Plate:
         """The plate for a floater at `place` (3,) m."""
@@ -80,38 +82,50 @@ def cases(quick: bool) -> list[PlateCase]:
             found += [PlateCase(sweep, m, upright=beside, configuration=name, measure=m, part=MIDDLE) for m in some]
     found += [PlateCase("below, real plate", d, "reduced", distance=d) for d in real]
     found += [PlateCase("beside, real plate", d, "reduced", upright=True, distance=d) for d in real]
-    return found
+    return [replace(case, complete=not quick) for case in found]
 
 
 @cache
-def _in_field(configuration: str, measure: float) -> Levitation:
-    """A rotor in air, its field and compiled motion, once for all points that a process computes."""
+def _in_field(configuration: str, measure: float, complete: bool) -> Levitation:
+    """A rotor in air, its field and compiled motion, once for all points that a process computes; without currents."""
     scene = article_scene(configuration, measure, FREQUENCY)
-    return levitation_of(scene, "fem", FIELD_RTOL)
+    return levitation_of(scene, "fem", FIELD_RTOL, "auto" if complete else "rigid")
 
 
 @cache
-def _stable_range(configuration: str, measure: float) -> StableRange:
-    levitation = _in_field(configuration, measure)
+def _stable_range(configuration: str, measure: float, complete: bool) -> StableRange:
+    levitation = _in_field(configuration, measure, complete)
     return stable_range(levitation.scene, levitation.rates, *reference_state(levitation.scene))
 
 
-@cache
-def without_plate(configuration: str, measure: float, part: float | None) -> tuple[Levitation, Equilibrium]:
-    """A scene without plate, and its stable equilibrium.
+def without_plate(case: PlateCase) -> tuple[Levitation, Equilibrium]:
+    """A case's scene without plate, and its equilibrium that is stable but for the currents in rotor and floater.
 
     Raises
     ------
     EquilibriumError : nothing levitates there
     """
-    levitation, near = _in_field(configuration, measure), None
+    return _without_plate(case.configuration, case.measure, case.part, case.complete)
+
+
+@cache
+def _without_plate(
+    configuration: str, measure: float, part: float | None, complete: bool
+) -> tuple[Levitation, Equilibrium]:
+    alone, frequency = _in_field(configuration, measure, complete), FREQUENCY
     if part is not None:
-        stable = _stable_range(configuration, measure)
+        stable = _stable_range(configuration, measure, complete)
         frequency = stable.low.parameter + part * (stable.high.parameter - stable.low.parameter)
-        levitation = levitation.elsewhere(frequency=frequency)
-        near = at_frequency(levitation.scene, levitation.rates, stable.near(frequency), frequency).distance
-    found = levitation.equilibria
-    known = [e for e in found if (e.stable if near is None else abs(e.distance - near) < 1e-6)]
+        near = at_frequency(alone.scene, alone.rates, stable.near(frequency), frequency).distance
+    else:
+        near = next((e.distance for e in alone.equilibria if e.stable), np.nan)
+    levitation = alone.elsewhere(frequency=frequency)
+    if complete:
+        scene = conducting(levitation.scene)
+        whole = Levitation(replace(scene, drag=replace(scene.drag, air=True)), alone.models)
+        whole.share(levitation)
+        levitation = whole
+    known = [e for e in levitation.equilibria if abs(e.distance - near) < 1e-6]
     if not known:
         raise EquilibriumError("There is no stable levitation without the plate.")
     return levitation, known[0]

@@ -1,4 +1,8 @@
-"""What a plate does to levitation: damping of each small motion, drag, lift and loss against its place and material."""
+"""What a plate does to levitation: damping of each small motion, drag, lift and loss against its place and material.
+
+In the motion are Stokes drag and, but in the quick settings, real air, eddy currents in floater and rotor, and that
+both magnetise each other; the plate's currents answer the rigid floater and the rotor.
+"""
 
 from collections.abc import Sequence
 from dataclasses import asdict, replace
@@ -35,7 +39,7 @@ def plate_damping(point: Point) -> xr.Dataset:
     EquilibriumError : nothing levitates even without the plate
     """
     case = PlateCase(**point)
-    alone, start = without_plate(case.configuration, case.measure, case.part)
+    alone, start = without_plate(case)
     models = replace(alone.models, plate_model=case.model, plate_rtol=RTOL)
     beside = alone.elsewhere(models, plate=case.plate(start.position))
     beside.adopt(Survey((start,), ()))

@@ -79,9 +79,10 @@ MARKS = (
 
 
 def _draw_curves(axes: Axes, result: xr.Dataset, model: str) -> None:
-    on_model = result["curve_model"] == model
-    for number in np.unique(result["curve_number"].where(on_model, drop=True)):
-        points = result.where(on_model & (result["curve_number"] == number), drop=True)
+    curves = result[["curve_model", "curve_number", "curve_position", "curve_force"]]  # not the flight's many samples
+    curves = curves.isel(curve_point=(curves["curve_model"] == model).values)
+    for number in np.unique(curves["curve_number"]):
+        points = curves.isel(curve_point=(curves["curve_number"] == number).values)
         distance, force = -1e3 * points["curve_position"].sel(axis="z").values, 1e3 * points["curve_force"].values
         axes.plot(*_smooth(np.arange(len(force), dtype=float), distance, force), DASHES[model], color=COLORS[model])
     axes.plot([], [], DASHES[model], color=COLORS[model], label=NAMES[model])

@@ -39,7 +39,7 @@ def scene_of(name):
 )
 def test_map_equals_searches_at_random_points(name, model):
     """All equilibria, their places to 1e-9 m, growth and stability, of a table made for the point's own rotor."""
-    family, measures = rotor_family(scene_of(name), name, model, 1e-4), ROTORS[name][1]
+    family, measures = rotor_family(scene_of(name), name, model, 1e-4, interaction="rigid"), ROTORS[name][1]
     spacing = 8 if name == "horizontal" else 3
     found, rng = equilibrium_map(family, FREQUENCIES, measures, spacing=spacing), np.random.default_rng(1)
     assert found.number[0].sum() == len(found.row)

@@ -27,4 +27,4 @@ def test_vertical_rotor_below_within_and_above_its_range():
 
 def test_points_are_every_case_with_every_variant():
     points = time_points(False)
-    assert len({(p["case"], p["variant"]) for p in points}) == len(points) == 88
+    assert len({(p["case"], p["variant"]) for p in points}) == len(points) == 104

@@ -1,6 +1,7 @@
 """Points of a sweep that help each other have the values that each has alone."""
 
 import numpy as np
+import pytest
 import xarray as xr
 
 import spinlev as sl
@@ -54,6 +55,27 @@ def test_rotors_that_differ_share_nothing_but_the_sweep():
     asked, points = question(**{"rotor.displacement_mm": [1.5, 2.5], "frequency_hz": [120.0, 130.0, 140.0]})
     for point, job in zip(points, asked.prepared(points), strict=True):
         np.testing.assert_allclose(job()["position"], asked(point)["position"], rtol=0, atol=1e-12)
+
+
+@pytest.mark.slow
+def test_rotors_that_conduct_differently_have_losses_of_their_own():
+    asked, points = question(**{"rotor.conductivity_S_m": [0.0, 5e5], "frequency_hz": [120.0, 150.0]})
+    together = [job()["growth"].values for job in asked.prepared(points)]
+    for point, growth in zip(points, together, strict=True):
+        np.testing.assert_allclose(growth, asked(point)["growth"], rtol=1e-6, atol=1e-9)
+    assert not np.allclose(together[0], together[2], rtol=1e-3)
+
+
+def test_no_rotor_turns_with_the_currents_of_another():
+    """The second conducts like copper: the skin depth is too small for its table, and none else will do."""
+    asked, points = question(**{"rotor.conductivity_S_m": [0.0, 5e7], "frequency_hz": [120.0, 150.0]})
+    levitations = [asked.levitation(point) for point in points]
+    assert len({levitation.equations_key for levitation in levitations}) == 2
+    jobs = asked.prepared(points)
+    assert all(job().sizes["equilibrium"] for job in jobs[:2])
+    for job in jobs[2:]:
+        with pytest.raises(sl.InputError, match="skin depth"):
+            job()
 
 
 def test_a_point_that_cannot_be_leaves_the_others_alone(tmp_path):

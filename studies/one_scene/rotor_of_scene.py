@@ -1,0 +1,89 @@
+"""Tables of what a scene's rotor does to the floater, and the compiled equations in them: each is made once."""
+
+from collections.abc import Callable
+from functools import partial
+from typing import Any, TypeVar
+
+from ...dynamics.motion import Interaction, Rates
+from ...fem.measured_maps import GriddedTable, map_table
+from ...fem.mutual import MutualTable, cached_mutual_table, mutual_key
+from ...fem.rotor_losses import RotorLosses, cached_rotor_losses, losses_key, pieces_of
+from ...fem.rotor_tables import RotorTable, cached_rotor_table, rotor_key, rotor_table
+from ...geometry.scenes import Scene
+from ..terminal import Models, note
+
+RotorField = RotorTable | GriddedTable
+"""A rotor's table: computed, or from a map."""
+Cached = TypeVar("Cached", RotorTable, MutualTable, RotorLosses)
+Made = TypeVar("Made")
+
+
+class RotorTables:
+    """Tables and equations for any number of scenes to share; a scene finds those that were made for what it needs."""
+
+    def __init__(self) -> None:
+        self.from_cache: list[str] = []
+        """Names of the tables that were found in the user's cache."""
+        self._known: dict[str, Any] = {}
+
+    def field(self, scene: Scene, name: str, rtol: float) -> RotorField:
+        """The rotor's field by a model or from its map, accurate from the floater's radius off the magnets on.
+
+        Raises
+        ------
+        InputError : the map cannot be used
+        """
+        key = f"{rotor_key(scene.rotor, name, rtol, scene.floater.radius)} {scene.field_map}"
+        return self._once(key, lambda: self._field(scene, name, rtol))
+
+    def answers(self, scene: Scene) -> MutualTable:
+        """What rotor and floater do to each other's magnetisation."""
+        make = partial(cached_mutual_table, scene.rotor, scene.floater, note)
+        key = mutual_key(scene.rotor, scene.floater)
+        return self._once(key, lambda: self._cached("mutual", "Mutual magnetisation of rotor and floater", make))
+
+    def losses(self, scene: Scene) -> RotorLosses:
+        """The losses in the rotor's metal; some of it must conduct."""
+        make = partial(cached_rotor_losses, scene, note)
+        return self._once(
+            losses_key(scene), lambda: self._cached("rotor losses", "Currents in the rotor's metal", make)
+        )
+
+    def rates(self, key: str, interaction: Interaction) -> Rates:
+        """The equations of motion, compiled; `key` is the scene's `equations_key`."""
+        return self._once(f"rates {key}", lambda: Rates(interaction))
+
+    def _field(self, scene: Scene, name: str, rtol: float) -> RotorField:
+        if name == "map":
+            note("Rotor's field from its map ...")
+            return map_table(scene.field_map, scene.rotor)
+        if name != "fem":  # closed forms are quicker to make than to read
+            return rotor_table(scene.rotor, name, rtol, scene.floater.radius)
+        make = partial(cached_rotor_table, scene.rotor, name, rtol, note, scene.floater.radius)
+        return self._cached(name, "Rotor's field by finite elements", make)
+
+    def _cached(self, name: str, title: str, make: Callable[[], tuple[Cached, bool]]) -> Cached:
+        note(f"{title} ...")
+        table, found = make()
+        if found:
+            self.from_cache.append(name)
+        note("  from the cache." if found else f"  done in {table.provenance['seconds']:.1f} s.")
+        return table
+
+    def _once(self, key: str, make: Callable[[], Made]) -> Made:
+        if key not in self._known:
+            self._known[key] = make()
+        made: Made = self._known[key]
+        return made
+
+
+def equations_key(scene: Scene, models: Models) -> str:
+    """All that decides a scene's tables and equations of motion without plate; what it leaves out are parameters."""
+    return " ".join(
+        (
+            rotor_key(scene.rotor, models.model, models.rtol, scene.floater.radius),
+            f"{scene.field_map} {bool(scene.floater.conductivity)} {scene.drag.air} {models.interaction}",
+            "" if models.interaction == "rigid" else mutual_key(scene.rotor, scene.floater),
+            losses_key(scene) if pieces_of(scene.rotor, scene.conductors) else "",
+        )
+    )
