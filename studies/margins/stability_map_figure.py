@@ -76,7 +76,7 @@ def _plate(axes: Axes, part: xr.Dataset) -> None:
 
 
 def _lasting(axes: Axes, part: xr.Dataset) -> None:
-    for metal, (mark, _) in METAL.items():
+    for metal, (mark, _) in METAL.items() if "high" in part else ():  # older results do not say
         axes.plot(part["measure"], part["high"].sel(metal=metal), mark, color="k", ms=9, mew=1.2)
 
 
@@ -109,6 +109,8 @@ def _verdicts(one: xr.Dataset) -> str:
 
 
 def _flights(one: xr.Dataset) -> str:
+    if "metal" not in one:
+        return ""
     words = [
         f"{low:.1f} to {high:.1f} Hz ({metal} rotor; then {end})"
         for metal, low, high, end in zip(
