@@ -86,7 +86,8 @@ def magnets(*cuboids: Table, **more: Any) -> Table:
     **more : float or list
         Further keys of every rotor: recoil_permeability of the article's, conductivity_S_m of all magnets (their eddy
         currents, else left out), field_map, and conductors, a list of tables with shape ("cuboid" or "cylinder"),
-        size_mm or diameter_mm and height_mm, center_mm, rotation_deg and conductivity_S_m: metal that turns with the rotor.
+        size_mm or diameter_mm and height_mm, center_mm, rotation_deg and conductivity_S_m: metal that turns with the
+        rotor.
 
     Returns
     -------
