@@ -1,14 +1,6 @@
 """What is in the scene file, and is it a scene that can exist?"""
 
-from .building import (
-    horizontal as horizontal,
-    magnets as magnets,
-    plate as plate,
-    scene as scene,
-    sphere as sphere,
-    tilt as tilt,
-    vertical as vertical,
-)
+from .building import scene as scene
 from .contents import (
     AIR_VISCOSITY as AIR_VISCOSITY,
     AbsoluteStart as AbsoluteStart,
@@ -21,4 +13,12 @@ from .contents import (
 )
 from .faults import SceneError as SceneError
 from .file import changed as changed, load_scene as load_scene, parse_scene as parse_scene
+from .parts import (
+    horizontal as horizontal,
+    magnets as magnets,
+    plate as plate,
+    sphere as sphere,
+    tilt as tilt,
+    vertical as vertical,
+)
 from .writing import scene_text as scene_text

@@ -16,10 +16,21 @@ from .writing import scene_keys
 def load_scene(path: str | Path) -> Scene:
     """Read and check a scene file.
 
+    Parameters
+    ----------
+    path : str or Path
+        The file.
+
+    Returns
+    -------
+    Scene
+        What it describes, in SI units.
+
     Raises
     ------
-    SceneError : the file is missing or unreadable, is not TOML, has unknown, missing or wrong keys, or its
-        bodies overlap, or its map of the field is no file
+    SceneError
+        The file is missing or unreadable, is not TOML, has unknown, missing or wrong keys, or its bodies overlap, or
+        its map of the field is no file.
     """
     source = str(path)
     try:
@@ -35,15 +46,26 @@ def load_scene(path: str | Path) -> Scene:
 
 
 def parse_scene(text: str, source: str = "scene", changes: Mapping[str, float] | None = None) -> Scene:
-    """Build a scene from the text of a scene file; `source` names it in messages.
+    """Build a scene from the text of a scene file.
 
     Parameters
     ----------
-    changes : numbers that replace those of the file, by key, such as `rotor.displacement_mm` or `plate.center_mm.2`
+    text : str
+        As in a scene file, TOML.
+    source : str
+        What messages call it.
+    changes : dict of str to float, optional
+        Numbers that replace those of the text, by key, such as `rotor.displacement_mm` or `plate.center_mm.2`.
+
+    Returns
+    -------
+    Scene
+        What it describes, in SI units.
 
     Raises
     ------
-    SceneError : as `load_scene`, also for a change that no key takes
+    SceneError
+        As `load_scene`, also for a change that no key takes.
     """
     try:
         keys = tomllib.loads(text)

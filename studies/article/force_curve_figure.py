@@ -73,7 +73,7 @@ def _parts(axes: Axes, one: xr.Dataset) -> None:
     axes.axhline(-1e3 * WEIGHT, color="0.5", lw=0.8)
     axes.axhline(0.0, color="0.3", lw=0.6)
     for text, place, color in (("attracting part", (24, 165), PALETTE[0]), ("repelling part", (20, -225), PALETTE[1])):
-        axes.annotate(text, place, color=color)
+        axes.annotate(text, place, color=color, fontsize="small")
     axes.annotate("gravity", (40, -1e3 * WEIGHT - 30), color="0.4", fontsize=7)
     axes.set(ylabel="force, upwards (mN)", ylim=(-470, 350))
     axes.legend(title="black: net force", loc="lower right")

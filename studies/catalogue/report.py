@@ -1,6 +1,7 @@
 """The command `report`: one page of all results in a folder, which opens without a network."""
 
 import base64
+import gzip
 import json
 import os
 from importlib.resources import files
@@ -14,17 +15,19 @@ import xarray as xr
 from ...fem.storage import write_whole
 from ...geometry.basics import InputError
 from ..pictures import question_lines
+from ..rendering import RenderError, Turnable, View, drawn, inlined, page
 from ..results import figure_bytes
 from .drawings import QUESTION, figures_of, read_result
 from .entries import CATALOGUE
 from .jobs import failure_lines
-from .turned_view import view_of
+from .show import flight_of
 
 SUMMARIES = {
-    "run": "The main job: fields, force, equilibria and motion of a scene.",
+    "run": "A scene: its field, the force on the floater, where it levitates, and a flight.",
     "simulate": "A flight.",
-    QUESTION: "One's own question over parameters of a scene.",
+    QUESTION: "A quantity of a scene over some of its parameters.",
 }
+PLACE = b"the scene comes here"
 LONGEST = 400
 """Characters of a value that are shown."""
 LARGEST = 2_500_000
@@ -32,9 +35,9 @@ LARGEST = 2_500_000
 CAPTIONS = {
     "field": "Field on the axis below the rotor by each model, and how far the models are apart.",
     "force": "Axial force on the floater where all else is balanced. It floats where the curve meets its weight.",
-    "trajectory": "The flight: distance and polar angle as envelopes, and a closer look.",
+    "trajectory": "The flight: distance and polar angle (smallest, mean, largest in time), and a closer look.",
     "modes": "Growth and frequency of the small motions about each equilibrium; negative growth dies out.",
-    "scene": "Rotor, floater, plate and field, seen along with the rotor.",
+    "scene": "Rotor, floater, plate and field, in the frame that turns with the rotor.",
 }
 
 
@@ -53,8 +56,12 @@ def report_job(folder: Path, out: Path) -> tuple[Path, list[str]]:
     parts = [_part(path) for path in paths]
     _fit(parts)
     template = files(__package__).joinpath("report.html").read_text(encoding="utf-8")
-    page = jinja2.Environment(autoescape=True).from_string(template).render(folder=folder.resolve().name, parts=parts)
-    write_whole(out / "report.html", page.encode())
+    text = (
+        jinja2.Environment(autoescape=True)
+        .from_string(template)
+        .render(folder=folder.resolve().name, parts=parts, **_viewer(parts))
+    )
+    write_whole(out / "report.html", text.encode())
     return out / "report.html", [part["name"] for part in parts]
 
 
@@ -78,10 +85,29 @@ def _part(path: Path) -> dict[str, Any]:
         "headline": summary.get("headline", ""),
         "equilibria": summary.get("equilibria", []),
         "answers": _answers(summary),
-        "view": view_of(result),
+        **_view(result),
         "variables": [_row(name, values) for name, values in result.data_vars.items()],
         "provenance": {key: str(value) for key, value in result.attrs.items() if key != "failed_points"},
     }
+
+
+def _view(result: xr.Dataset) -> dict[str, str]:
+    """The end of a flight as the viewer takes it, or why there is none; nothing for a result without a flight."""
+    if "scene" not in result.attrs or "position_rotor_frame" not in result:
+        return {}
+    scene, motion = flight_of(result, "scene")
+    try:
+        view = View(scene, motion.position[-1], motion.moment[-1], motion.position)
+        return {"view": inlined(drawn(Turnable(view)))}
+    except RenderError as error:
+        return {"no_view": str(error)}
+
+
+def _viewer(parts: list[dict[str, Any]]) -> dict[str, str]:
+    """The program that draws the views, packed, and the text in it for which each view stands."""
+    if not any("view" in part for part in parts):
+        return {}
+    return {"viewer": base64.b64encode(gzip.compress(page(PLACE))).decode(), "place": inlined(PLACE)}
 
 
 def _embedded(content: bytes, kind: str) -> str:

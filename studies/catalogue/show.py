@@ -7,17 +7,18 @@ import numpy as np
 import xarray as xr
 
 from ...dynamics.motion import State
+from ...fem.storage import write_whole
 from ...geometry.basics import InputError
 from ...geometry.scenes import Scene, parse_scene
 from ..one_scene import Levitation, sources
 from ..pictures import flight_frames, last_view, plate_currents
-from ..rendering import Currents, current_places, render
+from ..rendering import Currents, Turnable, current_places, drawn, page, render
 from ..terminal import Models, note, progress
 from .drawings import read_result
 
 
-def show_job(path: Path, out: Path) -> list[str]:
-    """Write NAME-scene.png, and NAME-flight.gif of a flight; returns the files.
+def show_job(path: Path, out: Path, html: bool = False) -> list[str]:
+    """Write NAME-scene.png, NAME-flight.gif and, if `html`, NAME-view.html of a flight; returns the files.
 
     Raises
     ------
@@ -30,9 +31,8 @@ def show_job(path: Path, out: Path) -> list[str]:
             f"Input {path} must hold a flight (result.nc of `run`, trajectory.nc of `simulate`); instead it is of "
             f"'{result.attrs['study']}'. Its figures: spinlev figure {path}"
         )
-    scene = _at_end(parse_scene(str(result.attrs["scene"]), str(path)), float(result["time"][-1]))
+    scene, motion = flight_of(result, str(path))
     table = Levitation(scene, Models(result.attrs.get("model", "auto"))).table
-    motion = _motion(scene, result)
     view = last_view(scene, table, motion)
     if scene.plate is not None:
         note("Currents in the plate ...")
@@ -43,13 +43,20 @@ def show_job(path: Path, out: Path) -> list[str]:
     picture, animation = (out / f"{path.stem}-{name}" for name in ("scene.png", "flight.gif"))
     with progress("Pictures") as advance:
         render({picture: view, animation: flight_frames(scene, result["time"].values, motion)}, advance)
-    return [str(picture), str(animation)]
+    files = [str(picture), str(animation)]
+    if html:
+        turned = out / f"{path.stem}-view.html"
+        write_whole(turned, page(drawn(Turnable(view))))
+        files.append(str(turned))
+    return files
 
 
-def _motion(scene: Scene, result: xr.Dataset) -> State:
+def flight_of(result: xr.Dataset, source: str) -> tuple[Scene, State]:
+    """The scene at the end of the flight that a result holds, and its motion along the rotor's axes."""
+    scene = _at_end(parse_scene(str(result.attrs["scene"]), source), float(result["time"][-1]))
     names = ("position", "velocity", "moment", "spin")
     laboratory = State(*(result[name].values for name in names))
-    return laboratory.to_rotor(scene.angular_velocity * result["time"].values)
+    return scene, laboratory.to_rotor(scene.angular_velocity * result["time"].values)
 
 
 def _at_end(scene: Scene, time: float) -> Scene:

@@ -31,7 +31,7 @@ def study(
 ) -> Answer:
     """One study of the catalogue, or any quantity of a scene over any of its parameters.
 
-    Writes NAME.nc (question.nc for one's own), its figure as PNG and PDF, and says what it found. A study that was
+    Writes NAME.nc (question.nc for your own), its figures as PNG and PDF, and says what it found. A study that was
     stopped goes on where it was.
 
     Parameters
@@ -104,22 +104,24 @@ def figure(result: Path, *, output: Beside = Beside()) -> Answer:
     return Answer({"figures": files}, [f"Figure in {file}" for file in files], output.json)
 
 
-def show(result: Path, *, output: Beside = Beside()) -> Answer:
-    """Three-dimensional pictures of a flight, beside its file: the scene with the plate's currents, and an animation.
+def show(result: Path, *, html: Annotated[bool, Parameter(negative="")] = False, output: Beside = Beside()) -> Answer:
+    """Three-dimensional pictures of a flight, beside its file: scene and currents in the plate, animation, page.
 
     Parameters
     ----------
     result
         result.nc of `run` or trajectory.nc of `simulate`.
+    html
+        Also write a page in which the scene can be turned with the mouse.
     """
     from ..catalogue import show_job
 
-    files = show_job(result, output.out or result.parent)
+    files = show_job(result, output.out or result.parent, html)
     return Answer({"pictures": files}, [f"Picture in {file}" for file in files], output.json)
 
 
 def report(folder: Path, *, output: Beside = Beside()) -> Answer:
-    """One page, report.html, about all results in a folder: figures, numbers, errors, provenance; in that folder.
+    """One page, report.html, about all results in a folder: figures, numbers, errors and where they come from.
 
     Parameters
     ----------

@@ -36,7 +36,9 @@ def run(
     duration_s: float = 10.0,
     output: Output = Output(),
 ) -> Answer:
-    """The main job: fields, tables, equilibria, stability, motion, pictures, result.nc and summary.json.
+    """Everything about one scene: its field, where the floater levitates, a flight, figures and pictures.
+
+    Writes result.nc, summary.json and the pictures.
 
     Parameters
     ----------
@@ -87,7 +89,7 @@ def equilibria(
     spin: float = 0.0,
     output: Output = Output(),
 ) -> Answer:
-    """All synchronous equilibria and their stability.
+    """Every place where the floater can hang in step with the rotor, and whether it stays there.
 
     Parameters
     ----------
@@ -112,7 +114,7 @@ def simulate(
     resume: Annotated[bool, Parameter(negative="")] = False,
     output: Output = Output(),
 ) -> Answer:
-    """The floater's motion: trajectory.nc and how it ended.
+    """The floater's motion and how it ended; writes trajectory.nc and its figure.
 
     Parameters
     ----------
@@ -139,7 +141,7 @@ def plate(
     rtol: float = 1e-3,
     output: Output = Output(),
 ) -> Answer:
-    """Reaction tensor G of the plate's eddy currents: B = G m at the dipole's own place, phasors e^(+iωt).
+    """What the plate's eddy currents answer to a dipole: G in B = G m at its own place, phasors e^(+iωt).
 
     Parameters
     ----------

@@ -49,22 +49,46 @@ def sweep(
 
     Parameters
     ----------
-    scene : a scene or the path of a scene file
-    values : by key, numbers for keys of the scene file (`frequency_hz`, `rotor.angle_deg`, `plate.center_mm.2`) and for
-        `spin`, names for `model`, `plate_model` and `interaction`
-    ask : "equilibria", "flight" or "field"
-    model, plate_model, spin, rtol, plate_rtol, interaction : of all points, unless they are varied
-    duration : of a flight, s
-    place : (3,) of the field, m, rotor's frame
-    workers, scheduler : processes here, or the address of a dask scheduler; more than one worker needs the caller's
-        script to be guarded by `if __name__ == "__main__":`
-    out : folder in which finished points are kept until all are done; the same sweep goes on there
-    progress : whether messages and a progress bar go to standard error
+    scene : Scene, str or Path
+        The scene, or the path of its file.
+    values : dict of str to list
+        By key, numbers for keys of the scene file (`frequency_hz`, `rotor.angle_deg`, `plate.center_mm.2`) and for
+        `spin`, names for `model`, `plate_model` and `interaction`.
+    ask : {"equilibria", "flight", "field"}
+        What is computed at each point.
+    model, plate_model : str
+        Models of the rotor's field and of the plate at all points, unless they are varied.
+    spin : float
+        Body spin S = Ω·m̂/ω, likewise.
+    duration : float
+        Simulated time of a flight, s.
+    place : sequence of 3 floats
+        Where the field is asked for, m, rotor's frame.
+    rtol, plate_rtol : float
+        Relative accuracy asked of the field and of the plate's reaction.
+    interaction : {"auto", "rigid", "mutual"}
+        Whether rotor and floater magnetise each other, unless it is varied.
+    workers : int or None
+        Processes here, None for one a core; more than one needs the caller's script to be guarded by
+        `if __name__ == "__main__":`.
+    scheduler : str or None
+        Address of a dask scheduler that computes instead.
+    out : str or Path
+        Folder in which finished points are kept until all are done; the same sweep goes on there.
+    progress : bool
+        Whether messages and a progress bar go to standard error.
 
     Returns
     -------
-    Dataset over the keys; points that failed are NaN and named in the attribute `failed_points`. Raises InputError for
-    a key, a value or a model that is not allowed, and SweepError if no point could be computed.
+    xarray.Dataset
+        Over the keys; points that failed are NaN and named in the attribute `failed_points`.
+
+    Raises
+    ------
+    InputError
+        A key, a value or a model that is not allowed.
+    SweepError
+        No point could be computed.
     """
     loaded = given_scene(scene)
     models = Models(model, plate_model, rtol, plate_rtol, interaction).checked()
@@ -85,10 +109,35 @@ def run_study(
     out: str | Path = "out",
     progress: bool = False,
 ) -> xr.Dataset:
-    """The result of a study of the catalogue; points finished before an interruption are kept in `out`.
+    """The result of a study of the catalogue; points finished before an interruption are kept.
 
-    More than one worker needs the caller's script to be guarded by `if __name__ == "__main__":`. Raises InputError for
-    an unknown name.
+    Parameters
+    ----------
+    name : str
+        Name of the study, as `spinlev study --list` has it.
+    quick : bool
+        Coarser, in less than a minute.
+    workers : int or None
+        Processes here, None for one a core; more than one needs the caller's script to be guarded by
+        `if __name__ == "__main__":`.
+    scheduler : str or None
+        Address of a dask scheduler that computes instead.
+    out : str or Path
+        Folder in which finished points are kept until all are done.
+    progress : bool
+        Whether messages and a progress bar go to standard error.
+
+    Returns
+    -------
+    xarray.Dataset
+        The study's result, SI units.
+
+    Raises
+    ------
+    InputError
+        The name is unknown.
+    SweepError
+        No point could be computed.
     """
     if name not in CATALOGUE:
         raise InputError(f"Input name must be one of {', '.join(CATALOGUE)}; instead received {name}.")
@@ -98,7 +147,23 @@ def run_study(
 
 
 def draw(result: xr.Dataset) -> Mapping[str, Figure]:
-    """The figures of a result by name; a notebook shows them. Raises InputError where the result has no figure."""
+    """The figures of a result; a notebook shows them.
+
+    Parameters
+    ----------
+    result : xarray.Dataset
+        Of `equilibria`, `stability`, `simulate`, `sweep`, `run_study`, or read from a file.
+
+    Returns
+    -------
+    dict of str to matplotlib.figure.Figure
+        By name.
+
+    Raises
+    ------
+    InputError
+        The result has no figure.
+    """
     return figures_of(result)
 
 

@@ -4,41 +4,10 @@ from pathlib import Path
 
 import xarray as xr
 
-from ...dynamics.motion import PlateMemory
-from ...fem.rotor_tables import FieldTable
 from ...geometry.scenes import Scene, scene_text
 from ..one_scene import Levitation
 from ..results import found_dataset, lowering_times, trajectory_dataset
 from ..terminal import FieldModel, InteractionModel, Models, PlateModel, heard
-
-
-def rotor_table(
-    scene: Scene | str | Path, model: FieldModel = "auto", rtol: float = Models.rtol, progress: bool = False
-) -> FieldTable:
-    """The rotor's field: `evaluate(points)` gives B (n, 3) T and its gradient (n, 3, 3) T/m at points (n, 3) m.
-
-    Accurate to `rtol` wherever the floater can be; `relative_error(points)` is the estimate. Raises InputError for a
-    model or a tolerance that is not allowed, and AccuracyError where it cannot be reached.
-    """
-    with heard(progress):
-        return Levitation(scene, Models(model, rtol=rtol)).table
-
-
-def plate_table(
-    scene: Scene | str | Path,
-    model: FieldModel = "auto",
-    plate_model: PlateModel = "auto",
-    rtol: float = Models.rtol,
-    plate_rtol: float = Models.plate_rtol,
-    interaction: InteractionModel = "auto",
-    progress: bool = False,
-) -> PlateMemory | None:
-    """The plate's currents around the place where the floater levitates, or None where none are modelled.
-
-    Its `table` holds the network, its `share` what the rotor drives, its `error` the estimated relative error.
-    """
-    with heard(progress):
-        return Levitation(scene, Models(model, plate_model, rtol, plate_rtol, interaction)).plate
 
 
 def equilibria(
@@ -55,17 +24,32 @@ def equilibria(
 
     Parameters
     ----------
-    scene : a scene or the path of a scene file
-    model, plate_model : field model, and model of the plate
-    spin : body spin S = Ω·m̂/ω
-    rtol, plate_rtol : relative accuracy asked of the field and of the plate's reaction
-    interaction : "rigid", "mutual" (rotor and floater magnetise each other) or "auto"
-    progress : whether messages go to standard error
+    scene : Scene, str or Path
+        The scene, or the path of its file.
+    model : {"auto", "dipole", "cuboid", "fem", "map"}
+        Model of the rotor's field.
+    plate_model : {"auto", "none", "slab", "reduced", "fem"}
+        Model of the plate.
+    spin : float
+        Body spin S = Ω·m̂/ω of the floater about its own moment.
+    rtol, plate_rtol : float
+        Relative accuracy asked of the field and of the plate's reaction.
+    interaction : {"auto", "rigid", "mutual"}
+        Whether rotor and floater magnetise each other.
+    progress : bool
+        Whether messages go to standard error.
 
     Returns
     -------
-    Dataset over `equilibrium`, `mode` and `axis`, SI units. Raises EquilibriumError for a rotor at rest, InputError for
-    a model, tolerance or file that cannot be used.
+    xarray.Dataset
+        Over `equilibrium`, `mode` and `axis`, SI units.
+
+    Raises
+    ------
+    EquilibriumError
+        The rotor is at rest.
+    InputError
+        A model, a tolerance or a file that cannot be used.
     """
     with heard(progress):
         levitation = Levitation(scene, Models(model, plate_model, rtol, plate_rtol, interaction), spin)
@@ -85,13 +69,35 @@ def stability(
 ) -> xr.Dataset:
     """The five small motions about the equilibrium at which a flight begins, the nearest stable one if there is one.
 
-    Parameters are those of `equilibria`.
+    Parameters
+    ----------
+    scene : Scene, str or Path
+        The scene, or the path of its file.
+    model : {"auto", "dipole", "cuboid", "fem", "map"}
+        Model of the rotor's field.
+    plate_model : {"auto", "none", "slab", "reduced", "fem"}
+        Model of the plate.
+    spin : float
+        Body spin S = Ω·m̂/ω of the floater about its own moment.
+    rtol, plate_rtol : float
+        Relative accuracy asked of the field and of the plate's reaction.
+    interaction : {"auto", "rigid", "mutual"}
+        Whether rotor and floater magnetise each other.
+    progress : bool
+        Whether messages go to standard error.
 
     Returns
     -------
-    Dataset over `mode` (bounce, two side motions, precession, nutation): growth (1/s; negative where it dies out) and
-    frequency (Hz, rotor's frame); `stable`, `growth` and `growth_error` (what round-off may do to it) of the whole.
-    Raises EquilibriumError where there is no equilibrium to begin at.
+    xarray.Dataset
+        Over `mode` (bounce, two side motions, precession, nutation): growth (1/s; negative where it dies out) and
+        frequency (Hz, rotor's frame); `stable`, `growth` and `growth_error` (what round-off may do to it) of the whole.
+
+    Raises
+    ------
+    EquilibriumError
+        There is no equilibrium to begin at.
+    InputError
+        A model, a tolerance or a file that cannot be used.
     """
     with heard(progress):
         levitation = Levitation(scene, Models(model, plate_model, rtol, plate_rtol, interaction), spin)
@@ -109,12 +115,36 @@ def simulate(
     interaction: InteractionModel = "auto",
     progress: bool = False,
 ) -> xr.Dataset:
-    """The floater's motion for `duration` (s) from where the scene says; other parameters as for `equilibria`.
+    """The floater's motion from where the scene says.
+
+    Parameters
+    ----------
+    scene : Scene, str or Path
+        The scene, or the path of its file.
+    duration : float
+        Simulated time, s.
+    model : {"auto", "dipole", "cuboid", "fem", "map"}
+        Model of the rotor's field.
+    plate_model : {"auto", "none", "slab", "reduced", "fem"}
+        Model of the plate.
+    rtol, plate_rtol : float
+        Relative accuracy asked of the field and of the plate's reaction.
+    interaction : {"auto", "rigid", "mutual"}
+        Whether rotor and floater magnetise each other.
+    progress : bool
+        Whether messages go to standard error.
 
     Returns
     -------
-    Dataset over `time`, SI units; how it ended and the violation of the energy ledger are attributes. Raises
-    EquilibriumError where the scene starts from an equilibrium and has none.
+    xarray.Dataset
+        Over `time`, SI units; how it ended and the violation of the energy ledger are attributes.
+
+    Raises
+    ------
+    EquilibriumError
+        The scene starts from an equilibrium and has none.
+    InputError
+        A model, a tolerance or a file that cannot be used.
     """
     with heard(progress):
         levitation = Levitation(scene, Models(model, plate_model, rtol, plate_rtol, interaction))

@@ -1,11 +1,13 @@
 """How is a picture in three dimensions drawn, in a process whose end is not the program's?"""
 
-from .renderer import RenderError as RenderError, render as render, unavailable as unavailable
+from .renderer import RenderError as RenderError, drawn as drawn, render as render, unavailable as unavailable
 from .view import (
     Currents as Currents,
     FieldPlane as FieldPlane,
     Frames as Frames,
+    Turnable as Turnable,
     View as View,
     current_places as current_places,
     frame_times as frame_times,
 )
+from .viewer import inlined as inlined, page as page

@@ -17,10 +17,7 @@ LINES = 36
 
 def add_field(plotter: pv.Plotter, shown: FieldPlane, scene: Scene) -> None:
     """|B| on the plane y = 0 about the rotor, and field lines in it."""
-    width, depth = shown.width, shown.depth
-    grid = pv.ImageData(dimensions=(FINE, 3, FINE), spacing=(2 * width / (FINE - 1), 0.5, 2.4 * depth / (FINE - 1)))
-    grid.origin = (-width, -0.5, -1.6 * depth)
-    grid["B"] = np.nan_to_num(shown.field)
+    grid = _grid(shown)
     size = 1e3 * np.linalg.norm(shown.field, axis=1)
     grid[NAME] = size
     decades = np.floor(np.log10(np.nanpercentile(size, 0.1))), np.ceil(np.log10(np.nanpercentile(size, 99)))
@@ -35,11 +32,31 @@ def add_field(plotter: pv.Plotter, shown: FieldPlane, scene: Scene) -> None:
     look_of_it: dict[str, Any] = {"log_scale": True, "cmap": "viridis", "opacity": 0.6, "nan_opacity": 0.0}
     plane = grid.slice(normal="y", origin=(0, 0, 0))
     plotter.add_mesh(plane, scalars=NAME, clim=[10**d for d in decades], scalar_bar_args=bar, **look_of_it)
-    seeds = pv.PolyData(_seeds(grid, scene))
-    how: dict[str, Any] = {"vectors": "B", "max_length": 20 * width, "initial_step_length": 0.2, "max_step_length": 0.5}
-    lines = grid.streamlines_from_source(seeds, integration_direction="both", step_unit="l", max_steps=5000, **how)
+    lines = _lines(grid, shown.width, scene, 0.5)
     if lines.n_points:
-        plotter.add_mesh(lines.tube(radius=0.004 * width), color="#2E3440")
+        plotter.add_mesh(lines.tube(radius=0.004 * shown.width), color="#2E3440")
+
+
+def add_lines(plotter: pv.Plotter, shown: FieldPlane, scene: Scene, step: float) -> None:
+    """The field lines alone, thin, with steps of at most so many mm."""
+    lines = _lines(_grid(shown), shown.width, scene, step)
+    if lines.n_points:
+        plotter.add_mesh(lines, color="#2E3440", line_width=1)
+
+
+def _grid(shown: FieldPlane) -> pv.ImageData:
+    width, depth = shown.width, shown.depth
+    grid = pv.ImageData(dimensions=(FINE, 3, FINE), spacing=(2 * width / (FINE - 1), 0.5, 2.4 * depth / (FINE - 1)))
+    grid.origin = (-width, -0.5, -1.6 * depth)
+    grid["B"] = np.nan_to_num(shown.field)
+    return grid
+
+
+def _lines(grid: pv.ImageData, width: float, scene: Scene, step: float) -> pv.PolyData:
+    seeds = pv.PolyData(_seeds(grid, scene))
+    how: dict[str, Any] = {"vectors": "B", "max_length": 20 * width, "initial_step_length": 0.2}
+    how |= {"max_step_length": step, "step_unit": "l", "max_steps": 5000, "integration_direction": "both"}
+    return grid.streamlines_from_source(seeds, **how)
 
 
 def _seeds(grid: pv.ImageData, scene: Scene) -> Array:

@@ -55,6 +55,14 @@ def render(
         write_whole(left.pop(0), answer)
 
 
+def drawn(picture: Picture, command: Sequence[str] = COMMAND) -> bytes:
+    """One picture as the content of a file. Raises RenderError where it cannot be drawn."""
+    (answer,) = _drawn([picture], lambda fraction: None, command)
+    if isinstance(answer, str):
+        raise RenderError(f"The view in three dimensions is left out: {answer}")
+    return answer
+
+
 @cache
 def unavailable(command: Sequence[str] = COMMAND) -> str | None:
     """Why nothing can be drawn in three dimensions on this machine; None where a small picture can."""

@@ -26,9 +26,7 @@ def scene_picture(view: View) -> bytes:
 def draw_view(plotter: pv.Plotter, view: View) -> None:
     """Draw rotor, floater, plate, field and path, with their names."""
     scene, center = view.scene, view.position / MILLI
-    add_rotor(plotter, scene)
-    add_plate(plotter, scene, view.currents)
-    add_floater(plotter, scene, view.position, view.moment)
+    times = draw_bodies(plotter, view)
     if view.plane is not None:
         add_field(plotter, view.plane, scene)
     radius = scene.floater.radius / MILLI
@@ -37,16 +35,24 @@ def draw_view(plotter: pv.Plotter, view: View) -> None:
     if scene.plate is not None:
         corners = corners_mm(scene.plate.box)
         names["plate"] = corners[corners[:, 1].argsort()[:4]].mean(axis=0)
-    if len(view.path) > 1:
-        times = add_path(plotter, view.path / MILLI, radius)
+    if times:
         names[f"its path, {times:g} times enlarged"] = beside - np.array([0.0, 0.0, 0.8 * radius])
-    if scene.frequency:
-        add_turning(plotter, scene)
     labels = {"font_size": 22, "text_color": "black", "shape_color": "white", "shape_opacity": 0.7, "margin": 4}
     plotter.add_point_labels(
         np.array(list(names.values())), list(names), show_points=False, always_visible=True, **labels
     )
     look(plotter, scene, -float(center[2]))
+
+
+def draw_bodies(plotter: pv.Plotter, view: View) -> float:
+    """Draw rotor, floater, plate and path; returns how many times the path is enlarged, 0 for none."""
+    scene = view.scene
+    add_rotor(plotter, scene)
+    add_plate(plotter, scene, view.currents)
+    add_floater(plotter, scene, view.position, view.moment)
+    if scene.frequency:
+        add_turning(plotter, scene)
+    return add_path(plotter, view.path / MILLI, scene.floater.radius / MILLI) if len(view.path) > 1 else 0.0
 
 
 def sample_picture() -> bytes:

@@ -76,6 +76,19 @@ class View:
 
 
 @dataclass(frozen=True, eq=False)
+class Turnable:
+    """A view that a page lets its reader turn."""
+
+    view: View
+
+    def draw(self, progress: Callable[[float], None]) -> bytes:
+        """The scene of a `page`."""
+        from .turnable import turnable_scene
+
+        return turnable_scene(self.view)
+
+
+@dataclass(frozen=True, eq=False)
 class Frames:
     """A flight in the laboratory frame, frame by frame.
 

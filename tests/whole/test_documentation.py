@@ -6,8 +6,11 @@ import runpy
 import tomllib
 
 import pytest
+from numpydoc.docscrape import FunctionDoc
+from numpydoc.validate import validate
 from places import ROOT
 
+import spinlev as sl
 from spinlev.studies.terminal.system_libraries import PACKAGES
 
 PAGES = sorted([ROOT / "README.md", *(ROOT / "docs").glob("*.md")])
@@ -27,6 +30,23 @@ def test_files_that_are_named_exist(page):
 def test_modules_that_are_named_exist(page):
     for name in set(re.findall(r"\bspinlev(?:\.[A-Za-z_]\w*)+", page.read_text(encoding="utf-8"))):
         pkgutil.resolve_name(name)
+
+
+FUNCTIONS = [name for name in dir(sl) if name.islower() and callable(getattr(sl, name))]
+COMPLETE = {"PR01", "PR02", "PR03", "PR04", "PR07", "PR10", "RT01", "RT03"}
+"""Numpydoc's faults: a parameter or the returned value is missing, unknown, without a type or without a description."""
+
+
+def test_the_front_door_has_its_functions():
+    assert {"equilibria", "simulate", "sweep", "draw", "load_scene", "tilt", "to_magpylib"} <= set(FUNCTIONS)
+
+
+@pytest.mark.parametrize("name", FUNCTIONS)
+def test_numpydoc_finds_parameters_with_types_and_what_is_returned_and_raised(name):
+    assert [fault for fault in validate(f"spinlev.{name}")["errors"] if fault[0] in COMPLETE] == []
+    said = FunctionDoc(getattr(sl, name))
+    assert name in ("tilt", "horizontal", "vertical", "magnets", "sphere", "plate", "to_magpylib") or said["Raises"]
+    assert all(text.desc for text in said["Raises"])
 
 
 def test_every_section_of_the_mathematics_names_the_code_that_is_it():

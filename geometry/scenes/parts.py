@@ -1,0 +1,141 @@
+"""The tables of a scene, made in Python."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+Table = Mapping[str, Any]
+"""A table of the scene file."""
+
+
+def horizontal(*, displacement_mm: float, edge_mm: float, remanence_T: float, **more: Any) -> Table:
+    """One cube magnetised along +x and displaced along it from the axis.
+
+    Parameters
+    ----------
+    displacement_mm : float
+        Of the cube's centre, mm.
+    edge_mm : float
+        Edge of the cubes, mm.
+    remanence_T : float
+        Remanence, T.
+    **more : float or list
+        Further keys, as for `magnets`.
+
+    Returns
+    -------
+    dict
+        The table `[rotor]` of a scene file.
+    """
+    material = {"edge_mm": edge_mm, "remanence_T": remanence_T}
+    return {"configuration": "horizontal", "displacement_mm": displacement_mm, **material, **more}
+
+
+def vertical(*, displacement_mm: float, edge_mm: float, remanence_T: float, **more: Any) -> Table:
+    """A cube magnetised along +x and one above it along +z.
+
+    Parameters
+    ----------
+    displacement_mm : float
+        From centre to centre, mm.
+    edge_mm : float
+        Edge of the cubes, mm.
+    remanence_T : float
+        Remanence, T.
+    **more : float or list
+        Further keys, as for `magnets`.
+
+    Returns
+    -------
+    dict
+        The table `[rotor]` of a scene file.
+    """
+    material = {"edge_mm": edge_mm, "remanence_T": remanence_T}
+    return {"configuration": "vertical", "displacement_mm": displacement_mm, **material, **more}
+
+
+def tilt(*, angle_deg: float, edge_mm: float, remanence_T: float, **more: Any) -> Table:
+    """One cube, turned with its magnetisation about y.
+
+    Parameters
+    ----------
+    angle_deg : float
+        The magnetisation is along (cos angle, 0, sin angle), degrees.
+    edge_mm : float
+        Edge of the cubes, mm.
+    remanence_T : float
+        Remanence, T.
+    **more : float or list
+        Further keys, as for `magnets`.
+
+    Returns
+    -------
+    dict
+        The table `[rotor]` of a scene file.
+    """
+    return {"configuration": "tilt", "angle_deg": angle_deg, "edge_mm": edge_mm, "remanence_T": remanence_T, **more}
+
+
+def magnets(*cuboids: Table, **more: Any) -> Table:
+    """Any set of magnets.
+
+    Parameters
+    ----------
+    *cuboids : dict
+        Each with size_mm, center_mm, polarization_T, and where they are not the usual ones rotation_deg,
+        recoil_permeability, conductivity_S_m.
+    **more : float or list
+        Further keys of every rotor: recoil_permeability of the article's, conductivity_S_m of all magnets (their eddy
+        currents, else left out), field_map, and conductors, a list of tables with shape ("cuboid" or "cylinder"),
+        size_mm or diameter_mm and height_mm, center_mm, rotation_deg and conductivity_S_m: metal that turns with the
+        rotor.
+
+    Returns
+    -------
+    dict
+        The table `[rotor]` of a scene file.
+    """
+    return {"magnets": list(cuboids), **more}
+
+
+def sphere(*, diameter_mm: float, remanence_T: float, density_kg_m3: float, **more: Any) -> Table:
+    """The floating sphere.
+
+    Parameters
+    ----------
+    diameter_mm : float
+        Diameter, mm.
+    remanence_T : float
+        Remanence, T.
+    density_kg_m3 : float
+        Density, kg/m³.
+    **more : float
+        Further keys: recoil_permeability (1.05), conductivity_S_m (its eddy currents, else left out).
+
+    Returns
+    -------
+    dict
+        The table `[floater]` of a scene file.
+    """
+    return {"diameter_mm": diameter_mm, "remanence_T": remanence_T, "density_kg_m3": density_kg_m3, **more}
+
+
+def plate(*, size_mm: Sequence[float], center_mm: Sequence[float], conductivity_S_m: float, **more: Any) -> Table:
+    """A conducting plate.
+
+    Parameters
+    ----------
+    size_mm : sequence of 3 floats
+        Edges, mm.
+    center_mm : sequence of 3 floats
+        Centre in the laboratory frame, mm.
+    conductivity_S_m : float
+        Conductivity, S/m.
+    **more : list or dict
+        Further keys: rotation_deg about x, y, z, and lowering = {start_s, speed_mm_s, distance_mm}.
+
+    Returns
+    -------
+    dict
+        The table `[plate]` of a scene file.
+    """
+    return {"size_mm": size_mm, "center_mm": center_mm, "conductivity_S_m": conductivity_S_m, **more}
