@@ -80,7 +80,7 @@ def test_one_equilibrium(benchmark, model):
 @pytest.mark.parametrize("model", MODELS)
 def test_map(benchmark, model):
     """Frequency against displacement over the ranges of the article; time for each equilibrium found."""
-    family = rotor_family(SCENE, "horizontal", model, nearest=SCENE.floater.radius)
+    family = rotor_family(SCENE, "horizontal", model, nearest=SCENE.floater.radius, interaction="rigid")
     axes = np.linspace(50.0, 250.0, 100), np.linspace(1e-3, 8e-3, 100)
     assert family.rates is not None  # compiled
     found = benchmark.pedantic(equilibrium_map, (family, *axes), rounds=1)

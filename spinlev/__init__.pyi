@@ -18,6 +18,7 @@ from .geometry.scenes import (
 from .studies.exchange import from_magpylib as from_magpylib, to_magpylib as to_magpylib
 from .studies.interface import (
     draw as draw,
+    ensemble as ensemble,
     equilibria as equilibria,
     plate_table as plate_table,
     rotor_table as rotor_table,

@@ -1,6 +1,6 @@
 """The list of effects: which of them a scene has."""
 
-from ...fem.rotor_losses import cached_rotor_losses, pieces_of
+from ...fem.rotor_losses import cached_rotor_losses, check_slow_enough, pieces_of
 from ...fem.rotor_tables import FieldFormula
 from ...geometry.scenes import Scene
 from ..motion import Effect, Interaction, interaction_of
@@ -20,6 +20,8 @@ def with_effects(scene: Scene, table: FieldFormula) -> Interaction:
     effects: list[Effect] = [FloaterCurrents()] if scene.floater.conductivity else []
     if scene.drag.air:
         effects.append(RealAir())
-    if pieces_of(scene.rotor, scene.conductors) and ROTOR_CURRENTS not in {effect.name for effect in whole.effects}:
+    pieces = pieces_of(scene.rotor, scene.conductors)
+    check_slow_enough(pieces, scene.frequency)
+    if pieces and ROTOR_CURRENTS not in {effect.name for effect in whole.effects}:
         effects.append(RotorCurrents(cached_rotor_losses(scene, lambda _: None)[0]))
     return whole.joined(*effects)

@@ -10,7 +10,7 @@ import numpy as np
 
 from ...fem.harmonics import BallField
 from ...fem.mutual import MutualTable, answers
-from ...fem.rotor_tables import FieldTable
+from ...fem.rotor_tables import FieldTable, RangeError
 from ...geometry.basics import Array
 from ..motion import Added, Motion, Parameter, Vector, conservative
 from .mutual_ball import MutualInBall
@@ -108,8 +108,10 @@ class MutualAtPlace:
             values[:, [p]] for p in (Parameter.LENGTH, Parameter.PLATE_MOMENT, Parameter.PLATE_SHARE)
         )
         place = position * length
-        flux, known = np.zeros_like(place), field.in_range(place)
-        if known.any():
+        try:
+            flux = field.evaluate(place)[0]
+        except RangeError:  # some are in a magnet
+            flux, known = np.zeros_like(place), field.in_range(place)
             flux[known] = field.evaluate(place[known])[0]
         whole = strength * moment + self.table.polarizability * share * flux
         energy, slope, second = self.table.derivatives(place, whole / share)

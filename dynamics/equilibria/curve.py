@@ -5,7 +5,7 @@ of these curves at which the axial force vanishes too, so that following each cu
 folds included.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -18,6 +18,10 @@ from .search import SearchRange
 from .tracing import whole_curves
 
 STEPS = Steps(longest=0.1, shortest=1e-6, turn=0.15, most=5000, first=1 / 4)
+THINNED = 8
+"""One of so many starts is tried in the whole balance too where there is a rough one."""
+ITERATIONS = 30
+"""Of Newton's method from the starts; none of those that have not met by then was seen to meet in twice as many."""
 TOGETHER = 8
 """Curves that are followed at once; some may turn out to be the same."""
 
@@ -95,9 +99,7 @@ def _curve(balance: Balance, points: Array, tangents: Array) -> Curve:
 
 def all_curves(balance: Balance, where: SearchRange) -> list[Curve]:
     """Every curve that is met in the range, from its starts at their own heights."""
-    position, moment, step = solve(balance, *where.starts(), LATERAL)
-    met = (step < 1e-8) & where.holds(position)
-    seeds = _distinct(np.concatenate([position[met], moment[met]], axis=1))
+    seeds = from_starts(balance, where, LATERAL)
     curves: list[Curve] = []
     while len(seeds):
         chosen = np.arange(len(seeds)) % -(-len(seeds) // TOGETHER) == 0
@@ -106,6 +108,24 @@ def all_curves(balance: Balance, where: SearchRange) -> list[Curve]:
                 curves.append(curve)
         seeds = np.array([seed for seed in seeds[~chosen] if not any(curve.passes(seed) for curve in curves)])
     return curves
+
+
+def from_starts(balance: Balance, where: SearchRange, free: Indices) -> Array:
+    """Distinct points (n, 6) in the range, lowest first, at which the balances of `free` vanish, see `fixed_points`."""
+    position, moment = where.starts()
+    if balance.rates.has_rough:
+        near, turned = _newton(replace(balance, rates=balance.rates.rough), position, moment, where, free)
+        position, moment = np.concatenate([near, position[::THINNED]]), np.concatenate([turned, moment[::THINNED]])
+    return _distinct(np.concatenate(_newton(balance, position, moment, where, free), axis=1))
+
+
+def _newton(balance: Balance, position: Array, moment: Array, where: SearchRange, free: Indices) -> tuple[Array, Array]:
+    """Distinct places and moments (n, 3) in the range that Newton's method finds; many starts run away."""
+    with np.errstate(all="ignore"):
+        position, moment, step = solve(balance, position, moment, free, ITERATIONS)
+    met = (step < 1e-8) & where.holds(position)
+    points = _distinct(np.concatenate([position[met], moment[met]], axis=1))
+    return points[:, :3], points[:, 3:]
 
 
 def _distinct(points: Array) -> Array:

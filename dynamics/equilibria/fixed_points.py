@@ -1,10 +1,14 @@
-"""Where all five balances vanish: along the curves of lateral balance, and directly from many starts."""
+"""Where all five balances vanish: along the curves of lateral balance, and directly from many starts.
+
+Newton's method runs from all starts in the `rough` balance, where effects with numbers of their own cost nothing, and
+goes on in the whole one from what it found and from every eighth of the starts.
+"""
 
 import numpy as np
 
 from ...geometry.basics import Array
 from ..steady import EVERY, Balance, solve
-from .curve import Curve, all_curves
+from .curve import Curve, all_curves, from_starts
 from .search import SearchRange
 
 
@@ -18,11 +22,8 @@ def fixed_points(balance: Balance, where: SearchRange) -> tuple[list[Curve], lis
 
 def scattered(balance: Balance, where: SearchRange) -> tuple[Array, Array]:
     """What Newton's method in all five unknowns finds from the starts: short curves may pass between them."""
-    with np.errstate(all="ignore"):  # many of these starts run away
-        position, moment, step = solve(balance, *where.starts(), EVERY, 25)
-    points = np.concatenate([position, moment], axis=1)[(step < 1e-8) & where.holds(position)]
-    _, first = np.unique(points.round(6), axis=0, return_index=True)
-    return points[first, :3], points[first, 3:]
+    points = from_starts(balance, where, EVERY)
+    return points[:, :3], points[:, 3:]
 
 
 def _polished(balance: Balance, position: Array, moment: Array) -> list[tuple[Array, Array]]:

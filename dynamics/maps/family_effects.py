@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from ...fem.mutual import cached_mutual_table
-from ...fem.rotor_losses import cached_rotor_losses
+from ...fem.rotor_losses import cached_rotor_losses, check_slow_enough, pieces_of
 from ...fem.rotor_tables import RotorTable
 from ...geometry.basics import InputError
 from ...geometry.bodies import Magnet
@@ -59,6 +59,7 @@ def _currents(scene: Scene, parts: Sequence[Part]) -> list[Effect]:
     found = []
     for k, (magnet, move, alone) in enumerate(parts, 1):
         if magnet.conductivity:
+            check_slow_enough(pieces_of((magnet,), ()), scene.frequency)
             table, _ = cached_rotor_losses(replace(scene, rotor=(magnet,)), lambda _: None)
             name = ROTOR_CURRENTS if len(parts) == 1 else f"{ROTOR_CURRENTS}, magnet {k}"
             found.append(_moving(RotorCurrents(table), move, alone, name))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from copy import copy
 from functools import cached_property
 from typing import Any, cast
 
@@ -30,7 +31,7 @@ class Rates:
 
     def __init__(self, table: FieldFormula, optimised: bool = False) -> None:
         whole = interaction_of(table)
-        self._field = whole.field
+        self._field, self._rough = whole.field, False
         self._placed: list[Placed] = []
         effects: list[Effect] = []
         for effect in whole.effects:
@@ -67,11 +68,29 @@ class Rates:
         found = _called(self._balances, given, self._all(position, moment, values))
         return found[:5].T, np.moveaxis(found[5:].reshape(5, 5, -1), 2, 0)
 
+    @property
+    def has_rough(self) -> bool:
+        """Whether there are such effects."""
+        return bool(self._placed)
+
+    @cached_property
+    def rough(self) -> Rates:
+        """The same by the same code, but for the numbers of effects that have some: they are zero, which costs nothing.
+
+        Of mutual magnetisation the floater's uniform answer to the rotor's field stays.
+        """
+        _ = self._balances  # which both share
+        found = copy(self)
+        found._rough = True
+        return found
+
     def _all(self, position: Array, moment: Array, values: Array) -> Array:
         """The runtime parameters with the numbers of effects that have some, at scaled positions and moments (n, 3)."""
         if not self._placed:
             return values
         rows = np.broadcast_to(values, (len(position), values.shape[-1]))[:, : len(Parameter)]
+        if self._rough:
+            return np.pad(rows, ((0, 0), (0, sum(part.count for part in self._placed))))
         field = cast(FieldTable, self._field)
         return np.concatenate([rows, *(part.numbers(field, position, moment, rows) for part in self._placed)], axis=1)
 

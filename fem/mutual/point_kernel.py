@@ -16,6 +16,8 @@ from .answer_grid import AnswerGrid, point_energy
 
 ENTRIES = [(a, b) for a in range(6) for b in range(a, 6)]
 """Of a symmetric matrix over place and moment: those that are computed."""
+WHERE = np.array([[ENTRIES.index((min(a, b), max(a, b))) for b in range(6)] for a in range(6)])
+"""Which of them each entry is."""
 
 
 @cache
@@ -39,9 +41,7 @@ def grid_derivatives(grid: AnswerGrid, places: Array, moments: Array) -> tuple[A
     seen, pointing = grid.box.to_body(places), moments @ grid.box.rotation
     sums = [_summed(grid, seen[k : k + CHUNK], pointing[k : k + CHUNK]) for k in range(0, len(places), CHUNK)]
     found = np.concatenate([np.zeros((7 + len(ENTRIES), 0)), *sums], axis=1)
-    turn, second = np.kron(np.eye(2), grid.box.rotation), np.empty((len(places), 6, 6))
-    for row, (a, b) in zip(found[7:], ENTRIES, strict=True):
-        second[:, a, b] = second[:, b, a] = row
+    turn, second = np.kron(np.eye(2), grid.box.rotation), np.moveaxis(found[7:][WHERE], 2, 0)
     return found[0], found[1:7].T @ turn.T, turn @ second @ turn.T
 
 

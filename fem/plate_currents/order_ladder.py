@@ -75,7 +75,8 @@ class Ladder:
         if self.order < 2 or self.error <= self.allowed:
             return np.inf if self.order < 2 else 0.0
         reduction = self.change / self.last
-        return float(np.max(order_error(self.change * reduction, self.change)))
+        size = np.linalg.norm(self.tensors, axis=(1, 2))
+        return float(np.max(order_error(self.change * reduction, self.change) + self.truncation / size))
 
     def refuse(self) -> None:
         """Go on only where that can help.

@@ -26,7 +26,8 @@ from .watch import Watch, unwatched
 SPACE_SHARE = 0.1
 """Share of the tolerance for what the current space misses of the finite elements' currents."""
 STRICT, LOOSE = 5e-4, 2e-3
-"""Tolerances below the first have a finer mesh, from the second on less air: its truncation takes a part of them."""
+"""Tolerances below the first have a finer mesh, from the second on a coarser one with less air: its truncation takes a
+part of them."""
 HOPEFUL = 1.5
 """An order whose expected error is at most so many times what is allowed is trained at once."""
 
@@ -107,4 +108,4 @@ def mesh_rule(rtol: float) -> MeshRule:
     """Mesh that has been found to need the least work for a tolerance."""
     if rtol < STRICT:
         return MeshRule(1.0, 1.6, 1.4)
-    return MeshRule(reach=3.0) if rtol >= LOOSE else MeshRule()
+    return MeshRule(1.2, 3.0, 2.5, 4.0) if rtol >= LOOSE else MeshRule()

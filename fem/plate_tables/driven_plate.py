@@ -9,7 +9,7 @@ from ...geometry.basics import InputError
 from ...geometry.meshes import MeshRule
 from ...geometry.scenes import Plate
 from ..plate_currents import OtherSources, PlateSolution, Region, Watch, error_of, solve_currents, unwatched
-from ..plate_network import reduce_currents
+from ..plate_network import NETWORK_SHARE, reduce_currents
 from ..rotor_tables import RotorTable
 from .outer_box import outer_box, outer_frequencies
 from .plate_table import PlateTable
@@ -23,8 +23,9 @@ ANGLES, DEPTHS = 8, 5
 """Training: the rotor at so many angles of a turn and depths of the plate; probes stand between them."""
 SHARE_PART = 0.1
 """Share of the tolerance for the series of the rotor's signals."""
-OTHERS_SHARE = 0.1
-"""Share of the tolerance for what dipoles around the rotor miss of it; above, the rotor itself is solved for."""
+OTHERS_SHARE = 0.5
+"""Share of what the finite elements leave of the tolerance for what dipoles around the rotor miss of it; the rest is
+the left-out states'.  Above, the rotor itself is solved for."""
 INNER = 0.25
 """Part of a magnet's edges about its centre in which those dipoles are."""
 
@@ -71,7 +72,7 @@ def plate_and_rotor_table(
     solution = solve(plate, boxes, outer, rtol, rule)
     watch("network of the scene", 0.0)
     error = error_of(solution, others.probes)
-    if error > OTHERS_SHARE * rtol:
+    if error > OTHERS_SHARE * (NETWORK_SHARE * rtol - solution.mesh_error):
         solution = solve(plate, boxes, outer, rtol, rule, others)
         error = solution.space_error
     watch("network of the scene", 0.5)

@@ -1,7 +1,6 @@
 """Arrays that frozen objects hold."""
 
 import numpy as np
-import scipy
 from numpy.typing import ArrayLike, NDArray
 
 Array = NDArray[np.float64]
@@ -15,5 +14,7 @@ def frozen_array(values: ArrayLike, shape: tuple[int, ...]) -> Array:
 
 
 def spread_points(lower: ArrayLike, upper: ArrayLike, number: int) -> Array:
-    """Points (number, 3) spread evenly through a box, always the same ones (J. H. Halton, 1960)."""
-    return np.asarray(scipy.stats.qmc.scale(scipy.stats.qmc.Halton(3, seed=1).random(number), lower, upper))
+    """Points (number, 3) spread evenly through a box: multiples of irrational numbers, modulo 1 (H. Weyl, 1916)."""
+    parts = np.arange(1, number + 1)[:, None] * np.sqrt([2.0, 3.0, 5.0]) % 1.0
+    low, high = np.asarray(lower, float), np.asarray(upper, float)
+    return np.asarray(low + parts * (high - low))

@@ -86,7 +86,7 @@ def _by_formula(point: Point, grid: Array) -> dict[str, Array]:
 
 def _in_field(point: Point, grid: Array) -> dict[str, Array]:
     scene = article_scene(point["configuration"], point["value"], HIGHEST)
-    levitation = levitation_of(scene, point["model"], interaction=point["interaction"])
+    levitation = levitation_of(scene, point["model"], interaction=point.get("interaction", "rigid"))
     table = levitation.interaction
     branch = levitating_branch(scene, table, levitation.rates, HIGHEST)
     found = [branch.side(side, grid) for side in SIDES]

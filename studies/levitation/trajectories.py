@@ -47,7 +47,7 @@ def trajectories(point: Point) -> xr.Dataset:
     Dataset over `frequency`: what became of the simulated flight and of the averaged one; over `part` of the flight:
     its time, and the least, mean and largest distance along the axis; over `sample`: the averaged flight.
     """
-    complete = point["complete"]
+    complete = point.get("complete", False)
     scene = conducting(article_scene(point["configuration"], point["value"], HIGHEST), rotor=complete)
     scene = replace(scene, drag=replace(scene.drag, air=complete))
     levitation = levitation_of(scene, point["model"], interaction="auto" if complete else "rigid")

@@ -51,7 +51,7 @@ def points(quick: bool) -> list[Point]:
     return [
         {
             "configuration": c, "measure": m, "model": model, "with_plate": (2 if quick else 5) if known else 0,
-            "flights": known and not quick, "interaction": "rigid" if quick else "auto",
+            **({} if quick else {"flights": known, "interaction": "auto"}),
         }
         for c, measures in rotors.items() for m in measures for model in MODELS
         for known in [model == "fem" and m in CONFIGURATIONS[c].levitated]
@@ -61,7 +61,7 @@ def points(quick: bool) -> list[Point]:
 def compute(point: Point, rtol: float = RTOL) -> xr.Dataset:
     """Intervals of stable frequencies of one rotor, and growth with a plate below at some frequencies."""
     scene = article_scene(point["configuration"], point["measure"], drag=False)
-    levitation = levitation_of(scene, point["model"], rtol, point["interaction"])
+    levitation = levitation_of(scene, point["model"], rtol, point.get("interaction", "rigid"))
     try:
         found = levitating_ranges(scene, levitation.interaction, levitation.rates)
     except EquilibriumError as error:
@@ -77,12 +77,10 @@ def compute(point: Point, rtol: float = RTOL) -> xr.Dataset:
         name: variable(("interval",), row, *words) for (name, words), row in zip(INTERVAL.items(), rows, strict=True)
     }
     data |= {name: variable(("tried",), row, *words) for (name, words), row in zip(PLATE.items(), plate.T, strict=True)}
-    lasting = [_lasting(levitation, found[0], metal) if found and point["flights"] else Lasting() for metal in METAL]
-    for name, words in LASTING.items():
-        data[name] = variable(("metal",), np.array([getattr(one, name) for one in lasting]), *words)
-    data["ended_by"] = xr.Variable(("metal",), np.array([one.ended_by for one in lasting], "U12"))
+    if "flights" in point:
+        data |= _flights(levitation, found[0] if found and point["flights"] else None)
     data |= {name: xr.Variable(("interval",), row) for name, row in zip(("low_kind", "high_kind"), kinds, strict=True)}
-    return one_case(point, xr.Dataset(data, {"metal": list(METAL)}))
+    return one_case(point, xr.Dataset(data))
 
 
 METAL = {"insulating": False, "conducting": True}
@@ -105,6 +103,17 @@ PLATE = {
     "plate_distance": ("m", "distance with a plate below"),
     "plate_error": ("1", "estimated relative error of the plate's table"),
 }
+
+
+def _flights(alone: Levitation, stable: StableRange | None) -> dict[str, xr.Variable]:
+    """Where flights last, without and with currents in the rotor's magnets."""
+    found = [_lasting(alone, stable, metal) if stable else Lasting() for metal in METAL]
+    data = {
+        name: variable(("metal",), np.array([getattr(one, name) for one in found]), *words)
+        for name, words in LASTING.items()
+    }
+    data["ended_by"] = xr.Variable(("metal",), np.array([one.ended_by for one in found], "U12"))
+    return {**data, "metal": xr.Variable(("metal",), list(METAL))}
 
 
 def _lasting(alone: Levitation, stable: StableRange, metal: str) -> Lasting:

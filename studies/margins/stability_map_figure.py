@@ -42,7 +42,8 @@ def map_figure(result: xr.Dataset) -> Figure:
         axes[0, 0].plot([], [], "x", color=PALETTE[3], label="unstable with it")[0],
         axes[0, 0].plot([], [], "1", color="0.2", label="no equilibrium is left with it")[0],
     ]
-    handles += [axes[0, 0].plot([], [], mark, color="k", label=words)[0] for mark, words in METAL.values()]
+    if "high" in result:
+        handles += [axes[0, 0].plot([], [], mark, color="k", label=words)[0] for mark, words in METAL.values()]
     for place in axes[0]:
         place.margins(x=0.08)
     axes[0, 0].set_ylabel("frequency of the rotor (Hz)")
@@ -76,7 +77,7 @@ def _plate(axes: Axes, part: xr.Dataset) -> None:
 
 
 def _lasting(axes: Axes, part: xr.Dataset) -> None:
-    for metal, (mark, _) in METAL.items() if "high" in part else ():  # older results do not say
+    for metal, (mark, _) in METAL.items() if "high" in part else ():
         axes.plot(part["measure"], part["high"].sel(metal=metal), mark, color="k", ms=9, mew=1.2)
 
 
@@ -109,7 +110,7 @@ def _verdicts(one: xr.Dataset) -> str:
 
 
 def _flights(one: xr.Dataset) -> str:
-    if "metal" not in one:
+    if "high" not in one:
         return ""
     words = [
         f"{low:.1f} to {high:.1f} Hz ({metal} rotor; then {end})"

@@ -21,7 +21,7 @@ from ...fem.slab import resolve_plate_model, rotor_nearby
 from ...geometry.basics import Array, InputError, millimetre_size
 from ...geometry.scenes import AbsoluteStart, Scene, load_scene
 from ..terminal import Models, detail, finite, note, positive, progress
-from .plate_of_scene import check_room, check_way, plate_memory
+from .plate_of_scene import check_room, check_way, floating, plate_memory
 from .rotor_of_scene import RotorField, RotorTables, equations_key
 
 PLATE_WORDS = {
@@ -132,8 +132,8 @@ class Levitation:
         """
         note("Equilibria ...")
         found = survey(self.scene, self.interaction, self.spin, rates=self.rates)
-        if (chosen := _first(found.equilibria)) is not None:
-            check_way(self.scene, chosen.position)
+        if found.equilibria:
+            check_way(self.scene, floating(found.equilibria).position)
         return found
 
     @cached_property

@@ -34,7 +34,8 @@ class Models:
     Parameters
     ----------
     model
-        Field model of the motion.
+        Field model of the motion. dipole and cuboid take the rotor's moment as Br V/μ0, as the article does: for cubes
+        of μr = 1.05 that is 1.6 % too strong. fem has the true one; the floater's always carries its 3/(μr + 2).
     plate_model
         none, slab (infinite), fem or reduced (the network of the finite elements), or auto.
     interaction

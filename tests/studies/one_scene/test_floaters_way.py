@@ -1,11 +1,13 @@
 """A conductor of the rotor where the floater would levitate is a wrong scene."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
 import spinlev as sl
 from spinlev.geometry.basics import InputError
-from spinlev.studies.one_scene.plate_of_scene import check_way
+from spinlev.studies.one_scene.plate_of_scene import check_way, floating
 
 BALL = sl.sphere(diameter_mm=12.7, remanence_T=1.305, density_kg_m3=7500.0)
 BLOCK = {"size_mm": [4.0, 4.0, 4.0], "center_mm": [0.0, 0.0, -8.0], "conductivity_S_m": 1.4e6}
@@ -18,3 +20,11 @@ def test_a_conductor_in_the_floaters_way_is_said_with_its_depth():
     check_way(scene, np.array([0.0, 0.0, -17e-3]))
     with pytest.raises(InputError, match=r"conductors\[0\] must leave the floater's way free.* by 0.35 mm"):
         check_way(scene, np.array([0.0, 0.0, -16e-3]))
+
+
+def test_where_a_brake_undoes_every_equilibrium_the_least_growing_is_the_floaters_way():
+    """As found for a block of steel 14 mm below the cube: 702 /s beside the rotor, 2.4 /s where it would float."""
+    beside, below, far = (
+        SimpleNamespace(growth_per_s=growth, stable=False, without=None) for growth in (702.0, 2.4, 36.0)
+    )
+    assert floating([beside, below, far]) is below

@@ -1,0 +1,81 @@
+"""`sl.ensemble`: flights as simulated one by one, the same bits from a seed in any number of workers, wrong input."""
+
+import doctest
+
+import numpy as np
+import pytest
+import xarray as xr
+
+import spinlev as sl
+
+AT = {"position_mm": [1.0, 0.0, -19.8], "velocity_mm_s": [0.0, 690.0, 0.0], "moment": [-0.1, 0.0, 1.0]}
+SCENE = sl.scene(
+    frequency_hz=110.0,
+    rotor=sl.horizontal(displacement_mm=2.0, edge_mm=10.0, remanence_T=1.305),
+    floater=sl.sphere(diameter_mm=12.7, remanence_T=1.305, density_kg_m3=7500.0),
+    start={**AT, "spin_hz": [0.0, 0.0, 110.0]},
+)
+SPREAD = {"offset_mm": [0.1, 0.1, 0.3], "velocity_mm_s": 5.0, "moment_deg": 2.0, "spin_hz": 0.5}
+
+
+def test_each_ends_as_when_it_is_simulated():
+    """The second of three; what is given once holds for all."""
+    places = np.array([[1.0, 0.0, -19.8], [1.1, 0.1, -19.5], [0.0, 0.0, -5.0]])
+    starts = xr.Dataset({"position_mm": (("flight", "axis"), places), "velocity_mm_s": ("axis", AT["velocity_mm_s"])})
+    found = sl.ensemble(SCENE, starts, 0.1, model="dipole")
+    assert found.sizes == {"flight": 3, "axis": 3}
+    changes = {f"start.position_mm.{k}": places[1, k] for k in range(3)}
+    changes |= {"start.moment.0": 0.0, "start.spin_hz.2": 0.0}
+    alone = sl.simulate(sl.parse_scene(found.attrs["scene"], changes=changes), 0.1, "dipole")
+    assert found["ended_by"].values.tolist()[1:] == [alone.attrs["ended_by"], "contact"]
+    assert float(found["levitated"][1]) == pytest.approx(alone.attrs["levitated_s"], rel=1e-8)
+    last = alone["position_rotor_frame"].values[-1]
+    assert np.abs(found["position"].values[1] - last).max() < 1e-8  # the ball's field errs by 1e-6
+    assert float(found["levitated"][2]) == 0.0
+
+
+def test_a_seed_gives_the_same_bits_in_any_number_of_workers():
+    """Starts as well: spread about the scene's own, with the standard deviations asked for."""
+    asked = {"n": 40, "seed": 3, "spread": SPREAD, "duration": 0.05, "model": "dipole"}
+    one, two = sl.ensemble(SCENE, **asked), sl.ensemble(SCENE, **asked, workers=2)
+    xr.testing.assert_identical(one, two)
+    away = one["start_position"].values - np.array(AT["position_mm"]) * 1e-3
+    np.testing.assert_allclose(away.std(axis=0), [1e-4, 1e-4, 3e-4], rtol=0.3)
+    other = sl.ensemble(SCENE, **{**asked, "seed": 4})
+    assert not np.any(other["start_position"].values == one["start_position"].values)
+    narrow = sl.ensemble(SCENE, **{**asked, "spread": {"offset_mm": [0.1, 0.1, 0.3]}})
+    np.testing.assert_array_equal(narrow["start_position"], one["start_position"])
+
+
+@pytest.mark.parametrize(
+    ("asked", "says"),
+    [
+        ({}, "starts must be given, or n with spread"),
+        ({"starts": AT, "n": 3}, "both or neither"),
+        ({"starts": {"place": [0, 0, 0]}}, "keys among offset_mm, position_mm"),
+        ({"starts": {"velocity_mm_s": [0, 0, 0]}}, "either offset_mm or position_mm"),
+        ({"starts": {"offset_mm": [0, 0, 0], "spin_hz": [0, 0, 0]}}, "offset_mm alone"),
+        ({"starts": {"position_mm": [0, 0]}}, r"shape \(2,\)"),
+        ({"starts": {"position_mm": [[0, 0, np.nan]]}}, "three finite numbers"),
+        ({"starts": {"position_mm": "here"}}, "must be numbers"),
+        ({"starts": {"position_mm": np.zeros((2, 3)), "moment": np.ones((3, 3))}}, "as many rows"),
+        ({"starts": {"position_mm": [0, 0, -20], "moment": [0, 0, 0]}}, "directions, not zero"),
+        ({"n": 0, "spread": SPREAD}, "n must be a whole number, 1 at least"),
+        ({"n": 2.5, "spread": SPREAD}, "n must be a whole number"),
+        ({"n": 2, "seed": -1, "spread": SPREAD}, "seed must be a whole number, 0 at least"),
+        ({"n": 2}, "spread must have standard deviations"),
+        ({"n": 2, "spread": {"offset_mm": -1.0}}, "not negative"),
+        ({"n": 2, "spread": {"offset": 1.0}}, "keys among offset_mm, velocity_mm_s"),
+        ({"starts": AT, "duration": 0.0}, "duration must be a positive number"),
+        ({"starts": AT, "workers": 0}, "between 1 and 1024"),
+    ],
+)
+def test_wrong_input_is_told(asked, says):
+    with pytest.raises(sl.InputError, match=says):
+        sl.ensemble(SCENE, **asked, model="dipole")
+
+
+def test_the_example_runs():
+    from spinlev.studies.interface import many_flights
+
+    assert doctest.testmod(many_flights).failed == 0
