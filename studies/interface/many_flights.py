@@ -49,8 +49,8 @@ def ensemble(
     scene : Scene, str or Path
         The scene, or the path of its file.
     starts : dict or xarray.Dataset, optional
-        By key of the scene file's `[start]`, three numbers for each flight (n, 3), or three for all: "offset_mm" from the
-        stable equilibrium, or "position_mm" with "velocity_mm_s", "moment" and "spin_hz".
+        By key of the scene file's `[start]`, three numbers for each flight (n, 3), or three for all: "offset_mm" from
+        the stable equilibrium, or "position_mm" with "velocity_mm_s", "moment" and "spin_hz".
     duration : float
         Of each flight, s.
     n : int, optional
@@ -75,8 +75,8 @@ def ensemble(
     Returns
     -------
     xarray.Dataset
-        Over `flight` and `axis`, SI units: `levitated`, `ended_by` ("duration", "contact", "lost"), the state at the end
-        and, as start_..., at the beginning. Accuracy: the field errs by 1e-6 of its gradient; steps by round-off.
+        Over `flight` and `axis`, SI units: `levitated`, `ended_by` ("duration", "contact", "lost"), the state at the
+        end and, as start_..., at the beginning. Accuracy: the field errs by 1e-6 of its gradient; steps by round-off.
 
     Raises
     ------
