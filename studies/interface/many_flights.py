@@ -75,8 +75,9 @@ def ensemble(
     Returns
     -------
     xarray.Dataset
-        Over `flight` and `axis`, SI units: `levitated`, `ended_by` ("duration", "contact", "lost"), the state at the
-        end and, as start_..., at the beginning. Accuracy: the field errs by 1e-6 of its gradient; steps by round-off.
+        Over `flight` and `axis`, SI units: `levitated`, `ended_by` ("duration", "contact", "lost"), the state at
+        the end and, as ``start_...``, at the beginning. Accuracy: the field errs by 1e-6 of its gradient, steps
+        by round-off.
 
     Raises
     ------
