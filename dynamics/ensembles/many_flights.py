@@ -73,8 +73,9 @@ def fly_together(
     began = perf_counter()
     for scene, start in zip(scenes, starts, strict=True):
         key = scene_text(replace(scene, start=OffsetStart()))
-        local = known.setdefault(key, local_flight(scene, table, duration))
-        flights.append(Flying.begun(local, start, duration, True))
+        if key not in known:
+            known[key] = local_flight(scene, table, duration)
+        flights.append(Flying.begun(known[key], start, duration, True))
     fly_all(flights)
     speed = sum(f.seconds for f in flights) / (perf_counter() - began)
     return [None if f.recorder is None else f.trajectory(speed) for f in flights]

@@ -77,6 +77,7 @@ def test_vertical_range_against_known_numbers():
     assert result["high_kind"].item() == "oscillatory"
 
 
+@pytest.mark.slow
 def test_remanence_and_density_enter_only_as_a_ratio(horizontal):
     """Accelerations are those of gravity and Br Br'/density: their logarithmic derivatives are one number."""
     names = "rotor_remanence", "floater_remanence", "density"
@@ -103,6 +104,7 @@ def test_a_design_holds_the_floater_where_it_was_wanted():
     assert found.margin == pytest.approx(min(100 - found.low.parameter, found.high.parameter - 100) / 100)
 
 
+@pytest.mark.slow
 def test_mutual_magnetisation_moves_the_floater_as_the_perturbed_balance_says(tilted):
     """The table's energy in the equations, against Broyden's method with the magnetostatics of both bodies."""
     scene, _, found = tilted

@@ -54,6 +54,7 @@ def changed_by_scale(derived, exponents):
     return sum(parts).values + exponents["frequency"] * at * by.sel(parameter="frequency").values
 
 
+@pytest.mark.slow
 def test_all_derivatives_obey_a_change_of_the_unit_of_time(derived):
     """Rates × λ where accelerations are × λ²: by λ² for gravity and for the product of the remanences."""
     change = changed_by_scale(derived, {"gravity": 2, "rotor_remanence": 1, "floater_remanence": 1, "frequency": 1})
@@ -86,6 +87,7 @@ def test_a_small_tilt_of_the_axis_moves_the_floater_in_second_order(derived):
     assert np.all(derived["leaning_growth"].values < 1e-6)
 
 
+@pytest.mark.slow
 def test_a_design_is_stable_up_to_its_margin():
     """Half a hertz beyond its ends a search finds nothing stable; cubes of 2 mm are too weak."""
     asked = {"configuration": "tilt", "distance_mm": 25.0, "frequency": 100.0, "edges_mm": [2.0, 12.7]}

@@ -179,7 +179,7 @@ BAD_SCENES = {
 def test_wrong_scenes_end_with_status_2_one_message_and_no_file(spinlev, tmp_path, fault):
     path = tmp_path / "s.toml"
     path.write_text(BAD_SCENES[fault])
-    status, out, err = spinlev("run", path)
+    status, out, err = spinlev("run", path, "--model", "dipole")
     assert status == 2, err
     assert out == ""
     assert "Traceback" not in err
@@ -244,7 +244,7 @@ def test_a_rotor_at_rest_has_no_equilibrium_but_its_floater_still_falls(spinlev,
     path = tmp_path / "s.toml"
     at_rest = GOOD.replace("frequency_hz = 110.0", "frequency_hz = 0.0")
     path.write_text(at_rest)
-    status, _, err = spinlev("run", path, "--model", "dipole", *NO_PLATE)
+    status, _, err = spinlev("equilibria", path, "--model", "dipole", *NO_PLATE)
     assert status == 1
     assert "Earnshaw" in err
     path.write_text(at_rest + "\n[start]\nposition_mm = [0.0, 0.0, -60.0]\n")

@@ -34,6 +34,7 @@ def errors(truths):
     return found
 
 
+@pytest.mark.slow
 def test_without_permeability_every_method_tends_to_the_closed_form(errors):
     """Moments gain with their degree (odd ones alone belong to a cube), elements with theirs; a fit is good inside."""
     assert errors["closed form"][0].max() < 1e-14
