@@ -48,22 +48,22 @@ def ensemble(
     ----------
     scene : Scene, str or Path
         The scene, or the path of its file.
-    starts : mapping or xarray.Dataset, or None
+    starts : dict or xarray.Dataset, optional
         By key of the scene file's `[start]`, three numbers for each flight (n, 3), or three for all: "offset_mm" from
         the stable equilibrium, or "position_mm" with "velocity_mm_s", "moment" and "spin_hz".
     duration : float
-        Simulated time of each flight, s.
-    n : int or None
+        Of each flight, s.
+    n : int, optional
         Instead of `starts`: so many flights from about where the scene begins.
     seed : int
-        Of their random starts: the same flights, to the last bit, with any number of workers.
-    spread : mapping or None
-        Standard deviations of these starts: "offset_mm" (at rest in the turning frame), "velocity_mm_s", "moment_deg"
-        and "spin_hz", each one number or three.
+        Of the random numbers; the same gives the same flights, to the last bit, with any number of workers.
+    spread : dict, optional
+        Standard deviations of "offset_mm" (at rest in the turning frame), "velocity_mm_s", "moment_deg" and "spin_hz",
+        each one number or three.
     model : {"auto", "dipole", "cuboid", "fem", "map"}
         Model of the rotor's field.
     rtol : float
-        Relative accuracy asked of it.
+        Relative accuracy asked of the field.
     interaction : {"auto", "rigid", "mutual"}
         Whether rotor and floater magnetise each other.
     workers : int or None
@@ -75,8 +75,9 @@ def ensemble(
     Returns
     -------
     xarray.Dataset
-        Over `flight` and `axis`, SI units: `levitated`, `ended_by` ("duration", "contact", "lost"), the state at the
-        end and, as start_..., at the beginning. The field errs by 1e-6 of its gradient, the steps by round-off.
+        Over `flight` and `axis`, SI units: `levitated`, `ended_by` ("duration", "contact", "lost"), the state at
+        the end and, as ``start_...``, at the beginning. Accuracy: the field errs by 1e-6 of its gradient, steps
+        by round-off.
 
     Raises
     ------

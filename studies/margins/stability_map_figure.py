@@ -12,7 +12,7 @@ MODELS = ("dipole", "fem")
 FACE = -0.045
 """Height of the plate's upper face below the rotor's origin, m: no floater that levitates touches it."""
 MARKERS = {"fold": "^", "oscillatory": "o", "real": "D", "contact": "v", "border": "_"}
-METAL = {"insulating": ("_", "flights of 250 s last up to here"), "conducting": ("x", "… with currents in the rotor")}
+METAL = {"insulating": ("<", "flights of 250 s last up to here"), "conducting": ("*", "… with currents in the rotor")}
 """Marks of where averaged flights last, without and with eddy currents in the rotor's magnets."""
 MEANINGS = {
     "fold": "fold: no equilibrium beyond",
@@ -78,7 +78,7 @@ def _plate(axes: Axes, part: xr.Dataset) -> None:
 
 def _lasting(axes: Axes, part: xr.Dataset) -> None:
     for metal, (mark, _) in METAL.items() if "high" in part else ():
-        axes.plot(part["measure"], part["high"].sel(metal=metal), mark, color="k", ms=9, mew=1.2)
+        axes.plot(part["measure"], part["high"].sel(metal=metal), mark, color="k", ms=5)
 
 
 def map_lines(result: xr.Dataset) -> list[str]:
