@@ -9,6 +9,8 @@ from spinlev.dynamics.maps import equilibrium_map, rotor_family
 from spinlev.dynamics.motion import Rates, Scales, parameters
 from spinlev.dynamics.steady import EVERY, Balance, modes, solve
 from spinlev.fem.rotor_tables import rotor_table
+from spinlev.studies.one_scene import Levitation
+from spinlev.studies.terminal import Models
 
 PEER = "least squares + magpylib, no stability"
 MODELS = ["dipole", "cuboid", "fem"]
@@ -57,10 +59,11 @@ def test_equilibria(benchmark, model):
 
 
 @pytest.mark.benchmark(group=ONE)
-@pytest.mark.parametrize("model", MODELS)
+@pytest.mark.parametrize("model", [*MODELS, "fem, mutual"])
 def test_one_equilibrium(benchmark, model):
     """Newton from 0.02 radii away and the ten eigenvalues there; it must be the stable one."""
-    table = rotor_table(SCENE.rotor, model, nearest=SCENE.floater.radius)
+    name, _, answers = model.partition(", ")
+    table = Levitation(SCENE, Models(name, "none", interaction="mutual" if answers else "rigid")).interaction
     rates, scales = Rates(table), Scales.of(SCENE)
     near = next(e for e in find_equilibria(SCENE, table, rates=rates) if e.stable)
     guess = scales.pack(near.state) + 0.02

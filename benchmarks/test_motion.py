@@ -16,7 +16,8 @@ from spinlev.dynamics.flights.simulation import PLATE_TOLERANCE
 from spinlev.dynamics.motion import State
 from spinlev.fem.rotor_tables import rotor_table
 from spinlev.fem.slab import rotor_nearby
-from spinlev.studies.one_scene import plate_memory
+from spinlev.studies.one_scene import Levitation, plate_memory
+from spinlev.studies.terminal import Models
 
 FREE = replace(SCENE, plate=None, drag=replace(SCENE.drag, linear=0.0, angular=0.0))
 TURNS = 2
@@ -66,6 +67,22 @@ def test_flight_in_balls(benchmark, start, compact):
     table = rotor_table(SCENE.rotor, "fem", nearest=SCENE.floater.radius)
     flight = compile_local_flight(FREE, table, 1.0, compact=compact)
     trajectory = benchmark.pedantic(lambda: integrate(FREE, flight, start, 1.0, None), rounds=3, warmup_rounds=1)
+    benchmark.extra_info["error"] = f"ledger {trajectory.energy_error:.0e} in 110 turns"
+    assert trajectory.ended_by == "duration"
+
+
+@pytest.mark.benchmark(group="a simulated second at 110 Hz")
+@pytest.mark.parametrize("effects", ["rigid", "mutual", "metal", "mutual and metal"])
+def test_flight_with_effects(benchmark, start, effects):
+    """What effects cost in balls, with finite elements."""
+    scene = FREE
+    if "metal" in effects:
+        scene = replace(FREE, rotor=tuple(replace(magnet, conductivity=6.7e5) for magnet in FREE.rotor))
+    levitation = Levitation(scene, Models("fem", "none", interaction="mutual" if "mutual" in effects else "rigid"))
+    flight = compile_local_flight(scene, levitation.interaction, 1.0, compact=True)
+    trajectory = benchmark.pedantic(lambda: integrate(scene, flight, start, 1.0, None), rounds=3, warmup_rounds=1)
+    operations = [len(part.integrator.decomposition) for part in flight.parts._known.values()]
+    print(f"\n{effects}: {operations} operations, {trajectory.realtime_factor:.0f} x real time")
     benchmark.extra_info["error"] = f"ledger {trajectory.energy_error:.0e} in 110 turns"
     assert trajectory.ended_by == "duration"
 

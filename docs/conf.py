@@ -20,7 +20,7 @@ sphinx_gallery_conf = {
     "examples_dirs": "examples",
     "gallery_dirs": "gallery",
     "filename_pattern": r"\.py$",
-    "within_subsection_order": "ExampleTitleSortKey",
+    "within_subsection_order": "gallery_pictures.Order",
     "image_scrapers": ("gallery_pictures.picture",),
     "reset_modules": ("gallery_pictures.style",),
     "capture_repr": (),

@@ -5,6 +5,20 @@ from sphinx_gallery.scrapers import figure_rst
 
 from spinlev.studies.results.style import STYLE
 
+FIRST = ("first_steps", "own_scene", "kick", "sweep", "field_map", "dipole_error")
+
+
+class Order:
+    """What a beginner asks comes first."""
+
+    def __init__(self, folder):
+        self.folder = folder
+
+    def __call__(self, name):
+        """Place of a program among all."""
+        stem = name.removesuffix(".py")
+        return (FIRST.index(stem) if stem in FIRST else len(FIRST), stem)
+
 
 def style(gallery_conf, fname):
     """Draw the next program's figure as all others are."""

@@ -20,8 +20,6 @@ LATERAL: Indices = np.array([0, 1, 3, 4])
 """The four balances but the axial force, and the four unknowns but the height."""
 EVERY: Indices = np.arange(5)
 AXIAL = 2
-NEGLIGIBLE = 1e-12
-"""Step of Newton's method, floater radii or rad."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,13 +100,11 @@ def solve(
     Returns
     -------
     position, moment : (n, 3)
-    step : (n,) estimate of the error: the length of the last step, or of the next one where the last two, by the
-        square that Newton's method promises, make it too short to be worth another look; infinite where it failed
+    step : (n,) length of the last step: an estimate of the error before it was made; infinite where it failed
     """
     position, moment = position.copy(), moment.copy()
     length = np.full(len(position), np.inf)
     active = np.arange(len(position))
-    before = np.full(len(position), np.inf)
     for _ in range(iterations):
         value, slope = balance.at(active)(position[active], moment[active])
         step = np.zeros((len(active), 5))
@@ -117,11 +113,8 @@ def solve(
         size = np.maximum(np.linalg.norm(step[:, :3], axis=1), np.linalg.norm(step[:, 3:], axis=1))
         step *= np.minimum(1.0, reach / np.maximum(size, reach))[:, None]
         position[active], moment[active] = moved_pose(position[active], moment[active], step)
-        known = before[active]
-        following = np.where(np.isfinite(known), size * (size / known) ** 2, np.inf)
-        before[active] = np.where(size < reach, size, np.inf)
-        done = ~good | (size < 1e-11) | (following < NEGLIGIBLE)
-        length[active] = np.where(good, np.minimum(size, following), np.inf)
+        done = ~good | (size < 1e-11)
+        length[active] = np.where(good, size, np.inf)
         active = active[~done]
         if not len(active):
             break

@@ -1,5 +1,10 @@
 """Which fields, potentials and losses are known without any elements?"""
 
+from .bodies import (
+    fields_of_magnets as fields_of_magnets,
+    fields_of_sphere as fields_of_sphere,
+    left_out as left_out,
+)
 from .closed_moments import (
     added_by_closed_form as added_by_closed_form,
     carrier as carrier,

@@ -15,7 +15,7 @@ import meshio
 import numpy as np
 
 from ...dynamics.motion import State
-from ...fem.closed_forms import remanent_field
+from ...fem.closed_forms import fields_of_magnets, fields_of_sphere, left_out
 from ...fem.storage import write_whole
 from ...geometry.basics import MU_0, Array, Box, InputError
 from ...geometry.scenes import AbsoluteStart, Scene
@@ -54,7 +54,7 @@ def export_job(scene: Scene, asked: Models, path: Path) -> tuple[Mapping[str, An
     count = sum(len(points) for points, _, _ in parts)
     values = {
         "model": levitation.table.model,
-        "error_estimate": max(magnet.contrast for magnet in scene.rotor),  # where the closed form stands in
+        "error_estimate": left_out(scene.rotor),
         "file": str(path),
         "points": count,
         "floater": state is not None,
@@ -106,34 +106,18 @@ def _lattice(axes: list[Array]) -> tuple[Array, Array]:
 def _fields(levitation: Levitation, state: State | None, points: Array) -> dict[str, Array]:
     """B, H, M, no J, and the number of the body at points (n, 3) m."""
     scene, table = levitation.scene, levitation.table
-    h = remanent_field(scene.rotor, points) / MU_0
-    magnetization, body = np.zeros_like(points), np.full(len(points), AIR)
+    h, magnetization = fields_of_magnets(scene.rotor, points)
+    body = np.full(len(points), AIR)
     for magnet in scene.rotor:
-        inside = magnet.box.distance(points) <= 0
-        remanent = magnet.polarization_in_rotor / MU_0
-        magnetization[inside] = remanent + h[inside] @ (magnet.permeability_in_rotor - np.eye(3)).T
-        body[inside] = ROTOR
-    b = MU_0 * (h + magnetization)
+        body[magnet.box.distance(points) <= 0] = ROTOR
     known = (body == AIR) & table.in_range(points)
-    b[known] = table.evaluate(points[known])[0]
-    h[known] = b[known] / MU_0
+    h[known] = table.evaluate(points[known])[0] / MU_0
     if state is not None:
-        own, within = _sphere(scene, state, points)
-        magnetization[within] = scene.floater.moment * state.moment / scene.floater.volume
-        h += own
-        b = MU_0 * (h + magnetization)
-        body[within] = FLOATER
-    return {"B": b, "H": h, "M": magnetization, "J": np.zeros_like(points), "body": body}
-
-
-def _sphere(scene: Scene, state: State, points: Array) -> tuple[Array, Any]:
-    """H (n, 3) A/m of the floater: a dipole's outside, -M/3 inside; and which points are inside."""
-    moment, away = scene.floater.moment * state.moment, points - state.position
-    distance = np.maximum(np.linalg.norm(away, axis=1), 1e-9)[:, None]
-    unit = away / distance
-    outside = (3 * unit * (unit @ moment)[:, None] - moment) / (4 * np.pi * distance**3)
-    within = distance[:, 0] <= scene.floater.radius
-    return np.where(within[:, None], -moment / (3 * scene.floater.volume), outside), within
+        moment, radius = scene.floater.moment * state.moment, scene.floater.radius
+        own, inside = fields_of_sphere(moment, state.position, radius, points)
+        h, magnetization = h + own, magnetization + inside
+        body[inside.any(axis=1)] = FLOATER
+    return {"B": MU_0 * (h + magnetization), "H": h, "M": magnetization, "J": np.zeros_like(points), "body": body}
 
 
 def _write(path: Path, parts: list[tuple[Array, Array, dict[str, Array]]]) -> None:

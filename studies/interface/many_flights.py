@@ -46,27 +46,45 @@ def ensemble(
 
     Parameters
     ----------
-    scene : a scene or the path of a scene file
-    starts : by key of the scene file's `[start]`, three numbers for each flight (n, 3), or three for all: "offset_mm"
-        from the stable equilibrium, or "position_mm" with "velocity_mm_s", "moment" and "spin_hz"; a mapping or Dataset
-    duration : of each flight, s
-    n, seed, spread : instead of `starts`: so many flights from about where the scene begins, with the standard
-        deviations of "offset_mm" (at rest in the turning frame), "velocity_mm_s", "moment_deg" and "spin_hz", each
-        one number or three; the same seed gives the same flights, to the last bit, with any number of workers
-    model, rtol, interaction : see `equilibria`
-    workers : processes, None: one for each core; more than one needs the caller's script to be guarded by
-        `if __name__ == "__main__":`
-    progress : whether messages go to standard error
+    scene : Scene, str or Path
+        The scene, or the path of its file.
+    starts : dict or xarray.Dataset, optional
+        By key of the scene file's `[start]`, three numbers for each flight (n, 3), or three for all: "offset_mm" from
+        the stable equilibrium, or "position_mm" with "velocity_mm_s", "moment" and "spin_hz".
+    duration : float
+        Of each flight, s.
+    n : int, optional
+        Instead of `starts`: so many flights from about where the scene begins.
+    seed : int
+        Of the random numbers; the same gives the same flights, to the last bit, with any number of workers.
+    spread : dict, optional
+        Standard deviations of "offset_mm" (at rest in the turning frame), "velocity_mm_s", "moment_deg" and "spin_hz",
+        each one number or three.
+    model : {"auto", "dipole", "cuboid", "fem", "map"}
+        Model of the rotor's field.
+    rtol : float
+        Relative accuracy asked of the field.
+    interaction : {"auto", "rigid", "mutual"}
+        Whether rotor and floater magnetise each other.
+    workers : int or None
+        Processes, None for one a core; more than one needs the caller's script to be guarded by
+        `if __name__ == "__main__":`.
+    progress : bool
+        Whether messages go to standard error.
 
     Returns
     -------
-    Dataset over `flight` and `axis`, SI units: `levitated`, `ended_by` ("duration", "contact", "lost"), the state at
-    the end and, as start_..., at the beginning. Accuracy: the field errs by 1e-6 of its gradient; steps by round-off.
+    xarray.Dataset
+        Over `flight` and `axis`, SI units: `levitated`, `ended_by` ("duration", "contact", "lost"), the state at
+        the end and, as ``start_...``, at the beginning. Accuracy: the field errs by 1e-6 of its gradient, steps
+        by round-off.
 
     Raises
     ------
-    InputError : starts that are not allowed, with what is
-    EquilibriumError : a flight shall begin near an equilibrium, and there is none
+    InputError
+        Starts that are not allowed, with what is.
+    EquilibriumError
+        A flight shall begin near an equilibrium, and there is none.
 
     Examples
     --------

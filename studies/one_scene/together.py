@@ -66,12 +66,13 @@ def _find_together(alike: Sequence[Levitation], places: Indices) -> None:
 def fly(levitations: Sequence[Levitation], duration: float) -> None:
     """Fly for `duration` (s) together what can be; what cannot be flown here is left to each scene, which says why.
 
-    Over a plate with currents, and in a field so short that balls do not pay, each flies alone.
+    Over a plate whose currents may be modelled, and in a field so short that balls do not pay, each flies alone.
     """
     groups: dict[tuple[object, ...], list[Levitation]] = {}
     for levitation in levitations:
         with suppress(SpinlevError):
-            if levitation.plate is None and is_long(levitation.interaction):
+            still = levitation.scene.plate is None or levitation.models.plate_model == "none"
+            if still and is_long(levitation.interaction):
                 tilted = bool(np.any(levitation.scene.gravity[:2]))
                 key = levitation.equations_key, levitation.interaction_model, tilted
                 groups.setdefault(key, []).append(levitation)

@@ -144,6 +144,7 @@ def trajectory_figure(result: xr.Dataset) -> Figure:
     axes[0, 1].set(xlabel="time (s)", ylabel="distance below the rotor (mm)", title="A closer look")
     axes[1, 1].set(xlabel="x (mm)", ylabel="y (mm)", title="The same from above, rotor's frame")
     axes[1, 1].set(aspect="equal", adjustable="datalim")
+    axes[1, 1].locator_params(axis="x", nbins=5)
     return figure
 
 

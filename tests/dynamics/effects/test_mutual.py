@@ -60,6 +60,20 @@ def test_rates_and_their_derivatives_agree(mutual, start):
         np.testing.assert_allclose((found[0] - found[1]) / (2 * step), slope[:, k], atol=1e-8 * np.abs(slope).max())
 
 
+def test_rough_rates_leave_out_all_answers_but_the_uniform_one(mutual, start):
+    """A search begins with them: they are the rates with a table whose points answer nothing."""
+    table = mutual.effects[0].table
+    grids = [replace(grid, strengths=0 * grid.strengths, degrees=0 * grid.degrees) for grid in table.grids]
+    silent = replace(table, grids=tuple(grids), coupling=0 * table.coupling, pairs=0 * table.pairs)
+    state, values, rates = SCALES.pack(start.state)[None], parameters(SCENE, SCALES), Rates(mutual)
+    rough = rates.rough(state, values)
+    for part, known in zip(
+        rough, Rates(replace(mutual, effects=(Mutual(silent, FLOATER.moment),)))(state, values), strict=True
+    ):
+        np.testing.assert_allclose(part, known, rtol=1e-12, atol=1e-12)
+    assert np.abs(rough[0] - rates(state, values)[0]).max() > 1e-4
+
+
 @pytest.mark.parametrize("formula", [SMALL, LARGE])
 def test_in_a_ball_force_and_torque_come_from_one_energy(mutual, start, formula):
     """∇J · rates = 0 at any state in the ball, and the rates are those of the table."""

@@ -9,6 +9,7 @@ from places import SCENES
 from scipy.spatial.transform import Rotation
 
 import spinlev as sl
+from spinlev.fem.closed_forms import fields_of_sphere
 from spinlev.geometry.basics import MU_0, InputError
 from spinlev.studies.exchange import export_job, from_magpylib, to_magpylib
 from spinlev.studies.terminal import KINDS, Models, new_scene
@@ -111,3 +112,20 @@ def test_the_fields_have_no_divergence_in_the_air(exported):
 def test_only_vtu(tmp_path):
     with pytest.raises(InputError, match=r"must end in \.vtu"):
         export_job(sl.load_scene(SCENES / "vertical-24h.toml"), Models("cuboid", "none"), tmp_path / "fields.csv")
+
+
+def test_the_stated_error_of_an_export_holds_against_finite_elements(tmp_path):
+    """Where the closed form stands in for the permeable magnets: in the air around them."""
+    scene = SCENES / "horizontal.toml"
+    values, _ = export_job(sl.load_scene(scene), Models("cuboid", "none"), tmp_path / "fields.vtu")
+    mesh = meshio.read(tmp_path / "fields.vtu")
+    table = sl.rotor_table(scene, model="fem", rtol=1e-4)
+    start = sl.equilibria(scene, model="cuboid", plate_model="none").isel(equilibrium=0)
+    air = (mesh.point_data["body"] == 0) & table.in_range(mesh.points)
+    ball = sl.load_scene(scene).floater
+    own, _ = fields_of_sphere(ball.moment * start.moment.values, start.position.values, ball.radius, mesh.points[air])
+    expected = table.evaluate(mesh.points[air])[0] + MU_0 * own
+    rotor = np.linalg.norm(expected - MU_0 * own, axis=1)
+    apart = np.linalg.norm(mesh.point_data["B"][air] - expected, axis=1) / rotor
+    assert air.sum() > 1000
+    assert values["error_estimate"] / 10 < apart.max() < values["error_estimate"]
