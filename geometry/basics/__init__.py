@@ -1,15 +1,8 @@
-"""What is everything made of: arrays, boxes, constants, and the errors that a user reads?"""
+"""What is everything made of: arrays, boxes, constants, and the errors that a user reads?
 
-from .arrays import Array as Array, frozen_array as frozen_array, spread_points as spread_points
-from .box import Box as Box, rotation_matrix as rotation_matrix
-from .constants import MAGNET_CONDUCTIVITY as MAGNET_CONDUCTIVITY, MU_0 as MU_0
-from .cylinder import Cylinder as Cylinder
-from .errors import ComputationError as ComputationError, InputError as InputError, SpinlevError as SpinlevError
-from .solid import Solid as Solid, places_off as places_off
-from .text import (
-    counted as counted,
-    html_table as html_table,
-    listed as listed,
-    millimetre_size as millimetre_size,
-    millimetres as millimetres,
-)
+The public names are listed in `__init__.pyi`; each is loaded when it is first used, errors without numpy.
+"""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -1,12 +1,17 @@
 """Numbers given on the command line, and points to evaluate a field at, from a CSV file."""
 
+from __future__ import annotations
+
 import csv
+import math
 from numbers import Real
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
-import numpy as np
+from ...geometry.basics import InputError
 
-from ...geometry.basics import Array, InputError
+if TYPE_CHECKING:
+    from ...geometry.basics import Array
 
 COLUMNS = ("x_mm", "y_mm", "z_mm")
 
@@ -14,12 +19,12 @@ COLUMNS = ("x_mm", "y_mm", "z_mm")
 def three_numbers(name: str, text: str) -> Array:
     """(3,) from X,Y,Z. Raises InputError where they are not three finite numbers."""
     try:
-        numbers = np.array([float(part) for part in text.split(",")])
+        numbers = [float(part) for part in text.split(",")]
     except ValueError:
-        numbers = np.zeros(0)
-    if len(numbers) != 3 or not np.all(np.isfinite(numbers)):
+        numbers = []
+    if len(numbers) != 3 or not all(map(math.isfinite, numbers)):
         raise InputError(f"Input {name} must be three numbers X,Y,Z; instead received {text!r}.")
-    return numbers
+    return _in_array(numbers)
 
 
 def positive(name: str, value: float) -> None:
@@ -58,7 +63,14 @@ def read_points(path: Path) -> Array:
     filled = [(line, row) for line, row in enumerate(rows[1:], start=2) if any(cell.strip() for cell in row)]
     if not filled:
         raise InputError(f"{path}: Input points must be at least one line below the header; instead received none.")
-    return np.array([[_number(path, line, row, i) for i in where] for line, row in filled]) * 1e-3
+    return _in_array([[_number(path, line, row, i) for i in where] for line, row in filled]) * 1e-3
+
+
+def _in_array(numbers: list[Any]) -> Array:
+    """As an array; NumPy is loaded when the first number is read, not with the command line."""
+    import numpy as np
+
+    return np.array(numbers)
 
 
 def _number(path: Path, line: int, row: list[str], column: int) -> float:
@@ -66,7 +78,7 @@ def _number(path: Path, line: int, row: list[str], column: int) -> float:
     try:
         value = float(text)
     except ValueError:
-        value = np.nan
-    if not np.isfinite(value):
+        value = math.nan
+    if not math.isfinite(value):
         raise InputError(f"{path}: Input line {line} must have three finite numbers; instead received {text!r}.")
     return value

@@ -6,8 +6,6 @@ from itertools import product
 from numbers import Real
 from typing import Any
 
-import numpy as np
-
 from ...geometry.basics import InputError
 
 MOST = 100_000
@@ -70,7 +68,7 @@ def _values(text: str, values: str) -> list[float]:
         numbers = [float(part) for part in values.split(separator)]
     except ValueError:
         raise _wrong(text) from None
-    if not np.all(np.isfinite(numbers)):
+    if not all(map(math.isfinite, numbers)):
         raise _wrong(text)
     if separator == ",":
         return numbers
