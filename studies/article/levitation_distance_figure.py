@@ -41,7 +41,7 @@ def formulas_figure(result: xr.Dataset) -> Figure:
                 color = rotor_color(configuration, value)
                 _formulas(panel, rotor, color=color)
                 panel.plot([], [], color=color, label=rotor_label(configuration, value))
-        if configuration != "horizontal":
+        if configuration != "horizontal" and panel.get_legend_handles_labels()[0]:
             panel.legend(loc="upper right")
     _key(axes[0])
     return figure

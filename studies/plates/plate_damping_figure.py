@@ -106,7 +106,8 @@ def _growths(result: xr.Dataset, sweeps: Sequence[str]) -> tuple[Figure, Any]:
 
 
 def _mark_distances(axes: Axes) -> None:
-    axes.set_xscale("log")
+    axes.autoscale(enable=False, axis="x")
+    axes.set(xlim=(0.9 * DISTANCES[0], 1.1 * DISTANCES[-1]), xscale="log")
     axes.set_xticks(DISTANCES, [f"{d:g}" for d in DISTANCES])
     axes.xaxis.set_minor_locator(NullLocator())
 

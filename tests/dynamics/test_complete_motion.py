@@ -65,6 +65,7 @@ def shaken(braked, memory, rates):
     return with_plate(SCENE, braked, Survey(alone.equilibria[:1], ()), memory, rates).equilibria[0]
 
 
+@pytest.mark.slow
 def test_multipliers_with_currents_in_the_rotor_are_the_growth_of_a_kicked_flight(shaken, braked, memory, rates):
     """One turn of small kicks, by the integrator, against Floquet's modes: 1e-6; the currents change them by more."""
     values = parameters(SCENE, SCALES, frozen_spin=True)

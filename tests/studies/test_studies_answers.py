@@ -86,6 +86,7 @@ def test_remanence_and_density_enter_only_as_a_ratio(horizontal):
     np.testing.assert_allclose(rows[2], -rows[0], rtol=1e-4)  # steps of 1 and 1/(1 ± 0.001) differ in second order
 
 
+@pytest.mark.slow
 def test_distance_of_a_sample_is_that_of_a_survey(horizontal):
     values = horizontal.values | {"measure": 2.05, "edge": 10.03e-3, "density": 7450.0}
     found = dict(zip(QUANTITIES, levitation(horizontal, values), strict=True))

@@ -63,6 +63,7 @@ def test_all_derivatives_obey_a_change_of_the_unit_of_time(derived):
     np.testing.assert_allclose(change[2:], 0.0, atol=1e-4 * nominal[2:].max())
 
 
+@pytest.mark.slow
 def test_all_derivatives_obey_a_change_of_the_unit_of_length(derived):
     """All lengths × λ at the same Br and density: the force per mass is × 1/λ, so that all rates are, and gravity."""
     lengths = {"measure": 1, "edge": 1, "diameter": 1, "gravity": -1, "frequency": -1}
@@ -118,6 +119,7 @@ def test_a_design_that_cannot_be_built_says_why(rotor, said):
         designed(*rotor)
 
 
+@pytest.mark.slow
 def test_an_unstable_design_has_no_margin():
     """A search confirms the place and that small motions grow there."""
     found = designed("vertical", 10e-3, 25e-3, 100.0)
@@ -136,6 +138,7 @@ def compared():
     return dipole_vs_fem.compute(point).isel(case=0, step=0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("model", ["dipole", "cuboid"])
 def test_each_model_s_levitation_is_that_of_a_search(compared, model):
     frequency = float(compared["frequency"])
@@ -177,6 +180,7 @@ def test_with_mutual_magnetisation_a_fold_is_where_the_balance_has_a_double_root
     assert 0 < rigid.parameter - low.parameter < 1
 
 
+@pytest.mark.slow
 def test_a_plate_below_damps_what_is_neutral_without_it():
     """Without drag nothing decays. Beside the fold the bounce is soft: the place moves by a millimetre or two."""
     asked = {"configuration": "vertical", "measure": 14.0, "model": "fem", "with_plate": 1}

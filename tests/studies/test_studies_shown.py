@@ -37,6 +37,7 @@ def scene():
     return load_scene(SCENES / "horizontal.toml")
 
 
+@pytest.mark.slow
 def test_no_net_current_flows_through_a_section_of_the_plate(scene):
     """Currents are closed: as much flows one way through a plane as the other, and none out of a face."""
     table = rotor_table(scene.rotor, "dipole")
@@ -83,6 +84,7 @@ def test_a_floater_without_a_direction_has_no_arrow(scene):
     plotter.close()
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("needs_3d")
 def test_a_flight_is_shown_with_the_plate_where_it_has_been_lowered_to(tmp_path, monkeypatch):
     """After 4 s of a lowering that begins at 3 s with 10 mm/s the currents are those of a plate 10 mm further down."""
@@ -108,12 +110,12 @@ def test_a_flight_is_shown_with_the_plate_where_it_has_been_lowered_to(tmp_path,
 def test_the_report_of_a_run_has_its_numbers_cut_where_they_are_long(scene, tmp_path):
     result = sl.simulate(replace(scene, plate=None), 0.02, "dipole", "none").assign_attrs(study="run")
     write_dataset(result, tmp_path / "result.nc")
-    numbers = {"levitated_s": 0.0215, "long": "x" * LONGEST + " the end"}
+    numbers = {"levitated_s": 0.0215, "long": "x" * LONGEST + " last of all"}
     (tmp_path / "summary.json").write_text(json.dumps(numbers))
     page = report_job(tmp_path, tmp_path)[0].read_text()
     assert "0.0215" in page
     assert "xx …" in page
-    assert "the end" not in page
+    assert "last of all" not in page
     (tmp_path / "summary.json").write_text("{")
     with pytest.raises(InputError, match=r"summary.json must be a JSON object; instead: Expecting"):
         report_job(tmp_path, tmp_path)

@@ -225,8 +225,8 @@ PHASES = {
     "table, when it is written": ("spinlev.fem.storage.checked_files.write_whole", FIELD),
     "equilibria": ("spinlev.studies.one_scene.levitation.survey", WRITERS["equilibria.json"]),
     "files": ("spinlev.studies.one_scene.single.write_whole", WRITERS["equilibria.json"]),
-    "sweep": ("spinlev.studies.one_scene.levitation.rotor_table", SWEEP),
-    "sweep, when a point is kept": ("spinlev.studies.sweeps.running.write_checked", SWEEP),
+    "sweep": ("spinlev.studies.one_scene.rotor_of_scene.rotor_table", SWEEP),
+    "sweep, when a point is kept": ("spinlev.studies.sweeps.running.write_whole", SWEEP),
     "sweep, when all are joined": ("spinlev.studies.catalogue.jobs.write_dataset", SWEEP),
     "figures": ("spinlev.studies.catalogue.jobs.save_figures", SWEEP),
 }

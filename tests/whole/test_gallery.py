@@ -44,7 +44,7 @@ def as_a_user(monkeypatch, tmp_path):
     CATALOGUE.update(before)
 
 
-LONG = ("own_field_model", "own_study", "stability_with_plate", "sweep")
+LONG = ("kick", "own_scene", "own_field_model", "own_study", "stability_with_plate", "sweep")
 
 
 @pytest.mark.parametrize("name", [pytest.param(n, marks=pytest.mark.slow if n in LONG else ()) for n in NUMBERS])

@@ -94,6 +94,7 @@ def over_slab():
     return scene, table, rates, memory, standing, with_plate(scene, table, Survey(tuple(near), ()), standing, rates)
 
 
+@pytest.mark.slow
 def test_distance_of_the_plate_as_parameter(over_slab):
     """Two millimetres away from the floater, against the motion found there directly: 1e-9 radii."""
     _, _, rates, memory, _, found = over_slab

@@ -52,6 +52,7 @@ def test_drag_of_a_fast_way_is_that_of_other_data():
     np.testing.assert_allclose(24 / number * moving(number), [27.2, 4.26, 1.09, 0.555], rtol=0.06)
 
 
+@pytest.mark.slow
 def test_a_flight_through_air_balances_its_ledger():
     """Thrown with 1 m/s and 150 turns a second; the floater falls out of the field, and the books close to 1e-11."""
     start = AbsoluteStart(np.array([0.0, 0.0, -30e-3]), np.array([0.5, 0.0, 0.8]), np.array([0.0, 0.0, 1.0]),

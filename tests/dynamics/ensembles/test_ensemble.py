@@ -38,6 +38,7 @@ def flown(starts):
     return ensemble(SCENE, TABLE, starts, DURATION)
 
 
+@pytest.mark.slow
 def test_each_ends_as_if_it_flew_alone(starts, flown):
     """The same field by the same expansions; steps differ where the lanes look for flights that have ended."""
     assert flown.changes.max() >= 1

@@ -30,6 +30,7 @@ def alone(table):
     return find_equilibria(SCENE, table)[0]
 
 
+@pytest.mark.slow
 def test_shift_by_mutual_magnetisation(table, alone):
     """To first order, 0.05 mm to a part in fifty; the rough force without the table to a factor of two."""
     answers = cached_mutual_table(SCENE.rotor, FLOATER, print)[0]

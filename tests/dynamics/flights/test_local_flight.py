@@ -64,6 +64,7 @@ def test_a_ball_misses_no_more_than_it_says(degree, place):
     assert np.abs(np.trace(tensor)).max() < 1e-14 * np.abs(tensor).max()
 
 
+@pytest.mark.slow
 def test_a_resting_floater_stays_in_one_ball_and_flies_as_in_the_table(start):
     near, whole = both(start, 1.0)
     assert near.field_changes.count == 0

@@ -79,6 +79,7 @@ def test_its_power_is_that_of_the_moved_rotor():
     assert found[0][0] < 0
 
 
+@pytest.mark.slow
 def test_a_map_has_mutual_magnetisation():
     """Of a rotor between the map's own: places to 1e-9 m of a search with the tables of that rotor."""
     family = rotor_family(scene_of(tilt(0.0, *SHAPE)), "tilt", "cuboid", interaction="mutual")

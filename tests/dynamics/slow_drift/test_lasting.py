@@ -32,6 +32,7 @@ def start_of(rates):
     return Scales.of(SCENE).pack(found.state)
 
 
+@pytest.mark.slow
 def test_flights_last_within_the_ends_and_not_beyond(rates):
     """Searches that know no branch, one resolution within each end and two beyond it."""
     found = lasting_frequencies(SCENE, TABLE, rates, start_of(rates), SCENE.frequency, resolution=0.5)

@@ -30,6 +30,7 @@ def table(magnets):
     st.tuples(*[st.floats(-1, 1)] * 3),
     st.floats(0.012, 0.06),
 )
+@pytest.mark.slow
 def test_any_pose_agrees_with_quadrature_over_the_faces(size, turn, polarization, direction, distance):
     magnet = Magnet(Box(size, (0.001, 0.002, 0.003), rotation_matrix(turn)), polarization)
     way = np.array(direction)

@@ -40,6 +40,7 @@ def test_loss_of_the_field_is_the_work_of_the_source(response):
     assert joule_loss(response, AMPLITUDES) == pytest.approx(float(work), rel=1e-8)
 
 
+@pytest.mark.slow
 def test_flux_density_at_the_dipole_is_the_coupling():
     """Point value against reciprocity, on a mesh that also resolves the air."""
     mesh = plate_mesh(SIZE, SIGMA, PLACE, FREQUENCY, MeshRule(1.2, 2.0, 1.0))

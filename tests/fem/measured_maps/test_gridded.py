@@ -83,6 +83,7 @@ def fitted(request):
     return rotor, fit_field_map(grid_map(rotor), centers, radius=CORNERS)
 
 
+@pytest.mark.slow
 def test_exact_values_on_a_2_mm_grid_give_the_field_between_13_and_40_mm(fitted):
     """The project's bounds, 1e-5 of B and 1e-4 of ∇B; and the error bars hold at every point."""
     rotor, table = fitted

@@ -31,6 +31,7 @@ def test_pose_turns_the_tensor():
     assert turned.tensors[0] == pytest.approx(expected, rel=1e-7, abs=1e-8 * abs(expected).max())
 
 
+@pytest.mark.slow
 def test_error_estimate_covers_the_error():
     coarse, fine = (plate_reaction(LYING, [(0.0, 0.0, 0.03)], 100.0, rtol) for rtol in (3e-2, 1e-3))
     error = np.linalg.norm(coarse.tensors - fine.tensors) / np.linalg.norm(fine.tensors)

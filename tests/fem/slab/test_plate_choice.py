@@ -37,6 +37,7 @@ def test_auto(size, center, model, reason):
     assert reason in said
 
 
+@pytest.mark.slow
 def test_more_is_asked_of_the_slab_where_the_tolerance_is_smaller():
     """Beyond the edges lies about the square of the depth over their distance: (2.5/30)² = 0.7 %."""
     wide = ((0.6, 0.6, 0.01), (0.0, 0.0, -0.04))

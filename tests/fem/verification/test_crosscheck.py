@@ -47,6 +47,7 @@ def test_both_assemblies_agree_on_one_mesh(name, formulation, tolerance):
     assert np.abs(difference).max() < tolerance * scale
 
 
+@pytest.mark.slow
 def test_anisotropic_split_and_elements_without_any_closed_form_agree():
     """Two formulations, order 4: the moment of a box whose easy axis is not along its edges, to 1e-5 of J V.
 

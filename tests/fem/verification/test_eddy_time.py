@@ -35,6 +35,7 @@ def field(space, per_turn):
     return work_on(space, unit_dipoles(PLACE), source, history[-3][0], reactions, step)
 
 
+@pytest.mark.slow
 def test_steady_state_is_the_phasor_with_second_order(space):
     """Twice the steps, a quarter of the error; 80 a turn leave less than 1e-3."""
     exact = (solve_eddy(space.conductors, space.order, FREQUENCY, unit_dipoles(PLACE), space).couplings @ PHASOR).real

@@ -84,6 +84,7 @@ def distances():
     return by_case([levitation_distance({**asked, "model": m}) for m in ("semi-analytic", "analytic", "dipole", "fem")])
 
 
+@pytest.mark.slow
 def test_levitation_distance_is_that_of_the_survey(distances):
     found = distances.isel(case=list(distances["model"].values).index("dipole"))
     frequency = 180.0
@@ -156,6 +157,7 @@ def test_force_curve_passes_the_equilibrium(forces, distances):
     assert np.degrees(float(found["angle_equilibrium"])) == pytest.approx(known.polar_angle_deg, rel=1e-3)
 
 
+@pytest.mark.slow
 def test_kinds_of_flight():
     found = trajectories({**ONE, "model": "dipole", "duration_s": 1.0}).isel(case=0)
     assert found["kind"].values.tolist()[:3] == [NONE] * 3

@@ -114,6 +114,7 @@ def test_only_vtu(tmp_path):
         export_job(sl.load_scene(SCENES / "vertical-24h.toml"), Models("cuboid", "none"), tmp_path / "fields.csv")
 
 
+@pytest.mark.slow
 def test_the_stated_error_of_an_export_holds_against_finite_elements(tmp_path):
     """Where the closed form stands in for the permeable magnets: in the air around them."""
     scene = SCENES / "horizontal.toml"

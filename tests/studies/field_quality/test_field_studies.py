@@ -47,6 +47,7 @@ def test_without_permeability_every_method_tends_to_the_closed_form(errors):
     assert errors["gridded, 4 mm"][0][1:4].max() < 1e-2
 
 
+@pytest.mark.slow
 def test_the_far_dipole_of_a_cube_is_as_good_as_its_symmetry(errors):
     """No octupole for a cube: the next moments have degree 5, the relative error goes with the fourth power."""
     near, far = errors["dipole"][0][[3, 4]]

@@ -39,6 +39,7 @@ def test_weak_currents_act_in_proportion_to_the_conductivity(weak):
         assert values[1] / values[0] == pytest.approx(2.0, rel=0.02)
 
 
+@pytest.mark.slow
 def test_a_part_of_the_range_is_a_frequency_of_stable_levitation():
     """Half way between the ends, which the closed form knows to some per cent; weak currents damp more than air."""
     scene = article_scene("tilt", 10.0)
@@ -50,6 +51,7 @@ def test_a_part_of_the_range_is_a_frequency_of_stable_levitation():
     assert np.all(row["growth"] < row["growth_without"])
 
 
+@pytest.mark.slow
 def test_the_sentence_and_figure_come_from_the_dataset_alone(weak):
     lines = STUDY.report(weak)
     worst = weak["growth"].max("mode").values
