@@ -1,6 +1,6 @@
 """Figures of the study of the plate's damping, from its dataset alone."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 import numpy as np
@@ -52,8 +52,7 @@ def places_figure(result: xr.Dataset) -> Figure:
         if part_of(result, f"below{ending}").sizes["case"]:
             axes[1].plot([], [], style, ms=size, mfc="none" if ending else "0.3", color="0.3", label=name)
     axes[1].legend(loc="lower right")
-    for panel in axes:
-        _mark_distances(panel)
+    _mark_distances(axes)
     return figure
 
 
@@ -78,7 +77,7 @@ def means_figure(result: xr.Dataset) -> Figure:
     for number, (panel, (title, words)) in enumerate(zip(axes.flat, MEANS, strict=True)):
         _mean(panel, result, number)
         panel.set(title=title, ylabel=words, yscale="linear" if number == LIFT else "log")
-        _mark_distances(panel)
+    _mark_distances(axes.ravel())
     for panel in axes[1]:
         panel.set_xlabel("distance of the face (mm)")
     axes[0, 0].legend(loc="upper right")
@@ -105,11 +104,14 @@ def _growths(result: xr.Dataset, sweeps: Sequence[str]) -> tuple[Figure, Any]:
     return figure, axes
 
 
-def _mark_distances(axes: Axes) -> None:
-    axes.autoscale(enable=False, axis="x")
-    axes.set(xlim=(0.9 * DISTANCES[0], 1.1 * DISTANCES[-1]), xscale="log")
-    axes.set_xticks(DISTANCES, [f"{d:g}" for d in DISTANCES])
-    axes.xaxis.set_minor_locator(NullLocator())
+def _mark_distances(panels: Iterable[Axes]) -> None:
+    """The same marks on each, whatever was drawn: first none may choose limits by itself."""
+    for axes in panels:
+        axes.autoscale(enable=False, axis="x")
+    for axes in panels:
+        axes.set(xlim=(0.9 * DISTANCES[0], 1.1 * DISTANCES[-1]), xscale="log")
+        axes.set_xticks(DISTANCES, [f"{d:g}" for d in DISTANCES])
+        axes.xaxis.set_minor_locator(NullLocator())
 
 
 def part_of(result: xr.Dataset, sweep: str) -> xr.Dataset:
