@@ -43,7 +43,9 @@ test: lint types
 	$(BIN)/pytest -n 2 --dist worksteal -m "not slow"
 
 # Report and documentation in headless Chromium (Debian: apt-get install chromium); skipped where there is none.
-test-browser: docs
+# The gallery's programs are not run for it: the pages are then without their output.
+test-browser: install
+	$(BIN)/sphinx-build --quiet -D plot_gallery=0 -b html docs docs/_build/html
 	$(BIN)/pytest tests/whole/test_browser.py
 
 # Lines that the fast tests run, in child processes too; what a killed process has left of its own count is removed.

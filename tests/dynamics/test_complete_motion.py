@@ -92,6 +92,7 @@ def test_multipliers_with_currents_in_the_rotor_are_the_growth_of_a_kicked_fligh
     assert max(changes) > 1e-5
 
 
+@pytest.mark.slow
 def test_the_ledger_closes_with_every_loss(shaken, memory):
     """Mutual magnetisation, both currents, real air and a sinking plate, after a kick: 1e-10 of the energy."""
     answers = Mutual(cached_mutual_table(BARE, FLOATER, print)[0], FLOATER.moment)

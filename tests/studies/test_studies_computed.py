@@ -72,6 +72,7 @@ def test_all_derivatives_obey_a_change_of_the_unit_of_length(derived):
     np.testing.assert_allclose(change[2:], nominal[2:], rtol=1e-4)
 
 
+@pytest.mark.slow
 def test_a_sample_is_what_the_derivatives_foretell(derived):
     """Tolerances are small: the tangent plane gives the limits of stability but for second-order terms."""
     draws, by = derived["drawn"].values, derived["derivative"].values[:, :2]
@@ -80,6 +81,7 @@ def test_a_sample_is_what_the_derivatives_foretell(derived):
     assert np.all(np.abs(draws @ by - moved) < 0.1 * np.abs(draws) @ np.abs(by))
 
 
+@pytest.mark.slow
 def test_a_small_tilt_of_the_axis_moves_the_floater_in_second_order(derived):
     """By symmetry the mean distance is even in the tilt: 2° changes it four times as much as 1°."""
     upright, one, two = derived["leaning_distance"].values
@@ -152,6 +154,7 @@ def test_each_model_s_levitation_is_that_of_a_search(compared, model):
     )
 
 
+@pytest.mark.slow
 def test_causes_go_the_way_that_physics_says(compared):
     """A floater of full remanence is the stronger one, and attraction by magnetised iron moves it nearer the rotor."""
     distance = compared["distance"]
@@ -163,6 +166,7 @@ def test_causes_go_the_way_that_physics_says(compared):
     assert np.all(compared["distance_error"].sel(model=["fem", "mutual"]) < 1e-4)
 
 
+@pytest.mark.slow
 def test_with_mutual_magnetisation_a_fold_is_where_the_balance_has_a_double_root():
     """Force and torque vanish, and so does their change along one direction; it lies below the rigid dipole's."""
     scene = article_scene("tilt", 10.0, drag=False)

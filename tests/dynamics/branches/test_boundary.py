@@ -44,6 +44,7 @@ def beside(family, point, factor):
     return [e for e in found if np.linalg.norm(e.position / FLOATER.radius - point.position) < 0.05]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("kind", "end"), [(FOLD, 60.0), (OSCILLATORY, 250.0)])
 def test_boundary_is_where_a_search_finds_the_change(family, stable, kind, end):
     """To 1e-6 of the frequency: on one side a stable equilibrium, on the other none or an unstable one."""

@@ -114,6 +114,7 @@ def test_distance_of_the_plate_as_parameter(over_slab):
     assert np.abs(points[-1].states[0] - points[0].states[0]).max() > 1e-3
 
 
+@pytest.mark.slow
 def test_growth_with_a_plate_is_that_of_kicked_flights(over_slab):
     """One stable and one unstable equilibrium: rates measured after every turn of a flight agree to 1 %."""
     scene, table, _, _, memory, found = over_slab

@@ -34,6 +34,7 @@ def equilibrium():
     return find_equilibria(SCENE, TABLE)[0]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("formula", [SMALL, LARGE])
 def test_the_brake_is_that_of_the_table(equilibrium, formula):
     """At any place, moment and motion in the ball, to what is allowed; and its power is the work that it does."""

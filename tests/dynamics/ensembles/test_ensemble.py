@@ -63,6 +63,7 @@ def test_the_company_does_not_matter(starts, flown):
     same(ensemble(SCENE, TABLE, State(*(v[order] for v in starts.vectors)), DURATION), flown, order)
 
 
+@pytest.mark.slow
 def test_the_number_of_workers_does_not_matter(starts, flown):
     with ProcessPoolExecutor(2, get_context("spawn")) as pool:
         same(ensemble(SCENE, TABLE, starts, DURATION, pool.map, together=10), flown, np.arange(len(starts.position)))

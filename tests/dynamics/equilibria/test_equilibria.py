@@ -72,7 +72,7 @@ def unbalanced(scene, source, spin, unknowns):
 
 @pytest.mark.parametrize("model", ["dipole", "cuboid"])
 @pytest.mark.parametrize("name", SCENES)
-@pytest.mark.parametrize("spin", [0.0, -0.2])
+@pytest.mark.parametrize("spin", [0.0, pytest.param(-0.2, marks=pytest.mark.slow)])
 def test_equilibria_equal_an_independent_solution(name, model, spin):
     scene = SCENES[name]
     found = find_equilibria(scene, table_of(scene, model), spin)

@@ -73,6 +73,7 @@ def test_a_resting_floater_stays_in_one_ball_and_flies_as_in_the_table(start):
     assert np.abs(near.lab.position - whole.lab.position).max() < 1e-9
 
 
+@pytest.mark.slow
 def test_a_kicked_floater_changes_its_ball_and_the_ledger_says_so(start):
     """The table's own Jacobi integral drifts by the sum of the changes, but for the balls' error at the two ends."""
     flown, whole = both(kicked(start), 1.0)

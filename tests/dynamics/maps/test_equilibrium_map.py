@@ -37,6 +37,7 @@ def scene_of(name):
         pytest.param("horizontal", "fem", marks=pytest.mark.slow),
     ],
 )
+@pytest.mark.slow
 def test_map_equals_searches_at_random_points(name, model):
     """All equilibria, their places to 1e-9 m, growth and stability, of a table made for the point's own rotor."""
     family, measures = rotor_family(scene_of(name), name, model, 1e-4, interaction="rigid"), ROTORS[name][1]

@@ -196,6 +196,7 @@ def test_a_balance_where_small_motions_grow_is_not_endless():
     ],
     ids=["lost after 73 s", "lost after 143 s", "250 s near the fold", "250 s"],
 )
+@pytest.mark.slow
 def test_real_slow_torques(scene, table, ended):
     """Heights to 1e-4, time of loss to 0.5 % (measured 0.15 % and 0.07 %)."""
     start = nearest(scene, table)

@@ -125,6 +125,7 @@ def test_noise_is_averaged_and_the_error_bar_is_true():
     assert table.expansions.provenance["misfit"] == pytest.approx(1.73e-3, rel=0.03)  # √3: |B| over a component's size
 
 
+@pytest.mark.slow
 def test_a_probe_of_one_component_below_the_rotor_is_enough_there():
     """A harmonic field is known from its normal component on the map's planes; the table ends with the map's box."""
     rotor = ROTORS["centred"]

@@ -187,6 +187,7 @@ def test_both_bodies_solved_at_once_agree(rotors):
     assert np.linalg.norm(error.force) < 2e-3 * np.linalg.norm(added.force)
 
 
+@pytest.mark.slow
 def test_high_permeability_settles_as_well():
     """μr = 3 in both bodies: more terms, and the direct solution still agrees."""
     body = floater(3.0)

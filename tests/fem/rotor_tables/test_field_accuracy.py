@@ -164,6 +164,7 @@ def check(case, own_step=1e-6):
     assert np.isfinite(table.evaluate(on_lines)[1]).all()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", [name for name in CASES if name not in SLOW])
 def test_hard_cases(name):
     check(CASES[name])

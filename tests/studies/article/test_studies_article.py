@@ -99,6 +99,7 @@ def test_levitation_distance_is_that_of_the_survey(distances):
     assert np.isnan(found["distance"].sel(frequency=145.0)).all()
 
 
+@pytest.mark.slow
 def test_flights_and_the_semi_analytic_formula_agree_with_the_equilibrium(distances):
     dipole, formula = (distances.isel(case=k) for k in (2, 0))
     near = dipole["distance"].sel(side="near")
@@ -168,6 +169,7 @@ def test_kinds_of_flight():
     assert found["levitated"].values.tolist()[3:] == [1.0] * 3
 
 
+@pytest.mark.slow
 def test_figures_and_reports_come_from_the_result_alone(distances, forces, tmp_path):
     field = by_case(
         [

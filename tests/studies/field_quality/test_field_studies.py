@@ -54,6 +54,7 @@ def test_the_far_dipole_of_a_cube_is_as_good_as_its_symmetry(errors):
     assert near / far == pytest.approx((0.05 / 0.03) ** 4, rel=0.1)
 
 
+@pytest.mark.slow
 def test_with_permeability_what_leaves_it_out_is_wrong_by_the_demagnetisation(errors):
     """A sphere's own field, -J/3, takes (μr - 1)/3 of its moment, 1.7 %, and a cube's nearly that."""
     for name in ("dipole, μr left out", "closed form, μr left out"):

@@ -32,7 +32,7 @@ def asked(**values):
 @pytest.mark.parametrize(
     "values",
     [
-        {"start.offset_mm.2": [0.05, 0.4, 2.5], "start.offset_mm.0": [0.0, 0.1]},
+        pytest.param({"start.offset_mm.2": [0.05, 0.4, 2.5], "start.offset_mm.0": [0.0, 0.1]}, marks=pytest.mark.slow),
         {"frequency_hz": [105.0, 110.0, 115.0]},
     ],
 )

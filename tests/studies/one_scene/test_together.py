@@ -51,6 +51,7 @@ def test_points_that_cannot_be_prepared_are_computed_alone(caplog):
     assert [float(found[k]["frequency_hz"][0]) for k in (0, 1)] == [120.0, 130.0]
 
 
+@pytest.mark.slow
 def test_rotors_that_differ_share_nothing_but_the_sweep():
     asked, points = question(**{"rotor.displacement_mm": [1.5, 2.5], "frequency_hz": [120.0, 130.0, 140.0]})
     for point, job in zip(points, asked.prepared(points), strict=True):

@@ -138,6 +138,7 @@ def flight():
     return scene, table, simulate(scene, table, 0.5, found)
 
 
+@pytest.mark.slow
 def test_the_frames_of_a_flight_are_places_on_its_path(flight):
     """Between two samples a straight line along the rotor's axes is within 1 % of a millimetre."""
     scene, _, flown = flight
