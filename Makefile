@@ -46,7 +46,7 @@ test: lint types
 # The gallery's programs are not run for it: the pages are then without their output.
 test-browser: install
 	$(BIN)/sphinx-build --quiet -D plot_gallery=0 -b html docs docs/_build/html
-	$(BIN)/pytest -n 2 tests/whole/test_browser.py
+	$(BIN)/pytest tests/whole/test_browser.py
 
 # Lines that the fast tests run, in child processes too; what a killed process has left of its own count is removed.
 coverage: install
