@@ -10,7 +10,7 @@ from typing import Any
 
 from ...dynamics.effects import Mutual, RotorCurrents, mutual_choice, with_effects
 from ...dynamics.equilibria import survey, with_plate
-from ...dynamics.flights import Checkpoint, Trajectory, simulate, starting_point
+from ...dynamics.flights import Checkpoint, LiveFlight, Trajectory, simulate, starting_point
 from ...dynamics.motion import Interaction, PlateMemory, Rates, interaction_of
 from ...dynamics.steady import Equilibrium, EquilibriumError, Survey
 from ...fem.measured_maps import GriddedTable
@@ -217,6 +217,11 @@ class Levitation:
         note("Motion ...")
         with progress("Motion") as advance:
             return simulate(self.scene, table, duration, known, progress=advance, memory=plate, checkpoint=checkpoint)
+
+    def live_flight(self) -> LiveFlight:
+        """A flight to play with, from where the scene says. Raises what `flight` raises."""
+        known = () if self.absolute else self.equilibria
+        return LiveFlight(self.scene, self._with_effects(self.flight_table), known, self.plate)
 
     def field(self, model: str) -> RotorField:
         """The rotor's field by any model, accurate wherever the floater can be: from its radius off the magnets on."""
