@@ -18,8 +18,8 @@ from .recorder import Recorder
 from .simulation import PLATE_TOLERANCE, StartError, initial_state
 from .trajectory import DURATION
 
-SAMPLES = 8
-"""Samples of a piece."""
+FEWEST, MOST, A_SECOND = 8, 256, 400
+"""Samples of a piece at least and at most, and between that so many a second."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,8 +85,8 @@ class LiveFlight:
             raise InputError(f"Input seconds must be positive; instead received {seconds}.")
         if self.log.ended_by != DURATION:
             return self._piece(np.array([self.time]), self.state[None])
-        unit = self.flight.scales.time
-        recorder = _Samples(self.state, self.time / unit, seconds / SAMPLES / unit)
+        unit, number = self.flight.scales.time, int(np.clip(A_SECOND * seconds, FEWEST, MOST))
+        recorder = _Samples(self.state, self.time / unit, seconds / number / unit)
         self._go(self.time + seconds, recorder)
         return self._piece(recorder.times[1:] * unit, recorder.states[1:])
 
@@ -134,5 +134,5 @@ class _Samples(Recorder):
     """Samples from now on; those before are forgotten."""
 
     def __init__(self, state: Array, now: float, interval: float) -> None:
-        super().__init__(state, interval, 4 * SAMPLES)
+        super().__init__(state, interval, 4 * MOST)
         self.times = np.array([now])

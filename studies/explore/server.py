@@ -16,7 +16,6 @@ from bokeh.server.server import BaseServer
 from bokeh.server.tornado import BokehTornado
 from tornado.httpserver import HTTPServer
 from tornado.ioloop import IOLoop
-from tornado.netutil import bind_sockets
 
 from ...geometry.basics import ComputationError, InputError
 from ...geometry.scenes import Scene
@@ -77,15 +76,17 @@ def serve(scene: Scene, source: str = "scene", host: str = LOOPBACK, port: int =
     if not 0 <= port <= 65535:
         raise InputError(f"Input port must be between 0 and 65535; instead received {port}.")
     try:
-        sockets = bind_sockets(port, host)
+        family = socket.AF_INET6 if ":" in host else socket.AF_INET
+        listening = socket.create_server((host, port), family=family)
     except (OSError, UnicodeError) as error:
         raise ComputationError(
             f"Cannot listen on {host}, port {port}: {error}. Take another --port, or leave it out for any that is free."
         ) from None
+    listening.setblocking(False)
     warm_up()
     for talkative in ("bokeh", "tornado.access"):
         logging.getLogger(talkative).setLevel(logging.ERROR)
-    token, port = secrets.token_urlsafe(24), sockets[0].getsockname()[1]
+    token, port = secrets.token_urlsafe(24), listening.getsockname()[1]
     opened: set[Page] = set()
     begin = partial(_open, opened=opened, state=first_state(scene, source))
     pages = BokehTornado(
@@ -98,7 +99,7 @@ def serve(scene: Scene, source: str = "scene", host: str = LOOPBACK, port: int =
         use_index=False,
     )
     http = HTTPServer(Gate(pages, token))
-    http.add_sockets(sockets)
+    http.add_socket(listening)
     server = BaseServer(IOLoop.current(), pages, http)
     server.start()
     return Pages(f"http://{_name(host)}:{port}/?token={token}", server, opened)

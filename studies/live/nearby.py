@@ -66,9 +66,9 @@ class Nearby:
         levitation = _without_plate(state)
         levitation.share(self.levitation)
         problem, before = self._problem(levitation), self._problem(self.levitation)
-        known = self.searched().without_plate.equilibria
         if problem is None or before is None or np.any(state.scene.gravity[:2]):
             return None
+        known = self.searched().without_plate.equilibria
         size = self.state.scene.floater.radius
         position = np.reshape([e.position / size for e in known], (-1, 3))
         moment = np.reshape([e.state.moment for e in known], (-1, 3))

@@ -72,7 +72,7 @@ class PageState:
         return urlencode(parts | dict(_flat(self.keys)))
 
     def with_query(self, asked: Mapping[str, str]) -> Self:
-        """The state of an address; a rotor or a plate in it is whole, other keys that it lacks stay as they are.
+        """The state of an address: of a whole scene, or one that changes what it names; its rotor or plate is whole.
 
         Raises
         ------
@@ -94,11 +94,13 @@ class PageState:
         )
 
     def _scene(self, given: Mapping[str, str]) -> Scene:
-        keys = {**scene_keys(self.scene)}
+        keys: dict[str, Any] = scene_keys(self.scene)
         own_map = keys["rotor"].get("field_map")
-        for table in ("rotor", "plate", "drag", "start"):  # a table is whole
-            if any(key.startswith(f"{table}.") for key in given):
-                keys.pop(table, None)
+        tables = {key.partition(".")[0] for key in given}
+        if tables >= {"frequency_hz", "rotor", "floater"}:
+            keys = {}
+        for table in tables - {"floater"}:
+            keys.pop(table, None)
         for key, text in given.items():
             _put(keys, key.split("."), _value(text))
         rotor = keys.get("rotor")
