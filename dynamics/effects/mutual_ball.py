@@ -14,7 +14,7 @@ from ...fem.harmonics import Ball, BallField
 from ...fem.mutual import MutualTable
 from ...geometry.basics import Array
 from ..motion import Added, Motion, Parameter, cross, dot
-from .ball_polynomials import FALL, count, falling, fitting, nodes, polynomials, slopes, weighted_sum
+from .ball_polynomials import FALL, count, fallen, falling, fitting, nodes, polynomials, slopes, weighted_sum
 
 DEGREE = 2
 PARTS = 8
@@ -34,6 +34,7 @@ class MutualInBall:
     moment : of the floater, A m², for the error
     ball : whose centre and radius are among the runtime parameters
     first : number of the first of the weights
+    name : in results
     """
 
     table: MutualTable
@@ -57,7 +58,7 @@ class MutualInBall:
         quadratic, value, *tensor = (weighted_sum(self.first + k * size, basis) for k in range(PARTS))
         start = self.first + PARTS * size
         inverse = 1.0 / quadratic
-        fall = inverse * inverse * inverse
+        fall = fallen(inverse)
         flux = [share * b for b in motion.field]
         whole = [strength * m + alpha * b for m, b in zip(motion.moment, flux, strict=True)]
         pairs = [(0.5 if a == b else 1.0) * whole[a] * whole[b] for a, b in ENTRIES]

@@ -21,4 +21,4 @@ from .parts import (
     tilt as tilt,
     vertical as vertical,
 )
-from .writing import scene_text as scene_text
+from .writing import scene_text as scene_text, startless_text as startless_text

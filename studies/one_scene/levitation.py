@@ -10,7 +10,7 @@ from typing import Any
 
 from ...dynamics.effects import Mutual, RotorCurrents, mutual_choice, with_effects
 from ...dynamics.equilibria import survey, with_plate
-from ...dynamics.flights import Checkpoint, Trajectory, simulate, starting_point
+from ...dynamics.flights import Checkpoint, Trajectory, most_like_levitation, simulate
 from ...dynamics.motion import Interaction, PlateMemory, Rates, interaction_of
 from ...dynamics.steady import Equilibrium, EquilibriumError, Survey
 from ...fem.measured_maps import GriddedTable
@@ -21,7 +21,7 @@ from ...fem.slab import resolve_plate_model, rotor_nearby
 from ...geometry.basics import Array, InputError, millimetre_size
 from ...geometry.scenes import AbsoluteStart, Scene, load_scene
 from ..terminal import Models, detail, finite, note, positive, progress
-from .plate_of_scene import check_room, check_way, floating, plate_memory
+from .plate_of_scene import check_room, check_way, plate_memory
 from .rotor_of_scene import RotorField, RotorTables, equations_key
 
 PLATE_WORDS = {
@@ -132,8 +132,9 @@ class Levitation:
         """
         note("Equilibria ...")
         found = survey(self.scene, self.interaction, self.spin, rates=self.rates)
-        if found.equilibria:
-            check_way(self.scene, floating(found.equilibria).position)
+        place = most_like_levitation(found.equilibria)
+        if place is not None:
+            check_way(self.scene, place.position)
         return found
 
     @cached_property
@@ -176,13 +177,13 @@ class Levitation:
 
     @cached_property
     def stability(self) -> Equilibrium:
-        """The equilibrium at which a flight begins, with its small motions; if none will do, the nearest of all.
+        """The equilibrium at which a flight begins, with its small motions; if none will do, the least growing.
 
         Raises
         ------
         EquilibriumError : there is none
         """
-        chosen = _first(self.equilibria)
+        chosen = most_like_levitation(self.equilibria)
         if chosen is None:
             raise EquilibriumError(
                 f"At {self.scene.frequency:g} Hz the floater has no equilibrium with body spin {self.spin:g}."
@@ -248,7 +249,7 @@ class Levitation:
         """The equations of motion in the rotor's field, compiled."""
         return self._tables.rates(self.equations_key, self.interaction)
 
-    @property
+    @cached_property
     def equations_key(self) -> str:
         """All that decides tables and equations; scenes where it is the same differ in parameters of the motion."""
         return equations_key(self.scene, self.models)
@@ -262,7 +263,7 @@ class Levitation:
         """Where the floater is while it levitates, (3,) m."""
         if isinstance(self.scene.start, AbsoluteStart):
             return self.scene.start.position
-        chosen = _first(known)
+        chosen = most_like_levitation(known)
         return None if chosen is None else chosen.position
 
 
@@ -273,11 +274,6 @@ def given_scene(scene: Scene | str | Path) -> Scene:
     if isinstance(scene, str | Path):
         return load_scene(scene)
     raise InputError(f"Input scene must be a Scene or the path of a scene file; instead received {scene!r}.")
-
-
-def _first(known: Sequence[Equilibrium]) -> Equilibrium | None:
-    """The equilibrium at which a flight begins, or else the nearest."""
-    return starting_point(known) or next(iter(known), None)
 
 
 def sources(table: RotorField) -> RotorTable:
