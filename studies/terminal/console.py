@@ -75,7 +75,8 @@ def silence() -> Iterator[None]:
 def progress(label: str) -> Iterator[Progressed]:
     """A progress bar where messages are heard; gives a function that takes the finished fraction and a new label."""
     columns = (TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(), TimeRemainingColumn())
-    with Progress(*columns, console=ERRORS, transient=True, disable=not LOG.handlers) as bar:
+    shown = LOG.handlers and (ERRORS.is_interactive or ERRORS.is_jupyter)
+    with Progress(*columns, console=ERRORS, transient=True, disable=not shown) as bar:
         task = bar.add_task(label, total=1.0)
 
         def advance(fraction: float, text: str = label) -> None:
