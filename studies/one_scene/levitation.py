@@ -130,8 +130,9 @@ class Levitation:
         EquilibriumError : the rotor is at rest
         InputError : a conductor is in the floater's way, or the rotor turns too fast for its metal
         """
+        interaction = self.interaction
         note("Equilibria ...")
-        found = survey(self.scene, self.interaction, self.spin, rates=self.rates)
+        found = survey(self.scene, interaction, self.spin, rates=self.rates)
         place = most_like_levitation(found.equilibria)
         if place is not None:
             check_way(self.scene, place.position)
