@@ -11,6 +11,7 @@ from .choice import resolve_model as resolve_model, rotor_table as rotor_table
 from .fem_model import AccuracyWarning as AccuracyWarning, fem_table as fem_table
 from .shortened import shortened_table as shortened_table
 from .table import (
+    ROUND_OFF as ROUND_OFF,
     FieldFormula as FieldFormula,
     FieldTable as FieldTable,
     RangeError as RangeError,

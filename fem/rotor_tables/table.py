@@ -16,6 +16,8 @@ from ..harmonics import CompiledField, FieldExpressions, MultipoleExpansion, as_
 
 BLUR = 0.5
 """Share of the root mean square of a doubt that is added to its field."""
+ROUND_OFF = 1e-13
+"""Of a field and its gradient, relative."""
 KNOWN = "truncation"
 """What is cut off an expansion is known exactly."""
 
@@ -146,8 +148,8 @@ class RotorTable:
         b, g = self.evaluate(points)
         error_b, error_g = self.absolute_error(points)
         size_b, size_g = np.linalg.norm(b, axis=1), np.linalg.norm(g, axis=(1, 2))
-        tiny, round_off = np.finfo(float).tiny, 1e-13
-        return error_b / (size_b + tiny) + round_off, error_g / (size_g + tiny) + round_off
+        tiny = np.finfo(float).tiny
+        return error_b / (size_b + tiny) + ROUND_OFF, error_g / (size_g + tiny) + ROUND_OFF
 
     def absolute_error(self, points: ArrayLike) -> tuple[Array, Array]:
         """Estimated errors (n,) of B (T) and of its gradient (T/m).
