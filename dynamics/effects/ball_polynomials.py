@@ -18,6 +18,11 @@ FALL = 3
 """Minus the power of q."""
 
 
+def fallen(inverse: hy.expression) -> hy.expression:
+    """q⁻³ from 1/q."""
+    return inverse * inverse * inverse
+
+
 def polynomials(degree: int, offset: Sequence[hy.expression]) -> list[hy.expression]:
     """A basis of all polynomials up to a degree in the place in the ball (three expressions, radii); the first is 1."""
     square = hy.sum([t * t for t in offset])

@@ -1,8 +1,8 @@
 """Mutual magnetisation in a ball of a flight: its energy as polynomials whose weights are runtime parameters.
 
-With M = m + α B0 the energy is q⁻³ (u(x) + ½ MᵀH(x)M) - ½ α B0²: q, u and the six entries of H are polynomials of the
-place in the ball (`ball_polynomials`), and so are their derivatives, which have weights of their own: products of
-variables cost more than sums.
+With M = m + α B0 the energy is q⁻³ (u(x) + M·V(x) + ½ MᵀH(x)M) - ½ α B0²: q, u, the three parts of V and the six
+entries of H are polynomials of the place in the ball (`ball_polynomials`), and so are their derivatives, which have
+weights of their own: products of variables cost more than sums.
 """
 
 from dataclasses import dataclass
@@ -14,11 +14,10 @@ from ...fem.harmonics import Ball, BallField
 from ...fem.mutual import MutualTable
 from ...geometry.basics import Array
 from ..motion import Added, Motion, Parameter, cross, dot
-from .ball_polynomials import FALL, count, falling, fitting, nodes, polynomials, slopes, weighted_sum
+from .ball_polynomials import FALL, count, fallen, falling, fitting, nodes, polynomials, slopes, weighted_sum
 
-DEGREE = 2
-PARTS = 8
-"""q, u, and xx, xy, xz, yy, yz, zz of H."""
+PARTS = (2, 2, *(1, 1, 1), *(2, 2, 2, 2, 2, 2))
+"""Degrees of q, u, the three of V, and xx, xy, xz, yy, yz, zz of H; V is small."""
 ALLOWED = 1e-5
 """Error of the force by that of the rigid dipole."""
 ENTRIES = [(a, b) for a in range(3) for b in range(a, 3)]
@@ -34,6 +33,7 @@ class MutualInBall:
     moment : of the floater, A m², for the error
     ball : whose centre and radius are among the runtime parameters
     first : number of the first of the weights
+    name : in results
     """
 
     table: MutualTable
@@ -45,46 +45,58 @@ class MutualInBall:
     @property
     def count(self) -> int:
         """Of the weights."""
-        return PARTS * (count(DEGREE) + 3 * count(DEGREE - 1))
+        return sum(count(degree) + 3 * count(degree - 1) for degree in PARTS)
 
     def added(self, motion: Motion) -> Added:
         """Force and torque are the derivatives of one energy."""
         length, alpha = hy.par[Parameter.LENGTH], self.table.polarizability
         strength, share = hy.par[Parameter.PLATE_MOMENT], hy.par[Parameter.PLATE_SHARE]
         offset = self.ball.offset([length * x for x in motion.position])
-        basis, lower = polynomials(DEGREE, offset), polynomials(DEGREE - 1, offset)
-        size, less = count(DEGREE), count(DEGREE - 1)
-        quadratic, value, *tensor = (weighted_sum(self.first + k * size, basis) for k in range(PARTS))
-        start = self.first + PARTS * size
+        bases, start, values, steep = [polynomials(degree, offset) for degree in range(3)], self.first, [], []
+        for degree in PARTS:
+            sizes = count(degree), count(degree - 1)
+            values.append(weighted_sum(start, bases[degree]))
+            begins = [start + sizes[0] + j * sizes[1] for j in range(3)]
+            steep.append([weighted_sum(begin, bases[degree - 1]) for begin in begins])
+            start += sizes[0] + 3 * sizes[1]
+        quadratic, value, *rest = values
+        linear, tensor = rest[:3], rest[3:]
         inverse = 1.0 / quadratic
-        fall = inverse * inverse * inverse
+        fall = fallen(inverse)
         flux = [share * b for b in motion.field]
         whole = [strength * m + alpha * b for m, b in zip(motion.moment, flux, strict=True)]
-        pairs = [(0.5 if a == b else 1.0) * whole[a] * whole[b] for a, b in ENTRIES]
+        factors = [share * m for m in whole]
+        factors += [(0.5 if a == b else 1.0) * whole[a] * whole[b] for a, b in ENTRIES]
         rows = [[tensor[ENTRIES.index((min(a, b), max(a, b)))] for b in range(3)] for a in range(3)]
-        answer = [-fall * dot(row, whole) for row in rows]
-        level = share * share * value + hy.sum([h * p for h, p in zip(tensor, pairs, strict=True)])
+        answer = [-fall * (share * v + dot(row, whole)) for v, row in zip(linear, rows, strict=True)]
+        level = share * share * value + hy.sum([h * p for h, p in zip(rest, factors, strict=True)])
         carried = [(alpha * share) * (b + a) for a, b in zip(answer, flux, strict=True)]
-        scale, steep, force = length * hy.par[self.ball.first + 3], FALL * (level * inverse), []
+        scale, falls, force = length * hy.par[self.ball.first + 3], FALL * (level * inverse), []
         for j in range(3):
-            shrinks, *change = (weighted_sum(start + (3 * k + j) * less, lower) for k in range(PARTS))
-            slope = share * share * change[0] + hy.sum([h * p for h, p in zip(change[1:], pairs, strict=True)])
+            shrinks, *change = (each[j] for each in steep)
+            slope = share * share * change[0] + hy.sum([h * p for h, p in zip(change[1:], factors, strict=True)])
             pulled = length * dot(carried, [motion.gradient[i][j] for i in range(3)])
-            force.append(pulled + scale * fall * (steep * shrinks - slope))
+            force.append(pulled + scale * fall * (falls * shrinks - slope))
         turn = [strength / hy.par[Parameter.INERTIA] * t for t in cross(motion.moment, answer)]
         return Added(force, turn, fall * level - 0.5 * alpha * dot(flux, flux))
 
     def fit(self, ball: Ball, gradient: Array) -> tuple[Array, float]:
         """See `InBall`; what is missed of the energy is taken to change as fast as a cubic."""
         places = ball.center + ball.radius * nodes()
-        values, _, second = self.table.derivatives(places, np.zeros_like(places))
-        parts = np.array([values, *(second[:, 3 + a, 3 + b] for a, b in ENTRIES)])
-        solve, basis = fitting(DEGREE)
-        units = np.array([1.0, *[self.moment**2 / 2] * len(ENTRIES)])
+        values, slope, second = self.table.derivatives(places, np.zeros_like(places))
+        parts = np.array([values, *slope[:, 3:].T, *(second[:, 3 + a, 3 + b] for a, b in ENTRIES)])
+        units = np.array([1.0, *[self.moment] * 3, *[self.moment**2 / 2] * len(ENTRIES)])
         quadratic, fall = falling(np.linalg.norm(units[:, None] * parts, axis=0))
-        weights = (parts / fall) @ solve.T
-        missed = units * np.abs(fall * (weights @ basis.T) - parts).max(axis=1)
-        error = 3 * (missed[0] + missed[1:].max()) / (ball.radius * self.moment * float(np.linalg.norm(gradient)))
-        weights = np.concatenate([quadratic[None], weights])
-        steep = np.einsum("akp,cp->cak", slopes(DEGREE), weights)
-        return np.concatenate([weights.ravel(), steep.ravel()]), float(error) / ALLOWED
+        numbers, missed = [_with_slopes(PARTS[0], quadratic)], []
+        for degree, unit, part in zip(PARTS[1:], units, parts, strict=True):
+            solve, basis = fitting(degree)
+            weights = solve @ (part / fall)
+            missed.append(unit * np.abs(fall * (basis @ weights) - part).max())
+            numbers.append(_with_slopes(degree, weights))
+        wrong = missed[0] + max(missed[1:4]) + max(missed[4:])
+        error = 3 * wrong / (ball.radius * self.moment * float(np.linalg.norm(gradient)))
+        return np.concatenate(numbers), float(error) / ALLOWED
+
+
+def _with_slopes(degree: int, weights: Array) -> Array:
+    return np.concatenate([weights, (slopes(degree) @ weights).ravel()])

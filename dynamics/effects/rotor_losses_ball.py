@@ -15,7 +15,7 @@ from ...fem.harmonics import Ball, BallField
 from ...fem.rotor_losses import RotorLosses
 from ...geometry.basics import Array
 from ..motion import Added, Motion, Parameter, Vector, cross, dissipative
-from .ball_polynomials import count, falling, fitting, nodes, polynomials, weighted_sum
+from .ball_polynomials import count, fallen, falling, fitting, nodes, polynomials, weighted_sum
 
 NUMBERS = 8
 UPPER = ((0, 0), (1, 1), (0, 1), (0, 2), (1, 2))
@@ -37,6 +37,7 @@ class RotorCurrentsInBall:
     table : of the losses
     ball : whose centre and radius are among the runtime parameters
     first : number of the first of the weights: of q (10), and of the 36 entries of S (4 each)
+    name : in results
     """
 
     table: RotorLosses
@@ -61,7 +62,7 @@ class RotorCurrentsInBall:
         pairs += [moment[i] * drift[j] + moment[j] * drift[i] for i, j in UPPER[2:]]
         rates = [*(length * p for p in pairs), *cross(motion.lag, moment)]
         strength = hy.par[Parameter.PLATE_MOMENT] * hy.par[Parameter.PLATE_MOMENT] / hy.par[Parameter.TIME]
-        scale = -strength * (inverse * inverse * inverse)
+        scale = -strength * fallen(inverse)
         sums = [hy.sum([known[min(a, b), max(a, b)] * r for b, r in enumerate(rates)]) for a in range(NUMBERS)]
         xx, yy, xy, xz, yz, *field = (scale * s for s in sums)
         slopes = [[xx, xy, xz], [xy, yy, yz], [xz, yz, -xx - yy]]

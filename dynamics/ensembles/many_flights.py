@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import replace
 from functools import partial
 from time import perf_counter
 from typing import Any
@@ -12,7 +11,7 @@ import numpy as np
 
 from ...fem.rotor_tables import FieldTable
 from ...geometry.basics import InputError
-from ...geometry.scenes import OffsetStart, Scene, scene_text
+from ...geometry.scenes import Scene, startless_text
 from ..flights import LARGE, SMALL, TOLERANCE, LocalFlight, Parts, Trajectory
 from ..motion import State
 from .endings import Endings
@@ -72,21 +71,21 @@ def fly_together(
     flights = []
     began = perf_counter()
     for scene, start in zip(scenes, starts, strict=True):
-        key = scene_text(replace(scene, start=OffsetStart()))
+        key = startless_text(scene)
         if key not in known:
-            known[key] = local_flight(scene, table, duration)
+            known[key] = _local_flight(scene, table, duration)
         flights.append(Flying.begun(known[key], start, duration, True))
-    fly_all(flights)
+    _fly_all(flights)
     speed = sum(f.seconds for f in flights) / (perf_counter() - began)
     return [None if f.recorder is None else f.trajectory(speed) for f in flights]
 
 
-def local_flight(scene: Scene, table: FieldTable, duration: float) -> LocalFlight:
+def _local_flight(scene: Scene, table: FieldTable, duration: float) -> LocalFlight:
     """What flies in balls, without a plate's currents."""
     return LocalFlight(scene, table, Parts(scene, table, duration, TOLERANCE, True, None))
 
 
-def fly_all(flights: Sequence[Flying]) -> None:
+def _fly_all(flights: Sequence[Flying]) -> None:
     """In lanes, in small balls first, then in large ones; at last one by one near bodies, and where it is too fast."""
     for formula in (SMALL, LARGE):
         here = [f for f in flights if not f.over and f.degree == formula.degree]
@@ -98,10 +97,10 @@ def fly_all(flights: Sequence[Flying]) -> None:
 
 
 def _ended(scene: Scene, table: FieldTable, duration: float, starts: State) -> Endings:
-    flight = local_flight(scene, table, duration)
+    flight = _local_flight(scene, table, duration)
     count = len(starts.position)
     flights = [Flying.begun(flight, State(*(v[k] for v in starts.vectors)), duration, False) for k in range(count)]
-    fly_all(flights)
+    _fly_all(flights)
     return Endings(
         np.array([f.log.ended_by for f in flights]),
         np.minimum([f.seconds for f in flights], duration),

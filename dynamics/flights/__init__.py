@@ -27,7 +27,9 @@ from .pieces import (
 from .recorder import Recorder as Recorder
 from .simulation import (
     StartError as StartError,
+    displaced as displaced,
     initial_state as initial_state,
+    most_like_levitation as most_like_levitation,
     simulate as simulate,
     starting_point as starting_point,
 )

@@ -101,7 +101,7 @@ def initial_state(
         chosen = starting_point(known)
         if chosen is None:
             raise EquilibriumError(way_out(scene, table, known))
-        state = _displaced(scene, chosen.start, scene.start.offset)
+        state = displaced(chosen.start, scene.start.offset, scene.angular_velocity)
         currents = currents if chosen.currents is None else chosen.currents[0]
     gap = float(clearance(scene, np.zeros(1), state.position[None])[0])
     if gap < 0:
@@ -124,6 +124,16 @@ def starting_point(equilibria: Sequence[Equilibrium]) -> Equilibrium | None:
     return next(iter([*stable, *without, *slowly]), None)
 
 
-def _displaced(scene: Scene, start: State, offset: Array) -> State:
-    turning = np.cross([0.0, 0.0, scene.angular_velocity], offset)
-    return replace(start, position=start.position + offset, velocity=start.velocity + turning)
+def most_like_levitation(equilibria: Sequence[Equilibrium]) -> Equilibrium | None:
+    """Where a flight begins, or, where none may, the equilibrium whose small motions grow least; None without any.
+
+    A brake undoes those near the rotor the most.
+    """
+    return starting_point(equilibria) or min(equilibria, key=lambda e: e.growth_per_s, default=None)
+
+
+def displaced(start: State, offset: Array, angular_velocity: float) -> State:
+    """A state moved by one or more offsets (..., 3) m, as much at rest in the frame that turns (rad/s) as it was."""
+    turning = np.cross([0.0, 0.0, angular_velocity], offset)
+    moment, spin = (np.broadcast_to(v, offset.shape) for v in (start.moment, start.spin))
+    return State(start.position + offset, start.velocity + turning, moment, spin)

@@ -1,6 +1,6 @@
 """A rotor's field with one measure of the rotor as a runtime parameter, so that a map needs one compilation."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, Protocol
@@ -90,9 +90,14 @@ def _cosine_sine(angle: Scalar) -> tuple[Scalar, Scalar]:
 def moved_field(source: FieldFormula, move: Move, position: Vector, measure: hy.expression) -> FieldExpressions:
     """Field at a position (m) of a source that has moved, and its gradient."""
     field, slope = source.expressions(move.place(position, measure))
-    half = [move.back(row, measure) for row in slope]
-    columns = [move.back([half[i][j] for i in range(3)], measure) for j in range(3)]
-    return move.back(field, measure), [[columns[j][i] for j in range(3)] for i in range(3)]
+    return move.back(field, measure), turned(slope, lambda vector: move.back(vector, measure))
+
+
+def turned(tensor: Sequence[Vector], turn: Callable[[Vector], Vector]) -> list[list[Scalar]]:
+    """A tensor (3, 3) along other axes, by what turns a vector."""
+    rows = [turn(row) for row in tensor]
+    columns = [turn(column) for column in zip(*rows, strict=True)]
+    return [list(row) for row in zip(*columns, strict=True)]
 
 
 @dataclass(frozen=True, eq=False)

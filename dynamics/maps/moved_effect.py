@@ -12,7 +12,7 @@ import numpy as np
 from ...fem.rotor_tables import FieldTable
 from ...geometry.basics import Array
 from ..motion import Added, Effect, Motion, Parameter, Placeable, Placed, Vector
-from .movable import Move
+from .movable import Move, turned
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,8 +73,6 @@ def _moved(effect: Effect, move: Move, motion: Motion) -> Added:
         return move.into(vector, measure)
 
     place = move.place([length * x for x in motion.position], measure)
-    half = [into(row) for row in motion.gradient]
-    columns = [into([half[i][j] for i in range(3)]) for j in range(3)]
     found = effect.added(
         Motion(
             position=[x / length for x in place],
@@ -84,7 +82,7 @@ def _moved(effect: Effect, move: Move, motion: Motion) -> Added:
             drift=into(motion.drift),
             lag=into(motion.lag),
             field=into(motion.field),
-            gradient=[[columns[j][i] for j in range(3)] for i in range(3)],
+            gradient=turned(motion.gradient, into),
         )
     )
     return replace(found, force=move.back(found.force, measure), torque=move.back(found.torque, measure))

@@ -1,9 +1,9 @@
 """Which fields, potentials and losses are known without any elements?"""
 
 from .bodies import (
+    closed_form_error as closed_form_error,
     fields_of_magnets as fields_of_magnets,
     fields_of_sphere as fields_of_sphere,
-    left_out as left_out,
 )
 from .closed_moments import (
     added_by_closed_form as added_by_closed_form,

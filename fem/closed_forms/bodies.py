@@ -16,7 +16,7 @@ def fields_of_magnets(magnets: Sequence[Magnet], points: Array) -> Fields:
     """H and M of cuboids at points (n, 3) m off their edges.
 
     H is that of the remanent polarisation J alone, M = J/μ0 + (μr - 1) H inside. The H of the second part of M is
-    left out: of the order of μr - 1, relative to H (`left_out`). Exact for μr = 1.
+    left out: of the order of μr - 1, relative to H (`closed_form_error`). Exact for μr = 1.
     """
     h = remanent_field(magnets, points) / MU_0
     magnetization = np.zeros_like(h)
@@ -27,7 +27,7 @@ def fields_of_magnets(magnets: Sequence[Magnet], points: Array) -> Fields:
     return h, magnetization
 
 
-def left_out(magnets: Sequence[Magnet]) -> float:
+def closed_form_error(magnets: Sequence[Magnet]) -> float:
     """Estimated error of `fields_of_magnets`, relative to the field: the largest μr - 1."""
     return max((magnet.contrast for magnet in magnets), default=0.0)
 

@@ -10,12 +10,13 @@ because 1/|r - s| = Σ conj Υ_lm(r) Θ_lm(s) makes a charge's c_lm = conj Υ_lm
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 from scipy.special import gammaln
 
 from ...geometry.basics import MU_0, Array
-from .solid import CHUNK, Coefficients, irregular_values, regular_values
+from .solid import CHUNK, Coefficients, regular_values, weighted_sums
 
 FOUR_PI = 4 * np.pi
 
@@ -52,11 +53,19 @@ def interior_coefficients(field: Callable[[Array], Array], ball: Ball, degree: i
     """
     normals, areas = sphere(degree)
     radial = areas * np.sum(field(ball.center + ball.radius * normals) * normals, axis=1)
-    result = np.zeros((degree + 1, degree + 1), complex)
-    for (l, m), values in regular_values(degree, *normals.T).items():
+    along_circles = np.conj(np.fft.rfft(radial.reshape(degree + 6, -1)))[:, : degree + 1]
+    return np.asarray(np.einsum("lmk,km->lm", _by_height(degree), along_circles), complex)
+
+
+@cache
+def _by_height(degree: int) -> Array:
+    """[l, m, k]: weights of the normal field at the heights of `sphere`; around them Υ_lm is that at y = 0 by e^imφ."""
+    first = sphere(degree)[0].reshape(degree + 6, -1, 3)[:, 0]
+    result = np.zeros((degree + 1, degree + 1, degree + 6))
+    for (l, m), values in regular_values(degree, *first.T).items():
         if l:
-            result[l, m] = -(2 * l + 1) / (FOUR_PI * l) * (values @ radial)
-    return np.asarray(factorials(degree) * result, complex)
+            result[l, m] = -(2 * l + 1) / (FOUR_PI * l) * values.real
+    return factorials(degree)[:, :, None] * result
 
 
 def from_magnetization(points: Array, moments: Array, ball: Ball, degree: int) -> Coefficients:
@@ -64,14 +73,12 @@ def from_magnetization(points: Array, moments: Array, ball: Ball, degree: int) -
 
     a_lm = (4π radius³)⁻¹ Σ μ0 M dV · ∇̃Θ_lm, exact for these dipoles.
     """
-    size = degree + 2
-    degrees, orders = np.tril_indices(size)
-    sums = np.zeros((3, size, size), complex)
+    sums = np.zeros((3, degree + 2, degree + 2), complex)
     for start in range(0, len(points), CHUNK):
-        chosen = slice(start, start + CHUNK)
-        harmonics = irregular_values(degree + 1, (points[chosen] - ball.center) / ball.radius)
-        values = np.array([harmonics[int(l), int(m)] for l, m in zip(degrees, orders, strict=True)])
-        sums[:, degrees, orders] += (values.real @ moments[chosen] + 1j * (values.imag @ moments[chosen])).T
+        away = (points[start : start + CHUNK] - ball.center) / ball.radius
+        square = np.sum(away**2, axis=1)[:, None]
+        sums += weighted_sums(degree + 1, away / square, moments[start : start + CHUNK] / np.sqrt(square))
+    sums *= factorials(degree + 1)  # Θ_lm(r) = (l-m)! (l+m)! Υ_lm(r/r²)/r
     minus = np.concatenate([-np.conj(sums[:, 1:, 1:2]), sums[:, 1:, :-2]], axis=2)
     plus = sums[:, 1:, 1:]
     x, y, z = (plus[0] - minus[0]) / 2, (plus[1] + minus[1]) / 2j, -sums[2, 1:, :-1]

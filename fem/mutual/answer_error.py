@@ -4,16 +4,18 @@ import numpy as np
 
 from ...geometry.basics import Array
 from ...geometry.scenes import Floater
-from ..harmonics import field_at_center, gradient_at_center
+from ..harmonics import Ball, field_at_center, gradient_at_center
 from .answer_samples import places_around
+from .degree_needed import enough_degree
 from .forces import two_body
 from .rotor_response import RotorResponse
 from .table import MutualTable
 
 GAPS, EACH = (0.03, 0.16, 0.5, 1.5), 3
 """Gaps at which both are compared, in floater radii, and at how many poses for each magnet."""
-DEGREE, SERIES = 14, 1e-6
-SAFETY = 2.5
+DEGREES, SERIES = 1e-4, 1e-5
+"""Where the degrees and the series of both bodies end."""
+SAFETY = 4.0
 """For the poses that were not looked at, and for the finite elements."""
 
 
@@ -38,7 +40,8 @@ def answer_errors(table: MutualTable, rotor: RotorResponse, floater: Floater) ->
         for place in places_around(rotor.magnets, floater.radius, (gap,), EACH, 3):
             direction = generator.normal(size=3)
             direction /= np.linalg.norm(direction)
-            both = two_body(rotor, floater, place, direction, DEGREE, SERIES)
+            degree = enough_degree(rotor.magnets, Ball(place, floater.radius), DEGREES)
+            both = two_body(rotor, floater, place, direction, degree, SERIES)
             added = both.total - both.rigid
             field, gradient = field_at_center(both.own), gradient_at_center(both.own, floater.radius)
             _, force, torque = answers(

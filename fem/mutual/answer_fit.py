@@ -3,7 +3,6 @@
 import time
 from collections.abc import Sequence
 from dataclasses import replace
-from itertools import combinations
 
 import numpy as np
 
@@ -12,48 +11,52 @@ from ...geometry.bodies import Magnet
 from ...geometry.scenes import Floater
 from ..harmonics import FOUR_PI
 from .answer_error import answer_errors
-from .answer_grid import POWERS, AnswerGrid, orbits, point_counts
+from .answer_grid import POWERS, RETURNED, AnswerGrid, point_counts
 from .answer_samples import (
+    FAR_GAPS,
     ROTOR_GAPS,
     SPHERE_GAPS,
-    SphereSamples,
     answer_products,
     places_around,
+    returned_samples,
     sphere_samples,
     unit_dipole_fields,
 )
 from .permeable_sphere import reflection
 from .rotor_response import rotor_ladder
-from .table import FULL, MutualTable
+from .sphere_fit import PARALLEL, classes, least_squares, returned_fit, sphere_fit
+from .table import MutualTable
 
 NEAREST = 0.16
 """Gap in floater radii from which on force and torque are to be met to 1e-3: 1 mm for the article's floater."""
-EQUATIONS, SMALL = 8000, 1e-9
-"""Pairs of dipoles that are fitted, and the relative size of a singular value that is none."""
-PARALLEL = 1e-9
+EQUATIONS, SPARSE = 8000, 6
+"""Pairs of dipoles that are fitted; and at one of so many places the rotor's answer to the sphere's is."""
 
 
 def mutual_table(magnets: tuple[Magnet, ...], floater: Floater, order: int = 2) -> MutualTable:
-    """The answers of a rotor and a floater, by finite elements of a degree, with errors against `two_body`.
+    """The answers of a rotor and a floater, by finite elements of a degree, with errors against the next.
 
     Raises
     ------
     InputError : a magnet's permeability has other axes than its body
     """
     started = time.perf_counter()
-    (rotor,) = rotor_ladder(magnets, (order,))
+    rotor, fine = rotor_ladder(magnets, (order, order + 1))
     counts = [point_counts(m.box, (1 + NEAREST) * floater.radius) for m in magnets]
     grids = [_empty(magnet, floater, n) for magnet, n in zip(magnets, counts, strict=True)]
     coupling, pairs = np.zeros((3 * len(grids), 3 * len(grids))), np.zeros((len(grids), len(grids)))
     if rotor.regions is not None:
         places = places_around(magnets, floater.radius, ROTOR_GAPS, 9, 1)
-        grids, coupling = _rotor_fit(grids, magnets, answer_products(rotor, places), places)
+        far = places_around(magnets, floater.radius, FAR_GAPS, 2, 3)
+        grids, coupling = _rotor_fit(grids, magnets, answer_products(rotor, fine, places, far), places)
     if floater.recoil_permeability != 1:
-        places = places_around(magnets, floater.radius, SPHERE_GAPS, 30, 2)
-        grids, pairs = _sphere_fit(grids, sphere_samples(rotor, floater, places))
+        places = places_around(magnets, floater.radius, SPHERE_GAPS, 60, 2)
+        grids, pairs = sphere_fit(grids, sphere_samples(rotor, floater, places))
+        if rotor.regions is not None:
+            grids = returned_fit(grids, returned_samples(rotor, floater, grids, coupling, places[::SPARSE]))
     alpha = FOUR_PI * floater.radius**3 / MU_0 * float(reflection(floater.recoil_permeability, 1)[1])
     table = MutualTable(magnets, tuple(grids), coupling, pairs, alpha)
-    gaps, errors = answer_errors(table, rotor, floater)
+    gaps, errors = answer_errors(table, fine, floater)
     return replace(
         table, gaps=gaps, errors=errors, provenance={"order": order, "seconds": time.perf_counter() - started}
     )
@@ -75,13 +78,8 @@ def _empty(magnet: Magnet, floater: Floater, counts: tuple[int, int, int]) -> An
         )
     count = int(np.prod(counts))
     axis = magnet.polarization / size if size else np.zeros(3)
-    return AnswerGrid(magnet.box, axis, floater.radius, counts, np.zeros((count, 3)), np.zeros((count, 2, 2)))
-
-
-def _classes(grid: AnswerGrid, mirrored: bool) -> Array:
-    """(n, classes): which points belong to a class."""
-    number = orbits(grid.points, mirrored)
-    return np.asarray(np.eye(number.max() + 1)[number])
+    zeros = np.zeros((count, 3)), np.zeros((count, len(POWERS), 2)), np.zeros((count, len(RETURNED), 2))
+    return AnswerGrid(magnet.box, axis, floater.radius, counts, *zeros)
 
 
 def _rotor_fit(
@@ -96,11 +94,11 @@ def _rotor_fit(
         first, second = first[chosen], second[chosen]
     columns, kinds, centers = [], [], []
     for grid, magnet in zip(grids, magnets, strict=True):
-        classes = _classes(grid, mirrored=True) if magnet.contrast else np.zeros((len(grid.points), 0))
+        kind = classes(grid, mirrored=True) if magnet.contrast else np.zeros((len(grid.points), 0))
         fields = unit_dipole_fields(grid.box.center + grid.points @ grid.box.rotation.T, places) @ grid.box.rotation
         fields *= size[:, None, None]
-        columns += [(fields[first, :, a] * fields[second, :, a]) @ classes for a in range(3)]
-        kinds.append(classes)
+        columns += [(fields[first, :, a] * fields[second, :, a]) @ kind for a in range(3)]
+        kinds.append(kind)
         centers.append(unit_dipole_fields(grid.box.center[None], places)[:, 0] * size[:, None])
     whole = np.concatenate(centers, axis=1)
     couples = list(zip(*np.triu_indices(whole.shape[1]), strict=True))
@@ -109,85 +107,13 @@ def _rotor_fit(
             [whole[first, a] * whole[second, b] + (a != b) * whole[first, b] * whole[second, a] for a, b in couples]
         ).T
     )
-    found = list(_least_squares(np.concatenate(columns, axis=1), products[first, second] * size[first] * size[second]))
+    found = list(least_squares(np.concatenate(columns, axis=1), products[first, second] * size[first] * size[second]))
     made = []
-    for grid, classes in zip(grids, kinds, strict=True):
-        count = classes.shape[1]
-        parts = [classes @ np.array([found.pop(0) for _ in range(count)]) for _ in range(3)]
+    for grid, kind in zip(grids, kinds, strict=True):
+        count = kind.shape[1]
+        parts = [kind @ np.array([found.pop(0) for _ in range(count)]) for _ in range(3)]
         made.append(replace(grid, strengths=np.stack(parts, axis=1)))
     coupling = np.zeros((whole.shape[1], whole.shape[1]))
     for (a, b), value in zip(couples, found, strict=True):
         coupling[a, b] = coupling[b, a] = value
     return made, coupling
-
-
-def _sphere_fit(grids: Sequence[AnswerGrid], samples: SphereSamples) -> tuple[list[AnswerGrid], Array]:
-    """Weights of the points' powers, and of pairs of magnets, that give energy and force of the sphere's answer."""
-    values, slopes, kinds = [], [], []
-    for grid in grids:
-        aligned = bool(np.sum(np.abs(grid.axis) > PARALLEL) == 1)
-        classes = _classes(grid, mirrored=aligned) if grid.axis.any() else np.zeros((len(grid.points), 0))
-        value, slope = _powers(grid, samples.places)
-        values.append((value @ classes).reshape(len(value), -1))
-        slopes.append((slope @ classes).reshape(*slope.shape[:2], -1))
-        kinds.append(classes)
-    pairs = list(combinations(range(len(grids)), 2))
-    if pairs:
-        step = 1e-4 * grids[0].radius
-        at = [
-            _pair_products(grids, samples.places + move)
-            for move in (0 * np.eye(3)[0], *(step * np.eye(3)), *(-step * np.eye(3)))
-        ]
-        values.append(at[0])
-        slopes.append(np.stack([(at[1 + a] - at[4 + a]) / (2 * step) for a in range(3)], axis=1))
-    value, slope = np.concatenate(values, axis=1), np.concatenate(slopes, axis=2)
-    rows = [value / samples.energy_size[:, None], *np.moveaxis(slope / samples.force_size[:, None, None], 1, 0)]
-    right = [-samples.energy / samples.energy_size, *(samples.force / samples.force_size[:, None]).T]
-    found = list(_least_squares(np.concatenate(rows), np.concatenate(right)))
-    made = []
-    for grid, classes in zip(grids, kinds, strict=True):
-        count = classes.shape[1]
-        parts = [classes @ np.array([found.pop(0) for _ in range(count)]) for _ in range(2 * len(POWERS))]
-        made.append(replace(grid, degrees=np.stack(parts, axis=1).reshape(-1, len(POWERS), 2)))
-    coupled = np.zeros((len(grids), len(grids)))
-    for (a, b), weight in zip(pairs, found, strict=True):
-        coupled[a, b] = coupled[b, a] = weight
-    return made, coupled
-
-
-def _powers(grid: AnswerGrid, places: Array) -> tuple[Array, Array]:
-    """Of every point (n): 1 and (ĵ·d)²/d² times (R/d)^2p at places (m): (m, 4, n), and their gradients (m, 3, 4, n)."""
-    d = grid.box.to_body(places)[:, None] - grid.points
-    inverse = 1 / np.sum(d**2, axis=2)
-    along = d @ grid.axis
-    values, slopes = [], []
-    for p in POWERS:
-        power = grid.radius ** (2 * p) * inverse**p
-        values += [power, power * along**2 * inverse]
-        flat = (-2 * p * power * inverse)[..., None] * d
-        steep = (-2 * (p + 1) * power * along**2 * inverse**2)[..., None] * d
-        slopes += [flat, steep + (2 * power * along * inverse)[..., None] * grid.axis]
-    turned = np.stack(slopes, axis=1) @ grid.box.rotation.T
-    return np.stack(values, axis=1), np.moveaxis(turned, 3, 1)
-
-
-def _pair_products(grids: Sequence[AnswerGrid], places: Array) -> Array:
-    """Products (m, pairs) of the gradients of two magnets' central dipoles, as `dipole_slope`'s."""
-    slopes = []
-    for grid in grids:
-        d, j = places - grid.box.center, grid.box.rotation @ grid.axis
-        square = np.sum(d**2, axis=1)
-        along = d @ j
-        entries = []
-        for a, b in (*((a, a) for a in range(3)), (0, 1), (0, 2), (1, 2)):
-            entries.append(j[a] * d[:, b] + j[b] * d[:, a] + (a == b) * along - 5 * along * d[:, a] * d[:, b] / square)
-        slopes.append(np.array(entries) / square**2.5)
-    return np.array(
-        [np.einsum("e,em,em->m", FULL, slopes[a], slopes[b]) for a, b in combinations(range(len(grids)), 2)]
-    ).T
-
-
-def _least_squares(columns: Array, values: Array) -> Array:
-    size = np.linalg.norm(columns, axis=0)
-    size[size == 0] = 1.0
-    return np.asarray(np.linalg.lstsq(columns / size, values, rcond=SMALL)[0] / size)

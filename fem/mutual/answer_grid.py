@@ -8,7 +8,11 @@ magnet answers with the energy
 Gauss's rule for the energy of its magnetisation with weights that are fitted to finite elements (`answer_fit`).  The
 field that its own remanence, along ĵ, has beyond the uniform part in a permeable sphere about x costs
 
-    -Σ_k Σ_p (v_kp + w_kp (ĵ·d)²/d²) (R/d)^2p.
+    -Σ_k Σ_p (v_kp + w_kp (ĵ·d)²/d²) (R/d)^2p,
+
+and what the magnet answers to this part of the sphere is a field on the moment, with the energy
+
+    -Σ_k Σ_q (s_kq m·ĵ + t_kq (ĵ·d)(m·d)/d²) (R/d)^2q.
 """
 
 from collections.abc import Sequence
@@ -24,8 +28,8 @@ from numpy.typing import NDArray
 from ...geometry.basics import MU_0, Array, Box
 
 UNIT = MU_0 / (4 * np.pi)
-POWERS = (4, 6)
-"""p of the sphere's energy: two dipoles' begin with p = 4, those of degree 2."""
+POWERS, RETURNED = (4, 5, 6), (5, 6)
+"""p of the sphere's energy: two dipoles' begin with p = 4, those of degree 2; and q, about that of three dipoles."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,7 +43,8 @@ class AnswerGrid:
     radius : of the floater, m
     counts : points along each body axis
     strengths : (n, 3) λ, A m²/T, along the body's axes
-    degrees : (n, 2, 2) v and w of each power, J
+    degrees : (n, 3, 2) v and w of each power, J
+    returned : (n, 2, 2) s and t of each power, T
     """
 
     box: Box
@@ -48,6 +53,7 @@ class AnswerGrid:
     counts: tuple[int, int, int]
     strengths: Array
     degrees: Array
+    returned: Array
 
     @property
     def nodes(self) -> list[Array]:
@@ -65,31 +71,34 @@ class AnswerGrid:
         """Energy at a position (3 expressions, m) of a moment (A m² times `share`); in J times share²."""
         place = _along(self.box, [x - float(c) for x, c in zip(position, self.box.center, strict=True)])
         pointing, parts = _along(self.box, moment), []
-        for point, strengths, degrees in zip(self.points, self.strengths, self.degrees.reshape(-1, 4), strict=True):
+        for point, row in zip(self.points, self.numbers, strict=True):
             d = [x - float(t) for x, t in zip(place, point, strict=True)]
-            numbers = strengths.tolist(), (share * share * w for w in degrees.tolist())
-            parts.append(point_energy(d, pointing, numbers[0], list(numbers[1]), self.axis.tolist(), self.radius))
+            answer, degrees, returned = row[:3], row[3:9], row[9:]
+            weights = [*answer, *(share * share * v for v in degrees), *(share * s for s in returned)]
+            parts.append(point_energy(d, pointing, weights, self.axis.tolist(), self.radius))
         return hy.sum(parts)
+
+    @cached_property
+    def numbers(self) -> Array:
+        """(n, 13) of each point: λ (3), v and w of three powers, s and t of two."""
+        return np.concatenate([self.strengths, *(w.reshape(len(w), -1) for w in (self.degrees, self.returned))], axis=1)
 
 
 def point_energy(
-    d: Sequence[Any],
-    moment: Sequence[Any],
-    strengths: Sequence[Any],
-    degrees: Sequence[Any],
-    axis: Sequence[Any],
-    r: Any,
+    d: Sequence[Any], moment: Sequence[Any], numbers: Sequence[Any], axis: Sequence[Any], r: Any
 ) -> hy.expression:
-    """Energy of one point, from d (m), the moment, λ (3), v and w of both powers (4), ĵ and R, in the body's axes."""
+    """Energy of one point, from d (m), the moment, its `numbers`, ĵ and R, in the body's axes."""
+    v4, w4, v5, w5, v6, w6, s5, t5, s6, t6 = numbers[3:]
     inverse = 1.0 / hy.sum([x * x for x in d])
-    along = 3.0 * inverse * hy.sum([m * x for m, x in zip(moment, d, strict=True)])
-    field = [x * along - m for x, m in zip(d, moment, strict=True)]  # times 4π d³/μ0
-    square = hy.sum([s * (b * b) for s, b in zip(strengths, field, strict=True)])
+    along = hy.sum([m * x for m, x in zip(moment, d, strict=True)])
+    field = [3.0 * inverse * along * x - m for x, m in zip(d, moment, strict=True)]  # times 4π d³/μ0
+    square = hy.sum([s * (b * b) for s, b in zip(numbers[:3], field, strict=True)])
     answer = (0.5 * UNIT**2) * (inverse * inverse * inverse * square)
     ratio, axial = r * r * inverse, hy.sum([j * x for j, x in zip(axis, d, strict=True)])
-    cosine, fourth = axial * axial * inverse, ratio * ratio * ratio * ratio
-    v, w, v_next, w_next = degrees
-    return -answer - fourth * (v + w * cosine + ratio * ratio * (v_next + w_next * cosine))
+    pointing = hy.sum([j * m for j, m in zip(axis, moment, strict=True)])
+    flat = v4 + ratio * (v5 + s5 * pointing + ratio * (v6 + s6 * pointing))
+    steep = w4 * axial + ratio * (w5 * axial + t5 * along + ratio * (w6 * axial + t6 * along))
+    return -answer - ratio * ratio * ratio * ratio * (flat + inverse * axial * steep)
 
 
 def _along(box: Box, vector: Sequence[Any]) -> list[Any]:
@@ -98,18 +107,18 @@ def _along(box: Box, vector: Sequence[Any]) -> list[Any]:
     return [hy.sum([float(r) * v for r, v in zip(row, vector, strict=True) if r]) for row in exact]
 
 
-def point_counts(box: Box, clearance: float) -> tuple[int, int, int]:
+DIGITS = 7.2
+"""-ln of the error of Gauss's rule, about: with the weights fitted, force and torque are met to 1e-3."""
+
+
+def point_counts(box: Box, clearance: float, digits: float = DIGITS) -> tuple[int, int, int]:
     """Gauss points along each edge for fields with sources no nearer than a clearance (m) to the faces.
 
     Gauss's error falls as ρ^-2n, ρ the sum of the half axes of the ellipse about the edge that reaches the source.
     """
     z = 1 + clearance / box.half_edges
-    nx, ny, nz = (int(n) for n in np.ceil(DIGITS / np.log(z + np.sqrt(z * z - 1))))
+    nx, ny, nz = (int(n) for n in np.ceil(digits / np.log(z + np.sqrt(z * z - 1))))
     return nx, ny, nz
-
-
-DIGITS = 7.2
-"""-ln of the error of Gauss's rule, about: with the weights fitted, force and torque are met to 1e-3."""
 
 
 def orbits(grid_points: Array, mirrored: bool) -> NDArray[np.intp]:

@@ -13,19 +13,25 @@ from ..harmonics import (
     FOUR_PI,
     Ball,
     Coefficients,
+    derivative,
+    dipole_sources,
     factorials,
+    field_at_center,
     from_magnetization,
     interior_coefficients,
     multipole_force,
+    outer_sums,
 )
+from .answer_grid import AnswerGrid
 from .degree_needed import enough_degree
 from .permeable_sphere import induced_sources, reflection
-from .rotor_response import RotorResponse
+from .rotor_response import RotorResponse, direct_rule
 
 ROTOR_GAPS, SPHERE_GAPS = (0.1, 0.25, 0.6, 1.2, 2.5), (0.08, 0.16, 0.3, 0.55, 0.95, 1.6, 2.8)
-"""Gaps between the bodies at which samples are taken, in floater radii."""
-TAIL = 1e-4
-"""Part of the sphere's answer that the degrees left out may hold."""
+FAR_GAPS = (0.6, 1.2)
+"""Gaps between the bodies at which samples are taken, in floater radii; the last for finer elements."""
+TAIL, MOST_ADDED, MOST_RETURNED = 1e-5, 16, 24
+"""Part of the sphere's answer that the degrees left out may hold, and the most degrees of the small parts."""
 
 
 def places_around(magnets: Sequence[Magnet], radius: float, gaps: Sequence[float], number: int, seed: int) -> Array:
@@ -49,12 +55,35 @@ def unit_dipole_fields(points: Array, places: Array) -> Array:
     return np.asarray(MU_0 / FOUR_PI * np.stack(fields, axis=1).reshape(-1, len(points), 3))
 
 
-def answer_products(rotor: RotorResponse, places: Array) -> Array:
-    """(3 p, 3 p) J: twice minus the rotor's energy for unit dipoles at places (p, 3) m, in pairs; symmetric."""
-    points, weights, magnetized = rotor.linear_response()
+def answer_products(rotor: RotorResponse, fine: RotorResponse, places: Array, far: Array) -> Array:
+    """(3 p, 3 p) J: twice minus the rotor's energy for unit dipoles at places (p, 3) m, in pairs; symmetric.
+
+    What the magnets' own field adds to the direct part comes from finite elements, times how much more of it finer ones
+    find at a few far places: the same to 3e-3 of it everywhere.
+    """
+    coarse, finer = (_beyond(response, far) for response in (rotor, fine))
+    size = np.sqrt(np.diag(_direct(rotor.magnets, far)))
+    coarse, finer = (part / size / size[:, None] for part in (coarse, finer))
+    square = float(np.sum(coarse**2))
+    factor = float(np.sum(coarse * finer)) / square if square else 1.0
+    return _direct(rotor.magnets, places) + factor * _beyond(rotor, places)
+
+
+def _direct(magnets: Sequence[Magnet], places: Array) -> Array:
+    """The products by the direct part of the magnetisation, exact but for round-off."""
+    nearest = min(float(np.min(magnet.box.distance(places))) for magnet in magnets)
+    points, tensors = direct_rule(magnets, nearest)
+    fields = unit_dipole_fields(points, places)
+    return np.asarray(np.einsum("pni,qnj,nij->pq", fields, fields, tensors, optimize=True) / MU_0)
+
+
+def _beyond(rotor: RotorResponse, places: Array) -> Array:
+    """The products by the rest."""
+    points, weights, magnetized = rotor.linear_response(direct=False)
     fields = unit_dipole_fields(points, places)
     answers = np.array([magnetized(given) for given in fields])
-    return np.asarray(np.einsum("pni,qni,n->pq", fields, answers, weights, optimize=True) / MU_0)
+    found = np.einsum("pni,qni,n->pq", fields, answers, weights, optimize=True) / MU_0
+    return np.asarray((found + found.T) / 2)
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,9 +109,7 @@ def sphere_samples(rotor: RotorResponse, floater: Floater, places: Array) -> Sph
     dipoles, rows = rotor.own_dipoles(), []
     for place in places:
         ball = Ball(place, floater.radius)
-        degree = int(np.clip(enough_degree(rotor.magnets, ball, TAIL), 8, 16))
-        own = interior_coefficients(lambda points: remanent_field(rotor.magnets, points), ball, degree)
-        own = own + from_magnetization(*dipoles, ball, degree)
+        own = _own_field(rotor, dipoles, ball, enough_degree(rotor.magnets, ball, TAIL))
         sources = induced_sources(own, floater.recoil_permeability)
         first = sources.copy()
         first[2:] = 0.0
@@ -91,6 +118,73 @@ def sphere_samples(rotor: RotorResponse, floater: Floater, places: Array) -> Sph
         rows.append((-energies[2:].sum(), whole - uniform, energies.sum(), np.linalg.norm(whole)))
     energy, force, size, strength = (np.array(column) for column in zip(*rows, strict=True))
     return SphereSamples(places, energy, force, size, strength)
+
+
+@dataclass(frozen=True, eq=False)
+class ReturnedSamples:
+    """What the rotor answers to the sphere's answer of degree 2 and more to the rotor's field, at places (n, 3).
+
+    Parameters
+    ----------
+    places : m
+    field, slope : (n, 3) T at the sphere's centre, and (n, 3, 3) T/m: its change as the sphere moves along x, y, z
+    """
+
+    places: Array
+    field: Array
+    slope: Array
+
+
+def returned_samples(
+    rotor: RotorResponse, floater: Floater, grids: Sequence[AnswerGrid], coupling: Array, places: Array
+) -> ReturnedSamples:
+    """The same from the points that answer for the rotor: to 2e-3 what its finite elements give from 1 mm off contact.
+
+    The energy is -M·V of the moment M. A unit moment and the sphere's answer to B0 are sources, the rotor answers to
+    both, and the sphere to its answer to the moment: the forces of the three are the derivatives of V.
+    """
+    dipoles, fields, slopes = rotor.own_dipoles(), [], []
+
+    def high(incident: Coefficients) -> Coefficients:
+        sources = induced_sources(incident, floater.recoil_permeability)
+        sources[:2] = 0.0
+        return sources
+
+    for place in places:
+        ball = Ball(place, floater.radius)
+        degree = min(enough_degree(rotor.magnets, ball, TAIL), MOST_RETURNED)
+        own = _own_field(rotor, dipoles, ball, degree)
+        back, slope = point_answer(grids, coupling, high(own), ball), []
+        for unit in np.eye(3):
+            moment = dipole_sources(unit, ball, degree)
+            answer = point_answer(grids, coupling, moment, ball)
+            pairs = (answer, high(own)), (back, moment), (own, high(answer))
+            slope.append(np.sum([multipole_force(*pair, ball) for pair in pairs], axis=0))
+        fields.append(field_at_center(back))
+        slopes.append(slope)
+    return ReturnedSamples(places, np.array(fields), np.array(slopes))
+
+
+def point_answer(grids: Sequence[AnswerGrid], coupling: Array, sources: Coefficients, ball: Ball) -> Coefficients:
+    """Coefficients a_lm (T) of what the points of magnets, and magnets as a whole, send back to sources in a ball."""
+    frames = [grid.box for grid in grids]
+    points = [box.center + grid.points @ box.rotation.T for grid, box in zip(grids, frames, strict=True)]
+    places = np.concatenate([*points, [box.center for box in frames]])
+    fields = outer_sums([-derivative(sources, axis) for axis in range(3)], (places - ball.center) / ball.radius)
+    *seen, whole = np.split(fields, np.cumsum([len(p) for p in points]))
+    moments = [
+        (b @ box.rotation * grid.strengths) @ box.rotation.T for grid, box, b in zip(grids, frames, seen, strict=True)
+    ]
+    moments.append((coupling @ whole.ravel()).reshape(-1, 3))
+    return from_magnetization(places, MU_0 * np.concatenate(moments), ball, len(sources) - 1)
+
+
+def _own_field(rotor: RotorResponse, dipoles: tuple[Array, Array], ball: Ball, degree: int) -> Coefficients:
+    """Of the rotor; what its permeability adds to its remanence, by the dipoles, up to a degree of its own."""
+    own = interior_coefficients(lambda points: remanent_field(rotor.magnets, points), ball, degree)
+    size = min(degree, MOST_ADDED) + 1
+    own[:size, :size] += from_magnetization(*dipoles, ball, size - 1)
+    return own
 
 
 def _energies(incident: Coefficients, floater: Floater) -> Array:

@@ -19,12 +19,15 @@ ENTRIES = [(a, b) for a in range(6) for b in range(a, 6)]
 WHERE = np.array([[ENTRIES.index((min(a, b), max(a, b))) for b in range(6)] for a in range(6)])
 """Which of them each entry is."""
 
+NUMBERS = 13
+"""Of a point."""
+
 
 @cache
 def _kernel() -> Any:
     place, moment = hy.make_vars("x", "y", "z"), hy.make_vars("m_x", "m_y", "m_z")
-    numbers = [hy.expression(f"n_{k}") for k in range(7)]
-    energy = point_energy(place, moment, numbers[:3], numbers[3:], [hy.par[0], hy.par[1], hy.par[2]], hy.par[3])
+    numbers = [hy.expression(f"n_{k}") for k in range(NUMBERS)]
+    energy = point_energy(place, moment, numbers, [hy.par[0], hy.par[1], hy.par[2]], hy.par[3])
     free = [*place, *moment]
     gradient = list(hy.diff_tensors([energy], diff_args=free, diff_order=1).gradient)
     hessian = np.asarray(hy.diff_tensors(gradient, diff_args=free, diff_order=1).jacobian)
@@ -48,10 +51,10 @@ def grid_derivatives(grid: AnswerGrid, places: Array, moments: Array) -> tuple[A
 def _summed(grid: AnswerGrid, places: Array, moments: Array) -> Array:
     """The kernel's outputs (28, n), summed over the points."""
     count, points = len(places), len(grid.points)
-    given = np.empty((13, count, points))
+    given = np.empty((6 + NUMBERS, count, points))
     given[:3] = places.T[:, :, None] - grid.points.T[:, None]
     given[3:6] = moments.T[:, :, None]
-    given[6:9], given[9:] = grid.strengths.T[:, None], grid.degrees.reshape(points, 4).T[:, None]
+    given[6:] = grid.numbers.T[:, None]
     pars = np.repeat(np.append(grid.axis, grid.radius)[:, None], count * points, axis=1)
-    found = _kernel()(given.reshape(13, -1), pars=pars)
+    found = _kernel()(given.reshape(len(given), -1), pars=pars)
     return np.asarray(found.reshape(-1, count, points).sum(axis=2))

@@ -2,7 +2,8 @@
 
 In the magnets H0 is the closed form of the remanent polarisation J (μr = 1) plus the field of the ball's sources. The
 magnetisation (μ - 1)(H0 - ∇ψ) comes from finite elements on a mesh of the magnets alone, which serves every position of
-the ball. Its field in the ball is a volume integral over the magnets, whose error is the square of that of ∇ψ.
+the ball. Its field in the ball is a volume integral over the magnets, whose error is the square of that of ∇ψ.  The
+direct part (μ - 1) H0, nearly all of it, is integrated with points apart from the mesh, which are enough for it.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -17,9 +18,12 @@ from ...geometry.meshes import MagnetMesh, mesh_magnets
 from ..closed_forms import remanent_field, volume_rule
 from ..harmonics import Ball, Coefficients, derivative, from_magnetization, interior_coefficients, outer_sums
 from ..magnetostatics import PermeableRegions, assemble_regions
+from .answer_grid import point_counts
 
 NODES = 24
 """Integration points per axis in a magnet for the closed form; its logarithm at the edges is met to round-off."""
+DIRECT_DIGITS = 16.0
+"""As `answer_grid.DIGITS`, for the direct part of the answer."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,10 +60,14 @@ class RotorResponse:
         if self.regions is None:
             return np.zeros((0, 3)), np.zeros((0, 3))
         potentials = [-derivative(sources, axis) for axis in range(3)]
-        fields = {
-            name: outer_sums(potentials, (points - ball.center) / ball.radius) for name, points in self._places.items()
-        }
-        return self._dipoles(self.regions.magnetization(fields))
+
+        def field(points: Array) -> Array:
+            return outer_sums(potentials, (points - ball.center) / ball.radius)
+
+        fields = {name: field(points) for name, points in self._places.items()}
+        points, tensors = direct_rule(self.magnets, ball.radius)
+        direct = points, np.einsum("na,nab->nb", field(points), tensors)
+        return _joined(self._dipoles(self._beyond(fields)), direct)
 
     @cached_property
     def remanent_dipoles(self) -> tuple[Array, Array]:
@@ -70,20 +78,20 @@ class RotorResponse:
         if self.regions is None:
             return np.zeros((0, 3)), np.zeros((0, 3))
         fields = {name: remanent_field(self.magnets, points) for name, points in self._places.items()}
-        total = self.regions.magnetization(fields)
-        chi = self.regions.susceptibility
-        parts = [self._dipoles({name: total[name] - fields[name] @ chi[name] for name in total})]
-        parts.append(closed_dipoles(self.magnets))
-        return np.concatenate([p for p, _ in parts]), np.concatenate([m for _, m in parts])
+        return _joined(self._dipoles(self._beyond(fields)), closed_dipoles(self.magnets))
 
-    def linear_response(self) -> tuple[Array, Array, Callable[[Array], Array]]:
-        """Points (n, 3) m and weights (n,) m³, and what makes μ0 M (n, 3) T there of a field H0 (n, 3) T."""
+    def linear_response(self, direct: bool = True) -> tuple[Array, Array, Callable[[Array], Array]]:
+        """Points (n, 3) m and weights (n,) m³, and what makes μ0 M (n, 3) T there of a field H0 (n, 3) T.
+
+        M without its direct part (μ - 1) H0 if that is not wanted.
+        """
         assert self.regions is not None
         regions, names = self.regions, list(self._places)
         ends = np.cumsum([len(self._places[name]) for name in names])[:-1]
 
         def magnetized(field: Array) -> Array:
-            found = regions.magnetization(dict(zip(names, np.split(field, ends), strict=True)))
+            fields = dict(zip(names, np.split(field, ends), strict=True))
+            found = regions.magnetization(fields) if direct else self._beyond(fields)
             return np.concatenate([found[name] for name in names])
 
         weights = np.concatenate([regions.points[name].weights for name in names]) * self.mesh.unit**3
@@ -102,6 +110,12 @@ class RotorResponse:
         assert self.regions is not None
         return {name: self.mesh.to_meter(points.points) for name, points in self.regions.points.items()}
 
+    def _beyond(self, fields: Mapping[str, Array]) -> dict[str, Array]:
+        """μ0 M of fields H0 (n, 3) T at the mesh's points without its direct part (μ - 1) H0."""
+        assert self.regions is not None
+        total, chi = self.regions.magnetization(fields), self.regions.susceptibility
+        return {name: total[name] - fields[name] @ chi[name] for name in total}
+
     def _dipoles(self, magnetization: Mapping[str, Array]) -> tuple[Array, Array]:
         assert self.regions is not None
         weights = {name: points.weights * self.mesh.unit**3 for name, points in self.regions.points.items()}
@@ -115,6 +129,23 @@ def rotor_response(mesh: MagnetMesh, order: int = 3) -> RotorResponse:
     if all(np.array_equal(mu, np.eye(3)) for mu in permeability.values()):
         return RotorResponse(mesh, None)
     return RotorResponse(mesh, assemble_regions(mesh.mesh, permeability, mesh.ball_radius, order))
+
+
+def direct_rule(magnets: Sequence[Magnet], nearest: float) -> tuple[Array, Array]:
+    """Points (n, 3) m and (μ - 1) dV (n, 3, 3) m³ for fields with sources no nearer to the magnets than so many m."""
+    points, tensors = [], []
+    for magnet in magnets:
+        half, counts = magnet.box.half_edges, point_counts(magnet.box, nearest, DIRECT_DIGITS)
+        nodes, weights = zip(*(np.polynomial.legendre.leggauss(n) for n in counts), strict=True)
+        grid = np.stack(np.meshgrid(*nodes, indexing="ij"), axis=-1).reshape(-1, 3)
+        volumes = np.prod(half) * np.einsum("i,j,k->ijk", *weights).ravel()
+        points.append(magnet.box.center + (half * grid) @ magnet.box.rotation.T)
+        tensors.append(volumes[:, None, None] * (magnet.permeability_in_rotor - np.eye(3)))
+    return np.concatenate(points), np.concatenate(tensors)
+
+
+def _joined(*parts: tuple[Array, Array]) -> tuple[Array, Array]:
+    return np.concatenate([points for points, _ in parts]), np.concatenate([moments for _, moments in parts])
 
 
 def closed_dipoles(magnets: Sequence[Magnet]) -> tuple[Array, Array]:

@@ -2,11 +2,13 @@
 
 With the rotor's own field B0 and the floater's rigid moment m at x, beyond -m·B0 the energy is
 
-    U = -½ α B0² - ½ Σ_k λ_k (M·b_k)² - (sphere's answer of degree 2 and more to B0),    M = m + α B0,
+    U = -½ α B0² - ½ Σ_k λ_k (M·b_k)² - u - M·V,    M = m + α B0,
 
 with harmonic b_k (`answer_grid`; magnets as a whole also by the field at their centres, in which they answer to each
 other).  α is the sphere's polarisability; that M stands for m lets the rotor answer to what B0 induces in the sphere.
-Left out is what goes to and fro once more, and the sphere's answer of degree 2 and more to the rotor's answer.
+The sphere's answer of degree 2 and more to B0 has the energy -u; the rotor answers to it with the field V at x, and so,
+as derivatives of -M·V, come the sphere's answer of these degrees to the rotor's answer and their forces.
+Left out is what goes to and fro once more: less than 2e-4 of what is told.
 """
 
 from collections.abc import Sequence

@@ -16,7 +16,7 @@ from .answer_fit import mutual_table
 from .answer_grid import AnswerGrid
 from .table import MutualTable
 
-FORMAT = "spinlev mutual table 1"
+FORMAT = "spinlev mutual table 2"
 
 
 def cached_mutual_table(
@@ -72,6 +72,7 @@ def to_dataset(table: MutualTable) -> xr.Dataset:
         "counts": (("magnet", "body_axis"), np.array([grid.counts for grid in grids]), "1"),
         "strengths": (("point", "body_axis"), np.concatenate([grid.strengths for grid in grids]), "A m2/T"),
         "degrees": (("point", "power", "kind"), np.concatenate([grid.degrees for grid in grids]), "J"),
+        "returned": (("point", "higher_power", "kind"), np.concatenate([grid.returned for grid in grids]), "T"),
         "coupling": (("field", "other_field"), table.coupling, "A m2/T"),
         "pairs": (("magnet", "other_magnet"), table.pairs, "J m8"),
         "polarizability": ((), table.polarizability, "A m2/T"),
@@ -91,7 +92,7 @@ def from_dataset(dataset: xr.Dataset, magnets: tuple[Magnet, ...]) -> MutualTabl
     """The table of a data set that `to_dataset` made for these magnets."""
     data = {str(name): variable.values for name, variable in dataset.data_vars.items()}
     ends = np.cumsum(np.prod(data["counts"], axis=1))[:-1]
-    parts = (np.split(data[name], ends) for name in ("strengths", "degrees"))
+    parts = (np.split(data[name], ends) for name in ("strengths", "degrees", "returned"))
     grids = [
         AnswerGrid(Box(m.box.size, m.box.center, m.box.rotation), axis, float(data["radius"]), tuple(counts), *rest)
         for m, axis, counts, *rest in zip(magnets, data["axis"], data["counts"].tolist(), *parts, strict=True)

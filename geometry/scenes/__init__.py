@@ -22,4 +22,4 @@ from .parts import (
     tilt as tilt,
     vertical as vertical,
 )
-from .writing import scene_keys as scene_keys, scene_text as scene_text
+from .writing import scene_keys as scene_keys, scene_text as scene_text, startless_text as startless_text

@@ -13,7 +13,7 @@ import numpy as np
 from ..basics import Array, Box, Cylinder, Solid
 from ..bodies import Conductor, Magnet, horizontal, tilt, vertical
 from .assembly import assemble
-from .contents import AbsoluteStart, Drag, Plate, Scene
+from .contents import AbsoluteStart, Drag, OffsetStart, Plate, Scene
 from .faults import SceneError
 
 SAME = 1e-12
@@ -24,6 +24,11 @@ DEFAULT_START = {"offset_mm": [0.0, 0.0, 0.1]}
 def scene_text(scene: Scene) -> str:
     """The scene file of a scene: the one that was read if it still says the same, else one written from the object."""
     return scene.text if scene.text and _says(scene.text, scene) else _toml(_keys(scene))
+
+
+def startless_text(scene: Scene) -> str:
+    """The scene file of a scene as if it did not say where a flight begins: the same for all flights of one scene."""
+    return scene_text(replace(scene, start=OffsetStart()))
 
 
 def scene_keys(scene: Scene) -> dict[str, Any]:

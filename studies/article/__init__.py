@@ -24,6 +24,7 @@ from .article_figure import (
     legend_name as legend_name,
     plot_branch as plot_branch,
     rotor_color as rotor_color,
+    rotor_panels as rotor_panels,
     values_of as values_of,
 )
 from .article_formulas import side_radius as side_radius

@@ -6,16 +6,35 @@ import matplotlib as mpl
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from ...geometry.basics import Array
-from .article import CONFIGURATIONS, rotor_label
+from ..results import PAGE, panels
+from .article import CONFIGURATIONS, axis_label, by_configuration, rotor_label
 
 TITLES = {
     "horizontal": "Cube displaced by δx",
     "vertical": "Two cubes, δz apart",
     "tilt": "Cube tilted by δθ",
 }
+
+
+def one_panel_each(height: float, **shared: Any) -> tuple[Figure, Any]:
+    """A panel (3,) side by side for each configuration, `height` inches high; `shared` are options of `panels`."""
+    figure, (axes,) = panels(1, len(CONFIGURATIONS), (PAGE, height), **shared)
+    for panel, configuration in zip(axes, CONFIGURATIONS, strict=True):
+        panel.set_title(TITLES[configuration])
+    return figure, axes
+
+
+def rotor_panels(result: xr.Dataset, height: float, **shared: Any) -> tuple[Figure, Any]:
+    """A panel (3,) for each configuration of a joined result, with a numbered place for each of its rotors."""
+    figure, (axes,) = panels(1, len(CONFIGURATIONS), (PAGE, height), **shared)
+    for panel, (configuration, part) in zip(axes, by_configuration(result), strict=False):
+        panel.set_xticks(range(part.sizes["case"]), [f"{m:g}" for m in part["measure"].values])
+        panel.set(xlabel=axis_label(configuration), xlim=(-0.6, part.sizes["case"] - 0.4), title=TITLES[configuration])
+    return figure, axes
 
 
 def rotor_color(configuration: str, value: float) -> tuple[float, ...]:

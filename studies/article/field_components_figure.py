@@ -11,9 +11,9 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter
 
 from ...geometry.basics import Array
-from ..results import DASHES, NAMES, PAGE, PALETTE, cases_with, panels, styled
+from ..results import DASHES, NAMES, PALETTE, cases_with, styled
 from .article import CONFIGURATIONS
-from .article_figure import TITLES
+from .article_figure import one_panel_each
 
 PARTS = {"off_axis": "off-axis field $B_\\perp$ (mT)", "on_axis": "on-axis field $B_z$ (mT)"}
 MODELS = ("fem", "dipole", "article")
@@ -22,7 +22,7 @@ MODELS = ("fem", "dipole", "article")
 @styled
 def component_figure(result: xr.Dataset, quantity: str) -> Figure:
     """One component of the field below the rotor against the parameter of each configuration."""
-    figure, axes = _one_panel_each(result)
+    figure, axes = _logarithmic_panels(result)
     for panel, configuration in zip(axes, CONFIGURATIONS, strict=True):
         _component(panel, cases_with(result, configuration=configuration), quantity)
     axes[0].set(ylabel=PARTS[quantity], ylim=(0.02 if quantity == "on_axis" else 0.2, None))
@@ -37,7 +37,7 @@ def component_figure(result: xr.Dataset, quantity: str) -> Figure:
 @styled
 def differences_figure(result: xr.Dataset) -> Figure:
     """How far the simpler models are from the finite elements."""
-    figure, axes = _one_panel_each(result)
+    figure, axes = _logarithmic_panels(result)
     for panel, configuration in zip(axes, CONFIGURATIONS, strict=True):
         _differences(panel, cases_with(result, configuration=configuration))
     axes[0].set(ylabel="difference |ΔB| / |B| (%)", ylim=(1e-4, 100))
@@ -55,11 +55,11 @@ FIGURES: dict[str, Callable[[xr.Dataset], Figure]] = {
 }
 
 
-def _one_panel_each(result: xr.Dataset) -> tuple[Figure, Any]:
+def _logarithmic_panels(result: xr.Dataset) -> tuple[Figure, Any]:
     """A logarithmic panel for each configuration; the first says the colours of the distances."""
-    figure, (axes,) = panels(1, 3, (PAGE, 2.7), sharey=True)
-    for panel, (configuration, kind) in zip(axes, CONFIGURATIONS.items(), strict=True):
-        panel.set(xlabel=f"{kind.symbol} ({kind.unit})", title=TITLES[configuration], yscale="log")
+    figure, axes = one_panel_each(2.7, sharey=True)
+    for panel, kind in zip(axes, CONFIGURATIONS.values(), strict=True):
+        panel.set(xlabel=f"{kind.symbol} ({kind.unit})", yscale="log")
     for distance, color in zip(result["distance"].values, PALETTE, strict=False):
         axes[0].plot([], [], color=color, label=f"{1e3 * distance:g} mm below")
     axes[0].legend(loc="lower left", ncols=2, columnspacing=1.0)

@@ -8,9 +8,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from ...geometry.basics import Array
-from ..results import PAGE, cases_with, panels, styled
+from ..results import cases_with, styled
 from .article import CONFIGURATIONS, rotor_label, stable_in_flight
-from .article_figure import TITLES, legend_name, plot_branch, rotor_color, values_of
+from .article_figure import legend_name, one_panel_each, plot_branch, rotor_color, values_of
 
 LIMITS = (8.0, 66.0)
 """Of the axis of distances, mm."""
@@ -19,7 +19,7 @@ LIMITS = (8.0, 66.0)
 @styled
 def models_figure(result: xr.Dataset) -> Figure:
     """The levitation distance of every rotor by finite elements and by the dipole."""
-    figure, axes = _one_panel_each()
+    figure, axes = _distance_panels()
     for panel, configuration in zip(axes, CONFIGURATIONS, strict=True):
         for value in values_of(result, configuration):
             rotor = cases_with(result, configuration=configuration, value=value)
@@ -33,7 +33,7 @@ def models_figure(result: xr.Dataset) -> Figure:
 @styled
 def formulas_figure(result: xr.Dataset) -> Figure:
     """The article's formulas and simulated flights beside the dipole's equilibrium, for the rotors that levitated."""
-    figure, axes = _one_panel_each()
+    figure, axes = _distance_panels()
     for panel, configuration in zip(axes, CONFIGURATIONS, strict=True):
         for value in values_of(result, configuration):
             if value in CONFIGURATIONS[configuration].levitated:
@@ -50,10 +50,10 @@ def formulas_figure(result: xr.Dataset) -> Figure:
 FIGURES = {"levitation-distance-models": models_figure, "levitation-distance-formulas": formulas_figure}
 
 
-def _one_panel_each() -> tuple[Figure, Any]:
-    figure, (axes,) = panels(1, 3, (PAGE, 3.2), sharey=True)
-    for panel, configuration in zip(axes, CONFIGURATIONS, strict=True):
-        panel.set(xlabel="frequency of the rotor (Hz)", title=TITLES[configuration], xlim=(25, 255), ylim=LIMITS)
+def _distance_panels() -> tuple[Figure, Any]:
+    figure, axes = one_panel_each(3.2, sharey=True)
+    for panel in axes:
+        panel.set(xlabel="frequency of the rotor (Hz)", xlim=(25, 255), ylim=LIMITS)
     axes[0].set_ylabel("levitation distance (mm)")
     return figure, axes
 

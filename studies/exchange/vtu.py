@@ -15,7 +15,7 @@ import meshio
 import numpy as np
 
 from ...dynamics.motion import State
-from ...fem.closed_forms import fields_of_magnets, fields_of_sphere, left_out
+from ...fem.closed_forms import closed_form_error, fields_of_magnets, fields_of_sphere
 from ...fem.storage import write_whole
 from ...geometry.basics import MU_0, Array, Box, InputError
 from ...geometry.scenes import AbsoluteStart, Scene
@@ -54,7 +54,7 @@ def export_job(scene: Scene, asked: Models, path: Path) -> tuple[Mapping[str, An
     count = sum(len(points) for points, _, _ in parts)
     values = {
         "model": levitation.table.model,
-        "error_estimate": left_out(scene.rotor),
+        "error_estimate": closed_form_error(scene.rotor),
         "file": str(path),
         "points": count,
         "floater": state is not None,

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from ...dynamics.flights import initial_state
+from ...dynamics.flights import displaced, initial_state
 from ...dynamics.motion import State
 from ...geometry.basics import Array, InputError
 from ...geometry.scenes import OffsetStart
@@ -67,13 +67,6 @@ def drawn_starts(levitation: Levitation, count: int, seed: int, spread: Mapping[
     turned = begun.moment + moment
     turned = turned / np.linalg.norm(turned, axis=1)[:, None]
     return State(begun.position, begun.velocity + velocity, turned, begun.spin + spin)
-
-
-def displaced(begun: State, offset: Array, angular_velocity: float) -> State:
-    """A state moved by offsets (n, 3) m, as much at rest in the turning frame as it was."""
-    turning = np.cross([0.0, 0.0, angular_velocity], offset)
-    same = (np.tile(v, (len(offset), 1)) for v in (begun.moment, begun.spin))
-    return State(begun.position + offset, begun.velocity + turning, *same)
 
 
 def _rows(name: str, key: str, values: Any, units: Mapping[str, float]) -> Array:

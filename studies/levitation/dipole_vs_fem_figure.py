@@ -8,7 +8,7 @@ import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from ..article import TITLES, axis_label, by_configuration, rotor_label
+from ..article import TITLES, by_configuration, rotor_label, rotor_panels
 from ..results import PAGE, PALETTE, panels, styled
 
 CAUSES = {
@@ -67,12 +67,10 @@ FIGURES = {
 
 
 def _one_panel_each(result: xr.Dataset, draw: Callable[[Axes, xr.Dataset], None]) -> tuple[Figure, Any]:
-    """A panel for each configuration, with a place for each rotor."""
-    figure, (axes,) = panels(1, 3, (PAGE, 2.8), sharey=True)
-    for panel, (configuration, part) in zip(axes, by_configuration(result), strict=False):
+    """A panel for each configuration, drawn by `draw`."""
+    figure, axes = rotor_panels(result, 2.8, sharey=True)
+    for panel, (_, part) in zip(axes, by_configuration(result), strict=False):
         draw(panel, part)
-        panel.set_xticks(range(part.sizes["case"]), [f"{m:g}" for m in part["measure"].values])
-        panel.set(xlabel=axis_label(configuration), xlim=(-0.6, part.sizes["case"] - 0.4), title=TITLES[configuration])
     return figure, axes
 
 

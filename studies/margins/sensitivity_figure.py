@@ -2,7 +2,6 @@
 
 from collections.abc import Callable
 from functools import partial
-from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -11,7 +10,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from ...geometry.basics import Array
-from ..article import CONFIGURATIONS, TITLES, axis_label, by_configuration, rotor_label
+from ..article import CONFIGURATIONS, TITLES, by_configuration, rotor_label, rotor_panels
 from ..results import PAGE, PALETTE, panels, styled
 from .tolerances import FRACTIONS, PARAMETERS, QUANTITIES, TILT_SPREAD, TILTS
 
@@ -52,7 +51,7 @@ def contributions_figure(result: xr.Dataset, quantity: str, scale: float, words:
 @styled
 def frequency_bands_figure(result: xr.Dataset) -> Figure:
     """Lowest and highest stable frequency of the rotors within all tolerances together."""
-    figure, axes = _bands(result)
+    figure, axes = rotor_panels(result, 2.5)
     for panel, (_, part) in zip(axes, by_configuration(result), strict=False):
         places = np.arange(part.sizes["case"], dtype=float)
         for name, color in (("lowest", PALETTE[0]), ("highest", PALETTE[1])):
@@ -65,7 +64,7 @@ def frequency_bands_figure(result: xr.Dataset) -> Figure:
 @styled
 def distance_bands_figure(result: xr.Dataset) -> Figure:
     """Distance in mid-range of the rotors within all tolerances together."""
-    figure, axes = _bands(result)
+    figure, axes = rotor_panels(result, 2.5)
     for panel, (_, part) in zip(axes, by_configuration(result), strict=False):
         _box(panel, part, MIDDLE, np.arange(part.sizes["case"], dtype=float), PALETTE[2], 1e3, "distance")
     axes[0].set_ylabel(f"distance in mid-range (mm),\n{PERCENTILES[0]} to {PERCENTILES[1]} % of the rotors")
@@ -82,15 +81,6 @@ FIGURES: dict[str, Callable[[xr.Dataset], Figure]] = {
     "sensitivity-distance-band": distance_bands_figure,
     "sensitivity-frequency-band": frequency_bands_figure,
 }
-
-
-def _bands(result: xr.Dataset) -> tuple[Figure, Any]:
-    """A panel for each configuration, with a place for each rotor."""
-    figure, (axes,) = panels(1, 3, (PAGE, 2.5))
-    for panel, (configuration, part) in zip(axes, by_configuration(result), strict=False):
-        panel.set_xticks(range(part.sizes["case"]), [f"{m:g}" for m in part["measure"].values])
-        panel.set(xlabel=axis_label(configuration), xlim=(-0.5, part.sizes["case"] - 0.5), title=TITLES[configuration])
-    return figure, axes
 
 
 def _contributions(axes: Axes, part: xr.Dataset, quantity: str, scale: float) -> None:

@@ -12,7 +12,7 @@ MODELS = ("dipole", "fem")
 FACE = -0.045
 """Height of the plate's upper face below the rotor's origin, m: no floater that levitates touches it."""
 MARKERS = {"fold": "^", "oscillatory": "o", "real": "D", "contact": "v", "border": "_"}
-METAL = {"insulating": ("<", "flights of 250 s last up to here"), "conducting": ("*", "… with currents in the rotor")}
+MARKS = {"insulating": ("<", "flights of 250 s last up to here"), "conducting": ("*", "… with currents in the rotor")}
 """Marks of where averaged flights last, without and with eddy currents in the rotor's magnets."""
 MEANINGS = {
     "fold": "fold: no equilibrium beyond",
@@ -43,7 +43,7 @@ def map_figure(result: xr.Dataset) -> Figure:
         axes[0, 0].plot([], [], "1", color="0.2", label="no equilibrium is left with it")[0],
     ]
     if "high" in result:
-        handles += [axes[0, 0].plot([], [], mark, color="k", label=words)[0] for mark, words in METAL.values()]
+        handles += [axes[0, 0].plot([], [], mark, color="k", label=words)[0] for mark, words in MARKS.values()]
     for place in axes[0]:
         place.margins(x=0.08)
     axes[0, 0].set_ylabel("frequency of the rotor (Hz)")
@@ -77,7 +77,7 @@ def _plate(axes: Axes, part: xr.Dataset) -> None:
 
 
 def _lasting(axes: Axes, part: xr.Dataset) -> None:
-    for metal, (mark, _) in METAL.items() if "high" in part else ():
+    for metal, (mark, _) in MARKS.items() if "high" in part else ():
         axes.plot(part["measure"], part["high"].sel(metal=metal), mark, color="k", ms=5)
 
 

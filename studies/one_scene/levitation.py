@@ -10,7 +10,7 @@ from typing import Any
 
 from ...dynamics.effects import Mutual, RotorCurrents, mutual_choice, with_effects
 from ...dynamics.equilibria import survey, with_plate
-from ...dynamics.flights import Checkpoint, LiveFlight, Trajectory, simulate, starting_point
+from ...dynamics.flights import Checkpoint, LiveFlight, Trajectory, most_like_levitation, simulate, starting_point
 from ...dynamics.motion import Interaction, PlateMemory, Rates, interaction_of
 from ...dynamics.steady import Equilibrium, EquilibriumError, Survey
 from ...fem.measured_maps import GriddedTable
@@ -21,7 +21,7 @@ from ...fem.slab import resolve_plate_model, rotor_nearby
 from ...geometry.basics import Array, InputError, millimetre_size
 from ...geometry.scenes import AbsoluteStart, Scene, load_scene
 from ..terminal import Models, detail, finite, note, positive, progress
-from .plate_of_scene import check_room, check_way, floating, plate_memory
+from .plate_of_scene import check_room, check_way, plate_memory
 from .rotor_of_scene import RotorField, RotorTables, equations_key
 
 PLATE_WORDS = {
@@ -130,10 +130,12 @@ class Levitation:
         EquilibriumError : the rotor is at rest
         InputError : a conductor is in the floater's way, or the rotor turns too fast for its metal
         """
+        interaction = self.interaction
         note("Equilibria ...")
-        found = survey(self.scene, self.interaction, self.spin, rates=self.rates)
-        if found.equilibria:
-            check_way(self.scene, floating(found.equilibria).position)
+        found = survey(self.scene, interaction, self.spin, rates=self.rates)
+        place = most_like_levitation(found.equilibria)
+        if place is not None:
+            check_way(self.scene, place.position)
         return found
 
     @cached_property
@@ -253,7 +255,7 @@ class Levitation:
         """The equations of motion in the rotor's field, compiled."""
         return self._tables.rates(self.equations_key, self.interaction)
 
-    @property
+    @cached_property
     def equations_key(self) -> str:
         """All that decides tables and equations; scenes where it is the same differ in parameters of the motion."""
         return equations_key(self.scene, self.models)

@@ -1,12 +1,8 @@
 """The plate of a scene for its motion, as the console tells it, and whether it leaves the floater room."""
 
-from collections.abc import Sequence
-
 import numpy as np
 
-from ...dynamics.flights import starting_point
 from ...dynamics.motion import PlateMemory
-from ...dynamics.steady import Equilibrium
 from ...fem.rotor_tables import RotorTable
 from ...fem.slab import plate_around
 from ...geometry.basics import Array, InputError
@@ -47,11 +43,6 @@ def check_way(scene: Scene, place: Array) -> None:
                 f"{depth * 1e3:.4g} mm where it levitates, at {np.round(place * 1e3, 3).tolist()} mm; make it smaller "
                 "or move it away."
             )
-
-
-def floating(known: Sequence[Equilibrium]) -> Equilibrium:
-    """The equilibrium that is most like levitation, also where a brake undoes all of them: then the least growing."""
-    return starting_point(known) or min(known, key=lambda equilibrium: equilibrium.growth_per_s)
 
 
 def check_room(scene: Scene, place: Array) -> None:

@@ -5,7 +5,6 @@ Flights that begin in one field go side by side in a processor's lanes (`dynamic
 
 from collections.abc import Sequence
 from contextlib import suppress
-from dataclasses import replace
 
 import numpy as np
 
@@ -14,7 +13,7 @@ from ...dynamics.flights import initial_state, is_long
 from ...dynamics.maps import surveys
 from ...dynamics.steady import Indices
 from ...geometry.basics import SpinlevError
-from ...geometry.scenes import OffsetStart, scene_text
+from ...geometry.scenes import startless_text
 from .levitation import Levitation
 
 
@@ -44,7 +43,7 @@ def _find_together(alike: Sequence[Levitation], places: Indices) -> None:
     first_places = []
     for levitation, place in zip(alike, places, strict=True):
         if levitation.scene.frequency:
-            key = f"{scene_text(replace(levitation.scene, start=OffsetStart()))} {levitation.spin!r}"
+            key = f"{startless_text(levitation.scene)} {levitation.spin!r}"
             if key not in same:
                 first_places.append(place)
             same.setdefault(key, []).append(levitation)

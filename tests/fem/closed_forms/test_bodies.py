@@ -8,7 +8,7 @@ import pytest
 from places import HORIZONTAL
 
 import spinlev as sl
-from spinlev.fem.closed_forms import fields_of_magnets, fields_of_sphere, left_out, volume_rule
+from spinlev.fem.closed_forms import closed_form_error, fields_of_magnets, fields_of_sphere, volume_rule
 from spinlev.geometry.basics import MU_0
 
 MAGNET = sl.load_scene(HORIZONTAL).rotor[0]
@@ -28,7 +28,7 @@ def test_a_magnet_without_permeability_is_magpylibs():
     h, magnetization = fields_of_magnets([rigid], AROUND)
     np.testing.assert_allclose(MU_0 * h, theirs(same.getH), rtol=0, atol=1e-12)
     np.testing.assert_allclose(MU_0 * magnetization, theirs(same.getM), rtol=0, atol=1e-12)
-    assert left_out([rigid]) == 0.0
+    assert closed_form_error([rigid]) == 0.0
 
 
 def test_a_sphere_is_magpylibs():
@@ -54,7 +54,7 @@ def test_the_moment_of_a_permeable_cube_is_that_of_finite_elements():
     moment = np.linalg.norm(weights @ magnetization) * MU_0
     share = moment / (np.linalg.norm(MAGNET.polarization) * np.prod(MAGNET.box.size))
     assert share == pytest.approx(MOMENT_OF_A_CUBE, abs=0.05**2)
-    assert abs(share - MOMENT_OF_A_CUBE) < left_out([MAGNET])
+    assert abs(share - MOMENT_OF_A_CUBE) < closed_form_error([MAGNET])
 
 
 def test_the_error_outside_is_what_is_estimated():
@@ -66,5 +66,5 @@ def test_the_error_outside_is_what_is_estimated():
     assert table.in_range(points).all()
     true = table.evaluate(points)[0]
     apart = np.linalg.norm(MU_0 * fields_of_magnets([MAGNET], points)[0] - true, axis=1) / np.linalg.norm(true, axis=1)
-    assert apart.max() < left_out([MAGNET])
-    assert apart.max() > left_out([MAGNET]) / 10
+    assert apart.max() < closed_form_error([MAGNET])
+    assert apart.max() > closed_form_error([MAGNET]) / 10

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 import spinlev as sl
+from spinlev.dynamics.flights import most_like_levitation
 from spinlev.geometry.basics import InputError
-from spinlev.studies.one_scene.plate_of_scene import check_way, floating
+from spinlev.studies.one_scene.plate_of_scene import check_way
 
 BALL = sl.sphere(diameter_mm=12.7, remanence_T=1.305, density_kg_m3=7500.0)
 BLOCK = {"size_mm": [4.0, 4.0, 4.0], "center_mm": [0.0, 0.0, -8.0], "conductivity_S_m": 1.4e6}
@@ -27,4 +28,4 @@ def test_where_a_brake_undoes_every_equilibrium_the_least_growing_is_the_floater
     beside, below, far = (
         SimpleNamespace(growth_per_s=growth, stable=False, without=None) for growth in (702.0, 2.4, 36.0)
     )
-    assert floating([beside, below, far]) is below
+    assert most_like_levitation([beside, below, far]) is below
