@@ -56,7 +56,7 @@ class Page:
     def __init__(self, document: Document, state: PageState, asked: Mapping[str, str]) -> None:
         self.document, self.state, self.layout = document, state, Layout()
         self.number, self.answered, self.shown = 0, 0, cast("Shown | None", None)
-        self.crew = Crew(document, (follow, fly))
+        self.crew = Crew(document, (follow, fly), self._failed)
         self.flight = FlightPanel(self.layout, self.crew, lambda: self.state, self._pose, self._rest_floater)
         self.resting: Any = None
         self.mapped, self.poses = "", 0
@@ -241,6 +241,11 @@ class Page:
             self.drawn = rotor, whole, kept
             self.layout.bodies(scene_bodies(self.state.scene, kept))
             self.layout.side.scene(self.state.scene)
+
+    def _failed(self, message: str) -> None:
+        if fly not in self.crew and self.flight.playing:
+            self.flight.land()
+        self.layout.say(message)
 
     def _rest_floater(self) -> None:
         """Draw the floater where it would hang, and the other equilibria."""

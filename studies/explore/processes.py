@@ -7,6 +7,7 @@ import os
 import signal
 import threading
 from collections.abc import Callable, Collection
+from dataclasses import dataclass
 from functools import cache
 from multiprocessing.connection import Connection
 from multiprocessing.context import ForkServerContext
@@ -29,6 +30,13 @@ def _context() -> ForkServerContext:
     context = multiprocessing.get_context("forkserver")
     context.set_forkserver_preload([LIBRARIES])
     return context
+
+
+@dataclass(frozen=True)
+class Failure:
+    """What a process says that cannot go on."""
+
+    message: str
 
 
 class Worker:
@@ -74,7 +82,11 @@ class Worker:
             while self._open and self._connection.poll():
                 self._heard(self._connection.recv())
         except (EOFError, ConnectionError):
+            self.process.join(1.0)
+            status = self.process.exitcode
             self.stop()
+            if status:
+                self._heard(Failure(f"A computation was ended from outside (status {status}); memory may be short."))
 
 
 class Crew:
@@ -84,10 +96,11 @@ class Crew:
     ----------
     document : of the page, in whose turn answers are heard
     hurried : tasks for which the others have to wait
+    failed : is told why a process could not go on
     """
 
-    def __init__(self, document: Document, hurried: Collection[Task]) -> None:
-        self._document, self._hurried = document, hurried
+    def __init__(self, document: Document, hurried: Collection[Task], failed: Callable[[str], None]) -> None:
+        self._document, self._hurried, self._failed = document, hurried, failed
         self._workers: dict[Task, Worker] = {}
 
     def __contains__(self, task: Task) -> bool:
@@ -119,7 +132,12 @@ class Crew:
             self.stop(task)
 
     def _hear(self, task: Task, worker: Worker, heard: Callable[[Any], None], answer: Any) -> None:
-        if self._workers.get(task) is worker:
+        if self._workers.get(task) is not worker:
+            return
+        if isinstance(answer, Failure):
+            self.stop(task)
+            self._failed(answer.message)
+        else:
             heard(answer)
 
 
@@ -131,13 +149,15 @@ def _run(patient: bool, task: Task, connection: Connection, *arguments: Any) -> 
         task(connection, *arguments)
     except (EOFError, BrokenPipeError, ConnectionResetError):  # the page has gone
         return
+    except Exception as error:  # the last resort: the page says it
+        connection.send(Failure(f"The computation failed: {type(error).__name__}: {error}."))
 
 
 def _end_with_parent() -> None:
     parent = multiprocessing.parent_process()
     if parent is not None:
         parent.join()
-    os._exit(1)
+        os._exit(1)
 
 
 def warm_up() -> None:

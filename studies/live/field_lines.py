@@ -49,7 +49,7 @@ def _followed(scene: Scene, field: Callable[[Array], Array], start: Array, sign:
 
     lines, active = [[place] for place in start], np.arange(len(start))
     for _ in range(STEPS):
-        places = np.array([lines[k][-1] for k in active])
+        places = np.reshape([lines[k][-1] for k in active], (-1, 3))
         active = active[_outside(scene, places)]
         if not len(active):
             break

@@ -68,6 +68,10 @@ def test_lines_of_a_dipoles_field_are_its_field_lines():
         assert np.abs(one[:, 1]).max() < 1e-12
 
 
+def test_where_there_is_no_field_there_are_no_lines():
+    assert field_lines(STATE.scene, lambda points: np.zeros((len(points), 3))) == []
+
+
 def test_the_latest_question_is_answered_and_equilibria_are_carried(line):
     """Three questions that wait: the last alone is answered, from what was searched for elsewhere."""
     connection = line(complete, 7, STATE)
