@@ -21,9 +21,11 @@ import heyoka as hy
 import numpy as np
 from numpy.typing import NDArray
 
-from ...geometry.basics import MU_0, Array, Box
+from ...geometry.basics import MU_0, Array, Box, Solid, Sphere
 
 UNIT = MU_0 / (4 * np.pi)
+IN_SPHERE, IN_CIRCLE = 0.64, 0.8
+"""Edges of the boxes that stand for a sphere and for the section of a cylinder, in diameters."""
 POWERS = (4, 6)
 """p of the sphere's energy: two dipoles' begin with p = 4, those of degree 2."""
 
@@ -34,7 +36,7 @@ class AnswerGrid:
 
     Parameters
     ----------
-    box : of the magnet
+    box : of the magnet, see `answer_box`
     axis : (3,) direction of its remanence along the body's axes; zero: none
     radius : of the floater, m
     counts : points along each body axis
@@ -96,6 +98,14 @@ def _along(box: Box, vector: Sequence[Any]) -> list[Any]:
     """Components along the body's axes of a vector in the rotor's frame."""
     exact = np.where(np.abs(box.rotation.T) < 1e-15, 0.0, box.rotation.T)
     return [hy.sum([float(r) * v for r, v in zip(row, vector, strict=True) if r]) for row in exact]
+
+
+def answer_box(body: Solid) -> Box:
+    """The box in which a body's points lie: itself, or for round ones a box that hardly leaves it."""
+    if isinstance(body, Box):
+        return body
+    share = np.full(3, IN_SPHERE) if isinstance(body, Sphere) else np.array([IN_CIRCLE, IN_CIRCLE, 1.0])
+    return Box(body.size * share, body.center, body.rotation)
 
 
 def point_counts(box: Box, clearance: float) -> tuple[int, int, int]:

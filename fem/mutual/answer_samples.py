@@ -35,9 +35,11 @@ def places_around(magnets: Sequence[Magnet], radius: float, gaps: Sequence[float
         for gap in gaps:
             directions = generator.normal(size=(number, 3))
             directions /= np.linalg.norm(directions, axis=1)[:, None]
-            found.append(places_off(magnet.box, directions, (1 + gap) * radius))
+            found.append(places_off(magnet.body, directions, (1 + gap) * radius))
     places = np.concatenate(found)
-    clear = np.min([magnet.box.distance(places) for magnet in magnets], axis=0) >= (1 + min(gaps)) * radius * (1 - 1e-6)
+    clear = np.min([magnet.body.distance(places) for magnet in magnets], axis=0) >= (1 + min(gaps)) * radius * (
+        1 - 1e-6
+    )
     return np.asarray(places[clear])
 
 

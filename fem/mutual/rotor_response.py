@@ -11,7 +11,7 @@ from functools import cached_property
 
 import numpy as np
 
-from ...geometry.basics import Array
+from ...geometry.basics import Array, within
 from ...geometry.bodies import Magnet
 from ...geometry.meshes import MagnetMesh, mesh_magnets
 from ..closed_forms import remanent_field, volume_rule
@@ -100,7 +100,10 @@ class RotorResponse:
     def _places(self) -> dict[str, Array]:
         """Integration points of every magnet (n, 3), m."""
         assert self.regions is not None
-        return {name: self.mesh.to_meter(points.points) for name, points in self.regions.points.items()}
+        return {
+            name: within(self.magnets[int(name.removeprefix("magnet"))].body, self.mesh.to_meter(points.points))
+            for name, points in self.regions.points.items()
+        }
 
     def _dipoles(self, magnetization: Mapping[str, Array]) -> tuple[Array, Array]:
         assert self.regions is not None
@@ -122,10 +125,10 @@ def closed_dipoles(magnets: Sequence[Magnet]) -> tuple[Array, Array]:
 
     The points are graded towards the edges, where H0 has a logarithm.
     """
-    boxes = [magnet.box for magnet in magnets]
+    bodies = [magnet.body for magnet in magnets]
     points, moments = [], []
     for magnet in magnets:
-        places, weights = volume_rule(magnet.box, boxes, NODES)
+        places, weights = volume_rule(magnet.body, bodies, NODES)
         field = remanent_field(magnets, places) @ (magnet.permeability_in_rotor - np.eye(3))
         points.append(places)
         moments.append(weights[:, None] * field)

@@ -109,7 +109,7 @@ def _fields(levitation: Levitation, state: State | None, points: Array) -> dict[
     h, magnetization = fields_of_magnets(scene.rotor, points)
     body = np.full(len(points), AIR)
     for magnet in scene.rotor:
-        body[magnet.box.distance(points) <= 0] = ROTOR
+        body[magnet.body.distance(points) <= 0] = ROTOR
     known = (body == AIR) & table.in_range(points)
     h[known] = table.evaluate(points[known])[0] / MU_0
     if state is not None:
