@@ -7,7 +7,8 @@ the outer field (`RotorTable`) stays what the motion uses.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -19,8 +20,13 @@ from ..closed_forms import UniformField, carrier
 from ..magnetostatics import RotorSolution, in_ball, potential_slopes, refinement_of, solve_rotor, strongest
 from .accuracy import Accuracy
 from .fem_model import fem_table
+from .table import RotorTable
 
-ORDERS = range(3, 9)
+LOWEST, HIGHEST = 3, 8
+"""Orders of the elements."""
+CONTINUED = ("cuboid", "fem")
+"""Models whose field is known inside the magnets, too."""
+RIGID: dict[str, Any] = {"recoil_permeability": 1.0, "transverse_permeability": None}
 SPREAD = 2.0
 """Share of the root mean square of the last step that is added to it, whose zeros are not those of the error."""
 ON_EDGE = 1e-7
@@ -54,13 +60,41 @@ class NearField:
         return self.flux_density - self.field
 
 
-def near_field(magnets: Sequence[Magnet], points: ArrayLike, rtol: float = 1e-4) -> NearField:
+def field_anywhere(table: RotorTable, points: ArrayLike, rtol: float = 1e-4) -> NearField:
+    """A table's field at points (n, 3) m, and where it does not reach that of `near_field`.
+
+    A table of closed forms (μr = 1) is continued by them.
+
+    Raises
+    ------
+    RangeError : the table is of another model, and does not reach a point
+    InputError : a point lies on an edge
+    """
+    places = np.asarray(points, float).reshape(-1, 3)
+    reached = table.in_range(places)
+    if table.model not in CONTINUED or reached.all():
+        flux, gradient = table.evaluate(places)
+        return NearField(flux, flux, gradient, table.absolute_error(places)[0], np.full(len(places), -1), 0)
+    magnets = table.magnets if table.model == "fem" else tuple(replace(m, **RIGID) for m in table.magnets)
+    found = near_field(magnets, places[~reached], rtol)
+    parts = [np.zeros((len(places), *np.shape(value)[1:])) for value in (found.field, found.gradient, found.error)]
+    field, gradient, error = parts
+    field[reached], gradient[reached] = table.evaluate(places[reached])
+    error[reached] = table.absolute_error(places[reached])[0]
+    flux, owner = field.copy(), np.full(len(places), -1)
+    flux[~reached], field[~reached], gradient[~reached] = found.flux_density, found.field, found.gradient
+    error[~reached], owner[~reached] = found.error, found.magnet
+    return NearField(flux, field, gradient, error, owner, found.order)
+
+
+def near_field(magnets: Sequence[Magnet], points: ArrayLike, rtol: float = 1e-4, highest: int = HIGHEST) -> NearField:
     """B, H and M anywhere but on the edges of magnets.
 
     Parameters
     ----------
     points : (n, 3) m, rotor's frame
     rtol : error of B asked for, relative to the largest remanence; the last step of the elements' order tells it
+    highest : order of the elements that is not exceeded, even if `error` is larger then
 
     Raises
     ------
@@ -74,7 +108,7 @@ def near_field(magnets: Sequence[Magnet], points: ArrayLike, rtol: float = 1e-4)
     field, slope = closed[:3].T, np.moveaxis(closed[3:].reshape(3, 3, -1), -1, 0)
     error, order = np.zeros(len(places)), 0
     if any(magnet.contrast for magnet in magnets):
-        reaction, steep, error, order = _reaction(tuple(magnets), carriers, places, rtol)
+        reaction, steep, error, order = _reaction(tuple(magnets), carriers, places, rtol, highest)
         field, slope = field + reaction, slope + steep
     owner = owners(magnets, places)
     flux, gradient = field.copy(), slope.copy()
@@ -95,15 +129,15 @@ def owners(magnets: Sequence[Magnet], points: Array) -> NDArray[np.intp]:
 
 
 def _reaction(
-    magnets: tuple[Magnet, ...], carriers: Sequence[Magnet], points: Array, rtol: float
+    magnets: tuple[Magnet, ...], carriers: Sequence[Magnet], points: Array, rtol: float, highest: int
 ) -> tuple[Array, Array, Array, int]:
     """-∇ψ (n, 3) T, its slope, its estimated error (n,) T, and the order of the elements."""
     allowed = rtol * max(float(np.linalg.norm(magnet.polarization)) for magnet in magnets)
     found, slope = np.zeros_like(points), np.zeros((len(points), 3, 3))
-    error, before, order = np.zeros(len(points)), None, ORDERS[0]
+    error, before, order = np.zeros(len(points)), None, LOWEST
     settings = MeshSettings()
     inside = None
-    for order in ORDERS:
+    for order in range(LOWEST, highest + 1):
         refinement = refinement_of(order, settings, strongest(magnets))
         solution: RotorSolution = solve_rotor(magnets, refinement, "split", 1, carriers=carriers)
         inside = in_ball(solution, points)
