@@ -38,10 +38,10 @@ PLATES = [
 ]
 TABLES = """
 table { border-collapse: collapse; font-size: 12px; width: 100%; }
-th, td { padding: 2px 8px 2px 0; white-space: nowrap; text-align: right; border-bottom: 1px solid #e5e9f0; }
+th, td { padding: 2px 6px 2px 0; white-space: nowrap; text-align: right; border-bottom: 1px solid #e5e9f0; }
 th { font-weight: 600; color: #4c566a; }
 th:first-child, td:first-child, td:last-child { text-align: left; }
-td:nth-child(7) { white-space: normal; min-width: 7em; }
+td:nth-child(7) { white-space: normal; min-width: 6em; }
 """
 MESSAGE = "div { color: #8f1d1d; background: #fbe9e7; padding: 6px 10px; border-radius: 4px; white-space: pre-wrap; }"
 HEADLINE = "div { font-size: 16px; font-weight: 600; }"

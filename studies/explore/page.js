@@ -5,7 +5,7 @@ window.spinlev = (() => {
     scene: { aspectmode: "data", camera: { eye: { x: 0.22, y: -1.45, z: 0.28 }, center: { x: 0, y: 0, z: 0 }, projection: { type: "perspective" } } },
   };
   const WAYS = { displaylogo: false, responsive: true, displayModeBar: false };
-  let drawn = null, pose = { position: [0, 0, -20], moment: [0, 0, 1], angle: 0 }, busy = false, again = false;
+  let drawn = null, pose = { position: [0, 0, -20], moment: [0, 0, 1], angle: 0 }, busy = false, again = false, took = 0;
 
   const turned = (at, angle) => {
     const c = Math.cos(angle), s = Math.sin(angle);
@@ -42,16 +42,23 @@ window.spinlev = (() => {
     busy = true;
     const [half, low, high] = drawn.reach;
     const scene = { ...LOOK.scene, xaxis: axis(-half, half), yaxis: axis(-half, half), zaxis: axis(low, high) };
+    const began = performance.now();
     await Plotly.react("picture", traces(), { ...LOOK, scene }, WAYS);
+    await new Promise(done => requestAnimationFrame(() => setTimeout(done)));
+    took = performance.now() - began;
     busy = false;
     if (again) { again = false; requestAnimationFrame(draw); }
   };
+  // While a slider moves its numbers come first; a picture that takes long to draw follows when it rests.
+  let waiting = null;
+  const drawSoon = () => { clearTimeout(waiting); waiting = setTimeout(draw, took < 40 ? 0 : 350); };
   return {
-    bodies: text => { drawn = JSON.parse(text); draw(); },
-    pose: async (text, line) => {  // says when it is drawn, so that no more comes than can be
+    bodies: text => { drawn = JSON.parse(text); drawSoon(); },
+    pose: async (text, line) => {
       pose = JSON.parse(text);
+      if (!pose.flying) { drawSoon(); return; }
       await draw();
-      requestAnimationFrame(() => { line.text = `${performance.now()}`; });
+      requestAnimationFrame(() => { line.text = `${performance.now()}`; });  // then the next one may come
     },
     address: query => {
       const token = new URLSearchParams(location.search).get("token");

@@ -254,7 +254,8 @@ class Page:
 
     def _pose(self, position: list[float], moment: list[float], angle: float, seen: list[float]) -> None:
         self.poses += 1  # so that each is another, and is answered for
-        self.layout.pose({"position": position, "moment": moment, "angle": angle, "number": self.poses})
+        moved = {"position": position, "moment": moment, "angle": angle, "flying": fly in self.crew}
+        self.layout.pose({**moved, "number": self.poses})
         if not self.flight.held:
             self.layout.side.place(seen[0], seen[2], 1e3 * self.state.scene.floater.radius)
 
