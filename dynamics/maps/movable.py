@@ -11,7 +11,7 @@ import numpy as np
 from ...fem.harmonics import FieldExpressions
 from ...fem.rotor_tables import FieldFormula
 from ...fem.storage import compiled
-from ...geometry.basics import Array, rotation_matrix
+from ...geometry.basics import Array, moved, rotation_matrix
 from ...geometry.bodies import Magnet
 from ..motion import Parameter, Vector
 
@@ -48,7 +48,7 @@ class Translation:
     def moved(self, magnet: Magnet, measure: float) -> Magnet:
         """The magnet, from where it is at measure zero."""
         center = magnet.box.center + self.way_of(measure)
-        return replace(magnet, box=replace(magnet.box, center=center))
+        return replace(magnet, body=moved(magnet.body, center))
 
     def place(self, position: Sequence[Scalar], measure: Scalar) -> list[Scalar]:
         """A position (3) m in the part's own frame."""
@@ -68,7 +68,7 @@ class Rotation:
     def moved(self, magnet: Magnet, measure: float) -> Magnet:
         """The magnet, from where it is at measure zero."""
         turn, box = rotation_matrix((0.0, -np.degrees(measure), 0.0)), magnet.box
-        return replace(magnet, box=replace(box, center=turn @ box.center, rotation=turn @ box.rotation))
+        return replace(magnet, body=moved(magnet.body, turn @ box.center, turn @ box.rotation))
 
     def into(self, vector: Sequence[Scalar], measure: Scalar) -> list[Scalar]:
         """A vector (3) along the axes of the part's own frame."""

@@ -41,9 +41,11 @@ def places_around(magnets: Sequence[Magnet], radius: float, gaps: Sequence[float
         for gap in gaps:
             directions = generator.normal(size=(number, 3))
             directions /= np.linalg.norm(directions, axis=1)[:, None]
-            found.append(places_off(magnet.box, directions, (1 + gap) * radius))
+            found.append(places_off(magnet.body, directions, (1 + gap) * radius))
     places = np.concatenate(found)
-    clear = np.min([magnet.box.distance(places) for magnet in magnets], axis=0) >= (1 + min(gaps)) * radius * (1 - 1e-6)
+    clear = np.min([magnet.body.distance(places) for magnet in magnets], axis=0) >= (1 + min(gaps)) * radius * (
+        1 - 1e-6
+    )
     return np.asarray(places[clear])
 
 
@@ -71,7 +73,7 @@ def answer_products(rotor: RotorResponse, fine: RotorResponse, places: Array, fa
 
 def _direct(magnets: Sequence[Magnet], places: Array) -> Array:
     """The products by the direct part of the magnetisation, exact but for round-off."""
-    nearest = min(float(np.min(magnet.box.distance(places))) for magnet in magnets)
+    nearest = min(float(np.min(magnet.body.distance(places))) for magnet in magnets)
     points, tensors = direct_rule(magnets, nearest)
     fields = unit_dipole_fields(points, places)
     return np.asarray(np.einsum("pni,qnj,nij->pq", fields, fields, tensors, optimize=True) / MU_0)

@@ -123,7 +123,7 @@ class RotorTable:
             raise RangeError(
                 f"Input points must lie outside the magnets{self._beyond()}; instead received a point at ({where}) mm."
             )
-        if not any(form.is_far(columns).any() for form in self._closed_forms):
+        if not any((form.is_far(columns) | form.is_close(columns)).any() for form in self._closed_forms):
             return field_and_gradient(self._near.rows(columns))
         rows = np.zeros((12, columns.shape[1]))
         for form in self._closed_forms:
@@ -176,8 +176,8 @@ class RotorTable:
     def _in_range(self, columns: Array) -> NDArray[np.bool_]:
         outside = np.ones(columns.shape[1], bool)
         for magnet in self.magnets:
-            near = squared_distance(columns, magnet.box.center) < magnet.box.circumradius**2
-            outside[near] &= magnet.box.distance(columns[:, near].T) >= 0
+            near = squared_distance(columns, magnet.box.center) < magnet.body.circumradius**2
+            outside[near] &= magnet.body.distance(columns[:, near].T) >= 0
         for expansion in self.expansions:
             if expansion.nearest:
                 outside &= squared_distance(columns, expansion.center) > expansion.nearest**2
