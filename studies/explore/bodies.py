@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from ...geometry.basics import Array, Box, Solid
+from ...geometry.basics import Array, Box, Ring, Solid, Sphere
 from ...geometry.scenes import Scene
 
 MAGNET, METAL, NORTH, BALL = "#434C5E", "#B08D57", "#D55E00", "#9AA5B1"
@@ -25,7 +25,7 @@ EDGES = ((0, 1), (1, 3), (3, 2), (2, 0), (4, 5), (5, 7), (7, 6), (6, 4), (0, 4),
 def scene_bodies(scene: Scene, lines: Sequence[Array]) -> dict[str, Any]:
     """What is drawn: what turns with the rotor, what stands still, and the floater about its own centre, moment up."""
     size = max(float(np.linalg.norm(m.box.size)) for m in scene.rotor) * 1e3
-    turning = [_solid(magnet.box, MAGNET, 1.0) for magnet in scene.rotor]
+    turning = [_solid(magnet.body, MAGNET, 1.0) for magnet in scene.rotor]
     turning += [_solid(conductor.body, METAL, 1.0) for conductor in scene.conductors]
     for magnet in scene.rotor:
         turning.append(_arrow(1e3 * magnet.box.center, magnet.polarization_in_rotor, 0.55 * size))
@@ -79,18 +79,16 @@ def _box_corners(body: Solid) -> Array:
 def _solid(body: Solid, color: str, opacity: float) -> dict[str, Any]:
     if isinstance(body, Box):
         return _mesh(1e3 * _box_corners(body), FACES, color, opacity)
-    angles = np.arange(SIDES) * (2 * np.pi / SIDES)
-    circle = np.column_stack([np.cos(angles), np.sin(angles)]) / 2
-    ends = [np.column_stack([circle, np.full(SIDES, z)]) for z in (-0.5, 0.5)]
-    unit = np.concatenate([*ends, [(0, 0, -0.5), (0, 0, 0.5)]])
-    k = np.arange(SIDES)
-    following = (k + 1) % SIDES
-    sides = [(a, b, b + SIDES) for a, b in zip(k, following, strict=True)]
-    sides += [(a, b + SIDES, a + SIDES) for a, b in zip(k, following, strict=True)]
-    lids = [(b, a, 2 * SIDES) for a, b in zip(k, following, strict=True)]
-    lids += [(a + SIDES, b + SIDES, 2 * SIDES + 1) for a, b in zip(k, following, strict=True)]
-    corners = 1e3 * (body.center + (unit * body.size) @ body.rotation.T)
-    return _mesh(corners, np.array(sides + lids), color, opacity)
+    if isinstance(body, Sphere):
+        return _mesh(1e3 * body.center + _ball_places(1e3 * body.radius), _quads(SIDES // 2 + 1), color, opacity)
+    if isinstance(body, Ring):
+        outer, inner, half = body.filled.radius, body.hole.radius, body.size[2] / 2
+        profile = [(inner, -half), (outer, -half), (outer, half), (inner, half), (inner, -half)]
+    else:
+        outer, half = body.radius, body.size[2] / 2
+        profile = [(0.0, -half), (outer, -half), (outer, half), (0.0, half)]
+    places = _revolved(1e3 * np.array(profile), 1e3 * body.center, body.rotation[:, 2])
+    return _mesh(places, _quads(len(profile)), color, opacity)
 
 
 def _edges(box: Box) -> list[list[list[float]]]:
@@ -99,23 +97,28 @@ def _edges(box: Box) -> list[list[list[float]]]:
 
 
 def _ball(radius: float) -> dict[str, Any]:
-    polar, azimuth = np.linspace(0, np.pi, SIDES // 2 + 1), np.arange(SIDES) * (2 * np.pi / SIDES)
-    t, p = np.meshgrid(polar, azimuth, indexing="ij")
-    places = radius * np.stack([np.sin(t) * np.cos(p), np.sin(t) * np.sin(p), np.cos(t)], -1).reshape(-1, 3)
-    return _mesh(places, _quads(len(polar)), BALL, 1.0)
+    return _mesh(_ball_places(radius), _quads(SIDES // 2 + 1), BALL, 1.0)
+
+
+def _ball_places(radius: float) -> Array:
+    polar = np.linspace(0, np.pi, SIDES // 2 + 1)
+    return _revolved(radius * np.column_stack([np.sin(polar), np.cos(polar)]), np.zeros(3), np.array([0.0, 0.0, 1.0]))
 
 
 def _arrow(center: Array, direction: Array, length: float) -> dict[str, Any]:
-    """An arrow of revolution through a centre, both ways so long together."""
+    """An arrow of revolution through a centre, both ways so long."""
     axis = direction / (np.linalg.norm(direction) or 1.0)
-    helper = np.eye(3)[int(np.abs(axis).argmin())]
-    side = np.cross(axis, helper) / np.linalg.norm(np.cross(axis, helper))
-    other = np.cross(axis, side)
     profile = np.array([(0, -1), (0.09, -1), (0.09, 0.35), (0.28, 0.35), (0, 1)]) * length
+    return _mesh(_revolved(profile, center, axis), _quads(len(profile)), NORTH, 1.0)
+
+
+def _revolved(profile: Array, center: Array, axis: Array) -> Array:
+    """Points of a surface of revolution, ring after ring; the profile (n, 2) has radius and height."""
+    side = np.cross(axis, np.eye(3)[int(np.abs(axis).argmin())])
+    side /= np.linalg.norm(side) or 1.0
     angles = np.arange(SIDES) * (2 * np.pi / SIDES)
-    ring = np.outer(np.cos(angles), side) + np.outer(np.sin(angles), other)
-    places = np.concatenate([center + r * ring + h * axis for r, h in profile])
-    return _mesh(places, _quads(len(profile)), NORTH, 1.0)
+    ring = np.outer(np.cos(angles), side) + np.outer(np.sin(angles), np.cross(axis, side))
+    return np.concatenate([center + r * ring + h * axis for r, h in profile])
 
 
 def _quads(rows: int) -> Array:

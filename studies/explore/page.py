@@ -196,13 +196,11 @@ class Page:
             self.crew.start(regions, (self.state, tuple(spans)), self._mapped)
 
     def _map_key(self) -> str:
-        """All that a map depends on."""
-        moved = {control.key: control.low for control in controls(self.state)[:2]}
-        state = replace(self.state, scene=replace(self.state.scene, plate=None))
-        for key, value in moved.items():
-            state = state.changed(key, value + 1.0)
-        model = state.model if state.model == "cuboid" else "dipole"
-        return replace(state, model=cast("Any", model), plate_model="none").query()
+        """All that a map depends on: neither its own axes, nor the plate, nor where a flight begins."""
+        keys = {key: value for key, value in self.state.keys.items() if key not in ("frequency_hz", "plate", "start")}
+        open_ones = ("displacement_mm", "angle_deg")
+        keys["rotor"] = {key: value for key, value in keys["rotor"].items() if key not in open_ones}
+        return f"{keys} {self.state.spin} {self.state.model == 'cuboid'}"
 
     def _found(self, found: Found) -> None:
         """Numbers at once."""

@@ -67,5 +67,5 @@ def _outside(scene: Scene, places: Array) -> Array:
     """Which of the places (n, 3) m are in sight and farther from every magnet than two steps."""
     free = np.linalg.norm(places, axis=1) < FAR
     for magnet in scene.rotor:
-        free &= magnet.box.distance(places) > 0.1 * STEP
+        free &= magnet.body.distance(places) > 0.1 * STEP
     return np.asarray(free)

@@ -42,6 +42,7 @@ def controls(state: PageState) -> list[Control]:
     rotor = keys["rotor"]
     if (kind := rotor.get("configuration")) in MEASURES:
         key, title, low, high = MEASURES[kind]
+        low = max(low, rotor["edge_mm"]) if kind == "vertical" else low  # where its cubes touch
         found.append(_control(key, title, rotor[key.partition(".")[2]], low, high, 0.05))
         found.append(_control("rotor.edge_mm", "Edge of the cube (mm)", rotor["edge_mm"], 3.0, 20.0, 0.05))
     diameter = keys["floater"]["diameter_mm"]

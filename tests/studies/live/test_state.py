@@ -75,3 +75,10 @@ def test_sliders_have_room_for_their_values_and_move_the_plate_towards_the_float
     assert all(control.low <= control.value <= control.high for control in found.values())
     assert [c.key for c in controls(OTHER)][-1] == "plate.center_mm.0"  # which stands beside the floater
     assert controls(first_state(load_scene(SCENES / "explicit-magnets.toml")))[1].key == "floater.diameter_mm"
+
+
+def test_cubes_one_over_the_other_cannot_be_moved_into_each_other():
+    state = first_state(load_scene(SCENES / "vertical-24h.toml"))
+    measure = controls(state)[1]
+    assert measure.low >= state.keys["rotor"]["edge_mm"]
+    state.changed(measure.key, measure.low)
