@@ -12,7 +12,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ...geometry.basics import Array, Box, Solid, Sphere, moved
+from ...geometry.basics import Array, Box, Part, Solid, Sphere, moved
 from ...geometry.bodies import Cells, Magnet, cells_of
 from ..harmonics import Coefficients, MultipoleExpansion, curvature_moments, moments_of_magnetization, uniform_moments
 from .demagnetization import demagnetizing_tensor, remanent_field, remanent_potential
@@ -29,7 +29,12 @@ A 6 mm cube across the face of a 10 mm one: 5e-7 of B is wrong with 40 and 64, 9
 
 
 def carrier(magnet: Magnet) -> Magnet:
-    """The magnet with μr = 1 and the mean polarisation J'; the magnet itself if its permeability is 1."""
+    """The magnet with μr = 1 and the mean polarisation J'; the magnet itself if its permeability is 1.
+
+    A part has no closed form, and all of its remanence is left to the elements.
+    """
+    if isinstance(magnet.body, Part):
+        return Magnet(magnet.body, np.zeros(3))
     if not magnet.contrast:
         return magnet
     turn = magnet.body.rotation

@@ -10,7 +10,7 @@ from itertools import product
 
 import numpy as np
 
-from ...geometry.basics import Array, Box, Solid
+from ...geometry.basics import Array, Box, InputError, Part, Solid
 from ...geometry.bodies import Magnet
 from .round_magnets import round_tensor
 
@@ -46,6 +46,11 @@ class _Corners:
 
 def demagnetizing_tensor(body: Solid, points: Array) -> Array:
     """(n, 3, 3): H = T J (T) at points (n, 3) m, off the body's edges, of a polarisation J; frame of the points."""
+    if isinstance(body, Part):
+        raise InputError(
+            "Input rotor must have no part from a file where closed forms are asked for; instead it has one. "
+            "Choose --model fem and --interaction rigid."
+        )
     return _box_tensor(body, points) if isinstance(body, Box) else round_tensor(body, points)
 
 
@@ -83,7 +88,9 @@ def potential_vector(box: Box, points: Array) -> Array:
 
 def remanent_field(magnets: Sequence[Magnet], points: Array) -> Array:
     """μ0 H (n, 3) T of magnets with μr = 1 at points (n, 3) m, off their edges."""
-    return np.asarray(sum(demagnetizing_tensor(m.body, points) @ m.polarization_in_rotor for m in magnets))
+    known = [magnet for magnet in magnets if magnet.polarization.any()]
+    fields = [demagnetizing_tensor(m.body, points) @ m.polarization_in_rotor for m in known]
+    return np.asarray(np.sum([np.zeros_like(points), *fields], axis=0))
 
 
 def remanent_potential(magnets: Sequence[Magnet], points: Array) -> Array:

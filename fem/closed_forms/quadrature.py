@@ -5,9 +5,12 @@ from itertools import combinations
 
 import numpy as np
 
-from ...geometry.basics import Array, Box, Ring, Solid, Sphere
+from ...geometry.basics import Array, Box, Part, Ring, Solid, Sphere
 from ...geometry.bodies import separation
+from ...geometry.meshes import part_rule
 
+PART_ORDER = 20
+"""Of the rule over a part."""
 NEAR = 0.1
 """Gaps below this part of the shortest edge are as contact to a rule."""
 
@@ -79,6 +82,8 @@ def volume_rule(body: Solid, others: Sequence[Solid], nodes: int) -> tuple[Array
     """Points (n, 3) m inside the body and weights (n,) m³."""
     if isinstance(body, Box):
         return _box_rule(body, others, nodes)
+    if isinstance(body, Part):
+        return part_rule(body, PART_ORDER)
     circle = 2 * np.pi * (np.arange(2 * nodes) + 0.5) / (2 * nodes)
     across, height, weight = _sphere_section(body, nodes) if isinstance(body, Sphere) else _ring_section(body, nodes)
     turned = across[:, None, None] * np.stack([np.cos(circle), np.sin(circle)], axis=-1)

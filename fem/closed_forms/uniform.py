@@ -7,7 +7,7 @@ import heyoka as hy
 import numpy as np
 from numpy.typing import NDArray
 
-from ...geometry.basics import Array, Box, Cylinder, Ring, Sphere
+from ...geometry.basics import Array, Box, Cylinder, Part, Ring, Sphere
 from ...geometry.bodies import Magnet
 from ..harmonics import CompiledField, FieldExpressions, uniform_moments
 from .cuboid import cuboid_field
@@ -73,14 +73,14 @@ class UniformField:
     def _beside(self, points: Array) -> Array:
         """As `rows`, beside the surface of a round magnet."""
         body, polarization = self.magnet.body, self.magnet.polarization_in_rotor
-        assert not isinstance(body, Box)
+        assert not isinstance(body, Box | Part)
         field, slope = round_tensor(body, points) @ polarization, round_slope(body, points) @ polarization
         return np.concatenate([field.T, slope.reshape(len(points), 9).T])
 
     def is_close(self, columns: Array) -> NDArray[np.bool_]:
         """Which of `columns` (3, n) m are in a round magnet or so near that the expressions do not do: (n,)."""
         body = self.magnet.body
-        if isinstance(body, Box):
+        if isinstance(body, Box | Part):
             return np.zeros(columns.shape[1], bool)
         nearest = 0.0 if isinstance(body, Sphere) else resolved_distance(body)
         return np.asarray(body.distance(columns.T) < nearest)

@@ -2,11 +2,20 @@
 
 import numpy as np
 
-from ...geometry.basics import Array, Box, Ring, Solid, Sphere
+from ...geometry.basics import Array, Box, Part, Ring, Solid, Sphere
+from ...geometry.meshes import part_rule
+
+ROUND = 12
+"""Degrees beside the polynomial's own that curved elements of a part need."""
 
 
 def polynomial_rule(body: Solid, degree: int) -> tuple[Array, Array]:
-    """Points (n, 3) m and weights (n,) m³ that integrate polynomials up to `degree` over a body to round-off."""
+    """Points (n, 3) m and weights (n,) m³ that integrate polynomials up to `degree` over a body.
+
+    To round-off, but for a part: as well as curved elements fill it, 1e-8.
+    """
+    if isinstance(body, Part):
+        return part_rule(body, degree + ROUND)
     if isinstance(body, Box):
         local, weights = _box_rule(body, degree)
     elif isinstance(body, Sphere):

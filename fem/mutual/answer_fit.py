@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ...geometry.basics import MU_0, Array, InputError
+from ...geometry.basics import MU_0, Array, InputError, Part
 from ...geometry.bodies import Magnet
 from ...geometry.scenes import Floater
 from ..harmonics import FOUR_PI
@@ -63,7 +63,12 @@ def mutual_table(magnets: tuple[Magnet, ...], floater: Floater, order: int = 2) 
 
 
 def oblique(magnet: Magnet) -> bool:
-    """Whether the permeability has other axes than the body, which the points of a magnet cannot answer with."""
+    """Whether the permeability has other axes than the body, which the points of a magnet cannot answer with.
+
+    Nor can those of a part from a file, whose remanence has no closed form.
+    """
+    if isinstance(magnet.body, Part):
+        return True
     turn = magnet.box.rotation
     inside = turn.T @ magnet.permeability_in_rotor @ turn
     return bool(np.abs(inside - np.diag(np.diag(inside))).max() > PARALLEL)

@@ -11,6 +11,7 @@ from .anywhere import (
     edge_distance as edge_distance,
     field_anywhere as field_anywhere,
     near_field as near_field,
+    refuse_edges as refuse_edges,
 )
 from .cache import cached_rotor_table as cached_rotor_table, rotor_key as rotor_key
 from .choice import resolve_model as resolve_model, rotor_table as rotor_table

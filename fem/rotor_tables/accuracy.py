@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...geometry.basics import Array, InputError, places_off
+from ...geometry.basics import Array, InputError, Part, places_off
 from ...geometry.bodies import Magnet
 from ..closed_forms import carrier
 from ..harmonics import uniform_moments
@@ -66,9 +66,13 @@ def points_around(magnets: tuple[Magnet, ...], offset: float) -> Array:
 
 def typical_field(magnets: tuple[Magnet, ...], points: Array) -> Array:
     """B (n,) T to which errors at points (n, 3) m, all about as far away, are relative: see `error_points`."""
-    dipoles = [uniform_moments(carrier(magnet), 1) for magnet in magnets]
+    dipoles = [uniform_moments(_carrier(magnet), 1) for magnet in magnets]
     field = np.linalg.norm(sum(dipole.evaluate(points)[0] for dipole in dipoles), axis=1)
     return np.maximum(field, np.median(field) / 3) if field.any() else np.ones(len(field))
+
+
+def _carrier(magnet: Magnet) -> Magnet:
+    return magnet if isinstance(magnet.body, Part) else carrier(magnet)
 
 
 def guards(magnets: tuple[Magnet, ...], clearance: float) -> tuple[Array, Array]:

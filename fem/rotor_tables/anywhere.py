@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ...geometry.basics import Array, Box, InputError, Ring, Solid, Sphere
+from ...geometry.basics import Array, Box, InputError, Part, Ring, Solid, Sphere
 from ...geometry.bodies import Magnet
 from ...geometry.meshes import MeshSettings
 from ..closed_forms import UniformField, carrier
@@ -101,13 +101,13 @@ def near_field(magnets: Sequence[Magnet], points: ArrayLike, rtol: float = 1e-4,
     InputError : a point lies on an edge, where the field is infinite
     """
     places = np.asarray(points, float).reshape(-1, 3)
-    _refuse_edges(magnets, places)
+    refuse_edges(magnets, places)
     carriers = [carrier(magnet) for magnet in magnets]
     rows = sum(UniformField(one).rows(np.ascontiguousarray(places.T)) for one in carriers if one.polarization.any())
     closed = np.zeros((12, len(places))) + rows
     field, slope = closed[:3].T, np.moveaxis(closed[3:].reshape(3, 3, -1), -1, 0)
     error, order = np.zeros(len(places)), 0
-    if any(magnet.contrast for magnet in magnets):
+    if any(magnet.contrast or isinstance(magnet.body, Part) for magnet in magnets):
         reaction, steep, error, order = _reaction(tuple(magnets), carriers, places, rtol, highest)
         field, slope = field + reaction, slope + steep
     owner = owners(magnets, places)
@@ -161,7 +161,8 @@ def _reaction(
     return found, slope, error, order
 
 
-def _refuse_edges(magnets: Sequence[Magnet], points: Array) -> None:
+def refuse_edges(magnets: Sequence[Magnet], points: Array) -> None:
+    """Raises InputError where one of the points (n, 3) m lies on an edge of a magnet."""
     for k, magnet in enumerate(magnets):
         close = edge_distance(magnet.body, points)
         if len(points) and close.min() < ON_EDGE:
@@ -174,7 +175,7 @@ def _refuse_edges(magnets: Sequence[Magnet], points: Array) -> None:
 
 def edge_distance(body: Solid, points: Array) -> Array:
     """Distances (n,) m of points (n, 3) m from the nearest edge of a body; infinite where it has none."""
-    if isinstance(body, Sphere):
+    if isinstance(body, Part | Sphere):
         return np.full(len(points), np.inf)
     local = body.to_body(points)
     if isinstance(body, Box):

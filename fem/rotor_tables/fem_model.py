@@ -14,7 +14,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ...geometry.basics import Array
+from ...geometry.basics import Array, Part
 from ...geometry.bodies import CONVERGENCE, Cells, Magnet, cells_of, cut_magnets, largest_shift
 from ...geometry.meshes import MeshSettings
 from ..closed_forms import carrier, closed_part
@@ -61,6 +61,7 @@ def fem_table(
     whole = solution.expansions(
         [without_noise(a + b, 1e-15) for a, b in zip(closed, solution.coefficients, strict=True)]
     )
+    polarized = tuple(one for one in carriers if one.polarization.any())
     doubts = {
         **{cause: nonzero(step) for cause, step in steps.items()},
         "quadrature": nonzero(solution.expansions(unsure)),
@@ -68,7 +69,7 @@ def fem_table(
         "gap": nonzero(gap_doubt(magnets, solution)),
     }
     doubts = {cause: parts for cause, parts in doubts.items() if parts}
-    rest = RotorTable("fem", magnets, carriers, (), doubts).absolute_error(points)[0]
+    rest = RotorTable("fem", magnets, polarized, (), doubts).absolute_error(points)[0]
     allowed = 0.99 * np.maximum(scale * accuracy.rtol - rest, scale * accuracy.rtol / 20)
     beside, scale_beside = guards(magnets, accuracy.clearance(magnets))
     kept, dropped = trimmed_expansions(
@@ -76,7 +77,7 @@ def fem_table(
     )
     if any(part.coefficients.any() for part in dropped):
         doubts[KNOWN] = nonzero(dropped)
-    table = RotorTable("fem", magnets, carriers, nonzero(kept), doubts)
+    table = RotorTable("fem", magnets, polarized, nonzero(kept), doubts)
     reached = float(np.max(table.absolute_error(points)[0] / scale))
     if reached > accuracy.rtol:
         warnings.warn(
@@ -94,8 +95,9 @@ def _degree(pieces: Sequence[Magnet], cells: Sequence[Cells], points: Array, rto
     for piece, own in zip(pieces, cells, strict=True):
         apart = np.linalg.norm(points[:, None] - own.centers, axis=2).min(axis=0)
         ratio = float(np.min(apart / own.radii))
-        if piece.contrast:
-            needed = max(needed, 4 + np.log(piece.contrast / rtol) / np.log(ratio))
+        share = 1.0 if isinstance(piece.body, Part) else piece.contrast  # all of a part's field is in its moments
+        if share:
+            needed = max(needed, 4 + np.log(share / rtol) / np.log(ratio))
     return int(min(np.ceil(needed), HIGHEST_DEGREE))
 
 

@@ -5,8 +5,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from ...geometry.basics import Part
 from ...geometry.bodies import Magnet, cut_magnets
-from ..closed_forms import first_order_moments
+from ..closed_forms import first_order_moments, uniform_cells
 from ..harmonics import MultipoleExpansion, trimmed_expansions, uniform_moments
 from .accuracy import Accuracy, error_points
 from .table import KNOWN, RotorTable
@@ -37,8 +38,12 @@ def moments_table(rotor: Rotor, accuracy: Accuracy) -> RotorTable:
 
 
 def cuboid_table(rotor: Rotor, accuracy: Accuracy) -> RotorTable:
-    """The closed form of the remanence."""
-    return _finished(RotorTable("cuboid", rotor, rotor), accuracy, time.perf_counter())
+    """The closed form of the remanence; moments of parts, which have none."""
+    start = time.perf_counter()
+    known = tuple(magnet for magnet in rotor if not isinstance(magnet.body, Part))
+    parts = [magnet for magnet in rotor if isinstance(magnet.body, Part)]
+    moments = tuple(cell for magnet in parts for cell in uniform_cells(magnet, accuracy.clearance(rotor)))
+    return _finished(RotorTable("cuboid", rotor, known, moments), accuracy, start)
 
 
 def _finished(table: RotorTable, accuracy: Accuracy, start: float) -> RotorTable:

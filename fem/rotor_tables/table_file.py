@@ -1,14 +1,15 @@
 """A rotor table as one self-describing netCDF file."""
 
 import json
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import xarray as xr
 
-from ...geometry.basics import Array, shape_numbers, solid_of
-from ...geometry.bodies import Magnet
+from ...geometry.basics import Array, Part, Solid, moved, shape_numbers, solid_of
+from ...geometry.bodies import Magnet, part_of
 from ..harmonics import MultipoleExpansion
 from ..storage import described, read_checked, write_checked
 from .table import RotorTable
@@ -65,6 +66,7 @@ def to_dataset(table: RotorTable) -> xr.Dataset:
         "title": "Magnetic field of a rotor: closed forms of magnets plus solid-harmonic expansions",
         "model": table.model,
         "expansion_uses": json.dumps(list(causes)),  # "field", and the causes of doubt
+        "parts": json.dumps([[str(m.body.file), m.body.step] for m in magnets if isinstance(m.body, Part)]),
         "provenance": json.dumps(dict(table.provenance), sort_keys=True),
     }
     return described(variables, attrs)
@@ -78,16 +80,25 @@ def _closed_forms(table: RotorTable) -> list[Array]:
 
 def _padded(magnet: Magnet) -> Array:
     """The numbers (4,) of a magnet's shape, those that it has not as nan."""
-    numbers = shape_numbers(magnet.body)
+    numbers = np.zeros(0) if isinstance(magnet.body, Part) else shape_numbers(magnet.body)
     return np.pad(numbers, (0, 4 - len(numbers)), constant_values=np.nan)
+
+
+def _body(numbers: Array, parts: Iterator[list[str]], center: Array, rotation: Array) -> Solid:
+    """The body of a shape's numbers, or where there are none the next of the parts."""
+    if len(numbers):
+        return solid_of(numbers, center, rotation)
+    file, step = next(parts)
+    return moved(part_of(step, Path(file)), center, rotation)
 
 
 def from_dataset(dataset: xr.Dataset) -> RotorTable:
     """The table of a data set that `to_dataset` made."""
     data = {str(name): variable.values for name, variable in dataset.data_vars.items()}
+    parts = iter(json.loads(dataset.attrs["parts"]))
     names = ("shape", "center", "rotation", "polarization", "recoil_permeability", "transverse_permeability")
     magnets = tuple(
-        Magnet(solid_of(shape[~np.isnan(shape)], center, rotation), polarization, float(along), float(across))
+        Magnet(_body(shape[~np.isnan(shape)], parts, center, rotation), polarization, float(along), float(across))
         for shape, center, rotation, polarization, along, across in zip(
             *(data[f"magnet_{n}"] for n in names), strict=True
         )

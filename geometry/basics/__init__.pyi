@@ -3,6 +3,7 @@ from .box import Box as Box, rotation_matrix as rotation_matrix
 from .constants import MAGNET_CONDUCTIVITY as MAGNET_CONDUCTIVITY, MU_0 as MU_0
 from .cylinder import Cylinder as Cylinder
 from .errors import ComputationError as ComputationError, InputError as InputError, SpinlevError as SpinlevError
+from .part import Part as Part
 from .pose import Posed as Posed
 from .ring import Ring as Ring
 from .solid import (

@@ -1,5 +1,6 @@
 """Any body's shape and pose, and places around it."""
 
+import hashlib
 from dataclasses import replace
 
 import numpy as np
@@ -7,11 +8,12 @@ import numpy as np
 from .arrays import Array
 from .box import Box
 from .cylinder import Cylinder
+from .part import Part
 from .ring import Ring
 from .sphere import Sphere
 from .text import millimetres
 
-Solid = Box | Cylinder | Ring | Sphere
+Solid = Box | Cylinder | Part | Ring | Sphere
 """A body's shape and pose."""
 INSIDE = 1 - 1e-9
 """Just inside of a surface, in radii."""
@@ -31,7 +33,7 @@ def places_off(body: Solid, directions: Array, distance: float) -> Array:
 
 def within(body: Solid, points: Array) -> Array:
     """Points (n, 3) m of the elements of a round body, those just outside of its surface put just inside it."""
-    if isinstance(body, Box):
+    if isinstance(body, Box | Part):
         return points
     local = body.to_body(points)
     if isinstance(body, Sphere):
@@ -58,19 +60,22 @@ def moved(body: Solid, center: Array, rotation: Array | None = None) -> Solid:
 def shape_numbers(body: Solid) -> Array:
     """Numbers (n,) m that tell a body from another of its shape, but for its pose; how many of them tells the shape.
 
-    A cuboid has three, its edges; a sphere one; a cylinder two; a ring four.
+    A cuboid has three, its edges; a sphere one; a cylinder two; a ring four; a part eight, of its file's digest.
     """
     if isinstance(body, Box):
         return np.array(body.size)
     if isinstance(body, Sphere):
         return np.array([body.radius])
+    if isinstance(body, Part):
+        digest = hashlib.sha256(body.step.encode()).digest()
+        return np.frombuffer(digest, dtype="<u4").astype(float)
     if isinstance(body, Ring):
         return np.array([body.radius, body.inner_radius, body.height, 0.0])
     return np.array([body.radius, body.height])
 
 
 def solid_of(numbers: Array, center: Array, rotation: Array) -> Solid:
-    """The body of the numbers of `shape_numbers` in its place."""
+    """The body of the numbers of `shape_numbers` in its place; of a part they do not tell it."""
     if len(numbers) == 3:
         return Box(numbers, center, rotation)
     if len(numbers) == 1:
@@ -86,6 +91,8 @@ def described_size(body: Solid) -> str:
         return millimetres(body.size)
     if isinstance(body, Sphere):
         return f"sphere Ø {body.radius * 2e3:.4g} mm"
+    if isinstance(body, Part):
+        return f"{body.file.name} {millimetres(body.size)}"
     across = f"Ø {body.radius * 2e3:.4g}"
     if isinstance(body, Ring):
         across = f"ring {across} / {body.inner_radius * 2e3:.4g}"

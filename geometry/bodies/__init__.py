@@ -16,6 +16,7 @@ from .overlap import (
     sphere_overlap as sphere_overlap,
 )
 from .pieces import CONVERGENCE as CONVERGENCE, cut_magnets as cut_magnets
+from .step_file import part_of as part_of, read_part as read_part
 from .symmetry import (
     SAME_PLACE as SAME_PLACE,
     Symmetry as Symmetry,

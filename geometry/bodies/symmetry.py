@@ -10,7 +10,7 @@ from itertools import product
 
 import numpy as np
 
-from ..basics import Array, Box, Solid, Sphere, moved
+from ..basics import Array, Box, Part, Solid, Sphere, moved
 from .magnet import Magnet
 
 SAME_PLACE = 1e-9
@@ -84,6 +84,8 @@ def _same_body(body: Solid, other: Solid, flip: Array) -> bool:
     if isinstance(body, Box) and isinstance(other, Box):
         distance = np.linalg.norm((body.corners * flip)[:, None] - other.corners, axis=-1)
         return bool(distance.min(axis=1).max() <= allowed)
+    if isinstance(body, Part):
+        return False
     same = np.linalg.norm(body.center * flip - other.center) <= allowed
     same &= all(
         abs(getattr(body, key) - getattr(other, key)) <= allowed

@@ -14,9 +14,9 @@ import netgen.occ as occ
 import ngsolve as ng
 import numpy as np
 
-from ..basics import Array, Box, Solid, Sphere, frozen_array, moved
+from ..basics import Array, Box, Cylinder, Part, Ring, Solid, frozen_array, moved
 from ..bodies import Magnet, overlapping_magnets
-from .solids import occ_solid
+from .solids import occ_solid, part_edges
 
 LARGE = 100.0
 TINY = 1e-7
@@ -159,6 +159,7 @@ def _generate(
                 face.name = f"plane{axis}"
     if settings.hp_layers:
         _mark_singular(shape, bodies, unit)
+        _mark_parts(shape, bodies, unit)
     sizes = {"maxh": settings.air_size, "grading": settings.grading, "curvaturesafety": settings.curvature}
     mesh = ng.Mesh(occ.OCCGeometry(shape).GenerateMesh(**sizes, parallel_meshing=False))
     if settings.hp_layers:
@@ -180,6 +181,23 @@ def _mark_singular(shape: Any, bodies: Sequence[Solid], unit: float) -> None:
             vertex.hpref = 1
 
 
+def _mark_parts(shape: Any, bodies: Sequence[Solid], unit: float) -> None:
+    """Mark the edges of parts, and the points where three of them meet."""
+    sharp = [edge for body in bodies if isinstance(body, Part) for edge in part_edges(body, np.zeros(3), unit)]
+    for edge in shape.edges if sharp else ():
+        if edge.mass > TINY and _touched(_middle(edge), sharp):
+            edge.hpref = 1
+    for vertex in shape.vertices if sharp else ():
+        if _touched(np.array([vertex.p.x, vertex.p.y, vertex.p.z]), sharp) > 2:
+            vertex.hpref = 1
+
+
+def _touched(point: Array, edges: Sequence[Any]) -> int:
+    """On how many of the edges a point lies."""
+    place = occ.Vertex(occ.Pnt(*map(float, point)))
+    return sum(place.Distance(edge) < TINY for edge in edges)
+
+
 def _middle(edge: Any) -> Array:
     """The point (3,) in the middle of an edge, in the mesh's coordinates."""
     start, end = edge.parameter_interval
@@ -195,7 +213,7 @@ def _edge_directions(point: Array, bodies: Sequence[Solid], unit: float) -> list
             flush = np.abs(excess) < TINY * unit
             if excess.max() < TINY * unit and flush.sum() >= 2:
                 found += [body.rotation[:, axis] for axis in range(3) if np.delete(flush, axis).all()]
-        elif not isinstance(body, Sphere):
+        elif isinstance(body, Cylinder | Ring):
             found += _circle_directions(body, point * unit, TINY * unit)
     return found
 

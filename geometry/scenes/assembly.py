@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from pydantic import ValidationError
 
-from ..basics import Array, Box, rotation_matrix
+from ..basics import Array, Box, InputError, rotation_matrix
 from ..bodies import Conductor, Magnet, horizontal, tilt, vertical
 from .contents import AbsoluteStart, Drag, Floater, Lowering, OffsetStart, Plate, Scene
 from .faults import SceneError, describe_fault, overlap_faults
@@ -25,7 +25,7 @@ from .schema import (
     TiltRotor,
     VerticalRotor,
 )
-from .shapes import ARTICLE_SIZES, MILLI, shape_faults, solid
+from .shapes import ARTICLE_SIZES, MILLI, part, shape_faults, solid
 
 
 def assemble(keys: Mapping[str, Any], source: str) -> Scene:
@@ -42,7 +42,10 @@ def assemble(keys: Mapping[str, Any], source: str) -> Scene:
     faults = _start_faults(table.start) + _drag_faults(table.drag) + _shape_faults(table.rotor)
     if faults:
         raise SceneError(source, faults)
-    scene = _scene(table, Path(source).parent)
+    try:
+        scene = _scene(table, Path(source).parent)
+    except InputError as error:  # a file of a magnet
+        raise SceneError(source, [str(error)]) from None
     faults = overlap_faults(scene)
     if faults:
         raise SceneError(source, faults)
@@ -99,7 +102,7 @@ def _scene(table: SceneSection, folder: Path) -> Scene:
     return Scene(
         frequency=table.frequency_hz,
         gravity=np.array(table.gravity_m_s2),
-        rotor=_rotor(table.rotor),
+        rotor=_rotor(table.rotor, folder),
         floater=floater,
         plate=_plate(table.plate) if table.plate else None,
         drag=_drag(drag, floater.radius),
@@ -125,15 +128,16 @@ def _metres(millimetres: list[float]) -> Array:
     return np.array(millimetres) * MILLI
 
 
-def _rotor(rotor: Rotor) -> tuple[Magnet, ...]:
+def _rotor(rotor: Rotor, folder: Path) -> tuple[Magnet, ...]:
     if isinstance(rotor, ExplicitRotor):
-        return tuple(_magnet(magnet, rotor.conductivity_S_m) for magnet in rotor.magnets)
+        return tuple(_magnet(magnet, rotor.conductivity_S_m, folder) for magnet in rotor.magnets)
     return tuple(replace(magnet, conductivity=rotor.conductivity_S_m) for magnet in _of_article(rotor))
 
 
-def _magnet(magnet: MagnetSection, conductivity: float | None) -> Magnet:
+def _magnet(magnet: MagnetSection, conductivity: float | None, folder: Path) -> Magnet:
     """One of an explicit rotor; `conductivity` where it has none of its own."""
-    body = solid(magnet, magnet.center_mm, magnet.rotation_deg)
+    pose = magnet.center_mm, magnet.rotation_deg
+    body = part(folder / magnet.file, *pose) if magnet.file else solid(magnet, *pose)
     along, across = magnet.recoil_permeability
     own = magnet.conductivity_S_m
     return Magnet(body, np.array(magnet.polarization_T), along, across, conductivity if own is None else own)

@@ -108,6 +108,7 @@ class TiltRotor(_ArticleRotor):
 class MagnetSection(ShapeSection):
     """One magnet of an explicit rotor; its polarisation is along the body's axes and turns with it."""
 
+    file: Annotated[str, Field(min_length=1)] | None = None
     center_mm: Coordinates
     rotation_deg: Angles = [0.0, 0.0, 0.0]
     polarization_T: Polarizations

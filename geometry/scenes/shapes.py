@@ -1,11 +1,14 @@
 """From the keys of a shape to the body, and back."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from ..basics import Box, Cylinder, Ring, Solid, Sphere, rotation_matrix
+from ..basics import Box, Cylinder, Part, Ring, Solid, Sphere, rotation_matrix
+from ..bodies import read_part
 from .schema import SIZES
 
 MILLI = 1e-3
@@ -16,8 +19,14 @@ KEYS = ("size_mm", "edge_mm", "diameter_mm", "inner_diameter_mm", "height_mm")
 
 def shape_faults(place: str, table: Any, sizes: Mapping[str, tuple[str, ...]]) -> list[str]:
     """What is wrong with the keys of a shape at a place of the scene file."""
+    if getattr(table, "file", None):
+        sizes = {"cuboid": ()}
+        if table.shape not in sizes:
+            return [f"Input {place}.shape must be left out beside file; instead received {table.shape!r}."]
     given = tuple(key for key in KEYS if getattr(table, key, None) is not None)
     wanted = sizes[table.shape]
+    if set(given) != set(wanted) and not wanted:
+        return [f"Input {place} must have no size beside file; instead received {' and '.join(given)}."]
     if set(given) != set(wanted):
         return [
             f"Input {place} must have {' and '.join(wanted)}, as the shape is {table.shape!r}; "
@@ -46,10 +55,18 @@ def solid(
     return Ring(radius, table.inner_diameter_mm * MILLI / 2, table.height_mm * MILLI, *pose)
 
 
+def part(file: Path, center_mm: Sequence[float], rotation_deg: Sequence[float]) -> Part:
+    """The solid of a STEP file, its own origin in a place. Raises InputError where the file holds no such."""
+    found, turn = read_part(file), rotation_matrix(rotation_deg)
+    return replace(found, center=np.array(center_mm) * MILLI - turn @ found.origin, rotation=turn)
+
+
 def shape_keys(body: Solid) -> dict[str, Any]:
     """The keys of a body's shape in SI units of the body, but for its pose; a cuboid's is left out."""
     if isinstance(body, Box):
         return {"size_mm": body.size}
+    if isinstance(body, Part):
+        return {"file": str(body.file)}
     if isinstance(body, Sphere):
         return {"shape": "sphere", "diameter_mm": 2 * body.radius}
     known: dict[str, Any] = {"diameter_mm": 2 * body.radius, "height_mm": body.height}

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from ..basics import Array, Box, Ring, Solid, moved, shape_numbers
+from ..basics import Array, Box, Part, Ring, Solid, moved, shape_numbers
 from ..bodies import Conductor, Magnet, horizontal, tilt, vertical
 from .assembly import assemble
 from .contents import AbsoluteStart, Drag, OffsetStart, Plate, Scene
@@ -90,7 +90,7 @@ def _rotor(rotor: tuple[Magnet, ...]) -> dict[str, Any]:
     }
     for (configuration, key, value), like in known.items():
         alike = len(like) == len(rotor) and len({magnet.conductivity for magnet in rotor}) == 1
-        alike &= not (isinstance(body, Box) and np.ptp(body.size)) and not isinstance(body, Ring)
+        alike &= not (isinstance(body, Box) and np.ptp(body.size)) and not isinstance(body, Ring | Part)
         if alike and all(map(_same, like, rotor)) and value >= (0 if key != "angle_deg" else -90):
             return {
                 "configuration": configuration,
@@ -130,11 +130,16 @@ def _parts(magnet: Magnet) -> Array:
 def _magnet(magnet: Magnet) -> dict[str, Any]:
     return {
         **_shape(magnet.body),
-        **_pose(magnet.body),
+        **_pose(_at_its_origin(magnet.body)),
         "polarization_T": _numbers(magnet.polarization),
         "recoil_permeability": _permeability(magnet),
         **_conductivity(magnet),
     }
+
+
+def _at_its_origin(body: Solid) -> Solid:
+    """A part with the origin of its file for its middle, as a scene file places it."""
+    return moved(body, body.center + body.rotation @ body.origin) if isinstance(body, Part) else body
 
 
 def _conductivity(magnet: Magnet) -> dict[str, float]:

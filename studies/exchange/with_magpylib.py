@@ -7,7 +7,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from ...fem.rotor_tables import RotorTable
-from ...geometry.basics import MU_0, Array, Cylinder, InputError, Ring, Solid, Sphere
+from ...geometry.basics import MU_0, Array, Cylinder, InputError, Part, Ring, Solid, Sphere
 from ...geometry.scenes import magnets
 
 
@@ -113,6 +113,8 @@ def to_magpylib(table: RotorTable) -> Any:
 
 
 def _source(body: Solid, pose: dict[str, Any]) -> Any:
+    if isinstance(body, Part):
+        raise InputError("Input table must have no part from a file among its closed forms; instead it has one.")
     if isinstance(body, Sphere):
         return magpylib.magnet.Sphere(diameter=2 * body.radius, **pose)
     if isinstance(body, Ring):

@@ -8,7 +8,7 @@ import numpy as np
 from ...dynamics.flights import GROWING, STABLE, Trajectory, flight_kind
 from ...dynamics.motion import PlateMemory
 from ...dynamics.steady import Equilibrium
-from ...fem.rotor_tables import FieldTable, RotorTable, field_anywhere
+from ...fem.rotor_tables import FieldTable, RotorTable, field_anywhere, refuse_edges
 from ...geometry.basics import MU_0, Array
 from ..results import EQUILIBRIUM_FIELDS
 from .effects import effects_answer
@@ -17,6 +17,8 @@ from .levitation import Levitation
 
 def field_answer(table: FieldTable, points: Array) -> dict[str, Any]:
     """B, its gradient and their estimated errors at points (n, 3) m."""
+    if isinstance(table, RotorTable) and table.model in ("cuboid", "fem"):
+        refuse_edges(table.magnets, points)
     if isinstance(table, RotorTable) and not table.in_range(points).all():
         return _near_answer(table, points)
     b, gradient = table.evaluate(points)

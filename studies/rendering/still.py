@@ -6,7 +6,7 @@ import numpy as np
 import pyvista as pv
 from vtkmodules.vtkCommonCore import vtkLogger
 
-from ...geometry.basics import Array, Box, Ring, Solid, Sphere
+from ...geometry.basics import Array, Box, Part, Ring, Solid, Sphere
 from ...geometry.scenes import Scene
 from .field_lines import add_field
 from .marks import MILLI, add_path, add_turning, beside_the_rotor, corners_mm
@@ -154,6 +154,10 @@ def _surface(body: Solid) -> pv.DataSet:
     """A body's surface, mm."""
     if isinstance(body, Box):
         return _box(body)
+    if isinstance(body, Part):
+        corners = body.triangles.reshape(-1, 3) / MILLI
+        faces = np.arange(len(corners)).reshape(-1, 3)
+        return _posed(pv.PolyData.from_regular_faces(corners, faces), body)
     radius = body.radius / MILLI
     if isinstance(body, Sphere):
         return _posed(pv.Sphere(radius=radius, theta_resolution=ROUND, phi_resolution=ROUND), body)

@@ -1,0 +1,128 @@
+"""Magnets from STEP files: beside the same shape by key, and what no magnet can be made of."""
+
+from pathlib import Path
+
+import netgen.occ as occ
+import numpy as np
+import pytest
+
+from spinlev.fem.rotor_tables import rotor_table
+from spinlev.fem.rotor_tables.accuracy import error_points
+from spinlev.fem.rotor_tables.table_file import load_table, save_table
+from spinlev.geometry.basics import Box, Cylinder, moved, rotation_matrix
+from spinlev.geometry.bodies import Magnet, overlapping_magnets, read_part
+from spinlev.geometry.scenes import SceneError, magnets, parse_scene, scene, scene_text, sphere
+
+BALL = sphere(diameter_mm=12.7, remanence_T=1.305, density_kg_m3=7500.0)
+TURN = rotation_matrix((25.0, -40.0, 10.0))
+NEAREST = 6e-3
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    path = tmp_path_factory.mktemp("parts")
+    occ.Cylinder(occ.Pnt(1, 2, 0), occ.Z, r=5, h=8).WriteStep(str(path / "cylinder.step"))
+    occ.Box(occ.Pnt(-5, -5, -5), occ.Pnt(5, 5, 5)).WriteStep(str(path / "cube.step"))
+    occ.Cylinder(occ.Pnt(0, 0, 0), occ.Z, r=5, h=8).faces[0].WriteStep(str(path / "open.step"))
+    two = [occ.Box(occ.Pnt(0, 0, z), occ.Pnt(1, 1, z + 1)) for z in (0, 3)]
+    occ.Compound(two).WriteStep(str(path / "two.step"))
+    (path / "empty.step").write_text("")
+    (path / "text.step").write_text("solid of revolution")
+    return path
+
+
+def worst(one, other, magnet):
+    points, scale = error_points((magnet,), NEAREST)
+    apart = np.linalg.norm(one.evaluate(points)[0] - other.evaluate(points)[0], axis=1)
+    return np.max(apart / scale), np.max((one.absolute_error(points)[0] + other.absolute_error(points)[0]) / scale)
+
+
+def placed(path, turn):
+    part = read_part(path)
+    return moved(part, np.array([1e-3, 0.0, 2e-3]), turn)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("name", "body"), [("cylinder", Cylinder(5e-3, 8e-3)), ("cube", Box((0.01,) * 3))])
+def test_a_rigid_part_has_the_field_of_the_same_shape_by_key(folder, name, body):
+    """μr = 1: moments of the file's solid against the closed form, 1e-6 of B from 6 mm off the faces on."""
+    part = placed(folder / f"{name}.step", TURN)
+    known = moved(body, part.center, TURN)
+    magnet, other = (Magnet(b, (1.2, 0.0, 0.5)) for b in (part, known))
+    assert part.volume == pytest.approx(body.volume, rel=1e-9)
+    tables = [rotor_table((m,), model, 5e-7, NEAREST) for m, model in ((magnet, "fem"), (other, "cuboid"))]
+    assert worst(*tables, other)[0] < 1e-6
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("name", "body", "rtol"), [("cylinder", Cylinder(5e-3, 8e-3), 3e-6), ("cube", Box((0.01,) * 3), 3e-5)]
+)
+def test_a_permeable_part_agrees_with_the_same_shape_within_the_stated_errors(folder, name, body, rtol):
+    """No closed form is split off of a part, so that the corners of the cube cost more: 1.3e-5 is reached."""
+    part = placed(folder / f"{name}.step", TURN)
+    pair = [Magnet(b, (1.2, 0.0, 0.5), 1.05) for b in (part, moved(body, part.center, TURN))]
+    tables = [rotor_table((magnet,), "fem", rtol, NEAREST) for magnet in pair]
+    apart, stated = worst(*tables, pair[1])
+    assert apart < min(stated, 1.5 * rtol)
+
+
+def test_distances_are_those_of_the_solid(folder):
+    part, cube = read_part(folder / "cube.step"), Box((0.01,) * 3)
+    points = np.random.default_rng(0).uniform(-0.01, 0.01, (500, 3))
+    assert part.distance(points) == pytest.approx(cube.distance(points), abs=1e-12)
+    assert part.reach(np.eye(3)) == pytest.approx([5e-3] * 3)
+    beside = Magnet(Box((0.01,) * 3, (9.5e-3, 0, 0)), (1, 0, 0))
+    ((_, _, depth),) = overlapping_magnets([Magnet(part, (1, 0, 0)), beside])
+    assert depth == pytest.approx(0.5e-3)
+
+
+def test_a_scene_with_a_part_is_written_and_read_with_its_place(folder):
+    rotor = magnets(
+        {
+            "file": str(folder / "cylinder.step"),
+            "center_mm": [0.0, 0.0, 1.0],
+            "rotation_deg": [90.0, 0.0, 0.0],
+            "polarization_T": [1.2, 0.0, 0.0],
+        }
+    )
+    made = scene(frequency_hz=100.0, rotor=rotor, floater=BALL)
+    # the file's axis is at (1, 2), from z = 0 to 8; turned about x its middle is at (1, -4, 2), and then 1 higher
+    assert made.rotor[0].body.center == pytest.approx([1e-3, -4e-3, 3e-3])
+    again = parse_scene(scene_text(made))
+    assert again.rotor[0].body.center == pytest.approx(made.rotor[0].body.center)
+    assert "cylinder.step" in repr(again)
+
+
+def test_a_table_with_a_part_needs_its_file_no_more(folder, tmp_path):
+    table = rotor_table((Magnet(read_part(folder / "cube.step"), (1.0, 0.0, 0.0)),), "dipole")
+    save_table(table, tmp_path / "table.nc")
+    again = load_table(tmp_path / "table.nc")
+    assert np.array_equal(again.moment, table.moment)
+    assert again.magnets[0].body.volume == pytest.approx(1e-6)
+    assert again.magnets[0].body.file == Path(folder / "cube.step")
+
+
+@pytest.mark.parametrize(
+    ("keys", "said"),
+    [
+        ({"file": "open.step"}, "must hold one closed solid; instead .*open.step holds none, and 1 open faces"),
+        ({"file": "empty.step"}, "must be a STEP file; instead .*empty.step is empty"),
+        ({"file": "none.step"}, "must be a STEP file; instead there is no .*none.step"),
+        ({"file": "text.step"}, "must be a STEP file; instead .*text.step does not begin with ISO-10303-21"),
+        ({"file": "two.step"}, "must hold one closed solid; instead .*two.step holds 2 solids"),
+        ({"file": "cube.step", "shape": "sphere"}, "shape must be left out beside file; instead received 'sphere'"),
+        ({"file": "cube.step", "size_mm": [1.0, 1.0, 1.0]}, "must have no size beside file; instead received size_mm"),
+    ],
+)
+def test_what_is_no_part_is_told(folder, keys, said):
+    keys = {**keys, "file": str(folder / keys["file"]), "center_mm": [0.0, 0.0, 0.0], "polarization_T": [1.0, 0.0, 0.0]}
+    with pytest.raises(SceneError, match=said) as caught:
+        scene(frequency_hz=100.0, rotor=magnets(keys), floater=BALL)
+    assert len(caught.value.faults) == 1
+
+
+def test_a_rigid_part_has_the_moment_of_its_shape(folder):
+    part = read_part(folder / "cylinder.step")
+    table = rotor_table((Magnet(part, (1.2, 0.0, 0.5)),), "dipole")
+    assert table.moment == pytest.approx(Magnet(Cylinder(5e-3, 8e-3), (1.2, 0.0, 0.5)).moment, rel=1e-6, abs=1e-9)
