@@ -175,7 +175,8 @@ class RotorTable:
         outside = np.ones(columns.shape[1], bool)
         for magnet in self.magnets:
             near = squared_distance(columns, magnet.box.center) < magnet.box.circumradius**2
-            outside[near] &= magnet.box.distance(columns[:, near].T) >= 0
+            if near.any():
+                outside[near] &= magnet.box.distance(columns[:, near].T) >= 0
         for expansion in self.expansions:
             if expansion.nearest:
                 outside &= squared_distance(columns, expansion.center) > expansion.nearest**2
