@@ -42,11 +42,11 @@ types: install
 test: lint types
 	$(BIN)/pytest -n 2 --dist worksteal -m "not slow"
 
-# Report and documentation in headless Chromium (Debian: apt-get install chromium); skipped where there is none.
-# The gallery's programs are not run for it: the pages are then without their output.
+# Report, documentation and the live page in headless Chromium (Debian: apt-get install chromium); skipped where there is none.
+# The gallery's programs are not run for it: the pages are then without their output. It says how fast a slider is.
 test-browser: install
 	$(BIN)/sphinx-build --quiet -D plot_gallery=0 -b html docs docs/_build/html
-	$(BIN)/pytest tests/whole/test_browser.py
+	$(BIN)/pytest -s tests/whole/test_browser.py tests/whole/test_explore_browser.py
 
 # Lines that the fast tests run, in child processes too; what a killed process has left of its own count is removed.
 coverage: install
@@ -93,7 +93,7 @@ dist: install
 
 # Pin anew (needs pip-tools in the environment that calls it).
 lock:
-	pip-compile --quiet --extra dev --generate-hashes --allow-unsafe --strip-extras --no-emit-index-url \
+	pip-compile --quiet --extra dev --extra explore --generate-hashes --allow-unsafe --strip-extras --no-emit-index-url \
 	  --no-emit-trusted-host --no-emit-find-links --output-file requirements.txt pyproject.toml
 
 clean:

@@ -52,15 +52,20 @@ def needed_by(text):
 def page():
     """The whole page."""
     run, _, rest = (ROOT / "pyproject.toml").read_text("utf-8").partition("[project.optional-dependencies]")
-    run, dev = reasons(run.partition("dependencies = [")[2]), reasons(rest.partition("[project.scripts]")[0])
+    extra, _, dev = rest.partition("[project.scripts]")[0].partition("\ndev = [")
+    run, extra, dev = reasons(run.partition("dependencies = [")[2]), reasons(extra), reasons(dev)
     pinned = needed_by((ROOT / "requirements.txt").read_text("utf-8"))
     lines = [HEAD]
-    for title, names in (("To run", run), ("To develop", dev)):
+    for title, names in (
+        ("To run", run),
+        ("For the page in the browser (`spinlev[explore]`)", extra),
+        ("To develop", dev),
+    ):
         lines += [f"## {title}", "", "| package | for | licence |", "| --- | --- | --- |"]
         lines += [f"| {name} | {reason} | {licence(name)} |" for name, reason in names.items()]
         lines += [""]
     lines += ["## What these need", "", "| package | needed by | licence |", "| --- | --- | --- |"]
-    others = sorted(set(pinned) - set(run) - set(dev))
+    others = sorted(set(pinned) - set(run) - set(extra) - set(dev))
     lines += [f"| {name} | {', '.join(pinned[name])} | {licence(name)} |" for name in others]
     return "\n".join(lines) + "\n"
 

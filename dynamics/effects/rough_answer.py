@@ -26,7 +26,7 @@ def rough_force(
         distance = np.linalg.norm(offset, axis=1)
         along = offset @ direction / distance
         square = (MU_0 / (4 * np.pi) * floater.moment / distance**3) ** 2 * (1 + 3 * along**2)
-        energy -= _polarizability(magnet.box.volume, 1 + magnet.contrast) / 2 * square
+        energy -= _polarizability(magnet.body.volume, 1 + magnet.contrast) / 2 * square
     return np.asarray((energy[3:] - energy[:3]) / (2 * step))
 
 

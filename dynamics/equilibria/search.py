@@ -38,7 +38,7 @@ class SearchRange:
         bound, height = self.bound + margin, position[:, 2]
         inside = (-bound <= height) & (height <= margin) & (np.hypot(position[:, 0], position[:, 1]) <= bound)
         for magnet in self.scene.rotor:
-            inside &= magnet.box.distance(position * radius) > (1 - margin) * radius
+            inside &= magnet.body.distance(position * radius) > (1 - margin) * radius
         return np.asarray(inside)
 
     def starts(self) -> tuple[Array, Array]:

@@ -13,14 +13,16 @@ from .checkpoint import Checkpoint as Checkpoint
 from .compiled_flight import TOLERANCE as TOLERANCE
 from .integration import fly_on as fly_on
 from .kind import GROWING as GROWING, STABLE as STABLE, flight_kind as flight_kind
-from .ledger import booked as booked, ledger_scale as ledger_scale
+from .live import LiveFlight as LiveFlight, Piece as Piece
 from .local_flight import LocalFlight as LocalFlight
 from .pieces import (
     MOST_SAMPLES as MOST_SAMPLES,
     IntegrationError as IntegrationError,
     Log as Log,
+    booked as booked,
     first_interval as first_interval,
     flown as flown,
+    ledger_scale as ledger_scale,
 )
 from .recorder import Recorder as Recorder
 from .simulation import (

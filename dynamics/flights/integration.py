@@ -14,9 +14,8 @@ from ..motion import Parameter, State, lost_distance, plate_legs
 from .ball_parts import LEFT
 from .checkpoint import Checkpoint, Progress
 from .compiled_flight import Flight
-from .ledger import booked, ledger_scale
 from .local_flight import LocalFlight
-from .pieces import MOST_SAMPLES, Log, first_interval, flown, fly_piece
+from .pieces import MOST_SAMPLES, Log, booked, first_interval, flown, fly_piece, ledger_scale
 from .recorder import Recorder
 from .trajectory import DURATION, STOPPED, FieldChanges, FlightStopped, Trajectory
 
@@ -49,11 +48,11 @@ def integrate(
     IntegrationError : the state became infinite
     """
     scales, log, began = flight.scales, Log(), perf_counter()
-    values = _begin(flight, start, np.zeros(0) if currents is None else currents, log)
+    values = begun(flight, start, np.zeros(0) if currents is None else currents, log)
     interval = first_interval(scene, duration)
-    begun = flight.part(values).integrator.state
-    first = booked(scene, flight.part(values), values, np.zeros(1), begun[None])
-    scale = ledger_scale(scene, flight.part(values), values, begun)
+    at_first = flight.part(values).integrator.state
+    first = booked(scene, flight.part(values), values, np.zeros(1), at_first[None])
+    scale = ledger_scale(scene, flight.part(values), values, at_first)
     recorder = Recorder(first[0], interval, MOST_SAMPLES)
     known = checkpoint.read() if checkpoint else None
     if known is not None:
@@ -73,7 +72,7 @@ def integrate(
     return found
 
 
-def _begin(flight: Flight | LocalFlight, start: State, currents: Array, log: Log) -> Array:
+def begun(flight: Flight | LocalFlight, start: State, currents: Array, log: Log) -> Array:
     """Set the integrator to the start; the runtime parameters with the distance at which the floater is lost."""
     values = flight.values.copy()
     values[Parameter.LOST_DISTANCE] = lost_distance(start.position) / flight.scales.length

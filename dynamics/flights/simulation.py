@@ -125,7 +125,10 @@ def starting_point(equilibria: Sequence[Equilibrium]) -> Equilibrium | None:
 
 
 def most_like_levitation(equilibria: Sequence[Equilibrium]) -> Equilibrium | None:
-    """Where a flight begins, or, where none may, the equilibrium whose small motions grow least; None without any."""
+    """Where a flight begins, or, where none may, the equilibrium whose small motions grow least; None without any.
+
+    A brake undoes those near the rotor the most.
+    """
     return starting_point(equilibria) or min(equilibria, key=lambda e: e.growth_per_s, default=None)
 
 

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 from ...fem.closed_forms import carrier
 from ...fem.rotor_losses import check_slow_enough, pieces_of
 from ...fem.rotor_tables import RotorTable, rotor_table
-from ...geometry.basics import Array, Box
+from ...geometry.basics import Array, moved
 from ...geometry.bodies import Magnet
 from ...geometry.scenes import Scene
 from ..branches import Problem
@@ -160,4 +160,4 @@ def _unmoved(magnet: Magnet, move: Move | None) -> Magnet:
     """The magnet where its measure is zero: on the axis' origin, its axes along the rotor's."""
     if move is None:
         return magnet
-    return replace(magnet, box=Box(magnet.box.size))
+    return replace(magnet, body=moved(magnet.body, np.zeros(3), np.eye(3)))

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any, Protocol
 
 import heyoka as hy
@@ -9,7 +10,8 @@ import numpy as np
 
 from ...fem.harmonics import FieldExpressions
 from ...fem.rotor_tables import FieldFormula
-from ...geometry.basics import Array, rotation_matrix
+from ...fem.storage import compiled
+from ...geometry.basics import Array, moved, rotation_matrix
 from ...geometry.bodies import Magnet
 from ..motion import Parameter, Vector
 
@@ -46,7 +48,7 @@ class Translation:
     def moved(self, magnet: Magnet, measure: float) -> Magnet:
         """The magnet, from where it is at measure zero."""
         center = magnet.box.center + self.way_of(measure)
-        return replace(magnet, box=replace(magnet.box, center=center))
+        return replace(magnet, body=moved(magnet.body, center))
 
     def place(self, position: Sequence[Scalar], measure: Scalar) -> list[Scalar]:
         """A position (3) m in the part's own frame."""
@@ -66,7 +68,7 @@ class Rotation:
     def moved(self, magnet: Magnet, measure: float) -> Magnet:
         """The magnet, from where it is at measure zero."""
         turn, box = rotation_matrix((0.0, -np.degrees(measure), 0.0)), magnet.box
-        return replace(magnet, box=replace(box, center=turn @ box.center, rotation=turn @ box.rotation))
+        return replace(magnet, body=moved(magnet.body, turn @ box.center, turn @ box.rotation))
 
     def into(self, vector: Sequence[Scalar], measure: Scalar) -> list[Scalar]:
         """A vector (3) along the axes of the part's own frame."""
@@ -120,3 +122,19 @@ class MovableField:
             [hy.sum([b[i] for b, _ in found]) for i in range(3)],
             [[hy.sum([g[i][j] for _, g in found]) for j in range(3)] for i in range(3)],
         )
+
+    @cached_property
+    def _function(self) -> Any:
+        variables = hy.make_vars("x", "y", "z")
+        field, gradient = self.expressions(variables)
+        return compiled(hy.cfunc, [*field, *(g for row in gradient for g in row)], variables)
+
+    def evaluate(self, points: Array, measure: float) -> tuple[Array, Array]:
+        """B (n, 3) T and ∂B_i/∂x_j (n, 3, 3) T/m at points (n, 3) m, compiled once for all measures.
+
+        Nobody asks whether the points lie inside a magnet.
+        """
+        values = np.zeros((len(Parameter), len(points)))
+        values[Parameter.MEASURE] = measure
+        rows = self._function(np.ascontiguousarray(points.T), pars=values[: self._function.nparams])
+        return rows[:3].T, np.moveaxis(rows[3:].reshape(3, 3, -1), -1, 0)

@@ -7,9 +7,11 @@ from .bodies import (
 )
 from .closed_moments import (
     added_by_closed_form as added_by_closed_form,
+    by_cells as by_cells,
     carrier as carrier,
     closed_part as closed_part,
     first_order_moments as first_order_moments,
+    uniform_cells as uniform_cells,
 )
 from .demagnetization import remanent_field as remanent_field
 from .quadrature import oblique_contact as oblique_contact, volume_rule as volume_rule

@@ -21,7 +21,7 @@ def fields_of_magnets(magnets: Sequence[Magnet], points: Array) -> Fields:
     h = remanent_field(magnets, points) / MU_0
     magnetization = np.zeros_like(h)
     for magnet in magnets:
-        inside = magnet.box.distance(points) <= 0
+        inside = magnet.body.distance(points) <= 0
         magnetization[inside] = magnet.polarization_in_rotor / MU_0
         magnetization[inside] += h[inside] @ (magnet.permeability_in_rotor - np.eye(3)).T
     return h, magnetization

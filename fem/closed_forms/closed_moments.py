@@ -12,14 +12,16 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ...geometry.basics import Array, Box
-from ...geometry.bodies import Magnet
-from ..harmonics import Coefficients, curvature_moments, moments_of_magnetization, uniform_moments
-from .demagnetization import demagnetizing_tensor, remanent_potential
+from ...geometry.basics import Array, Box, Solid, Sphere, moved
+from ...geometry.bodies import Cells, Magnet, cells_of
+from ..harmonics import Coefficients, MultipoleExpansion, curvature_moments, moments_of_magnetization, uniform_moments
+from .demagnetization import demagnetizing_tensor, remanent_field, remanent_potential
 from .quadrature import enough_nodes, face_rule, oblique_contact, volume_rule
 
 NODES = 6
 """Of the rule for N, which need not be exact: elements and moments make up for it."""
+CELL_NODES, CELL_DEGREE = 28, 40
+"""Of the rule over a body of several cells, where high degrees only place the sum of its cells' fields; and degree."""
 OBLIQUE_NODES, OBLIQUE_NODES_ANISOTROPIC = (96, 128), (40, 64)
 """Of the rules for boxes that touch without being parallel, over faces, and in volumes where faces do not suffice.
 
@@ -30,15 +32,15 @@ def carrier(magnet: Magnet) -> Magnet:
     """The magnet with μr = 1 and the mean polarisation J'; the magnet itself if its permeability is 1."""
     if not magnet.contrast:
         return magnet
-    turn = magnet.box.rotation
+    turn = magnet.body.rotation
     susceptibility = turn.T @ (magnet.permeability_in_rotor - np.eye(3)) @ turn
-    polarization = np.linalg.solve(np.eye(3) + susceptibility @ _mean_tensor(magnet.box), magnet.polarization)
-    return Magnet(magnet.box, np.asarray(polarization, float))
+    polarization = np.linalg.solve(np.eye(3) + susceptibility @ _mean_tensor(magnet.body), magnet.polarization)
+    return Magnet(magnet.body, np.asarray(polarization, float))
 
 
-def _mean_tensor(box: Box) -> Array:
+def _mean_tensor(body: Solid) -> Array:
     """Mean demagnetising tensor N (3, 3) in body axes, of trace 1: mean H = -N J."""
-    upright = Box(box.size)
+    upright = moved(body, np.zeros(3), np.eye(3))
     points, weights = volume_rule(upright, (), NODES)
     diagonal = -np.einsum("n,nii->i", weights, demagnetizing_tensor(upright, points))
     return np.diag(diagonal / diagonal.sum())
@@ -47,8 +49,11 @@ def _mean_tensor(box: Box) -> Array:
 def induced_moments(body: Magnet, sources: Sequence[Magnet], degree: int, nodes: int | None = None) -> Coefficients:
     """Coefficients (T) of (μ - 1) H0 in a body, about its centre with radius its circumradius.
 
-    Accuracy with the default number of nodes: round-off for boxes whose axes are parallel or that do not touch.
+    Accuracy with the default number of nodes: round-off for boxes whose axes are parallel or that do not touch, and for
+    bodies that do not touch.
     """
+    if not all(isinstance(part.body, Box) for part in (body, *sources)):
+        return cell_moments(body, np.zeros(3), sources, degree, cells_of(body.body, np.inf), nodes)[0]
     box, nodes = body.box, nodes or enough_nodes(degree)
     others = [source.box for source in sources]
     points, areas = face_rule(box, others, nodes)
@@ -61,6 +66,47 @@ def induced_moments(body: Magnet, sources: Sequence[Magnet], degree: int, nodes:
         source = weights * remanent_potential(sources, points)
         result += curvature_moments(points, source, susceptibility, *sphere, degree)
     return result
+
+
+def cell_moments(
+    body: Magnet, rest: Array, sources: Sequence[Magnet], degree: int, cells: Cells, nodes: int | None = None
+) -> list[Coefficients]:
+    """Coefficients (T) of (μ - 1) H0 and of a uniform `rest` (3,) T in body axes, of every cell of any body.
+
+    By integrals over the volume, graded towards edges and faces.
+    """
+    others = [source.body for source in sources]
+    enough = enough_nodes(degree) if len(cells.radii) == 1 else CELL_NODES
+    points, weights = volume_rule(body.body, others, nodes or enough)
+    susceptibility = body.permeability_in_rotor - np.eye(3)
+    field = remanent_field(sources, points) @ susceptibility + body.body.rotation @ rest
+    return by_cells(points, weights, field, cells, degree)
+
+
+def by_cells(points: Array, weights: Array, field: Array, cells: Cells, degree: int) -> list[Coefficients]:
+    """Coefficients (T) of every cell, of a magnetisation (n, 3) T at points (n, 3) m with weights (n,) m³."""
+    owner = cells.which(points)
+    return [
+        moments_of_magnetization(points[mine], weights[mine], field[mine], center, float(radius), degree)
+        for k, (center, radius) in enumerate(zip(cells.centers, cells.radii, strict=True))
+        for mine in (owner == k,)
+    ]
+
+
+def uniform_cells(magnet: Magnet, nearest: float) -> list[MultipoleExpansion]:
+    """The remanent polarisation of a round magnet (μr = 1) as expansions that converge from `nearest` (m) on.
+
+    With `CELL_DEGREE`, to 1e-6 of the field there; a sphere is one dipole.
+    """
+    if isinstance(magnet.body, Sphere):
+        return [uniform_moments(magnet, 1)]
+    cells = cells_of(magnet.body, nearest)
+    if len(cells.radii) == 1:
+        return [uniform_moments(magnet, CELL_DEGREE)]
+    points, weights = volume_rule(magnet.body, (), CELL_NODES)
+    field = np.broadcast_to(magnet.polarization_in_rotor, points.shape)
+    found = by_cells(points, weights, field, cells, CELL_DEGREE)
+    return [MultipoleExpansion(c, float(r), part) for c, r, part in zip(cells.centers, cells.radii, found, strict=True)]
 
 
 def closed_moments(
@@ -82,23 +128,39 @@ def added_by_closed_form(
     carriers: Sequence[Magnet],
     degree: int,
     nodes: int | None = None,
+    cells: Sequence[Cells] | None = None,
 ) -> list[Coefficients]:
-    """Moments of every piece that need no elements: (μ - 1) H0 + J - J' of the carriers' closed form H0."""
+    """Moments of every cell of every piece that need no elements: (μ - 1) H0 + J - J' of the carriers' H0.
+
+    Without `cells` every piece is one.
+    """
     rests = [whole.polarization - carried.polarization for whole, carried in zip(magnets, carriers, strict=True)]
-    return [
-        closed_moments(piece, rest, carriers, degree, nodes)
-        for pieces, rest in zip(cut, rests, strict=True)
-        for piece in pieces
-    ]
+    pieces = [(piece, rest) for whole, rest in zip(cut, rests, strict=True) for piece in whole]
+    known = cells or [cells_of(piece.body, np.inf) for piece, _ in pieces]
+    found: list[Coefficients] = []
+    for (piece, rest), own in zip(pieces, known, strict=True):
+        if all(isinstance(part.body, Box) for part in (piece, *carriers)):
+            found.append(closed_moments(piece, rest, carriers, degree, nodes))
+        else:
+            found += cell_moments(piece, rest, carriers, degree, own, nodes)
+    return found
 
 
 def closed_part(
-    cut: Sequence[Sequence[Magnet]], magnets: Sequence[Magnet], carriers: Sequence[Magnet], degree: int
+    cut: Sequence[Sequence[Magnet]],
+    magnets: Sequence[Magnet],
+    carriers: Sequence[Magnet],
+    degree: int,
+    cells: Sequence[Cells] | None = None,
 ) -> tuple[list[Coefficients], list[Coefficients]]:
-    """`added_by_closed_form` and its error: round-off, but for boxes that touch obliquely the step to finer rules."""
-    if not oblique_contact([magnet.box for magnet in magnets]):
-        closed = added_by_closed_form(cut, magnets, carriers, degree)
+    """`added_by_closed_form` and its error: round-off, but for bodies in contact the step to finer rules.
+
+    Parallel boxes may touch.
+    """
+    if not oblique_contact([magnet.body for magnet in magnets]):
+        closed = added_by_closed_form(cut, magnets, carriers, degree, None, cells)
         return closed, [np.zeros_like(c) for c in closed]
-    rules = OBLIQUE_NODES if all(magnet.isotropic for magnet in magnets) else OBLIQUE_NODES_ANISOTROPIC
-    coarse, fine = (added_by_closed_form(cut, magnets, carriers, degree, nodes) for nodes in rules)
+    only_faces = all(magnet.isotropic and isinstance(magnet.body, Box) for magnet in magnets)
+    rules = OBLIQUE_NODES if only_faces else OBLIQUE_NODES_ANISOTROPIC
+    coarse, fine = (added_by_closed_form(cut, magnets, carriers, degree, nodes, cells) for nodes in rules)
     return fine, [b - a for a, b in zip(coarse, fine, strict=True)]

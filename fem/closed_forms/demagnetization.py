@@ -1,4 +1,4 @@
-"""Field and potential of uniformly polarised boxes inside and outside of them, as matrices on the polarisation.
+"""Field and potential of uniformly polarised magnets inside and outside of them, as matrices on the polarisation.
 
 With the corner sums of `cuboid`, H = T J and H = -grad (g·J), J in T: T is minus the demagnetising tensor at a point, g
 the potential of the box's charged faces. NumPy, for the many points inside the elements; each matrix serves every
@@ -10,8 +10,9 @@ from itertools import product
 
 import numpy as np
 
-from ...geometry.basics import Array, Box
+from ...geometry.basics import Array, Box, Solid
 from ...geometry.bodies import Magnet
+from .round_magnets import round_tensor
 
 SIGNS = (-1, 1)
 FOUR_PI = 4 * np.pi
@@ -43,8 +44,12 @@ class _Corners:
         return found
 
 
-def demagnetizing_tensor(box: Box, points: Array) -> Array:
-    """(n, 3, 3): H = T J (T) at points (n, 3) m, off the box's edges, of a polarisation J; frame of the points."""
+def demagnetizing_tensor(body: Solid, points: Array) -> Array:
+    """(n, 3, 3): H = T J (T) at points (n, 3) m, off the body's edges, of a polarisation J; frame of the points."""
+    return _box_tensor(body, points) if isinstance(body, Box) else round_tensor(body, points)
+
+
+def _box_tensor(box: Box, points: Array) -> Array:
     corners = _Corners(box, points)
     tensor = np.zeros((len(points), 3, 3))
     for a in range(3):
@@ -78,9 +83,9 @@ def potential_vector(box: Box, points: Array) -> Array:
 
 def remanent_field(magnets: Sequence[Magnet], points: Array) -> Array:
     """μ0 H (n, 3) T of magnets with μr = 1 at points (n, 3) m, off their edges."""
-    return np.asarray(sum(demagnetizing_tensor(m.box, points) @ m.polarization_in_rotor for m in magnets))
+    return np.asarray(sum(demagnetizing_tensor(m.body, points) @ m.polarization_in_rotor for m in magnets))
 
 
 def remanent_potential(magnets: Sequence[Magnet], points: Array) -> Array:
-    """Potential (n,) T m of magnets with μr = 1 at points (n, 3) m."""
+    """Potential (n,) T m of cuboids with μr = 1 at points (n, 3) m."""
     return np.asarray(sum(potential_vector(m.box, points) @ m.polarization_in_rotor for m in magnets))

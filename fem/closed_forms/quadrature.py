@@ -5,7 +5,7 @@ from itertools import combinations
 
 import numpy as np
 
-from ...geometry.basics import Array, Box
+from ...geometry.basics import Array, Box, Ring, Solid, Sphere
 from ...geometry.bodies import separation
 
 NEAR = 0.1
@@ -17,15 +17,18 @@ def enough_nodes(degree: int) -> int:
     return max(20, degree + 6)
 
 
-def oblique_contact(boxes: Sequence[Box]) -> bool:
-    """Whether two boxes that are not parallel (nearly) touch: then kinks run across the panels of the rules."""
+def oblique_contact(bodies: Sequence[Solid]) -> bool:
+    """Whether two bodies but parallel boxes (nearly) touch: then kinks run across the panels of the rules."""
     return any(
         not _parallel(first, second) and separation(first, second)[0] < NEAR * min(first.size.min(), second.size.min())
-        for first, second in combinations(boxes, 2)
+        for first, second in combinations(bodies, 2)
     )
 
 
-def _parallel(first: Box, second: Box) -> bool:
+def _parallel(first: Solid, second: Solid) -> bool:
+    """Whether both are boxes, of the same axes."""
+    if not (isinstance(first, Box) and isinstance(second, Box)):
+        return False
     return np.allclose(np.abs(first.rotation.T @ second.rotation).max(axis=0), 1, rtol=0, atol=1e-12)
 
 
@@ -40,7 +43,7 @@ def graded_rule(breaks: Array, nodes: int) -> tuple[Array, Array]:
     return (middle[:, None] + half[:, None] * place).ravel(), (half[:, None] * weight).ravel()
 
 
-def panel_breaks(box: Box, others: Sequence[Box]) -> list[Array]:
+def panel_breaks(box: Box, others: Sequence[Solid]) -> list[Array]:
     """Ends of the panels along each body axis: the faces, and where faces of parallel boxes lie between them."""
     result = []
     for axis in range(3):
@@ -56,7 +59,7 @@ def panel_breaks(box: Box, others: Sequence[Box]) -> list[Array]:
     return result
 
 
-def face_rule(box: Box, others: Sequence[Box], nodes: int) -> tuple[Array, Array]:
+def face_rule(box: Box, others: Sequence[Solid], nodes: int) -> tuple[Array, Array]:
     """Points (n, 3) m on the faces, and outward normals times weight (n, 3) m²."""
     rules = [graded_rule(breaks, nodes) for breaks in panel_breaks(box, others)]
     points, areas = [], []
@@ -72,8 +75,36 @@ def face_rule(box: Box, others: Sequence[Box], nodes: int) -> tuple[Array, Array
     return np.concatenate(points), np.concatenate(areas)
 
 
-def volume_rule(box: Box, others: Sequence[Box], nodes: int) -> tuple[Array, Array]:
-    """Points (n, 3) m inside the box and weights (n,) m³."""
+def volume_rule(body: Solid, others: Sequence[Solid], nodes: int) -> tuple[Array, Array]:
+    """Points (n, 3) m inside the body and weights (n,) m³."""
+    if isinstance(body, Box):
+        return _box_rule(body, others, nodes)
+    circle = 2 * np.pi * (np.arange(2 * nodes) + 0.5) / (2 * nodes)
+    across, height, weight = _sphere_section(body, nodes) if isinstance(body, Sphere) else _ring_section(body, nodes)
+    turned = across[:, None, None] * np.stack([np.cos(circle), np.sin(circle)], axis=-1)
+    upright = np.broadcast_to(height[:, None, None], (*turned.shape[:2], 1))
+    points = np.concatenate([turned, upright], axis=-1).reshape(-1, 3)
+    weights = np.repeat(weight * across * np.pi / nodes, 2 * nodes)
+    return body.center + points @ body.rotation.T, weights
+
+
+def _ring_section(body: Solid, nodes: int) -> tuple[Array, Array, Array]:
+    """Distance from the axis, height, and weight (n,) m² over the section of a ring or cylinder."""
+    inner = body.inner_radius if isinstance(body, Ring) else 0.0
+    rho, wide = graded_rule(np.array([inner, body.half_edges[0]]), nodes)
+    z, tall = graded_rule(np.array([-1.0, 1.0]) * body.half_edges[2], nodes)
+    return np.repeat(rho, len(z)), np.tile(z, len(rho)), np.outer(wide, tall).ravel()
+
+
+def _sphere_section(body: Sphere, nodes: int) -> tuple[Array, Array, Array]:
+    """As `_ring_section`, of a sphere."""
+    r, deep = graded_rule(np.array([0.0, body.radius]), nodes)
+    cosine, weights = np.polynomial.legendre.leggauss(nodes)
+    sine = np.sqrt(1 - cosine**2)
+    return np.outer(r, sine).ravel(), np.outer(r, cosine).ravel(), np.outer(deep * r, weights / sine).ravel()
+
+
+def _box_rule(box: Box, others: Sequence[Solid], nodes: int) -> tuple[Array, Array]:
     rules = [graded_rule(breaks, nodes) for breaks in panel_breaks(box, others)]
     grid = np.stack(np.meshgrid(*(points for points, _ in rules), indexing="ij"), -1).reshape(-1, 3)
     x, y, z = (weights for _, weights in rules)

@@ -7,10 +7,12 @@ import heyoka as hy
 import numpy as np
 from numpy.typing import NDArray
 
-from ...geometry.basics import Array
+from ...geometry.basics import Array, Box, Cylinder, Ring, Sphere
 from ...geometry.bodies import Magnet
 from ..harmonics import CompiledField, FieldExpressions, uniform_moments
 from .cuboid import cuboid_field
+from .round_magnets import round_slope, round_tensor
+from .segments import resolved_distance, segments_field
 
 FAR = 5.0
 """From this many circumradii on, moments are as exact as the closed form, whose terms cancel more and more."""
@@ -26,16 +28,25 @@ class UniformField:
 
     def expressions(self, position: Sequence[hy.expression]) -> FieldExpressions:
         """Closed form at a position (three expressions, m), turned from the magnet's axes into the rotor's."""
-        box, axes = self.magnet.box, self.magnet.box.rotation
-        shifted = [position[i] - float(box.center[i]) for i in range(3)]
+        body, axes = self.magnet.body, self.magnet.body.rotation
+        if isinstance(body, Sphere):
+            return uniform_moments(self.magnet, 1).expressions(position)
+        shifted = [position[i] - float(body.center[i]) for i in range(3)]
         if np.array_equal(axes, np.eye(3)):
-            return cuboid_field(shifted, box.half_edges, self.magnet.polarization)
-        body = [hy.sum([float(axes[i, a]) * shifted[i] for i in range(3)]) for a in range(3)]
-        b, g = cuboid_field(body, box.half_edges, self.magnet.polarization)
+            return self._in_body(shifted)
+        b, g = self._in_body([hy.sum([float(axes[i, a]) * shifted[i] for i in range(3)]) for a in range(3)])
         field = [hy.sum([float(axes[i, a]) * b[a] for a in range(3)]) for i in range(3)]
         half = [[hy.sum([float(axes[j, c]) * g[a][c] for c in range(3)]) for j in range(3)] for a in range(3)]
         gradient = [[hy.sum([float(axes[i, a]) * half[a][j] for a in range(3)]) for j in range(3)] for i in range(3)]
         return field, gradient
+
+    def _in_body(self, position: Sequence[hy.expression]) -> FieldExpressions:
+        """Closed form in the magnet's own axes."""
+        body, polarization = self.magnet.body, self.magnet.polarization
+        if isinstance(body, Box):
+            return cuboid_field(position, body.half_edges, polarization)
+        assert isinstance(body, Cylinder | Ring)
+        return segments_field(position, body, polarization)
 
     @cached_property
     def _near(self) -> CompiledField:
@@ -46,18 +57,38 @@ class UniformField:
         return CompiledField(uniform_moments(self.magnet, FAR_DEGREE).expressions)
 
     def rows(self, columns: Array) -> Array:
-        """B (T) and its gradient (T/m), (12, n), at `columns` (3, n) m; 1e-13 of B at any distance."""
-        far = self.is_far(columns)
+        """B (T) outside, μ0 H inside, and its gradient (T/m), (12, n), at `columns` (3, n) m; 1e-13 at any distance.
+
+        Of cylinders and rings 1e-10, but for places that `is_close`.
+        """
+        far, close = self.is_far(columns), self.is_close(columns)
         found = np.empty((12, columns.shape[1]))
-        for chosen, field in ((~far, self._near), (far, self._far)):
+        for chosen, field in ((~far & ~close, self._near), (far, self._far)):
             if chosen.any():
                 found[:, chosen] = field.rows(np.ascontiguousarray(columns[:, chosen]))
+        if close.any():
+            found[:, close] = self._beside(columns[:, close].T)
         return found
+
+    def _beside(self, points: Array) -> Array:
+        """As `rows`, beside the surface of a round magnet."""
+        body, polarization = self.magnet.body, self.magnet.polarization_in_rotor
+        assert not isinstance(body, Box)
+        field, slope = round_tensor(body, points) @ polarization, round_slope(body, points) @ polarization
+        return np.concatenate([field.T, slope.reshape(len(points), 9).T])
+
+    def is_close(self, columns: Array) -> NDArray[np.bool_]:
+        """Which of `columns` (3, n) m are in a round magnet or so near that the expressions do not do: (n,)."""
+        body = self.magnet.body
+        if isinstance(body, Box):
+            return np.zeros(columns.shape[1], bool)
+        nearest = 0.0 if isinstance(body, Sphere) else resolved_distance(body)
+        return np.asarray(body.distance(columns.T) < nearest)
 
     def is_far(self, columns: Array) -> NDArray[np.bool_]:
         """Which of `columns` (3, n) m are so far away that moments are the more exact: (n,)."""
-        box = self.magnet.box
-        return squared_distance(columns, box.center) > (FAR * box.circumradius) ** 2
+        body = self.magnet.body
+        return squared_distance(columns, body.center) > (FAR * body.circumradius) ** 2
 
 
 def squared_distance(columns: Array, center: Array) -> Array:

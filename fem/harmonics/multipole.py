@@ -8,8 +8,9 @@ from typing import Any
 import heyoka as hy
 import numpy as np
 
-from ...geometry.basics import MU_0, Array, frozen_array
+from ...geometry.basics import MU_0, Array, Sphere, frozen_array
 from ...geometry.bodies import Magnet
+from .body_rules import polynomial_rule
 from .expressions import harmonic_sums
 from .solid import (
     Coefficients,
@@ -123,16 +124,15 @@ def curvature_moments(
 def uniform_moments(magnet: Magnet, degree: int) -> MultipoleExpansion:
     """Moments up to `degree` of a magnet with exactly its remanent polarisation (μr = 1); degree 1 is the dipole.
 
-    Gauss quadrature of the polynomial ∇Υ_lm is exact, so that the coefficients are good to round-off.
+    The quadrature of the polynomial ∇Υ_lm is exact, so that the coefficients are good to round-off.  A sphere has none
+    but its dipole.
     """
-    box = magnet.box
-    nodes, weights = np.polynomial.legendre.leggauss(degree // 2 + 1)
-    grid = np.stack(np.meshgrid(nodes, nodes, nodes, indexing="ij"), -1).reshape(-1, 3)
-    volume = (weights[:, None, None] * weights[:, None] * weights).ravel() * box.volume / 8
-    points = box.center + (grid * box.half_edges) @ box.rotation.T
+    body = magnet.body
+    degree = min(degree, 1) if isinstance(body, Sphere) else degree
+    points, volume = polynomial_rule(body, degree)
     polarization = np.broadcast_to(magnet.polarization_in_rotor, points.shape)
-    coefficients = moments_of_magnetization(points, volume, polarization, box.center, box.circumradius, degree)
-    return MultipoleExpansion(box.center, box.circumradius, without_noise(coefficients, 1e-15))
+    coefficients = moments_of_magnetization(points, volume, polarization, body.center, body.circumradius, degree)
+    return MultipoleExpansion(body.center, body.circumradius, without_noise(coefficients, 1e-15))
 
 
 def without_noise(coefficients: Coefficients, level: float) -> Coefficients:

@@ -1,13 +1,17 @@
 """The outer field as functionals of the solution, which converge twice as fast as its values.
 
 Either moments of the magnetisation about every magnet, or the harmonics of ψ on the outer sphere about the centre.
+Those of cuboids are integrals over the faces, those of other shapes over the volume, where many centres may share them.
 """
 
+from collections.abc import Sequence
+
+import ngsolve as ng
 import numpy as np
 from numpy.typing import NDArray
 
-from ...geometry.basics import Array
-from ...geometry.bodies import SAME_PLACE, Magnet, mirror
+from ...geometry.basics import Array, Box
+from ...geometry.bodies import SAME_PLACE, Magnet, mirror, mirror_images
 from ..elements import surface_points, volume_points
 from ..harmonics import Coefficients, curvature_moments, mirrored_harmonics, moments_of_magnetization
 from .solver import Solution
@@ -35,10 +39,66 @@ def reaction_moments(solution: Solution, degree: int) -> Array:
         k = int(name.removeprefix("magnet"))
         if mesh.magnets[k].contrast == 0:
             continue
-        part = -_part_moments(solution, k, degree, points, areas, potential)
+        if isinstance(mesh.magnets[k].body, Box):
+            part = -_part_moments(solution, k, degree, points, areas, potential)
+        else:
+            part = _volume_moments(solution, k, degree)
+        owners = np.array([owner for owner, _ in _image_numbers(mesh.magnets, k, mesh.planes)])
         for place, coefficients in images(centers[k], part, mesh.planes, signs):
-            result[int(np.argmin(np.linalg.norm(centers - place, axis=1)))] += coefficients
+            result[owners[np.argmin(np.linalg.norm(centers[owners] - place, axis=1))]] += coefficients
     return result
+
+
+def _volume_moments(solution: Solution, k: int, degree: int) -> Coefficients:
+    """Coefficients (T) of -(μ - 1) ∇ψ of magnet number k, from its meshed share, as an integral over the volume."""
+    body = solution.system.mesh.magnets[k].body
+    return moments_of_magnetization(*_share(solution, k), body.center, body.circumradius, degree)
+
+
+def _share(solution: Solution, k: int) -> tuple[Array, Array, Array]:
+    """Points (n, 3) m and weights (n,) m³ in the meshed share of magnet number k, and -(μ - 1) ∇ψ (n, 3) T there."""
+    mesh = solution.system.mesh
+    volume = volume_points(mesh.mesh, f"magnet{k}", 2 * solution.system.order)
+    slope = volume.sample(*(ng.grad(solution.potential)[axis] for axis in range(3)))
+    values = -slope @ (mesh.magnets[k].permeability_in_rotor - np.eye(3))
+    return mesh.to_meter(volume.points), volume.weights * mesh.unit**3, values
+
+
+def reaction_dipoles(solution: Solution, number: int) -> tuple[Array, Array, Array]:
+    """-(μ - 1) ∇ψ of a magnet's share on the meshed side of the planes, and of those that are its images.
+
+    Returns
+    -------
+    Integration points (n, 3) m and weights (n,) m³ in the mirrors' frame, and values (n, 3) T there; nothing where the
+    magnet has no share but that of an image.
+    """
+    mesh = solution.system.mesh
+    parts = []
+    for k, magnet in enumerate(mesh.magnets):
+        owners = [flipped for owner, flipped in _image_numbers(mesh.magnets, k, mesh.planes) if owner == number]
+        if f"magnet{k}" not in mesh.mesh.GetMaterials() or not magnet.contrast or not owners:
+            continue
+        points, weights, values = _share(solution, k)
+        for flipped in owners:
+            flips = np.prod([np.ones(3), *(mirror(plane) for plane in flipped)], axis=0)
+            signs = [sign for plane, sign in zip(mesh.planes, solution.signs, strict=True) if plane in flipped]
+            parts.append((points * flips, weights, float(np.prod([1.0, *signs])) * values * flips))
+    if not parts:
+        return np.zeros((0, 3)), np.zeros(0), np.zeros((0, 3))
+    points, weights, values = (np.concatenate(column) for column in zip(*parts, strict=True))
+    return points, weights, values
+
+
+def _image_numbers(
+    magnets: Sequence[Magnet], number: int, planes: tuple[int, ...]
+) -> list[tuple[int, tuple[int, ...]]]:
+    """Number of the magnet that a magnet's share becomes at every set of the planes, and the set."""
+    found: list[tuple[int, tuple[int, ...]]] = [(number, ())]
+    for plane in planes:
+        image = mirror_images(magnets, plane)
+        assert image is not None
+        found += [(image[k], (*flipped, plane)) for k, flipped in found]
+    return found
 
 
 def images(

@@ -6,12 +6,22 @@ from itertools import product
 
 import numpy as np
 
-from ...geometry.basics import Array, Box
-from ...geometry.bodies import Magnet, Symmetry, closing_shifts, find_symmetry, parity_parts, shifted_magnet
+from ...geometry.basics import Array, Solid
+from ...geometry.bodies import (
+    Cells,
+    Magnet,
+    Symmetry,
+    cells_of,
+    closing_shifts,
+    find_symmetry,
+    parity_parts,
+    shifted_magnet,
+)
 from ...geometry.meshes import MagnetMesh, MeshSettings, mesh_magnets
+from ..closed_forms import by_cells
 from ..harmonics import Coefficients, MultipoleExpansion, rotated_harmonics
-from .moments import reaction_moments, trace_moments
-from .solver import Formulation, MeshError, System, assemble, solve
+from .moments import reaction_dipoles, reaction_moments, trace_moments
+from .solver import Formulation, MeshError, Solution, System, assemble, solve
 
 SIZES = (1.0, 0.8, 0.5)
 """Of elements in magnets, relative to what is asked for, that are tried."""
@@ -39,12 +49,15 @@ class RotorSolution:
 
     Parameters
     ----------
-    coefficients : c_lm (T), one per piece about its centre in `split`, one about the mesh's in `direct`
+    coefficients : c_lm (T), one per cell of every piece about its centre in `split`, one about the mesh's in `direct`
     spheres : centre (3,) m and radius m of every expansion, in the rotor's frame
     mesh : of the part of space that the mirror planes leave, in their frame
     unknowns : number of unknowns
     area_error : relative error of the area of the outer sphere
     layers : of elements at the edges; fewer than asked for where the mesher cannot match more
+    symmetry : the frame of the mesh and its mirror planes
+    parts : the potentials of every parity
+    shifts : (n, 3) m by which the magnets were moved to close narrow gaps
     """
 
     coefficients: tuple[Coefficients, ...]
@@ -53,6 +66,9 @@ class RotorSolution:
     unknowns: int
     area_error: float
     layers: int
+    symmetry: Symmetry
+    parts: tuple[Solution, ...]
+    shifts: Array
 
     def expansions(self, coefficients: Sequence[Coefficients]) -> list[MultipoleExpansion]:
         """Expansions about the same spheres with other coefficients."""
@@ -67,6 +83,7 @@ def solve_rotor(
     pieces: Sequence[Sequence[Magnet]] | None = None,
     use_symmetry: bool = True,
     carriers: Sequence[Magnet] | None = None,
+    cells: Sequence[Cells] | None = None,
 ) -> RotorSolution:
     """Solve for every parity part of the polarisation and add up; gaps too narrow for elements are closed.
 
@@ -77,6 +94,7 @@ def solve_rotor(
     use_symmetry : whether to mesh only one side of the mirror planes
     carriers : in `split`, the magnets with μr = 1 whose closed form is split off, each in the place of one of the
         magnets; by default the magnets' own remanence
+    cells : of every piece, each with its own expansion; by default one
 
     Raises
     ------
@@ -90,29 +108,50 @@ def solve_rotor(
     planes = symmetry.planes if use_symmetry else ()
     seen = [symmetry.to_frame(magnet) for magnet in closed]
     bodies = [piece for whole in cut for piece in whole]
+    known = cells or [cells_of(body.body, np.inf) for body in bodies]
     meshed = [symmetry.to_frame(shifted_magnet(p, s)) for whole, s in zip(cut, shifts, strict=True) for p in whole]
-    mesh, system, layers = _meshed_system(meshed, refinement, planes, [magnet.box for magnet in seen])
+    mesh, system, layers = _meshed_system(meshed, refinement, planes, [magnet.body for magnet in seen])
     total: list[Coefficients] = []
-    area_error = 0.0
+    solutions = []
     owners = [k for k, whole in enumerate(cut) for _ in whole]
     for signs, (own, carried) in parity_parts(seen, planes, _polarizations(magnets, carriers, symmetry)):
-        sources = [Magnet(m.box, m.box.rotation.T @ j) for m, j in zip(seen, carried, strict=True)]
+        sources = [Magnet(m.body, m.body.rotation.T @ j) for m, j in zip(seen, carried, strict=True)]
         rest = (own - carried)[owners]
         solution = solve(system, sources, formulation, refinement.boundary_degree, signs, rest)
-        area_error = solution.boundary.area_error
-        part = [trace_moments(solution)] if formulation == "direct" else list(reaction_moments(solution, degree))
+        solutions.append(solution)
+        if formulation == "direct":
+            part = [rotated_harmonics(trace_moments(solution), symmetry.axes)]
+        else:
+            part = _of_cells(solution, symmetry, known, shifts[owners], degree)
         total = [a + b for a, b in zip(total, part, strict=True)] if total else part
-    spheres = tuple((body.box.center, body.box.circumradius) for body in bodies)
+    spheres = tuple((c, float(r)) for own in known for c, r in zip(own.centers, own.radii, strict=True))
     size = degree
     if formulation == "direct":
         spheres, size = ((symmetry.center + symmetry.axes @ mesh.center, mesh.unit),), refinement.boundary_degree
     nothing = [np.zeros((size + 1, size + 1), complex)] * len(spheres)
-    coefficients = tuple(rotated_harmonics(c, symmetry.axes) for c in total or nothing)
-    return RotorSolution(coefficients, spheres, mesh, system.unknowns, area_error, layers)
+    area_error = max((solution.boundary.area_error for solution in solutions), default=0.0)
+    return RotorSolution(
+        tuple(total or nothing), spheres, mesh, system.unknowns, area_error, layers, symmetry, tuple(solutions), shifts
+    )
+
+
+def _of_cells(
+    solution: Solution, symmetry: Symmetry, cells: Sequence[Cells], shifts: Array, degree: int
+) -> list[Coefficients]:
+    """Coefficients (T) of -(μ - 1) ∇ψ of every cell of every piece, about its centre, in the rotor's frame."""
+    whole, found = reaction_moments(solution, degree), list[Coefficients]()
+    for k, (own, shift) in enumerate(zip(cells, shifts, strict=True)):
+        if len(own.radii) == 1:
+            found.append(rotated_harmonics(whole[k], symmetry.axes))
+            continue
+        points, weights, values = reaction_dipoles(solution, k)
+        places = symmetry.center + points @ symmetry.axes.T - shift
+        found += by_cells(places, weights, values @ symmetry.axes.T, own, degree)
+    return found
 
 
 def _meshed_system(
-    bodies: list[Magnet], refinement: Refinement, planes: tuple[int, ...], edges_of: list[Box]
+    bodies: list[Magnet], refinement: Refinement, planes: tuple[int, ...], edges_of: list[Solid]
 ) -> tuple[MagnetMesh, System, int]:
     """Mesh, matrix, layers at the edges: where the mesher cannot match them, smaller elements, else fewer layers.
 

@@ -29,7 +29,7 @@ def map_table(path: Path | None, magnets: Sequence[Magnet]) -> GriddedTable:
     if path is None:
         raise FieldMapError("Input rotor.field_map must name a file for the model map; instead it is missing.")
     field_map = read_field_map(path)
-    radius = max(magnet.box.circumradius for magnet in magnets)
+    radius = max(magnet.body.circumradius for magnet in magnets)
     centers = np.array([magnet.box.center for magnet in magnets])
     for center in centers:
         field_map = field_map.outside(center, radius)

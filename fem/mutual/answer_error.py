@@ -65,7 +65,7 @@ def _at_poles(magnets: Sequence[Magnet], distance: float) -> list[Array]:
     for magnet in magnets:
         size = float(np.linalg.norm(magnet.polarization))
         if size:
-            (place,) = places_off(magnet.box, magnet.polarization_in_rotor[None] / size, distance)
-            if min(float(other.box.distance(place)) for other in magnets) > distance * (1 - 1e-6):
+            (place,) = places_off(magnet.body, magnet.polarization_in_rotor[None] / size, distance)
+            if min(float(other.body.distance(place)) for other in magnets) > distance * (1 - 1e-6):
                 places.append(place)
     return places

@@ -11,7 +11,7 @@ from ...geometry.bodies import Magnet
 from ...geometry.scenes import Floater
 from ..harmonics import FOUR_PI
 from .answer_error import answer_errors
-from .answer_grid import POWERS, RETURNED, AnswerGrid, point_counts
+from .answer_grid import POWERS, RETURNED, AnswerGrid, answer_box, point_counts
 from .answer_samples import (
     FAR_GAPS,
     ROTOR_GAPS,
@@ -43,7 +43,7 @@ def mutual_table(magnets: tuple[Magnet, ...], floater: Floater, order: int = 2) 
     """
     started = time.perf_counter()
     rotor, fine = rotor_ladder(magnets, (order, order + 1))
-    counts = [point_counts(m.box, (1 + NEAREST) * floater.radius) for m in magnets]
+    counts = [point_counts(answer_box(m.body), (1 + NEAREST) * floater.radius) for m in magnets]
     grids = [_empty(magnet, floater, n) for magnet, n in zip(magnets, counts, strict=True)]
     coupling, pairs = np.zeros((3 * len(grids), 3 * len(grids))), np.zeros((len(grids), len(grids)))
     if rotor.regions is not None:
@@ -82,7 +82,7 @@ def _empty(magnet: Magnet, floater: Floater, counts: tuple[int, int, int]) -> An
     count = int(np.prod(counts))
     axis = magnet.polarization / size if size else np.zeros(3)
     zeros = np.zeros((count, 3)), np.zeros((count, len(POWERS), 2)), np.zeros((count, len(RETURNED), 2))
-    return AnswerGrid(magnet.box, axis, floater.radius, counts, *zeros)
+    return AnswerGrid(answer_box(magnet.body), axis, floater.radius, counts, *zeros)
 
 
 def _rotor_fit(

@@ -25,9 +25,11 @@ import heyoka as hy
 import numpy as np
 from numpy.typing import NDArray
 
-from ...geometry.basics import MU_0, Array, Box
+from ...geometry.basics import MU_0, Array, Box, Solid, Sphere
 
 UNIT = MU_0 / (4 * np.pi)
+IN_SPHERE, IN_CIRCLE = 0.64, 0.8
+"""Edges of the boxes that stand for a sphere and for the section of a cylinder, in diameters."""
 POWERS, RETURNED = (4, 5, 6), (5, 6)
 """p of the sphere's energy: two dipoles' begin with p = 4, those of degree 2; and q, about that of three dipoles."""
 
@@ -38,7 +40,7 @@ class AnswerGrid:
 
     Parameters
     ----------
-    box : of the magnet
+    box : of the magnet, see `answer_box`
     axis : (3,) direction of its remanence along the body's axes; zero: none
     radius : of the floater, m
     counts : points along each body axis
@@ -109,6 +111,14 @@ def _along(box: Box, vector: Sequence[Any]) -> list[Any]:
 
 DIGITS = 7.2
 """-ln of the error of Gauss's rule, about: with the weights fitted, force and torque are met to 1e-3."""
+
+
+def answer_box(body: Solid) -> Box:
+    """The box in which a body's points lie: itself, or for round ones a box that hardly leaves it."""
+    if isinstance(body, Box):
+        return body
+    share = np.full(3, IN_SPHERE) if isinstance(body, Sphere) else np.array([IN_CIRCLE, IN_CIRCLE, 1.0])
+    return Box(body.size * share, body.center, body.rotation)
 
 
 def point_counts(box: Box, clearance: float, digits: float = DIGITS) -> tuple[int, int, int]:

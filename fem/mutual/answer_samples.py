@@ -42,7 +42,7 @@ def places_around(magnets: Sequence[Magnet], radius: float, gaps: Sequence[float
         for gap in gaps:
             directions = generator.normal(size=(number, 3))
             directions /= np.linalg.norm(directions, axis=1)[:, None]
-            found.append(places_off(magnet.box, directions, (1 + gap) * radius))
+            found.append(places_off(magnet.body, directions, (1 + gap) * radius))
     return _clear(magnets, np.concatenate(found), (1 + min(gaps)) * radius)
 
 
@@ -52,13 +52,13 @@ def places_facing(magnets: Sequence[Magnet], radius: float, gaps: Sequence[float
     if len(magnets) == 1:
         ways = ways[len(ways) // 2 :]
     ways /= np.linalg.norm(ways, axis=1)[:, None]
-    found = [places_off(m.box, ways @ m.box.rotation.T, (1 + gap) * radius) for m in magnets for gap in gaps]
+    found = [places_off(m.body, ways @ m.body.rotation.T, (1 + gap) * radius) for m in magnets for gap in gaps]
     return _clear(magnets, np.concatenate(found), (1 + min(gaps)) * radius)
 
 
 def _clear(magnets: Sequence[Magnet], places: Array, distance: float) -> Array:
     """Those of the places (n, 3) m that are no nearer to any magnet than a distance, m."""
-    nearest = np.min([magnet.box.distance(places) for magnet in magnets], axis=0)
+    nearest = np.min([magnet.body.distance(places) for magnet in magnets], axis=0)
     return np.asarray(places[nearest >= distance * (1 - 1e-6)])
 
 
@@ -86,7 +86,7 @@ def answer_products(rotor: RotorResponse, fine: RotorResponse, places: Array, fa
 
 def _direct(magnets: Sequence[Magnet], places: Array) -> Array:
     """The products by the direct part of the magnetisation, exact but for round-off."""
-    nearest = min(float(np.min(magnet.box.distance(places))) for magnet in magnets)
+    nearest = min(float(np.min(magnet.body.distance(places))) for magnet in magnets)
     points, tensors = direct_rule(magnets, nearest)
     fields = unit_dipole_fields(points, places)
     return np.asarray(np.einsum("pni,qnj,nij->pq", fields, fields, tensors, optimize=True) / MU_0)

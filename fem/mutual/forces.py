@@ -93,7 +93,7 @@ def two_body(
     ball = Ball(np.asarray(position, float), floater.radius)
     degree = degree or enough_degree(rotor.magnets, ball)
     for k, magnet in enumerate(rotor.magnets):
-        if sphere_overlap(ball.center, ball.radius, magnet.box) > TOUCHING:
+        if sphere_overlap(ball.center, ball.radius, magnet.body) > TOUCHING:
             raise TwoBodyError(
                 f"Input position must leave the floater outside the magnets; instead it cuts magnet {k}."
             )

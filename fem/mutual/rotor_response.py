@@ -12,7 +12,7 @@ from functools import cached_property
 
 import numpy as np
 
-from ...geometry.basics import Array
+from ...geometry.basics import Array, Box, within
 from ...geometry.bodies import Magnet
 from ...geometry.meshes import MagnetMesh, mesh_magnets
 from ..closed_forms import remanent_field, volume_rule
@@ -108,7 +108,10 @@ class RotorResponse:
     def _places(self) -> dict[str, Array]:
         """Integration points of every magnet (n, 3), m."""
         assert self.regions is not None
-        return {name: self.mesh.to_meter(points.points) for name, points in self.regions.points.items()}
+        return {
+            name: within(self.magnets[int(name.removeprefix("magnet"))].body, self.mesh.to_meter(points.points))
+            for name, points in self.regions.points.items()
+        }
 
     def _beyond(self, fields: Mapping[str, Array]) -> dict[str, Array]:
         """μ0 M of fields H0 (n, 3) T at the mesh's points without its direct part (μ - 1) H0."""
@@ -135,13 +138,23 @@ def direct_rule(magnets: Sequence[Magnet], nearest: float) -> tuple[Array, Array
     """Points (n, 3) m and (μ - 1) dV (n, 3, 3) m³ for fields with sources no nearer to the magnets than so many m."""
     points, tensors = [], []
     for magnet in magnets:
-        half, counts = magnet.box.half_edges, point_counts(magnet.box, nearest, DIRECT_DIGITS)
-        nodes, weights = zip(*(np.polynomial.legendre.leggauss(n) for n in counts), strict=True)
-        grid = np.stack(np.meshgrid(*nodes, indexing="ij"), axis=-1).reshape(-1, 3)
-        volumes = np.prod(half) * np.einsum("i,j,k->ijk", *weights).ravel()
-        points.append(magnet.box.center + (half * grid) @ magnet.box.rotation.T)
+        counts = point_counts(magnet.box, nearest, DIRECT_DIGITS)
+        places, volumes = (
+            _gauss(magnet.body, counts)
+            if isinstance(magnet.body, Box)
+            else volume_rule(magnet.body, [magnet.body], max(counts))
+        )
+        points.append(places)
         tensors.append(volumes[:, None, None] * (magnet.permeability_in_rotor - np.eye(3)))
     return np.concatenate(points), np.concatenate(tensors)
+
+
+def _gauss(box: Box, counts: tuple[int, int, int]) -> tuple[Array, Array]:
+    """Points (n, 3) m and weights (n,) m³ of Gauss's rule in a box."""
+    nodes, weights = zip(*(np.polynomial.legendre.leggauss(n) for n in counts), strict=True)
+    grid = np.stack(np.meshgrid(*nodes, indexing="ij"), axis=-1).reshape(-1, 3)
+    volumes = np.prod(box.half_edges) * np.einsum("i,j,k->ijk", *weights).ravel()
+    return box.center + (box.half_edges * grid) @ box.rotation.T, volumes
 
 
 def _joined(*parts: tuple[Array, Array]) -> tuple[Array, Array]:
@@ -153,10 +166,10 @@ def closed_dipoles(magnets: Sequence[Magnet]) -> tuple[Array, Array]:
 
     The points are graded towards the edges, where H0 has a logarithm.
     """
-    boxes = [magnet.box for magnet in magnets]
+    bodies = [magnet.body for magnet in magnets]
     points, moments = [], []
     for magnet in magnets:
-        places, weights = volume_rule(magnet.box, boxes, NODES)
+        places, weights = volume_rule(magnet.body, bodies, NODES)
         field = remanent_field(magnets, places) @ (magnet.permeability_in_rotor - np.eye(3))
         points.append(places)
         moments.append(weights[:, None] * field)

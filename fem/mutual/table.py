@@ -111,7 +111,7 @@ class MutualTable:
         """Estimated relative errors (n,) of what the answers add to force and torque, at points (n, 3) m."""
         places = np.asarray(points, float).reshape(-1, 3)
         radius = self.grids[0].radius
-        gap = np.min([magnet.box.distance(places) for magnet in self.magnets], axis=0) - radius
+        gap = np.min([magnet.body.distance(places) for magnet in self.magnets], axis=0) - radius
         at = np.log(np.maximum(gap, self.gaps[0]))
         force, torque = (np.exp(np.interp(at, np.log(self.gaps), np.log(e))) for e in self.errors.T + 1e-12)
         return force, torque

@@ -8,12 +8,12 @@ from dataclasses import replace
 import numpy as np
 import xarray as xr
 
-from ...geometry.basics import Box
+from ...geometry.basics import moved, shape_numbers
 from ...geometry.bodies import Magnet
 from ...geometry.scenes import Floater
 from ..storage import described, from_cache, program_of, read_checked, write_checked
 from .answer_fit import mutual_table
-from .answer_grid import AnswerGrid
+from .answer_grid import AnswerGrid, answer_box
 from .table import MutualTable
 
 FORMAT = "spinlev mutual table 2"
@@ -39,7 +39,9 @@ def cached_mutual_table(
 
 def _upright(magnets: tuple[Magnet, ...]) -> tuple[Magnet, ...]:
     """A lone magnet at the origin with its axes along the rotor's; several as they are."""
-    return magnets if len(magnets) > 1 else tuple(replace(magnet, box=Box(magnet.box.size)) for magnet in magnets)
+    if len(magnets) > 1:
+        return magnets
+    return tuple(replace(magnet, body=moved(magnet.body, np.zeros(3), np.eye(3))) for magnet in magnets)
 
 
 def _posed(table: MutualTable, magnets: tuple[Magnet, ...]) -> MutualTable:
@@ -48,7 +50,7 @@ def _posed(table: MutualTable, magnets: tuple[Magnet, ...]) -> MutualTable:
         return table
     turns = [magnet.box.rotation for magnet in magnets]
     coupling = turns[0] @ table.coupling @ turns[0].T if turns else table.coupling
-    grids = tuple(replace(grid, box=magnet.box) for grid, magnet in zip(table.grids, magnets, strict=True))
+    grids = tuple(replace(grid, box=answer_box(magnet.body)) for grid, magnet in zip(table.grids, magnets, strict=True))
     return replace(table, magnets=magnets, grids=grids, coupling=coupling)
 
 
@@ -57,7 +59,7 @@ def mutual_key(magnets: tuple[Magnet, ...], floater: Floater) -> str:
     digest = hashlib.sha256(f"{FORMAT} {program_of(__package__)}".encode())
     sphere = np.array([floater.radius, floater.remanence, floater.recoil_permeability])
     for magnet in magnets:
-        for part in (magnet.box.size, magnet.box.center, magnet.box.rotation, magnet.polarization):
+        for part in (shape_numbers(magnet.body), magnet.body.center, magnet.body.rotation, magnet.polarization):
             digest.update(np.ascontiguousarray(part + 0.0, dtype="<f8").tobytes())
         digest.update(np.ascontiguousarray(magnet.permeability_in_rotor + 0.0, dtype="<f8").tobytes())
     digest.update(np.ascontiguousarray(sphere, dtype="<f8").tobytes())
@@ -94,7 +96,7 @@ def from_dataset(dataset: xr.Dataset, magnets: tuple[Magnet, ...]) -> MutualTabl
     ends = np.cumsum(np.prod(data["counts"], axis=1))[:-1]
     parts = (np.split(data[name], ends) for name in ("strengths", "degrees", "returned"))
     grids = [
-        AnswerGrid(Box(m.box.size, m.box.center, m.box.rotation), axis, float(data["radius"]), tuple(counts), *rest)
+        AnswerGrid(answer_box(m.body), axis, float(data["radius"]), tuple(counts), *rest)
         for m, axis, counts, *rest in zip(magnets, data["axis"], data["counts"].tolist(), *parts, strict=True)
     ]
     return MutualTable(

@@ -14,14 +14,17 @@ from functools import cached_property
 
 import numpy as np
 
-from ...geometry.basics import MU_0, Array, InputError, rotation_matrix
+from ...geometry.basics import MU_0, Array, Box, InputError, rotation_matrix
+from ...geometry.bodies import Magnet
 from ...geometry.scenes import Plate
-from ..closed_forms import PolarizedCuboid
+from ..closed_forms import PolarizedCuboid, uniform_cells
 from ..eddy_currents import Source
 from ..harmonics import Coefficients, MultipoleExpansion, derivative, field_spectrum, outer_sums
 from ..rotor_tables import RotorTable
 
 DOWN = np.array([0.0, 0.0, -1.0])
+CLOSEST = 0.1
+"""Clearance of the plate, in radii of a round magnet, for which its moments are made at least."""
 INAUDIBLE = 1e-7
 """Share of the rotor's field at the plate that is left out where no tolerance says another."""
 
@@ -77,8 +80,12 @@ def rotor_parts(table: RotorTable, plate: Plate, inaudible: float = INAUDIBLE) -
     ------
     InputError : the plate comes so near that an expansion does not converge in it
     """
-    parts: list[Source] = [PolarizedCuboid.of_magnet(magnet) for magnet in table.uniform]
-    for expansion in table.expansions:
+    parts: list[Source] = [
+        PolarizedCuboid.of_magnet(magnet) for magnet in table.uniform if isinstance(magnet.body, Box)
+    ]
+    round_ones = [magnet for magnet in table.uniform if not isinstance(magnet.body, Box)]
+    moments = [part for magnet in round_ones for part in uniform_cells(magnet, _clearance(magnet, plate))]
+    for expansion in (*table.expansions, *moments):
         nearest = _nearest(expansion.center, plate)
         if nearest <= 1.001 * expansion.nearest:
             raise InputError(
@@ -99,6 +106,12 @@ def posed_rotor(parts: Sequence[Source], plate: Plate, angle: float, depth: floa
     """The rotor turned by `angle` (rad), seen from the plate `depth` (m) below its first place."""
     back = rotation_matrix((0.0, 0.0, -np.degrees(angle)))
     return RotorSource(parts, plate.box.rotation.T @ back.T, back @ (plate.box.center + depth * DOWN))
+
+
+def _clearance(magnet: Magnet, plate: Plate) -> float:
+    """A distance (m) from the surface of a turning magnet that the plate keeps, at least."""
+    body = magnet.body
+    return max(_nearest(body.center, plate) - body.circumradius, CLOSEST * body.circumradius)
 
 
 def _nearest(place: Array, plate: Plate) -> float:

@@ -45,7 +45,7 @@ def pieces_of(rotor: Sequence[Magnet], conductors: Sequence[Conductor]) -> Piece
     No current flows from one to another: magnets are coated and glued, and conductors of unlike metal are joined by
     films.  Conductors that touch and have the same conductivity are one piece.
     """
-    magnets: Pieces = [((magnet.box,), magnet.conductivity) for magnet in rotor if magnet.conductivity]
+    magnets: Pieces = [((magnet.body,), magnet.conductivity) for magnet in rotor if magnet.conductivity]
     groups = separate_pieces(conductors)
     return [*magnets, *((tuple(part.body for part in group), group[0].conductivity) for group in groups)]
 
@@ -65,7 +65,7 @@ def rotor_losses(
     start, pieces = time.perf_counter(), pieces_of(rotor, conductors)
     if not pieces:
         raise ValueError("Input rotor must have a conductivity; instead neither magnets nor conductors have one.")
-    bodies = [magnet.box for magnet in rotor] + [conductor.body for conductor in conductors]
+    bodies: list[Solid] = [magnet.body for magnet in rotor] + [conductor.body for conductor in conductors]
     around = partial(places_around, bodies, directions=directions)
     metals = [metal_of(group, conductivity, ORDER) for group, conductivity in pieces]
     found = current_patterns(metals, around(nearest), LEFT_OUT)

@@ -6,11 +6,18 @@ from .accuracy import (
     points_around as points_around,
     typical_field as typical_field,
 )
+from .anywhere import (
+    NearField as NearField,
+    edge_distance as edge_distance,
+    field_anywhere as field_anywhere,
+    near_field as near_field,
+)
 from .cache import cached_rotor_table as cached_rotor_table, rotor_key as rotor_key
 from .choice import resolve_model as resolve_model, rotor_table as rotor_table
 from .fem_model import AccuracyWarning as AccuracyWarning, fem_table as fem_table
 from .shortened import shortened_table as shortened_table
 from .table import (
+    ROUND_OFF as ROUND_OFF,
     FieldFormula as FieldFormula,
     FieldTable as FieldTable,
     RangeError as RangeError,

@@ -39,7 +39,7 @@ class Accuracy:
 
     def clearance(self, magnets: tuple[Magnet, ...]) -> float:
         """The distance from faces from which on `rtol` holds, m."""
-        return self.nearest or 0.8 * max(magnet.box.volume for magnet in magnets) ** (1 / 3)
+        return self.nearest or 0.8 * max(magnet.body.volume for magnet in magnets) ** (1 / 3)
 
 
 def error_points(magnets: tuple[Magnet, ...], clearance: float) -> tuple[Array, Array]:
@@ -59,8 +59,8 @@ def points_around(magnets: tuple[Magnet, ...], offset: float) -> Array:
     """Points (n, 3) m at a distance `offset` (m) from the nearest of the magnets' faces, all around them."""
     directions = np.random.default_rng(0).normal(size=(150, 3))
     directions /= np.linalg.norm(directions, axis=1)[:, None]
-    points = np.concatenate([places_off(magnet.box, directions, offset) for magnet in magnets])
-    outside = np.all([magnet.box.distance(points) >= offset * (1 - 1e-6) for magnet in magnets], axis=0)
+    points = np.concatenate([places_off(magnet.body, directions, offset) for magnet in magnets])
+    outside = np.all([magnet.body.distance(points) >= offset * (1 - 1e-6) for magnet in magnets], axis=0)
     return np.asarray(points[outside])
 
 
@@ -81,6 +81,6 @@ def guards(magnets: tuple[Magnet, ...], clearance: float) -> tuple[Array, Array]
     directions /= np.linalg.norm(directions, axis=1)[:, None]
     spheres = [m.box.center + (clearance + m.box.half_edges.max()) * directions for m in magnets]
     points = np.concatenate(spheres)
-    gaps = np.min([magnet.box.distance(points) for magnet in magnets], axis=0)
+    gaps = np.min([magnet.body.distance(points) for magnet in magnets], axis=0)
     points = points[(gaps >= clearance / 2) & (gaps < clearance)]
     return points, typical_field(magnets, points)

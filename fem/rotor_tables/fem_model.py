@@ -15,7 +15,7 @@ from dataclasses import replace
 import numpy as np
 
 from ...geometry.basics import Array
-from ...geometry.bodies import CONVERGENCE, Magnet, cut_magnets, largest_shift
+from ...geometry.bodies import CONVERGENCE, Cells, Magnet, cells_of, cut_magnets, largest_shift
 from ...geometry.meshes import MeshSettings
 from ..closed_forms import carrier, closed_part
 from ..harmonics import MultipoleExpansion, trimmed_expansions, without_noise
@@ -48,13 +48,14 @@ def fem_table(
     cut = cut_magnets(magnets, accuracy.clearance(magnets))
     pieces = [piece for whole in cut for piece in whole]
     points, scale = error_points(magnets, accuracy.clearance(magnets))
-    degree = _degree(pieces, points, accuracy.rtol)
+    cells = [cells_of(piece.body, accuracy.clearance(magnets)) for piece in pieces]
+    degree = _degree(pieces, cells, points, accuracy.rtol)
     carriers = tuple(carrier(magnet) for magnet in magnets)
-    closed, unsure = closed_part(cut, magnets, carriers, degree)
+    closed, unsure = closed_part(cut, magnets, carriers, degree, cells)
 
     def reaction(order: int) -> RotorSolution:
         refinement = refinement_of(order, settings, strongest(magnets))
-        return solve_rotor(magnets, refinement, "split", degree, cut, carriers=carriers)
+        return solve_rotor(magnets, refinement, "split", degree, cut, carriers=carriers, cells=cells)
 
     solution, order, steps = refined(reaction, points, scale, accuracy.rtol / 3, settings)
     whole = solution.expansions(
@@ -87,11 +88,12 @@ def fem_table(
     return replace(table, provenance=provenance(solution, order, settings, reached, time.perf_counter() - start))
 
 
-def _degree(pieces: Sequence[Magnet], points: Array, rtol: float) -> int:
+def _degree(pieces: Sequence[Magnet], cells: Sequence[Cells], points: Array, rtol: float) -> int:
     """Degree at which what the permeability adds has surely fallen below the tolerance; 5 to `HIGHEST_DEGREE`."""
     needed = 5.0
-    for piece in pieces:
-        ratio = np.linalg.norm(points - piece.box.center, axis=1).min() / piece.box.circumradius
+    for piece, own in zip(pieces, cells, strict=True):
+        apart = np.linalg.norm(points[:, None] - own.centers, axis=2).min(axis=0)
+        ratio = float(np.min(apart / own.radii))
         if piece.contrast:
             needed = max(needed, 4 + np.log(piece.contrast / rtol) / np.log(ratio))
     return int(min(np.ceil(needed), HIGHEST_DEGREE))

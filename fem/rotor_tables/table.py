@@ -16,6 +16,8 @@ from ..harmonics import CompiledField, FieldExpressions, MultipoleExpansion, as_
 
 BLUR = 0.5
 """Share of the root mean square of a doubt that is added to its field."""
+ROUND_OFF = 1e-13
+"""Of a field and its gradient, relative."""
 KNOWN = "truncation"
 """What is cut off an expansion is known exactly."""
 
@@ -121,7 +123,7 @@ class RotorTable:
             raise RangeError(
                 f"Input points must lie outside the magnets{self._beyond()}; instead received a point at ({where}) mm."
             )
-        if not any(form.is_far(columns).any() for form in self._closed_forms):
+        if not any((form.is_far(columns) | form.is_close(columns)).any() for form in self._closed_forms):
             return field_and_gradient(self._near.rows(columns))
         rows = np.zeros((12, columns.shape[1]))
         for form in self._closed_forms:
@@ -146,8 +148,8 @@ class RotorTable:
         b, g = self.evaluate(points)
         error_b, error_g = self.absolute_error(points)
         size_b, size_g = np.linalg.norm(b, axis=1), np.linalg.norm(g, axis=(1, 2))
-        tiny, round_off = np.finfo(float).tiny, 1e-13
-        return error_b / (size_b + tiny) + round_off, error_g / (size_g + tiny) + round_off
+        tiny = np.finfo(float).tiny
+        return error_b / (size_b + tiny) + ROUND_OFF, error_g / (size_g + tiny) + ROUND_OFF
 
     def absolute_error(self, points: ArrayLike) -> tuple[Array, Array]:
         """Estimated errors (n,) of B (T) and of its gradient (T/m).
@@ -174,9 +176,9 @@ class RotorTable:
     def _in_range(self, columns: Array) -> NDArray[np.bool_]:
         outside = np.ones(columns.shape[1], bool)
         for magnet in self.magnets:
-            near = squared_distance(columns, magnet.box.center) < magnet.box.circumradius**2
+            near = squared_distance(columns, magnet.body.center) < magnet.body.circumradius**2
             if near.any():
-                outside[near] &= magnet.box.distance(columns[:, near].T) >= 0
+                outside[near] &= magnet.body.distance(columns[:, near].T) >= 0
         for expansion in self.expansions:
             if expansion.nearest:
                 outside &= squared_distance(columns, expansion.center) > expansion.nearest**2

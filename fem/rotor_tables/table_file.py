@@ -7,13 +7,13 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from ...geometry.basics import Array, Box
+from ...geometry.basics import Array, shape_numbers, solid_of
 from ...geometry.bodies import Magnet
 from ..harmonics import MultipoleExpansion
 from ..storage import described, read_checked, write_checked
 from .table import RotorTable
 
-FORMAT = "spinlev rotor table 4"
+FORMAT = "spinlev rotor table 5"
 
 
 def save_table(table: RotorTable, path: str | Path) -> None:
@@ -46,9 +46,9 @@ def to_dataset(table: RotorTable) -> xr.Dataset:
     power, axis = ("expansion", "degree", "order"), ("magnet", "axis")
     across = [m.recoil_permeability if m.isotropic else m.transverse_permeability for m in magnets]
     variables = {
-        "magnet_size": (axis, stack([m.box.size for m in magnets], 3), "m"),
-        "magnet_center": (axis, stack([m.box.center for m in magnets], 3), "m"),
-        "magnet_rotation": (("magnet", "axis", "body_axis"), stack([m.box.rotation for m in magnets], 3, 3), "1"),
+        "magnet_shape": (("magnet", "shape_number"), stack([_padded(m) for m in magnets], 4), "m"),
+        "magnet_center": (axis, stack([m.body.center for m in magnets], 3), "m"),
+        "magnet_rotation": (("magnet", "axis", "body_axis"), stack([m.body.rotation for m in magnets], 3, 3), "1"),
         "magnet_polarization": (("magnet", "body_axis"), stack([m.polarization for m in magnets], 3), "T"),
         "magnet_recoil_permeability": (("magnet",), stack([m.recoil_permeability for m in magnets]), "1"),
         "magnet_transverse_permeability": (("magnet",), stack(across), "1"),
@@ -62,7 +62,7 @@ def to_dataset(table: RotorTable) -> xr.Dataset:
     }
     attrs = {
         "format": FORMAT,
-        "title": "Magnetic field of a rotor: closed forms of cuboids plus solid-harmonic expansions",
+        "title": "Magnetic field of a rotor: closed forms of magnets plus solid-harmonic expansions",
         "model": table.model,
         "expansion_uses": json.dumps(list(causes)),  # "field", and the causes of doubt
         "provenance": json.dumps(dict(table.provenance), sort_keys=True),
@@ -72,17 +72,23 @@ def to_dataset(table: RotorTable) -> xr.Dataset:
 
 def _closed_forms(table: RotorTable) -> list[Array]:
     """Polarisation (3,) T, in body axes, whose closed form is part of the field, of every magnet."""
-    found = {id(form.box): form.polarization for form in table.uniform}
-    return [found.get(id(magnet.box), np.zeros(3)) for magnet in table.magnets]
+    found = {id(form.body): form.polarization for form in table.uniform}
+    return [found.get(id(magnet.body), np.zeros(3)) for magnet in table.magnets]
+
+
+def _padded(magnet: Magnet) -> Array:
+    """The numbers (4,) of a magnet's shape, those that it has not as nan."""
+    numbers = shape_numbers(magnet.body)
+    return np.pad(numbers, (0, 4 - len(numbers)), constant_values=np.nan)
 
 
 def from_dataset(dataset: xr.Dataset) -> RotorTable:
     """The table of a data set that `to_dataset` made."""
     data = {str(name): variable.values for name, variable in dataset.data_vars.items()}
-    names = ("size", "center", "rotation", "polarization", "recoil_permeability", "transverse_permeability")
+    names = ("shape", "center", "rotation", "polarization", "recoil_permeability", "transverse_permeability")
     magnets = tuple(
-        Magnet(Box(size, center, rotation), polarization, float(along), float(across))
-        for size, center, rotation, polarization, along, across in zip(
+        Magnet(solid_of(shape[~np.isnan(shape)], center, rotation), polarization, float(along), float(across))
+        for shape, center, rotation, polarization, along, across in zip(
             *(data[f"magnet_{n}"] for n in names), strict=True
         )
     )
@@ -96,7 +102,7 @@ def from_dataset(dataset: xr.Dataset) -> RotorTable:
         model=dataset.attrs["model"],
         magnets=magnets,
         uniform=tuple(
-            m if np.array_equal(m.polarization, j) else Magnet(m.box, j)
+            m if np.array_equal(m.polarization, j) else Magnet(m.body, j)
             for m, j in zip(magnets, data["magnet_closed_form"], strict=True)
             if j.any()
         ),

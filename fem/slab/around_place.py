@@ -59,7 +59,7 @@ def plate_around(
 
 def rotor_nearby(table: RotorTable, rotor: tuple[Magnet, ...], place: Array, radius: float, rtol: float) -> RotorTable:
     """The rotor's table with the coefficients that count from `REACH` nearer to the magnets than `place` (3,) m on."""
-    gap = min(float(magnet.box.distance(place)) for magnet in rotor) - REACH
+    gap = min(float(magnet.body.distance(place)) for magnet in rotor) - REACH
     return shortened_table(table, Accuracy(rtol, max(gap, radius)))
 
 

@@ -66,9 +66,9 @@ def _dipole(mesh: MagnetMesh, k: int, formulation: Formulation, inside: skfem.Ba
     magnet = mesh.magnets[k]
     susceptibility = _susceptibility(magnet)
     if formulation == "direct":
-        closed = magnet.polarization_in_rotor * magnet.box.volume
+        closed = magnet.polarization_in_rotor * magnet.body.volume
     else:
-        points, weights = volume_rule(magnet.box, [source.box for source in mesh.magnets], 24)
+        points, weights = volume_rule(magnet.body, [source.body for source in mesh.magnets], 24)
         closed = susceptibility @ (weights @ remanent_field(mesh.magnets, points))
     slope = np.asarray(inside.interpolate(potential).grad)
     return np.asarray(closed - susceptibility @ np.sum(slope * inside.dx, axis=(1, 2)) * mesh.unit**3)

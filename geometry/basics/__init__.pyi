@@ -3,7 +3,18 @@ from .box import Box as Box, rotation_matrix as rotation_matrix
 from .constants import MAGNET_CONDUCTIVITY as MAGNET_CONDUCTIVITY, MU_0 as MU_0
 from .cylinder import Cylinder as Cylinder
 from .errors import ComputationError as ComputationError, InputError as InputError, SpinlevError as SpinlevError
-from .solid import Solid as Solid, places_off as places_off
+from .pose import Posed as Posed
+from .ring import Ring as Ring
+from .solid import (
+    Solid as Solid,
+    described_size as described_size,
+    moved as moved,
+    places_off as places_off,
+    shape_numbers as shape_numbers,
+    solid_of as solid_of,
+    within as within,
+)
+from .sphere import Sphere as Sphere
 from .text import (
     counted as counted,
     html_table as html_table,

@@ -6,10 +6,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .arrays import Array, frozen_array
+from .pose import Posed
 
 
 @dataclass(frozen=True, eq=False)
-class Cylinder:
+class Cylinder(Posed):
     """A straight round cylinder.
 
     Parameters
@@ -45,9 +46,8 @@ class Cylinder:
 
     def distance(self, points: ArrayLike) -> Array:
         """Signed distance (...,) of `points` (..., 3) from the surface, m; negative inside."""
-        body = (np.asarray(points, float) - self.center) @ self.rotation
-        across = np.hypot(body[..., 0], body[..., 1]) - self.radius
-        excess = np.stack([across, np.abs(body[..., 2]) - self.height / 2], axis=-1)
+        radial, height = self._off_axis(points)
+        excess = np.stack([radial - self.radius, np.abs(height) - self.height / 2], axis=-1)
         outside = np.linalg.norm(np.maximum(excess, 0.0), axis=-1)
         return np.asarray(outside + np.minimum(excess.max(axis=-1), 0.0))
 

@@ -1,6 +1,7 @@
 """Which magnets are there, and how do they lie to each other?"""
 
 from .article_rotors import horizontal as horizontal, tilt as tilt, vertical as vertical
+from .cells import Cells as Cells, cells_of as cells_of
 from .conductor import Conductor as Conductor, separate_pieces as separate_pieces
 from .magnet import Magnet as Magnet
 from .overlap import (
@@ -20,5 +21,6 @@ from .symmetry import (
     Symmetry as Symmetry,
     find_symmetry as find_symmetry,
     mirror as mirror,
+    mirror_images as mirror_images,
     parity_parts as parity_parts,
 )

@@ -1,16 +1,17 @@
-"""The three rotors of the article, as magnets in the rotor's frame at t = 0."""
+"""The three rotors of the article, as magnets in the rotor's frame at t = 0; SI units, angles in rad."""
 
 import numpy as np
 
-from ..basics import Array, Box, rotation_matrix
+from ..basics import Box, Solid, moved, rotation_matrix
 from .magnet import Magnet
 
 X, Z = np.array([1.0, 0.0, 0.0]), np.array([0.0, 0.0, 1.0])
 Rotor = tuple[Magnet, ...]
 
 
-def _cube(edge: float, center: Array, polarization: Array, along: float, across: float | None) -> Magnet:
-    return Magnet(Box(np.full(3, edge), center), polarization, along, across)
+def _body(edge: float, body: Solid | None) -> Solid:
+    """The cube about the origin, or the body that stands for it."""
+    return body or Box(np.full(3, edge))
 
 
 def horizontal(
@@ -19,9 +20,11 @@ def horizontal(
     remanence: float,
     recoil_permeability: float,
     transverse_permeability: float | None = None,
+    body: Solid | None = None,
 ) -> Rotor:
-    """One cube magnetised along +x, `displacement` off the axis along +x (SI units)."""
-    return (_cube(edge, displacement * X, remanence * X, recoil_permeability, transverse_permeability),)
+    """One cube magnetised along +x, `displacement` off the axis along +x; or a `body` in its place."""
+    material = (recoil_permeability, transverse_permeability)
+    return (Magnet(moved(_body(edge, body), displacement * X), remanence * X, *material),)
 
 
 def vertical(
@@ -30,11 +33,13 @@ def vertical(
     remanence: float,
     recoil_permeability: float,
     transverse_permeability: float | None = None,
+    body: Solid | None = None,
 ) -> Rotor:
-    """A cube at the origin magnetised along +x and one `displacement` above it along +z (SI units)."""
+    """A cube at the origin magnetised along +x and one `displacement` above it along +z; or a `body` each."""
+    material = (recoil_permeability, transverse_permeability)
     return (
-        _cube(edge, 0 * X, remanence * X, recoil_permeability, transverse_permeability),
-        _cube(edge, displacement * Z, remanence * Z, recoil_permeability, transverse_permeability),
+        Magnet(moved(_body(edge, body), 0 * X), remanence * X, *material),
+        Magnet(moved(_body(edge, body), displacement * Z), remanence * Z, *material),
     )
 
 
@@ -44,7 +49,8 @@ def tilt(
     remanence: float,
     recoil_permeability: float,
     transverse_permeability: float | None = None,
+    body: Solid | None = None,
 ) -> Rotor:
-    """One cube at the origin, body and magnetisation turned to (cos angle, 0, sin angle); angle in rad."""
-    box = Box(np.full(3, edge), rotation=rotation_matrix((0.0, -np.degrees(angle), 0.0)))
-    return (Magnet(box, remanence * X, recoil_permeability, transverse_permeability),)
+    """One cube at the origin, body and magnetisation turned to (cos angle, 0, sin angle); or a `body`."""
+    turned = moved(_body(edge, body), 0 * X, rotation_matrix((0.0, -np.degrees(angle), 0.0)))
+    return (Magnet(turned, remanence * X, recoil_permeability, transverse_permeability),)

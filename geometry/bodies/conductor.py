@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from ..basics import Box, Solid, millimetres
+from ..basics import Solid, described_size, millimetres
 from .overlap import TOUCHING, body_overlap
 
 
@@ -21,10 +21,8 @@ class Conductor:
     conductivity: float
 
     def __repr__(self) -> str:
-        body = self.body
-        shape = f"Ø {body.size[0] * 1e3:.4g} × {body.size[2] * 1e3:.4g} mm"
-        what = millimetres(body.size) if isinstance(body, Box) else shape
-        return f"Conductor {what} at {millimetres(body.center)}, {self.conductivity:.3g} S/m"
+        place = f"{described_size(self.body)} at {millimetres(self.body.center)}"
+        return f"Conductor {place}, {self.conductivity:.3g} S/m"
 
 
 def separate_pieces(conductors: Sequence[Conductor]) -> list[tuple[Conductor, ...]]:

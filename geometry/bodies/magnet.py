@@ -1,10 +1,11 @@
-"""A uniformly polarised permanent magnet in the shape of a box."""
+"""A uniformly polarised permanent magnet."""
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
-from ..basics import MU_0, Array, Box, frozen_array, listed, millimetres
+from ..basics import MU_0, Array, Box, Solid, described_size, frozen_array, listed, millimetres
 
 
 @dataclass(frozen=True, eq=False)
@@ -13,7 +14,7 @@ class Magnet:
 
     Parameters
     ----------
-    box : shape and pose
+    body : shape and pose
     polarization : (3,) remanent polarisation along the body axes, T; it turns with the body
     recoil_permeability : μr of the demagnetisation curve, along the easy axis, which is that of the polarisation
     transverse_permeability : μr across the easy axis; None: as along it
@@ -24,7 +25,7 @@ class Magnet:
     ValueError : two unlike permeabilities without a polarisation that tells the easy axis
     """
 
-    box: Box
+    body: Solid
     polarization: Array
     recoil_permeability: float = 1.0
     transverse_permeability: float | None = None
@@ -36,6 +37,11 @@ class Magnet:
             raise ValueError(
                 "Input polarization must not be zero where the permeability has an easy axis; instead it is zero."
             )
+
+    @cached_property
+    def box(self) -> Box:
+        """The box about the body, along its axes: the body itself where it is a cuboid."""
+        return self.body if isinstance(self.body, Box) else self.body.box
 
     @property
     def isotropic(self) -> bool:
@@ -59,17 +65,17 @@ class Magnet:
     @property
     def polarization_in_rotor(self) -> Array:
         """(3,) remanent polarisation in the rotor's frame, T."""
-        return self.box.rotation @ self.polarization
+        return self.body.rotation @ self.polarization
 
     @property
     def moment(self) -> Array:
         """(3,) moment J V/μ0 of the remanent polarisation alone, rotor's frame, A m²."""
-        return self.polarization_in_rotor * self.box.volume / MU_0
+        return self.polarization_in_rotor * self.body.volume / MU_0
 
     def __repr__(self) -> str:
         along = self.recoil_permeability
         permeability = f"{along:g}" if self.isotropic else f"{along:g} along, {self.transverse_permeability:g} across"
         polarization = listed(self.polarization_in_rotor)
-        place = f"{millimetres(self.box.size)} at {millimetres(self.box.center)}"
+        place = f"{described_size(self.body)} at {millimetres(self.body.center)}"
         text = f"Magnet {place}, ({polarization}) T, μr {permeability}"
         return text if self.conductivity is None else f"{text}, {self.conductivity:.3g} S/m"

@@ -1,4 +1,4 @@
-"""Exact overlap of boxes and spheres in any pose, and gaps that are too narrow for elements."""
+"""Overlap of bodies in any pose, exact for convex ones, and gaps that are too narrow for elements."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -8,20 +8,40 @@ import numpy as np
 import scipy
 from numpy.typing import ArrayLike
 
-from ..basics import Array, Box, Solid, rotation_matrix
+from ..basics import Array, Box, Ring, Solid, Sphere, moved, rotation_matrix
 from .magnet import Magnet
 
 TOUCHING = 1e-9
 """Bodies that overlap by less than this (m) only touch: it is far above round-off and far below any tolerance."""
+ROUNDS = 5
+"""Of searches for the widest gap."""
 NARROW = 2e-3
 """Gaps below this part of the smallest edge are closed for the mesh."""
 
 
-def separation(first: Box, second: Box) -> tuple[float, Array]:
-    """Widest gap between two boxes, m (negative: shortest shift that parts them), and its direction (3,).
+def separation(first: Solid, second: Solid) -> tuple[float, Array]:
+    """Widest gap between two bodies, m (negative: shortest shift that parts them), and its direction (3,).
 
-    Separating-axis theorem (S. Gottschalk et al., SIGGRAPH 1996): two boxes are apart exactly if one of the
-    three axes of either or one of the nine products of their edges parts them.
+    Exact for convex bodies, to the 1e-9 of a search where mantles or edges of cylinders are nearest.  A ring counts as
+    filled, but for what lies in its hole or fits in there.
+    """
+    through = []
+    for ring, other, sign in ((first, second, 1.0), (second, first, -1.0)):
+        if isinstance(ring, Ring):
+            gap, direction, fits = _gap_in_hole(ring, other)
+            if gap > -TOUCHING:
+                return gap, sign * direction
+            through += [(gap, sign * direction)] if fits else []
+    if isinstance(first, Box) and isinstance(second, Box):
+        return _box_separation(first, second)
+    return max([_convex_separation(first, second), *through], key=lambda found: found[0])
+
+
+def _box_separation(first: Box, second: Box) -> tuple[float, Array]:
+    """Separating-axis theorem (S. Gottschalk et al., SIGGRAPH 1996).
+
+    Two boxes are apart exactly if one of the three axes of either or one of the nine products of their edges parts
+    them.
     """
     a, b = first.rotation.T, second.rotation.T
     crossed = np.cross(a[:, None, :], b[None, :, :]).reshape(9, 3)
@@ -33,33 +53,77 @@ def separation(first: Box, second: Box) -> tuple[float, Array]:
     return float(np.abs(along[best]) - reach[best]), axes[best] * np.sign(along[best])
 
 
-def box_overlap(first: Box, second: Box) -> float:
-    """Penetration depth of two boxes, m: the shortest shift that parts them; negative if they are apart."""
-    return -separation(first, second)[0]
+def _convex_separation(first: Solid, second: Solid) -> tuple[float, Array]:
+    """Some direction shows the widest gap between convex bodies.
 
-
-def body_overlap(first: Solid, second: Solid) -> float:
-    """Penetration depth of two convex bodies, m: the shortest shift that parts them; negative if they are apart.
-
-    Some direction shows the widest gap between them.  Where faces or mantles meet it is one of those that are tried
-    first, and the depth is exact; elsewhere it is found by a search, which can only tell too large a depth.
+    Where faces or mantles meet it is one of those that are tried first, and the gap is exact; elsewhere it is found by
+    a search, which can only tell too small a gap.
     """
-    if isinstance(first, Box) and isinstance(second, Box):
-        return box_overlap(first, second)
     offset = second.center - first.center
 
     def gap(directions: Array) -> Array:
         ways = directions / np.linalg.norm(directions, axis=1)[:, None]
-        return np.asarray(np.abs(ways @ offset) - first.reach(ways) - second.reach(ways))
+        return np.asarray(ways @ offset - first.reach(ways) - second.reach(ways))
 
     axes = np.vstack([first.rotation.T, second.rotation.T])
+    crossed = np.cross(first.rotation.T[:, None], second.rotation.T).reshape(9, 3)
     across = np.vstack([offset, *(offset - (offset @ axis) * axis for axis in axes)])
-    tried = np.vstack([axes, across, np.random.default_rng(0).normal(size=(200, 3))])
+    tried = np.vstack([axes, -axes, crossed, -crossed, across, np.random.default_rng(0).normal(size=(200, 3))])
     tried = tried[np.linalg.norm(tried, axis=1) > 1e-12]
-    widest = tried[int(np.argmax(gap(tried)))]
+    tried /= np.linalg.norm(tried, axis=1)[:, None]
+    best = tried[int(np.argmax(gap(tried)))]
     scale = first.circumradius + second.circumradius
-    found = scipy.optimize.minimize(lambda n: -gap(n[None])[0] / scale, widest, method="Nelder-Mead", tol=1e-9)
-    return float(min(scale * found.fun, -gap(tried).max()))
+    for _ in range(ROUNDS):  # the simplex may end early on an edge of the gap; from there it goes on
+        found = scipy.optimize.minimize(
+            lambda n: -gap(n[None])[0] / scale, best, method="Nelder-Mead", options={"xatol": 1e-10, "fatol": 1e-13}
+        )
+        better = found.x / np.linalg.norm(found.x)
+        gained = gap(better[None])[0] - gap(best[None])[0]
+        best = better if gained > 0 else best
+        if gained < 1e-10 * scale:
+            break
+    return float(gap(best[None])[0]), best
+
+
+def _gap_in_hole(ring: Ring, body: Solid) -> tuple[float, Array, bool]:
+    """Gap between a convex body and the wall of the endless hole of a ring, the way (3,) off that wall, if it fits."""
+    x, y, _ = ring.rotation.T
+    offset = body.center - ring.center
+
+    def stands_off(angle: Array) -> Array:
+        ways = np.multiply.outer(np.cos(angle), x) + np.multiply.outer(np.sin(angle), y)
+        return np.asarray(ring.inner_radius - ways @ offset - body.reach(ways))
+
+    angles = np.linspace(0.0, 2 * np.pi, 361)
+    best = angles[int(np.argmin(stands_off(angles)))]
+    step = angles[1]
+    found = scipy.optimize.minimize_scalar(
+        lambda angle: float(stands_off(np.array([angle]))[0]),
+        bounds=(best - step, best + step),
+        method="bounded",
+        options={"xatol": 1e-12},
+    )
+    angle = found.x if found.fun < stands_off(np.array([best]))[0] else best
+    ways = np.multiply.outer(np.cos(angles), x) + np.multiply.outer(np.sin(angles), y)
+    fits = bool(body.reach(ways).max() <= ring.inner_radius + TOUCHING)
+    return float(stands_off(np.array([angle]))[0]), -(np.cos(angle) * x + np.sin(angle) * y), fits
+
+
+def body_overlap(first: Solid, second: Solid) -> float:
+    """Penetration depth of two bodies, m: the shortest shift that parts them; negative if they are apart.
+
+    Exact as `separation`, and between a sphere and any body.
+    """
+    if isinstance(second, Sphere):
+        return sphere_overlap(second.center, second.radius, first)
+    if isinstance(first, Sphere):
+        return sphere_overlap(first.center, first.radius, second)
+    return -separation(first, second)[0]
+
+
+def box_overlap(first: Box, second: Box) -> float:
+    """Penetration depth of two boxes, m: the shortest shift that parts them; negative if they are apart."""
+    return -_box_separation(first, second)[0]
 
 
 def sphere_overlap(center: ArrayLike, radius: float, body: Solid) -> float:
@@ -70,7 +134,7 @@ def sphere_overlap(center: ArrayLike, radius: float, body: Solid) -> float:
 def turned(body: Solid, angle: float) -> Solid:
     """The body after the rotor has turned by `angle` (rad) about z."""
     turn = rotation_matrix((0.0, 0.0, np.degrees(angle)))
-    return replace(body, center=turn @ body.center, rotation=turn @ body.rotation)
+    return moved(body, turn @ body.center, turn @ body.rotation)
 
 
 def deepest_overlap_in_a_turn(rotating: Solid, fixed: Box) -> float:
@@ -100,14 +164,13 @@ def _farthest(body: Solid) -> float:
 
 def overlapping_magnets(magnets: Sequence[Magnet]) -> list[tuple[int, int, float]]:
     """Pairs of magnets that overlap (touching is allowed) with their depth, m."""
-    pairs = [(i, j, box_overlap(magnets[i].box, magnets[j].box)) for j in range(len(magnets)) for i in range(j)]
+    pairs = [(i, j, body_overlap(magnets[i].body, magnets[j].body)) for j in range(len(magnets)) for i in range(j)]
     return [(i, j, depth) for i, j, depth in pairs if depth > TOUCHING]
 
 
 def shifted_magnet(magnet: Magnet, shift: Array) -> Magnet:
     """The magnet moved by `shift` (3,) m."""
-    box = magnet.box
-    return replace(magnet, box=Box(box.size, box.center + shift, box.rotation)) if shift.any() else magnet
+    return replace(magnet, body=moved(magnet.body, magnet.body.center + shift)) if shift.any() else magnet
 
 
 def closing_shifts(magnets: Sequence[Magnet]) -> Array:
@@ -115,10 +178,17 @@ def closing_shifts(magnets: Sequence[Magnet]) -> Array:
     shifts = np.zeros((len(magnets), 3))
     narrow = NARROW * min(float(magnet.box.size.min()) for magnet in magnets)
     for i, j in combinations(range(len(magnets)), 2):
-        gap, axis = separation(shifted_magnet(magnets[i], shifts[i]).box, shifted_magnet(magnets[j], shifts[j]).box)
-        if TOUCHING < gap < narrow:
+        gap, axis = separation(shifted_magnet(magnets[i], shifts[i]).body, shifted_magnet(magnets[j], shifts[j]).body)
+        if TOUCHING < gap < narrow and all(_flat_across(magnets[k].body, axis) for k in (i, j)):
             shifts[j] -= gap * axis
     return shifts
+
+
+def _flat_across(body: Solid, direction: Array) -> bool:
+    """Whether a body ends in a plane across a direction, so that a gap to it can be closed by a shift; any box does."""
+    if isinstance(body, Box):
+        return True
+    return not isinstance(body, Sphere) and bool(abs(body.rotation[:, 2] @ direction) > 1 - 1e-12)
 
 
 def largest_shift(magnets: Sequence[Magnet]) -> float:

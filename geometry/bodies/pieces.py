@@ -15,9 +15,12 @@ CONVERGENCE = 1.3
 def cut_magnets(magnets: Sequence[Magnet], nearest: float) -> tuple[tuple[Magnet, ...], ...]:
     """Pieces of every magnet, equal boxes, for expansions that are used from the distance `nearest` (m) from faces on.
 
-    A cube stays whole down to 0.63 of its edge from a face.
+    A cube stays whole down to 0.63 of its edge from a face.  Magnets of other shapes stay whole here, see `cells_of`.
     """
-    return tuple(tuple(_pieces(magnet, _counts(magnet.box.size, nearest))) for magnet in magnets)
+    return tuple(
+        tuple(_pieces(magnet, _counts(magnet.box.size, nearest))) if isinstance(magnet.body, Box) else (magnet,)
+        for magnet in magnets
+    )
 
 
 def _counts(size: Array, nearest: float) -> tuple[int, ...]:

@@ -10,7 +10,7 @@ from itertools import product
 
 import numpy as np
 
-from ..basics import Array, Box
+from ..basics import Array, Box, Solid, Sphere, moved
 from .magnet import Magnet
 
 SAME_PLACE = 1e-9
@@ -37,19 +37,19 @@ class Symmetry:
 
     def to_frame(self, magnet: Magnet) -> Magnet:
         """The magnet as seen in the mirrors' frame: planes are coordinate planes through the origin."""
-        box = magnet.box
-        return replace(magnet, box=Box(box.size, self.axes.T @ (box.center - self.center), self.axes.T @ box.rotation))
+        body, turn = magnet.body, self.axes.T
+        return replace(magnet, body=moved(body, turn @ (body.center - self.center), turn @ body.rotation))
 
 
 def find_symmetry(magnets: Sequence[Magnet]) -> Symmetry:
     """The frame, of the rotor or of the first magnet, in which the bodies have most mirror planes."""
-    found = [_symmetry_along(magnets, axes) for axes in (np.eye(3), magnets[0].box.rotation)]
+    found = [_symmetry_along(magnets, axes) for axes in (np.eye(3), magnets[0].body.rotation)]
     return max(found, key=lambda symmetry: len(symmetry.planes))
 
 
 def _symmetry_along(magnets: Sequence[Magnet], axes: Array) -> Symmetry:
-    corners = np.concatenate([magnet.box.corners for magnet in magnets]) @ axes
-    middle = axes @ ((corners.min(axis=0) + corners.max(axis=0)) / 2)
+    ends = np.concatenate([_ends(magnet.body, axes) for magnet in magnets])
+    middle = axes @ ((ends.min(axis=0) + ends.max(axis=0)) / 2)
     symmetry = Symmetry(middle, axes, ())
     seen = [symmetry.to_frame(magnet) for magnet in magnets]
     mirrors = (axis for axis in range(3) if mirror_images(seen, axis) is not None)
@@ -58,9 +58,40 @@ def _symmetry_along(magnets: Sequence[Magnet], axes: Array) -> Symmetry:
 
 def _in_narrow_gap(magnets: Sequence[Magnet], axis: int) -> bool:
     """Whether the plane across a coordinate axis runs close by a corner of a body, but not through it."""
-    heights = np.abs([magnet.box.corners[:, axis] for magnet in magnets])
+    heights = np.abs(np.concatenate([_heights(magnet.body, axis) for magnet in magnets]))
     shortest = min(float(magnet.box.size.min()) for magnet in magnets)
     return bool(np.any((heights > SAME_PLACE * shortest) & (heights < NARROW_SIDE * shortest)))
+
+
+def _ends(body: Solid, axes: Array) -> Array:
+    """(2, 3) coordinates along axes (columns) between which a body lies."""
+    reach = body.reach(axes.T)
+    return np.asarray(body.center @ axes + np.array([-reach, reach]))
+
+
+def _heights(body: Solid, axis: int) -> Array:
+    """Coordinates (n,) along an axis of the corners of a body, or of its ends where it is round."""
+    if isinstance(body, Box):
+        return body.corners[:, axis]
+    return _ends(body, np.eye(3))[:, axis]
+
+
+def _same_body(body: Solid, other: Solid, flip: Array) -> bool:
+    """Whether the mirror image of a body takes the place of another."""
+    allowed = SAME_PLACE * max(body.circumradius, float(np.linalg.norm(body.center)))
+    if type(body) is not type(other):
+        return False
+    if isinstance(body, Box) and isinstance(other, Box):
+        distance = np.linalg.norm((body.corners * flip)[:, None] - other.corners, axis=-1)
+        return bool(distance.min(axis=1).max() <= allowed)
+    same = np.linalg.norm(body.center * flip - other.center) <= allowed
+    same &= all(
+        abs(getattr(body, key) - getattr(other, key)) <= allowed
+        for key in ("radius", "inner_radius", "height")
+        if hasattr(body, key)
+    )
+    parallel = abs((body.rotation[:, 2] * flip) @ other.rotation[:, 2]) > 1 - 1e-15
+    return bool(same and (isinstance(body, Sphere) or parallel))
 
 
 def mirror_images(magnets: Sequence[Magnet], axis: int) -> list[int] | None:
@@ -81,9 +112,7 @@ def mirror(axis: int) -> Array:
 
 def _mirrored(magnet: Magnet, other: Magnet, axis: int) -> bool:
     flip = mirror(axis)
-    size = max(magnet.box.circumradius, float(np.linalg.norm(magnet.box.center)))
-    distance = np.linalg.norm((magnet.box.corners * flip)[:, None] - other.box.corners, axis=-1)
-    if distance.min(axis=1).max() > SAME_PLACE * size:
+    if not _same_body(magnet.body, other.body, flip):
         return False
     permeability = magnet.permeability_in_rotor * flip[:, None] * flip
     return bool(np.allclose(permeability, other.permeability_in_rotor, rtol=0, atol=1e-12))

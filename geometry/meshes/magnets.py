@@ -14,8 +14,9 @@ import netgen.occ as occ
 import ngsolve as ng
 import numpy as np
 
-from ..basics import Array, Box, frozen_array
+from ..basics import Array, Box, Solid, Sphere, frozen_array, moved
 from ..bodies import Magnet, overlapping_magnets
+from .solids import occ_solid
 
 LARGE = 100.0
 TINY = 1e-7
@@ -34,7 +35,8 @@ class MeshSettings:
     grading : how fast sizes may grow (0 slow … 1 fast)
     hp_layers : layers of elements that shrink towards the magnets' edges and corners
     hp_factor : ratio of the sizes of two such layers
-    curve_order : polynomial degree of the curved elements at the sphere
+    curve_order : polynomial degree of the curved elements at the sphere and at round magnets
+    curvature : elements in a radius of curvature
     """
 
     ball_radius: float = 1.3
@@ -44,6 +46,7 @@ class MeshSettings:
     hp_layers: int = 1
     hp_factor: float = 0.15
     curve_order: int = 6
+    curvature: float = 2.0
 
     def __post_init__(self) -> None:
         if self.ball_radius <= 1:
@@ -87,7 +90,7 @@ def mesh_magnets(
     magnets: Sequence[Magnet],
     settings: MeshSettings | None = None,
     planes: tuple[int, ...] = (),
-    edges_of: Sequence[Box] | None = None,
+    edges_of: Sequence[Solid] | None = None,
 ) -> MagnetMesh:
     """Mesh magnets in a ball of air; they may touch each other.
 
@@ -95,7 +98,7 @@ def mesh_magnets(
     ----------
     planes : coordinate planes (0: across x, …) that mirror the magnets; only the positive side is meshed. The faces
         there are the boundaries `plane0`, …
-    edges_of : the boxes at whose edges and corners the field is singular; by default the magnets
+    edges_of : the bodies at whose edges and corners the field is singular; by default the magnets
 
     Raises
     ------
@@ -107,21 +110,30 @@ def mesh_magnets(
         raise ValueError("Input magnets must hold at least one magnet; instead received none.")
     for i, j, depth in overlapping_magnets(magnets):
         raise ValueError(f"Input magnets must not overlap; instead magnets {i} and {j} do, {depth * 1e3:.3g} mm deep.")
-    corners = np.concatenate([magnet.box.corners for magnet in magnets])
-    center = (corners.min(axis=0) + corners.max(axis=0)) / 2
-    unit = float(np.linalg.norm(corners - center, axis=1).max())
+    reach = np.array([magnet.body.reach(np.eye(3)) for magnet in magnets])
+    places = np.array([magnet.body.center for magnet in magnets])
+    center = ((places - reach).min(axis=0) + (places + reach).max(axis=0)) / 2
+    unit = max(_farthest(magnet.body, center) for magnet in magnets)
     kept = _kept_side(planes)
     solids = []
     for k, magnet in enumerate(magnets):
-        solid = _solid(magnet.box, center, unit) * kept
+        solid = occ_solid(magnet.body, center, unit) * kept
         solid.mat(f"magnet{k}")
-        solid.maxh = settings.magnet_size * float(np.min(magnet.box.size) * magnet.box.volume ** (1 / 3)) ** 0.5 / unit
+        thinnest, cube = float(magnet.body.size.min()), magnet.body.volume ** (1 / 3)
+        solid.maxh = settings.magnet_size * (min(thinnest, cube) * cube) ** 0.5 / unit
         if solid.solids:
             solids.append(solid)
-    boxes = [magnet.box for magnet in magnets] if edges_of is None else edges_of
-    scaled = [Box(box.size / unit, (box.center - center) / unit, box.rotation) for box in boxes]
-    mesh = _generate(solids, kept, planes, scaled, settings)
+    bodies = [magnet.body for magnet in magnets] if edges_of is None else edges_of
+    placed = [moved(body, body.center - center) for body in bodies]
+    mesh = _generate(solids, kept, planes, placed, unit, settings)
     return MagnetMesh(mesh, magnets, frozen_array(center, (3,)), unit, settings.ball_radius, planes)
+
+
+def _farthest(body: Solid, center: Array) -> float:
+    """Radius of a sphere about a centre that holds a body, m; the smallest one for a cuboid."""
+    if isinstance(body, Box):
+        return float(np.linalg.norm(body.corners - center, axis=1).max())
+    return float(np.linalg.norm(body.center - center)) + body.circumradius
 
 
 def _kept_side(planes: tuple[int, ...]) -> Any:
@@ -131,7 +143,7 @@ def _kept_side(planes: tuple[int, ...]) -> Any:
 
 
 def _generate(
-    solids: list[Any], kept: Any, planes: tuple[int, ...], boxes: Sequence[Box], settings: MeshSettings
+    solids: list[Any], kept: Any, planes: tuple[int, ...], bodies: Sequence[Solid], unit: float, settings: MeshSettings
 ) -> Any:
     air = occ.Sphere(occ.Pnt(0, 0, 0), settings.ball_radius)
     air.faces.name = "outer"
@@ -146,45 +158,54 @@ def _generate(
             if abs(face.center[axis]) < TINY:
                 face.name = f"plane{axis}"
     if settings.hp_layers:
-        _mark_singular(shape, boxes)
-    mesh = ng.Mesh(
-        occ.OCCGeometry(shape).GenerateMesh(maxh=settings.air_size, grading=settings.grading, parallel_meshing=False)
-    )
+        _mark_singular(shape, bodies, unit)
+    sizes = {"maxh": settings.air_size, "grading": settings.grading, "curvaturesafety": settings.curvature}
+    mesh = ng.Mesh(occ.OCCGeometry(shape).GenerateMesh(**sizes, parallel_meshing=False))
     if settings.hp_layers:
         mesh.RefineHP(settings.hp_layers, settings.hp_factor)
     mesh.Curve(settings.curve_order)
     return mesh
 
 
-def _mark_singular(shape: Any, boxes: Sequence[Box]) -> None:
-    """Mark the edges of boxes, and the points where edges of different directions meet, for hp-refinement."""
+def _mark_singular(shape: Any, bodies: Sequence[Solid], unit: float) -> None:
+    """Mark the edges of bodies, and the points where edges of different directions meet, for hp-refinement."""
     for edge in shape.edges:
-        if _edge_directions(edge.center, boxes):
+        if edge.mass > TINY and _edge_directions(
+            _middle(edge), bodies, unit
+        ):  # a sphere's poles are edges of no length
             edge.hpref = 1
     for vertex in shape.vertices:
-        directions = _edge_directions(vertex.p, boxes)
+        directions = _edge_directions(np.array([vertex.p.x, vertex.p.y, vertex.p.z]), bodies, unit)
         if any(abs(first @ second) < 1 - TINY for first, second in combinations(directions, 2)):
             vertex.hpref = 1
 
 
-def _edge_directions(point: Any, boxes: Sequence[Box]) -> list[Array]:
-    """Directions of the edges of boxes on which a point lies."""
+def _middle(edge: Any) -> Array:
+    """The point (3,) in the middle of an edge, in the mesh's coordinates."""
+    start, end = edge.parameter_interval
+    return np.array(list(edge.Value((start + end) / 2)))
+
+
+def _edge_directions(point: Array, bodies: Sequence[Solid], unit: float) -> list[Array]:
+    """Directions of the edges of bodies on which a point of the mesh's coordinates lies."""
     found = []
-    for box in boxes:
-        excess = np.abs(box.to_body([point.x, point.y, point.z])) - box.half_edges
-        flush = np.abs(excess) < TINY
-        if excess.max() < TINY and flush.sum() >= 2:
-            found += [box.rotation[:, axis] for axis in range(3) if np.delete(flush, axis).all()]
+    for body in bodies:
+        if isinstance(body, Box):
+            excess = np.abs(body.to_body(point * unit)) - body.half_edges
+            flush = np.abs(excess) < TINY * unit
+            if excess.max() < TINY * unit and flush.sum() >= 2:
+                found += [body.rotation[:, axis] for axis in range(3) if np.delete(flush, axis).all()]
+        elif not isinstance(body, Sphere):
+            found += _circle_directions(body, point * unit, TINY * unit)
     return found
 
 
-def _solid(box: Box, center: Array, unit: float) -> Any:
-    """The box as a solid in the mesh's coordinates."""
-    half = box.half_edges / unit
-    origin = (box.center - center) / unit - box.rotation @ half
-    axes = occ.Axes(tuple(map(float, origin)), n=_direction(box.rotation[:, 2]), h=_direction(box.rotation[:, 0]))
-    return occ.WorkPlane(axes).Rectangle(2 * half[0], 2 * half[1]).Face().Extrude(float(2 * half[2]))
-
-
-def _direction(vector: Array) -> Any:
-    return occ.gp_Vec(*map(float, vector))
+def _circle_directions(body: Solid, point: Array, tolerance: float) -> list[Array]:
+    """Direction of the circle of a cylinder or ring on which a point (3,) m lies."""
+    local = body.to_body(point)
+    across = float(np.hypot(local[0], local[1]))
+    radii = [getattr(body, key) for key in ("radius", "inner_radius") if hasattr(body, key)]
+    on_mantle = any(abs(across - radius) < tolerance for radius in radii)
+    if not on_mantle or abs(abs(local[2]) - body.half_edges[2]) > tolerance:
+        return []
+    return [np.asarray(body.rotation @ np.array([-local[1], local[0], 0.0]) / across)]

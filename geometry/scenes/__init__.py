@@ -1,5 +1,6 @@
 """What is in the scene file, and is it a scene that can exist?"""
 
+from .assembly import assemble as assemble
 from .building import scene as scene
 from .contents import (
     AIR_VISCOSITY as AIR_VISCOSITY,
@@ -21,4 +22,4 @@ from .parts import (
     tilt as tilt,
     vertical as vertical,
 )
-from .writing import scene_text as scene_text, startless_text as startless_text
+from .writing import scene_keys as scene_keys, scene_text as scene_text, startless_text as startless_text

@@ -8,12 +8,12 @@ from typing import Any
 import numpy as np
 from pydantic import ValidationError
 
-from ..basics import Array, Box, Cylinder, Solid, rotation_matrix
+from ..basics import Array, Box, rotation_matrix
 from ..bodies import Conductor, Magnet, horizontal, tilt, vertical
 from .contents import AbsoluteStart, Drag, Floater, Lowering, OffsetStart, Plate, Scene
 from .faults import SceneError, describe_fault, overlap_faults
 from .schema import (
-    ConductorSection,
+    SIZES,
     DragSection,
     ExplicitRotor,
     HorizontalRotor,
@@ -25,8 +25,7 @@ from .schema import (
     TiltRotor,
     VerticalRotor,
 )
-
-MILLI = 1e-3
+from .shapes import ARTICLE_SIZES, MILLI, shape_faults, solid
 
 
 def assemble(keys: Mapping[str, Any], source: str) -> Scene:
@@ -40,7 +39,7 @@ def assemble(keys: Mapping[str, Any], source: str) -> Scene:
         table = SceneSection.model_validate(keys)
     except ValidationError as error:
         raise SceneError(source, [describe_fault(detail) for detail in error.errors()]) from None
-    faults = _start_faults(table.start) + _drag_faults(table.drag) + _conductor_faults(table.rotor.conductors)
+    faults = _start_faults(table.start) + _drag_faults(table.drag) + _shape_faults(table.rotor)
     if faults:
         raise SceneError(source, faults)
     scene = _scene(table, Path(source).parent)
@@ -80,18 +79,16 @@ def _drag_faults(drag: DragSection | None) -> list[str]:
     return [f"Input drag.{key} must be given; instead it is missing." for key in numbers if key not in given]
 
 
-def _conductor_faults(conductors: list[ConductorSection]) -> list[str]:
+def _shape_faults(rotor: Rotor) -> list[str]:
     """Which sizes belong to which shape."""
-    sizes = {"cuboid": ("size_mm",), "cylinder": ("diameter_mm", "height_mm")}
     faults = []
-    for k, conductor in enumerate(conductors):
-        wanted = sizes[conductor.shape]
-        given = [key for keys in sizes.values() for key in keys if getattr(conductor, key) is not None]
-        if tuple(given) != wanted:
-            faults.append(
-                f"Input rotor.conductors[{k}] must have {' and '.join(wanted)}, as the shape is {conductor.shape!r}; "
-                f"instead received {' and '.join(given) or 'no size'}."
-            )
+    if isinstance(rotor, ExplicitRotor):
+        for k, magnet in enumerate(rotor.magnets):
+            faults += shape_faults(f"rotor.magnets[{k}]", magnet, SIZES)
+    else:
+        faults += shape_faults("rotor", rotor, ARTICLE_SIZES)
+    for k, conductor in enumerate(rotor.conductors):
+        faults += shape_faults(f"rotor.conductors[{k}]", conductor, SIZES)
     return faults
 
 
@@ -108,7 +105,9 @@ def _scene(table: SceneSection, folder: Path) -> Scene:
         drag=_drag(drag, floater.radius),
         start=_start(table.start),
         field_map=folder / table.rotor.field_map if table.rotor.field_map else None,
-        conductors=tuple(Conductor(_solid(c), c.conductivity_S_m) for c in table.rotor.conductors),
+        conductors=tuple(
+            Conductor(solid(c, c.center_mm, c.rotation_deg), c.conductivity_S_m) for c in table.rotor.conductors
+        ),
     )
 
 
@@ -120,14 +119,6 @@ def _drag(drag: DragSection, radius: float) -> Drag:
     if drag.linear_N_s_m is not None and drag.angular_N_m_s is not None:
         return Drag(drag.linear_N_s_m, drag.angular_N_m_s)
     return replace(Drag.stokes(radius), air=drag.model == "air")
-
-
-def _solid(conductor: ConductorSection) -> Solid:
-    if conductor.size_mm is not None:
-        return _box(conductor.size_mm, conductor.center_mm, conductor.rotation_deg)
-    diameter, height = _metres([conductor.diameter_mm or 0.0, conductor.height_mm or 0.0])
-    pose = _metres(conductor.center_mm), rotation_matrix(conductor.rotation_deg)
-    return Cylinder(diameter / 2, float(height), *pose)
 
 
 def _metres(millimetres: list[float]) -> Array:
@@ -142,14 +133,15 @@ def _rotor(rotor: Rotor) -> tuple[Magnet, ...]:
 
 def _magnet(magnet: MagnetSection, conductivity: float | None) -> Magnet:
     """One of an explicit rotor; `conductivity` where it has none of its own."""
-    box = _box(magnet.size_mm, magnet.center_mm, magnet.rotation_deg)
+    body = solid(magnet, magnet.center_mm, magnet.rotation_deg)
     along, across = magnet.recoil_permeability
     own = magnet.conductivity_S_m
-    return Magnet(box, np.array(magnet.polarization_T), along, across, conductivity if own is None else own)
+    return Magnet(body, np.array(magnet.polarization_T), along, across, conductivity if own is None else own)
 
 
 def _of_article(rotor: HorizontalRotor | VerticalRotor | TiltRotor) -> tuple[Magnet, ...]:
-    material = (rotor.edge_mm * MILLI, rotor.remanence_T, *rotor.recoil_permeability)
+    body = solid(rotor)
+    material = (0.0, rotor.remanence_T, rotor.recoil_permeability[0], rotor.recoil_permeability[1], body)
     if isinstance(rotor, TiltRotor):
         return tilt(float(np.radians(rotor.angle_deg)), *material)
     build = horizontal if rotor.configuration == "horizontal" else vertical

@@ -155,7 +155,7 @@ class Scene:
     @property
     def turning_bodies(self) -> tuple[Solid, ...]:
         """The rotor's magnets and conductors."""
-        return (*(magnet.box for magnet in self.rotor), *(conductor.body for conductor in self.conductors))
+        return (*(magnet.body for magnet in self.rotor), *(conductor.body for conductor in self.conductors))
 
     def __repr__(self) -> str:
         air = f"drag {self.drag.linear:.3g} N s/m, {self.drag.angular:.3g} N m s{' and more' if self.drag.air else ''}"

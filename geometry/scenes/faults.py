@@ -129,7 +129,7 @@ def overlap_faults(scene: Scene) -> list[str]:
 
 def named_bodies(scene: Scene) -> list[tuple[str, Solid]]:
     """Magnets and conductors with the words that messages have for them."""
-    magnets = [(f"magnet {i + 1}", magnet.box) for i, magnet in enumerate(scene.rotor)]
+    magnets = [(f"magnet {i + 1}", magnet.body) for i, magnet in enumerate(scene.rotor)]
     return [*magnets, *((f"conductor {i + 1}", part.body) for i, part in enumerate(scene.conductors))]
 
 

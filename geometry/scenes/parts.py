@@ -7,17 +7,17 @@ Table = Mapping[str, Any]
 """A table of the scene file."""
 
 
-def horizontal(*, displacement_mm: float, edge_mm: float, remanence_T: float, **more: Any) -> Table:
+def horizontal(*, displacement_mm: float, remanence_T: float, edge_mm: float | None = None, **more: Any) -> Table:
     """One cube magnetised along +x and displaced along it from the axis.
 
     Parameters
     ----------
     displacement_mm : float
         Of the cube's centre, mm.
-    edge_mm : float
-        Edge of the cubes, mm.
     remanence_T : float
         Remanence, T.
+    edge_mm : float, optional
+        Edge of the cubes, mm; left out where `shape` is "sphere" (with diameter_mm) or "cylinder" (and height_mm).
     **more : float or list
         Further keys, as for `magnets`.
 
@@ -26,21 +26,21 @@ def horizontal(*, displacement_mm: float, edge_mm: float, remanence_T: float, **
     dict
         The table `[rotor]` of a scene file.
     """
-    material = {"edge_mm": edge_mm, "remanence_T": remanence_T}
+    material = _article_material(remanence_T, edge_mm)
     return {"configuration": "horizontal", "displacement_mm": displacement_mm, **material, **more}
 
 
-def vertical(*, displacement_mm: float, edge_mm: float, remanence_T: float, **more: Any) -> Table:
+def vertical(*, displacement_mm: float, remanence_T: float, edge_mm: float | None = None, **more: Any) -> Table:
     """A cube magnetised along +x and one above it along +z.
 
     Parameters
     ----------
     displacement_mm : float
         From centre to centre, mm.
-    edge_mm : float
-        Edge of the cubes, mm.
     remanence_T : float
         Remanence, T.
+    edge_mm : float, optional
+        Edge of the cubes, mm; left out where `shape` is "sphere" (with diameter_mm) or "cylinder" (and height_mm).
     **more : float or list
         Further keys, as for `magnets`.
 
@@ -49,21 +49,21 @@ def vertical(*, displacement_mm: float, edge_mm: float, remanence_T: float, **mo
     dict
         The table `[rotor]` of a scene file.
     """
-    material = {"edge_mm": edge_mm, "remanence_T": remanence_T}
+    material = _article_material(remanence_T, edge_mm)
     return {"configuration": "vertical", "displacement_mm": displacement_mm, **material, **more}
 
 
-def tilt(*, angle_deg: float, edge_mm: float, remanence_T: float, **more: Any) -> Table:
+def tilt(*, angle_deg: float, remanence_T: float, edge_mm: float | None = None, **more: Any) -> Table:
     """One cube, turned with its magnetisation about y.
 
     Parameters
     ----------
     angle_deg : float
         The magnetisation is along (cos angle, 0, sin angle), degrees.
-    edge_mm : float
-        Edge of the cubes, mm.
     remanence_T : float
         Remanence, T.
+    edge_mm : float, optional
+        Edge of the cubes, mm; left out where `shape` is "sphere" (with diameter_mm) or "cylinder" (and height_mm).
     **more : float or list
         Further keys, as for `magnets`.
 
@@ -72,17 +72,23 @@ def tilt(*, angle_deg: float, edge_mm: float, remanence_T: float, **more: Any) -
     dict
         The table `[rotor]` of a scene file.
     """
-    return {"configuration": "tilt", "angle_deg": angle_deg, "edge_mm": edge_mm, "remanence_T": remanence_T, **more}
+    material = _article_material(remanence_T, edge_mm)
+    return {"configuration": "tilt", "angle_deg": angle_deg, **material, **more}
 
 
-def magnets(*cuboids: Table, **more: Any) -> Table:
+def _article_material(remanence_T: float, edge_mm: float | None) -> Table:
+    return {"remanence_T": remanence_T} | ({} if edge_mm is None else {"edge_mm": edge_mm})
+
+
+def magnets(*bodies: Table, **more: Any) -> Table:
     """Any set of magnets.
 
     Parameters
     ----------
-    *cuboids : dict
+    *bodies : dict
         Each with size_mm, center_mm, polarization_T, and where they are not the usual ones rotation_deg,
-        recoil_permeability, conductivity_S_m.
+        recoil_permeability, conductivity_S_m.  For other shapes than "cuboid", in place of size_mm: shape "cylinder"
+        with diameter_mm and height_mm, "ring" with inner_diameter_mm beside, "sphere" with diameter_mm.
     **more : float or list
         Further keys of every rotor: recoil_permeability of the article's, conductivity_S_m of all magnets (their eddy
         currents, else left out), field_map, and conductors, a list of tables with shape ("cuboid" or "cylinder"),
@@ -94,7 +100,7 @@ def magnets(*cuboids: Table, **more: Any) -> Table:
     dict
         The table `[rotor]` of a scene file.
     """
-    return {"magnets": list(cuboids), **more}
+    return {"magnets": list(bodies), **more}
 
 
 def sphere(*, diameter_mm: float, remanence_T: float, density_kg_m3: float, **more: Any) -> Table:

@@ -38,6 +38,25 @@ class _Table(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid")
 
 
+class ShapeSection(_Table):
+    """The keys of a body's shape; which of them belong to it, `SIZES` says."""
+
+    shape: Literal["cuboid", "cylinder", "ring", "sphere"] = "cuboid"
+    size_mm: Sizes | None = None
+    diameter_mm: Length | None = None
+    inner_diameter_mm: Length | None = None
+    height_mm: Length | None = None
+
+
+SIZES = {
+    "cuboid": ("size_mm",),
+    "cylinder": ("diameter_mm", "height_mm"),
+    "ring": ("diameter_mm", "inner_diameter_mm", "height_mm"),
+    "sphere": ("diameter_mm",),
+}
+"""The keys of every shape; its axis, where it has one, is along the body's z."""
+
+
 class ConductorSection(_Table):
     """A piece of metal that turns with the rotor: a cuboid, or a cylinder with its axis along the body's z."""
 
@@ -57,36 +76,38 @@ class _AnyRotor(_Table):
 
 
 class _ArticleRotor(_AnyRotor):
-    edge_mm: Length
+    shape: Literal["cube", "cylinder", "sphere"] = "cube"
+    edge_mm: Length | None = None
+    diameter_mm: Length | None = None
+    height_mm: Length | None = None
     remanence_T: Remanence
     recoil_permeability: MagnetPermeability = [RECOIL_PERMEABILITY, RECOIL_PERMEABILITY]
 
 
 class HorizontalRotor(_ArticleRotor):
-    """One cube, displaced from the axis."""
+    """One cube (or cylinder, or sphere), displaced from the axis."""
 
     configuration: Literal["horizontal"]
     displacement_mm: Annotated[NotNegative, Field(le=1e6)]
 
 
 class VerticalRotor(_ArticleRotor):
-    """Two cubes, the upper magnetised along the axis."""
+    """Two cubes (or cylinders, or spheres), the upper magnetised along the axis."""
 
     configuration: Literal["vertical"]
     displacement_mm: Annotated[NotNegative, Field(le=1e6)]
 
 
 class TiltRotor(_ArticleRotor):
-    """One cube, turned about y."""
+    """One cube (or cylinder, or sphere), turned about y."""
 
     configuration: Literal["tilt"]
     angle_deg: Annotated[Number, Field(ge=-90.0, le=90.0)]
 
 
-class MagnetSection(_Table):
-    """One cuboid of an explicit rotor; its polarisation is along the body's axes and turns with it."""
+class MagnetSection(ShapeSection):
+    """One magnet of an explicit rotor; its polarisation is along the body's axes and turns with it."""
 
-    size_mm: Sizes
     center_mm: Coordinates
     rotation_deg: Angles = [0.0, 0.0, 0.0]
     polarization_T: Polarizations
@@ -95,7 +116,7 @@ class MagnetSection(_Table):
 
 
 class ExplicitRotor(_AnyRotor):
-    """Any set of cuboids."""
+    """Any set of magnets."""
 
     magnets: Annotated[list[MagnetSection], Field(min_length=1)]
 

@@ -10,11 +10,12 @@ from typing import Any
 
 import numpy as np
 
-from ..basics import Array, Box, Cylinder, Solid
+from ..basics import Array, Box, Ring, Solid, moved, shape_numbers
 from ..bodies import Conductor, Magnet, horizontal, tilt, vertical
 from .assembly import assemble
 from .contents import AbsoluteStart, Drag, OffsetStart, Plate, Scene
 from .faults import SceneError
+from .shapes import shape_keys
 
 SAME = 1e-12
 """Relative difference of numbers below which they are taken for the same."""
@@ -77,22 +78,24 @@ def _keys(scene: Scene) -> dict[str, Any]:
 def _rotor(rotor: tuple[Magnet, ...]) -> dict[str, Any]:
     """A rotor of the article by its name if its magnets conduct alike, any other as its magnets."""
     first = rotor[0]
-    material = (float(first.box.size[0]), float(np.linalg.norm(first.polarization)), first.recoil_permeability)
+    body = moved(first.body, np.zeros(3), np.eye(3))
+    material = (0.0, float(np.linalg.norm(first.polarization)), first.recoil_permeability)
     transverse = first.transverse_permeability
-    x, _, z = rotor[-1].box.center
+    x, _, z = rotor[-1].body.center
     angle = float(np.arctan2(first.polarization_in_rotor[2], first.polarization_in_rotor[0]))
     known = {
-        ("horizontal", "displacement_mm", _milli(x)): horizontal(float(x), *material, transverse),
-        ("vertical", "displacement_mm", _milli(z)): vertical(float(z), *material, transverse),
-        ("tilt", "angle_deg", _number(float(np.degrees(angle)))): tilt(angle, *material, transverse),
+        ("horizontal", "displacement_mm", _milli(x)): horizontal(float(x), *material, transverse, body),
+        ("vertical", "displacement_mm", _milli(z)): vertical(float(z), *material, transverse, body),
+        ("tilt", "angle_deg", _number(float(np.degrees(angle)))): tilt(angle, *material, transverse, body),
     }
     for (configuration, key, value), like in known.items():
         alike = len(like) == len(rotor) and len({magnet.conductivity for magnet in rotor}) == 1
+        alike &= not (isinstance(body, Box) and np.ptp(body.size)) and not isinstance(body, Ring)
         if alike and all(map(_same, like, rotor)) and value >= (0 if key != "angle_deg" else -90):
             return {
                 "configuration": configuration,
                 key: value,
-                "edge_mm": _milli(material[0]),
+                **_article_shape(body),
                 "remanence_T": _number(material[1]),
                 "recoil_permeability": _permeability(first),
                 **_conductivity(first),
@@ -100,19 +103,34 @@ def _rotor(rotor: tuple[Magnet, ...]) -> dict[str, Any]:
     return {"magnets": [_magnet(magnet) for magnet in rotor]}
 
 
+def _article_shape(body: Solid) -> dict[str, Any]:
+    return {"edge_mm": _milli(body.size[0])} if isinstance(body, Box) else _shape(body)
+
+
+def _shape(body: Solid) -> dict[str, Any]:
+    """A shape's keys in millimetres."""
+    return {
+        key: value if isinstance(value, str) else _millis(value) if np.ndim(value) else _milli(value)
+        for key, value in shape_keys(body).items()
+    }
+
+
 def _same(one: Magnet, other: Magnet) -> bool:
-    return bool(np.allclose(_parts(one), _parts(other), rtol=SAME, atol=1e-14))
+    return type(one.body) is type(other.body) and bool(np.allclose(_parts(one), _parts(other), rtol=SAME, atol=1e-14))
 
 
 def _parts(magnet: Magnet) -> Array:
-    box = magnet.box
-    turned = (box.rotation, magnet.permeability_in_rotor)
-    return np.concatenate([box.size, box.center, magnet.polarization, *(matrix.ravel() for matrix in turned)])
+    body = magnet.body
+    turned = (body.rotation, magnet.permeability_in_rotor)
+    return np.concatenate(
+        [shape_numbers(body), body.center, magnet.polarization, *(matrix.ravel() for matrix in turned)]
+    )
 
 
 def _magnet(magnet: Magnet) -> dict[str, Any]:
     return {
-        **_box(magnet.box),
+        **_shape(magnet.body),
+        **_pose(magnet.body),
         "polarization_T": _numbers(magnet.polarization),
         "recoil_permeability": _permeability(magnet),
         **_conductivity(magnet),
@@ -125,9 +143,7 @@ def _conductivity(magnet: Magnet) -> dict[str, float]:
 
 def _conductor(conductor: Conductor) -> dict[str, Any]:
     body, conductivity = conductor.body, {"conductivity_S_m": _number(conductor.conductivity)}
-    if isinstance(body, Box):
-        return {"shape": "cuboid", **_box(body), **conductivity}
-    return {"shape": "cylinder", **_cylinder(body), **conductivity}
+    return {"shape": "cuboid"} | _shape(body) | _pose(body) | conductivity
 
 
 def _permeability(magnet: Magnet) -> float | list[float]:
@@ -157,10 +173,6 @@ def _start(scene: Scene) -> dict[str, Any]:
 
 def _box(box: Box) -> dict[str, Any]:
     return {"size_mm": _millis(box.size), **_pose(box)}
-
-
-def _cylinder(body: Cylinder) -> dict[str, Any]:
-    return {"diameter_mm": _milli(2 * body.radius), "height_mm": _milli(body.height), **_pose(body)}
 
 
 def _pose(body: Solid) -> dict[str, Any]:

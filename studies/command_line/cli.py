@@ -18,6 +18,7 @@ from rich.console import Console
 from ...geometry.basics import SpinlevError
 from ..terminal import FORTRAN, Answer, answers_only, heard, is_missing_library, note, to_json, way_out
 from .file_commands import add_file_commands
+from .page_command import add_page_command
 from .result_commands import add_result_commands
 from .scene_commands import add_scene_commands
 from .start import STOPPED
@@ -32,6 +33,7 @@ app = App(
 add_scene_commands(app)
 add_result_commands(app)
 add_file_commands(app)
+add_page_command(app)
 app.register_install_completion_command()
 
 
@@ -93,3 +95,5 @@ def _answer(arguments: list[str], out: Any) -> None:
         values = {**answer.values, "seconds": time.perf_counter() - began}
         said = to_json(values, getattr(out, "encoding", None)) if answer.json else "\n".join(answer.lines)
         print(said, file=out, flush=True)
+        if answer.then:
+            answer.then()

@@ -131,7 +131,7 @@ def report(folder: Path, *, output: Beside = Beside()) -> Answer:
     from ..catalogue import report_job
 
     page, names = report_job(folder, output.out or folder)
-    return Answer({"report": str(page), "results": names}, [f"{', '.join(names)}: {page}"], output.json)
+    return Answer({"report": str(page), "results": names}, [f"Report in {page}"], output.json)
 
 
 def cite(result: Path, *, output: Output = Output()) -> Answer:

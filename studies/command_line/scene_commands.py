@@ -9,12 +9,23 @@ from typing import TYPE_CHECKING, Annotated, Literal
 from cyclopts import App, Parameter
 
 from ...geometry.basics import InputError
-from ..terminal import Answer, FieldModel, Models, Output, default_scene, positive, read_points, three_numbers
+from ..terminal import (
+    Answer,
+    FieldModel,
+    Models,
+    Output,
+    default_scene,
+    map_extent,
+    positive,
+    read_points,
+    three_numbers,
+)
 
 if TYPE_CHECKING:
     from ...geometry.scenes import Scene
 
 ReactionModel = Literal["slab", "fem", "reduced", "auto"]
+Plane = Literal["xy", "xz", "yz"]
 
 
 def add_scene_commands(app: App) -> None:
@@ -57,12 +68,18 @@ def run(
 def field(
     scene: Path,
     *,
-    points: Path,
+    points: Path | None = None,
+    plane: Plane | None = None,
+    extent_mm: Annotated[str | None, Parameter(allow_leading_hyphen=True)] = None,
+    offset_mm: Annotated[float, Parameter(allow_leading_hyphen=True)] = 0.0,
+    steps: int = 121,
     model: FieldModel = "auto",
     rtol: float = 3e-6,
     output: Output = Output(),
 ) -> Answer:
-    """B and its gradient at points in the rotor's frame at t = 0.
+    """B and its gradient at points in the rotor's frame at t = 0, or maps of the field on a plane.
+
+    Points may lie in the magnets. Maps are those of every model and their differences: field-map.nc, .png and .vtu.
 
     Parameters
     ----------
@@ -70,12 +87,30 @@ def field(
         Scene file.
     points
         CSV file with the columns x_mm, y_mm, z_mm.
+    plane
+        Maps on the plane xy, xz or yz instead.
+    extent_mm
+        Half the width of the maps, or their ends LEFT,RIGHT,LOWER,UPPER, mm; left out: twice the rotor's.
+    offset_mm
+        Third coordinate of the plane, mm.
+    steps
+        Points along the longer side of the maps.
     model
-        Field model.
+        Field model at points; maps show dipole, closed form and finite elements.
     rtol
         Relative accuracy asked of the field wherever the floater can be.
     """
     asked = Models(model, rtol=rtol).checked()
+    if (points is None) == (plane is None):
+        raise InputError("Input --points must be given, or --plane; instead received both or neither.")
+    if plane is not None:
+        extent = None if extent_mm is None else map_extent(extent_mm)
+        if not 5 <= steps <= 1001:
+            raise InputError(f"Input --steps must be between 5 and 1001; instead received {steps}.")
+        from ..exchange import field_map_job
+
+        return Answer(*field_map_job(_loaded(scene), plane, extent, offset_mm * 1e-3, steps, output.out), output.json)
+    assert points is not None
     loaded, places = _loaded(scene), read_points(points)
     from ..one_scene import field_job
 

@@ -109,7 +109,7 @@ def _fields(levitation: Levitation, state: State | None, points: Array) -> dict[
     h, magnetization = fields_of_magnets(scene.rotor, points)
     body = np.full(len(points), AIR)
     for magnet in scene.rotor:
-        body[magnet.box.distance(points) <= 0] = ROTOR
+        body[magnet.body.distance(points) <= 0] = ROTOR
     known = (body == AIR) & table.in_range(points)
     h[known] = table.evaluate(points[known])[0] / MU_0
     if state is not None:
@@ -126,6 +126,11 @@ def _write(path: Path, parts: list[tuple[Array, Array, dict[str, Array]]]) -> No
     cells = np.concatenate([part + start for start, (_, part, _) in zip(starts, parts, strict=False)])
     data = {name: np.concatenate([part[name] for _, _, part in parts]) for name in parts[0][2]}
     mesh = meshio.Mesh(np.concatenate([points for points, _, _ in parts]), [("hexahedron", cells)], point_data=data)
+    write_grids(path, mesh)
+
+
+def write_grids(path: Path, mesh: meshio.Mesh) -> None:
+    """Write a mesh as VTU; the file is whole or absent."""
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "fields.vtu"
         mesh.write(file)

@@ -76,7 +76,7 @@ def _second_opinion(size: float, magnets: Magnets) -> tuple[FieldTable, int]:
     mesh = mesh_magnets(magnets, MeshSettings(hp_layers=0, magnet_size=size, air_size=2 * size, curve_order=1))
     added = magnet_dipoles(mesh)
     raised = tuple(
-        replace(m, polarization=m.polarization + m.box.rotation.T @ (dipole / m.box.volume))
+        replace(m, polarization=m.polarization + m.box.rotation.T @ (dipole / m.body.volume))
         for m, dipole in zip(magnets, added, strict=True)
     )
     return RotorTable("cuboid", raised, raised), int(mesh.mesh.nv + mesh.mesh.nedge)

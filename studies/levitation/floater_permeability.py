@@ -116,7 +116,7 @@ def _depths(scene: Scene, number: int) -> Array:
     radius, step = scene.floater.radius, 1e-5
     heights = np.arange(0.0, FARTHEST, step)
     places = np.stack([0 * heights, 0 * heights, -heights], axis=1)
-    gap = np.min([magnet.box.distance(places) for magnet in scene.rotor], axis=0) - radius
+    gap = np.min([magnet.body.distance(places) for magnet in scene.rotor], axis=0) - radius
     nearest = heights[gap < 0].max(initial=0.0) + step
     return np.geomspace(nearest, FARTHEST, number)
 

@@ -8,8 +8,8 @@ import numpy as np
 from ...dynamics.flights import GROWING, STABLE, Trajectory, flight_kind
 from ...dynamics.motion import PlateMemory
 from ...dynamics.steady import Equilibrium
-from ...fem.rotor_tables import FieldTable
-from ...geometry.basics import Array
+from ...fem.rotor_tables import FieldTable, RotorTable, field_anywhere
+from ...geometry.basics import MU_0, Array
 from ..results import EQUILIBRIUM_FIELDS
 from .effects import effects_answer
 from .levitation import Levitation
@@ -17,6 +17,8 @@ from .levitation import Levitation
 
 def field_answer(table: FieldTable, points: Array) -> dict[str, Any]:
     """B, its gradient and their estimated errors at points (n, 3) m."""
+    if isinstance(table, RotorTable) and not table.in_range(points).all():
+        return _near_answer(table, points)
     b, gradient = table.evaluate(points)
     error, gradient_error = table.relative_error(points)
     return {
@@ -27,6 +29,22 @@ def field_answer(table: FieldTable, points: Array) -> dict[str, Any]:
         "dB_T_per_m": gradient,
         "B_relative_error": error,
         "dB_relative_error": gradient_error,
+    }
+
+
+def _near_answer(table: RotorTable, points: Array) -> dict[str, Any]:
+    """As `field_answer`, with H, M and the magnets' numbers, also where the table itself does not reach."""
+    found = field_anywhere(table, points)
+    size = np.linalg.norm(found.flux_density, axis=1) + np.finfo(float).tiny
+    return {
+        "model": table.model,
+        "error_estimate": float((found.error / size).max()),
+        "B_T": found.flux_density,
+        "dB_T_per_m": found.gradient,
+        "H_A_per_m": found.field / MU_0,
+        "M_A_per_m": found.magnetization / MU_0,
+        "inside_magnet": (found.magnet + 1).tolist(),
+        "B_relative_error": found.error / size,
     }
 
 

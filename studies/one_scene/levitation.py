@@ -10,7 +10,7 @@ from typing import Any
 
 from ...dynamics.effects import Mutual, RotorCurrents, mutual_choice, with_effects
 from ...dynamics.equilibria import survey, with_plate
-from ...dynamics.flights import Checkpoint, Trajectory, most_like_levitation, simulate
+from ...dynamics.flights import Checkpoint, LiveFlight, Trajectory, most_like_levitation, simulate, starting_point
 from ...dynamics.motion import Interaction, PlateMemory, Rates, interaction_of
 from ...dynamics.steady import Equilibrium, EquilibriumError, Survey
 from ...fem.measured_maps import GriddedTable
@@ -130,8 +130,9 @@ class Levitation:
         EquilibriumError : the rotor is at rest
         InputError : a conductor is in the floater's way, or the rotor turns too fast for its metal
         """
+        interaction = self.interaction
         note("Equilibria ...")
-        found = survey(self.scene, self.interaction, self.spin, rates=self.rates)
+        found = survey(self.scene, interaction, self.spin, rates=self.rates)
         place = most_like_levitation(found.equilibria)
         if place is not None:
             check_way(self.scene, place.position)
@@ -177,13 +178,13 @@ class Levitation:
 
     @cached_property
     def stability(self) -> Equilibrium:
-        """The equilibrium at which a flight begins, with its small motions; if none will do, the least growing.
+        """The equilibrium at which a flight begins, with its small motions; if none will do, the nearest of all.
 
         Raises
         ------
         EquilibriumError : there is none
         """
-        chosen = most_like_levitation(self.equilibria)
+        chosen = _first(self.equilibria)
         if chosen is None:
             raise EquilibriumError(
                 f"At {self.scene.frequency:g} Hz the floater has no equilibrium with body spin {self.spin:g}."
@@ -218,6 +219,11 @@ class Levitation:
         note("Motion ...")
         with progress("Motion") as advance:
             return simulate(self.scene, table, duration, known, progress=advance, memory=plate, checkpoint=checkpoint)
+
+    def live_flight(self) -> LiveFlight:
+        """A flight to play with, from where the scene says. Raises what `flight` raises."""
+        known = () if self.absolute else self.equilibria
+        return LiveFlight(self.scene, self._with_effects(self.flight_table), known, self.plate)
 
     def field(self, model: str) -> RotorField:
         """The rotor's field by any model, accurate wherever the floater can be: from its radius off the magnets on."""
@@ -263,7 +269,7 @@ class Levitation:
         """Where the floater is while it levitates, (3,) m."""
         if isinstance(self.scene.start, AbsoluteStart):
             return self.scene.start.position
-        chosen = most_like_levitation(known)
+        chosen = _first(known)
         return None if chosen is None else chosen.position
 
 
@@ -274,6 +280,11 @@ def given_scene(scene: Scene | str | Path) -> Scene:
     if isinstance(scene, str | Path):
         return load_scene(scene)
     raise InputError(f"Input scene must be a Scene or the path of a scene file; instead received {scene!r}.")
+
+
+def _first(known: Sequence[Equilibrium]) -> Equilibrium | None:
+    """The equilibrium at which a flight begins, or else the nearest."""
+    return starting_point(known) or next(iter(known), None)
 
 
 def sources(table: RotorField) -> RotorTable:

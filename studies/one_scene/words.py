@@ -21,6 +21,7 @@ CLEAR = 0.5
 
 SPOKEN = {"side, backward": "backward side motion", "side, forward": "forward side motion"}
 """Names of small motions in a sentence, where they are others."""
+COLUMNS = ("below (mm)", "aside (mm)", "tilt (°)", "lag (°)", "slowest motion", "growth (1/s)", "")
 FINEST = 0.01
 """Of distances from the axis, mm."""
 
@@ -111,11 +112,18 @@ def equilibria_words(levitation: Levitation, equilibria: Sequence[Equilibrium] |
 
 def equilibria_table(levitation: Levitation, equilibria: Sequence[Equilibrium]) -> list[str]:
     """The equilibria worth a row, as a table."""
+    rows = equilibria_rows(levitation, equilibria)
+    widths = [max((len(row[k]) for row in rows), default=0) for k in range(len(COLUMNS))]
+    return ["  ".join(["", *map(str.rjust, row[:-1], widths), row[-1]]).rstrip() for row in rows]
+
+
+def equilibria_rows(levitation: Levitation, equilibria: Sequence[Equilibrium]) -> list[tuple[str, ...]]:
+    """The table's head and a row for each equilibrium that is worth one; nothing where none is."""
     useful = worth_a_row(equilibria)
     if not useful:
         return []
     felt = levitation.plate is not None
-    rows = [("below (mm)", "aside (mm)", "tilt (°)", "lag (°)", "slowest motion", "growth (1/s)", "")]
+    rows: list[tuple[str, ...]] = [COLUMNS]
     for e in useful:
         name, growth = slowest(e)
         aside, doubt = math.hypot(*e.position[:2]) / MILLI, e.position_error / MILLI
@@ -132,8 +140,7 @@ def equilibria_table(levitation: Levitation, equilibria: Sequence[Equilibrium]) 
                 verdict + ("" if e.currents is not None or not felt else ", without the plate"),
             )
         )
-    widths = [max(len(row[k]) for row in rows) for k in range(len(rows[0]))]
-    return ["  ".join(["", *map(str.rjust, row[:-1], widths), row[-1]]).rstrip() for row in rows]
+    return rows
 
 
 def flight_words(levitation: Levitation, flight: Trajectory) -> str:

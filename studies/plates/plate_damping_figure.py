@@ -11,7 +11,7 @@ from matplotlib.ticker import NullLocator
 
 from ...geometry.basics import Array
 from ..article import rotor_label
-from ..results import PAGE, PALETTE, cases_with, panels, styled
+from ..results import PAGE, PALETTE, cases_with, legend_below, panels, styled
 from .plate_cases import ROTORS
 
 SWEEPS = {
@@ -22,6 +22,8 @@ SWEEPS = {
     "thickness": ("Thickness", "thickness (mm)", 1e3),
 }
 DISTANCES = (10, 15, 20, 30, 40, 60)
+LIMITS = (8.0, 66.0)
+"""Of the axis of distances, mm."""
 MODELS = {"": ("infinite slab", "o-", 3.0), ", real plate": ("real plate", "s", 6.0)}
 """By the ending of a sweep's name: what the plate is, its marks and their size."""
 LINEAR = 0.1
@@ -50,8 +52,8 @@ def places_figure(result: xr.Dataset) -> Figure:
     figure, axes = _growths(result, ("below", "beside"))
     for ending, (name, style, size) in MODELS.items():
         if part_of(result, f"below{ending}").sizes["case"]:
-            axes[1].plot([], [], style, ms=size, mfc="none" if ending else "0.3", color="0.3", label=name)
-    axes[1].legend(loc="lower right")
+            axes[0].plot([], [], style, ms=size, mfc="none" if ending else "0.3", color="0.3", label=name)
+    legend_below(figure, axes[0], columns=7)
     _mark_distances(axes)
     return figure
 
@@ -59,7 +61,9 @@ def places_figure(result: xr.Dataset) -> Figure:
 @styled
 def materials_figure(result: xr.Dataset) -> Figure:
     """Growth of each small motion against frequency, conductivity and thickness, plate 18 mm below the floater."""
-    return _growths(result, ("frequency", "conductivity", "thickness"))[0]
+    figure, axes = _growths(result, ("frequency", "conductivity", "thickness"))
+    legend_below(figure, axes[0])
+    return figure
 
 
 @styled
@@ -80,7 +84,7 @@ def means_figure(result: xr.Dataset) -> Figure:
     _mark_distances(axes.ravel())
     for panel in axes[1]:
         panel.set_xlabel("distance of the face (mm)")
-    axes[0, 0].legend(loc="upper right")
+    legend_below(figure, axes[0, 0])
     return figure
 
 
@@ -94,13 +98,12 @@ FIGURES = {
 
 def _growths(result: xr.Dataset, sweeps: Sequence[str]) -> tuple[Figure, Any]:
     """A panel for each sweep."""
-    figure, (axes,) = panels(1, len(sweeps), (PAGE, 3.0), sharey=True)
+    figure, (axes,) = panels(1, len(sweeps), (PAGE, 3.2), sharey=True)
     for panel, sweep in zip(axes, sweeps, strict=True):
         title, words, scale = SWEEPS[sweep]
         _growth(panel, result, sweep, scale)
         panel.set(title=title, xlabel=words)
     axes[0].set_ylabel("growth rate (1/s)")
-    axes[0].legend(loc="lower right")
     return figure, axes
 
 
@@ -109,7 +112,7 @@ def _mark_distances(panels: Iterable[Axes]) -> None:
     for axes in panels:
         axes.autoscale(enable=False, axis="x")
     for axes in panels:
-        axes.set(xlim=(0.9 * DISTANCES[0], 1.1 * DISTANCES[-1]), xscale="log")
+        axes.set(xlim=LIMITS, xscale="log")
         axes.set_xticks(DISTANCES, [f"{d:g}" for d in DISTANCES])
         axes.xaxis.set_minor_locator(NullLocator())
 

@@ -74,7 +74,7 @@ def sentence(result: xr.Dataset) -> str:
             f"{range_text(lift, abs(lift) * error)} % of its weight and a braking torque of "
             f"{range_text(torque, abs(torque) * error)} µN m"
         )
-    before = result["growth_without"].max("mode").values
+    before = part_of(result, next(iter(ROTORS)))["growth_without"].max("mode").values
     return (
         f"The plate (infinite slab of 30 mm aluminium, face {DISTANCE * 1e3:g} mm from the floater's centre) changes "
         f"the growth of the least damped small motion of the article's rotors, in the middle of their stable "

@@ -6,7 +6,7 @@ import numpy as np
 import pyvista as pv
 from vtkmodules.vtkCommonCore import vtkLogger
 
-from ...geometry.basics import Array, Box
+from ...geometry.basics import Array, Box, Ring, Solid, Sphere
 from ...geometry.scenes import Scene
 from .field_lines import add_field
 from .marks import MILLI, add_path, add_turning, beside_the_rotor, corners_mm
@@ -14,6 +14,8 @@ from .view import Currents, View
 
 NORTH = "#D55E00"
 METAL = "#9AA5B1"
+ROUND = 72
+"""Facets of a circle."""
 
 
 def scene_picture(view: View) -> bytes:
@@ -81,8 +83,8 @@ def add_rotor(plotter: pv.Plotter, scene: Scene) -> list[pv.Actor]:
     """Draw the magnets with their polarisation; returns the actors, which turn together."""
     actors = []
     for magnet in scene.rotor:
-        actors.append(plotter.add_mesh(_box(magnet.box), color="#4C566A", show_edges=True))
-        center, radius = magnet.box.center / MILLI, magnet.box.circumradius / MILLI
+        actors.append(plotter.add_mesh(_surface(magnet.body), color="#4C566A", show_edges=isinstance(magnet.body, Box)))
+        center, radius = magnet.body.center / MILLI, magnet.body.circumradius / MILLI
         actors += _arrow(plotter, center, magnet.polarization_in_rotor, radius)
     return actors
 
@@ -144,10 +146,29 @@ def look(plotter: pv.Plotter, scene: Scene, depth: float) -> None:
 
 
 def _box(box: Box) -> pv.DataSet:
-    pose = np.eye(4)
-    pose[:3, :3], pose[:3, 3] = box.rotation, box.center / MILLI
     x, y, z = box.size / MILLI
-    return pv.Cube(x_length=x, y_length=y, z_length=z).transform(pose, inplace=False)
+    return _posed(pv.Cube(x_length=x, y_length=y, z_length=z), box)
+
+
+def _surface(body: Solid) -> pv.DataSet:
+    """A body's surface, mm."""
+    if isinstance(body, Box):
+        return _box(body)
+    radius = body.radius / MILLI
+    if isinstance(body, Sphere):
+        return _posed(pv.Sphere(radius=radius, theta_resolution=ROUND, phi_resolution=ROUND), body)
+    height = body.height / MILLI
+    if isinstance(body, Ring):
+        inner = body.inner_radius / MILLI
+        disc = pv.Disc(center=(0, 0, -height / 2), inner=inner, outer=radius, c_res=ROUND)
+        return _posed(disc.extrude((0, 0, height), capping=True), body)
+    return _posed(pv.Cylinder(direction=(0, 0, 1), radius=radius, height=height, resolution=ROUND), body)
+
+
+def _posed(mesh: pv.DataSet, body: Solid) -> pv.DataSet:
+    pose = np.eye(4)
+    pose[:3, :3], pose[:3, 3] = body.rotation, body.center / MILLI
+    return mesh.transform(pose, inplace=False)
 
 
 def _arrow(plotter: pv.Plotter, center: Array, direction: Array, radius: float) -> list[pv.Actor]:

@@ -33,6 +33,7 @@ from .style import (
     PAGE as PAGE,
     PALETTE as PALETTE,
     figure_bytes as figure_bytes,
+    legend_below as legend_below,
     panels as panels,
     save_figure as save_figure,
     save_figures as save_figures,

@@ -13,6 +13,7 @@ from .console import (
 from .numbers import (
     COLUMNS as COLUMNS,
     finite as finite,
+    map_extent as map_extent,
     positive as positive,
     read_points as read_points,
     three_numbers as three_numbers,

@@ -13,6 +13,7 @@ from typing import Any, Protocol, TextIO
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
 
+from .heartbeat import Heartbeat
 from .plain_text import READABLE
 
 LOG = logging.getLogger("spinlev")
@@ -39,10 +40,21 @@ def detail(text: str) -> None:
 
 
 class _Printed(logging.Handler):
-    """Messages as they are, above a progress bar."""
+    """Messages as they are, above a progress bar, and a sign of life where there are none."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.heartbeat = Heartbeat(lambda text: ERRORS.print(text, markup=False))
+        self.heartbeat.start()
 
     def emit(self, record: logging.LogRecord) -> None:
-        ERRORS.print(record.getMessage(), markup=False)
+        text = record.getMessage()
+        self.heartbeat.said(text)
+        ERRORS.print(text, markup=False)
+
+    def close(self) -> None:
+        self.heartbeat.stop()
+        super().close()
 
 
 @contextmanager
@@ -59,6 +71,7 @@ def heard(wanted: bool = True, verbose: bool = False) -> Iterator[None]:
     finally:
         LOG.removeHandler(handler)
         LOG.setLevel(level)
+        handler.close()
 
 
 @contextmanager
@@ -75,13 +88,18 @@ def silence() -> Iterator[None]:
 def progress(label: str) -> Iterator[Progressed]:
     """A progress bar where messages are heard; gives a function that takes the finished fraction and a new label."""
     columns = (TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(), TimeRemainingColumn())
-    with Progress(*columns, console=ERRORS, transient=True, disable=not LOG.handlers) as bar:
+    shown = LOG.handlers and (ERRORS.is_interactive or ERRORS.is_jupyter)
+    with Progress(*columns, console=ERRORS, transient=True, disable=not shown) as bar:
         task = bar.add_task(label, total=1.0)
 
         def advance(fraction: float, text: str = label) -> None:
             if text != bar.tasks[task].description:
                 bar.reset(task, description=text)
             bar.update(task, completed=fraction)
+            if shown:
+                for handler in LOG.handlers:
+                    if isinstance(handler, _Printed):
+                        handler.heartbeat.said()
 
         yield advance
 

@@ -27,6 +27,23 @@ def three_numbers(name: str, text: str) -> Array:
     return _in_array(numbers)
 
 
+def map_extent(text: str) -> Array:
+    """(4,) m left, right, lower and upper end of a map, from HALF or the four in mm. Raises InputError."""
+    try:
+        numbers = [float(part) for part in text.split(",")]
+    except ValueError:
+        numbers = []
+    if len(numbers) == 1:
+        numbers = [-numbers[0], numbers[0]] * 2
+    sound = len(numbers) == 4 and all(map(math.isfinite, numbers))
+    if not (sound and numbers[0] < numbers[1] and numbers[2] < numbers[3]):
+        raise InputError(
+            "Input --extent-mm must be one positive number, or LEFT,RIGHT,LOWER,UPPER in rising order; instead "
+            f"received {text!r}."
+        )
+    return _in_array(numbers) * 1e-3
+
+
 def positive(name: str, value: float) -> None:
     """Raises InputError where the value is no positive finite number."""
     if not (isinstance(value, Real) and 0 < value < float("inf")):

@@ -1,6 +1,6 @@
 """What every command is asked: which scene and tables, who computes, and where its answers go."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from importlib.resources import files
 from pathlib import Path
@@ -120,6 +120,8 @@ class Answer:
     values: Mapping[str, Any]
     lines: Sequence[str]
     json: bool
+    then: Callable[[], None] | None = None
+    """What is done once it is said."""
 
 
 @Parameter(name="*")

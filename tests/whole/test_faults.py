@@ -424,6 +424,7 @@ def crashing(patch, folder, script):
     patch.setenv("PYTHONPATH", str(folder))
 
 
+@pytest.mark.slow
 def test_a_renderer_that_dies_takes_no_result_with_it(spinlev, monkeypatch, tmp_path):
     """As VTK makes it without graphics libraries: a line on the console; all but these pictures is whole."""
     arguments = ("run", SCENE, "--duration-s", "0.1", "--rtol", "1e-2", *DIPOLE)

@@ -171,7 +171,10 @@ def test_no_output_dies_of_an_encoding(monkeypatch, encoding):
     assert json.load(answer)["studies"] == json.loads(same.getvalue())["studies"]
 
 
-@pytest.mark.parametrize("settings", [{"PYTHONIOENCODING": "ascii"}, {"LC_ALL": "C", "PYTHONUTF8": "0"}])
+@pytest.mark.parametrize(
+    "settings",
+    [{"PYTHONIOENCODING": "ascii"}, pytest.param({"LC_ALL": "C", "PYTHONUTF8": "0"}, marks=pytest.mark.slow)],
+)
 def test_a_command_on_a_terminal_that_knows_only_ascii(tmp_path, settings):
     command = [sys.executable, "-c", "from spinlev.studies.command_line.start import main; main()"]
     arguments = ["equilibria", SCENE, "--model", "dipole", "--plate-model", "none", "--out", str(tmp_path)]

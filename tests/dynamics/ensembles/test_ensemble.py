@@ -58,6 +58,7 @@ def same(found, exact, order):
         np.testing.assert_array_equal(a, b[order])
 
 
+@pytest.mark.slow
 def test_the_company_does_not_matter(starts, flown):
     order = np.random.default_rng(1).permutation(len(starts.position))[:11]
     same(ensemble(SCENE, TABLE, State(*(v[order] for v in starts.vectors)), DURATION), flown, order)

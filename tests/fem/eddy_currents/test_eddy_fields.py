@@ -107,6 +107,7 @@ def test_sphere_in_a_uniform_field_on_curved_tetrahedra():
     assert abs(found - np.diag(np.diag(found))).max() < 1e-3 * abs(exact)
 
 
+@pytest.mark.slow
 def test_two_bodies_with_their_own_conductivity():
     """Two far boxes, one a thousand times worse: the couplings are those of the boxes alone."""
     place = [(0.0, 0.0, 0.02)]
@@ -120,6 +121,7 @@ def test_two_bodies_with_their_own_conductivity():
     assert two == pytest.approx(one, rel=2e-2, abs=1e-2 * abs(one).max())  # order 2 on two different coarse meshes
 
 
+@pytest.mark.slow
 def test_tetrahedra_and_hexahedra_agree():
     size, place = (0.04, 0.05, 0.02), [(0.0, 0.0, 0.025)]
     half = 500 * np.array(size)

@@ -53,6 +53,7 @@ def test_a_solve_that_the_memory_does_not_hold_is_refused(monkeypatch):
         plate()
 
 
+@pytest.mark.slow
 def test_a_limit_of_the_process_is_seen_before_it_is_hit():
     """A child that may have 60 MB more than it has and NGSolve's heap: refused in words where the solver would die."""
     code = (

@@ -94,6 +94,7 @@ def test_exact_values_on_a_2_mm_grid_give_the_field_between_13_and_40_mm(fitted)
         assert (to_bar <= bar).all()
 
 
+@pytest.mark.slow
 def test_divergence_and_curl_vanish_to_round_off(fitted):
     """The gradient is symmetric to the bit; its trace is a sum of some hundred terms with round-off each."""
     rotor, table = fitted

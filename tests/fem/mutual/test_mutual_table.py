@@ -132,8 +132,8 @@ def test_a_lone_magnet_has_one_table_wherever_it_stands():
     """From the cache for another pose; energy, force and torque turn with the magnet."""
     turn, shift = rotation_matrix((20.0, -35.0, 50.0)), np.array([1e-3, -2e-3, 5e-4])
     (magnet,) = MAGNETS
-    turned = (replace(magnet, box=Box(magnet.box.size, shift, turn)),)
-    upright = (replace(magnet, box=Box(magnet.box.size)),)
+    turned = (replace(magnet, body=Box(magnet.box.size, shift, turn)),)
+    upright = (replace(magnet, body=Box(magnet.box.size)),)
     (first, _), (second, found) = (cached_mutual_table(m, FLOATER, print) for m in (upright, turned))
     assert found
     place, direction = (values + 0.0 for values in poses(0.6, 4, 6))

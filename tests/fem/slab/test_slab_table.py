@@ -25,7 +25,7 @@ SLAB = Slab(3.5e7, 0.03)
 SIZE = np.array([0.1, 0.24, 0.03])
 RTOL = 1e-3
 CUBE = tilt(0.2, 0.01, 1.305, 1.0)[0]
-ROTOR = rotor_table((replace(CUBE, box=replace(CUBE.box, center=(2e-3, 0.0, 0.0))),), "cuboid")
+ROTOR = rotor_table((replace(CUBE, body=replace(CUBE.box, center=(2e-3, 0.0, 0.0))),), "cuboid")
 """Tilted and beside the axis: its field has all harmonics of the turn."""
 FLAT = Plate(Box(SIZE, (0.004, 0.0, -0.05)), SLAB.conductivity, Lowering(0.0, 0.01, 0.02))
 UPRIGHT = Plate(Box(SIZE, (-0.04, 0.0, -0.02), rotation_matrix((0.0, 90.0, 0.0))), SLAB.conductivity)
@@ -221,7 +221,7 @@ def test_rotors_permeability_is_heard():
         ),
         (FLAT, Region(np.full(3, -0.01), np.full(3, 0.02)), r"Move the plate, or model it by finite elements"),
         (FLAT, Region(np.array([0.0, 0.0, -0.03]), np.array([0.01, 0.01, -0.02])), "the floater's side"),
-        (replace(UPRIGHT, box=replace(UPRIGHT.box, center=(-0.018, 0.0, -0.02))), None, "comes .* mm below its face"),
+        (replace(UPRIGHT, body=replace(UPRIGHT.box, center=(-0.018, 0.0, -0.02))), None, "comes .* mm below its face"),
     ],
 )
 def test_a_plate_that_no_slab_can_stand_for_is_refused(plate, region, message):

@@ -62,6 +62,7 @@ def test_heyoka_keeps_nothing_by_itself(file):
     assert not hy.llvm_state.get_diskcache_enabled()
 
 
+@pytest.mark.slow
 def test_the_same_code_has_the_same_name_in_every_process(folder):
     code = (
         "import heyoka as hy; from spinlev.fem.storage import compiled; x, y = hy.make_vars('x', 'y')\n"

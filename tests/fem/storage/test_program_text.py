@@ -63,7 +63,7 @@ def test_a_new_module_and_one_of_another_name_change_the_digest(copy):
     assert digest_of(ROTOR, root=copy) not in (added, digest_of(ROTOR))
 
 
-@pytest.mark.parametrize("package", [ROTOR, PLATE, SCENE])
+@pytest.mark.parametrize("package", [ROTOR, pytest.param(PLATE, marks=pytest.mark.slow), SCENE])
 def test_no_room_that_a_package_loads_is_missed(package):
     """Python itself says in a fresh process which rooms it has loaded."""
     code = f"import sys, json, {package}; print(json.dumps([m for m in sys.modules if m.startswith('spinlev.')]))"

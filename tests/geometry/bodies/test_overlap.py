@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given, settings, strategies as st
 from scipy.optimize import linprog
 
-from spinlev.geometry.basics import Box, rotation_matrix
-from spinlev.geometry.bodies import deepest_overlap_in_a_turn, sphere_overlap
+from spinlev.geometry.basics import Box, Cylinder, Ring, Sphere, moved, rotation_matrix
+from spinlev.geometry.bodies import body_overlap, deepest_overlap_in_a_turn, sphere_overlap
 from spinlev.geometry.bodies.overlap import box_overlap
 
 angle = st.floats(-180, 180)
@@ -57,3 +57,34 @@ def test_turning_corner_reaches_farther_than_the_face():
     rotor, plate = Box((10, 10, 10)), Box((2, 100, 100), (7.5, 0, 0))
     assert box_overlap(rotor, plate) < 0
     assert deepest_overlap_in_a_turn(rotor, plate) == pytest.approx(np.sqrt(50) - 6.5, abs=1e-9)
+
+
+TURN = rotation_matrix((30.0, -20.0, 50.0))
+
+
+@pytest.mark.parametrize(
+    ("first", "second", "gap"),
+    [
+        (Sphere(1.0), Sphere(2.0, (0, 0, 4.0)), 1.0),
+        (Sphere(1.0, (0, 0, 2.0)), Cylinder(3.0, 1.0), 0.5),
+        (Sphere(1.0, (3.0, 0, 3.0)), Cylinder(2.0, 2.0), np.sqrt(5.0) - 1),  # to the edge
+        (Cylinder(1.0, 4.0), Cylinder(2.0, 4.0, (4.0, 0, 1.0)), 1.0),  # mantle to mantle
+        (Cylinder(1.0, 9.0), Cylinder(1.0, 9.0, (0, 0, 2.5), rotation_matrix((90.0, 0, 0))), -2.0),
+        (Cylinder(1.0, 2.0), Cylinder(1.0, 2.0, (2.5, 0, 3.0)), np.hypot(0.5, 1.0)),  # edge to edge
+        (
+            Cylinder(1.0, 9.0, (0, 0, 0), rotation_matrix((0, 90.0, 0))),
+            Cylinder(0.5, 9.0, (0, 0, 2.0), rotation_matrix((90.0, 0, 0))),
+            0.5,
+        ),
+        (Box((2.0, 2.0, 2.0)), Cylinder(1.0, 3.0, (0, 0, 2.5), rotation_matrix((0, 90.0, 0))), 0.5),
+        (Sphere(1.0), Ring(4.0, 2.0, 1.0), 1.0),  # in the hole
+        (Sphere(1.0, (0.5, 0, 0)), Ring(4.0, 2.0, 1.0), 0.5),
+        (Cylinder(1.0, 9.0, (0.25, 0, 3.0)), Ring(4.0, 2.0, 1.0), 0.75),  # a shaft
+        (Ring(2.0, 1.0, 1.0), Ring(2.0, 1.0, 1.0, (0, 0, 1.25)), 0.25),
+    ],
+)
+def test_gaps_of_round_bodies_are_exact_in_any_pose(first, second, gap):
+    for turn in (np.eye(3), TURN):
+        one, other = (moved(body, turn @ body.center, turn @ body.rotation) for body in (first, second))
+        assert body_overlap(one, other) == pytest.approx(-gap, abs=1e-8)
+        assert body_overlap(other, one) == pytest.approx(-gap, abs=1e-8)

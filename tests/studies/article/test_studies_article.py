@@ -110,6 +110,7 @@ def test_flights_and_the_semi_analytic_formula_agree_with_the_equilibrium(distan
     np.testing.assert_allclose(formula["distance"].sel(side="near")[good], near[good], rtol=2e-3)
 
 
+@pytest.mark.slow
 def test_distance_error_bounds_what_the_permeability_changes(distances):
     dipole, fem = (distances.isel(case=k)["distance"].sel(side="near").values for k in (2, 3))
     bound = distances["distance_error"].isel(case=2).sel(side="near").values

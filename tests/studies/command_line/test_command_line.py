@@ -230,7 +230,7 @@ def test_wrong_command_lines_end_with_status_2(spinlev, tmp_path, arguments, sai
         ("x_mm,y_mm,z_mm\n0,0,deep\n", "line 2 must have three finite numbers; instead received 'deep'"),
         ("x_mm,y_mm,z_mm\n0,0,-20\n0,0,nan\n", "line 3"),
         ("x_mm,y_mm,z_mm\n0,0\n", "line 2"),
-        ("x_mm,y_mm,z_mm\n2,0,0\n", "outside the magnets"),
+        ("x_mm,y_mm,z_mm\n7,5,0\n", "must not lie on an edge of a magnet"),
     ],
 )
 def test_wrong_points_end_with_status_2(spinlev, tmp_path, text, said):

@@ -49,11 +49,22 @@ def test_a_table_with_expansions_is_a_source_of_magpylib():
     np.testing.assert_allclose(MU_0 * source.getH(POINTS), table.evaluate(POINTS)[0], rtol=1e-12)
 
 
+def test_round_magnets_go_there_and_back():
+    ring = magpylib.magnet.CylinderSegment(dimension=(0.004, 0.008, 0.005, 0, 360), polarization=(1.1, 0, 0.2))
+    ball = magpylib.magnet.Sphere(diameter=0.006, polarization=(0, 0, 1), position=(0, 0, 0.01))
+    disc = magpylib.magnet.Cylinder(dimension=(0.01, 0.002), polarization=(0, 1, 0), position=(0, 0, -0.01))
+    collection = magpylib.Collection(ring, ball, disc)
+    rotor = sl.from_magpylib(collection, recoil_permeability=1.0)
+    ball = sl.sphere(diameter_mm=12.7, remanence_T=1.305, density_kg_m3=7500.0)
+    table = sl.rotor_table(sl.scene(frequency_hz=100.0, rotor=rotor, floater=ball), model="cuboid")
+    np.testing.assert_allclose(to_magpylib(table).getB(POINTS), collection.getB(POINTS), rtol=1e-12, atol=1e-16)
+
+
 @pytest.mark.parametrize(
     ("wrong", "said"),
     [
         (magpylib.Collection(), "at least one magnet"),
-        (magpylib.magnet.Sphere(diameter=0.01, polarization=(0, 0, 1)), "cuboids only"),
+        (magpylib.misc.Dipole(moment=(0, 0, 1)), "cuboids, cylinders, rings and spheres only"),
         (magpylib.magnet.Cuboid(), "with a size and a polarisation"),
         (collection().children[0].copy(position=[(0, 0, 0), (0, 0, 1)]), "at rest"),
     ],

@@ -66,6 +66,7 @@ def test_with_permeability_what_leaves_it_out_is_wrong_by_the_demagnetisation(er
     assert split[1] < 0.1 * direct[1]
 
 
+@pytest.mark.slow
 def test_a_table_keeps_what_it_states_and_unknowns_are_counted(errors):
     """To the 10 % that an estimate is good for; from 15 mm on, beyond contact, also what it was asked for."""
     for rtol in (1e-3, 1e-5):

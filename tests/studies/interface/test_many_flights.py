@@ -34,6 +34,7 @@ def test_each_ends_as_when_it_is_simulated():
     assert float(found["levitated"][2]) == 0.0
 
 
+@pytest.mark.slow
 def test_a_seed_gives_the_same_bits_in_any_number_of_workers():
     """Starts as well: spread about the scene's own, with the standard deviations asked for."""
     asked = {"n": 40, "seed": 3, "spread": SPREAD, "duration": 0.05, "model": "dipole"}

@@ -101,6 +101,7 @@ def test_batches_hold_every_point_once_and_rotors_together():
     assert len(batches) == 4
 
 
+@pytest.mark.slow
 def test_a_sweep_that_goes_on_has_the_same_bits(tmp_path):
     """Two of its eight points are there from before; so it is by two workers."""
     values = {"frequency_hz": list(np.linspace(100.0, 170.0, 8))}

@@ -76,11 +76,11 @@ def test_pictures_are_drawn_by_one_process_in_a_group_of_its_own(tmp_path):
     ("end", "said"),
     [
         (Dies(signal.SIGSEGV), "died (Segmentation fault), as it does without graphics libraries. "),
-        (Dies(signal.SIGABRT), "died (Aborted)"),
-        (Dies(signal.SIGKILL), "was killed; too little memory may be the reason."),
+        pytest.param(Dies(signal.SIGABRT), "died (Aborted)", marks=pytest.mark.slow),
+        pytest.param(Dies(signal.SIGKILL), "was killed; too little memory may be the reason.", marks=pytest.mark.slow),
         (Fails(ImportError("libGL.so.1: cannot open shared object")), f"cannot open shared object. {way_out(DRAWING)}"),
         (Fails(ImportError("cannot import name 'Cube'")), "ImportError: cannot import name 'Cube'."),
-        (Fails(ValueError("ω\nis not")), "ValueError: ω is not."),
+        pytest.param(Fails(ValueError("ω\nis not")), "ValueError: ω is not.", marks=pytest.mark.slow),
     ],
 )
 def test_what_was_finished_stays_and_the_rest_is_named(tmp_path, end, said):

@@ -58,6 +58,7 @@ def kept(point):
     return read_checked(point["file"])
 
 
+@pytest.mark.slow
 def test_workers_of_a_cluster_write_tables_and_one_that_is_killed_does_not_stop_the_sweep(tmp_path):
     asked = {k: {**point, "file": str(tmp_path / f"{k}.nc")} for k, point in points(4.0, 9.0, -1.0, 16.0).items()}
     asked[3]["kill"] = str(tmp_path / "killed")

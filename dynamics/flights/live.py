@@ -1,0 +1,138 @@
+"""A flight that goes on piece by piece, and whose floater can be pushed and put elsewhere on the way."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ...fem.rotor_tables import FieldTable
+from ...geometry.basics import Array, InputError
+from ...geometry.scenes import Scene
+from ..motion import PlateMemory, State, clearance, turned_about_z
+from ..steady import Equilibrium
+from .compiled_flight import TOLERANCE
+from .integration import begun, fly_on
+from .local_flight import compile_local_flight
+from .pieces import Log
+from .recorder import Recorder
+from .simulation import PLATE_TOLERANCE, StartError, initial_state
+from .trajectory import DURATION
+
+FEWEST, MOST, A_SECOND = 8, 256, 400
+"""Samples of a piece at least and at most, and between that so many a second."""
+
+
+@dataclass(frozen=True, eq=False)
+class Piece:
+    """Samples of a piece of a flight.
+
+    Parameters
+    ----------
+    time : (n,) s
+    lab : motion (n, 3) along the laboratory's axes, SI units
+    angle : of the rotor at the last sample, rad
+    ended_by : "duration" where the flight can go on, else "contact" or "lost"
+    """
+
+    time: Array
+    lab: State
+    angle: float
+    ended_by: str
+
+
+class LiveFlight:
+    """A flight of a scene's floater, with the plate's memory if there is one.
+
+    Parameters
+    ----------
+    scene, table : the problem
+    equilibria : of this scene
+    memory : the plate's currents; None where the plate is only an obstacle
+
+    Raises
+    ------
+    EquilibriumError : it shall begin near a stable equilibrium and there is none
+    StartError : it would begin in contact
+    """
+
+    def __init__(
+        self, scene: Scene, table: FieldTable, equilibria: Sequence[Equilibrium], memory: PlateMemory | None = None
+    ) -> None:
+        start, currents = initial_state(scene, table, equilibria, memory)
+        tolerance = TOLERANCE if memory is None else PLATE_TOLERANCE
+        self.scene = scene
+        self.flight = compile_local_flight(scene, table, 1.0, tolerance, True, memory)
+        self.log = Log()
+        self.values = begun(self.flight, start, currents, self.log)
+        self.state = self.flight.part(self.values).integrator.state.copy()
+        self.time = 0.0
+        """Since the flight began, s."""
+
+    @property
+    def now(self) -> State:
+        """Motion along the laboratory's axes, SI units."""
+        return self.flight.scales.unpack(self.state).to_lab(self.scene.angular_velocity * self.time)
+
+    def onward(self, seconds: float) -> Piece:
+        """Fly on so long (s), or to contact or loss, after which there is nothing to fly.
+
+        Raises
+        ------
+        InputError : `seconds` is not positive
+        IntegrationError : the state became infinite
+        """
+        if not seconds > 0:
+            raise InputError(f"Input seconds must be positive; instead received {seconds}.")
+        if self.log.ended_by != DURATION:
+            return self._piece(np.array([self.time]), self.state[None])
+        unit, number = self.flight.scales.time, int(np.clip(A_SECOND * seconds, FEWEST, MOST))
+        recorder = _Samples(self.state, self.time / unit, seconds / number / unit)
+        self._go(self.time + seconds, recorder)
+        return self._piece(recorder.times[1:] * unit, recorder.states[1:])
+
+    def push(self, velocity: Array) -> None:
+        """Add a velocity (3,) m/s, along the laboratory's axes, as a blow does."""
+        self._become(replace(self.now, velocity=self.now.velocity + velocity))
+
+    def put(self, position: Array) -> None:
+        """Hold the floater at a position (3,) m, rotor's frame, at rest there, and let go; moment and spin stay.
+
+        Raises
+        ------
+        StartError : it would overlap a magnet or the plate; nothing is changed
+        """
+        gap = float(clearance(self.scene, np.array([self.time]), np.asarray(position, float)[None])[0])
+        if gap <= 0:
+            where = ", ".join(f"{1e3 * c:.4g}" for c in position)
+            raise StartError(
+                f"Input position must leave the floater free of the magnets and the plate; instead it is ({where}) mm, "
+                f"{-1e3 * gap:.3g} mm inside one of them."
+            )
+        place = turned_about_z(position, self.scene.angular_velocity * self.time)
+        turning = np.cross([0.0, 0.0, self.scene.angular_velocity], place)
+        self.log.ended_by = DURATION
+        self._become(replace(self.now, position=place, velocity=turning))
+
+    def _become(self, lab: State) -> None:
+        state = lab.to_rotor(self.scene.angular_velocity * self.time)
+        self.state[:12] = self.flight.scales.pack(state)
+        self.flight.enter(state, self.values)
+
+    def _go(self, end: float, recorder: Recorder) -> None:
+        unit, log = self.flight.scales.time, self.log
+        fly_on(self.scene, self.flight, self.values, self.time / unit, self.state, end, recorder, log)
+        integrator = self.flight.part(self.values).integrator
+        self.state, self.time = integrator.state.copy(), float(recorder.times[-1]) * unit
+
+    def _piece(self, times: Array, states: Array) -> Piece:
+        turned = self.scene.angular_velocity * times
+        lab = self.flight.scales.unpack(states).to_lab(turned)
+        return Piece(times, lab, float(turned[-1]), self.log.ended_by)
+
+
+class _Samples(Recorder):
+    """Samples from now on; those before are forgotten."""
+
+    def __init__(self, state: Array, now: float, interval: float) -> None:
+        super().__init__(state, interval, 4 * MOST)
+        self.times = np.array([now])

@@ -1,0 +1,81 @@
+"""Bodies seen as cells so compact that a multipole expansion about each converges where it is needed."""
+
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..basics import Array, Box, Solid
+from .pieces import CONVERGENCE
+
+SAMPLES = 12
+"""Places along each edge of a cell at which it is looked at."""
+MARGIN = 1.0 + 1e-6
+
+
+@dataclass(frozen=True, eq=False)
+class Cells:
+    """Parts of a body by which of the equal boxes within the box about it they lie in.
+
+    Parameters
+    ----------
+    body : the body
+    counts : number of boxes along each body axis
+    centers, radii : (n, 3) m and (n,) m of spheres that hold the parts, rotor's frame
+    numbers : (counts) which part lies in a box; -1: none
+    """
+
+    body: Solid
+    counts: tuple[int, int, int]
+    centers: Array
+    radii: Array
+    numbers: NDArray[np.intp]
+
+    def which(self, points: Array) -> NDArray[np.intp]:
+        """Number of the part (n,) to which points (n, 3) m of the body belong, the nearest where there is none."""
+        share = self.body.to_body(points) / (2 * self.body.half_edges) + 0.5
+        place = np.clip((share * self.counts).astype(int), 0, np.array(self.counts) - 1)
+        found = self.numbers[tuple(place.T)]
+        lost = found < 0
+        if lost.any():
+            apart = np.linalg.norm(points[lost, None] - self.centers, axis=2)
+            found[lost] = np.argmin(apart, axis=1)
+        return np.asarray(found)
+
+
+def cells_of(body: Solid, nearest: float) -> Cells:
+    """Cells for expansions that are used from the distance `nearest` (m) from the surface on; a cuboid stays whole.
+
+    A cuboid that is too long is cut before, see `cut_magnets`.
+    """
+    counts = np.ones(3, dtype=int)
+    while True:
+        cells = _cells(body, (int(counts[0]), int(counts[1]), int(counts[2])))
+        depth = -body.distance(cells.centers)
+        if isinstance(body, Box) or np.all(nearest + depth >= CONVERGENCE * cells.radii):
+            return cells
+        counts[np.argmax(body.half_edges / counts)] += 1
+
+
+def _cells(body: Solid, counts: tuple[int, int, int]) -> Cells:
+    if counts == (1, 1, 1):
+        radius = np.array([body.circumradius])
+        return Cells(body, counts, body.center[None], radius, np.zeros(counts, dtype=int))
+    lines = [np.linspace(-h, h, n * SAMPLES + 1) for h, n in zip(body.half_edges, counts, strict=True)]
+    size = 2 * body.half_edges / counts
+    step = float(np.linalg.norm(size)) / SAMPLES
+    centers, radii = list[Array](), list[float]()
+    numbers = np.full(counts, -1)
+    for place in product(*(range(n) for n in counts)):
+        ends = [line[k * SAMPLES : (k + 1) * SAMPLES + 1] for line, k in zip(lines, place, strict=True)]
+        grid = np.stack(np.meshgrid(*ends, indexing="ij"), -1).reshape(-1, 3)
+        within = body.distance(body.center + grid @ body.rotation.T) <= step / 2
+        if not within.any():
+            continue
+        held = grid[within]
+        middle = (held.min(axis=0) + held.max(axis=0)) / 2
+        numbers[place] = len(centers)
+        centers.append(body.center + body.rotation @ middle)
+        radii.append(MARGIN * float(np.linalg.norm(held - middle, axis=1).max()) + step / 2)
+    return Cells(body, counts, np.array(centers), np.array(radii), numbers)

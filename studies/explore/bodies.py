@@ -1,0 +1,134 @@
+"""The bodies of a scene as triangles and lines for the picture that turns with the mouse; lengths in mm."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from ...geometry.basics import Array, Box, Solid
+from ...geometry.scenes import Scene
+
+MAGNET, METAL, NORTH, BALL = "#434C5E", "#B08D57", "#D55E00", "#9AA5B1"
+SEEN = 0.06
+"""How far from the rotor's origin a plate is drawn, along its edges, m."""
+SIDES = 20
+"""Of what is round."""
+FACES = np.array(
+    [(0, 1, 3), (0, 3, 2), (4, 6, 7), (4, 7, 5), (0, 4, 5), (0, 5, 1), (2, 3, 7), (2, 7, 6), (0, 2, 6), (0, 6, 4),
+     (1, 5, 7), (1, 7, 3)]
+)  # fmt: skip
+"""Triangles of a box whose corners are numbered by the signs of x, y and z, the last changing fastest."""
+EDGES = ((0, 1), (1, 3), (3, 2), (2, 0), (4, 5), (5, 7), (7, 6), (6, 4), (0, 4), (1, 5), (2, 6), (3, 7))
+
+
+def scene_bodies(scene: Scene, lines: Sequence[Array]) -> dict[str, Any]:
+    """What is drawn: what turns with the rotor, what stands still, and the floater about its own centre, moment up."""
+    size = max(float(np.linalg.norm(m.box.size)) for m in scene.rotor) * 1e3
+    turning = [_solid(magnet.box, MAGNET, 1.0) for magnet in scene.rotor]
+    turning += [_solid(conductor.body, METAL, 1.0) for conductor in scene.conductors]
+    for magnet in scene.rotor:
+        turning.append(_arrow(1e3 * magnet.box.center, magnet.polarization_in_rotor, 0.55 * size))
+    radius = 1e3 * scene.floater.radius
+    floater = [_ball(radius), _arrow(np.zeros(3), np.array([0.0, 0.0, 1.0]), 1.45 * radius)]
+    fixed, edges = [], []
+    if scene.plate is not None:
+        near = _near(scene.plate.box)
+        fixed, edges = [_solid(near, BALL, 0.25)], _edges(near)
+    return {
+        "turning": turning,
+        "floater": floater,
+        "fixed": fixed,
+        "edges": edges,
+        "lines": [np.round(1e3 * line, 2).tolist() for line in lines],
+        "reach": _reach(scene),
+    }
+
+
+def outlines(scene: Scene) -> tuple[list[list[float]], list[list[float]]]:
+    """The turning bodies seen along y, as polygons in mm: their x and their z."""
+    from scipy.spatial import ConvexHull  # slow to load
+
+    shapes = []
+    for body in scene.turning_bodies:
+        flat = 1e3 * _box_corners(body)[:, [0, 2]]
+        shapes.append(flat[ConvexHull(flat).vertices])
+    return [shape[:, 0].tolist() for shape in shapes], [shape[:, 1].tolist() for shape in shapes]
+
+
+def _near(plate: Box) -> Box:
+    """The part of a plate that is in the picture."""
+    middle = plate.to_body(np.zeros((1, 3)))[0]
+    low, high = np.maximum(-plate.size / 2, middle - SEEN), np.minimum(plate.size / 2, middle + SEEN)
+    if not (high > low).all():
+        return plate
+    return replace(plate, size=high - low, center=plate.center + plate.rotation @ ((low + high) / 2))
+
+
+def _reach(scene: Scene) -> list[float]:
+    """Half the width of the picture, its lowest and its highest point, mm."""
+    return [30.0, -50.0, 16.0] if scene.plate is None else [40.0, -64.0, 16.0]
+
+
+def _box_corners(body: Solid) -> Array:
+    """Corners (8, 3) m of the box around a body, numbered as `FACES` and `EDGES` have it."""
+    signs = np.array([(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)])
+    return np.asarray(body.center + (signs * body.size / 2) @ body.rotation.T)
+
+
+def _solid(body: Solid, color: str, opacity: float) -> dict[str, Any]:
+    if isinstance(body, Box):
+        return _mesh(1e3 * _box_corners(body), FACES, color, opacity)
+    angles = np.arange(SIDES) * (2 * np.pi / SIDES)
+    circle = np.column_stack([np.cos(angles), np.sin(angles)]) / 2
+    ends = [np.column_stack([circle, np.full(SIDES, z)]) for z in (-0.5, 0.5)]
+    unit = np.concatenate([*ends, [(0, 0, -0.5), (0, 0, 0.5)]])
+    k = np.arange(SIDES)
+    following = (k + 1) % SIDES
+    sides = [(a, b, b + SIDES) for a, b in zip(k, following, strict=True)]
+    sides += [(a, b + SIDES, a + SIDES) for a, b in zip(k, following, strict=True)]
+    lids = [(b, a, 2 * SIDES) for a, b in zip(k, following, strict=True)]
+    lids += [(a + SIDES, b + SIDES, 2 * SIDES + 1) for a, b in zip(k, following, strict=True)]
+    corners = 1e3 * (body.center + (unit * body.size) @ body.rotation.T)
+    return _mesh(corners, np.array(sides + lids), color, opacity)
+
+
+def _edges(box: Box) -> list[list[list[float]]]:
+    corners = 1e3 * _box_corners(box)
+    return [np.round(corners[list(edge)], 3).tolist() for edge in EDGES]
+
+
+def _ball(radius: float) -> dict[str, Any]:
+    polar, azimuth = np.linspace(0, np.pi, SIDES // 2 + 1), np.arange(SIDES) * (2 * np.pi / SIDES)
+    t, p = np.meshgrid(polar, azimuth, indexing="ij")
+    places = radius * np.stack([np.sin(t) * np.cos(p), np.sin(t) * np.sin(p), np.cos(t)], -1).reshape(-1, 3)
+    return _mesh(places, _quads(len(polar)), BALL, 1.0)
+
+
+def _arrow(center: Array, direction: Array, length: float) -> dict[str, Any]:
+    """An arrow of revolution through a centre, both ways so long together."""
+    axis = direction / (np.linalg.norm(direction) or 1.0)
+    helper = np.eye(3)[int(np.abs(axis).argmin())]
+    side = np.cross(axis, helper) / np.linalg.norm(np.cross(axis, helper))
+    other = np.cross(axis, side)
+    profile = np.array([(0, -1), (0.09, -1), (0.09, 0.35), (0.28, 0.35), (0, 1)]) * length
+    angles = np.arange(SIDES) * (2 * np.pi / SIDES)
+    ring = np.outer(np.cos(angles), side) + np.outer(np.sin(angles), other)
+    places = np.concatenate([center + r * ring + h * axis for r, h in profile])
+    return _mesh(places, _quads(len(profile)), NORTH, 1.0)
+
+
+def _quads(rows: int) -> Array:
+    """Triangles of a surface of revolution with so many rings of points."""
+    k = np.arange(SIDES)
+    following = (k + 1) % SIDES
+    found = []
+    for row in range(rows - 1):
+        below, above = row * SIDES, (row + 1) * SIDES
+        found += [(below + a, below + b, above + b) for a, b in zip(k, following, strict=True)]
+        found += [(below + a, above + b, above + a) for a, b in zip(k, following, strict=True)]
+    return np.array(found)
+
+
+def _mesh(corners: Array, faces: Array, color: str, opacity: float) -> dict[str, Any]:
+    return {"at": np.round(corners, 3).tolist(), "faces": faces.tolist(), "color": color, "opacity": opacity}

@@ -1,0 +1,144 @@
+"""What the processes of a page compute, each function in one of its own."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from multiprocessing.connection import Connection
+from typing import Any
+
+import numpy as np
+
+from ...dynamics.maps import EquilibriumMap, equilibrium_map, rotor_family
+from ...dynamics.steady import Survey
+from ...geometry.basics import Array, SpinlevError
+from ..one_scene import Levitation
+from .downloads import content
+from .field_lines import field_lines
+from .nearby import Nearby
+from .shown import Shown, shown
+from .sliders import MEASURES
+from .state import PageState
+
+POINTS = (13, 41)
+"""Of a map along each axis: first, and then."""
+
+
+@dataclass(frozen=True)
+class Found:
+    """An answer to a state of a page.
+
+    Parameters
+    ----------
+    number : of the question
+    shown : what the page shows; None where nothing could be found
+    message : why not
+    lines : field lines, m, where they were asked for
+    survey : the equilibria without the plate, all searched for, for neighbours to begin with
+    """
+
+    number: int
+    shown: Shown | None
+    message: str = ""
+    lines: tuple[Array, ...] = ()
+    survey: Survey | None = None
+
+
+@dataclass(frozen=True)
+class Regions:
+    """Where something levitates: 0 nothing, 1 only unstably, 2 stably, (n, m) over frequencies Hz and measures."""
+
+    model: str
+    frequencies: Array
+    measures: Array
+    kind: Array
+    message: str = ""
+
+
+def follow(connection: Connection) -> None:
+    """Answer to states of the page one after the other, by the latest question, as soon as can be."""
+    nearby: Nearby | None = None
+    while True:
+        number, state, known = _latest(connection)
+        if known is not None:
+            nearby = Nearby(state)
+            nearby.learn(known)
+            nearby.at(state)  # what is compiled later would be waited for
+            continue
+        try:
+            there = None if nearby is None else nearby.at(state)
+            if there is None:
+                nearby = Nearby(state)
+                there = nearby.searched()
+            connection.send(Found(number, shown(there)))
+        except SpinlevError as error:
+            connection.send(Found(number, None, str(error)))
+
+
+def _latest(connection: Connection) -> tuple[int, PageState, Survey | None]:
+    """The last of the messages that wait; one with equilibria first, unless a later one has another state."""
+    message: tuple[int, PageState, Survey | None] = connection.recv()
+    while message[2] is None and connection.poll():
+        message = connection.recv()
+    return message
+
+
+def complete(connection: Connection, number: int, state: PageState) -> None:
+    """All equilibria by the models asked for, as the command line finds them, and the field's lines."""
+    try:
+        levitation = Levitation(state.scene, state.models, state.spin)
+        without = levitation.without_plate
+        found = shown(levitation)
+    except SpinlevError as error:
+        connection.send(Found(number, None, str(error)))
+        return
+    lines = field_lines(state.scene, _field(levitation))
+    connection.send(Found(number, found, lines=tuple(lines), survey=without))
+
+
+def _field(levitation: Levitation) -> Callable[[Array], Array]:
+    """The field at points (n, 3) m; zero where the table does not know it."""
+
+    def field(points: Array) -> Array:
+        b, known = np.zeros((len(points), 3)), levitation.table.in_range(points)
+        if known.any():
+            b[known] = levitation.table.evaluate(points[known])[0]
+        return b
+
+    return field
+
+
+def regions(connection: Connection, state: PageState, spans: tuple[tuple[float, float], tuple[float, float]]) -> None:
+    """Maps of where something levitates, first by a dipole and coarse; spans in Hz, and mm or degrees."""
+    configuration = state.keys["rotor"]["configuration"]
+    unit = np.radians(1.0) if configuration == "tilt" else 1e-3
+    models = ["dipole", *(["cuboid"] if state.model == "cuboid" else [])]
+    for model in models:
+        for points in POINTS:
+            axes = np.linspace(*spans[0], points), np.linspace(*spans[1], points)
+            try:
+                family = rotor_family(state.scene, configuration, model)
+                found = equilibrium_map(family, axes[0], axes[1] * unit, state.spin)
+            except (SpinlevError, ValueError) as error:
+                connection.send(Regions(model, *axes, np.zeros((points, points), np.uint8), str(error)))
+                return
+            connection.send(Regions(model, *axes, _kind(found)))
+
+
+def _kind(found: EquilibriumMap) -> Array:
+    every, stable = found.number
+    return np.asarray((every > 0).astype(np.uint8) + (stable > 0))
+
+
+def has_map(state: PageState) -> bool:
+    """Whether a scene's rotor has a measure for a map's second axis, and its equilibria are fixed points."""
+    known = state.keys["rotor"].get("configuration") in MEASURES
+    return known and not np.any(state.scene.gravity[:2])
+
+
+def download(connection: Connection, kind: str, state: PageState, extra: Any) -> None:
+    """The content of a file, or why there is none."""
+    try:
+        connection.send((kind, content(kind, state, extra), ""))
+    except SpinlevError as error:
+        connection.send((kind, b"", str(error)))

@@ -1,0 +1,111 @@
+"""B, H and M next to magnets, in gaps and inside: against closed forms, the exact sphere, and themselves."""
+
+import magpylib
+import numpy as np
+import pytest
+
+from spinlev.fem.rotor_tables import near_field, rotor_table
+from spinlev.fem.rotor_tables.anywhere import edge_distance
+from spinlev.geometry.basics import Box, Cylinder, InputError, Ring, Sphere, rotation_matrix
+from spinlev.geometry.bodies import Magnet
+
+POLARIZATION = np.array([1.2, 0.0, 0.5])
+TURN = rotation_matrix((25.0, -40.0, 10.0))
+CUBE = Box((0.01,) * 3, (2e-3, 0.0, 0.0), TURN)
+
+
+def places_about(body, clear_of_edges, reach=1e-3, count=400):
+    """Inside and up to `reach` off the surface, but so far from edges."""
+    half = body.half_edges + reach
+    points = body.center + np.random.default_rng(4).uniform(-half, half, (count, 3)) @ body.rotation.T
+    return points[(edge_distance(body, points) > clear_of_edges) & (body.distance(points) < reach)]
+
+
+def test_in_and_beside_a_cube_it_is_the_closed_form():
+    """μr = 1: magpylib's cuboid, inside and within 1 mm, 0.5 mm off the edges; 1e-4 is asked for."""
+    magnet, points = Magnet(CUBE, POLARIZATION), places_about(CUBE, 0.5e-3)
+    found = near_field((magnet,), points)
+    source = magpylib.magnet.Cuboid(dimension=CUBE.size, polarization=POLARIZATION)
+    theirs = source.getB(CUBE.to_body(points)) @ CUBE.rotation.T
+    assert np.abs(found.flux_density - theirs).max() < 1e-12
+    inside = CUBE.distance(points) < 0
+    assert inside.any()
+    assert np.array_equal(found.magnet == 0, inside)
+    assert np.abs(found.magnetization[inside] - magnet.polarization_in_rotor).max() < 1e-12
+    assert not found.magnetization[~inside].any()
+
+
+@pytest.mark.parametrize("permeability", [1.05, 3.0])
+def test_in_a_permeable_sphere_everything_is_uniform_and_exact(permeability):
+    magnet = Magnet(Sphere(9.5e-3, (1e-3, 0, 0)), POLARIZATION, permeability)
+    points = places_about(magnet.body, 0.0)
+    found = near_field((magnet,), points)
+    inside = found.magnet == 0
+    assert np.abs(found.field[inside] + POLARIZATION / (permeability + 2)).max() < 1e-9
+    assert np.abs(found.flux_density[inside] - 2 * POLARIZATION / (permeability + 2)).max() < 1e-9
+    outside = points[~inside]
+    assert found.flux_density[~inside] == pytest.approx(rotor_table((magnet,), "fem").evaluate(outside)[0], abs=1e-9)
+
+
+@pytest.mark.slow
+def test_in_a_permeable_cylinder_two_accuracies_agree_within_what_they_state():
+    body = Cylinder(5e-3, 8e-3, (2e-3, 0.0, 0.0), TURN)
+    magnet, points = Magnet(body, POLARIZATION, 1.05), places_about(body, 0.5e-3)
+    coarse, fine = (near_field((magnet,), points, rtol) for rtol in (1e-3, 1e-4))
+    assert fine.order > coarse.order
+    apart = np.linalg.norm(coarse.flux_density - fine.flux_density, axis=1)
+    assert np.all(apart <= coarse.error + fine.error)
+    assert fine.error.max() < 1e-4 * np.linalg.norm(POLARIZATION)
+
+
+@pytest.mark.slow
+def test_in_a_permeable_cube_and_a_gap_the_field_converges_and_jumps_as_it_must():
+    """Two cubes 1 mm apart, μr = 1.05: B normal to the faces is continuous, H along them, and 1e-4 is reached."""
+    lower, upper = Box((0.01,) * 3), Box((0.01,) * 3, (0, 0, 0.011))
+    magnets = (Magnet(lower, (1.3, 0, 0), 1.05), Magnet(upper, (0, 0, 1.3), 1.05))
+    places = np.array([[x, 1e-3, 0.0] for x in (-3e-3, 0.0, 2e-3)])
+    tiny = np.array([0.0, 0.0, 2e-6])
+    face = np.array([0.0, 0.0, 5e-3])
+    points = np.concatenate([places + face - tiny, places + face + tiny, places + face + [0, 0, 0.5e-3]])
+    found = near_field(magnets, points)
+    below, above, gap = np.split(np.arange(9), 3)
+    assert list(found.magnet[below]) == [0] * 3
+    assert list(found.magnet[gap]) == [-1] * 3
+    jump = 3e-4 * 1.3
+    assert np.abs(found.flux_density[below, 2] - found.flux_density[above, 2]).max() < jump
+    assert np.abs(found.field[below, :2] - found.field[above, :2]).max() < jump
+    assert found.error.max() < 1e-4 * 1.3
+
+
+@pytest.mark.slow
+def test_far_away_it_is_the_table():
+    magnet = Magnet(Cylinder(5e-3, 8e-3), POLARIZATION, 1.05)
+    points = np.array([[0.0, 0.0, -0.02], [0.03, 0.01, 0.0]])
+    found = near_field((magnet,), points)
+    field, gradient = rotor_table((magnet,), "fem").evaluate(points)
+    assert found.flux_density == pytest.approx(field, rel=1e-4)
+    assert found.gradient == pytest.approx(gradient, rel=1e-3, abs=1e-5 * np.abs(gradient).max())
+
+
+def test_the_gradient_is_that_of_the_field():
+    magnet = Magnet(Cylinder(5e-3, 8e-3), POLARIZATION, 1.05)
+    points = np.array([[1e-3, 2e-3, 1e-3], [6e-3, 0.5e-3, 2e-3], [-2e-3, -1e-3, -5e-3]])
+    step = 1e-6
+    found = near_field((magnet,), points)
+    moved = np.concatenate([points + s * step * axis for axis in np.eye(3) for s in (1, -1)])
+    around = near_field((magnet,), np.concatenate([points, moved])).flux_density[3:].reshape(3, 2, 3, 3)
+    numeric = np.moveaxis((around[:, 0] - around[:, 1]) / (2 * step), 0, -1)
+    assert np.abs(found.gradient - numeric).max() < 2e-2 * np.abs(numeric).max()
+
+
+@pytest.mark.parametrize(
+    ("body", "point"),
+    [
+        (Box((0.01,) * 3), (5e-3, 5e-3, 1e-3)),
+        (Cylinder(5e-3, 8e-3), (3e-3, 4e-3, 4e-3)),
+        (Ring(5e-3, 3e-3, 8e-3), (0.0, -3e-3, -4e-3)),
+    ],
+)
+def test_a_point_on_an_edge_is_refused(body, point):
+    with pytest.raises(InputError, match="must not lie on an edge of a magnet, where the field is infinite"):
+        near_field((Magnet(body, POLARIZATION),), [point])

@@ -1,0 +1,32 @@
+"""A step that says nothing for a while is heard of all the same."""
+
+import queue
+
+import pytest
+
+from spinlev.studies.terminal.heartbeat import Heartbeat
+
+WAIT = 30.0
+"""Until a test fails, s."""
+
+
+def test_a_silent_step_says_how_long_it_has_gone_on_until_it_ends():
+    said: queue.Queue[str] = queue.Queue()
+    heartbeat = Heartbeat(said.put, 0.01)
+    heartbeat.start()
+    heartbeat.said("Equilibria ...")
+    lines = [said.get(timeout=WAIT) for _ in range(3)]
+    heartbeat.said("  done in 0.1 s.")
+    heartbeat.stop()
+    assert set(lines) == {"  0 s so far"}
+    assert not heartbeat.is_alive()
+
+
+def test_nothing_is_said_outside_of_a_step():
+    said: queue.Queue[str] = queue.Queue()
+    heartbeat = Heartbeat(said.put, 0.01)
+    heartbeat.start()
+    heartbeat.said("Plate: finite")
+    with pytest.raises(queue.Empty):
+        said.get(timeout=0.2)
+    heartbeat.stop()

@@ -1,0 +1,236 @@
+"""The live page in a browser: everything its reader can do, two pages at once, and what a closed page leaves behind."""
+
+import json
+import statistics
+import subprocess
+import sys
+import time
+from urllib.parse import parse_qs, urlsplit
+
+import numpy as np
+import psutil
+import pytest
+from devtools import CHROMIUM, Browser
+from PIL import Image
+from places import OVER_PLATE
+
+from spinlev.geometry.scenes import load_scene
+from spinlev.studies.one_scene import equilibria_job
+from spinlev.studies.terminal import Models
+
+DESK, PHONE = (1400, 1250), (390, 844)
+pytestmark = [
+    pytest.mark.skipif(CHROMIUM is None, reason="no chromium here (Debian: apt-get install chromium)"),
+    pytest.mark.slow,  # a minute, and make test-browser runs it
+]
+FIND = "const model = name => Bokeh.documents[0].get_model_by_name(name);"
+NUMBER = "+(/data-number=\"(\\d+)\"/.exec(model('sign').text) || [0, 0])[1]"
+COMPLETE = "/data-number/.test(model('sign').text) && !/carried|follow/.test(model('sign').text)"
+BOX = """const box = name => { const r = Bokeh.index.find_one(model(name)).el.getBoundingClientRect();
+  return [r.x + r.width / 2, r.y + r.height / 2]; };"""
+MOVE = """(async (name, value) => {{ {find} const before = {number}, began = performance.now();
+  model(name).value = value;
+  while ({number} <= before) await new Promise(done => setTimeout(done, 1));
+  return performance.now() - began; }})({name}, {value})"""
+
+
+def said(tab, program):
+    """The value of a program in which `model` finds Bokeh's models by name."""
+    return tab.run(f"(() => {{ {FIND} {BOX} return {program}; }})()")
+
+
+def wait(tab, program, seconds=60.0):
+    """Until it is true."""
+    return tab.until(f"(() => {{ {FIND} {BOX} return {program}; }})()", seconds)
+
+
+def click(tab, name):
+    """In the middle of a widget or plot."""
+    said(tab, f"Bokeh.index.find_one(model('{name}')).el.scrollIntoView({{block: 'center'}})")
+    tab.mouse(tuple(said(tab, f"box('{name}')")))
+
+
+@pytest.fixture(scope="module")
+def server():
+    """`spinlev explore` of a scene, as a process; its first line is the address."""
+    start = "import sys; from spinlev.studies.command_line.start import main; sys.argv[0] = 'spinlev'; main()"
+    command = [sys.executable, "-c", start, "explore", str(OVER_PLATE), "--no-browser"]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
+        process.address = process.stdout.readline().strip()
+        yield process
+        process.terminate()
+        assert process.wait(30) == 0
+
+
+@pytest.fixture(scope="module")
+def browser(tmp_path_factory):
+    one = Browser(tmp_path_factory.mktemp("profile"))
+    yield one
+    one.close()
+
+
+def opened(browser, address, size=DESK):
+    """A page whose first complete answer is there."""
+    tab = browser.open(address, *size)
+    tab.until("window.Bokeh && Bokeh.documents.length > 0 && Bokeh.documents[0].roots().length > 5")
+    wait(tab, COMPLETE)
+    return tab
+
+
+def assert_quiet(tab, address):
+    """No error, and every request went to this machine."""
+    tab.run("0")
+    assert tab.errors == []
+    parts = urlsplit(address)
+    home = tuple(f"{kind}://{parts.netloc}/" for kind in ("http", "ws"))
+    assert len(tab.asked) > 5
+    assert [asked for asked in tab.asked if not asked.startswith((*home, "data:", "blob:"))] == []
+
+
+def workers(process):
+    """Processes that compute for pages."""
+    return [one for one in psutil.Process(process.pid).children(recursive=True) if one.status() != "zombie"]
+
+
+def test_everything_that_can_be_done(server, browser, tmp_path):
+    tab = opened(browser, server.address)
+    values, lines = equilibria_job(load_scene(OVER_PLATE), Models("dipole", "slab"), 0.0, tmp_path)
+    assert said(tab, "model('headline').text") == lines[0]
+    shown = said(tab, "model('table').text.replaceAll(/<[^>]*>/g, ' ')").split()
+    rows = len(values["equilibria"])
+    assert shown == " ".join(lines[1 : 2 + rows]).split()
+    eigenvalues = said(tab, "model('modes').text.replaceAll(/<[^>]*>/g, ' ')").split()
+    for mode in values["equilibria"][0]["modes"]:
+        assert f"{mode['growth_per_s']:.6g}" in eigenvalues
+        assert f"{mode['frequency_hz']:.6g}" in eigenvalues
+
+    moves = {
+        "frequency_hz": [131 + k / 2 for k in range(5)],
+        "rotor.angle_deg": [10.1 + k / 5 for k in range(5)],
+        "rotor.edge_mm": [10.05, 10.1, 10.15],
+        "floater.diameter_mm": [12.75, 12.8, 12.85],
+        "spin": [0.01, 0.02, 0.03],
+        "plate.center_mm.2": [-52.25, -52.5, -52.75],
+    }
+    latency = {
+        name: [tab.run(MOVE.format(find=FIND, number=NUMBER, name=json.dumps(name), value=value)) for value in values]
+        for name, values in moves.items()
+    }
+    every = [value for values in latency.values() for value in values]
+    print(f"median latency of a slider: {statistics.median(every):.0f} ms;", end=" ")
+    print(", ".join(f"{name} {statistics.median(values):.0f}" for name, values in latency.items()))
+    wait(tab, COMPLETE)
+    state = parse_qs(urlsplit(tab.run("location.href")).query)
+    assert state["frequency_hz"] == ["133.0"]
+    assert state["rotor.angle_deg"] == ["10.9"]
+    assert state["token"] == parse_qs(urlsplit(server.address).query)["token"]
+
+    wait(tab, "/Click to go/.test(model('map_says').text)")
+    click(tab, "map")
+    wait(tab, "Math.abs(model('frequency_hz').value - 160) < 30 && Math.abs(model('rotor.angle_deg').value - 22) < 8")
+    for name, value in (("frequency_hz", 130), ("rotor.angle_deg", 10)):
+        tab.run(MOVE.format(find=FIND, number=NUMBER, name=json.dumps(name), value=value))
+    wait(tab, COMPLETE)
+
+    click(tab, "play")
+    wait(tab, "/^t = /.test(model('says').text) && parseFloat(model('says').text.slice(4)) > 0.2")
+    click(tab, "up")
+    samples = "model('height').renderers[0].data_source.data.height"
+    wait(tab, f"Math.max(...{samples}) - Math.min(...{samples}) > 0.15")
+    click(tab, "play")
+    wait(tab, "model('play').label === 'Play'")
+    said(tab, "model('speed').active = 3")
+    click(tab, "play")
+    before = said(tab, "model('says').text")
+    wait(tab, f"model('says').text !== {json.dumps(before)}")
+    said(tab, "model('speed').active = 0")
+
+    assert_dragged(tab)
+    assert_downloaded(tab, tmp_path)
+    assert_quiet(tab, server.address)
+    tab.close()
+
+
+def assert_dragged(tab):
+    """The ball, dragged a long way down and let go, is lost or falls on something, and the page says so."""
+    where = """(() => { const view = Bokeh.index.find_one(model('side')), ball = model('side').renderers
+      .map(one => one.data_source.data).find(data => 'r' in data), frame = view.canvas_view.el.getBoundingClientRect();
+      return [frame.x + view.frame.x_scale.compute(ball.x[0]), frame.y + view.frame.y_scale.compute(ball.z[0])]; })()"""
+    said(tab, "Bokeh.index.find_one(model('side')).el.scrollIntoView({block: 'center'})")
+    x, y = said(tab, where)
+    tab.mouse((x, y), (x + 20, y + 5), (x + 60, y + 15), (x + 90, y + 25))
+    wait(tab, "/^After .* s (touched|lost)/.test(model('says').text)")
+    click(tab, "again")
+    wait(tab, "model('says').text === ''")
+
+
+def assert_downloaded(tab, folder):
+    """Each file arrives; the scene is that of the address, the result that of the command line."""
+    tab.ask("Browser.setDownloadBehavior", behavior="allow", downloadPath=str(folder))
+    for kind, name in (("toml", "scene.toml"), ("json", "equilibria.json"), ("png", "explore.png")):
+        file = folder / name
+        file.unlink(missing_ok=True)
+        click(tab, f"get_{kind}")
+        end = time.monotonic() + 60
+        while not file.exists():
+            tab.run("0")
+            assert time.monotonic() < end, f"{name} does not come"
+            time.sleep(0.05)
+    scene = load_scene(folder / "scene.toml")
+    assert scene.frequency == 130.0
+    found = json.loads((folder / "equilibria.json").read_text())
+    other = folder / "again"
+    known, _ = equilibria_job(scene, Models("dipole", "slab"), 0.03, other)
+    places = [[e["position_mm"] for e in one["equilibria"]] for one in (found, known)]
+    assert np.allclose(*places, rtol=1e-12, atol=1e-12)
+    with Image.open(folder / "explore.png") as figure:
+        assert figure.size[0] > 1000
+
+
+def test_two_pages_do_not_disturb_each_other_and_a_killed_one_frees_its_work(server, browser):
+    first = opened(browser, server.address)
+    address = f"{server.address}&frequency_hz=150&model=cuboid&plate_model=none"
+    second = opened(browser, address)
+    click(second, "play")
+    wait(second, "parseFloat(model('says').text.slice(4)) > 0.1")
+    for tab, frequency in ((first, 130), (second, 150)):
+        assert said(tab, "model('frequency_hz').value") == frequency
+    mine = said(first, "model('headline').text")
+    second.run(MOVE.format(find=FIND, number=NUMBER, name='"frequency_hz"', value=151))
+    assert said(first, "model('headline').text") == mine
+    assert said(first, "model('frequency_hz').value") == 130
+    busy = len(workers(server))
+    second.close()
+    first.run("0")
+    end = time.monotonic() + 30
+    while len(workers(server)) >= busy:
+        assert time.monotonic() < end, "a closed page's processes go on"
+        time.sleep(0.1)
+    first.run(MOVE.format(find=FIND, number=NUMBER, name='"frequency_hz"', value=132))
+    assert_quiet(first, server.address)
+    first.close()
+
+
+def test_a_scene_that_cannot_be_is_a_message_in_the_page(server, browser):
+    tab = opened(browser, f"{server.address}&frequency_hz=fast&floater.colour=red")
+    text = said(tab, "model('message').text")
+    assert "frequency_hz" in text
+    assert "floater.colour" in text
+    assert said(tab, "model('message').visible")
+    assert said(tab, "model('frequency_hz').value") == 130  # the scene of the command line
+    assert_quiet(tab, server.address)
+    tab.close()
+
+
+def test_a_phone_shows_it_without_scrolling_sideways(server, browser, tmp_path):
+    tab = opened(browser, server.address, PHONE)
+    tab.until("document.querySelectorAll('#picture canvas').length > 0")
+    assert tab.run("document.documentElement.scrollWidth") <= PHONE[0]
+    tab.run("new Promise(done => setTimeout(done, 500))")
+    picture = tmp_path / "phone.png"
+    tab.picture(picture)
+    with Image.open(picture) as seen:
+        pixels = np.asarray(seen.convert("RGB")).reshape(-1, 3).astype(int)
+    assert ((pixels[:, 0] > pixels[:, 2] + 80) & (pixels[:, 0] > 150)).sum() > 50  # the arrows of the moments
+    assert_quiet(tab, server.address)
+    tab.close()
