@@ -17,6 +17,8 @@ from .mutual_ball import MutualInBall
 
 MUTUAL = "mutual magnetisation"
 UPPER = [(a, b) for a in range(6) for b in range(a, 6)]
+ROWS, COLUMNS = np.triu_indices(6)
+WHICH = [Parameter.LENGTH, Parameter.PLATE_MOMENT, Parameter.PLATE_SHARE]
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,21 +106,19 @@ class MutualAtPlace:
 
     def numbers(self, field: FieldTable, position: Array, moment: Array, values: Array) -> Array:
         """(n, count) for scaled positions and moments (n, 3), and runtime parameters (n, p)."""
-        length, strength, share = (
-            values[:, [p]] for p in (Parameter.LENGTH, Parameter.PLATE_MOMENT, Parameter.PLATE_SHARE)
-        )
+        length, strength, share = values[:, WHICH].T[:, :, None]
         place = position * length
         try:
             flux = field.evaluate(place)[0]
         except RangeError:  # some are in a magnet
-            flux, known = np.zeros_like(place), field.in_range(place)
+            flux, known = np.zeros(place.shape), field.in_range(place)
             flux[known] = field.evaluate(place[known])[0]
         whole = strength * moment + self.table.polarizability * share * flux
         energy, slope, second = self.table.derivatives(place, whole / share)
-        units = np.concatenate([np.repeat(length, 3, axis=1), np.repeat(1 / share, 3, axis=1)], axis=1)
+        units = np.repeat(np.concatenate([length, 1 / share], axis=1), 3, axis=1)
         second = second * units[:, :, None] * units[:, None, :]
-        upper = np.array([second[:, a, b] for a, b in UPPER]).T
-        return np.concatenate([position, whole, share**2 * np.column_stack([energy, slope * units, upper])], axis=1)
+        told = [energy[:, None], slope * units, second[:, ROWS, COLUMNS]]
+        return np.concatenate([position, whole, *(share**2 * part for part in told)], axis=1)
 
 
 def _quadratic(weights: Sequence[hy.expression], away: Sequence[hy.expression]) -> list[hy.expression]:

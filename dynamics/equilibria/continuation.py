@@ -107,12 +107,15 @@ def follow(equations: Equations, points: Array, tangents: Array, steps: Steps, w
 def stepped(
     equations: Equations, points: Array, tangents: Array, lengths: Array, which: Indices = ONE
 ) -> tuple[Array, Array, Truth]:
-    """Points and tangents (n, k + 1) at steps (n,) along the curves, and where Newton's method found these again."""
+    """Points and tangents (n, k + 1) at steps (n,) along the curves, and where Newton's method found these again.
+
+    The tangents are by the derivatives of the last correction, which moved the points by less than `CLOSE`.
+    """
     ahead = equations.onto(points + lengths[:, None] * tangents)
-    ahead, good = corrected(equations, ahead, tangents, np.maximum(lengths / 2, 1e-8), which)
+    ahead, good, slope = _corrected(equations, ahead, tangents, np.maximum(lengths / 2, 1e-8), which)
     turned = np.full(tangents.shape, np.nan)
     if good.any():
-        turned[good] = directions(equations, ahead[good], tangents[good], which[good])
+        turned[good] = _along(slope[good], tangents[good])
     return ahead, turned, good & np.isfinite(turned).all(axis=1)
 
 
@@ -120,9 +123,18 @@ def corrected(
     equations: Equations, points: Array, across: Array, reach: Array, which: Indices = ONE
 ) -> tuple[Array, Truth]:
     """Solutions in the planes through guesses (n, k + 1) across directions, and where one was within reach (n,)."""
+    return _corrected(equations, points, across, reach, which)[:2]
+
+
+def _corrected(
+    equations: Equations, points: Array, across: Array, reach: Array, which: Indices
+) -> tuple[Array, Truth, Array]:
+    """The same, and the derivatives (n, k, k + 1) of the last correction."""
+    slopes = np.full((len(points), points.shape[1] - 1, points.shape[1]), np.nan)
     points, good, active = points.copy(), np.zeros(len(points), bool), np.arange(len(points))
     for _ in range(CORRECTIONS):
         value, slope = equations.linear(points[active], which[active])
+        slopes[active] = slope
         change = _solved(slope, across[active], -value, 0.0)
         size = np.linalg.norm(change, axis=1)
         near = size <= reach[active]  # not a number is not near
@@ -132,12 +144,15 @@ def corrected(
         active = active[size >= CLOSE]
         if not len(active):
             break
-    return points, good
+    return points, good, slopes
 
 
 def directions(equations: Equations, points: Array, before: Array, which: Indices = ONE) -> Array:
     """Unit tangents (n, k + 1) of the curves that go on as `before` (n, k + 1); not a number where there is none."""
-    slope = equations.linear(points, which)[1]
+    return _along(equations.linear(points, which)[1], before)
+
+
+def _along(slope: Array, before: Array) -> Array:
     along = _solved(slope, before, np.zeros(slope.shape[:2]), 1.0)
     return np.asarray(along / np.linalg.norm(along, axis=1, keepdims=True))
 

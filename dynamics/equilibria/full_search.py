@@ -135,12 +135,14 @@ def _shaken(problem: Shaken, found: list[Equilibrium]) -> list[Equilibrium]:
 
 def _equilibrium(scales: Scales, balance: Balance, position: Array, moment: Array, doubt: Array) -> Equilibrium:
     state = balance.states(position[None], moment[None])
+    balance = balance.about(position[None], moment[None])
     value, slope = balance(position[None], moment[None])
     motion = modes(state[0], balance.rates(state, balance.values)[1][0])
-    torque, length, inertia = balance.values[[Parameter.TORQUE, Parameter.LENGTH, Parameter.INERTIA]]
+    values = np.ravel(balance.values)
+    torque, length, inertia = values[[Parameter.TORQUE, Parameter.LENGTH, Parameter.INERTIA]]
     unsure = np.abs(value[0]) + torque * np.array([inertia * length * doubt[1]] * 3 + [doubt[0]] * 2)
     error = float(np.linalg.norm((np.abs(np.linalg.inv(slope[0])) @ unsure)[:3]))
-    gravity = abs(float(balance.values[Parameter.GRAVITY_Z]))
+    gravity = abs(float(values[Parameter.GRAVITY_Z]))
     return Equilibrium(
         state=scales.unpack(state[0]),
         spin=float(balance.spin),

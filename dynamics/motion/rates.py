@@ -49,10 +49,10 @@ class Rates:
     def __call__(self, states: ArrayLike, values: Array) -> tuple[Array, Array]:
         """Rates (n, 12) and their derivatives (n, 12, 12) at scaled `states` (n, 12).
 
-        `values` of the parameters: (p,) for all states or (n, p), one row for each.
+        `values` of the parameters: (p,) for all states or (n, p), one row for each, or what `about` gives.
         """
         states = np.asarray(states, float)
-        found = _called(self._function, states.T, self._all(states[:, :3], states[:, 6:9], values)).T
+        found = _called(self._function, states.T, self.about(states[:, :3], states[:, 6:9], values)).T
         return found[:, :12], found[:, 12:].reshape(-1, 12, 12)
 
     def balance(
@@ -65,8 +65,8 @@ class Rates:
         given = np.empty((13, len(position)))
         given[:3], given[3:6], given[12] = position.T, moment.T, spin
         given[6:12] = tangents.reshape(-1, 6).T
-        found = _called(self._balances, given, self._all(position, moment, values))
-        return found[:5].T, np.moveaxis(found[5:].reshape(5, 5, -1), 2, 0)
+        found = _called(self._balances, given, self.about(position, moment, values))
+        return found[:5].T, found[5:].T.reshape(-1, 5, 5)
 
     @property
     def has_rough(self) -> bool:
@@ -84,9 +84,12 @@ class Rates:
         found._rough = True
         return found
 
-    def _all(self, position: Array, moment: Array, values: Array) -> Array:
-        """The runtime parameters with the numbers of effects that have some, at scaled positions and moments (n, 3)."""
-        if not self._placed:
+    def about(self, position: Array, moment: Array, values: Array) -> Array:
+        """`values` with the numbers of effects that have some about scaled positions and moments (n, 3).
+
+        They hold to second order in the way from there: force and torque, and to first order their derivatives.
+        """
+        if not self._placed or values.shape[-1] > len(Parameter):
             return values
         rows = np.broadcast_to(values, (len(position), values.shape[-1]))[:, : len(Parameter)]
         if self._rough:

@@ -20,6 +20,8 @@ LATERAL: Indices = np.array([0, 1, 3, 4])
 """The four balances but the axial force, and the four unknowns but the height."""
 EVERY: Indices = np.arange(5)
 AXIAL = 2
+CLOSE = 1e-6
+"""Steps of Newton's method from which on effects are known well enough from where the step began: to its square."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,6 +50,11 @@ class Balance:
             return self
         spin = self.spin if np.ndim(self.spin) == 0 else np.asarray(self.spin)[rows]
         return replace(self, values=self.values[rows], spin=spin)
+
+    def about(self, position: Array, moment: Array) -> Self:
+        """The balance near positions and moments (n, 3), of as many points, see `Rates.about`."""
+        values = self.rates.about(position, moment, self.values)
+        return self if values is self.values else replace(self, values=values)
 
     def states(self, position: Array, moment: Array) -> Array:
         """States (n, 12) at rest in the rotor's frame at positions and moments (n, 3)."""
@@ -105,8 +112,11 @@ def solve(
     position, moment = position.copy(), moment.copy()
     length = np.full(len(position), np.inf)
     active = np.arange(len(position))
+    known, farthest = balance, np.inf
     for _ in range(iterations):
-        value, slope = balance.at(active)(position[active], moment[active])
+        if farthest > CLOSE:
+            known = balance.at(active).about(position[active], moment[active])
+        value, slope = known(position[active], moment[active])
         step = np.zeros((len(active), 5))
         good = np.isfinite(slope).all(axis=(1, 2))
         step[np.ix_(good, free)] = -_divided(slope[good][:, free[:, None], free], value[good][:, free])
@@ -115,7 +125,7 @@ def solve(
         position[active], moment[active] = moved_pose(position[active], moment[active], step)
         done = ~good | (size < 1e-11)
         length[active] = np.where(good, size, np.inf)
-        active = active[~done]
+        active, known, farthest = active[~done], known.at(~done), np.max(size[~done], initial=0.0)
         if not len(active):
             break
     return position, moment, length

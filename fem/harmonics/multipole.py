@@ -51,7 +51,7 @@ class MultipoleExpansion:
         """Highest degree L."""
         return len(self.coefficients) - 1
 
-    @property
+    @cached_property
     def nearest(self) -> float:
         """Distance from the centre beyond which the series converges, m; a lone dipole or nothing is no series."""
         return self.radius if self.degree > 1 and self.coefficients.any() else 0.0

@@ -1,8 +1,11 @@
 """How far a `MutualTable` is from the magnetostatics of both bodies, by their gap."""
 
+from collections.abc import Sequence
+
 import numpy as np
 
-from ...geometry.basics import Array
+from ...geometry.basics import Array, places_off
+from ...geometry.bodies import Magnet
 from ...geometry.scenes import Floater
 from ..harmonics import Ball, field_at_center, gradient_at_center
 from .answer_samples import places_around
@@ -11,8 +14,8 @@ from .forces import two_body
 from .rotor_response import RotorResponse
 from .table import MutualTable
 
-GAPS, EACH = (0.03, 0.16, 0.5, 1.5), 3
-"""Gaps at which both are compared, in floater radii, and at how many poses for each magnet."""
+GAPS, EACH = (0.03, 0.08, 0.16, 0.5, 1.5), 2
+"""Gaps at which both are compared, in floater radii, and at how many poses for each magnet beside that at its pole."""
 DEGREES, SERIES = 1e-4, 1e-5
 """Where the degrees and the series of both bodies end."""
 SAFETY = 4.0
@@ -37,7 +40,8 @@ def answer_errors(table: MutualTable, rotor: RotorResponse, floater: Floater) ->
     errors = []
     for gap in GAPS:
         worst = np.zeros(2)
-        for place in places_around(rotor.magnets, floater.radius, (gap,), EACH, 3):
+        anywhere = places_around(rotor.magnets, floater.radius, (gap,), EACH, 3)
+        for place in (*anywhere, *_at_poles(rotor.magnets, (1 + gap) * floater.radius)):
             direction = generator.normal(size=3)
             direction /= np.linalg.norm(direction)
             degree = enough_degree(rotor.magnets, Ball(place, floater.radius), DEGREES)
@@ -53,3 +57,15 @@ def answer_errors(table: MutualTable, rotor: RotorResponse, floater: Floater) ->
             worst = np.maximum(worst, np.array(missed) / np.maximum(np.array(sizes), np.finfo(float).tiny))
         errors.append(SAFETY * worst)
     return np.array(GAPS) * floater.radius, np.array(errors)
+
+
+def _at_poles(magnets: Sequence[Magnet], distance: float) -> list[Array]:
+    """Places (3,) m at a distance (m) from where the magnets' remanence points, where no other magnet is nearer."""
+    places = []
+    for magnet in magnets:
+        size = float(np.linalg.norm(magnet.polarization))
+        if size:
+            (place,) = places_off(magnet.body, magnet.polarization_in_rotor[None] / size, distance)
+            if min(float(other.body.distance(place)) for other in magnets) > distance * (1 - 1e-6):
+                places.append(place)
+    return places

@@ -18,6 +18,7 @@ from .answer_samples import (
     SPHERE_GAPS,
     answer_products,
     places_around,
+    places_facing,
     returned_samples,
     sphere_samples,
     unit_dipole_fields,
@@ -50,10 +51,12 @@ def mutual_table(magnets: tuple[Magnet, ...], floater: Floater, order: int = 2) 
         far = places_around(magnets, floater.radius, FAR_GAPS, 2, 3)
         grids, coupling = _rotor_fit(grids, magnets, answer_products(rotor, fine, places, far), places)
     if floater.recoil_permeability != 1:
-        places = places_around(magnets, floater.radius, SPHERE_GAPS, 60, 2)
+        facing = places_facing(magnets, floater.radius, SPHERE_GAPS)
+        places = np.concatenate([facing, places_around(magnets, floater.radius, SPHERE_GAPS, 60, 2)])
         grids, pairs = sphere_fit(grids, sphere_samples(rotor, floater, places))
         if rotor.regions is not None:
-            grids = returned_fit(grids, returned_samples(rotor, floater, grids, coupling, places[::SPARSE]))
+            fewer = np.concatenate([facing, places[len(facing) :: SPARSE]])
+            grids = returned_fit(grids, returned_samples(rotor, floater, grids, coupling, fewer))
     alpha = FOUR_PI * floater.radius**3 / MU_0 * float(reflection(floater.recoil_permeability, 1)[1])
     table = MutualTable(magnets, tuple(grids), coupling, pairs, alpha)
     gaps, errors = answer_errors(table, fine, floater)

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import product
 
 import numpy as np
 
@@ -42,11 +43,23 @@ def places_around(magnets: Sequence[Magnet], radius: float, gaps: Sequence[float
             directions = generator.normal(size=(number, 3))
             directions /= np.linalg.norm(directions, axis=1)[:, None]
             found.append(places_off(magnet.body, directions, (1 + gap) * radius))
-    places = np.concatenate(found)
-    clear = np.min([magnet.body.distance(places) for magnet in magnets], axis=0) >= (1 + min(gaps)) * radius * (
-        1 - 1e-6
-    )
-    return np.asarray(places[clear])
+    return _clear(magnets, np.concatenate(found), (1 + min(gaps)) * radius)
+
+
+def places_facing(magnets: Sequence[Magnet], radius: float, gaps: Sequence[float]) -> Array:
+    """The same before the middles of faces and edges and the corners of the magnets; of a lone one, on one side."""
+    ways = np.array([way for way in product((-1.0, 0.0, 1.0), repeat=3) if any(way)])
+    if len(magnets) == 1:
+        ways = ways[len(ways) // 2 :]
+    ways /= np.linalg.norm(ways, axis=1)[:, None]
+    found = [places_off(m.body, ways @ m.body.rotation.T, (1 + gap) * radius) for m in magnets for gap in gaps]
+    return _clear(magnets, np.concatenate(found), (1 + min(gaps)) * radius)
+
+
+def _clear(magnets: Sequence[Magnet], places: Array, distance: float) -> Array:
+    """Those of the places (n, 3) m that are no nearer to any magnet than a distance, m."""
+    nearest = np.min([magnet.body.distance(places) for magnet in magnets], axis=0)
+    return np.asarray(places[nearest >= distance * (1 - 1e-6)])
 
 
 def unit_dipole_fields(points: Array, places: Array) -> Array:

@@ -21,6 +21,7 @@ WHERE = np.array([[ENTRIES.index((min(a, b), max(a, b))) for b in range(6)] for 
 
 NUMBERS = 13
 """Of a point."""
+IDENTITY = np.eye(3)
 
 
 @cache
@@ -41,20 +42,29 @@ CHUNK = 48
 
 def grid_derivatives(grid: AnswerGrid, places: Array, moments: Array) -> tuple[Array, Array, Array]:
     """Energy (n,) J, gradient (n, 6) and second derivatives (n, 6, 6) by place (m) and moment (A m²) at (n, 3) each."""
-    seen, pointing = grid.box.to_body(places), moments @ grid.box.rotation
-    sums = [_summed(grid, seen[k : k + CHUNK], pointing[k : k + CHUNK]) for k in range(0, len(places), CHUNK)]
-    found = np.concatenate([np.zeros((7 + len(ENTRIES), 0)), *sums], axis=1)
-    turn, second = np.kron(np.eye(2), grid.box.rotation), np.moveaxis(found[7:][WHERE], 2, 0)
-    return found[0], found[1:7].T @ turn.T, turn @ second @ turn.T
+    rotation = grid.box.rotation
+    seen, pointing = grid.box.to_body(places), moments @ rotation
+    if len(places) <= CHUNK:
+        found = _summed(grid, seen, pointing)
+    else:
+        sums = [_summed(grid, seen[k : k + CHUNK], pointing[k : k + CHUNK]) for k in range(0, len(places), CHUNK)]
+        found = np.concatenate(sums, axis=1)
+    slope, second = found[1:7].T, found[7:].T[:, WHERE]
+    if np.array_equal(rotation, IDENTITY):
+        return found[0], slope, second
+    turn = np.zeros((6, 6))
+    turn[:3, :3] = turn[3:, 3:] = rotation
+    return found[0], slope @ turn.T, turn @ second @ turn.T
 
 
 def _summed(grid: AnswerGrid, places: Array, moments: Array) -> Array:
     """The kernel's outputs (28, n), summed over the points."""
     count, points = len(places), len(grid.points)
     given = np.empty((6 + NUMBERS, count, points))
-    given[:3] = places.T[:, :, None] - grid.points.T[:, None]
+    np.subtract(places.T[:, :, None], grid.points.T[:, None], out=given[:3])
     given[3:6] = moments.T[:, :, None]
     given[6:] = grid.numbers.T[:, None]
-    pars = np.repeat(np.append(grid.axis, grid.radius)[:, None], count * points, axis=1)
+    pars = np.empty((4, count * points))
+    pars[:3], pars[3] = grid.axis[:, None], grid.radius
     found = _kernel()(given.reshape(len(given), -1), pars=pars)
     return np.asarray(found.reshape(-1, count, points).sum(axis=2))

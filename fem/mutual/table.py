@@ -92,10 +92,11 @@ class MutualTable:
 
         By place (n, 3) m and moment (n, 3) A m², in this order.
         """
-        found = [grid_derivatives(grid, places, moments) for grid in self.grids]
         rows = self._coupled(np.ascontiguousarray(np.concatenate([places, moments], axis=1).T))
-        found.append((rows[0], rows[1:7].T, np.moveaxis(rows[7:].reshape(6, 6, -1), -1, 0)))
-        energy, slope, second = (np.sum(parts, axis=0) for parts in zip(*found, strict=True))
+        energy, slope, second = rows[0], rows[1:7].T, rows[7:].T.reshape(-1, 6, 6)
+        for grid in self.grids:
+            parts = grid_derivatives(grid, places, moments)
+            energy, slope, second = energy + parts[0], slope + parts[1], second + parts[2]
         return energy, slope, second
 
     @cached_property

@@ -176,8 +176,9 @@ class RotorTable:
     def _in_range(self, columns: Array) -> NDArray[np.bool_]:
         outside = np.ones(columns.shape[1], bool)
         for magnet in self.magnets:
-            near = squared_distance(columns, magnet.box.center) < magnet.body.circumradius**2
-            outside[near] &= magnet.body.distance(columns[:, near].T) >= 0
+            near = squared_distance(columns, magnet.body.center) < magnet.body.circumradius**2
+            if near.any():
+                outside[near] &= magnet.body.distance(columns[:, near].T) >= 0
         for expansion in self.expansions:
             if expansion.nearest:
                 outside &= squared_distance(columns, expansion.center) > expansion.nearest**2

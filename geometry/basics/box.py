@@ -1,6 +1,7 @@
 """A rectangular box in any pose: the shape of every magnet and of the plate."""
 
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -35,12 +36,12 @@ class Box:
         object.__setattr__(self, "center", frozen_array(self.center, (3,)))
         object.__setattr__(self, "rotation", frozen_array(self.rotation, (3, 3)))
 
-    @property
+    @cached_property
     def half_edges(self) -> Array:
         """(3,) half of each edge, m."""
         return self.size / 2
 
-    @property
+    @cached_property
     def circumradius(self) -> float:
         """Radius of the smallest sphere about the centre that holds the box, m."""
         return float(np.linalg.norm(self.half_edges))
