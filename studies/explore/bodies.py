@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from ...geometry.basics import Array, Box, Ring, Solid, Sphere
+from ...geometry.basics import Array, Box, Part, Ring, Solid, Sphere
 from ...geometry.scenes import Scene
 
 MAGNET, METAL, NORTH, BALL = "#434C5E", "#B08D57", "#D55E00", "#9AA5B1"
@@ -81,6 +81,9 @@ def _solid(body: Solid, color: str, opacity: float) -> dict[str, Any]:
         return _mesh(1e3 * _box_corners(body), FACES, color, opacity)
     if isinstance(body, Sphere):
         return _mesh(1e3 * body.center + _ball_places(1e3 * body.radius), _quads(SIDES // 2 + 1), color, opacity)
+    if isinstance(body, Part):
+        corners = body.center + body.triangles.reshape(-1, 3) @ body.rotation.T
+        return _mesh(1e3 * corners, np.arange(len(corners)).reshape(-1, 3), color, opacity)
     if isinstance(body, Ring):
         outer, inner, half = body.filled.radius, body.hole.radius, body.size[2] / 2
         profile = [(inner, -half), (outer, -half), (outer, half), (inner, half), (inner, -half)]
