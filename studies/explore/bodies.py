@@ -5,6 +5,7 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...geometry.basics import Array, Box, Part, Ring, Solid, Sphere
 from ...geometry.scenes import Scene
@@ -136,5 +137,5 @@ def _quads(rows: int) -> Array:
     return np.array(found)
 
 
-def _mesh(corners: Array, faces: Array, color: str, opacity: float) -> dict[str, Any]:
+def _mesh(corners: Array, faces: Array | NDArray[np.intp], color: str, opacity: float) -> dict[str, Any]:
     return {"at": np.round(corners, 3).tolist(), "faces": faces.tolist(), "color": color, "opacity": opacity}
