@@ -46,6 +46,9 @@ class Spring:
     def at(self, active):
         return self
 
+    def about(self, position, moment):
+        return self
+
     def __call__(self, position, moment):
         slope = np.zeros((len(position), 5, 5))
         slope[:, :3, :3] = np.eye(3)
