@@ -46,7 +46,7 @@ test: lint types
 # The gallery's programs are not run for it: the pages are then without their output. It says how fast a slider is.
 test-browser: install
 	$(BIN)/sphinx-build --quiet -D plot_gallery=0 -b html docs docs/_build/html
-	$(BIN)/pytest -s tests/whole/test_browser.py tests/whole/test_explore_browser.py
+	$(BIN)/pytest -n 2 --dist loadfile tests/whole/test_browser.py tests/whole/test_explore_browser.py
 
 # Lines that the fast tests run, in child processes too; what a killed process has left of its own count is removed.
 coverage: install

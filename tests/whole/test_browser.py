@@ -3,6 +3,7 @@
 import functools
 import http.server
 import json
+import os
 import re
 import shutil
 import subprocess
@@ -13,10 +14,14 @@ import pytest
 from PIL import Image
 from places import ROOT, SCENES
 
+from spinlev.fem.rotor_tables import rotor_table
 from spinlev.geometry.scenes import load_scene
-from spinlev.studies.catalogue import report_job, show_job
+from spinlev.studies.catalogue import report_job
+from spinlev.studies.catalogue.drawings import read_result
+from spinlev.studies.catalogue.show import flight_of
 from spinlev.studies.one_scene import simulate_job
-from spinlev.studies.rendering import unavailable
+from spinlev.studies.pictures import last_view
+from spinlev.studies.rendering import Turnable, drawn, page, unavailable
 from spinlev.studies.terminal import Models
 
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
@@ -58,7 +63,7 @@ def browser(tmp_path, address, *what):
 
 def seen(folder, page, width, tmp_path):
     """What a browser finds on a page of a folder in a frame so wide; fails where the page says an error."""
-    frame = folder / f"frame-{width}.html"
+    frame = folder / f"frame-{os.getpid()}.html"  # others may look at the same folder
     frame.write_text(FRAME.replace("PAGE", page).replace("WIDTH", str(width)))
     with http.server.ThreadingHTTPServer(("127.0.0.1", 0), functools.partial(Quiet, directory=str(folder))) as server:
         threading.Thread(target=server.serve_forever, daemon=True).start()
@@ -83,7 +88,10 @@ def report(tmp_path_factory):
     if unavailable() is not None:
         pytest.skip(unavailable())
     report_job(folder, folder)
-    show_job(folder / "trajectory.nc", folder, html=True)
+    result = read_result(folder / "trajectory.nc")
+    scene, motion = flight_of(result, "trajectory.nc")
+    view = last_view(scene, rotor_table(scene.rotor, "dipole"), motion)
+    (folder / "trajectory-view.html").write_bytes(page(drawn(Turnable(view))))
     return folder
 
 
