@@ -32,6 +32,7 @@ from ..live import (
     fly,
     follow,
     has_map,
+    map_key,
     regions,
 )
 from .bodies import scene_bodies
@@ -189,18 +190,11 @@ class Page:
             self.crew.stop(regions)
             self.layout.map_title("No map: it needs a horizontal, vertical or tilted rotor and gravity along the axis.")
             self.layout.map.forget()
-        elif (key := self._map_key()) != self.mapped:
+        elif (key := map_key(self.state)) != self.mapped:
             self.mapped = key
             self.layout.map_title("Map: being computed ...")
             self.layout.map.forget()
             self.crew.start(regions, (self.state, tuple(spans)), self._mapped)
-
-    def _map_key(self) -> str:
-        """All that a map depends on: neither its own axes, nor the plate, nor where a flight begins."""
-        keys = {key: value for key, value in self.state.keys.items() if key not in ("frequency_hz", "plate", "start")}
-        open_ones = ("displacement_mm", "angle_deg")
-        keys["rotor"] = {key: value for key, value in keys["rotor"].items() if key not in open_ones}
-        return f"{keys} {self.state.spin} {self.state.model == 'cuboid'}"
 
     def _found(self, found: Found) -> None:
         """Numbers at once."""

@@ -13,5 +13,6 @@ from .work import (
     download as download,
     follow as follow,
     has_map as has_map,
+    map_key as map_key,
     regions as regions,
 )

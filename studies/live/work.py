@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from multiprocessing.connection import Connection
 from typing import Any
 
@@ -12,6 +12,7 @@ import numpy as np
 from ...dynamics.maps import EquilibriumMap, equilibrium_map, rotor_family
 from ...dynamics.steady import Survey
 from ...geometry.basics import Array, SpinlevError
+from ...geometry.scenes import scene_keys
 from ..one_scene import Levitation
 from .downloads import content
 from .field_lines import field_lines
@@ -138,6 +139,15 @@ def has_map(state: PageState) -> bool:
     """Whether a scene's rotor has a measure for a map's second axis, and its equilibria are fixed points."""
     known = state.keys["rotor"].get("configuration") in MEASURES
     return known and not np.any(state.scene.gravity[:2])
+
+
+def map_key(state: PageState) -> str:
+    """All that a map depends on: neither its own axes, nor the plate, nor where a flight begins."""
+    whole = scene_keys(replace(state.scene, text=""))  # with every key, whatever the scene's file left out
+    keys = {key: value for key, value in whole.items() if key not in ("frequency_hz", "plate", "start")}
+    open_ones = ("displacement_mm", "angle_deg")
+    keys["rotor"] = {key: value for key, value in keys["rotor"].items() if key not in open_ones}
+    return f"{keys} {state.spin} {state.model == 'cuboid'}"
 
 
 def download(connection: Connection, kind: str, state: PageState, extra: Any) -> None:

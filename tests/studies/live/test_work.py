@@ -11,7 +11,7 @@ import xarray as xr
 from places import OVER_PLATE
 
 from spinlev.geometry.scenes import load_scene, parse_scene
-from spinlev.studies.live import Screen, complete, first_state, fly, follow, has_map, regions
+from spinlev.studies.live import Screen, complete, first_state, fly, follow, has_map, map_key, regions
 from spinlev.studies.live.downloads import content
 from spinlev.studies.live.field_lines import field_lines
 from spinlev.studies.one_scene import Levitation, equilibria_job
@@ -112,6 +112,13 @@ def test_the_map_says_where_it_levitates(line):
         there = there.changed("rotor.angle_deg", float(fine.measures[column]))
         found = Levitation(there.scene, there.models).equilibria
         assert fine.kind[row, column] == (2 if any(e.stable for e in found) else 1 if found else 0)
+
+
+def test_a_map_stays_while_only_its_point_or_the_plate_moves():
+    moved = STATE.changed("frequency_hz", 144.0).changed("rotor.angle_deg", 12.0).changed("plate.center_mm.2", -60.0)
+    assert map_key(moved) == map_key(STATE)
+    for key, value in (("rotor.edge_mm", 9.0), ("floater.diameter_mm", 10.0), ("spin", 0.1)):
+        assert map_key(STATE.changed(key, value)) != map_key(STATE)
 
 
 def test_what_has_no_map():
