@@ -45,7 +45,7 @@ test: lint types
 # Report, documentation and the live page in headless Chromium (Debian: apt-get install chromium); skipped where there is none.
 # The gallery's programs are not run for it: the pages are then without their output. It says how fast a slider is.
 test-browser: install
-	$(BIN)/sphinx-build --quiet -D plot_gallery=0 -b html docs docs/_build/html
+	$(BIN)/sphinx-build --quiet -D plot_gallery=0 -b html docs docs/_build/unrun
 	$(BIN)/pytest -n 2 --dist loadfile tests/whole/test_browser.py tests/whole/test_explore_browser.py
 
 # Lines that the fast tests run, in child processes too; what a killed process has left of its own count is removed.

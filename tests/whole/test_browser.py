@@ -25,7 +25,7 @@ from spinlev.studies.rendering import Turnable, drawn, page, unavailable
 from spinlev.studies.terminal import Models
 
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
-SITE = ROOT / "docs" / "_build" / "html"
+SITE = ROOT / "docs" / "_build" / "unrun"
 PHONE, DESK = 390, 1400
 HARMLESS = ("[PST]: Changed to", '"scene,hashes"')
 """What the documentation's theme says of its colours, and the viewer of what it was given."""
@@ -122,6 +122,6 @@ def test_the_view_to_turn_shows_rotor_and_floater(report, tmp_path):
 )
 def test_the_documentation_is_whole(page, width, tmp_path):
     if not (SITE / page).exists():
-        pytest.skip("the documentation is not built here (make docs)")
+        pytest.skip("the documentation is not built here (make test-browser)")
     found = seen(SITE, page, width, tmp_path)
     assert found["equations"] > 10 or page != "mathematics.html"
