@@ -8,14 +8,14 @@ import numpy as np
 from ...fem.rotor_tables import FieldTable
 from ...geometry.basics import Array, InputError
 from ...geometry.scenes import Scene
-from ..motion import PlateMemory, State, clearance, turned_about_z
+from ..motion import PlateMemory, State, turned_about_z
 from ..steady import Equilibrium
 from .compiled_flight import TOLERANCE
 from .integration import begun, fly_on
 from .local_flight import compile_local_flight
 from .pieces import Log
 from .recorder import Recorder
-from .simulation import PLATE_TOLERANCE, StartError, initial_state
+from .simulation import PLATE_TOLERANCE, check_free, initial_state
 from .trajectory import DURATION
 
 FEWEST, MOST, A_SECOND = 8, 256, 400
@@ -101,13 +101,7 @@ class LiveFlight:
         ------
         StartError : it would overlap a magnet or the plate; nothing is changed
         """
-        gap = float(clearance(self.scene, np.array([self.time]), np.asarray(position, float)[None])[0])
-        if gap <= 0:
-            where = ", ".join(f"{1e3 * c:.4g}" for c in position)
-            raise StartError(
-                f"Input position must leave the floater free of the magnets and the plate; instead it is ({where}) mm, "
-                f"{-1e3 * gap:.3g} mm inside one of them."
-            )
+        check_free("position", self.scene, np.asarray(position, float), self.time)
         place = turned_about_z(position, self.scene.angular_velocity * self.time)
         turning = np.cross([0.0, 0.0, self.scene.angular_velocity], place)
         self.log.ended_by = DURATION

@@ -103,14 +103,19 @@ def initial_state(
             raise EquilibriumError(way_out(scene, table, known))
         state = displaced(chosen.start, scene.start.offset, scene.angular_velocity)
         currents = currents if chosen.currents is None else chosen.currents[0]
-    gap = float(clearance(scene, np.zeros(1), state.position[None])[0])
-    if gap < 0:
-        where = ", ".join(f"{1e3 * c:.6g}" for c in state.position)
-        raise StartError(
-            f"Input start must leave the floater free of the magnets and the plate; instead it begins at ({where}) mm, "
-            f"{-1e3 * gap:.3g} mm inside one of them. Move the plate or the start."
-        )
+    check_free("start", scene, state.position)
     return state, currents
+
+
+def check_free(name: str, scene: Scene, position: Array, time: float = 0.0) -> None:
+    """Raises StartError where a floater at a position (3,) m, rotor's frame, would overlap a body at a time (s)."""
+    gap = float(clearance(scene, np.array([time]), position[None])[0])
+    if gap < 0:
+        where = ", ".join(f"{1e3 * c:.6g}" for c in position)
+        raise StartError(
+            f"Input {name} must leave the floater free of the magnets and the plate; instead it begins at ({where}) "
+            f"mm, {-1e3 * gap:.3g} mm inside one of them. Move the plate or the {name}."
+        )
 
 
 def starting_point(equilibria: Sequence[Equilibrium]) -> Equilibrium | None:

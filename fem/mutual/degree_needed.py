@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ...geometry.basics import Array, Box, Solid, Sphere
+from ...geometry.basics import Array, Box, Solid, Sphere, edge_distance
 from ...geometry.bodies import Magnet
 from ..harmonics import Ball
 
@@ -31,18 +31,9 @@ def _singular_distance(body: Solid, place: Array) -> float:
     """Distance (m) of a place (3,) m from where the field of a body cannot be continued."""
     local, half = body.to_body(place), body.half_edges
     if isinstance(body, Box):
-        return _edge_distance(local, half)
+        return float(edge_distance(body, place[None])[0])
     if isinstance(body, Sphere):
         return float(np.linalg.norm(local))
     across = float(np.hypot(local[0], local[1]))
     beyond = max(abs(float(local[2])) - float(half[2]), 0.0)
-    axis, rim = np.hypot(across, beyond), np.hypot(across - half[0], abs(float(local[2])) - half[2])
-    return float(min(axis, rim))
-
-
-def _edge_distance(body: Array, half: Array) -> float:
-    """Distance of a point from the edges of a box, both in body axes."""
-    to_faces = np.abs(body) - half
-    along = np.maximum(to_faces, 0.0)
-    squares = [to_faces[(a + 1) % 3] ** 2 + to_faces[(a + 2) % 3] ** 2 + along[a] ** 2 for a in range(3)]
-    return float(np.sqrt(min(squares)))
+    return float(min(np.hypot(across, beyond), edge_distance(body, place[None])[0]))

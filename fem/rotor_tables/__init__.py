@@ -8,7 +8,6 @@ from .accuracy import (
 )
 from .anywhere import (
     NearField as NearField,
-    edge_distance as edge_distance,
     field_anywhere as field_anywhere,
     near_field as near_field,
     refuse_edges as refuse_edges,

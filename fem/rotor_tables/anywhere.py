@@ -7,13 +7,12 @@ the outer field (`RotorTable`) stays what the motion uses.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from typing import Any
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ...geometry.basics import Array, Box, InputError, Part, Ring, Solid, Sphere
+from ...geometry.basics import Array, InputError, Part, edge_distance
 from ...geometry.bodies import Magnet
 from ...geometry.meshes import MeshSettings
 from ..closed_forms import UniformField, carrier
@@ -26,7 +25,6 @@ LOWEST, HIGHEST = 3, 8
 """Orders of the elements."""
 CONTINUED = ("cuboid", "fem")
 """Models whose field is known inside the magnets, too."""
-RIGID: dict[str, Any] = {"recoil_permeability": 1.0, "transverse_permeability": None}
 SPREAD = 2.0
 """Share of the root mean square of the last step that is added to it, whose zeros are not those of the error."""
 ON_EDGE = 1e-7
@@ -75,7 +73,7 @@ def field_anywhere(table: RotorTable, points: ArrayLike, rtol: float = 1e-4) -> 
     if table.model not in CONTINUED or reached.all():
         flux, gradient = table.evaluate(places)
         return NearField(flux, flux, gradient, table.absolute_error(places)[0], np.full(len(places), -1), 0)
-    magnets = table.magnets if table.model == "fem" else tuple(replace(m, **RIGID) for m in table.magnets)
+    magnets = table.magnets if table.model == "fem" else tuple(magnet.rigid for magnet in table.magnets)
     found = near_field(magnets, places[~reached], rtol)
     parts = [np.zeros((len(places), *np.shape(value)[1:])) for value in (found.field, found.gradient, found.error)]
     field, gradient, error = parts
@@ -171,18 +169,3 @@ def refuse_edges(magnets: Sequence[Magnet], points: Array) -> None:
                 "Input points must not lie on an edge of a magnet, where the field is infinite; instead "
                 f"({where}) mm is on one of magnet {k + 1}. Move the point by 0.001 mm or more."
             )
-
-
-def edge_distance(body: Solid, points: Array) -> Array:
-    """Distances (n,) m of points (n, 3) m from the nearest edge of a body; infinite where it has none."""
-    if isinstance(body, Part | Sphere):
-        return np.full(len(points), np.inf)
-    local = body.to_body(points)
-    if isinstance(body, Box):
-        to_faces = np.abs(local) - body.half_edges
-        along = np.maximum(to_faces, 0.0)
-        squares = [to_faces[:, (a + 1) % 3] ** 2 + to_faces[:, (a + 2) % 3] ** 2 + along[:, a] ** 2 for a in range(3)]
-        return np.asarray(np.sqrt(np.min(squares, axis=0)))
-    across, height = np.hypot(local[:, 0], local[:, 1]), np.abs(local[:, 2]) - body.half_edges[2]
-    radii = [body.radius, body.inner_radius] if isinstance(body, Ring) else [body.radius]
-    return np.asarray(np.min([np.hypot(across - radius, height) for radius in radii], axis=0))

@@ -9,6 +9,7 @@ from .ring import Ring as Ring
 from .solid import (
     Solid as Solid,
     described_size as described_size,
+    edge_distance as edge_distance,
     moved as moved,
     places_off as places_off,
     shape_numbers as shape_numbers,

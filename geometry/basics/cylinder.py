@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .arrays import Array, frozen_array
+from .arrays import Array
 from .pose import Posed
 
 
@@ -24,10 +24,6 @@ class Cylinder(Posed):
     height: float
     center: Array = field(default_factory=lambda: np.zeros(3))
     rotation: Array = field(default_factory=lambda: np.eye(3))
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "center", frozen_array(self.center, (3,)))
-        object.__setattr__(self, "rotation", frozen_array(self.rotation, (3, 3)))
 
     @property
     def size(self) -> Array:

@@ -39,9 +39,9 @@ class Part(Posed):
     rotation: Array = field(default_factory=lambda: np.eye(3))
 
     def __post_init__(self) -> None:
-        for name in ("center", "extent", "origin"):
+        super().__post_init__()
+        for name in ("extent", "origin"):
             object.__setattr__(self, name, frozen_array(getattr(self, name), (3,)))
-        object.__setattr__(self, "rotation", frozen_array(self.rotation, (3, 3)))
         object.__setattr__(self, "triangles", frozen_array(self.triangles, (len(self.triangles), 3, 3)))
 
     @property

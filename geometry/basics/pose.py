@@ -1,11 +1,11 @@
-"""Where a body of revolution is and what it has in common with a box: the box about it."""
+"""Where a body other than a box is, and what it has in common with one: the box about it."""
 
 from abc import abstractmethod
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .arrays import Array
+from .arrays import Array, frozen_array
 from .box import Box
 
 
@@ -14,6 +14,10 @@ class Posed:
 
     center: Array
     rotation: Array
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "center", frozen_array(self.center, (3,)))
+        object.__setattr__(self, "rotation", frozen_array(self.rotation, (3, 3)))
 
     @property
     @abstractmethod

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .arrays import Array, frozen_array
+from .arrays import Array
 from .cylinder import Cylinder
 from .pose import Posed
 
@@ -32,8 +32,7 @@ class Ring(Posed):
     rotation: Array = field(default_factory=lambda: np.eye(3))
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "center", frozen_array(self.center, (3,)))
-        object.__setattr__(self, "rotation", frozen_array(self.rotation, (3, 3)))
+        super().__post_init__()
         if not 0 < self.inner_radius < self.radius:
             raise ValueError(
                 f"Input inner_radius must be positive and less than radius {self.radius}; instead received "

@@ -85,6 +85,21 @@ def solid_of(numbers: Array, center: Array, rotation: Array) -> Solid:
     return Ring(float(numbers[0]), float(numbers[1]), float(numbers[2]), center, rotation)
 
 
+def edge_distance(body: Solid, points: Array) -> Array:
+    """Distances (n,) m of points (n, 3) m from the nearest edge of a body; infinite where it has none."""
+    if isinstance(body, Part | Sphere):
+        return np.full(len(points), np.inf)
+    local = body.to_body(points)
+    if isinstance(body, Box):
+        to_faces = np.abs(local) - body.half_edges
+        along = np.maximum(to_faces, 0.0)
+        squares = [to_faces[:, (a + 1) % 3] ** 2 + to_faces[:, (a + 2) % 3] ** 2 + along[:, a] ** 2 for a in range(3)]
+        return np.asarray(np.sqrt(np.min(squares, axis=0)))
+    across, height = np.hypot(local[:, 0], local[:, 1]), np.abs(local[:, 2]) - body.half_edges[2]
+    radii = [body.radius, body.inner_radius] if isinstance(body, Ring) else [body.radius]
+    return np.asarray(np.min([np.hypot(across - radius, height) for radius in radii], axis=0))
+
+
 def described_size(body: Solid) -> str:
     """Shape and size as a person writes them, in mm."""
     if isinstance(body, Box):

@@ -1,6 +1,8 @@
 """A uniformly polarised permanent magnet."""
 
-from dataclasses import dataclass
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -42,6 +44,11 @@ class Magnet:
     def box(self) -> Box:
         """The box about the body, along its axes: the body itself where it is a cuboid."""
         return self.body if isinstance(self.body, Box) else self.body.box
+
+    @property
+    def rigid(self) -> Magnet:
+        """The magnet with the same remanence and μr = 1."""
+        return replace(self, recoil_permeability=1.0, transverse_permeability=None)
 
     @property
     def isotropic(self) -> bool:

@@ -1,7 +1,6 @@
 """Maps of the field on a plane, through the magnets: point dipoles, closed form and finite elements side by side."""
 
 from collections.abc import Mapping
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -9,9 +8,8 @@ import meshio
 import numpy as np
 import xarray as xr
 
-from ...fem.rotor_tables import edge_distance, near_field, rotor_table
-from ...geometry.basics import MU_0, Array
-from ...geometry.bodies import Magnet
+from ...fem.rotor_tables import near_field, rotor_table
+from ...geometry.basics import MU_0, Array, edge_distance
 from ...geometry.scenes import Scene
 from ..results import save_figures, write_dataset
 from ..terminal import note
@@ -67,7 +65,7 @@ def field_map(scene: Scene, plane: str, extent: Array | None, offset: float, ste
     b, h = (np.full((3, len(places), 3), np.nan) for _ in range(2))
     b[0], h[0] = (_dipoles(scene, places),) * 2
     note("Finite elements for the map ...")
-    closed = near_field([_rigid(magnet) for magnet in scene.rotor], places[clear])
+    closed = near_field([magnet.rigid for magnet in scene.rotor], places[clear])
     elements = near_field(scene.rotor, places[clear], highest=HIGHEST)
     for k, found in enumerate((closed, elements), start=1):
         b[k, clear], h[k, clear] = found.flux_density, found.field
@@ -102,10 +100,6 @@ def _around(scene: Scene, along: int, up: int) -> Array:
     corners = np.concatenate([magnet.body.corners for magnet in scene.rotor])[:, [along, up]]
     middle, half = (corners.max(axis=0) + corners.min(axis=0)) / 2, np.ptp(corners, axis=0).max()
     return np.array([middle[0] - half, middle[0] + half, middle[1] - half, middle[1] + half])
-
-
-def _rigid(magnet: Magnet) -> Magnet:
-    return replace(magnet, recoil_permeability=1.0, transverse_permeability=None)
 
 
 def _dipoles(scene: Scene, places: Array) -> Array:

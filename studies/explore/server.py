@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 import secrets
 import socket
+from contextlib import suppress
 from functools import partial
 from importlib.resources import files
 
@@ -45,9 +46,8 @@ class Pages:
     def run(self) -> None:
         """Serve until someone stops the program."""
         try:
-            self._server.io_loop.start()
-        except KeyboardInterrupt:  # the way to stop it
-            pass
+            with suppress(KeyboardInterrupt):  # the way to stop it
+                self._server.io_loop.start()
         finally:
             self.stop()
 

@@ -73,7 +73,7 @@ def test_a_flight_ends_by_contact_or_loss_and_begins_again_where_the_floater_is_
 def test_what_cannot_be_changes_nothing():
     live = LiveFlight(SCENE, DIPOLE, ())
     state = live.state.copy()
-    with pytest.raises(StartError, match=r"free of the magnets and the plate; instead it is \(0, 0, -5\) mm"):
+    with pytest.raises(StartError, match=r"free of the magnets and the plate; instead it begins at \(0, 0, -5\) mm"):
         live.put(np.array([0.0, 0.0, -5e-3]))
     for seconds in (0.0, -1.0, float("nan")):
         with pytest.raises(InputError, match="seconds must be positive"):

@@ -5,8 +5,7 @@ import numpy as np
 import pytest
 
 from spinlev.fem.rotor_tables import near_field, rotor_table
-from spinlev.fem.rotor_tables.anywhere import edge_distance
-from spinlev.geometry.basics import Box, Cylinder, InputError, Ring, Sphere, rotation_matrix
+from spinlev.geometry.basics import Box, Cylinder, InputError, Ring, Sphere, edge_distance, rotation_matrix
 from spinlev.geometry.bodies import Magnet
 
 POLARIZATION = np.array([1.2, 0.0, 0.5])
