@@ -18,7 +18,7 @@ from ...dynamics.motion import Parameter, Rates, Scales, parameters
 from ...dynamics.steady import EVERY, Balance, Survey, solve
 from ...fem.rotor_tables import ROUND_OFF, RotorTable
 from ...geometry.basics import Array, SpinlevError
-from ...geometry.scenes import Drag, Scene, scene_keys
+from ...geometry.scenes import Drag, Scene
 from ..one_scene import Levitation
 from .sliders import MEASURES
 from .state import QUICK, PageState
@@ -65,7 +65,7 @@ class Nearby:
             return None
         levitation = _without_plate(state)
         levitation.share(self.levitation)
-        problem, before = self._problem(levitation), self._problem(self.levitation)
+        problem, before = self._problem(levitation, state), self._problem(self.levitation, self.state)
         if problem is None or before is None or np.any(state.scene.gravity[:2]):
             return None
         known = self.searched().without_plate.equilibria
@@ -93,7 +93,7 @@ class Nearby:
         sizes = np.linalg.norm(field, axis=1), np.linalg.norm(slope, axis=(1, 2))
         return there, np.stack(table.absolute_error(places[there]), axis=1) + ROUND_OFF * np.stack(sizes, axis=1)
 
-    def _problem(self, levitation: Levitation) -> _Problem | None:
+    def _problem(self, levitation: Levitation, state: PageState) -> _Problem | None:
         """The balance of a scene in the equations that are compiled here; None where it needs others."""
         scene, spin = levitation.scene, levitation.spin
         if self._family is None:
@@ -101,7 +101,7 @@ class Nearby:
                 return None
             values = parameters(scene, Scales.of(scene), frozen_spin=True)
             return _Problem(self.levitation.rates, values, spin, 1.0)
-        return self._family.problem(scene, spin)
+        return self._family.problem(state)
 
 
 @dataclass(frozen=True, eq=False)
@@ -128,9 +128,9 @@ class _Family:
     edge: float
     rest: str
 
-    def problem(self, scene: Scene, spin: float) -> _Problem | None:
-        rotor = scene_keys(scene)["rotor"]
-        if rotor.get("configuration") != self.configuration or _rest(scene) != self.rest:
+    def problem(self, state: PageState) -> _Problem | None:
+        rotor, scene = state.keys["rotor"], state.scene
+        if rotor.get("configuration") != self.configuration or _rest(state) != self.rest:
             return None
         likeness = self.edge / rotor["edge_mm"]
         if likeness != 1 and not _scalable(scene):
@@ -138,11 +138,11 @@ class _Family:
         key = MEASURES[self.configuration][0].partition(".")[2]
         measure = np.radians(rotor[key]) if key == "angle_deg" else 1e-3 * likeness * rotor[key]
         like = replace(self.family, scene=_similar(scene, likeness))
-        return _Problem(self.family.rates, like.values(scene.frequency, measure)[0], spin, likeness, like)
+        return _Problem(self.family.rates, like.values(scene.frequency, measure)[0], state.spin, likeness, like)
 
 
 def _family(state: PageState) -> _Family | None:
-    rotor = scene_keys(state.scene)["rotor"]
+    rotor = state.keys["rotor"]
     configuration = rotor.get("configuration")
     if configuration not in MEASURES or state.model not in QUICK:
         return None
@@ -150,15 +150,14 @@ def _family(state: PageState) -> _Family | None:
         family = rotor_family(replace(state.scene, plate=None), configuration, state.model)
     except SpinlevError:  # conductors that do not move with the magnets
         return None
-    return _Family(family, configuration, rotor["edge_mm"], _rest(state.scene))
+    return _Family(family, configuration, rotor["edge_mm"], _rest(state))
 
 
-def _rest(scene: Scene) -> str:
+def _rest(state: PageState) -> str:
     """What no parameter of a family's equations can change."""
-    rotor = {
-        k: v for k, v in scene_keys(scene)["rotor"].items() if k not in ("edge_mm", "displacement_mm", "angle_deg")
-    }
-    return f"{rotor} {bool(scene.floater.conductivity)} {scene.drag.air}"
+    open_ones = ("edge_mm", "displacement_mm", "angle_deg")
+    rotor = {key: value for key, value in state.keys["rotor"].items() if key not in open_ones}
+    return f"{rotor} {bool(state.scene.floater.conductivity)} {state.scene.drag.air}"
 
 
 def _scalable(scene: Scene) -> bool:
