@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import xarray as xr
 
-from ...geometry.basics import moved, shape_numbers
+from ...geometry.basics import moved
 from ...geometry.bodies import Magnet
 from ...geometry.scenes import Floater
 from ..storage import described, from_cache, program_of, read_checked, write_checked
@@ -59,7 +59,7 @@ def mutual_key(magnets: tuple[Magnet, ...], floater: Floater) -> str:
     digest = hashlib.sha256(f"{FORMAT} {program_of(__package__)}".encode())
     sphere = np.array([floater.radius, floater.remanence, floater.recoil_permeability])
     for magnet in magnets:
-        for part in (shape_numbers(magnet.body), magnet.body.center, magnet.body.rotation, magnet.polarization):
+        for part in (magnet.body.shape_numbers, magnet.body.center, magnet.body.rotation, magnet.polarization):
             digest.update(np.ascontiguousarray(part + 0.0, dtype="<f8").tobytes())
         digest.update(np.ascontiguousarray(magnet.permeability_in_rotor + 0.0, dtype="<f8").tobytes())
     digest.update(np.ascontiguousarray(sphere, dtype="<f8").tobytes())
