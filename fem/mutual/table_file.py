@@ -8,7 +8,6 @@ from dataclasses import replace
 import numpy as np
 import xarray as xr
 
-from ...geometry.basics import shape_numbers
 from ...geometry.bodies import Magnet
 from ...geometry.scenes import Floater
 from ..rotor_tables import at_home
@@ -53,7 +52,7 @@ def mutual_key(magnets: tuple[Magnet, ...], floater: Floater) -> str:
     digest = hashlib.sha256(f"{FORMAT} {program_of(__package__)}".encode())
     sphere = np.array([floater.radius, floater.remanence, floater.recoil_permeability])
     for magnet in magnets:
-        for part in (shape_numbers(magnet.body), magnet.body.center, magnet.body.rotation, magnet.polarization):
+        for part in (magnet.body.shape_numbers, magnet.body.center, magnet.body.rotation, magnet.polarization):
             digest.update(np.ascontiguousarray(part + 0.0, dtype="<f8").tobytes())
         digest.update(np.ascontiguousarray(magnet.permeability_in_rotor + 0.0, dtype="<f8").tobytes())
     digest.update(np.ascontiguousarray(sphere, dtype="<f8").tobytes())

@@ -5,7 +5,6 @@ from collections.abc import Callable
 
 import numpy as np
 
-from ...geometry.basics import shape_numbers
 from ...geometry.bodies import Magnet
 from ..storage import from_cache, program_of
 from .choice import rotor_table
@@ -18,7 +17,7 @@ def rotor_key(rotor: tuple[Magnet, ...], model: str, rtol: float, nearest: float
     """SHA-256 of the magnets, the model, the accuracy asked for and where, and the programs that compute them."""
     digest = hashlib.sha256(f"{FORMAT} {program_of(__package__)} {model} {rtol!r} {nearest!r}".encode())
     for magnet in rotor:
-        for part in (shape_numbers(magnet.body), magnet.body.center, magnet.body.rotation, magnet.polarization):
+        for part in (magnet.body.shape_numbers, magnet.body.center, magnet.body.rotation, magnet.polarization):
             digest.update(np.ascontiguousarray(part + 0.0, dtype="<f8").tobytes())
         digest.update(np.ascontiguousarray(magnet.permeability_in_rotor + 0.0, dtype="<f8").tobytes())
     return digest.hexdigest()

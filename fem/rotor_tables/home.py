@@ -6,7 +6,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from ...geometry.basics import Array, Box, Part, moved, shape_numbers, solid_of
+from ...geometry.basics import Array, Box, Part, moved, solid_of
 from ...geometry.bodies import Magnet
 from ..closed_forms import first_order_moments
 from ..harmonics import Coefficients, MultipoleExpansion, rotated_harmonics, uniform_moments, without_noise
@@ -75,7 +75,7 @@ def _turned(coefficients: Coefficients, axes: Array) -> Coefficients:
 
 
 def _alike(magnet: Magnet) -> Alike:
-    shape = _numbers(shape_numbers(magnet.body), magnet)
+    shape = _numbers(magnet.body.shape_numbers, magnet)
     return shape, tuple(magnet.polarization), magnet.recoil_permeability, magnet.transverse_permeability
 
 
