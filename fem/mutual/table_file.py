@@ -8,9 +8,9 @@ from dataclasses import replace
 import numpy as np
 import xarray as xr
 
-from ...geometry.basics import moved
 from ...geometry.bodies import Magnet
 from ...geometry.scenes import Floater
+from ..rotor_tables import at_home
 from ..storage import described, from_cache, program_of, read_checked, write_checked
 from .answer_fit import mutual_table
 from .answer_grid import AnswerGrid, answer_box
@@ -26,7 +26,7 @@ def cached_mutual_table(
 
     A lone magnet answers in its own axes: one table serves it wherever it stands and however it is turned.
     """
-    upright = _upright(magnets)
+    upright = at_home(magnets)
     table, found = from_cache(
         f"mutual-{mutual_key(upright, floater)}.nc",
         lambda path: from_dataset(read_checked(path, FORMAT), upright),
@@ -35,13 +35,6 @@ def cached_mutual_table(
         report,
     )
     return _posed(table, magnets), found
-
-
-def _upright(magnets: tuple[Magnet, ...]) -> tuple[Magnet, ...]:
-    """A lone magnet at the origin with its axes along the rotor's; several as they are."""
-    if len(magnets) > 1:
-        return magnets
-    return tuple(replace(magnet, body=moved(magnet.body, np.zeros(3), np.eye(3))) for magnet in magnets)
 
 
 def _posed(table: MutualTable, magnets: tuple[Magnet, ...]) -> MutualTable:

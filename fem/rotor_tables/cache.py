@@ -8,6 +8,7 @@ import numpy as np
 from ...geometry.bodies import Magnet
 from ..storage import from_cache, program_of
 from .choice import rotor_table
+from .home import at_home, taken_along
 from .table import RotorTable
 from .table_file import FORMAT, load_table, save_table
 
@@ -25,11 +26,11 @@ def rotor_key(rotor: tuple[Magnet, ...], model: str, rtol: float, nearest: float
 def cached_rotor_table(
     rotor: tuple[Magnet, ...], model: str, rtol: float, report: Callable[[str], None], nearest: float | None = None
 ) -> tuple[RotorTable, bool]:
-    """A rotor table, see `rotor_table`, from the cache if it is there, and whether it was."""
-    return from_cache(
-        f"rotor-{rotor_key(rotor, model, rtol, nearest)}.nc",
-        load_table,
-        lambda: rotor_table(rotor, model, rtol, nearest),
-        save_table,
-        report,
-    )
+    """A rotor table, see `rotor_table`, from the cache if it is there, and whether it was.
+
+    A lone magnet has one, wherever it is in the rotor.
+    """
+    home = at_home(rotor)
+    name = f"rotor-{rotor_key(home, model, rtol, nearest)}.nc"
+    table, found = from_cache(name, load_table, lambda: rotor_table(home, model, rtol, nearest), save_table, report)
+    return taken_along(table, rotor), found

@@ -158,6 +158,12 @@ def assert_dragged(tab):
       return [frame.x + view.frame.x_scale.compute(ball.x[0]), frame.y + view.frame.y_scale.compute(ball.z[0])]; })()"""
     said(tab, "Bokeh.index.find_one(model('side')).el.scrollIntoView({block: 'center'})")
     x, y = said(tab, where)
+    scales = said(
+        tab,
+        "['x', 'y'].map(k => Bokeh.index.find_one(model('side')).frame[k + '_scale'])"
+        ".map(scale => Math.abs(scale.compute(1) - scale.compute(0)))",
+    )
+    assert abs(scales[0] - scales[1]) < 0.01 * scales[0]  # a ball looks round
     tab.mouse((x, y), (x + 20, y + 5), (x + 60, y + 15), (x + 90, y + 25))
     wait(tab, "/^After .* s (touched|lost)/.test(model('says').text)")
     click(tab, "again")
