@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ...fem.mutual import oblique
+from ...fem.mutual import unanswered
 from ...fem.rotor_tables import FieldTable
 from ...geometry.basics import InputError
 from ...geometry.scenes import Scene
@@ -23,16 +23,17 @@ def mutual_choice(scene: Scene, table: FieldTable, asked: str, rtol: float) -> t
     if asked == "rigid":
         return False, "as asked"
     magnets, floater = scene.rotor, scene.floater
+    reasons = {k: why for k, magnet in enumerate(magnets, 1) if (why := unanswered(magnet))}
     if asked == "mutual":
         if table.model == "map":
             raise InputError(
                 "Input --interaction must be rigid or auto with a measured map, which does not tell how the rotor "
                 "answers; instead received mutual. Leave the map out (--model fem) to have the rotor's magnets answer."
             )
-        if any(oblique(magnet) for magnet in magnets):
+        if reasons:
             raise InputError(
-                "Input --interaction must be rigid or auto for magnets whose easy axis is along none of their edges; "
-                "instead received mutual. Give them one recoil_permeability, or turn the magnet with its magnetisation."
+                f"Input --interaction must be rigid or auto with such magnets; instead received mutual, and magnet "
+                f"{min(reasons)} is {reasons[min(reasons)]}"
             )
     if floater.recoil_permeability == 1 and all(magnet.contrast == 0 for magnet in magnets):
         return False, NOTHING_ANSWERS
@@ -40,8 +41,8 @@ def mutual_choice(scene: Scene, table: FieldTable, asked: str, rtol: float) -> t
         return True, "as asked"
     if table.model != "fem":
         return False, f"the field model {table.model} has no permeability"
-    if any(oblique(magnet) for magnet in magnets):
-        return False, "the answer of magnets with an oblique easy axis is not known"
+    if reasons:
+        return False, f"the answer of magnet {min(reasons)} is not known: it is {reasons[min(reasons)].split('.')[0]}"
     part = rough_part(scene, table)
     if part < rtol:
         return False, f"about {part:.0e} of the force near the rotor, less than --rtol asks for"

@@ -1,7 +1,7 @@
 """How is a field outside or between its sources written as a sum of solid harmonics?"""
 
 from .ball_field import BallField as BallField
-from .body_rules import polynomial_rule as polynomial_rule
+from .body_rules import box_rule as box_rule, polynomial_rule as polynomial_rule
 from .compiled import (
     CompiledField as CompiledField,
     FieldExpressions as FieldExpressions,

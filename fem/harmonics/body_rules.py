@@ -17,8 +17,8 @@ def polynomial_rule(body: Solid, degree: int) -> tuple[Array, Array]:
     if isinstance(body, Part):
         return part_rule(body, degree + ROUND)
     if isinstance(body, Box):
-        local, weights = _box_rule(body, degree)
-    elif isinstance(body, Sphere):
+        return box_rule(body, (degree // 2 + 1,) * 3)
+    if isinstance(body, Sphere):
         local, weights = _sphere_rule(body.radius, degree)
     else:
         inner = body.inner_radius if isinstance(body, Ring) else 0.0
@@ -26,11 +26,12 @@ def polynomial_rule(body: Solid, degree: int) -> tuple[Array, Array]:
     return body.center + local @ body.rotation.T, weights
 
 
-def _box_rule(body: Box, degree: int) -> tuple[Array, Array]:
-    nodes, weights = np.polynomial.legendre.leggauss(degree // 2 + 1)
-    grid = np.stack(np.meshgrid(nodes, nodes, nodes, indexing="ij"), -1).reshape(-1, 3)
-    volume = (weights[:, None, None] * weights[:, None] * weights).ravel() * body.volume / 8
-    return grid * body.half_edges, volume
+def box_rule(box: Box, counts: tuple[int, int, int]) -> tuple[Array, Array]:
+    """Points (n, 3) m and weights (n,) m³ of Gauss's rule in a box, with so many points along each edge."""
+    nodes, weights = zip(*(np.polynomial.legendre.leggauss(n) for n in counts), strict=True)
+    grid = np.stack(np.meshgrid(*nodes, indexing="ij"), axis=-1).reshape(-1, 3)
+    volumes = np.prod(box.half_edges) * np.einsum("i,j,k->ijk", *weights).ravel()
+    return box.center + (box.half_edges * grid) @ box.rotation.T, volumes
 
 
 def _circle(count: int) -> Array:

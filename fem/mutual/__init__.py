@@ -1,7 +1,7 @@
 """What do rotor and floater do to each other once both are permeable?"""
 
 from .answer_error import answers as answers
-from .answer_fit import mutual_table as mutual_table, oblique as oblique
+from .answer_fit import mutual_table as mutual_table, unanswered as unanswered
 from .degree_needed import enough_degree as enough_degree
 from .forces import (
     TwoBody as TwoBody,

@@ -30,6 +30,11 @@ from .table import MutualTable
 
 NEAREST = 0.16
 """Gap in floater radii from which on force and torque are to be met to 1e-3: 1 mm for the article's floater."""
+PART = "a part from a STEP file, whose remanence has no closed form. Choose --interaction rigid, or give it a shape."
+OBLIQUE = (
+    "one with two permeabilities and an easy axis along none of its edges, which its points cannot answer with. Choose "
+    "--interaction rigid, give it one recoil_permeability, or turn the body with its magnetisation."
+)
 EQUATIONS, SPARSE = 8000, 6
 """Pairs of dipoles that are fitted; and at one of so many places the rotor's answer to the sphere's is."""
 
@@ -39,7 +44,7 @@ def mutual_table(magnets: tuple[Magnet, ...], floater: Floater, order: int = 2) 
 
     Raises
     ------
-    InputError : a magnet's permeability has other axes than its body
+    InputError : a magnet's permeability has other axes than its body, or it is a part from a file
     """
     started = time.perf_counter()
     rotor, fine = rotor_ladder(magnets, (order, order + 1))
@@ -65,24 +70,21 @@ def mutual_table(magnets: tuple[Magnet, ...], floater: Floater, order: int = 2) 
     )
 
 
-def oblique(magnet: Magnet) -> bool:
-    """Whether the permeability has other axes than the body, which the points of a magnet cannot answer with.
-
-    Nor can those of a part from a file, whose remanence has no closed form.
-    """
+def unanswered(magnet: Magnet) -> str:
+    """Why a magnet's answer to the floater is not known, with the way out; empty where it is."""
     if isinstance(magnet.body, Part):
-        return True
+        return PART
     turn = magnet.box.rotation
     inside = turn.T @ magnet.permeability_in_rotor @ turn
-    return bool(np.abs(inside - np.diag(np.diag(inside))).max() > PARALLEL)
+    return OBLIQUE if np.abs(inside - np.diag(np.diag(inside))).max() > PARALLEL else ""
 
 
 def _empty(magnet: Magnet, floater: Floater, counts: tuple[int, int, int]) -> AnswerGrid:
     size = float(np.linalg.norm(magnet.polarization))
-    if oblique(magnet):
+    if reason := unanswered(magnet):
         raise InputError(
-            "Input transverse_permeability must belong to a magnet polarised along one of its edges where rotor and "
-            "floater magnetise each other; instead its easy axis is oblique. Choose --interaction rigid."
+            "Input magnets must be of the kinds that answer to the floater where both magnetise each other; instead "
+            f"one is {reason}"
         )
     count = int(np.prod(counts))
     axis = magnet.polarization / size if size else np.zeros(3)

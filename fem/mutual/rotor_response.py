@@ -16,7 +16,15 @@ from ...geometry.basics import Array, Box
 from ...geometry.bodies import Magnet
 from ...geometry.meshes import MagnetMesh, mesh_magnets
 from ..closed_forms import remanent_field, volume_rule
-from ..harmonics import Ball, Coefficients, derivative, from_magnetization, interior_coefficients, outer_sums
+from ..harmonics import (
+    Ball,
+    Coefficients,
+    box_rule,
+    derivative,
+    from_magnetization,
+    interior_coefficients,
+    outer_sums,
+)
 from ..magnetostatics import PermeableRegions, assemble_regions
 from .answer_grid import point_counts
 
@@ -140,21 +148,13 @@ def direct_rule(magnets: Sequence[Magnet], nearest: float) -> tuple[Array, Array
     for magnet in magnets:
         counts = point_counts(magnet.box, nearest, DIRECT_DIGITS)
         places, volumes = (
-            _gauss(magnet.body, counts)
+            box_rule(magnet.body, counts)
             if isinstance(magnet.body, Box)
             else volume_rule(magnet.body, [magnet.body], max(counts))
         )
         points.append(places)
         tensors.append(volumes[:, None, None] * (magnet.permeability_in_rotor - np.eye(3)))
     return np.concatenate(points), np.concatenate(tensors)
-
-
-def _gauss(box: Box, counts: tuple[int, int, int]) -> tuple[Array, Array]:
-    """Points (n, 3) m and weights (n,) m³ of Gauss's rule in a box."""
-    nodes, weights = zip(*(np.polynomial.legendre.leggauss(n) for n in counts), strict=True)
-    grid = np.stack(np.meshgrid(*nodes, indexing="ij"), axis=-1).reshape(-1, 3)
-    volumes = np.prod(box.half_edges) * np.einsum("i,j,k->ijk", *weights).ravel()
-    return box.center + (box.half_edges * grid) @ box.rotation.T, volumes
 
 
 def _joined(*parts: tuple[Array, Array]) -> tuple[Array, Array]:

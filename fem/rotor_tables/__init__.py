@@ -7,7 +7,10 @@ from .accuracy import (
     typical_field as typical_field,
 )
 from .anywhere import (
+    NEAR_RTOL as NEAR_RTOL,
+    CompleteTable as CompleteTable,
     NearField as NearField,
+    complete as complete,
     field_anywhere as field_anywhere,
     near_field as near_field,
     refuse_edges as refuse_edges,

@@ -7,7 +7,8 @@ the outer field (`RotorTable`) stays what the motion uses.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -27,6 +28,9 @@ CONTINUED = ("cuboid", "fem")
 ON_EDGE = 1e-7
 """Distance (m) from an edge below which the field counts as that on the edge."""
 
+OFF_FACE = 1e-10
+"""Distance (m) from a face below which a point counts as just outside of it."""
+
 
 @dataclass(frozen=True, eq=False)
 class NearField:
@@ -39,7 +43,7 @@ class NearField:
     gradient : ∂B_i/∂x_j (n, 3, 3) T/m, of one side on a face
     error : estimated error (n,) of B and of μ0 H, T
     gradient_error : estimated error (n,) of the gradient (Frobenius norm), T/m
-    magnet : number of the magnet (n,) in which a point lies, -1 in air
+    magnet : number of the magnet (n,) in which a point lies, -1 in air and on faces
     order : of the elements; 0 where none were needed
     """
 
@@ -90,6 +94,18 @@ def field_anywhere(
     )
 
 
+def _off_faces(magnets: Sequence[Magnet], points: Array) -> Array:
+    """Points (n, 3) m, those on a face of a magnet moved out of it by `OFF_FACE`: H jumps there."""
+    moved = points.copy()
+    for magnet in magnets:
+        on = np.abs(magnet.body.distance(points)) < OFF_FACE
+        if on.any():
+            steps = ON_EDGE / 2 * np.eye(3)
+            slope = [magnet.body.distance(points[on] + s) - magnet.body.distance(points[on] - s) for s in steps]
+            moved[on] += OFF_FACE * np.transpose(slope) / ON_EDGE
+    return moved
+
+
 def _joined(chosen: NDArray[np.bool_], there: Array, elsewhere: Array) -> Array:
     whole = np.zeros((len(chosen), *there.shape[1:]))
     whole[chosen], whole[~chosen] = there, elsewhere
@@ -108,7 +124,7 @@ def near_field(
     highest: int = HIGHEST,
     elements: NearElements | None = None,
 ) -> NearField:
-    """B, H and M anywhere but on the edges of magnets.
+    """B, H and M anywhere but on the edges of magnets; on a face, those just outside.
 
     Parameters
     ----------
@@ -123,6 +139,7 @@ def near_field(
     """
     places = np.asarray(points, float).reshape(-1, 3)
     refuse_edges(magnets, places)
+    places = _off_faces(magnets, places)
     solved = elements or NearElements(magnets)
     rows = [UniformField(one).rows(np.ascontiguousarray(places.T)) for one in solved.carriers if one.polarization.any()]
     closed = sum(rows, np.zeros((12, len(places))))
@@ -142,10 +159,10 @@ def near_field(
 
 
 def owners(magnets: Sequence[Magnet], points: Array) -> NDArray[np.intp]:
-    """Number of the magnet (n,) in which points (n, 3) m lie, on the surface included; -1: none."""
+    """Number of the magnet (n,) in which points (n, 3) m lie; -1: none."""
     owner = np.full(len(points), -1)
     for k, magnet in enumerate(magnets):
-        owner[(owner < 0) & (magnet.body.distance(points) <= 0)] = k
+        owner[(owner < 0) & (magnet.body.distance(points) < -OFF_FACE / 2)] = k
     return owner
 
 
@@ -159,3 +176,56 @@ def refuse_edges(magnets: Sequence[Magnet], points: Array) -> None:
                 "Input points must not lie on an edge of a magnet, where the field is infinite; instead "
                 f"({where}) mm is on one of magnet {k + 1}. Move the point by 0.001 mm or more."
             )
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class CompleteTable(RotorTable):
+    """A table of closed forms or finite elements that knows the field everywhere but on edges; made by `complete`.
+
+    Where the table of the outer field does not reach (`in_range`), `near_field` continues it: its finite elements are
+    solved when they are first asked for, and kept.  The motion's expressions are those of the outer field.
+
+    Parameters
+    ----------
+    near_rtol : error of B asked for there, relative to the largest remanence
+    """
+
+    near_rtol: float = NEAR_RTOL
+
+    @cached_property
+    def _elements(self) -> NearElements:
+        return NearElements(continued_by(self))
+
+    def fields(self, points: ArrayLike) -> NearField:
+        """B, H, M and the gradient at points (n, 3) m, with their errors. Raises InputError on edges."""
+        return field_anywhere(self, points, self.near_rtol, self._elements)
+
+    def evaluate(self, points: ArrayLike) -> tuple[Array, Array]:
+        """B (n, 3) T and ∂B_i/∂x_j (n, 3, 3) T/m at points (n, 3) m in the rotor's frame, in magnets, too.
+
+        Raises
+        ------
+        InputError : a point lies on an edge of a magnet
+        """
+        places = np.asarray(points, float).reshape(-1, 3)
+        if not self.in_range(places).all():
+            found = self.fields(places)
+            return found.flux_density, found.gradient
+        refuse_edges(self.magnets, places)
+        return super().evaluate(places)
+
+    def absolute_error(self, points: ArrayLike) -> tuple[Array, Array]:
+        """Estimated errors (n,) of B (T) and of its gradient (T/m)."""
+        places = np.asarray(points, float).reshape(-1, 3)
+        if self.in_range(places).all():
+            return super().absolute_error(places)
+        found = self.fields(places)
+        return found.error, found.gradient_error
+
+
+def complete(table: RotorTable, near_rtol: float = NEAR_RTOL) -> RotorTable:
+    """The table with the field in its magnets and near them; one of another model than `CONTINUED` as it is."""
+    if table.model not in CONTINUED:
+        return table
+    parts = {part.name: getattr(table, part.name) for part in fields(RotorTable)}
+    return CompleteTable(**parts, near_rtol=near_rtol)

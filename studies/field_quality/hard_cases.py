@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ...fem.rotor_tables import Accuracy
-from ...geometry.basics import Array, Box, rotation_matrix
+from ...geometry.basics import Array, Box, Cylinder, Ring, rotation_matrix
 from ...geometry.bodies import Magnet, horizontal, tilt, vertical
 from ...geometry.meshes import MeshSettings
 
@@ -56,6 +56,10 @@ def _magnet(box: Box, polarization: Sequence[float], along: float, across: float
     return Magnet(box, np.array(polarization, float), along, across)
 
 
+def _round(body: Cylinder | Ring, polarization: tuple[float, float, float]) -> tuple[Magnet, ...]:
+    return (Magnet(body, np.array(polarization), PERMEABILITY),)
+
+
 def _cube(permeability: float) -> tuple[Magnet, ...]:
     return horizontal(0.002, 0.01, REMANENCE, permeability)
 
@@ -81,6 +85,7 @@ EIGHT = tuple(
     for k, a in enumerate(np.arange(8) * np.pi / 4)
 )
 OBLIQUE = (_magnet(_box(CUBE, rotation=rotation_matrix((15, 40, 70))), (1, 0, 0), 1.05, 1.15),)
+DISC, THIN_RING = Cylinder(10e-3, 1e-3), Ring(10e-3, 9e-3, 5e-3)
 LONG = (_magnet(_box((0.005, 0.005, 0.04)), (1.3, 0, 0), PERMEABILITY),)
 CASES = {
     "contact distance": HardCase(_cube(PERMEABILITY), CONTACT, quick=True),
@@ -92,6 +97,9 @@ CASES = {
     "flat, across": HardCase(_plate((0, 0, 1.3)), CONTACT, order=4),
     "flat, along": HardCase(_plate((1.3, 0, 0)), CONTACT, order=4),
     "long": HardCase(LONG, CONTACT),
+    "disc of 20 : 1, across": HardCase(_round(DISC, (0, 0, 1.3)), CONTACT, order=4),
+    "disc of 20 : 1, along": HardCase(_round(DISC, (1.3, 0, 0)), CONTACT, order=4),
+    "thin ring": HardCase(_round(THIN_RING, (1.3, 0, 0)), CONTACT, order=4),
     "touching": HardCase(_pair(0.01)),
     "gap of 1 µm": HardCase(_pair(0.010001)),
     "gap of 50 µm": HardCase(_pair(0.01005), order=4),

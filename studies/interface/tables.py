@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from ...dynamics.motion import PlateMemory
-from ...fem.rotor_tables import FieldTable
+from ...fem.rotor_tables import NEAR_RTOL, FieldTable, RotorTable, complete
 from ...geometry.scenes import Scene
 from ..one_scene import Levitation
 from ..terminal import FieldModel, InteractionModel, Models, PlateModel, heard
@@ -29,17 +29,19 @@ def rotor_table(
     -------
     FieldTable
         Its `evaluate(points)` gives B (n, 3) T and its gradient (n, 3, 3) T/m at points (n, 3) m of the rotor's frame,
-        `relative_error(points)` the estimated errors.
+        `relative_error(points)` the estimated errors. With "cuboid" and "fem" also in the magnets, in gaps and at
+        faces, there to `rtol` or 1e-4 of the remanence, whichever is more; `fields(points)` has H and M, too.
 
     Raises
     ------
     InputError
-        A model, a tolerance or a file that cannot be used.
+        A model, a tolerance or a file that cannot be used; of `evaluate`, a point on an edge of a magnet.
     AccuracyError
         The accuracy cannot be reached.
     """
     with heard(progress):
-        return Levitation(scene, Models(model, rtol=rtol)).table
+        table = Levitation(scene, Models(model, rtol=rtol)).table
+        return complete(table, max(rtol, NEAR_RTOL)) if isinstance(table, RotorTable) else table
 
 
 def plate_table(

@@ -8,7 +8,7 @@ import numpy as np
 from ...dynamics.flights import GROWING, STABLE, Trajectory, flight_kind
 from ...dynamics.motion import PlateMemory
 from ...dynamics.steady import Equilibrium
-from ...fem.rotor_tables import FieldTable, RotorTable, field_anywhere, refuse_edges
+from ...fem.rotor_tables import CompleteTable, FieldTable
 from ...geometry.basics import MU_0, Array
 from ..results import EQUILIBRIUM_FIELDS
 from .effects import effects_answer
@@ -17,9 +17,7 @@ from .levitation import Levitation
 
 def field_answer(table: FieldTable, points: Array) -> dict[str, Any]:
     """B, its gradient and their estimated errors at points (n, 3) m."""
-    if isinstance(table, RotorTable) and table.model in ("cuboid", "fem"):
-        refuse_edges(table.magnets, points)
-    if isinstance(table, RotorTable) and not table.in_range(points).all():
+    if isinstance(table, CompleteTable) and not table.in_range(points).all():
         return _near_answer(table, points)
     b, gradient = table.evaluate(points)
     error, gradient_error = table.relative_error(points)
@@ -34,19 +32,22 @@ def field_answer(table: FieldTable, points: Array) -> dict[str, Any]:
     }
 
 
-def _near_answer(table: RotorTable, points: Array) -> dict[str, Any]:
+def _near_answer(table: CompleteTable, points: Array) -> dict[str, Any]:
     """As `field_answer`, with H, M and the magnets' numbers, also where the table itself does not reach."""
-    found = field_anywhere(table, points)
+    found = table.fields(points)
     size = np.linalg.norm(found.flux_density, axis=1) + np.finfo(float).tiny
+    steepness = np.linalg.norm(found.gradient, axis=(1, 2)) + np.finfo(float).tiny
     return {
         "model": table.model,
         "error_estimate": float((found.error / size).max()),
+        "gradient_error_estimate": float((found.gradient_error / steepness).max()),
         "B_T": found.flux_density,
         "dB_T_per_m": found.gradient,
         "H_A_per_m": found.field / MU_0,
         "M_A_per_m": found.magnetization / MU_0,
         "inside_magnet": (found.magnet + 1).tolist(),
         "B_relative_error": found.error / size,
+        "dB_relative_error": found.gradient_error / steepness,
     }
 
 

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from ...dynamics.flights import Checkpoint, FlightStopped, Trajectory
+from ...fem.rotor_tables import NEAR_RTOL, RotorTable, complete
 from ...fem.storage import program_of, write_whole
 from ...geometry.basics import Array
 from ...geometry.scenes import OffsetStart, Scene, scene_text
@@ -25,7 +26,9 @@ Job = tuple[Mapping[str, Any], list[str]]
 def field_job(scene: Scene, points: Array, asked: Models, out: Path) -> Job:
     """B and its gradient at points (n, 3) m; writes field.csv."""
     levitation = Levitation(scene, asked)
-    values = field_answer(levitation.table, points)
+    table = levitation.table
+    known = complete(table, max(asked.rtol, NEAR_RTOL)) if isinstance(table, RotorTable) else table
+    values = field_answer(known, points)
     b, gradient, error = values["B_T"], values["dB_T_per_m"].reshape(-1, 9), values["B_relative_error"]
     slopes = (f"dB{i}_d{j}_T_per_m" for i in "xyz" for j in "xyz")
     stream = io.StringIO(newline="")

@@ -141,6 +141,9 @@ SLOW = {
     "gap of 50 µm",
     "an edge within a face",
     "eight magnets",
+    "disc of 20 : 1, across",
+    "disc of 20 : 1, along",
+    "thin ring",
 }
 
 

@@ -4,7 +4,7 @@ import magpylib
 import numpy as np
 import pytest
 
-from spinlev.fem.rotor_tables import near_field, rotor_table
+from spinlev.fem.rotor_tables import RangeError, complete, near_field, rotor_table
 from spinlev.geometry.basics import Box, Cylinder, InputError, Ring, Sphere, rotation_matrix
 from spinlev.geometry.bodies import Magnet
 
@@ -108,3 +108,74 @@ def test_the_gradient_is_that_of_the_field():
 def test_a_point_on_an_edge_is_refused(body, point):
     with pytest.raises(InputError, match="must not lie on an edge of a magnet, where the field is infinite"):
         near_field((Magnet(body, POLARIZATION),), [point])
+
+
+def test_a_complete_table_has_the_near_field_and_the_far_table_alike():
+    """A sphere of μr = 1.05, exact: uniform inside, a dipole outside; the motion's table is the one of before."""
+    magnet = Magnet(Sphere(5e-3), (0, 0, 1.3), 1.05)
+    far = rotor_table((magnet,), "fem")
+    table = complete(far)
+    points = np.array([[0.0, 1e-3, 2e-3], [0.0, 0.0, 5.0001e-3], [0.0, 0.0, -2e-2]])
+    field, gradient = table.evaluate(points)
+    exact = 2 * 1.3 / 3.05 * np.array([1.0, (5 / 5.0001) ** 3, (5 / 20) ** 3])
+    assert np.abs(field[:, 2] - exact).max() < 1e-8
+    assert np.abs(gradient[0]).max() < 1e-5
+    assert gradient[1:, 2, 2] == pytest.approx(-3 * exact[1:] / points[1:, 2], rel=1e-5)
+    error, steep = table.absolute_error(points)
+    assert np.all(np.abs(field[:, 2] - exact) <= error + 1e-10)
+    assert np.all(np.isfinite(steep))
+    assert np.all(table.relative_error(points)[0] < 1e-4)
+    assert np.array_equal(table.in_range(points), far.in_range(points))
+    assert np.array_equal(table.evaluate(points[2:])[0], far.evaluate(points[2:])[0])
+    with pytest.raises(RangeError):
+        far.evaluate(points)
+    found = table.fields(points)
+    assert found.field[0] == pytest.approx([0, 0, -1.3 / 3.05], abs=1e-9)
+    assert list(found.magnet) == [0, -1, -1]
+
+
+def test_a_complete_table_of_closed_forms_is_magpylibs_and_refuses_edges():
+    magnet, points = Magnet(CUBE, POLARIZATION, 1.05), places_about(CUBE, 0.5e-3)
+    table = complete(rotor_table((magnet,), "cuboid"))  # which is that of μr = 1
+    source = magpylib.magnet.Cuboid(dimension=CUBE.size, polarization=POLARIZATION)
+    assert np.abs(table.evaluate(points)[0] - source.getB(CUBE.to_body(points)) @ CUBE.rotation.T).max() < 1e-12
+    for place in (CUBE.corners[0], CUBE.corners[:2].mean(axis=0)):
+        with pytest.raises(InputError, match="must not lie on an edge"):
+            table.evaluate([place])
+    dipole = rotor_table((magnet,), "dipole")
+    assert complete(dipole) is dipole
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("distance", [0.2e-3, 1e-3, 3e-3])
+def test_next_to_faces_inside_the_circumscribed_sphere_near_and_far_field_meet(distance):
+    """Cube, μr = 1.05: at the corners' sphere the table of moments and the elements agree within what both state."""
+    magnet = Magnet(Box((0.01,) * 3), (1.3, 0, 0), 1.05)
+    table = complete(rotor_table((magnet,), "fem", 1e-6, 3.7e-3))
+    ways = np.random.default_rng(2).normal(size=(60, 3))
+    ways /= np.linalg.norm(ways, axis=1)[:, None]
+    near = ways * (magnet.body.circumradius - 1e-7)
+    far = ways * (magnet.body.circumradius + 1e-3)
+    found, beyond = near_field((magnet,), far), table.evaluate(far)
+    assert np.all(np.linalg.norm(found.flux_density - beyond[0], axis=1) <= found.error + table.absolute_error(far)[0])
+    at_face = near * np.array([5e-3 + distance, 3e-3, 3e-3]) / np.abs(near).max(axis=1)[:, None]
+    outside = magnet.body.distance(at_face) > 0
+    inner = table.fields(at_face[outside])
+    assert inner.error.max() < 2e-4 * 1.3
+    assert np.abs(np.trace(inner.gradient, axis1=1, axis2=2)).max() < 3 * inner.gradient_error.max() + 1e-6
+
+
+@pytest.mark.parametrize("permeability", [1.0, 1.05])
+def test_on_a_face_the_field_is_the_one_just_outside(permeability):
+    """B across a face is the same on either side, H along it, too; the sphere is exact."""
+    ball = Magnet(Sphere(5e-3), (0, 0, 1.3), permeability)
+    found = near_field((ball,), [[0.0, 0.0, 5e-3], [5e-3, 0.0, 0.0]])
+    inside = 1.3 / (permeability + 2)
+    assert found.flux_density[:, 2] == pytest.approx([2 * inside, -inside], abs=1e-6)
+    assert not found.magnetization.any()
+    if permeability == 1:
+        cube = Magnet(Box((0.01,) * 3, (2e-3, 0, 0), TURN), POLARIZATION)
+        at = cube.body.center + np.array([[5e-3, 1e-3, 2e-3], [-1e-3, -5e-3, 1e-3], [1e-3, 1e-3, 5e-3]]) @ TURN.T
+        out = np.array([[1e-7, 0, 0], [0, -1e-7, 0], [0, 0, 1e-7]]) @ TURN.T
+        on, beside = near_field((cube,), at).flux_density, near_field((cube,), at + out).flux_density
+        assert on == pytest.approx(beside, abs=5e-5)

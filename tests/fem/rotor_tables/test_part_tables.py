@@ -1,11 +1,13 @@
 """Magnets from STEP files: beside the same shape by key, and what no magnet can be made of."""
 
 from pathlib import Path
+from types import SimpleNamespace
 
 import netgen.occ as occ
 import numpy as np
 import pytest
 
+from spinlev.dynamics.effects import mutual_choice
 from spinlev.fem.rotor_tables import refuse_edges, rotor_table
 from spinlev.fem.rotor_tables.accuracy import error_points
 from spinlev.fem.rotor_tables.table_file import load_table, save_table
@@ -138,3 +140,15 @@ def test_edges_of_a_part_are_those_of_the_shape_by_key(folder):
     assert part.edge_distance(points) == pytest.approx(cylinder.edge_distance(points), abs=1e-4)
     with pytest.raises(InputError, match="must not lie on an edge"):
         refuse_edges([Magnet(read_part(folder / "cube.step"), (1.0, 0, 0))], np.array([[5e-3, 5e-3, 1e-3]]))
+
+
+def test_mutual_magnetisation_of_a_part_is_refused_for_what_it_is(folder):
+    body = {"file": "cube.step", "center_mm": [0, 0, 0], "polarization_T": [1.3, 0, 0]}
+    body["file"] = str(folder / "cube.step")
+    made, table = scene(frequency_hz=100.0, rotor=magnets(body), floater=BALL), SimpleNamespace(model="fem")
+    with pytest.raises(InputError, match=r"magnet 1 is a part from a STEP file.*Choose --interaction rigid"):
+        mutual_choice(made, table, "mutual", 1e-3)
+    assert mutual_choice(made, table, "auto", 1e-3) == (
+        False,
+        "the answer of magnet 1 is not known: it is a part from a STEP file, whose remanence has no closed form",
+    )

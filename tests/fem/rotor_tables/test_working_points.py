@@ -82,6 +82,7 @@ def test_a_floater_and_a_touching_magnet_add_what_magpylib_adds():
         assert point.lowest_turning <= point.lowest
 
 
+@pytest.mark.slow
 def test_a_thin_ring_across_its_axis_is_nearly_free_of_iron():
     """H = -J where a thin wall stands across the polarisation: all but the sides is lost at a knee of half of that."""
     ring = Magnet(Ring(10e-3, 9.9e-3, 20e-3), (J, 0, 0), coercivity=knee_at(-0.5 * J))
