@@ -1,0 +1,5 @@
+"""Who is caught, and from where?"""
+
+from .capture import STUDY as CAPTURE
+
+STUDIES = (CAPTURE,)
