@@ -1,5 +1,6 @@
-"""Who is caught, and from where?"""
+"""Who is caught from where, and above which frequency is everything lost?"""
 
 from .capture import STUDY as CAPTURE
+from .upper_limit import STUDY as UPPER_LIMIT
 
-STUDIES = (CAPTURE,)
+STUDIES = (CAPTURE, UPPER_LIMIT)

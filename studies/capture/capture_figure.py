@@ -51,6 +51,7 @@ def place_figure(result: xr.Dataset) -> Figure:
         _lean(bottom, caught)
         top.set_title(f"{rotor_label(caught.configuration, caught.measure)}, {caught.frequency:.0f} Hz")
     maps[0].set_ylabel("farther from the rotor (mm)")
+    maps[0].invert_yaxis()  # shared by all
     leans[0].set_ylabel("held (%)")
     return figure
 
@@ -68,7 +69,6 @@ def _map(axes: Axes, caught: Caught) -> None:
     share = np.divide(100 * some, every, out=np.full_like(every, np.nan), where=every > 0)
     drawn = axes.pcolormesh(1e3 * side, 1e3 * height, share.T, vmin=0, vmax=100, cmap="RdYlBu")
     axes.set_xlabel("beside the axis (mm)")
-    axes.invert_yaxis()
     axes.figure.colorbar(drawn, ax=axes, label="held (%)")
 
 
