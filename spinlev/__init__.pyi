@@ -27,6 +27,7 @@ from .studies.interface import (
     simulate as simulate,
     stability as stability,
     sweep as sweep,
+    working_point as working_point,
 )
 from .studies.one_scene import Levitation as Levitation
 from .studies.terminal import Models as Models

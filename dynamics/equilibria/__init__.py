@@ -25,6 +25,7 @@ from .full_search import (
     turning as turning,
     with_plate as with_plate,
 )
+from .nearby_scene import carried as carried
 from .perturbed import PerturbedBalance as PerturbedBalance, Shift as Shift
 from .plate_effect import plate_action as plate_action
 from .search import SearchRange as SearchRange

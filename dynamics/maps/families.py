@@ -8,10 +8,10 @@ from numpy.typing import ArrayLike
 
 from ...fem.closed_forms import carrier
 from ...fem.rotor_losses import check_slow_enough, pieces_of
-from ...fem.rotor_tables import RotorTable, rotor_table
+from ...fem.rotor_tables import RotorTable, cached_rotor_table, rotor_table
 from ...geometry.basics import Array, moved
 from ...geometry.bodies import Magnet
-from ...geometry.scenes import Scene
+from ...geometry.scenes import Scene, scene_keys
 from ..branches import Problem
 from ..effects import with_effects
 from ..motion import Effect, Interaction, Parameter, Rates, Scales, parameters
@@ -121,13 +121,31 @@ def rotor_family(
         )
     moves = MOVES[configuration]
     rotor = tuple(_unmoved(magnet, move) for magnet, move in zip(scene.rotor, moves, strict=True))
-    alone = [rotor_table((magnet,), model, rtol, nearest) for magnet in rotor]
+    alone = [_alone(magnet, model, rtol, nearest) for magnet in rotor]
     effects = family_effects(scene, list(zip(rotor, moves, alone, strict=True)), interaction, rtol)
     if len(rotor) > 1 and model == "fem":
         field = _magnetised(rotor, moves, rtol, nearest, measures, tables)
     else:
         field = MovableField(tuple(zip(alone, moves, strict=True)))
     return RotorFamily(scene, rotor, moves, field, effects)
+
+
+def _alone(magnet: Magnet, model: str, rtol: float, nearest: float | None) -> RotorTable:
+    """Elements take a second, and are kept."""
+    if model == "fem":
+        return cached_rotor_table((magnet,), model, rtol, lambda _: None, nearest)[0]
+    return rotor_table((magnet,), model, rtol, nearest)
+
+
+def article_measure(scene: Scene) -> tuple[str, float] | None:
+    """Configuration of a rotor of the article and its displacement (m) or tilt (rad); None for any other rotor."""
+    rotor = scene_keys(scene)["rotor"]
+    configuration = rotor.get("configuration")
+    if configuration is None:
+        return None
+    if configuration == "tilt":
+        return configuration, float(np.radians(rotor["angle_deg"]))
+    return configuration, 1e-3 * rotor["displacement_mm"]
 
 
 def _magnetised(

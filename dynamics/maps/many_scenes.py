@@ -1,8 +1,9 @@
-"""The surveys of many scenes at once, which differ in numbers but not in the rotor's field."""
+"""The surveys of many scenes at once, which have one rotor's field or differ in one measure of it."""
 
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ...fem.rotor_tables import FieldTable
 from ...geometry.basics import Array
@@ -16,10 +17,11 @@ from .grid import Grid
 
 def surveys(
     scenes: Sequence[Scene],
-    table: FieldTable,
+    tables: Sequence[FieldTable],
     spin: Array,
     places: Indices,
     rates: Rates,
+    measures: ArrayLike = 0.0,
     farthest: float = 0.1,
     spacing: int | None = None,
 ) -> list[tuple[Survey, bool]]:
@@ -27,10 +29,12 @@ def surveys(
 
     Parameters
     ----------
-    scenes : n scenes with one rotor; their plates are left out
-    table, rates : the rotor's field, and compiled for it
+    scenes : n scenes with one rotor, or of one family of rotors; their plates are left out
+    tables : (n,) the rotors' fields, for their errors
+    rates : compiled for the rotor or the family
     spin : (n,) body spin s
     places : (n, axes) whole-numbered coordinates by which scenes are neighbours
+    measures : (n,) of the rotors in their family, see `RotorFamily`
     farthest : largest depth, and distance from the axis, m
     spacing : steps between two searches, None for 5, and 10 along a single axis; a sheet between them is missed if it
         meets no other in a fold
@@ -42,12 +46,18 @@ def surveys(
     for scene in scenes:
         turning(scene)
     values = np.array([parameters(scene, Scales.of(scene), frozen_spin=True) for scene in scenes])
+    values[:, Parameter.MEASURE] = measures
     ranges = [SearchRange(scene, farthest) for scene in scenes]
     grid = Grid(rates, values, spin, ranges, np.arange(len(scenes)), places)
     nodes = grid.coarse(spacing or (SPACING if places.shape[1] > 1 else 2 * SPACING))
     point, position, moment = filled(grid, nodes).within(grid)
-    known, doubts = field_doubts(table, position * values[point, Parameter.LENGTH, None])
-    point, points = point[known], np.concatenate([position, moment], axis=1)[known]
+    points = np.concatenate([position, moment], axis=1)
+    known, doubts = np.zeros(len(points), bool), np.zeros((len(points), 2))
+    for table in {id(table): table for table in tables}.values():
+        (mine,) = np.nonzero(np.isin(point, [k for k, other in enumerate(tables) if other is table]))
+        there, unsure = field_doubts(table, points[mine, :3] * values[point[mine], Parameter.LENGTH, None])
+        known[mine], doubts[mine[there]] = there, unsure
+    point, points, doubts = point[known], points[known], doubts[known]
     return [
         (told(scene, grid.alone(k), points[point == k], doubts[point == k]), k in nodes)
         for k, scene in enumerate(scenes)

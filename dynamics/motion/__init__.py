@@ -26,6 +26,7 @@ from .events import (
     rotor_gap as rotor_gap,
 )
 from .interaction import Interaction as Interaction, interaction_of as interaction_of
+from .likeness import has_likes as has_likes, like as like
 from .plate_force import PlateForce as PlateForce
 from .plate_terms import PlateMemory as PlateMemory
 from .rates import Rates as Rates

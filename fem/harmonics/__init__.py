@@ -49,6 +49,6 @@ from .surface import (
     orthonormal as orthonormal,
     orthonormal_keys as orthonormal_keys,
     outer_coefficients as outer_coefficients,
-    rotated_harmonics as rotated_harmonics,
 )
 from .trim import trimmed_expansions as trimmed_expansions
+from .turning import rotated_harmonics as rotated_harmonics

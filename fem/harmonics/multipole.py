@@ -1,7 +1,7 @@
 """The field of a multipole expansion about one centre."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
@@ -22,8 +22,11 @@ from .solid import (
     regular_derivative,
     weighted_sums,
 )
+from .turning import rotated_harmonics
 
 FOUR_PI = 4 * np.pi
+TURNED = 1e-14
+"""Of the largest term: what turning there and back leaves at most."""
 UPPER = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2))
 """Entries of the gradient that determine the rest: it is symmetric and traceless."""
 
@@ -36,15 +39,18 @@ class MultipoleExpansion:
     ----------
     center : (3,) m, rotor's frame
     radius : radius of a sphere about the centre that holds all sources, m; the series converges outside it
-    coefficients : c_lm (T), complex (L+1, L+1), m ≥ 0
+    coefficients : c_lm (T), complex (L+1, L+1), m ≥ 0, along the rotor's axes
+    axes : (3, 3) along whose columns its expressions are written, because fewer terms are left there
     """
 
     center: Array
     radius: float
     coefficients: Coefficients
+    axes: Array = field(default_factory=lambda: np.eye(3))
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "center", frozen_array(self.center, (3,)))
+        object.__setattr__(self, "axes", frozen_array(self.axes, (3, 3)))
 
     @property
     def degree(self) -> int:
@@ -73,6 +79,8 @@ class MultipoleExpansion:
 
     def expressions(self, position: Sequence[hy.expression]) -> tuple[list[hy.expression], list[list[hy.expression]]]:
         """B (T) and ∂B_i/∂x_j (T/m) at a position (three expressions, m, rotor's frame)."""
+        if not np.array_equal(self.axes, np.eye(3)):
+            return self._along_axes([position[i] - float(self.center[i]) for i in range(3)])
         scaled = [(position[i] - float(self.center[i])) * (1.0 / self.radius) for i in range(3)]
         fields, gradients = self.components
         slopes = [{k: w / self.radius for k, w in gradients[i][j].items()} for i, j in UPPER]
@@ -80,6 +88,14 @@ class MultipoleExpansion:
         upper = dict(zip(UPPER, sums[3:], strict=True))
         upper[2, 2] = -upper[0, 0] - upper[1, 1]
         return sums[:3], [[upper[min(i, j), max(i, j)] for j in range(3)] for i in range(3)]
+
+    def _along_axes(self, place: list[hy.expression]) -> tuple[list[hy.expression], list[list[hy.expression]]]:
+        """Expressions along other axes, turned back."""
+        own = without_noise(rotated_harmonics(self.coefficients, self.axes.T), TURNED)
+        b, slope = MultipoleExpansion(np.zeros(3), self.radius, own).expressions(_turned(self.axes.T, place))
+        rows = [_turned(self.axes, row) for row in slope]
+        columns = [_turned(self.axes, [row[j] for row in rows]) for j in range(3)]
+        return _turned(self.axes, b), [[columns[j][i] for j in range(3)] for i in range(3)]
 
     def evaluate(self, points: Array) -> tuple[Array, Array]:
         """B (n, 3) T and ∂B_i/∂x_j (n, 3, 3) T/m at points (n, 3) m, without compilation."""
@@ -98,6 +114,11 @@ class MultipoleExpansion:
         parts = field_spectrum(self.coefficients) * (self.radius / distance) ** (degree + 2)
         slopes = parts * np.sqrt((degree + 2) * (2 * degree + 3)) / distance
         return np.linalg.norm(parts, axis=1), np.linalg.norm(slopes, axis=1)
+
+
+def _turned(axes: Array, vector: Sequence[hy.expression]) -> list[hy.expression]:
+    """A vector along the columns of `axes`, along the outer ones."""
+    return [hy.sum([float(factor) * part for factor, part in zip(row, vector, strict=True) if factor]) for row in axes]
 
 
 def moments_of_magnetization(

@@ -1,4 +1,4 @@
-"""Spherical harmonics: orthonormal on the unit sphere, and what mirrors and turns do to expansion coefficients."""
+"""Spherical harmonics: orthonormal on the unit sphere, and what mirrors do to expansion coefficients."""
 
 import numpy as np
 from scipy.special import gammaln
@@ -56,31 +56,3 @@ def outer_coefficients(amplitudes: Array, keys: Keys, degree: int) -> Coefficien
     for value, (l, m, imaginary) in zip(amplitudes, keys, strict=True):
         result[l, m] += (2 * l + 1) / FOUR_PI / norm(l, m) * (-1j * value if imaginary else value)
     return result
-
-
-def amplitudes_of(coefficients: Coefficients, keys: Keys) -> Array:
-    """The inverse of `outer_coefficients`."""
-    values = [
-        (-coefficients[l, m].imag if imaginary else coefficients[l, m].real) * norm(l, m) * FOUR_PI / (2 * l + 1)
-        for l, m, imaginary in keys
-    ]
-    return np.array(values)
-
-
-def rotated_harmonics(coefficients: Coefficients, axes: Array) -> Coefficients:
-    """Coefficients of f(axesᵀ x) of f = Σ c_lm Θ_lm: from a frame with the columns of `axes` as axes to the outer one.
-
-    By values on the unit sphere, where the harmonics are orthonormal: exact but for round-off.
-    """
-    if np.array_equal(axes, np.eye(3)):
-        return coefficients
-    degree = len(coefficients) - 1
-    height, weights = np.polynomial.legendre.leggauss(degree + 1)
-    angle = 2 * np.pi * np.arange(2 * degree + 2) / (2 * degree + 2)
-    across = np.sqrt(1 - height**2)[:, None]
-    grid = np.broadcast_arrays(across * np.cos(angle), across * np.sin(angle), height[:, None])
-    points = np.stack(grid, axis=-1).reshape(-1, 3)
-    area = np.repeat(weights * np.pi / (degree + 1), len(angle))
-    keys = orthonormal_keys(degree)
-    values = orthonormal(keys, points @ axes) @ amplitudes_of(coefficients, keys)
-    return outer_coefficients(orthonormal(keys, points).T @ (area * values), keys, degree)

@@ -1,6 +1,7 @@
 """Expansions shortened to the coefficients that matter."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -36,7 +37,7 @@ def trimmed_expansions(
     fields = np.concatenate([_fields(e, [p for p in parts if p[0] == k], points) for k, e in enumerate(expansions)])
     fields /= allowed[:, None]
     dipoles = [part for part in parts if part[1] == 1]
-    if np.linalg.norm(fields.sum(axis=0), axis=1).max() <= 1:
+    if _largest(fields.sum(axis=0)) <= 1:
         dipoles = []
     order = [i for i in np.argsort(-np.linalg.norm(fields, axis=2).max(axis=1)) if parts[i] not in dipoles]
     factors = _fewest(fields[order])
@@ -52,10 +53,12 @@ def trimmed_expansions(
 def _fewest(fields: Array) -> Array:
     """Factors of the first few of the fields (k, n, 3), with which they make the sum of all to 1 at every point."""
     total = fields.sum(axis=0)
-    left_out = np.linalg.norm(total - np.cumsum(fields, axis=0), axis=2).max(axis=1)
-    if np.linalg.norm(total, axis=1).max(initial=0.0) <= 1:
+    too_few, enough, left_out = 0, 0, total.copy()
+    while enough < len(fields) and _largest(left_out) > 1:
+        left_out -= fields[enough]
+        enough += 1
+    if not enough:
         return np.zeros(0)
-    too_few, enough = 0, int(np.argmax(left_out <= 1)) + 1
     factors = np.ones(enough)
     if enough > MOST:
         return factors
@@ -71,16 +74,27 @@ def _fewest(fields: Array) -> Array:
 
 def _fitted(fields: Array, total: Array) -> Array | None:
     """Factors (k,) with which the fields make the total to 1 at every point; None if none were found."""
-    columns, weights = fields.reshape(len(fields), -1).T, np.ones(len(total))
+    columns, weights = fields.reshape(len(fields), -1), np.ones(len(total))
+    scale = 1 / np.sqrt(np.einsum("kn,kn->k", columns, columns))
     for _ in range(ROUNDS):
-        rows = np.repeat(weights, 3)
-        factors = np.linalg.lstsq(columns * rows[:, None], total.ravel() * rows, rcond=None)[0]
-        error = np.linalg.norm(total - (columns @ factors).reshape(total.shape), axis=1)
+        weighted = columns * np.repeat(weights, 3) * scale[:, None]
+        factors = scale * _solved(weighted, total.ravel() * np.repeat(weights, 3))
+        error = np.linalg.norm(total - (factors @ columns).reshape(total.shape), axis=1)
         if error.max() <= 1:
             return np.asarray(factors)
         weights *= np.sqrt(0.3 + error / error.max())  # towards equal largest errors
         weights /= weights.mean()
     return None
+
+
+def _solved(rows: Array, right: Array) -> Array:
+    """Least squares (k,) by normal equations, which suffice for rows (k, n) of like size: the error is looked at."""
+    return np.asarray(np.linalg.lstsq(rows @ rows.T, rows @ right, rcond=None)[0])
+
+
+def _largest(field: Array) -> float:
+    """The largest size of vectors (n, 3)."""
+    return float(np.sqrt(np.einsum("ni,ni->n", field, field).max(initial=0.0)))
 
 
 def _fields(expansion: MultipoleExpansion, parts: list[Part], points: Array) -> Array:
@@ -102,4 +116,4 @@ def _with(expansion: MultipoleExpansion, parts: list[Part], number: int) -> Mult
     coefficients = np.zeros((degree + 1, degree + 1), complex)
     for _, l, m, value in mine:
         coefficients[l, m] += value
-    return MultipoleExpansion(expansion.center, expansion.radius, coefficients)
+    return replace(expansion, coefficients=coefficients)

@@ -21,7 +21,7 @@ import ngsolve as ng
 import numpy as np
 from netgen.meshing import NgException
 
-from ...geometry.basics import Array, ComputationError, within
+from ...geometry.basics import Array, ComputationError
 from ...geometry.bodies import Magnet
 from ...geometry.meshes import MagnetMesh
 from ..closed_forms import remanent_field
@@ -152,7 +152,7 @@ def _add_source(
     if not susceptibility.any() and not rest.any():
         return
     points = volume_points(mesh.mesh, name, 2 * system.order + 2)
-    places = within(mesh.magnets[k].body, mesh.to_meter(points.points))
+    places = mesh.magnets[k].body.within(mesh.to_meter(points.points))
     source = remanent_field(sources, places) @ susceptibility + rest
     for axis in range(3):
         load += points.function(source[:, axis]) * ng.grad(test)[axis] * points.measure

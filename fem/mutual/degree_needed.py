@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ...geometry.basics import Array, Box, Solid, Sphere, edge_distance
+from ...geometry.basics import Array, Box, Solid, Sphere
 from ...geometry.bodies import Magnet
 from ..harmonics import Ball
 
@@ -31,9 +31,9 @@ def _singular_distance(body: Solid, place: Array) -> float:
     """Distance (m) of a place (3,) m from where the field of a body cannot be continued."""
     local, half = body.to_body(place), body.half_edges
     if isinstance(body, Box):
-        return float(edge_distance(body, place[None])[0])
+        return float(body.edge_distance(place[None])[0])
     if isinstance(body, Sphere):
         return float(np.linalg.norm(local))
     across = float(np.hypot(local[0], local[1]))
     beyond = max(abs(float(local[2])) - float(half[2]), 0.0)
-    return float(min(np.hypot(across, beyond), edge_distance(body, place[None])[0]))
+    return float(min(np.hypot(across, beyond), body.edge_distance(place[None])[0]))

@@ -67,4 +67,4 @@ def _summed(grid: AnswerGrid, places: Array, moments: Array) -> Array:
     pars = np.empty((4, count * points))
     pars[:3], pars[3] = grid.axis[:, None], grid.radius
     found = _kernel()(given.reshape(len(given), -1), pars=pars)
-    return np.asarray(found.reshape(-1, count, points).sum(axis=2))
+    return np.asarray(found.reshape(len(found), count, points).sum(axis=2))

@@ -12,7 +12,7 @@ from functools import cached_property
 
 import numpy as np
 
-from ...geometry.basics import Array, Box, within
+from ...geometry.basics import Array, Box
 from ...geometry.bodies import Magnet
 from ...geometry.meshes import MagnetMesh, mesh_magnets
 from ..closed_forms import remanent_field, volume_rule
@@ -109,7 +109,7 @@ class RotorResponse:
         """Integration points of every magnet (n, 3), m."""
         assert self.regions is not None
         return {
-            name: within(self.magnets[int(name.removeprefix("magnet"))].body, self.mesh.to_meter(points.points))
+            name: self.magnets[int(name.removeprefix("magnet"))].body.within(self.mesh.to_meter(points.points))
             for name, points in self.regions.points.items()
         }
 

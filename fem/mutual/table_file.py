@@ -8,9 +8,9 @@ from dataclasses import replace
 import numpy as np
 import xarray as xr
 
-from ...geometry.basics import moved, shape_numbers
 from ...geometry.bodies import Magnet
 from ...geometry.scenes import Floater
+from ..rotor_tables import at_home
 from ..storage import described, from_cache, program_of, read_checked, write_checked
 from .answer_fit import mutual_table
 from .answer_grid import AnswerGrid, answer_box
@@ -26,7 +26,7 @@ def cached_mutual_table(
 
     A lone magnet answers in its own axes: one table serves it wherever it stands and however it is turned.
     """
-    upright = _upright(magnets)
+    upright = at_home(magnets)
     table, found = from_cache(
         f"mutual-{mutual_key(upright, floater)}.nc",
         lambda path: from_dataset(read_checked(path, FORMAT), upright),
@@ -35,13 +35,6 @@ def cached_mutual_table(
         report,
     )
     return _posed(table, magnets), found
-
-
-def _upright(magnets: tuple[Magnet, ...]) -> tuple[Magnet, ...]:
-    """A lone magnet at the origin with its axes along the rotor's; several as they are."""
-    if len(magnets) > 1:
-        return magnets
-    return tuple(replace(magnet, body=moved(magnet.body, np.zeros(3), np.eye(3))) for magnet in magnets)
 
 
 def _posed(table: MutualTable, magnets: tuple[Magnet, ...]) -> MutualTable:
@@ -59,7 +52,7 @@ def mutual_key(magnets: tuple[Magnet, ...], floater: Floater) -> str:
     digest = hashlib.sha256(f"{FORMAT} {program_of(__package__)}".encode())
     sphere = np.array([floater.radius, floater.remanence, floater.recoil_permeability])
     for magnet in magnets:
-        for part in (shape_numbers(magnet.body), magnet.body.center, magnet.body.rotation, magnet.polarization):
+        for part in (magnet.body.shape_numbers, magnet.body.center, magnet.body.rotation, magnet.polarization):
             digest.update(np.ascontiguousarray(part + 0.0, dtype="<f8").tobytes())
         digest.update(np.ascontiguousarray(magnet.permeability_in_rotor + 0.0, dtype="<f8").tobytes())
     digest.update(np.ascontiguousarray(sphere, dtype="<f8").tobytes())

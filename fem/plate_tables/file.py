@@ -8,7 +8,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike
 
-from ...geometry.basics import MU_0, shape_numbers
+from ...geometry.basics import MU_0
 from ...geometry.scenes import Plate
 from ..harmonics import FOUR_PI
 from ..plate_currents import Region, Watch, cached_solver, digest, unwatched
@@ -108,7 +108,7 @@ def driven_plate_key(
         [plate.lowering.distance if plate.lowering else 0.0],
     ]
     for magnet in rotor.uniform:
-        numbers += [shape_numbers(magnet.body), magnet.body.center, magnet.body.rotation, magnet.polarization]
+        numbers += [magnet.body.shape_numbers, magnet.body.center, magnet.body.rotation, magnet.polarization]
     for expansion in rotor.expansions:
         scaled = expansion.coefficients * (expansion.radius**3 * FOUR_PI / MU_0 / np.linalg.norm(rotor.moment))
         numbers += [expansion.center, [expansion.radius], np.round(scaled.real, 9), np.round(scaled.imag, 9)]

@@ -15,6 +15,14 @@ from .anywhere import (
 from .cache import cached_rotor_table as cached_rotor_table, rotor_key as rotor_key
 from .choice import resolve_model as resolve_model, rotor_table as rotor_table
 from .fem_model import AccuracyWarning as AccuracyWarning, fem_table as fem_table
+from .home import at_home as at_home
+from .lowest_field import (
+    EasyField as EasyField,
+    WorkingPoint as WorkingPoint,
+    easy_axis as easy_axis,
+    working_points as working_points,
+)
+from .near_elements import NearElements as NearElements
 from .shortened import shortened_table as shortened_table
 from .table import (
     ROUND_OFF as ROUND_OFF,

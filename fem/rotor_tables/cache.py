@@ -5,10 +5,10 @@ from collections.abc import Callable
 
 import numpy as np
 
-from ...geometry.basics import shape_numbers
 from ...geometry.bodies import Magnet
 from ..storage import from_cache, program_of
 from .choice import rotor_table
+from .home import at_home, taken_along
 from .table import RotorTable
 from .table_file import FORMAT, load_table, save_table
 
@@ -17,7 +17,7 @@ def rotor_key(rotor: tuple[Magnet, ...], model: str, rtol: float, nearest: float
     """SHA-256 of the magnets, the model, the accuracy asked for and where, and the programs that compute them."""
     digest = hashlib.sha256(f"{FORMAT} {program_of(__package__)} {model} {rtol!r} {nearest!r}".encode())
     for magnet in rotor:
-        for part in (shape_numbers(magnet.body), magnet.body.center, magnet.body.rotation, magnet.polarization):
+        for part in (magnet.body.shape_numbers, magnet.body.center, magnet.body.rotation, magnet.polarization):
             digest.update(np.ascontiguousarray(part + 0.0, dtype="<f8").tobytes())
         digest.update(np.ascontiguousarray(magnet.permeability_in_rotor + 0.0, dtype="<f8").tobytes())
     return digest.hexdigest()
@@ -26,11 +26,11 @@ def rotor_key(rotor: tuple[Magnet, ...], model: str, rtol: float, nearest: float
 def cached_rotor_table(
     rotor: tuple[Magnet, ...], model: str, rtol: float, report: Callable[[str], None], nearest: float | None = None
 ) -> tuple[RotorTable, bool]:
-    """A rotor table, see `rotor_table`, from the cache if it is there, and whether it was."""
-    return from_cache(
-        f"rotor-{rotor_key(rotor, model, rtol, nearest)}.nc",
-        load_table,
-        lambda: rotor_table(rotor, model, rtol, nearest),
-        save_table,
-        report,
-    )
+    """A rotor table, see `rotor_table`, from the cache if it is there, and whether it was.
+
+    A lone magnet has one, wherever it is in the rotor.
+    """
+    home = at_home(rotor)
+    name = f"rotor-{rotor_key(home, model, rtol, nearest)}.nc"
+    table, found = from_cache(name, load_table, lambda: rotor_table(home, model, rtol, nearest), save_table, report)
+    return taken_along(table, rotor), found

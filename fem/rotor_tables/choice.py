@@ -7,6 +7,7 @@ import numpy as np
 from ...geometry.bodies import Magnet
 from .accuracy import Accuracy, error_points
 from .fem_model import fem_table
+from .home import at_home, taken_along
 from .simple_models import cuboid_table, dipole_table, moments_table
 from .table import RotorTable
 
@@ -66,7 +67,7 @@ def rotor_table(
     if not rotor:
         raise ValueError("Input rotor must hold at least one magnet; instead received none.")
     name, _ = resolve_model(rotor, model, rtol, nearest)
-    return MODELS[name](rotor, accuracy)
+    return taken_along(MODELS[name](at_home(rotor), accuracy), rotor)
 
 
 def _cheapest(rotor: tuple[Magnet, ...], accuracy: Accuracy) -> tuple[str, str]:

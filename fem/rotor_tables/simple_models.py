@@ -1,6 +1,7 @@
 """Tables of the models that leave something out, and what they leave out as their doubts."""
 
 import time
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -8,8 +9,9 @@ import numpy as np
 from ...geometry.basics import Part
 from ...geometry.bodies import Magnet, cut_magnets
 from ..closed_forms import first_order_moments, uniform_cells
-from ..harmonics import MultipoleExpansion, trimmed_expansions, uniform_moments
+from ..harmonics import Coefficients, MultipoleExpansion, trimmed_expansions, uniform_moments
 from .accuracy import Accuracy, error_points
+from .home import added_moments, shape_moments
 from .table import KNOWN, RotorTable
 
 DEGREE = 25
@@ -23,7 +25,7 @@ def dipole_table(rotor: Rotor, accuracy: Accuracy) -> RotorTable:
     """Moments J V/μ0 of the remanence at the magnets' centres."""
     start = time.perf_counter()
     dipoles = tuple(uniform_moments(magnet, 1) for magnet in rotor)
-    doubts = {"shape": tuple(_without_dipole(uniform_moments(magnet, DEGREE)) for magnet in rotor)}
+    doubts = {"shape": tuple(_without_dipole(magnet) for magnet in rotor)}
     return _finished(RotorTable("dipole", rotor, (), dipoles, doubts), accuracy, start)
 
 
@@ -56,14 +58,22 @@ def neglected_permeability(rotor: Rotor, accuracy: Accuracy) -> tuple[MultipoleE
     """What the permeability adds, to first order, about every piece of the magnets that have one."""
     found = []
     for magnet, pieces in zip(rotor, cut_magnets(rotor, accuracy.clearance(rotor)), strict=True):
-        factor = FIRST_ORDER_SAFETY * np.sqrt(1 + magnet.contrast)
-        for piece in pieces if magnet.contrast else ():
-            coefficients = factor * first_order_moments(piece, rotor, DEGREE)
-            found.append(MultipoleExpansion(piece.box.center, piece.box.circumradius, coefficients))
+        if magnet.contrast:
+            alone = len(rotor) == 1
+            added = added_moments(magnet, pieces, DEGREE) if alone else _added_together(rotor, pieces)
+            factor = FIRST_ORDER_SAFETY * np.sqrt(1 + magnet.contrast)
+            found += [
+                MultipoleExpansion(piece.body.center, piece.body.circumradius, factor * one)
+                for piece, one in zip(pieces, added, strict=True)
+            ]
     return tuple(found)
 
 
-def _without_dipole(expansion: MultipoleExpansion) -> MultipoleExpansion:
-    rest = np.array(expansion.coefficients)
-    rest[1] = 0.0
-    return MultipoleExpansion(expansion.center, expansion.radius, rest)
+def _added_together(rotor: Rotor, pieces: Sequence[Magnet]) -> list[Coefficients]:
+    return [first_order_moments(piece, rotor, DEGREE) for piece in pieces]
+
+
+def _without_dipole(magnet: Magnet) -> MultipoleExpansion:
+    rest = np.array(shape_moments(magnet, DEGREE))
+    rest[1:2] = 0.0
+    return MultipoleExpansion(magnet.body.center, magnet.body.circumradius, rest)

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from ...geometry.basics import Array, Part, Solid, moved, shape_numbers, solid_of
+from ...geometry.basics import Array, Part, Solid, moved, solid_of
 from ...geometry.bodies import Magnet, part_of
 from ..harmonics import MultipoleExpansion
 from ..storage import described, read_checked, write_checked
@@ -80,7 +80,7 @@ def _closed_forms(table: RotorTable) -> list[Array]:
 
 def _padded(magnet: Magnet) -> Array:
     """The numbers (4,) of a magnet's shape, those that it has not as nan."""
-    numbers = np.zeros(0) if isinstance(magnet.body, Part) else shape_numbers(magnet.body)
+    numbers = np.zeros(0) if isinstance(magnet.body, Part) else magnet.body.shape_numbers
     return np.pad(numbers, (0, 4 - len(numbers)), constant_values=np.nan)
 
 

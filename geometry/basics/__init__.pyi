@@ -8,13 +8,9 @@ from .pose import Posed as Posed
 from .ring import Ring as Ring
 from .solid import (
     Solid as Solid,
-    described_size as described_size,
-    edge_distance as edge_distance,
     moved as moved,
     places_off as places_off,
-    shape_numbers as shape_numbers,
     solid_of as solid_of,
-    within as within,
 )
 from .sphere import Sphere as Sphere
 from .text import (

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .arrays import Array, frozen_array
+from .text import millimetres
 
 
 def rotation_matrix(degrees_xyz: ArrayLike) -> Array:
@@ -70,3 +71,24 @@ class Box:
         excess = np.abs(self.to_body(points)) - self.half_edges
         outside = np.linalg.norm(np.maximum(excess, 0.0), axis=-1)
         return np.asarray(outside + np.minimum(excess.max(axis=-1), 0.0))
+
+    def edge_distance(self, points: ArrayLike) -> Array:
+        """Distances (n,) m of points (n, 3) m from the nearest edge."""
+        to_faces = np.abs(self.to_body(points)) - self.half_edges
+        along = np.maximum(to_faces, 0.0)
+        squares = [to_faces[:, (a + 1) % 3] ** 2 + to_faces[:, (a + 2) % 3] ** 2 + along[:, a] ** 2 for a in range(3)]
+        return np.asarray(np.sqrt(np.min(squares, axis=0)))
+
+    def within(self, points: Array) -> Array:
+        """Points (n, 3) m of its elements, none of which lies outside of flat faces."""
+        return points
+
+    @property
+    def shape_numbers(self) -> Array:
+        """(3,) m that tell it from another box, but for its pose: its edges."""
+        return np.array(self.size)
+
+    @property
+    def described_size(self) -> str:
+        """Its size as a person writes it, mm."""
+        return millimetres(self.size)

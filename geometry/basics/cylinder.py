@@ -52,3 +52,21 @@ class Cylinder(Posed):
         along = np.abs(directions @ self.rotation[:, 2])
         across = np.sqrt(np.maximum(1 - along**2, 0.0))
         return np.asarray(self.radius * across + self.height / 2 * along)
+
+    @property
+    def shape_numbers(self) -> Array:
+        """(2,) m: radius and height."""
+        return np.array([self.radius, self.height])
+
+    @property
+    def described_size(self) -> str:
+        """Its size as a person writes it, mm."""
+        return f"Ø {self.radius * 2e3:.4g} × {self.height * 1e3:.4g} mm"
+
+    def edge_distance(self, points: ArrayLike) -> Array:
+        """Distances (n,) m of points (n, 3) m from the nearest edge."""
+        return self._off_circles(points, [self.radius])
+
+    def within(self, points: Array) -> Array:
+        """Points (n, 3) m of its elements, those just outside of its surface put just inside it."""
+        return self._between(points, 0.0, self.radius)

@@ -1,6 +1,8 @@
 """A solid of any shape, as a STEP file has it: known here by its surface in triangles."""
 
+import hashlib
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
@@ -8,9 +10,14 @@ from numpy.typing import ArrayLike
 
 from .arrays import Array, frozen_array
 from .pose import Posed
+from .text import millimetres
 
 CHUNK = 2_000_000
 """Points times triangles at once."""
+SMOOTH = float(np.cos(np.radians(30.0)))
+"""Cosine between the normals of triangles from which on their common side is no edge."""
+SAME, EDGES = 1e-7, 64
+"""Of the size: distance of corners that are one; edges at once."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,6 +73,45 @@ class Part(Posed):
         for part in np.array_split(flat, max(1, len(flat) * len(self.triangles) // CHUNK)):
             found.append(self._distance(part))
         return np.asarray(np.concatenate(found).reshape(local.shape[:-1]))
+
+    @property
+    def shape_numbers(self) -> Array:
+        """(8,) of the digest of its file."""
+        digest = hashlib.sha256(self.step.encode()).digest()
+        return np.frombuffer(digest, dtype="<u4").astype(float)
+
+    @property
+    def described_size(self) -> str:
+        """Its file, and the edges of the box about it, mm."""
+        return f"{self.file.name} {millimetres(self.size)}"
+
+    @cached_property
+    def edges(self) -> Array:
+        """(m, 2, 3) m, sides of triangles that meet at an angle of more than 30°, along the body axes."""
+        normals = np.cross(self.triangles[:, 1] - self.triangles[:, 0], self.triangles[:, 2] - self.triangles[:, 0])
+        normals /= np.maximum(np.linalg.norm(normals, axis=1), 1e-300)[:, None]
+        unit = SAME * float(np.linalg.norm(self.extent))
+        sides: dict[tuple[tuple[int, ...], ...], list[tuple[int, int]]] = {}
+        for t, corners in enumerate(np.round(self.triangles / unit).astype(int)):
+            for k in range(3):
+                ends = sorted(map(tuple, (corners[k].tolist(), corners[(k + 1) % 3].tolist())))
+                sides.setdefault(tuple(ends), []).append((t, k))
+        sharp = [met[0] for met in sides.values() if len(met) == 2 and normals[met[0][0]] @ normals[met[1][0]] < SMOOTH]
+        found = [self.triangles[t][[k, (k + 1) % 3]] for t, k in sharp]
+        return np.array(found).reshape(-1, 2, 3)
+
+    def edge_distance(self, points: ArrayLike) -> Array:
+        """Distances (n,) m of points (n, 3) m from the nearest of its `edges`; infinite where it has none."""
+        local = self.to_body(points).reshape(-1, 3)
+        nearest = np.full(len(local), np.inf)
+        for start in range(0, len(self.edges), EDGES):
+            a, b = (self.edges[None, start : start + EDGES, k] - local[:, None] for k in range(2))
+            nearest = np.minimum(nearest, _segment(a, b).min(axis=1))
+        return nearest
+
+    def within(self, points: Array) -> Array:
+        """Points (n, 3) m of its elements as they are."""
+        return points
 
     def _distance(self, points: Array) -> Array:
         a, b, c = (self.triangles[None, :, k] - points[:, None] for k in range(3))

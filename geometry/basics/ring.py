@@ -75,3 +75,21 @@ class Ring(Posed):
     def reach(self, directions: Array) -> Array:
         """How far (n,) it reaches from its centre along unit vectors (n, 3), m."""
         return self.filled.reach(directions)
+
+    @property
+    def shape_numbers(self) -> Array:
+        """(4,) m: both radii, height, and zero."""
+        return np.array([self.radius, self.inner_radius, self.height, 0.0])
+
+    @property
+    def described_size(self) -> str:
+        """Shape and size as a person writes them, mm."""
+        return f"ring Ø {self.radius * 2e3:.4g} / {self.inner_radius * 2e3:.4g} × {self.height * 1e3:.4g} mm"
+
+    def edge_distance(self, points: ArrayLike) -> Array:
+        """Distances (n,) m of points (n, 3) m from the nearest edge."""
+        return self._off_circles(points, [self.radius, self.inner_radius])
+
+    def within(self, points: Array) -> Array:
+        """Points (n, 3) m of its elements, those just outside of its surface put just inside it."""
+        return self._between(points, self.inner_radius, self.radius)

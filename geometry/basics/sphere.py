@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .arrays import Array
-from .pose import Posed
+from .pose import INSIDE, Posed
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,3 +46,23 @@ class Sphere(Posed):
     def reach(self, directions: Array) -> Array:
         """How far (n,) it reaches from its centre along unit vectors (n, 3), m."""
         return np.full(len(directions), self.radius)
+
+    @property
+    def shape_numbers(self) -> Array:
+        """(1,) m: the radius."""
+        return np.array([self.radius])
+
+    @property
+    def described_size(self) -> str:
+        """Shape and size as a person writes them, mm."""
+        return f"sphere Ø {self.radius * 2e3:.4g} mm"
+
+    def edge_distance(self, points: ArrayLike) -> Array:
+        """Infinite (n,): it has no edge."""
+        return np.full(len(np.asarray(points)), np.inf)
+
+    def within(self, points: Array) -> Array:
+        """Points (n, 3) m of its elements, those just outside of its surface put just inside it."""
+        local, limit = self.to_body(points), self.radius * INSIDE
+        size = np.linalg.norm(local, axis=1)
+        return np.asarray(self.center + (local * (limit / np.maximum(size, limit))[:, None]) @ self.rotation.T)

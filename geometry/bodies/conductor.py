@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from ..basics import Solid, described_size, millimetres
+from ..basics import Solid, millimetres
 from .overlap import TOUCHING, body_overlap
 
 
@@ -21,7 +21,7 @@ class Conductor:
     conductivity: float
 
     def __repr__(self) -> str:
-        place = f"{described_size(self.body)} at {millimetres(self.body.center)}"
+        place = f"{self.body.described_size} at {millimetres(self.body.center)}"
         return f"Conductor {place}, {self.conductivity:.3g} S/m"
 
 

@@ -7,7 +7,7 @@ from functools import cached_property
 
 import numpy as np
 
-from ..basics import MU_0, Array, Box, Solid, described_size, frozen_array, listed, millimetres
+from ..basics import MU_0, Array, Box, Solid, frozen_array, listed, millimetres
 
 
 @dataclass(frozen=True, eq=False)
@@ -21,6 +21,7 @@ class Magnet:
     recoil_permeability : μr of the demagnetisation curve, along the easy axis, which is that of the polarisation
     transverse_permeability : μr across the easy axis; None: as along it
     conductivity : S/m, or None where its eddy currents are not modelled
+    coercivity : field (A/m) against the polarisation at the knee of the demagnetisation curve, or None if not known
 
     Raises
     ------
@@ -32,6 +33,7 @@ class Magnet:
     recoil_permeability: float = 1.0
     transverse_permeability: float | None = None
     conductivity: float | None = None
+    coercivity: float | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "polarization", frozen_array(self.polarization, (3,)))
@@ -83,6 +85,6 @@ class Magnet:
         along = self.recoil_permeability
         permeability = f"{along:g}" if self.isotropic else f"{along:g} along, {self.transverse_permeability:g} across"
         polarization = listed(self.polarization_in_rotor)
-        place = f"{described_size(self.body)} at {millimetres(self.body.center)}"
+        place = f"{self.body.described_size} at {millimetres(self.body.center)}"
         text = f"Magnet {place}, ({polarization}) T, μr {permeability}"
         return text if self.conductivity is None else f"{text}, {self.conductivity:.3g} S/m"

@@ -130,26 +130,32 @@ def _metres(millimetres: list[float]) -> Array:
 
 def _rotor(rotor: Rotor, folder: Path) -> tuple[Magnet, ...]:
     if isinstance(rotor, ExplicitRotor):
-        return tuple(_magnet(magnet, rotor.conductivity_S_m, folder) for magnet in rotor.magnets)
-    return tuple(replace(magnet, conductivity=rotor.conductivity_S_m) for magnet in _of_article(rotor))
+        return tuple(_magnet(magnet, rotor, folder) for magnet in rotor.magnets)
+    conductivity, knee = rotor.conductivity_S_m, _knee(rotor.coercivity_kA_m)
+    return tuple(replace(magnet, conductivity=conductivity, coercivity=knee) for magnet in _of_article(rotor))
 
 
-def _magnet(magnet: MagnetSection, conductivity: float | None, folder: Path) -> Magnet:
-    """One of an explicit rotor; `conductivity` where it has none of its own."""
+def _magnet(magnet: MagnetSection, rotor: ExplicitRotor, folder: Path) -> Magnet:
+    """One of an explicit rotor, whose conductivity and knee it has where it has none of its own."""
     pose = magnet.center_mm, magnet.rotation_deg
     body = part(folder / magnet.file, *pose) if magnet.file else solid(magnet, *pose)
     along, across = magnet.recoil_permeability
-    own = magnet.conductivity_S_m
-    return Magnet(body, np.array(magnet.polarization_T), along, across, conductivity if own is None else own)
+    conductivity = rotor.conductivity_S_m if magnet.conductivity_S_m is None else magnet.conductivity_S_m
+    knee = _knee(magnet.coercivity_kA_m or rotor.coercivity_kA_m)
+    return Magnet(body, np.array(magnet.polarization_T), along, across, conductivity, knee)
+
+
+def _knee(coercivity: float | None) -> float | None:
+    return None if coercivity is None else 1e3 * coercivity
 
 
 def _of_article(rotor: HorizontalRotor | VerticalRotor | TiltRotor) -> tuple[Magnet, ...]:
-    body = solid(rotor)
-    material = (0.0, rotor.remanence_T, rotor.recoil_permeability[0], rotor.recoil_permeability[1], body)
+    along, across = rotor.recoil_permeability
+    material = rotor.remanence_T, along, across
     if isinstance(rotor, TiltRotor):
-        return tilt(float(np.radians(rotor.angle_deg)), *material)
+        return tilt(float(np.radians(rotor.angle_deg)), solid(rotor), *material)
     build = horizontal if rotor.configuration == "horizontal" else vertical
-    return build(rotor.displacement_mm * MILLI, *material)
+    return build(rotor.displacement_mm * MILLI, solid(rotor), *material)
 
 
 def _plate(plate: PlateSection) -> Plate:

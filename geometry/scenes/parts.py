@@ -87,13 +87,14 @@ def magnets(*bodies: Table, **more: Any) -> Table:
     ----------
     *bodies : dict
         Each with size_mm, center_mm, polarization_T, and where they are not the usual ones rotation_deg,
-        recoil_permeability, conductivity_S_m.  For other shapes than "cuboid", in place of size_mm: shape "cylinder"
-        with diameter_mm and height_mm, "ring" with inner_diameter_mm beside, "sphere" with diameter_mm.
+        recoil_permeability, conductivity_S_m, coercivity_kA_m.  For other shapes than "cuboid", in place of size_mm:
+        shape "cylinder" with diameter_mm and height_mm, "ring" with inner_diameter_mm beside, "sphere" with
+        diameter_mm.
     **more : float or list
         Further keys of every rotor: recoil_permeability of the article's, conductivity_S_m of all magnets (their eddy
-        currents, else left out), field_map, and conductors, a list of tables with shape ("cuboid" or "cylinder"),
-        size_mm or diameter_mm and height_mm, center_mm, rotation_deg and conductivity_S_m: metal that turns with the
-        rotor.
+        currents, else left out), coercivity_kA_m (the knee of their demagnetisation curves), field_map, and
+        conductors, a list of tables with shape ("cuboid" or "cylinder"), size_mm or diameter_mm and height_mm,
+        center_mm, rotation_deg and conductivity_S_m: metal that turns with the rotor.
 
     Returns
     -------

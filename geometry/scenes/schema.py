@@ -14,6 +14,7 @@ Polarization = Annotated[Number, Field(ge=-100.0, le=100.0)]
 Remanence = Annotated[NotNegative, Field(le=100.0)]
 Permeability = Annotated[Number, Field(ge=1.0, le=1e6)]
 Conductivity = Annotated[NotNegative, Field(le=1e9)]
+Coercivity = Annotated[Positive, Field(le=1e5)]
 Vector = Annotated[list[Number], Field(min_length=3, max_length=3)]
 Sizes = Annotated[list[Length], Field(min_length=3, max_length=3)]
 Coordinates = Annotated[list[Coordinate], Field(min_length=3, max_length=3)]
@@ -72,6 +73,7 @@ class ConductorSection(_Table):
 class _AnyRotor(_Table):
     field_map: Annotated[str, Field(min_length=1)] | None = None
     conductivity_S_m: Conductivity | None = None
+    coercivity_kA_m: Coercivity | None = None
     conductors: list[ConductorSection] = []
 
 
@@ -114,6 +116,7 @@ class MagnetSection(ShapeSection):
     polarization_T: Polarizations
     recoil_permeability: MagnetPermeability = [RECOIL_PERMEABILITY, RECOIL_PERMEABILITY]
     conductivity_S_m: Conductivity | None = None
+    coercivity_kA_m: Coercivity | None = None
 
 
 class ExplicitRotor(_AnyRotor):

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from ..basics import Array, Box, Part, Ring, Solid, moved, shape_numbers
+from ..basics import Array, Box, Part, Ring, Solid, moved
 from ..bodies import Conductor, Magnet, horizontal, tilt, vertical
 from .assembly import assemble
 from .contents import AbsoluteStart, Drag, OffsetStart, Plate, Scene
@@ -79,26 +79,26 @@ def _rotor(rotor: tuple[Magnet, ...]) -> dict[str, Any]:
     """A rotor of the article by its name if its magnets conduct alike, any other as its magnets."""
     first = rotor[0]
     body = moved(first.body, np.zeros(3), np.eye(3))
-    material = (0.0, float(np.linalg.norm(first.polarization)), first.recoil_permeability)
-    transverse = first.transverse_permeability
+    remanence = float(np.linalg.norm(first.polarization))
+    material = (body, remanence, first.recoil_permeability, first.transverse_permeability)
     x, _, z = rotor[-1].body.center
     angle = float(np.arctan2(first.polarization_in_rotor[2], first.polarization_in_rotor[0]))
     known = {
-        ("horizontal", "displacement_mm", _milli(x)): horizontal(float(x), *material, transverse, body),
-        ("vertical", "displacement_mm", _milli(z)): vertical(float(z), *material, transverse, body),
-        ("tilt", "angle_deg", _number(float(np.degrees(angle)))): tilt(angle, *material, transverse, body),
+        ("horizontal", "displacement_mm", _milli(x)): horizontal(float(x), *material),
+        ("vertical", "displacement_mm", _milli(z)): vertical(float(z), *material),
+        ("tilt", "angle_deg", _number(float(np.degrees(angle)))): tilt(angle, *material),
     }
     for (configuration, key, value), like in known.items():
-        alike = len(like) == len(rotor) and len({magnet.conductivity for magnet in rotor}) == 1
+        alike = len(like) == len(rotor) and len({(m.conductivity, m.coercivity) for m in rotor}) == 1
         alike &= not (isinstance(body, Box) and np.ptp(body.size)) and not isinstance(body, Ring | Part)
         if alike and all(map(_same, like, rotor)) and value >= (0 if key != "angle_deg" else -90):
             return {
                 "configuration": configuration,
                 key: value,
                 **_article_shape(body),
-                "remanence_T": _number(material[1]),
+                "remanence_T": _number(remanence),
                 "recoil_permeability": _permeability(first),
-                **_conductivity(first),
+                **_optional(first),
             }
     return {"magnets": [_magnet(magnet) for magnet in rotor]}
 
@@ -123,7 +123,7 @@ def _parts(magnet: Magnet) -> Array:
     body = magnet.body
     turned = (body.rotation, magnet.permeability_in_rotor)
     return np.concatenate(
-        [shape_numbers(body), body.center, magnet.polarization, *(matrix.ravel() for matrix in turned)]
+        [body.shape_numbers, body.center, magnet.polarization, *(matrix.ravel() for matrix in turned)]
     )
 
 
@@ -133,7 +133,7 @@ def _magnet(magnet: Magnet) -> dict[str, Any]:
         **_pose(_at_its_origin(magnet.body)),
         "polarization_T": _numbers(magnet.polarization),
         "recoil_permeability": _permeability(magnet),
-        **_conductivity(magnet),
+        **_optional(magnet),
     }
 
 
@@ -142,8 +142,9 @@ def _at_its_origin(body: Solid) -> Solid:
     return moved(body, body.center + body.rotation @ body.origin) if isinstance(body, Part) else body
 
 
-def _conductivity(magnet: Magnet) -> dict[str, float]:
-    return {} if magnet.conductivity is None else {"conductivity_S_m": _number(magnet.conductivity)}
+def _optional(magnet: Magnet) -> dict[str, float]:
+    found = {} if magnet.conductivity is None else {"conductivity_S_m": _number(magnet.conductivity)}
+    return found if magnet.coercivity is None else found | {"coercivity_kA_m": _number(magnet.coercivity / 1e3)}
 
 
 def _conductor(conductor: Conductor) -> dict[str, Any]:

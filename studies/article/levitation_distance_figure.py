@@ -12,28 +12,29 @@ from ..results import cases_with, styled
 from .article import CONFIGURATIONS, rotor_label, stable_in_flight
 from .article_figure import legend_name, one_panel_each, plot_branch, rotor_color, values_of
 
-LIMITS = (8.0, 66.0)
+LOWEST = 8.0
 """Of the axis of distances, mm."""
 
 
 @styled
 def models_figure(result: xr.Dataset) -> Figure:
     """The levitation distance of every rotor by finite elements and by the dipole."""
-    figure, axes = _distance_panels()
+    figure, axes = _distance_panels(4.3)
     for panel, configuration in zip(axes, CONFIGURATIONS, strict=True):
         for value in values_of(result, configuration):
             rotor = cases_with(result, configuration=configuration, value=value)
             _fields(panel, rotor, rotor_color(configuration, value), legend_name(configuration, value))
         panel.plot([], [], ":", color="0.3", lw=0.8, label="dipole")
         panel.plot([], [], "o", color="0.3", ms=3, label="fold")
-        panel.legend(ncols=2, loc="upper right", columnspacing=1.0)
+        panel.set_ylim(LOWEST, 52.0)
+        panel.legend(ncols=2, loc="upper center", bbox_to_anchor=(0.5, -0.17), columnspacing=1.0)
     return figure
 
 
 @styled
 def formulas_figure(result: xr.Dataset) -> Figure:
     """The article's formulas and simulated flights beside the dipole's equilibrium, for the rotors that levitated."""
-    figure, axes = _distance_panels()
+    figure, axes = _distance_panels(3.2)
     for panel, configuration in zip(axes, CONFIGURATIONS, strict=True):
         for value in values_of(result, configuration):
             if value in CONFIGURATIONS[configuration].levitated:
@@ -41,6 +42,7 @@ def formulas_figure(result: xr.Dataset) -> Figure:
                 color = rotor_color(configuration, value)
                 _formulas(panel, rotor, color=color)
                 panel.plot([], [], color=color, label=rotor_label(configuration, value))
+        panel.set_ylim(LOWEST, 62.0)
         if configuration != "horizontal" and panel.get_legend_handles_labels()[0]:
             panel.legend(loc="upper right")
     _key(axes[0])
@@ -50,10 +52,10 @@ def formulas_figure(result: xr.Dataset) -> Figure:
 FIGURES = {"levitation-distance-models": models_figure, "levitation-distance-formulas": formulas_figure}
 
 
-def _distance_panels() -> tuple[Figure, Any]:
-    figure, axes = one_panel_each(3.2, sharey=True)
+def _distance_panels(height: float) -> tuple[Figure, Any]:
+    figure, axes = one_panel_each(height, sharey=True)
     for panel in axes:
-        panel.set(xlabel="frequency of the rotor (Hz)", xlim=(25, 255), ylim=LIMITS)
+        panel.set(xlabel="frequency of the rotor (Hz)", xlim=(25, 255))
     axes[0].set_ylabel("levitation distance (mm)")
     return figure, axes
 

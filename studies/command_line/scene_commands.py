@@ -73,13 +73,15 @@ def field(
     extent_mm: Annotated[str | None, Parameter(allow_leading_hyphen=True)] = None,
     offset_mm: Annotated[float, Parameter(allow_leading_hyphen=True)] = 0.0,
     steps: int = 121,
+    working_point: Annotated[bool, Parameter(negative="")] = False,
     model: FieldModel = "auto",
     rtol: float = 3e-6,
     output: Output = Output(),
 ) -> Answer:
-    """B and its gradient at points in the rotor's frame at t = 0, or maps of the field on a plane.
+    """B and its gradient at points in the rotor's frame at t = 0, maps of the field on a plane, or the working point.
 
     Points may lie in the magnets. Maps are those of every model and their differences: field-map.nc, .png and .vtu.
+    The working point says whether the magnets demagnetise: working-point.nc, .json and .png.
 
     Parameters
     ----------
@@ -95,14 +97,22 @@ def field(
         Third coordinate of the plane, mm.
     steps
         Points along the longer side of the maps.
+    working_point
+        The lowest μ0H along each magnet's easy axis instead, the floater where it levitates, against coercivity_kA_m.
     model
         Field model at points; maps show dipole, closed form and finite elements.
     rtol
         Relative accuracy asked of the field wherever the floater can be.
     """
     asked = Models(model, rtol=rtol).checked()
-    if (points is None) == (plane is None):
-        raise InputError("Input --points must be given, or --plane; instead received both or neither.")
+    if (given := (points is not None) + (plane is not None) + working_point) != 1:
+        raise InputError(
+            f"Input --points must be given, or --plane, or --working-point; instead received {given or 'none'} of them."
+        )
+    if working_point:
+        from ..one_scene import Levitation, working_point_job
+
+        return Answer(*working_point_job(Levitation(_loaded(scene), asked), output.out), output.json)
     if plane is not None:
         extent = None if extent_mm is None else map_extent(extent_mm)
         if not 5 <= steps <= 1001:

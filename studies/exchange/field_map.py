@@ -9,7 +9,7 @@ import numpy as np
 import xarray as xr
 
 from ...fem.rotor_tables import near_field, rotor_table
-from ...geometry.basics import MU_0, Array, edge_distance
+from ...geometry.basics import MU_0, Array
 from ...geometry.scenes import Scene
 from ..results import save_figures, write_dataset
 from ..terminal import note
@@ -61,7 +61,7 @@ def field_map(scene: Scene, plane: str, extent: Array | None, offset: float, ste
     points = np.zeros((len(v), len(u), 3))
     points[..., along], points[..., up], points[..., across] = u, v[:, None], offset
     places = points.reshape(-1, 3)
-    clear = np.min([edge_distance(magnet.body, places) for magnet in scene.rotor], axis=0) > OFF_EDGE
+    clear = np.min([magnet.body.edge_distance(places) for magnet in scene.rotor], axis=0) > OFF_EDGE
     b, h = (np.full((3, len(places), 3), np.nan) for _ in range(2))
     b[0], h[0] = (_dipoles(scene, places),) * 2
     note("Finite elements for the map ...")

@@ -219,7 +219,12 @@ class Page:
         self.shown = found.shown
         self.document.hold("combine")
         self.layout.numbers(found.shown, found.number, waits)
-        self._draw(found.lines)
+        self.document.unhold()
+        self.document.add_next_tick_callback(lambda: self._picture(found.lines))  # the numbers go first
+
+    def _picture(self, lines: tuple[Array, ...]) -> None:
+        self.document.hold("combine")
+        self._draw(lines)
         if fly not in self.crew:
             self._rest_floater()
         self.document.unhold()

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from bokeh.models import ColumnDataSource, LinearColorMapper, PointDrawTool, Range1d
+from bokeh.models import ColumnDataSource, DataRange1d, LinearColorMapper, PointDrawTool, Range1d
 from bokeh.plotting import figure
 
 from ...geometry.scenes import Scene
@@ -60,7 +60,9 @@ class SideView:
         self.bodies = ColumnDataSource({"x": [], "z": []})
         self.equilibria = ColumnDataSource({"x": [], "z": []})
         plot = figure(height=340, tools="", name="side", x_axis_label="x (mm)", y_axis_label="z (mm)", **LOOK)
-        plot.x_range, plot.y_range = Range1d(-30, 30), Range1d(-60, 15)
+        self.frame = ColumnDataSource({"x": [-30, 30], "z": [-60, 15]})
+        corners = [plot.scatter("x", "z", source=self.frame, alpha=0)]  # ranges that are not given have one scale
+        plot.x_range, plot.y_range = (DataRange1d(renderers=corners, range_padding=0) for _ in range(2))
         plot.match_aspect = True
         plot.patches("x", "z", source=self.bodies, color=MAGNET, alpha=0.8)
         plot.scatter("x", "z", source=self.equilibria, marker="x", size=9, color="#2E3440", line_width=2)
@@ -79,8 +81,8 @@ class SideView:
         """Put the floater; mm."""
         self.floater.data = {"x": [x], "z": [z], "r": [radius]}
         low = min(-60.0, z - 2 * radius)
-        if self.figure.y_range.start != low:
-            self.figure.y_range.start = low
+        if self.frame.data["z"][0] != low:
+            self.frame.data = {"x": [-30, 30], "z": [low, 15]}
 
 
 class RunningPlot:

@@ -1,6 +1,10 @@
 """What does one scene do?"""
 
 from .answers import equilibria_answer as equilibria_answer
+from .demagnetising import (
+    working_point_dataset as working_point_dataset,
+    working_point_job as working_point_job,
+)
 from .levitation import Levitation as Levitation, given_scene as given_scene, sources as sources
 from .plate_of_scene import plate_memory as plate_memory
 from .question import Question as Question

@@ -29,6 +29,7 @@ from ..results import (
 )
 from ..terminal import Models, note, to_json
 from .answers import equilibria_answer, flight_answer
+from .demagnetising import write_working_point
 from .levitation import Levitation
 from .single import Job
 from .words import bracketed, effects_words, equilibria_words, flight_words, headline, tell_details
@@ -82,6 +83,10 @@ def main_job(scene: Scene, asked: Models, duration: float, out: Path) -> Job:
         except FlightStopped as stop:
             flight = (failure := stop).flown
     lines += effects_words(values)
+    if any(magnet.coercivity is not None and magnet.polarization.any() for magnet in scene.rotor):
+        worked, told, _ = write_working_point(levitation, out)
+        values |= worked
+        lines += told
     if failure:
         values["failed"] = str(failure)
         lines.append(str(failure))

@@ -3,18 +3,22 @@
 Flights that begin in one field go side by side in a processor's lanes (`dynamics.ensembles`).
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
+from dataclasses import replace
 
 import numpy as np
 
 from ...dynamics.ensembles import fly_together
 from ...dynamics.flights import initial_state, is_long
-from ...dynamics.maps import surveys
+from ...dynamics.maps import article_measure, rotor_family, surveys
+from ...dynamics.motion import Rates
 from ...dynamics.steady import Indices
-from ...geometry.basics import SpinlevError
+from ...fem.rotor_tables import at_home
+from ...geometry.basics import Array, SpinlevError
 from ...geometry.scenes import startless_text
 from .levitation import Levitation
+from .rotor_of_scene import equations_key
 
 
 def share(levitations: Sequence[Levitation], places: Sequence[tuple[int, ...]], equilibria: Sequence[bool]) -> None:
@@ -29,16 +33,33 @@ def share(levitations: Sequence[Levitation], places: Sequence[tuple[int, ...]], 
     groups: dict[str, list[int]] = {}
     for k, levitation in enumerate(levitations):
         groups.setdefault(levitation.equations_key, []).append(k)
-    for members in groups.values():
+    families: dict[str, list[int]] = {}
+    for key, members in groups.items():
         for k in members[1:]:
             levitations[k].share(levitations[members[0]])
         asked = [k for k in members if equilibria[k]]
-        if len(asked) > 1:
-            _find_together([levitations[k] for k in asked], np.array([places[k] for k in asked]))
+        if asked:
+            families.setdefault(_family_key(levitations[asked[0]]) or key, []).extend(asked)
+    for members in families.values():
+        if len(members) > 1:
+            with suppress(SpinlevError):  # what cannot be found here is left to each scene, which says why
+                _find_together([levitations[k] for k in members], np.array([places[k] for k in members]))
+
+
+def _family_key(levitation: Levitation) -> str | None:
+    """All but displacement or tilt that decides the equations of a lone magnet of the article; None for others."""
+    scene = levitation.scene
+    if len(scene.rotor) > 1 or scene.conductors or scene.field_map:
+        return None
+    with suppress(SpinlevError):
+        if found := article_measure(scene):
+            home = equations_key(replace(scene, rotor=at_home(scene.rotor)), levitation.models)
+            return f"{found[0]} {levitation.table.model} {levitation.interaction_model} {home}"
+    return None
 
 
 def _find_together(alike: Sequence[Levitation], places: Indices) -> None:
-    """What cannot be found here is left to each scene, which says why; where a flight begins does not matter."""
+    """Where a flight begins does not matter."""
     same: dict[str, list[Levitation]] = {}
     first_places = []
     for levitation, place in zip(alike, places, strict=True):
@@ -52,14 +73,28 @@ def _find_together(alike: Sequence[Levitation], places: Indices) -> None:
     chosen = [some[0] for some in same.values()]
     near = np.array([np.unique(column, return_inverse=True)[1] for column in np.array(first_places).T]).T
     spin = np.array([levitation.spin for levitation in chosen])
-    try:
-        first = chosen[0]
-        found = surveys([one.scene for one in chosen], first.interaction, spin, near, first.rates)
-    except SpinlevError:
-        return
+    fields = {levitation.equations_key: levitation for levitation in reversed(chosen)}
+    tables = [fields[levitation.equations_key].interaction for levitation in chosen]
+    rates, measures = (chosen[0].rates, 0.0) if len(fields) == 1 else _of_family(chosen, fields)
+    found = surveys([one.scene for one in chosen], tables, spin, near, rates, measures)
     for some, (survey, searched) in zip(same.values(), found, strict=True):
         for levitation in some:
             levitation.adopt(survey, searched)
+
+
+def _of_family(alike: Sequence[Levitation], different: Mapping[str, Levitation]) -> tuple[Rates, Array]:
+    """The equations of a family of rotors, and the measure of each of its scenes."""
+    known = {key: article_measure(levitation.scene) or ("", 0.0) for key, levitation in different.items()}
+    first = alike[0]
+    family = rotor_family(
+        replace(first.scene, plate=None),
+        known[first.equations_key][0],
+        first.table.model,
+        first.models.rtol,
+        first.scene.floater.radius,
+        interaction=first.interaction_model,
+    )
+    return family.rates, np.array([known[levitation.equations_key][1] for levitation in alike])
 
 
 def fly(levitations: Sequence[Levitation], duration: float) -> None:

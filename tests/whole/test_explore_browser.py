@@ -4,7 +4,10 @@ import json
 import statistics
 import subprocess
 import sys
+import threading
 import time
+from functools import partial
+from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
 from urllib.parse import parse_qs, urlsplit
 
 import numpy as np
@@ -14,6 +17,7 @@ from devtools import CHROMIUM, Browser
 from PIL import Image
 from places import OVER_PLATE
 
+import spinlev as sl
 from spinlev.geometry.scenes import load_scene
 from spinlev.studies.one_scene import equilibria_job
 from spinlev.studies.terminal import Models
@@ -158,6 +162,12 @@ def assert_dragged(tab):
       return [frame.x + view.frame.x_scale.compute(ball.x[0]), frame.y + view.frame.y_scale.compute(ball.z[0])]; })()"""
     said(tab, "Bokeh.index.find_one(model('side')).el.scrollIntoView({block: 'center'})")
     x, y = said(tab, where)
+    scales = said(
+        tab,
+        "['x', 'y'].map(k => Bokeh.index.find_one(model('side')).frame[k + '_scale'])"
+        ".map(scale => Math.abs(scale.compute(1) - scale.compute(0)))",
+    )
+    assert abs(scales[0] - scales[1]) < 0.01 * scales[0]  # a ball looks round
     tab.mouse((x, y), (x + 20, y + 5), (x + 60, y + 15), (x + 90, y + 25))
     wait(tab, "/^After .* s (touched|lost)/.test(model('says').text)")
     click(tab, "again")
@@ -220,6 +230,32 @@ def test_a_scene_that_cannot_be_is_a_message_in_the_page(server, browser):
     assert said(tab, "model('frequency_hz').value") == 130  # the scene of the command line
     assert_quiet(tab, server.address)
     tab.close()
+
+
+def test_a_notebook_shows_it_in_a_frame(browser, tmp_path):
+    """As Jupyter does: from another server, in a frame that `sl.explore` writes."""
+    page = sl.explore(OVER_PLATE)
+    (tmp_path / "notebook.html").write_text(
+        f'<!DOCTYPE html><title>cell</title><link rel="icon" href="data:,">{page._repr_html_()}'
+    )
+    handler = partial(SimpleHTTPRequestHandler, directory=str(tmp_path))
+    with ThreadingHTTPServer(("127.0.0.1", 0), handler) as notebook:
+        threading.Thread(target=notebook.serve_forever, daemon=True).start()
+        tab = browser.open(f"http://127.0.0.1:{notebook.server_port}/notebook.html", *DESK)
+        tab.until("document.title === 'cell' && document.readyState === 'complete'")
+        picture, end = tmp_path / "frame.png", time.monotonic() + 60
+        while True:
+            tab.picture(picture)
+            with Image.open(picture) as seen:
+                pixels = np.asarray(seen.convert("RGB")).reshape(-1, 3).astype(int)
+            if (np.abs(pixels - (0x56, 0xB4, 0xE9)).max(axis=1) < 8).sum() > 500:  # the map's stable region
+                break
+            assert time.monotonic() < end, "the frame stays empty"
+            time.sleep(0.3)
+        assert tab.errors == []
+        tab.close()
+        notebook.shutdown()
+    page.stop()
 
 
 def test_a_phone_shows_it_without_scrolling_sideways(server, browser, tmp_path):

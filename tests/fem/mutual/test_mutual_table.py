@@ -143,3 +143,9 @@ def test_a_lone_magnet_has_one_table_wherever_it_stands():
     for there, value in zip(answers(second, *moved), here, strict=True):
         expected = value if value.ndim == 1 else value @ turn.T
         np.testing.assert_allclose(there, expected, rtol=1e-10, atol=1e-12 * np.abs(expected).max())
+
+
+def test_no_place_is_no_answer(table):
+    """As where a map has nothing to search."""
+    energy, slope, second = table.derivatives(np.zeros((0, 3)), np.zeros((0, 3)))
+    assert (energy.shape, slope.shape, second.shape) == ((0,), (0, 6), (0, 6, 6))

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from spinlev.fem.rotor_tables import near_field, rotor_table
-from spinlev.geometry.basics import Box, Cylinder, InputError, Ring, Sphere, edge_distance, rotation_matrix
+from spinlev.geometry.basics import Box, Cylinder, InputError, Ring, Sphere, rotation_matrix
 from spinlev.geometry.bodies import Magnet
 
 POLARIZATION = np.array([1.2, 0.0, 0.5])
@@ -17,7 +17,7 @@ def places_about(body, clear_of_edges, reach=1e-3, count=400):
     """Inside and up to `reach` off the surface, but so far from edges."""
     half = body.half_edges + reach
     points = body.center + np.random.default_rng(4).uniform(-half, half, (count, 3)) @ body.rotation.T
-    return points[(edge_distance(body, points) > clear_of_edges) & (body.distance(points) < reach)]
+    return points[(body.edge_distance(points) > clear_of_edges) & (body.distance(points) < reach)]
 
 
 def test_in_and_beside_a_cube_it_is_the_closed_form():

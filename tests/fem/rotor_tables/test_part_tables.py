@@ -6,10 +6,10 @@ import netgen.occ as occ
 import numpy as np
 import pytest
 
-from spinlev.fem.rotor_tables import rotor_table
+from spinlev.fem.rotor_tables import refuse_edges, rotor_table
 from spinlev.fem.rotor_tables.accuracy import error_points
 from spinlev.fem.rotor_tables.table_file import load_table, save_table
-from spinlev.geometry.basics import Box, Cylinder, moved, rotation_matrix
+from spinlev.geometry.basics import Box, Cylinder, InputError, moved, rotation_matrix
 from spinlev.geometry.bodies import Magnet, overlapping_magnets, read_part
 from spinlev.geometry.scenes import SceneError, magnets, parse_scene, scene, scene_text, sphere
 
@@ -126,3 +126,15 @@ def test_a_rigid_part_has_the_moment_of_its_shape(folder):
     part = read_part(folder / "cylinder.step")
     table = rotor_table((Magnet(part, (1.2, 0.0, 0.5)),), "dipole")
     assert table.moment == pytest.approx(Magnet(Cylinder(5e-3, 8e-3), (1.2, 0.0, 0.5)).moment, rel=1e-6, abs=1e-9)
+
+
+def test_edges_of_a_part_are_those_of_the_shape_by_key(folder):
+    """A cube's are met exactly, a cylinder's circles as well as the triangles do (2 % of the radius)."""
+    points = np.random.default_rng(5).uniform(-7e-3, 7e-3, (200, 3))
+    box, part = Box((0.01,) * 3, (0, 0, 0), TURN), read_part(folder / "cube.step")
+    assert moved(part, box.center, TURN).edge_distance(points) == pytest.approx(box.edge_distance(points), abs=1e-12)
+    part = moved(read_part(folder / "cylinder.step"), np.zeros(3), TURN)
+    cylinder = Cylinder(5e-3, 8e-3, (0, 0, 0), TURN)
+    assert part.edge_distance(points) == pytest.approx(cylinder.edge_distance(points), abs=1e-4)
+    with pytest.raises(InputError, match="must not lie on an edge"):
+        refuse_edges([Magnet(read_part(folder / "cube.step"), (1.0, 0, 0))], np.array([[5e-3, 5e-3, 1e-3]]))

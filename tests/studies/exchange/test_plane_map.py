@@ -64,8 +64,8 @@ def test_an_extent_that_is_none_is_refused(text):
 @pytest.mark.parametrize(
     ("more", "said"),
     [
-        ([], "Input --points must be given, or --plane"),
-        (["--plane", "xz", "--points", "p.csv"], "both or neither"),
+        ([], "Input --points must be given, or --plane, or --working-point; instead received none of them"),
+        (["--plane", "xz", "--points", "p.csv"], "instead received 2 of them"),
         (["--plane", "xq"], "xq"),
         (["--plane", "xz", "--steps", "1"], "--steps must be between 5 and 1001; instead received 1"),
         (["--plane", "xz", "--extent-mm", "0"], "--extent-mm must be one positive number"),

@@ -1,5 +1,7 @@
 """Points of a sweep that help each other have the values that each has alone."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import xarray as xr
@@ -49,6 +51,31 @@ def test_points_that_cannot_be_prepared_are_computed_alone(caplog):
     found = dict(attempts(asked, broken, dict(enumerate(points)), frozenset({0, 1})))
     assert "no way" in caplog.text
     assert [float(found[k]["frequency_hz"][0]) for k in (0, 1)] == [120.0, 130.0]
+
+
+@pytest.mark.parametrize(
+    ("key", "values", "alone"),
+    [
+        ("rotor.displacement_mm", [1.9, 2.0, 2.1, 2.2], {"model": "cuboid"}),
+        pytest.param(
+            "rotor.displacement_mm",
+            [1.9, 2.2],
+            {"model": "fem", "interaction": "mutual"},
+            marks=pytest.mark.slow,  # 30 s
+        ),
+    ],
+)
+def test_rotors_of_one_family_share_their_equations(key, values, alone):
+    """They are not compiled for each, and each has what it has alone."""
+    asked, points = question(**{key: values})
+    asked = replace(asked, models=Models(plate_model="none", **alone))
+    jobs = asked.prepared(points)
+    for point, job in list(zip(points, jobs, strict=True))[1::2]:
+        found, expected = job(), asked(point)
+        np.testing.assert_allclose(found["position"], expected["position"], rtol=0, atol=1e-14)
+        np.testing.assert_allclose(found["growth"], expected["growth"], rtol=1e-10, atol=1e-10)
+    if len(values) > 2:  # the ends of an axis are searched
+        assert {str(job()["found_by"].values[0]) for job in jobs} == {"search", "neighbours"}
 
 
 @pytest.mark.slow

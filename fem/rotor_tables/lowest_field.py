@@ -1,0 +1,208 @@
+"""Where a magnet works: the field against its polarisation, at its lowest and over its volume.
+
+    h = μ0 H · e,        e the easy axis, along the polarisation;        the knee: h = -μ0 × coercivity.
+
+Where h is below the knee a magnet loses polarisation; that is told here, not followed (no hysteresis).  On an edge
+the field can be infinite, so that h has no lowest value in a whole magnet.  What converges is the lowest value at
+places that keep a stated distance from all edges, and the share of the volume that is below the knee.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ...geometry.basics import MU_0, Array, moved, rotation_matrix
+from ...geometry.bodies import Magnet
+from ..closed_forms import carrier, remanent_field
+from .anywhere import NearField, near_field
+from .near_elements import NearElements
+
+RTOL = 1e-3
+"""Error asked for, relative to the largest remanence: knees are known to per cents."""
+HIGHEST = 5
+"""Order of the elements; near edges they stop there, with the error that is stated."""
+CLEAR = 0.02
+"""Distance from edges that the lowest value keeps, in edges of a cube of the magnet's volume."""
+JUST_INSIDE = 1e-7
+"""How far below the surface (m) a place may lie."""
+BATCHES, PER_BATCH = 8, 10
+"""Sets of 2^n evenly spread places in a magnet's volume."""
+STARTS, LAST_STEP = 6, 1e-6
+"""Places from which the lowest value is sought, and the step (m) at which the search ends."""
+PHASES = 72
+"""Places of the floater about the axis, while the rotor turns alone."""
+
+
+@dataclass(frozen=True, eq=False)
+class WorkingPoint:
+    """The field along a magnet's easy axis: μ0 H · e.
+
+    Parameters
+    ----------
+    lowest : T, at all places that keep `clear` from edges
+    place : (3,) m where that is, rotor's frame
+    error : estimated, T
+    lowest_turning : T, as `lowest` if the floater stays behind for a whole turn and the rotor turns alone
+    clear : m
+    knee : T, or None where the magnet has no coercivity
+    share_below : of the volume that is below the knee; 0 without a knee
+    share_error : estimated
+    levels : (n,) T, from low to high: between two of them lie equal parts of the volume
+    """
+
+    lowest: float
+    place: Array
+    error: float
+    lowest_turning: float
+    clear: float
+    knee: float | None
+    share_below: float
+    share_error: float
+    levels: Array
+
+    @property
+    def margin(self) -> float | None:
+        """Lowest value above the knee, T; negative where the magnet demagnetises."""
+        return None if self.knee is None else self.lowest - self.knee
+
+
+class EasyField:
+    """μ0 H along the easy axis of each magnet of a rotor, with a permeable floater beside it or none.
+
+    Parameters
+    ----------
+    magnets : the rotor's
+    floater : a magnet in the rotor's frame, or None
+    """
+
+    def __init__(self, magnets: Sequence[Magnet], floater: Magnet | None = None, rtol: float = RTOL) -> None:
+        self.magnets, self.floater, self.rtol = tuple(magnets), floater, rtol
+        bodies = self.magnets if floater is None else (*self.magnets, floater)
+        self.elements = NearElements(bodies)
+
+    def at(self, number: int, points: Array) -> tuple[Array, Array]:
+        """μ0 H · e and its estimated error (n,) T at points (n, 3) m in a magnet (counted from 0), off the edges."""
+        found = self.near(points)
+        return found.field @ easy_axis(self.magnets[number]), found.error
+
+    def near(self, points: Array) -> NearField:
+        """The field of all at points (n, 3) m."""
+        return near_field(self.elements.magnets, points, self.rtol, HIGHEST, self.elements)
+
+    def section(self, number: int, first: Array, steps: int) -> tuple[Array, Array, Array, Array]:
+        """μ0 H · e (n, n) T on a plane through a magnet's centre, NaN beside it, with the plane's coordinates.
+
+        Returns also the coordinates (n,) m of columns, along the easy axis, and rows, and the rows' axis (3,).
+
+        Parameters
+        ----------
+        first : (3,) m, a place through which the plane goes, if it is not on the easy axis
+        """
+        body, along = self.magnets[number].body, easy_axis(self.magnets[number])
+        away = first - body.center - along * ((first - body.center) @ along)
+        if np.linalg.norm(away) < LAST_STEP * 10:
+            least = np.eye(3)[int(np.argmin(np.abs(along)))]
+            away = np.cross(along, least)
+        up = away / np.linalg.norm(away)
+        u, v = (1.02 * np.linspace(-1, 1, steps) * float(body.reach(way[None])[0]) for way in (along, up))
+        points = (body.center + u[None, :, None] * along + v[:, None, None] * up).reshape(-1, 3)
+        inside = (body.distance(points) < -JUST_INSIDE) & (_edge_distance(self.magnets, points) > JUST_INSIDE * 10)
+        values = np.full(len(points), np.nan)
+        if inside.any():
+            values[inside] = self.at(number, points[inside])[0]
+        return values.reshape(steps, steps), u, v, up
+
+    def of_floater(self, number: int, points: Array, turn_deg: float) -> Array:
+        """The same (n,) T of the floater alone, turned about the rotor's axis; a dipole, which nothing answers to."""
+        if self.floater is None:
+            return np.zeros(len(points))
+        turn, body = rotation_matrix((0.0, 0.0, turn_deg)), self.floater.body
+        there = replace(self.floater, body=moved(body, turn @ body.center, turn @ body.rotation))
+        return np.asarray(remanent_field([carrier(there)], points) @ easy_axis(self.magnets[number]))
+
+
+def easy_axis(magnet: Magnet) -> Array:
+    """(3,) unit vector along the polarisation, rotor's frame; zero without one."""
+    size = float(np.linalg.norm(magnet.polarization))
+    return magnet.polarization_in_rotor / size if size else np.zeros(3)
+
+
+def working_points(field: EasyField) -> tuple[WorkingPoint | None, ...]:
+    """The working point of every magnet; None for those without polarisation.
+
+    Accuracy: `error` is that of the elements (`NearElements`), against closed forms and magpylib in the tests.
+    """
+    return tuple(
+        _working_point(field, k) if magnet.polarization.any() else None for k, magnet in enumerate(field.magnets)
+    )
+
+
+def _working_point(field: EasyField, number: int) -> WorkingPoint:
+    magnet = field.magnets[number]
+    clear = CLEAR * float(np.cbrt(magnet.body.volume))
+    batches = [_spread_inside(magnet, seed) for seed in range(BATCHES)]
+    points = np.concatenate(batches)
+    free = _edge_distance(field.magnets, points) >= clear
+    values, error = np.empty(len(points)), np.empty(len(points))
+    for chosen in (free, ~free):  # places at edges, which converge slowly, do not drive the order of all
+        if chosen.any():
+            values[chosen], error[chosen] = field.at(number, points[chosen])
+    seen, found, doubt = _lowest(field, number, points[free], values[free], clear)
+    best = int(np.argmin(found))
+    alone = found - field.of_floater(number, seen, 0.0)
+    turned = [field.of_floater(number, seen, 360.0 * k / PHASES) for k in range(PHASES)]
+    turning = min(float(found[best]), *(float((alone + one).min()) for one in turned))
+    knee = None if magnet.coercivity is None else -MU_0 * magnet.coercivity
+    share, share_error = (0.0, 0.0) if knee is None else _share_below(knee, values, error)
+    return WorkingPoint(
+        float(found[best]), seen[best], float(doubt[best]), turning, clear, knee, share, share_error, np.sort(values)
+    )
+
+
+def _spread_inside(magnet: Magnet, seed: int) -> Array:
+    """2^PER_BATCH evenly spread points in a magnet."""
+    from scipy.stats.qmc import Sobol  # slow to load
+
+    body, wanted, found = magnet.body, 2**PER_BATCH, np.zeros((0, 3))
+    draw = Sobol(3, rng=np.random.default_rng(seed))
+    while len(found) < wanted:
+        local = (2 * draw.random(2 * wanted) - 1) * body.half_edges
+        points = body.center + local @ body.rotation.T
+        off = (body.distance(points) < -JUST_INSIDE) & (body.edge_distance(points) > JUST_INSIDE)
+        found = np.concatenate([found, points[off]])
+    return found[:wanted]
+
+
+def _edge_distance(magnets: Sequence[Magnet], points: Array) -> Array:
+    return np.asarray(np.min([magnet.body.edge_distance(points) for magnet in magnets], axis=0))
+
+
+def _lowest(field: EasyField, number: int, points: Array, values: Array, clear: float) -> tuple[Array, Array, Array]:
+    """Places (n, 3) m that go down from the lowest of the given ones, step by step, with values and errors (n,) T."""
+    body = field.magnets[number].body
+    ways = np.array([w for w in np.ndindex(3, 3, 3) if w != (1, 1, 1)]) - 1.0
+    here, low = points[(order := np.argsort(values)[:STARTS])], values[order]
+    step = float(np.cbrt(body.volume)) / 16
+    while step > LAST_STEP:
+        tried = (here[:, None] + step * ways @ body.rotation.T).reshape(-1, 3)
+        good = (body.distance(tried) < -JUST_INSIDE) & (_edge_distance(field.magnets, tried) >= clear)
+        reached = np.full(len(tried), np.inf)
+        if good.any():
+            reached[good] = field.at(number, tried[good])[0]
+        around = reached.reshape(len(here), -1)
+        best = around.argmin(axis=1)
+        better = around[np.arange(len(here)), best] < low
+        low = np.where(better, around[np.arange(len(here)), best], low)
+        here = np.where(better[:, None], tried.reshape(len(here), -1, 3)[np.arange(len(here)), best], here)
+        step /= 2
+    found = field.near(here)
+    axis = easy_axis(field.magnets[number])
+    return here, found.field @ axis, found.error + LAST_STEP * np.linalg.norm(axis @ found.gradient, axis=1)
+
+
+def _share_below(knee: float, values: Array, error: Array) -> tuple[float, float]:
+    """Share of the volume below the knee; its error is the scatter of the batches and what the field's error does."""
+    shares = np.mean(values.reshape(BATCHES, -1) < knee, axis=1)
+    moved_by = np.mean(np.abs(values - knee) < error)
+    return float(shares.mean()), float(shares.std(ddof=1) / np.sqrt(BATCHES) + moved_by)

@@ -1,0 +1,159 @@
+"""Whether a scene's magnets demagnetise: the field along their easy axes, with the floater where it levitates."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from ...dynamics.flights import most_like_levitation
+from ...dynamics.steady import Equilibrium, EquilibriumError
+from ...fem.rotor_tables import EasyField, WorkingPoint, easy_axis, working_points
+from ...fem.storage import write_whole
+from ...geometry.basics import Array, InputError, Sphere
+from ...geometry.bodies import Magnet
+from ...geometry.scenes import Floater
+from ..pictures import working_point_figure
+from ..results import AXIS, save_figures, variable, write_dataset
+from ..terminal import note, to_json
+from .levitation import Levitation
+
+STEPS, LEVELS = 101, 201
+"""Points across a section; levels of the field that are kept of a magnet."""
+
+
+def working_point_dataset(levitation: Levitation) -> xr.Dataset:
+    """The working point of every magnet that has a polarisation, over `magnet`, with a section through each.
+
+    Raises
+    ------
+    InputError : no magnet has a polarisation
+    """
+    scene = levitation.scene
+    numbers = [k for k, magnet in enumerate(scene.rotor) if magnet.polarization.any()]
+    if not numbers:
+        raise InputError(
+            "Input rotor must have a magnet with a polarisation, whose working point is asked for; instead none has."
+        )
+    place = _floating(levitation)
+    note("Field in the magnets ...")
+    field = EasyField(scene.rotor, None if place is None else _ball(scene.floater, place))
+    known = working_points(field)
+    found = [(k, point) for k in numbers if (point := known[k]) is not None]
+    sections = [field.section(k, point.place, STEPS) for k, point in found]
+    return xr.Dataset(
+        _values([point for _, point in found])
+        | {
+            "section": variable(("magnet", "v", "u"), [s[0] for s in sections], "T", "μ0 H along the easy axis"),
+            "along": variable(("magnet", "u"), [s[1] for s in sections], "m", "along the easy axis, from the centre"),
+            "across": variable(("magnet", "v"), [s[2] for s in sections], "m", "across the easy axis"),
+            "across_axis": variable(("magnet", "axis"), [s[3] for s in sections], "1", "unit vector of `across`"),
+            "easy_axis": variable(("magnet", "axis"), [easy_axis(scene.rotor[k]) for k in numbers], "1", "easy axis"),
+            "center": variable(("magnet", "axis"), [scene.rotor[k].body.center for k in numbers], "m", "centre"),
+            "floater": variable(
+                ("axis",), np.full(3, np.nan) if place is None else place.position, "m", "place of the floater"
+            ),
+        },
+        {
+            "magnet": ("magnet", np.array(numbers) + 1),
+            "axis": list(AXIS),
+            "share": ("level", np.linspace(0, 1, LEVELS), {"units": "1", "long_name": "share of the volume"}),
+        },
+        {"title": "Field along the easy axes of the rotor's magnets, rotor's frame"},
+    )
+
+
+def _values(points: list[WorkingPoint]) -> dict[str, xr.Variable]:
+    shares = np.linspace(0, 1, LEVELS)
+
+    def each(name: str, units: str, label: str) -> xr.Variable:
+        values = [np.nan if getattr(p, name) is None else getattr(p, name) for p in points]
+        return variable(("magnet", "axis")[: 1 + np.ndim(values[0])], values, units, label)
+
+    return {
+        "lowest": each("lowest", "T", "lowest μ0 H along the easy axis"),
+        "place": each("place", "m", "where it is lowest"),
+        "error": each("error", "T", "estimated error of the lowest"),
+        "lowest_turning": each("lowest_turning", "T", "lowest, the rotor turning past the floater"),
+        "clear": each("clear", "m", "distance from edges that the lowest keeps"),
+        "knee": each("knee", "T", "knee of the demagnetisation curve"),
+        "share_below": each("share_below", "1", "share of the volume below the knee"),
+        "share_error": each("share_error", "1", "estimated error of the share"),
+        "levels": variable(
+            ("magnet", "level"), [np.quantile(p.levels, shares) for p in points], "T", "μ0 H along the easy axis"
+        ),
+    }
+
+
+def _floating(levitation: Levitation) -> Equilibrium | None:
+    """Where the floater levitates, or nearly does; None where it has no equilibrium."""
+    try:
+        return most_like_levitation(levitation.without_plate.equilibria)
+    except EquilibriumError:
+        return None
+
+
+def _ball(floater: Floater, place: Equilibrium) -> Magnet:
+    polarization: Array = floater.remanence * place.state.moment
+    return Magnet(Sphere(floater.radius, place.position), polarization, floater.recoil_permeability)
+
+
+def working_point_answer(found: xr.Dataset) -> dict[str, Any]:
+    """The numbers of `working_point_dataset` for JSON."""
+    at = found["floater"].values
+    return {
+        "floater_position_mm": None if np.isnan(at).any() else 1e3 * at,
+        "working_points": [
+            {
+                "magnet": int(one["magnet"]),
+                "lowest_mu0H_T": float(one["lowest"]),
+                "error_T": float(one["error"]),
+                "place_mm": 1e3 * one["place"].values,
+                "clear_of_edges_mm": 1e3 * float(one["clear"]),
+                "lowest_while_slipping_mu0H_T": float(one["lowest_turning"]),
+                "knee_mu0H_T": (knee := None if np.isnan(one["knee"]) else float(one["knee"])),
+                "share_below_knee": None if knee is None else float(one["share_below"]),
+                "share_error": None if knee is None else float(one["share_error"]),
+            }
+            for one in (found.isel(magnet=k) for k in range(found.sizes["magnet"]))
+        ],
+    }
+
+
+def working_point_lines(answer: Mapping[str, Any]) -> list[str]:
+    """The same for a person."""
+    lines = [] if answer["floater_position_mm"] is not None else ["The floater has no equilibrium: it is left out."]
+    for one in answer["working_points"]:
+        text = (
+            f"Magnet {one['magnet']}: μ0H along its easy axis goes down to {one['lowest_mu0H_T']:.4f} ± "
+            f"{max(one['error_T'], 1e-4):.1g} T ({one['lowest_while_slipping_mu0H_T']:.4f} T while the rotor turns "
+            f"past the floater), {one['clear_of_edges_mm']:.2g} mm or more from edges"
+        )
+        if one["knee_mu0H_T"] is None:
+            lines.append(f"{text}. Give coercivity_kA_m to see whether it demagnetises.")
+            continue
+        margin, share = one["lowest_mu0H_T"] - one["knee_mu0H_T"], one["share_below_knee"]
+        safe = margin > one["error_T"] and share <= one["share_error"]
+        told = "it keeps its polarisation" if safe else f"{100 * share:.2g} % of its volume is beyond the knee"
+        side = "above" if margin > 0 else "below"
+        lines.append(f"{text}, {abs(margin):.3f} T {side} its knee of {one['knee_mu0H_T']:.3f} T: {told}.")
+    return lines
+
+
+def write_working_point(levitation: Levitation, out: Path) -> tuple[dict[str, Any], list[str], list[str]]:
+    """Write working-point.nc and its picture; returns the numbers, lines for a person, and the files."""
+    found = working_point_dataset(levitation)
+    write_dataset(found, out / "working-point.nc", levitation.scene)
+    files = [str(out / "working-point.nc"), *save_figures({"working-point": working_point_figure(found)}, out)]
+    answer = working_point_answer(found)
+    return answer, working_point_lines(answer), files
+
+
+def working_point_job(levitation: Levitation, out: Path) -> tuple[Mapping[str, Any], list[str]]:
+    """The working point of every magnet; writes working-point.nc, .json and the picture."""
+    answer, lines, files = write_working_point(levitation, out)
+    error = max(one["error_T"] / abs(one["lowest_mu0H_T"]) for one in answer["working_points"])
+    values = {"model": "fem", "error_estimate": error, **answer, "tables_from_cache": levitation.from_cache}
+    write_whole(out / "working-point.json", f"{to_json(values)}\n".encode())
+    return {**values, "files": files}, [*lines, f"In {', '.join(files)}"]
