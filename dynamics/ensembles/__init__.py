@@ -2,3 +2,4 @@
 
 from .endings import Endings as Endings
 from .many_flights import ensemble as ensemble, fly_together as fly_together
+from .over_plate import launched as launched

@@ -2,6 +2,7 @@
 
 from .article import (
     CONFIGURATIONS as CONFIGURATIONS,
+    EDGE as EDGE,
     FLIGHT as FLIGHT,
     FLOATER as FLOATER,
     HIGHEST as HIGHEST,

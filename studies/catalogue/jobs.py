@@ -68,6 +68,7 @@ def _studied(study: Study, points: Sequence[Point], engine: Workers, out: Path) 
         "failed_points": failed_points(result),
         "result": str(path),
         "figures": figures,
+        **(study.numbers(result) if study.numbers else {}),
     }
     return values, [*lines, f"Written: {', '.join([str(path), *figures])}"]
 

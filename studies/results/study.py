@@ -62,6 +62,7 @@ class Study:
     batches : which of the numbered points are computed together, with `prepared`
     timed : whether it measures times, for which its points must have the machine for themselves
     settings : what all points have in common, if they do not say it themselves
+    numbers : what else `--json` prints, by key, from the joined result alone
     """
 
     name: str
@@ -75,6 +76,7 @@ class Study:
     batches: Callable[[Mapping[int, Point]], Sequence[Sequence[int]]] | None = None
     timed: bool = False
     settings: Point = field(default_factory=dict)
+    numbers: Callable[[xr.Dataset], Mapping[str, Any]] | None = None
 
 
 def study_of_one(compute: Callable[[bool], xr.Dataset], **more: Any) -> Study:
