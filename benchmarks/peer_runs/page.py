@@ -3,7 +3,6 @@
 from pathlib import Path
 
 import numpy as np
-from figure import draw
 from growth import at_equal_error, at_equal_time, best_for_them, error_of, exponent, limit
 from works import WORKS
 
@@ -21,6 +20,8 @@ def write_page(rows):
     before, rest = PAGE.read_text(encoding="utf-8").split(BEGIN)
     after = rest.split(END)[1]
     PAGE.write_text(before + BEGIN + report(rows) + END + after, encoding="utf-8")
+    from figure import draw  # matplotlib takes longer to load than the tables to write
+
     for work in WORKS.values():
         if curves := error_curves(work, rows):
             draw(work, curves)
@@ -107,6 +108,15 @@ def _notes(work, rows):
     mine = _rows(work, rows)
     versions = {name: number for row in mine for name, number in row.get("versions", {}).items()}
     notes = ["Versions: " + ", ".join(f"{name} {number}" for name, number in sorted(versions.items())) + "."]
+    notes += [
+        "Reference: "
+        + ", ".join(
+            f"{r['resolution']} ({r['case']}, {seconds(r['seconds'])})"
+            for r in mine
+            if r["peer"] == "reference" and "seconds" in r
+        )
+        + "."
+    ]
     skipped = [f"{r['peer']} {r['resolution']} ({r['case']}): {r['skipped']}" for r in mine if "skipped" in r]
     notes += [f"Skipped: {'; '.join(skipped)}."] if skipped else []
     first = {(r["case"], r["peer"], r["resolution"]): r["seconds"] for r in mine if "seconds" in r}

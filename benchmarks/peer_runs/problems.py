@@ -56,6 +56,8 @@ TURNS, TURN_RATE = 10, 100.0
 """A dipole of 1 A m² that spins about z for so many turns, Hz."""
 FALL_FROM, FALL_TO = 0.03, 0.015
 """Its height over the plate's face at the beginning and the end, m; it falls uniformly."""
+OBSERVED = (np.arange(2, 9 * TURNS, 5) + 0.5) / (9 * TURN_RATE)
+"""Times (s) at which its reaction is compared: midpoints of steps where a turn has 9, 27, 81 of them."""
 
 
 def falling(time):
@@ -65,3 +67,31 @@ def falling(time):
     height = FALL_FROM + (FALL_TO - FALL_FROM) * part
     position = np.array([0.005, 0.0, PLATE_SIZE[2] / 2 + height])
     return position, np.array([np.cos(phase), np.sin(phase), 0.0])
+
+
+GRAVITY, ROTOR_FREQUENCY = 9.81, 110.0
+FLOATER = {"mass": 0.008043981230672775, "inertia": 1.297413732695212e-07, "moment": 1.0955491045081966}
+ROTOR_OFFSET = 0.002
+"""Of the cube's centre from the axis, along its magnetisation, m."""
+STARTS = {
+    "closed form": [
+        [0.00055857529, 0.0, -0.019640457998],
+        [0.0, 0.386059526, 0.0],
+        [0.2426090217, 0.0, 0.9701241479],
+        [-162.6697559, 0.0, 40.68051539],
+    ],
+    "dipole": [
+        [0.00058286151, 0.0, -0.0195788001],
+        [0.0, 0.4028449542, 0.0],
+        [0.2485053679, 0.0, 0.9686305189],
+        [-166.3667284, 0.0, 42.68193519],
+    ],
+}
+"""Position, velocity, direction of the moment and angular velocity of the floater at t = 0, near levitation."""
+
+
+def start_of_flight(case):
+    """The four vectors (4, 3), the direction of length one."""
+    vectors = np.array(STARTS[case])
+    vectors[2] /= np.linalg.norm(vectors[2])
+    return vectors

@@ -12,6 +12,7 @@ import json
 import os
 import subprocess
 import sys
+import tempfile
 from pathlib import Path
 
 from environments import HERE, Missing, interpreter
@@ -69,19 +70,22 @@ def carry_out(work, rows, run):
         if key in done:
             continue
         rows[:] = [row for row in rows if tuple(row[name] for name in FIELDS) != key]
-        row = {**dict(zip(FIELDS, key, strict=True)), **_job(peer, case, resolution)}
+        with tempfile.TemporaryDirectory() as cache:
+            job = _job(peer, case, resolution, cache)
+        row = {**dict(zip(FIELDS, key, strict=True)), **job}
         seconds = f"{row['seconds']:.3g} s" if "seconds" in row else f"skipped: {row['skipped']}"
         print(f"{work.name}, {case}: {peer.name} {resolution}: {seconds}", file=sys.stderr, flush=True)
         rows.append(row)
         save(SAVED, rows)
 
 
-def _job(peer, case, resolution):
+def _job(peer, case, resolution, cache):
     try:
         python, variables = interpreter(peer.environment)
     except Missing as reason:
         return {"skipped": str(reason)}
     one_thread = dict.fromkeys(("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "OMP_NUM_THREADS"), "1")
+    one_thread["SPINLEV_CACHE"] = cache  # nothing is found ready made
     command = [python, str(HERE / peer.script), case, *resolution.split()]
     try:
         done = subprocess.run(command, env={**os.environ, **one_thread, **variables}, capture_output=True, text=True,

@@ -9,7 +9,7 @@ import pytest
 from places import ROOT
 
 FOLDER = ROOT / "benchmarks" / "peer_runs"
-NAMES = ("environments", "figure", "growth", "page", "run", "works")
+NAMES = ("environments", "growth", "page", "run", "works")
 
 
 @pytest.fixture(scope="module")
@@ -102,7 +102,7 @@ def test_unknown_work_is_told(modules, capsys):
     with pytest.raises(SystemExit) as stopped:
         modules["run"].main(["plates"])
     assert stopped.value.code == 2
-    assert "Input WORK must be one of field, points, force, plate" in capsys.readouterr().err
+    assert "Input WORK must be one of field, points, force, plate, fall, flight" in capsys.readouterr().err
 
 
 def test_a_peer_that_the_machine_lacks_is_named_and_others_go_on(modules, monkeypatch, tmp_path, capsys):
