@@ -33,10 +33,10 @@ def reaction():
     space = ng.HCurl(mesh, order=order, dirichlet="far", gradientdomains=inside)
     trial, test = space.TnT()
     metal, rate = mesh.Materials("plate"), MU_0 * CONDUCTIVITY * MILLI**2
-    stiff = ng.curl(trial) * ng.curl(test) * ng.dx + 1e-8 * trial * test * ng.dx("air")
+    stiff = ng.curl(trial) * ng.curl(test) * ng.dx + 1e-12 * trial * test * ng.dx("air")
     stiffness = ng.BilinearForm(stiff).Assemble()
     implicit = ng.BilinearForm(rate * trial * test * ng.dx(definedon=metal))
-    implicit += 0.5 * STEP * ng.curl(trial) * ng.curl(test) * ng.dx + 0.5e-8 * STEP * trial * test * ng.dx("air")
+    implicit += 0.5 * STEP * ng.curl(trial) * ng.curl(test) * ng.dx + 0.5e-12 * STEP * trial * test * ng.dx("air")
     implicit.Assemble()
     inverse = implicit.mat.Inverse(space.FreeDofs(), inverse="sparsecholesky")
     # The source's place and moment are parameters: one form, compiled once, is assembled at every step

@@ -45,4 +45,4 @@ def reaction():
 
 
 (table, values), seconds = measure(reaction, rounds=1)
-say(values, seconds, len(table.rates), {"spinlev": version("spinlev")})
+say(values, seconds, len(table.rates), {"spinlev": version("spinlev")}, stated=table.errors.total)

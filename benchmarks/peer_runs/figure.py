@@ -3,6 +3,7 @@
 from pathlib import Path
 
 from growth import useful
+from matplotlib.ticker import NullFormatter
 
 from spinlev.studies.results import legend_below, panels, save_figure, styled
 
@@ -33,6 +34,7 @@ def _figure(work, curves):
             panel.loglog(time, [max(e, LEAST) for e in error], MARKERS[k], color=colour, label=name)
             time, error = zip(*useful(pairs), strict=True)
             panel.loglog(time, [max(e, LEAST) for e in error], "-", color=colour)
+        panel.xaxis.set_minor_formatter(NullFormatter())
         panel.set(title=case, xlabel="processor time (s)")
     axes.flat[0].set_ylabel("relative error")
     legend_below(figure, *axes.flat, columns=3)

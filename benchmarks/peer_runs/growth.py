@@ -3,6 +3,9 @@
 import numpy as np
 from scipy.optimize import brentq
 
+LEAST_SPAN = 2.0
+"""Of processor times, for an exponent."""
+
 
 def error_of(values, reference):
     """The largest relative distance of a row of `values` (n, k) from that of `reference`."""
@@ -12,8 +15,8 @@ def error_of(values, reference):
 
 
 def exponent(pairs):
-    """Slope of log error over log time by least squares; nan where there are less than three pairs."""
-    if len(pairs) < 3:
+    """Slope of log error over log time by least squares; nan for less than three pairs or times that hardly differ."""
+    if len(pairs) < 3 or max(pairs)[0] < LEAST_SPAN * min(pairs)[0]:
         return np.nan
     time, error = np.log(np.array(sorted(pairs))).T
     centred = time - time.mean()

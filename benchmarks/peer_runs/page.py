@@ -33,12 +33,14 @@ def report(rows):
 
 
 def error_curves(work, rows):
-    """Pairs (processor time, error) by case and library, of the first run."""
+    """Pairs (processor time, error) by case and library, of the first run; no error is below the reference's own."""
     references = _references(work, rows)
     curves = {}
     for row in _rows(work, rows):
         if row["peer"] != "reference" and row["case"] in references and "values" in row:
-            pair = (row["seconds"], error_of(row["values"], references[row["case"]]))
+            reference = references[row["case"]]
+            error = max(error_of(row["values"], reference["values"]), reference.get("stated", 0.0))
+            pair = (row["seconds"], error)
             curves.setdefault((row["case"], row["peer"]), []).append(pair)
     return curves
 
@@ -51,7 +53,7 @@ def _rows(work, rows, run=1):
 
 def _references(work, rows):
     mine = _rows(work, rows)
-    return {row["case"]: row["values"] for row in mine if row["peer"] == "reference" and "values" in row}
+    return {row["case"]: row for row in mine if row["peer"] == "reference" and "values" in row}
 
 
 def _section(work, rows):
@@ -101,7 +103,7 @@ def _own_limit(work, case, peer, mine, rows):
     found = limit([row["h"] for row in mine], [row["values"] for row in mine])
     if found is None:
         return "does not settle"
-    return f"{error_of(found[0], _references(work, rows)[case]):.1e} off (h^{found[1]:.1f})"
+    return f"{error_of(found[0], _references(work, rows)[case]['values']):.1e} off (h^{found[1]:.1f})"
 
 
 def _notes(work, rows):

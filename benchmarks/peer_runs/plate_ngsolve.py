@@ -36,7 +36,7 @@ def reaction():
     trial, test = space.TnT()
     rate = 2j * np.pi * frequency * MU_0 * CONDUCTIVITY * MILLI**2
     metal = mesh.Materials("plate")
-    form = ng.BilinearForm(ng.curl(trial) * ng.curl(test) * ng.dx + 1e-8 * trial * test * ng.dx("air")
+    form = ng.BilinearForm(ng.curl(trial) * ng.curl(test) * ng.dx + 1e-12 * trial * test * ng.dx("air")
                            + rate * trial * test * ng.dx(definedon=metal)).Assemble()  # fmt: skip
     inverse = form.mat.Inverse(space.FreeDofs(), inverse="umfpack")
     found, solution = [], ng.GridFunction(space)

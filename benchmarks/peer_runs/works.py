@@ -68,13 +68,15 @@ FIELD = Work(
     ),
     (
         _ours("field_spinlev.py", "1e-3", "1e-4", "1e-5"),
-        Peer("MagTense", "magtense", "field_magtense.py", ("4", "6", "8", "12"), True),
+        Peer("MagTense", "magtense", "field_magtense.py", ("4", "6", "8"), True),
+        Peer("MagTense", "magtense", "field_magtense.py", ("12",), only=("cube",)),
         Peer("magpylib, volume averages", "magpylib", "field_magpylib.py", ("4 newell", "8 newell", "16 newell"), True),
         Peer("magpylib, cell centres", "magpylib", "field_magpylib.py", ("4 point", "8 point", "16 point"), True),
         Peer("magpylib, volume averages", "magpylib", "field_magpylib.py", ("32 newell",), only=("cube",)),
         Peer("magpylib, cell centres", "magpylib", "field_magpylib.py", ("32 point",), only=("cube",)),
-        Peer("scikit-fem", "spinlev", "field_scikit_fem.py", ("3", "2", "1.4")),
-        Peer("GetDP", "getdp", "field_getdp.py", ("3", "1.5", "0.8")),
+        Peer("scikit-fem", "spinlev", "field_scikit_fem.py", ("3", "2", "1.4"), only=("cube",)),
+        Peer("GetDP", "getdp", "field_getdp.py", ("3", "2", "1.5")),
+        Peer("GetDP", "getdp", "field_getdp.py", ("0.8",), only=("cube",)),
     ),
 )  # fmt: skip
 POINTS = Work(
@@ -120,9 +122,9 @@ PLATE = Work(
     (_reference("plate_spinlev.py", "1e-4"),),
     (
         _ours("plate_spinlev.py", "1e-2", "1e-3"),
-        Peer("GetDP, first order", "getdp", "plate_getdp.py", ("8 1", "5 1", "3.2 1"), True),
-        Peer("NGSolve, first order", "spinlev", "plate_ngsolve.py", ("12 1", "8 1", "5 1")),
-        Peer("NGSolve, higher order", "spinlev", "plate_ngsolve.py", ("16 2", "12 2", "8 2")),
+        Peer("GetDP, first order", "getdp", "plate_getdp.py", ("10 1", "8 1", "5 1"), True),
+        Peer("NGSolve, first order", "spinlev", "plate_ngsolve.py", ("16 1", "12 1", "8 1")),
+        Peer("NGSolve, higher order", "spinlev", "plate_ngsolve.py", ("20 2", "16 2", "12 2")),
     ),
 )
 FALL = Work(
@@ -130,10 +132,10 @@ FALL = Work(
     "The same plate while a dipole spins above it and falls, ten turns",
     "Largest relative error of B at the dipole at 18 times. Time from nothing: mesh, factor or table, all steps.",
     ("fall",),
-    (_reference("fall_spinlev.py", "1e-4"),),
+    (_reference("fall_spinlev.py", "5e-4"),),
     (
-        _ours("fall_spinlev.py", "3e-2", "1e-2", "1e-3"),
-        Peer("NGSolve, trapezoidal rule", "spinlev", "fall_ngsolve.py", ("16 1 9", "16 2 27", "12 2 27", "12 2 81")),
+        _ours("fall_spinlev.py", "1e-1", "3e-2", "1e-2"),
+        Peer("NGSolve, trapezoidal rule", "spinlev", "fall_ngsolve.py", ("16 1 9", "16 1 27", "16 2 27")),
     ),
 )
 FLIGHT = Work(

@@ -30,6 +30,7 @@ def test_error_is_the_largest_of_all_rows(modules):
 def test_exponent_of_a_power(modules):
     assert modules["growth"].exponent([(t, 7 * t**-1.5) for t in (0.1, 2, 30)]) == pytest.approx(-1.5)
     assert np.isnan(modules["growth"].exponent([(1, 1), (2, 0.5)]))
+    assert np.isnan(modules["growth"].exponent([(1, 1), (1.1, 0.1), (1.2, 0.01)]))
 
 
 def test_ratios_at_equal_error_and_at_equal_time(modules):
@@ -87,6 +88,12 @@ def test_report_says_first_who_is_quicker_and_what_was_skipped(modules):
     assert "| 0.33 at 1.0e-01 |" in said
     assert "Skipped: MagTense closed form (field): its wheel is for Python 3.11 alone." in said
     assert "Times of a second run over those of the first, 1 rows: 1.50 to 1.50, median 1.50." in said
+
+
+def test_no_error_is_said_that_is_less_than_the_references_own(modules):
+    made = rows()
+    made[0]["stated"] = 0.2
+    assert "2.0e-01 in 1 s" in modules["page"].report(made)
 
 
 def test_the_page_is_what_the_raw_numbers_say(modules):
