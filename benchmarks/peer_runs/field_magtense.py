@@ -18,6 +18,8 @@ def field():
     cubes = len(centres)
     tiles = Tiles(n=cubes, tile_type=2, size=[EDGE] * 3, offset=centres, rot=[[0.0, -angle, 0.0]] * cubes,
                   M_rem=REMANENCE / MU_0, easy_axis=axes, mu_r_ea=RECOIL, mu_r_oa=RECOIL)  # fmt: skip
+    for across in (tiles.u_oa1, tiles.u_oa2):  # they are not of length one where the easy axis is oblique
+        across /= np.linalg.norm(across, axis=1)[:, None]
     tiles.refine_prism(list(range(cubes)), [n, n, n])
     tiles.M_rem = REMANENCE / MU_0  # refining leaves the remanence of new tiles at zero
     iterate_magnetization(tiles, max_error=1e-8)

@@ -16,6 +16,8 @@ def wrench():
     tiles = Tiles(n=2, tile_type=[6, 2], size=[[radius, 0, 0], [EDGE] * 3], offset=[SPHERE_CENTER, np.zeros(3)],
                   M_rem=REMANENCE / MU_0, easy_axis=[SPHERE_AXIS, np.array([1.0, 0, 0])], mu_r_ea=RECOIL,
                   mu_r_oa=RECOIL)  # fmt: skip
+    for across in (tiles.u_oa1, tiles.u_oa2):  # they are not of length one where the easy axis is oblique
+        across /= np.linalg.norm(across, axis=1)[:, None]
     tiles.refine_prism(1, [n, n, n])
     tiles.M_rem = REMANENCE / MU_0  # refining leaves the remanence of new tiles at zero
     iterate_magnetization(tiles, max_error=1e-8)
