@@ -8,7 +8,7 @@ OLD ?= benchmarks/measured.json
 NEW ?= out/benchmarks.json
 SOURCES := $(shell find spinlev geometry fem dynamics studies scenes -type f -not -name "*.pyc") setup.py pyproject.toml README.md LICENSE
 
-.PHONY: install run test test-browser lint types coverage bench bench-compare dist dependencies docs validate fuzz lock clean
+.PHONY: install run test test-browser lint types coverage bench bench-compare bench-peers dist dependencies docs validate fuzz lock clean
 
 install: $(VENV)/installed
 
@@ -65,6 +65,11 @@ bench: install
 	$(BIN)/pytest benchmarks --benchmark-timer=time.process_time --benchmark-columns=min,median,rounds \
 	  --benchmark-json=$(NEW)
 	$(BIN)/python benchmarks/ratios.py $(NEW) | tee out/benchmarks.md
+
+# Other people's programs on the same problems, in environments of their own under out/peers; WORK=plate does one of them.
+# A row that is finished stays; RUN=--again does them anew, RUN=--second fills the second run, whose times give the spread.
+bench-peers: install
+	$(BIN)/python benchmarks/peer_runs/run.py $(WORK) $(RUN)
 
 # Two commits: make bench in both, then make bench-compare OLD=theirs.json; by default with the one in the repository.
 bench-compare: install

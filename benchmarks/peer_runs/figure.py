@@ -1,0 +1,41 @@
+"""Error against processor time: one figure for each work, a panel for each case."""
+
+from pathlib import Path
+
+from growth import useful
+from matplotlib.ticker import NullFormatter
+
+from spinlev.studies.results import legend_below, panels, save_figure, styled
+
+PICTURES = Path("docs/pictures")
+MARKERS = "osD^vP*X"
+LEAST = 1e-16
+"""Errors below are drawn here."""
+
+
+def draw(work, curves):
+    """Save the figure of a work as docs/pictures/peers-NAME.png."""
+    figure = _figure(work, curves)
+    save_figure(figure, PICTURES / f"peers-{work.name}.png")
+
+
+@styled
+def _figure(work, curves):
+    cases = [case for case in work.cases if any(one == case for one, _ in curves)]
+    figure, axes = panels(1, len(cases), (2.6 * len(cases) + 0.6, 3.4), sharey=True)
+    names = sorted({peer for _, peer in curves}, key=lambda name: (name != "spinlev", name))
+    for panel, case in zip(axes.flat, cases, strict=True):
+        for k, name in enumerate(names):
+            pairs = sorted(curves.get((case, name), []))
+            if not pairs:
+                continue
+            time, error = zip(*pairs, strict=True)
+            colour = "black" if name == "spinlev" else f"C{k}"
+            panel.loglog(time, [max(e, LEAST) for e in error], MARKERS[k], color=colour, label=name)
+            time, error = zip(*useful(pairs), strict=True)
+            panel.loglog(time, [max(e, LEAST) for e in error], "-", color=colour)
+        panel.xaxis.set_minor_formatter(NullFormatter())
+        panel.set(title=case, xlabel="processor time (s)")
+    axes.flat[0].set_ylabel("relative error")
+    legend_below(figure, *axes.flat, columns=3)
+    return figure

@@ -1,0 +1,37 @@
+"""spinlev: force and torque on a magnetised sphere, rigid by closed form, permeable by the two-body solution.
+
+The resolution is the order of the finite elements of the rotor's answer.
+"""
+
+import sys
+from importlib.metadata import version
+
+import numpy as np
+from problems import EDGE, RECOIL, REMANENCE, SPHERE, SPHERE_AXIS, SPHERE_CENTER
+from said import measure, say
+
+from spinlev.fem.mutual import rotor_ladder, two_body
+from spinlev.fem.rotor_tables import rotor_table
+from spinlev.geometry import Box, Floater, Magnet
+
+case = sys.argv[1]
+order = 1 if case == "rigid" else int(sys.argv[2])
+cube = Magnet(Box((EDGE,) * 3, np.zeros(3)), np.array([REMANENCE, 0, 0]), 1.0 if case == "rigid" else RECOIL)
+recoil = 1.0 if case == "rigid" else SPHERE["recoil"]
+floater = Floater(SPHERE["diameter"] / 2, SPHERE["polarization"], recoil, 7500.0)
+
+
+def rigid():
+    field, gradient = (value[0] for value in rotor_table((cube,), "cuboid").evaluate(SPHERE_CENTER[None])[:2])
+    moment = floater.moment * SPHERE_AXIS
+    return moment @ gradient, np.cross(moment, field)
+
+
+def permeable():
+    (rotor,) = rotor_ladder((cube,), (order,))
+    total = two_body(rotor, floater, SPHERE_CENTER, SPHERE_AXIS).total
+    return total.force, total.torque
+
+
+values, seconds = measure(rigid if case == "rigid" else permeable)
+say(values, seconds, order, {"spinlev": version("spinlev")})
