@@ -147,22 +147,17 @@ def test_a_complete_table_of_closed_forms_is_magpylibs_and_refuses_edges():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("distance", [0.2e-3, 1e-3, 3e-3])
-def test_next_to_faces_inside_the_circumscribed_sphere_near_and_far_field_meet(distance):
-    """Cube, μr = 1.05: at the corners' sphere the table of moments and the elements agree within what both state."""
+def test_the_table_of_moments_and_the_elements_agree_within_what_they_state():
+    """Cube, μr = 1.05: 1 mm beyond the sphere through its corners, 1e-3 asked of the elements."""
     magnet = Magnet(Box((0.01,) * 3), (1.3, 0, 0), 1.05)
-    table = complete(rotor_table((magnet,), "fem", 1e-6, 3.7e-3))
+    table = complete(rotor_table((magnet,), "fem", 1e-5), 1e-3)
     ways = np.random.default_rng(2).normal(size=(60, 3))
-    ways /= np.linalg.norm(ways, axis=1)[:, None]
-    near = ways * (magnet.body.circumradius - 1e-7)
-    far = ways * (magnet.body.circumradius + 1e-3)
-    found, beyond = near_field((magnet,), far), table.evaluate(far)
-    assert np.all(np.linalg.norm(found.flux_density - beyond[0], axis=1) <= found.error + table.absolute_error(far)[0])
-    at_face = near * np.array([5e-3 + distance, 3e-3, 3e-3]) / np.abs(near).max(axis=1)[:, None]
-    outside = magnet.body.distance(at_face) > 0
-    inner = table.fields(at_face[outside])
-    assert inner.error.max() < 2e-4 * 1.3
-    assert np.abs(np.trace(inner.gradient, axis1=1, axis2=2)).max() < 3 * inner.gradient_error.max() + 1e-6
+    points = ways / np.linalg.norm(ways, axis=1)[:, None] * (magnet.body.circumradius + 1e-3)
+    points = points[table.in_range(points)]
+    assert len(points) > 30
+    found = near_field((magnet,), points, 1e-3)
+    apart = np.linalg.norm(found.flux_density - table.evaluate(points)[0], axis=1)
+    assert np.all(apart <= found.error + table.absolute_error(points)[0])
 
 
 @pytest.mark.parametrize("permeability", [1.0, 1.05])
