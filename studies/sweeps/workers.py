@@ -126,6 +126,7 @@ def _client(scheduler: str | None, number: int) -> Iterator[Client]:
     from distributed import Client, LocalCluster
 
     if scheduler is not None:
+        note(f"Scheduler {scheduler} ...")
         try:
             client = Client(scheduler, set_as_default=False)
         except (OSError, ValueError, TimeoutError) as error:
