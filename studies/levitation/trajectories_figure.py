@@ -18,7 +18,7 @@ LOST = (SHORT, "linear fall", "oscillating loss")
 @styled
 def flight_figure(result: xr.Dataset) -> Figure:
     """The distance in each flight, one panel for each displacement."""
-    figure, (axes,) = panels(1, result.sizes["case"], (PAGE, 3.0), sharey=True)
+    figure, (axes,) = panels(1, result.sizes["case"], (PAGE, 4.2), sharey=True)
     for panel, k in zip(axes, range(result.sizes["case"]), strict=True):
         rotor = result.isel(case=k)
         for one, color in zip(range(rotor.sizes["frequency"]), PALETTE, strict=False):
@@ -26,7 +26,7 @@ def flight_figure(result: xr.Dataset) -> Figure:
         panel.set(xlabel="time (s)", ylim=(11, 40))
         panel.set_title(rotor_label("horizontal", float(rotor["value"])))
         panel.plot([], [], "--", color="0.3", label="averaged flight")
-        panel.legend(loc="upper right")
+        panel.legend(loc="upper center", bbox_to_anchor=(0.5, -0.17))
     axes[0].set_ylabel("levitation distance (mm)")
     return figure
 

@@ -32,7 +32,7 @@ def design_figure(result: xr.Dataset) -> Figure:
         for one in _wish(result, distance, frequency):
             _margins(place, one)
         place.set_title(f"{1e3 * distance:g} mm at {frequency:g} Hz")
-        place.yaxis.set_major_formatter(PercentFormatter(1.0, decimals=0))
+        place.yaxis.set_major_formatter(PercentFormatter(1.0))
         place.margins(y=0.15)
         place.set(ylim=(-0.02, None))
         place.legend(loc="upper left")
