@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from bokeh.models import ColumnDataSource, DataRange1d, LinearColorMapper, PointDrawTool, Range1d
+from bokeh.models import ColumnDataSource, LinearColorMapper, PointDrawTool, Range1d
 from bokeh.plotting import figure
 
 from ...geometry.scenes import Scene
@@ -16,6 +16,10 @@ REGION_COLORS = ("#FFFFFF", "#D8DEE9", "#56B4E9")
 """Where nothing levitates, only unstably, and stably."""
 ROLLING = 4000
 """Samples in a running plot."""
+LOW, HIGH, SIDE = -60.0, 15.0, 34.0
+"""What the side view shows: heights, and to both sides, mm."""
+FRAME = 300
+"""Height of the side view, pixels."""
 LOOK: dict[str, Any] = {"toolbar_location": None, "sizing_mode": "stretch_width"}
 
 
@@ -59,11 +63,9 @@ class SideView:
         self.floater = ColumnDataSource({"x": [], "z": [], "r": []}, name="floater")
         self.bodies = ColumnDataSource({"x": [], "z": []})
         self.equilibria = ColumnDataSource({"x": [], "z": []})
-        plot = figure(height=340, tools="", name="side", x_axis_label="x (mm)", y_axis_label="z (mm)", **LOOK)
-        self.frame = ColumnDataSource({"x": [-30, 30], "z": [-60, 15]})
-        corners = [plot.scatter("x", "z", source=self.frame, alpha=0)]  # ranges that are not given have one scale
-        plot.x_range, plot.y_range = (DataRange1d(renderers=corners, range_padding=0) for _ in range(2))
-        plot.match_aspect = True
+        look = {"toolbar_location": None, "frame_width": int(FRAME * 2 * SIDE / (HIGH - LOW)), "frame_height": FRAME}
+        plot = figure(tools="", name="side", x_axis_label="x (mm)", y_axis_label="z (mm)", **look)
+        plot.x_range, plot.y_range = Range1d(-SIDE, SIDE), Range1d(LOW, HIGH)
         plot.patches("x", "z", source=self.bodies, color=MAGNET, alpha=0.8)
         plot.scatter("x", "z", source=self.equilibria, marker="x", size=9, color="#2E3440", line_width=2)
         ball = plot.circle("x", "z", radius="r", source=self.floater, color=BALL, alpha=0.6, line_color=NORTH)
@@ -80,9 +82,11 @@ class SideView:
     def place(self, x: float, z: float, radius: float) -> None:
         """Put the floater; mm."""
         self.floater.data = {"x": [x], "z": [z], "r": [radius]}
-        low = min(-60.0, z - 2 * radius)
-        if self.frame.data["z"][0] != low:
-            self.frame.data = {"x": [-30, 30], "z": [low, 15]}
+        low = min(LOW, z - 2 * radius)
+        if self.figure.y_range.start != low:
+            side = SIDE * (HIGH - low) / (HIGH - LOW)  # of one scale with the height
+            self.figure.y_range.start = low
+            self.figure.x_range.update(start=-side, end=side)
 
 
 class RunningPlot:

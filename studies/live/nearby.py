@@ -129,7 +129,7 @@ class _Family:
         key = MEASURES[self.configuration][0].partition(".")[2]
         measure = np.radians(rotor[key]) if key == "angle_deg" else 1e-3 * likeness * rotor[key]
         family = replace(self.family, scene=like(scene, likeness))
-        return _Problem(family.rates, family.values(scene.frequency, measure)[0], state.spin, likeness, family)
+        return _Problem(self.family.rates, family.values(scene.frequency, measure)[0], state.spin, likeness, family)
 
 
 def _family(state: PageState) -> _Family | None:

@@ -18,7 +18,7 @@ from spinlev.geometry.bodies import article_rotors as rotor
 from spinlev.geometry.scenes import Drag, Floater, Scene
 
 FLOATER = Floater(radius=6.35e-3, remanence=1.305, recoil_permeability=1.0, density=7500.0)
-SHAPE = {"edge": 10e-3, "remanence": 1.305, "recoil_permeability": 1.0}
+SHAPE = {"body": 10e-3, "remanence": 1.305, "recoil_permeability": 1.0}
 SCENES = {
     "horizontal": Scene(110.0, rotor.horizontal(2e-3, **SHAPE), FLOATER, Drag(0.0, 0.0)),
     "vertical": Scene(80.0, rotor.vertical(14e-3, **SHAPE), FLOATER, Drag(0.0, 0.0)),

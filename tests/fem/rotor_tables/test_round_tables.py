@@ -33,7 +33,7 @@ def test_a_permeable_sphere_is_its_exact_dipole(permeability):
 
 
 def test_a_tilted_sphere_is_the_sphere_with_a_tilted_polarisation():
-    (turned,) = tilt(0.2, 0.0, 1.3, 1.05, None, Sphere(9.5e-3))
+    (turned,) = tilt(0.2, Sphere(9.5e-3), 1.3, 1.05)
     upright = Magnet(Sphere(9.5e-3), turned.polarization_in_rotor, 1.05)
     points = np.random.default_rng(0).uniform(0.01, 0.03, (20, 3))
     fields = [rotor_table((magnet,), "fem").evaluate(points)[0] for magnet in (turned, upright)]

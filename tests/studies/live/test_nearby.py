@@ -43,6 +43,17 @@ def test_every_slider_of_a_tilted_dipole(tilted, index):
     assert_same(found, Levitation(state.scene, state.models, state.spin))
 
 
+def test_nothing_is_compiled_for_a_neighbour(tilted, monkeypatch):
+    tilted.at(tilted.state)
+
+    def compiled(*_, **__):
+        raise AssertionError("compiled anew")
+
+    monkeypatch.setattr("spinlev.dynamics.motion.rates.compiled", compiled)
+    for key, value in (("frequency_hz", 131.0), ("rotor.angle_deg", 10.4), ("rotor.edge_mm", 10.2)):
+        assert tilted.at(tilted.state.changed(key, value)) is not None
+
+
 @pytest.mark.parametrize(("model", "conductivity"), [("cuboid", None), ("dipole", 6.7e5)])
 def test_displacement_and_edge_at_once(model, conductivity):
     """Also with the floater's own eddy currents, which the similarity of edges has to keep."""
