@@ -1,0 +1,33 @@
+"""Two bounces in the time of one precession: a small oscillation grows although no small motion is unstable."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import spinlev as sl
+from spinlev.studies.one_scene import Levitation
+from spinlev.studies.terminal import Models
+
+SCENE = sl.scene(
+    frequency_hz=150.0,
+    rotor=sl.horizontal(displacement_mm=2.0, edge_mm=10.0, remanence_T=1.305),
+    floater=sl.sphere(diameter_mm=12.7, remanence_T=1.305, density_kg_m3=7500.0),
+    drag={"linear_N_s_m": 0.0, "angular_N_m_s": 0.0},
+)
+
+
+@pytest.mark.slow  # 40 s
+def test_two_bounces_in_one_precession_lose_the_floater():
+    """Without any loss, from 0.02 mm off a stable equilibrium: lost at the resonance, up beside it."""
+    scene, first = replace(SCENE, start=replace(SCENE.start, offset=np.array([0.0, 0.0, 0.02e-3]))), None
+    for spin, resonant in ((0.38, False), (0.423, True), (0.47, False)):
+        levitation = Levitation(scene, Models("fem", "none", interaction="mutual"), spin)
+        if first is not None:
+            levitation.share(first)
+        first = first or levitation
+        stable = levitation.equilibria[0]
+        modes = {mode.name: mode.frequency_hz for mode in stable.modes}
+        assert stable.stable
+        assert (abs(2 * modes["bounce"] - modes["precession"]) < 0.1) == resonant
+        assert levitation.flight(10.0).ended_by == ("lost" if resonant else "duration")
