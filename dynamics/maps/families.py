@@ -1,7 +1,9 @@
 """Scenes that differ in the rotor's frequency and in one measure of the rotor: what a map or a curve runs over."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -11,7 +13,7 @@ from ...fem.rotor_losses import check_slow_enough, pieces_of
 from ...fem.rotor_tables import RotorTable, cached_rotor_table, rotor_table
 from ...geometry.basics import Array, moved
 from ...geometry.bodies import Magnet
-from ...geometry.scenes import Scene, scene_keys
+from ...geometry.scenes import Scene
 from ..branches import Problem
 from ..effects import with_effects
 from ..motion import Effect, Interaction, Parameter, Rates, Scales, parameters
@@ -137,9 +139,8 @@ def _alone(magnet: Magnet, model: str, rtol: float, nearest: float | None) -> Ro
     return rotor_table((magnet,), model, rtol, nearest)
 
 
-def article_measure(scene: Scene) -> tuple[str, float] | None:
-    """Configuration of a rotor of the article and its displacement (m) or tilt (rad); None for any other rotor."""
-    rotor = scene_keys(scene)["rotor"]
+def article_measure(rotor: Mapping[str, Any]) -> tuple[str, float] | None:
+    """Configuration and displacement (m) or tilt (rad) in the keys of a scene file's rotor; None if it has none."""
     configuration = rotor.get("configuration")
     if configuration is None:
         return None

@@ -71,6 +71,12 @@ class MultipoleExpansion:
         return FOUR_PI * self.radius**3 / MU_0 * np.array([-2 * c[1].real, 2 * c[1].imag, c[0].real])
 
     @cached_property
+    def own_coefficients(self) -> Coefficients:
+        """c_lm (T) along its own axes."""
+        turned = rotated_harmonics(self.coefficients, self.axes.T)
+        return turned if turned is self.coefficients else without_noise(turned, TURNED)
+
+    @cached_property
     def components(self) -> tuple[list[dict[Any, float]], list[list[dict[Any, float]]]]:
         """Real-harmonic weights of B_i and of ∂B_i/∂x̃_j."""
         potentials = [-derivative(self.coefficients, i) for i in range(3)]
@@ -91,8 +97,8 @@ class MultipoleExpansion:
 
     def _along_axes(self, place: list[hy.expression]) -> tuple[list[hy.expression], list[list[hy.expression]]]:
         """Expressions along other axes, turned back."""
-        own = without_noise(rotated_harmonics(self.coefficients, self.axes.T), TURNED)
-        b, slope = MultipoleExpansion(np.zeros(3), self.radius, own).expressions(_turned(self.axes.T, place))
+        own = MultipoleExpansion(np.zeros(3), self.radius, self.own_coefficients)
+        b, slope = own.expressions(_turned(self.axes.T, place))
         rows = [_turned(self.axes, row) for row in slope]
         columns = [_turned(self.axes, [row[j] for row in rows]) for j in range(3)]
         return _turned(self.axes, b), [[columns[j][i] for j in range(3)] for i in range(3)]

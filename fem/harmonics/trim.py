@@ -8,6 +8,7 @@ import numpy as np
 from ...geometry.basics import Array
 from .multipole import MultipoleExpansion
 from .solid import irregular_gradient, irregular_values
+from .turning import rotated_harmonics
 
 Part = tuple[int, int, int, complex]
 """Number of the expansion, l, m, and the real or imaginary part of the coefficient."""
@@ -23,13 +24,15 @@ def trimmed_expansions(
     """The coefficients that matter, and what they leave out: at most `allowed` (n,) T at points (n, 3) m.
 
     The smallest ones are left out first. Those that stay are fitted to the whole field (weighted least squares), and
-    stand in for what is missing: little more than half as many do then. Dipole moments stay as they are.
+    stand in for what is missing: little more than half as many do then. Dipole moments stay as they are.  Coefficients
+    are those along each expansion's own axes, where its expressions are written.
     """
     parts = [
         (k, int(l), int(m), part)
         for k, expansion in enumerate(expansions)
-        for l, m in zip(*np.nonzero(expansion.coefficients), strict=True)
-        for part in (expansion.coefficients[l, m].real, 1j * expansion.coefficients[l, m].imag)
+        for own in (expansion.own_coefficients,)
+        for l, m in zip(*np.nonzero(own), strict=True)
+        for part in (own[l, m].real, 1j * own[l, m].imag)
         if part
     ]
     if not parts:
@@ -98,22 +101,23 @@ def _largest(field: Array) -> float:
 
 
 def _fields(expansion: MultipoleExpansion, parts: list[Part], points: Array) -> Array:
-    """B (parts, n, 3) of every single part."""
+    """B (parts, n, 3) of every single part, which is along the expansion's own axes."""
     if not parts:
         return np.zeros((0, len(points), 3))
-    harmonics = irregular_values(expansion.degree + 1, (points - expansion.center) / expansion.radius)
+    places = (points - expansion.center) @ expansion.axes / expansion.radius
+    harmonics = irregular_values(expansion.degree + 1, places)
     fields = []
     for _, l, m, value in parts:
         gradient = irregular_gradient(harmonics, l, m)
         fields.append([-(1 if m == 0 else 2) * np.real(value * component) for component in gradient])
-    return np.moveaxis(np.array(fields), 1, 2)
+    return np.moveaxis(np.array(fields), 1, 2) @ expansion.axes.T
 
 
 def _with(expansion: MultipoleExpansion, parts: list[Part], number: int) -> MultipoleExpansion:
-    """The expansion with only the given parts among those of its number, no longer than they need."""
+    """The expansion with only the given parts among those of its number, along its own axes; as long as they need."""
     mine = [part for part in parts if part[0] == number]
     degree = max((l for _, l, _, _ in mine), default=0)
     coefficients = np.zeros((degree + 1, degree + 1), complex)
     for _, l, m, value in mine:
         coefficients[l, m] += value
-    return replace(expansion, coefficients=coefficients)
+    return replace(expansion, coefficients=rotated_harmonics(coefficients, expansion.axes))

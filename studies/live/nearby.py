@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...dynamics.equilibria import SearchRange, carried, field_doubts, told
-from ...dynamics.maps import RotorFamily, rotor_family
+from ...dynamics.maps import RotorFamily, article_measure, rotor_family
 from ...dynamics.motion import Parameter, Rates, Scales, has_likes, like, parameters
 from ...dynamics.steady import Balance, Survey
 from ...fem.rotor_tables import ROUND_OFF, RotorTable
@@ -121,13 +121,13 @@ class _Family:
 
     def problem(self, state: PageState) -> _Problem | None:
         rotor, scene = state.keys["rotor"], state.scene
-        if rotor.get("configuration") != self.configuration or _rest(state) != self.rest:
+        found = article_measure(rotor)
+        if found is None or found[0] != self.configuration or _rest(state) != self.rest:
             return None
         likeness = self.edge / rotor["edge_mm"]
         if likeness != 1 and not has_likes(scene):
             return None
-        key = MEASURES[self.configuration][0].partition(".")[2]
-        measure = np.radians(rotor[key]) if key == "angle_deg" else 1e-3 * likeness * rotor[key]
+        measure = found[1] if self.configuration == "tilt" else likeness * found[1]
         family = replace(self.family, scene=like(scene, likeness))
         return _Problem(self.family.rates, family.values(scene.frequency, measure)[0], state.spin, likeness, family)
 

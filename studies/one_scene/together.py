@@ -16,7 +16,7 @@ from ...dynamics.motion import Rates
 from ...dynamics.steady import Indices
 from ...fem.rotor_tables import at_home
 from ...geometry.basics import Array, SpinlevError
-from ...geometry.scenes import startless_text
+from ...geometry.scenes import Scene, scene_keys, startless_text
 from .levitation import Levitation
 from .rotor_of_scene import equations_key
 
@@ -52,10 +52,14 @@ def _family_key(levitation: Levitation) -> str | None:
     if len(scene.rotor) > 1 or scene.conductors or scene.field_map:
         return None
     with suppress(SpinlevError):
-        if found := article_measure(scene):
+        if found := _measure(scene):
             home = equations_key(replace(scene, rotor=at_home(scene.rotor)), levitation.models)
             return f"{found[0]} {levitation.table.model} {levitation.interaction_model} {home}"
     return None
+
+
+def _measure(scene: Scene) -> tuple[str, float] | None:
+    return article_measure(scene_keys(scene)["rotor"])
 
 
 def _find_together(alike: Sequence[Levitation], places: Indices) -> None:
@@ -84,7 +88,7 @@ def _find_together(alike: Sequence[Levitation], places: Indices) -> None:
 
 def _of_family(alike: Sequence[Levitation], different: Mapping[str, Levitation]) -> tuple[Rates, Array]:
     """The equations of a family of rotors, and the measure of each of its scenes."""
-    known = {key: article_measure(levitation.scene) or ("", 0.0) for key, levitation in different.items()}
+    known = {key: _measure(levitation.scene) or ("", 0.0) for key, levitation in different.items()}
     first = alike[0]
     family = rotor_family(
         replace(first.scene, plate=None),

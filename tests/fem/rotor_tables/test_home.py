@@ -5,7 +5,7 @@ import pytest
 
 from spinlev.fem.closed_forms import first_order_moments
 from spinlev.fem.harmonics import uniform_moments
-from spinlev.fem.rotor_tables import Accuracy, cached_rotor_table, rotor_table
+from spinlev.fem.rotor_tables import Accuracy, cached_rotor_table, rotor_table, shortened_table
 from spinlev.fem.rotor_tables.fem_model import fem_table
 from spinlev.fem.rotor_tables.home import added_moments, shape_moments
 from spinlev.geometry.basics import Box, Cylinder, rotation_matrix
@@ -55,3 +55,23 @@ def test_one_table_in_the_cache_serves_every_pose(tmp_path, monkeypatch):
     turned = table.evaluate((POINTS - PLACE) @ TURN + other.box.center)[0] @ TURN.T
     field = rotor_table((MAGNET,), "moments", 1e-4).evaluate(POINTS)[0]
     assert np.abs(turned - field).max() < 1e-13 * np.abs(field).max()
+
+
+def test_a_turned_table_is_shortened_along_its_own_axes():
+    """Along the rotor's axes it would keep almost all of its terms."""
+    upright = Magnet(Box((0.01, 0.01, 0.01)), (1.3, 0.0, 0.0), 1.05)
+    turned = Magnet(Box((0.01, 0.01, 0.01), PLACE, TURN), (1.3, 0.0, 0.0), 1.05)
+    accuracy = Accuracy(3e-6, 0.02)
+    before, after = [], []
+    for magnet in (upright, turned):
+        table = rotor_table((magnet,), "moments", 3e-6, 0.0065)
+        short = shortened_table(table, accuracy)
+        for found, parts in ((before, table.expansions), (after, short.expansions)):
+            found.append(sum(np.count_nonzero(part.own_coefficients) for part in parts))
+        places = magnet.body.center + 0.04 * WAYS / np.linalg.norm(WAYS, axis=1)[:, None]
+        whole = table.evaluate(places)[0]
+        assert (
+            np.linalg.norm(short.evaluate(places)[0] - whole, axis=1).max() < 1e-5 * np.linalg.norm(whole, axis=1).min()
+        )
+    assert before[0] == before[1]
+    assert after[1] <= after[0] + 3 < before[1]
