@@ -31,7 +31,8 @@ class Part(Posed):
     triangles : (n, 3, 3) m, corners of triangles on the surface, outwards, from the middle along the body axes
     extent : (3,) m, edges of the box about it
     origin : (3,) m, the file's origin, from the middle along the body axes
-    volume : m³
+    volume, area : m³, m², of the solid and its surface
+    centroid : (3,) m, from the middle along the body axes
     center : (3,) position of the middle, m
     rotation : (3, 3) matrix whose columns are the body axes (default: none turned)
     """
@@ -42,12 +43,14 @@ class Part(Posed):
     extent: Array
     origin: Array
     volume: float
+    area: float
+    centroid: Array
     center: Array = field(default_factory=lambda: np.zeros(3))
     rotation: Array = field(default_factory=lambda: np.eye(3))
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        for name in ("extent", "origin"):
+        for name in ("extent", "origin", "centroid"):
             object.__setattr__(self, name, frozen_array(getattr(self, name), (3,)))
         object.__setattr__(self, "triangles", frozen_array(self.triangles, (len(self.triangles), 3, 3)))
 

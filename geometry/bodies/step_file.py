@@ -54,7 +54,10 @@ def part_of(text: str, path: Path) -> Part:
     faces = [[places[vertex.nr] for vertex in element.vertices] for element in mesh.Elements(ng.BND)]
     middle = (lower + upper) / 2 * MILLI
     triangles = _outwards(np.array(faces) - middle)
-    return Part(path, text, triangles, (upper - lower) * MILLI, -middle, float(solids[0].mass) * MILLI**3)
+    centroid = np.array([solids[0].center.x, solids[0].center.y, solids[0].center.z]) * MILLI - middle
+    volume = float(solids[0].mass) * MILLI**3
+    area = sum(float(face.mass) for face in solids[0].faces) * MILLI**2
+    return Part(path, text, triangles, (upper - lower) * MILLI, -middle, volume, area, centroid)
 
 
 def _outwards(triangles: Array) -> Array:

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from pydantic import ValidationError
 
-from ..basics import Array, Box, InputError, rotation_matrix
-from ..bodies import Conductor, Magnet, horizontal, tilt, vertical
+from ..basics import Array, Box, InputError, Part, Solid, rotation_matrix
+from ..bodies import Conductor, Magnet, horizontal, known_shape, tilt, vertical
 from .contents import AbsoluteStart, Drag, Floater, Lowering, OffsetStart, Plate, Scene
 from .faults import SceneError, describe_fault, overlap_faults
 from .schema import (
@@ -99,10 +99,11 @@ def _scene(table: SceneSection, folder: Path) -> Scene:
     sphere, drag = table.floater, table.drag or DragSection(model="stokes")
     material = (sphere.remanence_T, sphere.recoil_permeability, sphere.density_kg_m3, sphere.conductivity_S_m)
     floater = Floater(sphere.diameter_mm * MILLI / 2, *material)
+    rotor = _rotor(table.rotor, folder)
     return Scene(
         frequency=table.frequency_hz,
         gravity=np.array(table.gravity_m_s2),
-        rotor=_rotor(table.rotor, folder),
+        rotor=rotor,
         floater=floater,
         plate=_plate(table.plate) if table.plate else None,
         drag=_drag(drag, floater.radius),
@@ -111,6 +112,7 @@ def _scene(table: SceneSection, folder: Path) -> Scene:
         conductors=tuple(
             Conductor(solid(c, c.center_mm, c.rotation_deg), c.conductivity_S_m) for c in table.rotor.conductors
         ),
+        remarks=_recognised(table.rotor, rotor),
     )
 
 
@@ -138,11 +140,33 @@ def _rotor(rotor: Rotor, folder: Path) -> tuple[Magnet, ...]:
 def _magnet(magnet: MagnetSection, rotor: ExplicitRotor, folder: Path) -> Magnet:
     """One of an explicit rotor, whose conductivity and knee it has where it has none of its own."""
     pose = magnet.center_mm, magnet.rotation_deg
-    body = part(folder / magnet.file, *pose) if magnet.file else solid(magnet, *pose)
     along, across = magnet.recoil_permeability
     conductivity = rotor.conductivity_S_m if magnet.conductivity_S_m is None else magnet.conductivity_S_m
-    knee = _knee(magnet.coercivity_kA_m or rotor.coercivity_kA_m)
-    return Magnet(body, np.array(magnet.polarization_T), along, across, conductivity, knee)
+    material = along, across, conductivity, _knee(magnet.coercivity_kA_m or rotor.coercivity_kA_m)
+    polarization = np.array(magnet.polarization_T)
+    if not magnet.file:
+        return Magnet(solid(magnet, *pose), polarization, *material)
+    body = part(folder / magnet.file, *pose)
+    known = known_shape(body)
+    if known is None:
+        return Magnet(body, polarization, *material)
+    return Magnet(known, known.rotation.T @ body.rotation @ polarization, *material)
+
+
+def _recognised(rotor: Rotor, magnets: tuple[Magnet, ...]) -> tuple[str, ...]:
+    """A sentence on each magnet whose file holds a shape that has a closed form."""
+    pairs = zip(rotor.magnets, magnets, strict=True) if isinstance(rotor, ExplicitRotor) else ()
+    return tuple(
+        f"{section.file} is a {_named(magnet.body)} and is computed as one"
+        for section, magnet in pairs
+        if section.file and not isinstance(magnet.body, Part)
+    )
+
+
+def _named(body: Solid) -> str:
+    """A shape with its size, such as `cylinder, Ø 10 × 8 mm`."""
+    name = "cuboid" if isinstance(body, Box) else type(body).__name__.lower()
+    return f"{name}, {body.described_size.removeprefix(name).strip()},"
 
 
 def _knee(coercivity: float | None) -> float | None:

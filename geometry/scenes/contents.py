@@ -134,6 +134,7 @@ class Scene:
     field_map : file of a map of the rotor's B in its frame, or None
     text : the scene file as it was read, for the record
     conductors : metal beside the magnets that turns with the rotor
+    remarks : what was found out about its files, sentences for people
     """
 
     frequency: float
@@ -146,6 +147,7 @@ class Scene:
     field_map: Path | None = None
     text: str = ""
     conductors: tuple[Conductor, ...] = ()
+    remarks: tuple[str, ...] = ()
 
     @property
     def angular_velocity(self) -> float:

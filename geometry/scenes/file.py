@@ -1,5 +1,6 @@
 """Reads a scene file and tells every fault of it at once."""
 
+import logging
 import os
 import tomllib
 from collections.abc import Mapping
@@ -42,6 +43,8 @@ def load_scene(path: str | Path) -> Scene:
     scene = parse_scene(text, source)
     if scene.field_map and not os.path.isfile(scene.field_map):  # unlike Path.is_file never raises
         raise SceneError(source, [f"Input rotor.field_map must be a file; instead there is no {scene.field_map}."])
+    for remark in scene.remarks:
+        logging.getLogger("spinlev").info(remark)
     return scene
 
 
