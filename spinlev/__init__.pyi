@@ -21,6 +21,7 @@ from .studies.interface import (
     ensemble as ensemble,
     equilibria as equilibria,
     explore as explore,
+    floater_force as floater_force,
     plate_table as plate_table,
     rotor_table as rotor_table,
     run_study as run_study,

@@ -23,6 +23,10 @@ def mutual_choice(scene: Scene, table: FieldTable, asked: str, rtol: float) -> t
     if asked == "rigid":
         return False, "as asked"
     magnets, floater = scene.rotor, scene.floater
+    if floater.body is not None:
+        if asked == "mutual":
+            floater.must_be("sphere", where="for --interaction mutual", instead="Choose --interaction rigid.")
+        return False, "the answer of a floater that is no sphere is not known"
     reasons = {k: why for k, magnet in enumerate(magnets, 1) if (why := unanswered(magnet))}
     if asked == "mutual":
         if table.model == "map":

@@ -43,9 +43,10 @@ def ensemble(
 
     Raises
     ------
-    InputError : `duration` is not positive, or there is no start
+    InputError : `duration` is not positive, there is no start, or the floater is no sphere
     IntegrationError : a state became infinite
     """
+    scene.floater.must_be("sphere", where="where many fly side by side", instead="Fly them one by one.")
     count = len(starts.position)
     if not duration > 0:
         raise InputError(f"Input duration must be positive; instead received {duration} s.")

@@ -73,8 +73,9 @@ def launched(
 
     Raises
     ------
-    InputError : `duration` is not positive, there is no start, or the plate does not lie flat
+    InputError : `duration` is not positive, there is no start, the plate does not lie flat, or the floater is no sphere
     """
+    scene.floater.must_be("sphere", where="where many fly side by side", instead="Fly them one by one.")
     if not duration > 0:
         raise InputError(f"Input duration must be positive; instead received {duration} s.")
     if not len(starts.position):

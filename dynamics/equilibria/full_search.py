@@ -6,13 +6,16 @@ from numpy.typing import NDArray
 from ...fem.rotor_tables import FieldTable
 from ...geometry.basics import Array
 from ...geometry.scenes import Scene
-from ..effects import with_effects
-from ..motion import Parameter, PlateMemory, Rates, Scales, parameters
+from ..effects import FloaterShape, with_effects
+from ..motion import Parameter, PlateMemory, Rates, Scales, parameters, rotor_gap
 from ..steady import Balance, Equilibrium, EquilibriumError, ForceCurve, Survey, modes, named_modes
 from .curve import Curve
 from .fixed_points import fixed_points
 from .periodic_equilibrium import Shaken
 from .search import SearchRange
+
+BEYOND = 0.1
+"""Part of a floater's weight that its multipoles may leave out; beyond, they do not tell an equilibrium."""
 
 
 def find_equilibria(
@@ -60,11 +63,34 @@ def survey(
     """
     turning(scene)
     scales = Scales.of(scene)
-    balance = Balance(rates or Rates(with_effects(scene, table)), parameters(scene, scales, frozen_spin=True), spin)
+    equations = rates or Rates(with_effects(scene, table))
+    balance = Balance(equations, parameters(scene, scales, frozen_spin=True), spin * scales.spin_ratio)
     curves, points = fixed_points(balance, SearchRange(scene, farthest))
     where = np.reshape([np.concatenate(point) for point in points], (-1, 6))
     known, doubts = field_doubts(table, where[:, :3] * scales.length)
+    if scene.floater.body is not None:
+        known, doubts = _of_shape(scene, table, known, doubts, where)
     return told(scene, balance, where[known], doubts, tuple(_force_curve(scene, scales, curve) for curve in curves))
+
+
+def _of_shape(
+    scene: Scene, table: FieldTable, known: NDArray[np.bool_], doubts: Array, where: Array
+) -> tuple[NDArray[np.bool_], Array]:
+    """Of a floater that is no sphere: where it is free of the rotor and its multipoles tell the force, and the doubts.
+
+    The search knows the largest sphere in it alone; what the multipoles leave out is added to the doubts.
+    """
+    floater, length = scene.floater, Scales.of(scene).length
+    (shape,) = (effect for effect in with_effects(scene, table).effects if isinstance(effect, FloaterShape))
+    unit = float(np.linalg.norm(scene.gravity)) or scene.angular_velocity**2 * length
+    kept, more = known.copy(), []
+    for k, doubt in zip(np.flatnonzero(known), doubts, strict=True):
+        place, moment = where[k, :3] * length, where[k, 3:]
+        kept[k] = rotor_gap(scene, place, moment) > 0
+        missed = shape.missed(table, place[None], moment[None])[0] if kept[k] else np.zeros(2)
+        kept[k] &= bool(missed[1] * floater.moment < BEYOND * floater.mass * unit)
+        more += [doubt + missed] if kept[k] else []
+    return kept, np.reshape(more, (-1, 2))
 
 
 def told(scene: Scene, balance: Balance, points: Array, doubts: Array, curves: tuple[ForceCurve, ...] = ()) -> Survey:
@@ -145,7 +171,7 @@ def _equilibrium(scales: Scales, balance: Balance, position: Array, moment: Arra
     gravity = abs(float(values[Parameter.GRAVITY_Z]))
     return Equilibrium(
         state=scales.unpack(state[0]),
-        spin=float(balance.spin),
+        spin=float(balance.spin) / scales.spin_ratio,
         residual=float(np.abs(value).max() / (gravity or 1.0)),
         position_error=error * scales.length,
         stable=motion.stable,

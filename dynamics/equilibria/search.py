@@ -34,11 +34,11 @@ class SearchRange:
 
     def holds(self, position: Array, margin: float = 0.0) -> NDArray[np.bool_]:
         """Which of the scaled positions (n, 3) belong to the range, or lie at most a margin (radii) outside: (n,)."""
-        radius = self.scene.floater.radius
+        radius, inner = self.scene.floater.radius, self.scene.floater.inner_radius
         bound, height = self.bound + margin, position[:, 2]
         inside = (-bound <= height) & (height <= margin) & (np.hypot(position[:, 0], position[:, 1]) <= bound)
         for magnet in self.scene.rotor:
-            inside &= magnet.body.distance(position * radius) > (1 - margin) * radius
+            inside &= magnet.body.distance(position * radius) > inner - margin * radius
         return np.asarray(inside)
 
     def starts(self) -> tuple[Array, Array]:

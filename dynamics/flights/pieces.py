@@ -69,7 +69,7 @@ def _ending(
         ended_by = flight.meanings[-outcome.value - 1]
     if flight.meanings == [LEFT]:
         return times, states, ended_by
-    gap = clearance(scene, times * flight.scales.time, states[:, :3] * flight.scales.length)
+    gap = clearance(scene, times * flight.scales.time, states[:, :3] * flight.scales.length, states[:, 6:9])
     touching = np.flatnonzero(gap < -1e-9)
     if len(touching):
         return times[: touching[0] + 1], states[: touching[0] + 1], CONTACT

@@ -103,13 +103,14 @@ def initial_state(
             raise EquilibriumError(way_out(scene, table, known))
         state = displaced(chosen.start, scene.start.offset, scene.angular_velocity)
         currents = currents if chosen.currents is None else chosen.currents[0]
-    check_free("start", scene, state.position)
+    check_free("start", scene, state.position, moment=state.moment)
     return state, currents
 
 
-def check_free(name: str, scene: Scene, position: Array, time: float = 0.0) -> None:
+def check_free(name: str, scene: Scene, position: Array, time: float = 0.0, moment: Array | None = None) -> None:
     """Raises StartError where a floater at a position (3,) m, rotor's frame, would overlap a body at a time (s)."""
-    gap = float(clearance(scene, np.array([time]), position[None])[0])
+    pointing = None if moment is None else moment[None]
+    gap = float(clearance(scene, np.array([time]), position[None], pointing)[0])
     if gap < 0:
         where = ", ".join(f"{1e3 * c:.6g}" for c in position)
         raise StartError(

@@ -14,7 +14,12 @@ from .effect import (
     conservative as conservative,
     dissipative as dissipative,
 )
-from .equations import Equations as Equations, equations_of_motion as equations_of_motion, parameters as parameters
+from .equations import (
+    FORCE_ALONE as FORCE_ALONE,
+    Equations as Equations,
+    equations_of_motion as equations_of_motion,
+    parameters as parameters,
+)
 from .events import (
     CONTACT as CONTACT,
     clearance as clearance,

@@ -33,6 +33,7 @@ from .plate_terms import PlateMemory, memory_terms
 from .state import Scales
 from .symbols import Parameter, Vector, cross, dot, subtract, turned
 
+FORCE_ALONE = "spinlev.floater_force gives force and torque on it; for a motion take a cylinder or a sphere."
 NAMES = tuple(f"{vector}_{axis}" for vector in ("position", "velocity", "moment", "spin") for axis in "xyz")
 
 
@@ -55,7 +56,13 @@ class Equations:
 
 
 def parameters(scene: Scene, scales: Scales, frozen_spin: bool = False) -> Array:
-    """Values of the runtime parameters; `frozen_spin` takes the drag off the spin about the moment."""
+    """Values of the runtime parameters; `frozen_spin` takes the drag off the spin about the moment.
+
+    Raises
+    ------
+    InputError : the floater is a cuboid, whose turn about its own moment the equations do not have
+    """
+    scene.floater.must_be("sphere", "cylinder", where="where it moves", instead=FORCE_ALONE)
     floater, drag, (length, time) = scene.floater, scene.drag, (scales.length, scales.time)
     root_energy = np.sqrt(floater.mass) * length / time
     values = np.zeros(len(Parameter))
@@ -66,7 +73,7 @@ def parameters(scene: Scene, scales: Scales, frozen_spin: bool = False) -> Array
     values[Parameter.GRAVITY_X : Parameter.GRAVITY_Z + 1] = scene.gravity * (time**2 / length)
     values[Parameter.LINEAR_DRAG] = drag.linear * time / floater.mass
     values[Parameter.TILT_DRAG] = drag.angular * time / floater.inertia
-    values[Parameter.SPIN_DRAG] = 0.0 if frozen_spin else values[Parameter.TILT_DRAG]
+    values[Parameter.SPIN_DRAG] = 0.0 if frozen_spin else values[Parameter.TILT_DRAG] / floater.spin_ratio
     if floater.conductivity and scene.frequency:
         turning = float(rotating_torque(floater.radius, floater.conductivity, scene.frequency, 1.0))
         values[Parameter.TILT_EDDY] = turning / scene.angular_velocity * time / floater.inertia

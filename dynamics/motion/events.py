@@ -10,6 +10,7 @@ import heyoka as hy
 import numpy as np
 
 from ...geometry.basics import Array, Box, Solid
+from ...geometry.bodies import body_overlap
 from ...geometry.scenes import Plate, Scene
 from .state import turned_about_z
 from .symbols import Parameter, Vector
@@ -25,7 +26,8 @@ def flight_events(scene: Scene, position: Vector) -> tuple[list[hy.t_event], lis
     if scene.plate is not None:
         gaps.append(_excess(scene.plate.box, _plate_view(metres)))
     falling = hy.event_direction.negative
-    events = [hy.t_event(gap / (length * length) - 1.0, direction=falling) for gap in gaps]
+    within = (scene.floater.inner_radius / scene.floater.radius) ** 2  # its own contact is found at the samples
+    events = [hy.t_event(gap / (length * length) - within, direction=falling) for gap in gaps]
     reach = hy.par[Parameter.LOST_DISTANCE] ** 2.0 - hy.sum([p * p for p in position])
     return [*events, hy.t_event(reach, direction=falling)], [CONTACT] * len(gaps) + [LOST]
 
@@ -57,19 +59,42 @@ def lost_distance(start: Array) -> float:
     return max(0.1, 2 * float(np.linalg.norm(start)))
 
 
-def clearance(scene: Scene, time: Array, position: Array) -> Array:
-    """Smallest gap (n,) in m between the floater and any body; `time` (n,) s, `position` (n, 3) m, rotor's frame."""
+def clearance(scene: Scene, time: Array, position: Array, moment: Array | None = None) -> Array:
+    """Smallest gap (n,) in m between the floater and any body; `time` (n,) s, `position` (n, 3) m, rotor's frame.
+
+    Of a floater that is no sphere the gap of the smallest one about it where that is positive, else its own; without
+    its `moment` (n, 3), that of the sphere.
+    """
     gaps = [body.distance(position) for body in scene.turning_bodies]
     if scene.plate is not None:
         seen = turned_about_z(position, scene.angular_velocity * time)
         seen[:, 2] += plate_depth(scene.plate, time)
         gaps.append(scene.plate.box.distance(seen))
-    return np.min(gaps, axis=0) - scene.floater.radius if gaps else np.full(len(position), np.inf)
+    found = np.min(gaps, axis=0) - scene.floater.radius if gaps else np.full(len(position), np.inf)
+    if scene.floater.body is not None and moment is not None:
+        for k in np.flatnonzero(found < 0):
+            found[k] = _own_gap(scene, float(time[k]), position[k], moment[k])
+    return found
 
 
-def rotor_gap(scene: Scene, position: Array) -> float:
-    """Gap in m between the floater at `position` (3,) m, rotor's frame, and the rotor; negative where they overlap."""
-    return float(clearance(replace(scene, plate=None), np.zeros(1), position[None])[0])
+def _own_gap(scene: Scene, time: float, position: Array, moment: Array) -> float:
+    """Gap of a floater that is no sphere in one place, m."""
+    floater, bodies = scene.floater, list(scene.turning_bodies)
+    gaps = [-body_overlap(body, floater.placed(position, moment)) for body in bodies]
+    if scene.plate is not None:
+        turn = scene.angular_velocity * time
+        seen = turned_about_z(position, turn) + plate_depth(scene.plate, np.array([time])) * [0.0, 0.0, 1.0]
+        gaps.append(-body_overlap(scene.plate.box, floater.placed(seen, turned_about_z(moment, turn))))
+    return min(gaps)
+
+
+def rotor_gap(scene: Scene, position: Array, moment: Array | None = None) -> float:
+    """Gap in m between the floater at `position` (3,) m, rotor's frame, and the rotor; negative where they overlap.
+
+    See `clearance` for a floater that is no sphere, whose `moment` (3,) it needs.
+    """
+    pointing = None if moment is None else moment[None]
+    return float(clearance(replace(scene, plate=None), np.zeros(1), position[None], pointing)[0])
 
 
 def plate_depth(plate: Plate, time: Array) -> Array:

@@ -61,26 +61,39 @@ class Scales:
     ----------
     length : radius of the floater, m
     time : 1/ω of the rotor, s; of a rotor at rest the time of a fall through `length`, or one second without gravity
+    spin_ratio : moment of inertia about the magnetic moment over that across it; the integrated spin is L/I, which has
+        so much of the true one along the moment
     """
 
     length: float
     time: float
+    spin_ratio: float = 1.0
 
     @classmethod
     def of(cls, scene: Scene) -> Scales:
         """Units that suit a scene."""
         radius, weight = scene.floater.radius, float(np.linalg.norm(scene.gravity))
+        ratio = scene.floater.spin_ratio
         if scene.frequency:
-            return cls(radius, 1 / abs(scene.angular_velocity))
-        return cls(radius, float(np.sqrt(radius / weight)) if weight else 1.0)
+            return cls(radius, 1 / abs(scene.angular_velocity), ratio)
+        return cls(radius, float(np.sqrt(radius / weight)) if weight else 1.0, ratio)
 
     def pack(self, state: State) -> Array:
         """Scaled state (..., 12): position, velocity, moment, spin."""
         speed = self.length / self.time
-        parts = state.position / self.length, state.velocity / speed, state.moment, state.spin * self.time
+        spin = _stretched(state.spin, state.moment, self.spin_ratio)
+        parts = state.position / self.length, state.velocity / speed, state.moment, spin * self.time
         return np.concatenate(parts, axis=-1)
 
     def unpack(self, scaled: Array) -> State:
         """The state of `scaled` (..., 12 or more) in SI units, along the same axes."""
         position, velocity, moment, spin = (scaled[..., i : i + 3] for i in (0, 3, 6, 9))
+        spin = _stretched(spin, moment, 1 / self.spin_ratio)
         return State(position * self.length, velocity * (self.length / self.time), moment + 0.0, spin / self.time)
+
+
+def _stretched(spin: Array, moment: Array, ratio: float) -> Array:
+    """A spin (..., 3) with its part along the moment (..., 3) times a ratio."""
+    if ratio == 1:
+        return spin
+    return np.asarray(spin + (ratio - 1) * np.sum(spin * moment, axis=-1, keepdims=True) * moment)

@@ -48,7 +48,8 @@ class SlowTorque:
 
     @classmethod
     def of(cls, scene: Scene, rates: Rates, stokes: bool = False) -> Self:
-        """The slow torques of a scene."""
+        """The slow torques of a scene. Raises InputError for a floater that is no sphere."""
+        scene.floater.must_be("sphere", where="for its slow drift", instead="Fly it (`simulate`).")
         return cls(rates, parameters(scene, Scales.of(scene)), scene.floater.radius, not (stokes or scene.drag.air))
 
     @property

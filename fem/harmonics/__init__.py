@@ -20,6 +20,7 @@ from .interior import (
     interior_coefficients as interior_coefficients,
     multipole_force as multipole_force,
     multipole_torque as multipole_torque,
+    sphere as sphere,
 )
 from .multipole import (
     UPPER as UPPER,

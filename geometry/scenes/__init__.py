@@ -6,7 +6,6 @@ from .contents import (
     AIR_VISCOSITY as AIR_VISCOSITY,
     AbsoluteStart as AbsoluteStart,
     Drag as Drag,
-    Floater as Floater,
     Lowering as Lowering,
     OffsetStart as OffsetStart,
     Plate as Plate,
@@ -14,6 +13,7 @@ from .contents import (
 )
 from .faults import SceneError as SceneError
 from .file import changed as changed, load_scene as load_scene, parse_scene as parse_scene
+from .floater import Floater as Floater
 from .parts import (
     horizontal as horizontal,
     magnets as magnets,

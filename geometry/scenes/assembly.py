@@ -8,14 +8,16 @@ from typing import Any
 import numpy as np
 from pydantic import ValidationError
 
-from ..basics import Array, Box, InputError, Part, Solid, rotation_matrix
+from ..basics import Array, Box, Cylinder, InputError, Part, Solid, rotation_matrix
 from ..bodies import Conductor, Magnet, horizontal, known_shape, tilt, vertical
-from .contents import AbsoluteStart, Drag, Floater, Lowering, OffsetStart, Plate, Scene
+from .contents import AbsoluteStart, Drag, Lowering, OffsetStart, Plate, Scene
 from .faults import SceneError, describe_fault, overlap_faults
+from .floater import Floater
 from .schema import (
     SIZES,
     DragSection,
     ExplicitRotor,
+    FloaterSection,
     HorizontalRotor,
     MagnetSection,
     PlateSection,
@@ -25,7 +27,7 @@ from .schema import (
     TiltRotor,
     VerticalRotor,
 )
-from .shapes import ARTICLE_SIZES, MILLI, part, shape_faults, solid
+from .shapes import ARTICLE_SIZES, FLOATER_SIZES, MILLI, part, shape_faults, solid
 
 
 def assemble(keys: Mapping[str, Any], source: str) -> Scene:
@@ -39,7 +41,7 @@ def assemble(keys: Mapping[str, Any], source: str) -> Scene:
         table = SceneSection.model_validate(keys)
     except ValidationError as error:
         raise SceneError(source, [describe_fault(detail) for detail in error.errors()]) from None
-    faults = _start_faults(table.start) + _drag_faults(table.drag) + _shape_faults(table.rotor)
+    faults = _start_faults(table.start) + _drag_faults(table.drag) + _shape_faults(table.rotor) + _floater_faults(table)
     if faults:
         raise SceneError(source, faults)
     try:
@@ -95,10 +97,27 @@ def _shape_faults(rotor: Rotor) -> list[str]:
     return faults
 
 
+def _floater_faults(table: SceneSection) -> list[str]:
+    """The sizes of the floater's shape, and what only a sphere can have."""
+    floater, faults = table.floater, shape_faults("floater", table.floater, FLOATER_SIZES)
+    if floater.shape == "sphere":
+        missing = floater.diameter_mm is None and floater.size_mm is None and floater.height_mm is None
+        return ["Input floater.diameter_mm must be given; instead it is missing."] if missing else faults
+    if floater.conductivity_S_m is not None:
+        faults.append(
+            "Input floater.conductivity_S_m must be left out where the floater is no sphere, as its currents are not "
+            f"known then; instead received {floater.conductivity_S_m:g}."
+        )
+    if table.drag and table.drag.model == "air":
+        faults.append(
+            'Input drag.model must be "stokes", or linear_N_s_m and angular_N_m_s be given, where the floater is no '
+            'sphere; instead received "air".'
+        )
+    return faults
+
+
 def _scene(table: SceneSection, folder: Path) -> Scene:
-    sphere, drag = table.floater, table.drag or DragSection(model="stokes")
-    material = (sphere.remanence_T, sphere.recoil_permeability, sphere.density_kg_m3, sphere.conductivity_S_m)
-    floater = Floater(sphere.diameter_mm * MILLI / 2, *material)
+    drag, floater = table.drag or DragSection(model="stokes"), _floater(table.floater)
     rotor = _rotor(table.rotor, folder)
     return Scene(
         frequency=table.frequency_hz,
@@ -106,7 +125,7 @@ def _scene(table: SceneSection, folder: Path) -> Scene:
         rotor=rotor,
         floater=floater,
         plate=_plate(table.plate) if table.plate else None,
-        drag=_drag(drag, floater.radius),
+        drag=_drag(drag, floater),
         start=_start(table.start),
         field_map=folder / table.rotor.field_map if table.rotor.field_map else None,
         conductors=tuple(
@@ -116,14 +135,20 @@ def _scene(table: SceneSection, folder: Path) -> Scene:
     )
 
 
+def _floater(table: FloaterSection) -> Floater:
+    material = (table.remanence_T, table.recoil_permeability, table.density_kg_m3, table.conductivity_S_m)
+    body = solid(table)
+    return Floater(body.circumradius, *material, body if isinstance(body, Box | Cylinder) else None)
+
+
 def _box(size_mm: list[float], center_mm: list[float], rotation_deg: list[float]) -> Box:
     return Box(_metres(size_mm), _metres(center_mm), rotation_matrix(rotation_deg))
 
 
-def _drag(drag: DragSection, radius: float) -> Drag:
+def _drag(drag: DragSection, floater: Floater) -> Drag:
     if drag.linear_N_s_m is not None and drag.angular_N_m_s is not None:
         return Drag(drag.linear_N_s_m, drag.angular_N_m_s)
-    return replace(Drag.stokes(radius), air=drag.model == "air")
+    return replace(Drag.of(floater), air=drag.model == "air")
 
 
 def _metres(millimetres: list[float]) -> Array:

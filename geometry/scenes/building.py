@@ -27,7 +27,7 @@ def scene(
     rotor : dict
         `horizontal`, `vertical`, `tilt`, `magnets`, or a mapping with the same keys.
     floater : dict
-        `sphere`.
+        `sphere`, or a mapping with shape "cuboid" (and size_mm) or "cylinder" (and diameter_mm, height_mm).
     plate : dict, optional
         `plate`; left out, none.
     gravity_m_s2 : sequence of 3 floats

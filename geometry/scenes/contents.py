@@ -6,56 +6,12 @@ from typing import Self
 
 import numpy as np
 
-from ..basics import MU_0, Array, Box, Solid, frozen_array, html_table, listed, millimetres
+from ..basics import Array, Box, Solid, frozen_array, html_table, listed, millimetres
 from ..bodies import Conductor, Magnet
+from .floater import Floater
 
 AIR_VISCOSITY = 1.83e-5
 """Dynamic viscosity of air at 20-25 °C, Pa s."""
-
-
-@dataclass(frozen=True)
-class Floater:
-    """The floating sphere: rigidly magnetised, so that it is exactly a dipole, seen and seeing.
-
-    Parameters
-    ----------
-    radius : m
-    remanence : remanent polarisation, T
-    recoil_permeability : μr
-    density : kg/m³
-    conductivity : S/m, or None where its own eddy currents are not modelled
-    """
-
-    radius: float
-    remanence: float
-    recoil_permeability: float
-    density: float
-    conductivity: float | None = None
-
-    @property
-    def volume(self) -> float:
-        """Volume, m³."""
-        return 4 / 3 * np.pi * self.radius**3
-
-    @property
-    def mass(self) -> float:
-        """Mass, kg."""
-        return self.density * self.volume
-
-    @property
-    def inertia(self) -> float:
-        """Moment of inertia 2/5 M R², kg m²."""
-        return 0.4 * self.mass * self.radius**2
-
-    @property
-    def moment(self) -> float:
-        """Magnetic moment (Br V/μ0) 3/(μr + 2) of the free sphere, A m²."""
-        return self.remanence * self.volume / MU_0 * 3 / (self.recoil_permeability + 2)
-
-    def __repr__(self) -> str:
-        text = f"Floater Ø {self.radius * 2e3:.4g} mm, {self.mass * 1e3:.4g} g, {self.moment:.4g} A m²"
-        text += f", μr {self.recoil_permeability:g}"
-        return text if self.conductivity is None else f"{text}, {self.conductivity:.3g} S/m"
 
 
 @dataclass(frozen=True)
@@ -99,6 +55,11 @@ class Drag:
     def stokes(cls, radius: float) -> Self:
         """Stokes drag of a sphere in air: 6πηR and 8πηR³."""
         return cls(6 * np.pi * AIR_VISCOSITY * radius, 8 * np.pi * AIR_VISCOSITY * radius**3)
+
+    @classmethod
+    def of(cls, floater: Floater) -> Self:
+        """Stokes drag of a floater: that of the sphere of its volume."""
+        return cls.stokes(floater.radius if floater.body is None else float(np.cbrt(floater.volume * 0.75 / np.pi)))
 
 
 @dataclass(frozen=True, eq=False)

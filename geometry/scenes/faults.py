@@ -5,11 +5,12 @@ from collections.abc import Sequence
 from itertools import combinations
 from typing import Any
 
+import numpy as np
 from pydantic import BaseModel
 from pydantic_core import ErrorDetails
 
 from ..basics import InputError, Solid
-from ..bodies import TOUCHING, body_overlap, deepest_overlap_in_a_turn, sphere_overlap
+from ..bodies import TOUCHING, body_overlap, deepest_overlap_in_a_turn
 from . import schema
 from .contents import AbsoluteStart, Scene
 
@@ -138,7 +139,8 @@ def _start_overlaps(scene: Scene, start: AbsoluteStart) -> list[str]:
     if scene.plate:
         bodies.append(("the plate", scene.plate.box))
     place = ", ".join(f"{c * 1e3:g}" for c in start.position)
-    depths = [(name, sphere_overlap(start.position, scene.floater.radius, box)) for name, box in bodies]
+    floater = scene.floater.placed(start.position, start.moment / np.linalg.norm(start.moment))
+    depths = [(name, body_overlap(box, floater)) for name, box in bodies]
     return [
         f"Input start.position_mm must leave the floater clear of all bodies; instead received [{place}], where it "
         f"overlaps {name} by {depth * 1e3:.4g} mm."

@@ -142,9 +142,12 @@ Rotor = Annotated[
 
 
 class FloaterSection(_Table):
-    """The floating sphere."""
+    """The floating magnet: a sphere, or a cuboid or cylinder that is polarised along the body's z."""
 
-    diameter_mm: Length
+    shape: Literal["sphere", "cuboid", "cylinder"] = "sphere"
+    size_mm: Sizes | None = None
+    diameter_mm: Length | None = None
+    height_mm: Length | None = None
     remanence_T: Remanence
     recoil_permeability: Permeability = RECOIL_PERMEABILITY
     density_kg_m3: Annotated[Positive, Field(le=1e6)]

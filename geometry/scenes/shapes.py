@@ -14,6 +14,8 @@ from .schema import SIZES
 MILLI = 1e-3
 ARTICLE_SIZES = {"cube": ("edge_mm",), **{shape: SIZES[shape] for shape in ("cylinder", "sphere")}}
 """The keys of every shape that may stand for the cubes of a rotor of the article."""
+FLOATER_SIZES = {shape: SIZES[shape] for shape in ("sphere", "cuboid", "cylinder")}
+"""The keys of every shape of a floater."""
 KEYS = ("size_mm", "edge_mm", "diameter_mm", "inner_diameter_mm", "height_mm")
 
 

@@ -15,6 +15,7 @@ from ..bodies import Conductor, Magnet, horizontal, tilt, vertical
 from .assembly import assemble
 from .contents import AbsoluteStart, Drag, OffsetStart, Plate, Scene
 from .faults import SceneError
+from .floater import Floater
 from .shapes import shape_keys
 
 SAME = 1e-12
@@ -48,31 +49,37 @@ def _says(text: str, scene: Scene) -> bool:
 
 
 def _keys(scene: Scene) -> dict[str, Any]:
-    floater = scene.floater
     keys: dict[str, Any] = {
         "frequency_hz": _number(scene.frequency),
         "gravity_m_s2": _numbers(scene.gravity),
         "rotor": _rotor(scene.rotor) | ({"field_map": str(scene.field_map)} if scene.field_map else {}),
-        "floater": {
-            "diameter_mm": _milli(2 * floater.radius),
-            "remanence_T": _number(floater.remanence),
-            "recoil_permeability": _number(floater.recoil_permeability),
-            "density_kg_m3": _number(floater.density),
-        },
+        "floater": _floater(scene.floater),
     }
-    if floater.conductivity is not None:
-        keys["floater"]["conductivity_S_m"] = _number(floater.conductivity)
     if scene.conductors:
         keys["rotor"]["conductors"] = [_conductor(conductor) for conductor in scene.conductors]
     if scene.plate:
         keys["plate"] = _plate(scene.plate)
-    stokes = Drag.stokes(floater.radius)
+    stokes = Drag.of(scene.floater)
     if scene.drag == replace(stokes, air=True):
         keys["drag"] = {"model": "air"}
     elif scene.drag != stokes:
         keys["drag"] = {"linear_N_s_m": scene.drag.linear, "angular_N_m_s": scene.drag.angular}
     start = _start(scene)
     return keys if start == DEFAULT_START else keys | {"start": start}
+
+
+def _floater(floater: Floater) -> dict[str, Any]:
+    shape = {"shape": floater.shape} if floater.body else {}
+    keys = {
+        **_shape(floater.solid),
+        **shape,
+        "remanence_T": _number(floater.remanence),
+        "recoil_permeability": _number(floater.recoil_permeability),
+        "density_kg_m3": _number(floater.density),
+    }
+    if not floater.body:
+        del keys["shape"]
+    return keys if floater.conductivity is None else keys | {"conductivity_S_m": _number(floater.conductivity)}
 
 
 def _rotor(rotor: tuple[Magnet, ...]) -> dict[str, Any]:

@@ -2,8 +2,8 @@
 
 Rotor and floater as they are at t = 0, at the first equilibrium or where the scene says. Outside the magnets B is that
 of the field's table; inside them, and nearer than the table reaches, it is the closed form, with the magnetisation
-M = J/μ0 + (μr - 1) H to first order in the recoil permeability. The floater is a uniformly magnetised sphere. The field
-of the plate's currents is not in B.
+M = J/μ0 + (μr - 1) H to first order in the recoil permeability. The floater is a uniformly magnetised sphere; one of
+another shape is as the magnets are. The field of the plate's currents is not in B.
 """
 
 import tempfile
@@ -114,7 +114,10 @@ def _fields(levitation: Levitation, state: State | None, points: Array) -> dict[
     h[known] = table.evaluate(points[known])[0] / MU_0
     if state is not None:
         moment, radius = scene.floater.moment * state.moment, scene.floater.radius
-        own, inside = fields_of_sphere(moment, state.position, radius, points)
+        if scene.floater.body is None:
+            own, inside = fields_of_sphere(moment, state.position, radius, points)
+        else:
+            own, inside = fields_of_magnets([scene.floater.magnet(state.position, state.moment)], points)
         h, magnetization = h + own, magnetization + inside
         body[inside.any(axis=1)] = FLOATER
     return {"B": MU_0 * (h + magnetization), "H": h, "M": magnetization, "J": np.zeros_like(points), "body": body}

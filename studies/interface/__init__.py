@@ -1,5 +1,6 @@
 """How does a program or a notebook call the program?"""
 
+from .forces import floater_force as floater_force
 from .in_the_magnets import working_point as working_point
 from .live_page import LivePage as LivePage, explore as explore, page_server as page_server
 from .many_flights import ensemble as ensemble

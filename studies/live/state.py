@@ -113,7 +113,15 @@ class PageState:
 
 
 def first_state(scene: Scene, source: str = "scene") -> PageState:
-    """Where a page begins: everything by what can be told at once, the plate as an infinite slab."""
+    """Where a page begins: everything by what can be told at once, the plate as an infinite slab.
+
+    Raises
+    ------
+    InputError : the floater is no sphere
+    """
+    scene.floater.must_be(
+        "sphere", where="on the live page", instead="spinlev run, equilibria and simulate take cylinders."
+    )
     model: FieldModel = "map" if scene.field_map else "dipole"
     return PageState(scene, model, "slab" if scene.plate else "none", source=source)
 

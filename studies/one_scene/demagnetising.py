@@ -11,7 +11,7 @@ from ...dynamics.flights import most_like_levitation
 from ...dynamics.steady import Equilibrium, EquilibriumError
 from ...fem.rotor_tables import EasyField, WorkingPoint, easy_axis, working_points
 from ...fem.storage import write_whole
-from ...geometry.basics import Array, InputError, Sphere
+from ...geometry.basics import InputError
 from ...geometry.bodies import Magnet
 from ...geometry.scenes import Floater
 from ..pictures import working_point_figure
@@ -87,7 +87,10 @@ def _values(points: list[WorkingPoint]) -> dict[str, xr.Variable]:
 
 
 def _floating(levitation: Levitation) -> Equilibrium | None:
-    """Where the floater levitates, or nearly does; None where it has no equilibrium."""
+    """Where the floater levitates, or nearly does; None where it has no equilibrium, and for a cuboid."""
+    if levitation.scene.floater.shape == "cuboid":
+        note("The magnets alone: where a cuboid floats is not known.")
+        return None
     try:
         return most_like_levitation(levitation.without_plate.equilibria)
     except EquilibriumError:
@@ -95,8 +98,7 @@ def _floating(levitation: Levitation) -> Equilibrium | None:
 
 
 def _ball(floater: Floater, place: Equilibrium) -> Magnet:
-    polarization: Array = floater.remanence * place.state.moment
-    return Magnet(Sphere(floater.radius, place.position), polarization, floater.recoil_permeability)
+    return floater.magnet(place.position, place.state.moment)
 
 
 def working_point_answer(found: xr.Dataset) -> dict[str, Any]:

@@ -21,6 +21,8 @@ from .levitation import Levitation
 
 PLATE_NOT_MODELLED = "The plate's eddy currents are left out: the plate is only an obstacle."
 
+OF_SPHERES = "known for spherical floaters alone"
+
 
 @dataclass(frozen=True)
 class ListedEffect:
@@ -50,7 +52,7 @@ def listed_effects(levitation: Levitation, equilibria: Sequence[Equilibrium]) ->
 
 def _mutual(levitation: Levitation, first: Equilibrium | None) -> ListedEffect:
     (answers, why), shift = levitation.answers, None
-    if first is not None and why != NOTHING_ANSWERS:
+    if first is not None and why != NOTHING_ANSWERS and levitation.scene.floater.body is None:
         shift = 1e3 * shift_by_answers(levitation.scene, levitation.rates, levitation.table, first, answers)
     return ListedEffect(MUTUAL, answers is not None, shift, None, why)
 
@@ -58,6 +60,8 @@ def _mutual(levitation: Levitation, first: Equilibrium | None) -> ListedEffect:
 def _floater_currents(levitation: Levitation, first: Equilibrium | None) -> ListedEffect:
     """Those of the scene, or what those of a sintered magnet would be."""
     scene, floater, growth = levitation.scene, levitation.scene.floater, None
+    if floater.body is not None:
+        return ListedEffect(FLOATER_CURRENTS, False, None, None, OF_SPHERES)
     if first and scene.frequency:
         there = replace(scene, floater=replace(floater, conductivity=floater.conductivity or MAGNET_CONDUCTIVITY))
         growth = growth_by_floater(there, levitation.rates, levitation.table, first)
@@ -69,6 +73,8 @@ def _rotor_currents(levitation: Levitation, first: Equilibrium | None) -> Listed
     scene, growth, included = levitation.scene, None, levitation.losses is not None
     magnets = [replace(magnet, conductivity=MAGNET_CONDUCTIVITY) for magnet in scene.rotor]
     losses = levitation.losses or (ball_losses(pieces_of(magnets, ())) if magnets else None)
+    if scene.floater.body is not None:
+        return ListedEffect(ROTOR_CURRENTS, False, None, None, OF_SPHERES)
     if first and losses and scene.frequency:
         growth = growth_by_rotor(scene, levitation.rates, first, losses, included)
     return _conducting(ROTOR_CURRENTS, "rotor.conductivity_S_m", included, growth)
@@ -85,6 +91,8 @@ def _air(levitation: Levitation, first: Equilibrium | None) -> ListedEffect:
     if levitation.scene.drag.air:
         return ListedEffect(REAL_AIR, True, 0.0, None, 'drag.model is "air"')
     scene = levitation.scene
+    if scene.floater.body is not None:
+        return ListedEffect(REAL_AIR, False, None, None, f"{OF_SPHERES}; the drag is Stokes' on a sphere of its volume")
     h = float(swinging(reynolds(scene.floater.radius, scene.angular_velocity)))
     why = f'drag.model is not "air"; it would make the torque on a swing {h:.2g} times Stokes\''
     return ListedEffect(REAL_AIR, False, 0.0, None, why)

@@ -11,7 +11,7 @@ from typing import Any
 from ...dynamics.effects import Mutual, RotorCurrents, mutual_choice, with_effects
 from ...dynamics.equilibria import survey, with_plate
 from ...dynamics.flights import Checkpoint, LiveFlight, Trajectory, most_like_levitation, simulate, starting_point
-from ...dynamics.motion import Interaction, PlateMemory, Rates, interaction_of
+from ...dynamics.motion import FORCE_ALONE, Interaction, PlateMemory, Rates, interaction_of
 from ...dynamics.steady import Equilibrium, EquilibriumError, Survey
 from ...fem.measured_maps import GriddedTable
 from ...fem.mutual import MutualTable
@@ -65,8 +65,9 @@ class Levitation:
 
         Raises
         ------
-        InputError : mutual magnetisation is asked for where it cannot be known
+        InputError : mutual magnetisation is asked for where it cannot be known, or the floater is a cuboid
         """
+        self.scene.floater.must_be("sphere", "cylinder", where="where it moves", instead=FORCE_ALONE)
         return self._with_effects(self.table)
 
     @cached_property
@@ -159,6 +160,7 @@ class Levitation:
             detail(f"Plate model: {choice.model} ({choice.reason})")
         if choice.model == "none" or scene.plate is None or place is None:
             return None
+        scene.floater.must_be("sphere", where="over a plate with eddy currents", instead="Choose --plate-model none.")
         memory, found = plate_memory(
             scene, scene.plate, choice.model, sources(self.table), place, self.models.plate_rtol, choice.edges
         )

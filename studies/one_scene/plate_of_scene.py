@@ -52,7 +52,7 @@ def check_room(scene: Scene, place: Array) -> None:
     ------
     InputError : it overlaps the floater
     """
-    depth = sphere_overlap(place, scene.floater.radius, scene.plate.box) if scene.plate else 0.0
+    depth = sphere_overlap(place, scene.floater.inner_radius, scene.plate.box) if scene.plate else 0.0
     if scene.plate and depth > TOUCHING:
         center, levitates = (np.round(c * 1e3, 3).tolist() for c in (scene.plate.box.center, place))
         raise InputError(

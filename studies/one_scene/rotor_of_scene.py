@@ -9,7 +9,7 @@ from ...fem.measured_maps import GriddedTable, map_table
 from ...fem.mutual import MutualTable, cached_mutual_table, mutual_key
 from ...fem.rotor_losses import RotorLosses, cached_rotor_losses, losses_key, pieces_of
 from ...fem.rotor_tables import RotorTable, cached_rotor_table, rotor_key, rotor_table
-from ...geometry.scenes import Scene
+from ...geometry.scenes import Floater, Scene
 from ..terminal import Models, note
 
 RotorField = RotorTable | GriddedTable
@@ -85,5 +85,13 @@ def equations_key(scene: Scene, models: Models) -> str:
             f"{scene.field_map} {bool(scene.floater.conductivity)} {scene.drag.air} {models.interaction}",
             "" if models.interaction == "rigid" else mutual_key(scene.rotor, scene.floater),
             losses_key(scene) if pieces_of(scene.rotor, scene.conductors) else "",
+            _shape_key(scene.floater),
         )
     )
+
+
+def _shape_key(floater: Floater) -> str:
+    """What of a floater's shape is compiled into the equations; nothing of a sphere's."""
+    if floater.body is None:
+        return ""
+    return f"{floater.shape} {floater.body.shape_numbers.tolist()} {floater.recoil_permeability!r}"

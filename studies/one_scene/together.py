@@ -37,7 +37,7 @@ def share(levitations: Sequence[Levitation], places: Sequence[tuple[int, ...]], 
     for key, members in groups.items():
         for k in members[1:]:
             levitations[k].share(levitations[members[0]])
-        asked = [k for k in members if equilibria[k]]
+        asked = [k for k in members if equilibria[k] and levitations[k].scene.floater.body is None]
         if asked:
             families.setdefault(_family_key(levitations[asked[0]]) or key, []).extend(asked)
     for members in families.values():
@@ -110,7 +110,7 @@ def fly(levitations: Sequence[Levitation], duration: float) -> None:
     for levitation in levitations:
         with suppress(SpinlevError):
             still = levitation.scene.plate is None or levitation.models.plate_model == "none"
-            if still and is_long(levitation.interaction):
+            if still and levitation.scene.floater.body is None and is_long(levitation.interaction):
                 tilted = bool(np.any(levitation.scene.gravity[:2]))
                 key = levitation.equations_key, levitation.interaction_model, tilted
                 groups.setdefault(key, []).append(levitation)

@@ -90,10 +90,12 @@ def add_rotor(plotter: pv.Plotter, scene: Scene) -> list[pv.Actor]:
 
 
 def add_floater(plotter: pv.Plotter, scene: Scene, position: Array, moment: Array) -> list[pv.Actor]:
-    """Draw the sphere and its moment; positions m."""
+    """Draw the floater's body and its moment; positions m."""
     radius, center = scene.floater.radius / MILLI, position / MILLI
-    sphere = pv.Sphere(radius=radius, center=center, theta_resolution=60, phi_resolution=60)
-    drawn = plotter.add_mesh(sphere, color=METAL, specular=0.6, opacity=0.45)
+    surface = pv.Sphere(radius=radius, center=center, theta_resolution=60, phi_resolution=60)
+    if scene.floater.body is not None:
+        surface = _surface(scene.floater.placed(position, moment / np.linalg.norm(moment)))
+    drawn = plotter.add_mesh(surface, color=METAL, specular=0.6, opacity=0.45)
     return [drawn, *_arrow(plotter, center, moment, radius)]
 
 

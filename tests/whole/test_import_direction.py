@@ -9,7 +9,16 @@ from places import ROOT, TESTS
 FLOORS = {
     "geometry": ["basics", "bodies", "scenes", "meshes"],
     "fem": [
-        *("storage", "harmonics", "closed_forms", "elements", "magnetostatics", "rotor_tables", "measured_maps"),
+        *(
+            "storage",
+            "harmonics",
+            "closed_forms",
+            "elements",
+            "magnetostatics",
+            "rotor_tables",
+            "floaters",
+            "measured_maps",
+        ),
         *(
             "mutual",
             "eddy_currents",

@@ -61,15 +61,16 @@ def test_a_rigid_part_has_the_field_of_the_same_shape_by_key(folder, name, body)
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("name", "body", "rtol"), [("cylinder", Cylinder(5e-3, 8e-3), 3e-6), ("cube", Box((0.01,) * 3), 3e-5)]
+    ("name", "body", "rtol"), [("cylinder", Cylinder(5e-3, 8e-3), 3e-6), ("cube", Box((0.01,) * 3), 5e-5)]
 )
 def test_a_permeable_part_agrees_with_the_same_shape_within_the_stated_errors(folder, name, body, rtol):
-    """No closed form is split off of a part, so that the corners of the cube cost more: 1.3e-5 is reached."""
+    """No closed form is split off of a part, so that the corners of the cube cost more; each states what was asked."""
     part = placed(folder / f"{name}.step", TURN)
     pair = [Magnet(b, (1.2, 0.0, 0.5), 1.05) for b in (part, moved(body, part.center, TURN))]
     tables = [rotor_table((magnet,), "fem", rtol, NEAREST) for magnet in pair]
     apart, stated = worst(*tables, pair[1])
-    assert apart < min(stated, 1.5 * rtol)
+    print(f"{name} from a file against the same by key: {apart:.1e}, stated {stated:.1e}")
+    assert apart < stated < 2 * rtol
 
 
 @pytest.mark.slow
