@@ -122,7 +122,7 @@ PLATE = Work(
     (
         _reference("plate_spinlev.py", "1e-5", ("1 Hz",)),
         _reference("plate_spinlev.py", "1e-4", ("100 Hz",)),
-        _reference("plate_spinlev.py", "1e-3", ("1000 Hz",)),
+        _reference("plate_spinlev.py", "3e-4", ("1000 Hz",)),
     ),
     (
         _ours("plate_spinlev.py", "1e-2", "1e-3"),
