@@ -8,29 +8,17 @@ from importlib.metadata import version
 
 import ngsolve as ng
 import numpy as np
-from netgen.occ import Box, Glue, OCCGeometry
-from problems import CONDUCTIVITY, MU_0, OBSERVED, PLATE_SIZE, TURN_RATE, TURNS, falling
+from ngsolve_plate import MILLI, dipole, edge_elements, plate_in_air
+from problems import CONDUCTIVITY, MU_0, OBSERVED, TURN_RATE, TURNS, falling
 from said import measure, say
 
 size, order, steps = float(sys.argv[2]), int(sys.argv[3]), int(sys.argv[4])
-MILLI, STEP = 1e-3, 1 / (steps * TURN_RATE)
-
-
-def dipole(place, moment):
-    """Vector potential of a dipole, T m."""
-    apart = ng.CF((ng.x, ng.y, ng.z)) * MILLI - place
-    return MU_0 / (4 * np.pi) * ng.Cross(moment, apart) / (apart * apart) ** 1.5
+STEP = 1 / (steps * TURN_RATE)
 
 
 def reaction():
-    half = [500 * s for s in PLATE_SIZE]
-    plate = Box(tuple(-h for h in half), tuple(half)).mat("plate")
-    plate.maxh = size
-    air = Box((-300, -300, -300), (300, 300, 300)).mat("air")
-    air.faces.name = "far"
-    mesh = ng.Mesh(OCCGeometry(Glue([plate, air - plate])).GenerateMesh(maxh=100, grading=0.4))
-    inside = [material == "plate" for material in mesh.GetMaterials()]
-    space = ng.HCurl(mesh, order=order, dirichlet="far", gradientdomains=inside)
+    mesh = plate_in_air(size)
+    space = edge_elements(mesh, order)
     trial, test = space.TnT()
     metal, rate = mesh.Materials("plate"), MU_0 * CONDUCTIVITY * MILLI**2
     stiff = ng.curl(trial) * ng.curl(test) * ng.dx + 1e-12 * trial * test * ng.dx("air")

@@ -63,8 +63,8 @@ FIELD = Work(
     "Largest relative error of B at 24 points. Time from nothing to these fields: mesh, solution, evaluation.",
     ("cube", "touching", "tilted"),
     (
-        _reference("field_spinlev.py", "1e-8", ("cube", "touching")),
-        _reference("field_spinlev.py", "1e-8 turned", ("tilted",)),
+        _reference("field_spinlev.py", "1e-9", ("cube", "touching")),
+        _reference("field_spinlev.py", "1e-9 turned", ("tilted",)),
     ),
     (
         _ours("field_spinlev.py", "1e-3", "1e-4", "1e-5"),
@@ -119,12 +119,18 @@ PLATE = Work(
     "Reaction of a plate of 60 × 60 × 10 mm to a dipole at three places",
     "Largest relative error of the phasor of B. Time from nothing for all three places: mesh, factor, reciprocity.",
     ("1 Hz", "100 Hz", "1000 Hz"),
-    (_reference("plate_spinlev.py", "1e-4", ("1 Hz", "100 Hz")), _reference("plate_spinlev.py", "1e-3", ("1000 Hz",))),
+    (
+        _reference("plate_spinlev.py", "1e-5", ("1 Hz",)),
+        _reference("plate_spinlev.py", "1e-4", ("100 Hz",)),
+        _reference("plate_spinlev.py", "3e-4", ("1000 Hz",)),
+    ),
     (
         _ours("plate_spinlev.py", "1e-2", "1e-3"),
-        Peer("GetDP, first order", "getdp", "plate_getdp.py", ("10 1", "8 1", "5 1"), True),
+        Peer("GetDP, first order", "getdp", "plate_getdp.py", ("10 1", "8 1", "5 1", "3.5 1"), True),
+        Peer("GetDP, second order", "getdp", "plate_getdp.py", ("16 2", "12 2", "8 2")),
         Peer("NGSolve, first order", "spinlev", "plate_ngsolve.py", ("16 1", "12 1", "8 1")),
-        Peer("NGSolve, higher order", "spinlev", "plate_ngsolve.py", ("20 2", "16 2", "12 2")),
+        Peer("NGSolve, second order", "spinlev", "plate_ngsolve.py", ("20 2", "16 2", "12 2")),
+        Peer("NGSolve, third order", "spinlev", "plate_ngsolve.py", ("30 3", "20 3", "12 3")),
     ),
 )
 FALL = Work(

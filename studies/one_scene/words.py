@@ -24,6 +24,8 @@ SPOKEN = {"side, backward": "backward side motion", "side, forward": "forward si
 COLUMNS = ("below (mm)", "aside (mm)", "tilt (°)", "lag (°)", "slowest motion", "growth (1/s)", "")
 FINEST = 0.01
 """Of distances from the axis, mm."""
+LONG = 7200.0
+"""From here on (s) hours are said too."""
 
 
 def bracketed(value: float, error: float, digits: int = DIGITS) -> str:
@@ -147,16 +149,20 @@ def flight_words(levitation: Levitation, flight: Trajectory) -> str:
     """How a flight went, in one sentence."""
     kind = kind_of_flight(levitation, flight)
     if flight.ended_by == "contact":
-        return f"Flew {flight.levitated_s:.3g} s, then touched something ({kind})."
+        return f"Flew {_time(flight.levitated_s)}, then touched something ({kind})."
     if flight.ended_by == "lost":
-        return f"Flew {flight.levitated_s:.3g} s, then fell ({kind})."
+        return f"Flew {_time(flight.levitated_s)}, then fell ({kind})."
     start = None if levitation.absolute else levitation.stability
     how = {"stable": "", "drifting": "; it drifts slowly", "growing oscillation": "; the oscillation grows"}.get(
         kind, ""
     )
     if start is not None and not start.stable:
         how = f"; the oscillation grows (e-fold in {1 / start.growth_per_s:.2g} s)"
-    return f"Flew {flight.levitated_s:.4g} s, still up{how}."
+    return f"Flew {_time(flight.levitated_s)}, still up{how}."
+
+
+def _time(seconds: float) -> str:
+    return f"{seconds:.4g} s" if seconds < LONG else f"{seconds / 3600:.4g} h ({seconds:.0f} s)"
 
 
 def effects_words(values: Mapping[str, Any]) -> list[str]:

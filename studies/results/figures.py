@@ -115,13 +115,18 @@ PARTS = 120
 """Intervals of an envelope: more than a printed figure tells apart."""
 SHOWN = 200
 """Samples of a flight that are drawn one by one."""
+COARSE = 0.05
+"""Interval of samples (s) that lets a bounce pass unseen: a line through them would show slow motions that are none."""
+HOURS = 7200.0
+"""Flights that take longer are drawn over hours, s."""
 
 
 @styled
 def trajectory_figure(result: xr.Dataset) -> Figure:
     """Distance and polar angle of a flight as envelopes, and a closer look at its beginning, or at its end if lost."""
     figure, axes = panels(2, 2, (8.0, 5.4))
-    time, moment = result["time"].values, result["moment"].values
+    seconds, moment = result["time"].values, result["moment"].values
+    time, unit = (seconds / 3600, "h") if seconds[-1] > HOURS else (seconds, "s")
     distance = -1e3 * result["position"].sel(axis="z").values
     angle = np.degrees(np.arctan2(np.hypot(moment[:, 0], moment[:, 1]), moment[:, 2]))
     up = str(result.attrs.get("ended_by", "duration")) in ("duration", "stopped")
@@ -131,17 +136,25 @@ def trajectory_figure(result: xr.Dataset) -> Figure:
     for panel in axes[:, 0]:
         panel.axvspan(time[near][0], time[near][-1], color=PALETTE[4], alpha=0.4, lw=0, label="shown on the right")
         if "lowered_from_s" in result.attrs:
-            panel.axvspan(*_lowering(result, time), color="0.88", lw=0, zorder=0, label="plate is lowered")
-        panel.set_xlabel("time (s)")
+            lowered = np.array(_lowering(result, seconds)) * time[-1] / seconds[-1]
+            panel.axvspan(*lowered, color="0.88", lw=0, zorder=0, label="plate is lowered")
+        panel.set_xlabel(f"time ({unit})")
     axes[0, 0].legend(frameon=True, framealpha=0.9, edgecolor="none")
-    axes[0, 1].plot(*_smooth(time[near], time[near], distance[near]), lw=0.8)
     turned = 1e3 * result["position_rotor_frame"].values[near]
-    axes[1, 1].plot(*_smooth(time[near], turned[:, 0], turned[:, 1]), lw=0.8)
-    axes[1, 1].plot(*turned[-1, :2], "o", color=PALETTE[1], ms=4, label="end of the curve")
+    step = float(np.diff(seconds[near]).max(initial=0.0))
+    look = "A closer look"
+    if step > COARSE:
+        look = f"{look}: a sample every {step:.2g} s"
+        axes[0, 1].plot(time[near], distance[near], ".", ms=3)
+        axes[1, 1].plot(turned[:, 0], turned[:, 1], ".", ms=3)
+    else:
+        axes[0, 1].plot(*_smooth(time[near], time[near], distance[near]), lw=0.8)
+        axes[1, 1].plot(*_smooth(time[near], turned[:, 0], turned[:, 1]), lw=0.8)
+    axes[1, 1].plot(*turned[-1, :2], "o", color=PALETTE[1], ms=4, label="end")
     axes[1, 1].legend()
     axes[0, 0].set(ylabel="distance below the rotor (mm)", title="Distance: smallest, mean, largest")
     axes[1, 0].set(ylabel="polar angle of the moment (°)", title="Polar angle: smallest, mean, largest")
-    axes[0, 1].set(xlabel="time (s)", ylabel="distance below the rotor (mm)", title="A closer look")
+    axes[0, 1].set(xlabel=f"time ({unit})", ylabel="distance below the rotor (mm)", title=look)
     axes[1, 1].set(xlabel="x (mm)", ylabel="y (mm)", title="The same from above, rotor's frame")
     axes[1, 1].set(aspect="equal", adjustable="datalim")
     axes[1, 1].locator_params(axis="x", nbins=5)

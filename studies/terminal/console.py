@@ -5,7 +5,6 @@ import logging
 import math
 import os
 import sys
-import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from typing import Any, Protocol, TextIO
@@ -17,8 +16,6 @@ from .heartbeat import Heartbeat
 from .plain_text import READABLE
 
 LOG = logging.getLogger("spinlev")
-PAUSE = 2.0
-"""Between lines of progress, s."""
 ERRORS = Console(stderr=True, highlight=False, soft_wrap=True)
 
 
@@ -96,35 +93,20 @@ def progress(label: str) -> Iterator[Progressed]:
             if text != bar.tasks[task].description:
                 bar.reset(task, description=text)
             bar.update(task, completed=fraction)
-            if shown:
-                for handler in LOG.handlers:
-                    if isinstance(handler, _Printed):
-                        handler.heartbeat.said()
+            for handler in LOG.handlers:
+                if isinstance(handler, _Printed) and shown:
+                    handler.heartbeat.said()
+                elif isinstance(handler, _Printed):
+                    handler.heartbeat.advanced(fraction, text.partition(": ")[2])
 
         yield advance
 
 
 @contextmanager
 def stages(label: str) -> Iterator[Callable[[str, float], None]]:
-    """A progress bar for work in stages; gives a function that takes a stage's name and its finished fraction.
-
-    Where no terminal shows the bar, lines say the same, every few seconds at most.
-    """
-    stage, began, said = "", 0.0, time.monotonic()
+    """A progress bar for work in stages; gives a function that takes a stage's name and its finished fraction."""
     with progress(label) as advance:
-
-        def watch(name: str, fraction: float) -> None:
-            nonlocal stage, began, said
-            now = time.monotonic()
-            if name != stage:
-                stage, began = name, now
-            advance(fraction, f"{label}: {name}")
-            if not ERRORS.is_terminal and now - said > PAUSE:
-                left = f", {(now - began) * (1 / fraction - 1):.0f} s left" if fraction else ""
-                note(f"  {name}, {fraction:.0%}{left}")
-                said = now
-
-        yield watch
+        yield lambda name, fraction: advance(fraction, f"{label}: {name}")
 
 
 @contextmanager

@@ -6,6 +6,8 @@ from collections.abc import Callable
 
 PAUSE = 2.5
 """Silence after which a line is said, s."""
+SHARE = 1 / 60
+"""The same as a part of the time that the step has taken, once that is longer."""
 
 
 class Heartbeat(threading.Thread):
@@ -22,12 +24,20 @@ class Heartbeat(threading.Thread):
         self._say, self._pause, self._over = say, pause, threading.Event()
         self._began: float | None = None
         self._said = time.monotonic()
+        self._stage, self._stage_began, self._fraction = "", self._said, 0.0
 
     def said(self, text: str = "") -> None:
         """Something was shown; a text that ends in " ..." begins a step, any other ends it."""
         self._said = time.monotonic()
         if text:
             self._began = self._said if text.endswith(" ...") else None
+            self.advanced(0.0)
+
+    def advanced(self, fraction: float, stage: str = "") -> None:
+        """How much of the step is finished, 0 to 1, or of one of its stages."""
+        if stage != self._stage or fraction < self._fraction:
+            self._stage, self._stage_began = stage, time.monotonic()
+        self._fraction = fraction
 
     def stop(self) -> None:
         """Say no more; returns when the thread has ended."""
@@ -38,6 +48,12 @@ class Heartbeat(threading.Thread):
         """The thread's work."""
         while not self._over.wait(self._pause / 5):
             now, began = time.monotonic(), self._began
-            if began is not None and now - self._said > self._pause:
+            if began is not None and now - self._said > max(self._pause, SHARE * (now - began)):
                 self._said = now
-                self._say(f"  {now - began:.0f} s so far")
+                self._say(f"  {self._progress(now, began)}")
+
+    def _progress(self, now: float, began: float) -> str:
+        if not self._fraction:
+            return f"{now - began:.0f} s so far"
+        left = (now - self._stage_began) * (1 / self._fraction - 1)
+        return f"{self._stage}{self._stage and ', '}{self._fraction:.0%}, {left:.0f} s left"

@@ -30,3 +30,25 @@ def test_nothing_is_said_outside_of_a_step():
     with pytest.raises(queue.Empty):
         said.get(timeout=0.2)
     heartbeat.stop()
+
+
+def test_a_step_that_knows_says_its_share_and_the_time_left():
+    said: queue.Queue[str] = queue.Queue()
+    heartbeat = Heartbeat(said.put, 0.01)
+    heartbeat.start()
+    heartbeat.said("Motion ...")
+    heartbeat.advanced(0.5)
+    alone = _first(said, "left")
+    heartbeat.advanced(0.25, "places")
+    staged = _first(said, "places")
+    heartbeat.said("Equilibria ...")
+    _first(said, "so far")
+    heartbeat.stop()
+    assert alone == "  50%, 0 s left"
+    assert staged == "  places, 25%, 0 s left"
+
+
+def _first(said, word):
+    while word not in (line := said.get(timeout=WAIT)):
+        pass
+    return line
