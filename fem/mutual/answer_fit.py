@@ -14,6 +14,7 @@ from .answer_error import answer_errors
 from .answer_grid import POWERS, RETURNED, AnswerGrid, answer_box, point_counts
 from .answer_samples import (
     FAR_GAPS,
+    NEAR_GAPS,
     ROTOR_GAPS,
     SPHERE_GAPS,
     answer_products,
@@ -23,9 +24,9 @@ from .answer_samples import (
     sphere_samples,
     unit_dipole_fields,
 )
-from .permeable_sphere import reflection
+from .permeable_sphere import IMAGES, image_weights, reflection
 from .rotor_response import rotor_ladder
-from .sphere_fit import PARALLEL, classes, least_squares, returned_fit, sphere_fit
+from .sphere_fit import MANY, PARALLEL, classes, least_squares, returned_fit, sphere_fit
 from .table import MutualTable
 
 NEAREST = 0.16
@@ -35,8 +36,10 @@ OBLIQUE = (
     "one with two permeabilities and an easy axis along none of its edges, which its points cannot answer with. Choose "
     "--interaction rigid, give it one recoil_permeability, or turn the body with its magnetisation."
 )
-EQUATIONS, SPARSE = 8000, 6
+EQUATIONS, SPARSE, NEAR_SPARSE = 8000, 6, 3
 """Pairs of dipoles that are fitted; and at one of so many places the rotor's answer to the sphere's is."""
+INNER = 2
+"""Points along each axis at which magnets beside each other answer beyond their direct answer."""
 
 
 def mutual_table(magnets: tuple[Magnet, ...], floater: Floater, order: int = 2) -> MutualTable:
@@ -50,20 +53,26 @@ def mutual_table(magnets: tuple[Magnet, ...], floater: Floater, order: int = 2) 
     rotor, fine = rotor_ladder(magnets, (order, order + 1))
     counts = [point_counts(answer_box(m.body), (1 + NEAREST) * floater.radius) for m in magnets]
     grids = [_empty(magnet, floater, n) for magnet, n in zip(magnets, counts, strict=True)]
-    coupling, pairs = np.zeros((3 * len(grids), 3 * len(grids))), np.zeros((len(grids), len(grids)))
+    images = image_weights(floater.recoil_permeability) if floater.recoil_permeability != 1 else np.zeros(len(IMAGES))
+    inner = [grid.inner(INNER if 1 < len(grids) < MANY else 1) for grid in grids]
+    coupling = np.zeros([3 * sum(len(points) for points in inner)] * 2)
+    pairs = mixed = np.zeros((len(grids), len(grids)))
     if rotor.regions is not None:
         places = places_around(magnets, floater.radius, ROTOR_GAPS, 9, 1)
         far = places_around(magnets, floater.radius, FAR_GAPS, 2, 3)
-        grids, coupling = _rotor_fit(grids, magnets, answer_products(rotor, fine, places, far), places)
+        grids, coupling = _rotor_fit(grids, inner, magnets, *answer_products(rotor, fine, places, far), places)
     if floater.recoil_permeability != 1:
         facing = places_facing(magnets, floater.radius, SPHERE_GAPS)
         places = np.concatenate([facing, places_around(magnets, floater.radius, SPHERE_GAPS, 60, 2)])
-        grids, pairs = sphere_fit(grids, sphere_samples(rotor, floater, places))
+        near = places_around(magnets, floater.radius, NEAR_GAPS, 90, 3) if len(magnets) > 1 else places[:0]
+        samples = sphere_samples(rotor, floater, np.concatenate([places, near]))
+        grids, pairs = sphere_fit(grids, images, samples)
         if rotor.regions is not None:
-            fewer = np.concatenate([facing, places[len(facing) :: SPARSE]])
-            grids = returned_fit(grids, returned_samples(rotor, floater, grids, coupling, fewer))
+            fewer = np.concatenate([facing, places[len(facing) :: SPARSE], near[::NEAR_SPARSE]])
+            returned = returned_samples(rotor, floater, grids, np.concatenate(inner), coupling, fewer)
+            grids, mixed = returned_fit(grids, inner, images, returned)
     alpha = FOUR_PI * floater.radius**3 / MU_0 * float(reflection(floater.recoil_permeability, 1)[1])
-    table = MutualTable(magnets, tuple(grids), coupling, pairs, alpha)
+    table = MutualTable(magnets, tuple(grids), coupling, pairs, mixed, images, alpha)
     gaps, errors = answer_errors(table, fine, floater)
     return replace(
         table, gaps=gaps, errors=errors, provenance={"order": order, "seconds": time.perf_counter() - started}
@@ -93,37 +102,40 @@ def _empty(magnet: Magnet, floater: Floater, counts: tuple[int, int, int]) -> An
 
 
 def _rotor_fit(
-    grids: Sequence[AnswerGrid], magnets: Sequence[Magnet], products: Array, places: Array
+    grids: Sequence[AnswerGrid],
+    inner: Sequence[Array],
+    magnets: Sequence[Magnet],
+    direct: Array,
+    beyond: Array,
+    places: Array,
 ) -> tuple[list[AnswerGrid], Array]:
-    """Strengths and coupling that give the products of fields of dipoles with the answers to them."""
-    size = 1 / np.sqrt(np.diag(products))
-    first, second = np.triu_indices(len(products))
+    """Strengths and coupling that give the products of fields of dipoles with the answers to them.
+
+    The direct answers by points of one weight for a class, which mirrors keep; the rest by these and the coupling.
+    """
+    size = 1 / np.sqrt(np.diag(direct))
+    first, second = np.triu_indices(len(direct))
     if len(first) > EQUATIONS:
         chosen = np.random.default_rng(0).choice(len(first), EQUATIONS, replace=False)
         chosen = np.union1d(chosen, np.flatnonzero(first == second))
         first, second = first[chosen], second[chosen]
-    columns, kinds, centers = [], [], []
-    for grid, magnet in zip(grids, magnets, strict=True):
-        kind = classes(grid, mirrored=True) if magnet.contrast else np.zeros((len(grid.points), 0))
+    columns, kinds = [], [classes(g, True)[:, : None if m.contrast else 0] for g, m in zip(grids, magnets, strict=True)]
+    for grid, kind in zip(grids, kinds, strict=True):
         fields = unit_dipole_fields(grid.box.center + grid.points @ grid.box.rotation.T, places) @ grid.box.rotation
         fields *= size[:, None, None]
         columns += [(fields[first, :, a] * fields[second, :, a]) @ kind for a in range(3)]
-        kinds.append(kind)
-        centers.append(unit_dipole_fields(grid.box.center[None], places)[:, 0] * size[:, None])
-    whole = np.concatenate(centers, axis=1)
-    couples = list(zip(*np.triu_indices(whole.shape[1]), strict=True))
-    columns.append(
-        np.array(
-            [whole[first, a] * whole[second, b] + (a != b) * whole[first, b] * whole[second, a] for a, b in couples]
-        ).T
-    )
-    found = list(least_squares(np.concatenate(columns, axis=1), products[first, second] * size[first] * size[second]))
-    made = []
+    alone = np.concatenate(columns, axis=1)
+    whole = (unit_dipole_fields(np.concatenate(inner), places) * size[:, None, None]).reshape(len(size), -1)
+    a, b = np.triu_indices(whole.shape[1] if len(grids) > 1 else 0)
+    together = whole[first][:, a] * whole[second][:, b] + (a != b) * whole[first][:, b] * whole[second][:, a]
+    direct, beyond = (part[first, second] * size[first] * size[second] for part in (direct, beyond))
+    held = np.arange(alone.shape[1] + len(a)) >= alone.shape[1]
+    found = least_squares(np.concatenate([alone, together], axis=1), beyond, held)
+    found[: alone.shape[1]] += least_squares(alone, direct, held[: alone.shape[1]])
+    weights, made = list(found), []
     for grid, kind in zip(grids, kinds, strict=True):
-        count = kind.shape[1]
-        parts = [kind @ np.array([found.pop(0) for _ in range(count)]) for _ in range(3)]
+        parts = [kind @ np.array([weights.pop(0) for _ in range(kind.shape[1])]) for _ in range(3)]
         made.append(replace(grid, strengths=np.stack(parts, axis=1)))
     coupling = np.zeros((whole.shape[1], whole.shape[1]))
-    for (a, b), value in zip(couples, found, strict=True):
-        coupling[a, b] = coupling[b, a] = value
+    coupling[a, b] = coupling[b, a] = weights
     return made, coupling

@@ -30,6 +30,8 @@ from ...geometry.basics import MU_0, Array, Box, Solid, Sphere
 UNIT = MU_0 / (4 * np.pi)
 IN_SPHERE, IN_CIRCLE = 0.64, 0.8
 """Edges of the boxes that stand for a sphere and for the section of a cylinder, in diameters."""
+CHARGES, FEW_CHARGES = 4, 2
+"""Along an edge of a face; the first meet what two magnets' fields do in the sphere to 1e-3 of all that is added."""
 POWERS, RETURNED = (4, 5, 6), (5, 6)
 """p of the sphere's energy: two dipoles' begin with p = 4, those of degree 2; and q, about that of three dipoles."""
 
@@ -69,6 +71,21 @@ class AnswerGrid:
         """(n, 3) m along the body's axes, from its centre."""
         return np.array(list(product(*self.nodes)))
 
+    @cached_property
+    def charges(self) -> tuple[Array, Array]:
+        """Places (k, 3) m in the rotor's frame of charges that stand for the remanence, and these (k,)."""
+        return face_charges(self.box, self.axis, CHARGES)
+
+    @cached_property
+    def few_charges(self) -> tuple[Array, Array]:
+        """The same, fewer."""
+        return face_charges(self.box, self.axis, FEW_CHARGES)
+
+    def inner(self, number: int) -> Array:
+        """(number³, 3) m in the rotor's frame: Gauss's points for what the magnet is as a whole."""
+        nodes = np.polynomial.legendre.leggauss(number)[0]
+        return self.box.center + np.array(list(product(nodes, repeat=3))) * self.box.half_edges @ self.box.rotation.T
+
     def energy(self, position: Sequence[Any], moment: Sequence[Any], share: Any) -> hy.expression:
         """Energy at a position (3 expressions, m) of a moment (A m² times `share`); in J times share²."""
         place = _along(self.box, [x - float(c) for x, c in zip(position, self.box.center, strict=True)])
@@ -101,6 +118,20 @@ def point_energy(
     flat = v4 + ratio * (v5 + s5 * pointing + ratio * (v6 + s6 * pointing))
     steep = w4 * axial + ratio * (w5 * axial + t5 * along + ratio * (w6 * axial + t6 * along))
     return -answer - ratio * ratio * ratio * ratio * (flat + inverse * axial * steep)
+
+
+def face_charges(box: Box, axis: Array, number: int) -> tuple[Array, Array]:
+    """Places (k, 3) m of charges on a box's faces that stand for a remanence along `axis` in the body, and these (k,).
+
+    At Gauss's points, `number` along an edge, in units of the charge of a face that the remanence leaves upright.
+    """
+    nodes, weights = np.polynomial.legendre.leggauss(number)
+    along, places, amounts = list(zip(nodes, weights / 2, strict=True)), [np.zeros((0, 3))], []
+    for k in np.flatnonzero(np.abs(axis) > 1e-9):
+        for side, (u, first), (v, second) in product((-1.0, 1.0), along, along):
+            places.append(np.roll([[side, u, v]], k, axis=1) * box.half_edges)
+            amounts.append(side * axis[k] * first * second)
+    return box.center + np.concatenate(places) @ box.rotation.T, np.array(amounts)
 
 
 def _along(box: Box, vector: Sequence[Any]) -> list[Any]:

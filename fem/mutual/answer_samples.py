@@ -29,8 +29,8 @@ from .permeable_sphere import induced_sources, reflection
 from .rotor_response import RotorResponse, direct_rule
 
 ROTOR_GAPS, SPHERE_GAPS = (0.1, 0.25, 0.6, 1.2, 2.5), (0.08, 0.16, 0.3, 0.55, 0.95, 1.6, 2.8)
-FAR_GAPS = (0.6, 1.2)
-"""Gaps between the bodies at which samples are taken, in floater radii; the last for finer elements."""
+FAR_GAPS, NEAR_GAPS = (0.6, 1.2), (0.1, 0.13, 0.16, 0.2, 0.25, 0.35, 0.5, 1.0)
+"""Gaps between the bodies at which samples are taken, in floater radii; the last for finer elements and for several."""
 TAIL, MOST_ADDED, MOST_RETURNED = 1e-5, 16, 24
 """Part of the sphere's answer that the degrees left out may hold, and the most degrees of the small parts."""
 
@@ -70,18 +70,18 @@ def unit_dipole_fields(points: Array, places: Array) -> Array:
     return np.asarray(MU_0 / FOUR_PI * np.stack(fields, axis=1).reshape(-1, len(points), 3))
 
 
-def answer_products(rotor: RotorResponse, fine: RotorResponse, places: Array, far: Array) -> Array:
+def answer_products(rotor: RotorResponse, fine: RotorResponse, places: Array, far: Array) -> tuple[Array, Array]:
     """(3 p, 3 p) J: twice minus the rotor's energy for unit dipoles at places (p, 3) m, in pairs; symmetric.
 
-    What the magnets' own field adds to the direct part comes from finite elements, times how much more of it finer ones
-    find at a few far places: the same to 3e-3 of it everywhere.
+    The direct part, exact but for round-off, and what the magnets' own field adds: by finite elements, times how much
+    more of it finer ones find at a few far places, which is the same to 3e-3 of it everywhere.
     """
     coarse, finer = (_beyond(response, far) for response in (rotor, fine))
     size = np.sqrt(np.diag(_direct(rotor.magnets, far)))
     coarse, finer = (part / size / size[:, None] for part in (coarse, finer))
     square = float(np.sum(coarse**2))
     factor = float(np.sum(coarse * finer)) / square if square else 1.0
-    return _direct(rotor.magnets, places) + factor * _beyond(rotor, places)
+    return _direct(rotor.magnets, places), factor * _beyond(rotor, places)
 
 
 def _direct(magnets: Sequence[Magnet], places: Array) -> Array:
@@ -151,7 +151,12 @@ class ReturnedSamples:
 
 
 def returned_samples(
-    rotor: RotorResponse, floater: Floater, grids: Sequence[AnswerGrid], coupling: Array, places: Array
+    rotor: RotorResponse,
+    floater: Floater,
+    grids: Sequence[AnswerGrid],
+    inner: Array,
+    coupling: Array,
+    places: Array,
 ) -> ReturnedSamples:
     """The same from the points that answer for the rotor: to 2e-3 what its finite elements give from 1 mm off contact.
 
@@ -169,10 +174,10 @@ def returned_samples(
         ball = Ball(place, floater.radius)
         degree = min(enough_degree(rotor.magnets, ball, TAIL), MOST_RETURNED)
         own = _own_field(rotor, dipoles, ball, degree)
-        back, slope = point_answer(grids, coupling, high(own), ball), []
+        back, slope = point_answer(grids, inner, coupling, high(own), ball), []
         for unit in np.eye(3):
             moment = dipole_sources(unit, ball, degree)
-            answer = point_answer(grids, coupling, moment, ball)
+            answer = point_answer(grids, inner, coupling, moment, ball)
             pairs = (answer, high(own)), (back, moment), (own, high(answer))
             slope.append(np.sum([multipole_force(*pair, ball) for pair in pairs], axis=0))
         fields.append(field_at_center(back))
@@ -180,11 +185,13 @@ def returned_samples(
     return ReturnedSamples(places, np.array(fields), np.array(slopes))
 
 
-def point_answer(grids: Sequence[AnswerGrid], coupling: Array, sources: Coefficients, ball: Ball) -> Coefficients:
+def point_answer(
+    grids: Sequence[AnswerGrid], inner: Array, coupling: Array, sources: Coefficients, ball: Ball
+) -> Coefficients:
     """Coefficients a_lm (T) of what the points of magnets, and magnets as a whole, send back to sources in a ball."""
     frames = [grid.box for grid in grids]
     points = [box.center + grid.points @ box.rotation.T for grid, box in zip(grids, frames, strict=True)]
-    places = np.concatenate([*points, [box.center for box in frames]])
+    places = np.concatenate([*points, inner])
     fields = outer_sums([-derivative(sources, axis) for axis in range(3)], (places - ball.center) / ball.radius)
     *seen, whole = np.split(fields, np.cumsum([len(p) for p in points]))
     moments = [

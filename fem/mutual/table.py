@@ -14,18 +14,27 @@ Left out is what goes to and fro once more: less than 2e-4 of what is told.
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from itertools import combinations
-from typing import Any
+from itertools import combinations, permutations
 
 import heyoka as hy
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...geometry.basics import MU_0, Array
+from ...geometry.basics import Array
 from ...geometry.bodies import Magnet
-from ..storage import compiled
 from .answer_grid import AnswerGrid
-from .point_kernel import grid_derivatives
+from .permeable_sphere import answer_to_charge
+from .point_kernel import (
+    Pairs,
+    coupled_derivatives,
+    grid_derivatives,
+    mixed_derivatives,
+    mixed_energy,
+    pair_derivatives,
+    pairs_mixed,
+    pairs_of_charges,
+    point_field,
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,8 +45,10 @@ class MutualTable:
     ----------
     magnets : of the rotor
     grids : of those magnets that answer or are magnetised
-    coupling : (3n, 3n) A m²/T: energies of the fields at the grids' centres, -½ bᵀ coupling b
-    pairs : (n, n) J m⁸: energies of the sphere by the field gradients of two magnets' central dipoles
+    coupling : (3k, 3k) A m²/T: energies of the fields at the grids' inner points, -½ bᵀ coupling b
+    pairs : (n, n) J: energies of the sphere by what two magnets' fields, as those of charges, do in it together
+    mixed : (n, n) T: fields by which the second magnet answers to the sphere's answer to the first
+    images : (3,) weights of the images that tell its answer to charges
     polarizability : α, A m²/T
     gaps, errors : (k,) m between the bodies, and (k, 2) the largest relative errors of force and torque found there
     provenance : how the table was made; texts and numbers
@@ -47,6 +58,8 @@ class MutualTable:
     grids: tuple[AnswerGrid, ...]
     coupling: Array
     pairs: Array
+    mixed: Array
+    images: Array
     polarizability: float
     gaps: Array = field(default_factory=lambda: np.array([1.0]))
     errors: Array = field(default_factory=lambda: np.zeros((1, 2)))
@@ -72,19 +85,50 @@ class MutualTable:
         self, position: Sequence[hy.expression], whole: Sequence[hy.expression], share: hy.expression | float = 1.0
     ) -> hy.expression:
         """The part of the energy of the moment M that magnets have by what they are as a whole, as `energy`."""
-        parts = [hy.expression(0.0)]
-        if self.coupling.any():
-            fields = [b for grid in self.grids for b in dipole_field(grid, position, whole)]
+        mixed = share * self._mixed(position, whole)
+        return self._between(position, whole) + mixed + share * share * self._together(position)
+
+    def _between(self, position: Sequence[hy.expression], whole: Sequence[hy.expression]) -> hy.expression:
+        """-½ bᵀ coupling b."""
+        if not self.coupling.any():
+            return hy.expression(0.0)
+        ways = [[x - float(c) for x, c in zip(position, point, strict=True)] for p in self._inner for point in p]
+        fields = [b for way in ways for b in point_field(way, whole)]
+        entries = zip(*np.triu_indices(len(fields)), strict=True)
+        return hy.sum(
+            [float(-0.5 * (1 if a == b else 2) * self.coupling[a, b]) * (fields[a] * fields[b]) for a, b in entries]
+        )
+
+    def _mixed(self, position: Sequence[hy.expression], whole: Sequence[hy.expression]) -> hy.expression:
+        """What magnets answer to the sphere's answer to others."""
+        parts, images = [hy.expression(0.0)], self.images.tolist()
+        for a, b in permutations(range(len(self.grids)), 2):
+            if self.mixed[a, b]:
+                (places, amounts), radius, points = self.grids[a].few_charges, self.grids[a].radius, self._inner[b]
+                ways = [
+                    [[(x - float(c)) / radius for x, c in zip(position, q, strict=True)] for q in p]
+                    for p in (places, points)
+                ]
+                parts += [
+                    float(-self.mixed[a, b] / len(points) * amount) * mixed_energy(here, there, whole, images)
+                    for here, amount in zip(ways[0], amounts, strict=True)
+                    for there in ways[1]
+                ]
+        return hy.sum(parts)
+
+    def _together(self, position: Sequence[hy.expression]) -> hy.expression:
+        """What each two magnets' charges do in the sphere."""
+        parts, images = [hy.expression(0.0)], self.images.tolist()
+        scaled = [
+            [[(x - float(c)) / grid.radius for x, c in zip(position, place, strict=True)] for place in grid.charges[0]]
+            for grid in self.grids
+        ]
+        for a, b in self._related:
+            amounts = -self.pairs[a, b] * np.outer(self.grids[a].charges[1], self.grids[b].charges[1])
             parts += [
-                float(-0.5 * (1 if a == b else 2) * self.coupling[a, b]) * (fields[a] * fields[b])
-                for a, b in zip(*np.triu_indices(len(fields)), strict=True)
-                if self.coupling[a, b]
+                float(amounts[k, l]) * answer_to_charge(scaled[a][k], scaled[b][l], images)
+                for k, l in np.ndindex(*amounts.shape)
             ]
-        if self.pairs.any():
-            slopes = [dipole_slope(grid, position) for grid in self.grids]
-            for a, b in combinations(range(len(slopes)), 2):
-                product = hy.sum([w * (p * q) for w, p, q in zip(FULL, slopes[a], slopes[b], strict=True)])
-                parts.append(-float(self.pairs[a, b]) * share * share * product)
         return hy.sum(parts)
 
     def derivatives(self, places: Array, moments: Array) -> tuple[Array, Array, Array]:
@@ -92,20 +136,50 @@ class MutualTable:
 
         By place (n, 3) m and moment (n, 3) A m², in this order.
         """
-        rows = self._coupled(np.ascontiguousarray(np.concatenate([places, moments], axis=1).T))
-        energy, slope, second = rows[0], rows[1:7].T, rows[7:].T.reshape(-1, 6, 6)
-        for grid in self.grids:
-            parts = grid_derivatives(grid, places, moments)
-            energy, slope, second = energy + parts[0], slope + parts[1], second + parts[2]
+        energy, slope, second = np.zeros(len(places)), np.zeros((len(places), 6)), np.zeros((len(places), 6, 6))
+        parts = [grid_derivatives(grid, places, moments) for grid in self.grids]
+        if self.coupling.any():
+            parts.append(coupled_derivatives(np.concatenate(self._inner), self.coupling, places, moments))
+        for weight, given in self._answering:
+            energies = mixed_derivatives(given, places, moments)
+            parts.append((weight * energies[0], weight * energies[1], weight * energies[2]))
+        for part in parts:
+            energy, slope, second = energy + part[0], slope + part[1], second + part[2]
+        for weight, given in self._charged:
+            value, along, bend = pair_derivatives(given, places)
+            energy = energy + weight * value
+            slope[:, :3] += weight * along
+            second[:, :3, :3] += weight * bend
         return energy, slope, second
 
     @cached_property
-    def _coupled(self) -> Any:
-        given = hy.make_vars("x", "y", "z", "m_x", "m_y", "m_z")
-        energy = self.coupled(given[:3], given[3:])
-        gradient = list(hy.diff_tensors([energy], diff_args=given, diff_order=1).gradient)
-        second = np.asarray(hy.diff_tensors(gradient, diff_args=given, diff_order=1).jacobian)
-        return compiled(hy.cfunc, [energy, *gradient, *second.ravel()], given, compact_mode=True)
+    def _answering(self) -> list[tuple[float, Pairs]]:
+        """Magnets that answer to the sphere's answer to others."""
+        each = permutations(range(len(self.grids)), 2)
+        return [
+            (-float(self.mixed[a, b]), pairs_mixed(self.grids[a], self._inner[b], self.images))
+            for a, b in each
+            if self.mixed[a, b]
+        ]
+
+    @cached_property
+    def _charged(self) -> list[tuple[float, Pairs]]:
+        """Two magnets each that are charged."""
+        return [
+            (-float(self.pairs[a, b]), pairs_of_charges(self.grids[a], self.grids[b], self.images))
+            for a, b in self._related
+        ]
+
+    @cached_property
+    def _inner(self) -> list[Array]:
+        """The points of each magnet at which they answer to each other."""
+        number = round((len(self.coupling) / (3 * max(len(self.grids), 1))) ** (1 / 3))
+        return [grid.inner(number) for grid in self.grids]
+
+    @property
+    def _related(self) -> list[tuple[int, int]]:
+        """Two magnets each."""
+        return [(a, b) for a, b in combinations(range(len(self.grids)), 2) if self.pairs[a, b]]
 
     def relative_error(self, points: ArrayLike) -> tuple[Array, Array]:
         """Estimated relative errors (n,) of what the answers add to force and torque, at points (n, 3) m."""
@@ -122,34 +196,3 @@ class MutualTable:
             f"{e:.1e} at {g * 1e3:.2g} mm" for g, e in zip(self.gaps, self.errors.max(axis=1), strict=True)
         )
         return f"MutualTable: {points} points in {len(self.grids)} magnets; relative error {told} from contact"
-
-
-FULL = (1.0, 1.0, 1.0, 2.0, 2.0, 2.0)
-"""How often the entries xx, yy, zz, xy, xz, yz of a symmetric tensor are in its square."""
-
-
-def dipole_field(
-    grid: AnswerGrid, position: Sequence[hy.expression], moment: Sequence[hy.expression]
-) -> list[hy.expression]:
-    """Field (3) T at a grid's centre of a moment (A m²) at a position (m), along the rotor's axes."""
-    d = [x - float(c) for x, c in zip(position, grid.box.center, strict=True)]
-    inverse = 1.0 / hy.sum([t * t for t in d])
-    cube = (MU_0 / (4 * np.pi)) * (inverse * hy.sqrt(inverse))
-    along = 3.0 * inverse * hy.sum([m * t for m, t in zip(moment, d, strict=True)])
-    return [cube * (along * t - m) for t, m in zip(d, moment, strict=True)]
-
-
-def dipole_slope(grid: AnswerGrid, position: Sequence[hy.expression]) -> list[hy.expression]:
-    """Field gradient (xx yy zz xy xz yz, 1/m⁴) of a unit dipole along the remanence at the centre, by 3 μ0/4π."""
-    j = grid.box.rotation @ grid.axis
-    d = [x - float(c) for x, c in zip(position, grid.box.center, strict=True)]
-    inverse = 1.0 / hy.sum([t * t for t in d])
-    fifth = inverse * inverse * hy.sqrt(inverse)
-    along = hy.sum([float(c) * t for c, t in zip(j, d, strict=True) if c])
-    steep = 5.0 * inverse * along
-
-    def entry(a: int, b: int) -> hy.expression:
-        flat = float(j[a]) * d[b] + float(j[b]) * d[a]
-        return fifth * ((flat + along if a == b else flat) - steep * (d[a] * d[b]))
-
-    return [entry(0, 0), entry(1, 1), entry(2, 2), entry(0, 1), entry(0, 2), entry(1, 2)]

@@ -16,7 +16,7 @@ from .answer_fit import mutual_table
 from .answer_grid import AnswerGrid, answer_box
 from .table import MutualTable
 
-FORMAT = "spinlev mutual table 2"
+FORMAT = "spinlev mutual table 3"
 
 
 def cached_mutual_table(
@@ -42,7 +42,8 @@ def _posed(table: MutualTable, magnets: tuple[Magnet, ...]) -> MutualTable:
     if len(magnets) > 1:
         return table
     turns = [magnet.box.rotation for magnet in magnets]
-    coupling = turns[0] @ table.coupling @ turns[0].T if turns else table.coupling
+    turn = np.kron(np.eye(len(table.coupling) // 3), turns[0]) if turns else np.zeros((0, 0))
+    coupling = turn @ table.coupling @ turn.T
     grids = tuple(replace(grid, box=answer_box(magnet.body)) for grid, magnet in zip(table.grids, magnets, strict=True))
     return replace(table, magnets=magnets, grids=grids, coupling=coupling)
 
@@ -69,7 +70,9 @@ def to_dataset(table: MutualTable) -> xr.Dataset:
         "degrees": (("point", "power", "kind"), np.concatenate([grid.degrees for grid in grids]), "J"),
         "returned": (("point", "higher_power", "kind"), np.concatenate([grid.returned for grid in grids]), "T"),
         "coupling": (("field", "other_field"), table.coupling, "A m2/T"),
-        "pairs": (("magnet", "other_magnet"), table.pairs, "J m8"),
+        "pairs": (("magnet", "other_magnet"), table.pairs, "J"),
+        "mixed": (("magnet", "other_magnet"), table.mixed, "T"),
+        "images": (("image",), table.images, "1"),
         "polarizability": ((), table.polarizability, "A m2/T"),
         "radius": ((), grids[0].radius, "m"),
         "gaps": (("gap",), table.gaps, "m"),
@@ -97,6 +100,8 @@ def from_dataset(dataset: xr.Dataset, magnets: tuple[Magnet, ...]) -> MutualTabl
         grids=tuple(grids),
         coupling=data["coupling"],
         pairs=data["pairs"],
+        mixed=data["mixed"],
+        images=data["images"],
         polarizability=float(data["polarizability"]),
         gaps=data["gaps"],
         errors=data["errors"],

@@ -24,7 +24,7 @@ def floater_figure(result: xr.Dataset) -> Figure:
         place = -1e3 * float(result["rigid_position"].sel(axis="z"))
         for axes in (left, right):
             axes.axvline(place, color="0.3", lw=0.8, ls=":", label="stable equilibrium")
-    left.legend(loc="lower left", frameon=True, framealpha=1.0)
+    left.legend(loc="upper center", bbox_to_anchor=(0.5, -0.17))
     right.legend(loc="upper right")
     return figure
 

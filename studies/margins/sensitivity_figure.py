@@ -100,7 +100,7 @@ def _contributions(axes: Axes, part: xr.Dataset, quantity: str, scale: float) ->
         )  # fmt: skip
     axes.set_yticks(places, [WORDS[name] for name in names])
     axes.xaxis.set_major_locator(MaxNLocator(4))
-    axes.legend()
+    axes.legend(ncols=2, loc="upper center", bbox_to_anchor=(0.5, -0.2), columnspacing=1.0)
 
 
 def _box(axes: Axes, part: xr.Dataset, quantity: str, places: Array, color: str, scale: float, label: str) -> None:

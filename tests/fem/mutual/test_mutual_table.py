@@ -5,14 +5,16 @@ from dataclasses import replace
 import heyoka as hy
 import numpy as np
 import pytest
+from numpy.polynomial import legendre
 
 from spinlev.fem.harmonics import Ball, field_at_center, gradient_at_center
 from spinlev.fem.mutual import answers, cached_mutual_table, enough_degree, mutual_table, rotor_ladder, two_body
 from spinlev.fem.mutual.answer_samples import places_around
+from spinlev.fem.mutual.permeable_sphere import answer_to_charge, image_weights, reflection
 from spinlev.fem.mutual.table_file import FORMAT, from_dataset, to_dataset
 from spinlev.fem.storage import read_checked, write_checked
 from spinlev.geometry.basics import Box, InputError, rotation_matrix
-from spinlev.geometry.bodies import Magnet, horizontal, tilt
+from spinlev.geometry.bodies import Magnet, horizontal, tilt, vertical
 from spinlev.geometry.scenes import Floater
 
 FLOATER = Floater(6.35e-3, 1.305, 1.05, 7500.0)
@@ -70,16 +72,23 @@ def test_nearer_to_contact_the_stated_error_holds(table, fine):
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    "rotor", [MAGNETS, horizontal(1.5e-3, 10e-3, 1.305, 1.05), tilt(np.radians(10.0), 10e-3, 1.305, 1.05)]
+    ("rotor", "part"),
+    [
+        (MAGNETS, 1e-3),
+        (horizontal(1.5e-3, 10e-3, 1.305, 1.05), 1e-3),
+        (tilt(np.radians(10.0), 10e-3, 1.305, 1.05), 1e-3),
+        (vertical(14e-3, 10e-3, 1.305, 1.05), 1.5e-3),
+        (vertical(10e-3, 10e-3, 1.305, 1.05), 1e-3),  # touching
+    ],
 )
-def test_from_a_millimetre_off_contact_on_a_cube_is_met_to_a_thousandth(rotor):
+def test_from_a_millimetre_off_contact_on_cubes_are_met_to_a_thousandth(rotor, part):
     """At thirty poses of each rotor."""
     (fine,), table = rotor_ladder(rotor, (3,)), cached_mutual_table(rotor, FLOATER, print)[0]
     for gap in (1e-3, 2e-3, 4e-3):
         each = zip(*poses(gap / FLOATER.radius, 10, 31, rotor), strict=True)
         worst = np.max([missed(table, fine, place, direction) for place, direction in each], axis=0)
         print(f"\n{1e3 * gap:g} mm off contact: misses {worst[0]:.1e} of the added force, {worst[1]:.1e} of the torque")
-        assert max(worst) < 1e-3
+        assert max(worst) < part
 
 
 def test_written_out_and_by_points_the_energy_is_one(table):
@@ -143,6 +152,44 @@ def test_a_lone_magnet_has_one_table_wherever_it_stands():
     for there, value in zip(answers(second, *moved), here, strict=True):
         expected = value if value.ndim == 1 else value @ turn.T
         np.testing.assert_allclose(there, expected, rtol=1e-10, atol=1e-12 * np.abs(expected).max())
+
+
+def test_the_answer_to_charges_is_the_sum_of_its_degrees():
+    """Legendre's series with the sphere's t_l, to the 7e-4 of the images; and two charges may change places."""
+    weights, places = image_weights(1.05), hy.make_vars("a", "b", "c", "d", "e", "f")
+    told = hy.cfunc([answer_to_charge(places[:3], places[3:], weights.tolist())], places)
+    a, b = np.array([0.3, -1.2, 0.4]), np.array([1.1, 0.5, -0.9])
+    sizes = np.linalg.norm(a), np.linalg.norm(b)
+    share = reflection(1.05, 60) * 2.05 / 0.05 / np.prod(sizes) ** np.arange(1, 62)
+    share[:2] = 0.0
+    expected = legendre.legval(a @ b / np.prod(sizes), share)
+    assert told(np.concatenate([a, b]))[0] == pytest.approx(expected, rel=2e-3)
+    assert told(np.concatenate([b, a]))[0] == pytest.approx(told(np.concatenate([a, b]))[0], rel=1e-12)
+
+
+def test_two_magnets_written_out_and_by_pairs_have_one_energy(table):
+    """Made-up weights: pairs of charges, what is mixed, and a coupling at inner points, with their derivatives."""
+    generator, (grid,) = np.random.default_rng(3), table.grids
+    above = replace(grid, box=Box(grid.box.size, grid.box.center + np.array([0.0, 0.0, 12e-3])), axis=np.eye(3)[2])
+    coupling = 1e-3 * generator.normal(size=(48, 48))
+    pairs, mixed = np.array([[0.0, 4e-3], [4e-3, 0.0]]), np.array([[0.0, 3e-5], [2e-5, 0.0]])
+    two = replace(table, grids=(grid, above), coupling=coupling + coupling.T, pairs=pairs, mixed=mixed)
+    given = hy.make_vars("x", "y", "z", "m_x", "m_y", "m_z")
+    written = hy.cfunc([two.coupled(given[:3], given[3:])], given, compact_mode=True)
+    alone = [replace(table, grids=(g,), coupling=np.zeros((3, 3)), pairs=0 * pairs, mixed=0 * mixed) for g in two.grids]
+    places, directions = poses(0.6, 9, 8)
+    places, directions = np.ascontiguousarray(places - [0.0, 0.0, 20e-3]), FLOATER.moment * directions
+    energy, slope, second = two.derivatives(places, directions)
+    rest = energy - sum(t.derivatives(places, directions)[0] for t in alone)
+    found = written(np.ascontiguousarray(np.concatenate([places, directions], axis=1).T))[0]
+    np.testing.assert_allclose(found, rest, rtol=1e-8, atol=1e-9 * np.abs(rest).max())
+    for axis in range(6):
+        step = np.zeros(6)
+        step[axis] = 1e-6 if axis < 3 else 1e-5
+        ends = [two.derivatives(places + s * step[:3], directions + s * step[3:]) for s in (1, -1)]
+        change, bend = ((ends[0][k] - ends[1][k]) / (2 * step[axis]) for k in (0, 1))
+        np.testing.assert_allclose(change, slope[:, axis], rtol=1e-5, atol=1e-6 * np.abs(slope[:, axis]).max())
+        assert np.abs(bend - second[:, axis]).max() < 1e-5 * np.abs(second[:, axis]).max()
 
 
 def test_no_place_is_no_answer(table):
