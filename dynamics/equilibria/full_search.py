@@ -1,9 +1,11 @@
 """All synchronous equilibria of a floater: fixed points in the frame that turns with the rotor."""
 
+from contextlib import suppress
+
 import numpy as np
 from numpy.typing import NDArray
 
-from ...fem.rotor_tables import FieldTable
+from ...fem.rotor_tables import FieldTable, RangeError
 from ...geometry.basics import Array
 from ...geometry.scenes import Scene
 from ..effects import FloaterShape, with_effects
@@ -86,10 +88,12 @@ def _of_shape(
     kept, more = known.copy(), []
     for k, doubt in zip(np.flatnonzero(known), doubts, strict=True):
         place, moment = where[k, :3] * length, where[k, 3:]
-        kept[k] = rotor_gap(scene, place, moment) > 0
-        missed = shape.missed(table, place[None], moment[None])[0] if kept[k] else np.zeros(2)
-        kept[k] &= bool(missed[1] * floater.moment < BEYOND * floater.mass * unit)
-        more += [doubt + missed] if kept[k] else []
+        kept[k] = False
+        with suppress(RangeError):  # part of the floater is where a series of the rotor's field does not converge
+            if rotor_gap(scene, place, moment) > 0:
+                missed = shape.missed(table, place[None], moment[None])[0]
+                kept[k] = missed[1] * floater.moment < BEYOND * floater.mass * unit
+                more += [doubt + missed] if kept[k] else []
     return kept, np.reshape(more, (-1, 2))
 
 

@@ -64,6 +64,14 @@ def test_nearest_equilibrium_balances_its_charges():
         assert equilibrium.position_error > 0.1 * shift
 
 
+@pytest.mark.slow
+def test_where_a_series_of_the_rotor_does_not_reach_there_is_no_equilibrium_and_no_error():
+    """Moments of a cube hold outside its circumscribed sphere; starts of the search have the disc partly inside."""
+    found = survey(SCENE, rotor_table((CUBE,), "moments", 1e-4)).equilibria
+    exact = survey(SCENE, rotor_table((CUBE,), "cuboid")).equilibria
+    assert [e.distance for e in found] == pytest.approx([e.distance for e in exact if e.distance > 0.017], rel=1e-3)
+
+
 def test_its_multipoles_are_no_detail_and_four_of_them_do():
     """20 mm below the rotor, against all charges: the dipole alone misses percents of the force."""
     shape = FloaterShape.of(DISC, floater_sources(DISC), TABLE)

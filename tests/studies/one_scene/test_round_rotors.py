@@ -46,3 +46,29 @@ def test_a_flight_under_a_cylinder_stays_up_and_its_ledger_closes():
     flown = sl.simulate(scene, 0.05, model="cuboid", interaction="rigid")
     assert flown.attrs["ended_by"] == "duration"
     assert flown.attrs["energy_error"] < 1e-10
+
+
+def of_spheres(**more):
+    """A sphere with μr = 1 is exactly its dipole: whatever follows from its field is known from the dipole's."""
+    rotor = sl.tilt(angle_deg=7.5, shape="sphere", diameter_mm=19.0, remanence_T=1.2, recoil_permeability=1.0)
+    return sl.scene(frequency_hz=130.0, rotor=rotor, floater=BALL, **more)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("plate_model", ["slab", "reduced"])
+def test_over_a_plate_a_rotor_of_a_sphere_is_one_of_a_dipole(plate_model):
+    plate = sl.plate(size_mm=[100.0, 240.0, 30.0], center_mm=[0.0, 0.0, -65.0], conductivity_S_m=3.5e7)
+    pair = [sl.equilibria(of_spheres(plate=plate), model=m, plate_model=plate_model) for m in ("cuboid", "dipole")]
+    sphere, dipole = (found.isel(equilibrium=0) for found in pair)
+    assert sphere.position.values == pytest.approx(dipole.position.values, abs=1e-9)
+    assert float(sphere.growth) == pytest.approx(float(dipole.growth), rel=1e-6)
+    assert float(sphere.growth) < -1.0
+
+
+@pytest.mark.slow
+def test_a_map_of_sphere_rotors_is_that_of_dipoles():
+    asked = {"rotor.angle_deg": [6.5, 7.5, 8.5], "frequency_hz": [130.0, 140.0]}
+    pair = [sl.sweep(of_spheres(), {**asked, "model": [m]}, ask="equilibria", workers=1) for m in ("cuboid", "dipole")]
+    sphere, dipole = (found.distance.values for found in pair)
+    assert np.isfinite(sphere).any()
+    assert sphere == pytest.approx(dipole, abs=1e-9, nan_ok=True)
