@@ -33,7 +33,7 @@ VARIANTS = {
 SETTINGS: Mapping[bool, Point] = {
     False: {
         "heights": 12, "spins": 5, "steel": True, "single": 64, "stack": 36, "better": 8,
-        "single_degree": 4, "stack_degree": 3, "better_degree": 1, "live": 250, "walks": 20, "draws": 1 << 16,
+        "single_degree": 4, "stack_degree": 3, "better_degree": 1, "live": 150, "walks": 20, "draws": 1 << 15,
     },
     True: {
         "heights": 7, "spins": 3, "steel": False, "single": 12, "stack": 16, "better": 0,
@@ -134,6 +134,8 @@ def _row(name: str, facts: Mapping[str, Fact], models: Models, found: Posterior,
         "log_evidence_single": (("fact",), drawn.single, "1", "logarithm of the evidence of one fact"),
         "log_evidence_pair": (("fact", "other_fact"), drawn.pair, "1", "logarithm of the evidence of two facts"),
         "log_evidence_others": (("fact",), drawn.without, "1", "logarithm of the evidence of all other facts"),
+        "fact_shift": (("fact", "unknown"), drawn.shift, "1", "mean given one fact, in deviations of the prior"),
+        "fact_width": (("fact", "unknown"), drawn.width, "1", "deviation given one fact, in deviations of the prior"),
         "surrogate_error": (("rotor_kind", "fitted"), [s.errors for s in each], "1", "error for rotors left out"),
         "surrogate_rotors": (("rotor_kind",), [s.rotors for s in each], "1", "rotors that it is fitted to"),
         "truth": (("unknown",), truth, "see unit", "unknowns of which the facts were made up"),

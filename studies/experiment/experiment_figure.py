@@ -14,10 +14,12 @@ SHOWN = ("displacement", "tilt", "stack_tilt", "magnets", "steel", "motion", "sp
 @styled
 def corner_figure(result: xr.Dataset) -> Figure:
     """The posterior of some unknowns, alone and in pairs; grey: the middle 68 % of the prior."""
-    one, before = result.isel(variant=0), prior_quantiles(result)
+    one = result.isel(variant=0)
+    units = np.where(result["unit"].values == "S/m", 1e-6, 1.0)
+    before = prior_quantiles(result) * units[:, None]
     names = list(result["unknown"].values)
     chosen = [names.index(name) for name in SHOWN]
-    draws = one["posterior"].values
+    draws = one["posterior"].values * units
     draws = draws[np.isfinite(draws).all(axis=1)]
     figure, axes = panels(len(chosen), len(chosen), (PAGE, PAGE))
     for row, i in enumerate(chosen):
@@ -90,7 +92,7 @@ def facts_figure(result: xr.Dataset) -> Figure:
     drawn = right.imshow(ratio, cmap="RdBu", vmin=-3, vmax=3)
     right.set_xticks(np.arange(len(names)), names, rotation=90, fontsize=6)
     right.set_yticks(np.arange(len(names)), [""] * len(names))
-    figure.colorbar(drawn, ax=right, label="logarithm of what two facts gain by each other")
+    figure.colorbar(drawn, ax=right, label="gain of two facts (logarithm)")
     return figure
 
 
@@ -99,4 +101,4 @@ FIGURES = {"experiment": unknowns_figure, "experiment-corner": corner_figure, "e
 
 def _label(result: xr.Dataset, k: int) -> str:
     name, unit = str(result["unknown"].values[k]).replace("_", " "), str(result["unit"].values[k])
-    return name if unit == "1" else f"{name} ({unit})"
+    return name if unit == "1" else f"{name} ({'MS/m' if unit == 'S/m' else unit})"

@@ -10,8 +10,10 @@ from ...geometry.basics import Array
 from .synthetic import SYNTHETIC
 
 SHARES = (0.16, 0.5, 0.84)
-PINNED = 0.8
+PINNED = 0.7
 """A posterior that is narrower than this part of the prior, or off its middle by as much, is worth a line."""
+PINS, TOLD = 3, 0.25
+"""How many unknowns are named with a fact, and from which change on."""
 CONTRADICTS = 1.0
 """Logarithm of the ratio of evidences below minus which two facts contradict each other."""
 
@@ -101,9 +103,18 @@ def _facts(one: xr.Dataset) -> list[str]:
         given = float(one["log_evidence_drawn"] - one["log_evidence_others"][k])
         lines.append(
             f"{one['fact'].values[k]}: probability {alone:.2g} beforehand, {np.exp(given):.2g} given all others, "
-            f"{np.nanmean(kept):.2g} in the fit."
+            f"{np.nanmean(kept):.2g} in the fit{_pinned(one, k)}."
         )
     return lines
+
+
+def _pinned(one: xr.Dataset, k: int) -> str:
+    """The unknowns that one fact alone moves or narrows most, in deviations of their priors."""
+    shift, width = one["fact_shift"].values[k], one["fact_width"].values[k]
+    moved = np.maximum(np.abs(shift), 1 - width)
+    names = [j for j in np.argsort(-moved)[:PINS] if moved[j] > TOLD]
+    told = ", ".join(f"{one['unknown'].values[j]} {shift[j]:+.1f} ± {width[j]:.1f}" for j in names)
+    return f"; alone it asks for {told}" if told else ""
 
 
 def _pairs(one: xr.Dataset) -> list[str]:

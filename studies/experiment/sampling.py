@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.special import logsumexp
+from scipy.special import logsumexp, ndtri
 from scipy.stats import qmc
 
 from ...geometry.basics import Array
@@ -83,6 +83,7 @@ class Evidences:
     pair : (fact, fact) of each two
     without : (fact,) of all others together
     every, error : of all together, and its standard deviation
+    shift, width : (fact, unknown) mean and deviation of each unknown given one fact, in deviations of the prior
     """
 
     single: Array
@@ -90,6 +91,8 @@ class Evidences:
     without: Array
     every: float
     error: float
+    shift: Array
+    width: Array
 
 
 def evidences(models: Models, facts: Mapping[str, Fact], draws: int, seed: int) -> Evidences:
@@ -106,5 +109,9 @@ def evidences(models: Models, facts: Mapping[str, Fact], draws: int, seed: int) 
     pair = np.stack([mean(known + known[:, [k]]) for k in range(len(facts))])
     np.fill_diagonal(pair, mean(known))
     whole = float(mean(every))
-    spread = np.exp(every - whole)
-    return Evidences(mean(known), pair, mean(every[:, None] - known), whole, float(spread.std() / np.sqrt(draws)))
+    spread, deviates = np.exp(every - whole), ndtri(shares)
+    weights = np.exp(known - logsumexp(known, axis=0)).T
+    shift = weights @ deviates
+    width = np.sqrt(np.maximum(weights @ deviates**2 - shift**2, 0.0))
+    error = float(spread.std() / np.sqrt(draws))
+    return Evidences(mean(known), pair, mean(every[:, None] - known), whole, error, shift, width)

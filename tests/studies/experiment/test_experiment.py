@@ -14,7 +14,7 @@ from spinlev.geometry.basics import MAGNET_CONDUCTIVITY
 from spinlev.geometry.scenes import Drag
 from spinlev.studies.article import levitation_of
 from spinlev.studies.experiment import EXPERIMENT
-from spinlev.studies.experiment.design import design_inputs, losses_of
+from spinlev.studies.experiment.design import cached_row, design_inputs, design_row, losses_of
 from spinlev.studies.experiment.experiment import SETTINGS, VARIANTS, surrogates_of
 from spinlev.studies.experiment.facts import FACTS, Models, ends, log_likelihoods
 from spinlev.studies.experiment.flights import Conditions, Course, flown
@@ -24,6 +24,8 @@ from spinlev.studies.experiment.rotors import KINDS, scene_of
 from spinlev.studies.experiment.sampling import evidences, posterior
 from spinlev.studies.experiment.surrogate import FITTED, Surrogate, exponents, fitted, targets
 from spinlev.studies.experiment.synthetic import TRUTH, synthetic_facts
+from spinlev.studies.sweeps import swept
+from spinlev.studies.terminal import Workers
 
 INPUTS = {"on_axis": 7.3, "displacement": 1.0, "radius": 1.0, "weight": 1.0}
 """The rotor of docs/examples/three_flights.toml."""
@@ -224,3 +226,16 @@ def test_a_variant_without_an_effect_has_none_of_it(models):
     every = models.conditions(values, flight).strengths
     without = replace(models, effects=("floater", "air")).conditions(values, flight).strengths
     np.testing.assert_array_equal(without, every * [1, 0, 0, 1])
+
+
+@pytest.mark.slow
+def test_the_number_of_workers_does_not_matter(tmp_path):
+    """The quick study with one and two workers, and a rotor that is computed anew against the one that was kept."""
+    points = dict(enumerate(EXPERIMENT.points(True)))
+    one, two = (swept("experiment", EXPERIMENT, points, Workers(workers=n), tmp_path / str(n)) for n in (1, 2))
+    for name in one.data_vars:
+        np.testing.assert_array_equal(one[name].values, two[name].values)
+    for k in (0, SETTINGS[True]["single"]):
+        np.testing.assert_array_equal(design_row(points[k])["node"], cached_row(points[k])["node"])
+    assert "logarithm of the evidence" in EXPERIMENT.report(one)[-1]
+    assert all(draw(one).axes for draw in EXPERIMENT.figures.values())
