@@ -11,7 +11,7 @@ from pathlib import Path
 ROOT = Path(__file__).parent.parent
 DIRECT = re.compile(r'^  "([\w.-]+)[^"]*",\s*(?:# (.+))?$', re.MULTILINE)
 INDIRECT = re.compile(r"^([\w.-]+)==.*?(?=^\S|\Z)", re.MULTILINE | re.DOTALL)
-KNOWN = {"matplotlib": "PSF-based (BSD compatible)"}
+KNOWN = {"matplotlib": "PSF-based (BSD compatible)", "dynesty": "MIT"}
 """What a package's text says in many words."""
 HEAD = """# Dependencies
 

@@ -15,6 +15,7 @@ from .mutual import MUTUAL as MUTUAL, Mutual as Mutual
 from .rigid_or_mutual import NOTHING_ANSWERS as NOTHING_ANSWERS, mutual_choice as mutual_choice
 from .rotor_losses import (
     ROTOR_CURRENTS as ROTOR_CURRENTS,
+    Dissipation as Dissipation,
     RotorCurrents as RotorCurrents,
     brake_slope as brake_slope,
 )

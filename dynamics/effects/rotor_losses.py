@@ -8,9 +8,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Protocol
 
 import heyoka as hy
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ...fem.harmonics import BallField
 from ...fem.rotor_losses import RotorLosses
@@ -102,7 +104,14 @@ def _sum(weights: Array, terms: Sequence[hy.expression]) -> hy.expression:
     return hy.sum([float(w) * t for w, t in zip(weights, terms, strict=True) if w])
 
 
-def brake_slope(table: RotorLosses, scene: Scene, state: State) -> Array:
+class Dissipation(Protocol):
+    """Losses in metal that turns with the rotor."""
+
+    def dissipation(self, positions: ArrayLike, moments: ArrayLike) -> Array:
+        """D (n, 6, 6) of dipoles (n, 3) A m² at (n, 3) m: N s/m, N s and N m s."""
+
+
+def brake_slope(table: Dissipation, scene: Scene, state: State) -> Array:
     """(12, 12): what the currents add to the derivatives of the scaled rates of a floater in step with the rotor."""
     scales, floater = Scales.of(scene), scene.floater
     matrix = table.dissipation(state.position[None], floater.moment * state.moment[None])[0]

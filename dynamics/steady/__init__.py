@@ -32,4 +32,5 @@ from .stability import (
     modes as modes,
     named_modes as named_modes,
     spectra as spectra,
+    tangent_spaces as tangent_spaces,
 )

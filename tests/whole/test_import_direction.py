@@ -44,7 +44,7 @@ FLOORS = {
             "field_quality",
             "levitation",
         ),
-        *("margins", "plates", "capture", "catalogue", "live", "explore", "interface", "command_line"),
+        *("margins", "plates", "capture", "experiment", "catalogue", "live", "explore", "interface", "command_line"),
     ],
 }
 ORDER = [(floor, room) for floor, rooms in FLOORS.items() for room in rooms]
