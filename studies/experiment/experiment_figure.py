@@ -6,6 +6,7 @@ from matplotlib.figure import Figure
 
 from ..results import PAGE, PALETTE, panels, styled
 from .experiment_report import facts_known, prior_quantiles, quantiles, support
+from .priors import UNKNOWNS
 
 SHOWN = ("displacement", "tilt", "stack_tilt", "magnets", "steel", "motion", "spin")
 """Unknowns of the corner."""
@@ -51,6 +52,7 @@ def unknowns_figure(result: xr.Dataset) -> Figure:
     before = prior_quantiles(result)
     middle, half = before[:, 1], (before[:, 2] - before[:, 0]) / 2
     told = [k for k in range(result.sizes["variant"]) if not np.isfinite(result["truth"].values[k]).any()]
+    symbols = {unknown.name: unknown.symbol for unknown in UNKNOWNS}
     figure, ((panel,),) = panels(1, 1, (PAGE, 1.2 + 0.22 * len(middle)))
     places = np.arange(len(middle))[::-1]
     panel.axvspan(-1, 1, color="0.92", zorder=0)
@@ -61,8 +63,8 @@ def unknowns_figure(result: xr.Dataset) -> Figure:
         panel.errorbar(
             found[:, 1], places - 0.12 * n, xerr=bars, fmt="o", ms=3, color=PALETTE[n % len(PALETTE)], label=name
         )
-    panel.set_yticks(places, list(result["unknown"].values))
-    panel.set_xlabel("deviations of the prior")
+    panel.set_yticks(places, [symbols.get(str(name), str(name)) for name in result["unknown"].values])
+    panel.set_xlabel("middle 68 %, in deviations of the prior")
     panel.legend(fontsize=6, loc="lower right")
     return figure
 
@@ -91,8 +93,9 @@ def facts_figure(result: xr.Dataset) -> Figure:
     np.fill_diagonal(ratio, np.nan)
     drawn = right.imshow(ratio, cmap="RdBu", vmin=-3, vmax=3)
     right.set_xticks(np.arange(len(names)), names, rotation=90, fontsize=6)
-    right.set_yticks(np.arange(len(names)), [""] * len(names))
-    figure.colorbar(drawn, ax=right, label="gain of two facts (logarithm)")
+    right.set_yticks(np.arange(len(names)), names, fontsize=6)
+    right.grid(False)
+    figure.colorbar(drawn, ax=right, shrink=0.6, label="gain of two facts (logarithm)")
     return figure
 
 

@@ -11,18 +11,17 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ...geometry.basics import Array, Box, moved
-from ...geometry.bodies import Conductor, Magnet, tilt, vertical
+from ...geometry.basics import Array, moved
+from ...geometry.bodies import Magnet, tilt, vertical
 from ...geometry.scenes import Drag, Scene
 from ..article import EDGE, FLOATER, REMANENCE
+from ..capture import spacer
 
 GRAVITY = 9.81
 PER_MILLIMETRE = 5.0
 """Tilt, in degrees, that does about what a millimetre of displacement does."""
-STEEL = 1.4e6
-"""Conductivity of non-magnetic steel (AISI 304), S/m."""
-SPACER = Conductor(Box(np.array([2.11e-3, EDGE, EDGE]), np.array([-4e-3 - 1.055e-3, 0.0, 0.0])), STEEL)
-"""The block behind a cube displaced by 1 mm that puts the centre of mass on the axis (`capture.upper_limit.spacer`)."""
+SPACER = spacer(1e-3)
+"""The block of steel that balances a cube displaced by 1 mm."""
 
 
 @dataclass(frozen=True)
