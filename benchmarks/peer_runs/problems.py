@@ -95,3 +95,9 @@ def start_of_flight(case):
     vectors = np.array(STARTS[case])
     vectors[2] /= np.linalg.norm(vectors[2])
     return vectors
+
+
+SLOTS = (-0.0196, -0.0295, -0.0454)
+"""Heights near which the equilibria of the scene are, m."""
+MAP_FREQUENCIES, MAP_DISPLACEMENTS = (100.0, 115.0, 130.0, 145.0, 160.0), (1.5e-3, 2e-3, 2.5e-3, 3e-3)
+"""Of the map of equilibria, Hz and m."""

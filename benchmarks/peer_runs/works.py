@@ -157,4 +157,17 @@ FLIGHT = Work(
         Peer("MuJoCo", "mujoco", "flight_mujoco.py", ("50", "100", "200"), True, only=("dipole",)),
     ),
 )  # fmt: skip
-WORKS = {work.name: work for work in (FIELD, POINTS, FORCE, PLATE, FALL, FLIGHT)}
+EQUILIBRIA = Work(
+    "equilibria",
+    "All equilibria of a scene, and a map of 20 scenes",
+    "Largest relative error of the three places below the rotor, or of the nearest of each scene; one that is not found "
+    "counts as 1 or more (the reference differentiates numerically: 1e-9). Time with compilation of the equations; ours "
+    "tells stability as well.",
+    ("one scene", "map"),
+    (_reference("equilibria_scipy.py", "near"),),
+    (
+        _ours("equilibria_spinlev.py", "closed form"),
+        Peer("SciPy least squares and magpylib", "spinlev", "equilibria_scipy.py", ("10", "20", "40")),
+    ),
+)
+WORKS = {work.name: work for work in (FIELD, POINTS, FORCE, PLATE, FALL, FLIGHT, EQUILIBRIA)}
