@@ -160,9 +160,9 @@ FLIGHT = Work(
 EQUILIBRIA = Work(
     "equilibria",
     "All equilibria of a scene, and a map of 20 scenes",
-    "Largest relative error of the three places below the rotor, or of the nearest of each scene; one that is not found "
-    "counts as 1 or more (the reference differentiates numerically: 1e-9). Time with compilation of the equations; ours "
-    "tells stability as well.",
+    "Largest relative error of the three places below the rotor, or of the nearest of each scene; one that is not "
+    "found counts as 1 or more (the reference differentiates numerically: 1e-9). Time with compilation of the "
+    "equations; ours tells stability as well.",
     ("one scene", "map"),
     (_reference("equilibria_scipy.py", "near"),),
     (
