@@ -21,10 +21,12 @@ case, starts = sys.argv[1:]
 
 
 def searched():
+    """Places (n, 3) m of each scene, from random ones."""
     return [np.reshape(scipy_equilibria(one, magpylib_rotor(one.rotor), int(starts)), (-1, 3)) for one in scenes(case)]
 
 
 def polished():
+    """The same from beside those of spinlev."""
     return [
         np.array(
             [

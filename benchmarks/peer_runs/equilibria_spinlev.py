@@ -16,10 +16,12 @@ case = sys.argv[1]
 
 
 def one_scene():
+    """Places (n, 3) m of all equilibria of the scene."""
     return [np.array([e.position for e in find_equilibria(SCENE, rotor_table(SCENE.rotor, "cuboid"))])]
 
 
 def whole_map():
+    """The same of each scene of the map."""
     family = rotor_family(SCENE, "horizontal", "cuboid", nearest=SCENE.floater.radius, interaction="rigid")
     found = equilibrium_map(family, np.array(MAP_FREQUENCIES), np.array(MAP_DISPLACEMENTS))
     places = [(k, n) for k in range(len(MAP_DISPLACEMENTS)) for n in range(len(MAP_FREQUENCIES))]
