@@ -11,6 +11,7 @@ PICTURES = Path("docs/pictures")
 MARKERS = "osD^vP*X"
 LEAST = 1e-16
 """Errors below are drawn here."""
+DECADE = 10.0
 
 
 def draw(work, curves):
@@ -34,7 +35,9 @@ def _figure(work, curves):
             panel.loglog(time, [max(e, LEAST) for e in error], MARKERS[k], color=colour, label=name)
             time, error = zip(*useful(pairs), strict=True)
             panel.loglog(time, [max(e, LEAST) for e in error], "-", color=colour)
-        panel.xaxis.set_minor_formatter(NullFormatter())
+        low, high = panel.get_xlim()
+        if high > DECADE * low:  # else no other tick may have a number
+            panel.xaxis.set_minor_formatter(NullFormatter())
         panel.set(title=case, xlabel="processor time (s)")
     axes.flat[0].set_ylabel("relative error")
     legend_below(figure, *axes.flat, columns=3)
