@@ -1,6 +1,7 @@
 """Field expressions compiled to machine code, evaluated at many points in one call."""
 
 from collections.abc import Callable, Sequence
+from typing import Any
 
 import heyoka as hy
 import numpy as np
@@ -9,6 +10,8 @@ from numpy.typing import ArrayLike
 from ...geometry.basics import Array
 from ..storage import compiled
 
+Number = Callable[[float], Any]
+"""What a number of a formula is written as: `float`, or `RuntimeNumbers`."""
 FieldExpressions = tuple[list[hy.expression], list[list[hy.expression]]]
 """B_i (T) and ∂B_i/∂x_j (T/m), the latter symmetric."""
 
