@@ -18,7 +18,7 @@ Terms = Mapping[Any, float]
 
 
 def harmonic_sums(
-    position: Sequence[hy.expression], sums: Sequence[Terms], number: Callable[[float], Any] = float
+    position: Sequence[hy.expression], sums: Sequence[Terms], number: Callable[[Any], Any] = lambda weight: weight
 ) -> list[hy.expression]:
     """Σ weight Re Θ_lm or Im Θ_lm at a position (three expressions), one expression for each of `sums`.
 
@@ -56,7 +56,7 @@ def _chain(z: hy.expression, inverse: hy.expression, m: int, highest: int) -> di
 
 
 def _summed(
-    terms: Terms, sectoral: list[dict[str, Any]], chains: dict[int, dict[int, Any]], number: Callable[[float], Any]
+    terms: Terms, sectoral: list[dict[str, Any]], chains: dict[int, dict[int, Any]], number: Callable[[Any], Any]
 ) -> hy.expression:
     parts: dict[tuple[int, str], list[tuple[Any, hy.expression]]] = {}
     for (l, m, part), weight in terms.items():
