@@ -1,0 +1,4 @@
+"""What are the fields of a plate's currents about the place of a flight?"""
+
+from .choice import KEY as KEY, SHARE as SHARE, PlateBall as PlateBall, PlateBalls as PlateBalls
+from .formula import PlateInBall as PlateInBall, PlateKind as PlateKind
