@@ -88,8 +88,8 @@ class Flight:
         """What flies on with these runtime parameters: itself (see `LocalFlight`)."""
         return self
 
-    def enter(self, start: State, values: Array) -> float:
-        """Set the runtime parameters for a flight from a start; error of the representation chosen."""
+    def enter(self, start: State, values: Array, time: float = 0.0) -> float:
+        """Set the runtime parameters for a flight from a start at a scaled time; error of the representation chosen."""
         return 0.0
 
     def onward(self, values: Array, changes: FieldChanges) -> FieldChanges:

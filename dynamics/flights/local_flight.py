@@ -84,14 +84,14 @@ class LocalFlight:
         memory = self.parts.memory
         return None if memory is None else PlateBalls(memory, self.scene.floater.radius)
 
-    def enter(self, start: State, values: Array) -> float:
-        """Set the runtime parameters to a ball, a small one if it will do, for where the flight starts; its error."""
+    def enter(self, start: State, values: Array, time: float = 0.0) -> float:
+        """Set the runtime parameters to a ball, a small one if it will do, for a start at a scaled time; its error."""
         state, error = self.scales.pack(start), 0.0
         values[DEGREE] = 0.0
         for formula in (SMALL, LARGE):
             if not values[DEGREE]:
                 error = self.enter_ball(formula, state, values)
-        self.enter_plate_ball(0.0, state, values)
+        self.enter_plate_ball(time, state, values)
         return error
 
     def onward(self, values: Array, changes: FieldChanges) -> FieldChanges:

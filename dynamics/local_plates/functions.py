@@ -64,7 +64,7 @@ class LocalHarmonics:
         products = [[s * h for h in basis] for s in halves]
         shares = self.slopes * np.array([2.0, 2.0, 1.0])[:, None, None]
         return [
-            _signed([(shares[a, j, k], products[a][j]) for a, j in np.argwhere(self.slopes[:, :, k])])
+            _combined([(shares[a, j, k], products[a][j]) for a, j in np.argwhere(self.slopes[:, :, k])])
             for k in range(1, self.count + 1)
         ]
 
@@ -108,13 +108,12 @@ def _exact(matrix: Array) -> Array:
 
 def _summed(matrix: Array, basis: Vector, strengths: Vector) -> hy.expression:
     """Σ matrix_jk basis_j strength_k, the strengths of each member of the basis first."""
-    sums = [_signed([(row[k], strengths[int(k) - 1]) for k in np.flatnonzero(row)]) for row in matrix]
+    unit = float(np.abs(matrix[matrix != 0]).min())
+    sums = [_combined([(row[k] / unit, strengths[int(k) - 1]) for k in np.flatnonzero(row)]) for row in matrix]
     used = [bool(row.any()) for row in matrix]
-    return hy.sum([b * s for b, s, there in zip(basis, sums, used, strict=True) if there])
+    return unit * hy.sum([b * s for b, s, there in zip(basis, sums, used, strict=True) if there])
 
 
-def _signed(terms: list[tuple[float, hy.expression]]) -> hy.expression:
-    """Σ factor · term; those with the factor -1 are subtracted as a sum."""
-    plus = [t if w == 1 else float(w) * t for w, t in terms if w != -1]
-    minus = [t for w, t in terms if w == -1]
-    return hy.sum(plus) - hy.sum(minus) if minus else hy.sum(plus)
+def _combined(terms: list[tuple[float, hy.expression]]) -> hy.expression:
+    """Σ factor · term: products with the same factor are shared by all sums, and cost less than differences."""
+    return hy.sum([t if w == 1 else float(w) * t for w, t in terms])
