@@ -18,6 +18,7 @@ from ...geometry.basics import Array, InputError
 from ...geometry.scenes import Scene
 from ..effects import with_effects
 from ..flights import DURATION, IntegrationError
+from ..local_plates import WholePlate
 from ..motion import (
     CONTACT,
     Parameter,
@@ -26,7 +27,6 @@ from ..motion import (
     Scales,
     State,
     Vector,
-    WholePlate,
     clearance,
     equations_of_motion,
     flight_events,

@@ -13,7 +13,7 @@ from ...fem.harmonics import BallField
 from ...fem.rotor_tables import FieldTable
 from ...geometry.scenes import Scene
 from ..effects import with_effects
-from ..local_plates import KEY, PlateInBall, PlateKind
+from ..local_plates import KEY, PlateInBall, PlateKind, WholePlate
 from ..motion import (
     Effect,
     Equations,
@@ -23,7 +23,6 @@ from ..motion import (
     Parameter,
     PlateFormula,
     PlateMemory,
-    WholePlate,
     equations_of_motion,
     flight_events,
     interaction_of,

@@ -13,6 +13,7 @@ from ...fem.storage import compiled
 from ...geometry.basics import Array
 from ...geometry.scenes import Scene
 from ..effects import with_effects
+from ..local_plates import WholePlate
 from ..motion import (
     Equations,
     Parameter,
@@ -20,7 +21,6 @@ from ..motion import (
     PlateMemory,
     Scales,
     State,
-    WholePlate,
     equations_of_motion,
     flight_events,
     parameters,

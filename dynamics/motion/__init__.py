@@ -37,7 +37,6 @@ from .plate_terms import (
     Felt as Felt,
     PlateFormula as PlateFormula,
     PlateMemory as PlateMemory,
-    WholePlate as WholePlate,
     pushed as pushed,
     rotor_numbers as rotor_numbers,
     seen_by_plate as seen_by_plate,

@@ -7,7 +7,7 @@ In the units of `Scales`, with energies in M R²/T², the plate's states p̃ and
 with the rotor's share r̃, act on the floater by F = R μ̃ Σ ỹ_i ∇(m̂·b_i) and τ = (μ̃/i) m̂ × Σ ỹ_i b_i.  Integrated are
 p̃_i less what the rotor alone leaves (`rotor_currents`).  The plate turns backwards in the rotor's frame and may go
 down, so that time enters.  The field functions are sums b_i = Σ_k W_ik B_k, by what a `PlateFormula` says: in the
-table, of its multipoles (`WholePlate`).  Stored energy and Jacobi integral together change by the loss Σ λ_i T ỹ_i²,
+table, of its multipoles (`local_plates`).  Stored energy and Jacobi integral together change by the loss Σ λ_i T ỹ_i²,
 and by what turning the plate's view, lowering it and the change of the rotor's currents take:
 
     F·(W × r + u ẑ) + i W·τ + μ̃ m̂·Σ b_i dỹ_i/dt (rotor's currents),    u: speed of the plate's descent.
@@ -22,7 +22,6 @@ from typing import Protocol
 import heyoka as hy
 import numpy as np
 
-from ...fem.harmonics import UPPER
 from ...fem.plate_tables import PlateTable, RotorShare
 from ...geometry.basics import Array
 from ...geometry.scenes import Plate
@@ -125,58 +124,6 @@ class PlateFormula(Protocol):
 
     def seen(self, place: Vector, source: Vector) -> tuple[Vector, Felt]:
         """What each function hears of a moment at a place (m), both along the plate's axes, and what it does there."""
-
-
-@dataclass(frozen=True, eq=False)
-class WholePlate:
-    """The table's own multipoles: they hold wherever the table does.
-
-    Parameters
-    ----------
-    memory : the plate
-    first : number of the first runtime parameter
-    """
-
-    memory: PlateMemory
-    first: int = len(Parameter)
-    further: int = 0
-
-    @property
-    def share(self) -> RotorShare:
-        """See `PlateFormula`."""
-        return self.memory.share
-
-    @property
-    def reach(self) -> list[int]:
-        """See `PlateFormula`: all."""
-        series = self.share.series
-        return [len(self.memory.table.multipoles.kinds)] * ((len(series) - 1) * series.shape[2])
-
-    @property
-    def lowered(self) -> bool:
-        """See `PlateFormula`."""
-        return self.memory.plate.lowering is not None
-
-    @property
-    def weights(self) -> list[list[hy.expression | None]]:
-        """See `PlateFormula`."""
-        return [[hy.expression(float(w)) if w else None for w in row] for row in self.memory.table.weights]
-
-    def numbers(self, values: Array) -> Array:
-        """Values of its runtime parameters, from those of `parameters`."""
-        return rotor_numbers(self, self.memory.table.weights, values)
-
-    def seen(self, place: Vector, source: Vector) -> tuple[Vector, Felt]:
-        """See `PlateFormula`."""
-        parts = self.memory.table.multipoles.expressions(place)
-
-        def felt(strengths: Vector) -> tuple[Vector, Vector]:
-            pairs = list(zip(strengths, parts, strict=True))
-            field = [hy.sum([w * b[i] for w, (b, _) in pairs]) for i in range(3)]
-            slope = {(i, j): hy.sum([w * g[i][j] for w, (_, g) in pairs]) for i, j in UPPER}
-            return field, pushed(slope, source)
-
-        return [dot(source, field) for field, _ in parts], felt
 
 
 def pushed(slope: dict[tuple[int, int], hy.expression], source: Vector) -> Vector:

@@ -6,14 +6,13 @@ import heyoka as hy
 import numpy as np
 import pytest
 
-from spinlev.dynamics.local_plates import SHARE, PlateBall, PlateBalls, PlateInBall
+from spinlev.dynamics.local_plates import SHARE, PlateBall, PlateBalls, PlateInBall, WholePlate
 from spinlev.dynamics.local_plates.functions import local_harmonics
 from spinlev.dynamics.motion import (
     Parameter,
     PlateMemory,
     Scales,
     State,
-    WholePlate,
     equations_of_motion,
     parameters,
     seen_by_plate,
