@@ -54,7 +54,7 @@ class UniformField:
 
     @cached_property
     def _far(self) -> CompiledField:
-        return CompiledField(uniform_moments(self.magnet, FAR_DEGREE).expressions)
+        return CompiledField(uniform_moments(self.magnet, FAR_DEGREE).expressions, seldom=True)
 
     def rows(self, columns: Array) -> Array:
         """B (T) outside, μ0 H inside, and its gradient (T/m), (12, n), at `columns` (3, n) m; 1e-13 at any distance.

@@ -107,7 +107,7 @@ class RotorTable:
     @cached_property
     def _far(self) -> tuple[CompiledField, ...]:
         """The parts one by one, where the closed forms have to give way to moments."""
-        return tuple(CompiledField(expansion.expressions) for expansion in self.expansions)
+        return tuple(CompiledField(expansion.expressions, seldom=True) for expansion in self.expansions)
 
     def evaluate(self, points: ArrayLike) -> tuple[Array, Array]:
         """B (n, 3) T and ∂B_i/∂x_j (n, 3, 3) T/m at points (n, 3) m in the rotor's frame.
