@@ -18,6 +18,7 @@ from ...geometry.basics import Array, InputError
 from ...geometry.scenes import Scene
 from ..effects import with_effects
 from ..flights import DURATION, IntegrationError
+from ..local_plates import WholePlate
 from ..motion import (
     CONTACT,
     Parameter,
@@ -115,7 +116,8 @@ class _One:
 class _Launches:
     def __init__(self, scene: Scene, table: FieldFormula, memory: PlateMemory, duration: float, step_error: float):
         tilted = bool(np.any(scene.gravity[:2]))
-        equations = equations_of_motion(with_effects(scene, table), tilted, memory, scene.angular_velocity)
+        plate = WholePlate(memory)
+        equations = equations_of_motion(with_effects(scene, table), tilted, plate)
         whole = flight_events(replace(scene, plate=None), equations.variables[:3])
         smooth = obstacles(scene, memory, equations.variables[:3])
         events = [*(event.expression for event in whole[0]), *smooth]
@@ -131,7 +133,8 @@ class _Launches:
             opt_level=1,
             t_events=[hy.t_event_batch(e, direction=hy.event_direction.negative) for e in events],
         )
-        self.values = parameters(scene, self.scales)
+        values = parameters(scene, self.scales)
+        self.values = np.concatenate([values, plate.numbers(values)])
         self.integrator.pars[:] = self.values[: len(self.integrator.pars), None]  # of empty lanes as well
         self.ends = np.zeros(LANES)
 

@@ -1,6 +1,9 @@
-"""The compiled parts of a flight through balls: one for balls of each degree, and one for the table's own field."""
+"""The compiled parts of a flight through balls: one for balls of each kind, and one for the table's own field.
 
-from dataclasses import dataclass, field
+A plate's currents have balls of their own (`local_plates`), in the laboratory, while the plate stands still.
+"""
+
+from dataclasses import dataclass, field, replace
 from typing import cast
 
 import heyoka as hy
@@ -10,6 +13,7 @@ from ...fem.harmonics import BallField
 from ...fem.rotor_tables import FieldTable
 from ...geometry.scenes import Scene
 from ..effects import with_effects
+from ..local_plates import KEY, PlateInBall, PlateKind, WholePlate
 from ..motion import (
     Effect,
     Equations,
@@ -17,9 +21,12 @@ from ..motion import (
     InBall,
     Interaction,
     Parameter,
+    PlateFormula,
     PlateMemory,
     equations_of_motion,
+    flight_events,
     interaction_of,
+    seen_by_plate,
 )
 from .compiled_flight import Flight, compile_flight, flight_of
 
@@ -61,36 +68,52 @@ class Parts:
     tolerance: float
     compact: bool | None
     memory: PlateMemory | None
-    _known: dict[int, Flight] = field(default_factory=dict)
+    _known: dict[tuple[int, PlateKind | None], Flight] = field(default_factory=dict)
 
-    def of(self, degree: int) -> Flight:
-        """The part for balls of a degree; 0: in no ball."""
-        if degree not in self._known:
-            self._known[degree] = self._compiled(degree)
-        return self._known[degree]
+    def of(self, degree: int, kind: PlateKind | None = None) -> Flight:
+        """The part for balls of a degree, 0: in none; and for a kind of a plate's, None: in its table's own fields."""
+        if (degree, kind) not in self._known:
+            self._known[degree, kind] = self._compiled(degree, kind)
+        return self._known[degree, kind]
+
+    @property
+    def first(self) -> int:
+        """Number of the first runtime parameter of a plate."""
+        return FIRST + sum(effect.count for effect in fitted(with_effects(self.scene, self.table), LARGE)) + KEY
 
     @property
     def compile_seconds(self) -> float:
         """Time that compilation took so far."""
         return sum(part.compile_seconds for part in self._known.values())
 
-    def _compiled(self, degree: int) -> Flight:
+    def _compiled(self, degree: int, kind: PlateKind | None) -> Flight:
         scene, memory = self.scene, self.memory
         if not degree:
             return compile_flight(scene, self.table, self.duration, self.tolerance, True, memory)
-        equations, inside = ball_equations(scene, self.table, BallField(DEGREE + 1, degree), memory)
-        leaves = hy.t_event(inside, direction=hy.event_direction.negative)
+        plate: PlateFormula | None = None
+        if memory is not None:
+            plate = PlateInBall(memory, kind, self.first) if kind else WholePlate(memory, self.first)
+        equations, inside = ball_equations(scene, self.table, BallField(DEGREE + 1, degree), plate)
+        leaves = [inside]
+        if isinstance(plate, PlateInBall):
+            offset = plate.offset(seen_by_plate(plate, equations.variables[:3]))
+            leaves.append(1.0 - hy.sum([t * t for t in offset]))
+        events = [hy.t_event(each, direction=hy.event_direction.negative) for each in leaves]
+        meanings, tolerance = [LEFT] * len(events), LOOSER * self.tolerance
+        if plate is not None:
+            lost, meaning = flight_events(replace(scene, rotor=(), conductors=(), plate=None), equations.variables[:3])
+            events, meanings, tolerance = [*events, *lost], [*meanings, *meaning], self.tolerance
         long = memory is None and degree == SMALL.degree and scene.frequency * self.duration > STRAIGHT_TURNS
         straight = long if self.compact is None else not self.compact
-        return flight_of(scene, equations, ([leaves], [LEFT]), LOOSER * self.tolerance, not straight, memory)
+        return flight_of(scene, equations, (events, meanings), tolerance, not straight, plate)
 
 
 def ball_equations(
-    scene: Scene, table: FieldTable, formula: BallField, memory: PlateMemory | None = None
+    scene: Scene, table: FieldTable, formula: BallField, plate: PlateFormula | None = None
 ) -> tuple[Equations, hy.expression]:
     """The motion in a ball, with the effects of the table, and what becomes negative outside of it."""
     tilted, inside = bool(np.any(scene.gravity[:2])), in_ball(with_effects(scene, table), formula)
-    equations = equations_of_motion(inside, tilted, memory, scene.angular_velocity)
+    equations = equations_of_motion(inside, tilted, plate)
     offset = formula.offset([hy.par[Parameter.LENGTH] * x for x in equations.variables[:3]])
     return equations, 1.0 - hy.sum([t * t for t in offset])
 

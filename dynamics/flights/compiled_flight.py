@@ -13,9 +13,11 @@ from ...fem.storage import compiled
 from ...geometry.basics import Array
 from ...geometry.scenes import Scene
 from ..effects import with_effects
+from ..local_plates import WholePlate
 from ..motion import (
     Equations,
     Parameter,
+    PlateFormula,
     PlateMemory,
     Scales,
     State,
@@ -45,8 +47,10 @@ class Flight:
     ledger : compiled terms of the Jacobi integral
     values : runtime parameters
     scales : units of the state
-    left : (k,) √J, what the turning rotor alone leaves in the plate at t = 0
+    scene, memory : the problem
     compile_seconds : time that compilation took
+    first : number of the first further runtime parameter
+    numbers : values of these, which `values` do not have
     """
 
     integrator: hy.taylor_adaptive
@@ -54,20 +58,38 @@ class Flight:
     ledger: hy.cfunc
     values: Array
     scales: Scales
-    left: Array
+    scene: Scene
+    memory: PlateMemory | None
     compile_seconds: float
+    first: int
+    numbers: Array
+
+    def given(self, values: Array) -> Array:
+        """All runtime parameters (..., p) that the code asks for, from values (..., q)."""
+        if not len(self.numbers):
+            return values
+        further = np.broadcast_to(self.numbers, (*values.shape[:-1], len(self.numbers)))
+        return np.concatenate([values[..., : self.first], further], axis=-1)
+
+    def start(self, values: Array) -> None:
+        """Give the integrator its runtime parameters."""
+        self.integrator.pars[:] = self.given(values)[: len(self.integrator.pars)]
+
+    def leg(self, values: Array, depth: float, speed: float, changes: FieldChanges) -> FieldChanges:
+        """Let the plate move, scaled, from now on; what has been done of changes of the field."""
+        values[Parameter.PLATE_DEPTH], values[Parameter.PLATE_SPEED] = depth, speed
+        return changes
 
     def state(self, start: State, currents: Array) -> Array:
         """The integrator's state at t = 0, from the floater's and the plate's (k,), √J."""
-        plate = (currents - self.left) * self.values[Parameter.PLATE_SHARE]
-        return np.concatenate([self.scales.pack(start), plate, [0.0]])
+        return scaled_state(self.scene, self.memory, start, currents)
 
     def part(self, values: Array) -> Flight:
         """What flies on with these runtime parameters: itself (see `LocalFlight`)."""
         return self
 
-    def enter(self, start: State, values: Array) -> float:
-        """Set the runtime parameters for a flight from a start; error of the representation chosen."""
+    def enter(self, start: State, values: Array, time: float = 0.0) -> float:
+        """Set the runtime parameters for a flight from a start at a scaled time; error of the representation chosen."""
         return 0.0
 
     def onward(self, values: Array, changes: FieldChanges) -> FieldChanges:
@@ -76,7 +98,7 @@ class Flight:
 
     def terms(self, times: Array, states: Array, values: Array) -> Array:
         """Terms (k, n) of the Jacobi integral at scaled times (n,), states (n, s) and runtime parameters (n, p)."""
-        pars = np.ascontiguousarray(values.T[: self.ledger.nparams])
+        pars = np.ascontiguousarray(self.given(values).T[: self.ledger.nparams])
         return np.asarray(self.ledger(np.ascontiguousarray(states[:, :-1].T), pars=pars, time=times))
 
 
@@ -99,11 +121,12 @@ def compile_flight(
     memory : the plate's currents, if they are modelled
     """
     tilted = bool(np.any(scene.gravity[:2]))
-    equations = equations_of_motion(with_effects(scene, table), tilted, memory, scene.angular_velocity)
+    plate = None if memory is None else WholePlate(memory)
+    equations = equations_of_motion(with_effects(scene, table), tilted, plate)
     events = flight_events(scene, equations.variables[:3])
     if compact is None:
         compact = not _worth_compiling(equations, scene, duration)
-    return flight_of(scene, equations, events, tolerance, compact, memory)
+    return flight_of(scene, equations, events, tolerance, compact, plate)
 
 
 def flight_of(
@@ -112,7 +135,7 @@ def flight_of(
     events: tuple[list[hy.t_event], list[str]],
     tolerance: float,
     compact: bool,
-    memory: PlateMemory | None,
+    plate: PlateFormula | None,
 ) -> Flight:
     """Compile equations of motion with their terminal events and what these mean; else as `compile_flight`."""
     started = perf_counter()
@@ -127,12 +150,20 @@ def flight_of(
         t_events=events[0],
     )
     ledger = compiled(hy.cfunc, list(equations.jacobi), list(equations.variables), compact_mode=True)
-    left = np.zeros(0)
+    values, memory = parameters(scene, scales), plate.memory if plate else None
+    numbers = plate.numbers(values) if isinstance(plate, WholePlate) else np.zeros(0)
+    first, seconds = plate.first if plate else len(values), perf_counter() - started
+    return Flight(integrator, events[1], ledger, values, scales, scene, memory, seconds, first, numbers)
+
+
+def scaled_state(scene: Scene, memory: PlateMemory | None, start: State, currents: Array) -> Array:
+    """The integrator's state at t = 0, from the floater's and the plate's (k,), √J."""
+    scales = Scales.of(scene)
     if memory is not None:
         depth = float(plate_depth(memory.plate, np.zeros(1))[0])
         left = memory.driven(scene.angular_velocity).left.signals(0.0, depth)
-    values = parameters(scene, scales)
-    return Flight(integrator, events[1], ledger, values, scales, left, perf_counter() - started)
+        currents = (currents - left) * parameters(scene, scales)[Parameter.PLATE_SHARE]
+    return np.concatenate([scales.pack(start), currents, [0.0]])
 
 
 def _worth_compiling(equations: Equations, scene: Scene, duration: float) -> bool:

@@ -47,7 +47,7 @@ def integrate(
     FlightStopped : by a keyboard interrupt; it has what is finished, and so has the checkpoint
     IntegrationError : the state became infinite
     """
-    scales, log, began = flight.scales, Log(), perf_counter()
+    scales, log, began, compiled = flight.scales, Log(), perf_counter(), flight.compile_seconds
     values = begun(flight, start, np.zeros(0) if currents is None else currents, log)
     interval = first_interval(scene, duration)
     at_first = flight.part(values).integrator.state
@@ -57,7 +57,7 @@ def integrate(
     known = checkpoint.read() if checkpoint else None
     if known is not None:
         values, log.steps, log.changes = known.restore(flight, recorder)
-    began_at, compiled = recorder.times[-1], flight.compile_seconds
+    began_at = recorder.times[-1]
     try:
         fly(scene, flight, values, duration, recorder, log, progress, checkpoint)
     except KeyboardInterrupt:
@@ -97,8 +97,9 @@ def fly(
     """Propagate in pieces until something ends the flight."""
     scales, kept = flight.scales, perf_counter()
     for end, depth, speed in plate_legs(scene.plate, duration):
-        values[Parameter.PLATE_DEPTH] = depth / scales.length
-        values[Parameter.PLATE_SPEED] = speed * scales.time / scales.length
+        if flight.part(values).integrator.time >= end / scales.time:
+            continue
+        log.changes = flight.leg(values, depth / scales.length, speed * scales.time / scales.length, log.changes)
         while flight.part(values).integrator.time < end / scales.time:
             log.changes = flight.onward(values, log.changes)
             times, states = fly_piece(scene, flight.part(values), values, end / scales.time, recorder, log)

@@ -110,7 +110,7 @@ class LiveFlight:
     def _become(self, lab: State) -> None:
         state = lab.to_rotor(self.scene.angular_velocity * self.time)
         self.state[:12] = self.flight.scales.pack(state)
-        self.flight.enter(state, self.values)
+        self.flight.enter(state, self.values, self.time / self.flight.scales.time)
 
     def _go(self, end: float, recorder: Recorder) -> None:
         unit, log = self.flight.scales.time, self.log

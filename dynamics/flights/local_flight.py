@@ -2,14 +2,16 @@
 
 The same compiled code flies everywhere.  A floater that leaves its ball goes over to another one, by an event; where
 a body is so near that there is no room for one, or where it does not turn with the rotor, to the full table, which
-alone knows contact and loss.
+alone knows contact and loss.  The fields of a plate's currents go over in the same way, about the place in the
+laboratory; while the plate moves and where the rotor's field is the full table's, they are their own table's.
 
 Each change moves the floater's energy by U_new - U_old = -m·(B_new - B_old) at the same state, about 1e-8 of it.
 It goes into the integrated work, so that the ledger tells what the motion between changes does, and is summed up by
 itself in `FieldChanges`.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -18,10 +20,11 @@ from ...fem.rotor_tables import FieldTable
 from ...geometry.basics import Array
 from ...geometry.scenes import Scene
 from ..effects import with_effects
+from ..local_plates import KEY, PlateBall, PlateBalls
 from ..motion import Parameter, PlateMemory, Scales, State, parameters
 from .ball_parts import DEGREE, LARGE, SMALL, Parts, fitted, is_long
-from .balls import Balls
-from .compiled_flight import TOLERANCE, Flight, compile_flight
+from .balls import MOST, Balls
+from .compiled_flight import TOLERANCE, Flight, compile_flight, scaled_state
 from .trajectory import FieldChanges
 
 INSIDE = 1 - 1e-9
@@ -40,6 +43,7 @@ class LocalFlight:
     table: FieldTable
     parts: Parts
     _balls: dict[tuple[int, float], Balls] = field(default_factory=dict)
+    _over_plate: dict[bytes, Flight] = field(default_factory=dict)
 
     @property
     def scales(self) -> Scales:
@@ -49,12 +53,8 @@ class LocalFlight:
     @property
     def values(self) -> Array:
         """Runtime parameters, without a ball."""
-        return np.concatenate([parameters(self.scene, self.scales), np.zeros(1 + LARGE.count + self._further)])
-
-    @property
-    def _further(self) -> int:
-        """Number of the runtime parameters of effects in a ball."""
-        return sum(effect.count for effect in fitted(with_effects(self.scene, self.table), LARGE))
+        known = parameters(self.scene, self.scales)
+        return np.concatenate([known, np.zeros(self.parts.first - len(known))])
 
     @property
     def compile_seconds(self) -> float:
@@ -63,17 +63,36 @@ class LocalFlight:
 
     def state(self, start: State, currents: Array) -> Array:
         """See `Flight.state`."""
-        return self.parts.of(SMALL.degree).state(start, currents)
+        return scaled_state(self.scene, self.parts.memory, start, currents)
 
     def part(self, values: Array) -> Flight:
         """What flies on with these runtime parameters."""
-        return self.parts.of(int(values[DEGREE]))
+        degree, key = int(values[DEGREE]), values[-KEY:]
+        if self.plates is None or not key[0]:
+            return self.parts.of(degree)
+        known = np.array([degree, *key, values[Parameter.PLATE_DEPTH]]).tobytes()
+        if known not in self._over_plate:
+            if len(self._over_plate) >= MOST:
+                self._over_plate.clear()
+            kind, numbers = self.plates.told(PlateBall.of(key), self.parts.first, values)
+            self._over_plate[known] = replace(self.parts.of(degree, kind), numbers=numbers)
+        return self._over_plate[known]
 
-    def enter(self, start: State, values: Array) -> float:
-        """Set the runtime parameters to a ball, a small one if it will do, for where the flight starts; its error."""
-        state = self.scales.pack(start)
-        error = self.enter_ball(SMALL, state, values)
-        return error if values[DEGREE] else self.enter_ball(LARGE, state, values)
+    @cached_property
+    def plates(self) -> PlateBalls | None:
+        """Balls of the plate's currents, if it has some."""
+        memory = self.parts.memory
+        return None if memory is None else PlateBalls(memory, self.scene.floater.radius)
+
+    def enter(self, start: State, values: Array, time: float = 0.0) -> float:
+        """Set the runtime parameters to a ball, a small one if it will do, for a start at a scaled time; its error."""
+        state, error = self.scales.pack(start), 0.0
+        values[DEGREE] = 0.0
+        for formula in (SMALL, LARGE):
+            if not values[DEGREE]:
+                error = self.enter_ball(formula, state, values)
+        self.enter_plate_ball(time, state, values)
+        return error
 
     def onward(self, values: Array, changes: FieldChanges) -> FieldChanges:
         """Go over to another ball once the floater has left its own; what has been done of that.
@@ -82,24 +101,60 @@ class LocalFlight:
         """
         before, (degree, *center, inverse) = self.part(values), values[DEGREE : DEGREE + 5]
         time, state = before.integrator.dtime, before.integrator.state.copy()
-        if degree and np.sum((state[:3] * self.scales.length - center) ** 2) * inverse**2 < INSIDE:
+        inside = bool(degree) and np.sum((state[:3] * self.scales.length - center) ** 2) * inverse**2 < INSIDE
+        if inside and (self.plates is None or self.plates.holds(sum(time), state, values)):
             return changes
-        changes = self.go_over(sum(time), state, values, changes)
-        if degree or values[DEGREE]:
-            following = self.part(values)
-            following.integrator.dtime = time
-            following.integrator.state[:] = state
-            following.integrator.reset_cooldowns()
+        after = values.copy()
+        error = 0.0 if inside else self.enter_ball(LARGE, state, after)
+        self.enter_plate_ball(sum(time), state, after)
+        return self._changed(time, state, values, after, error, changes)
+
+    def leg(self, values: Array, depth: float, speed: float, changes: FieldChanges) -> FieldChanges:
+        """See `Flight.leg`: a plate that moves is told by its own table."""
+        if self.plates is None or (depth, speed) == (values[Parameter.PLATE_DEPTH], values[Parameter.PLATE_SPEED]):
+            values[Parameter.PLATE_DEPTH], values[Parameter.PLATE_SPEED] = depth, speed
+            return changes
+        before, after = self.part(values), values.copy()
+        after[Parameter.PLATE_DEPTH], after[Parameter.PLATE_SPEED] = depth, speed
+        time, state = before.integrator.dtime, before.integrator.state.copy()
+        self.enter_plate_ball(sum(time), state, after)
+        return self._changed(time, state, values, after, 0.0, changes)
+
+    def enter_plate_ball(self, time: float, state: Array, values: Array) -> None:
+        """Set the ball of a plate's currents for a scaled state at a time, if there is one and the rotor has one."""
+        if self.plates is None:
+            return
+        ball = self.plates.around(time, state, values) if values[DEGREE] else None
+        values[-KEY:] = 0.0 if ball is None else ball.key
+
+    def _changed(
+        self, time: tuple[float, float], state: Array, values: Array, after: Array, error: float, changes: FieldChanges
+    ) -> FieldChanges:
+        """Fly on with other runtime parameters; what that does to the energy is booked in the work."""
+        if np.array_equal(values, after):
+            return changes
+        changes = self.booked(sum(time), state, values, after, error, changes)
+        following = self.part(values)
+        following.integrator.dtime = time
+        following.integrator.state[:] = state
+        following.integrator.reset_cooldowns()
         return changes
 
     def go_over(self, time: float, state: Array, values: Array, changes: FieldChanges) -> FieldChanges:
         """Set the ball for a scaled state at a time, and book in its work what that does to the energy."""
-        before, after = self.part(values), values.copy()
+        after = values.copy()
         error = self.enter_ball(LARGE, state, after)
         if values[DEGREE] == after[DEGREE] == 0:
             return changes
+        return self.booked(time, state, values, after, error, changes)
+
+    def booked(
+        self, time: float, state: Array, values: Array, after: Array, error: float, changes: FieldChanges
+    ) -> FieldChanges:
+        """Take other runtime parameters for a scaled state at a time, and book what that does to the energy."""
         now, row = np.array([time]), state[None]
-        jump = float(self.part(after).terms(now, row, after[None]).sum() - before.terms(now, row, values[None]).sum())
+        energies = [self.part(each).terms(now, row, each[None]).sum() for each in (after, values)]
+        jump = float(energies[0] - energies[1])
         state[-1] += jump
         values[:] = after
         return FieldChanges(
@@ -116,7 +171,7 @@ class LocalFlight:
         arm = rate * np.array([-drift[1], drift[0], 0.0])
         middle, way = (state[:3] - arm) * length, float(abs(drift[2]) if rate else np.linalg.norm(drift)) * length
         found = self._balls_of(formula, float(values[Parameter.LOST_DISTANCE]) * length).at(middle)
-        values[DEGREE:] = 0.0
+        values[DEGREE:-KEY] = 0.0
         if found is None:
             return 0.0
         (*center, inverse), error = found[0][:4], found[1]
@@ -143,12 +198,13 @@ def compile_local_flight(
     compact: bool | None = None,
     memory: PlateMemory | None = None,
 ) -> Flight | LocalFlight:
-    """Compile the motion of a scene in balls, if its table's own expressions are longer than theirs.
+    """Compile the motion of a scene in balls, if its table's own expressions are longer than theirs or beside a plate.
 
     Parameters as of `compile_flight`.
     """
-    if not is_long(table):
+    if memory is None and not is_long(table):
         return compile_flight(scene, table, duration, tolerance, compact, memory)
     parts = Parts(scene, table, duration, tolerance, compact, memory)
-    parts.of(SMALL.degree)
+    if memory is None:
+        parts.of(SMALL.degree)
     return LocalFlight(scene, table, parts)

@@ -44,7 +44,7 @@ def fly_piece(
     scene: Scene, flight: Flight, values: Array, end: float, recorder: Recorder, log: Log
 ) -> tuple[Array, Array]:
     """Fly on to the end of a piece or to an event: scaled times and states, of which the last is the ledger's sum."""
-    flight.integrator.pars[:] = values[: len(flight.integrator.pars)]
+    flight.start(values)
     count = int(np.clip(PIECE_TURNS * 2 * np.pi / recorder.interval, 1, PIECE_SAMPLES))
     grid = recorder.grid(flight.integrator.time, end, count)
     outcome, _, _, steps, _, states = flight.integrator.propagate_grid(grid)
@@ -67,7 +67,7 @@ def _ending(
         times = np.append(times, flight.integrator.time)
         states = np.vstack([states, flight.integrator.state])
         ended_by = flight.meanings[-outcome.value - 1]
-    if flight.meanings == [LEFT]:
+    if LEFT in flight.meanings:
         return times, states, ended_by
     gap = clearance(scene, times * flight.scales.time, states[:, :3] * flight.scales.length, states[:, 6:9])
     touching = np.flatnonzero(gap < -1e-9)
@@ -111,7 +111,7 @@ def first_interval(scene: Scene, duration: float) -> float:
 
 def booked(scene: Scene, flight: Flight, values: Array, times: Array, states: Array) -> Array:
     """States (n, s) at scaled times (n,) with J - work in the place of the work."""
-    needed = values[: max(len(Parameter), flight.ledger.nparams)]
+    needed = values if len(flight.numbers) else values[: max(len(Parameter), flight.ledger.nparams)]
     books = flight.terms(times, states, plate_places(scene, needed, times)).sum(axis=0) - states[:, -1]
     return np.concatenate([states[:, :-1], books[:, None]], axis=1)
 

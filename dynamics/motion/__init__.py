@@ -33,7 +33,14 @@ from .events import (
 from .interaction import Interaction as Interaction, interaction_of as interaction_of
 from .likeness import has_likes as has_likes, like as like
 from .plate_force import PlateForce as PlateForce
-from .plate_terms import PlateMemory as PlateMemory
+from .plate_terms import (
+    Felt as Felt,
+    PlateFormula as PlateFormula,
+    PlateMemory as PlateMemory,
+    pushed as pushed,
+    rotor_numbers as rotor_numbers,
+    seen_by_plate as seen_by_plate,
+)
 from .rates import Rates as Rates
 from .state import Scales as Scales, State as State, turned_about_z as turned_about_z
 from .symbols import (
@@ -41,5 +48,6 @@ from .symbols import (
     Vector as Vector,
     cross as cross,
     dot as dot,
+    dotted as dotted,
     subtract as subtract,
 )

@@ -29,7 +29,7 @@ from ...geometry.basics import Array
 from ...geometry.scenes import Scene
 from .effect import Motion
 from .interaction import interaction_of
-from .plate_terms import PlateMemory, memory_terms
+from .plate_terms import PlateFormula, memory_terms
 from .state import Scales
 from .symbols import Parameter, Vector, cross, dot, subtract, turned
 
@@ -87,8 +87,7 @@ def parameters(scene: Scene, scales: Scales, frozen_spin: bool = False) -> Array
 def equations_of_motion(
     table: FieldFormula,
     tilted_gravity: bool = False,
-    memory: PlateMemory | None = None,
-    angular_velocity: float = 0.0,
+    plate: PlateFormula | None = None,
 ) -> Equations:
     """Rates of the scaled state in the field of a table.
 
@@ -96,8 +95,7 @@ def equations_of_motion(
     ----------
     table : the rotor's field, with effects if it is an `Interaction`
     tilted_gravity : whether gravity has a part across the axis; it turns in this frame, so that time enters
-    memory : the plate's currents, if they are modelled
-    angular_velocity : of the rotor, rad/s; only `memory` needs it, in which it is compiled in
+    plate : the fields of the plate's currents, if they are modelled
     """
     variables = hy.make_vars(*NAMES)
     position, velocity, moment, spin = (variables[i : i + 3] for i in (0, 3, 6, 9))
@@ -130,14 +128,14 @@ def equations_of_motion(
         power = power + added.power
     states: list[hy.expression] = []
     state_rates: Vector = []
-    if memory is not None:
-        states = [hy.expression(name) for name in memory.names]
-        plate = memory_terms(memory, angular_velocity, position, moment, states)
-        force = [a + b for a, b in zip(force, plate.force, strict=True)]
-        turn = [a + b for a, b in zip(turn, plate.torque, strict=True)]
-        state_rates = plate.rates
-        jacobi.append(plate.stored)
-        power = power - plate.spent
+    if plate is not None:
+        states = [hy.expression(name) for name in plate.memory.names]
+        terms = memory_terms(plate, position, moment, states)
+        force = [a + b for a, b in zip(force, terms.force, strict=True)]
+        turn = [a + b for a, b in zip(turn, terms.torque, strict=True)]
+        state_rates = terms.rates
+        jacobi.append(terms.stored)
+        power = power - terms.spent
     rates = [
         *drift,
         *subtract([force[i] + axial[i] + push[i] for i in range(3)], turned(velocity)),

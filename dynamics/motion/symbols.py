@@ -1,6 +1,6 @@
 """Runtime parameters of the equations of motion, and vectors of expressions."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from enum import IntEnum, auto
 
 import heyoka as hy
@@ -37,9 +37,9 @@ class Parameter(IntEnum):
     MEASURE = auto()
 
 
-def combined(weights: Iterable[float], terms: Vector) -> hy.expression:
-    """Σ weight · term, without the terms whose weight is zero."""
-    return hy.sum([float(w) * t for w, t in zip(weights, terms, strict=True) if w])
+def dotted(a: Vector, b: Vector) -> hy.expression:
+    """Σ a · b of vectors of any length."""
+    return hy.sum([x * y for x, y in zip(a, b, strict=True)])
 
 
 def dot(a: Vector, b: Vector) -> hy.expression:

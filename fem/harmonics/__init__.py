@@ -10,6 +10,7 @@ from .compiled import (
     field_and_gradient as field_and_gradient,
 )
 from .expressions import harmonic_sums as harmonic_sums
+from .fit_in_ball import derivatives as derivatives, sphere_fit as sphere_fit
 from .interior import (
     FOUR_PI as FOUR_PI,
     Ball as Ball,
@@ -32,7 +33,7 @@ from .multipole import (
     uniform_moments as uniform_moments,
     without_noise as without_noise,
 )
-from .regular_sums import regular_harmonics as regular_harmonics
+from .regular_sums import members as members, real_sizes as real_sizes, regular_harmonics as regular_harmonics
 from .solid import (
     Coefficients as Coefficients,
     derivative as derivative,

@@ -16,10 +16,10 @@ import numpy as np
 
 from ...geometry.basics import Array
 from .compiled import FieldExpressions
+from .fit_in_ball import derivatives, sphere_fit
 from .interior import Ball
 from .multipole import UPPER
 from .regular_sums import regular_harmonics, weighted
-from .sphere_fit import derivatives, sphere_fit
 
 
 @dataclass(frozen=True)

@@ -47,10 +47,21 @@ def weighted(first: int, harmonics: Sequence[hy.expression]) -> hy.expression:
 def real_weights(coefficients: Coefficients) -> Array:
     """Weights in the order of `members` of Σ conj a_lm Υ_lm over positive and negative m."""
     degree = len(coefficients) - 1
+    scaled = coefficients * _sizes(degree) * np.where(np.arange(degree + 1), 2.0, 1.0)
+    return np.array([(scaled[l, m].imag if part else scaled[l, m].real) for l, m, part in members(degree)])
+
+
+def real_sizes(degree: int) -> Array:
+    """Re Υ_lm and Im Υ_lm by the members that `regular_harmonics` gives, in their order."""
+    sizes = _sizes(degree)
+    return np.array([sizes[l, m] for l, m, _ in members(degree)])
+
+
+def _sizes(degree: int) -> Array:
+    """[l, m]: Υ_lm by S_m Q_lm."""
     sizes = np.zeros((degree + 1, degree + 1))
     for m in range(degree + 1):
         sizes[m, m] = 1.0 if m == 0 else -sizes[m - 1, m - 1] / (2 * m)
         for l in range(m + 1, degree + 1):
             sizes[l, m] = sizes[l - 1, m] * (2 * l - 1) / ((l + m) * (l - m))
-    scaled = coefficients * sizes * np.where(np.arange(degree + 1), 2.0, 1.0)
-    return np.array([(scaled[l, m].imag if part else scaled[l, m].real) for l, m, part in members(degree)])
+    return sizes

@@ -30,7 +30,10 @@ FLOORS = {
             "verification",
         ),
     ],
-    "dynamics": ["motion", "effects", "steady", "equilibria", "branches", "maps", "flights", "ensembles", "slow_drift"],
+    "dynamics": [
+        *("motion", "local_plates", "effects", "steady", "equilibria", "branches", "maps", "flights", "ensembles"),
+        "slow_drift",
+    ],
     "studies": [
         *(
             "terminal",

@@ -6,7 +6,10 @@ import numpy as np
 import pytest
 
 from spinlev.dynamics.ensembles import launched
-from spinlev.dynamics.flights import initial_state, simulate
+from spinlev.dynamics.flights import initial_state
+from spinlev.dynamics.flights.compiled_flight import compile_flight
+from spinlev.dynamics.flights.integration import integrate
+from spinlev.dynamics.flights.simulation import PLATE_TOLERANCE
 from spinlev.dynamics.motion import PlateMemory, State
 from spinlev.fem.plate_currents import Region
 from spinlev.fem.rotor_tables import rotor_table
@@ -68,25 +71,32 @@ def test_the_company_does_not_matter(memory, starts, flown):
         np.testing.assert_array_equal(a, b[order])
 
 
-def test_a_launch_is_what_simulate_flies(memory, starts):
+def alone_from(scene, memory, duration, currents):
+    """The flight of one floater by the integrator for one, in the tables' own fields."""
+    flight = compile_flight(scene, TABLE, duration, PLATE_TOLERANCE, True, memory)
+    return integrate(scene, flight, initial_state(scene, TABLE, [], memory)[0], duration, currents=currents)
+
+
+def test_a_launch_is_what_one_flight_is(memory, starts):
     """The same equations integrated to round-off by another integrator; a thirtieth of a second is not yet chaotic."""
     few = State(*(v[:2] for v in starts.vectors))
     scenes = [replace(SCENE, start=AbsoluteStart(*(v[k] for v in few.vectors))) for k in range(2)]
     currents = np.array([initial_state(scene, TABLE, [], memory)[1] for scene in scenes])
     found = launched(SCENE, TABLE, memory, few, 0.03, 1e-13, currents)
     for k, scene in enumerate(scenes):
-        alone = simulate(scene, TABLE, 0.03, [], compact=True, memory=memory)
+        alone = alone_from(scene, memory, 0.03, currents[k])
         assert np.abs(found.last.position[k] - alone.rotor.position[-1]).max() < 1e-10
         assert np.abs(found.last.moment[k] - alone.rotor.moment[-1]).max() < 1e-8
 
 
 @pytest.mark.slow
-def test_a_plate_that_goes_down_is_what_simulate_flies(starts):
+def test_over_a_plate_that_goes_down_it_is_so_too(starts):
     scene = replace(SCENE, plate=replace(PLATE, lowering=Lowering(0.02, 0.2, 0.004)))
     memory, few = memory_of(scene.plate, 0.004), State(*(v[:1] for v in starts.vectors))
     one = replace(scene, start=AbsoluteStart(*(v[0] for v in few.vectors)))
-    found = launched(scene, TABLE, memory, few, 0.05, 1e-13, initial_state(one, TABLE, [], memory)[1][None])
-    alone = simulate(one, TABLE, 0.05, [], memory=memory)
+    currents = initial_state(one, TABLE, [], memory)[1]
+    found = launched(scene, TABLE, memory, few, 0.05, 1e-13, currents[None])
+    alone = alone_from(one, memory, 0.05, currents)
     assert found.ended_by[0] == alone.ended_by == "duration"
     assert np.abs(found.last.position[0] - alone.rotor.position[-1]).max() < 1e-9
 

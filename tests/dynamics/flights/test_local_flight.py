@@ -11,6 +11,7 @@ from spinlev.dynamics.flights.balls import ERROR
 from spinlev.dynamics.flights.compiled_flight import compile_flight
 from spinlev.dynamics.flights.integration import integrate
 from spinlev.dynamics.flights.local_flight import LocalFlight, compile_local_flight
+from spinlev.dynamics.local_plates import SHARE
 from spinlev.dynamics.motion import PlateMemory
 from spinlev.fem.harmonics import Ball, BallField, uniform_moments
 from spinlev.fem.plate_currents import Region
@@ -100,7 +101,7 @@ def test_a_ball_holds_the_circle_of_a_floater_that_was_displaced(start):
     flown = integrate(SCENE, flight, begun, 0.5)
     assert np.ptp(flown.rotor.position[:, 0]) > 5e-4
     assert 1 <= flown.field_changes.count <= 3
-    assert list(flight.parts._known) == [7, 9]
+    assert [degree for degree, _ in flight.parts._known] == [7, 9]
 
 
 def test_contact_is_that_of_the_tables_own_flight():
@@ -138,7 +139,10 @@ def test_a_stopped_flight_with_changes_goes_on_to_the_last_bit(start, tmp_path):
 
 @pytest.mark.slow
 def test_over_a_plate_that_is_lowered_it_flies_as_in_the_table(start):
-    """Changes of the ball while the plate moves; the ledger of currents and motion closes as without balls."""
+    """Changes of the ball while the plate moves; the ledger of currents and motion closes as without balls.
+
+    The balls of a plate at rest miss at most a tenth of what its table does, here 1e-3 of what the plate does.
+    """
     plate = Plate(Box((0.1, 0.24, 0.03), (0.0, 0.0, -0.047)), 3.5e7, Lowering(0.05, 0.02, 4e-3))
     region = Region(np.array([-3e-3, -3e-3, 0.024]), np.array([3e-3, 3e-3, 0.037]))
     memory = PlateMemory(plate, *slab_and_rotor_table(plate, TABLE, region, rtol=1e-2), "slab")
@@ -150,7 +154,9 @@ def test_over_a_plate_that_is_lowered_it_flies_as_in_the_table(start):
     ]
     assert near.field_changes.count >= 1
     assert near.energy_error < 1e-9
-    assert np.abs(near.lab.position - whole.lab.position).max() < 1e-8
+    alone = integrate(scene, compile_local_flight(scene, TABLE, 0.5, 1e-13, True), state, 0.5)
+    done = np.abs(alone.lab.position - whole.lab.position).max()
+    assert np.abs(near.lab.position - whole.lab.position).max() < SHARE * memory.table.errors.total * done
 
 
 def test_short_expressions_fly_by_themselves():

@@ -6,12 +6,11 @@ With lengths in radii of the ball, B = -∇ Σ c_k R_k, the R_k in the order of 
 from dataclasses import dataclass
 from functools import cache
 
-import heyoka as hy
 import numpy as np
 
 from ...geometry.basics import Array
 from .interior import factorials, gradient_coefficients, sphere
-from .regular_sums import members, real_weights, regular_harmonics
+from .regular_sums import members, real_sizes, real_weights
 from .solid import regular_values
 
 
@@ -40,9 +39,9 @@ def sphere_fit(degree: int) -> SphereFit:
         if l:
             found[:, l, m] = -(2 * l + 1) / (4 * np.pi * l) * values * areas
     potential = np.stack([real_weights(np.asarray(factorials(degree) * row, complex)) for row in found], axis=1)
-    x = hy.make_vars("x", "y", "z")
-    harmonics = hy.cfunc(regular_harmonics(degree - 1, x, hy.sum([t * t for t in x])), x, compact_mode=True)
-    return SphereFit(normals, potential, np.asarray(harmonics(np.ascontiguousarray(normals.T))))
+    known = regular_values(degree - 1, *normals.T)
+    values = np.array([known[l, m].imag if part else known[l, m].real for l, m, part in members(degree - 1)])
+    return SphereFit(normals, potential, values / real_sizes(degree - 1)[:, None])
 
 
 @cache

@@ -1,0 +1,79 @@
+"""Flights over a plate in local harmonics: as in the whole tables, before, while and after the plate goes down."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from spinlev.dynamics.flights import Checkpoint, FlightStopped, initial_state
+from spinlev.dynamics.flights.compiled_flight import compile_flight
+from spinlev.dynamics.flights.integration import integrate
+from spinlev.dynamics.flights.local_flight import compile_local_flight
+from spinlev.dynamics.flights.simulation import PLATE_TOLERANCE
+from spinlev.dynamics.local_plates import SHARE
+from spinlev.dynamics.motion import PlateMemory
+from spinlev.fem.plate_currents import Region
+from spinlev.fem.rotor_tables import rotor_table
+from spinlev.fem.slab import slab_and_rotor_table
+from spinlev.geometry.basics import Box
+from spinlev.geometry.bodies import article_rotors as rotor
+from spinlev.geometry.scenes import Drag, Floater, Lowering, Plate, Scene
+
+MAGNETS = rotor.horizontal(2e-3, 10e-3, 1.305, 1.0)
+TABLE = rotor_table(MAGNETS, "dipole")
+PLATE = Plate(Box((0.1, 0.24, 0.03), (0.0, 0.0, -0.047)), 3.5e7, Lowering(0.02, 0.2, 4e-3))
+SCENE = Scene(110.0, MAGNETS, Floater(6.35e-3, 1.305, 1.0, 7500.0), Drag(0.0, 0.0), plate=PLATE)
+REGION = Region(np.array([-3e-3, -3e-3, 0.024]), np.array([3e-3, 3e-3, 0.037]))
+DURATION = 0.08
+
+
+@pytest.fixture(scope="module")
+def memory():
+    return PlateMemory(PLATE, *slab_and_rotor_table(PLATE, TABLE, REGION, rtol=1e-2), "slab")
+
+
+@pytest.fixture(scope="module")
+def local(memory):
+    return compile_local_flight(SCENE, TABLE, DURATION, PLATE_TOLERANCE, True, memory)
+
+
+@pytest.fixture(scope="module")
+def start():
+    return initial_state(replace(SCENE, plate=None), TABLE)[0]
+
+
+def still(memory):
+    return np.zeros(len(memory.table.rates))
+
+
+def test_it_flies_as_in_the_whole_tables(local, memory, start):
+    """To a tenth of the table's error in what the plate does; the ledger tells of each change and closes as there."""
+    near = integrate(SCENE, local, start, DURATION, currents=still(memory))
+    flight = compile_flight(SCENE, TABLE, DURATION, PLATE_TOLERANCE, True, memory)
+    whole = integrate(SCENE, flight, start, DURATION, currents=still(memory))
+    alone = integrate(SCENE, compile_flight(SCENE, TABLE, DURATION, PLATE_TOLERANCE, True), start, DURATION)
+    kinds = [kind for _, kind in local.parts._known]
+    assert None in kinds  # while the plate moves
+    assert len([kind for kind in kinds if kind]) >= 1
+    assert near.field_changes.count >= 2
+    plate = np.abs(alone.lab.position - whole.lab.position).max()
+    assert plate > 1e-5
+    assert np.abs(near.lab.position - whole.lab.position).max() < SHARE * memory.table.errors.total * plate
+    assert near.energy_error < max(1e-9, 3 * whole.energy_error)
+
+
+def test_a_stopped_flight_goes_on_to_the_last_bit(local, memory, start, tmp_path):
+    """Stopped after the plate has begun to move, and taken up by the same code."""
+    whole = integrate(SCENE, local, start, DURATION, currents=still(memory))
+    checkpoint = Checkpoint(tmp_path / "checkpoint.npz", "this flight", 0.0)
+
+    def stop(done):
+        if done > 0.4:
+            raise KeyboardInterrupt
+
+    with pytest.raises(FlightStopped):
+        integrate(SCENE, local, start, DURATION, stop, still(memory), checkpoint)
+    second = integrate(SCENE, local, start, DURATION, None, still(memory), checkpoint)
+    for found, exact in zip(second.lab.vectors, whole.lab.vectors, strict=True):
+        np.testing.assert_array_equal(found, exact)
+    assert second.field_changes == whole.field_changes
