@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from copy import copy
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, cast
 
@@ -10,8 +12,9 @@ import heyoka as hy
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...fem.rotor_tables import FieldFormula, FieldTable
-from ...fem.storage import compiled
+from ...fem.harmonics import FieldExpressions
+from ...fem.rotor_tables import FieldFormula, FieldTable, RotorTable
+from ...fem.storage import RuntimeNumbers, compiled
 from ...geometry.basics import Array
 from .at_rest import balances
 from .effect import Effect, Placeable, Placed
@@ -38,7 +41,9 @@ class Rates:
             if isinstance(effect, Placeable):
                 self._placed.append(effect.placed(len(Parameter) + sum(known.count for known in self._placed)))
             effects.append(self._placed[-1] if isinstance(effect, Placeable) else effect)
-        equations = equations_of_motion(Interaction(whole.field, tuple(effects)))
+        self._numbers = RuntimeNumbers(len(Parameter) + sum(known.count for known in self._placed))
+        formula = _Written(whole.field, self._numbers) if isinstance(whole.field, RotorTable) else whole.field
+        equations = equations_of_motion(Interaction(formula, tuple(effects)))
         self._equations, self._level = equations, 1 if optimised else 0
         variables = list(equations.variables)
         tensors = hy.diff_tensors(list(equations.rates), diff_args=variables, diff_order=1)
@@ -89,18 +94,35 @@ class Rates:
 
         They hold to second order in the way from there: force and torque, and to first order their derivatives.
         """
-        if not self._placed or values.shape[-1] > len(Parameter):
+        own = np.array(self._numbers.values)
+        if values.shape[-1] > len(Parameter) or not (self._placed or own.size):
             return values
+        if not self._placed and values.ndim == 1:
+            return np.concatenate([values, own])
         rows = np.broadcast_to(values, (len(position), values.shape[-1]))[:, : len(Parameter)]
+        field, count = cast(FieldTable, self._field), len(rows)
         if self._rough:
-            return np.pad(rows, ((0, 0), (0, sum(part.count for part in self._placed))))
-        field = cast(FieldTable, self._field)
-        return np.concatenate([rows, *(part.numbers(field, position, moment, rows) for part in self._placed)], axis=1)
+            answers = [np.zeros((count, part.count)) for part in self._placed]
+        else:
+            answers = [part.numbers(field, position, moment, rows) for part in self._placed]
+        return np.concatenate([rows, *answers, np.broadcast_to(own, (count, own.size))], axis=1)
 
     @cached_property
     def _balances(self) -> Any:
         given, outputs = balances(self._equations)
         return compiled(hy.cfunc, outputs, given, compact_mode=True, opt_level=self._level)
+
+
+@dataclass(frozen=True, eq=False)
+class _Written:
+    """A table's field, its numbers as runtime parameters: rotors of one kind share the compiled code."""
+
+    table: RotorTable
+    numbers: RuntimeNumbers
+
+    def expressions(self, position: Sequence[hy.expression]) -> FieldExpressions:
+        """B and its gradient as heyoka expressions of a position (m, rotor's frame)."""
+        return self.table.expressions(position, self.numbers)
 
 
 def _called(function: Any, given: Array, values: Array) -> Array:

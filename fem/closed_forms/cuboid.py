@@ -25,6 +25,7 @@ import heyoka as hy
 import numpy as np
 
 from ...geometry.basics import Array
+from ..harmonics import Number
 
 Expression = Any
 """A heyoka expression."""
@@ -36,7 +37,7 @@ FOUR_PI = 4 * np.pi
 class _Edge:
     """An edge of length L seen from a point: r1 + r2, its square less L², and two reciprocals."""
 
-    length: float
+    length: Expression
     reach: Expression
     gap: Expression
     reciprocal: Expression
@@ -56,8 +57,8 @@ class _Edge:
 class _Corners:
     """Corner vectors and distances of one cuboid seen from one position, shared by all the sums."""
 
-    def __init__(self, position: Sequence[Expression], half_edges: Array) -> None:
-        self.half_edges = [float(h) for h in half_edges]
+    def __init__(self, position: Sequence[Expression], half_edges: Sequence[Expression]) -> None:
+        self.half_edges = half_edges
         self.offset = [{s: position[a] - s * self.half_edges[a] for s in SIGNS} for a in range(3)]
         square = [{s: d * d for s, d in axis.items()} for axis in self.offset]
         self.distance: dict[tuple[int, ...], Expression] = {
@@ -116,7 +117,7 @@ class _Corners:
 
 
 def cuboid_field(
-    position: Sequence[Expression], half_edges: Array, polarization: Array
+    position: Sequence[Expression], half_edges: Array, polarization: Array, number: Number = float
 ) -> tuple[list[Expression], list[list[Expression]]]:
     """B and its gradient of a uniformly polarised cuboid, in the cuboid's own axes.
 
@@ -125,6 +126,7 @@ def cuboid_field(
     position : three expressions, m, from the centre along the body axes
     half_edges : (3,) m
     polarization : (3,) T; only its non-zero components cost anything
+    number : how these numbers are written
 
     Returns
     -------
@@ -134,11 +136,11 @@ def cuboid_field(
     Accuracy: round-off of the largest terms. The terms cancel as the distance grows, so that it is 1e-15 of B beside
     the cuboid and grows as (distance/size)²: 1e-12 at a hundred sizes.
     """
-    strength = {axis: float(p) / FOUR_PI for axis, p in enumerate(polarization) if p}
+    strength = {axis: number(p / FOUR_PI) for axis, p in enumerate(polarization) if p}
     zero = hy.expression(0.0)
     if not strength:
         return [zero] * 3, [[zero] * 3 for _ in range(3)]
-    corners = _Corners(position, half_edges)
+    corners = _Corners(position, [number(half) for half in half_edges])
     second: dict[tuple[int, ...], Expression] = {(axis, axis): corners.solid_angle(axis) for axis in strength}
     third: dict[tuple[int, ...], Expression] = {(0, 1, 2): corners.mixed()}
     for a, b in ((0, 1), (0, 2), (1, 2)):

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from ...geometry.basics import Array, Box, Cylinder, Part, Ring, Sphere
 from ...geometry.bodies import Magnet
-from ..harmonics import CompiledField, FieldExpressions, uniform_moments
+from ..harmonics import CompiledField, FieldExpressions, Number, turned_expressions, uniform_moments
 from .cuboid import cuboid_field
 from .round_magnets import round_slope, round_tensor
 from .segments import resolved_distance, segments_field
@@ -26,25 +26,24 @@ class UniformField:
     def __init__(self, magnet: Magnet) -> None:
         self.magnet = magnet
 
-    def expressions(self, position: Sequence[hy.expression]) -> FieldExpressions:
+    def expressions(self, position: Sequence[hy.expression], number: Number = float) -> FieldExpressions:
         """Closed form at a position (three expressions, m), turned from the magnet's axes into the rotor's."""
         body, axes = self.magnet.body, self.magnet.body.rotation
         if isinstance(body, Sphere):
-            return uniform_moments(self.magnet, 1).expressions(position)
-        shifted = [position[i] - float(body.center[i]) for i in range(3)]
+            return uniform_moments(self.magnet, 1).expressions(position, number)
+        shifted = [position[i] - number(body.center[i]) for i in range(3)]
         if np.array_equal(axes, np.eye(3)):
-            return self._in_body(shifted)
-        b, g = self._in_body([hy.sum([float(axes[i, a]) * shifted[i] for i in range(3)]) for a in range(3)])
-        field = [hy.sum([float(axes[i, a]) * b[a] for a in range(3)]) for i in range(3)]
-        half = [[hy.sum([float(axes[j, c]) * g[a][c] for c in range(3)]) for j in range(3)] for a in range(3)]
-        gradient = [[hy.sum([float(axes[i, a]) * half[a][j] for a in range(3)]) for j in range(3)] for i in range(3)]
-        return field, gradient
+            return self._in_body(shifted, number)
+        b, g = self._in_body(turned_expressions(axes.T, shifted, number), number)
+        half = [turned_expressions(axes, row, number) for row in g]
+        columns = [turned_expressions(axes, [row[j] for row in half], number) for j in range(3)]
+        return turned_expressions(axes, b, number), [[columns[j][i] for j in range(3)] for i in range(3)]
 
-    def _in_body(self, position: Sequence[hy.expression]) -> FieldExpressions:
+    def _in_body(self, position: Sequence[hy.expression], number: Number) -> FieldExpressions:
         """Closed form in the magnet's own axes."""
         body, polarization = self.magnet.body, self.magnet.polarization
         if isinstance(body, Box):
-            return cuboid_field(position, body.half_edges, polarization)
+            return cuboid_field(position, body.half_edges, polarization, number)
         assert isinstance(body, Cylinder | Ring)
         return segments_field(position, body, polarization)
 
@@ -54,7 +53,7 @@ class UniformField:
 
     @cached_property
     def _far(self) -> CompiledField:
-        return CompiledField(uniform_moments(self.magnet, FAR_DEGREE).expressions)
+        return CompiledField(uniform_moments(self.magnet, FAR_DEGREE).expressions, seldom=True)
 
     def rows(self, columns: Array) -> Array:
         """B (T) outside, μ0 H inside, and its gradient (T/m), (12, n), at `columns` (3, n) m; 1e-13 at any distance.

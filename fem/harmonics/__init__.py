@@ -5,6 +5,7 @@ from .body_rules import box_rule as box_rule, polynomial_rule as polynomial_rule
 from .compiled import (
     CompiledField as CompiledField,
     FieldExpressions as FieldExpressions,
+    Number as Number,
     as_columns as as_columns,
     field_and_gradient as field_and_gradient,
 )
@@ -27,6 +28,7 @@ from .multipole import (
     MultipoleExpansion as MultipoleExpansion,
     curvature_moments as curvature_moments,
     moments_of_magnetization as moments_of_magnetization,
+    turned_expressions as turned_expressions,
     uniform_moments as uniform_moments,
     without_noise as without_noise,
 )

@@ -8,7 +8,7 @@ Each sum is taken over l first, at fixed m, and then over m: real and imaginary 
 every operation costs, so that this saves time as well as compilation.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import heyoka as hy
@@ -17,8 +17,13 @@ Terms = Mapping[Any, float]
 """Weights of real harmonics: keys (l, m, "re") and (l, m, "im")."""
 
 
-def harmonic_sums(position: Sequence[hy.expression], sums: Sequence[Terms]) -> list[hy.expression]:
-    """Σ weight Re Θ_lm or Im Θ_lm at a position (three expressions), one expression for each of `sums`."""
+def harmonic_sums(
+    position: Sequence[hy.expression], sums: Sequence[Terms], number: Callable[[Any], Any] = lambda weight: weight
+) -> list[hy.expression]:
+    """Σ weight Re Θ_lm or Im Θ_lm at a position (three expressions), one expression for each of `sums`.
+
+    The weights are written as `number` has them.
+    """
     x, y, z = position
     inverse = 1.0 / (x * x + y * y + z * z)
     highest: dict[int, int] = {}
@@ -27,7 +32,7 @@ def harmonic_sums(position: Sequence[hy.expression], sums: Sequence[Terms]) -> l
             highest[m] = max(highest.get(m, m), l)
     sectoral = _sectoral(x * inverse, y * inverse, inverse, max(highest, default=0))
     chains = {m: _chain(z * inverse, inverse, m, l) for m, l in highest.items()}
-    return [_summed(terms, sectoral, chains) for terms in sums]
+    return [_summed(terms, sectoral, chains, number) for terms in sums]
 
 
 def _sectoral(x: hy.expression, y: hy.expression, inverse: hy.expression, highest: int) -> list[dict[str, Any]]:
@@ -50,18 +55,20 @@ def _chain(z: hy.expression, inverse: hy.expression, m: int, highest: int) -> di
     return found
 
 
-def _summed(terms: Terms, sectoral: list[dict[str, Any]], chains: dict[int, dict[int, Any]]) -> hy.expression:
-    parts: dict[tuple[int, str], list[tuple[float, hy.expression]]] = {}
+def _summed(
+    terms: Terms, sectoral: list[dict[str, Any]], chains: dict[int, dict[int, Any]], number: Callable[[Any], Any]
+) -> hy.expression:
+    parts: dict[tuple[int, str], list[tuple[Any, hy.expression]]] = {}
     for (l, m, part), weight in terms.items():
         factor = (-1.0) ** m * weight
         for j in range(1, l + 1):
             factor *= 2 * j - 1
-        parts.setdefault((m, part), []).append((factor, chains[m][l]))
+        parts.setdefault((m, part), []).append((number(factor), chains[m][l]))
     found = [_product(sectoral[m][part], inner) for (m, part), inner in parts.items()]
     return hy.sum(found) if found else hy.expression(0.0)
 
 
-def _product(sectoral: hy.expression, inner: Sequence[tuple[float, hy.expression]]) -> hy.expression:
+def _product(sectoral: hy.expression, inner: Sequence[tuple[Any, hy.expression]]) -> hy.expression:
     """S_m Σ factor Q_lm; a single harmonic is made before its factor, so that all sums share it."""
     if len(inner) == 1:
         return inner[0][0] * (sectoral * inner[0][1])

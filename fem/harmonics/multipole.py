@@ -11,6 +11,7 @@ import numpy as np
 from ...geometry.basics import MU_0, Array, Sphere, frozen_array
 from ...geometry.bodies import Magnet
 from .body_rules import polynomial_rule
+from .compiled import FieldExpressions, Number
 from .expressions import harmonic_sums
 from .solid import (
     Coefficients,
@@ -83,25 +84,26 @@ class MultipoleExpansion:
         gradients = [[real_terms(derivative(p, j)) for j in range(3)] for p in potentials]
         return [real_terms(p) for p in potentials], gradients
 
-    def expressions(self, position: Sequence[hy.expression]) -> tuple[list[hy.expression], list[list[hy.expression]]]:
+    def expressions(self, position: Sequence[hy.expression], number: Number = float) -> FieldExpressions:
         """B (T) and ∂B_i/∂x_j (T/m) at a position (three expressions, m, rotor's frame)."""
+        place = [position[i] - number(self.center[i]) for i in range(3)]
         if not np.array_equal(self.axes, np.eye(3)):
-            return self._along_axes([position[i] - float(self.center[i]) for i in range(3)])
-        scaled = [(position[i] - float(self.center[i])) * (1.0 / self.radius) for i in range(3)]
+            return self._along_axes(place, number)
+        scaled = [component * number(1.0 / self.radius) for component in place]
         fields, gradients = self.components
         slopes = [{k: w / self.radius for k, w in gradients[i][j].items()} for i, j in UPPER]
-        sums = harmonic_sums(scaled, [*fields, *slopes])
+        sums = harmonic_sums(scaled, [*fields, *slopes], number)
         upper = dict(zip(UPPER, sums[3:], strict=True))
         upper[2, 2] = -upper[0, 0] - upper[1, 1]
         return sums[:3], [[upper[min(i, j), max(i, j)] for j in range(3)] for i in range(3)]
 
-    def _along_axes(self, place: list[hy.expression]) -> tuple[list[hy.expression], list[list[hy.expression]]]:
+    def _along_axes(self, place: list[hy.expression], number: Number) -> FieldExpressions:
         """Expressions along other axes, turned back."""
         own = MultipoleExpansion(np.zeros(3), self.radius, self.own_coefficients)
-        b, slope = own.expressions(_turned(self.axes.T, place))
-        rows = [_turned(self.axes, row) for row in slope]
-        columns = [_turned(self.axes, [row[j] for row in rows]) for j in range(3)]
-        return _turned(self.axes, b), [[columns[j][i] for j in range(3)] for i in range(3)]
+        b, slope = own.expressions(turned_expressions(self.axes.T, place, number), number)
+        rows = [turned_expressions(self.axes, row, number) for row in slope]
+        columns = [turned_expressions(self.axes, [row[j] for row in rows], number) for j in range(3)]
+        return turned_expressions(self.axes, b, number), [[columns[j][i] for j in range(3)] for i in range(3)]
 
     def evaluate(self, points: Array) -> tuple[Array, Array]:
         """B (n, 3) T and ∂B_i/∂x_j (n, 3, 3) T/m at points (n, 3) m, without compilation."""
@@ -122,9 +124,9 @@ class MultipoleExpansion:
         return np.linalg.norm(parts, axis=1), np.linalg.norm(slopes, axis=1)
 
 
-def _turned(axes: Array, vector: Sequence[hy.expression]) -> list[hy.expression]:
+def turned_expressions(axes: Array, vector: Sequence[hy.expression], number: Number) -> list[hy.expression]:
     """A vector along the columns of `axes`, along the outer ones."""
-    return [hy.sum([float(factor) * part for factor, part in zip(row, vector, strict=True) if factor]) for row in axes]
+    return [hy.sum([number(factor) * part for factor, part in zip(row, vector, strict=True) if factor]) for row in axes]
 
 
 def moments_of_magnetization(

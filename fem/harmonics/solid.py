@@ -60,9 +60,11 @@ def regular_values(degree: int, x: Array, y: Array, z: Array) -> dict[tuple[int,
 def weighted_sums(degree: int, points: Array, weights: Array) -> Coefficients:
     """Σ_n weight_n Υ_lm(r_n), [k, l, m], at points (n, 3) with weights (n, k)."""
     result = np.zeros((weights.shape[1], degree + 1, degree + 1), complex)
-    for m, rows, power in regular_orders(degree, *np.ascontiguousarray(points.T)):
-        turned = np.ascontiguousarray(power[:, None] * weights)
-        result[:, m:, m] = (rows @ turned.view(float)).view(complex).T
+    for first in range(0, len(points), CHUNK):
+        here = slice(first, first + CHUNK)
+        for m, rows, power in regular_orders(degree, *np.ascontiguousarray(points[here].T)):
+            turned = np.ascontiguousarray(power[:, None] * weights[here])
+            result[:, m:, m] += (rows @ turned.view(float)).view(complex).T
     return result
 
 

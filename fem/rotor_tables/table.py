@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from ...geometry.basics import Array, InputError, counted, html_table
 from ...geometry.bodies import Magnet
 from ..closed_forms import UniformField, squared_distance
-from ..harmonics import CompiledField, FieldExpressions, MultipoleExpansion, as_columns, field_and_gradient
+from ..harmonics import CompiledField, FieldExpressions, MultipoleExpansion, Number, as_columns, field_and_gradient
 
 BLUR = 0.5
 """Share of the root mean square of a doubt that is added to its field."""
@@ -71,10 +71,10 @@ class RotorTable:
     doubts: Mapping[str, tuple[MultipoleExpansion, ...]] = field(default_factory=dict)
     provenance: Mapping[str, str | float] = field(default_factory=dict)
 
-    def expressions(self, position: Sequence[hy.expression]) -> FieldExpressions:
-        """B and its gradient as heyoka expressions of a position (m, rotor's frame)."""
-        parts = [part.expressions(position) for part in self._closed_forms]
-        parts += [part.expressions(position) for part in self.expansions]
+    def expressions(self, position: Sequence[hy.expression], number: Number = float) -> FieldExpressions:
+        """B and its gradient as heyoka expressions of a position (m, rotor's frame), its numbers as `number` writes."""
+        parts = [part.expressions(position, number) for part in self._closed_forms]
+        parts += [part.expressions(position, number) for part in self.expansions]
         return (
             [hy.sum([b[i] for b, _ in parts]) for i in range(3)],
             [[hy.sum([g[i][j] for _, g in parts]) for j in range(3)] for i in range(3)],
@@ -107,7 +107,7 @@ class RotorTable:
     @cached_property
     def _far(self) -> tuple[CompiledField, ...]:
         """The parts one by one, where the closed forms have to give way to moments."""
-        return tuple(CompiledField(expansion.expressions) for expansion in self.expansions)
+        return tuple(CompiledField(expansion.expressions, seldom=True) for expansion in self.expansions)
 
     def evaluate(self, points: ArrayLike) -> tuple[Array, Array]:
         """B (n, 3) T and ∂B_i/∂x_j (n, 3, 3) T/m at points (n, 3) m in the rotor's frame.

@@ -10,4 +10,5 @@ from .checked_files import (
 from .compiled_code import compiled as compiled
 from .foreign import hdf5_fault as hdf5_fault, is_hdf5 as is_hdf5
 from .program_text import digest_of as digest_of, program_of as program_of
+from .runtime_numbers import RuntimeNumbers as RuntimeNumbers
 from .whole_files import seal as seal, unsealed as unsealed, write_whole as write_whole

@@ -1,5 +1,7 @@
 """Figure and table of the study of hard cases, from its result alone."""
 
+from textwrap import fill
+
 import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
@@ -29,7 +31,7 @@ def hard_case_figure(result: xr.Dataset) -> Figure:
             values = np.where(row[key] > 0, np.maximum(row[key], 1e-17), np.nan)
             panel.loglog(1e3 * row["distance"], values, dash, color=color, marker=marker, ms=3, label=label)
         panel.axhline(1e-5, color="0.2", lw=0.7, label="tolerance asked for")
-        panel.set_title(name)
+        panel.set_title(fill(name, 22))
         small = float(row["true_error"].min()) < SMALL
         panel.set(xlim=(4, 1300), ylim=(3e-17 if small else 1e-10, 1e-4))
         panel.yaxis.set_major_locator(LogLocator(numticks=6))

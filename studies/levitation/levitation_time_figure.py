@@ -117,9 +117,11 @@ def _flights(axes: Axes, result: xr.Dataset) -> None:
         color = PALETTE[number % len(PALETTE)]
         time, distance = nominal["flight_time"][k].values, 1e3 * nominal["flight_distance"][k].values
         axes.plot(time, distance, color=color)
-        words = f" {frequency[k]:.4g} Hz" if time[-1] > 200 else f"{frequency[k]:.4g} Hz"
-        axes.annotate(words, (time[-1], distance[-1]), color=color, size=7, ha="left", va="center")
-    axes.set(xlabel="time (s)", xlim=(0, 330))
+        fold = OUTCOMES[int(nominal["outcome"][k])] == "fold"
+        way = {"rotation": 60, "rotation_mode": "anchor"} if fold else {"va": "center"}
+        axes.annotate(f" {frequency[k]:.3g} Hz", (time[-1], distance[-1]), color=color, size=7, ha="left", **way)
+    low, high = axes.get_ylim()
+    axes.set(xlabel="time (s)", xlim=(0, 330), ylim=(low, high + 0.25 * (high - low)))  # room for words above folds
 
 
 def time_lines(result: xr.Dataset) -> list[str]:

@@ -1,0 +1,45 @@
+"""Rotors of one kind share the compiled rates, and numbers as runtime parameters change nothing."""
+
+import numpy as np
+import pytest
+
+from spinlev.dynamics.motion import Rates, Scales, parameters
+from spinlev.fem.rotor_tables import rotor_table
+from spinlev.geometry.bodies import horizontal, tilt, vertical
+from spinlev.geometry.scenes import Drag, Floater, Scene
+
+FLOATER = Floater(6.35e-3, 1.305, 1.05, 7500.0)
+PAIRS = {
+    "horizontal": (horizontal(2e-3, 10e-3, 1.305, 1.05), horizontal(1e-3, 9.5e-3, 1.29, 1.05)),
+    "vertical": (vertical(14e-3, 10e-3, 1.305, 1.05), vertical(16.5e-3, 9.8e-3, 1.31, 1.05)),
+    "tilt": (tilt(np.radians(10.0), 10e-3, 1.305, 1.05), tilt(np.radians(7.3), 10.2e-3, 1.3, 1.05)),
+}
+
+
+class WrittenOut:
+    """A table's field with its numbers in the code."""
+
+    def __init__(self, table):
+        self.table = table
+
+    def expressions(self, position):
+        return self.table.expressions(position)
+
+
+@pytest.mark.parametrize("model", ["dipole", "cuboid"])
+@pytest.mark.parametrize("kind", PAIRS)
+def test_rotors_of_one_kind_share_their_code_and_each_has_its_own_rates(kind, model):
+    tables = [rotor_table(rotor, model) for rotor in PAIRS[kind]]
+    rates = [Rates(table) for table in tables]
+    assert rates[0]._function is rates[1]._function
+    rng = np.random.default_rng(3)
+    states = 0.1 * rng.normal(size=(40, 12)) + np.array([0, 0, -3.5, 0, 0, 0, 0, 0, 1, 0, 0, 0])
+    for rotor, table, found in zip(PAIRS[kind], tables, rates, strict=True):
+        scene = Scene(110.0, rotor, FLOATER, Drag(0.0, 0.0))
+        values = parameters(scene, Scales.of(scene))
+        for values_given in (values, np.tile(values, (len(states), 1))):
+            exact = Rates(WrittenOut(table))(states, values_given)
+            for one, other in zip(found(states, values_given), exact, strict=True):
+                np.testing.assert_allclose(one, other, rtol=0, atol=1e-13 * np.abs(other).max())
+    apart = [r(states, values)[0] for r in rates]
+    assert np.abs(apart[0] - apart[1]).max() > 1e-3 * np.abs(apart[0]).max()
