@@ -8,7 +8,11 @@ from .air import (
     spinning as spinning,
     swinging as swinging,
 )
-from .catalogue import with_effects as with_effects
+from .catalogue import (
+    BESIDE_METAL as BESIDE_METAL,
+    WITHOUT_METAL as WITHOUT_METAL,
+    with_effects as with_effects,
+)
 from .floater_currents import FLOATER_CURRENTS as FLOATER_CURRENTS, FloaterCurrents as FloaterCurrents
 from .floater_shape import FLOATER_SHAPE as FLOATER_SHAPE, FloaterShape as FloaterShape
 from .mutual import MUTUAL as MUTUAL, Mutual as Mutual

@@ -11,11 +11,12 @@ import heyoka as hy
 import numpy as np
 
 from ...fem.harmonics import regular_harmonics
-from ...geometry.basics import Array
+from ...geometry.basics import Array, even_directions
 
 NORMALS, RADII = 32, (0.35, 0.7, 1.0)
 FALL = 3
 """Minus the power of q."""
+ROWS, COLUMNS = np.triu_indices(3)
 
 
 def fallen(inverse: hy.expression) -> hy.expression:
@@ -41,10 +42,7 @@ def count(degree: int) -> int:
 @cache
 def nodes() -> Array:
     """(n, 3) places in the unit ball at which functions are fitted."""
-    number = np.arange(NORMALS) + 0.5
-    height, angle = 1 - 2 * number / NORMALS, np.pi * (1 + 5**0.5) * number
-    across = np.sqrt(1 - height**2)
-    normals = np.stack([across * np.cos(angle), across * np.sin(angle), height], axis=1)
+    normals = even_directions(NORMALS)
     return np.concatenate([np.zeros((1, 3)), *(radius * normals for radius in RADII)])
 
 
@@ -69,11 +67,16 @@ def weighted_sum(first: int, basis: Sequence[hy.expression]) -> hy.expression:
 
 
 @cache
-def slopes(degree: int) -> Array:
-    """(3, count of one degree less, count): weights of the derivatives by the weights, exact but for round-off."""
+def derivatives(degree: int) -> Array:
+    """(3 or 9, count): weights at the centre of the first derivatives and, xx, xy, xz, yy, yz, zz, of the second ones.
+
+    By the weights of a polynomial of degree 1 or 2, which they tell.
+    """
     x = hy.make_vars("x", "y", "z")
     tensors = hy.diff_tensors(polynomials(degree, x), diff_args=x, diff_order=1).jacobian
     function = hy.cfunc(list(np.asarray(tensors).ravel()), x, compact_mode=True)
-    values = function(np.ascontiguousarray(nodes().T)).reshape(count(degree), 3, -1)
-    found = np.einsum("kn,pan->akp", fitting(degree - 1)[0], values)
-    return np.where(np.abs(found) < 1e-13, 0.0, found)
+    slopes = function(np.ascontiguousarray(np.eye(4)[:3])).reshape(count(degree), 3, 4)  # along each axis, and in it
+    first, second = slopes[..., 3], slopes[..., :3] - slopes[..., 3:]
+    if degree == 1:
+        return np.asarray(first.T)
+    return np.concatenate([first.T, second[:, ROWS, COLUMNS].T])

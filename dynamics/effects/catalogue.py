@@ -10,6 +10,7 @@ from .floater_currents import FloaterCurrents
 from .floater_shape import FLOATER_SHAPE, FloaterShape
 from .rotor_losses import ROTOR_CURRENTS, RotorCurrents
 
+BESIDE_METAL = "beside metal that turns with the rotor"
 WITHOUT_METAL = "Leave conductivity_S_m of the rotor and rotor.conductors out."
 
 
@@ -31,7 +32,7 @@ def with_effects(scene: Scene, table: FieldFormula) -> Interaction:
     pieces = pieces_of(scene.rotor, scene.conductors)
     check_slow_enough(pieces, scene.frequency)
     if pieces:
-        scene.floater.must_be("sphere", where="beside metal that turns with the rotor", instead=WITHOUT_METAL)
+        scene.floater.must_be("sphere", where=BESIDE_METAL, instead=WITHOUT_METAL)
     if pieces and ROTOR_CURRENTS not in {effect.name for effect in whole.effects}:
         effects.append(RotorCurrents(cached_rotor_losses(scene, lambda _: None)[0]))
     return whole.joined(*effects)

@@ -74,7 +74,7 @@ class FloaterShape:
             turns = zip(cross(moment, field), cross(arm, pull), strict=True)
             turn = [a + strength * b + c for a, (b, c) in zip(turn, turns, strict=True)]
             energy = energy - strength * inertia * dot(moment, field)
-        return Added(force, turn, energy)
+        return Added(force, turn, energy=energy)
 
     def missed(self, table: FieldTable, position: Array, moment: Array) -> Array:
         """(n, 2) what the dipoles miss of torque and force over the moment, T and T/m, at (n, 3) m and (n, 3)."""

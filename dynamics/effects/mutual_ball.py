@@ -1,8 +1,8 @@
 """Mutual magnetisation in a ball of a flight: its energy as polynomials whose weights are runtime parameters.
 
 With M = m + α B0 the energy is q⁻³ (u(x) + M·V(x) + ½ MᵀH(x)M) - ½ α B0²: q, u, the three parts of V and the six
-entries of H are polynomials of the place in the ball (`ball_polynomials`), and so are their derivatives, which have
-weights of their own: products of variables cost more than sums.
+entries of H are polynomials of the place in the ball (`ball_polynomials`).  Its change with the place is that of one
+polynomial, whose derivatives at the centre are sums of theirs: they have weights of their own.
 """
 
 from dataclasses import dataclass
@@ -13,11 +13,13 @@ import numpy as np
 from ...fem.harmonics import Ball, BallField
 from ...fem.mutual import MutualTable
 from ...geometry.basics import Array
-from ..motion import Added, Motion, Parameter, cross, dot
-from .ball_polynomials import FALL, count, fallen, falling, fitting, nodes, polynomials, slopes, weighted_sum
+from ..motion import Added, Motion, Parameter, dot
+from .ball_polynomials import FALL, count, derivatives, fallen, falling, fitting, nodes, polynomials, weighted_sum
 
 PARTS = (2, 2, *(1, 1, 1), *(2, 2, 2, 2, 2, 2))
 """Degrees of q, u, the three of V, and xx, xy, xz, yy, yz, zz of H; V is small."""
+TOLD = {1: 3, 2: 9}
+"""Numbers that tell the derivatives of a polynomial of a degree."""
 ALLOWED = 1e-5
 """Error of the force by that of the rigid dipole."""
 ENTRIES = [(a, b) for a in range(3) for b in range(a, 3)]
@@ -45,40 +47,43 @@ class MutualInBall:
     @property
     def count(self) -> int:
         """Of the weights."""
-        return sum(count(degree) + 3 * count(degree - 1) for degree in PARTS)
+        return sum(count(degree) + TOLD[degree] for degree in PARTS)
 
     def added(self, motion: Motion) -> Added:
         """Force and torque are the derivatives of one energy."""
         length, alpha = hy.par[Parameter.LENGTH], self.table.polarizability
         strength, share = hy.par[Parameter.PLATE_MOMENT], hy.par[Parameter.PLATE_SHARE]
         offset = self.ball.offset([length * x for x in motion.position])
-        bases, start, values, steep = [polynomials(degree, offset) for degree in range(3)], self.first, [], []
+        bases, start, values, first = [polynomials(degree, offset) for degree in range(3)], self.first, [], []
         for degree in PARTS:
-            sizes = count(degree), count(degree - 1)
             values.append(weighted_sum(start, bases[degree]))
-            begins = [start + sizes[0] + j * sizes[1] for j in range(3)]
-            steep.append([weighted_sum(begin, bases[degree - 1]) for begin in begins])
-            start += sizes[0] + 3 * sizes[1]
+            start += count(degree)
+            first.append(start)
+            start += TOLD[degree]
         quadratic, value, *rest = values
-        linear, tensor = rest[:3], rest[3:]
         inverse = 1.0 / quadratic
         fall = fallen(inverse)
         flux = [share * b for b in motion.field]
         whole = [strength * m + alpha * b for m, b in zip(motion.moment, flux, strict=True)]
-        factors = [share * m for m in whole]
+        linear = [share * v for v in rest[:3]]
+        rows = [[rest[3 + ENTRIES.index((min(a, b), max(a, b)))] for b in range(3)] for a in range(3)]
+        seen = [v + dot(row, whole) for v, row in zip(linear, rows, strict=True)]
+        level = share * share * value + 0.5 * dot(whole, [v + s for v, s in zip(linear, seen, strict=True)])
+        factors = [-FALL * (level * inverse), share * share, *(share * m for m in whole)]
         factors += [(0.5 if a == b else 1.0) * whole[a] * whole[b] for a, b in ENTRIES]
-        rows = [[tensor[ENTRIES.index((min(a, b), max(a, b)))] for b in range(3)] for a in range(3)]
-        answer = [-fall * (share * v + dot(row, whole)) for v, row in zip(linear, rows, strict=True)]
-        level = share * share * value + hy.sum([h * p for h, p in zip(rest, factors, strict=True)])
-        carried = [(alpha * share) * (b + a) for a, b in zip(answer, flux, strict=True)]
-        scale, falls, force = length * hy.par[self.ball.first + 3], FALL * (level * inverse), []
-        for j in range(3):
-            shrinks, *change = (each[j] for each in steep)
-            slope = share * share * change[0] + hy.sum([h * p for h, p in zip(change[1:], factors, strict=True)])
-            pulled = length * dot(carried, [motion.gradient[i][j] for i in range(3)])
-            force.append(pulled + scale * fall * (falls * shrinks - slope))
-        turn = [strength / hy.par[Parameter.INERTIA] * t for t in cross(motion.moment, answer)]
-        return Added(force, turn, fall * level - 0.5 * alpha * dot(flux, flux))
+        slope = [hy.sum([f * hy.par[k + j] for f, k in zip(factors, first, strict=True)]) for j in range(3)]
+        bending = [(f, k + 3) for f, k, degree in zip(factors, first, PARTS, strict=True) if degree > 1]
+        bend = [hy.sum([f * hy.par[k + e] for f, k in bending]) for e in range(len(ENTRIES))]
+        bends = [[bend[ENTRIES.index((min(a, b), max(a, b)))] for b in range(3)] for a in range(3)]
+        scale = -(length * hy.par[self.ball.first + 3]) * fall
+        answer = [-fall * s for s in seen]
+        induced = [(length * share * alpha) * (b + a) for a, b in zip(answer, flux, strict=True)]
+        return Added(
+            force=[scale * (s + dot(row, offset)) for s, row in zip(slope, bends, strict=True)],
+            pulled=induced,
+            turning=[strength / hy.par[Parameter.INERTIA] * a for a in answer],
+            energy=fall * level - 0.5 * alpha * dot(flux, flux),
+        )
 
     def fit(self, ball: Ball, gradient: Array) -> tuple[Array, float]:
         """See `InBall`; what is missed of the energy is taken to change as fast as a cubic."""
@@ -99,4 +104,4 @@ class MutualInBall:
 
 
 def _with_slopes(degree: int, weights: Array) -> Array:
-    return np.concatenate([weights, (slopes(degree) @ weights).ravel()])
+    return np.concatenate([weights, derivatives(degree) @ weights])

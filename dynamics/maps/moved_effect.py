@@ -85,4 +85,7 @@ def _moved(effect: Effect, move: Move, motion: Motion) -> Added:
             gradient=turned(motion.gradient, into),
         )
     )
-    return replace(found, force=move.back(found.force, measure), torque=move.back(found.torque, measure))
+    force, torque, pulled, turning = (
+        move.back(vector, measure) for vector in (found.force, found.torque, found.pulled, found.turning)
+    )
+    return replace(found, force=force, torque=torque, pulled=pulled, turning=turning)

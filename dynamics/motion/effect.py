@@ -12,7 +12,7 @@ import heyoka as hy
 from ...fem.harmonics import Ball, BallField
 from ...fem.rotor_tables import FieldTable
 from ...geometry.basics import Array
-from .symbols import Parameter, Vector, cross, dot
+from .symbols import Parameter, Vector
 
 ZERO = hy.expression(0.0)
 NOTHING = (ZERO, ZERO, ZERO)
@@ -46,12 +46,16 @@ class Added:
     Parameters
     ----------
     force, torque : (3,) scaled accelerations of place and of spin
+    pulled : (3,) a moment on which the rotor's gradient acts: scaled force by a gradient of 1 T/m
+    turning : (3,) a field that turns the floater's moment: scaled torque by a unit moment across it
     energy : term of the Jacobi integral
     power : rate of change of the Jacobi integral by this effect
     """
 
     force: Vector = NOTHING
     torque: Vector = NOTHING
+    pulled: Vector = NOTHING
+    turning: Vector = NOTHING
     energy: hy.expression = ZERO
     power: hy.expression = ZERO
 
@@ -131,6 +135,9 @@ def conservative(energy: Callable[[Vector, Vector, Vector], hy.expression], moti
     slopes = hy.diff_tensors([value], diff_args=given, diff_order=1).gradient
     here = dict(zip(names, (*motion.position, *motion.moment, *motion.field), strict=True))
     stored, *slopes = hy.subs([value, *slopes], here)
-    carried = [dot(slopes[6:], [motion.gradient[i][j] for i in range(3)]) for j in range(3)]
-    force = [-slopes[j] - hy.par[Parameter.LENGTH] * carried[j] for j in range(3)]
-    return Added(force, [t / hy.par[Parameter.INERTIA] for t in cross(slopes[3:6], motion.moment)], stored)
+    return Added(
+        force=[-s for s in slopes[:3]],
+        pulled=[-hy.par[Parameter.LENGTH] * s for s in slopes[6:]],
+        turning=[-s / hy.par[Parameter.INERTIA] for s in slopes[3:6]],
+        energy=stored,
+    )

@@ -104,8 +104,8 @@ def equations_of_motion(
     )
     field, gradient = table.expressions([length * p for p in position])
     strength = torque * inertia * length
-    force = [strength * dot(moment, [gradient[i][j] for i in range(3)]) for j in range(3)]
-    turn = [torque * component for component in cross(moment, field)]
+    force, turn = [hy.expression(0.0)] * 3, [hy.expression(0.0)] * 3
+    pulled, turning = [strength * m for m in moment], [torque * b for b in field]
     axial, lateral = _gravity(tilted_gravity)
     push = [lateral[i] - linear * velocity[i] for i in range(3)]
     drift = subtract(velocity, turned(position))
@@ -124,8 +124,12 @@ def equations_of_motion(
         added = effect.added(motion)
         force = [a + b for a, b in zip(force, added.force, strict=True)]
         turn = [a + b for a, b in zip(turn, added.torque, strict=True)]
+        pulled = [a + b for a, b in zip(pulled, added.pulled, strict=True)]
+        turning = [a + b for a, b in zip(turning, added.turning, strict=True)]
         jacobi.append(added.energy)
         power = power + added.power
+    force = [dot(pulled, [gradient[i][j] for i in range(3)]) + f for j, f in enumerate(force)]
+    turn = [a + b for a, b in zip(cross(moment, turning), turn, strict=True)]
     states: list[hy.expression] = []
     state_rates: Vector = []
     if plate is not None:

@@ -13,7 +13,6 @@ from ..harmonics import FOUR_PI
 from .answer_error import answer_errors
 from .answer_grid import POWERS, RETURNED, AnswerGrid, answer_box, point_counts
 from .answer_samples import (
-    FAR_GAPS,
     NEAR_GAPS,
     ROTOR_GAPS,
     SPHERE_GAPS,
@@ -36,8 +35,11 @@ OBLIQUE = (
     "one with two permeabilities and an easy axis along none of its edges, which its points cannot answer with. Choose "
     "--interaction rigid, give it one recoil_permeability, or turn the body with its magnetisation."
 )
-EQUATIONS, SPARSE, NEAR_SPARSE = 8000, 6, 3
-"""Pairs of dipoles that are fitted; and at one of so many places the rotor's answer to the sphere's is."""
+EACH, EACH_OF_MANY = 16, 6
+"""Places of dipoles for each gap and magnet; of rotors of `MANY` magnets."""
+EQUATIONS, AT_ONE_PLACE, SPARSE, NEAR_SPARSE = 8000, 5.0, 12, 6
+"""Pairs of dipoles that are fitted; how much those at one place count, which alone make the energy; and at one of so
+many places the rotor's answer to the sphere's is."""
 INNER = 2
 """Points along each axis at which magnets beside each other answer beyond their direct answer."""
 
@@ -58,9 +60,8 @@ def mutual_table(magnets: tuple[Magnet, ...], floater: Floater, order: int = 2) 
     coupling = np.zeros([3 * sum(len(points) for points in inner)] * 2)
     pairs = mixed = np.zeros((len(grids), len(grids)))
     if rotor.regions is not None:
-        places = places_around(magnets, floater.radius, ROTOR_GAPS, 9, 1)
-        far = places_around(magnets, floater.radius, FAR_GAPS, 2, 3)
-        grids, coupling = _rotor_fit(grids, inner, magnets, *answer_products(rotor, fine, places, far), places)
+        places = places_around(magnets, floater.radius, ROTOR_GAPS, EACH if len(grids) < MANY else EACH_OF_MANY, 1)
+        grids, coupling = _rotor_fit(grids, inner, magnets, *answer_products(rotor, fine, places), places)
     if floater.recoil_permeability != 1:
         facing = places_facing(magnets, floater.radius, SPHERE_GAPS)
         places = np.concatenate([facing, places_around(magnets, floater.radius, SPHERE_GAPS, 60, 2)])
@@ -73,7 +74,7 @@ def mutual_table(magnets: tuple[Magnet, ...], floater: Floater, order: int = 2) 
             grids, mixed = returned_fit(grids, inner, images, returned)
     alpha = FOUR_PI * floater.radius**3 / MU_0 * float(reflection(floater.recoil_permeability, 1)[1])
     table = MutualTable(magnets, tuple(grids), coupling, pairs, mixed, images, alpha)
-    gaps, errors = answer_errors(table, fine, floater)
+    gaps, errors = answer_errors(table, rotor, fine, floater)
     return replace(
         table, gaps=gaps, errors=errors, provenance={"order": order, "seconds": time.perf_counter() - started}
     )
@@ -117,8 +118,9 @@ def _rotor_fit(
     first, second = np.triu_indices(len(direct))
     if len(first) > EQUATIONS:
         chosen = np.random.default_rng(0).choice(len(first), EQUATIONS, replace=False)
-        chosen = np.union1d(chosen, np.flatnonzero(first == second))
+        chosen = np.union1d(chosen, np.flatnonzero(first // 3 == second // 3))
         first, second = first[chosen], second[chosen]
+    counts = np.where(first // 3 == second // 3, AT_ONE_PLACE, 1.0)
     columns, kinds = [], [classes(g, True)[:, : None if m.contrast else 0] for g, m in zip(grids, magnets, strict=True)]
     for grid, kind in zip(grids, kinds, strict=True):
         fields = unit_dipole_fields(grid.box.center + grid.points @ grid.box.rotation.T, places) @ grid.box.rotation
@@ -128,7 +130,8 @@ def _rotor_fit(
     whole = (unit_dipole_fields(np.concatenate(inner), places) * size[:, None, None]).reshape(len(size), -1)
     a, b = np.triu_indices(whole.shape[1] if len(grids) > 1 else 0)
     together = whole[first][:, a] * whole[second][:, b] + (a != b) * whole[first][:, b] * whole[second][:, a]
-    direct, beyond = (part[first, second] * size[first] * size[second] for part in (direct, beyond))
+    alone, together = alone * counts[:, None], together * counts[:, None]
+    direct, beyond = (part[first, second] * size[first] * size[second] * counts for part in (direct, beyond))
     held = np.arange(alone.shape[1] + len(a)) >= alone.shape[1]
     found = least_squares(np.concatenate([alone, together], axis=1), beyond, held)
     found[: alone.shape[1]] += least_squares(alone, direct, held[: alone.shape[1]])

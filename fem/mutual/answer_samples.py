@@ -28,10 +28,12 @@ from .degree_needed import enough_degree
 from .permeable_sphere import induced_sources, reflection
 from .rotor_response import RotorResponse, direct_rule
 
-ROTOR_GAPS, SPHERE_GAPS = (0.1, 0.25, 0.6, 1.2, 2.5), (0.08, 0.16, 0.3, 0.55, 0.95, 1.6, 2.8)
-FAR_GAPS, NEAR_GAPS = (0.6, 1.2), (0.1, 0.13, 0.16, 0.2, 0.25, 0.35, 0.5, 1.0)
-"""Gaps between the bodies at which samples are taken, in floater radii; the last for finer elements and for several."""
-TAIL, MOST_ADDED, MOST_RETURNED = 1e-5, 16, 24
+ROTOR_GAPS, SPHERE_GAPS = (0.1, 0.16, 0.25, 0.4, 0.7, 1.2, 2.5), (0.08, 0.16, 0.3, 0.55, 0.95, 1.6, 2.8)
+NEAR_GAPS = (0.1, 0.13, 0.16, 0.2, 0.25, 0.35, 0.5, 1.0)
+"""Gaps between the bodies at which samples are taken, in floater radii; the last for several magnets."""
+ALIKE = 1e-4
+"""Part of the largest energy of a field in the magnets below which one counts as none: 6e-5 of an answer in contact."""
+TAIL, MOST_ADDED, MOST_RETURNED = 1e-4, 16, 24
 """Part of the sphere's answer that the degrees left out may hold, and the most degrees of the small parts."""
 
 
@@ -70,18 +72,15 @@ def unit_dipole_fields(points: Array, places: Array) -> Array:
     return np.asarray(MU_0 / FOUR_PI * np.stack(fields, axis=1).reshape(-1, len(points), 3))
 
 
-def answer_products(rotor: RotorResponse, fine: RotorResponse, places: Array, far: Array) -> tuple[Array, Array]:
+def answer_products(rotor: RotorResponse, fine: RotorResponse, places: Array) -> tuple[Array, Array]:
     """(3 p, 3 p) J: twice minus the rotor's energy for unit dipoles at places (p, 3) m, in pairs; symmetric.
 
-    The direct part, exact but for round-off, and what the magnets' own field adds: by finite elements, times how much
-    more of it finer ones find at a few far places, which is the same to 3e-3 of it everywhere.
+    The direct part, exact but for round-off, and what the magnets' own field adds, by the fine elements: those of
+    degree 2 err by a twentieth of it, those of degree 3 by a hundredth.
     """
-    coarse, finer = (_beyond(response, far) for response in (rotor, fine))
-    size = np.sqrt(np.diag(_direct(rotor.magnets, far)))
-    coarse, finer = (part / size / size[:, None] for part in (coarse, finer))
-    square = float(np.sum(coarse**2))
-    factor = float(np.sum(coarse * finer)) / square if square else 1.0
-    return _direct(rotor.magnets, places), factor * _beyond(rotor, places)
+    direct = _direct(rotor.magnets, places)
+    size = np.sqrt(np.diag(direct))
+    return direct, size * size[:, None] * _beyond(rotor, fine, places, size)
 
 
 def _direct(magnets: Sequence[Magnet], places: Array) -> Array:
@@ -92,13 +91,26 @@ def _direct(magnets: Sequence[Magnet], places: Array) -> Array:
     return np.asarray(np.einsum("pni,qnj,nij->pq", fields, fields, tensors, optimize=True) / MU_0)
 
 
-def _beyond(rotor: RotorResponse, places: Array) -> Array:
-    """The products by the rest."""
-    points, weights, magnetized = rotor.linear_response(direct=False)
-    fields = unit_dipole_fields(points, places)
-    answers = np.array([magnetized(given) for given in fields])
-    found = np.einsum("pni,qni,n->pq", fields, answers, weights, optimize=True) / MU_0
-    return np.asarray((found + found.T) / 2)
+def _beyond(rotor: RotorResponse, fine: RotorResponse, places: Array, size: Array) -> Array:
+    """The products by the rest, of unit dipoles over `size` (3 p,).
+
+    Their fields in the magnets are sums of far fewer, which the coarse elements' points tell.
+    """
+    points, weights, _ = rotor.linear_response(direct=False)
+    fields = unit_dipole_fields(points, places) * (np.sqrt(weights)[:, None] / size[:, None, None])
+    rows = fields.reshape(len(size), -1)
+    values, vectors = np.linalg.eigh(rows @ rows.T)
+    kept = values > ALIKE * values[-1]
+    shares = vectors[:, kept] * np.sqrt(values[kept])
+    points, weights, magnetized = fine.linear_response(direct=False)
+    parts = np.zeros((shares.shape[1], *points.shape))
+    for k, place in enumerate(places):
+        own = np.arange(3 * k, 3 * k + 3)
+        given = unit_dipole_fields(points, place[None]) / size[own, None, None]
+        parts += np.einsum("ak,ani->kni", vectors[own][:, kept] / np.sqrt(values[kept]), given)
+    answers = np.array([magnetized(part) for part in parts])
+    found = np.einsum("kni,lni,n->kl", parts, answers, weights, optimize=True) / MU_0
+    return np.asarray(shares @ ((found + found.T) / 2) @ shares.T)
 
 
 @dataclass(frozen=True, eq=False)

@@ -4,13 +4,17 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...geometry.basics import Array, InputError, Part, places_off
+from ...geometry.basics import Array, InputError, Part, even_directions, places_off
 from ...geometry.bodies import Magnet
 from ..closed_forms import carrier
 from ..harmonics import uniform_moments
 
 OFFSETS = (0.0, 1.0, 3.0, 10.0, 100.0)
 """Errors are looked at this far out, beyond the nearest distance, in sizes of the rotor."""
+NEAR, FARTHER = 600, 150
+"""In how many directions; nearest by, what is left out of a series changes within 10°."""
+BETWEEN = 0.8
+"""What may be left out, by what is allowed: between these places it is up to a fifth more than there."""
 
 
 class AccuracyError(InputError):
@@ -50,15 +54,14 @@ def error_points(magnets: tuple[Magnet, ...], clearance: float) -> tuple[Array, 
     fields cancel; 1 T if nothing is magnetised.
     """
     size = max(float(np.linalg.norm(m.box.corners - magnets[0].box.center, axis=1).max()) for m in magnets)
-    shells = [points_around(magnets, clearance + factor * size) for factor in OFFSETS]
+    shells = [points_around(magnets, clearance + f * size, FARTHER if f else NEAR) for f in OFFSETS]
     points, scales = zip(*[(points, typical_field(magnets, points)) for points in shells], strict=True)
     return np.concatenate(points), np.concatenate(scales)
 
 
-def points_around(magnets: tuple[Magnet, ...], offset: float) -> Array:
-    """Points (n, 3) m at a distance `offset` (m) from the nearest of the magnets' faces, all around them."""
-    directions = np.random.default_rng(0).normal(size=(150, 3))
-    directions /= np.linalg.norm(directions, axis=1)[:, None]
+def points_around(magnets: tuple[Magnet, ...], offset: float, number: int = FARTHER) -> Array:
+    """Points (n, 3) m at a distance `offset` (m) from the nearest of the magnets' faces, in directions all around."""
+    directions = even_directions(number)
     points = np.concatenate([places_off(magnet.body, directions, offset) for magnet in magnets])
     outside = np.all([magnet.body.distance(points) >= offset * (1 - 1e-6) for magnet in magnets], axis=0)
     return np.asarray(points[outside])

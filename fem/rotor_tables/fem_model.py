@@ -20,7 +20,7 @@ from ...geometry.meshes import MeshSettings
 from ..closed_forms import carrier, closed_part
 from ..harmonics import MultipoleExpansion, trimmed_expansions, without_noise
 from ..magnetostatics import RotorSolution, refined, refinement_of, solve_rotor, strongest
-from .accuracy import Accuracy, error_points, guards
+from .accuracy import BETWEEN, Accuracy, error_points, guards
 from .table import KNOWN, RotorTable
 
 HIGHEST_DEGREE = 44
@@ -70,7 +70,7 @@ def fem_table(
     }
     doubts = {cause: parts for cause, parts in doubts.items() if parts}
     rest = RotorTable("fem", magnets, polarized, (), doubts).absolute_error(points)[0]
-    allowed = 0.99 * np.maximum(scale * accuracy.rtol - rest, scale * accuracy.rtol / 20)
+    allowed = BETWEEN * np.maximum(scale * accuracy.rtol - rest, scale * accuracy.rtol / 20)
     beside, scale_beside = guards(magnets, accuracy.clearance(magnets))
     kept, dropped = trimmed_expansions(
         whole, np.concatenate([points, beside]), np.concatenate([allowed, BESIDE * accuracy.rtol * scale_beside])

@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..harmonics import trimmed_expansions
-from .accuracy import Accuracy, error_points, guards
+from .accuracy import BETWEEN, Accuracy, error_points, guards
 from .fem_model import BESIDE, nonzero
 from .table import KNOWN, RotorTable
 
@@ -28,7 +28,7 @@ def shortened_table(table: RotorTable, accuracy: Accuracy) -> RotorTable:
     points, scale = error_points(table.magnets, accuracy.clearance(table.magnets))
     beside, scale_beside = guards(table.magnets, accuracy.clearance(table.magnets))
     rest = table.absolute_error(points)[0]
-    allowed = np.maximum(0.99 * (scale * accuracy.rtol - rest), AT_LEAST * scale * accuracy.rtol)
+    allowed = np.maximum(BETWEEN * (scale * accuracy.rtol - rest), AT_LEAST * scale * accuracy.rtol)
     kept, dropped = trimmed_expansions(
         table.expansions,
         np.concatenate([points, beside]),

@@ -1,4 +1,9 @@
-from .arrays import Array as Array, frozen_array as frozen_array, spread_points as spread_points
+from .arrays import (
+    Array as Array,
+    even_directions as even_directions,
+    frozen_array as frozen_array,
+    spread_points as spread_points,
+)
 from .box import Box as Box, rotation_matrix as rotation_matrix
 from .constants import MAGNET_CONDUCTIVITY as MAGNET_CONDUCTIVITY, MU_0 as MU_0
 from .cylinder import Cylinder as Cylinder

@@ -18,3 +18,11 @@ def spread_points(lower: ArrayLike, upper: ArrayLike, number: int) -> Array:
     parts = np.arange(1, number + 1)[:, None] * np.sqrt([2.0, 3.0, 5.0]) % 1.0
     low, high = np.asarray(lower, float), np.asarray(upper, float)
     return np.asarray(low + parts * (high - low))
+
+
+def even_directions(number: int) -> Array:
+    """Unit vectors (number, 3) all around, evenly: a spiral of the golden angle."""
+    steps = np.arange(number) + 0.5
+    height, angle = 1 - 2 * steps / number, np.pi * (1 + 5**0.5) * steps
+    across = np.sqrt(1 - height**2)
+    return np.stack([across * np.cos(angle), across * np.sin(angle), height], axis=1)

@@ -8,7 +8,14 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from ...dynamics.effects import Mutual, RotorCurrents, mutual_choice, with_effects
+from ...dynamics.effects import (
+    BESIDE_METAL,
+    WITHOUT_METAL,
+    Mutual,
+    RotorCurrents,
+    mutual_choice,
+    with_effects,
+)
 from ...dynamics.equilibria import survey, with_plate
 from ...dynamics.flights import Checkpoint, LiveFlight, Trajectory, most_like_levitation, simulate, starting_point
 from ...dynamics.motion import FORCE_ALONE, Interaction, PlateMemory, Rates, interaction_of
@@ -93,9 +100,11 @@ class Levitation:
 
         Raises
         ------
-        InputError : the rotor turns too fast for its metal
+        InputError : the rotor turns too fast for its metal, or the floater is no sphere
         """
         pieces = pieces_of(self.scene.rotor, self.scene.conductors)
+        if pieces:
+            self.scene.floater.must_be("sphere", where=BESIDE_METAL, instead=WITHOUT_METAL)
         check_slow_enough(pieces, self.scene.frequency)
         return self._tables.losses(self.scene) if pieces else None
 

@@ -8,8 +8,9 @@ import netgen.occ as occ
 import ngsolve as ng
 import numpy as np
 
-from spinlev.geometry.basics import Array, Box, frozen_array
+from spinlev.geometry.basics import Array, frozen_array
 from spinlev.geometry.bodies import Magnet
+from spinlev.geometry.meshes.solids import occ_solid
 
 
 @dataclass(frozen=True, eq=False)
@@ -19,7 +20,7 @@ class TwoBodyMesh:
     Parameters
     ----------
     mesh : the `ngsolve.Mesh`
-    magnets : the boxes among the bodies
+    magnets : the magnets among the bodies
     center : (3,) centre of the ball of air and origin of the mesh's coordinates, m
     unit : length of one unit of the mesh, m
     ball_radius : radius of the ball of air, in units
@@ -53,7 +54,9 @@ def mesh_two_bodies(
     center = (low + high) / 2
     unit = max(float(np.linalg.norm(corners - center, axis=1).max()), float(np.linalg.norm(position - center)) + radius)
     ball = occ.Sphere(occ.Pnt(*map(float, (position - center) / unit)), radius / unit)
-    bodies = {f"magnet{k}": _solid(magnet.box, center, unit) for k, magnet in enumerate(magnets)} | {"floater": ball}
+    bodies = {f"magnet{k}": occ_solid(magnet.body, center, unit) for k, magnet in enumerate(magnets)} | {
+        "floater": ball
+    }
     air = occ.Sphere(occ.Pnt(0, 0, 0), ball_radius)
     air.faces.name = "outer"
     for name, solid in bodies.items():
@@ -65,11 +68,3 @@ def mesh_two_bodies(
     mesh = ng.Mesh(occ.OCCGeometry(occ.Glue([*bodies.values(), air])).GenerateMesh(maxh=2 * size, grading=0.5))
     mesh.Curve(6)
     return TwoBodyMesh(mesh, tuple(magnets), frozen_array(center, (3,)), unit, ball_radius)
-
-
-def _solid(box: Box, center: Array, unit: float) -> Any:
-    half = box.half_edges / unit
-    origin = (box.center - center) / unit - box.rotation @ half
-    vertical, along = (occ.gp_Vec(*map(float, box.rotation[:, axis])) for axis in (2, 0))
-    axes = occ.Axes(tuple(map(float, origin)), n=vertical, h=along)
-    return occ.WorkPlane(axes).Rectangle(2 * half[0], 2 * half[1]).Face().Extrude(float(2 * half[2]))

@@ -48,7 +48,8 @@ def test_the_default_rotor_moves_its_floater_as_known(mutual, start):
     state, values = SCALES.pack(rigid.state)[None], parameters(SCENE, SCALES)
     change = Rates(mutual)(state, values)[0] - Rates(mutual.field)(state, values)[0]
     force = change[0, 3:6] * FLOATER.mass * SCALES.length / SCALES.time**2
-    assert force[2] * 1e3 == pytest.approx(8.5504, abs=0.002)
+    print(f"force {force[2] * 1e3:.5f} mN, {1e3 * (start.position[2] - rigid.position[2]):.5f} mm higher")
+    assert force[2] * 1e3 == pytest.approx(8.5504, abs=0.001)
     assert start.position[2] - rigid.position[2] == pytest.approx(0.0902e-3, abs=0.0001e-3)
     assert start.position_error < 2e-7
 

@@ -76,8 +76,7 @@ def test_the_stated_error_of_a_tilted_cylinder_holds_against_a_finer_table():
 def test_the_stated_error_of_rings_and_discs_holds(body):
     """Hard cases: many cells, thin walls, a disc of 20 : 1; another ladder of meshes, finer at the start.
 
-    A lone magnet's table is made at home, where 1e-5 is met at the points that are looked at; a turned one is seen at
-    others, and between them the shortened series is up to three times worse, as it states.
+    A lone magnet's table is made at home and met here in other directions, so that 1e-5 holds between those as well.
     """
     magnet, nearest = Magnet(body, (1.2, 0.0, 0.5), 1.05), 6.35e-3
     coarse = rotor_table((magnet,), "fem", 1e-5, nearest)
@@ -86,8 +85,8 @@ def test_the_stated_error_of_rings_and_discs_holds(body):
     error = np.linalg.norm(coarse.evaluate(points)[0] - fine.evaluate(points)[0], axis=1)
     stated = coarse.absolute_error(points)[0] + fine.absolute_error(points)[0]
     assert np.all(error <= stated)
-    assert np.max(coarse.absolute_error(points)[0] / scale) < 3e-5
-    assert np.quantile(coarse.absolute_error(points)[0] / scale, 0.98) < 1e-5
+    print(f"true {np.max(error / scale):.2e}, stated {np.max(coarse.absolute_error(points)[0] / scale):.2e}")
+    assert np.max(coarse.absolute_error(points)[0] / scale) < 1e-5
 
 
 def test_a_table_of_round_magnets_is_read_as_it_was_written(tmp_path):
