@@ -4,6 +4,8 @@ VENV := .venv
 BIN := $(VENV)/bin
 # Several threads of BLAS wait for each other on small matrices; work side by side is by processes.
 export OPENBLAS_NUM_THREADS ?= 1
+# Where the user forbids it, every process would compile the sources of all libraries anew: seconds each time.
+export PYTHONDONTWRITEBYTECODE =
 OLD ?= benchmarks/measured.json
 NEW ?= out/benchmarks.json
 SOURCES := $(shell find spinlev geometry fem dynamics studies scenes -type f -not -name "*.pyc") setup.py pyproject.toml README.md LICENSE

@@ -7,8 +7,11 @@ from collections.abc import Sequence
 from ..rendering import unavailable
 from ..terminal import FORTRAN, lend_quadmath, way_out
 
-MODULES = ("ngsolve", "netgen.occ", "heyoka", "h5py", "matplotlib.figure", "distributed", "spinlev.studies.interface")
-"""Those with compiled code, and what stands on them."""
+MODULES = (
+    *("ngsolve", "netgen.occ", "heyoka", "h5py", "matplotlib.backends.backend_pdf", "distributed"),
+    *("spinlev.studies.interface", "spinlev.studies.command_line.cli"),
+)
+"""Those with compiled code, and what stands on them: what is loaded here, Python has compiled before the first run."""
 
 
 def main(modules: Sequence[str] = MODULES) -> int:
