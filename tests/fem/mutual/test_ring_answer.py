@@ -72,7 +72,7 @@ def test_a_rings_answer_is_that_of_both_bodies_in_one_mesh():
     """What the answers add: force by the elements to 1e-3, torque to 4e-3, by the table's points as it states.
 
     The mesh of both leaves the torque uncertain by 2e-3 for the cube as well (`test_two_body`).
-    Points in a box stand for the round body: they miss up to 4 % at its rim, 0.4 % below it.
+    Points in a box stand for the round body: they miss up to 4 % at its rim, 1.1 % below it.
     """
     table = cached_mutual_table(RING, FLOATER, print)[0]
     (rotor,) = rotor_ladder(RING, (3,))
