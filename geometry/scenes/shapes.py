@@ -30,9 +30,10 @@ def shape_faults(place: str, table: Any, sizes: Mapping[str, tuple[str, ...]]) -
     if set(given) != set(wanted) and not wanted:
         return [f"Input {place} must have no size beside file; instead received {' and '.join(given)}."]
     if set(given) != set(wanted):
+        more = " and ".join(key for key in given if key not in wanted)
         return [
             f"Input {place} must have {' and '.join(wanted)}, as the shape is {table.shape!r}; "
-            f"instead received {' and '.join(given) or 'no size'}."
+            f"instead received {' and '.join(given) or 'no size'}." + (f" Leave out {more}." if more else "")
         ]
     if table.shape == "ring" and table.inner_diameter_mm >= table.diameter_mm:
         return [
