@@ -129,8 +129,8 @@ def test_mutual_demagnetisation_of_touching_cubes():
     """PHYSICS.md: it changes B by 0.75 % on the axis, 20 mm below the lower cube's centre."""
     rotor = rotors(1.05)["vertical"]
     point = [[0.0, 0.0, -0.02]]
-    together = rotor_table(rotor, "fem", 1e-3).evaluate(point)[0]
-    alone = sum(fem_table((magnet,), Accuracy(1e-3)).evaluate(point)[0] for magnet in rotor)
+    together = rotor_table(rotor, "fem", 1e-4).evaluate(point)[0]
+    alone = sum(fem_table((magnet,), Accuracy(1e-4)).evaluate(point)[0] for magnet in rotor)
     assert np.linalg.norm(together - alone) / np.linalg.norm(together) == pytest.approx(0.0075, abs=0.0002)
 
 
