@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from ...geometry.basics import Array, Box, Cylinder, Part, Ring, Sphere
 from ...geometry.bodies import Magnet
-from ..harmonics import CompiledField, FieldExpressions, Number, turned_expressions, uniform_moments
+from ..harmonics import CompiledField, FieldExpressions, Number, turned_expressions, turned_field, uniform_moments
 from .cuboid import cuboid_field
 from .round_magnets import round_slope, round_tensor
 from .segments import resolved_distance, segments_field
@@ -34,10 +34,7 @@ class UniformField:
         shifted = [position[i] - number(body.center[i]) for i in range(3)]
         if np.array_equal(axes, np.eye(3)):
             return self._in_body(shifted, number)
-        b, g = self._in_body(turned_expressions(axes.T, shifted, number), number)
-        half = [turned_expressions(axes, row, number) for row in g]
-        columns = [turned_expressions(axes, [row[j] for row in half], number) for j in range(3)]
-        return turned_expressions(axes, b, number), [[columns[j][i] for j in range(3)] for i in range(3)]
+        return turned_field(axes, self._in_body(turned_expressions(axes.T, shifted, number), number), number)
 
     def _in_body(self, position: Sequence[hy.expression], number: Number) -> FieldExpressions:
         """Closed form in the magnet's own axes."""

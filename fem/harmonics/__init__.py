@@ -30,6 +30,7 @@ from .multipole import (
     curvature_moments as curvature_moments,
     moments_of_magnetization as moments_of_magnetization,
     turned_expressions as turned_expressions,
+    turned_field as turned_field,
     uniform_moments as uniform_moments,
     without_noise as without_noise,
 )

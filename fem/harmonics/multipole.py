@@ -100,10 +100,7 @@ class MultipoleExpansion:
     def _along_axes(self, place: list[hy.expression], number: Number) -> FieldExpressions:
         """Expressions along other axes, turned back."""
         own = MultipoleExpansion(np.zeros(3), self.radius, self.own_coefficients)
-        b, slope = own.expressions(turned_expressions(self.axes.T, place, number), number)
-        rows = [turned_expressions(self.axes, row, number) for row in slope]
-        columns = [turned_expressions(self.axes, [row[j] for row in rows], number) for j in range(3)]
-        return turned_expressions(self.axes, b, number), [[columns[j][i] for j in range(3)] for i in range(3)]
+        return turned_field(self.axes, own.expressions(turned_expressions(self.axes.T, place, number), number), number)
 
     def evaluate(self, points: Array) -> tuple[Array, Array]:
         """B (n, 3) T and ∂B_i/∂x_j (n, 3, 3) T/m at points (n, 3) m, without compilation."""
@@ -127,6 +124,14 @@ class MultipoleExpansion:
 def turned_expressions(axes: Array, vector: Sequence[hy.expression], number: Number) -> list[hy.expression]:
     """A vector along the columns of `axes`, along the outer ones."""
     return [hy.sum([number(factor) * part for factor, part in zip(row, vector, strict=True) if factor]) for row in axes]
+
+
+def turned_field(axes: Array, field: FieldExpressions, number: Number) -> FieldExpressions:
+    """A field and its gradient along the columns of `axes`, along the outer ones."""
+    b, slope = field
+    rows = [turned_expressions(axes, row, number) for row in slope]
+    columns = [turned_expressions(axes, [row[j] for row in rows], number) for j in range(3)]
+    return turned_expressions(axes, b, number), [[columns[j][i] for j in range(3)] for i in range(3)]
 
 
 def moments_of_magnetization(

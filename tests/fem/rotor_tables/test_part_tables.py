@@ -97,7 +97,7 @@ def test_a_part_of_no_known_shape_is_the_sum_of_its_cuboids(folder):
     points, scale = error_points(pair, NEAREST)
     apart = np.linalg.norm(ell.evaluate(points)[0] - known.evaluate(points)[0], axis=1)
     print(f"an L from a file against its two cuboids: {np.max(apart / scale):.1e}")
-    assert np.all(apart < ell.absolute_error(points)[0] + 1e-10 * scale)  # sums of 2400 moments in floating point
+    assert np.all(apart < ell.absolute_error(points)[0] + 2e-11 * scale)  # round-off of 2400 moments
     assert np.max(apart / scale) < 1e-6
 
 
