@@ -108,7 +108,7 @@ def test_twenty_times_the_conductivity_ends_a_flight():
     """δx = 1.5 mm at 150 Hz: lost near 10.6 s, known without its start, which is 4 µm off the equilibrium then.
 
     From ten times as far off it is lost earlier by about as long as growth takes from one to the other; with the
-    magnets' own conductivity it is not lost in 15 s.  (From 0.1 mm off, rounding decides which of the last swings it is.)
+    magnets' own conductivity it is not lost in 15 s.  (From 0.1 mm off, rounding decides in which swing.)
     """
     scene, table = braked("1.5 mm", 20.0)
     found = min(find_equilibria(replace(scene, frequency=150.0), table), key=lambda e: e.growth_per_s)
