@@ -8,6 +8,8 @@ PAUSE = 2.5
 """Silence after which a line is said, s."""
 SHARE = 1 / 60
 """The same as a part of the time that the step has taken, once that is longer."""
+TELLING = 0.01
+"""Finished share from which the time left can be told."""
 
 
 class Heartbeat(threading.Thread):
@@ -53,7 +55,13 @@ class Heartbeat(threading.Thread):
                 self._say(f"  {self._progress(now, began)}")
 
     def _progress(self, now: float, began: float) -> str:
-        if not self._fraction:
-            return f"{now - began:.0f} s so far"
+        if self._fraction < TELLING:
+            return f"{_rounded(now - began)} so far"
         left = (now - self._stage_began) * (1 / self._fraction - 1)
-        return f"{self._stage}{self._stage and ', '}{self._fraction:.0%}, {left:.0f} s left"
+        return f"{self._stage}{self._stage and ', '}{self._fraction:.0%}, {_rounded(left)} left"
+
+
+def _rounded(seconds: float) -> str:
+    if seconds < 300:
+        return f"{seconds:.0f} s"
+    return f"{seconds / 60:.0f} min" if seconds < 7200 else f"{seconds / 3600:.1f} h"

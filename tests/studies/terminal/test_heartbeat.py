@@ -48,6 +48,16 @@ def test_a_step_that_knows_says_its_share_and_the_time_left():
     assert staged == "  places, 25%, 0 s left"
 
 
+def test_the_time_left_is_told_once_it_can_be_and_in_units_that_suit_it():
+    heartbeat = Heartbeat(print, 0.01)
+    heartbeat.advanced(0.001)
+    now = heartbeat._stage_began + 6000.0
+    assert heartbeat._progress(now, now - 6000.0) == "100 min so far"
+    heartbeat.advanced(0.1)
+    now = heartbeat._stage_began + 6000.0
+    assert heartbeat._progress(now, now - 6000.0) == "10%, 15.0 h left"
+
+
 def _first(said, word):
     while word not in (line := said.get(timeout=WAIT)):
         pass
