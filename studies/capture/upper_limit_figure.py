@@ -70,16 +70,16 @@ def _span(one: xr.Dataset) -> str:
 def _change(rotor: xr.Dataset) -> str:
     """What conduction changes where it changes the most: the end in Hz, and a flight in s."""
     first, second = (rotor.isel(case=k) for k in (0, 1))
-    less = float(first["lasts_to"] - second["lasts_to"])
+    less = max(0.0, float(first["lasts_to"] - second["lasts_to"]))
     ratio = first["levitated"].values / second["levitated"].values
     lost = second["end"].values == "instability"
     if not lost.any():
         return f"the magnets' currents lower the end by {less:.1f} Hz and shorten no flight."
     k = int(np.argmax(np.where(lost, ratio, 0.0)))
-    times = [float(one["levitated"][k]) for one in (first, second)]
+    times = [float(f"{float(one['levitated'][k]):.3g}") for one in (first, second)]
     return (
         f"a rotor that does not conduct holds up to {less:.1f} Hz more; at "
-        f"{float(first['rotor_frequency'][k]):.1f} Hz its floater stays for {times[0]:.3g} instead of {times[1]:.3g} s."
+        f"{float(first['rotor_frequency'][k]):.1f} Hz its floater stays for {times[0]:g} instead of {times[1]:g} s."
     )
 
 

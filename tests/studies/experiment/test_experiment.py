@@ -28,7 +28,7 @@ from spinlev.studies.sweeps import swept
 from spinlev.studies.terminal import Workers
 
 INPUTS = {"on_axis": 7.3, "displacement": 1.0, "radius": 1.0, "weight": 1.0}
-"""The rotor of docs/examples/three_flights.toml."""
+"""Displaced by 1 mm and tilted by 2.3°: of its three flights one falls and two last."""
 
 
 @pytest.mark.parametrize("metal", [False, pytest.param(True, marks=pytest.mark.slow)])
