@@ -38,6 +38,7 @@ from .plate_terms import (
     PlateFormula as PlateFormula,
     PlateMemory as PlateMemory,
     pushed as pushed,
+    decay_numbers as decay_numbers,
     rotor_numbers as rotor_numbers,
     seen_by_plate as seen_by_plate,
 )

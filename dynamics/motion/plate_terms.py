@@ -62,11 +62,6 @@ class PlateMemory:
         told = f"relative error {self.error:.1e}, {harmonics} harmonics of the rotor"
         return f"PlateMemory {self.model!r}: {told}\n{self.table!r}"
 
-    @property
-    def names(self) -> list[str]:
-        """Names of the states."""
-        return [f"plate_{i}" for i in range(len(self.table.rates))]
-
 
 @dataclass(frozen=True, eq=False)
 class MemoryTerms:
@@ -132,12 +127,17 @@ def pushed(slope: dict[tuple[int, int], hy.expression], source: Vector) -> Vecto
     return [hy.sum([source[i] * slope[min(i, j), max(i, j)] for i in range(3)]) for j in range(3)]
 
 
+def decay_numbers(rates: Array, values: Array) -> Array:
+    """Runtime parameters of the decay of states with rates (n,) 1/s, from those of `parameters`."""
+    scaled = rates * float(values[Parameter.TIME])
+    return np.concatenate([scaled, np.sqrt(scaled)])
+
+
 def rotor_numbers(formula: PlateFormula, weights: Array, values: Array) -> Array:
-    """Runtime parameters of decay and of the rotor's currents for weights W (states, k), from those of `parameters`."""
-    time, rates = float(values[Parameter.TIME]), formula.memory.table.rates
-    rotor = RotorCurrents(formula.share, rates, float(values[Parameter.RATE]) / time)
-    driven = rotor.numbers(weights, formula.reach, float(values[Parameter.PLATE_SHARE]), formula.lowered)
-    return np.concatenate([rates * time, np.sqrt(rates * time), driven])
+    """Runtime parameters of the rotor's currents for weights W (states, k), from those of `parameters`."""
+    velocity = float(values[Parameter.RATE]) / float(values[Parameter.TIME])
+    rotor = RotorCurrents(formula.share, formula.memory.table.rates, velocity)
+    return rotor.numbers(weights, formula.reach, float(values[Parameter.PLATE_SHARE]), formula.lowered)
 
 
 def memory_terms(formula: PlateFormula, position: Vector, moment: Vector, states: Vector) -> MemoryTerms:
