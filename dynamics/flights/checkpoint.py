@@ -51,8 +51,8 @@ class Progress:
         """Where a flight is now."""
         integrator = flight.integrator
         return cls(
-            np.array(integrator.dtime), integrator.state.copy(), values.copy(), recorder.times.copy(), recorder.states.copy(),
-            recorder.interval, steps, np.array(astuple(changes)),
+            np.array(integrator.dtime), integrator.state.copy(), values.copy(),
+            recorder.times.copy(), recorder.states.copy(), recorder.interval, steps, np.array(astuple(changes)),
         )  # fmt: skip
 
     def restore(self, flight: Flight | LocalFlight, recorder: Recorder) -> tuple[Array, int, FieldChanges]:

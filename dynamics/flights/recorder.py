@@ -63,7 +63,11 @@ class Recorder:
         count = self._count + len(times)
         if count > len(self._times):
             room = 2 * count
-            old, self._times, self._states = (self.times, self.states), np.empty(room), np.empty((room, states.shape[1]))
+            old, self._times, self._states = (
+                (self.times, self.states),
+                np.empty(room),
+                np.empty((room, states.shape[1])),
+            )
             self._times[: self._count], self._states[: self._count] = old
         self._times[self._count : count], self._states[self._count : count] = times, states
         self._count = count
