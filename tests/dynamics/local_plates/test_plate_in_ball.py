@@ -44,6 +44,12 @@ def balls(memory):
     return PlateBalls(memory, RADIUS)
 
 
+@pytest.fixture(scope="module")
+def fine():
+    """Balls of a finer network, of which a floater in one place hears only a part."""
+    return PlateBalls(PlateMemory(PLATE, *slab_and_rotor_table(PLATE, TABLE, REGION, rtol=1e-3), "slab"), RADIUS)
+
+
 def with_key(values):
     """Runtime parameters with room for a ball's key at their end."""
     return np.concatenate([values, np.zeros(5)])
@@ -121,10 +127,10 @@ def test_about_the_middle_of_a_plate_each_state_has_few_harmonics(balls, memory)
 
 
 @pytest.mark.parametrize("place", [(0.5e-3, 0.2e-3, -19.6e-3), (2.9e-3, 1.0e-3, -18.0e-3), (0.0, 0.0, -22e-3)])
-def test_fewer_states_miss_no_more_of_reaction_tensors_than_a_tenth_of_what_the_table_does(balls, memory, place):
+def test_fewer_states_miss_no_more_of_reaction_tensors_than_a_tenth_of_what_the_table_does(fine, place):
     """Inside the ball, at 25 frequencies, most of which the choice does not look at; against all states' harmonics."""
-    ball = balls.around(0.0, hanging(place), VALUES)
-    fewer, weights = balls.fewer(ball), balls._expanded(ball)[0]
+    ball, memory = fine.around(0.0, hanging(place), VALUES), fine.memory
+    fewer, weights = fine.fewer(ball), fine._expanded(ball)[0]
     assert len(fewer.rates) < len(weights)
     np.testing.assert_allclose(fewer.directions.T @ fewer.directions, np.eye(len(fewer.rates)), atol=1e-12)
     known, x = local_harmonics(ball.degree), hy.make_vars("x", "y", "z")
@@ -144,24 +150,24 @@ def test_fewer_states_miss_no_more_of_reaction_tensors_than_a_tenth_of_what_the_
         assert np.abs(told - exact).max() < 1.2 * SHARE * memory.table.errors.total * np.abs(exact).max()
 
 
-def test_fewer_states_are_passive_and_silent_towards_a_floater_at_rest(balls, memory):
+def test_fewer_states_are_passive_and_silent_towards_a_floater_at_rest(fine):
     """All rates within those of the plate; signals of a floater at rest leave no currents."""
-    ball = balls.around(0.0, STATE, VALUES)
-    fewer, reduction = balls.fewer(ball), balls.reduction(ball, VALUES)
+    ball, memory = fine.around(0.0, STATE, VALUES), fine.memory
+    fewer, reduction = fine.fewer(ball), fine.reduction(ball, VALUES)
     slowest, fastest = memory.table.rates.min(), memory.table.rates.max()
     assert np.all((slowest * (1 - 1e-9) < fewer.rates) & (fewer.rates < fastest * (1 + 1e-9)))
     resting = np.concatenate([STATE[:12], reduction.signals(0.3, STATE), [0.0]])
     own = reduction.own(resting)
-    kind, numbers = balls.told(ball, FIRST, VALUES)
+    kind, numbers = fine.told(ball, FIRST, VALUES)
     rates = rates_of(PlateInBall(memory, kind, FIRST), numbers, own[:-1], 0.3)[12:-2]
     moving = np.abs(VALUES[Parameter.TIME] * fewer.rates * own[12:-1]).max()
     assert np.abs(rates).max() < SHARE * memory.table.errors.total * moving
 
 
-def test_from_all_states_to_fewer_and_back(balls):
+def test_from_all_states_to_fewer_and_back(fine):
     """What the ball tells comes back to round-off, and so do all states of a floater at rest."""
-    ball = balls.around(0.0, STATE, VALUES)
-    reduction = balls.reduction(ball, VALUES)
+    ball = fine.around(0.0, STATE, VALUES)
+    reduction = fine.reduction(ball, VALUES)
     own = np.concatenate([STATE[:12], np.random.default_rng(4).normal(size=reduction.directions.shape[1]), [0.7]])
     np.testing.assert_allclose(reduction.own(reduction.whole(0.4, own)), own, rtol=0, atol=1e-12)
     resting = np.concatenate([STATE[:12], reduction.signals(0.4, STATE), [0.7]])
