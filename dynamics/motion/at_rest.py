@@ -16,7 +16,7 @@ TILTS = ("tilt_t", "tilt_u")
 
 
 def balances(equations: Equations) -> tuple[list[hy.expression], list[hy.expression]]:
-    """The balances (5,) with their derivatives (5 × 5, row by row) of equations of motion, and their variables (13,)."""
+    """The balances (5,) of a motion with their derivatives (5 × 5, row by row), and their variables (13,)."""
     given, tilts = list(hy.make_vars(*GIVEN)), list(hy.make_vars(*TILTS))
     position, tangents, spin = given[:3], (given[6:9], given[9:12]), given[12]
     moment = [given[3 + i] + tilts[0] * tangents[0][i] + tilts[1] * tangents[1][i] for i in range(3)]

@@ -167,7 +167,7 @@ def test_code_that_is_read_counts_as_used(file):
 
 def test_code_whose_arguments_are_written_later_is_told_by_what_they_are_written_from(folder):
     """Nothing is written where it is there already; another source, option or room is other code."""
-    (x,), written = hy.make_vars("x"), []
+    x, written = hy.make_vars("x"), []
 
     def later(source, package="spinlev.fem.storage", **options):
         def write():
