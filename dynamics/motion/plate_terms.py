@@ -26,7 +26,7 @@ from ...fem.plate_tables import PlateTable, RotorShare
 from ...geometry.basics import Array
 from ...geometry.scenes import Plate
 from .rotor_currents import RotorCurrents, rotor_terms
-from .symbols import Parameter, Vector, cross, dot, turned
+from .symbols import Parameter, Vector, cross, dot, dotted, turned
 
 
 @dataclass(frozen=True, eq=False)
@@ -128,9 +128,8 @@ def pushed(slope: dict[tuple[int, int], hy.expression], source: Vector) -> Vecto
 
 
 def decay_numbers(rates: Array, values: Array) -> Array:
-    """Runtime parameters of the decay of states with rates (n,) 1/s, from those of `parameters`."""
-    scaled = rates * float(values[Parameter.TIME])
-    return np.concatenate([scaled, np.sqrt(scaled)])
+    """Runtime parameters of the decay of states with rates (n,) 1/s, from those of `parameters`: -λT."""
+    return -rates * float(values[Parameter.TIME])
 
 
 def rotor_numbers(formula: PlateFormula, weights: Array, values: Array) -> Array:
@@ -149,13 +148,12 @@ def memory_terms(formula: PlateFormula, position: Vector, moment: Vector, states
     heard, felt = formula.seen(place, source)
     weights = formula.weights
     own = [p - _picked(row, heard) for p, row in zip(states, weights, strict=True)]
-    rotor = rotor_terms(formula.share, formula.reach, start + 2 * len(own), formula.lowered, heard, own)
+    rotor = rotor_terms(formula.share, formula.reach, start + len(own), formula.lowered, heard, own)
     strengths = [_picked(column, own) for column in zip(*weights, strict=True)]
     field, push = felt([a + b for a, b in zip(strengths, rotor.strengths, strict=True)])
     force = [length * f for f in _seen_by_rotor(plate, push)]
     turn = [strength * t for t in cross(moment, _seen_by_rotor(plate, field))]
-    decay = [-hy.par[start + i] * y for i, y in enumerate(own)]
-    lost = [hy.par[start + len(own) + i] * y for i, y in enumerate(own)]
+    decay = [hy.par[start + i] * y for i, y in enumerate(own)]
     speed = hy.par[Parameter.PLATE_SPEED] if formula.lowered else hy.expression(0.0)
     drive = dot(force, [*turned(position)[:2], speed]) + hy.par[Parameter.RATE] * turn[2]
     return MemoryTerms(
@@ -163,7 +161,7 @@ def memory_terms(formula: PlateFormula, position: Vector, moment: Vector, states
         force=force,
         torque=[t / hy.par[Parameter.INERTIA] for t in turn],
         stored=0.5 * hy.sum([y * y for y in own]) + rotor.stored,
-        spent=hy.sum([y * y for y in lost]) + rotor.spent + drive,
+        spent=rotor.spent + drive - dotted(own, decay),
     )
 
 
