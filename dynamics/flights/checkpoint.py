@@ -51,8 +51,8 @@ class Progress:
         """Where a flight is now."""
         integrator = flight.integrator
         return cls(
-            np.array(integrator.dtime), integrator.state.copy(), values.copy(), recorder.times, recorder.states,
-            recorder.interval, steps, np.array(astuple(changes)),
+            np.array(integrator.dtime), integrator.state.copy(), values.copy(),
+            recorder.times.copy(), recorder.states.copy(), recorder.interval, steps, np.array(astuple(changes)),
         )  # fmt: skip
 
     def restore(self, flight: Flight | LocalFlight, recorder: Recorder) -> tuple[Array, int, FieldChanges]:
@@ -61,7 +61,8 @@ class Progress:
         integrator.dtime = (float(self.time[0]), float(self.time[1]))
         integrator.state[:] = self.state
         integrator.reset_cooldowns()
-        recorder.times, recorder.states, recorder.interval = self.times, self.states, self.interval
+        recorder.put(self.times, self.states)
+        recorder.interval = self.interval
         count, *rest = self.changes.tolist()
         return self.values.copy(), self.steps, FieldChanges(int(count), *rest)
 

@@ -13,7 +13,7 @@ from ...fem.storage import compiled
 from ...geometry.basics import Array
 from ...geometry.scenes import Scene
 from ..effects import with_effects
-from ..local_plates import WholePlate
+from ..local_plates import Reduction, WholePlate
 from ..motion import (
     Equations,
     Parameter,
@@ -51,6 +51,7 @@ class Flight:
     compile_seconds : time that compilation took
     first : number of the first further runtime parameter
     numbers : values of these, which `values` do not have
+    reduction : of the plate's states to those that are integrated, if these are not all
     """
 
     integrator: hy.taylor_adaptive
@@ -63,17 +64,35 @@ class Flight:
     compile_seconds: float
     first: int
     numbers: Array
+    reduction: Reduction | None = None
 
-    def given(self, values: Array) -> Array:
-        """All runtime parameters (..., p) that the code asks for, from values (..., q)."""
-        if not len(self.numbers):
-            return values
-        further = np.broadcast_to(self.numbers, (*values.shape[:-1], len(self.numbers)))
-        return np.concatenate([values[..., : self.first], further], axis=-1)
+    def given(self, values: Array, count: int) -> Array:
+        """(count, n) runtime parameters of compiled code, a column for each row of values (n, q)."""
+        given = np.empty((count, len(values)))
+        own = min(self.first, count) if len(self.numbers) else count
+        given[:own] = values.T[:own]
+        given[own:] = self.numbers[: count - own, None]
+        return given
 
     def start(self, values: Array) -> None:
         """Give the integrator its runtime parameters."""
-        self.integrator.pars[:] = self.given(values)[: len(self.integrator.pars)]
+        self.integrator.pars[:] = self.given(values[None], len(self.integrator.pars))[:, 0]
+
+    def take(self, time: float | tuple[float, float], state: Array) -> None:
+        """Go on at a scaled time, one number or the sum of two, from a state with all of the plate's."""
+        self.integrator.dtime = time if isinstance(time, tuple) else (time, 0.0)
+        self.integrator.state[:] = self.own(state)
+        self.integrator.reset_cooldowns()
+
+    def own(self, state: Array) -> Array:
+        """The integrator's state, from one with all of the plate's."""
+        return state if self.reduction is None else self.reduction.own(state)
+
+    @property
+    def whole(self) -> Array:
+        """State where the integrator is, with all of the plate's."""
+        state = self.integrator.state.copy()
+        return state if self.reduction is None else self.reduction.whole(self.integrator.time, state)
 
     def leg(self, values: Array, depth: float, speed: float, changes: FieldChanges) -> FieldChanges:
         """Let the plate move, scaled, from now on; what has been done of changes of the field."""
@@ -81,7 +100,7 @@ class Flight:
         return changes
 
     def state(self, start: State, currents: Array) -> Array:
-        """The integrator's state at t = 0, from the floater's and the plate's (k,), √J."""
+        """Scaled state at t = 0, from the floater's and the plate's (k,), √J."""
         return scaled_state(self.scene, self.memory, start, currents)
 
     def part(self, values: Array) -> Flight:
@@ -98,8 +117,8 @@ class Flight:
 
     def terms(self, times: Array, states: Array, values: Array) -> Array:
         """Terms (k, n) of the Jacobi integral at scaled times (n,), states (n, s) and runtime parameters (n, p)."""
-        pars = np.ascontiguousarray(self.given(values).T[: self.ledger.nparams])
-        return np.asarray(self.ledger(np.ascontiguousarray(states[:, :-1].T), pars=pars, time=times))
+        inputs, pars = np.ascontiguousarray(states[:, :-1].T), self.given(values, self.ledger.nparams)
+        return np.asarray(self.ledger(inputs, pars=pars, time=times))
 
 
 def compile_flight(
@@ -157,7 +176,7 @@ def flight_of(
 
 
 def scaled_state(scene: Scene, memory: PlateMemory | None, start: State, currents: Array) -> Array:
-    """The integrator's state at t = 0, from the floater's and the plate's (k,), √J."""
+    """Scaled state at t = 0, with work, from the floater's and the plate's (k,), √J."""
     scales = Scales.of(scene)
     if memory is not None:
         depth = float(plate_depth(memory.plate, np.zeros(1))[0])

@@ -77,10 +77,7 @@ def begun(flight: Flight | LocalFlight, start: State, currents: Array, log: Log)
     values = flight.values.copy()
     values[Parameter.LOST_DISTANCE] = lost_distance(start.position) / flight.scales.length
     log.changes = FieldChanges(error=flight.enter(start, values))
-    integrator = flight.part(values).integrator
-    integrator.time = 0.0
-    integrator.state[:] = flight.state(start, currents)
-    integrator.reset_cooldowns()
+    flight.part(values).take(0.0, flight.state(start, currents))
     return values
 
 
@@ -126,12 +123,9 @@ def fly_on(
     recorder: Recorder,
     log: Log,
 ) -> None:
-    """Fly from a scaled time and state (13,) on until `duration` (s) after t = 0.
+    """Fly from a scaled time and state, with all of a plate's, on until `duration` (s) after t = 0.
 
     The runtime parameters `values`, the samples and the log go on as well.
     """
-    integrator = flight.part(values).integrator
-    integrator.time = time
-    integrator.state[:] = state
-    integrator.reset_cooldowns()
+    flight.part(values).take(time, state)
     fly(scene, flight, values, duration, recorder, log, None, None)

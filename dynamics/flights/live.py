@@ -64,7 +64,7 @@ class LiveFlight:
         self.flight = compile_local_flight(scene, table, 1.0, tolerance, True, memory)
         self.log = Log()
         self.values = begun(self.flight, start, currents, self.log)
-        self.state = self.flight.part(self.values).integrator.state.copy()
+        self.state = self.flight.part(self.values).whole
         self.time = 0.0
         """Since the flight began, s."""
 
@@ -86,7 +86,7 @@ class LiveFlight:
         if self.log.ended_by != DURATION:
             return self._piece(np.array([self.time]), self.state[None])
         unit, number = self.flight.scales.time, int(np.clip(A_SECOND * seconds, FEWEST, MOST))
-        recorder = _Samples(self.state, self.time / unit, seconds / number / unit)
+        recorder = _Samples(np.append(self.state[:12], 0.0), self.time / unit, seconds / number / unit)
         self._go(self.time + seconds, recorder)
         return self._piece(recorder.times[1:] * unit, recorder.states[1:])
 
@@ -115,8 +115,7 @@ class LiveFlight:
     def _go(self, end: float, recorder: Recorder) -> None:
         unit, log = self.flight.scales.time, self.log
         fly_on(self.scene, self.flight, self.values, self.time / unit, self.state, end, recorder, log)
-        integrator = self.flight.part(self.values).integrator
-        self.state, self.time = integrator.state.copy(), float(recorder.times[-1]) * unit
+        self.state, self.time = self.flight.part(self.values).whole, float(recorder.times[-1]) * unit
 
     def _piece(self, times: Array, states: Array) -> Piece:
         turned = self.scene.angular_velocity * times
@@ -128,5 +127,4 @@ class _Samples(Recorder):
     """Samples from now on; those before are forgotten."""
 
     def __init__(self, state: Array, now: float, interval: float) -> None:
-        super().__init__(state, interval, 4 * MOST)
-        self.times = np.array([now])
+        super().__init__(state, interval, 4 * MOST, now)

@@ -74,8 +74,10 @@ class LocalFlight:
         if known not in self._over_plate:
             if len(self._over_plate) >= MOST:
                 self._over_plate.clear()
-            kind, numbers = self.plates.told(PlateBall.of(key), self.parts.first, values)
-            self._over_plate[known] = replace(self.parts.of(degree, kind), numbers=numbers)
+            ball, part = PlateBall.of(key), self.parts
+            kind, numbers = self.plates.told(ball, part.first, values)
+            reduction = self.plates.reduction(ball, values)
+            self._over_plate[known] = replace(part.of(degree, kind), numbers=numbers, reduction=reduction)
         return self._over_plate[known]
 
     @cached_property
@@ -100,11 +102,11 @@ class LocalFlight:
         To a large one, from a small ball as well.
         """
         before, (degree, *center, inverse) = self.part(values), values[DEGREE : DEGREE + 5]
-        time, state = before.integrator.dtime, before.integrator.state.copy()
-        inside = bool(degree) and np.sum((state[:3] * self.scales.length - center) ** 2) * inverse**2 < INSIDE
-        if inside and (self.plates is None or self.plates.holds(sum(time), state, values)):
+        time, place = before.integrator.dtime, before.integrator.state[:3]
+        inside = bool(degree) and np.sum((place * self.scales.length - center) ** 2) * inverse**2 < INSIDE
+        if inside and (self.plates is None or self.plates.holds(sum(time), before.integrator.state, values)):
             return changes
-        after = values.copy()
+        after, state = values.copy(), before.whole
         error = 0.0 if inside else self.enter_ball(LARGE, state, after)
         self.enter_plate_ball(sum(time), state, after)
         return self._changed(time, state, values, after, error, changes)
@@ -116,7 +118,7 @@ class LocalFlight:
             return changes
         before, after = self.part(values), values.copy()
         after[Parameter.PLATE_DEPTH], after[Parameter.PLATE_SPEED] = depth, speed
-        time, state = before.integrator.dtime, before.integrator.state.copy()
+        time, state = before.integrator.dtime, before.whole
         self.enter_plate_ball(sum(time), state, after)
         return self._changed(time, state, values, after, 0.0, changes)
 
@@ -134,10 +136,7 @@ class LocalFlight:
         if np.array_equal(values, after):
             return changes
         changes = self.booked(sum(time), state, values, after, error, changes)
-        following = self.part(values)
-        following.integrator.dtime = time
-        following.integrator.state[:] = state
-        following.integrator.reset_cooldowns()
+        self.part(values).take(time, state)
         return changes
 
     def go_over(self, time: float, state: Array, values: Array, changes: FieldChanges) -> FieldChanges:
@@ -152,8 +151,8 @@ class LocalFlight:
         self, time: float, state: Array, values: Array, after: Array, error: float, changes: FieldChanges
     ) -> FieldChanges:
         """Take other runtime parameters for a scaled state at a time, and book what that does to the energy."""
-        now, row = np.array([time]), state[None]
-        energies = [self.part(each).terms(now, row, each[None]).sum() for each in (after, values)]
+        now, parts = np.array([time]), [(self.part(each), each[None]) for each in (after, values)]
+        energies = [part.terms(now, part.own(state)[None], pars).sum() for part, pars in parts]
         jump = float(energies[0] - energies[1])
         state[-1] += jump
         values[:] = after

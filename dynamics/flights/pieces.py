@@ -110,10 +110,10 @@ def first_interval(scene: Scene, duration: float) -> float:
 
 
 def booked(scene: Scene, flight: Flight, values: Array, times: Array, states: Array) -> Array:
-    """States (n, s) at scaled times (n,) with J - work in the place of the work."""
+    """The floater's states (n, 12) at scaled times (n,), and J - work, from the integrator's (n, s)."""
     needed = values if len(flight.numbers) else values[: max(len(Parameter), flight.ledger.nparams)]
     books = flight.terms(times, states, plate_places(scene, needed, times)).sum(axis=0) - states[:, -1]
-    return np.concatenate([states[:, :-1], books[:, None]], axis=1)
+    return np.concatenate([states[:, :12], books[:, None]], axis=1)
 
 
 def ledger_scale(scene: Scene, flight: Flight, values: Array, state: Array) -> float:

@@ -10,14 +10,29 @@ class Recorder:
 
     Parameters
     ----------
-    state : (n,) at time zero
+    state : (n,) at the first time
     interval : first spacing of the samples
     capacity : most samples kept
+    now : the first time
     """
 
-    def __init__(self, state: Array, interval: float, capacity: int) -> None:
-        self.times, self.states = np.zeros(1), state[None].copy()
+    def __init__(self, state: Array, interval: float, capacity: int, now: float = 0.0) -> None:
         self.interval, self.capacity = interval, capacity
+        self.put(np.array([now]), state[None])
+
+    @property
+    def times(self) -> Array:
+        """(m,) of the samples."""
+        return self._times[: self._count]
+
+    @property
+    def states(self) -> Array:
+        """(m, n) samples."""
+        return self._states[: self._count]
+
+    def put(self, times: Array, states: Array) -> None:
+        """Forget all samples and have these instead."""
+        self._count, self._times, self._states = len(times), times.copy(), states.copy()
 
     def grid(self, now: float, end: float, count: int) -> Array:
         """Times to visit next: `now`, then at most `count` multiples of the interval, and `end` if they reach it."""
@@ -35,12 +50,24 @@ class Recorder:
     def add(self, times: Array, states: Array, last: bool) -> None:
         """Keep samples at multiples of the interval; of the `last` ones all."""
         on_grid = np.abs(times / self.interval - np.round(times / self.interval)) < 1e-9
-        keep = on_grid | last
-        self.times = np.concatenate([self.times, times[keep]])
-        self.states = np.concatenate([self.states, states[keep]])
-        while len(self.times) > self.capacity:
+        self._append(times[on_grid | last], states[on_grid | last])
+        while self._count > self.capacity:
             self.interval *= 2
             even = np.round(self.times / self.interval) * self.interval
             kept = np.abs(self.times - even) < 1e-6 * self.interval
             kept[-1] |= last
-            self.times, self.states = self.times[kept], self.states[kept]
+            self.put(self.times[kept], self.states[kept])
+
+    def _append(self, times: Array, states: Array) -> None:
+        """At the end, in arrays that double where they are full."""
+        count = self._count + len(times)
+        if count > len(self._times):
+            room = 2 * count
+            old, self._times, self._states = (
+                (self.times, self.states),
+                np.empty(room),
+                np.empty((room, states.shape[1])),
+            )
+            self._times[: self._count], self._states[: self._count] = old
+        self._times[self._count : count], self._states[self._count : count] = times, states
+        self._count = count

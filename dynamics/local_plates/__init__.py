@@ -2,4 +2,5 @@
 
 from .choice import KEY as KEY, SHARE as SHARE, PlateBall as PlateBall, PlateBalls as PlateBalls
 from .formula import PlateInBall as PlateInBall, PlateKind as PlateKind
+from .reduction import Reduction as Reduction
 from .whole import WholePlate as WholePlate

@@ -15,11 +15,14 @@ import numpy as np
 from ...fem.harmonics import UPPER, sphere_fit
 from ...geometry.basics import Array
 from ..motion import Parameter, PlateMemory, turned_about_z
+from .fewer import FewerStates, fewer_states
 from .formula import PlateInBall, PlateKind, at_depth
 from .functions import local_harmonics
+from .reduction import Reduction
 
 SHARE = 0.1
-"""Of the error that the plate's table has, for what a ball misses of reaction tensors and their gradients."""
+"""Of the error that the plate's table has, for what a ball misses of reaction tensors and their gradients, and for what
+fewer states miss of them."""
 DEGREES = range(4, 10)
 LATTICE = 1 / 32
 """Spacing of the centres, in radii of the floater."""
@@ -82,6 +85,7 @@ class PlateBalls:
     memory: PlateMemory
     radius: float
     _known: dict[bytes, tuple[Array, float]] = field(default_factory=dict)
+    _fewer: dict[bytes, FewerStates] = field(default_factory=dict)
 
     def around(self, time: float, state: Array, values: Array) -> PlateBall | None:
         """The ball for the circle on which the laboratory sees a floater in a scaled state (rotor's axes) at a time.
@@ -129,9 +133,33 @@ class PlateBalls:
 
     def told(self, ball: PlateBall, first: int, values: Array) -> tuple[PlateKind, Array]:
         """Its kind, and its runtime parameters from number `first` on, the plate at rest."""
-        kind = PlateKind(ball.degree, self._turning(ball, values), self._present(ball).tobytes())
+        kind = PlateKind(ball.degree, self._turning(ball, values), self.fewer(ball).pattern.tobytes())
         formula, weights = PlateInBall(self.memory, kind, first), self._expanded(ball)[0]
-        return kind, formula.numbers(ball.center, ball.radius, weights, self._depth(values), values)
+        weights = np.where(self._present(ball), weights, 0.0)
+        return kind, formula.numbers(ball.center, ball.radius, weights, self.fewer(ball), self._depth(values), values)
+
+    def fewer(self, ball: PlateBall) -> FewerStates:
+        """The states that are enough in a ball."""
+        key = ball.key.tobytes()
+        if key not in self._fewer:
+            if len(self._fewer) >= MOST:
+                self._fewer.clear()
+            table, known = self.memory.table, local_harmonics(ball.degree)
+            parts = self._expanded(ball)[0], self._present(ball), table.rates, table.frequencies
+            self._fewer[key] = fewer_states(known, *parts, SHARE * table.errors.total)
+        return self._fewer[key]
+
+    def reduction(self, ball: PlateBall, values: Array) -> Reduction:
+        """Between all of the plate's states and those of a ball, the plate at rest."""
+        known = values.copy()
+        return Reduction(self.fewer(ball).directions, lambda time, state: self._heard(time, state, known))
+
+    def _heard(self, time: float, state: Array, values: Array) -> Array:
+        """(states,) signals of a floater in a scaled state at a time, without the rotor's share."""
+        box, table = self.memory.plate.box, self.memory.table
+        place, moment = self._place(state[:3], time, values), turned_about_z(state[6:9], values[Parameter.RATE] * time)
+        fields = table.weights @ table.multipoles.fields(place[None])[0]
+        return np.asarray(values[Parameter.PLATE_MOMENT] * fields @ (box.rotation.T @ moment))
 
     def _turning(self, ball: PlateBall, values: Array) -> tuple[int, ...]:
         """Up to which degree the rotor's currents are told, for each of its harmonics that the floater feels.

@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 
 from ...fem.plate_tables import RotorShare
 from ...geometry.basics import Array
-from ..motion import Felt, PlateMemory, Vector, pushed, rotor_numbers
+from ..motion import Felt, PlateMemory, Vector, decay_numbers, pushed, rotor_numbers
+from .fewer import FewerStates
 from .functions import local_harmonics
 
 
@@ -27,7 +28,7 @@ class PlateKind:
     ----------
     degree : of the harmonics
     turning : highest degree of the rotor's currents, for each harmonic of its turn
-    present : which states have which harmonics, (states, count) as bytes
+    present : which of the ball's states have which harmonics, (states, count) as bytes
     """
 
     degree: int
@@ -98,12 +99,20 @@ class PlateInBall:
 
         return known.heard(basis, source), felt
 
-    def numbers(self, center: Array, radius: float, weights: Array, depth: float, values: Array) -> Array:
-        """Values of the runtime parameters for a ball with weights (states, count), the plate at a depth, m."""
+    def numbers(
+        self, center: Array, radius: float, weights: Array, fewer: FewerStates, depth: float, values: Array
+    ) -> Array:
+        """Values of the runtime parameters for a ball, the plate at a depth, m.
+
+        Parameters
+        ----------
+        weights : (all, count) of all states' fields; the rotor's currents are told by all of them
+        fewer : the states of the floater's currents
+        """
         share = at_depth(self.memory.share, depth, len(self.kind.turning))
         standing = replace(self, memory=replace(self.memory, share=share))
-        own = np.concatenate([center, [1 / radius], weights[self.kind.pattern]])
-        return np.concatenate([own, rotor_numbers(standing, np.where(self.kind.pattern, weights, 0.0), values)])
+        own = np.concatenate([center, [1 / radius], fewer.weights[self.kind.pattern]])
+        return np.concatenate([own, decay_numbers(fewer.rates, values), rotor_numbers(standing, weights, values)])
 
 
 def at_depth(share: RotorShare, depth: float, harmonics: int | None = None) -> RotorShare:

@@ -3,11 +3,12 @@
 from dataclasses import dataclass
 
 import heyoka as hy
+import numpy as np
 
 from ...fem.harmonics import UPPER
 from ...fem.plate_tables import RotorShare
 from ...geometry.basics import Array
-from ..motion import Felt, Parameter, PlateMemory, Vector, dot, pushed, rotor_numbers
+from ..motion import Felt, Parameter, PlateMemory, Vector, decay_numbers, dot, pushed, rotor_numbers
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,7 +48,8 @@ class WholePlate:
 
     def numbers(self, values: Array) -> Array:
         """Values of its runtime parameters, from those of `parameters`."""
-        return rotor_numbers(self, self.memory.table.weights, values)
+        table = self.memory.table
+        return np.concatenate([decay_numbers(table.rates, values), rotor_numbers(self, table.weights, values)])
 
     def seen(self, place: Vector, source: Vector) -> tuple[Vector, Felt]:
         """See `PlateFormula`."""

@@ -37,6 +37,7 @@ from .plate_terms import (
     Felt as Felt,
     PlateFormula as PlateFormula,
     PlateMemory as PlateMemory,
+    decay_numbers as decay_numbers,
     pushed as pushed,
     rotor_numbers as rotor_numbers,
     seen_by_plate as seen_by_plate,

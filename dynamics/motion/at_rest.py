@@ -16,7 +16,7 @@ TILTS = ("tilt_t", "tilt_u")
 
 
 def balances(equations: Equations) -> tuple[list[hy.expression], list[hy.expression]]:
-    """Variables (13,), and the balances (5,) with their derivatives (5 × 5, row by row), of equations of motion."""
+    """The balances (5,) of a motion with their derivatives (5 × 5, row by row), and their variables (13,)."""
     given, tilts = list(hy.make_vars(*GIVEN)), list(hy.make_vars(*TILTS))
     position, tangents, spin = given[:3], (given[6:9], given[9:12]), given[12]
     moment = [given[3 + i] + tilts[0] * tangents[0][i] + tilts[1] * tangents[1][i] for i in range(3)]
@@ -28,7 +28,7 @@ def balances(equations: Equations) -> tuple[list[hy.expression], list[hy.express
     for k in (3, 4):
         slopes[k, k] = slopes[k, k] - dot(moment, torque)  # the tangents turn with the moment
     untilted = {name: hy.expression(0.0) for name in TILTS}
-    return given, hy.subs([*values, *slopes.ravel()], untilted)
+    return hy.subs([*values, *slopes.ravel()], untilted), given
 
 
 def _state(position: Vector, moment: Vector, spin: hy.expression) -> list[hy.expression]:

@@ -133,7 +133,7 @@ def equations_of_motion(
     states: list[hy.expression] = []
     state_rates: Vector = []
     if plate is not None:
-        states = [hy.expression(name) for name in plate.memory.names]
+        states = [hy.expression(f"plate_{i}") for i in range(len(plate.weights))]
         terms = memory_terms(plate, position, moment, states)
         force = [a + b for a, b in zip(force, terms.force, strict=True)]
         turn = [a + b for a, b in zip(turn, terms.torque, strict=True)]

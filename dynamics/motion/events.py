@@ -99,7 +99,9 @@ def rotor_gap(scene: Scene, position: Array, moment: Array | None = None) -> flo
 
 def plate_depth(plate: Plate, time: Array) -> Array:
     """How far the plate has gone down at `time` (n,) s, in m."""
-    return np.array([plate.lowering.depth(float(t)) if plate.lowering else 0.0 for t in time])
+    if plate.lowering is None:
+        return np.zeros(len(time))
+    return np.array([plate.lowering.depth(float(t)) for t in time])
 
 
 def plate_legs(plate: Plate | None, duration: float) -> list[tuple[float, float, float]]:

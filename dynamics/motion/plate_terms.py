@@ -26,7 +26,7 @@ from ...fem.plate_tables import PlateTable, RotorShare
 from ...geometry.basics import Array
 from ...geometry.scenes import Plate
 from .rotor_currents import RotorCurrents, rotor_terms
-from .symbols import Parameter, Vector, cross, dot, turned
+from .symbols import Parameter, Vector, cross, dot, dotted, turned
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,11 +61,6 @@ class PlateMemory:
         harmonics = len(self.share.series) // 2
         told = f"relative error {self.error:.1e}, {harmonics} harmonics of the rotor"
         return f"PlateMemory {self.model!r}: {told}\n{self.table!r}"
-
-    @property
-    def names(self) -> list[str]:
-        """Names of the states."""
-        return [f"plate_{i}" for i in range(len(self.table.rates))]
 
 
 @dataclass(frozen=True, eq=False)
@@ -132,12 +127,16 @@ def pushed(slope: dict[tuple[int, int], hy.expression], source: Vector) -> Vecto
     return [hy.sum([source[i] * slope[min(i, j), max(i, j)] for i in range(3)]) for j in range(3)]
 
 
+def decay_numbers(rates: Array, values: Array) -> Array:
+    """Runtime parameters of the decay of states with rates (n,) 1/s, from those of `parameters`: -λT."""
+    return -rates * float(values[Parameter.TIME])
+
+
 def rotor_numbers(formula: PlateFormula, weights: Array, values: Array) -> Array:
-    """Runtime parameters of decay and of the rotor's currents for weights W (states, k), from those of `parameters`."""
-    time, rates = float(values[Parameter.TIME]), formula.memory.table.rates
-    rotor = RotorCurrents(formula.share, rates, float(values[Parameter.RATE]) / time)
-    driven = rotor.numbers(weights, formula.reach, float(values[Parameter.PLATE_SHARE]), formula.lowered)
-    return np.concatenate([rates * time, np.sqrt(rates * time), driven])
+    """Runtime parameters of the rotor's currents for weights W (states, k), from those of `parameters`."""
+    velocity = float(values[Parameter.RATE]) / float(values[Parameter.TIME])
+    rotor = RotorCurrents(formula.share, formula.memory.table.rates, velocity)
+    return rotor.numbers(weights, formula.reach, float(values[Parameter.PLATE_SHARE]), formula.lowered)
 
 
 def memory_terms(formula: PlateFormula, position: Vector, moment: Vector, states: Vector) -> MemoryTerms:
@@ -149,13 +148,12 @@ def memory_terms(formula: PlateFormula, position: Vector, moment: Vector, states
     heard, felt = formula.seen(place, source)
     weights = formula.weights
     own = [p - _picked(row, heard) for p, row in zip(states, weights, strict=True)]
-    rotor = rotor_terms(formula.share, formula.reach, start + 2 * len(own), formula.lowered, heard, own)
+    rotor = rotor_terms(formula.share, formula.reach, start + len(own), formula.lowered, heard, own)
     strengths = [_picked(column, own) for column in zip(*weights, strict=True)]
     field, push = felt([a + b for a, b in zip(strengths, rotor.strengths, strict=True)])
     force = [length * f for f in _seen_by_rotor(plate, push)]
     turn = [strength * t for t in cross(moment, _seen_by_rotor(plate, field))]
-    decay = [-hy.par[start + i] * y for i, y in enumerate(own)]
-    lost = [hy.par[start + len(own) + i] * y for i, y in enumerate(own)]
+    decay = [hy.par[start + i] * y for i, y in enumerate(own)]
     speed = hy.par[Parameter.PLATE_SPEED] if formula.lowered else hy.expression(0.0)
     drive = dot(force, [*turned(position)[:2], speed]) + hy.par[Parameter.RATE] * turn[2]
     return MemoryTerms(
@@ -163,7 +161,7 @@ def memory_terms(formula: PlateFormula, position: Vector, moment: Vector, states
         force=force,
         torque=[t / hy.par[Parameter.INERTIA] for t in turn],
         stored=0.5 * hy.sum([y * y for y in own]) + rotor.stored,
-        spent=hy.sum([y * y for y in lost]) + rotor.spent + drive,
+        spent=rotor.spent + drive - dotted(own, decay),
     )
 
 

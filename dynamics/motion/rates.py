@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from copy import copy
 from dataclasses import dataclass
 from functools import cached_property
@@ -14,11 +14,11 @@ from numpy.typing import ArrayLike
 
 from ...fem.harmonics import FieldExpressions
 from ...fem.rotor_tables import FieldFormula, FieldTable, RotorTable
-from ...fem.storage import RuntimeNumbers, compiled
+from ...fem.storage import RuntimeNumbers, compiled_later
 from ...geometry.basics import Array
 from .at_rest import balances
 from .effect import Effect, Placeable, Placed
-from .equations import equations_of_motion
+from .equations import Equations, equations_of_motion
 from .interaction import Interaction, interaction_of
 from .symbols import Parameter
 
@@ -45,11 +45,14 @@ class Rates:
         formula = _Written(whole.field, self._numbers) if isinstance(whole.field, RotorTable) else whole.field
         equations = equations_of_motion(Interaction(formula, tuple(effects)))
         self._equations, self._level = equations, 1 if optimised else 0
-        variables = list(equations.variables)
-        tensors = hy.diff_tensors(list(equations.rates), diff_args=variables, diff_order=1)
-        outputs = [*equations.rates, *np.asarray(tensors.jacobian).ravel()]
         # Unoptimised code is compiled three times as fast, and a search is over before faster code would be ready.
-        self._function = compiled(hy.cfunc, outputs, variables, compact_mode=True, opt_level=self._level)
+        self._function = self._compiled(_with_jacobian)
+
+    def _compiled(self, write: Callable[[Equations], tuple[list[hy.expression], list[hy.expression]]]) -> Any:
+        """Outputs and variables that are written from the equations, compiled."""
+        source = write.__name__, self._equations.variables, self._equations.rates
+        options = {"compact_mode": True, "opt_level": self._level}
+        return compiled_later(hy.cfunc, lambda: write(self._equations), source, __package__, **options)
 
     def __call__(self, states: ArrayLike, values: Array) -> tuple[Array, Array]:
         """Rates (n, 12) and their derivatives (n, 12, 12) at scaled `states` (n, 12).
@@ -109,8 +112,13 @@ class Rates:
 
     @cached_property
     def _balances(self) -> Any:
-        given, outputs = balances(self._equations)
-        return compiled(hy.cfunc, outputs, given, compact_mode=True, opt_level=self._level)
+        return self._compiled(balances)
+
+
+def _with_jacobian(equations: Equations) -> tuple[list[hy.expression], list[hy.expression]]:
+    variables = list(equations.variables)
+    tensors = hy.diff_tensors(list(equations.rates), diff_args=variables, diff_order=1)
+    return [*equations.rates, *np.asarray(tensors.jacobian).ravel()], variables
 
 
 @dataclass(frozen=True, eq=False)

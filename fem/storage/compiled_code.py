@@ -10,12 +10,13 @@ import os
 import pickle
 import zlib
 from collections import OrderedDict
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import cache
 from pathlib import Path
 from typing import Any, TypeVar
 
 from .cache import cache_folder
+from .program_text import digest_of
 from .whole_files import seal, unsealed, write_whole
 
 LIMIT = 2**29
@@ -36,13 +37,32 @@ def compiled(compiler: Callable[..., Compiled], *arguments: Any, **options: Any)
     compiler : ``heyoka.cfunc`` or ``heyoka.taylor_adaptive``
     arguments, options : the compiler's
     """
-    asked = pickle.dumps((compiler, arguments, options))
-    path = cache_folder() / "code" / f"{hashlib.sha256(_target() + asked).hexdigest()}.code"
+    return _kept((compiler, arguments, options), lambda: compiler(*arguments, **options))
+
+
+def compiled_later(
+    compiler: Callable[..., Compiled], write: Callable[[], Sequence[Any]], source: Any, package: str, **options: Any
+) -> Compiled:
+    """What a compiler makes of arguments that take longer to write than to say what they are written from.
+
+    Parameters
+    ----------
+    compiler, options : as of `compiled`
+    write : the compiler's arguments; called only where nothing is in the cache
+    source : all that they depend on, which can be pickled
+    package : the room of `write`, with all that it imports: its text is part of the key
+    """
+    asked = compiler, source, digest_of(package), options
+    return _kept(asked, lambda: compiler(*write(), **options))
+
+
+def _kept(asked: tuple[Any, ...], make: Callable[[], Compiled]) -> Compiled:
+    path = cache_folder() / "code" / f"{hashlib.sha256(_target() + pickle.dumps(asked)).hexdigest()}.code"
     found: Compiled | None = _functions.pop(path, None) or _read(path)
     if found is None:
-        found = compiler(*arguments, **options)
+        found = make()
         _keep(found, path)
-    if compiler.__name__ == "cfunc":
+    if asked[0].__name__ == "cfunc":
         _functions[path] = found
         while len(_functions) > SHARED:
             _functions.popitem(last=False)

@@ -78,7 +78,7 @@ def test_multipliers_with_currents_in_the_rotor_are_the_growth_of_a_kicked_fligh
 
     def after_one_turn(state):
         integrator.time, integrator.state[:] = 0.0, state
-        integrator.pars[:] = flight.given(values)[: len(integrator.pars)]
+        integrator.pars[:] = flight.given(values[None], len(integrator.pars))[:, 0]
         integrator.propagate_until(2 * np.pi)
         return integrator.state.copy()
 

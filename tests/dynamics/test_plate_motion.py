@@ -161,7 +161,7 @@ def test_multipliers_are_the_growth_of_a_kicked_flight(shaken, memory, rates):
 
     def after_one_turn(state):
         integrator.time, integrator.state[:] = 0.0, state
-        integrator.pars[:] = flight.given(VALUES)[: len(integrator.pars)]
+        integrator.pars[:] = flight.given(VALUES[None], len(integrator.pars))[:, 0]
         integrator.propagate_until(2 * np.pi)
         return integrator.state.copy()
 

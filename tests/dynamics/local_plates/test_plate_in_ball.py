@@ -44,6 +44,12 @@ def balls(memory):
     return PlateBalls(memory, RADIUS)
 
 
+@pytest.fixture(scope="module")
+def fine():
+    """Balls of a finer network, of which a floater in one place hears only a part."""
+    return PlateBalls(PlateMemory(PLATE, *slab_and_rotor_table(PLATE, TABLE, REGION, rtol=1e-3), "slab"), RADIUS)
+
+
 def with_key(values):
     """Runtime parameters with room for a ball's key at their end."""
     return np.concatenate([values, np.zeros(5)])
@@ -113,9 +119,59 @@ def test_about_the_middle_of_a_plate_each_state_has_few_harmonics(balls, memory)
     """Over a slab, those of one order and one parity; none that is left out has a weight beyond round-off."""
     ball = PlateBall(np.array([0.0, 0.0, 0.0274]), 2e-3, 5)
     kind, _ = balls.told(ball, FIRST, VALUES)
-    weights = balls._expanded(ball)[0]
+    weights, present = balls._expanded(ball)[0], balls._present(ball)
     assert kind.pattern.sum() < kind.pattern.size / 6
-    assert np.abs(weights[~kind.pattern]).max() < 1e-9 * np.abs(weights[:, :3]).max()
+    assert np.abs(weights[~present]).max() < 1e-9 * np.abs(weights[:, :3]).max()
+    told = balls.fewer(ball).directions.T @ weights
+    assert np.abs(told[~kind.pattern]).max() < 1e-9 * np.abs(weights[:, :3]).max()
+
+
+@pytest.mark.parametrize("place", [(0.5e-3, 0.2e-3, -19.6e-3), (2.9e-3, 1.0e-3, -18.0e-3), (0.0, 0.0, -22e-3)])
+def test_fewer_states_miss_no_more_of_reaction_tensors_than_a_tenth_of_what_the_table_does(fine, place):
+    """Inside the ball, at 25 frequencies, most of which the choice does not look at; against all states' harmonics."""
+    ball, memory = fine.around(0.0, hanging(place), VALUES), fine.memory
+    fewer, weights = fine.fewer(ball), fine._expanded(ball)[0]
+    assert len(fewer.rates) < len(weights)
+    np.testing.assert_allclose(fewer.directions.T @ fewer.directions, np.eye(len(fewer.rates)), atol=1e-12)
+    known, x = local_harmonics(ball.degree), hy.make_vars("x", "y", "z")
+    basis, units = (
+        known.basis(x),
+        [[hy.expression(float(k == j)) for k in range(known.count)] for j in range(known.count)],
+    )
+    functions = hy.cfunc([f for unit in units for f in known.field(basis, unit)], x, compact_mode=True)
+    points = np.random.default_rng(5).uniform(-1, 1, size=(60, 3))
+    points = points[np.linalg.norm(points, axis=1) < 1]
+    fields = functions(np.ascontiguousarray(points.T)).reshape(known.count, 3, -1)
+    for omega in 2 * np.pi * np.geomspace(*memory.table.frequencies, 25):
+        exact, told = (
+            np.einsum("i,ik,kan,il,lbn->nab", 1j * omega / (rates + 1j * omega), w, fields, w, fields, optimize=True)
+            for rates, w in ((memory.table.rates, weights), (fewer.rates, fewer.weights))
+        )
+        assert np.abs(told - exact).max() < 1.2 * SHARE * memory.table.errors.total * np.abs(exact).max()
+
+
+def test_fewer_states_are_passive_and_silent_towards_a_floater_at_rest(fine):
+    """All rates within those of the plate; signals of a floater at rest leave no currents."""
+    ball, memory = fine.around(0.0, STATE, VALUES), fine.memory
+    fewer, reduction = fine.fewer(ball), fine.reduction(ball, VALUES)
+    slowest, fastest = memory.table.rates.min(), memory.table.rates.max()
+    assert np.all((slowest * (1 - 1e-9) < fewer.rates) & (fewer.rates < fastest * (1 + 1e-9)))
+    resting = np.concatenate([STATE[:12], reduction.signals(0.3, STATE), [0.0]])
+    own = reduction.own(resting)
+    kind, numbers = fine.told(ball, FIRST, VALUES)
+    rates = rates_of(PlateInBall(memory, kind, FIRST), numbers, own[:-1], 0.3)[12:-2]
+    moving = np.abs(VALUES[Parameter.TIME] * fewer.rates * own[12:-1]).max()
+    assert np.abs(rates).max() < SHARE * memory.table.errors.total * moving
+
+
+def test_from_all_states_to_fewer_and_back(fine):
+    """What the ball tells comes back to round-off, and so do all states of a floater at rest."""
+    ball = fine.around(0.0, STATE, VALUES)
+    reduction = fine.reduction(ball, VALUES)
+    own = np.concatenate([STATE[:12], np.random.default_rng(4).normal(size=reduction.directions.shape[1]), [0.7]])
+    np.testing.assert_allclose(reduction.own(reduction.whole(0.4, own)), own, rtol=0, atol=1e-12)
+    resting = np.concatenate([STATE[:12], reduction.signals(0.4, STATE), [0.7]])
+    np.testing.assert_allclose(reduction.whole(0.4, reduction.own(resting)), resting, rtol=0, atol=1e-12)
 
 
 def test_there_is_no_ball_for_a_moving_plate_or_a_flight_across_it(balls):
@@ -154,22 +210,28 @@ def rates_of(formula, numbers, states, time, values=VALUES):
 
 @pytest.mark.parametrize("depth", [0.0, 4e-3])
 def test_the_plate_acts_in_a_ball_as_by_its_table(balls, memory, depth):
-    """All rates of floater and plate, at rest above and below its way: within a fifth of the table's error."""
+    """All rates of floater and plate, at rest above and below its way: within a fifth of the table's error.
+
+    Currents are those that the ball tells; the plate's states are compared as these are.
+    """
     values = VALUES.copy()
     values[Parameter.PLATE_DEPTH] = depth / RADIUS
     ball = balls.around(0.7, STATE, values)
     kind, numbers = balls.told(ball, FIRST, values)
     whole = WholePlate(memory)
     rng = np.random.default_rng(3)
-    states = np.concatenate([STATE[:-1], 1e-3 * rng.normal(size=len(memory.table.rates))])
-    told = rates_of(PlateInBall(memory, kind, FIRST), numbers, states, 0.7, values)
+    reduction = balls.reduction(ball, values)
+    own = np.concatenate([STATE[:-1], 1e-3 * rng.normal(size=reduction.directions.shape[1]), [0.0]])
+    states = reduction.whole(0.7, own)[:-1]
+    told = rates_of(PlateInBall(memory, kind, FIRST), numbers, own[:-1], 0.7, values)
     right = rates_of(whole, whole.numbers(values), states, 0.7, values)
     still = memory.table.weights * 0.0
     none = replace(memory, table=replace(memory.table, weights=still))
     free = rates_of(WholePlate(none), WholePlate(none).numbers(values), states, 0.7, values)
     plate = np.abs(right[3:12] - free[3:12])
     assert np.abs(told[3:12] - right[3:12]).max() < 2 * SHARE * memory.table.errors.total * plate.max()
-    assert np.abs(told[12:-2] - right[12:-2]).max() < 2 * SHARE * memory.table.errors.total * np.abs(right[12:-2]).max()
+    currents = right[12:-2] @ reduction.directions
+    assert np.abs(told[12:-2] - currents).max() < 2 * SHARE * memory.table.errors.total * np.abs(currents).max()
 
 
 def test_one_code_serves_all_frequencies_floaters_and_balls_of_a_kind(balls, memory):

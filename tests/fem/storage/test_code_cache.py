@@ -12,7 +12,7 @@ import heyoka as hy
 import numpy as np
 import pytest
 
-from spinlev.fem.storage import compiled, compiled_code
+from spinlev.fem.storage import compiled, compiled_code, compiled_later
 from spinlev.fem.storage.whole_files import seal, unsealed
 
 CONSTANT = 3.1640625
@@ -163,3 +163,27 @@ def test_code_that_is_read_counts_as_used(file):
     os.utime(file, (1e9, 1e9))
     value()
     assert file.stat().st_mtime > 1.5e9
+
+
+def test_code_whose_arguments_are_written_later_is_told_by_what_they_are_written_from(folder):
+    """Nothing is written where it is there already; another source, option or room is other code."""
+    x, written = hy.make_vars("x"), []
+
+    def later(source, package="spinlev.fem.storage", **options):
+        def write():
+            written.append(source)
+            return [hy.diff(source * hy.sin(x), x)], [x]
+
+        hy.llvm_state.clear_memcache()
+        return compiled_later(hy.cfunc, write, source, package, **options)([0.5])[0]
+
+    assert later(2.0) == later(2.0) == pytest.approx(2 * np.cos(0.5), rel=1e-15)
+    assert written == [2.0]
+    compiled_code._functions.clear()
+    assert later(2.0) == pytest.approx(2 * np.cos(0.5), rel=1e-15)
+    assert written == [2.0]
+    assert later(3.0) == pytest.approx(3 * np.cos(0.5), rel=1e-15)
+    later(2.0, compact_mode=True)
+    later(2.0, package="spinlev.fem.harmonics")
+    assert written == [2.0, 3.0, 2.0, 2.0]
+    assert len(list(folder.iterdir())) == 4
