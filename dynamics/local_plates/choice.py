@@ -145,8 +145,8 @@ class PlateBalls:
             if len(self._fewer) >= MOST:
                 self._fewer.clear()
             table, known = self.memory.table, local_harmonics(ball.degree)
-            parts = self._expanded(ball)[0], self._present(ball), table.rates, table.frequencies
-            self._fewer[key] = fewer_states(known, *parts, SHARE * table.errors.total)
+            weights, present, allowed = self._expanded(ball)[0], self._present(ball), SHARE * table.errors.total
+            self._fewer[key] = fewer_states(known, weights, present, table.rates, table.frequencies, allowed)
         return self._fewer[key]
 
     def reduction(self, ball: PlateBall, values: Array) -> Reduction:
