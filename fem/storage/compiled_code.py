@@ -80,7 +80,7 @@ class _Asked(pickle.Pickler):
 def _target() -> bytes:
     """What code is compiled for: heyoka, and the processor as its compiler sees it.
 
-    From here on heyoka keeps none by itself, in a process neither: that would be up to 2 GB of what is kept here anyway.
+    From here on heyoka keeps none by itself, in a process neither: that would be 2 GB of what is kept here anyway.
     """
     import heyoka as hy
 
