@@ -25,7 +25,7 @@ class CompiledField:
     Parameters
     ----------
     build : takes three heyoka expressions (position, m) and returns `FieldExpressions`
-    seldom : at fewer than 1e5 points: compiled in a fifth of the time, evaluated in ten times the time
+    seldom : at fewer than some 1e5 points: compiled in a fourth of the time, evaluated in five to ten times the time
     """
 
     def __init__(self, build: Callable[[Sequence[hy.expression]], FieldExpressions], seldom: bool = False) -> None:
