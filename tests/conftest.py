@@ -31,3 +31,13 @@ def needs_3d():
     reason = unavailable()
     if reason:
         pytest.skip(reason)
+
+
+@pytest.fixture
+def undrawn(monkeypatch):
+    """Leaves out the process that draws in three dimensions, two seconds each time: for tests of something else."""
+
+    def written(pictures, progress, command):
+        return iter([b"not drawn"] * len(pictures))
+
+    monkeypatch.setattr("spinlev.studies.rendering.renderer._drawn", written)

@@ -50,7 +50,7 @@ def nodes() -> Array:
 def fitting(degree: int) -> tuple[Array, Array]:
     """(count, n): weights by the values at the nodes; and (n, count): the values by the weights."""
     x = hy.make_vars("x", "y", "z")
-    values = hy.cfunc(polynomials(degree, x), x, compact_mode=True)(np.ascontiguousarray(nodes().T)).T
+    values = hy.cfunc(polynomials(degree, x), x, compact_mode=True, opt_level=0)(np.ascontiguousarray(nodes().T)).T
     return np.linalg.pinv(values), values
 
 
@@ -74,7 +74,7 @@ def derivatives(degree: int) -> Array:
     """
     x = hy.make_vars("x", "y", "z")
     tensors = hy.diff_tensors(polynomials(degree, x), diff_args=x, diff_order=1).jacobian
-    function = hy.cfunc(list(np.asarray(tensors).ravel()), x, compact_mode=True)
+    function = hy.cfunc(list(np.asarray(tensors).ravel()), x, compact_mode=True, opt_level=0)
     slopes = function(np.ascontiguousarray(np.eye(4)[:3])).reshape(count(degree), 3, 4)  # along each axis, and in it
     first, second = slopes[..., 3], slopes[..., :3] - slopes[..., 3:]
     if degree == 1:

@@ -28,7 +28,7 @@ from ..motion import (
     interaction_of,
     seen_by_plate,
 )
-from .compiled_flight import Flight, compile_flight, flight_of
+from .compiled_flight import STRAIGHT_TURNS, Flight, compile_flight, flight_of
 
 LEFT = "left"
 DEGREE = len(Parameter)
@@ -42,8 +42,6 @@ LOOSER = 300
 
 Measured: in a ball J drifts by 3e-14 in 1100 turns at 3e-14, and by 2e-14 in the table's field at 1e-16.
 """
-STRAIGHT_TURNS = 8e4
-"""Turns from which on straight code saves more time (21 of 47 µs a step) than its compilation takes (10 s)."""
 WORTH = 5e6
 """Length of a field's expressions, written out, from which on balls are faster.
 
@@ -105,7 +103,7 @@ class Parts:
             events, meanings, tolerance = [*events, *lost], [*meanings, *meaning], self.tolerance
         long = memory is None and degree == SMALL.degree and scene.frequency * self.duration > STRAIGHT_TURNS
         straight = long if self.compact is None else not self.compact
-        return flight_of(scene, equations, (events, meanings), tolerance, not straight, plate)
+        return flight_of(scene, equations, (events, meanings), self.duration, tolerance, not straight, plate)
 
 
 def ball_equations(

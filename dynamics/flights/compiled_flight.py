@@ -32,8 +32,14 @@ TOLERANCE = 1e-16
 """Of a Taylor step. Measured over 1300 turns: J drifts by 3e-13 at 1e-15, by 1e-14 at 1e-16 with 1 % more steps."""
 OPTIMISATION = 1
 """Of the compiler. Measured: more takes twice as long to compile, and the code is not faster, but often slower."""
-PATIENCE = 10.0
-"""Seconds that a faster integrator may take to compile without need."""
+SHORT_TURNS = 1000.0
+"""Turns up to which code that is not optimised at all is done sooner.
+
+Measured for a dipole, for closed forms and in a ball: loops are compiled in 0.05 to 0.1 s instead of 0.4 to 0.7 s, and
+a turn takes 0.3 to 0.5 ms longer.
+"""
+STRAIGHT_TURNS = 8e4
+"""Turns from which on straight code may save more time (in a ball 21 of 47 µs a step) than its compilation takes."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -136,7 +142,7 @@ def compile_flight(
     scene, table : the problem
     duration : how long it shall fly, s: it decides how much compilation is worth
     tolerance : relative error of a step
-    compact : compile loops instead of straight code: sooner ready, two to three times slower; None to choose
+    compact : compile loops instead of straight code: sooner ready, up to twice as slow; None to choose
     memory : the plate's currents, if they are modelled
     """
     tilted = bool(np.any(scene.gravity[:2]))
@@ -145,13 +151,14 @@ def compile_flight(
     events = flight_events(scene, equations.variables[:3])
     if compact is None:
         compact = not _worth_compiling(equations, scene, duration)
-    return flight_of(scene, equations, events, tolerance, compact, plate)
+    return flight_of(scene, equations, events, duration, tolerance, compact, plate)
 
 
 def flight_of(
     scene: Scene,
     equations: Equations,
     events: tuple[list[hy.t_event], list[str]],
+    duration: float,
     tolerance: float,
     compact: bool,
     plate: PlateFormula | None,
@@ -165,10 +172,10 @@ def flight_of(
         np.zeros(len(equations.variables) + 1),
         tol=tolerance,
         compact_mode=compact,
-        opt_level=OPTIMISATION,
+        opt_level=OPTIMISATION if scene.frequency * duration > SHORT_TURNS else 0,
         t_events=events[0],
     )
-    ledger = compiled(hy.cfunc, list(equations.jacobi), list(equations.variables), compact_mode=True)
+    ledger = compiled(hy.cfunc, list(equations.jacobi), list(equations.variables), compact_mode=True, opt_level=0)
     values, memory = parameters(scene, scales), plate.memory if plate else None
     numbers = plate.numbers(values) if isinstance(plate, WholePlate) else np.zeros(0)
     first, seconds = plate.first if plate else len(values), perf_counter() - started
@@ -186,12 +193,14 @@ def scaled_state(scene: Scene, memory: PlateMemory | None, start: State, current
 
 
 def _worth_compiling(equations: Equations, scene: Scene, duration: float) -> bool:
-    """Whether straight code is soon compiled or saves more time than its compilation takes.
+    """Whether straight code saves more time than its compilation takes.
 
-    Measured: it takes about 2.5 s for n = 136 (closed form) and 30 s for n = 229 (with an expansion of degree 9), n
-    being the length of the decomposed rates, and then each of some six steps a turn saves n · 0.1 µs.
+    Measured: it takes 3 s for a dipole (n = 67) and 17 to 23 s for closed forms (n = 139 to 152), n being the length of
+    the decomposed rates, and then each of some six steps a turn saves n · 0.1 µs.
     """
-    rates = compiled(hy.cfunc, list(equations.rates), list(equations.variables), compact_mode=True)
+    turns = scene.frequency * duration
+    if turns < STRAIGHT_TURNS:
+        return False
+    rates = compiled(hy.cfunc, list(equations.rates), list(equations.variables), compact_mode=True, opt_level=0)
     size = len(rates.dc)
-    seconds = 2.5 * (size / 136) ** 5
-    return seconds < PATIENCE or seconds < 6 * scene.frequency * duration * size * 0.1e-6
+    return 8e-4 * size**2 < 6 * turns * size * 0.1e-6

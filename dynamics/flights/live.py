@@ -61,7 +61,7 @@ class LiveFlight:
         start, currents = initial_state(scene, table, equilibria, memory)
         tolerance = TOLERANCE if memory is None else PLATE_TOLERANCE
         self.scene = scene
-        self.flight = compile_local_flight(scene, table, 1.0, tolerance, True, memory)
+        self.flight = compile_local_flight(scene, table, np.inf, tolerance, True, memory)
         self.log = Log()
         self.values = begun(self.flight, start, currents, self.log)
         self.state = self.flight.part(self.values).whole

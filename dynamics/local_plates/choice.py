@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 from itertools import product
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...fem.harmonics import UPPER, sphere_fit
 from ...geometry.basics import Array
@@ -196,7 +197,7 @@ class PlateBalls:
         lowering = self.memory.plate.lowering
         return float(values[Parameter.PLATE_DEPTH] * values[Parameter.LENGTH]) if lowering else 0.0
 
-    def _present(self, ball: PlateBall) -> Array:
+    def _present(self, ball: PlateBall) -> NDArray[np.bool_]:
         """Which states (rows) have which harmonics by the symmetries of the plate about the ball's centre."""
         known = local_harmonics(ball.degree)
         energies = (self._expanded(ball)[0] * known.sizes[1:]) ** 2

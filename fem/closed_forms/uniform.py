@@ -46,7 +46,12 @@ class UniformField:
 
     @cached_property
     def _near(self) -> CompiledField:
-        return CompiledField(self.expressions)
+        return CompiledField(self.expressions, seldom=self.is_long)
+
+    @property
+    def is_long(self) -> bool:
+        """Whether its closed form is so long that to optimise its code takes a second (cylinder) or three (ring)."""
+        return isinstance(self.magnet.body, Cylinder | Ring)
 
     @cached_property
     def _far(self) -> CompiledField:

@@ -102,7 +102,7 @@ class RotorTable:
 
     @cached_property
     def _near(self) -> CompiledField:
-        return CompiledField(self.expressions)
+        return CompiledField(self.expressions, seldom=any(form.is_long for form in self._closed_forms))
 
     @cached_property
     def _far(self) -> tuple[CompiledField, ...]:

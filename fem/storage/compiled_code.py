@@ -5,6 +5,7 @@ number.  What it has compiled can be pickled with the code in it, which is read 
 """
 
 import hashlib
+import io
 import logging
 import os
 import pickle
@@ -57,7 +58,7 @@ def compiled_later(
 
 
 def _kept(asked: tuple[Any, ...], make: Callable[[], Compiled]) -> Compiled:
-    path = cache_folder() / "code" / f"{hashlib.sha256(_target() + pickle.dumps(asked)).hexdigest()}.code"
+    path = cache_folder() / "code" / f"{hashlib.sha256(_target() + _Asked.of(asked)).hexdigest()}.code"
     found: Compiled | None = _functions.pop(path, None) or _read(path)
     if found is None:
         found = make()
@@ -69,12 +70,42 @@ def _kept(asked: tuple[Any, ...], make: Callable[[], Compiled]) -> Compiled:
     return found
 
 
+class _Asked(pickle.Pickler):
+    """Writes what is asked for with all its expressions as one: what they share is written once, not in each."""
+
+    def __init__(self, stream: io.BytesIO) -> None:
+        import heyoka as hy
+
+        super().__init__(stream)
+        self._kind, self._found = hy.expression, list[Any]()
+
+    def persistent_id(self, thing: Any) -> int | None:
+        """The number of an expression; None for what is no expression."""
+        if not isinstance(thing, self._kind):
+            return None
+        self._found.append(thing)
+        return len(self._found)
+
+    @classmethod
+    def of(cls, asked: object) -> bytes:
+        """All of it as bytes."""
+        import heyoka as hy
+
+        writer = cls(stream := io.BytesIO())
+        writer.dump(asked)
+        return stream.getvalue() + pickle.dumps(hy.dfun("asked", writer._found))
+
+
 @cache
 def _target() -> bytes:
-    """What code is compiled for: heyoka, and the processor as its compiler sees it. heyoka keeps none from here on."""
+    """What code is compiled for: heyoka, and the processor as its compiler sees it.
+
+    From here on heyoka keeps none by itself, in a process neither: that would be 2 GB of what is kept here anyway.
+    """
     import heyoka as hy
 
     hy.llvm_state.set_diskcache_enabled(False)
+    hy.llvm_state.set_memcache_limit(0)
     x = hy.make_vars("x")
     return f"{hy.__version__} {hy.cfunc([x], [x]).llvm_states}".encode()
 

@@ -29,7 +29,7 @@ def share_figure(result: xr.Dataset) -> Figure:
             there = [(measure, parts[k].held) for measure, parts in rows if k < len(parts)]
             values = np.array([share.value for _, share in there])
             around = np.array([share.bounds for _, share in there])
-            bars = np.clip([values - around[:, 0], around[:, 1] - values], 0, None)
+            bars = np.maximum(np.stack([values - around[:, 0], around[:, 1] - values]), 0)
             label = f"{rows[0][1][k].part:.0%} of the stable range"
             panel.errorbar([m for m, _ in there], 100 * values, 100 * bars, fmt="o-", color=PALETTE[k], label=label)
         for measure in CONFIGURATIONS[name].levitated:

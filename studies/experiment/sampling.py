@@ -106,7 +106,7 @@ def evidences(models: Models, facts: Mapping[str, Fact], draws: int, seed: int) 
         return np.asarray(logsumexp(logarithms, axis=0) - np.log(draws))
 
     every = known.sum(axis=1)
-    pair = np.stack([mean(known + known[:, [k]]) for k in range(len(facts))])
+    pair = np.stack([mean(known + one[:, None]) for one in known.T])
     np.fill_diagonal(pair, mean(known))
     whole = float(mean(every))
     spread, deviates = np.exp(every - whole), ndtri(shares)

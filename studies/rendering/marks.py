@@ -34,7 +34,7 @@ def add_path(plotter: pv.Plotter, path: Array, radius: float) -> float:
 def add_turning(plotter: pv.Plotter, scene: Scene) -> None:
     """An arrow above the rotor in the sense in which it turns."""
     corners = np.concatenate([corners_mm(magnet.box) for magnet in scene.rotor])
-    height, radius = corners[:, 2].max() + 3.0, 1.0 * np.hypot(corners[:, 0], corners[:, 1]).max()
+    height, radius = float(corners[:, 2].max()) + 3.0, float(np.linalg.norm(corners[:, :2], axis=1).max())
     angles = np.radians(np.linspace(-200, 60, 60))
     arc = np.column_stack([radius * np.cos(angles), radius * np.sin(angles), np.full(60, height)])
     plotter.add_mesh(pv.MultipleLines(arc).tube(radius=0.45), color="black")

@@ -164,7 +164,9 @@ def test_ledger_with_the_rotor_closes(made):
     n, omega, slope = len(table.rates), 2 * np.pi * 100, 0.02
     variables = hy.make_vars("angle", "depth")
     signals = share.expressions(share.basis(*variables))
-    driven = hy.cfunc([*signals, *(hy.diff(s, v) for v in variables for s in signals)], variables, compact_mode=True)
+    driven = hy.cfunc(
+        [*signals, *(hy.diff(s, v) for v in variables for s in signals)], variables, compact_mode=True, opt_level=0
+    )
     moment = spinning(omega, 0.3)
 
     def state(t, p):

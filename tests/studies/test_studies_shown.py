@@ -107,6 +107,7 @@ def test_a_flight_is_shown_with_the_plate_where_it_has_been_lowered_to(tmp_path,
     assert plate.lowering is None
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_the_report_of_a_run_has_its_numbers_cut_where_they_are_long(scene, tmp_path):
     result = sl.simulate(replace(scene, plate=None), 0.02, "dipole", "none").assign_attrs(study="run")
     write_dataset(result, tmp_path / "result.nc")

@@ -34,7 +34,7 @@ def test_power_beside_a_dipole_is_that_of_a_ball_in_its_own_frame():
     )
     scales = Scales.of(SCENE)
     equations = equations_of_motion(with_effects(SCENE, TABLE))
-    power = hy.cfunc([equations.power], list(equations.variables), compact_mode=True)
+    power = hy.cfunc([equations.power], list(equations.variables), compact_mode=True, opt_level=0)
     found = power(scales.pack(state), pars=parameters(SCENE, scales)[: power.nparams])[0]
     drift, lag = state.velocity - np.cross(rotor, state.position), state.spin - rotor
     edge = FLOATER.radius / CUBE

@@ -89,7 +89,7 @@ def test_in_a_ball_force_and_torque_come_from_one_energy(mutual, start, formula)
     equations, _ = ball_equations(SCENE, mutual, formula)
     slopes = [hy.diff(hy.sum(list(equations.jacobi)), v) for v in equations.variables]
     terms = [a * b for a, b in zip(slopes, equations.rates, strict=True)]
-    function = hy.cfunc([*terms, *equations.rates], list(equations.variables), compact_mode=True)
+    function = hy.cfunc([*terms, *equations.rates], list(equations.variables), compact_mode=True, opt_level=0)
     numbers, error = Balls(SCENE, mutual.evaluate, formula, 0.1, fitted(mutual, formula)).at(start.position)
     values = np.concatenate([parameters(SCENE, SCALES), [0.0], numbers])
     states = np.tile(SCALES.pack(start.state), (6, 1))

@@ -92,7 +92,7 @@ def test_its_power_is_the_loss_of_the_table():
     import heyoka as hy
 
     equations = equations_of_motion(TABLE)
-    power = hy.cfunc([equations.power], list(equations.variables), compact_mode=True)
+    power = hy.cfunc([equations.power], list(equations.variables), compact_mode=True, opt_level=0)
     values = parameters(BARE, SCALES)[: power.nparams]
     found = power(SCALES.pack(STATE), pars=values)[0]
     rotor = np.array([0.0, 0.0, BARE.angular_velocity])

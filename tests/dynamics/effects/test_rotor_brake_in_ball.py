@@ -42,7 +42,7 @@ def test_the_brake_is_that_of_the_table(equilibrium, formula):
     bare, _ = ball_equations(SCENE, FIELD, formula)
     added = [a - b for a, b in zip(equations.rates, bare.rates, strict=True)]
     outputs = [*added, equations.power]
-    function = hy.cfunc(outputs, list(equations.variables), compact_mode=True)
+    function = hy.cfunc(outputs, list(equations.variables), compact_mode=True, opt_level=0)
     center = equilibrium.position
     found = Balls(SCENE, FIELD.evaluate, formula, 0.1, fitted(TABLE, formula)).at(center)
     numbers, error = found

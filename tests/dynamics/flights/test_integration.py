@@ -8,6 +8,8 @@ import pytest
 
 from spinlev.dynamics.equilibria import find_equilibria
 from spinlev.dynamics.flights import FlightStopped, StartError, initial_state, simulate
+from spinlev.dynamics.flights.compiled_flight import SHORT_TURNS, STRAIGHT_TURNS, compile_flight
+from spinlev.dynamics.flights.integration import integrate
 from spinlev.dynamics.motion import clearance
 from spinlev.dynamics.steady import EquilibriumError
 from spinlev.fem.harmonics import uniform_moments
@@ -145,3 +147,16 @@ def test_without_a_stable_equilibrium_the_way_out_is_named():
     assert [any(e.stable for e in known) for known in found.values()] == [True, False]  # so it is not far inside
     with pytest.raises(StartError, match="duration must be positive"):
         simulate(SCENE, DIPOLE, 0.0)
+
+
+def test_code_is_as_optimised_as_the_flight_is_long():
+    """The same flight by each: loops that are not optimised, loops that are, and straight code."""
+    start, _ = initial_state(SCENE, DIPOLE)
+    flown, kinds = [], []
+    for turns in (0.9 * SHORT_TURNS, 1.1 * SHORT_TURNS, 2 * STRAIGHT_TURNS):
+        flight = compile_flight(SCENE, DIPOLE, turns / SCENE.frequency)
+        kinds.append((flight.integrator.llvm_state.opt_level, flight.integrator.compact_mode))
+        flown.append(integrate(SCENE, flight, start, 0.2).lab.position)
+    assert kinds == [(0, True), (1, True), (1, False)]
+    for other in flown[1:]:
+        np.testing.assert_allclose(other, flown[0], atol=1e-13)

@@ -50,7 +50,7 @@ def test_a_ball_misses_no_more_than_it_says(degree, place):
     values, error = formula.fit(TABLE.evaluate, ball)
     position = hy.make_vars("x", "y", "z")
     field, gradient = formula.expressions(position)
-    compiled = hy.cfunc([*field, *(e for row in gradient for e in row)], position, compact_mode=True)
+    compiled = hy.cfunc([*field, *(e for row in gradient for e in row)], position, compact_mode=True, opt_level=0)
     generator = np.random.default_rng(0)
     points = generator.normal(size=(200, 3))
     points *= (generator.uniform(size=200) / np.linalg.norm(points, axis=1))[:, None]

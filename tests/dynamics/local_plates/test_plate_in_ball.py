@@ -75,7 +75,7 @@ def test_heard_and_felt_are_a_harmonic_and_its_derivatives(degree):
     basis, given = known.basis(x), [hy.expression(float(s)) for s in strengths]
     slope = known.gradient(basis, given)
     outputs = [*known.heard(basis, source), *known.field(basis, given), *slope.values()]
-    function = hy.cfunc(outputs, [*x, *source], compact_mode=True)
+    function = hy.cfunc(outputs, [*x, *source], compact_mode=True, opt_level=0)
     place, step = np.array([0.3, -0.4, 0.5]), 1e-5
 
     def at(point, direction):
@@ -104,7 +104,9 @@ def test_a_ball_misses_no_more_of_reaction_tensors_than_a_tenth_of_what_the_tabl
     x = hy.make_vars("x", "y", "z")
     basis = known.basis(x)
     ones = [known.field(basis, [hy.expression(float(w)) for w in row]) for row in weights]
-    fields = hy.cfunc([f for one in ones for f in one], x, compact_mode=True)(np.ascontiguousarray(points.T))
+    fields = hy.cfunc([f for one in ones for f in one], x, compact_mode=True, opt_level=0)(
+        np.ascontiguousarray(points.T)
+    )
     near = np.moveaxis(fields.reshape(len(weights), 3, -1), -1, 0)
     exact = np.einsum(
         "nka,ik->nia", memory.table.multipoles.fields(ball.center + ball.radius * points), memory.table.weights

@@ -71,7 +71,7 @@ def test_its_power_is_that_of_the_moved_rotor():
         RotorCurrents(ball_losses(pieces_of(there, ()), degree=2)),
     ):
         equations = equations_of_motion(Interaction(rotor_table(there, "dipole"), (effect,)))
-        power = hy.cfunc([equations.power, *equations.rates], list(equations.variables), compact_mode=True)
+        power = hy.cfunc([equations.power, *equations.rates], list(equations.variables), compact_mode=True, opt_level=0)
         values = parameters(scene, Scales.of(scene))
         values[Parameter.MEASURE] = measure
         found.append(power(states(1)[0], pars=values[: power.nparams]))

@@ -73,7 +73,7 @@ def test_energy_and_power_keep_the_books():
     equations = equations_of_motion(Interaction(TABLE, (RigidAgain(), Friction())))
     slopes = [hy.diff(hy.sum(list(equations.jacobi)), v) for v in equations.variables]
     terms = [a * b for a, b in zip(slopes, equations.rates, strict=True)]
-    function = hy.cfunc([*terms, equations.power], list(equations.variables), compact_mode=True)
+    function = hy.cfunc([*terms, equations.power], list(equations.variables), compact_mode=True, opt_level=0)
     values = function(np.ascontiguousarray(random_states(20).T), pars=np.tile(VALUES[: function.nparams, None], 20))
     assert np.all(values[-1] < 0)
     np.testing.assert_allclose(values[:-1].sum(axis=0), values[-1], atol=1e-12 * np.abs(values).max())

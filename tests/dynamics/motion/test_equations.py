@@ -108,7 +108,7 @@ def test_jacobi_integral_changes_by_the_power_of_drag_and_lateral_gravity_alone(
     equations = equations_of_motion(TABLES["cuboid"], any(gravity[:2]))
     slopes = [hy.diff(hy.sum(list(equations.jacobi)), v) for v in equations.variables]
     terms = [a * b for a, b in zip(slopes, equations.rates, strict=True)]
-    function = hy.cfunc([*terms, equations.power], list(equations.variables), compact_mode=True)
+    function = hy.cfunc([*terms, equations.power], list(equations.variables), compact_mode=True, opt_level=0)
     generator = np.random.default_rng(3)
     for _ in range(20):
         state = scales.pack(random_state(scene, generator))

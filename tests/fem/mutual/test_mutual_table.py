@@ -98,7 +98,7 @@ def test_written_out_and_by_points_the_energy_is_one(table):
     """The expression of the whole, and the kernel summed over points, with its derivatives by differences."""
     names = [f"v_{k}" for k in range(9)]
     given = hy.make_vars(*names)
-    whole = hy.cfunc([table.energy(given[:3], given[3:6], given[6:])], given, compact_mode=True)
+    whole = hy.cfunc([table.energy(given[:3], given[3:6], given[6:])], given, compact_mode=True, opt_level=0)
     place, direction = poses(0.6, 4, 5)
     moment, flux = FLOATER.moment * direction, 0.02 * direction[:, ::-1]
     energy = answers(table, place, moment, flux, np.zeros((4, 3, 3)))[0]
@@ -178,7 +178,7 @@ def test_two_magnets_written_out_and_by_pairs_have_one_energy(table):
     pairs, mixed = np.array([[0.0, 4e-3], [4e-3, 0.0]]), np.array([[0.0, 3e-5], [2e-5, 0.0]])
     two = replace(table, grids=(grid, above), coupling=coupling + coupling.T, pairs=pairs, mixed=mixed)
     given = hy.make_vars("x", "y", "z", "m_x", "m_y", "m_z")
-    written = hy.cfunc([two.coupled(given[:3], given[3:])], given, compact_mode=True)
+    written = hy.cfunc([two.coupled(given[:3], given[3:])], given, compact_mode=True, opt_level=0)
     alone = [replace(table, grids=(g,), coupling=np.zeros((3, 3)), pairs=0 * pairs, mixed=0 * mixed) for g in two.grids]
     places, directions = poses(0.6, 9, 8)
     places, directions = np.ascontiguousarray(places - [0.0, 0.0, 20e-3]), FLOATER.moment * directions

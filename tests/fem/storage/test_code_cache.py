@@ -60,6 +60,17 @@ def test_code_is_compiled_once(file):
 
 def test_heyoka_keeps_nothing_by_itself(file):
     assert not hy.llvm_state.get_diskcache_enabled()
+    assert hy.llvm_state.get_memcache_limit() == 0
+
+
+def test_each_expression_has_its_place_in_the_name(folder):
+    """Also where they have parts in common, which are written once."""
+    x = hy.make_vars("x")
+    shared = hy.sin(x) + 1.25
+    for factors in ([1.0, 2.0], [2.0, 1.0], [1.0, 3.0], [2.0]):
+        function = compiled(hy.cfunc, [factor * shared for factor in factors], [x])
+        np.testing.assert_allclose(function([1.0]), np.array(factors) * (np.sin(1.0) + 1.25), rtol=1e-14)
+    assert len(list(folder.iterdir())) == 4
 
 
 @pytest.mark.slow

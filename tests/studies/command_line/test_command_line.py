@@ -241,6 +241,7 @@ def test_wrong_points_end_with_status_2(spinlev, tmp_path, text, said):
     assert said in err
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_no_equilibrium_is_a_failed_computation_that_keeps_what_was_finished(spinlev, tmp_path):
     path = tmp_path / "s.toml"
     path.write_text(GOOD.replace("frequency_hz = 110.0", "frequency_hz = 30.0"))
@@ -251,6 +252,7 @@ def test_no_equilibrium_is_a_failed_computation_that_keeps_what_was_finished(spi
     assert "failed" in json.loads((tmp_path / "out" / "summary.json").read_text())
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_a_rotor_at_rest_has_no_equilibrium_but_its_floater_still_falls(spinlev, tmp_path):
     path = tmp_path / "s.toml"
     at_rest = GOOD.replace("frequency_hz = 110.0", "frequency_hz = 0.0")

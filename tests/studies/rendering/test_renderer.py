@@ -6,12 +6,11 @@ Nothing here needs a graphics library, but for the last test.
 import os
 import signal
 import sys
-import threading
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 import pytest
+from pictures_that_fail import Dies, Endless, Fails, Group
 from places import SCENES, TESTS
 
 from spinlev.dynamics.equilibria import find_equilibria
@@ -21,39 +20,6 @@ from spinlev.geometry.scenes import load_scene
 from spinlev.studies.pictures import flight_frames, last_view
 from spinlev.studies.rendering import FieldPlane, RenderError, frame_times, render, unavailable
 from spinlev.studies.terminal import DRAWING, way_out
-
-
-@dataclass(frozen=True)
-class Group:
-    """Tells the group of the process that draws; prints past Python."""
-
-    def draw(self, progress):
-        os.write(1, b"printed by a library")
-        progress(1.0)
-        return str(os.getpgrp()).encode()
-
-
-@dataclass(frozen=True)
-class Dies:
-    how: int
-
-    def draw(self, progress):
-        os.kill(os.getpid(), self.how)
-
-
-@dataclass(frozen=True)
-class Fails:
-    error: Exception
-
-    def draw(self, progress):
-        raise self.error
-
-
-@dataclass(frozen=True)
-class Endless:
-    def draw(self, progress):
-        progress(float(os.getpid()))
-        threading.Event().wait(60)
 
 
 @pytest.fixture(autouse=True)

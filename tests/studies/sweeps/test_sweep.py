@@ -2,8 +2,6 @@
 
 import json
 import logging
-import os
-import signal
 import subprocess
 import sys
 import time
@@ -13,32 +11,16 @@ from pathlib import Path
 import dask
 import numpy as np
 import pytest
-import xarray as xr
 from distributed import LocalCluster
 from matplotlib.figure import Figure
 from places import TESTS
+from roots import kept, root
 
-from spinlev.fem.storage import read_checked, write_checked
 from spinlev.geometry.basics import InputError
 from spinlev.studies.results import Study, by_case, write_dataset
 from spinlev.studies.sweeps import forget, swept
 from spinlev.studies.sweeps.running import SweepError
 from spinlev.studies.terminal import Workers
-
-
-def root(point):
-    """A point that writes down that it was computed, and fails where it is told to."""
-    if "log" in point:
-        with Path(point["log"]).open("a") as log:
-            log.write(f"{point['x']}\n")
-    if point.get("kill") and not Path(point["kill"]).exists():
-        Path(point["kill"]).touch()
-        os.kill(os.getpid(), signal.SIGKILL)
-    time.sleep(point.get("pause", 0.0))
-    if point["x"] < 0:
-        raise ValueError("no root")
-    return xr.Dataset({"root": ("case", [np.sqrt(point["x"])])}, {"x": ("case", [point["x"]])})
-
 
 STUDY = Study("roots", "square roots", lambda quick: [], root, by_case, lambda result: Figure(), lambda result: [])
 
@@ -50,12 +32,6 @@ def points(*values, **more):
 def bytes_of(result, path):
     write_dataset(result, path)
     return path.read_bytes()
-
-
-def kept(point):
-    """A point that makes a table's file on its way, as those do that need a new field."""
-    write_checked(root(point), Path(point["file"]))
-    return read_checked(point["file"])
 
 
 @pytest.mark.slow
@@ -106,8 +82,8 @@ def test_a_killed_sweep_goes_on_where_it_was(tmp_path):
             assert process.poll() is None
             time.sleep(0.02)
         process.kill()
-    kept = len(list(folder.glob("roots.points/0*.json")))
-    assert 2 <= kept < 6
+    finished = len(list(folder.glob("roots.points/0*.json")))
+    assert 2 <= finished < 6
     swept("roots", STUDY, asked, Workers(workers=1), folder)
     done = log.read_text().split()
     assert sorted(set(done)) == [str(float(x)) for x in range(6)]

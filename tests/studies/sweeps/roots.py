@@ -1,0 +1,31 @@
+"""Points of a sweep. The processes that compute them read this file, which loads little for that."""
+
+import os
+import signal
+import time
+from pathlib import Path
+
+import numpy as np
+import xarray as xr
+
+
+def root(point):
+    """A point that writes down that it was computed, and fails where it is told to."""
+    if "log" in point:
+        with Path(point["log"]).open("a") as log:
+            log.write(f"{point['x']}\n")
+    if point.get("kill") and not Path(point["kill"]).exists():
+        Path(point["kill"]).touch()
+        os.kill(os.getpid(), signal.SIGKILL)
+    time.sleep(point.get("pause", 0.0))
+    if point["x"] < 0:
+        raise ValueError("no root")
+    return xr.Dataset({"root": ("case", [np.sqrt(point["x"])])}, {"x": ("case", [point["x"]])})
+
+
+def kept(point):
+    """A point that makes a table's file on its way, as those do that need a new field."""
+    from spinlev.fem.storage import read_checked, write_checked
+
+    write_checked(root(point), Path(point["file"]))
+    return read_checked(point["file"])
