@@ -1,9 +1,17 @@
 """The study of the upper frequency: its steel balances the cube, and what conducts is lost sooner."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import xarray as xr
 
+from spinlev.dynamics.branches import at_frequency, reference_state, stable_range
+from spinlev.dynamics.flights import simulate
+from spinlev.dynamics.motion import Scales
+from spinlev.dynamics.slow_drift import drift
+from spinlev.geometry.scenes import AbsoluteStart
+from spinlev.studies.article import article_scene, levitation_of
 from spinlev.studies.capture import UPPER_LIMIT
 from spinlev.studies.capture.upper_limit import MAGNET_DENSITY, STEEL_DENSITY, VARIANTS, scene_of, spacer
 
@@ -62,3 +70,29 @@ def test_conducting_magnets_lose_the_floater_of_two_millimetres_sooner():
     """As the study stability-map has it with finite elements, mutual magnetisation included: 163.0 and 159.3 Hz."""
     ends = [float(UPPER_LIMIT.compute(point)["lasts_to"].item()) for point in UPPER_LIMIT.points(True)]
     assert ends == pytest.approx([166.8, 163.0], abs=1.0)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("configuration", "measure", "variant", "frequency"),
+    [("tilt", 10.0, 1, 190.0), ("horizontal", 1.0, 2, 240.0), ("tilt", 5.0, 1, 260.0)],
+)
+def test_full_flights_are_lost_when_averaged_ones_are(configuration, measure, variant, frequency):
+    """From 3 mm/e⁷ off; which motion that begins is worth an e-fold or two of seven."""
+    point = {"configuration": configuration, "measure": measure, "variant": VARIANTS[variant]}
+    scene = replace(scene_of(point), frequency=frequency)
+    bare = article_scene(configuration, measure, permeability=1.0, drag=False)
+    alone, whole = levitation_of(bare, "cuboid"), levitation_of(scene, "cuboid")
+    stable = stable_range(bare, alone.rates, *reference_state(bare))
+    start = Scales.of(scene).unpack(at_frequency(bare, alone.rates, stable.near(frequency), frequency).state)
+    averaged = drift(scene, whole.interaction, 0.0, 400.0, whole.rates, start)
+    place = start.position + np.array([0.0, 3e-3 * np.exp(-7), 0.0])
+    moved = replace(start, position=place, velocity=np.cross([0.0, 0.0, scene.angular_velocity], place))
+    offset = replace(scene, start=AbsoluteStart(*moved.vectors))
+    full = simulate(offset, whole.interaction, 2 * averaged.levitated_s)
+    print(
+        f"\n{configuration} {measure:g}, {frequency:g} Hz: {averaged.levitated_s:.1f} s, full {full.levitated_s:.1f} s"
+    )
+    assert averaged.ended_by == "instability"
+    assert full.ended_by in {"lost", "contact"}
+    assert full.levitated_s == pytest.approx(averaged.levitated_s, rel=0.2)
