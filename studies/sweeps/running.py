@@ -4,6 +4,7 @@ import json
 import shutil
 from collections.abc import Callable, Mapping
 from importlib.metadata import version
+from itertools import count
 from pathlib import Path
 
 import numpy as np
@@ -26,7 +27,7 @@ class Journal:
     ----------
     folder : made when the first point is kept
     identity : tells this sweep from every other; points that another one left in the folder are not used
-    report : told about what is thrown away
+    report : told about what is not used, and where it is
     """
 
     def __init__(self, folder: Path, identity: str, report: Callable[[str], None]) -> None:
@@ -38,11 +39,21 @@ class Journal:
             return {}
         label = self.folder / "identity.json"
         if not label.exists() or label.read_bytes() != self.identity.encode():
-            self.report(f"{self.folder} is of another sweep or another version of the program: all is computed anew.")
-            shutil.rmtree(self.folder, ignore_errors=True)
+            aside = self._set_aside()
+            self.report(
+                f"{self.folder} is of another sweep or another version of the program: all is computed anew. "
+                f"What it held is in {aside}; delete that when you need it no more."
+            )
             return {}
         found = {int(path.stem): self._read(path) for path in sorted(self.folder.glob("[0-9]*.json"))}
         return {number: point for number, point in found.items() if point is not None}
+
+    def _set_aside(self) -> Path:
+        """Give the folder a name that is free: its points may be hours of work."""
+        names = (self.folder.with_name(f"{self.folder.name}.old{number or ''}") for number in count())
+        aside = next(name for name in names if not name.exists())
+        self.folder.rename(aside)
+        return aside
 
     def _read(self, path: Path) -> xr.Dataset | None:
         try:

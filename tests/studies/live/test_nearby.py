@@ -49,7 +49,7 @@ def test_nothing_is_compiled_for_a_neighbour(tilted, monkeypatch):
     def compiled(*_, **__):
         raise AssertionError("compiled anew")
 
-    monkeypatch.setattr("spinlev.dynamics.motion.rates.compiled", compiled)
+    monkeypatch.setattr("spinlev.dynamics.motion.rates.compiled_later", compiled)
     for key, value in (("frequency_hz", 131.0), ("rotor.angle_deg", 10.4), ("rotor.edge_mm", 10.2)):
         assert tilted.at(tilted.state.changed(key, value)) is not None
 

@@ -103,12 +103,17 @@ def test_a_damaged_point_is_computed_anew(tmp_path, caplog):
     np.testing.assert_array_equal(result["root"], [1.0, 2.0])
 
 
-def test_points_of_another_sweep_are_not_used(tmp_path, caplog):
+def test_points_of_another_sweep_are_not_used_and_not_lost(tmp_path, caplog):
     caplog.set_level(logging.INFO, "spinlev")
     swept("roots", STUDY, points(1.0, 4.0), Workers(workers=1), tmp_path)
+    kept = {path.name: path.read_bytes() for path in (tmp_path / "roots.points").iterdir()}
     result = swept("roots", STUDY, points(9.0, 4.0), Workers(workers=1), tmp_path)
     assert "another sweep" in caplog.text
+    assert "roots.points.old" in caplog.text
     np.testing.assert_array_equal(result["root"], [3.0, 2.0])
+    assert {path.name: path.read_bytes() for path in (tmp_path / "roots.points.old").iterdir()} == kept
+    swept("roots", STUDY, points(16.0), Workers(workers=1), tmp_path)
+    assert (tmp_path / "roots.points.old1").is_dir()
 
 
 def test_a_failed_point_is_named_and_the_rest_goes_on(tmp_path):
