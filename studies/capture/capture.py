@@ -40,7 +40,7 @@ from .outcomes import HELD, LOST, NO_EQUILIBRIUM, PLATE, ROTOR
 
 PARTS = (1 / 6, 1 / 2, 5 / 6)
 """Places in the range of stable frequencies."""
-TOGETHER, BATCHES = 200, 50
+TOGETHER, BATCHES = 2000, 5
 """Flights of a point, and points for each rotor and frequency: ten thousand flights."""
 QUICK = (("horizontal", 2.0), ("vertical", 14.0), ("tilt", 10.0))
 CHECKED = 8

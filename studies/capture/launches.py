@@ -1,6 +1,7 @@
 """How a floater is brought in: a rotor over its plate, and launches drawn at random."""
 
 from dataclasses import dataclass, replace
+from functools import cache, cached_property
 from zlib import crc32
 
 import numpy as np
@@ -47,13 +48,14 @@ class Place:
     low: float
     high: float
 
-    @property
+    @cached_property
     def lowered(self) -> Scene:
         """The scene whose plate goes down once the floater has settled."""
         assert self.scene.plate is not None
         return replace(self.scene, plate=replace(self.scene.plate, lowering=Lowering(SETTLED, LOWERING_SPEED, LOWERED)))
 
 
+@cache
 def place_of(configuration: str, measure: float, part: float) -> Place:
     """A rotor of the article at a `part` (0 to 1) of its stable frequencies; floater and air as they are.
 
@@ -75,6 +77,7 @@ def place_of(configuration: str, measure: float, part: float) -> Place:
     return Place(replace(whole, plate=plate), distance, low, high)
 
 
+@cache
 def plate_under(place: Place, scene: Scene) -> PlateMemory:
     """The currents in the plate of a place's scene, taken as an infinite slab, wherever launches begin."""
     plate = scene.plate
@@ -88,6 +91,7 @@ def plate_under(place: Place, scene: Scene) -> PlateMemory:
     return PlateMemory(plate, table, share, "slab")
 
 
+@cache
 def field_of(place: Place, model: str = "cuboid") -> FieldTable:
     """The rotor's field."""
     return levitation_of(replace(place.scene, plate=None), model).table  # type: ignore[arg-type]

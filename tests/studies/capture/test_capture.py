@@ -4,8 +4,22 @@ import numpy as np
 import pytest
 from scipy.stats import binomtest, norm
 
+from spinlev.dynamics.ensembles import ensemble, launched
+from spinlev.dynamics.flights import DURATION
 from spinlev.studies.capture import CAPTURE
-from spinlev.studies.capture.launches import FARTHER, LEAN, NEARER, SIDEWAYS, SPIN, launches, place_of, seed_of
+from spinlev.studies.capture.launches import (
+    FARTHER,
+    LEAN,
+    NEARER,
+    SETTLED,
+    SIDEWAYS,
+    SPIN,
+    field_of,
+    launches,
+    place_of,
+    plate_under,
+    seed_of,
+)
 from spinlev.studies.capture.outcomes import HELD, NO_EQUILIBRIUM, WORDS, Share
 from spinlev.studies.sweeps import swept
 from spinlev.studies.terminal import Workers
@@ -90,6 +104,17 @@ def test_a_rotor_without_a_stable_frequency_is_said_not_left_out():
     assert (row["outcome"] == NO_EQUILIBRIUM).all()
     assert "no stable frequency" in CAPTURE.report(CAPTURE.gather([row]))[0]
     assert CAPTURE.numbers(CAPTURE.gather([row]))["shares"][0]["frequency_hz"] is None
+
+
+@pytest.mark.slow
+def test_without_the_plates_currents_nothing_is_held(place):
+    begun = launches(place, 200, seed_of("vertical", 14.0, 0.5, 0))
+    braked = launched(place.scene, field_of(place), plate_under(place, place.scene), begun.states, SETTLED)
+    unbraked = ensemble(place.scene, field_of(place), begun.states, SETTLED)
+    held, none = (Share(int(np.sum(ended.ended_by == DURATION)), 200) for ended in (braked, unbraked))
+    print(f"\nheld over aluminium {held}, over a plate that does not conduct {none}")
+    assert 0.6 < held.value < 0.8
+    assert none.hits == 0
 
 
 @pytest.mark.slow
