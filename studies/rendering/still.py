@@ -117,8 +117,9 @@ def _add_currents(plotter: pv.Plotter, currents: Currents) -> None:
     cloud["J"], cloud["|J| (A/mm²)"] = current, np.linalg.norm(current, axis=1)
     longest = float(cloud["|J| (A/mm²)"].max()) or 1.0
     arrows = cloud.glyph(orient="J", scale="|J| (A/mm²)", factor=12.0 / longest, geom=pv.Arrow())
-    place = {"position_x": 0.9, "position_y": 0.3, "height": 0.5}
-    bar = {"title": "J (A/mm²)", "color": "black", "fmt": "%.2g", "vertical": True, **place}
+    place = {"position_x": 0.04, "position_y": 0.3, "height": 0.4}  # the field's is on the right
+    look_of_it = {"title_font_size": 24, "label_font_size": 22}
+    bar = {"title": "J (A/mm²)", "color": "black", "fmt": "%.2g", "vertical": True, **place, **look_of_it}
     plotter.add_mesh(arrows, scalars="|J| (A/mm²)", cmap="magma_r", scalar_bar_args=bar)
 
 
