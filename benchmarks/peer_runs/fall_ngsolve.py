@@ -17,6 +17,7 @@ STEP = 1 / (steps * TURN_RATE)
 
 
 def reaction():
+    """What the plate answers to the falling magnet, on the mesh."""
     mesh = plate_in_air(size)
     space = edge_elements(mesh, order)
     trial, test = space.TnT()

@@ -30,6 +30,7 @@ times = np.arange(2000 * TURNS + 1) / (2000 * TURN_RATE)
 
 
 def reaction():
+    """What the plate answers to the falling magnet, by its table."""
     table = plate_table(plate, region, (0.5, 1000.0), rtol)
     positions, moments = (np.array(part) for part in zip(*map(falling, times), strict=True))
     functions = table.field_functions(positions)[0]

@@ -11,6 +11,7 @@ case, size = sys.argv[1], float(sys.argv[2])  # mm
 
 
 def field():
+    """B at the points, in files as GetDP writes them, and its unknowns."""
     files = {"points.pro": lists_file(p=points_below())}
     return solve("field", "Static", files, ["Field"], size=1e-3 * size, cubes=len(CUBES[case]), angle=turned(case))
 

@@ -17,6 +17,7 @@ points = points_below()
 
 
 def field():
+    """B at the points."""
     cubes = []
     for center, axis in CUBES[case]:
         cube = magpylib.magnet.Cuboid(

@@ -15,6 +15,7 @@ axes = axes @ np.array([[np.cos(angle), 0, np.sin(angle)], [0, 1, 0], [-np.sin(a
 
 
 def field():
+    """B at the points."""
     cubes = len(centres)
     tiles = Tiles(n=cubes, tile_type=2, size=[EDGE] * 3, offset=centres, rot=[[0.0, -angle, 0.0]] * cubes,
                   M_rem=REMANENCE / MU_0, easy_axis=axes, mu_r_ea=RECOIL, mu_r_oa=RECOIL)  # fmt: skip

@@ -42,6 +42,7 @@ def mesh():
 
 
 def field():
+    """B at the points."""
     tetrahedra, owner = mesh()
     everywhere = skfem.Basis(tetrahedra, skfem.ElementTetP2(), intorder=4)
     permeability = np.where(owner >= 0, RECOIL, 1.0)[:, None]

@@ -26,6 +26,7 @@ elif case == "tilted":
 
 
 def field():
+    """The table, and B at the points."""
     table = rotor_table(rotor, "fem", rtol, nearest=0.007)
     return table, table.evaluate(points @ way)[0] @ way.T
 

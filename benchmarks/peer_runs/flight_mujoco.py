@@ -39,6 +39,7 @@ def passive(model, data):
 
 
 def flight():
+    """Where the floater is at the end (3,), m."""
     model = mujoco.MjModel.from_xml_string(SCENE)
     data = mujoco.MjData(model)
     data.qpos[:3], data.qvel[:3], data.qvel[3:] = position, velocity, spin

@@ -62,12 +62,8 @@ class Recorder:
         """At the end, in arrays that double where they are full."""
         count = self._count + len(times)
         if count > len(self._times):
-            room = 2 * count
-            old, self._times, self._states = (
-                (self.times, self.states),
-                np.empty(room),
-                np.empty((room, states.shape[1])),
-            )
-            self._times[: self._count], self._states[: self._count] = old
+            roomy = np.empty(2 * count), np.empty((2 * count, states.shape[1]))
+            roomy[0][: self._count], roomy[1][: self._count] = self.times, self.states
+            self._times, self._states = roomy
         self._times[self._count : count], self._states[self._count : count] = times, states
         self._count = count

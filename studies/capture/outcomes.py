@@ -42,7 +42,8 @@ class Share:
         return (high - low) / 2
 
     def __str__(self) -> str:
-        return f"{100 * self.value:.1f} ± {100 * self.error:.1f} %"
+        digits = 1 if self.error >= 1e-3 or not self.trials else 2
+        return f"{100 * self.value:.{digits}f} ± {100 * self.error:.{digits}f} %"
 
 
 @dataclass(frozen=True, eq=False)
