@@ -35,6 +35,10 @@ def draw_result(path: Path, out: Path) -> list[str]:
 
 def read_result(path: Path) -> xr.Dataset:
     """The whole of a result file. Raises InputError if it cannot be read, or is no result of this program."""
+    if path.suffix == ".toml":
+        raise InputError(
+            f"Input {path} must be a result; instead it is a scene. Its result is made by: spinlev run {path}"
+        )
     try:
         result = read_checked(path)
     except FileNotFoundError:

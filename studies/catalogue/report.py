@@ -24,7 +24,7 @@ from .show import flight_of
 
 SUMMARIES = {
     "run": "A scene: its field, the force on the floater, where it levitates, and a flight.",
-    "simulate": "A flight.",
+    "simulate": "The motion of the floater from where the scene lets it go.",
     QUESTION: "A quantity of a scene over some of its parameters.",
 }
 PLACE = b"the scene comes here"
@@ -82,7 +82,7 @@ def _part(path: Path) -> dict[str, Any]:
         "lines": study.report(result) if study else question_lines(result) if kind == QUESTION else [],
         "failures": failure_lines(result) if "failed_points" in result.attrs else [],
         "pictures": pictures,
-        "headline": summary.get("headline", ""),
+        "headline": summary.get("headline", result.attrs.get("headline", "")),
         "equilibria": summary.get("equilibria", []),
         "answers": _answers(summary),
         **_view(result),

@@ -68,7 +68,7 @@ def simulate_job(scene: Scene, asked: Models, duration: float, out: Path, resume
         note(f"The flight begins at an unstable equilibrium: e-fold in {1 / growth:.2g} s.")
 
     def keep(flight: Trajectory) -> None:
-        labels = {**levitation.labels, **lowering_times(scene)}
+        labels = {**levitation.labels, **lowering_times(scene), "headline": flight_words(levitation, flight)}
         flown = trajectory_dataset(flight).assign_attrs(labels)
         write_dataset(flown, out / "trajectory.nc", scene)
         save_figures({"trajectory": trajectory_figure(flown)}, out)

@@ -3,7 +3,9 @@
 import io
 import json
 import zipfile
+from itertools import product
 
+import numpy as np
 import pyvista as pv
 from trame_vtk.modules.vtk.serializers import (
     SynchronizationContext,
@@ -13,12 +15,15 @@ from trame_vtk.modules.vtk.serializers import (
     serialize,
 )
 
+from ...geometry.basics import Array
 from .field_lines import add_lines
 from .still import draw_bodies, new_plotter
 from .view import View
 
 STEP = 2.0
 """Longest step along a field line, mm: a line that a browser draws needs no more."""
+MARGIN = 0.92
+"""Part of the window's width and height that the scene fills."""
 
 
 def turnable_scene(view: View) -> bytes:
@@ -38,11 +43,30 @@ def turnable_scene(view: View) -> bytes:
 
 
 def _look(plotter: pv.Plotter) -> None:
-    """From the front and a little from above at everything, from a finite distance: the viewer knows no other."""
-    plotter.view_vector((0.14, -1.0, 0.15))
-    plotter.reset_camera()
-    plotter.camera.Dolly(1.4)
+    """From the front and a little from above, from so near that a square window just shows everything.
+
+    From a finite distance and with VTK's usual angle of view: the viewer knows no other. A corner at (x, z) across and towards the camera at (c, d) is
+    within the half angle of tangent t if |x - c| <= t (d - z); two corners decide c and d, and the same holds for the
+    height.
+    """
+    away, up = np.array([0.14, -1.0, 0.25]), np.array([0.0, 0.0, 1.0])
+    away /= np.linalg.norm(away)
+    right = np.cross(up, away) / np.linalg.norm(np.cross(up, away))
+    corners = np.concatenate([_corners(actor.bounds) for actor in plotter.renderer.actors.values() if actor.bounds])
+    slope = MARGIN * np.tan(np.radians(plotter.camera.view_angle) / 2)
+    middle, distance = np.zeros(3), 0.0
+    for axis in (right, np.cross(away, right)):
+        more, less = (float((corners @ (slope * away + side * axis)).max()) for side in (1, -1))
+        middle += axis * (more - less) / 2
+        distance = max(distance, (more + less) / 2 / slope)
+    depth = float((corners @ away).mean())
+    plotter.camera_position = [middle + distance * away, middle + depth * away, up]
     plotter.reset_camera_clipping_range()
+
+
+def _corners(bounds: tuple[float, ...]) -> Array:
+    """Of a box along the axes, (8, 3)."""
+    return np.array(list(product(bounds[:2], bounds[2:4], bounds[4:])))
 
 
 def _exported(plotter: pv.Plotter) -> bytes:

@@ -10,6 +10,8 @@ SHARE = 1 / 60
 """The same as a part of the time that the step has taken, once that is longer."""
 TELLING = 0.01
 """Finished share from which the time left can be told."""
+ALL = 0.995
+"""Share that would be shown as the whole; what still goes on then has no share."""
 
 
 class Heartbeat(threading.Thread):
@@ -55,7 +57,7 @@ class Heartbeat(threading.Thread):
                 self._say(f"  {self._progress(now, began)}")
 
     def _progress(self, now: float, began: float) -> str:
-        if self._fraction < TELLING:
+        if not TELLING <= self._fraction < ALL:
             return f"{_rounded(now - began)} so far"
         left = (now - self._stage_began) * (1 / self._fraction - 1)
         return f"{self._stage}{self._stage and ', '}{self._fraction:.0%}, {_rounded(left)} left"
