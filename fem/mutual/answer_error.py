@@ -7,6 +7,7 @@ import numpy as np
 from ...geometry.basics import Array, places_off
 from ...geometry.bodies import Magnet
 from ...geometry.scenes import Floater
+from ..elements import Watch, watched
 from ..harmonics import Ball, field_at_center, gradient_at_center
 from .answer_samples import places_around
 from .degree_needed import enough_degree
@@ -37,7 +38,7 @@ def answers(
 
 
 def answer_errors(
-    table: MutualTable, coarse: RotorResponse, rotor: RotorResponse, floater: Floater
+    table: MutualTable, coarse: RotorResponse, rotor: RotorResponse, floater: Floater, watch: Watch
 ) -> tuple[Array, Array]:
     """Gaps (k,) m, and the largest relative errors (k, 2) of force and torque found at poses with these gaps.
 
@@ -45,7 +46,7 @@ def answer_errors(
     """
     generator = np.random.default_rng(4)
     errors = []
-    for gap in GAPS:
+    for gap in watched(GAPS, watch, "errors"):
         worst = np.zeros(2)
         anywhere = places_around(rotor.magnets, floater.radius, (gap,), EACH, 3)
         for place in (*anywhere, *_at_poles(rotor.magnets, (1 + gap) * floater.radius)):

@@ -9,6 +9,7 @@ import numpy as np
 from ...geometry.basics import MU_0, Array, InputError, Part
 from ...geometry.bodies import Magnet
 from ...geometry.scenes import Floater
+from ..elements import Watch, unwatched
 from ..harmonics import FOUR_PI
 from .answer_error import answer_errors
 from .answer_grid import POWERS, RETURNED, AnswerGrid, answer_box, point_counts
@@ -44,7 +45,9 @@ INNER = 2
 """Points along each axis at which magnets beside each other answer beyond their direct answer."""
 
 
-def mutual_table(magnets: tuple[Magnet, ...], floater: Floater, order: int = 2) -> MutualTable:
+def mutual_table(
+    magnets: tuple[Magnet, ...], floater: Floater, order: int = 2, watch: Watch = unwatched
+) -> MutualTable:
     """The answers of a rotor and a floater, by finite elements of a degree, with errors against the next.
 
     Raises
@@ -61,20 +64,20 @@ def mutual_table(magnets: tuple[Magnet, ...], floater: Floater, order: int = 2) 
     pairs = mixed = np.zeros((len(grids), len(grids)))
     if rotor.regions is not None:
         places = places_around(magnets, floater.radius, ROTOR_GAPS, EACH if len(grids) < MANY else EACH_OF_MANY, 1)
-        grids, coupling = _rotor_fit(grids, inner, magnets, *answer_products(rotor, fine, places), places)
+        grids, coupling = _rotor_fit(grids, inner, magnets, *answer_products(rotor, fine, places, watch), places)
     if floater.recoil_permeability != 1:
         facing = places_facing(magnets, floater.radius, SPHERE_GAPS)
         places = np.concatenate([facing, places_around(magnets, floater.radius, SPHERE_GAPS, 60, 2)])
         near = places_around(magnets, floater.radius, NEAR_GAPS, 90, 3) if len(magnets) > 1 else places[:0]
-        samples = sphere_samples(rotor, floater, np.concatenate([places, near]))
+        samples = sphere_samples(rotor, floater, np.concatenate([places, near]), watch)
         grids, pairs = sphere_fit(grids, images, samples)
         if rotor.regions is not None:
             fewer = np.concatenate([facing, places[len(facing) :: SPARSE], near[::NEAR_SPARSE]])
-            returned = returned_samples(rotor, floater, grids, np.concatenate(inner), coupling, fewer)
+            returned = returned_samples(rotor, floater, grids, np.concatenate(inner), coupling, fewer, watch)
             grids, mixed = returned_fit(grids, inner, images, returned)
     alpha = FOUR_PI * floater.radius**3 / MU_0 * float(reflection(floater.recoil_permeability, 1)[1])
     table = MutualTable(magnets, tuple(grids), coupling, pairs, mixed, images, alpha)
-    gaps, errors = answer_errors(table, rotor, fine, floater)
+    gaps, errors = answer_errors(table, rotor, fine, floater, watch)
     return replace(
         table, gaps=gaps, errors=errors, provenance={"order": order, "seconds": time.perf_counter() - started}
     )

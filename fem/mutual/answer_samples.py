@@ -10,6 +10,7 @@ from ...geometry.basics import MU_0, Array, places_off
 from ...geometry.bodies import Magnet
 from ...geometry.scenes import Floater
 from ..closed_forms import remanent_field
+from ..elements import Watch, watched
 from ..harmonics import (
     FOUR_PI,
     Ball,
@@ -72,7 +73,7 @@ def unit_dipole_fields(points: Array, places: Array) -> Array:
     return np.asarray(MU_0 / FOUR_PI * np.stack(fields, axis=1).reshape(-1, len(points), 3))
 
 
-def answer_products(rotor: RotorResponse, fine: RotorResponse, places: Array) -> tuple[Array, Array]:
+def answer_products(rotor: RotorResponse, fine: RotorResponse, places: Array, watch: Watch) -> tuple[Array, Array]:
     """(3 p, 3 p) J: twice minus the rotor's energy for unit dipoles at places (p, 3) m, in pairs; symmetric.
 
     The direct part, exact but for round-off, and what the magnets' own field adds, by the fine elements: those of
@@ -80,7 +81,7 @@ def answer_products(rotor: RotorResponse, fine: RotorResponse, places: Array) ->
     """
     direct = _direct(rotor.magnets, places)
     size = np.sqrt(np.diag(direct))
-    return direct, size * size[:, None] * _beyond(rotor, fine, places, size)
+    return direct, size * size[:, None] * _beyond(rotor, fine, places, size, watch)
 
 
 def _direct(magnets: Sequence[Magnet], places: Array) -> Array:
@@ -91,7 +92,7 @@ def _direct(magnets: Sequence[Magnet], places: Array) -> Array:
     return np.asarray(np.einsum("pni,qnj,nij->pq", fields, fields, tensors, optimize=True) / MU_0)
 
 
-def _beyond(rotor: RotorResponse, fine: RotorResponse, places: Array, size: Array) -> Array:
+def _beyond(rotor: RotorResponse, fine: RotorResponse, places: Array, size: Array, watch: Watch) -> Array:
     """The products by the rest, of unit dipoles over `size` (3 p,).
 
     Their fields in the magnets are sums of far fewer, which the coarse elements' points tell.
@@ -108,7 +109,7 @@ def _beyond(rotor: RotorResponse, fine: RotorResponse, places: Array, size: Arra
         own = np.arange(3 * k, 3 * k + 3)
         given = unit_dipole_fields(points, place[None]) / size[own, None, None]
         parts += np.einsum("ak,ani->kni", vectors[own][:, kept] / np.sqrt(values[kept]), given)
-    answers = np.array([magnetized(part) for part in parts])
+    answers = np.array([magnetized(part) for part in watched(parts, watch, "rotor's answer")])
     found = np.einsum("kni,lni,n->kl", parts, answers, weights, optimize=True) / MU_0
     return np.asarray(shares @ ((found + found.T) / 2) @ shares.T)
 
@@ -131,10 +132,10 @@ class SphereSamples:
     force_size: Array
 
 
-def sphere_samples(rotor: RotorResponse, floater: Floater, places: Array) -> SphereSamples:
+def sphere_samples(rotor: RotorResponse, floater: Floater, places: Array, watch: Watch) -> SphereSamples:
     """The sphere's answer, degree by degree, to the rotor's own field."""
     dipoles, rows = rotor.own_dipoles(), []
-    for place in places:
+    for place in watched(places, watch, "floater's answer"):
         ball = Ball(place, floater.radius)
         own = _own_field(rotor, dipoles, ball, enough_degree(rotor.magnets, ball, TAIL))
         sources = induced_sources(own, floater.recoil_permeability)
@@ -169,6 +170,7 @@ def returned_samples(
     inner: Array,
     coupling: Array,
     places: Array,
+    watch: Watch,
 ) -> ReturnedSamples:
     """The same from the points that answer for the rotor: to 2e-3 what its finite elements give from 1 mm off contact.
 
@@ -182,7 +184,7 @@ def returned_samples(
         sources[:2] = 0.0
         return sources
 
-    for place in places:
+    for place in watched(places, watch, "rotor's answer to it"):
         ball = Ball(place, floater.radius)
         degree = min(enough_degree(rotor.magnets, ball, TAIL), MOST_RETURNED)
         own = _own_field(rotor, dipoles, ball, degree)

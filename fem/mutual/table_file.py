@@ -10,6 +10,7 @@ import xarray as xr
 
 from ...geometry.bodies import Magnet
 from ...geometry.scenes import Floater
+from ..elements import Watch, unwatched
 from ..rotor_tables import at_home
 from ..storage import described, from_cache, program_of, read_checked, write_checked
 from .answer_fit import mutual_table
@@ -20,7 +21,7 @@ FORMAT = "spinlev mutual table 3"
 
 
 def cached_mutual_table(
-    magnets: tuple[Magnet, ...], floater: Floater, report: Callable[[str], None]
+    magnets: tuple[Magnet, ...], floater: Floater, report: Callable[[str], None], watch: Watch = unwatched
 ) -> tuple[MutualTable, bool]:
     """The answers of a rotor and a floater, see `mutual_table`, from the cache if they are there, and whether.
 
@@ -30,7 +31,7 @@ def cached_mutual_table(
     table, found = from_cache(
         f"mutual-{mutual_key(upright, floater)}.nc",
         lambda path: from_dataset(read_checked(path, FORMAT), upright),
-        lambda: mutual_table(upright, floater),
+        lambda: mutual_table(upright, floater, watch=watch),
         lambda table, path: write_checked(to_dataset(table), path),
         report,
     )

@@ -8,4 +8,3 @@ from .region import Region as Region
 from .solution import STRICT as STRICT, PlateSolution as PlateSolution, solve_currents as solve_currents
 from .solution_file import cached_solver as cached_solver, digest as digest
 from .sources import OtherSources as OtherSources, grid_counts as grid_counts, probe_places as probe_places
-from .watch import Watch as Watch, unwatched as unwatched

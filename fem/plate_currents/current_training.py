@@ -14,10 +14,10 @@ import numpy as np
 from ...geometry.basics import Array
 from ..closed_forms import ComplexArray
 from ..eddy_currents import ClassFactor, EddySpace, FieldRows, ShiftedSystem
+from ..elements import Watch, unwatched
 from .current_space import CurrentSpace
 from .shift_basis import Residuals, class_basis
 from .sources import SourceSet
-from .watch import Watch, unwatched
 
 SHIFT = 0.25
 """The real shift in units of the highest angular frequency; a second one gave the same states for more work."""

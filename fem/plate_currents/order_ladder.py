@@ -14,10 +14,10 @@ from ...geometry.meshes import MeshRule, plate_mesh
 from ...geometry.scenes import Plate
 from ..closed_forms import ComplexArray, unit_dipoles
 from ..eddy_currents import EddySpace, solve_shifted
+from ..elements import Watch, unwatched
 from ..rotor_tables import AccuracyError
 from .limits import highest_order
 from .reaction import BEST_REDUCTION, STALLED, order_error, own_tensors, truncation_error
-from .watch import Watch, unwatched
 
 MESH_SHARE = 0.6
 """Share of the tolerance for the finite elements."""

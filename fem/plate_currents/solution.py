@@ -16,12 +16,12 @@ from ...geometry.basics import Array
 from ...geometry.meshes import MeshRule
 from ...geometry.scenes import Plate
 from ..closed_forms import ComplexArray
+from ..elements import Watch, unwatched
 from .current_space import CurrentSpace, space_couplings
 from .current_training import train
 from .order_ladder import MESH_SHARE, Ladder
 from .region import Region
 from .sources import OtherSources, SourceSet, grid_counts, probe_places
-from .watch import Watch, unwatched
 
 SPACE_SHARE = 0.1
 """Share of the tolerance for what the current space misses of the finite elements' currents."""

@@ -16,13 +16,12 @@ from numpy.typing import ArrayLike
 from ...geometry.basics import spread_points
 from ...geometry.meshes import MeshRule
 from ...geometry.scenes import Plate
-from ..elements import Parity
+from ..elements import Parity, Watch, unwatched
 from ..storage import described, from_cache, program_of, read_checked, write_checked
 from .current_space import CurrentSpace
 from .region import Region
 from .solution import PlateSolution, solve_currents
 from .sources import OtherSources
-from .watch import Watch, unwatched
 
 FORMAT = "spinlev plate currents 1"
 LOOKS = 20

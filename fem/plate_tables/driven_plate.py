@@ -8,7 +8,8 @@ from numpy.typing import ArrayLike
 from ...geometry.basics import InputError
 from ...geometry.meshes import MeshRule
 from ...geometry.scenes import Plate
-from ..plate_currents import OtherSources, PlateSolution, Region, Watch, error_of, solve_currents, unwatched
+from ..elements import Watch, unwatched
+from ..plate_currents import OtherSources, PlateSolution, Region, error_of, solve_currents
 from ..plate_network import NETWORK_SHARE, reduce_currents
 from ..rotor_tables import RotorTable
 from .outer_box import outer_box, outer_frequencies

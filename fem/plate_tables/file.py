@@ -10,8 +10,9 @@ from numpy.typing import ArrayLike
 
 from ...geometry.basics import MU_0
 from ...geometry.scenes import Plate
+from ..elements import Watch, unwatched
 from ..harmonics import FOUR_PI
-from ..plate_currents import Region, Watch, cached_solver, digest, unwatched
+from ..plate_currents import Region, cached_solver, digest
 from ..rotor_tables import RotorTable
 from ..storage import TableFileError, described, from_cache, program_of, read_checked, write_checked
 from .driven_plate import plate_and_rotor_table

@@ -8,7 +8,8 @@ import numpy as np
 from ...geometry.basics import Array
 from ...geometry.bodies import Magnet
 from ...geometry.scenes import Plate
-from ..plate_currents import Region, Watch, unwatched
+from ..elements import Watch, unwatched
+from ..plate_currents import Region
 from ..plate_tables import PlateTable, RotorShare, cached_driven_plate, reachable_region
 from ..rotor_tables import Accuracy, RotorTable, shortened_table
 from .table import slab_and_rotor_table

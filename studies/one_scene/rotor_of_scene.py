@@ -10,7 +10,7 @@ from ...fem.mutual import MutualTable, cached_mutual_table, mutual_key
 from ...fem.rotor_losses import RotorLosses, cached_rotor_losses, losses_key, pieces_of
 from ...fem.rotor_tables import RotorTable, cached_rotor_table, rotor_key, rotor_table
 from ...geometry.scenes import Floater, Scene
-from ..terminal import Models, note
+from ..terminal import Models, note, stages
 
 RotorField = RotorTable | GriddedTable
 """A rotor's table: computed, or from a map."""
@@ -38,9 +38,13 @@ class RotorTables:
 
     def answers(self, scene: Scene) -> MutualTable:
         """What rotor and floater do to each other's magnetisation."""
-        make = partial(cached_mutual_table, scene.rotor, scene.floater, note)
-        key = mutual_key(scene.rotor, scene.floater)
-        return self._once(key, lambda: self._cached("mutual", "Mutual magnetisation of rotor and floater", make))
+        title, key = "Mutual magnetisation of rotor and floater", mutual_key(scene.rotor, scene.floater)
+
+        def make() -> tuple[MutualTable, bool]:
+            with stages(title) as watch:
+                return cached_mutual_table(scene.rotor, scene.floater, note, watch)
+
+        return self._once(key, lambda: self._cached("mutual", title, make))
 
     def losses(self, scene: Scene) -> RotorLosses:
         """The losses in the rotor's metal; some of it must conduct."""

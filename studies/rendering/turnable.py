@@ -45,9 +45,9 @@ def turnable_scene(view: View) -> bytes:
 def _look(plotter: pv.Plotter) -> None:
     """From the front and a little from above, from so near that a square window just shows everything.
 
-    From a finite distance and with VTK's usual angle of view: the viewer knows no other. A corner at (x, z) across and towards the camera at (c, d) is
-    within the half angle of tangent t if |x - c| <= t (d - z); two corners decide c and d, and the same holds for the
-    height.
+    From a finite distance and with VTK's usual angle of view: the viewer knows no other. A corner at (x, z) across and
+    towards the camera at (c, d) is within the half angle of tangent t if |x - c| <= t (d - z); two corners decide c and
+    d, and the same holds for the height.
     """
     away, up = np.array([0.14, -1.0, 0.25]), np.array([0.0, 0.0, 1.0])
     away /= np.linalg.norm(away)

@@ -127,7 +127,7 @@ def test_field_over_one_parameter(spinlev):
         (("study", SCENE, "--vary", "frequency_hz=1", "--workers", "0"), "--workers must be between"),
         (("study", SCENE, "--vary", "frequency_hz=1", "--duration-s", "0"), "--duration-s must be a positive"),
         (("figure", "none.nc"), "must be a file that exists"),
-        (("figure", SCENE), "must be a readable netCDF file"),
+        (("figure", SCENE), "instead it is a scene. Its result is made by: spinlev run"),
         (("show", "none.nc"), "must be a file that exists"),
         (("cite", "none.nc"), "must be a file that exists"),
         (("report", "nowhere"), "must be a folder with results"),
