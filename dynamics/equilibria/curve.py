@@ -22,6 +22,9 @@ THINNED = 8
 """One of so many starts is tried in the whole balance too where there is a rough one."""
 ITERATIONS = 30
 """Of Newton's method from the starts; none of those that have not met by then was seen to meet in twice as many."""
+STEPS_TOGETHER, CELL, AWAY = 3, 0.1, 1.0
+"""Steps after which the starts are thinned: within a cell of such an edge (radii, and of the moment) one is kept, and
+those that are as far outside the range, in radii, are left out; on four scenes at three frequencies none was missed."""
 TOGETHER = 8
 """Curves that are followed at once; some may turn out to be the same."""
 
@@ -120,11 +123,20 @@ def from_starts(balance: Balance, where: SearchRange, free: Indices) -> Array:
 
 
 def _newton(balance: Balance, position: Array, moment: Array, where: SearchRange, free: Indices) -> tuple[Array, Array]:
-    """Distinct places and moments (n, 3) in the range that Newton's method finds; many starts run away."""
-    with np.errstate(all="ignore"):
-        position, moment, step = solve(balance, position, moment, free, ITERATIONS)
-    met = (step < 1e-8) & where.holds(position)
-    points = _distinct(np.concatenate([position[met], moment[met]], axis=1))
+    """Distinct places and moments (n, 3) in the range that Newton's method finds.
+
+    Every few steps those that ran away are given up, and of those that have come together one goes on.
+    """
+    found = []
+    for _ in range(ITERATIONS // STEPS_TOGETHER):
+        with np.errstate(all="ignore"):
+            position, moment, step = solve(balance, position, moment, free, STEPS_TOGETHER)
+        points, met = np.concatenate([position, moment], axis=1), step < 1e-8
+        found.append(points[met & where.holds(position)])
+        going = points[~met & np.isfinite(step) & where.holds(position, AWAY)]
+        going = going[np.unique(np.round(going / CELL), axis=0, return_index=True)[1]]
+        position, moment = going[:, :3], going[:, 3:]
+    points = _distinct(np.concatenate(found))
     return points[:, :3], points[:, 3:]
 
 

@@ -100,15 +100,16 @@ class Rates:
         own = np.array(self._numbers.values)
         if values.shape[-1] > len(Parameter) or not (self._placed or own.size):
             return values
-        if not self._placed and values.ndim == 1:
-            return np.concatenate([values, own])
+        if values.ndim == 1 and (self._rough or not self._placed):
+            return np.concatenate([values, np.zeros(sum(part.count for part in self._placed)), own])
         rows = np.broadcast_to(values, (len(position), values.shape[-1]))[:, : len(Parameter)]
         field, count = cast(FieldTable, self._field), len(rows)
         if self._rough:
             answers = [np.zeros((count, part.count)) for part in self._placed]
         else:
             answers = [part.numbers(field, position, moment, rows) for part in self._placed]
-        return np.concatenate([rows, *answers, np.broadcast_to(own, (count, own.size))], axis=1)
+        parts = [rows, *answers, np.broadcast_to(own, (count, own.size))]
+        return np.concatenate([part.T for part in parts]).T  # column by column, as the machine code reads them
 
     @cached_property
     def _balances(self) -> Any:

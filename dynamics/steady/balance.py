@@ -49,7 +49,7 @@ class Balance:
         if self.values.ndim == 1:
             return self
         spin = self.spin if np.ndim(self.spin) == 0 else np.asarray(self.spin)[rows]
-        return replace(self, values=self.values[rows], spin=spin)
+        return replace(self, values=self.values.T[:, rows].T, spin=spin)
 
     def about(self, position: Array, moment: Array) -> Self:
         """The balance near positions and moments (n, 3), of as many points, see `Rates.about`."""
