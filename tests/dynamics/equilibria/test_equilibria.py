@@ -8,7 +8,7 @@ import pytest
 from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
-from spinlev.dynamics.equilibria import SearchRange, curve, find_equilibria, survey
+from spinlev.dynamics.equilibria import SearchRange, curve as searching, find_equilibria, survey
 from spinlev.dynamics.equilibria.continuation import stepped
 from spinlev.dynamics.motion import Rates, Scales, parameters
 from spinlev.dynamics.steady import EVERY, LATERAL, Balance, EquilibriumError, solve
@@ -136,10 +136,10 @@ def test_starts_thinned_on_the_way_find_what_all_find(name, free, monkeypatch):
     scene = SCENES[name]
     rates, values = Rates(table_of(scene, "cuboid")), parameters(scene, Scales.of(scene), frozen_spin=True)
     balance, where = Balance(rates, values, 0.0), SearchRange(scene, 0.1)
-    thinned = curve.from_starts(balance, where, free)
-    monkeypatch.setattr(curve, "CELL", 1e-12)
-    monkeypatch.setattr(curve, "AWAY", np.inf)
-    every = curve.from_starts(balance, where, free)
+    thinned = searching.from_starts(balance, where, free)
+    monkeypatch.setattr(searching, "CELL", 1e-12)
+    monkeypatch.setattr(searching, "AWAY", np.inf)
+    every = searching.from_starts(balance, where, free)
     apart = np.abs(thinned[:, None] - every).max(axis=2)
     assert 3 <= len(thinned) <= len(every)
     assert apart.min(axis=0).max() < 1e-5
