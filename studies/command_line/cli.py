@@ -27,7 +27,7 @@ app = App(
     name="spinlev",
     version=lambda: version("spinlev"),
     help="Magnetic levitation by rotation: true fields, true motion.",
-    help_format="plaintext",
+    help_format="markdown",
     suppress_keyboard_interrupt=False,
 )
 add_scene_commands(app)
