@@ -9,7 +9,6 @@ import numpy as np
 from ...geometry.basics import MU_0, Array, places_off
 from ...geometry.bodies import Magnet
 from ...geometry.scenes import Floater
-from ..closed_forms import remanent_field
 from ..elements import Watch, watched
 from ..harmonics import (
     FOUR_PI,
@@ -20,7 +19,6 @@ from ..harmonics import (
     factorials,
     field_at_center,
     from_magnetization,
-    interior_coefficients,
     multipole_force,
     outer_sums,
 )
@@ -217,7 +215,7 @@ def point_answer(
 
 def _own_field(rotor: RotorResponse, dipoles: tuple[Array, Array], ball: Ball, degree: int) -> Coefficients:
     """Of the rotor; what its permeability adds to its remanence, by the dipoles, up to a degree of its own."""
-    own = interior_coefficients(lambda points: remanent_field(rotor.magnets, points), ball, degree)
+    own = rotor.closed_field(ball, degree)
     size = min(degree, MOST_ADDED) + 1
     own[:size, :size] += from_magnetization(*dipoles, ball, size - 1)
     return own

@@ -26,6 +26,7 @@ from ..harmonics import (
     outer_sums,
 )
 from ..magnetostatics import PermeableRegions, assemble_regions
+from ..rotor_tables import RotorTable
 from .answer_grid import point_counts
 
 NODES = 24
@@ -54,8 +55,16 @@ class RotorResponse:
 
     def own_field(self, ball: Ball, degree: int) -> Coefficients:
         """Coefficients a_lm (T) of the rotor's field alone, its permeability included, about the ball's centre."""
-        closed = interior_coefficients(lambda points: remanent_field(self.magnets, points), ball, degree)
-        return closed + from_magnetization(*self.remanent_dipoles, ball, degree)
+        return self.closed_field(ball, degree) + from_magnetization(*self.remanent_dipoles, ball, degree)
+
+    def closed_field(self, ball: Ball, degree: int) -> Coefficients:
+        """The same of the remanence alone, as if every μ were 1."""
+        return interior_coefficients(lambda points: self._remanence.evaluate(points)[0], ball, degree)
+
+    @cached_property
+    def _remanence(self) -> RotorTable:
+        magnetized = tuple(magnet for magnet in self.magnets if magnet.polarization.any())
+        return RotorTable("cuboid", self.magnets, magnetized)
 
     def answer(self, sources: Coefficients, ball: Ball, degree: int) -> Coefficients:
         """Coefficients a_lm (T) of the field that the magnets send back to sources c_lm (T) in the ball."""
