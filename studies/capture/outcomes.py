@@ -1,5 +1,6 @@
 """How launches end, as numbers in a result, and shares of many with their errors."""
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 
@@ -42,7 +43,7 @@ class Share:
         return (high - low) / 2
 
     def __str__(self) -> str:
-        digits = 1 if self.error >= 1e-3 or not self.trials else 2
+        digits = max(1, math.ceil(-math.log10(100 * self.error))) if self.trials else 1
         return f"{100 * self.value:.{digits}f} ± {100 * self.error:.{digits}f} %"
 
 
