@@ -136,6 +136,8 @@ def _newton(balance: Balance, position: Array, moment: Array, where: SearchRange
         going = points[~met & np.isfinite(step) & where.holds(position, AWAY)]
         going = going[np.unique(np.round(going / CELL), axis=0, return_index=True)[1]]
         position, moment = going[:, :3], going[:, 3:]
+        if not len(going):
+            break
     points = _distinct(np.concatenate(found))
     return points[:, :3], points[:, 3:]
 

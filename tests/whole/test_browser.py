@@ -108,7 +108,10 @@ def test_the_view_to_turn_shows_rotor_and_floater(report, tmp_path):
     seen(report, "trajectory-view.html", DESK, tmp_path)
     picture = tmp_path / "view.png"
     browser(tmp_path, (report / "trajectory-view.html").as_uri(), f"--screenshot={picture}")
-    pixels = np.asarray(Image.open(picture).convert("RGB")).reshape(-1, 3).astype(int)
+    rows = np.asarray(Image.open(picture).convert("RGB")).astype(int)
+    for edge in (rows[:3], rows[-3:], rows[:, :3], rows[:, -3:]):  # nothing is cut off
+        assert edge.min() > 250
+    pixels = rows.reshape(-1, 3)
     dark, orange = (pixels.max(axis=1) < 100), (pixels[:, 0] > pixels[:, 2] + 80)
     assert dark.sum() > 1000
     assert orange.sum() > 100

@@ -56,6 +56,8 @@ def test_the_time_left_is_told_once_it_can_be_and_in_units_that_suit_it():
     heartbeat.advanced(0.1)
     now = heartbeat._stage_began + 6000.0
     assert heartbeat._progress(now, now - 6000.0) == "10%, 15.0 h left"
+    heartbeat.advanced(0.999)
+    assert heartbeat._progress(now, now - 6000.0) == "100 min so far"
 
 
 def _first(said, word):
