@@ -24,7 +24,7 @@ ITERATIONS = 30
 """Of Newton's method from the starts; none of those that have not met by then was seen to meet in twice as many."""
 STEPS_TOGETHER, CELL, AWAY = 3, 0.1, 1.0
 """Steps after which the starts are thinned: within a cell of such an edge (radii, and of the moment) one is kept, and
-those that are as far outside the range, in radii, are left out; on four scenes at three frequencies none was missed."""
+those that are as far outside the range, in radii, are left out; a test compares what is found with what all find."""
 TOGETHER = 8
 """Curves that are followed at once; some may turn out to be the same."""
 

@@ -50,6 +50,8 @@ def mutual_table(
 ) -> MutualTable:
     """The answers of a rotor and a floater, by finite elements of a degree, with errors against the next.
 
+    `watch` hears of the progress.
+
     Raises
     ------
     InputError : a magnet's permeability has other axes than its body, or it is a part from a file

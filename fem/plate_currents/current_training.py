@@ -14,7 +14,7 @@ import numpy as np
 from ...geometry.basics import Array
 from ..closed_forms import ComplexArray
 from ..eddy_currents import ClassFactor, EddySpace, FieldRows, ShiftedSystem
-from ..elements import Watch, unwatched
+from ..elements import Watch, unwatched, watched
 from .current_space import CurrentSpace
 from .shift_basis import Residuals, class_basis
 from .sources import SourceSet
@@ -83,8 +83,8 @@ def train(
     fields, inductances = [], []
     couplings = np.zeros((len(omegas), *[tests.shape[1]] * 2), complex)
     residuals = np.zeros_like(couplings)
-    for done, (parity_class, driving, testing) in enumerate(zip(space.parity.classes, sources, tests, strict=True)):
-        watch(f"currents at order {space.order}", done / len(sources))
+    classes = zip(space.parity.classes, sources, tests, strict=True)
+    for parity_class, driving, testing in watched(classes, watch, f"currents at order {space.order}"):
         solve = partial(_solved, rows, system.factor(parity_class))
         basis = class_basis(driving * scale[:, None], solve, omegas, allowed / len(sources))
         left = Residuals.of(testing, basis)

@@ -128,12 +128,7 @@ def look(plotter: pv.Plotter, scene: Scene, depth: float) -> None:
 
     `depth` of the floater below the rotor, mm.
     """
-    side = -1.0 if scene.plate and scene.plate.box.center[0] > 0 else 1.0
-    away = np.array([side * 0.14, -1.0, 0.15])
-    away /= np.linalg.norm(away)
-    right = np.cross([0.0, 0.0, 1.0], away)
-    right /= np.linalg.norm(right)
-    upwards = np.cross(away, right)
+    away, right, upwards = axes_of_view(scene, 0.15)
     seen = np.array([(s * 1.6 * depth, 0, z) for s in (-1, 1) for z in (-1.6 * depth, 0.8 * depth)])
     if scene.plate is not None:
         seen = np.concatenate([seen, corners_mm(scene.plate.box)])
@@ -146,6 +141,16 @@ def look(plotter: pv.Plotter, scene: Scene, depth: float) -> None:
     plotter.camera.parallel_scale = 0.54 * max(np.ptp(up), np.ptp(across) * high / wide)
     plotter.camera.clipping_range = (1.0, 5e3)
     plotter.add_axes()
+
+
+def axes_of_view(scene: Scene, height: float) -> tuple[Array, Array, Array]:
+    """Unit vectors (3,) to the camera, to the right and upwards, as of `look`; `height` of the camera over its way."""
+    side = -1.0 if scene.plate and scene.plate.box.center[0] > 0 else 1.0
+    away = np.array([side * 0.14, -1.0, height])
+    away /= np.linalg.norm(away)
+    right = np.cross([0.0, 0.0, 1.0], away)
+    right /= np.linalg.norm(right)
+    return away, right, np.cross(away, right)
 
 
 def _box(box: Box) -> pv.DataSet:

@@ -16,12 +16,15 @@ from trame_vtk.modules.vtk.serializers import (
 )
 
 from ...geometry.basics import Array
+from ...geometry.scenes import Scene
 from .field_lines import add_lines
-from .still import draw_bodies, new_plotter
+from .still import axes_of_view, draw_bodies, new_plotter
 from .view import View
 
 STEP = 2.0
 """Longest step along a field line, mm: a line that a browser draws needs no more."""
+HEIGHT = 0.25
+"""Of the camera over its way to the scene: more than in a still picture, for a near plate is seen in perspective."""
 MARGIN = 0.92
 """Part of the window's width and height that the scene fills."""
 
@@ -35,32 +38,30 @@ def turnable_scene(view: View) -> bytes:
     draw_bodies(plotter, view)
     if view.plane is not None:
         add_lines(plotter, view.plane, view.scene, STEP)
-    _look(plotter)
+    _look(plotter, view.scene)
     plotter.render()
     content = _exported(plotter)
     plotter.close()
     return content
 
 
-def _look(plotter: pv.Plotter) -> None:
+def _look(plotter: pv.Plotter, scene: Scene) -> None:
     """From the front and a little from above, from so near that a square window just shows everything.
 
     From a finite distance and with VTK's usual angle of view: the viewer knows no other. A corner at (x, z) across and
     towards the camera at (c, d) is within the half angle of tangent t if |x - c| <= t (d - z); two corners decide c and
     d, and the same holds for the height.
     """
-    away, up = np.array([0.14, -1.0, 0.25]), np.array([0.0, 0.0, 1.0])
-    away /= np.linalg.norm(away)
-    right = np.cross(up, away) / np.linalg.norm(np.cross(up, away))
+    away, right, upwards = axes_of_view(scene, HEIGHT)
     corners = np.concatenate([_corners(actor.bounds) for actor in plotter.renderer.actors.values() if actor.bounds])
     slope = MARGIN * np.tan(np.radians(plotter.camera.view_angle) / 2)
     middle, distance = np.zeros(3), 0.0
-    for axis in (right, np.cross(away, right)):
+    for axis in (right, upwards):
         more, less = (float((corners @ (slope * away + side * axis)).max()) for side in (1, -1))
         middle += axis * (more - less) / 2
         distance = max(distance, (more + less) / 2 / slope)
     depth = float((corners @ away).mean())
-    plotter.camera_position = [middle + distance * away, middle + depth * away, up]
+    plotter.camera_position = [middle + distance * away, middle + depth * away, (0, 0, 1)]
     plotter.reset_camera_clipping_range()
 
 

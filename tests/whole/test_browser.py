@@ -21,7 +21,7 @@ from spinlev.studies.catalogue.drawings import read_result
 from spinlev.studies.catalogue.show import flight_of
 from spinlev.studies.one_scene import simulate_job
 from spinlev.studies.pictures import last_view
-from spinlev.studies.rendering import Turnable, drawn, page, unavailable
+from spinlev.studies.rendering import Turnable, View, drawn, page, unavailable
 from spinlev.studies.terminal import Models
 
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
@@ -108,15 +108,26 @@ def test_the_view_to_turn_shows_rotor_and_floater(report, tmp_path):
     seen(report, "trajectory-view.html", DESK, tmp_path)
     picture = tmp_path / "view.png"
     browser(tmp_path, (report / "trajectory-view.html").as_uri(), f"--screenshot={picture}")
-    rows = np.asarray(Image.open(picture).convert("RGB")).astype(int)
-    for edge in (rows[:3], rows[-3:], rows[:, :3], rows[:, -3:]):  # nothing is cut off
-        assert edge.min() > 250
-    pixels = rows.reshape(-1, 3)
+    pixels = np.asarray(Image.open(picture).convert("RGB")).reshape(-1, 3).astype(int)
     dark, orange = (pixels.max(axis=1) < 100), (pixels[:, 0] > pixels[:, 2] + 80)
     assert dark.sum() > 1000
     assert orange.sum() > 100
     assert 0.3 < (pixels.min(axis=1) > 250).mean() < 0.99
     assert (report / "trajectory-view.html").stat().st_size < 3_000_000
+
+
+def test_the_view_to_turn_cuts_no_plate_off(tmp_path):
+    """A deep plate that is wider than all else; the margin of the picture stays white."""
+    if unavailable() is not None:
+        pytest.skip(unavailable())
+    place = np.array([0.0, 0.0, -0.019])
+    view = View(load_scene(SCENES / "tilt-over-plate.toml"), place, np.array([0.0, 0.0, 1.0]), place[None].repeat(2, 0))
+    (tmp_path / "view.html").write_bytes(page(drawn(Turnable(view))))
+    picture = tmp_path / "view.png"
+    browser(tmp_path, (tmp_path / "view.html").as_uri(), f"--screenshot={picture}")
+    rows = np.asarray(Image.open(picture).convert("L"))
+    assert (rows < 250).mean() > 0.1
+    assert min(edge.min() for edge in (rows[:3], rows[-3:], rows[:, :3], rows[:, -3:])) > 250
 
 
 @pytest.mark.parametrize("width", [PHONE, DESK])

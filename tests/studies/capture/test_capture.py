@@ -50,10 +50,11 @@ def test_errors_of_shares_are_those_of_another_program():
         known = binomtest(hits, trials).proportion_ci(one_sigma, method="wilson")
         assert Share(hits, trials).bounds == pytest.approx((known.low, known.high), abs=1e-12)
     assert np.isnan(Share(0, 0).value)
-    assert [str(share) for share in (Share(142, 200), Share(3, 4000), Share(0, 4000))] == [
+    assert [str(share) for share in (Share(142, 200), Share(3, 4000), Share(0, 4000), Share(0, 10_000))] == [
         "71.0 ± 3.2 %",
         "0.07 ± 0.05 %",
         "0.00 ± 0.01 %",
+        "0.000 ± 0.005 %",
     ]
 
 
