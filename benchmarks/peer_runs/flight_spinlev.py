@@ -17,6 +17,7 @@ start = State(*start_of_flight(case))
 
 
 def flight():
+    """The table, the compiled flight, and a second of it."""
     table = rotor_table(SCENE.rotor, "cuboid" if case == "closed form" else "dipole")
     return integrate(SCENE, compile_flight(SCENE, table, 1.0, tolerance, True), start, 1.0, None)
 

@@ -11,6 +11,7 @@ moment = np.pi / 6 * SPHERE["diameter"] ** 3 * SPHERE["polarization"] / MU_0 * S
 
 
 def wrench():
+    """Force (3,) N and torque (3,) N m on the sphere, to 40 digits."""
     gradient = np.array([float(v) for v in slope(SPHERE_CENTER)]).reshape(3, 3)
     return moment @ gradient, np.cross(moment, [float(v) for v in field(SPHERE_CENTER)])
 

@@ -20,6 +20,7 @@ case, n, cells = sys.argv[1], int(sys.argv[2]), int(sys.argv[3])
 
 
 def bodies():
+    """The cube and the sphere."""
     cube = magpylib.magnet.Cuboid(polarization=(REMANENCE, 0, 0), dimension=[EDGE] * 3)
     polarization = SPHERE["polarization"] * SPHERE_AXIS
     sphere = magpylib.magnet.Sphere(polarization=polarization, diameter=SPHERE["diameter"], position=SPHERE_CENTER)
@@ -33,6 +34,7 @@ def rigid():
 
 
 def permeable():
+    """Force and torque on the sphere's cells, the cube in n³ cells."""
     cube, sphere = bodies()
     cube.susceptibility, sphere.susceptibility = RECOIL - 1, SPHERE["recoil"] - 1
     cube = mesh_Cuboid(cube, (n, n, n))

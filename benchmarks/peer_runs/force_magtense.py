@@ -13,6 +13,7 @@ n, radius = int(sys.argv[2]), SPHERE["diameter"] / 2
 
 
 def wrench():
+    """Force (3,) N and torque (3,) N m on the sphere."""
     tiles = Tiles(n=2, tile_type=[6, 2], size=[[radius, 0, 0], [EDGE] * 3], offset=[SPHERE_CENTER, np.zeros(3)],
                   M_rem=REMANENCE / MU_0, easy_axis=[SPHERE_AXIS, np.array([1.0, 0, 0])], mu_r_ea=RECOIL,
                   mu_r_oa=RECOIL)  # fmt: skip

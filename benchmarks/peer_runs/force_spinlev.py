@@ -22,12 +22,14 @@ floater = Floater(SPHERE["diameter"] / 2, SPHERE["polarization"], recoil, 7500.0
 
 
 def rigid():
+    """Force (3,) N and torque (3,) N m on the rigid sphere, by the closed form."""
     field, gradient = (value[0] for value in rotor_table((cube,), "cuboid").evaluate(SPHERE_CENTER[None])[:2])
     moment = floater.moment * SPHERE_AXIS
     return moment @ gradient, np.cross(moment, field)
 
 
 def permeable():
+    """The same of two bodies that magnetise each other, by finite elements."""
     (rotor,) = rotor_ladder((cube,), (order,))
     total = two_body(rotor, floater, SPHERE_CENTER, SPHERE_AXIS).total
     return total.force, total.torque

@@ -11,6 +11,7 @@ frequency, size, order = FREQUENCIES[sys.argv[1]], float(sys.argv[2]), int(sys.a
 
 
 def reaction():
+    """What the plate answers to the dipoles, in files as GetDP writes them, and its unknowns."""
     files = {"points.pro": lists_file(p=PLACES, m=MOMENTS)}
     return solve("plate", "Currents", files, [], frequency=frequency, size=1e-3 * size, second=order - 1)
 
