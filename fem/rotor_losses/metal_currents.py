@@ -55,16 +55,23 @@ class Metal:
         return np.asarray(self.conductivity * self.mesh.unit**3 * self.points.weights)
 
     def dissipation(self, sources: Potentials, loads: Array | None = None) -> Array:
-        """σ ∫ E_a·E_b dV (k, k) of the rates of k sources; their `loads`, if they are known."""
-        loads = self.loads(sources) if loads is None else loads
+        """σ ∫ E_a·E_b dV (k, k) of the rates of k sources; of many, whose fields are large, with their `loads`."""
+        if loads is None:
+            fields = sources(self.places)
+            loads, blocks = self._integrals(fields), iter([(fields, self.weights)])
+        else:
+            blocks = self._blocks(sources)
         potentials = self.solutions(loads)
-        whole = np.sum([a.T @ (np.repeat(w, 3)[:, None] * a) for a, w in self._blocks(sources)], axis=0)
+        whole = np.sum([_flat(a).T @ _flat(w[:, None, None] * a) for a, w in blocks], axis=0)
         return np.asarray(whole - self.conductivity * self.mesh.unit**3 * loads @ potentials.T)
 
     def loads(self, sources: Potentials) -> Array:
         """∫ A·∇v (k, unknowns), in units of the mesh."""
-        test, fields = self.space.TestFunction(), sources(self.places)
-        found = []
+        return self._integrals(sources(self.places))
+
+    def _integrals(self, fields: Array) -> Array:
+        """∫ A·∇v (k, unknowns) of A (n, 3, k) at the points."""
+        test, found = self.space.TestFunction(), []
         for k in range(fields.shape[2]):
             form = ng.LinearForm(self.space)
             along = ng.CF(tuple(self.points.function(fields[:, axis, k]) for axis in range(3)))
@@ -94,8 +101,11 @@ class Metal:
 
     def _blocks(self, sources: Potentials) -> Iterator[tuple[Array, Array]]:
         for start in range(0, len(self.places), BLOCK):
-            fields = sources(self.places[start : start + BLOCK])
-            yield fields.reshape(-1, fields.shape[2]), self.weights[start : start + BLOCK]
+            yield sources(self.places[start : start + BLOCK]), self.weights[start : start + BLOCK]
+
+
+def _flat(values: Array) -> Array:
+    return values.reshape(-1, values.shape[-1])
 
 
 def metal_of(bodies: Sequence[Solid], conductivity: float, order: int) -> Metal:

@@ -9,12 +9,20 @@ from numpy.typing import ArrayLike
 from .arrays import Array, frozen_array
 from .text import millimetres
 
+ROUND_OFF = 4e-16
+"""Of the entries of a rotation."""
+
 
 def rotation_matrix(degrees_xyz: ArrayLike) -> Array:
-    """Matrix that turns about the fixed x, then y, then z axis, by angles in degrees."""
+    """Matrix that turns about the fixed x, then y, then z axis, by angles in degrees.
+
+    Entries within round-off of 0 or ±1 are just that: rotors of one kind are alike in which entries are plain.
+    """
     from scipy.spatial.transform import Rotation  # three times the time of NumPy to load
 
-    return np.asarray(Rotation.from_euler("xyz", np.asarray(degrees_xyz, float), degrees=True).as_matrix())
+    matrix = Rotation.from_euler("xyz", np.asarray(degrees_xyz, float), degrees=True).as_matrix()
+    plain = np.round(matrix) + 0.0  # no -0
+    return np.asarray(np.where(np.abs(matrix - plain) < ROUND_OFF, plain, matrix))
 
 
 @dataclass(frozen=True, eq=False)

@@ -3,6 +3,7 @@
 import hashlib
 import json
 from dataclasses import dataclass, replace
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -12,12 +13,11 @@ from scipy.stats import qmc
 
 from ...dynamics.effects import Dissipation
 from ...fem.rotor_losses import RotorLosses, cached_rotor_losses
-from ...fem.rotor_tables import at_home
 from ...fem.storage import digest_of, from_cache, read_checked, write_checked
 from ...geometry.basics import MAGNET_CONDUCTIVITY, Array
-from ...geometry.bodies import Magnet
-from ...geometry.scenes import Scene
-from ..article import FLOATER, levitation_of
+from ...geometry.bodies import Magnet, horizontal
+from ...geometry.scenes import Drag, Scene
+from ..article import EDGE, FLOATER, REMANENCE, levitation_of
 from ..results import Point, variable
 from ..terminal import FieldModel
 from .nodes import QUANTITIES, Levitating
@@ -110,10 +110,17 @@ def design_row(point: Point) -> xr.Dataset:
 
 def losses_of(scene: Scene, steel: bool) -> tuple[Dissipation, Dissipation | None]:
     """Losses of a scene's magnets and, if asked for, of the block that balances a displaced cube."""
-    home = replace(at_home(scene.rotor[:1])[0], conductivity=MAGNET_CONDUCTIVITY)
-    alone = replace(scene, rotor=(home,), floater=FLOATER)
-    carried = CarriedLosses(cached_rotor_losses(alone, lambda _: None)[0], scene.rotor)
+    magnet, block = _losses_at_home(scene.rotor[0].recoil_permeability, steel)
+    return CarriedLosses(magnet, scene.rotor), block
+
+
+@cache
+def _losses_at_home(permeability: float, steel: bool) -> tuple[RotorLosses, RotorLosses | None]:
+    """Those of a cube about the origin, and of the block above it."""
+    cube = replace(horizontal(0.0, EDGE, REMANENCE, permeability)[0], conductivity=MAGNET_CONDUCTIVITY)
+    alone = Scene(100.0, (cube,), FLOATER, Drag(0.0, 0.0))
+    magnet = cached_rotor_losses(alone, lambda _: None)[0]
     if not steel:
-        return carried, None
-    block = replace(alone, rotor=(replace(home, conductivity=None),), conductors=(SPACER,))
-    return carried, cached_rotor_losses(block, lambda _: None)[0]
+        return magnet, None
+    block = replace(alone, rotor=(replace(cube, conductivity=None),), conductors=(SPACER,))
+    return magnet, cached_rotor_losses(block, lambda _: None)[0]

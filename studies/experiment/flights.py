@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from ...geometry.basics import Array
 from .design import SPINS
 from .nodes import EFFECTS, MOTIONS
-from .surrogate import FITTED, WITH_STRENGTH, Surrogate, strength
+from .surrogate import FITTED, WITH_STRENGTH, Surrogate, at_spin, strength
 
 STEPS = 40
 LONGEST = 250.0
@@ -82,7 +82,8 @@ class Course:
 
     def parted(self, count: int) -> list[Self]:
         """As many equal parts, in order."""
-        each = [np.split(getattr(self, field.name), count) for field in fields(self)]
+        whole = [getattr(self, field.name) for field in fields(self)]
+        each = [values.reshape(count, -1, *values.shape[1:]) for values in whole]
         return [type(self)(*part) for part in zip(*each, strict=True)]
 
     def lasts(self, needed: Array) -> Array:
@@ -95,11 +96,11 @@ class Course:
 def flown(surrogate: Surrogate, asked: Conditions) -> Course:
     """Flights of many rotors."""
     longest = asked.longest[:, None]
-    reduced = surrogate.reduced(asked.inputs)
     part = np.linspace(surrogate.kind.near, surrogate.kind.far, STEPS)
+    along = surrogate.along(asked.inputs, part)
     usual = WITH_STRENGTH * np.log(strength(surrogate.name, asked.inputs))
-    spin = _spins(surrogate, reduced, part, np.log(asked.frequency) - usual)
-    known = surrogate.at(reduced, part, np.clip(spin, *SPINS))
+    spin = _spins(along[..., PLACE["frequency"]], part, np.log(asked.frequency) - usual)
+    known = at_spin(along, np.clip(spin, *SPINS))
     top = np.argmax(spin, axis=1)
     highest = np.take_along_axis(spin, top[:, None], 1)[:, 0]
     way = np.diff(np.clip(spin, np.minimum(asked.spin, highest)[:, None], None), axis=1)
@@ -168,12 +169,11 @@ def _first(values: Array, where: NDArray[np.bool_]) -> Array:
     return np.asarray(np.take_along_axis(values, np.argmax(where, axis=1)[:, None], 1)[:, 0])
 
 
-def _spins(surrogate: Surrogate, reduced: Array, part: Array, pitch: Array) -> Array:
+def _spins(along: Array, part: Array, pitch: Array) -> Array:
     """Body spin (n, k) at which a floater levitates at each part of the way; `pitch` (n,) as the fitted frequency."""
     spin = np.full((len(pitch), len(part)), 0.1)
     for _ in range(TURNS):
-        known = surrogate.at(reduced, part, np.clip(spin, *SPINS), slice(0, 1))[..., 0]
-        spin = 1 - np.exp(2 * (known - pitch[:, None])) / (1 - part)
+        spin = 1 - np.exp(2 * (at_spin(along, np.clip(spin, *SPINS)) - pitch[:, None])) / (1 - part)
     return spin
 
 

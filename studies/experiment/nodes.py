@@ -8,8 +8,10 @@ adds M to the derivatives of the rates makes it grow by Re w*Mv/(w*v).
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
+from numpy.typing import ArrayLike
 from scipy.optimize import brentq
 
 from ...dynamics.branches import Family, frequencies
@@ -34,8 +36,9 @@ frequency of the bounce, Hz; growth without losses, 1/s; of two motions the freq
 ITERATIONS, CLOSE = 40, 1e-10
 UNIT = 50.0
 """Hz over which the equilibrium moves by about a radius of the floater."""
-REACH = (11.5e-3, 0.15)
-"""Distances between which the attraction is looked at, m."""
+REACH = (11.5e-3, 22e-3, 40e-3, 0.15)
+"""Distances up to which the attraction is looked at, m: farther only where it still carries the weight there."""
+STEPS = 24
 OFF = [Parameter.LINEAR_DRAG, Parameter.TILT_DRAG, Parameter.SPIN_DRAG, Parameter.TILT_EDDY, Parameter.SPIN_EDDY]
 AIR, EDDY = OFF[:3], OFF[3:]
 
@@ -68,14 +71,15 @@ class Levitating:
         """Distance on the axis at which the attraction alone carries the weight, m."""
         weight = self.scene.floater.mass * abs(float(self.scene.gravity[2])) / self.scene.floater.moment
 
-        def excess(distance: float) -> float:
-            return float(self.table.evaluate([[0.0, 0.0, -distance]])[1][0, 2, 2]) - weight
+        def excess(distances: ArrayLike) -> Array:
+            return self.table.evaluate(np.multiply.outer(distances, [0.0, 0.0, -1.0]))[1][:, 2, 2] - weight
 
-        grid = np.geomspace(*REACH, 60)
-        carried = [k for k, distance in enumerate(grid[:-1]) if excess(distance) > 0]
-        if not carried:
-            raise EquilibriumError("The attraction carries the weight at no distance.")
-        return float(brentq(excess, grid[carried[-1]], grid[carried[-1] + 1]))
+        for nearest, farthest in pairwise(REACH):
+            grid = np.geomspace(nearest, farthest, STEPS)
+            carried = np.flatnonzero(excess(grid) > 0)
+            if len(carried) and carried[-1] + 1 < STEPS:
+                return float(brentq(lambda distance: excess([distance])[0], *grid[carried[-1] : carried[-1] + 2]))
+        raise EquilibriumError("The attraction carries the weight at no distance.")
 
     def nodes(self, heights: Array, spins: Array) -> Array:
         """Quantities (height, spin, quantity) at distances (n,) m along the axis and body spins; NaN where none is."""

@@ -18,7 +18,7 @@ from .priors import NAMES, UNKNOWNS, drawn
 
 KEPT = 1000
 """Draws of the posterior that are kept."""
-TOGETHER = 2000
+TOGETHER = 500
 """Draws that are evaluated in one call."""
 DONE = 0.1
 """What the evidence that remains may add to its logarithm."""

@@ -6,7 +6,6 @@ the rows B of one rotor are missed by (1 - H_BB)⁻¹ r_B if it is left out (R. 
 Influence in Regression, 1982), so that one fit gives all.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import product
@@ -137,27 +136,33 @@ class Surrogate:
         """The box in which it holds."""
         return KINDS[self.name]
 
-    def reduced(self, inputs: Array) -> Array:
-        """Coefficients (n, pair, fitted) of the polynomials in part and spin alone, for inputs (n, input)."""
-        scaled = coordinates(self.name, inputs)
+    def along(self, inputs: Array, part: Array) -> Array:
+        """Coefficients (spin power, n, k, fitted) of the polynomials in spin alone: inputs (n, input), parts (k,)."""
+        scaled, (degree, *_) = coordinates(self.name, inputs), self._spread.shape[1:]
         powers = np.polynomial.legendre.legvander(scaled, int(self.terms.max()))
         picked = np.ones((len(inputs), len(self.terms)))
         for k in range(inputs.shape[1]):
             picked = picked * powers[:, k, self.terms[:, k]]
-        return np.asarray(np.einsum("nt,tp,tf->npf", picked, self._pairs[1], self.weights, optimize=True))
+        reduced = picked @ self._spread.reshape(len(self.terms), -1)
+        along = np.polynomial.legendre.legvander(_scaled(part, (self.kind.near, self.kind.far)), degree - 1)
+        found = along @ reduced.reshape(len(inputs), degree, -1)
+        return np.moveaxis(found.reshape(len(inputs), len(part), -1, len(FITTED)), 2, 0)
 
     @cached_property
-    def _pairs(self) -> tuple[Array, Array]:
-        """The degrees (pair, 2) in part and spin that occur, and to which of them each term belongs (term, pair)."""
-        pairs, which = np.unique(self.terms[:, -2:], axis=0, return_inverse=True)
-        return pairs, np.eye(len(pairs))[which.ravel()]
+    def _spread(self) -> Array:
+        """Weights (term, part power, spin power, fitted), each at the powers that its term has."""
+        along, turning = self.terms[:, -2:].T
+        spread = np.zeros((len(self.terms), along.max() + 1, turning.max() + 1, len(FITTED)))
+        spread[np.arange(len(self.terms)), along, turning] = self.weights
+        return spread
 
-    def at(self, reduced: Array, part: Array, spin: Array, which: Sequence[int] | slice = slice(None)) -> Array:
-        """What is fitted (n, k, some) at parts (k,) and spins (n, k) for coefficients (n, pair, fitted)."""
-        pairs, degree = self._pairs[0], int(self.terms[:, -2:].max())
-        along = np.polynomial.legendre.legvander(_scaled(part, (self.kind.near, self.kind.far)), degree)[:, pairs[:, 0]]
-        turning = np.polynomial.legendre.legvander(_scaled(spin, SPINS), degree)[..., pairs[:, 1]]
-        return np.asarray((along * turning) @ reduced[:, :, which])
+
+def at_spin(along: Array, spin: Array) -> Array:
+    """What is fitted (n, k, fitted), at spins (n, k) for what `Surrogate.along` gives; or (n, k) for one of them."""
+    scaled = _scaled(spin, SPINS)
+    return np.asarray(
+        np.polynomial.legendre.legval(scaled[..., None] if along.ndim > 3 else scaled, along, tensor=False)
+    )
 
 
 def fitted(name: str, design: xr.Dataset, degree: int) -> Surrogate:

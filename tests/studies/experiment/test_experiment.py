@@ -22,7 +22,7 @@ from spinlev.studies.experiment.nodes import EFFECTS, QUANTITIES, Levitating
 from spinlev.studies.experiment.priors import NAMES, UNKNOWNS, drawn, likeness
 from spinlev.studies.experiment.rotors import KINDS, scene_of
 from spinlev.studies.experiment.sampling import evidences, posterior
-from spinlev.studies.experiment.surrogate import FITTED, Surrogate, exponents, fitted, targets
+from spinlev.studies.experiment.surrogate import FITTED, Surrogate, at_spin, exponents, fitted, targets
 from spinlev.studies.experiment.synthetic import TRUTH, synthetic_facts
 from spinlev.studies.sweeps import swept
 from spinlev.studies.terminal import Workers
@@ -100,13 +100,13 @@ def test_the_stated_error_is_that_of_rotors_left_out_one_by_one():
     for k in range(14):
         others = fitted("single", bent.isel(rotor=[j for j in range(14) if j != k]), 2)
         one = bent.isel(rotor=[k])
-        told = others.at(others.reduced(one["input"].values), one["part"].values[0], np.zeros((1, 6)), slice(0, 1))
-        missed.append((targets("single", one)[0, :, :, place], others, told))
+        missed.append((targets("single", one)[0, :, :, place], others))
     squares = []
-    for k, (wanted, others, _) in enumerate(missed):
-        reduced = others.reduced(bent["input"].values[[k]])
+    for k, (wanted, others) in enumerate(missed):
+        along = others.along(bent["input"].values[[k]], bent["part"].values[0])
         for j, spin in enumerate(bent["body_spin"].values):
-            guess = others.at(reduced, bent["part"].values[0], np.full((1, 6), spin))[0, :, place]
+            guess = at_spin(along, np.full((1, 6), spin))[0, :, place]
+            np.testing.assert_allclose(at_spin(along[..., place], np.full((1, 6), spin))[0], guess, rtol=1e-14)
             squares.append((wanted[:, j] - guess) ** 2)
     assert len(whole.weights) == len(terms)
     assert whole.errors[place] == pytest.approx(np.sqrt(np.mean(squares)), rel=1e-6)
