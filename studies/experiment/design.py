@@ -91,10 +91,9 @@ def design_row(point: Point) -> xr.Dataset:
     scene = scene_of(inputs, 1.0 if model == "cuboid" else 1.05)
     field: FieldModel = "cuboid" if model == "cuboid" else "fem"
     levitation = levitation_of(scene, field, interaction="mutual" if model == "mutual" else "rigid")
-    losses = losses_of(scene, point["steel"])
     spins, steps = np.linspace(*SPINS, point["spins"]), np.arange(point["heights"]) + 0.5
     part = kind.near + (kind.far - kind.near) * (1 - np.cos(np.pi * steps / len(steps))) / 2
-    floater = Levitating.of(scene, levitation.interaction, losses)
+    floater = Levitating.of(scene, levitation.interaction, lambda: losses_of(scene, point["steel"]))
     hanging = floater.hanging
     nodes = floater.nodes(CONTACT + part * (hanging - CONTACT), spins)
     return xr.Dataset(

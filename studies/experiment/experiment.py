@@ -52,6 +52,7 @@ def experiment_points(quick: bool) -> list[Point]:
         for kind, model, count in _designs(settings, True)
         for number in range(int(settings[count]))
     ]
+    rotors.sort(key=lambda point: point["number"])  # kinds in turn: processes compile the code of one each
     names = tuple(VARIANTS)[: 2 if quick else None]
     return [*rotors, *({"variant": name, "quick": quick} for name in names)]
 

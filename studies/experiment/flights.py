@@ -100,17 +100,20 @@ def flown(surrogate: Surrogate, asked: Conditions) -> Course:
     along = surrogate.along(asked.inputs, part)
     usual = WITH_STRENGTH * np.log(strength(surrogate.name, asked.inputs))
     spin = _spins(along[..., PLACE["frequency"]], part, np.log(asked.frequency) - usual)
-    known = at_spin(along, np.clip(spin, *SPINS))
+    rest = 1 - np.clip(spin, *SPINS)
+    known = at_spin(along, 1 - rest)
+    eddy = rest * np.exp(known[..., PLACE["eddy"]])
     top = np.argmax(spin, axis=1)
     highest = np.take_along_axis(spin, top[:, None], 1)[:, 0]
     way = np.diff(np.clip(spin, np.minimum(asked.spin, highest)[:, None], None), axis=1)
     way = np.where(np.arange(1, STEPS) <= top[:, None], np.maximum(way, 0.0), 0.0)
-    drift = _middle(_drift(known, spin, asked.strengths))
+    drift = _middle(asked.strengths[:, :1] * eddy + 1e-3 * asked.strengths[:, 3:] * known[..., PLACE["air"]])
     time = np.cumsum(way / np.maximum(drift, SLOWEST), axis=1)
     begun = np.concatenate([np.zeros((len(time), 1)), time[:, :-1]], axis=1)
     spent = np.clip(np.minimum(time, longest) - begun, 0.0, None)
     flying = (way > 0) & (begun < longest)
-    growths = [_growth(surrogate, known, spin, asked.strengths, motion) for motion in MOTIONS]
+    over = _growth_over(known, eddy, rest)
+    growths = [_growth(surrogate, known, over[motion], asked.strengths, motion) for motion in MOTIONS]
     each = np.stack([np.cumsum(np.maximum(_middle(growth), 0.0) * spent, axis=1) for growth, _ in growths])
     folds, which = each.max(axis=0), np.argmax(each[:, :, -1], axis=0)
     doubts = np.stack([np.sum(_middle(doubt) * spent, axis=1) for _, doubt in growths])
@@ -129,30 +132,20 @@ def flown(surrogate: Surrogate, asked: Conditions) -> Course:
     )
 
 
-def _eddy(known: Array, spin: Array) -> Array:
-    """Drift (n, k) by the floater's currents at their strength in the design, 1/s."""
-    return np.asarray((1 - np.clip(spin, *SPINS)) * np.exp(known[..., PLACE["eddy"]]))
+def _growth_over(known: Array, eddy: Array, rest: Array) -> dict[str, Array]:
+    """What growth of each small motion is fitted over (n, k), 1/s: drift by the floater's currents, see `targets`."""
+    lateral = np.sqrt(np.maximum(known[..., PLACE["lateral"]], NARROWEST))
+    return {"precession": eddy, "side": eddy / rest / lateral}
 
 
-def _drift(known: Array, spin: Array, strengths: Array) -> Array:
-    """ds/dt (n, k), 1/s."""
-    return np.asarray(
-        strengths[:, 0, None] * _eddy(known, spin) + 1e-3 * strengths[:, 3, None] * known[..., PLACE["air"]]
-    )
-
-
-def _growth(surrogate: Surrogate, known: Array, spin: Array, strengths: Array, motion: str) -> tuple[Array, Array]:
+def _growth(surrogate: Surrogate, known: Array, over: Array, strengths: Array, motion: str) -> tuple[Array, Array]:
     """Growth of a small motion, and its error by the surrogate's (n, k), 1/s."""
-    over = _eddy(known, spin)
-    if motion == "side":
-        lateral = np.sqrt(np.maximum(known[..., PLACE["lateral"]], NARROWEST))
-        over = over / (1 - np.clip(spin, *SPINS)) / lateral
-    growth, variance = np.zeros(spin.shape), np.zeros(spin.shape)
-    for k, name in enumerate(EFFECTS):
-        by, place = strengths[:, k, None] * (1e-3 if name == "air" else over), PLACE[f"{motion} {name}"]
-        growth = growth + by * known[..., place]
-        variance = variance + (by * surrogate.errors[place]) ** 2
-    return growth, np.sqrt(variance)
+    first, air = (PLACE[f"{motion} {name}"] for name in (EFFECTS[0], EFFECTS[-1]))
+    currents, errors = strengths[:, :-1], surrogate.errors[first:air]
+    growth = over * (known[..., first:air] @ currents[..., None])[..., 0]
+    growth += 1e-3 * strengths[:, -1:] * known[..., air]
+    still = (1e-3 * strengths[:, -1:] * surrogate.errors[air]) ** 2
+    return growth, np.sqrt(over**2 * ((currents * errors) ** 2).sum(axis=1)[:, None] + still)
 
 
 def _two_bounces(known: Array, frequency: Array, spent: Array) -> NDArray[np.bool_]:

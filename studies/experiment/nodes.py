@@ -6,7 +6,7 @@ had afterwards by a factor: with left and right eigenvectors w and v of a small 
 adds M to the derivatives of the rates makes it grow by Re w*Mv/(w*v).
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
@@ -39,6 +39,7 @@ UNIT = 50.0
 REACH = (11.5e-3, 22e-3, 40e-3, 0.15)
 """Distances up to which the attraction is looked at, m: farther only where it still carries the weight there."""
 STEPS = 24
+Losses = tuple[Dissipation | None, Dissipation | None]
 OFF = [Parameter.LINEAR_DRAG, Parameter.TILT_DRAG, Parameter.SPIN_DRAG, Parameter.TILT_EDDY, Parameter.SPIN_EDDY]
 AIR, EDDY = OFF[:3], OFF[3:]
 
@@ -51,18 +52,17 @@ class Levitating:
     ----------
     scene : without losses
     table : the rotor's field
-    losses : in the magnets, and in the steel; None where they are not asked for
+    losses : gives those in the magnets and in the steel, None where they are not asked for; called when something
+        levitates, so that one process compiles while another computes the losses that both need
     """
 
     scene: Scene
     table: FieldTable
     rates: Rates
-    losses: tuple[Dissipation | None, Dissipation | None]
+    losses: Callable[[], Losses]
 
     @classmethod
-    def of(
-        cls, scene: Scene, interaction: Interaction, losses: tuple[Dissipation | None, Dissipation | None]
-    ) -> "Levitating":
+    def of(cls, scene: Scene, interaction: Interaction, losses: Callable[[], Losses]) -> "Levitating":
         """With the floater's currents and real air among the compiled equations, where their strength is zero."""
         return cls(scene, interaction, Rates(with_effects(_lossy(scene), interaction)), losses)
 
@@ -146,7 +146,7 @@ class Levitating:
             self.rates(state, _without(v, [Parameter.SPIN_DRAG, Parameter.SPIN_EDDY]))[1][0] - bare for v in (eddy, air)
         ]
         there = scales.unpack(state[0])
-        brakes = [np.zeros((12, 12)) if loss is None else brake_slope(loss, scene, there) for loss in self.losses]
+        brakes = [np.zeros((12, 12)) if loss is None else brake_slope(loss, scene, there) for loss in self.losses()]
         small = modes(state[0], bare)
         named = {mode.name: mode.frequency_hz for mode in named_modes(small, scales.time)}
         effects = [slopes[0], *brakes, slopes[1]]
