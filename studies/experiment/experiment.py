@@ -37,7 +37,7 @@ SETTINGS: Mapping[bool, Point] = {
     },
     True: {
         "heights": 7, "spins": 3, "steel": False, "single": 12, "stack": 16, "better": 0,
-        "single_degree": 2, "stack_degree": 2, "better_degree": 0, "live": 50, "walks": 12, "draws": 1 << 11,
+        "single_degree": 2, "stack_degree": 2, "better_degree": 0, "live": 50, "walks": 8, "draws": 1 << 11,
     },
 }  # fmt: skip
 """Nodes of a rotor, whether there is steel, rotors of designs, degrees of surrogates, live points, walks, draws."""
