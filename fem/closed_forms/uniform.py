@@ -9,16 +9,7 @@ from numpy.typing import NDArray
 
 from ...geometry.basics import Array, Box, Cylinder, Part, Ring, Sphere
 from ...geometry.bodies import Magnet
-from ..harmonics import (
-    CompiledField,
-    FieldExpressions,
-    MultipoleExpansion,
-    Number,
-    as_rows,
-    turned_expressions,
-    turned_field,
-    uniform_moments,
-)
+from ..harmonics import CompiledField, FieldExpressions, Number, turned_expressions, turned_field, uniform_moments
 from .cuboid import cuboid_field
 from .round_magnets import round_slope, round_tensor
 from .segments import resolved_distance, segments_field
@@ -63,8 +54,8 @@ class UniformField:
         return isinstance(self.magnet.body, Cylinder | Ring)
 
     @cached_property
-    def _far(self) -> MultipoleExpansion:
-        return uniform_moments(self.magnet, FAR_DEGREE)
+    def _far(self) -> CompiledField:
+        return CompiledField(uniform_moments(self.magnet, FAR_DEGREE).expressions, seldom=True)
 
     def rows(self, columns: Array) -> Array:
         """B (T) outside, μ0 H inside, and its gradient (T/m), (12, n), at `columns` (3, n) m; 1e-13 at any distance.
@@ -73,11 +64,9 @@ class UniformField:
         """
         far, close = self.is_far(columns), self.is_close(columns)
         found = np.empty((12, columns.shape[1]))
-        near = ~far & ~close
-        if near.any():
-            found[:, near] = self._near.rows(np.ascontiguousarray(columns[:, near]))
-        if far.any():
-            found[:, far] = as_rows(*self._far.evaluate(columns[:, far].T))
+        for chosen, field in ((~far & ~close, self._near), (far, self._far)):
+            if chosen.any():
+                found[:, chosen] = field.rows(np.ascontiguousarray(columns[:, chosen]))
         if close.any():
             found[:, close] = self._beside(columns[:, close].T)
         return found
@@ -86,7 +75,8 @@ class UniformField:
         """As `rows`, beside the surface of a round magnet."""
         body, polarization = self.magnet.body, self.magnet.polarization_in_rotor
         assert not isinstance(body, Box | Part)
-        return as_rows(round_tensor(body, points) @ polarization, round_slope(body, points) @ polarization)
+        field, slope = round_tensor(body, points) @ polarization, round_slope(body, points) @ polarization
+        return np.concatenate([field.T, slope.reshape(len(points), 9).T])
 
     def is_close(self, columns: Array) -> NDArray[np.bool_]:
         """Which of `columns` (3, n) m are in a round magnet or so near that the expressions do not do: (n,)."""

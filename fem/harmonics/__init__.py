@@ -7,7 +7,6 @@ from .compiled import (
     FieldExpressions as FieldExpressions,
     Number as Number,
     as_columns as as_columns,
-    as_rows as as_rows,
     field_and_gradient as field_and_gradient,
 )
 from .expressions import harmonic_sums as harmonic_sums

@@ -52,8 +52,3 @@ def as_columns(points: ArrayLike) -> Array:
 def field_and_gradient(rows: Array) -> tuple[Array, Array]:
     """B (n, 3) and its gradient (n, 3, 3) as views of (12, n)."""
     return rows[:3].T, np.moveaxis(rows[3:].reshape(3, 3, -1), -1, 0)
-
-
-def as_rows(field: Array, gradient: Array) -> Array:
-    """B (n, 3) and its gradient (n, 3, 3) as (12, n)."""
-    return np.concatenate([field.T, gradient.reshape(len(field), 9).T])

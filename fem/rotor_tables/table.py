@@ -12,15 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from ...geometry.basics import Array, InputError, counted, html_table
 from ...geometry.bodies import Magnet
 from ..closed_forms import UniformField, squared_distance
-from ..harmonics import (
-    CompiledField,
-    FieldExpressions,
-    MultipoleExpansion,
-    Number,
-    as_columns,
-    as_rows,
-    field_and_gradient,
-)
+from ..harmonics import CompiledField, FieldExpressions, MultipoleExpansion, Number, as_columns, field_and_gradient
 
 BLUR = 0.5
 """Share of the root mean square of a doubt that is added to its field."""
@@ -112,6 +104,11 @@ class RotorTable:
     def _near(self) -> CompiledField:
         return CompiledField(self.expressions, seldom=any(form.is_long for form in self._closed_forms))
 
+    @cached_property
+    def _far(self) -> tuple[CompiledField, ...]:
+        """The parts one by one, where the closed forms have to give way to moments."""
+        return tuple(CompiledField(expansion.expressions, seldom=True) for expansion in self.expansions)
+
     def evaluate(self, points: ArrayLike) -> tuple[Array, Array]:
         """B (n, 3) T and ∂B_i/∂x_j (n, 3, 3) T/m at points (n, 3) m in the rotor's frame.
 
@@ -131,8 +128,8 @@ class RotorTable:
         rows = np.zeros((12, columns.shape[1]))
         for form in self._closed_forms:
             rows += form.rows(columns)
-        for expansion in self.expansions:
-            rows += as_rows(*expansion.evaluate(columns.T))
+        for part in self._far:
+            rows += part.rows(columns)
         return field_and_gradient(rows)
 
     @property

@@ -8,7 +8,7 @@ adds M to the derivatives of the rates makes it grow by Re w*Mv/(w*v).
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from itertools import pairwise
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -19,6 +19,7 @@ from ...dynamics.effects import Dissipation, brake_slope, with_effects
 from ...dynamics.motion import Interaction, Parameter, Rates, Scales, parameters
 from ...dynamics.slow_drift import SlowTorque
 from ...dynamics.steady import EquilibriumError, modes, named_modes, tangent_spaces
+from ...fem.harmonics import CompiledField
 from ...fem.rotor_tables import FieldTable
 from ...geometry.basics import MAGNET_CONDUCTIVITY, Array
 from ...geometry.scenes import Drag, Scene
@@ -36,9 +37,8 @@ frequency of the bounce, Hz; growth without losses, 1/s; of two motions the freq
 ITERATIONS, CLOSE = 40, 1e-10
 UNIT = 50.0
 """Hz over which the equilibrium moves by about a radius of the floater."""
-REACH = (11.5e-3, 22e-3, 40e-3, 0.15)
-"""Distances up to which the attraction is looked at, m: farther only where it still carries the weight there."""
-STEPS = 24
+REACH = (11.5e-3, 0.15)
+"""Distances between which the attraction is looked at, m."""
 Losses = tuple[Dissipation | None, Dissipation | None]
 OFF = [Parameter.LINEAR_DRAG, Parameter.TILT_DRAG, Parameter.SPIN_DRAG, Parameter.TILT_EDDY, Parameter.SPIN_EDDY]
 AIR, EDDY = OFF[:3], OFF[3:]
@@ -66,20 +66,25 @@ class Levitating:
         """With the floater's currents and real air among the compiled equations, where their strength is zero."""
         return cls(scene, interaction, Rates(with_effects(_lossy(scene), interaction)), losses)
 
+    @cached_property
+    def _field(self) -> CompiledField:
+        """The table's own expressions, good to 1e-11 at these distances, without moments for what is far away."""
+        return CompiledField(self.table.expressions)
+
     @property
     def hanging(self) -> float:
         """Distance on the axis at which the attraction alone carries the weight, m."""
         weight = self.scene.floater.mass * abs(float(self.scene.gravity[2])) / self.scene.floater.moment
 
         def excess(distances: ArrayLike) -> Array:
-            return self.table.evaluate(np.multiply.outer(distances, [0.0, 0.0, -1.0]))[1][:, 2, 2] - weight
+            return self._field(np.multiply.outer(distances, [0.0, 0.0, -1.0]))[1][:, 2, 2] - weight
 
-        for nearest, farthest in pairwise(REACH):
-            grid = np.geomspace(nearest, farthest, STEPS)
-            carried = np.flatnonzero(excess(grid) > 0)
-            if len(carried) and carried[-1] + 1 < STEPS:
-                return float(brentq(lambda distance: excess([distance])[0], *grid[carried[-1] : carried[-1] + 2]))
-        raise EquilibriumError("The attraction carries the weight at no distance.")
+        grid = np.geomspace(*REACH, 60)
+        carried = np.flatnonzero(excess(grid)[:-1] > 0)
+        if not len(carried):
+            raise EquilibriumError("The attraction carries the weight at no distance.")
+        ends = grid[carried[-1] : carried[-1] + 2]
+        return float(brentq(lambda distance: excess([distance])[0], *ends))
 
     def nodes(self, heights: Array, spins: Array) -> Array:
         """Quantities (height, spin, quantity) at distances (n,) m along the axis and body spins; NaN where none is."""
@@ -117,7 +122,7 @@ class Levitating:
     def _guess(self, height: float, spin: float, family: Family) -> Array | None:
         """From the axial force at a place on the axis, which gives the moment's angle, and the torque there."""
         floater, place = self.scene.floater, np.array([0.0, 0.0, -height])
-        (field,), (slope,) = self.table.evaluate(place[None])
+        (field,), (slope,) = self._field(place[None])
         size, turn = np.hypot(slope[0, 2], slope[2, 2]), np.arctan2(slope[0, 2], slope[2, 2])
         cosine = floater.mass * abs(float(self.scene.gravity[2])) / (floater.moment * size)
         if not cosine < 1:
