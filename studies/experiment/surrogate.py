@@ -138,14 +138,14 @@ class Surrogate:
 
     def along(self, inputs: Array, part: Array) -> Array:
         """Coefficients (spin power, n, k, fitted) of the polynomials in spin alone: inputs (n, input), parts (k,)."""
-        scaled, (degree, *_) = coordinates(self.name, inputs), self._spread.shape[1:]
+        scaled, count = coordinates(self.name, inputs), self._spread.shape[1]
         powers = np.polynomial.legendre.legvander(scaled, int(self.terms.max()))
         picked = np.ones((len(inputs), len(self.terms)))
         for k in range(inputs.shape[1]):
             picked = picked * powers[:, k, self.terms[:, k]]
         reduced = picked @ self._spread.reshape(len(self.terms), -1)
-        along = np.polynomial.legendre.legvander(_scaled(part, (self.kind.near, self.kind.far)), degree - 1)
-        found = along @ reduced.reshape(len(inputs), degree, -1)
+        along = np.polynomial.legendre.legvander(_scaled(part, (self.kind.near, self.kind.far)), count - 1)
+        found = along @ reduced.reshape(len(inputs), count, -1)
         return np.moveaxis(found.reshape(len(inputs), len(part), -1, len(FITTED)), 2, 0)
 
     @cached_property

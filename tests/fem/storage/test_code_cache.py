@@ -198,3 +198,10 @@ def test_code_whose_arguments_are_written_later_is_told_by_what_they_are_written
     later(2.0, package="spinlev.fem.harmonics")
     assert written == [2.0, 3.0, 2.0, 2.0]
     assert len(list(folder.iterdir())) == 4
+
+
+def test_compiled_code_runs_in_one_thread():
+    """A second one waits busily for small work; parallel work is by processes."""
+    x = hy.make_vars("x")
+    compiled(hy.cfunc, [x * 2.0], [x])
+    assert hy.get_nthreads() == 1

@@ -1,0 +1,27 @@
+"""Rotations about one axis have plain entries, and others are what SciPy makes of them."""
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from spinlev.geometry.basics import rotation_matrix
+
+ANGLES = np.random.default_rng(5).uniform(-180.0, 180.0, size=(300, 3))
+
+
+def test_what_an_axis_leaves_alone_is_exactly_alone():
+    for axis in range(3):
+        for angle in ANGLES[:, axis]:
+            matrix = rotation_matrix(np.eye(3)[axis] * angle)
+            np.testing.assert_array_equal(matrix[axis], np.eye(3)[axis])
+            np.testing.assert_array_equal(matrix[:, axis], np.eye(3)[axis])
+
+
+def test_quarter_turns_are_exact():
+    np.testing.assert_array_equal(rotation_matrix((0.0, 90.0, 0.0)), [[0, 0, 1], [0, 1, 0], [-1, 0, 0]])
+
+
+def test_any_rotation_is_that_of_scipy_and_orthogonal_to_round_off():
+    for angles in ANGLES:
+        matrix = rotation_matrix(angles)
+        np.testing.assert_allclose(matrix, Rotation.from_euler("xyz", angles, degrees=True).as_matrix(), atol=4e-16)
+        np.testing.assert_allclose(matrix @ matrix.T, np.eye(3), atol=2e-15)
