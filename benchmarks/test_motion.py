@@ -25,6 +25,9 @@ LONG = 20.0
 """A flight that is so long, s, has its code optimised; what is timed is flown with such code."""
 TURNS = 2
 """Of the peer's flight."""
+EFFECTS = ("rigid", "mutual", "metal", "mutual and metal")
+PLATES = [("reduced", 3e-3), ("slab", 2e-4)]
+"""Plate models and their accuracies."""
 
 
 @pytest.fixture(scope="module")
@@ -64,7 +67,7 @@ def test_flight(benchmark, start, model, compact):
 
 
 @pytest.mark.benchmark(group="a simulated second at 110 Hz")
-@pytest.mark.parametrize("compact", [True, False], ids=["loops", "straight code"])
+@pytest.mark.parametrize("compact", [True, False], ids=["fem in balls, loops", "fem in balls, straight code"])
 def test_flight_in_balls(benchmark, start, compact):
     """As `simulate` flies with finite elements."""
     table = rotor_table(SCENE.rotor, "fem", nearest=SCENE.floater.radius)
@@ -75,7 +78,7 @@ def test_flight_in_balls(benchmark, start, compact):
 
 
 @pytest.mark.benchmark(group="a simulated second at 110 Hz")
-@pytest.mark.parametrize("effects", ["rigid", "mutual", "metal", "mutual and metal"])
+@pytest.mark.parametrize("effects", EFFECTS, ids=[f"fem in balls, {effects}" for effects in EFFECTS])
 def test_flight_with_effects(benchmark, start, effects):
     """What effects cost in balls, with finite elements."""
     scene = FREE
@@ -104,7 +107,7 @@ def test_flights_side_by_side(benchmark, start):
 
 
 @pytest.mark.benchmark(group="a simulated second at 110 Hz")
-@pytest.mark.parametrize(("plate_model", "rtol"), [("reduced", 3e-3), ("slab", 2e-4)], ids=["network", "slab"])
+@pytest.mark.parametrize(("plate_model", "rtol"), PLATES, ids=["network", "slab"])
 @pytest.mark.parametrize("model", ["cuboid", "fem"])
 def test_flight_with_plate(benchmark, start, model, plate_model, rtol):
     """A floater that hangs over the plate's currents, at the tolerance and in the fields that `simulate` uses."""
@@ -112,7 +115,7 @@ def test_flight_with_plate(benchmark, start, model, plate_model, rtol):
 
 
 @pytest.mark.benchmark(group="a simulated second at 110 Hz")
-@pytest.mark.parametrize(("plate_model", "rtol"), [("reduced", 3e-3), ("slab", 2e-4)], ids=["network", "slab"])
+@pytest.mark.parametrize(("plate_model", "rtol"), PLATES, ids=["fem-network, whole tables", "fem-slab, whole tables"])
 def test_flight_with_plate_in_whole_tables(benchmark, start, plate_model, rtol):
     """The same as while the plate moves: in the tables' own fields."""
     _over_plate(benchmark, start, "fem", plate_model, rtol, compile_flight)
