@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...geometry.basics import Array
+from ..elements import Watch, unwatched, watched
 from .dipole_potentials import of_places
 from .metal_currents import Metal
 
@@ -38,10 +39,10 @@ class CurrentPatterns:
         """Number of patterns."""
         return int(self.patterns[0].shape[2])
 
-    def fields(self, positions: Array) -> Array:
-        """c_k (k, n, 3) at positions (n, 3) m, √W s/(A m²)."""
+    def fields(self, positions: Array, watch: Watch = unwatched) -> Array:
+        """c_k (k, n, 3) at positions (n, 3) m, √W s/(A m²); `watch` hears of the progress."""
         found = []
-        for start in range(0, len(positions), TOGETHER):
+        for start in watched(range(0, len(positions), TOGETHER), watch, "their fields"):
             sources = of_places(positions[start : start + TOGETHER])
             parts = [
                 _flat(pattern).T @ _flat(sources(metal.places))
@@ -51,11 +52,16 @@ class CurrentPatterns:
         return np.concatenate(found, axis=1)
 
 
-def current_patterns(metals: Sequence[Metal], positions: Array, left_out: float) -> CurrentPatterns:
-    """Patterns that dipoles at `positions` (n, 3) m drive, but for a part `left_out` of the loss at any place."""
-    grams, loads = [], []
+def current_patterns(
+    metals: Sequence[Metal], positions: Array, left_out: float, watch: Watch = unwatched
+) -> CurrentPatterns:
+    """Patterns that dipoles at `positions` (n, 3) m drive, but for a part `left_out` of the loss at any place.
+
+    `watch` hears of the progress.
+    """
+    grams, loads, blocks = [], [], range(0, len(positions), TOGETHER)
     for metal in metals:
-        parts = [metal.loads(of_places(positions[k : k + TOGETHER])) for k in range(0, len(positions), TOGETHER)]
+        parts = [metal.loads(of_places(positions[k : k + TOGETHER])) for k in watched(blocks, watch, "patterns")]
         loads.append(np.concatenate(parts))
         grams.append(metal.dissipation(of_places(positions), loads[-1]))
     gram = np.sum(grams, axis=0)

@@ -9,6 +9,7 @@ import numpy as np
 
 from ...geometry.basics import Solid
 from ...geometry.scenes import Scene
+from ..elements import Watch, unwatched
 from ..plate_tables import Multipoles
 from ..storage import described, from_cache, program_of, read_checked, write_checked
 from .table import RotorLosses
@@ -59,15 +60,17 @@ def losses_key(scene: Scene) -> str:
     return digest.hexdigest()
 
 
-def cached_rotor_losses(scene: Scene, report: Callable[[str], None]) -> tuple[RotorLosses, bool]:
+def cached_rotor_losses(
+    scene: Scene, report: Callable[[str], None], watch: Watch = unwatched
+) -> tuple[RotorLosses, bool]:
     """The losses in a scene's rotor, from the cache if they are there, and whether they were.
 
-    At which frequencies they hold, `check_slow_enough` says.
+    `watch` hears of the progress.  At which frequencies they hold, `check_slow_enough` says.
     """
     return from_cache(
         f"rotor-losses-{losses_key(scene)}.nc",
         load_losses,
-        lambda: rotor_losses(scene.rotor, scene.conductors, scene.floater.radius),
+        lambda: rotor_losses(scene.rotor, scene.conductors, scene.floater.radius, watch=watch),
         save_losses,
         report,
     )

@@ -11,6 +11,7 @@ import scipy
 
 from ...geometry.basics import Array, Box, Solid, places_off
 from ...geometry.bodies import Conductor, Magnet, cut_magnets, separate_pieces
+from ..elements import Watch, unwatched, watched
 from ..plate_tables import Multipoles, fit_multipoles
 from .current_patterns import CurrentPatterns, current_patterns
 from .dipole_potentials import of_motion
@@ -51,11 +52,15 @@ def pieces_of(rotor: Sequence[Magnet], conductors: Sequence[Conductor]) -> Piece
 
 
 def rotor_losses(
-    rotor: Sequence[Magnet], conductors: Sequence[Conductor], nearest: float, directions: int = DIRECTIONS
+    rotor: Sequence[Magnet],
+    conductors: Sequence[Conductor],
+    nearest: float,
+    directions: int = DIRECTIONS,
+    watch: Watch = unwatched,
 ) -> RotorLosses:
     """Table of the dissipation for a floater whose centre is at least `nearest` (m) from every face.
 
-    It is fitted in so many `directions` of each octant.
+    It is fitted in so many `directions` of each octant; `watch` hears of the progress.
 
     Raises
     ------
@@ -68,15 +73,16 @@ def rotor_losses(
     bodies: list[Solid] = [magnet.body for magnet in rotor] + [conductor.body for conductor in conductors]
     around = partial(places_around, bodies, directions=directions)
     metals = [metal_of(group, conductivity, ORDER) for group, conductivity in pieces]
-    found = current_patterns(metals, around(nearest), LEFT_OUT)
+    found = current_patterns(metals, around(nearest), LEFT_OUT, watch)
     places = np.concatenate([around(share * nearest) for share in SHELLS])
-    values = found.fields(places)
+    values = found.fields(places, watch)
     scale = 1 / np.linalg.norm(values, axis=(0, 2))
     choice = _candidates([body for group, _ in pieces for body in group], nearest)
     fit = fit_multipoles(choice, places, values, np.ones(found.count), scale, FIT, lambda _: True)
     finer = [metal_of(group, conductivity, ORDER + 1) for group, conductivity in pieces]
     table = RotorLosses(fit.multipoles, sparse(fit.weights), nearest * np.array(CHECKED), np.zeros(len(CHECKED)))
-    errors = [_error(table, finer, around(distance, seed=1)) for distance in table.distances]
+    distances = watched(table.distances, watch, "errors")
+    errors = [_error(table, finer, around(distance, seed=1)) for distance in distances]
     return replace(table, errors=np.array(errors), provenance=_made(found, start))
 
 

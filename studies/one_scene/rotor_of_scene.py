@@ -5,6 +5,7 @@ from functools import partial
 from typing import Any, TypeVar
 
 from ...dynamics.motion import Interaction, Rates
+from ...fem.elements import Watch
 from ...fem.measured_maps import GriddedTable, map_table
 from ...fem.mutual import MutualTable, cached_mutual_table, mutual_key
 from ...fem.rotor_losses import RotorLosses, cached_rotor_losses, losses_key, pieces_of
@@ -38,20 +39,14 @@ class RotorTables:
 
     def answers(self, scene: Scene) -> MutualTable:
         """What rotor and floater do to each other's magnetisation."""
-        title, key = "Mutual magnetisation of rotor and floater", mutual_key(scene.rotor, scene.floater)
-
-        def make() -> tuple[MutualTable, bool]:
-            with stages(title) as watch:
-                return cached_mutual_table(scene.rotor, scene.floater, note, watch)
-
-        return self._once(key, lambda: self._cached("mutual", title, make))
+        title, make = "Mutual magnetisation of rotor and floater", partial(cached_mutual_table, scene.rotor)
+        key = mutual_key(scene.rotor, scene.floater)
+        return self._once(key, lambda: self._in_stages("mutual", title, partial(make, scene.floater, note)))
 
     def losses(self, scene: Scene) -> RotorLosses:
         """The losses in the rotor's metal; some of it must conduct."""
-        make = partial(cached_rotor_losses, scene, note)
-        return self._once(
-            losses_key(scene), lambda: self._cached("rotor losses", "Currents in the rotor's metal", make)
-        )
+        title, make = "Currents in the rotor's metal", partial(cached_rotor_losses, scene, note)
+        return self._once(losses_key(scene), lambda: self._in_stages("rotor losses", title, make))
 
     def rates(self, key: str, interaction: Interaction) -> Rates:
         """The equations of motion, compiled; `key` is the scene's `equations_key`."""
@@ -65,6 +60,13 @@ class RotorTables:
             return rotor_table(scene.rotor, name, rtol, scene.floater.radius)
         make = partial(cached_rotor_table, scene.rotor, name, rtol, note, scene.floater.radius)
         return self._cached(name, "Rotor's field by finite elements", make)
+
+    def _in_stages(self, name: str, title: str, make: Callable[[Watch], tuple[Cached, bool]]) -> Cached:
+        def watched() -> tuple[Cached, bool]:
+            with stages(title) as watch:
+                return make(watch)
+
+        return self._cached(name, title, watched)
 
     def _cached(self, name: str, title: str, make: Callable[[], tuple[Cached, bool]]) -> Cached:
         note(f"{title} ...")

@@ -10,8 +10,10 @@ import pytest
 from spinlev.fem.closed_forms.sphere_eddy import thin_field_torque
 from spinlev.fem.rotor_losses import ball_losses
 from spinlev.fem.rotor_losses.balls import CUBE
+from spinlev.fem.rotor_losses.current_patterns import current_patterns
 from spinlev.fem.rotor_losses.dipole_potentials import of_motion, of_places
 from spinlev.fem.rotor_losses.metal_currents import metal_of, metal_on
+from spinlev.fem.rotor_losses.tabulate import places_around
 from spinlev.geometry.basics import Box, Cylinder
 from spinlev.geometry.meshes import MetalMesh
 
@@ -92,3 +94,13 @@ def test_potentials_of_a_moving_dipole_are_derivatives():
         turned = potential(PLACE, np.cross(axis, MOMENT))
         np.testing.assert_allclose(given[:, :, k], moved / (2 * step), atol=1e-6 * np.abs(given).max())
         np.testing.assert_allclose(given[:, :, 3 + k], turned, rtol=1e-12)
+
+
+def test_progress_is_told_block_by_block():
+    """Of 90 places 40 at a time: three blocks of either stage."""
+    heard = []
+    cube = Box((8e-3,) * 3)
+    places = places_around([cube], 5e-3, directions=12)[:90]
+    found = current_patterns([metal_of([cube], SIGMA, 2)], places, 0.5, lambda *told: heard.append(told))
+    found.fields(places, lambda *told: heard.append(told))
+    assert heard == [(stage, k / 3) for stage in ("patterns", "their fields") for k in range(3)]
