@@ -18,6 +18,7 @@ import numpy as np
 from ...geometry.basics import Array
 from ...geometry.bodies import Magnet
 from ...geometry.meshes import MeshSettings
+from ..elements import Watch, unwatched
 from ..harmonics import Coefficients, MultipoleExpansion
 from .rotor_solution import Refinement, RotorSolution
 
@@ -28,6 +29,8 @@ STRONG = 0.5
 """μ - 1 from which on edges need `LAYERS_STRONG`; with μr = 5, two layers leave 2.4e-6 of the dipole, three 1.4e-7."""
 FIRST_RATE = 0.5
 """Ratio of two differences that is assumed before it is known; 0.1 to 0.3 were measured."""
+DEARER = 2.3
+"""How much longer an order takes than the one before it, about: for the progress."""
 FASTEST_RATE, FASTEST_RATE_STRONG, SLOWEST_RATE = 0.1, 0.3, 0.75
 SAFETY = 1.25
 """Factor on each of the two extrapolated differences."""
@@ -45,7 +48,12 @@ def refinement_of(order: int, settings: MeshSettings, contrast: float = 0.0) -> 
 
 
 def refined(
-    solve: Callable[[int], RotorSolution], points: Array, scale: Array, target: float, settings: MeshSettings
+    solve: Callable[[int], RotorSolution],
+    points: Array,
+    scale: Array,
+    target: float,
+    settings: MeshSettings,
+    watch: Watch = unwatched,
 ) -> tuple[RotorSolution, int, dict[str, list[MultipoleExpansion]]]:
     """The solution at the first order whose error is below the target.
 
@@ -54,6 +62,7 @@ def refined(
     solve : solution at an order
     points, scale : where (n, 3) m the error is looked at, and the field (n,) T to which it is relative
     settings : of the mesh, as given to `refinement_of`
+    watch : hears of the progress, as far as the rate of convergence foretells it
 
     Returns
     -------
@@ -71,9 +80,16 @@ def refined(
         earlier = [size / before * d for d in old] if old and before else new
         if 2 * factor * size <= target:
             break
+        watch("orders of the elements", _finished(order, 2 * factor * size / target, rate))
         coarse, before, old = fine, size, new
     doubts = {"discretisation": new, "discretisation, earlier step": earlier}
     return fine, order, {cause: fine.expansions([factor * d for d in ds]) for cause, ds in doubts.items()}
+
+
+def _finished(order: int, missed: float, rate: float) -> float:
+    """Share of the work that orders up to this one are, if the error is still so many times too large."""
+    last = min(order + max(1, int(np.ceil(np.log(missed) / -np.log(rate)))), max(LAYERS))
+    return float((DEARER ** (order - 1) - 1) / (DEARER ** (last - 1) - 1))
 
 
 def _fastest(solution: RotorSolution, order: int, settings: MeshSettings) -> float:

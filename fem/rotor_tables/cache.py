@@ -2,10 +2,12 @@
 
 import hashlib
 from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 
 from ...geometry.bodies import Magnet
+from ..elements import Watch, unwatched
 from ..storage import from_cache, program_of
 from .choice import rotor_table
 from .home import at_home, taken_along
@@ -24,7 +26,12 @@ def rotor_key(rotor: tuple[Magnet, ...], model: str, rtol: float, nearest: float
 
 
 def cached_rotor_table(
-    rotor: tuple[Magnet, ...], model: str, rtol: float, report: Callable[[str], None], nearest: float | None = None
+    rotor: tuple[Magnet, ...],
+    model: str,
+    rtol: float,
+    report: Callable[[str], None],
+    nearest: float | None = None,
+    watch: Watch = unwatched,
 ) -> tuple[RotorTable, bool]:
     """A rotor table, see `rotor_table`, from the cache if it is there, and whether it was.
 
@@ -32,5 +39,6 @@ def cached_rotor_table(
     """
     home = at_home(rotor)
     name = f"rotor-{rotor_key(home, model, rtol, nearest)}.nc"
-    table, found = from_cache(name, load_table, lambda: rotor_table(home, model, rtol, nearest), save_table, report)
+    make = partial(rotor_table, home, model, rtol, nearest, watch)
+    table, found = from_cache(name, load_table, make, save_table, report)
     return taken_along(table, rotor), found

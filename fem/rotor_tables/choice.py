@@ -1,10 +1,12 @@
 """The field models of a rotor, and the choice between them."""
 
 from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 
 from ...geometry.bodies import Magnet
+from ..elements import Watch, unwatched
 from .accuracy import Accuracy, error_points
 from .fem_model import fem_table
 from .home import at_home, taken_along
@@ -42,7 +44,11 @@ def resolve_model(
 
 
 def rotor_table(
-    rotor: tuple[Magnet, ...], model: str = "auto", rtol: float = 3e-6, nearest: float | None = None
+    rotor: tuple[Magnet, ...],
+    model: str = "auto",
+    rtol: float = 3e-6,
+    nearest: float | None = None,
+    watch: Watch = unwatched,
 ) -> RotorTable:
     """Table of a rotor's field.
 
@@ -52,6 +58,7 @@ def rotor_table(
         form, μr = 1), "fem" (with recoil permeability and mutual demagnetisation), or "auto", see `resolve_model`
     rtol, nearest : relative accuracy of B asked of "fem" and "moments", and the distance from the magnets' faces from
         which on it holds, m (None: 0.8 of the largest magnet's edge, if it were a cube)
+    watch : hears of the progress of "fem"
 
     "dipole", "moments" and "cuboid" have the moment J V/μ0 of the remanence alone, as the article does; a cube with
     μr = 1.05 has 0.984 of it, so that their field is 1.6 % too strong by convention ("fem" has the true one, and the
@@ -67,7 +74,8 @@ def rotor_table(
     if not rotor:
         raise ValueError("Input rotor must hold at least one magnet; instead received none.")
     name, _ = resolve_model(rotor, model, rtol, nearest)
-    return taken_along(MODELS[name](at_home(rotor), accuracy), rotor)
+    make = partial(fem_table, watch=watch) if name == "fem" else MODELS[name]
+    return taken_along(make(at_home(rotor), accuracy), rotor)
 
 
 def _cheapest(rotor: tuple[Magnet, ...], accuracy: Accuracy) -> tuple[str, str]:

@@ -18,6 +18,7 @@ from ...geometry.basics import Array, Part
 from ...geometry.bodies import CONVERGENCE, Cells, Magnet, cells_of, cut_magnets, largest_shift
 from ...geometry.meshes import MeshSettings
 from ..closed_forms import carrier, closed_part
+from ..elements import Watch, unwatched
 from ..harmonics import MultipoleExpansion, trimmed_expansions, without_noise
 from ..magnetostatics import RotorSolution, refined, refinement_of, solve_rotor, strongest
 from .accuracy import BETWEEN, Accuracy, error_points, guards
@@ -38,11 +39,12 @@ def fem_table(
     magnets: tuple[Magnet, ...],
     accuracy: Accuracy | None = None,
     settings: MeshSettings | None = None,
+    watch: Watch = unwatched,
 ) -> RotorTable:
     """Field of magnets with recoil permeability: closed form of the remanence, and expansions of what is added to it.
 
     Orders from 2 to 8 are tried until the estimated error meets the accuracy. If none does, the last table is returned
-    with an `AccuracyWarning`; its error estimate says how far it is off.
+    with an `AccuracyWarning`; its error estimate says how far it is off.  `watch` hears of the progress.
     """
     accuracy, settings, start = accuracy or Accuracy(), settings or MeshSettings(), time.perf_counter()
     cut = cut_magnets(magnets, accuracy.clearance(magnets))
@@ -57,7 +59,7 @@ def fem_table(
         refinement = refinement_of(order, settings, strongest(magnets))
         return solve_rotor(magnets, refinement, "split", degree, cut, carriers=carriers, cells=cells)
 
-    solution, order, steps = refined(reaction, points, scale, accuracy.rtol / 3, settings)
+    solution, order, steps = refined(reaction, points, scale, accuracy.rtol / 3, settings, watch)
     whole = solution.expansions(
         [without_noise(a + b, 1e-15) for a, b in zip(closed, solution.coefficients, strict=True)]
     )

@@ -59,7 +59,7 @@ class RotorTables:
         if name != "fem":  # closed forms are quicker to make than to read
             return rotor_table(scene.rotor, name, rtol, scene.floater.radius)
         make = partial(cached_rotor_table, scene.rotor, name, rtol, note, scene.floater.radius)
-        return self._cached(name, "Rotor's field by finite elements", make)
+        return self._in_stages(name, "Rotor's field by finite elements", make)
 
     def _in_stages(self, name: str, title: str, make: Callable[[Watch], tuple[Cached, bool]]) -> Cached:
         def watched() -> tuple[Cached, bool]:

@@ -28,7 +28,7 @@ class Heartbeat(threading.Thread):
         self._say, self._pause, self._over = say, pause, threading.Event()
         self._began: float | None = None
         self._said = time.monotonic()
-        self._stage, self._stage_began, self._fraction = "", self._said, 0.0
+        self._stage, self._stage_began, self._fraction, self._advanced = "", self._said, 0.0, self._said
 
     def said(self, text: str = "") -> None:
         """Something was shown; a text that ends in " ..." begins a step, any other ends it."""
@@ -39,9 +39,10 @@ class Heartbeat(threading.Thread):
 
     def advanced(self, fraction: float, stage: str = "") -> None:
         """How much of the step is finished, 0 to 1, or of one of its stages."""
+        now = time.monotonic()
         if stage != self._stage or fraction < self._fraction:
-            self._stage, self._stage_began = stage, time.monotonic()
-        self._fraction = fraction
+            self._stage, self._stage_began = stage, now
+        self._fraction, self._advanced = fraction, now
 
     def stop(self) -> None:
         """Say no more; returns when the thread has ended."""
@@ -59,8 +60,9 @@ class Heartbeat(threading.Thread):
     def _progress(self, now: float, began: float) -> str:
         if not TELLING <= self._fraction < ALL:
             return f"{_rounded(now - began)} so far"
-        left = (now - self._stage_began) * (1 / self._fraction - 1)
-        return f"{self._stage}{self._stage and ', '}{self._fraction:.0%}, {_rounded(left)} left"
+        left = (self._advanced - self._stage_began) * (1 / self._fraction - 1) - (now - self._advanced)
+        told = f", {_rounded(left)} left" if left > 0 else ""  # a part that takes longer than its share tells no time
+        return f"{self._stage}{self._stage and ', '}{self._fraction:.0%}{told}"
 
 
 def _rounded(seconds: float) -> str:

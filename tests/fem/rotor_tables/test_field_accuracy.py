@@ -213,3 +213,12 @@ def test_fewer_coefficients_fitted_leave_out_what_they_say():
     own[: kept[0].degree + 1, : kept[0].degree + 1] = np.where(kept[0].coefficients, 1, 0)
     cut = replace(whole[0], coefficients=(1 - own) * whole[0].coefficients)
     assert (np.linalg.norm(cut.evaluate(points)[0], axis=1) > 1e-5 * scale).any()
+
+
+def test_the_ladder_of_orders_tells_how_far_it_is():
+    heard = []
+    rotor_table(horizontal(2e-3, 10e-3, 1.305, 1.05), "fem", 1e-6, watch=lambda *told: heard.append(told))
+    shares = [share for _, share in heard]
+    assert {stage for stage, _ in heard} == {"orders of the elements"}
+    assert shares == sorted(shares)
+    assert 0 < shares[0] <= shares[-1] < 1
