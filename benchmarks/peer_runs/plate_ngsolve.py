@@ -17,6 +17,7 @@ frequency, size, order = FREQUENCIES[sys.argv[1]], float(sys.argv[2]), int(sys.a
 
 
 def reaction():
+    """B (place, 3) that the plate answers to each dipole at its place, and the unknowns."""
     mesh = plate_in_air(size)
     space = edge_elements(mesh, order, complex=True)
     trial, test = space.TnT()

@@ -14,6 +14,7 @@ tile = Tiles(n=1, tile_type=2, size=[EDGE] * 3, offset=[0.0, 0.0, 0.0], M_rem=RE
 
 
 def field(places):
+    """B (n, 3) T at places (n, 3) m."""
     parts = np.array_split(places, max(1, len(places) // 100_000))  # its Fortran keeps arrays on the stack
     return MU_0 * np.concatenate([get_H_field(tile, np.asfortranarray(part)) for part in parts])
 

@@ -38,7 +38,7 @@ def _face_integrals(points: Array, half_edges: Array) -> dict[tuple[int, int], A
     for axis, side in product(range(3), SIGNS):
         second, third = (axis + 1) % 3, (axis + 2) % 3
         height = np.abs(offset[axis][-side])
-        total = np.zeros(len(points))
+        total = np.zeros_like(height)
         for s in SIGNS:
             total += s * offset[second][s] * edges[third, _corner(axis, -side, s, 0)]
             total += s * offset[third][s] * edges[second, _corner(axis, -side, 0, s)]

@@ -15,7 +15,7 @@ import numpy as np
 from ...geometry.basics import Array
 from ..elements import Watch, unwatched, watched
 from .dipole_potentials import of_places
-from .metal_currents import Metal
+from .metal_currents import Metal, flat
 
 TOGETHER = 40
 """Places at a time."""
@@ -45,7 +45,7 @@ class CurrentPatterns:
         for start in watched(range(0, len(positions), TOGETHER), watch, "their fields"):
             sources = of_places(positions[start : start + TOGETHER])
             parts = [
-                _flat(pattern).T @ _flat(sources(metal.places))
+                flat(pattern).T @ flat(sources(metal.places))
                 for metal, pattern in zip(self.metals, self.patterns, strict=True)
             ]
             found.append(np.sum(parts, axis=0).reshape(self.count, -1, 3))
@@ -82,7 +82,3 @@ def _pattern(metal: Metal, loads: Array, positions: Array, mix: Array) -> Array:
         part = of_places(positions[start : start + TOGETHER])(metal.places)
         fields += part @ mix[3 * start : 3 * (start + TOGETHER)]
     return np.asarray(metal.weights[:, None, None] * fields)
-
-
-def _flat(values: Array) -> Array:
-    return values.reshape(-1, values.shape[-1])

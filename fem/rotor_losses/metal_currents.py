@@ -62,7 +62,7 @@ class Metal:
         else:
             blocks = self._blocks(sources)
         potentials = self.solutions(loads)
-        whole = np.sum([_flat(a).T @ _flat(w[:, None, None] * a) for a, w in blocks], axis=0)
+        whole = np.sum([flat(a).T @ flat(w[:, None, None] * a) for a, w in blocks], axis=0)
         return np.asarray(whole - self.conductivity * self.mesh.unit**3 * loads @ potentials.T)
 
     def loads(self, sources: Potentials) -> Array:
@@ -104,7 +104,8 @@ class Metal:
             yield sources(self.places[start : start + BLOCK]), self.weights[start : start + BLOCK]
 
 
-def _flat(values: Array) -> Array:
+def flat(values: Array) -> Array:
+    """Fields (n, 3, k) as one column (3n,) for each of the k sources."""
     return values.reshape(-1, values.shape[-1])
 
 

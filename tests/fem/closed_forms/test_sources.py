@@ -100,3 +100,13 @@ def filament(half_edge, radius):
 def test_bad_racetrack_is_named():
     with pytest.raises(ValueError, match="Input outer_radius_m must lie between"):
         Racetrack((0, 0, 0), (0.1, 0.1), 0.1, 0.05, 0.02, 1.0)
+
+
+def test_round_off_of_the_attraction_is_that_of_its_cancelling_faces():
+    """Against the same in extended precision, 10 mm to 30 mm off a cuboid of some 10 mm: below 1e-12 of it."""
+    places = np.random.default_rng(8).normal(size=(500, 3))
+    places *= np.random.default_rng(9).uniform(15e-3, 35e-3, (500, 1)) / np.linalg.norm(places, axis=1, keepdims=True)
+    half = np.array([5e-3, 4e-3, 7e-3])
+    exact = attraction(places.astype(np.longdouble), half.astype(np.longdouble)).astype(float)
+    missed = np.linalg.norm(attraction(places, half) - exact, axis=1) / np.linalg.norm(exact, axis=1)
+    assert 0 < missed.max() < 1e-12

@@ -32,20 +32,22 @@ def test_nothing_is_said_outside_of_a_step():
     heartbeat.stop()
 
 
-def test_a_step_that_knows_says_its_share():
+def test_a_step_that_knows_says_its_share_and_the_time_left():
     said: queue.Queue[str] = queue.Queue()
     heartbeat = Heartbeat(said.put, 0.01)
     heartbeat.start()
     heartbeat.said("Motion ...")
     heartbeat.advanced(0.5)
-    alone = _first(said, "%")
+    heartbeat._stage_began -= 60.0
+    alone = _first(said, "left")
     heartbeat.advanced(0.25, "places")
-    staged = _first(said, "places")
+    heartbeat._stage_began -= 60.0
+    staged = _first(said, "places, 25%, ")
     heartbeat.said("Equilibria ...")
     _first(said, "so far")
     heartbeat.stop()
-    assert alone in ("  50%", "  50%, 0 s left")
-    assert staged in ("  places, 25%", "  places, 25%, 0 s left")
+    assert alone == "  50%, 60 s left"
+    assert staged == "  places, 25%, 180 s left"
 
 
 def test_the_time_left_is_told_once_it_can_be_and_in_units_that_suit_it():
