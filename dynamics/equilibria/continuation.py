@@ -69,6 +69,8 @@ class Steps:
     turn : largest angle between the tangents at the ends of a step, rad
     most : how many steps are tried at most
     first : the first step, as a part of the longest
+    far : where the first three unknowns are a position farther than this from the origin, in floater radii, the longest
+        step grows with the distance, as the scale of the field does
     """
 
     longest: float = 0.05
@@ -76,6 +78,11 @@ class Steps:
     turn: float = 0.1
     most: int = 2000
     first: float = 1 / 8
+    far: float = np.inf
+
+    def limits(self, points: Array) -> Array:
+        """The longest steps (n,) at points (n, k + 1)."""
+        return np.asarray(self.longest * np.maximum(1.0, np.linalg.norm(points[:, :3], axis=1) / self.far))
 
 
 Watch = Callable[[Indices, Array, Array, Array], int | NDArray[np.int_]]
@@ -88,7 +95,7 @@ def follow(equations: Equations, points: Array, tangents: Array, steps: Steps, w
 
     A curve ends where `watch` says so, or where no step that is long enough succeeds.
     """
-    which, length = np.arange(len(points)), np.full(len(points), steps.first * steps.longest)
+    which, length = np.arange(len(points)), steps.first * steps.limits(points)
     for _ in range(steps.most):
         if not len(which):
             return
@@ -99,7 +106,7 @@ def follow(equations: Equations, points: Array, tangents: Array, steps: Steps, w
             said[good] = watch(which[good], ahead[good], turned[good], length[good])
         went = said != SHORTER
         points, tangents = np.where(went[:, None], ahead, points), np.where(went[:, None], turned, tangents)
-        length = np.where(went, np.minimum(GROWTH * length, steps.longest), length / 2)
+        length = np.where(went, np.minimum(GROWTH * length, steps.limits(points)), length / 2)
         kept = (said != END) & (length > steps.shortest)
         which, points, tangents, length = which[kept], points[kept], tangents[kept], length[kept]
 

@@ -17,16 +17,17 @@ from .continuation import AtRest, Steps
 from .search import SearchRange
 from .tracing import whole_curves
 
-STEPS = Steps(longest=0.1, shortest=1e-6, turn=0.15, most=5000, first=1 / 4)
+STEPS = Steps(longest=0.1, shortest=1e-6, turn=0.15, most=5000, first=1 / 4, far=3.0)
 THINNED = 8
 """One of so many starts is tried in the whole balance too where there is a rough one."""
 ITERATIONS = 30
 """Of Newton's method from the starts; none of those that have not met by then was seen to meet in twice as many."""
-STEPS_TOGETHER, CELL, AWAY = 3, 0.1, 1.0
-"""Steps after which the starts are thinned: within a cell of such an edge (radii, and of the moment) one is kept, and
-those that are as far outside the range, in radii, are left out; a test compares what is found with what all find."""
+STEPS_TOGETHER, CELL, COARSER, AWAY = 3, 0.1, 1.3, 1.0
+"""Steps after which the starts are thinned: within a cell of such an edge (radii, and of the moment), which grows by
+that factor each time, one is kept, and those that are as far outside the range, in radii, are left out; a test compares
+what is found with what all find."""
 TOGETHER = 8
-"""Curves that are followed at once; some may turn out to be the same."""
+"""Curves that are followed at once."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,7 +106,10 @@ def all_curves(balance: Balance, where: SearchRange) -> list[Curve]:
     seeds = from_starts(balance, where, LATERAL)
     curves: list[Curve] = []
     while len(seeds):
-        chosen = np.arange(len(seeds)) % -(-len(seeds) // TOGETHER) == 0
+        # What is at one height lies on different curves, or on both sides of a fold.
+        heights, number = np.unique(np.round(seeds[:, 2], 6), return_counts=True)
+        chosen = np.abs(seeds[:, 2] - heights[np.argmax(number)]) < 1e-5
+        chosen &= np.cumsum(chosen) <= TOGETHER
         for seed, curve in zip(seeds[chosen], curves_through(balance, seeds[chosen], where), strict=True):
             if curve is not None and not any(known.passes(seed) for known in curves):
                 curves.append(curve)
@@ -113,9 +117,12 @@ def all_curves(balance: Balance, where: SearchRange) -> list[Curve]:
     return curves
 
 
-def from_starts(balance: Balance, where: SearchRange, free: Indices) -> Array:
-    """Distinct points (n, 6) in the range, lowest first, at which the balances of `free` vanish, see `fixed_points`."""
-    position, moment = where.starts()
+def from_starts(balance: Balance, where: SearchRange, free: Indices, every: int = 1) -> Array:
+    """Distinct points (n, 6) in the range, lowest first, at which the balances of `free` vanish, see `fixed_points`.
+
+    One of so many starts is taken.
+    """
+    position, moment = (part[::every] for part in where.starts())
     if balance.rates.has_rough:
         near, turned = _newton(replace(balance, rates=balance.rates.rough), position, moment, where, free)
         position, moment = np.concatenate([near, position[::THINNED]]), np.concatenate([turned, moment[::THINNED]])
@@ -128,13 +135,14 @@ def _newton(balance: Balance, position: Array, moment: Array, where: SearchRange
     Every few steps those that ran away are given up, and of those that have come together one goes on.
     """
     found = []
-    for _ in range(ITERATIONS // STEPS_TOGETHER):
+    for turn in range(ITERATIONS // STEPS_TOGETHER):
         with np.errstate(all="ignore"):
             position, moment, step = solve(balance, position, moment, free, STEPS_TOGETHER)
         points, met = np.concatenate([position, moment], axis=1), step < 1e-8
         found.append(points[met & where.holds(position)])
         going = points[~met & np.isfinite(step) & where.holds(position, AWAY)]
-        going = going[np.unique(np.round(going / CELL), axis=0, return_index=True)[1]]
+        cell = CELL * COARSER**turn
+        going = going[np.unique(np.round(going / cell), axis=0, return_index=True)[1]]
         position, moment = going[:, :3], going[:, 3:]
         if not len(going):
             break

@@ -57,7 +57,7 @@ def survey(
     -------
     Equilibria, the stable ones first, then by distance, accurate to round-off in the table's field: every curve of
     lateral balance that is met from nearly five thousand starts is followed, and every zero of the axial force on it is
-    polished; so is what Newton's method finds directly from these starts (see `fixed_points`).
+    polished; so is what Newton's method finds directly from a third of these starts (see `fixed_points`).
 
     Raises
     ------

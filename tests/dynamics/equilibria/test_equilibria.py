@@ -8,7 +8,7 @@ import pytest
 from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
-from spinlev.dynamics.equilibria import SearchRange, curve as searching, find_equilibria, survey
+from spinlev.dynamics.equilibria import SearchRange, curve as searching, find_equilibria, fixed_points, survey
 from spinlev.dynamics.equilibria.continuation import stepped
 from spinlev.dynamics.motion import Rates, Scales, parameters
 from spinlev.dynamics.steady import EVERY, LATERAL, Balance, EquilibriumError, solve
@@ -114,6 +114,31 @@ def test_none_is_missed_that_brute_force_finds(name, frequency, spin):
         assert np.linalg.norm(found - r, axis=1).min() < 1e-9
 
 
+@pytest.mark.slow
+def test_no_equilibrium_lies_off_the_curves(monkeypatch):
+    """Scenes at random: all starts tried for all five balances find what the curves alone find, and nothing else."""
+    generator, number = np.random.default_rng(7), 0
+    for _ in range(90):
+        edge, displacement, angle, spin = generator.uniform([6e-3, 0.0, 0.01, -0.6], [9.4e-3, 4e-3, 1.0, 0.6])
+        kind = generator.integers(3)
+        shape = SHAPE | {"body": edge, "remanence": generator.uniform(0.6, 1.4)}
+        magnets = (
+            rotor.horizontal(displacement, **shape),
+            rotor.vertical(edge + displacement, **shape),
+            rotor.tilt(angle, **shape),
+        )[kind]
+        frequency = float(np.exp(generator.uniform(np.log(20.0), np.log(400.0))))
+        scene = Scene(frequency, magnets, replace(FLOATER, radius=generator.uniform(2e-3, 8e-3)), Drag(0.0, 0.0))
+        table, found = table_of(scene, generator.choice(["dipole", "cuboid"])), []
+        for every in (1, 10**6):
+            monkeypatch.setattr(fixed_points, "SPARE", every)
+            found.append(sorted(tuple(np.round(e.position, 9)) for e in find_equilibria(scene, table, spin)))
+        assert len(found[0]) == len(found[1])
+        assert np.allclose(*found, atol=1e-8)
+        number += len(found[0])
+    assert number > 200
+
+
 PUBLISHED = [  # PHYSICS.md, "the family matters": scene, frequency, body spin, distance in mm of the near equilibrium
     ("horizontal", 118.0, -0.2, 19.0),
     ("horizontal", 118.0, 0.0, 20.1),
@@ -165,8 +190,9 @@ def test_force_curves_carry_the_magnetic_force_and_pass_through_the_equilibria()
         force = scene.floater.moment * np.einsum("ni,niz->nz", curve.moment, gradient)[:, 2]
         np.testing.assert_allclose(curve.magnetic_force, force, rtol=1e-9, atol=1e-9)
     points = np.concatenate([curve.position for curve in result.curves])
-    for equilibrium in result.equilibria:  # steps along the curve are at most a tenth of the radius
-        assert np.linalg.norm(points - equilibrium.position, axis=1).min() < 0.1 * FLOATER.radius
+    for equilibrium in result.equilibria:  # steps along the curve are a tenth of the radius, farther away more
+        step = 0.1 * FLOATER.radius * max(1.0, equilibrium.distance / (3 * FLOATER.radius))
+        assert np.linalg.norm(points - equilibrium.position, axis=1).min() < step
     order = [(not e.stable, e.distance) for e in result.equilibria]
     assert order == sorted(order)
 
