@@ -1,5 +1,6 @@
 """What tests of several files share; and a cache of the session's own: never the user's."""
 
+import ctypes
 import os
 import shutil
 import tempfile
@@ -21,6 +22,14 @@ def pytest_configure(config):
 def pytest_unconfigure(config):
     if not hasattr(config, "workerinput") and not os.environ.get("SPINLEV_TEST_CACHE"):
         shutil.rmtree(os.environ["SPINLEV_CACHE"], ignore_errors=True)
+
+
+@pytest.fixture(autouse=True, scope="module")
+def memory_given_back():
+    """After each file: glibc keeps what is freed in pieces, hundreds of MB of compiled code and matrices."""
+    yield
+    if hasattr(libc := ctypes.CDLL(None), "malloc_trim"):
+        libc.malloc_trim(0)
 
 
 @pytest.fixture

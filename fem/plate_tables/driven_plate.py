@@ -78,10 +78,9 @@ def plate_and_rotor_table(
         error = solution.space_error
     watch("network of the scene", 0.5)
     network = reduce_currents(plate, solution, region, frequencies, rtol, others, max(error, solution.space_error))
-    watch("signals of the rotor", 0.0)
-    share = rotor_share(network, plate, rotor, SHARE_PART * rtol)
+    share = rotor_share(network, plate, rotor, SHARE_PART * rtol, watch=watch)
     watch("field functions", 0.0)
-    table = tabulate(network, rtol)
+    table = tabulate(network, rtol, watch)
     return table, without_high_harmonics(share, table, MISSED * rtol)
 
 

@@ -7,12 +7,13 @@ highest degree among the candidates, and the finite elements, whose currents are
 that their field is harmonic only to their own accuracy.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from ...geometry.basics import Array
+from ..elements import Watch, unwatched
 from .field_functions import Multipoles
 
 INDEPENDENT = 1e-10
@@ -48,6 +49,7 @@ def fit_multipoles(
     tolerance: float,
     enough: Callable[[Array], bool],
     step: int = STEP,
+    watch: Watch = unwatched,
 ) -> Fit:
     """Few multipoles that meet the tolerance and are `enough`, or as many as still help.
 
@@ -58,6 +60,7 @@ def fit_multipoles(
     tolerance : for the norm of the scaled error over functions and components, at every point
     enough : whether errors (functions, n, 3) are small enough
     step : multipoles between two looks at the error
+    watch : hears of the progress, told by the orders of magnitude between the first error and the tolerance
     """
     columns = choice.fields(points) * point_scale[:, None, None]
     columns = columns.swapaxes(1, 2).reshape(-1, len(choice.kinds))
@@ -67,6 +70,7 @@ def fit_multipoles(
     chosen: list[int] = []
     left = [_worst(rest)]
     while True:
+        watch("field functions", _share(left, tolerance))
         error = rest.T.reshape(values.shape) / state_scale[:, None, None] / point_scale[:, None]
         stalled = len(left) > PATIENCE and left[-1] > STALLED * left[-1 - PATIENCE]
         if stalled or (left[-1] <= tolerance and enough(error)):
@@ -86,6 +90,12 @@ def fit_multipoles(
     weights = (scaled / size[chosen][:, None]).T
     small = np.abs(scaled.T) < NOISE * np.abs(scaled).max(initial=0.0)
     return Fit(choice.subset(chosen), np.where(small, 0.0, weights / state_scale[:, None]), error)
+
+
+def _share(left: Sequence[float], tolerance: float) -> float:
+    """How far the errors have come to the tolerance, or to round-off, by orders of magnitude."""
+    least = max(tolerance, np.finfo(float).eps * left[0])
+    return 1.0 if left[-1] <= least else float(np.log(left[0] / left[-1]) / np.log(left[0] / least))
 
 
 def _worst(rest: Array) -> float:

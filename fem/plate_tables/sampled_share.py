@@ -8,6 +8,7 @@ import numpy as np
 from ...geometry.basics import Array
 from ...geometry.scenes import Plate
 from ..eddy_currents import Source
+from ..elements import Watch, unwatched, watched
 from ..rotor_tables import AccuracyError, RotorTable
 from .rotor_source import posed_rotor, rotor_parts
 from .share import RotorShare, turn_harmonics
@@ -16,6 +17,8 @@ MOST_TERMS = 15
 """Highest number of harmonics, and of points along the way."""
 UNHEARD = 1e-2
 """Share of the tolerance for degrees of the rotor's multipoles that the plate does not hear."""
+TOGETHER = 12
+"""Places whose signals are asked for at once."""
 NOISE = 1e-10
 """Amplitudes below this share of the largest signal are what symmetry forbids."""
 
@@ -28,7 +31,12 @@ class Network(Protocol):
 
 
 def rotor_share(
-    network: Network, plate: Plate, rotor: RotorTable, tolerance: float = 1e-4, most: int = MOST_TERMS
+    network: Network,
+    plate: Plate,
+    rotor: RotorTable,
+    tolerance: float = 1e-4,
+    most: int = MOST_TERMS,
+    watch: Watch = unwatched,
 ) -> RotorShare:
     """Signals of a rotor for the pose and the way of `plate`.
 
@@ -37,12 +45,13 @@ def rotor_share(
     network : of a plate of the same size and conductivity, or of what stands for it
     tolerance : for the estimated error; harmonics and depths are added until it is met
     most : highest number of either
+    watch : hears of the progress
 
     Raises
     ------
     AccuracyError : the tolerance is not met with the most terms
     """
-    listen = _listener(network, plate, rotor_parts(rotor, plate, UNHEARD * tolerance))
+    listen = _listener(network, plate, rotor_parts(rotor, plate, UNHEARD * tolerance), watch)
     distance = plate.lowering.distance if plate.lowering else 0.0
     angles, depths = 12, 4 if distance else 1
     while True:
@@ -70,16 +79,17 @@ def _trimmed(distance: float, series: Array, error: float, tolerance: float, siz
     return RotorShare(distance, np.where(small, 0.0, part), error + float(np.append(tails, [0.0, 0.0])[kept]))
 
 
-def _listener(network: Network, plate: Plate, parts: Sequence[Source]) -> Callable[[Array, Array], Array]:
+def _listener(network: Network, plate: Plate, parts: Sequence[Source], watch: Watch) -> Callable[[Array, Array], Array]:
     """Signals (depths × angles, states) of the rotor at ways (m) and angles (rad); each place is asked for once."""
     known: dict[tuple[float, float], Array] = {}
 
     def listen(ways: Array, angles: Array) -> Array:
         places = [(float(way), float(angle)) for way in ways for angle in angles]
         new = [place for place in places if place not in known]
-        if new:
-            sources = [posed_rotor(parts, plate, angle, way) for way, angle in new]
-            known.update(zip(new, np.concatenate(network.couplings(sources), axis=1), strict=True))
+        groups = [new[first : first + TOGETHER] for first in range(0, len(new), TOGETHER)]
+        for some in watched(groups, watch, f"signals of the rotor at {len(new)} places"):
+            sources = [posed_rotor(parts, plate, angle, way) for way, angle in some]
+            known.update(zip(some, np.concatenate(network.couplings(sources), axis=1), strict=True))
         return np.array([known[place] for place in places])
 
     return listen

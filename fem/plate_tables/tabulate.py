@@ -8,6 +8,7 @@ import numpy as np
 from ...geometry.basics import Array
 from ...geometry.meshes import MeshRule
 from ...geometry.scenes import Plate
+from ..elements import Watch, unwatched
 from ..plate_currents import STRICT, OtherSources, Region
 from ..plate_network import PlateNetwork, reduce_plate
 from ..rotor_tables import AccuracyError
@@ -45,8 +46,8 @@ def plate_table(
     return tabulate(reduce_plate(plate, region, frequencies, rtol, rule, others), rtol)
 
 
-def tabulate(network: PlateNetwork, rtol: float) -> PlateTable:
-    """Field functions of a network as multipoles.
+def tabulate(network: PlateNetwork, rtol: float, watch: Watch = unwatched) -> PlateTable:
+    """Field functions of a network as multipoles; `watch` hears of the progress.
 
     Raises
     ------
@@ -67,8 +68,9 @@ def tabulate(network: PlateNetwork, rtol: float) -> PlateTable:
 
     choice = candidates(region, half_edges, HIGHEST_DEGREE if rtol >= STRICT else STRICT_DEGREE)
     fit = fit_multipoles(
-        choice, points, values, state_scale, point_scale, rtol, lambda error: worst(error) <= FUNCTION_SHARE * rtol
-    )
+        choice, points, values, state_scale, point_scale, rtol,
+        lambda error: worst(error) <= FUNCTION_SHARE * rtol, watch=watch,
+    )  # fmt: skip
     errors = PlateErrors(network.mesh_error, network.state_error, worst(fit.error))
     if errors.total > rtol:
         raise AccuracyError(

@@ -12,6 +12,7 @@ import pickle
 import zlib
 from collections import OrderedDict
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from functools import cache
 from pathlib import Path
 from typing import Any, TypeVar
@@ -22,10 +23,11 @@ from .whole_files import seal, unsealed, write_whole
 
 LIMIT = 2**29
 """Size of all that is kept, bytes; what was not used for the longest time makes room."""
-SHARED = 64
-"""Functions that this process keeps; integrators have a state, and are read anew each time."""
+SHARED = 2**23
+"""The same of functions that this process keeps at hand, which take 20 times as much of its memory; those in use are
+not lost by it, and integrators, which have a state, are read anew each time."""
 Compiled = TypeVar("Compiled")
-_functions: OrderedDict[Path, Any] = OrderedDict()
+_functions: OrderedDict[Path, tuple[Any, int]] = OrderedDict()
 
 
 def compiled(compiler: Callable[..., Compiled], *arguments: Any, **options: Any) -> Compiled:
@@ -59,15 +61,22 @@ def compiled_later(
 
 def _kept(asked: tuple[Any, ...], make: Callable[[], Compiled]) -> Compiled:
     path = cache_folder() / "code" / f"{hashlib.sha256(_target() + _Asked.of(asked)).hexdigest()}.code"
-    found: Compiled | None = _functions.pop(path, None) or _read(path)
+    known, size = _functions.pop(path, (None, 0))
+    found: Compiled | None = known or _read(path)
     if found is None:
         found = make()
         _keep(found, path)
     if asked[0].__name__ == "cfunc":
-        _functions[path] = found
-        while len(_functions) > SHARED:
+        _functions[path] = found, size or _size(path)
+        while sum(size for _, size in _functions.values()) > SHARED and len(_functions) > 1:
             _functions.popitem(last=False)
     return found
+
+
+def _size(path: Path) -> int:
+    with suppress(OSError):  # it could not be kept
+        return path.stat().st_size
+    return 0
 
 
 class _Asked(pickle.Pickler):

@@ -200,6 +200,23 @@ def test_code_whose_arguments_are_written_later_is_told_by_what_they_are_written
     assert len(list(folder.iterdir())) == 4
 
 
+def test_a_process_keeps_what_it_used_last_within_a_limit(folder, monkeypatch):
+    """What is dropped is read from the disk again, as another function of the same values."""
+    x = hy.make_vars("x")
+    compiled_code._functions.clear()
+    first, size = compiled(hy.cfunc, [hy.sin(x)], [x]), next(iter(folder.iterdir())).stat().st_size
+    monkeypatch.setattr(compiled_code, "SHARED", 3 * size)
+    for number in range(2):
+        assert compiled(hy.cfunc, [hy.sin(x)], [x]) is first
+        compiled(hy.cfunc, [hy.cos(x) + float(number)], [x])
+    for number in range(2, 5):
+        compiled(hy.cfunc, [hy.cos(x) + float(number)], [x])
+    again = compiled(hy.cfunc, [hy.sin(x)], [x])
+    assert again is not first
+    assert again([0.5])[0] == first([0.5])[0]
+    assert len(compiled_code._functions) < 4
+
+
 def test_compiled_code_runs_in_one_thread():
     """A second one waits busily for small work; parallel work is by processes."""
     x = hy.make_vars("x")
