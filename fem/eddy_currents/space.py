@@ -7,7 +7,7 @@ S. Zaglmayr, High order finite element methods for electromagnetic field computa
 """
 
 from collections.abc import Sequence
-from typing import Protocol
+from typing import Any, Protocol
 
 import ngsolve
 import numpy as np
@@ -17,7 +17,7 @@ from scipy.sparse import csr_matrix
 
 from ...geometry.basics import Array
 from ...geometry.meshes import MILLIMETRE, PLANES, ConductorMesh
-from ..elements import Parity, edge_vertices, region_edges, tree_edges
+from ..elements import Parity, edge_vertices, region_edges, tree_edges, value_matrix
 
 
 class Source(Protocol):
@@ -104,19 +104,16 @@ class EddySpace:
 
     def value_matrix(self, space: ngsolve.FESpace, basis: ngsolve.CoefficientFunction) -> csr_matrix:
         """(3n, unknowns) values of a space's `basis` at the quadrature points, the components of one point together."""
-        points = IntegrationRuleSpace(self.conductors.mesh, order=self.order + 2, definedon=self.region) ** 3
-        form = ngsolve.BilinearForm(trialspace=space, testspace=points)
-        integrand = self.sigma * basis * ngsolve.CF(tuple(points.TestFunction()))
-        # Not vectorised: NGSolve's vectorised integrals are wrong beyond 256 points an element (order 4 on).
-        integral = ngsolve.SymbolicBFI(integrand, definedon=self.region, simd_evaluate=False)
-        for element, rule in self._rules.items():
-            integral.SetIntegrationRule(element, rule)
-        form += integral
-        form.Assemble()
-        rows, columns, values = (np.asarray(part) for part in form.mat.COO())
-        component, point = np.divmod(rows, len(self.points))
-        values = values / (self.weights[point] / MILLIMETRE**3)
-        return csr_matrix((values, (3 * point + component, columns)), shape=(form.mat.height, form.mat.width))
+        points = IntegrationRuleSpace(self.conductors.mesh, order=self.order + 2, definedon=self.region)
+
+        def integral(integrand: Any) -> Any:
+            # Not vectorised: NGSolve's vectorised integrals are wrong beyond 256 points an element (order 4 on).
+            found = ngsolve.SymbolicBFI(self.sigma * integrand, definedon=self.region, simd_evaluate=False)
+            for element, rule in self._rules.items():
+                found.SetIntegrationRule(element, rule)
+            return found
+
+        return value_matrix(space, basis, points, integral, self.weights / MILLIMETRE**3)
 
     def free_unknowns(self, parity_class: Sequence[int], space: ngsolve.FESpace) -> ngsolve.BitArray:
         """Coupling unknowns of one parity class: without odd planes, the far boundary and a spanning tree in air."""

@@ -4,12 +4,14 @@ Functions that exist as NumPy code (closed forms, solid harmonics) enter and lea
 formula has to be written a second time. Works on every element shape, those of hp-refinement included.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
 import ngsolve as ng
 import numpy as np
 from ngsolve.comp import IntegrationRuleSpace, IntegrationRuleSpaceSurface
+from scipy.sparse import csr_matrix
 
 from ...geometry.basics import Array
 
@@ -42,6 +44,31 @@ class IntegrationPoints:
         result = ng.GridFunction(self.space)
         result.vec.FV().NumPy()[:] = values
         return result
+
+    def value_matrix(self, space: Any, basis: Any) -> csr_matrix:
+        """As the function of this name."""
+        return value_matrix(space, basis, self.space, lambda integrand: integrand * self.measure, self.weights)
+
+
+def value_matrix(space: Any, basis: Any, points: Any, integral: Callable[[Any], Any], weights: Array) -> csr_matrix:
+    """(3n, unknowns) values at points of a `basis` of three components, those of one point together.
+
+    Parameters
+    ----------
+    space : of the unknowns
+    points : NGSolve space with one unknown per point
+    integral : of a function, with exactly these points
+    weights : (n,) of the points in it
+    """
+    components = points**3
+    form = ng.BilinearForm(trialspace=space, testspace=components)
+    form += integral(basis * ng.CF(tuple(components.TestFunction())))
+    form.Assemble()
+    rows, columns, values = (np.asarray(part) for part in form.mat.COO())
+    component, point = np.divmod(rows, len(weights))
+    return csr_matrix(
+        (values / weights[point], (3 * point + component, columns)), shape=(form.mat.height, form.mat.width)
+    )
 
 
 def volume_points(mesh: Any, material: str, order: int) -> IntegrationPoints:

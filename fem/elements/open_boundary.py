@@ -51,6 +51,7 @@ class OpenBoundary:
         ]
         harmonics = np.zeros((len(used), len(self.keys)))
         harmonics[used] = orthonormal(self.keys, surface.points[used])
+        self._size = int(space.ndof)
         self.unknowns = np.nonzero(np.array(space.GetDofs(mesh.Boundaries("outer"))))[0]
         columns = []
         for values in harmonics.T:
@@ -72,6 +73,14 @@ class OpenBoundary:
         result = np.zeros_like(potential)
         result[self.unknowns] = self._projection @ ((self._degrees - 1) / self.radius**3 * amplitudes)
         return result
+
+    def lacking(self) -> tuple[Array, Array]:
+        """Load vectors (k, unknowns) p and factors (k,) d, none of them 0, of the same map Σ d p pᵀ."""
+        factors = self.copies * (self._degrees - 1) / self.radius**3
+        used = factors != 0
+        loads = np.zeros((int(used.sum()), self._size))
+        loads[:, self.unknowns] = self._projection[:, used].T
+        return loads, factors[used]
 
     def expansion(self, potential: Array) -> Coefficients:
         """Coefficients c_lm of the potential Σ c_lm Θ_lm outside, from its values on the sphere."""

@@ -13,9 +13,10 @@ from typing import Any
 
 import ngsolve as ng
 import numpy as np
+from scipy.sparse import csr_matrix
 
 from ...geometry.basics import Array
-from ..elements import IntegrationPoints, OpenBoundary, require_memory, solve_open, volume_points
+from ..elements import IntegrationPoints, OpenBoundary, OpenFactor, require_memory, volume_points
 
 BOUNDARY_DEGREE = 8
 """Harmonics up to this degree see an exactly open boundary; higher ones reach the bodies below 1e-8."""
@@ -29,35 +30,27 @@ class PermeableRegions:
     ----------
     susceptibility : (3, 3) μ - 1 of every body by region name
     points : integration points of every body, in the mesh's coordinates
+    slopes : (3n, unknowns) gradients of the basis at the points of every body
+    factor : of the matrix
     """
 
     susceptibility: Mapping[str, Array]
     points: Mapping[str, IntegrationPoints]
-    space: Any
-    stiffness: Any
-    inverse: Any
-    boundary: OpenBoundary
+    slopes: Mapping[str, csr_matrix]
+    factor: OpenFactor
 
     def magnetization(self, fields: Mapping[str, Array]) -> dict[str, Array]:
-        """μ0 M (n, 3) T at the points of every body, for given fields H0 (n, 3) T there.
-
-        Raises
-        ------
-        ConvergenceError : the iteration for the open boundary stalls
-        """
-        load, test = ng.LinearForm(self.space), self.space.TestFunction()
-        for name, points in self.points.items():
-            source = fields[name] @ self.susceptibility[name]
-            for axis in range(3):
-                load += points.function(source[:, axis]) * ng.grad(test)[axis] * points.measure
-        load.Assemble()
-        free = self.space.FreeDofs(True)
-        slope = ng.grad(solve_open(self.stiffness, self.inverse, free, load, self.boundary))
-        result = {}
-        for name, points in self.points.items():
-            own = points.sample(*(slope[axis] for axis in range(3)))
-            result[name] = (fields[name] - own) @ self.susceptibility[name]
-        return result
+        """μ0 M (n, 3) T at the points of every body, for given fields H0 (n, 3) T there."""
+        sources = {name: fields[name] @ chi for name, chi in self.susceptibility.items()}
+        load = sum(
+            self.slopes[name].T @ (source * self.points[name].weights[:, None]).ravel()
+            for name, source in sources.items()
+        )
+        (potential,) = self.factor.solve(load[None])
+        return {
+            name: source - (self.slopes[name] @ potential).reshape(-1, 3) @ self.susceptibility[name]
+            for name, source in sources.items()
+        }
 
 
 def assemble_regions(mesh: Any, permeability: Mapping[str, Array], ball_radius: float, order: int) -> PermeableRegions:
@@ -82,11 +75,11 @@ def assemble_regions(mesh: Any, permeability: Mapping[str, Array], ball_radius: 
     stiffness += (mesh.MaterialCF(tensors, default=ng.Id(3)) * ng.grad(trial)) * ng.grad(test) * ng.dx
     stiffness += boundary.robin * trial * test * ng.ds("outer")
     stiffness.Assemble()
+    inverse = stiffness.mat.Inverse(space.FreeDofs(True), inverse="sparsecholesky")
+    points = {name: volume_points(mesh, name, 2 * order - 2) for name in permeability}
     return PermeableRegions(
         susceptibility={name: mu - np.eye(3) for name, mu in permeability.items()},
-        points={name: volume_points(mesh, name, 2 * order - 2) for name in permeability},
-        space=space,
-        stiffness=stiffness,
-        inverse=stiffness.mat.Inverse(space.FreeDofs(True), inverse="sparsecholesky"),
-        boundary=boundary,
+        points=points,
+        slopes={name: part.value_matrix(space, ng.grad(trial)) for name, part in points.items()},
+        factor=OpenFactor(stiffness, inverse, boundary),
     )
