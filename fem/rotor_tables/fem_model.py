@@ -25,6 +25,11 @@ from .accuracy import BETWEEN, Accuracy, error_points, guards
 from .table import KNOWN, RotorTable
 
 HIGHEST_DEGREE = 44
+BEFORE, WHOLE = 4, 0.6
+"""Degrees before moments begin to fall; and those that a whole box needs beyond them, by those at which its moments are
+surely small enough: 0.4 to 0.55 were measured of cubes. Pieces need more, with moments from where they are cut."""
+LEAST = 1.05
+"""Distance from the centre of a box, in circumradii, from which on its moments fall fast enough to be continued."""
 BESIDE = 2.5
 """How much larger errors may be beside edges and corners, at the same distance from the magnet's centre."""
 GAP_SAFETY = 20.0
@@ -47,11 +52,12 @@ def fem_table(
     with an `AccuracyWarning`; its error estimate says how far it is off.  `watch` hears of the progress.
     """
     accuracy, settings, start = accuracy or Accuracy(), settings or MeshSettings(), time.perf_counter()
-    cut = cut_magnets(magnets, accuracy.clearance(magnets))
+    cut = cut_magnets(magnets, accuracy.clearance(magnets), _least_ratio(magnets, accuracy.rtol))
     pieces = [piece for whole in cut for piece in whole]
     points, scale = error_points(magnets, accuracy.clearance(magnets))
     cells = [cells_of(piece.body, accuracy.clearance(magnets)) for piece in pieces]
-    degree = _degree(pieces, cells, points, accuracy.rtol)
+    ratios = [_ratio(own, points) for own in cells]
+    degree = _degree(pieces, ratios, accuracy.rtol)
     carriers = tuple(carrier(magnet) for magnet in magnets)
     closed, unsure = closed_part(cut, magnets, carriers, degree, cells)
 
@@ -67,7 +73,7 @@ def fem_table(
     doubts = {
         **{cause: nonzero(step) for cause, step in steps.items()},
         "quadrature": nonzero(solution.expansions(unsure)),
-        "tail": nonzero(extrapolated_tail(whole)),
+        "tail": nonzero(extrapolated_tail(whole, min(ratios))),
         "gap": nonzero(gap_doubt(magnets, solution)),
     }
     doubts = {cause: parts for cause, parts in doubts.items() if parts}
@@ -91,15 +97,24 @@ def fem_table(
     return replace(table, provenance=provenance(solution, order, settings, reached, time.perf_counter() - start))
 
 
-def _degree(pieces: Sequence[Magnet], cells: Sequence[Cells], points: Array, rtol: float) -> int:
+def _least_ratio(magnets: Sequence[Magnet], rtol: float) -> float:
+    """Least distance from the centre of a box that stays whole, in circumradii, so that `HIGHEST_DEGREE` will do."""
+    share = max(magnet.contrast for magnet in magnets)
+    return float(np.clip((share / rtol) ** (WHOLE / (HIGHEST_DEGREE - BEFORE)), LEAST, CONVERGENCE)) if share else LEAST
+
+
+def _ratio(cells: Cells, points: Array) -> float:
+    """Least distance of points (n, 3) m from the nearest cell's centre, in radii."""
+    return float(np.min(np.linalg.norm(points[:, None] - cells.centers, axis=2).min(axis=0) / cells.radii))
+
+
+def _degree(pieces: Sequence[Magnet], ratios: Sequence[float], rtol: float) -> int:
     """Degree at which what the permeability adds has surely fallen below the tolerance; 5 to `HIGHEST_DEGREE`."""
     needed = 5.0
-    for piece, own in zip(pieces, cells, strict=True):
-        apart = np.linalg.norm(points[:, None] - own.centers, axis=2).min(axis=0)
-        ratio = float(np.min(apart / own.radii))
+    for piece, ratio in zip(pieces, ratios, strict=True):
         share = 1.0 if isinstance(piece.body, Part) else piece.contrast  # all of a part's field is in its moments
         if share:
-            needed = max(needed, 4 + np.log(share / rtol) / np.log(ratio))
+            needed = max(needed, BEFORE + np.log(share / rtol) / np.log(ratio))
     return int(min(np.ceil(needed), HIGHEST_DEGREE))
 
 
@@ -108,13 +123,16 @@ def nonzero(expansions: Sequence[MultipoleExpansion]) -> tuple[MultipoleExpansio
     return tuple(expansion for expansion in expansions if expansion.coefficients.any())
 
 
-def extrapolated_tail(expansions: Sequence[MultipoleExpansion]) -> list[MultipoleExpansion]:
-    """What lies beyond the highest degree: the last two degrees, continued as a geometric series."""
+def extrapolated_tail(expansions: Sequence[MultipoleExpansion], ratio: float = CONVERGENCE) -> list[MultipoleExpansion]:
+    """What lies beyond the highest degree: the last two degrees, continued as a geometric series.
+
+    `ratio` is the least distance from a centre, in radii; beyond `CONVERGENCE` it counts as that.
+    """
     found = []
     for expansion in expansions:
         last = np.array(expansion.coefficients)
         last[:-2] = 0.0
-        found.append(MultipoleExpansion(expansion.center, expansion.radius, last / (CONVERGENCE**2 - 1)))
+        found.append(MultipoleExpansion(expansion.center, expansion.radius, last / (min(ratio, CONVERGENCE) ** 2 - 1)))
     return found
 
 

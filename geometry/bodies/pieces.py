@@ -12,23 +12,28 @@ CONVERGENCE = 1.3
 """Least distance of a point from a piece's centre, in circumradii of the piece."""
 
 
-def cut_magnets(magnets: Sequence[Magnet], nearest: float) -> tuple[tuple[Magnet, ...], ...]:
+def cut_magnets(
+    magnets: Sequence[Magnet], nearest: float, whole: float = CONVERGENCE
+) -> tuple[tuple[Magnet, ...], ...]:
     """Pieces of every magnet, equal boxes, for expansions that are used from the distance `nearest` (m) from faces on.
 
-    A cube stays whole down to 0.63 of its edge from a face.  Magnets of other shapes stay whole here, see `cells_of`.
+    Parameters
+    ----------
+    whole : least distance of a point from the centre of a magnet that stays whole, in circumradii; at 1.3 a cube does
+        down to 0.63 of its edge from a face.  Magnets of other shapes stay whole here, see `cells_of`.
     """
     return tuple(
-        tuple(_pieces(magnet, _counts(magnet.box.size, nearest))) if isinstance(magnet.body, Box) else (magnet,)
+        tuple(_pieces(magnet, _counts(magnet.box.size, nearest, whole))) if isinstance(magnet.body, Box) else (magnet,)
         for magnet in magnets
     )
 
 
-def _counts(size: Array, nearest: float) -> tuple[int, ...]:
+def _counts(size: Array, nearest: float, whole: float) -> tuple[int, ...]:
     """Number of pieces along each axis: the longest side of the pieces is cut until they are compact enough."""
     counts = np.ones(3, dtype=int)
     while True:
         half = size / counts / 2
-        if nearest + half.min() >= CONVERGENCE * np.linalg.norm(half):
+        if nearest + half.min() >= (CONVERGENCE if counts.max() > 1 else whole) * np.linalg.norm(half):
             return tuple(int(n) for n in counts)
         counts[np.argmax(half)] += 1
 

@@ -12,7 +12,7 @@ from spinlev.fem.magnetostatics import Refinement, solve_rotor
 from spinlev.fem.rotor_tables import Accuracy, AccuracyWarning, RotorTable, fem_table, rotor_table
 from spinlev.fem.rotor_tables.accuracy import error_points
 from spinlev.geometry.basics import Box
-from spinlev.geometry.bodies import Magnet, cut_magnets, horizontal, vertical
+from spinlev.geometry.bodies import CONVERGENCE, Magnet, cut_magnets, horizontal, vertical
 from spinlev.geometry.meshes import MeshSettings
 from spinlev.studies.field_quality.field_hard_cases import extensions, reference
 from spinlev.studies.field_quality.hard_cases import CASES, MORE_LAYERS, OTHER_MESH
@@ -222,3 +222,20 @@ def test_the_ladder_of_orders_tells_how_far_it_is():
     assert {stage for stage, _ in heard} == {"orders of the elements"}
     assert shares == sorted(shares)
     assert 0 < shares[0] <= shares[-1] < 1
+
+
+def test_a_box_stays_whole_where_its_moments_suffice(monkeypatch):
+    """Then it has a third of the moments of its pieces, whose field, asked for three times as exactly, is the same."""
+    cube = (Magnet(Box((0.0118,) * 3, (0.0, 0.0, 0.0)), (1.2, 0.0, 0.5), 1.05),)
+    nearest, rtol = 0.00635, 1e-4
+    whole = fem_table(cube, Accuracy(rtol, nearest))
+    monkeypatch.setattr("spinlev.fem.rotor_tables.fem_model._least_ratio", lambda magnets, rtol: CONVERGENCE)
+    cut = fem_table(cube, Accuracy(rtol / 3, nearest))
+    counts = [sum(np.count_nonzero(part.coefficients) for part in table.expansions) for table in (whole, cut)]
+    assert (len(whole.expansions), len(cut.expansions)) == (1, 8)
+    assert counts[0] < counts[1] / 3
+    points, _ = error_points(cube, nearest)
+    true, stated = errors(whole, Truth(cut.uniform, cut.expansions), points)
+    assert np.all(true[0] <= stated[0] + cut.relative_error(points)[0])
+    assert stated[0].max() <= rtol
+    assert stated[0].max() <= 2 * true[0].max()
