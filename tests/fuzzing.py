@@ -217,7 +217,7 @@ def _write_map(path: Path) -> None:
 
 
 COMMANDS = {
-    "run": ["--duration-s", "--model", "--rtol", "--plate-model", "--plate-rtol", "--json", "--out"],
+    "run": ["--duration-s", "--spin", "--model", "--rtol", "--plate-model", "--plate-rtol", "--json", "--out"],
     "field": ["--points", "--model", "--rtol", "--json"],
     "equilibria": ["--spin", "--model", "--rtol", "--plate-model", "--json"],
     "simulate": ["--duration-s", "--resume", "--model", "--json"],

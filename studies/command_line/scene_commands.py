@@ -40,10 +40,16 @@ def _loaded(scene: Path) -> "Scene":
     return load_scene(scene)
 
 
+def _check_spin(spin: float) -> None:
+    if not -1e3 <= spin <= 1e3:
+        raise InputError(f"Input --spin must be between -1000 and 1000; instead received {spin}.")
+
+
 def run(
     scene: Path | None = None,
     *,
     asked: Models = Models(),
+    spin: float = 0.0,
     duration_s: float = 10.0,
     output: Output = Output(),
 ) -> Answer:
@@ -55,14 +61,17 @@ def run(
     ----------
     scene
         Scene file (left out: the one that comes with the program).
+    spin
+        Body spin S = Ω·m̂/ω of the floater about its own moment, with which it also begins to fly.
     duration_s
         Simulated time, s.
     """
     positive("--duration-s", duration_s)
+    _check_spin(spin)
     loaded = _loaded(scene or default_scene())
     from ..one_scene import main_job
 
-    return Answer(*main_job(loaded, asked.checked(), duration_s, output.out), output.json)
+    return Answer(*main_job(loaded, asked.checked(), spin, duration_s, output.out), output.json)
 
 
 def field(
@@ -143,8 +152,7 @@ def equilibria(
     spin
         Body spin S = Ω·m̂/ω of the floater about its own moment.
     """
-    if not -1e3 <= spin <= 1e3:
-        raise InputError(f"Input --spin must be between -1000 and 1000; instead received {spin}.")
+    _check_spin(spin)
     loaded = _loaded(scene)
     from ..one_scene import equilibria_job
 

@@ -68,6 +68,7 @@ def equilibria_answer(levitation: Levitation, equilibria: Sequence[Equilibrium] 
     places = np.array([e.position for e in found]).reshape(-1, 3)
     return {
         "model": levitation.table.model,
+        "body_spin": levitation.spin,
         "error_estimate": float(levitation.table.relative_error(places)[0].max()) if len(places) else None,
         **effects_answer(levitation, found),
         **plate_answer(levitation.plate),

@@ -39,13 +39,13 @@ DEEPEST = 0.05
 """The field figure reaches this far below the rotor's origin, m."""
 
 
-def main_job(scene: Scene, asked: Models, duration: float, out: Path) -> Job:
-    """Compute everything of a scene; writes result.nc, summary.json and the figures.
+def main_job(scene: Scene, asked: Models, spin: float, duration: float, out: Path) -> Job:
+    """Compute everything of a scene for a body spin; writes result.nc, summary.json and the figures.
 
     What is finished before a failure is kept: a scene without a stable equilibrium still leaves its fields and force
     curves, a flight that the user stops its beginning; then the error goes on to the caller.
     """
-    levitation = Levitation(scene, asked)
+    levitation = Levitation(scene, asked, spin)
     exact = "cuboid" if all(magnet.contrast == 0 for magnet in scene.rotor) else "fem"
     chosen = levitation.table
     failure: EquilibriumError | FlightStopped | None = None
@@ -54,7 +54,7 @@ def main_job(scene: Scene, asked: Models, duration: float, out: Path) -> Job:
         _tell_first(levitation)
         best = levitation.field(exact)
         alone = {
-            model: levitation.without_plate if model == chosen.model else survey(scene, levitation.field(model))
+            model: levitation.without_plate if model == chosen.model else survey(scene, levitation.field(model), spin)
             for model in dict.fromkeys(("dipole", best.model, chosen.model))
         }
         surveys = alone | {chosen.model: levitation.survey}
@@ -91,7 +91,7 @@ def main_job(scene: Scene, asked: Models, duration: float, out: Path) -> Job:
         values["failed"] = str(failure)
         lines.append(str(failure))
     tables = {name: levitation.field(name) for name in MODELS}
-    result = _static_dataset(scene, tables, surveys, alone, best.model).assign_attrs(levitation.labels)
+    result = _static_dataset(scene, tables, surveys, alone, best.model).assign_attrs(levitation.labels, body_spin=spin)
     _write(scene, chosen, result, values, flight, out)
     if failure and (flight is None or isinstance(failure, FlightStopped)):
         raise failure

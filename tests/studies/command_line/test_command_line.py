@@ -6,6 +6,7 @@ import sys
 
 import numpy as np
 import pytest
+import xarray as xr
 from places import SCENES
 
 from spinlev.studies.command_line.cli import _status
@@ -208,6 +209,7 @@ def test_wrong_scenes_end_with_status_2_one_message_and_no_file(spinlev, tmp_pat
         (("simulate", "S", "--duration-s", "nan"), "--duration-s must be a positive number"),
         (("simulate", "S", "--duration-s", "long"), "long"),
         (("equilibria", "S", "--spin", "1e9"), "--spin must be between"),
+        (("run", "S", "--spin", "nan"), "--spin must be between"),
         (("levitate",), "levitate"),
         (("run", "S", "--frequency", "3"), "--frequency"),
     ],
@@ -239,6 +241,25 @@ def test_wrong_points_end_with_status_2(spinlev, tmp_path, text, said):
     assert status == 2
     assert out == ""
     assert said in err
+
+
+@pytest.mark.usefixtures("undrawn")
+def test_a_run_is_of_the_body_spin_asked_for(spinlev, tmp_path):
+    """Its equilibria are those of the command of that name, its flight begins with that spin, its files say so."""
+    path, spin = tmp_path / "s.toml", 0.05
+    path.write_text(GOOD)
+    asked = (path, "--model", "dipole", "--rtol", "1e-2", *NO_PLATE, "--spin", spin, "--json")
+    status, out, err = spinlev("run", *asked, "--duration-s", "0.01")
+    assert status == 0, err
+    answer, places = json.loads(out), json.loads(spinlev("equilibria", *asked)[1])["equilibria"]
+    assert [e["position_mm"] for e in answer["equilibria"]] == [e["position_mm"] for e in places]
+    unspun = json.loads(spinlev("equilibria", *asked[:-3], "--json")[1])["equilibria"]
+    assert abs(places[0]["position_mm"][2] - unspun[0]["position_mm"][2]) > 1e-3
+    with xr.open_dataset(tmp_path / "out" / "result.nc") as result:
+        assert result.attrs["body_spin"] == answer["body_spin"] == spin
+        begun = result.isel(time=0)
+        along = float(begun.spin @ begun.moment)
+        assert along == pytest.approx(spin * 2 * np.pi * 110, rel=1e-6)
 
 
 @pytest.mark.usefixtures("undrawn")
