@@ -46,7 +46,7 @@ class IntegrationPoints:
         return result
 
     def value_matrix(self, space: Any, basis: Any) -> csr_matrix:
-        """As the function of this name."""
+        """(3n, unknowns) values here of a space's `basis` of three components, those of one point together."""
         return value_matrix(space, basis, self.space, lambda integrand: integrand * self.measure, self.weights)
 
 

@@ -128,11 +128,11 @@ def extrapolated_tail(expansions: Sequence[MultipoleExpansion], ratio: float = C
 
     `ratio` is the least distance from a centre, in radii; beyond `CONVERGENCE` it counts as that.
     """
-    found = []
+    found, faster = [], float(np.clip(ratio, LEAST, CONVERGENCE)) ** 2
     for expansion in expansions:
         last = np.array(expansion.coefficients)
         last[:-2] = 0.0
-        found.append(MultipoleExpansion(expansion.center, expansion.radius, last / (min(ratio, CONVERGENCE) ** 2 - 1)))
+        found.append(MultipoleExpansion(expansion.center, expansion.radius, last / (faster - 1)))
     return found
 
 
