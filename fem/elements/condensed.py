@@ -38,6 +38,8 @@ def solve_condensed(form: ngsolve.BilinearForm, inverse: ngsolve.BaseMatrix, loa
 class OpenFactor:
     """A factor that knows the open boundary: many loads, each at the price of one in the ball of air alone.
 
+    It is made by a solution for each harmonic of the boundary; for a single load `solve_open` takes fewer.
+
     What the boundary adds to the matrix K is of low rank, P D Pᵀ, so that with U = K⁻¹P a solution is
     u - U (D⁻¹ + Pᵀ U)⁻¹ Pᵀ u of K u = f (Sherman, Morrison, Woodbury).
 

@@ -62,7 +62,7 @@ def run(
     scene
         Scene file (left out: the one that comes with the program).
     spin
-        Body spin S = Ω·m̂/ω of the floater about its own moment, with which it also begins to fly.
+        Body spin S = Ω·m̂/ω of the floater about its own moment; a flight from an equilibrium begins with it.
     duration_s
         Simulated time, s.
     """

@@ -189,10 +189,11 @@ def test_force_curves_carry_the_magnetic_force_and_pass_through_the_equilibria()
         _, gradient = table.evaluate(curve.position)
         force = scene.floater.moment * np.einsum("ni,niz->nz", curve.moment, gradient)[:, 2]
         np.testing.assert_allclose(curve.magnetic_force, force, rtol=1e-9, atol=1e-9)
-    points = np.concatenate([curve.position for curve in result.curves])
-    for equilibrium in result.equilibria:  # steps along the curve are a tenth of the radius, farther away more
-        step = 0.1 * FLOATER.radius * max(1.0, equilibrium.distance / (3 * FLOATER.radius))
-        assert np.linalg.norm(points - equilibrium.position, axis=1).min() < step
+    starts, ends = (np.concatenate([c.position[part] for c in result.curves]) for part in (np.s_[:-1], np.s_[1:]))
+    for equilibrium in result.equilibria:  # on a chord between two points of a curve, which it leaves by its sag
+        way, along = equilibrium.position - starts, ends - starts
+        share = np.clip(np.sum(way * along, axis=1) / np.sum(along**2, axis=1), 0.0, 1.0)
+        assert np.linalg.norm(way - share[:, None] * along, axis=1).min() < 0.01 * FLOATER.radius
     order = [(not e.stable, e.distance) for e in result.equilibria]
     assert order == sorted(order)
 

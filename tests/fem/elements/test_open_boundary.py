@@ -1,4 +1,4 @@
-"""The open boundary: two ways to solve with it, and the flux that leaves a ball of air."""
+"""The open boundary in two ways to solve with it, and gradients of the basis at points."""
 
 import ngsolve as ng
 import numpy as np
