@@ -27,7 +27,8 @@ from .table import KNOWN, RotorTable
 HIGHEST_DEGREE = 44
 BEFORE, WHOLE = 4, 0.6
 """Degrees before moments begin to fall; and those that a whole box needs beyond them, by those at which its moments are
-surely small enough: at most 0.53 was measured, of cubes and two other boxes. Pieces need more, with moments from where they are cut."""
+surely small enough: at most 0.53 was measured, of cubes and two other boxes. Pieces need more, with moments from where
+they are cut."""
 LEAST = 1.05
 """Distance from the centre of a box, in circumradii, from which on its moments fall fast enough to be continued."""
 BESIDE = 2.5
