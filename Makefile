@@ -10,6 +10,9 @@ OLD ?= benchmarks/measured.json
 NEW ?= out/benchmarks.json
 SOURCES := $(shell find spinlev geometry fem dynamics studies scenes -type f -not -name "*.pyc") setup.py pyproject.toml README.md LICENSE
 
+# Slow tests are run by `validate`, those that need a browser by `test-browser`.
+FAST := not slow and not browser
+
 .PHONY: install run test test-browser lint types coverage bench bench-compare bench-peers dist dependencies docs validate fuzz lock clean
 
 install: $(VENV)/installed
@@ -42,7 +45,7 @@ types: install
 	cd $(VENV) && bin/mypy --config-file ../pyproject.toml --cache-dir ../.mypy_cache -p spinlev
 
 test: lint types
-	$(BIN)/pytest -n 2 --dist worksteal -m "not slow"
+	$(BIN)/pytest -n 2 --dist worksteal -m "$(FAST)"
 
 # Report, documentation and the live page in headless Chromium (Debian: apt-get install chromium); skipped where there is none.
 # The gallery's programs are not run for it: the pages are then without their output. It says how fast a slider is.
@@ -52,7 +55,7 @@ test-browser: install
 
 # Lines that the fast tests run, in child processes too; what a killed process has left of its own count is removed.
 coverage: install
-	$(BIN)/pytest -n 2 --dist worksteal -m "not slow" --cov --cov-report=
+	$(BIN)/pytest -n 2 --dist worksteal -m "$(FAST)" --cov --cov-report=
 	@rm -f .coverage.*
 	$(BIN)/coverage report --fail-under=95
 	@for p in geometry fem dynamics studies; do \

@@ -20,6 +20,7 @@ STYLE: Any = {
     "axes.titlesize": 8.5,
     "axes.titleweight": "bold",
     "axes.titlelocation": "left",
+    "axes.titley": 1.0,
     "axes.spines.top": False,
     "axes.spines.right": False,
     "legend.fontsize": 7,
@@ -76,21 +77,10 @@ def legend_below(figure: Figure, *labelled: Any, columns: int = 6) -> None:
 
 def save_figures(figures: Mapping[str, Figure], out: Path) -> list[str]:
     """Write each figure as PNG and PDF; returns the files."""
-    for figure in figures.values():
-        _laid_out(figure)
-    files = [out / f"{name}.{suffix}" for name in figures for suffix in ("png", "pdf")]
+    files = [out / f"{name}.{kind}" for name in figures for kind in ("png", "pdf")]
     for file in files:
         save_figure(figures[file.stem], file)
     return [str(file) for file in files]
-
-
-def _laid_out(figure: Figure) -> None:
-    """Fix the places of all axes: each file would else find them twice, which takes longer than the drawing."""
-    import matplotlib as mpl
-
-    with mpl.rc_context(STYLE):
-        figure.draw_without_rendering()
-    figure.set_layout_engine("none")
 
 
 def save_figure(figure: Figure, path: Path) -> None:
@@ -99,10 +89,23 @@ def save_figure(figure: Figure, path: Path) -> None:
 
 
 def figure_bytes(figure: Figure, kind: str) -> bytes:
-    """The figure as the content of a file of the kind `png` or `pdf`."""
-    import matplotlib as mpl
+    """The figure as the content of a file of the kind `png` or `pdf`.
 
-    stream = io.BytesIO()
-    with mpl.rc_context(STYLE):
-        figure.savefig(stream, format=kind)
+    Drawn once, where `savefig` draws twice; its axes are placed with the first file and stand there for the next.
+    """
+    import matplotlib as mpl
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.backends.backend_pdf import FigureCanvasPdf
+
+    stream, shown = io.BytesIO(), figure.dpi
+    figure.dpi = STYLE["savefig.dpi"]
+    try:
+        with mpl.rc_context(STYLE):
+            if kind == "png":
+                FigureCanvasAgg(figure).print_png(stream)
+            else:
+                FigureCanvasPdf(figure).print_pdf(stream)
+    finally:
+        figure.dpi = shown
+    figure.set_layout_engine("none")
     return stream.getvalue()

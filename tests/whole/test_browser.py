@@ -29,7 +29,10 @@ SITE = ROOT / "docs" / "_build" / "unrun"
 PHONE, DESK = 390, 1400
 HARMLESS = ("[PST]: Changed to", '"scene,hashes"')
 """What the documentation's theme says of its colours, and the viewer of what it was given."""
-pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="no chromium here (Debian: apt-get install chromium)")
+pytestmark = [
+    pytest.mark.skipif(CHROMIUM is None, reason="no chromium here (Debian: apt-get install chromium)"),
+    pytest.mark.browser,
+]
 
 FRAME = """<!doctype html><meta charset="utf-8"><link rel="icon" href="data:,">
 <iframe id="page" src="PAGE" width="WIDTH" height="900"></iframe>

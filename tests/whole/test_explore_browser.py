@@ -25,7 +25,7 @@ from spinlev.studies.terminal import Models
 DESK, PHONE = (1400, 1250), (390, 844)
 pytestmark = [
     pytest.mark.skipif(CHROMIUM is None, reason="no chromium here (Debian: apt-get install chromium)"),
-    pytest.mark.slow,  # a minute, and make test-browser runs it
+    pytest.mark.browser,
 ]
 FIND = "const model = name => Bokeh.documents[0].get_model_by_name(name);"
 NUMBER = "+(/data-number=\"(\\d+)\"/.exec(model('sign').text) || [0, 0])[1]"
