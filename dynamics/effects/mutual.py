@@ -91,16 +91,16 @@ class MutualAtPlace:
 
     def added(self, motion: Motion) -> Added:
         """Force, torque and their first derivatives are right at the pose."""
-        alpha, share = self.table.polarizability, hy.par[Parameter.PLATE_SHARE]
+        strength, share = hy.par[Parameter.PLATE_MOMENT], hy.par[Parameter.PLATE_SHARE]
+        induced = hy.par[Parameter.INDUCED]
         number = [hy.par[self.first + k] for k in range(self.count)]
 
         def energy(position: Vector, moment: Vector, field: Vector) -> hy.expression:
-            flux = [share * b for b in field]
-            whole = [hy.par[Parameter.PLATE_MOMENT] * m + alpha * b for m, b in zip(moment, flux, strict=True)]
+            whole = [strength * m + induced * b for m, b in zip(moment, field, strict=True)]
             away = [q - centre for q, centre in zip([*position, *whole], number[:6], strict=True)]
             parts = [number[6], *(g * q for g, q in zip(number[7:13], away, strict=True))]
             parts += _quadratic(number[13:], away)
-            return hy.sum(parts) - 0.5 * alpha * hy.sum([b * b for b in flux])
+            return hy.sum(parts) - 0.5 * share * induced * hy.sum([b * b for b in field])
 
         return conservative(energy, motion)
 

@@ -51,8 +51,9 @@ class MutualInBall:
 
     def added(self, motion: Motion) -> Added:
         """Force and torque are the derivatives of one energy."""
-        length, alpha = hy.par[Parameter.LENGTH], self.table.polarizability
+        length = hy.par[Parameter.LENGTH]
         strength, share = hy.par[Parameter.PLATE_MOMENT], hy.par[Parameter.PLATE_SHARE]
+        induced = hy.par[Parameter.INDUCED]
         offset = self.ball.offset([length * x for x in motion.position])
         bases, start, values, first = [polynomials(degree, offset) for degree in range(3)], self.first, [], []
         for degree in PARTS:
@@ -64,7 +65,7 @@ class MutualInBall:
         inverse = 1.0 / quadratic
         fall = fallen(inverse)
         flux = [share * b for b in motion.field]
-        whole = [strength * m + alpha * b for m, b in zip(motion.moment, flux, strict=True)]
+        whole = [strength * m + induced * b for m, b in zip(motion.moment, motion.field, strict=True)]
         linear = [share * v for v in rest[:3]]
         rows = [[rest[3 + ENTRIES.index((min(a, b), max(a, b)))] for b in range(3)] for a in range(3)]
         seen = [v + dot(row, whole) for v, row in zip(linear, rows, strict=True)]
@@ -77,12 +78,12 @@ class MutualInBall:
         bends = [[bend[ENTRIES.index((min(a, b), max(a, b)))] for b in range(3)] for a in range(3)]
         scale = -(length * hy.par[self.ball.first + 3]) * fall
         answer = [-fall * s for s in seen]
-        induced = [(length * share * alpha) * (b + a) for a, b in zip(answer, flux, strict=True)]
+        pulled = [(length * induced) * (b + a) for a, b in zip(answer, flux, strict=True)]
         return Added(
             force=[scale * (s + dot(row, offset)) for s, row in zip(slope, bends, strict=True)],
-            pulled=induced,
+            pulled=pulled,
             turning=[strength / hy.par[Parameter.INERTIA] * a for a in answer],
-            energy=fall * level - 0.5 * alpha * dot(flux, flux),
+            energy=fall * level - 0.5 * induced * dot(motion.field, flux),
         )
 
     def fit(self, ball: Ball, gradient: Array) -> tuple[Array, float]:

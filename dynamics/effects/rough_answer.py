@@ -6,7 +6,7 @@ import numpy as np
 
 from ...fem.rotor_tables import FieldTable
 from ...geometry.basics import MU_0, Array
-from ...geometry.bodies import Magnet
+from ...geometry.bodies import Magnet, polarizability
 from ...geometry.scenes import Floater
 
 STEP = 0.02
@@ -20,15 +20,11 @@ def rough_force(
     step = STEP * floater.radius
     places = place + step * np.concatenate([np.eye(3), -np.eye(3)])
     field = table.evaluate(places)[0]
-    energy = -_polarizability(floater.volume, floater.recoil_permeability) / 2 * np.sum(field**2, axis=1)
+    energy = -floater.polarizability / 2 * np.sum(field**2, axis=1)
     for magnet in magnets:
         offset = places - magnet.box.center
         distance = np.linalg.norm(offset, axis=1)
         along = offset @ direction / distance
         square = (MU_0 / (4 * np.pi) * floater.moment / distance**3) ** 2 * (1 + 3 * along**2)
-        energy -= _polarizability(magnet.body.volume, 1 + magnet.contrast) / 2 * square
+        energy -= polarizability(magnet.body.volume, 1 + magnet.contrast) / 2 * square
     return np.asarray((energy[3:] - energy[:3]) / (2 * step))
-
-
-def _polarizability(volume: float, permeability: float) -> float:
-    return 3 * volume / MU_0 * (permeability - 1) / (permeability + 2)

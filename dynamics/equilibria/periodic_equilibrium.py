@@ -70,7 +70,7 @@ class Shaken:
             values = self.values.copy()
             part = min(1.0, done + step)
             values[SHAKING] *= part
-            values[[Parameter.PLATE_MOMENT, Parameter.PLATE_SHARE]] *= np.sqrt(part)
+            values[[Parameter.PLATE_MOMENT, Parameter.PLATE_SHARE, Parameter.INDUCED]] *= np.sqrt(part)
             plate = None if self.memory is None else PlateForce(self.memory, values)
             found = periodic_orbit(self.rates, values, spin, plate, states)
             if found is None:

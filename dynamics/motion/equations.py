@@ -81,6 +81,7 @@ def parameters(scene: Scene, scales: Scales, frozen_spin: bool = False) -> Array
     values[Parameter.TIME] = time
     values[Parameter.PLATE_MOMENT] = floater.moment / root_energy
     values[Parameter.PLATE_SHARE] = 1 / root_energy
+    values[Parameter.INDUCED] = floater.polarizability / root_energy
     return values
 
 

@@ -12,6 +12,7 @@ class Parameter(IntEnum):
     """Places of the runtime parameters; free of units but LENGTH (m), TORQUE (1/T), TIME (s) and the last ones.
 
     PLATE_MOMENT is the floater's moment by the root of the unit of energy (A m²/√J), PLATE_SHARE one by that root.
+    INDUCED is the moment that 1 T induces in the floater, by the same root, A m²/(T √J).
     TILT_EDDY and SPIN_EDDY are the floater's own eddy currents, 1/T²: accelerations by unit field and relative turn.
     MEASURE is that of a rotor whose shape is a parameter, m or rad (`rotor_family`); no other rotor has it.
     """
@@ -32,6 +33,7 @@ class Parameter(IntEnum):
     TIME = auto()
     PLATE_MOMENT = auto()
     PLATE_SHARE = auto()
+    INDUCED = auto()
     TILT_EDDY = auto()
     SPIN_EDDY = auto()
     MEASURE = auto()

@@ -6,11 +6,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from ...geometry.basics import MU_0, Array, InputError, Part
+from ...geometry.basics import Array, InputError, Part
 from ...geometry.bodies import Magnet
 from ...geometry.scenes import Floater
 from ..elements import Watch, unwatched
-from ..harmonics import FOUR_PI
 from .answer_error import answer_errors
 from .answer_grid import POWERS, RETURNED, AnswerGrid, answer_box, point_counts
 from .answer_samples import (
@@ -24,7 +23,7 @@ from .answer_samples import (
     sphere_samples,
     unit_dipole_fields,
 )
-from .permeable_sphere import IMAGES, image_weights, reflection
+from .permeable_sphere import IMAGES, image_weights
 from .rotor_response import rotor_ladder
 from .sphere_fit import MANY, PARALLEL, classes, least_squares, returned_fit, sphere_fit
 from .table import MutualTable
@@ -77,8 +76,7 @@ def mutual_table(
             fewer = np.concatenate([facing, places[len(facing) :: SPARSE], near[::NEAR_SPARSE]])
             returned = returned_samples(rotor, floater, grids, np.concatenate(inner), coupling, fewer, watch)
             grids, mixed = returned_fit(grids, inner, images, returned)
-    alpha = FOUR_PI * floater.radius**3 / MU_0 * float(reflection(floater.recoil_permeability, 1)[1])
-    table = MutualTable(magnets, tuple(grids), coupling, pairs, mixed, images, alpha)
+    table = MutualTable(magnets, tuple(grids), coupling, pairs, mixed, images, floater.polarizability)
     gaps, errors = answer_errors(table, rotor, fine, floater, watch)
     return replace(
         table, gaps=gaps, errors=errors, provenance={"order": order, "seconds": time.perf_counter() - started}

@@ -4,7 +4,7 @@ from .article_rotors import horizontal as horizontal, tilt as tilt, vertical as 
 from .cells import Cells as Cells, cells_of as cells_of
 from .conductor import Conductor as Conductor, separate_pieces as separate_pieces
 from .known_shapes import known_shape as known_shape
-from .magnet import Magnet as Magnet
+from .magnet import Magnet as Magnet, polarizability as polarizability
 from .overlap import (
     TOUCHING as TOUCHING,
     body_overlap as body_overlap,

@@ -88,3 +88,8 @@ class Magnet:
         place = f"{self.body.described_size} at {millimetres(self.body.center)}"
         text = f"Magnet {place}, ({polarization}) T, μr {permeability}"
         return text if self.conductivity is None else f"{text}, {self.conductivity:.3g} S/m"
+
+
+def polarizability(volume: float, permeability: float) -> float:
+    """Moment (A m²) that a uniform field of 1 T induces in a sphere of a volume (m³)."""
+    return 3 * volume / MU_0 * (permeability - 1) / (permeability + 2)

@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from ..basics import MU_0, Array, Box, Cylinder, InputError, Sphere, moved
-from ..bodies import Magnet
+from ..bodies import Magnet, polarizability
 
 
 @dataclass(frozen=True)
@@ -82,6 +82,11 @@ class Floater:
         """Magnetic moment of the free body, A m²: (Br V/μ0) 3/(μr + 2) of a sphere, Br V/μ0 of another."""
         factor = 3 / (self.recoil_permeability + 2) if self.body is None else 1.0
         return self.remanence * self.volume / MU_0 * factor
+
+    @property
+    def polarizability(self) -> float:
+        """Moment that a uniform field of 1 T induces in a sphere of its volume, A m²."""
+        return polarizability(self.volume, self.recoil_permeability)
 
     def axes(self, moment: Array) -> Array:
         """(3, 3) body axes as columns where the moment points along (3,); turned about it as little as can be."""

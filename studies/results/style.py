@@ -101,10 +101,8 @@ def figure_bytes(figure: Figure, kind: str) -> bytes:
     figure.dpi = STYLE["savefig.dpi"]
     try:
         with mpl.rc_context(STYLE):
-            if kind == "png":
-                FigureCanvasAgg(figure).print_png(stream)
-            else:
-                FigureCanvasPdf(figure).print_pdf(stream)
+            canvas: Any = FigureCanvasAgg(figure) if kind == "png" else FigureCanvasPdf(figure)
+            getattr(canvas, f"print_{kind}")(stream)
     finally:
         figure.dpi = shown
     figure.set_layout_engine("none")

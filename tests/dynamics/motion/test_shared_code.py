@@ -1,9 +1,12 @@
-"""Rotors of one kind share the compiled rates, and numbers as runtime parameters change nothing."""
+"""Rotors of one kind and all floaters share the compiled rates, and numbers as runtime parameters change nothing."""
 
 import numpy as np
 import pytest
 
-from spinlev.dynamics.motion import Rates, Scales, parameters
+from spinlev.dynamics.effects import Mutual
+from spinlev.dynamics.motion import Interaction, Rates, Scales, parameters
+from spinlev.fem.mutual import MutualTable
+from spinlev.fem.mutual.answer_grid import AnswerGrid, answer_box
 from spinlev.fem.rotor_tables import rotor_table
 from spinlev.geometry.bodies import horizontal, tilt, vertical
 from spinlev.geometry.scenes import Drag, Floater, Scene
@@ -50,3 +53,29 @@ def test_tilted_rotors_share_their_code_whatever_the_angle():
     rotors = [tilt(np.radians(angle), 10e-3, 1.305, 1.0) for angle in np.linspace(3.0, 13.0, 20)]
     functions = {id(Rates(rotor_table(rotor, "cuboid"))._function) for rotor in rotors}
     assert len(functions) == 1
+
+
+@pytest.mark.parametrize("floater", [FLOATER, Floater(4.1e-3, 1.2, 1.3, 5000.0), Floater(5e-3, 0.0, 2.0, 2000.0)])
+def test_floaters_that_answer_share_their_code_and_each_has_its_own_answer(floater):
+    """A rotor that does not answer: what is added to the force is α ∇B²/2."""
+    rotor = horizontal(2e-3, 10e-3, 1.305, 1.0)
+    rates = [Rates(_answering(horizontal(2e-3, 9e-3, 1.305, 1.0), FLOATER)), Rates(_answering(rotor, floater))]
+    assert rates[0]._function is rates[1]._function
+    scene = Scene(110.0, rotor, floater, Drag(0.0, 0.0), gravity=np.zeros(3))
+    scales = Scales.of(scene)
+    values = parameters(scene, scales)
+    state = np.array([[0.2, 0.1, -3.0, 0, 0, 0, 0, 0, 1.0, 0, 0, 0]])
+    field, gradient = rotor_table(rotor, "cuboid").evaluate(state[:, :3] * scales.length)
+    alpha = 1e7 * floater.radius**3 * (floater.recoil_permeability - 1) / (floater.recoil_permeability + 2)
+    added = rates[1](state, values)[0][:, 3:6] - Rates(rotor_table(rotor, "cuboid"))(state, values)[0][:, 3:6]
+    force = added * floater.mass * scales.length / scales.time**2
+    assert force == pytest.approx(alpha * np.einsum("ni,nij->nj", field, gradient), rel=1e-6)
+
+
+def _answering(rotor, floater):
+    """The field of a lone cube beside a floater whose uniform answer to it is all that there is."""
+    nothing = np.zeros((1, 3)), np.zeros((1, 3, 2)), np.zeros((1, 2, 2))
+    grid = AnswerGrid(answer_box(rotor[0].body), np.array([1.0, 0, 0]), floater.radius, (1, 1, 1), *nothing)
+    none = np.zeros((1, 1))
+    table = MutualTable(rotor, (grid,), np.zeros((3, 3)), none, none, np.zeros(3), floater.polarizability)
+    return Interaction(rotor_table(rotor, "cuboid"), (Mutual(table, floater.moment),))
