@@ -29,7 +29,7 @@ from ...geometry.basics import Array, InputError, millimetre_size
 from ...geometry.scenes import AbsoluteStart, Scene, load_scene
 from ..terminal import Models, detail, finite, note, positive, progress
 from .plate_of_scene import check_room, check_way, plate_memory
-from .rotor_of_scene import RotorField, RotorTables, equations_key
+from .rotor_of_scene import RotorField, RotorTables, equations_key, nearest_faces
 
 PLATE_WORDS = {
     "none": "only an obstacle, without eddy currents",
@@ -240,7 +240,7 @@ class Levitation:
         """The rotor's field by any model, accurate wherever the floater can be: from its radius off the magnets on."""
         if model == "map":
             return self._tables.field(self.scene, model, self.models.rtol)
-        name, reason = resolve_model(self.scene.rotor, model, self.models.rtol, self.scene.floater.radius)
+        name, reason = resolve_model(self.scene.rotor, model, self.models.rtol, nearest_faces(self.scene.floater))
         if model == "auto":
             detail(f"Field model: {name} ({reason})")
         return self._tables.field(self.scene, name, self.models.rtol)

@@ -1,5 +1,6 @@
 """Tables of what a scene's rotor does to the floater, and the compiled equations in them: each is made once."""
 
+import math
 from collections.abc import Callable
 from functools import partial
 from typing import Any, TypeVar
@@ -28,13 +29,13 @@ class RotorTables:
         self._known: dict[str, Any] = {}
 
     def field(self, scene: Scene, name: str, rtol: float) -> RotorField:
-        """The rotor's field by a model or from its map, accurate from the floater's radius off the magnets on.
+        """The rotor's field by a model or from its map, accurate wherever the floater can be.
 
         Raises
         ------
         InputError : the map cannot be used
         """
-        key = f"{rotor_key(scene.rotor, name, rtol, scene.floater.radius)} {scene.field_map}"
+        key = f"{rotor_key(scene.rotor, name, rtol, nearest_faces(scene.floater))} {scene.field_map}"
         return self._once(key, lambda: self._field(scene, name, rtol))
 
     def answers(self, scene: Scene) -> MutualTable:
@@ -57,8 +58,8 @@ class RotorTables:
             note("Rotor's field from its map ...")
             return map_table(scene.field_map, scene.rotor)
         if name != "fem":  # closed forms are quicker to make than to read
-            return rotor_table(scene.rotor, name, rtol, scene.floater.radius)
-        make = partial(cached_rotor_table, scene.rotor, name, rtol, note, scene.floater.radius)
+            return rotor_table(scene.rotor, name, rtol, nearest_faces(scene.floater))
+        make = partial(cached_rotor_table, scene.rotor, name, rtol, note, nearest_faces(scene.floater))
         return self._in_stages(name, "Rotor's field by finite elements", make)
 
     def _in_stages(self, name: str, title: str, make: Callable[[Watch], tuple[Cached, bool]]) -> Cached:
@@ -81,6 +82,19 @@ class RotorTables:
             self._known[key] = make()
         made: Made = self._known[key]
         return made
+
+
+ONE_OF_THEM, STEP = 6.35e-3, 2 ** (1 / 8)
+"""Radii for which tables are made: that of the article's floater, m, and so many times the one before."""
+
+
+def nearest_faces(floater: Floater) -> float:
+    """Distance from the magnets' faces from which on a table is to be accurate, m.
+
+    The floater's radius or up to a twelfth less, so that floaters of about one size share the rotor's table.
+    """
+    steps = math.floor(math.log(floater.radius / ONE_OF_THEM) / math.log(STEP) + 1e-9)
+    return ONE_OF_THEM * STEP**steps
 
 
 def equations_key(scene: Scene, models: Models) -> str:

@@ -18,7 +18,7 @@ from ...fem.rotor_tables import at_home
 from ...geometry.basics import Array, SpinlevError
 from ...geometry.scenes import Scene, scene_keys, startless_text
 from .levitation import Levitation
-from .rotor_of_scene import equations_key
+from .rotor_of_scene import equations_key, nearest_faces
 
 
 def share(levitations: Sequence[Levitation], places: Sequence[tuple[int, ...]], equilibria: Sequence[bool]) -> None:
@@ -95,7 +95,7 @@ def _of_family(alike: Sequence[Levitation], different: Mapping[str, Levitation])
         known[first.equations_key][0],
         first.table.model,
         first.models.rtol,
-        first.scene.floater.radius,
+        nearest_faces(first.scene.floater),
         interaction=first.interaction_model,
     )
     return family.rates, np.array([known[levitation.equations_key][1] for levitation in alike])
