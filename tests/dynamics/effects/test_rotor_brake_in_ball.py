@@ -47,7 +47,8 @@ def test_the_brake_is_that_of_the_table(equilibrium, formula):
     found = Balls(SCENE, FIELD.evaluate, formula, 0.1, fitted(TABLE, formula)).at(center)
     numbers, error = found
     assert error <= 1e-6
-    values = np.concatenate([parameters(SCENE, SCALES), [0.0], numbers])
+    known = parameters(SCENE, SCALES)
+    values = np.concatenate([known, [0.0], numbers])
     radius, generator = 1 / numbers[3], np.random.default_rng(2)
     states = np.tile(SCALES.pack(equilibrium.state), (20, 1))
     away = generator.normal(size=(20, 3))
@@ -58,7 +59,7 @@ def test_the_brake_is_that_of_the_table(equilibrium, formula):
     states[:, 6:9] /= np.linalg.norm(states[:, 6:9], axis=1)[:, None]
     states[:, 9:] += 0.1 * generator.normal(size=(20, 3))
     brake = function(np.ascontiguousarray(states.T), pars=np.tile(values[: function.nparams, None], 20)).T
-    exact = Rates(TABLE)(states, values)[0] - Rates(FIELD)(states, values)[0]
+    exact = Rates(TABLE)(states, known)[0] - Rates(FIELD)(states, known)[0]
     for part in (slice(3, 6), slice(9, 12)):
         sizes = np.linalg.norm(exact[:, part], axis=1)
         apart = np.linalg.norm(brake[:, part] - exact[:, part], axis=1)
