@@ -84,17 +84,17 @@ class RotorTables:
         return made
 
 
-ONE_OF_THEM, STEP = 6.35e-3, 2 ** (1 / 8)
+ARTICLE_RADIUS, STEP = 6.35e-3, 2 ** (1 / 8)
 """Radii for which tables are made: that of the article's floater, m, and so many times the one before."""
 
 
 def nearest_faces(floater: Floater) -> float:
     """Distance from the magnets' faces from which on a table is to be accurate, m.
 
-    The floater's radius or up to a twelfth less, so that floaters of about one size share the rotor's table.
+    The floater's radius or up to a twelfth less, so that floaters between the same two steps share the rotor's table.
     """
-    steps = math.floor(math.log(floater.radius / ONE_OF_THEM) / math.log(STEP) + 1e-9)
-    return ONE_OF_THEM * STEP**steps
+    steps = math.floor(math.log(floater.radius / ARTICLE_RADIUS) / math.log(STEP) + 1e-9)
+    return ARTICLE_RADIUS * STEP**steps
 
 
 def equations_key(scene: Scene, models: Models) -> str:
