@@ -1,6 +1,7 @@
 """The main job: fields, tables, equilibria, motion, and what the dipole picture gets wrong."""
 
 from collections.abc import Mapping
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -167,10 +168,14 @@ def _write(
         result = xr.merge([result, flown], combine_attrs="no_conflicts")
     write_dataset(result, out / "result.nc", scene)
     write_whole(out / "summary.json", f"{to_json(values)}\n".encode())
-    save_figures({"field": field_figure(result), "force": force_figure(result)}, out)
-    if flight:
-        save_figures({"trajectory": trajectory_figure(result)}, out)
+    figures = {"field": field_figure(result), "force": force_figure(result)}
+    if flight is None:
+        save_figures(figures, out)
+        return
+    with ThreadPoolExecutor(1) as beside:  # in three dimensions another process draws, meanwhile
+        in_space = beside.submit(render, {out / "scene.png": last_view(scene, table, flight.rotor)})
+        save_figures(figures | {"trajectory": trajectory_figure(result)}, out)
         try:
-            render({out / "scene.png": last_view(scene, table, flight.rotor)})
+            in_space.result()
         except RenderError as error:
             note(str(error))
