@@ -25,6 +25,7 @@ from spinlev.fem.elements import memory
 from spinlev.fem.measured_maps import FieldMapError
 from spinlev.fem.measured_maps.readers import read_field_map
 from spinlev.fem.storage import hdf5_fault, read_checked, write_checked, write_whole
+from spinlev.fem.storage.cache import cache_folder
 from spinlev.fem.storage.whole_files import replacing
 from spinlev.studies.command_line.cli import _status
 
@@ -48,7 +49,12 @@ def table(tmp_path_factory):
 
 @pytest.fixture
 def spinlev(tmp_path, monkeypatch, capsys):
-    """Run the command line in this process in an empty folder; gives exit status, answer and messages."""
+    """Run the command line in this process in an empty folder; gives exit status, answer and messages.
+
+    Tables have a cache of their own there; compiled code is that of the session, for it is no matter of these tests.
+    """
+    session = cache_folder()
+    monkeypatch.setattr("spinlev.fem.storage.compiled_code.cache_folder", lambda: session)
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("SPINLEV_CACHE", str(tmp_path / "cache"))
     monkeypatch.setattr("sys.argv", ["spinlev", "test"])
