@@ -20,7 +20,7 @@ HOW = (
         "--no-first-run",
         "--remote-debugging-port=0",
     ),
-    *("--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--hide-scrollbars", "--disable-extensions"),
+    *("--disable-gpu", "--hide-scrollbars", "--disable-extensions"),
     "--host-resolver-rules=MAP * ~NOTFOUND, EXCLUDE 127.0.0.1",
 )
 

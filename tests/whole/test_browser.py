@@ -35,17 +35,19 @@ pytestmark = [
 ]
 
 FRAME = """<!doctype html><meta charset="utf-8"><link rel="icon" href="data:,">
-<iframe id="page" src="PAGE" width="WIDTH" height="900"></iframe>
-<pre id="found"></pre><script>
-const frame = document.getElementById("page");
-frame.onload = () => setTimeout(() => {
+FRAMES<pre id="found"></pre><script>
+const found = frame => {
   const inner = frame.contentWindow, page = inner.document;
   const views = [...page.querySelectorAll("iframe.view")].map(view => view.contentWindow);
   const asked = [inner, ...views].flatMap(one => one.performance.getEntriesByType("resource").map(entry => entry.name));
-  document.getElementById("found").textContent = JSON.stringify({
+  return {
     wide: page.documentElement.scrollWidth, title: page.title, asked,
     canvases: views.map(one => one.document.querySelectorAll("canvas").length),
-    equations: page.querySelectorAll("mjx-container").length });
+    equations: page.querySelectorAll("mjx-container").length };
+};
+window.onload = () => setTimeout(() => {
+  const all = [...document.querySelectorAll("iframe")].map(found);
+  document.getElementById("found").textContent = JSON.stringify(all);
 }, 1500);
 </script>"""
 
@@ -64,10 +66,11 @@ def browser(tmp_path, address, *what):
     return subprocess.run([CHROMIUM, *how, address], capture_output=True, text=True, check=True, timeout=200)
 
 
-def seen(folder, page, width, tmp_path):
-    """What a browser finds on a page of a folder in a frame so wide; fails where the page says an error."""
+def seen(folder, page, tmp_path):
+    """What a browser finds on a page of a folder on a phone and on a desk; fails where the page says an error."""
     frame = folder / f"frame-{os.getpid()}.html"  # others may look at the same folder
-    frame.write_text(FRAME.replace("PAGE", page).replace("WIDTH", str(width)))
+    frames = [f'<iframe src="{page}" width="{width}" height="900"></iframe>' for width in (PHONE, DESK)]
+    frame.write_text(FRAME.replace("FRAMES", "\n".join(frames)))
     with http.server.ThreadingHTTPServer(("127.0.0.1", 0), functools.partial(Quiet, directory=str(folder))) as server:
         threading.Thread(target=server.serve_forever, daemon=True).start()
         address = f"http://127.0.0.1:{server.server_port}"
@@ -79,8 +82,9 @@ def seen(folder, page, width, tmp_path):
     ]
     assert said == []
     found = json.loads(re.search(r'<pre id="found">(.*?)</pre>', done.stdout, re.DOTALL)[1].replace("&amp;", "&"))
-    assert [name for name in found["asked"] if not name.startswith((address, "data:", "blob:"))] == []
-    assert found["wide"] <= width
+    for one, width in zip(found, (PHONE, DESK), strict=True):
+        assert [name for name in one["asked"] if not name.startswith((address, "data:", "blob:"))] == []
+        assert one["wide"] <= width
     return found
 
 
@@ -98,17 +102,16 @@ def report(tmp_path_factory):
     return folder
 
 
-@pytest.mark.parametrize("width", [PHONE, DESK])
-def test_the_report_is_whole(report, width, tmp_path):
-    found = seen(report, "report.html", width, tmp_path)
-    assert found["title"].startswith("spinlev: ")
-    assert found["canvases"] == [1]
+def test_the_report_is_whole(report, tmp_path):
+    for found in seen(report, "report.html", tmp_path):
+        assert found["title"].startswith("spinlev: ")
+        assert found["canvases"] == [1]
     assert (report / "report.html").stat().st_size < 3_000_000
 
 
 def test_the_view_to_turn_shows_rotor_and_floater(report, tmp_path):
     """The dark cubes, the grey sphere and the orange arrows, on white."""
-    seen(report, "trajectory-view.html", DESK, tmp_path)
+    seen(report, "trajectory-view.html", tmp_path)
     picture = tmp_path / "view.png"
     browser(tmp_path, (report / "trajectory-view.html").as_uri(), f"--screenshot={picture}")
     pixels = np.asarray(Image.open(picture).convert("RGB")).reshape(-1, 3).astype(int)
@@ -133,12 +136,11 @@ def test_the_view_to_turn_cuts_no_plate_off(tmp_path):
     assert min(edge.min() for edge in (rows[:3], rows[-3:], rows[:, :3], rows[:, -3:])) > 250
 
 
-@pytest.mark.parametrize("width", [PHONE, DESK])
 @pytest.mark.parametrize(
     "page", ["index.html", "mathematics.html", "gallery/index.html", "gallery/kick.html", "api.html"]
 )
-def test_the_documentation_is_whole(page, width, tmp_path):
+def test_the_documentation_is_whole(page, tmp_path):
     if not (SITE / page).exists():
         pytest.skip("the documentation is not built here (make test-browser)")
-    found = seen(SITE, page, width, tmp_path)
-    assert found["equations"] > 10 or page != "mathematics.html"
+    for found in seen(SITE, page, tmp_path):
+        assert found["equations"] > 10 or page != "mathematics.html"
