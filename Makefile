@@ -10,7 +10,7 @@ OLD ?= benchmarks/measured.json
 NEW ?= out/benchmarks.json
 SOURCES := $(shell find spinlev geometry fem dynamics studies scenes -type f -not -name "*.pyc") setup.py pyproject.toml README.md LICENSE
 
-# Slow tests are run by `validate`, those that need a browser by `test-browser`.
+# Slow tests are run by `validate`, those that need a browser by `test-browser`, which `validate` begins with.
 FAST := not slow and not browser
 
 .PHONY: install run test test-browser lint types coverage bench bench-compare bench-peers dist dependencies docs validate fuzz lock clean
@@ -51,7 +51,7 @@ test: lint types
 # The gallery's programs are not run for it: the pages are then without their output. It says how fast a slider is.
 test-browser: install
 	$(BIN)/sphinx-build --quiet -D plot_gallery=0 -b html docs docs/_build/unrun
-	$(BIN)/pytest -n 2 --dist loadfile tests/whole/test_browser.py tests/whole/test_explore_browser.py
+	$(BIN)/pytest -n 2 --dist worksteal tests/whole/test_explore_browser.py tests/whole/test_browser.py
 
 # Lines that the fast tests run, in child processes too; what a killed process has left of its own count is removed.
 coverage: install
@@ -61,7 +61,7 @@ coverage: install
 	@for p in geometry fem dynamics studies; do \
 	  echo "$$p $$($(BIN)/coverage report --include="*/$$p/*" --format=total) %"; done
 
-validate: install
+validate: test-browser
 	$(BIN)/pytest -m slow -s
 
 # Processor times, so that other work on the machine matters little; the report says them as ratios to the peers.
