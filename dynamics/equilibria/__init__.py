@@ -17,6 +17,7 @@ from .effect_sizes import (
     shift_by_answers as shift_by_answers,
 )
 from .fixed_points import scattered as scattered
+from .found import Found as Found, cached_found as cached_found, found_key as found_key
 from .full_search import (
     field_doubts as field_doubts,
     find_equilibria as find_equilibria,

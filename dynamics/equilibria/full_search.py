@@ -1,5 +1,6 @@
 """All synchronous equilibria of a floater: fixed points in the frame that turns with the rotor."""
 
+from collections.abc import Callable
 from contextlib import suppress
 
 import numpy as np
@@ -13,6 +14,7 @@ from ..motion import Parameter, PlateMemory, Rates, Scales, parameters, rotor_ga
 from ..steady import Balance, Equilibrium, EquilibriumError, ForceCurve, Survey, modes, named_modes
 from .curve import Curve
 from .fixed_points import fixed_points
+from .found import Found
 from .periodic_equilibrium import Shaken
 from .search import SearchRange
 
@@ -40,6 +42,7 @@ def survey(
     spin: float = 0.0,
     farthest: float = 0.1,
     rates: Rates | None = None,
+    remembered: Callable[[Callable[[], Found]], Found] = lambda search: search(),
 ) -> Survey:
     """All synchronous equilibria with z < 0 between contact with the rotor and `farthest`, with their stability.
 
@@ -50,6 +53,7 @@ def survey(
     spin : body spin s = Ω·m̂/ω, which magnetic torque does not change
     farthest : largest depth, and distance from the axis, m
     rates : `Rates` of the same table, to compile them once for many scenes
+    remembered : gets the search and gives what it finds, perhaps from before, see `cached_found`
 
     With gravity across the axis equilibria are periodic motions, followed from the fixed points without it.
 
@@ -67,12 +71,18 @@ def survey(
     scales = Scales.of(scene)
     equations = rates or Rates(with_effects(scene, table))
     balance = Balance(equations, parameters(scene, scales, frozen_spin=True), spin * scales.spin_ratio)
+    found = remembered(lambda: _search(scene, table, balance, farthest))
+    return told(scene, balance, found.points, found.doubts, found.curves)
+
+
+def _search(scene: Scene, table: FieldTable, balance: Balance, farthest: float) -> Found:
+    scales = Scales.of(scene)
     curves, points = fixed_points(balance, SearchRange(scene, farthest))
     where = np.reshape([np.concatenate(point) for point in points], (-1, 6))
     known, doubts = field_doubts(table, where[:, :3] * scales.length)
     if scene.floater.body is not None:
         known, doubts = _of_shape(scene, table, known, doubts, where)
-    return told(scene, balance, where[known], doubts, tuple(_force_curve(scene, scales, curve) for curve in curves))
+    return Found(where[known], doubts, tuple(_force_curve(scene, scales, curve) for curve in curves))
 
 
 def _of_shape(

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 from ...dynamics.effects import (
     BESIDE_METAL,
@@ -16,18 +16,18 @@ from ...dynamics.effects import (
     mutual_choice,
     with_effects,
 )
-from ...dynamics.equilibria import survey, with_plate
+from ...dynamics.equilibria import Found, cached_found, found_key, survey, with_plate
 from ...dynamics.flights import Checkpoint, LiveFlight, Trajectory, most_like_levitation, simulate, starting_point
 from ...dynamics.motion import FORCE_ALONE, Interaction, PlateMemory, Rates, interaction_of
 from ...dynamics.steady import Equilibrium, EquilibriumError, Survey
 from ...fem.measured_maps import GriddedTable
 from ...fem.mutual import MutualTable
 from ...fem.rotor_losses import RotorLosses, check_slow_enough, pieces_of
-from ...fem.rotor_tables import RotorTable, resolve_model
+from ...fem.rotor_tables import FieldTable, RotorTable, resolve_model
 from ...fem.slab import resolve_plate_model, rotor_nearby
 from ...geometry.basics import Array, InputError, millimetre_size
 from ...geometry.scenes import AbsoluteStart, Scene, load_scene
-from ..terminal import Models, detail, finite, note, positive, progress
+from ..terminal import FieldModel, Models, detail, finite, note, positive, progress
 from .plate_of_scene import check_room, check_way, plate_memory
 from .rotor_of_scene import RotorField, RotorTables, equations_key, nearest_faces
 
@@ -142,11 +142,30 @@ class Levitation:
         """
         interaction = self.interaction
         note("Equilibria ...")
-        found = survey(self.scene, interaction, self.spin, rates=self.rates)
+        found = self._searched(interaction, self.equations_key, self.rates)
         place = most_like_levitation(found.equilibria)
         if place is not None:
             check_way(self.scene, place.position)
         return found
+
+    def survey_in(self, model: str) -> Survey:
+        """All equilibria in the rotor's field alone by a model: without plate and without all that it brings about."""
+        models = replace(self.models, model=cast(FieldModel, model), interaction="rigid")
+        key = equations_key(self.scene, models)
+        return self._searched(self.field(model), f"alone {key}")
+
+    def _searched(self, table: FieldTable, equations: str, rates: Rates | None = None) -> Survey:
+        """All equilibria in a table, from the cache if they were searched for before."""
+
+        def remembered(search: Callable[[], Found]) -> Found:
+            if self.scene.field_map:  # the file can have another content than it had
+                return search()
+            found, known = cached_found(found_key(self.scene, equations, self.spin), search, note)
+            if known:
+                detail("  from the cache.")
+            return found
+
+        return survey(self.scene, table, self.spin, rates=rates, remembered=remembered)
 
     @cached_property
     def plate(self) -> PlateMemory | None:

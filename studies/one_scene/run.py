@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from ...dynamics.equilibria import survey
 from ...dynamics.flights import FlightStopped, Trajectory
 from ...dynamics.steady import EquilibriumError, Survey
 from ...fem.rotor_tables import FieldTable
@@ -55,7 +54,7 @@ def main_job(scene: Scene, asked: Models, spin: float, duration: float, out: Pat
         _tell_first(levitation)
         best = levitation.field(exact)
         alone = {
-            model: levitation.without_plate if model == chosen.model else survey(scene, levitation.field(model), spin)
+            model: levitation.without_plate if model == chosen.model else levitation.survey_in(model)
             for model in dict.fromkeys(("dipole", best.model, chosen.model))
         }
         surveys = alone | {chosen.model: levitation.survey}

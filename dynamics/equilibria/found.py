@@ -1,0 +1,75 @@
+"""What a full search finds, and its file: the same search is not done again."""
+
+import hashlib
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from ...fem.storage import described, from_cache, program_of, read_checked, write_checked
+from ...geometry.basics import Array
+from ...geometry.scenes import Scene
+from ..motion import Scales, parameters
+from ..steady import ForceCurve
+
+FORMAT = "spinlev equilibria 1"
+
+
+@dataclass(frozen=True, eq=False)
+class Found:
+    """Fixed points of a scene without plate, and the curves on which they lie.
+
+    Parameters
+    ----------
+    points : (n, 6) scaled positions and moments, good to round-off
+    doubts : (n, 2) of the field there: of B, T, and of its gradient, T/m
+    curves : along which everything but the axial force is balanced
+    """
+
+    points: Array
+    doubts: Array
+    curves: tuple[ForceCurve, ...]
+
+
+def found_key(scene: Scene, equations: str, spin: float) -> str:
+    """SHA-256 of all that decides what a search finds, and the programs.
+
+    Parameters
+    ----------
+    scene : its plate and its start decide nothing
+    equations : tells the rotor's table and the equations of motion from all others
+    spin : body spin
+    """
+    digest = hashlib.sha256(f"{FORMAT} {program_of(__package__)} {equations} {spin!r}".encode())
+    digest.update(parameters(scene, Scales.of(scene), frozen_spin=True).tobytes())
+    return digest.hexdigest()
+
+
+def cached_found(key: str, make: Callable[[], Found], report: Callable[[str], None]) -> tuple[Found, bool]:
+    """What a search found, from the cache if it is there under its `found_key`, and whether it was."""
+    return from_cache(f"equilibria-{key}.nc", load_found, make, save_found, report)
+
+
+def save_found(found: Found, path: str | Path) -> None:
+    """Write it; the file is whole or absent. Raises OSError."""
+    curves = found.curves
+    length = [len(curve.position) for curve in curves]
+    variables = {
+        "point": (("equilibrium", "component"), found.points, "1"),
+        "doubt": (("equilibrium", "order"), found.doubts, "T m-order"),
+        "points_of_curve": (("curve",), np.array(length, np.int64), "1"),
+        "position": (("sample", "axis"), np.concatenate([np.zeros((0, 3)), *(c.position for c in curves)]), "m"),
+        "moment": (("sample", "axis"), np.concatenate([np.zeros((0, 3)), *(c.moment for c in curves)]), "1"),
+        "magnetic_force": (("sample",), np.concatenate([np.zeros(0), *(c.magnetic_force for c in curves)]), "N"),
+    }
+    write_checked(described(variables, {"format": FORMAT, "title": "Fixed points of a scene without plate"}), path)
+
+
+def load_found(path: str | Path) -> Found:
+    """Read it. Raises TableFileError if the file is not of this format, or its content is not what was written."""
+    data = read_checked(path, FORMAT)
+    ends = np.cumsum(data["points_of_curve"].values)[:-1]
+    parts = (np.split(data[name].values, ends) for name in ("position", "moment", "magnetic_force"))
+    curves = tuple(ForceCurve(*part) for part in zip(*parts, strict=True) if len(part[0]))
+    return Found(data["point"].values, data["doubt"].values, curves)
