@@ -11,4 +11,3 @@ from .integration_points import (
 from .memory import TooLargeError as TooLargeError, require_memory as require_memory
 from .open_boundary import OpenBoundary as OpenBoundary
 from .parity import Parity as Parity
-from .watch import Watch as Watch, unwatched as unwatched, watched as watched

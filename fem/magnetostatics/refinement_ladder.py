@@ -15,10 +15,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from ...geometry.basics import Array
+from ...geometry.basics import Array, Watch, unwatched
 from ...geometry.bodies import Magnet
 from ...geometry.meshes import MeshSettings
-from ..elements import Watch, unwatched
 from ..harmonics import Coefficients, MultipoleExpansion
 from .rotor_solution import Refinement, RotorSolution
 

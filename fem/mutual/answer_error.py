@@ -4,10 +4,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ...geometry.basics import Array, places_off
+from ...geometry.basics import Array, Watch, places_off, watched
 from ...geometry.bodies import Magnet
 from ...geometry.scenes import Floater
-from ..elements import Watch, watched
 from ..harmonics import Ball, field_at_center, gradient_at_center
 from .answer_samples import places_around
 from .degree_needed import enough_degree

@@ -6,10 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from ...geometry.basics import Array, InputError, Part
+from ...geometry.basics import Array, InputError, Part, Watch, unwatched
 from ...geometry.bodies import Magnet
 from ...geometry.scenes import Floater
-from ..elements import Watch, unwatched
 from .answer_error import answer_errors
 from .answer_grid import POWERS, RETURNED, AnswerGrid, answer_box, point_counts
 from .answer_samples import (

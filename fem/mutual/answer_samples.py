@@ -6,10 +6,9 @@ from itertools import product
 
 import numpy as np
 
-from ...geometry.basics import MU_0, Array, places_off
+from ...geometry.basics import MU_0, Array, Watch, places_off, watched
 from ...geometry.bodies import Magnet
 from ...geometry.scenes import Floater
-from ..elements import Watch, watched
 from ..harmonics import (
     FOUR_PI,
     Ball,

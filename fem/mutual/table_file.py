@@ -8,9 +8,9 @@ from dataclasses import replace
 import numpy as np
 import xarray as xr
 
+from ...geometry.basics import Watch, unwatched
 from ...geometry.bodies import Magnet
 from ...geometry.scenes import Floater
-from ..elements import Watch, unwatched
 from ..rotor_tables import at_home
 from ..storage import described, from_cache, program_of, read_checked, write_checked
 from .answer_fit import mutual_table

@@ -11,10 +11,9 @@ from functools import partial
 
 import numpy as np
 
-from ...geometry.basics import Array
+from ...geometry.basics import Array, Watch, unwatched, watched
 from ..closed_forms import ComplexArray
 from ..eddy_currents import ClassFactor, EddySpace, FieldRows, ShiftedSystem
-from ..elements import Watch, unwatched, watched
 from .current_space import CurrentSpace
 from .shift_basis import Residuals, class_basis
 from .sources import SourceSet

@@ -9,12 +9,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...geometry.basics import Array
+from ...geometry.basics import Array, Watch, unwatched
 from ...geometry.meshes import MeshRule, plate_mesh
 from ...geometry.scenes import Plate
 from ..closed_forms import ComplexArray, unit_dipoles
 from ..eddy_currents import EddySpace, solve_shifted
-from ..elements import Watch, unwatched
 from ..rotor_tables import AccuracyError
 from .limits import highest_order
 from .reaction import BEST_REDUCTION, STALLED, order_error, own_tensors, truncation_error

@@ -12,11 +12,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...geometry.basics import Array
+from ...geometry.basics import Array, Watch, unwatched
 from ...geometry.meshes import MeshRule
 from ...geometry.scenes import Plate
 from ..closed_forms import ComplexArray
-from ..elements import Watch, unwatched
 from .current_space import CurrentSpace, space_couplings
 from .current_training import train
 from .order_ladder import MESH_SHARE, Ladder

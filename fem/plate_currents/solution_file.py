@@ -13,10 +13,10 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...geometry.basics import spread_points
+from ...geometry.basics import Watch, spread_points, unwatched
 from ...geometry.meshes import MeshRule
 from ...geometry.scenes import Plate
-from ..elements import Parity, Watch, unwatched
+from ..elements import Parity
 from ..storage import described, from_cache, program_of, read_checked, write_checked
 from .current_space import CurrentSpace
 from .region import Region

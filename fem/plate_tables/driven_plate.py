@@ -5,10 +5,9 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...geometry.basics import InputError
+from ...geometry.basics import InputError, Watch, unwatched
 from ...geometry.meshes import MeshRule
 from ...geometry.scenes import Plate
-from ..elements import Watch, unwatched
 from ..plate_currents import OtherSources, PlateSolution, Region, error_of, solve_currents
 from ..plate_network import NETWORK_SHARE, reduce_currents
 from ..rotor_tables import RotorTable

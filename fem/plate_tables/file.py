@@ -8,9 +8,8 @@ import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike
 
-from ...geometry.basics import MU_0
+from ...geometry.basics import MU_0, Watch, unwatched
 from ...geometry.scenes import Plate
-from ..elements import Watch, unwatched
 from ..harmonics import FOUR_PI
 from ..plate_currents import Region, cached_solver, digest
 from ..rotor_tables import RotorTable

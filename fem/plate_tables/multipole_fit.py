@@ -12,8 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...geometry.basics import Array
-from ..elements import Watch, unwatched
+from ...geometry.basics import Array, Watch, unwatched
 from .field_functions import Multipoles
 
 INDEPENDENT = 1e-10

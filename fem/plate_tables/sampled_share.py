@@ -5,10 +5,9 @@ from typing import Protocol
 
 import numpy as np
 
-from ...geometry.basics import Array
+from ...geometry.basics import Array, Watch, unwatched, watched
 from ...geometry.scenes import Plate
 from ..eddy_currents import Source
-from ..elements import Watch, unwatched, watched
 from ..rotor_tables import AccuracyError, RotorTable
 from .rotor_source import posed_rotor, rotor_parts
 from .share import RotorShare, turn_harmonics

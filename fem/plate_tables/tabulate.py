@@ -5,10 +5,9 @@ from importlib.metadata import version
 
 import numpy as np
 
-from ...geometry.basics import Array
+from ...geometry.basics import Array, Watch, unwatched
 from ...geometry.meshes import MeshRule
 from ...geometry.scenes import Plate
-from ..elements import Watch, unwatched
 from ..plate_currents import STRICT, OtherSources, Region
 from ..plate_network import PlateNetwork, reduce_plate
 from ..rotor_tables import AccuracyError

@@ -12,8 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...geometry.basics import Array
-from ..elements import Watch, unwatched, watched
+from ...geometry.basics import Array, Watch, unwatched, watched
 from .dipole_potentials import of_places
 from .metal_currents import Metal, flat
 

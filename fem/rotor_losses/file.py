@@ -7,9 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
-from ...geometry.basics import Solid
+from ...geometry.basics import Solid, Watch, unwatched
 from ...geometry.scenes import Scene
-from ..elements import Watch, unwatched
 from ..plate_tables import Multipoles
 from ..storage import described, from_cache, program_of, read_checked, write_checked
 from .table import RotorLosses

@@ -9,9 +9,8 @@ from itertools import product
 import numpy as np
 import scipy
 
-from ...geometry.basics import Array, Box, Solid, places_off
+from ...geometry.basics import Array, Box, Solid, Watch, places_off, unwatched, watched
 from ...geometry.bodies import Conductor, Magnet, cut_magnets, separate_pieces
-from ..elements import Watch, unwatched, watched
 from ..plate_tables import Multipoles, fit_multipoles
 from .current_patterns import CurrentPatterns, current_patterns
 from .dipole_potentials import of_motion

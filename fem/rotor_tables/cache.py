@@ -6,8 +6,8 @@ from functools import partial
 
 import numpy as np
 
+from ...geometry.basics import Watch, unwatched
 from ...geometry.bodies import Magnet
-from ..elements import Watch, unwatched
 from ..storage import from_cache, program_of
 from .choice import rotor_table
 from .home import at_home, taken_along

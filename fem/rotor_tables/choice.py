@@ -5,8 +5,8 @@ from functools import partial
 
 import numpy as np
 
+from ...geometry.basics import Watch, unwatched
 from ...geometry.bodies import Magnet
-from ..elements import Watch, unwatched
 from .accuracy import Accuracy, error_points
 from .fem_model import fem_table
 from .home import at_home, taken_along

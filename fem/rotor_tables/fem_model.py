@@ -14,11 +14,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from ...geometry.basics import Array, Part
+from ...geometry.basics import Array, Part, Watch, unwatched
 from ...geometry.bodies import CONVERGENCE, Cells, Magnet, cells_of, cut_magnets, largest_shift
 from ...geometry.meshes import MeshSettings
 from ..closed_forms import carrier, closed_part
-from ..elements import Watch, unwatched
 from ..harmonics import MultipoleExpansion, trimmed_expansions, without_noise
 from ..magnetostatics import RotorSolution, refined, refinement_of, solve_rotor, strongest
 from .accuracy import BETWEEN, Accuracy, error_points, guards

@@ -5,10 +5,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from ...geometry.basics import Array
+from ...geometry.basics import Array, Watch, unwatched
 from ...geometry.bodies import Magnet
 from ...geometry.scenes import Plate
-from ..elements import Watch, unwatched
 from ..plate_currents import Region
 from ..plate_tables import PlateTable, RotorShare, cached_driven_plate, reachable_region
 from ..rotor_tables import Accuracy, RotorTable, shortened_table

@@ -25,3 +25,4 @@ from .text import (
     millimetre_size as millimetre_size,
     millimetres as millimetres,
 )
+from .watch import Watch as Watch, unwatched as unwatched, watched as watched

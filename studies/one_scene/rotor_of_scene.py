@@ -6,11 +6,11 @@ from functools import partial
 from typing import Any, TypeVar
 
 from ...dynamics.motion import Interaction, Rates
-from ...fem.elements import Watch
 from ...fem.measured_maps import GriddedTable, map_table
 from ...fem.mutual import MutualTable, cached_mutual_table, mutual_key
 from ...fem.rotor_losses import RotorLosses, cached_rotor_losses, losses_key, pieces_of
 from ...fem.rotor_tables import RotorTable, cached_rotor_table, rotor_key, rotor_table
+from ...geometry.basics import Watch
 from ...geometry.scenes import Floater, Scene
 from ..terminal import Models, note, stages
 
