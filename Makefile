@@ -42,7 +42,7 @@ lint: install
 	$(BIN)/ruff format --check .
 
 types: install
-	cd $(VENV) && bin/mypy --config-file ../pyproject.toml --cache-dir ../.mypy_cache -p spinlev
+	cd $(VENV) && bin/mypy --config-file ../pyproject.toml --cache-dir ../.mypy_cache --num-workers 2 -p spinlev
 
 test: lint types
 	$(BIN)/pytest -n 2 --dist worksteal -m "$(FAST)"

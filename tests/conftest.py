@@ -1,6 +1,7 @@
 """What tests of several files share; and a cache of the session's own: never the user's."""
 
 import ctypes
+import gc
 import os
 import shutil
 import tempfile
@@ -24,10 +25,19 @@ def pytest_unconfigure(config):
         shutil.rmtree(os.environ["SPINLEV_CACHE"], ignore_errors=True)
 
 
+def pytest_collection_finish():
+    """The libraries and the tests live to the end: Python need not look through them again for what is unused."""
+    gc.collect()
+    gc.freeze()
+
+
 @pytest.fixture(autouse=True, scope="module")
 def memory_given_back():
-    """After each file: glibc keeps what is freed in pieces, hundreds of MB of compiled code and matrices."""
+    """After each file: compiled functions that later ones read again, and what glibc keeps of freed memory."""
     yield
+    from spinlev.fem.storage import compiled_code  # after the session's cache is known
+
+    compiled_code._functions.clear()
     if hasattr(libc := ctypes.CDLL(None), "malloc_trim"):
         libc.malloc_trim(0)
 

@@ -11,7 +11,7 @@ from functools import cached_property
 import numpy as np
 from scipy.interpolate import CubicHermiteSpline
 
-from ...geometry.basics import Array
+from ...geometry.basics import Array, Watch, unwatched
 from ..steady import AXIAL, LATERAL, Balance, Indices, solve
 from .continuation import AtRest, Steps
 from .search import SearchRange
@@ -101,11 +101,13 @@ def _curve(balance: Balance, points: Array, tangents: Array) -> Curve:
     return Curve(arc, points[:, :3], points[:, 3:], tangents, value[:, AXIAL], along)
 
 
-def all_curves(balance: Balance, where: SearchRange) -> list[Curve]:
+def all_curves(balance: Balance, where: SearchRange, watch: Watch = unwatched) -> list[Curve]:
     """Every curve that is met in the range, from its starts at their own heights."""
-    seeds = from_starts(balance, where, LATERAL)
+    seeds = from_starts(balance, where, LATERAL, watch=watch)
     curves: list[Curve] = []
+    count = len(seeds)
     while len(seeds):
+        watch("curves of balance", 1 - len(seeds) / count)
         # What is at one height lies on different curves, or on both sides of a fold.
         heights, number = np.unique(np.round(seeds[:, 2], 6), return_counts=True)
         chosen = np.abs(seeds[:, 2] - heights[np.argmax(number)]) < 1e-5
@@ -117,25 +119,28 @@ def all_curves(balance: Balance, where: SearchRange) -> list[Curve]:
     return curves
 
 
-def from_starts(balance: Balance, where: SearchRange, free: Indices, every: int = 1) -> Array:
+def from_starts(balance: Balance, where: SearchRange, free: Indices, every: int = 1, watch: Watch = unwatched) -> Array:
     """Distinct points (n, 6) in the range, lowest first, at which the balances of `free` vanish, see `fixed_points`.
 
     One of so many starts is taken.
     """
     position, moment = (part[::every] for part in where.starts())
     if balance.rates.has_rough:
-        near, turned = _newton(replace(balance, rates=balance.rates.rough), position, moment, where, free)
+        near, turned = _newton(replace(balance, rates=balance.rates.rough), position, moment, where, free, watch)
         position, moment = np.concatenate([near, position[::THINNED]]), np.concatenate([turned, moment[::THINNED]])
-    return _distinct(np.concatenate(_newton(balance, position, moment, where, free), axis=1))
+    return _distinct(np.concatenate(_newton(balance, position, moment, where, free, watch), axis=1))
 
 
-def _newton(balance: Balance, position: Array, moment: Array, where: SearchRange, free: Indices) -> tuple[Array, Array]:
+def _newton(
+    balance: Balance, position: Array, moment: Array, where: SearchRange, free: Indices, watch: Watch
+) -> tuple[Array, Array]:
     """Distinct places and moments (n, 3) in the range that Newton's method finds.
 
     Every few steps those that ran away are given up, and of those that have come together one goes on.
     """
     found = []
     for turn in range(ITERATIONS // STEPS_TOGETHER):
+        watch("Newton's method from many starts", turn / (ITERATIONS // STEPS_TOGETHER))
         with np.errstate(all="ignore"):
             position, moment, step = solve(balance, position, moment, free, STEPS_TOGETHER)
         points, met = np.concatenate([position, moment], axis=1), step < 1e-8

@@ -6,7 +6,7 @@ goes on in the whole one from what it found and from every eighth of the starts.
 
 import numpy as np
 
-from ...geometry.basics import Array
+from ...geometry.basics import Array, Watch, unwatched
 from ..steady import EVERY, Balance, solve
 from .curve import Curve, all_curves, from_starts
 from .search import SearchRange
@@ -15,17 +15,19 @@ SPARE = 3
 """One of so many starts is tried for what lies on none of the curves: a test of 90 scenes finds no such equilibrium."""
 
 
-def fixed_points(balance: Balance, where: SearchRange) -> tuple[list[Curve], list[tuple[Array, Array]]]:
+def fixed_points(
+    balance: Balance, where: SearchRange, watch: Watch = unwatched
+) -> tuple[list[Curve], list[tuple[Array, Array]]]:
     """Curves of lateral balance in the range, and the scaled positions and moments of the equilibria on them."""
-    curves = all_curves(balance, where)
-    guesses = [*(curve.balanced() for curve in curves), scattered(balance, where, SPARE)]
+    curves = all_curves(balance, where, watch)
+    guesses = [*(curve.balanced() for curve in curves), scattered(balance, where, SPARE, watch)]
     position, moment = (np.concatenate(part) for part in zip(*guesses, strict=True))
     return curves, [(r, m) for r, m in _polished(balance, position, moment) if r in where]
 
 
-def scattered(balance: Balance, where: SearchRange, every: int = 1) -> tuple[Array, Array]:
+def scattered(balance: Balance, where: SearchRange, every: int = 1, watch: Watch = unwatched) -> tuple[Array, Array]:
     """What Newton's method in all unknowns finds from one of so many starts: short curves may pass between them."""
-    points = from_starts(balance, where, EVERY, every)
+    points = from_starts(balance, where, EVERY, every, watch)
     return points[:, :3], points[:, 3:]
 
 

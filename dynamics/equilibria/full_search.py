@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...fem.rotor_tables import FieldTable, RangeError
-from ...geometry.basics import Array
+from ...geometry.basics import Array, Watch, unwatched
 from ...geometry.scenes import Scene
 from ..effects import FloaterShape, with_effects
 from ..motion import Parameter, PlateMemory, Rates, Scales, parameters, rotor_gap
@@ -43,6 +43,7 @@ def survey(
     farthest: float = 0.1,
     rates: Rates | None = None,
     remembered: Callable[[Callable[[], Found]], Found] = lambda search: search(),
+    watch: Watch = unwatched,
 ) -> Survey:
     """All synchronous equilibria with z < 0 between contact with the rotor and `farthest`, with their stability.
 
@@ -54,6 +55,7 @@ def survey(
     farthest : largest depth, and distance from the axis, m
     rates : `Rates` of the same table, to compile them once for many scenes
     remembered : gets the search and gives what it finds, perhaps from before, see `cached_found`
+    watch : is told the stage of the search and its share that is done
 
     With gravity across the axis equilibria are periodic motions, followed from the fixed points without it.
 
@@ -71,13 +73,13 @@ def survey(
     scales = Scales.of(scene)
     equations = rates or Rates(with_effects(scene, table))
     balance = Balance(equations, parameters(scene, scales, frozen_spin=True), spin * scales.spin_ratio)
-    found = remembered(lambda: _search(scene, table, balance, farthest))
+    found = remembered(lambda: _search(scene, table, balance, farthest, watch))
     return told(scene, balance, found.points, found.doubts, found.curves)
 
 
-def _search(scene: Scene, table: FieldTable, balance: Balance, farthest: float) -> Found:
+def _search(scene: Scene, table: FieldTable, balance: Balance, farthest: float, watch: Watch) -> Found:
     scales = Scales.of(scene)
-    curves, points = fixed_points(balance, SearchRange(scene, farthest))
+    curves, points = fixed_points(balance, SearchRange(scene, farthest), watch)
     where = np.reshape([np.concatenate(point) for point in points], (-1, 6))
     known, doubts = field_doubts(table, where[:, :3] * scales.length)
     if scene.floater.body is not None:

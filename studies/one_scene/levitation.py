@@ -25,9 +25,9 @@ from ...fem.mutual import MutualTable
 from ...fem.rotor_losses import RotorLosses, check_slow_enough, pieces_of
 from ...fem.rotor_tables import FieldTable, RotorTable, resolve_model
 from ...fem.slab import resolve_plate_model, rotor_nearby
-from ...geometry.basics import Array, InputError, millimetre_size
+from ...geometry.basics import Array, InputError, Watch, millimetre_size, unwatched
 from ...geometry.scenes import AbsoluteStart, Scene, load_scene
-from ..terminal import FieldModel, Models, detail, finite, note, positive, progress
+from ..terminal import FieldModel, Models, detail, finite, note, positive, progress, stages
 from .plate_of_scene import check_room, check_way, plate_memory
 from .rotor_of_scene import RotorField, RotorTables, equations_key, nearest_faces
 
@@ -142,7 +142,9 @@ class Levitation:
         """
         interaction = self.interaction
         note("Equilibria ...")
-        found = self._searched(interaction, self.equations_key, self.rates)
+        with stages("Equilibria") as watch:
+            watch("compiling the equations of motion", 0.0)
+            found = self._searched(interaction, self.equations_key, watch, self.rates)
         place = most_like_levitation(found.equilibria)
         if place is not None:
             check_way(self.scene, place.position)
@@ -152,9 +154,9 @@ class Levitation:
         """All equilibria in the rotor's field alone by a model: without plate and without all that it brings about."""
         models = replace(self.models, model=cast(FieldModel, model), interaction="rigid")
         key = equations_key(self.scene, models)
-        return self._searched(self.field(model), f"alone {key}")
+        return self._searched(self.field(model), f"alone {key}", unwatched)
 
-    def _searched(self, table: FieldTable, equations: str, rates: Rates | None = None) -> Survey:
+    def _searched(self, table: FieldTable, equations: str, watch: Watch, rates: Rates | None = None) -> Survey:
         """All equilibria in a table, from the cache if they were searched for before."""
 
         def remembered(search: Callable[[], Found]) -> Found:
@@ -165,7 +167,7 @@ class Levitation:
                 detail("  from the cache.")
             return found
 
-        return survey(self.scene, table, self.spin, rates=rates, remembered=remembered)
+        return survey(self.scene, table, self.spin, rates=rates, remembered=remembered, watch=watch)
 
     @cached_property
     def plate(self) -> PlateMemory | None:

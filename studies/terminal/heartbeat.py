@@ -59,7 +59,7 @@ class Heartbeat(threading.Thread):
 
     def _progress(self, now: float, began: float) -> str:
         if not TELLING <= self._fraction < ALL:
-            return f"{_rounded(now - began)} so far"
+            return f"{self._stage}{self._stage and ', '}{_rounded(now - began)} so far"
         left = (self._advanced - self._stage_began) * (1 / self._fraction - 1) - (now - self._advanced)
         told = f", {_rounded(left)} left" if left > 0 else ""  # a part that takes longer than its share tells no time
         return f"{self._stage}{self._stage and ', '}{self._fraction:.0%}{told}"

@@ -61,6 +61,8 @@ def test_the_time_left_is_told_once_it_can_be_and_in_units_that_suit_it():
     assert heartbeat._progress(now + 3600.0, now - 6000.0) == "10%, 14.0 h left"
     heartbeat.advanced(0.999)
     assert heartbeat._progress(now, now - 6000.0) == "100 min so far"
+    heartbeat.advanced(0.0, "compiling the equations of motion")
+    assert heartbeat._progress(now, now - 6000.0) == "compiling the equations of motion, 100 min so far"
 
 
 def test_a_part_that_takes_longer_than_its_share_tells_no_time_that_grows():
