@@ -17,10 +17,10 @@ FieldExpressions = tuple[list[hy.expression], list[list[hy.expression]]]
 """B_i (T) and ∂B_i/∂x_j (T/m), the latter symmetric."""
 
 
-FEW = 1000
+FEW = 5000
 """Points of a call for which code is good enough that is compiled in a fourth of the time and evaluated in ten times.
 
-A call of so many takes a millisecond more; what decides is the call alone, so that the same call gives the same bits.
+A call of so many takes four milliseconds more; what decides is the call alone, so that the same call gives the same bits.
 """
 
 

@@ -1,11 +1,12 @@
 """Data on disk: one self-describing netCDF file with a checksum."""
 
+import io
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-import dask
 import xarray as xr
+from xarray.backends import H5NetCDFStore
 
 from ...geometry.basics import InputError
 from .foreign import hdf5_fault
@@ -26,9 +27,12 @@ def described(variables: Variables, attributes: Mapping[str, Any]) -> xr.Dataset
 
 def write_checked(dataset: xr.Dataset, path: str | Path) -> None:
     """Write a dataset with the checksum of the file at its end; the file is whole or absent. Raises OSError."""
-    with dask.config.set(scheduler="synchronous"):  # or xarray would ask a cluster for a lock of memory that is its own
-        content = bytes(dataset.to_netcdf(engine="h5netcdf"))  # on a full disk HDF5 itself would crash
-    write_whole(path, seal(content))
+    memory = io.BytesIO()  # on a full disk HDF5 itself would crash
+    # As `to_netcdf`, which would load a cluster's libraries and ask for a lock of memory that is its own.
+    store = H5NetCDFStore.open(memory, mode="w", lock=False)
+    dataset.dump_to_store(store)
+    store.close()
+    write_whole(path, seal(memory.getvalue()))
 
 
 def read_checked(path: str | Path, file_format: str | None = None) -> xr.Dataset:
