@@ -55,6 +55,8 @@ class Lanes:
         """
         waiting, ends = iter(flights), np.zeros(LANES)
         self._integrator.set_time(ends)
+        for lane in range(LANES):  # one that stays empty must be finite too: the equations are not, where all is zero
+            self._put(lane, flights[0])
         flying = {lane: first for lane in range(LANES) if (first := self._next(lane, waiting, ends))}
         while flying:
             recorded = any(flight.recorder for flight in flying.values())

@@ -20,7 +20,7 @@ FieldExpressions = tuple[list[hy.expression], list[list[hy.expression]]]
 FEW = 5000
 """Points of a call for which code is good enough that is compiled in a fourth of the time and evaluated in ten times.
 
-A call of so many takes four milliseconds more; what decides is the call alone, so that the same call gives the same bits.
+A call of so many takes four milliseconds more. The call alone decides, so that the same one gives the same bits.
 """
 
 

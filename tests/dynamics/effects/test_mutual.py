@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from spinlev.dynamics.effects import Mutual
+from spinlev.dynamics.ensembles import fly_together
 from spinlev.dynamics.equilibria import find_equilibria
 from spinlev.dynamics.flights import LARGE, SMALL, ball_equations
 from spinlev.dynamics.flights.balls import Balls
@@ -118,6 +119,17 @@ def test_a_floater_at_its_equilibrium_stays_there(mutual, start):
     """The search and the flight have the energy in two forms; they part by the error of the ball."""
     flight = integrate(SCENE, compile_local_flight(SCENE, mutual, 0.5, compact=True), start.state, 0.5)
     assert np.ptp(flight.lab.position[:, 2]) < 2e-7
+
+
+def test_flights_in_lanes_of_which_some_stay_empty_are_those_alone(mutual, start):
+    """Three side by side: where nobody flies the equations are asked for all the same, and must be finite."""
+    scenes = [replace(SCENE, frequency=frequency) for frequency in (109.0, 110.0, 111.0)]
+    begun = replace(start.state, position=start.state.position + np.array([0.0, 0.0, 1e-4]))
+    flown = fly_together(scenes, mutual, [begun] * 3, 0.1)
+    for scene, found in zip(scenes, flown, strict=True):
+        alone = integrate(scene, compile_local_flight(scene, mutual, 0.1, compact=True), begun, 0.1)
+        assert np.abs(found.lab.position - alone.lab.position).max() < 1e-10 * 0.02
+        assert found.energy_error < 1e-12
 
 
 @pytest.mark.slow
