@@ -2,7 +2,12 @@
 
 from .driven_plate import SHARE_PART as SHARE_PART, reachable_region as reachable_region, turning_rotor as turning_rotor
 from .field_functions import Multipoles as Multipoles
-from .file import cached_driven_plate as cached_driven_plate, cached_plate_table as cached_plate_table
+from .file import (
+    cached_driven_plate as cached_driven_plate,
+    cached_plate_table as cached_plate_table,
+    cached_with_share as cached_with_share,
+    driven_plate_key as driven_plate_key,
+)
 from .multipole_fit import Fit as Fit, fit_multipoles as fit_multipoles
 from .plate_table import PlateErrors as PlateErrors, PlateTable as PlateTable
 from .rotor_source import (

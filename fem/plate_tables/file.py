@@ -96,11 +96,17 @@ def plate_key(plate: Plate, region: Region, frequencies: tuple[float, float], rt
 
 
 def driven_plate_key(
-    plate: Plate, rotor: RotorTable, region: Region, frequencies: tuple[float, float], rtol: float
+    plate: Plate,
+    rotor: RotorTable,
+    region: Region,
+    frequencies: tuple[float, float],
+    rtol: float,
+    room: str = __package__,
 ) -> str:
     """SHA-256 of what is in `plate_key`, the plate's pose and the length of its way, and the rotor's field.
 
-    Coefficients of expansions count to nine digits: solved again, they differ in the last ones.
+    `room` is that whose program makes the table. Coefficients of expansions count to nine digits: solved again, they
+    differ in the last ones.
     """
     numbers: list[ArrayLike] = [
         plate.box.center,
@@ -112,7 +118,7 @@ def driven_plate_key(
     for expansion in rotor.expansions:
         scaled = expansion.coefficients * (expansion.radius**3 * FOUR_PI / MU_0 / np.linalg.norm(rotor.moment))
         numbers += [expansion.center, [expansion.radius], np.round(scaled.real, 9), np.round(scaled.imag, 9)]
-    return _hash(plate_key(plate, region, frequencies, rtol), numbers)
+    return digest(f"{program_of(room)} {plate_key(plate, region, frequencies, rtol)}", numbers)
 
 
 def _hash(name: str, parts: Sequence[ArrayLike]) -> str:
@@ -142,13 +148,20 @@ def cached_driven_plate(
     watch: Watch = unwatched,
 ) -> tuple[PlateTable, RotorShare, bool]:
     """`plate_and_rotor_table` from the cache if it is there, and whether it was."""
-    (table, share), found = from_cache(
-        f"driven-plate-{driven_plate_key(plate, rotor, region, frequencies, rtol)}.nc",
-        load_driven_plate,
+    return cached_with_share(
+        f"driven-plate-{driven_plate_key(plate, rotor, region, frequencies, rtol)}",
         lambda: plate_and_rotor_table(
             plate, rotor, region, frequencies, rtol, solve=cached_solver(report, watch), watch=watch
         ),
-        lambda made, path: save_plate_table(made[0], path, made[1]),
         report,
+    )
+
+
+def cached_with_share(
+    name: str, make: Callable[[], tuple[PlateTable, RotorShare]], report: Callable[[str], None]
+) -> tuple[PlateTable, RotorShare, bool]:
+    """A plate's table with the rotor's share, from the cache if it is there under a name, and whether it was."""
+    (table, share), found = from_cache(
+        f"{name}.nc", load_driven_plate, make, lambda made, path: save_plate_table(made[0], path, made[1]), report
     )
     return table, share, found

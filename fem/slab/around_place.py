@@ -1,7 +1,9 @@
 """The tables of a plate for a floater about one place: where it may go, and which frequencies it hears."""
 
+import math
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -9,7 +11,14 @@ from ...geometry.basics import Array, Watch, unwatched
 from ...geometry.bodies import Magnet
 from ...geometry.scenes import Plate
 from ..plate_currents import Region
-from ..plate_tables import PlateTable, RotorShare, cached_driven_plate, reachable_region
+from ..plate_tables import (
+    PlateTable,
+    RotorShare,
+    cached_driven_plate,
+    cached_with_share,
+    driven_plate_key,
+    reachable_region,
+)
 from ..rotor_tables import Accuracy, RotorTable, shortened_table
 from .table import slab_and_rotor_table
 
@@ -19,22 +28,49 @@ RASTER = 0.001
 """Bounds of regions are multiples of this, m, so that scenes that differ little share a table."""
 LOWEST, HIGHEST, HARMONICS = 0.5, 250.0, 2.0
 """Frequencies of a table, Hz, at least; and the multiple of the rotor's that it must hold."""
+COARSE = 50.0
+"""The highest frequency is a multiple of this, Hz, for the same reason."""
 PLUMB = 1e-9
 """Cosine of the angle between a slab's normal and the vertical below which it stands upright."""
 
 
+@dataclass(frozen=True, eq=False)
+class PlateAround:
+    """What a plate's table for a floater about a place is made from.
+
+    Parameters
+    ----------
+    plate : as the model sees it
+    model : "slab", or "reduced" for the network of the finite elements
+    rotor : its field
+    region, frequencies, rtol : as of `plate_and_rotor_table`
+    """
+
+    plate: Plate
+    model: str
+    rotor: RotorTable
+    region: Region
+    frequencies: tuple[float, float]
+    rtol: float
+
+    @cached_property
+    def key(self) -> str:
+        """The same for scenes that share the table."""
+        asked = self.plate, self.rotor, self.region, self.frequencies, self.rtol
+        return f"{self.model}-{driven_plate_key(*asked, __package__)}"
+
+    def made(self, report: Callable[[str], None], watch: Watch = unwatched) -> tuple[PlateTable, RotorShare, bool]:
+        """The table, the rotor's share in it, and whether they were cached. Raises what the models raise."""
+        asked = self.plate, self.rotor, self.region, self.frequencies, self.rtol
+        if self.model == "slab":
+            return cached_with_share(self.key, lambda: slab_and_rotor_table(*asked), report)
+        return cached_driven_plate(*asked, report, watch)
+
+
 def plate_around(
-    plate: Plate,
-    model: str,
-    table: RotorTable,
-    place: Array,
-    radius: float,
-    frequency: float,
-    rtol: float,
-    report: Callable[[str], None],
-    watch: Watch = unwatched,
-) -> tuple[Plate, PlateTable, RotorShare, bool]:
-    """The plate, its table, the rotor's share in it, and whether they were cached, for a floater about a place.
+    plate: Plate, model: str, table: RotorTable, place: Array, radius: float, frequency: float, rtol: float
+) -> PlateAround:
+    """The plate's table for a floater about a place, to be made.
 
     Parameters
     ----------
@@ -45,16 +81,14 @@ def plate_around(
 
     Raises
     ------
-    InputError : the plate leaves the floater no room, or is no slab for the floater and the rotor
+    InputError : the plate leaves the floater no room
     """
     if model == "slab" and plate.lowering and abs(plate.box.rotation[2, np.argmin(plate.box.size)]) < PLUMB:
         plate = replace(plate, lowering=None)  # an infinite slab that moves along itself stays where it is
     sideways = float(np.hypot(place[0], place[1])) + REACH
     region = _rastered(reachable_region(plate, [0.0, 0.0, place[2]], [sideways, sideways, REACH], radius))
-    frequencies = (LOWEST, max(HIGHEST, HARMONICS * frequency))
-    if model == "slab":
-        return plate, *slab_and_rotor_table(plate, table, region, frequencies, rtol), False
-    return plate, *cached_driven_plate(plate, table, region, frequencies, rtol, report, watch)
+    highest = max(HIGHEST, COARSE * math.ceil(HARMONICS * frequency / COARSE - 1e-9))
+    return PlateAround(plate, model, table, region, (LOWEST, highest), rtol)
 
 
 def rotor_nearby(table: RotorTable, rotor: tuple[Magnet, ...], place: Array, radius: float, rtol: float) -> RotorTable:

@@ -192,7 +192,14 @@ class Levitation:
             return None
         scene.floater.must_be("sphere", where="over a plate with eddy currents", instead="Choose --plate-model none.")
         memory, found = plate_memory(
-            scene, scene.plate, choice.model, sources(self.table), place, self.models.plate_rtol, choice.edges
+            scene,
+            scene.plate,
+            choice.model,
+            sources(self.table),
+            place,
+            self.models.plate_rtol,
+            choice.edges,
+            self._tables,
         )
         self._plate_cached = found
         return memory

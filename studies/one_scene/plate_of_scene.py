@@ -5,30 +5,44 @@ from time import perf_counter
 import numpy as np
 
 from ...dynamics.motion import PlateMemory
+from ...fem.plate_tables import PlateTable, RotorShare
 from ...fem.rotor_tables import RotorTable
-from ...fem.slab import plate_around
+from ...fem.slab import PlateAround, plate_around
 from ...geometry.basics import Array, InputError
 from ...geometry.bodies import TOUCHING, sphere_overlap
 from ...geometry.scenes import Plate, Scene
 from ..terminal import detail, note, stages
+from .rotor_of_scene import RotorTables
 
 
 def plate_memory(
-    scene: Scene, plate: Plate, model: str, table: RotorTable, place: Array, rtol: float, edges: float = 0.0
+    scene: Scene,
+    plate: Plate,
+    model: str,
+    table: RotorTable,
+    place: Array,
+    rtol: float,
+    edges: float = 0.0,
+    tables: RotorTables | None = None,
 ) -> tuple[PlateMemory, bool]:
     """The plate's currents for a floater about `place` (3,) m that turns with the rotor; whether they were cached.
 
-    `edges`: relative error by edges that the model leaves out. Errors are those of `plate_around`.
+    `edges`: relative error by edges that the model leaves out. `tables` are shared with other scenes. Errors are those
+    of `plate_around` and of its model.
     """
+    asked = plate_around(plate, model, table, place, scene.floater.radius, scene.frequency, rtol)
+    made, share, found = (tables or RotorTables()).once(asked.key, lambda: _told(asked))
+    return PlateMemory(asked.plate, made, share, model, edges), found
+
+
+def _told(asked: PlateAround) -> tuple[PlateTable, RotorShare, bool]:
     note("Plate's currents ...")
     begun = perf_counter()
     with stages("Plate's currents") as watch:
-        plate, made, share, found = plate_around(
-            plate, model, table, place, scene.floater.radius, scene.frequency, rtol, note, watch
-        )
+        made, share, found = asked.made(note, watch)
     note("  from the cache." if found else f"  done in {perf_counter() - begun:.1f} s.")
     detail(f"  {len(made.rates)} states, estimated relative error {made.errors.total:.1e}.")
-    return PlateMemory(plate, made, share, model, edges), found
+    return made, share, found
 
 
 def check_way(scene: Scene, place: Array) -> None:

@@ -36,22 +36,22 @@ class RotorTables:
         InputError : the map cannot be used
         """
         key = f"{rotor_key(scene.rotor, name, rtol, nearest_faces(scene.floater))} {scene.field_map}"
-        return self._once(key, lambda: self._field(scene, name, rtol))
+        return self.once(key, lambda: self._field(scene, name, rtol))
 
     def answers(self, scene: Scene) -> MutualTable:
         """What rotor and floater do to each other's magnetisation."""
         title, make = "Mutual magnetisation of rotor and floater", partial(cached_mutual_table, scene.rotor)
         key = mutual_key(scene.rotor, scene.floater)
-        return self._once(key, lambda: self._in_stages("mutual", title, partial(make, scene.floater, note)))
+        return self.once(key, lambda: self._in_stages("mutual", title, partial(make, scene.floater, note)))
 
     def losses(self, scene: Scene) -> RotorLosses:
         """The losses in the rotor's metal; some of it must conduct."""
         title, make = "Currents in the rotor's metal", partial(cached_rotor_losses, scene, note)
-        return self._once(losses_key(scene), lambda: self._in_stages("rotor losses", title, make))
+        return self.once(losses_key(scene), lambda: self._in_stages("rotor losses", title, make))
 
     def rates(self, key: str, interaction: Interaction) -> Rates:
         """The equations of motion, compiled; `key` is the scene's `equations_key`."""
-        return self._once(f"rates {key}", lambda: Rates(interaction))
+        return self.once(f"rates {key}", lambda: Rates(interaction))
 
     def _field(self, scene: Scene, name: str, rtol: float) -> RotorField:
         if name == "map":
@@ -77,7 +77,8 @@ class RotorTables:
         note("  from the cache." if found else f"  done in {table.provenance['seconds']:.1f} s.")
         return table
 
-    def _once(self, key: str, make: Callable[[], Made]) -> Made:
+    def once(self, key: str, make: Callable[[], Made]) -> Made:
+        """What was made under this key for any of the scenes, or else made now."""
         if key not in self._known:
             self._known[key] = make()
         made: Made = self._known[key]

@@ -137,6 +137,7 @@ def _client(scheduler: str | None, number: int) -> Iterator[Client]:
         with client:
             yield client
         return
+    logging.getLogger("distributed").setLevel(logging.CRITICAL)  # `silence_logs` is over before the cluster is
     # One thread in each worker, and (dask's default) in the numeric libraries inside it.
     with ExitStack() as stack:
         with _deaf_children():

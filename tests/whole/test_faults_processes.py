@@ -23,8 +23,8 @@ DIPOLE = ("--model", "dipole", "--plate-model", "none")
 FIELD = ("field", SCENE, "--points", "points.csv", "--model", "fem", "--rtol", "3e-5", "--json")
 FLIGHT = ("simulate", SCENE, "--duration-s", "300", *DIPOLE, "--json")
 RUN = ("run", SCENE, "--duration-s", "0.2", "--rtol", "1e-3", *DIPOLE, "--json")
-VARY = ("frequency_hz=92:120:0.05",)
-"""561 points in ten batches, so that the sweep goes on for seconds after its first."""
+VARY = ("frequency_hz=92:120:0.1",)
+"""281 points in five batches, so that the sweep goes on for seconds after its first."""
 SWEEP = ("study", SCENE, "--vary", *VARY, *DIPOLE, "--json")
 PHASES = {
     "field: the table is computed": (FIELD, "finite elements ...", 0.2),
@@ -33,9 +33,9 @@ PHASES = {
     "run: table": (RUN, "finite elements ...", 0.2),
     "run: equilibria": (RUN, "Equilibria ...", 0.3),
     "run: files": (RUN, "Files and figures ...", 0.5),
-    "sweep in one process": ((*SWEEP, "--workers", "1"), "000000.nc", 0.1),
+    "sweep in one process": ((*SWEEP, "--workers", "1"), "000000.json", 0.1),
     "sweep: its cluster starts": ((*SWEEP, "--workers", "2"), "identity.json", 0.8),
-    "sweep on a cluster": ((*SWEEP, "--workers", "2"), "000000.nc", 0.1),
+    "sweep on a cluster": ((*SWEEP, "--workers", "2"), "000000.json", 0.1),
 }
 RESULTS = ("field.csv", "trajectory.nc", "result.nc", "question.nc")
 

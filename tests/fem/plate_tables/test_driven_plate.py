@@ -123,6 +123,7 @@ def test_everything_that_decides_is_in_the_key(rotor, region):
     ]
     keys = [driven_plate_key(*arguments) for arguments in changed]
     assert len(set(keys)) == len(keys)
+    assert driven_plate_key(*changed[0], "spinlev.fem.slab") not in keys
     faster = replace(PLATE, lowering=Lowering(1.0, 0.02, 0.02))
     assert driven_plate_key(faster, *changed[0][1:]) == keys[0]
     again = rotor_table(rotor.magnets, "fem", 1e-4)

@@ -13,11 +13,9 @@ from spinlev.studies.sweeps import forget, swept
 from spinlev.studies.sweeps.workers import attempts
 from spinlev.studies.terminal import Models, Workers, combinations
 
-SCENE = sl.scene(
-    frequency_hz=120.0,
-    rotor=sl.horizontal(displacement_mm=2.0, edge_mm=10.0, remanence_T=1.305),
-    floater=sl.sphere(diameter_mm=12.7, remanence_T=1.305, density_kg_m3=7500.0),
-)
+ROTOR = sl.horizontal(displacement_mm=2.0, edge_mm=10.0, remanence_T=1.305)
+FLOATER = sl.sphere(diameter_mm=12.7, remanence_T=1.305, density_kg_m3=7500.0)
+SCENE = sl.scene(frequency_hz=120.0, rotor=ROTOR, floater=FLOATER)
 ALONE = {"plate_model": "none", "model": "dipole"}
 
 
@@ -51,6 +49,27 @@ def test_points_that_cannot_be_prepared_are_computed_alone(caplog):
     found = dict(attempts(asked, broken, dict(enumerate(points)), frozenset({0, 1})))
     assert "no way" in caplog.text
     assert [float(found[k]["frequency_hz"][0]) for k in (0, 1)] == [120.0, 130.0]
+
+
+def test_neighbours_over_a_slab_share_its_table(tmp_path, monkeypatch):
+    """Their places are in one region, their frequencies below one bound; each has what it has alone, file or not."""
+    plate = sl.plate(
+        size_mm=[100.0, 240.0, 30.0], center_mm=[0.0, 0.0, -60.0], rotation_deg=[0.0, 0.0, 0.0], conductivity_S_m=3.6e7
+    )
+    models = Models("dipole", "slab", interaction="rigid")
+    over = sl.scene(frequency_hz=127.0, rotor=ROTOR, floater=FLOATER, plate=plate)
+    scenes = [over, replace(over, frequency=128.0)]
+    first, second = (Levitation(scene, models) for scene in scenes)
+    second.share(first)
+    assert first.plate.table is second.plate.table
+    monkeypatch.setenv("SPINLEV_CACHE", str(tmp_path))
+    for shared, scene in zip((first, second), scenes, strict=True):
+        for from_cache in (False, True):
+            alone = Levitation(scene, models)
+            for one, other in zip(shared.equilibria, alone.equilibria, strict=True):
+                np.testing.assert_allclose(one.position, other.position, rtol=0, atol=1e-12)
+                assert one.growth_per_s == pytest.approx(other.growth_per_s, rel=1e-10, abs=1e-9)
+            assert ("plate" in alone.from_cache) == (from_cache or scene is scenes[1])
 
 
 @pytest.mark.parametrize(
