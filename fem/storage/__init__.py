@@ -7,7 +7,7 @@ from .checked_files import (
     read_checked as read_checked,
     write_checked as write_checked,
 )
-from .compiled_code import compiled as compiled, compiled_later as compiled_later
+from .compiled_code import compiled as compiled, compiled_later as compiled_later, make_room as make_room
 from .foreign import hdf5_fault as hdf5_fault, is_hdf5 as is_hdf5
 from .program_text import digest_of as digest_of, program_of as program_of
 from .runtime_numbers import RuntimeNumbers as RuntimeNumbers

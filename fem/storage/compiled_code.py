@@ -139,10 +139,10 @@ def _keep(made: object, path: Path) -> None:
         logging.getLogger("spinlev").debug("Compiled code could not be kept: %s", error)
 
 
-def make_room(folder: Path, limit: int = LIMIT) -> None:
-    """Remove what was not used for the longest time until all code together keeps the limit, bytes."""
+def make_room(folder: Path, limit: int = LIMIT, pattern: str = "*.code") -> None:
+    """Remove what was not used for the longest time until all files together keep the limit, bytes."""
     kept = []
-    for path in folder.glob("*.code"):
+    for path in folder.glob(pattern):
         try:
             kept.append((path.stat().st_mtime_ns, path.stat().st_size, path))
         except FileNotFoundError:  # another process makes room too

@@ -101,7 +101,7 @@ def test_other_drag_is_searched(known):
 def test_a_damaged_file_is_reported_and_made_anew(cache, caplog):
     caplog.set_level("INFO", "spinlev")
     first = Levitation(SCENE, DIPOLE).without_plate
-    (file,) = cache.glob("equilibria-*.nc")
+    (file,) = cache.glob("equilibria/*.nc")
     content = bytearray(file.read_bytes())
     content[len(content) // 2] ^= 1
     file.write_bytes(content)
@@ -109,6 +109,14 @@ def test_a_damaged_file_is_reported_and_made_anew(cache, caplog):
     assert "damaged" in caplog.text
     assert repr(again.equilibria) == repr(first.equilibria)
     assert load_found(file).points.shape == (len(first.equilibria), 6)
+
+
+def test_what_was_not_used_for_long_makes_room(cache, monkeypatch):
+    for frequency in (108.0, 109.0, 110.0):
+        Levitation(replace(SCENE, frequency=frequency), DIPOLE).without_plate  # noqa: B018
+        kept = sorted(cache.glob("equilibria/*.nc"), key=lambda path: path.stat().st_mtime_ns)
+        monkeypatch.setattr("spinlev.dynamics.equilibria.found.LIMIT", int(1.5 * kept[-1].stat().st_size))
+    assert len(kept) == 1
 
 
 def test_nothing_found_is_kept_as_well(tmp_path):
@@ -122,4 +130,4 @@ def test_nothing_found_is_kept_as_well(tmp_path):
 def test_a_search_from_python_asks_no_cache(cache):
     levitation = Levitation(SCENE, DIPOLE)
     assert survey(SCENE, levitation.table).equilibria
-    assert not list(cache.glob("equilibria-*.nc"))
+    assert not list(cache.glob("equilibria/*.nc"))
