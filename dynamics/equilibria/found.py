@@ -64,7 +64,7 @@ def _used(path: Path) -> Found:
 
 def _kept(found: Found, path: Path) -> None:
     save_found(found, path)
-    make_room(path.parent, LIMIT, "*")
+    make_room(path.parent, LIMIT)
 
 
 def save_found(found: Found, path: str | Path) -> None:

@@ -56,15 +56,17 @@ class PlateAround:
     @cached_property
     def key(self) -> str:
         """The same for scenes that share the table."""
-        asked = self.plate, self.rotor, self.region, self.frequencies, self.rtol
-        return f"{self.model}-{driven_plate_key(*asked, __package__)}"
+        return f"{self.model}-{driven_plate_key(*self._asked, __package__)}"
 
     def made(self, report: Callable[[str], None], watch: Watch = unwatched) -> tuple[PlateTable, RotorShare, bool]:
         """The table, the rotor's share in it, and whether they were cached. Raises what the models raise."""
-        asked = self.plate, self.rotor, self.region, self.frequencies, self.rtol
         if self.model == "slab":
-            return cached_with_share(self.key, lambda: slab_and_rotor_table(*asked), report)
-        return cached_driven_plate(*asked, report, watch)
+            return cached_with_share(self.key, lambda: slab_and_rotor_table(*self._asked), report)
+        return cached_driven_plate(*self._asked, report, watch)
+
+    @property
+    def _asked(self) -> tuple[Plate, RotorTable, Region, tuple[float, float], float]:
+        return self.plate, self.rotor, self.region, self.frequencies, self.rtol
 
 
 def plate_around(

@@ -1,13 +1,13 @@
 """How is a file kept whole, found again, and known to be damaged?"""
 
-from .cache import from_cache as from_cache
+from .cache import from_cache as from_cache, make_room as make_room
 from .checked_files import (
     TableFileError as TableFileError,
     described as described,
     read_checked as read_checked,
     write_checked as write_checked,
 )
-from .compiled_code import compiled as compiled, compiled_later as compiled_later, make_room as make_room
+from .compiled_code import compiled as compiled, compiled_later as compiled_later
 from .foreign import hdf5_fault as hdf5_fault, is_hdf5 as is_hdf5
 from .program_text import digest_of as digest_of, program_of as program_of
 from .runtime_numbers import RuntimeNumbers as RuntimeNumbers

@@ -73,3 +73,18 @@ def _take(lock: FileLock, report: Callable[[str], None]) -> None:
     except Timeout:
         report("Another process is making this table: waiting for it ...")
         lock.acquire()
+
+
+def make_room(folder: Path, limit: int) -> None:
+    """Remove what was not used for the longest time until all files of a folder together keep the limit, bytes."""
+    kept = []
+    for path in folder.iterdir():
+        try:
+            kept.append((path.stat().st_mtime_ns, path.stat().st_size, path))
+        except FileNotFoundError:  # another process makes room too
+            continue
+    total = 0
+    for _, size, path in sorted(kept, reverse=True):
+        total += size
+        if total > limit:
+            path.unlink(missing_ok=True)

@@ -17,7 +17,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any, TypeVar
 
-from .cache import cache_folder
+from .cache import cache_folder, make_room
 from .program_text import digest_of
 from .whole_files import seal, unsealed, write_whole
 
@@ -134,21 +134,6 @@ def _read(path: Path) -> Any:
 def _keep(made: object, path: Path) -> None:
     try:
         write_whole(path, seal(zlib.compress(pickle.dumps(made), 1)))
-        make_room(path.parent)
+        make_room(path.parent, LIMIT)
     except OSError as error:  # costs time only
         logging.getLogger("spinlev").debug("Compiled code could not be kept: %s", error)
-
-
-def make_room(folder: Path, limit: int = LIMIT, pattern: str = "*.code") -> None:
-    """Remove what was not used for the longest time until all files together keep the limit, bytes."""
-    kept = []
-    for path in folder.glob(pattern):
-        try:
-            kept.append((path.stat().st_mtime_ns, path.stat().st_size, path))
-        except FileNotFoundError:  # another process makes room too
-            continue
-    total = 0
-    for _, size, path in sorted(kept, reverse=True):
-        total += size
-        if total > limit:
-            path.unlink(missing_ok=True)

@@ -11,8 +11,9 @@ import time
 from pathlib import Path
 
 import pytest
+import xarray as xr
 
-from spinlev.fem.storage import from_cache, write_whole
+from spinlev.fem.storage import from_cache, read_checked, seal, write_checked, write_whole
 from spinlev.fem.storage.cache import cache_folder
 
 IMPORT_ALL = """
@@ -134,3 +135,12 @@ def test_the_unfinished_file_of_a_process_that_lives_is_left_alone(tmp_path):
     write_whole(tmp_path / "r.nc", b"whole")
     assert (tmp_path / "r.nc").read_bytes() == b"whole"
     assert left.exists()
+
+
+def test_a_file_has_the_bytes_that_xarray_writes(tmp_path):
+    """Texts, truths, NaN and attributes too; it is written without a cluster's libraries."""
+    columns = {"B": ("axis", [0.1, float("nan"), -2.0], {"units": "T"}), "stable": ("k", [True, False])}
+    dataset = xr.Dataset(columns, {"axis": ["x", "y", "z"]}, {"scene": "δx = 2", "number": 1.5})
+    write_checked(dataset, tmp_path / "checked.nc")
+    assert (tmp_path / "checked.nc").read_bytes() == seal(bytes(dataset.to_netcdf(engine="h5netcdf")))
+    assert read_checked(tmp_path / "checked.nc").identical(dataset)

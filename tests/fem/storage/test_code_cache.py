@@ -12,7 +12,7 @@ import heyoka as hy
 import numpy as np
 import pytest
 
-from spinlev.fem.storage import compiled, compiled_code, compiled_later
+from spinlev.fem.storage import compiled, compiled_code, compiled_later, make_room
 from spinlev.fem.storage.whole_files import seal, unsealed
 
 CONSTANT = 3.1640625
@@ -166,7 +166,7 @@ def test_what_was_not_used_for_the_longest_time_makes_room(tmp_path):
     for age, name in enumerate(("new", "used", "old", "oldest")):
         (tmp_path / f"{name}.code").write_bytes(bytes(100))
         os.utime(tmp_path / f"{name}.code", (1e9 - age, 1e9 - age))
-    compiled_code.make_room(tmp_path, 250)
+    make_room(tmp_path, 250)
     assert {path.stem for path in tmp_path.iterdir()} == {"new", "used"}
 
 
