@@ -4,17 +4,20 @@ Started by `renderer`; what goes to and fro is pickled. An answer is a finished 
 done (float), or the reason why there is no more (str).
 """
 
+import gc
 import os
 import pickle
 import sys
 from functools import partial
 from typing import Any, BinaryIO
 
-from ..terminal import DRAWING, is_missing_library, way_out
+MANY = 50_000
+"""New objects until Python looks for garbage, of which loading VTK makes none."""
 
 
 def main() -> None:
     """Draw one picture after the other."""
+    gc.set_threshold(MANY)
     answers = os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)  # what libraries print is no answer
     try:
@@ -22,6 +25,8 @@ def main() -> None:
         for number, picture in enumerate(pictures):
             _send(answers, picture.draw(partial(_progress, answers, number, len(pictures))))
     except Exception as error:  # whatever it is, the other process says it in a line
+        from ..terminal import DRAWING, is_missing_library, way_out
+
         reason = " ".join(f"{type(error).__name__}: {error}.".split())  # in one line
         _send(answers, f"{reason} {way_out(DRAWING)}" if is_missing_library(error) else reason)
         if "SPINLEV_TRACEBACK" in os.environ:

@@ -14,7 +14,6 @@ from pathlib import Path
 from typing import Protocol
 
 from ...geometry.basics import ComputationError
-from ..terminal import DRAWING, way_out
 from .view import Sample
 
 COMMAND = (sys.executable, "-P", "-m", f"{__package__}.draw_process")
@@ -43,7 +42,7 @@ def render(
     RenderError : the process died or found no way to draw; no older picture is left where one could not be drawn
     OSError : a file cannot be written
     """
-    from ...fem.storage import write_whole  # the other process has no use for it
+    from ...fem.storage import write_whole  # here, like all that the other process has no use for
 
     for path in pictures:
         path.unlink(missing_ok=True)
@@ -109,6 +108,8 @@ def _answers(process: subprocess.Popen[bytes], question: bytes) -> Iterator[byte
 
 def _death(status: int) -> str:
     """How the process ended too early, and what would help."""
+    from ..terminal import DRAWING, way_out
+
     if status == -signal.SIGKILL:
         return "the process that draws them was killed; too little memory may be the reason."
     how = signal.strsignal(-status) if status < 0 else f"exit status {status}"

@@ -9,7 +9,7 @@ import scipy
 import xarray as xr
 
 from ...geometry.basics import Array
-from .style import COLORS, DASHES, NAMES, PALETTE, panels, styled
+from .style import COLORS, DASHES, NAMES, PALETTE, fixed_panels, styled
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 @styled
 def field_figure(result: xr.Dataset) -> Figure:
     """Field components on the axis below the rotor for every model, and how far the models are apart."""
-    figure, ((left, right),) = panels(1, 2, (8.0, 3.4))
+    figure, ((left, right),) = fixed_panels(1, 2, (8.0, 3.4))
     distance = -1e3 * result["axis_height"].values
     reference = str(result.attrs["best_model"])
     true = result["axis_field"].sel(model=reference).values
@@ -48,7 +48,7 @@ def field_figure(result: xr.Dataset) -> Figure:
 @styled
 def force_figure(result: xr.Dataset) -> Figure:
     """Axial force against distance with its equilibria marked, for every model that has them; a zoom on the first."""
-    figure, ((axes, near),) = panels(1, 2, (8.0, 3.8))
+    figure, ((axes, near),) = fixed_panels(1, 2, (8.0, 3.8), lines_below=3)
     weight = -1e3 * float(result.attrs["weight_N"])
     for panel in (axes, near):
         panel.axhline(weight, color="0.3", lw=0.8, label="weight of the floater")
@@ -66,7 +66,7 @@ def force_figure(result: xr.Dataset) -> Figure:
         near.set_axis_off()
     else:
         near.set(xlim=(first - 1.0, first + 1.0), ylim=(0.0, 2 * weight), title="Where it floats")
-    figure.legend(*axes.get_legend_handles_labels(), loc="outside lower center", ncols=3)
+    figure.legend(*axes.get_legend_handles_labels(), loc="lower center", ncols=3)
     return figure
 
 
@@ -124,7 +124,7 @@ HOURS = 7200.0
 @styled
 def trajectory_figure(result: xr.Dataset) -> Figure:
     """Distance and polar angle of a flight as envelopes, and a closer look at its beginning, or at its end if lost."""
-    figure, axes = panels(2, 2, (8.0, 5.4))
+    figure, axes = fixed_panels(2, 2, (8.0, 5.4))
     seconds, moment = result["time"].values, result["moment"].values
     time, unit = (seconds / 3600, "h") if seconds[-1] > HOURS else (seconds, "s")
     distance = -1e3 * result["position"].sel(axis="z").values
