@@ -70,8 +70,10 @@ def run(
     _check_spin(spin)
     loaded = _loaded(scene or default_scene())
     from ..one_scene import main_job
+    from ..rendering import copied
 
-    return Answer(*main_job(loaded, asked.checked(), spin, duration_s, output.out), output.json)
+    with copied() as drawing:
+        return Answer(*main_job(loaded, asked.checked(), spin, duration_s, output.out, drawing), output.json)
 
 
 def field(

@@ -11,7 +11,7 @@ STOPPED = "spinlev: stopped; what was finished is kept."
 AGAIN = 0.01
 """Seconds until an interrupt is raised again that fell where Python drops exceptions."""
 MANY = 50_000
-"""New objects until Python looks for garbage: at its own 700 this took a tenth of a short run, and found next to none."""
+"""New objects until Python looks for garbage: at its own 700 that is a tenth of a short run, for next to none."""
 
 
 def main() -> None:

@@ -1,6 +1,6 @@
 """The main job: fields, tables, equilibria, motion, and what the dipole picture gets wrong."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
@@ -14,7 +14,7 @@ from ...fem.rotor_tables import FieldTable
 from ...fem.storage import write_whole
 from ...geometry.scenes import AbsoluteStart, Scene
 from ..pictures import last_view
-from ..rendering import RenderError, render
+from ..rendering import Copy, RenderError, render
 from ..results import (
     axis_dataset,
     curve_dataset,
@@ -39,8 +39,12 @@ DEEPEST = 0.05
 """The field figure reaches this far below the rotor's origin, m."""
 
 
-def main_job(scene: Scene, asked: Models, spin: float, duration: float, out: Path) -> Job:
+def main_job(
+    scene: Scene, asked: Models, spin: float, duration: float, out: Path, drawing: Copy | Sequence[str]
+) -> Job:
     """Compute everything of a scene for a body spin; writes result.nc, summary.json and the figures.
+
+    `drawing` is what draws in three dimensions.
 
     What is finished before a failure is kept: a scene without a stable equilibrium still leaves its fields and force
     curves, a flight that the user stops its beginning; then the error goes on to the caller.
@@ -92,7 +96,7 @@ def main_job(scene: Scene, asked: Models, spin: float, duration: float, out: Pat
         lines.append(str(failure))
     tables = {name: levitation.field(name) for name in MODELS}
     result = _static_dataset(scene, tables, surveys, alone, best.model).assign_attrs(levitation.labels, body_spin=spin)
-    _write(scene, chosen, result, values, flight, out)
+    _write(scene, chosen, result, values, flight, out, drawing)
     if failure and (flight is None or isinstance(failure, FlightStopped)):
         raise failure
     return values, [*lines, f"Results and figures in {out}/"]
@@ -157,7 +161,13 @@ def _static_dataset(
 
 
 def _write(
-    scene: Scene, table: FieldTable, result: xr.Dataset, values: dict[str, Any], flight: Trajectory | None, out: Path
+    scene: Scene,
+    table: FieldTable,
+    result: xr.Dataset,
+    values: dict[str, Any],
+    flight: Trajectory | None,
+    out: Path,
+    drawing: Copy | Sequence[str],
 ) -> None:
     """The result and its summary first, then what is drawn of them."""
     note("Files and figures ...")
@@ -172,7 +182,8 @@ def _write(
         save_figures(figures, out)
         return
     with ThreadPoolExecutor(1) as beside:  # in three dimensions another process draws, meanwhile
-        in_space = beside.submit(render, {out / "scene.png": last_view(scene, table, flight.rotor)})
+        view = {out / "scene.png": last_view(scene, table, flight.rotor)}
+        in_space = beside.submit(render, view, command=drawing)
         save_figures(figures | {"trajectory": trajectory_figure(result)}, out)
         try:
             in_space.result()

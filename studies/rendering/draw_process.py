@@ -1,7 +1,7 @@
 """The process that draws in three dimensions: reads pictures from standard input, answers on standard output.
 
-Started by `renderer`; what goes to and fro is pickled. An answer is a finished picture (bytes), the part of all that is
-done (float), or the reason why there is no more (str).
+Started by `renderer`, or a copy of a process that has loaded much already; what goes to and fro is pickled. An answer
+is a finished picture (bytes), the part of all that is done (float), or the reason why there is no more (str).
 """
 
 import gc
@@ -16,12 +16,19 @@ MANY = 50_000
 
 
 def main() -> None:
-    """Draw one picture after the other."""
+    """The life of a process of its own."""
     gc.set_threshold(MANY)
     answers = os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)  # what libraries print is no answer
+    answer_all(sys.stdin.buffer, answers)
+
+
+def answer_all(questions: BinaryIO, answers: BinaryIO) -> None:
+    """Draw one picture after the other; returns at once where nothing is asked."""
     try:
-        pictures = pickle.loads(sys.stdin.buffer.read())
+        if not (asked := questions.read()):
+            return
+        pictures = pickle.loads(asked)
         for number, picture in enumerate(pictures):
             _send(answers, picture.draw(partial(_progress, answers, number, len(pictures))))
     except Exception as error:  # whatever it is, the other process says it in a line

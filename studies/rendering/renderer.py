@@ -11,10 +11,13 @@ import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import cache
 from pathlib import Path
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol, Union
 
 from ...geometry.basics import ComputationError
 from .view import Sample
+
+if TYPE_CHECKING:
+    from .copy_process import Copy
 
 COMMAND = (sys.executable, "-P", "-m", f"{__package__}.draw_process")
 
@@ -33,9 +36,9 @@ class Picture(Protocol):
 def render(
     pictures: Mapping[Path, Picture],
     progress: Callable[[float], None] = lambda fraction: None,
-    command: Sequence[str] = COMMAND,
+    command: Union[Sequence[str], "Copy"] = COMMAND,
 ) -> None:
-    """Draw pictures, all in one process, begun by `command`, and write each as soon as it is finished.
+    """Draw pictures, all in one process, which a command begins or which waits; write each as soon as it is finished.
 
     Raises
     ------
@@ -70,13 +73,10 @@ def unavailable(command: Sequence[str] = COMMAND) -> str | None:
 
 
 def _drawn(
-    pictures: Sequence[Picture], progress: Callable[[float], None], command: Sequence[str]
+    pictures: Sequence[Picture], progress: Callable[[float], None], command: Union[Sequence[str], "Copy"]
 ) -> Iterator[bytes | str]:
     """The files' contents, one after the other; where that fails, last the reason."""
-    messages = None if "SPINLEV_TRACEBACK" in os.environ else subprocess.DEVNULL
-    pipe = subprocess.PIPE
-    # Ctrl-C at the terminal is for this process, which then ends the other: hence a group of its own.
-    with subprocess.Popen(command, stdin=pipe, stdout=pipe, stderr=messages, process_group=0) as process:
+    with _begun(command) if isinstance(command, Sequence) else command as process:
         try:
             unfinished = len(pictures)
             for answer in _answers(process, pickle.dumps(pictures)):
@@ -93,7 +93,14 @@ def _drawn(
             raise
 
 
-def _answers(process: subprocess.Popen[bytes], question: bytes) -> Iterator[bytes | float | str]:
+def _begun(command: Sequence[str]) -> subprocess.Popen[bytes]:
+    messages = None if "SPINLEV_TRACEBACK" in os.environ else subprocess.DEVNULL
+    pipe = subprocess.PIPE
+    # Ctrl-C at the terminal is for this process, which then ends the other: hence a group of its own.
+    return subprocess.Popen(command, stdin=pipe, stdout=pipe, stderr=messages, process_group=0)
+
+
+def _answers(process: Union[subprocess.Popen[bytes], "Copy"], question: bytes) -> Iterator[bytes | float | str]:
     """What the process says until it ends."""
     assert process.stdin
     assert process.stdout

@@ -75,7 +75,8 @@ def fixed_panels(rows: int, columns: int, size: tuple[float, float], lines_below
     """
     from matplotlib.figure import Figure
 
-    figure, (wide, high) = Figure(figsize=size, layout="none"), size
+    figure, (wide, high) = Figure(figsize=size), size
+    figure.set_layout_engine("none")
     bottom = 0.45 + lines_below * 0.16
     panel_wide, panel_high = (wide - 0.15) / columns - 0.72, (high - bottom - 0.25 + 0.7) / rows - 0.7
     places = {"left": 0.72 / wide, "right": 1 - 0.15 / wide, "bottom": bottom / high, "top": 1 - 0.25 / high}

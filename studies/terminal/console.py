@@ -42,7 +42,6 @@ class _Printed(logging.Handler):
     def __init__(self) -> None:
         super().__init__()
         self.heartbeat = Heartbeat(lambda text: ERRORS.print(text, markup=False))
-        self.heartbeat.start()
 
     def emit(self, record: logging.LogRecord) -> None:
         text = record.getMessage()

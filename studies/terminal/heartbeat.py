@@ -17,6 +17,8 @@ ALL = 0.995
 class Heartbeat(threading.Thread):
     """Says for how long a step of the work has gone on, as often as nothing else was said for a while.
 
+    The thread begins with the first step.
+
     Parameters
     ----------
     say : prints a line
@@ -36,6 +38,8 @@ class Heartbeat(threading.Thread):
         if text:
             self._began = self._said if text.endswith(" ...") else None
             self.advanced(0.0)
+        if self._began and self.ident is None:
+            self.start()
 
     def advanced(self, fraction: float, stage: str = "") -> None:
         """How much of the step is finished, 0 to 1, or of one of its stages."""
@@ -47,7 +51,8 @@ class Heartbeat(threading.Thread):
     def stop(self) -> None:
         """Say no more; returns when the thread has ended."""
         self._over.set()
-        self.join()
+        if self.ident is not None:
+            self.join()
 
     def run(self) -> None:
         """The thread's work."""

@@ -13,7 +13,6 @@ WAIT = 30.0
 def test_a_silent_step_says_how_long_it_has_gone_on_until_it_ends():
     said: queue.Queue[str] = queue.Queue()
     heartbeat = Heartbeat(said.put, 0.01)
-    heartbeat.start()
     heartbeat.said("Equilibria ...")
     lines = [said.get(timeout=WAIT) for _ in range(3)]
     heartbeat.said("  done in 0.1 s.")
@@ -25,8 +24,11 @@ def test_a_silent_step_says_how_long_it_has_gone_on_until_it_ends():
 def test_nothing_is_said_outside_of_a_step():
     said: queue.Queue[str] = queue.Queue()
     heartbeat = Heartbeat(said.put, 0.01)
-    heartbeat.start()
+    heartbeat.said("Equilibria ...")
+    said.get(timeout=WAIT)
     heartbeat.said("Plate: finite")
+    while not said.empty():  # what was being said just then
+        said.get()
     with pytest.raises(queue.Empty):
         said.get(timeout=0.2)
     heartbeat.stop()
@@ -35,7 +37,6 @@ def test_nothing_is_said_outside_of_a_step():
 def test_a_step_that_knows_says_its_share_and_the_time_left():
     said: queue.Queue[str] = queue.Queue()
     heartbeat = Heartbeat(said.put, 0.01)
-    heartbeat.start()
     heartbeat.said("Motion ...")
     heartbeat.advanced(0.5)
     heartbeat._stage_began -= 60.0
