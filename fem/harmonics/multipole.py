@@ -104,15 +104,15 @@ class MultipoleExpansion:
 
     def evaluate(self, points: Array) -> tuple[Array, Array]:
         """B (n, 3) T and ∂B_i/∂x_j (n, 3, 3) T/m at points (n, 3) m, without compilation."""
-        fields, slopes = self._derivatives
-        scaled = (points - self.center) / self.radius
-        return outer_sums(fields, scaled), outer_sums(slopes, scaled)[:, [[0, 1, 2], [1, 3, 4], [2, 4, 5]]]
+        sums = outer_sums(self._derivatives, (points - self.center) / self.radius)
+        return sums[:, :3], sums[:, [[3, 4, 5], [4, 6, 7], [5, 7, 8]]]
 
     @cached_property
-    def _derivatives(self) -> tuple[list[Coefficients], list[Coefficients]]:
-        """Of B_i, and of the upper ∂B_i/∂x_j."""
+    def _derivatives(self) -> list[Coefficients]:
+        """Of B_i, and of the upper ∂B_i/∂x_j; of one size."""
         fields = [-derivative(self.coefficients, axis) for axis in range(3)]
-        return fields, [derivative(fields[i], j) / self.radius for i in range(3) for j in range(i, 3)]
+        slopes = [derivative(fields[i], j) / self.radius for i in range(3) for j in range(i, 3)]
+        return [*(np.pad(field, (0, 1)) for field in fields), *slopes]
 
     def root_mean_square(self, points: Array) -> tuple[Array, Array]:
         """Sizes (n,) of B (T) and of its gradient (T/m), as a mean over the spheres on which the points lie.

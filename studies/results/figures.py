@@ -40,6 +40,7 @@ def field_figure(result: xr.Dataset) -> Figure:
         left.annotate(name, place, ha="left", va="bottom", xytext=(4, 2), textcoords="offset points")
     left.set(xlabel="distance below the rotor (mm)", ylabel="B (mT)", title="Field on the axis")
     right.set(xlabel="distance below the rotor (mm)", ylabel="|ΔB| / |B|", title=f"Difference from {NAMES[reference]}")
+    right.minorticks_off()  # many decades
     left.legend()
     right.legend()
     return figure
