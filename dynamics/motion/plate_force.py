@@ -95,10 +95,7 @@ class PlateForce:
 
     def _shares(self, times: Array) -> Array:
         angles = self.values[Parameter.RATE] * times
-        share, depth = self.memory.share, self._depth
-        return np.asarray(
-            self.values[Parameter.PLATE_SHARE] * np.array([share.signals(float(a), depth) for a in angles])
-        )
+        return np.asarray(self.values[Parameter.PLATE_SHARE] * self.memory.share.signals(angles, self._depth))
 
     @property
     def _depth(self) -> float:
@@ -115,8 +112,6 @@ class PlateForce:
         places = box.to_body(lab)
         b, g = self.memory.table.multipoles.evaluate(places)
         h = self.memory.table.multipoles.curvature(places)
-        return (
-            np.einsum("nia,nki->nka", axes, b),
-            np.einsum("nia,njb,nkij->nkab", axes, axes, g, optimize=True),
-            np.einsum("nia,njb,nlc,nkijl->nkabc", axes, axes, axes, h, optimize=True),
-        )
+        columns, rows = axes[:, None], axes.swapaxes(1, 2)[:, None]
+        bent = rows[:, None] @ h @ columns[:, None]
+        return b @ axes, rows @ g @ columns, (rows @ bent.reshape(*h.shape[:3], 9)).reshape(h.shape)

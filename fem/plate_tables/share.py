@@ -22,6 +22,7 @@ from dataclasses import dataclass, replace
 
 import heyoka as hy
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ...geometry.basics import Array, frozen_array
 from ..closed_forms import ComplexArray
@@ -46,8 +47,8 @@ class RotorShare:
     def __post_init__(self) -> None:
         object.__setattr__(self, "series", frozen_array(self.series, self.series.shape))
 
-    def signals(self, angle: float, depth: float) -> Array:
-        """s_i (states,), √J, at a rotor's angle (rad) and a depth of the plate (m)."""
+    def signals(self, angle: ArrayLike, depth: float) -> Array:
+        """s_i (..., states), √J, at angles (...) of the rotor (rad) and a depth of the plate (m)."""
         factors = np.polynomial.chebyshev.chebvander(np.array([self._place(depth)]), self.series.shape[2] - 1)[0]
         return np.asarray(turn_harmonics(angle, len(self.series)) @ (self.series @ factors))
 
@@ -80,7 +81,8 @@ class RotorShare:
         return [hy.sum([float(c) * m for c, m in zip(row, members, strict=True) if c]) for row in columns]
 
 
-def turn_harmonics(angle: float, count: int) -> Array:
-    """(count,) 1, cos φ, sin φ, cos 2φ, … of an angle, rad."""
-    h = np.arange(1, count // 2 + 1) * angle
-    return np.concatenate([[1.0], np.stack([np.cos(h), np.sin(h)], axis=1).ravel()])
+def turn_harmonics(angle: ArrayLike, count: int) -> Array:
+    """(..., count) 1, cos φ, sin φ, cos 2φ, … of angles (...), rad."""
+    h = np.multiply.outer(angle, np.arange(1, count // 2 + 1))
+    turns = np.stack([np.cos(h), np.sin(h)], axis=-1).reshape(*h.shape[:-1], count - 1)
+    return np.concatenate([np.ones((*h.shape[:-1], 1)), turns], axis=-1)

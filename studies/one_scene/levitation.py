@@ -23,13 +23,13 @@ from ...dynamics.steady import Equilibrium, EquilibriumError, Survey
 from ...fem.measured_maps import GriddedTable
 from ...fem.mutual import MutualTable
 from ...fem.rotor_losses import RotorLosses, check_slow_enough, pieces_of
-from ...fem.rotor_tables import FieldTable, RotorTable, resolve_model
+from ...fem.rotor_tables import FieldTable, RotorTable
 from ...fem.slab import resolve_plate_model, rotor_nearby
 from ...geometry.basics import Array, InputError, Watch, millimetre_size, unwatched
 from ...geometry.scenes import AbsoluteStart, Scene, load_scene
 from ..terminal import FieldModel, Models, detail, finite, note, positive, progress, stages
 from .plate_of_scene import check_room, check_way, plate_memory
-from .rotor_of_scene import RotorField, RotorTables, equations_key, nearest_faces
+from .rotor_of_scene import RotorField, RotorTables, equations_key
 
 PLATE_WORDS = {
     "none": "only an obstacle, without eddy currents",
@@ -268,7 +268,7 @@ class Levitation:
         """The rotor's field by any model, accurate wherever the floater can be: from its radius off the magnets on."""
         if model == "map":
             return self._tables.field(self.scene, model, self.models.rtol)
-        name, reason = resolve_model(self.scene.rotor, model, self.models.rtol, nearest_faces(self.scene.floater))
+        name, reason = self._tables.model(self.scene, model, self.models.rtol)
         if model == "auto":
             detail(f"Field model: {name} ({reason})")
         return self._tables.field(self.scene, name, self.models.rtol)

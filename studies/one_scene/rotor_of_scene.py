@@ -9,7 +9,7 @@ from ...dynamics.motion import Interaction, Rates
 from ...fem.measured_maps import GriddedTable, map_table
 from ...fem.mutual import MutualTable, cached_mutual_table, mutual_key
 from ...fem.rotor_losses import RotorLosses, cached_rotor_losses, losses_key, pieces_of
-from ...fem.rotor_tables import RotorTable, cached_rotor_table, rotor_key, rotor_table
+from ...fem.rotor_tables import RotorTable, cached_rotor_table, resolve_model, rotor_key, rotor_table
 from ...geometry.basics import Watch
 from ...geometry.scenes import Floater, Scene
 from ..terminal import Models, note, stages
@@ -27,6 +27,12 @@ class RotorTables:
         self.from_cache: list[str] = []
         """Names of the tables that were found in the user's cache."""
         self._known: dict[str, Any] = {}
+
+    def model(self, scene: Scene, name: str, rtol: float) -> tuple[str, str]:
+        """Name of the field model that is taken for `name`, and the reason in words."""
+        nearest = nearest_faces(scene.floater)
+        key = f"model {rotor_key(scene.rotor, name, rtol, nearest)}"
+        return self.once(key, lambda: resolve_model(scene.rotor, name, rtol, nearest))
 
     def field(self, scene: Scene, name: str, rtol: float) -> RotorField:
         """The rotor's field by a model or from its map, accurate wherever the floater can be.
