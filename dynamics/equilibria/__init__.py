@@ -11,6 +11,7 @@ from .continuation import (
     follow as follow,
     stepped as stepped,
 )
+from .curve import solutions as solutions
 from .effect_sizes import (
     growth_by_floater as growth_by_floater,
     growth_by_rotor as growth_by_rotor,

@@ -13,6 +13,7 @@ from collections.abc import Callable
 import numpy as np
 
 from ...geometry.basics import Array
+from ..equilibria import solutions
 from ..steady import EVERY, Indices, solve
 from .between import between
 from .grid import Atlas, Grid
@@ -40,16 +41,14 @@ def filled(grid: Grid, nodes: Indices, progress: Callable[[float], None] | None 
 
 
 def _searched(grid: Grid, point: int, random: np.random.Generator | None) -> tuple[Indices, Array, Array]:
-    """Equilibria of one point, from all starts or from some; each perhaps many times."""
+    """Equilibria of one point, from all starts or from some."""
     where = grid.range(point)
     position, moment = where.starts()
     if random is not None:
         chosen = random.choice(len(position), len(position) // PART, replace=False)
         position, moment = position[chosen], moment[chosen]
-    with np.errstate(all="ignore"):  # many of these starts run away
-        position, moment, step = solve(grid.alone(point), position, moment, EVERY, 25)
-    good = (step < 1e-8) & where.holds(position, MARGIN)
-    return np.full(good.sum(), point), position[good], moment[good]
+    found = solutions(grid.alone(point), where, position, moment, EVERY, MARGIN)
+    return np.full(len(found), point), found[:, :3], found[:, 3:]
 
 
 def _spread(grid: Grid, atlas: Atlas, point: Indices, position: Array, moment: Array) -> None:
