@@ -23,9 +23,9 @@ ANGLES, DEPTHS = 8, 5
 """Training: the rotor at so many angles of a turn and depths of the plate; probes stand between them."""
 SHARE_PART = 0.1
 """Share of the tolerance for the series of the rotor's signals."""
-OTHERS_SHARE = 0.5
+OTHERS_SHARE = 0.65
 """Share of what the finite elements leave of the tolerance for what dipoles around the rotor miss of it; the rest is
-the left-out states'.  Above, the rotor itself is solved for."""
+the left-out states'.  Above, the rotor itself is solved for, which takes as long again: a few more states cost less."""
 INNER = 0.25
 """Part of a magnet's edges about its centre in which those dipoles are."""
 
