@@ -49,9 +49,9 @@ class OrbitPoint(Solution):
 
     @property
     def leaving(self) -> complex:
-        """The largest multiplier."""
+        """The largest multiplier, as far as errors allow: in a fold two meet at 1 and are known least of all."""
         rates = self.motion.eigenvalues
-        return complex(np.exp(2 * np.pi * rates[np.argmax(rates.real)]))
+        return complex(np.exp(2 * np.pi * rates[np.argmax(rates.real + self.motion.errors)]))
 
     @property
     def loss(self) -> str:

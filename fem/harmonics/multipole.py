@@ -168,10 +168,11 @@ def uniform_moments(magnet: Magnet, degree: int) -> MultipoleExpansion:
     """
     body = magnet.body
     degree = min(degree, 1) if isinstance(body, Sphere) else degree
+    center, radius = body.center, body.circumradius
     points, volume = polynomial_rule(body, degree)
-    polarization = np.broadcast_to(magnet.polarization_in_rotor, points.shape)
-    coefficients = moments_of_magnetization(points, volume, polarization, body.center, body.circumradius, degree)
-    return MultipoleExpansion(body.center, body.circumradius, without_noise(coefficients, 1e-15))
+    (sums,) = weighted_sums(degree, (points - center) / radius, volume[:, None] / (FOUR_PI * radius**3))
+    parts = [along * regular_derivative(sums, axis) for axis, along in enumerate(magnet.polarization_in_rotor)]
+    return MultipoleExpansion(center, radius, without_noise(np.conj(np.sum(parts, axis=0)), 1e-15))
 
 
 def without_noise(coefficients: Coefficients, level: float) -> Coefficients:
