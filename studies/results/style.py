@@ -69,7 +69,7 @@ def panels(rows: int, columns: int, size: tuple[float, float], **shared: Any) ->
 
 
 def fixed_panels(rows: int, columns: int, size: tuple[float, float], lines_below: int = 0) -> tuple[Figure, Any]:
-    """As `panels`, at places that leave room for titles, labels, numbers of eight signs and a legend's lines below.
+    """As `panels`, at places that leave room for a title, labels, numbers with an exponent and a legend's lines below.
 
     To measure every text and make room for it, as `panels` does, takes half as long again as drawing.
     """
@@ -77,10 +77,10 @@ def fixed_panels(rows: int, columns: int, size: tuple[float, float], lines_below
 
     figure, (wide, high) = Figure(figsize=size), size
     figure.set_layout_engine("none")
-    bottom = 0.45 + lines_below * 0.16
-    panel_wide, panel_high = (wide - 0.15) / columns - 0.72, (high - bottom - 0.25 + 0.7) / rows - 0.7
-    places = {"left": 0.72 / wide, "right": 1 - 0.15 / wide, "bottom": bottom / high, "top": 1 - 0.25 / high}
-    apart = {"wspace": 0.72 / panel_wide, "hspace": 0.7 / panel_high}
+    left, right, top, bottom = 0.78, 0.15, 0.42, 0.45 + lines_below * 0.16
+    panel_wide, panel_high = (wide - right) / columns - left, (high - bottom - top - (rows - 1) * 0.87) / rows
+    places = {"left": left / wide, "right": 1 - right / wide, "bottom": bottom / high, "top": 1 - top / high}
+    apart = {"wspace": left / panel_wide, "hspace": 0.87 / panel_high}
     return figure, figure.subplots(rows, columns, squeeze=False, gridspec_kw=places | apart)
 
 

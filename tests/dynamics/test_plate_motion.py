@@ -176,6 +176,19 @@ def test_multipliers_are_the_growth_of_a_kicked_flight(shaken, memory, rates):
     assert shaken.growth_per_s == pytest.approx(modes.growth / scales.time, abs=1e-6)
 
 
+def test_the_stated_error_of_growth_is_that_of_the_steps(shaken, memory, rates, monkeypatch):
+    """Against eight times as many steps: never less, and for no mode a thousand times too much where steps decide."""
+    force = PlateForce(memory, VALUES)
+    orbit = periodic_orbit(rates, VALUES, 0.0, force, Scales.of(SCENE).pack(shaken.state))
+    modes = floquet_modes(orbit)
+    monkeypatch.setattr("spinlev.dynamics.steady.floquet.STEPS", 192)
+    exact = floquet_modes(orbit)
+    for rate, error in zip(modes.eigenvalues, modes.errors, strict=True):
+        assert np.abs(exact.eigenvalues - rate).min() < error
+    assert 1e-11 < modes.errors.max() < 1e-8
+    assert exact.errors.max() < 1e-3 * modes.errors.max()
+
+
 def test_without_a_plate_multipliers_are_the_eigenvalues(known, rates):
     """Where nothing shakes, both say the same: 1e-6 of the rotor's rate, frequencies beyond it included."""
     for equilibrium in known.equilibria[:2]:
