@@ -10,6 +10,7 @@ from pictures_that_fail import Dies, Endless, Group
 
 from spinlev.studies.rendering import Copy, RenderError, copied, render
 
+signal.signal(signal.SIGINT, signal.default_int_handler)  # who starts the tests in the background has it ignored
 folder = Path(sys.argv[2])
 with copied() as drawing:
     assert isinstance(drawing, Copy)
