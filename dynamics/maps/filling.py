@@ -1,7 +1,7 @@
 """All equilibria at the points of a grid: searched for at some, carried from point to point to the others.
 
 On a coarse grid Newton's method searches from the starts of `equilibria.search`, all of them at some points and a
-random quarter at others.  From what is found each equilibrium is carried to the points beside it, all at once, until
+random eighth at others.  From what is found each equilibrium is carried to the points beside it, all at once, until
 nothing new is found.  Where that does not lead to the neighbour the branch is followed by its arc length, around the
 fold and back on the other side if there is one (`between`).  So a sheet of equilibria is found whole if one of its
 points, or of a sheet that meets it in a fold, is found by a search; only one that fits between the points of the coarse
@@ -20,8 +20,8 @@ from .grid import Atlas, Grid
 
 SPACING = 5
 """Points of the map between two searches."""
-WHOLE, PART = 8, 4
-"""Every eighth search has all starts, the others a quarter of them."""
+WHOLE, PART = 8, 8
+"""Every eighth search has all starts, the others an eighth of them."""
 MARGIN = 0.3
 """Sheets are followed so far beyond the range (radii): what its border cuts into pieces is whole there."""
 JUMP = 0.15
