@@ -138,32 +138,35 @@ def solutions(
     watch: Watch = unwatched,
 ) -> Array:
     """The same from starts (n, 3), up to `margin` (radii) outside the range."""
-
-    def newton(balance: Balance, position: Array, moment: Array) -> tuple[Array, Array]:
-        """Distinct places and moments (n, 3) that Newton's method finds.
-
-        Every few steps those that ran away are given up, and of those that have come together one goes on.
-        """
-        found = []
-        for turn in range(ITERATIONS // STEPS_TOGETHER):
-            watch("Newton's method from many starts", turn / (ITERATIONS // STEPS_TOGETHER))
-            with np.errstate(all="ignore"):
-                position, moment, step = solve(balance, position, moment, free, STEPS_TOGETHER)
-            points, met = np.concatenate([position, moment], axis=1), step < 1e-8
-            found.append(points[met & where.holds(position, margin)])
-            going = points[~met & np.isfinite(step) & where.holds(position, AWAY)]
-            cell = CELL * COARSER**turn
-            going = going[np.unique(np.round(going / cell), axis=0, return_index=True)[1]]
-            position, moment = going[:, :3], going[:, 3:]
-            if not len(going):
-                break
-        points = _distinct(np.concatenate(found))
-        return points[:, :3], points[:, 3:]
-
     if balance.rates.has_rough:
-        near, turned = newton(replace(balance, rates=balance.rates.rough), position, moment)
+        rough = replace(balance, rates=balance.rates.rough)
+        near, turned = _newton(rough, position, moment, where, free, margin, watch)
         position, moment = np.concatenate([near, position[::THINNED]]), np.concatenate([turned, moment[::THINNED]])
-    return _distinct(np.concatenate(newton(balance, position, moment), axis=1))
+    return _distinct(np.concatenate(_newton(balance, position, moment, where, free, margin, watch), axis=1))
+
+
+def _newton(
+    balance: Balance, position: Array, moment: Array, where: SearchRange, free: Indices, margin: float, watch: Watch
+) -> tuple[Array, Array]:
+    """Distinct places and moments (n, 3) in the range, or at most `margin` outside, that Newton's method finds.
+
+    Every few steps those that ran away are given up, and of those that have come together one goes on.
+    """
+    found = []
+    for turn in range(ITERATIONS // STEPS_TOGETHER):
+        watch("Newton's method from many starts", turn / (ITERATIONS // STEPS_TOGETHER))
+        with np.errstate(all="ignore"):
+            position, moment, step = solve(balance, position, moment, free, STEPS_TOGETHER)
+        points, met = np.concatenate([position, moment], axis=1), step < 1e-8
+        found.append(points[met & where.holds(position, margin)])
+        going = points[~met & np.isfinite(step) & where.holds(position, AWAY)]
+        cell = CELL * COARSER**turn
+        going = going[np.unique(np.round(going / cell), axis=0, return_index=True)[1]]
+        position, moment = going[:, :3], going[:, 3:]
+        if not len(going):
+            break
+    points = _distinct(np.concatenate(found))
+    return points[:, :3], points[:, 3:]
 
 
 def _distinct(points: Array) -> Array:

@@ -9,7 +9,7 @@ from .stability import Modes, tangent_spaces
 STEPS, MOST = 24, 384
 """Steps in a turn, doubled once for the error, and again until it is small: so often at most."""
 ENOUGH = 1e-8
-"""Error of the multipliers that is small."""
+"""Error of the multipliers that is small: 1e-6 /s of growth at 100 Hz."""
 SHARE = 0.1
 """Of the change by the last doubling, as the error: of a method of order six it is a 63rd."""
 NODES = np.array([0.5 - np.sqrt(15) / 10, 0.5, 0.5 + np.sqrt(15) / 10])

@@ -1,6 +1,6 @@
 """The main job: fields, tables, equilibria, motion, and what the dipole picture gets wrong."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
@@ -14,7 +14,7 @@ from ...fem.rotor_tables import FieldTable
 from ...fem.storage import write_whole
 from ...geometry.scenes import AbsoluteStart, Scene
 from ..pictures import last_view
-from ..rendering import Copy, RenderError, render
+from ..rendering import Drawer, RenderError, render
 from ..results import (
     axis_dataset,
     curve_dataset,
@@ -39,9 +39,7 @@ DEEPEST = 0.05
 """The field figure reaches this far below the rotor's origin, m."""
 
 
-def main_job(
-    scene: Scene, asked: Models, spin: float, duration: float, out: Path, drawing: Copy | Sequence[str]
-) -> Job:
+def main_job(scene: Scene, asked: Models, spin: float, duration: float, out: Path, drawing: Drawer) -> Job:
     """Compute everything of a scene for a body spin; writes result.nc, summary.json and the figures.
 
     `drawing` is what draws in three dimensions.
@@ -167,7 +165,7 @@ def _write(
     values: dict[str, Any],
     flight: Trajectory | None,
     out: Path,
-    drawing: Copy | Sequence[str],
+    drawing: Drawer,
 ) -> None:
     """The result and its summary first, then what is drawn of them."""
     note("Files and figures ...")

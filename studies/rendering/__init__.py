@@ -1,7 +1,13 @@
 """How is a picture in three dimensions drawn, in a process whose end is not the program's?"""
 
 from .copy_process import Copy as Copy, copied as copied
-from .renderer import RenderError as RenderError, drawn as drawn, render as render, unavailable as unavailable
+from .renderer import (
+    Drawer as Drawer,
+    RenderError as RenderError,
+    drawn as drawn,
+    render as render,
+    unavailable as unavailable,
+)
 from .view import (
     Currents as Currents,
     FieldPlane as FieldPlane,

@@ -4,13 +4,13 @@ import os
 import signal
 import sys
 import threading
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import contextmanager
 from multiprocessing import get_context
 from types import TracebackType
 
 from .draw_process import answer_all
-from .renderer import COMMAND
+from .renderer import COMMAND, Drawer
 
 
 class Copy:
@@ -43,7 +43,7 @@ class Copy:
 
 
 @contextmanager
-def copied() -> Iterator[Copy | Sequence[str]]:
+def copied() -> Iterator[Drawer]:
     """A copy of this process, made before the work begins; where copies are not safe, the command of a new one.
 
     A copy has what other threads held locked, for ever: hence this one must have no others yet. It ends with the block.

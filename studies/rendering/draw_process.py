@@ -4,20 +4,15 @@ Started by `renderer`, or a copy of a process that has loaded much already; what
 is a finished picture (bytes), the part of all that is done (float), or the reason why there is no more (str).
 """
 
-import gc
 import os
 import pickle
 import sys
 from functools import partial
 from typing import Any, BinaryIO
 
-MANY = 50_000
-"""New objects until Python looks for garbage, of which loading VTK makes none."""
-
 
 def main() -> None:
     """The life of a process of its own."""
-    gc.set_threshold(MANY)
     answers = os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)  # what libraries print is no answer
     answer_all(sys.stdin.buffer, answers)

@@ -11,7 +11,7 @@ import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Protocol, Union
+from typing import TYPE_CHECKING, Protocol, TypeAlias
 
 from ...geometry.basics import ComputationError
 from .view import Sample
@@ -20,6 +20,8 @@ if TYPE_CHECKING:
     from .copy_process import Copy
 
 COMMAND = (sys.executable, "-P", "-m", f"{__package__}.draw_process")
+Drawer: TypeAlias = "Sequence[str] | Copy"
+"""What draws: a command that begins a process, or a process that waits."""
 
 
 class RenderError(ComputationError):
@@ -36,7 +38,7 @@ class Picture(Protocol):
 def render(
     pictures: Mapping[Path, Picture],
     progress: Callable[[float], None] = lambda fraction: None,
-    command: Union[Sequence[str], "Copy"] = COMMAND,
+    command: Drawer = COMMAND,
 ) -> None:
     """Draw pictures, all in one process, which a command begins or which waits; write each as soon as it is finished.
 
@@ -72,9 +74,7 @@ def unavailable(command: Sequence[str] = COMMAND) -> str | None:
     return f"No 3-D pictures can be drawn: {answer}" if isinstance(answer, str) else None
 
 
-def _drawn(
-    pictures: Sequence[Picture], progress: Callable[[float], None], command: Union[Sequence[str], "Copy"]
-) -> Iterator[bytes | str]:
+def _drawn(pictures: Sequence[Picture], progress: Callable[[float], None], command: Drawer) -> Iterator[bytes | str]:
     """The files' contents, one after the other; where that fails, last the reason."""
     with _begun(command) if isinstance(command, Sequence) else command as process:
         try:
@@ -100,7 +100,7 @@ def _begun(command: Sequence[str]) -> subprocess.Popen[bytes]:
     return subprocess.Popen(command, stdin=pipe, stdout=pipe, stderr=messages, process_group=0)
 
 
-def _answers(process: Union[subprocess.Popen[bytes], "Copy"], question: bytes) -> Iterator[bytes | float | str]:
+def _answers(process: "subprocess.Popen[bytes] | Copy", question: bytes) -> Iterator[bytes | float | str]:
     """What the process says until it ends."""
     assert process.stdin
     assert process.stdout

@@ -77,6 +77,7 @@ def fixed_panels(rows: int, columns: int, size: tuple[float, float], lines_below
 
     figure, (wide, high) = Figure(figsize=size), size
     figure.set_layout_engine("none")
+    # Margins in inches, for the style's sizes of letters.
     left, right, top, bottom = 0.78, 0.15, 0.42, 0.45 + lines_below * 0.16
     panel_wide, panel_high = (wide - right) / columns - left, (high - bottom - top - (rows - 1) * 0.87) / rows
     places = {"left": left / wide, "right": 1 - right / wide, "bottom": bottom / high, "top": 1 - top / high}

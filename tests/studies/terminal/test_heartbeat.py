@@ -1,6 +1,7 @@
 """A step that says nothing for a while is heard of all the same."""
 
 import queue
+import time
 
 import pytest
 
@@ -27,6 +28,7 @@ def test_nothing_is_said_outside_of_a_step():
     heartbeat.said("Equilibria ...")
     said.get(timeout=WAIT)
     heartbeat.said("Plate: finite")
+    time.sleep(0.1)
     while not said.empty():  # what was being said just then
         said.get()
     with pytest.raises(queue.Empty):
