@@ -20,6 +20,7 @@ STYLE: Any = {
     "axes.titlesize": 8.5,
     "axes.titleweight": "bold",
     "axes.titlelocation": "left",
+    "axes.titley": 1.0,  # a place that is not measured anew in each drawing: that is a third of its time
     "axes.spines.top": False,
     "axes.spines.right": False,
     "legend.fontsize": 7,
@@ -64,8 +65,7 @@ def panels(rows: int, columns: int, size: tuple[float, float], **shared: Any) ->
     """A figure without a window and its axes (rows, columns); `size` in inches, `shared` as of `Figure.subplots`."""
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=size)
-    return figure, figure.subplots(rows, columns, squeeze=False, **shared)
+    return _with_axes(Figure(figsize=size), rows, columns, **shared)
 
 
 def fixed_panels(rows: int, columns: int, size: tuple[float, float], lines_below: int = 0) -> tuple[Figure, Any]:
@@ -82,7 +82,15 @@ def fixed_panels(rows: int, columns: int, size: tuple[float, float], lines_below
     panel_wide, panel_high = (wide - right) / columns - left, (high - bottom - top - (rows - 1) * 0.87) / rows
     places = {"left": left / wide, "right": 1 - right / wide, "bottom": bottom / high, "top": 1 - top / high}
     apart = {"wspace": left / panel_wide, "hspace": 0.87 / panel_high}
-    return figure, figure.subplots(rows, columns, squeeze=False, gridspec_kw=places | apart)
+    return _with_axes(figure, rows, columns, gridspec_kw=places | apart)
+
+
+def _with_axes(figure: Figure, rows: int, columns: int, **options: Any) -> tuple[Figure, Any]:
+    """The figure and its new axes; powers of ten stand over the numbers, beside the title instead of under it."""
+    grid = figure.subplots(rows, columns, squeeze=False, **options)
+    for axes in grid.flat:
+        axes.yaxis.get_offset_text().set_horizontalalignment("right")
+    return figure, grid
 
 
 def legend_below(figure: Figure, *labelled: Any, columns: int = 6) -> None:
