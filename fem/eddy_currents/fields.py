@@ -4,6 +4,8 @@ A point anywhere is folded into the meshed part; each parity class then answers 
 axial for B.  `amplitudes` are the complex factors of the response's sources, whose fields they superpose.
 """
 
+from __future__ import annotations
+
 import ngsolve
 import numpy as np
 from numpy.typing import ArrayLike

@@ -6,12 +6,13 @@ their vector potential at the quadrature points of the conductors, so that any f
 S. Zaglmayr, High order finite element methods for electromagnetic field computation, thesis, Linz 2006 (the space).
 """
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 from typing import Any, Protocol
 
 import ngsolve
 import numpy as np
-from ngsolve.comp import IntegrationRuleSpace
 from numpy.typing import NDArray
 from scipy.sparse import csr_matrix
 
@@ -50,7 +51,7 @@ class EddySpace:
         self.region = mesh.Materials(conductors.pattern)
         self.sigma = mesh.MaterialCF(dict(conductors.conductivity), default=0.0)
         self.real = self._space(complex_valued=False)
-        scalar = IntegrationRuleSpace(mesh, order=order + 2, definedon=self.region)
+        scalar = ngsolve.comp.IntegrationRuleSpace(mesh, order=order + 2, definedon=self.region)
         self._rules = scalar.GetIntegrationRules()
         self._carrier = ngsolve.GridFunction(scalar**3)
         self._carrier.Interpolate(ngsolve.CF((ngsolve.x, ngsolve.y, ngsolve.z)), definedon=self.region)
@@ -104,7 +105,7 @@ class EddySpace:
 
     def value_matrix(self, space: ngsolve.FESpace, basis: ngsolve.CoefficientFunction) -> csr_matrix:
         """(3n, unknowns) values of a space's `basis` at the quadrature points, the components of one point together."""
-        points = IntegrationRuleSpace(self.conductors.mesh, order=self.order + 2, definedon=self.region)
+        points = ngsolve.comp.IntegrationRuleSpace(self.conductors.mesh, order=self.order + 2, definedon=self.region)
 
         def integral(integrand: Any) -> Any:
             # Not vectorised: NGSolve's vectorised integrals are wrong beyond 256 points an element (order 4 on).

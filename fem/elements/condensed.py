@@ -1,5 +1,7 @@
 """Systems whose element-inner unknowns are condensed out: the factor holds the coupling ones only."""
 
+from __future__ import annotations
+
 from typing import Any, TypeVar
 
 import ngsolve

@@ -9,6 +9,8 @@ with the same curl and the same field in the conductors.  Exact for any number o
 R. Albanese, G. Rubinacci, IEE Proc. A 135 (1988) 457; O. Bíró, Comput. Methods Appl. Mech. Engrg. 169 (1999) 391.
 """
 
+from __future__ import annotations
+
 import ngsolve
 import numpy as np
 from numpy.typing import NDArray

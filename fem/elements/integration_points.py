@@ -10,7 +10,6 @@ from typing import Any
 
 import ngsolve as ng
 import numpy as np
-from ngsolve.comp import IntegrationRuleSpace, IntegrationRuleSpaceSurface
 from scipy.sparse import csr_matrix
 
 from ...geometry.basics import Array
@@ -74,14 +73,14 @@ def value_matrix(space: Any, basis: Any, points: Any, integral: Callable[[Any], 
 def volume_points(mesh: Any, material: str, order: int) -> IntegrationPoints:
     """Points in a material, exact for polynomials up to `order` on straight elements."""
     region = mesh.Materials(material)
-    space = IntegrationRuleSpace(mesh, order=order, definedon=region)
+    space = ng.comp.IntegrationRuleSpace(mesh, order=order, definedon=region)
     return _collect(space, region, ng.dx(material, intrules=space.GetIntegrationRules()))
 
 
 def surface_points(mesh: Any, boundary: str, order: int) -> IntegrationPoints:
     """Points on all surfaces of the mesh; those off the named boundary have weight zero."""
     region = mesh.Boundaries(boundary)
-    space = IntegrationRuleSpaceSurface(mesh, order=order)
+    space = ng.comp.IntegrationRuleSpaceSurface(mesh, order=order)
     return _collect(space, region, ng.ds(boundary, intrules=space.GetIntegrationRules()))
 
 

@@ -9,6 +9,8 @@ leaves plates fewer unknowns 0.65 to 0.8 (orders 2 to 5).
 A. George, SIAM J. Numer. Anal. 10, 345 (1973) (nested dissection).
 """
 
+from __future__ import annotations
+
 import resource
 from dataclasses import dataclass
 from pathlib import Path

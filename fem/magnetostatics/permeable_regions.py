@@ -7,6 +7,8 @@ With the given field H0 (sources outside or remanence, in T) and Î¼0 H = H0 - âˆ
 as in `solver`, and open space outside the ball. H0 enters and M leaves at integration points.
 """
 
+from __future__ import annotations
+
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any

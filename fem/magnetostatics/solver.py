@@ -13,13 +13,15 @@ ball is exact (`elements.open_boundary`). Where the bodies have mirror planes th
 matrix serves polarisations of every parity: ψ = 0 on a plane where it is odd.
 """
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
+import netgen.meshing as netgen
 import ngsolve as ng
 import numpy as np
-from netgen.meshing import NgException
 
 from ...geometry.basics import Array, ComputationError
 from ...geometry.bodies import Magnet
@@ -96,7 +98,7 @@ def assemble(mesh: MagnetMesh, order: int) -> System:
     stiffness += 2 / mesh.ball_radius * trial * test * ng.ds("outer")
     try:
         stiffness.Assemble()
-    except NgException as error:
+    except netgen.NgException as error:
         if "alloc" in str(error):
             raise TooLargeError(f"The memory ran out in elements of order {order}: {error}. {WAY_OUT}.") from error
         raise MeshError(str(error)) from error  # netgen refined a face otherwise from either side

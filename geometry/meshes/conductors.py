@@ -1,5 +1,7 @@
 """A meshed set of conductors in air: what an eddy-current solver needs to know of a geometry."""
 
+from __future__ import annotations
+
 from collections.abc import Mapping
 from dataclasses import dataclass
 

@@ -1,5 +1,7 @@
 """Meshes of magnets for other programs, by meshio."""
 
+from __future__ import annotations
+
 from pathlib import Path
 
 import meshio
@@ -9,12 +11,12 @@ import numpy as np
 from .magnets import MagnetMesh
 
 MESHIO_SHAPES = {
-    ng.ET.TET: ("tetra", [0, 2, 1, 3]),
-    ng.ET.PRISM: ("wedge", [0, 2, 1, 3, 5, 4]),
-    ng.ET.PYRAMID: ("pyramid", [0, 3, 2, 1, 4]),
-    ng.ET.HEX: ("hexahedron", [0, 3, 2, 1, 4, 7, 6, 5]),
+    "TET": ("tetra", [0, 2, 1, 3]),
+    "PRISM": ("wedge", [0, 2, 1, 3, 5, 4]),
+    "PYRAMID": ("pyramid", [0, 3, 2, 1, 4]),
+    "HEX": ("hexahedron", [0, 3, 2, 1, 4, 7, 6, 5]),
 }
-"""Names and vertex order of the element shapes in meshio, where volumes are positive."""
+"""Names and vertex order of NGSolve's element shapes in meshio, where volumes are positive."""
 
 
 def to_meshio(mesh: MagnetMesh) -> meshio.Mesh:
@@ -26,7 +28,7 @@ def to_meshio(mesh: MagnetMesh) -> meshio.Mesh:
     cells: dict[str, list[list[int]]] = {}
     numbers: dict[str, list[int]] = {}
     for element in mesh.mesh.Elements(ng.VOL):
-        name, order = MESHIO_SHAPES[element.type]
+        name, order = MESHIO_SHAPES[element.type.name]
         cells.setdefault(name, []).append([element.vertices[i].nr for i in order])
         numbers.setdefault(name, []).append(regions[element.mat])
     points = mesh.to_meter(np.array([vertex.point for vertex in mesh.mesh.vertices]))

@@ -1,5 +1,7 @@
 """Structured hexahedral meshes of boxes on a tensor-product grid, and where its lines lie."""
 
+from __future__ import annotations
+
 import itertools
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass

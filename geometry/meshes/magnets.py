@@ -5,6 +5,8 @@ are `magnet0`, `magnet1`, … and `air`; the boundaries are `outer`, the surface
 magnets.
 """
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import combinations

@@ -1,5 +1,7 @@
 """Mesh of one connected piece of metal, without the air around it."""
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any

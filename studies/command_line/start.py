@@ -21,6 +21,9 @@ def main() -> None:
     gc.set_threshold(MANY)
     try:
         from ..terminal import make_readable
+        from .late import load_late
+
+        load_late("netgen", "netgen.occ", "netgen.meshing", "ngsolve")
 
         make_readable()
         from .cli import run
@@ -31,6 +34,7 @@ def main() -> None:
             raise
         print(STOPPED, file=sys.stderr)
         status = 1
+    gc.freeze()  # the system takes all memory back: nothing need be looked through once more
     sys.exit(status)
 
 

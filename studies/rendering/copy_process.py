@@ -1,5 +1,6 @@
 """The process that draws as a copy of this one: what is loaded already need not be loaded again."""
 
+import gc
 import os
 import signal
 import sys
@@ -53,6 +54,7 @@ def copied() -> Iterator[Drawer]:
         return
     import matplotlib.pyplot  # noqa: F401  # for the figures here and for VTK there
 
+    gc.freeze()  # what is loaded lives to the end, here and there
     with Copy() as copy:
         yield copy
 

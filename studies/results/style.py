@@ -82,7 +82,11 @@ def fixed_panels(rows: int, columns: int, size: tuple[float, float], lines_below
     panel_wide, panel_high = (wide - right) / columns - left, (high - bottom - top - (rows - 1) * 0.87) / rows
     places = {"left": left / wide, "right": 1 - right / wide, "bottom": bottom / high, "top": 1 - top / high}
     apart = {"wspace": left / panel_wide, "hspace": 0.87 / panel_high}
-    return _with_axes(figure, rows, columns, gridspec_kw=places | apart)
+    figure, grid = _with_axes(figure, rows, columns, gridspec_kw=places | apart)
+    for axes in grid.flat:
+        axes.xaxis.set_label_coords(0.5, -0.26 / panel_high)
+        axes.yaxis.set_label_coords(-0.52 / panel_wide, 0.5)
+    return figure, grid
 
 
 def _with_axes(figure: Figure, rows: int, columns: int, **options: Any) -> tuple[Figure, Any]:

@@ -1,0 +1,39 @@
+"""Libraries that are loaded when something of them is used: an answer from the cache does without finite elements."""
+
+from __future__ import annotations
+
+import sys
+from importlib import import_module
+from threading import RLock
+from types import ModuleType
+from typing import Any
+
+
+def load_late(*names: str) -> None:
+    """Let `import` find stand-ins for these modules, which load all of them at the first use of any.
+
+    The parts of a package follow it. What is loaded already stays as it is.
+    """
+    if any(name in sys.modules for name in names):
+        return
+    sleeping, loading = {name: _StandIn(name) for name in names}, RLock()
+
+    def wake() -> None:
+        with loading:
+            for name in [name for name in names if sys.modules.get(name) is sleeping[name]]:
+                del sys.modules[name]
+            for name in names:
+                import_module(name)
+
+    for name, module in sleeping.items():
+        vars(module)["_wake"] = wake
+        sys.modules[name] = module
+        package, _, part = name.rpartition(".")
+        if package:
+            setattr(sleeping[package], part, module)
+
+
+class _StandIn(ModuleType):
+    def __getattr__(self, name: str) -> Any:
+        self._wake()
+        return getattr(import_module(self.__name__), name)
