@@ -5,11 +5,13 @@ of these curves at which the axial force vanishes too, so that following each cu
 folds included.
 """
 
+from __future__ import annotations
+
 from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from scipy.interpolate import CubicHermiteSpline
+import scipy
 
 from ...geometry.basics import Array, Watch, unwatched
 from ..steady import AXIAL, LATERAL, Balance, Indices, solve
@@ -58,18 +60,20 @@ class Curve:
 
     def balanced(self) -> tuple[Array, Array]:
         """Estimates (k, 3) of positions and moments where the axial force vanishes as well."""
-        crossings = CubicHermiteSpline(self.arc, self.force, self.slope).roots(extrapolate=False)
+        crossings = scipy.interpolate.CubicHermiteSpline(self.arc, self.force, self.slope).roots(extrapolate=False)
         points = self._spline(crossings[np.isfinite(crossings)])
         moment = points[:, 3:]
         return points[:, :3], moment / np.linalg.norm(moment, axis=1, keepdims=True)
 
     @cached_property
-    def _spline(self) -> CubicHermiteSpline:
-        return CubicHermiteSpline(self.arc, np.concatenate([self.position, self.moment], axis=1), self.tangent)
+    def _spline(self) -> scipy.interpolate.CubicHermiteSpline:
+        return scipy.interpolate.CubicHermiteSpline(
+            self.arc, np.concatenate([self.position, self.moment], axis=1), self.tangent
+        )
 
     @cached_property
-    def _height(self) -> CubicHermiteSpline:
-        return CubicHermiteSpline(self.arc, self.position[:, 2], self.tangent[:, 2])
+    def _height(self) -> scipy.interpolate.CubicHermiteSpline:
+        return scipy.interpolate.CubicHermiteSpline(self.arc, self.position[:, 2], self.tangent[:, 2])
 
 
 @dataclass(frozen=True, eq=False)

@@ -4,8 +4,8 @@ import time
 from dataclasses import replace
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike, NDArray
-from scipy.spatial import KDTree
 
 from ...geometry.basics import Array
 from ..harmonics import Coefficients, MultipoleExpansion, field_sizes, field_spectrum
@@ -149,7 +149,7 @@ def _tail(spectrum: Array) -> Array:
 
 def _region(field_map: FieldMap, centers: Array, radii: Array) -> Array:
     """Box of the map and a step around it; without bounds if it surrounds all sources: then all is known outwards."""
-    step = np.median(KDTree(field_map.points).query(field_map.points, 2)[0][:, 1])
+    step = np.median(scipy.spatial.KDTree(field_map.points).query(field_map.points, 2)[0][:, 1])
     corners = np.array([field_map.points.min(axis=0) - step, field_map.points.max(axis=0) + step])
     surrounds = np.all(corners[0] <= centers - radii[:, None]) and np.all(centers + radii[:, None] <= corners[1])
     return np.array([[-np.inf] * 3, [np.inf] * 3]) if surrounds else corners

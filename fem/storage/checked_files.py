@@ -10,6 +10,7 @@ from xarray.backends import H5NetCDFStore
 
 from ...geometry.basics import InputError
 from .foreign import hdf5_fault
+from .netcdf import read_netcdf
 from .whole_files import seal, sealed, write_whole
 
 Variables = Mapping[str, tuple[tuple[str, ...], Any, str]]
@@ -55,11 +56,15 @@ def read_checked(path: str | Path, file_format: str | None = None) -> xr.Dataset
     if whole is None and (reason := hdf5_fault(Path(path))):
         raise TableFileError(f"Input {path} must be a readable netCDF file; instead: {reason}.")
     try:
-        with xr.open_dataset(path, engine="h5netcdf") as opened:
-            dataset = opened.load()
+        dataset = read_netcdf(path) if whole else _foreign(path)
     except Exception as error:  # the HDF5 layer raises many kinds on a damaged file
         raise TableFileError(f"Input {path} must be a readable netCDF file; instead: {error}.") from error
     if file_format and dataset.attrs.get("format") != file_format:
         received = dataset.attrs.get("format")
         raise TableFileError(f"Input {path} must be a '{file_format}'; instead received '{received}'.")
     return dataset
+
+
+def _foreign(path: str | Path) -> xr.Dataset:
+    with xr.open_dataset(path, engine="h5netcdf") as opened:
+        return opened.load()

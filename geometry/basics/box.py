@@ -18,9 +18,12 @@ def rotation_matrix(degrees_xyz: ArrayLike) -> Array:
 
     Entries within round-off of 0 or ±1 are just that: rotors of one kind are alike in which entries are plain.
     """
-    from scipy.spatial.transform import Rotation  # three times the time of NumPy to load
-
-    matrix = Rotation.from_euler("xyz", np.asarray(degrees_xyz, float), degrees=True).as_matrix()
+    angles = np.radians(np.asarray(degrees_xyz, float))
+    (cx, cy, cz), (sx, sy, sz) = np.cos(angles), np.sin(angles)  # SciPy's rotations take longer to load than NumPy
+    about_x = np.array([[1, 0, 0], [0, cx, -sx], [0, sx, cx]])
+    about_y = np.array([[cy, 0, sy], [0, 1, 0], [-sy, 0, cy]])
+    about_z = np.array([[cz, -sz, 0], [sz, cz, 0], [0, 0, 1]])
+    matrix = about_z @ about_y @ about_x
     plain = np.round(matrix) + 0.0  # no -0
     return np.asarray(np.where(np.abs(matrix - plain) < ROUND_OFF, plain, matrix))
 

@@ -6,7 +6,7 @@ from typing import Any
 import netgen.occ as occ
 import ngsolve as ng
 import numpy as np
-from scipy.spatial.transform import Rotation
+import scipy
 
 from ..basics import Array, Box, Part, Ring, Solid, Sphere
 
@@ -41,7 +41,7 @@ def _part(body: Part, center: Array, unit: float) -> Any:
         copy.flush()
         (solid,) = occ.OCCGeometry(copy.name).shape.solids
     solid = solid.Move(_direction(body.origin / MILLIMETRE))
-    turn = Rotation.from_matrix(body.rotation).as_rotvec(degrees=True)
+    turn = scipy.spatial.transform.Rotation.from_matrix(body.rotation).as_rotvec(degrees=True)
     angle = float(np.linalg.norm(turn))
     if angle > 0:
         axis = occ.Axis(occ.Pnt(0, 0, 0), occ.gp_Dir(*map(float, turn / angle)))

@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-import scipy
 import xarray as xr
 
 from ...geometry.basics import Array
@@ -177,8 +176,22 @@ def _envelope(axes: Axes, time: Array, values: Array) -> None:
 
 
 def _smooth(parameter: Array, x: Array, y: Array) -> tuple[Array, Array]:
-    """Points of a smooth curve through samples (n,) at a growing parameter (n,)."""
+    """Points of a smooth curve through samples (n,) at a growing parameter (n,): cubics that share slopes.
+
+    SciPy's splines take longer to load than the figure to draw.
+    """
     if len(parameter) < 4:
         return x, y
     fine = np.linspace(parameter[0], parameter[-1], 12 * len(parameter))
-    return scipy.interpolate.CubicSpline(parameter, x)(fine), scipy.interpolate.CubicSpline(parameter, y)(fine)
+    before = np.clip(np.searchsorted(parameter, fine, side="right") - 1, 0, len(parameter) - 2)
+    step = np.diff(parameter)[before]
+    part = (fine - parameter[before]) / step
+    rest = 1 - part
+
+    def between(values: Array) -> Array:
+        slope = np.gradient(values, parameter, edge_order=2)
+        low, high = values[before], values[before + 1]
+        leaving, coming = step * slope[before], step * slope[before + 1]
+        return rest**2 * (low + part * (2 * low + leaving)) + part**2 * (high + rest * (2 * high - coming))
+
+    return between(x), between(y)

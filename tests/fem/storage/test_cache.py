@@ -10,6 +10,7 @@ import sys
 import time
 from pathlib import Path
 
+import numpy as np
 import pytest
 import xarray as xr
 
@@ -144,3 +145,26 @@ def test_a_file_has_the_bytes_that_xarray_writes(tmp_path):
     write_checked(dataset, tmp_path / "checked.nc")
     assert (tmp_path / "checked.nc").read_bytes() == seal(bytes(dataset.to_netcdf(engine="h5netcdf")))
     assert read_checked(tmp_path / "checked.nc").identical(dataset)
+
+
+def test_a_file_of_its_own_is_read_as_xarray_reads_it(tmp_path):
+    """Numbers of any kind and dimension, texts, truths, coordinates, lists: same values, types and attributes."""
+    columns = {
+        "B": (("axis", "time"), np.arange(6.0).reshape(3, 2), {"units": "T", "range": [0.5, 1.5], "parts": ["a", "b"]}),
+        "count": ("time", np.array([1, 2], np.int32), {"number": 3, "factor": 0.5}),
+        "stable": ("time", [True, False]),
+        "z": ("axis", np.array([1j, float("nan"), 2.0])),
+        "name": ("time", ["flat", "Ørsted"]),
+        "nothing": ("none", np.empty(0)),
+        "mass": ((), 1.5),
+        "title": ((), "δ"),
+    }
+    coordinates = {"axis": ["x", "y", "z"], "time": [0.0, float("nan")], "depth": ("time", [1.0, 2.0], {"units": "m"})}
+    dataset = xr.Dataset(columns, coordinates, {"scene": "δx = 2", "number": 1.5, "none": "", "few": [1, 2]})
+    write_checked(dataset, tmp_path / "checked.nc")
+    ours = read_checked(tmp_path / "checked.nc")
+    with xr.open_dataset(tmp_path / "checked.nc", engine="h5netcdf") as theirs:
+        assert ours.identical(theirs)
+        assert {n: v.dtype for n, v in ours.variables.items()} == {n: v.dtype for n, v in theirs.variables.items()}
+        for one, other in ((ours, theirs), *((ours[n], theirs[n]) for n in theirs.variables)):
+            assert [type(value) for value in one.attrs.values()] == [type(value) for value in other.attrs.values()]
