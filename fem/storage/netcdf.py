@@ -26,9 +26,9 @@ def read_netcdf(path: str | Path) -> xr.Dataset:
             for name, item in stored.items()
             if not str(item.attrs.get("NAME", b""), "ascii").startswith("This is a netCDF dimension but not")
         }
-        dataset = xr.Dataset(variables, attrs=_attributes(file))
-    told = [holder.attrs.pop("coordinates", "") for holder in (dataset, *dataset.variables.values())]
-    return dataset.set_coords(" ".join(told).split())
+        attributes = _attributes(file)
+    told = [held.pop("coordinates", "") for held in (attributes, *(v.attrs for v in variables.values()))]
+    return xr.Dataset(variables, attrs=attributes).set_coords(" ".join(told).split())
 
 
 def _variable(item: h5py.Dataset, dimensions: Mapping[int, str]) -> xr.Variable:

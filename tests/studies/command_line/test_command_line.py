@@ -1,6 +1,7 @@
 """The command line as a user sees it: keys, files, messages and exit statuses."""
 
 import json
+import os
 import subprocess
 import sys
 
@@ -67,7 +68,20 @@ def test_help_comes_without_what_computes():
     assert "Commands" in found.stdout
     loaded = set(found.stdout.splitlines()[-1].split())
     assert "rich" in loaded
-    assert not loaded & {"numpy", "xarray", "matplotlib", "scipy", "ngsolve", "heyoka", "pandas", "pyvista"}
+    assert not loaded & {"numpy", "xarray", "matplotlib", "scipy", "pyngcore", "heyoka", "pandas", "pyvista"}
+
+
+def test_an_answer_comes_without_finite_elements_unless_they_make_it(tmp_path):
+    """They take a fourth of a second to load: one module of them calls for the other, and for pyngcore."""
+    code = "import sys; from spinlev.studies.command_line.start import main; sys.argv[1:] = {}\n"
+    code += "try: main()\nfinally: print('pyngcore' in sys.modules)"
+    arguments = ["field", str(SCENES / "horizontal.toml"), "--points", str(points_file(tmp_path)), "--json"]
+    arguments += ["--out", str(tmp_path / "out"), "--model"]
+    environment = os.environ | {"SPINLEV_CACHE": str(tmp_path / "cache")}
+    for model, loaded in [("dipole", "False"), ("fem", "True"), ("fem", "False")]:
+        command = [sys.executable, "-P", "-c", code.format([*arguments, model])]
+        done = subprocess.run(command, capture_output=True, text=True, check=True, env=environment)
+        assert done.stdout.splitlines()[-1] == loaded
 
 
 @pytest.mark.parametrize("model", ["dipole", "cuboid", "fem", "auto"])
