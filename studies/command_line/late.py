@@ -30,7 +30,7 @@ def load_late(*names: str) -> None:
         sys.modules[name] = module
         package, _, part = name.rpartition(".")
         if package:
-            setattr(sleeping[package], part, module)
+            vars(sleeping[package]).update({"__path__": [], part: module})
 
 
 class _StandIn(ModuleType):
