@@ -11,7 +11,7 @@ The equations keep |m̂| and the body spin s = Ω·m̂/ω; both are prescribed b
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import lstsq
+import scipy
 
 from ...geometry.basics import Array
 from ..motion import Parameter, PlateForce, Rates, turned_about_z
@@ -78,7 +78,8 @@ def orbit_near(rates: Rates, values: Array, spin: float, plate: PlateForce | Non
         if not np.isfinite(slope).all():
             return None
         matrix, target = np.vstack([slope, rows]), -np.append(residual, aims)
-        step = lstsq(matrix, target, cond=1e-14, lapack_driver="gelsy", check_finite=False)[0].reshape(states.shape)
+        step = scipy.linalg.lstsq(matrix, target, cond=1e-14, lapack_driver="gelsy", check_finite=False)[0]
+        step = step.reshape(states.shape)
         size = float(np.abs(step).max())
         states = states + step * min(1.0, LONGEST_STEP / size)
         if size < CONVERGED:

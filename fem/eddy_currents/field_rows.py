@@ -8,9 +8,8 @@ from collections.abc import Sequence
 
 import ngsolve
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.sparse import diags
-from scipy.sparse.linalg import splu
 
 from ...geometry.basics import Array
 from ...geometry.meshes import PLANES
@@ -32,7 +31,7 @@ class FieldRows:
     def __init__(self, space: EddySpace) -> None:
         self.space = space
         self.root = row_weights(space)
-        weights = diags(self.root)
+        weights = scipy.sparse.diags(self.root)
         self._values = weights @ space.value_matrix(space.real, space.real.TrialFunction())
         self._scalars = ngsolve.H1(space.conductors.mesh, order=space.order + 1, definedon=space.region)
         slopes = space.value_matrix(self._scalars, ngsolve.grad(self._scalars.TrialFunction()))
@@ -55,7 +54,9 @@ class FieldRows:
             kept[np.flatnonzero(kept)[0]] = False  # a constant has no gradient
         free = np.flatnonzero(kept)
         gradients = self._gradients[:, free]
-        factor = splu(self._products[free][:, free], permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True})
+        factor = scipy.sparse.linalg.splu(
+            self._products[free][:, free], permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True}
+        )
         return np.asarray(rows - (gradients @ factor.solve(np.ascontiguousarray(gradients.T @ rows.T))).T)
 
     def _fixed(self, parity_class: Sequence[int]) -> NDArray[np.bool_]:

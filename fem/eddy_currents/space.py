@@ -13,8 +13,8 @@ from typing import Any, Protocol
 
 import ngsolve
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.sparse import csr_matrix
 
 from ...geometry.basics import Array
 from ...geometry.meshes import MILLIMETRE, PLANES, ConductorMesh
@@ -103,7 +103,7 @@ class EddySpace:
         self._carrier.Interpolate(function, definedon=self.region)
         return np.stack([c.vec.FV().NumPy() for c in self._carrier.components], axis=1)
 
-    def value_matrix(self, space: ngsolve.FESpace, basis: ngsolve.CoefficientFunction) -> csr_matrix:
+    def value_matrix(self, space: ngsolve.FESpace, basis: ngsolve.CoefficientFunction) -> scipy.sparse.csr_matrix:
         """(3n, unknowns) values of a space's `basis` at the quadrature points, the components of one point together."""
         points = ngsolve.comp.IntegrationRuleSpace(self.conductors.mesh, order=self.order + 2, definedon=self.region)
 

@@ -7,8 +7,8 @@ from typing import Any, TypeVar
 import ngsolve
 import ngsolve as ng
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.sparse.linalg import LinearOperator, cg
 
 from ...geometry.basics import Array, ComputationError
 from .open_boundary import OpenBoundary
@@ -92,12 +92,12 @@ def solve_open(stiffness: Any, inverse: Any, free_dofs: Any, load: Any, boundary
         return np.where(free, target.FV().NumPy(), 0.0)
 
     shape = (len(free), len(free))
-    full = LinearOperator(
+    full = scipy.sparse.linalg.LinearOperator(
         shape, matvec=lambda x: multiply(stiffness.mat, x) + np.where(free, boundary.apply(x), 0.0), dtype=float
     )
-    preconditioner = LinearOperator(shape, matvec=lambda x: multiply(inverse, x), dtype=float)
+    preconditioner = scipy.sparse.linalg.LinearOperator(shape, matvec=lambda x: multiply(inverse, x), dtype=float)
     right_hand_side = np.where(free, load.vec.FV().NumPy(), 0.0)
-    result, failed = cg(full, right_hand_side, rtol=1e-12, maxiter=100, M=preconditioner)
+    result, failed = scipy.sparse.linalg.cg(full, right_hand_side, rtol=1e-12, maxiter=100, M=preconditioner)
     if failed:
         raise ConvergenceError(f"The open boundary did not converge in {failed} iterations; use a larger ball of air.")
     potential.vec.FV().NumPy()[:] = result

@@ -13,9 +13,8 @@ from __future__ import annotations
 
 import ngsolve
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.sparse import coo_matrix
-from scipy.sparse.csgraph import connected_components, minimum_spanning_tree
 
 IntArray = NDArray[np.int64]
 
@@ -42,11 +41,11 @@ def tree_edges(edges: IntArray, shrunk: NDArray[np.bool_]) -> IntArray:
     shrunk : (n,) which edges join their ends to one vertex
     """
     vertices = int(edges.max()) + 1
-    joined = coo_matrix((np.ones(int(shrunk.sum())), edges[shrunk].T), shape=(vertices, vertices))
-    count, label = connected_components(joined, directed=False)
+    joined = scipy.sparse.coo_matrix((np.ones(int(shrunk.sum())), edges[shrunk].T), shape=(vertices, vertices))
+    count, label = scipy.sparse.csgraph.connected_components(joined, directed=False)
     ends = np.sort(label[edges], axis=1)
     numbers = np.flatnonzero(ends[:, 0] != ends[:, 1])
     _, first = np.unique(ends[numbers], axis=0, return_index=True)
     numbers = numbers[first]
-    graph = coo_matrix((numbers + 1.0, ends[numbers].T), shape=(count, count))
-    return np.asarray(np.rint(minimum_spanning_tree(graph.tocsr()).data).astype(np.int64) - 1)
+    graph = scipy.sparse.coo_matrix((numbers + 1.0, ends[numbers].T), shape=(count, count))
+    return np.asarray(np.rint(scipy.sparse.csgraph.minimum_spanning_tree(graph.tocsr()).data).astype(np.int64) - 1)

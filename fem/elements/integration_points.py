@@ -4,13 +4,15 @@ Functions that exist as NumPy code (closed forms, solid harmonics) enter and lea
 formula has to be written a second time. Works on every element shape, those of hp-refinement included.
 """
 
+from __future__ import annotations
+
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
 import ngsolve as ng
 import numpy as np
-from scipy.sparse import csr_matrix
+import scipy
 
 from ...geometry.basics import Array
 
@@ -44,12 +46,14 @@ class IntegrationPoints:
         result.vec.FV().NumPy()[:] = values
         return result
 
-    def value_matrix(self, space: Any, basis: Any) -> csr_matrix:
+    def value_matrix(self, space: Any, basis: Any) -> scipy.sparse.csr_matrix:
         """(3n, unknowns) values here of a space's `basis` of three components, those of one point together."""
         return value_matrix(space, basis, self.space, lambda integrand: integrand * self.measure, self.weights)
 
 
-def value_matrix(space: Any, basis: Any, points: Any, integral: Callable[[Any], Any], weights: Array) -> csr_matrix:
+def value_matrix(
+    space: Any, basis: Any, points: Any, integral: Callable[[Any], Any], weights: Array
+) -> scipy.sparse.csr_matrix:
     """(3n, unknowns) values at points of a `basis` of three components, those of one point together.
 
     Parameters
@@ -65,7 +69,7 @@ def value_matrix(space: Any, basis: Any, points: Any, integral: Callable[[Any], 
     form.Assemble()
     rows, columns, values = (np.asarray(part) for part in form.mat.COO())
     component, point = np.divmod(rows, len(weights))
-    return csr_matrix(
+    return scipy.sparse.csr_matrix(
         (values / weights[point], (3 * point + component, columns)), shape=(form.mat.height, form.mat.width)
     )
 

@@ -12,7 +12,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.special import eval_legendre
+import scipy
 
 from ...geometry.basics import MU_0, Array
 from ...geometry.bodies import Magnet
@@ -50,9 +50,9 @@ class FloaterSources:
         for l in range(1, highest + 1):
             radius = np.linalg.norm(self.places, axis=1)
             tiny = np.finfo(float).tiny
-            below = radius ** (l - 1) * eval_legendre(l - 1, self.places[:, 2] / np.maximum(radius, tiny))
+            below = radius ** (l - 1) * scipy.special.eval_legendre(l - 1, self.places[:, 2] / np.maximum(radius, tiny))
             far = np.linalg.norm(self.corners, axis=1)
-            zonal = far**l * eval_legendre(l, self.corners[:, 2] / np.maximum(far, tiny))
+            zonal = far**l * scipy.special.eval_legendre(l, self.corners[:, 2] / np.maximum(far, tiny))
             # the z derivative of r^l P_l is l r^(l-1) P_(l-1); what lies across z cancels in a round body
             found.append(l * self.moments[:, 2] @ below + self.charges @ zonal)
         return np.array(found)

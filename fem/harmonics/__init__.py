@@ -15,7 +15,6 @@ from .interior import (
     FOUR_PI as FOUR_PI,
     Ball as Ball,
     dipole_sources as dipole_sources,
-    factorials as factorials,
     field_at_center as field_at_center,
     from_magnetization as from_magnetization,
     gradient_at_center as gradient_at_center,
@@ -38,6 +37,7 @@ from .regular_sums import members as members, real_sizes as real_sizes, regular_
 from .solid import (
     Coefficients as Coefficients,
     derivative as derivative,
+    factorials as factorials,
     field_sizes as field_sizes,
     field_spectrum as field_spectrum,
     irregular_gradient as irregular_gradient,

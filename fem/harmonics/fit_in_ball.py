@@ -9,9 +9,9 @@ from functools import cache
 import numpy as np
 
 from ...geometry.basics import Array
-from .interior import factorials, gradient_coefficients, sphere
+from .interior import gradient_coefficients, sphere
 from .regular_sums import members, real_sizes, real_weights
-from .solid import regular_values
+from .solid import factorials, regular_values
 
 
 @dataclass(frozen=True, eq=False)

@@ -13,10 +13,9 @@ from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
-from scipy.special import gammaln
 
 from ...geometry.basics import MU_0, Array
-from .solid import CHUNK, Coefficients, regular_values, weighted_sums
+from .solid import CHUNK, Coefficients, factorials, regular_values, weighted_sums
 
 FOUR_PI = 4 * np.pi
 
@@ -27,12 +26,6 @@ class Ball:
 
     center: Array
     radius: float
-
-
-def factorials(degree: int) -> Array:
-    """(l-m)! (l+m)! as [l, m], 1 for m > l: Θ_lm over Υ_lm on the unit sphere. Finite up to degree 85."""
-    l, m = np.indices((degree + 1, degree + 1))
-    return np.where(m <= l, np.exp(gammaln(np.maximum(l - m, 0) + 1) + gammaln(l + m + 1)), 1.0)
 
 
 def sphere(degree: int) -> tuple[Array, Array]:

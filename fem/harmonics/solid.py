@@ -9,14 +9,15 @@ irregular ones Θ_lm,
 A real harmonic function outside a sphere is Σ_lm c_lm Θ_lm with c_l(-m) = (-1)^m conj c_lm; only m ≥ 0 is kept.
 """
 
+import math
 from collections.abc import Container, Iterator, Sequence
+from functools import cache
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import gammaln
 
-from ...geometry.basics import Array
+from ...geometry.basics import Array, frozen_array
 
 Coefficients = NDArray[np.complex128]
 """c[l, m] for 0 ≤ m ≤ l, as a square array."""
@@ -24,6 +25,15 @@ Coefficients = NDArray[np.complex128]
 
 CHUNK = 4096
 """Points at once, so that the harmonics of all degrees fit in memory."""
+FACTORIALS = np.array([float(math.factorial(n)) for n in range(171)])
+"""All that a double can hold."""
+
+
+@cache
+def factorials(degree: int) -> Array:
+    """(l-m)! (l+m)! as [l, m], 1 for m > l: Θ_lm over Υ_lm on the unit sphere. For degrees up to 85."""
+    l, m = np.indices((degree + 1, degree + 1))
+    return frozen_array(np.where(m <= l, FACTORIALS[np.maximum(l - m, 0)] * FACTORIALS[l + m], 1.0), l.shape)
 
 
 def regular_orders(
@@ -84,8 +94,8 @@ def irregular_values(degree: int, points: Array) -> dict[tuple[int, int], Any]:
     """Θ_lm, 0 ≤ m ≤ l ≤ degree, at NumPy points (n, 3), by Θ_lm(r) = (l-m)! (l+m)! Υ_lm(r/r²)/r."""
     square = np.sum(points**2, axis=1)
     found = regular_values(degree, *(points / square[:, None]).T)
-    distance = np.sqrt(square)
-    return {(l, m): np.exp(gammaln(l - m + 1) + gammaln(l + m + 1)) / distance * v for (l, m), v in found.items()}
+    distance, sizes = np.sqrt(square), factorials(degree)
+    return {key: sizes[key] / distance * v for key, v in found.items()}
 
 
 def irregular_gradient(harmonics: dict[tuple[int, int], Any], l: int, m: int) -> list[Any]:
@@ -111,14 +121,13 @@ def outer_sums(coefficients: Sequence[Coefficients], points: Array) -> Array:
     """Σ c_lm Θ_lm (n, k) at points (n, 3), for k arrays c of one size."""
     stacked = np.stack(coefficients, axis=-1)
     degree, used = len(stacked) - 1, set(np.flatnonzero(stacked.any(axis=(0, 2))).tolist())
-    l = np.arange(degree + 1)
     result = np.zeros((len(points), stacked.shape[2]))
     for start in range(0, len(points), CHUNK):
         block = points[start : start + CHUNK]
         square = np.sum(block**2, axis=1)
         x, y, z = np.ascontiguousarray((block / square[:, None]).T)
         for m, rows, power in regular_orders(degree, x, y, z, used):
-            sizes = (1.0 if m == 0 else 2.0) * np.exp(gammaln(l[m:] - m + 1) + gammaln(l[m:] + m + 1))
+            sizes = (1.0 if m == 0 else 2.0) * factorials(degree)[m:, m]
             parts = np.ascontiguousarray(sizes[:, None] * stacked[m:, m])
             sums = np.ascontiguousarray(rows.T @ parts.view(float)).view(complex)
             result[start : start + CHUNK] += np.real(power[:, None] * sums)
@@ -166,8 +175,7 @@ def field_sizes(degree: int) -> Array:
     harmonic f of degree l. The size of Σ c_lm Θ_lm is the root of Σ |c_lm|² size_lm².
     """
     l, m = np.meshgrid(np.arange(degree + 1), np.arange(degree + 1), indexing="ij")
-    logarithm = gammaln(np.maximum(l - m, 0) + 1) + gammaln(l + m + 1)
-    return np.where(m <= l, np.sqrt(np.where(m == 0, 1.0, 2.0) * (l + 1.0) * np.exp(logarithm)), 0.0)
+    return np.where(m <= l, np.sqrt(np.where(m == 0, 1.0, 2.0) * (l + 1.0) * factorials(degree)), 0.0)
 
 
 def field_spectrum(coefficients: Coefficients) -> Array:

@@ -1,10 +1,9 @@
 """Spherical harmonics: orthonormal on the unit sphere, and what mirrors do to expansion coefficients."""
 
 import numpy as np
-from scipy.special import gammaln
 
 from ...geometry.basics import Array
-from .solid import Coefficients, regular_values
+from .solid import Coefficients, factorials, regular_values
 
 FOUR_PI = 4 * np.pi
 Keys = list[tuple[int, int, bool]]
@@ -13,7 +12,7 @@ Keys = list[tuple[int, int, bool]]
 
 def norm(l: int, m: int) -> float:
     """Factor that makes Re Υ_lm, and Im Υ_lm if m > 0, orthonormal on the unit sphere."""
-    square = (2 * l + 1) / FOUR_PI * np.exp(gammaln(l - m + 1) + gammaln(l + m + 1))
+    square = (2 * l + 1) / FOUR_PI * factorials(l)[l, m]
     return float(np.sqrt(square if m == 0 else 2 * square))
 
 

@@ -3,10 +3,9 @@
 from functools import cache
 
 import numpy as np
-from scipy.special import gammaln
 
 from ...geometry.basics import Array
-from .solid import Coefficients
+from .solid import Coefficients, factorials
 
 
 def rotated_harmonics(coefficients: Coefficients, axes: Array) -> Coefficients:
@@ -22,7 +21,7 @@ def rotated_harmonics(coefficients: Coefficients, axes: Array) -> Coefficients:
     first = np.arctan2(*(np.array([-across[1], across[0], 0.0]) @ axes[:, :2]))
     degrees = np.arange(len(coefficients))
     l, m = np.meshgrid(degrees, degrees, indexing="ij")
-    size = np.exp((gammaln(np.maximum(l - m, 0) + 1) + gammaln(l + m + 1)) / 2)
+    size = np.sqrt(factorials(len(coefficients) - 1))
     amplitudes = coefficients * np.where(m <= l, size, 0.0)
     for degree in degrees[1:]:
         orders, known = degrees[: degree + 1], amplitudes[degree, : degree + 1]

@@ -15,7 +15,7 @@ from typing import Any
 
 import ngsolve as ng
 import numpy as np
-from scipy.sparse import csr_matrix
+import scipy
 
 from ...geometry.basics import Array
 from ..elements import IntegrationPoints, OpenBoundary, OpenFactor, require_memory, volume_points
@@ -38,7 +38,7 @@ class PermeableRegions:
 
     susceptibility: Mapping[str, Array]
     points: Mapping[str, IntegrationPoints]
-    slopes: Mapping[str, csr_matrix]
+    slopes: Mapping[str, scipy.sparse.csr_matrix]
     factor: OpenFactor
 
     def magnetization(self, fields: Mapping[str, Array]) -> dict[str, Array]:

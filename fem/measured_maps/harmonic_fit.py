@@ -3,8 +3,8 @@
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.linalg import cho_factor, cho_solve
 
 from ...geometry.basics import Array
 from .harmonic_basis import HarmonicBasis
@@ -136,7 +136,7 @@ def _inverse_times(matrix: Array, ridge: float, right: Array) -> Array:
     scale = 1 / np.sqrt(matrix.diagonal() + ridge**2)
     regular = (matrix + ridge**2 * np.eye(len(matrix))) * scale[:, None] * scale
     regular[np.diag_indices(len(matrix))] += ROUND_OFF
-    return np.asarray((scale * cho_solve(cho_factor(regular), (scale * right.T).T).T).T)
+    return np.asarray((scale * scipy.linalg.cho_solve(scipy.linalg.cho_factor(regular), (scale * right.T).T).T).T)
 
 
 def _misfit(normals: Array | list[Array], solutions: list[Array]) -> float:

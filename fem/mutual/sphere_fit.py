@@ -5,7 +5,7 @@ from dataclasses import replace
 from itertools import combinations, permutations
 
 import numpy as np
-import scipy.linalg
+import scipy
 from numpy.typing import NDArray
 
 from ...geometry.basics import Array

@@ -11,10 +11,9 @@ A dipole m at x gives α_lm = μ0/(2l+1) m·∇(Y_lm/x^(l+1)).
 from collections.abc import Sequence
 
 import numpy as np
-from scipy.special import gammaln
 
 from ...geometry.basics import MU_0, Solid
-from ..harmonics import norm
+from ..harmonics import factorials, norm
 from ..plate_tables import Multipoles
 from .table import RotorLosses
 
@@ -43,6 +42,6 @@ def ball_losses(pieces: Sequence[tuple[Sequence[Solid], float]], degree: int = D
 def _weight(l: int, m: int, radius: float, conductivity: float) -> float:
     """√W s/(A m²) of the field of one harmonic Θ_lm with lengths in metres."""
     loss = conductivity * l / ((l + 1) * (2 * l + 3)) * radius ** (2 * l + 3)
-    harmonic = norm(l, m) / np.exp(gammaln(l - m + 1) + gammaln(l + m + 1))
+    harmonic = norm(l, m) / factorials(l)[l, m]
     both_signs = 1.0 if m == 0 else 2.0  # of m stand in one multipole
     return float(np.sqrt(loss) * MU_0 / (2 * l + 1) * harmonic / both_signs)

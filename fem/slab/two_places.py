@@ -1,8 +1,8 @@
 """The slab's reaction at one place to a dipole at another, by Hankel transforms; symbols as in `reaction`."""
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike
-from scipy.special import jv
 
 from ...geometry.basics import MU_0, Array
 from ..closed_forms import ComplexArray
@@ -23,7 +23,7 @@ def mutual_tensor(slab: Slab, points: ArrayLike, source: ArrayLike, frequency: A
     h, distance, f = np.broadcast_arrays(h, distance, f)
     k, weight = wave_numbers(h, aperture)
     spectrum = weight * k * k * np.exp(-2 * k * h[..., None]) * slab.reflection(k, f[..., None])
-    even, first, second = (np.sum(spectrum * jv(n, k * distance[..., None]), axis=-1) for n in (0, 1, 2))
+    even, first, second = (np.sum(spectrum * scipy.special.jv(n, k * distance[..., None]), axis=-1) for n in (0, 1, 2))
     return -MU_0 / (4 * np.pi) * _angular(even, first, second, offset)
 
 

@@ -4,7 +4,7 @@ from .arrays import (
     frozen_array as frozen_array,
     spread_points as spread_points,
 )
-from .box import Box as Box, rotation_matrix as rotation_matrix
+from .box import Box as Box, rotation_angles as rotation_angles, rotation_matrix as rotation_matrix
 from .constants import MAGNET_CONDUCTIVITY as MAGNET_CONDUCTIVITY, MU_0 as MU_0
 from .cylinder import Cylinder as Cylinder
 from .errors import ComputationError as ComputationError, InputError as InputError, SpinlevError as SpinlevError

@@ -28,6 +28,17 @@ def rotation_matrix(degrees_xyz: ArrayLike) -> Array:
     return np.asarray(np.where(np.abs(matrix - plain) < ROUND_OFF, plain, matrix))
 
 
+def rotation_angles(matrix: Array) -> Array:
+    """Degrees (3,) about the fixed x, then y, then z axis by which `rotation_matrix` makes this matrix.
+
+    Where y is ±90°, x and z are one turn, and x is 0; elsewhere y is between.
+    """
+    across = np.hypot(matrix[0, 0], matrix[1, 0])
+    x = np.arctan2(matrix[2, 1], matrix[2, 2]) if across > ROUND_OFF else 0.0
+    second = matrix[:, 1] * np.cos(x) - matrix[:, 2] * np.sin(x)  # column of the matrix without the turn about x
+    return np.degrees([x, np.arctan2(-matrix[2, 0], across), np.arctan2(-second[0], second[1])])
+
+
 @dataclass(frozen=True, eq=False)
 class Box:
     """A rectangular box.

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-import meshio
 import ngsolve as ng
 import numpy as np
 
 from .magnets import MagnetMesh
+
+if TYPE_CHECKING:
+    import meshio
 
 MESHIO_SHAPES = {
     "TET": ("tetra", [0, 2, 1, 3]),
@@ -24,6 +27,8 @@ def to_meshio(mesh: MagnetMesh) -> meshio.Mesh:
 
     Region k + 1 is `magnet{k}`, the last one is `air`; the names are in `field_data`, as Gmsh has them.
     """
+    import meshio
+
     regions = {name: k + 1 for k, name in enumerate(mesh.mesh.GetMaterials())}
     cells: dict[str, list[list[int]]] = {}
     numbers: dict[str, list[int]] = {}
@@ -43,5 +48,7 @@ def to_meshio(mesh: MagnetMesh) -> meshio.Mesh:
 
 def write_mesh(mesh: MagnetMesh, path: str | Path) -> None:
     """Write the mesh in the format of the file's suffix (.vtu, .msh, .xdmf, …), see `to_meshio`."""
+    import meshio
+
     gmsh = Path(path).suffix == ".msh"  # version 4 of that format would lose the regions
     meshio.write(path, to_meshio(mesh), file_format="gmsh22" if gmsh else None)

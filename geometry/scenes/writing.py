@@ -2,7 +2,6 @@
 
 import json
 import tomllib
-import warnings
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -10,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ..basics import Array, Box, Part, Ring, Solid, moved
+from ..basics import Array, Box, Part, Ring, Solid, moved, rotation_angles
 from ..bodies import Conductor, Magnet, horizontal, tilt, vertical
 from .assembly import assemble
 from .contents import AbsoluteStart, Drag, OffsetStart, Plate, Scene
@@ -189,12 +188,7 @@ def _box(box: Box) -> dict[str, Any]:
 
 
 def _pose(body: Solid) -> dict[str, Any]:
-    from scipy.spatial.transform import Rotation  # slow to load
-
-    with warnings.catch_warnings():  # where y is 90°, x and z are one turn, and SciPy says so
-        warnings.simplefilter("ignore", UserWarning)
-        turned = Rotation.from_matrix(body.rotation).as_euler("xyz", degrees=True)
-    return {"center_mm": _millis(body.center), "rotation_deg": _numbers(turned)}
+    return {"center_mm": _millis(body.center), "rotation_deg": _numbers(rotation_angles(body.rotation))}
 
 
 def _number(value: float) -> float:

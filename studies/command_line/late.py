@@ -33,6 +33,11 @@ def load_late(*names: str) -> None:
             vars(sleeping[package]).update({"__path__": [], part: module})
 
 
+def leave_out(name: str) -> None:
+    """Let a module that others try to import be missing in this process, unless it is there already."""
+    sys.modules.setdefault(name, None)  # type: ignore[arg-type]  # as the import statement has it
+
+
 class _StandIn(ModuleType):
     def __getattr__(self, name: str) -> Any:
         self._wake()

@@ -21,10 +21,10 @@ def main() -> None:
     gc.set_threshold(MANY)
     try:
         from ..terminal import make_readable
-        from .late import load_late
+        from .late import leave_out, load_late
 
         load_late("netgen", "netgen.occ", "netgen.meshing", "ngsolve")
-
+        leave_out("dask.array")  # xarray would load it, for as long as a flight takes, to ask whether data are of it
         make_readable()
         from .cli import run
 

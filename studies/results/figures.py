@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import xarray as xr
 
 from ...geometry.basics import Array
-from .style import COLORS, DASHES, NAMES, PALETTE, fixed_panels, styled
+from .style import COLORS, DASHES, NAMES, PALETTE, fixed_panels, power_of_ten, styled
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+
+
+RIGHT_ABOVE: Any = {"ha": "left", "va": "bottom", "xytext": (4, 2)}
+LEFT_BELOW: Any = {"ha": "right", "va": "top", "xytext": (-4, -2)}
 
 
 @styled
@@ -33,14 +37,17 @@ def field_figure(result: xr.Dataset) -> Figure:
             right.semilogy(distance, apart, DASHES[model], color=color, label=NAMES[model])
     error = result["axis_error"].sel(model=reference).values
     right.fill_between(distance, np.nanmin(error) / 3, error, color="0.85", label=f"error estimate, {NAMES[reference]}")
-    for column, name in ((0, "off-axis $B_\\perp$"), (2, "on-axis $|B_z|$")):
-        k = len(distance) // 2
-        place = (distance[k], 1e3 * np.abs(true[k, column]))
-        left.annotate(name, place, ha="left", va="bottom", xytext=(4, 2), textcoords="offset points")
+    middle = len(distance) // 2
+    sizes = {"across the axis": 1e3 * np.hypot(*true[middle, :2]), "along the axis": 1e3 * np.abs(true[middle, 2])}
+    for name, size in sizes.items():
+        where = RIGHT_ABOVE if size == max(sizes.values()) else LEFT_BELOW
+        left.annotate(name, (distance[middle], size), textcoords="offset points", **where)
     left.set(xlabel="distance below the rotor (mm)", ylabel="B (mT)", title="Field on the axis")
     right.set(xlabel="distance below the rotor (mm)", ylabel="|ΔB| / |B|", title=f"Difference from {NAMES[reference]}")
     right.minorticks_off()  # many decades
-    left.legend()
+    for panel in (left, right):
+        panel.yaxis.set_major_formatter(power_of_ten)
+    left.legend(loc="upper right")  # fields fall
     right.legend()
     return figure
 

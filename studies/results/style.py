@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import math
 from collections.abc import Callable, Mapping
 from functools import wraps
 from pathlib import Path
@@ -45,6 +46,7 @@ NAMES = {
 }
 COLORS = dict(zip(NAMES, PALETTE, strict=False))
 DASHES = {"dipole": "--", "cuboid": "-.", "fem": "-", "moments": ":", "map": "-"}
+RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 Draw = TypeVar("Draw", bound="Callable[..., Figure]")
 
 
@@ -95,6 +97,11 @@ def _with_axes(figure: Figure, rows: int, columns: int, **options: Any) -> tuple
     for axes in grid.flat:
         axes.yaxis.get_offset_text().set_horizontalalignment("right")
     return figure, grid
+
+
+def power_of_ten(value: float, _: int) -> str:
+    """The number at a decade of a logarithmic axis, in letters: formulas take as long as the rest of a drawing."""
+    return "10" + f"{math.log10(value):.0f}".translate(RAISED)
 
 
 def legend_below(figure: Figure, *labelled: Any, columns: int = 6) -> None:
