@@ -10,7 +10,7 @@ from ...geometry.basics import Array
 from ...geometry.scenes import Scene
 from ..effects import FloaterCurrents, Mutual, brake_slope, rough_force
 from ..motion import Interaction, Parameter, Rates, Scales, State, parameters
-from ..steady import Balance, Equilibrium, modes, tangent_basis
+from ..steady import Equilibrium, modes, tangent_basis
 
 EXACT_SLOPES = 4
 """Degree of a potential that has all derivatives which the slopes of the floater's currents ask for."""
@@ -18,9 +18,7 @@ AROUND = 1 / 32
 """Radius of the ball of that expansion, in radii of the floater."""
 
 
-def shift_by_answers(
-    scene: Scene, rates: Rates, table: FieldTable, equilibrium: Equilibrium, answers: MutualTable | None
-) -> float:
+def shift_by_answers(scene: Scene, table: FieldTable, equilibrium: Equilibrium, answers: MutualTable | None) -> float:
     """How far mutual magnetisation moves an equilibrium, m; without its table to a factor of two."""
     fixed = equilibrium.without or equilibrium
     place, moment = fixed.position[None], fixed.state.moment[None]
@@ -29,26 +27,29 @@ def shift_by_answers(
     else:
         effect = Mutual(answers, scene.floater.moment)
         force, torque = (part[0] for part in effect.wrench(place, moment, *table.evaluate(place)))
-    return _shift(scene, rates, fixed, force, torque)
-
-
-def _shift(scene: Scene, rates: Rates, fixed: Equilibrium, force: Array, torque: Array) -> float:
-    """How far a force (3,) N and a torque (3,) N m move an equilibrium, m."""
     scales = Scales.of(scene)
-    balance = Balance(rates, parameters(scene, scales, frozen_spin=True), fixed.spin)
-    position, moment = fixed.position[None] / scales.length, fixed.state.moment[None]
-    slope = balance(position, moment)[1][0]
     units = scales.time**2 / np.array([scene.floater.mass * scales.length, scene.floater.inertia])
     pushed = np.concatenate([force * units[0], tangent_basis(moment)[0] @ torque * units[1]])
-    return float(np.linalg.norm(np.linalg.solve(slope, pushed)[:3]) * scales.length)
+    return float(np.linalg.norm(np.linalg.solve(fixed.slope, pushed)[:3]) * scales.length)
 
 
-def growth_by_floater(scene: Scene, rates: Rates, table: FieldTable, equilibrium: Equilibrium) -> float:
-    """What the floater's own currents add to the growth of what grows fastest, 1/s; `rates` may know of them or not."""
-    scales, fixed = Scales.of(scene), equilibrium.without or equilibrium
-    state, still = scales.pack(fixed.state), parameters(scene, scales, frozen_spin=True)
-    without = rates(state[None], _without_currents(still))[1][0]
-    brake = floater_slope(scene, table, fixed.state)
+def growth_by_floater(scene: Scene, table: FieldTable, equilibrium: Equilibrium, included: bool) -> float:
+    """What the floater's own currents add to the growth of what grows fastest, 1/s; whether the motion had them."""
+    fixed = equilibrium.without or equilibrium
+    return _growth(scene, fixed, floater_slope(scene, table, fixed.state), included)
+
+
+def growth_by_rotor(scene: Scene, equilibrium: Equilibrium, losses: RotorLosses, included: bool) -> float:
+    """What losses in the rotor add to the growth of what grows fastest, 1/s; whether the motion had them."""
+    fixed = equilibrium.without or equilibrium
+    return _growth(scene, fixed, brake_slope(losses, scene, fixed.state), included)
+
+
+def _growth(scene: Scene, fixed: Equilibrium, brake: Array, included: bool) -> float:
+    """What a part (12, 12) of the Jacobian, which it has or has not, adds to the growth, 1/s."""
+    scales = Scales.of(scene)
+    state = scales.pack(fixed.state)
+    without = fixed.jacobian - brake if included else fixed.jacobian
     return (modes(state, without + brake).growth - modes(state, without).growth) / scales.time
 
 
@@ -62,22 +63,8 @@ def floater_slope(scene: Scene, table: FieldTable, state: State) -> Array:
     numbers, _ = formula.fit(table.evaluate, Ball(state.position, AROUND * scene.floater.radius))
     scales = Scales.of(scene)
     values = np.concatenate([parameters(scene, scales, frozen_spin=True), numbers])
-    rates = Rates(Interaction(formula, (FloaterCurrents(),)))
-    slopes = [rates(scales.pack(state)[None], each)[1][0] for each in (values, _without_currents(values))]
-    return np.asarray(slopes[0] - slopes[1])
-
-
-def _without_currents(values: Array) -> Array:
     still = values.copy()
     still[Parameter.TILT_EDDY] = 0.0
-    return still
-
-
-def growth_by_rotor(scene: Scene, rates: Rates, equilibrium: Equilibrium, losses: RotorLosses, included: bool) -> float:
-    """What losses in the rotor add to the growth of what grows fastest, 1/s; whether `rates` include them."""
-    scales, fixed = Scales.of(scene), equilibrium.without or equilibrium
-    state = scales.pack(fixed.state)
-    slope = rates(state[None], parameters(scene, scales, frozen_spin=True))[1][0]
-    brake = brake_slope(losses, scene, fixed.state)
-    without = slope - brake if included else slope
-    return (modes(state, without + brake).growth - modes(state, without).growth) / scales.time
+    rates = Rates(Interaction(formula, (FloaterCurrents(),)))
+    slopes = [rates(scales.pack(state)[None], each)[1][0] for each in (values, still)]
+    return np.asarray(slopes[0] - slopes[1])

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Self
 
 import numpy as np
 
@@ -13,27 +14,43 @@ from ...fem.storage import described, from_cache, make_room, program_of, read_ch
 from ...geometry.basics import Array
 from ...geometry.scenes import Scene
 from ..motion import Scales, parameters
-from ..steady import ForceCurve
+from ..steady import Balance, ForceCurve
 
-FORMAT = "spinlev equilibria 1"
+FORMAT = "spinlev equilibria 2"
 LIMIT = 2**26
 """Size of all that is kept, bytes: some thousand scenes; what was not used for the longest time makes room."""
 
 
 @dataclass(frozen=True, eq=False)
 class Found:
-    """Fixed points of a scene without plate, and the curves on which they lie.
+    """Fixed points of a scene without plate, what the equations of motion are like there, and the curves they lie on.
 
     Parameters
     ----------
     points : (n, 6) scaled positions and moments, good to round-off
     doubts : (n, 2) of the field there: of B, T, and of its gradient, T/m
+    residuals : (n, 5) what is left of the balances
+    slopes : (n, 5, 5) their derivatives
+    jacobians : (n, 12, 12) of the scaled state's rates by the state
     curves : along which everything but the axial force is balanced
     """
 
     points: Array
     doubts: Array
-    curves: tuple[ForceCurve, ...]
+    residuals: Array
+    slopes: Array
+    jacobians: Array
+    curves: tuple[ForceCurve, ...] = ()
+
+    @classmethod
+    def at(cls, balance: Balance, points: Array, doubts: Array, curves: tuple[ForceCurve, ...] = ()) -> Self:
+        """The balance's own rates and derivatives at points that were found."""
+        position, moment = points[:, :3], points[:, 3:]
+        if not len(points):
+            return cls(points, doubts, np.zeros((0, 5)), np.zeros((0, 5, 5)), np.zeros((0, 12, 12)), curves)
+        near = balance.about(position, moment)
+        _, jacobians = balance.rates(balance.states(position, moment), near.values)
+        return cls(points, doubts, *near(position, moment), jacobians, curves)
 
 
 def found_key(scene: Scene, equations: str, spin: float) -> str:
@@ -74,6 +91,9 @@ def save_found(found: Found, path: str | Path) -> None:
     variables = {
         "point": (("equilibrium", "component"), found.points, "1"),
         "doubt": (("equilibrium", "order"), found.doubts, "T m-order"),
+        "residual": (("equilibrium", "balance"), found.residuals, "1"),
+        "slope": (("equilibrium", "balance", "unknown"), found.slopes, "1"),
+        "jacobian": (("equilibrium", "rate", "state"), found.jacobians, "1"),
         "points_of_curve": (("curve",), np.array(length, np.int64), "1"),
         "position": (("sample", "axis"), np.concatenate([np.zeros((0, 3)), *(c.position for c in curves)]), "m"),
         "moment": (("sample", "axis"), np.concatenate([np.zeros((0, 3)), *(c.moment for c in curves)]), "1"),
@@ -86,6 +106,9 @@ def load_found(path: str | Path) -> Found:
     """Read it. Raises TableFileError if the file is not of this format, or its content is not what was written."""
     data = read_checked(path, FORMAT)
     ends = np.cumsum(data["points_of_curve"].values)[:-1]
-    parts = (np.split(data[name].values, ends) for name in ("position", "moment", "magnetic_force"))
-    curves = tuple(ForceCurve(*part) for part in zip(*parts, strict=True) if len(part[0]))
-    return Found(data["point"].values, data["doubt"].values, curves)
+    samples = (np.split(data[name].values, ends) for name in ("position", "moment", "magnetic_force"))
+    curves = tuple(ForceCurve(*part) for part in zip(*samples, strict=True) if len(part[0]))
+    points, doubts, residuals, slopes, jacobians = (
+        data[name].values for name in ("point", "doubt", "residual", "slope", "jacobian")
+    )
+    return Found(points, doubts, residuals, slopes, jacobians, curves)

@@ -74,17 +74,18 @@ def survey(
     equations = rates or Rates(with_effects(scene, table))
     balance = Balance(equations, parameters(scene, scales, frozen_spin=True), spin * scales.spin_ratio)
     found = remembered(lambda: _search(scene, table, balance, farthest, watch))
-    return told(scene, balance, found.points, found.doubts, found.curves)
+    return told(scene, balance, found)
 
 
 def _search(scene: Scene, table: FieldTable, balance: Balance, farthest: float, watch: Watch) -> Found:
     scales = Scales.of(scene)
+    balance.rates.compile()
     curves, points = fixed_points(balance, SearchRange(scene, farthest), watch)
     where = np.reshape([np.concatenate(point) for point in points], (-1, 6))
     known, doubts = field_doubts(table, where[:, :3] * scales.length)
     if scene.floater.body is not None:
         known, doubts = _of_shape(scene, table, known, doubts, where)
-    return Found(where[known], doubts, tuple(_force_curve(scene, scales, curve) for curve in curves))
+    return Found.at(balance, where[known], doubts, tuple(_force_curve(scene, scales, curve) for curve in curves))
 
 
 def _of_shape(
@@ -109,20 +110,13 @@ def _of_shape(
     return kept, np.reshape(more, (-1, 2))
 
 
-def told(scene: Scene, balance: Balance, points: Array, doubts: Array, curves: tuple[ForceCurve, ...] = ()) -> Survey:
-    """The survey of a scene of which all fixed points are known.
-
-    Parameters
-    ----------
-    points : (n, 6) scaled positions and moments, good to round-off
-    doubts : (n, 2) of the field there, see `field_doubts`
-    """
-    scales = Scales.of(scene)
-    rows = zip(points, doubts, strict=True)
-    found = [_equilibrium(scales, balance, point[:3], point[3:], doubt) for point, doubt in rows]
+def told(scene: Scene, balance: Balance, known: Found) -> Survey:
+    """The survey of a scene of which all fixed points are known."""
+    rows = zip(known.points, known.doubts, known.residuals, known.slopes, known.jacobians, strict=True)
+    found = [_equilibrium(Scales.of(scene), balance, *row) for row in rows]
     if np.any(scene.gravity[:2]):
         found = _shaken(Shaken(scene, balance.rates, balance.values, None), found)
-    return Survey(_in_order(found), curves)
+    return Survey(_in_order(found), known.curves)
 
 
 def field_doubts(table: FieldTable, places: Array) -> tuple[NDArray[np.bool_], Array]:
@@ -175,26 +169,28 @@ def _shaken(problem: Shaken, found: list[Equilibrium]) -> list[Equilibrium]:
     return kept
 
 
-def _equilibrium(scales: Scales, balance: Balance, position: Array, moment: Array, doubt: Array) -> Equilibrium:
-    state = balance.states(position[None], moment[None])
-    balance = balance.about(position[None], moment[None])
-    value, slope = balance(position[None], moment[None])
-    motion = modes(state[0], balance.rates(state, balance.values)[1][0])
+def _equilibrium(
+    scales: Scales, balance: Balance, point: Array, doubt: Array, residual: Array, slope: Array, jacobian: Array
+) -> Equilibrium:
+    (state,) = balance.states(point[None, :3], point[None, 3:])
+    motion = modes(state, jacobian)
     values = np.ravel(balance.values)
     torque, length, inertia = values[[Parameter.TORQUE, Parameter.LENGTH, Parameter.INERTIA]]
-    unsure = np.abs(value[0]) + torque * np.array([inertia * length * doubt[1]] * 3 + [doubt[0]] * 2)
-    error = float(np.linalg.norm((np.abs(np.linalg.inv(slope[0])) @ unsure)[:3]))
+    unsure = np.abs(residual) + torque * np.array([inertia * length * doubt[1]] * 3 + [doubt[0]] * 2)
+    error = float(np.linalg.norm((np.abs(np.linalg.inv(slope)) @ unsure)[:3]))
     gravity = abs(float(values[Parameter.GRAVITY_Z]))
     return Equilibrium(
-        state=scales.unpack(state[0]),
+        state=scales.unpack(state),
         spin=float(balance.spin) / scales.spin_ratio,
-        residual=float(np.abs(value).max() / (gravity or 1.0)),
+        residual=float(np.abs(residual).max() / (gravity or 1.0)),
         position_error=error * scales.length,
         stable=motion.stable,
         growth_per_s=motion.growth / scales.time,
         growth_error_per_s=float(motion.errors.max()) / scales.time,
         frequencies_hz=motion.angular_frequencies / (2 * np.pi * scales.time),
         modes=named_modes(motion, scales.time),
+        slope=slope,
+        jacobian=jacobian,
     )
 
 

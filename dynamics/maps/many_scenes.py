@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike
 from ...fem.rotor_tables import FieldTable
 from ...geometry.basics import Array
 from ...geometry.scenes import Scene
-from ..equilibria import SearchRange, field_doubts, told, turning
+from ..equilibria import Found, SearchRange, field_doubts, told, turning
 from ..motion import Parameter, Rates, Scales, parameters
 from ..steady import Indices, Survey
 from .filling import SPACING, filled
@@ -58,7 +58,5 @@ def surveys(
         there, unsure = field_doubts(table, points[mine, :3] * values[point[mine], Parameter.LENGTH, None])
         known[mine], doubts[mine[there]] = there, unsure
     point, points, doubts = point[known], points[known], doubts[known]
-    return [
-        (told(scene, grid.alone(k), points[point == k], doubts[point == k]), k in nodes)
-        for k, scene in enumerate(scenes)
-    ]
+    found = [Found.at(grid.alone(k), points[point == k], doubts[point == k]) for k in range(len(scenes))]
+    return [(told(scene, grid.alone(k), found[k]), k in nodes) for k, scene in enumerate(scenes)]

@@ -44,9 +44,12 @@ class Rates:
         self._numbers = RuntimeNumbers(len(Parameter) + sum(known.count for known in self._placed))
         formula = _Written(whole.field, self._numbers) if isinstance(whole.field, RotorTable) else whole.field
         equations = equations_of_motion(Interaction(formula, tuple(effects)))
-        self._equations, self._level = equations, 1 if optimised else 0
         # Unoptimised code is compiled three times as fast, and a search is over before faster code would be ready.
-        self._function = self._compiled(_with_jacobian)
+        self._equations, self._level = equations, 1 if optimised else 0
+
+    def compile(self) -> None:
+        """Compile now what is else compiled when it is first called."""
+        _ = self._function, self._balances
 
     def _compiled(self, write: Callable[[Equations], tuple[list[hy.expression], list[hy.expression]]]) -> Any:
         """Outputs and variables that are written from the equations, compiled."""
@@ -87,7 +90,7 @@ class Rates:
 
         Of mutual magnetisation the floater's uniform answer to the rotor's field stays.
         """
-        _ = self._balances  # which both share
+        self.compile()  # both share it
         found = copy(self)
         found._rough = True
         return found
@@ -110,6 +113,10 @@ class Rates:
             answers = [part.numbers(field, position, moment, rows) for part in self._placed]
         parts = [rows, *answers, np.broadcast_to(own, (count, own.size))]
         return np.concatenate([part.T for part in parts]).T  # column by column, as the machine code reads them
+
+    @cached_property
+    def _function(self) -> Any:
+        return self._compiled(_with_jacobian)
 
     @cached_property
     def _balances(self) -> Any:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -35,6 +35,8 @@ class Equilibrium:
     turn : (n, 3) the motion at equal intervals of a turn, the first at t = 0; None where it is at rest in this frame
     currents : (n, k) states of the plate then, √J; None where the plate's currents are not modelled
     without : the fixed point that it would be without the plate and with gravity along the axis
+    slope : (5, 5) derivatives of the scaled balances, see `Balance`; NaN for a periodic motion
+    jacobian : (12, 12) derivatives of the scaled state's rates by the state; NaN for a periodic motion
     """
 
     state: State
@@ -49,6 +51,8 @@ class Equilibrium:
     turn: State | None = None
     currents: Array | None = None
     without: Equilibrium | None = None
+    slope: Array = field(default_factory=lambda: np.full((5, 5), np.nan))
+    jacobian: Array = field(default_factory=lambda: np.full((12, 12), np.nan))
 
     @property
     def start(self) -> State:

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ...dynamics.equilibria import SearchRange, carried, field_doubts, told
+from ...dynamics.equilibria import Found, SearchRange, carried, field_doubts, told
 from ...dynamics.maps import RotorFamily, article_measure, rotor_family
 from ...dynamics.motion import Parameter, Rates, Scales, has_likes, like, parameters
 from ...dynamics.steady import Balance, Survey
@@ -68,7 +68,8 @@ class Nearby:
             return None
         points = points[SearchRange(state.scene, 0.1).holds(points[:, :3])]
         there, doubts = self._doubts(levitation, problem, points[:, :3] * state.scene.floater.radius)
-        levitation.adopt(told(state.scene, problem.balance, points[there], doubts), searched=False)
+        found = Found.at(problem.balance, points[there], doubts)
+        levitation.adopt(told(state.scene, problem.balance, found), searched=False)
         return levitation
 
     def _doubts(self, levitation: Levitation, problem: _Problem, places: Array) -> tuple[NDArray[np.bool_], Array]:

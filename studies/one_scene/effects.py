@@ -53,7 +53,7 @@ def listed_effects(levitation: Levitation, equilibria: Sequence[Equilibrium]) ->
 def _mutual(levitation: Levitation, first: Equilibrium | None) -> ListedEffect:
     (answers, why), shift = levitation.answers, None
     if first is not None and why != NOTHING_ANSWERS and levitation.scene.floater.body is None:
-        shift = 1e3 * shift_by_answers(levitation.scene, levitation.rates, levitation.table, first, answers)
+        shift = 1e3 * shift_by_answers(levitation.scene, levitation.table, first, answers)
     return ListedEffect(MUTUAL, answers is not None, shift, None, why)
 
 
@@ -64,7 +64,7 @@ def _floater_currents(levitation: Levitation, first: Equilibrium | None) -> List
         return ListedEffect(FLOATER_CURRENTS, False, None, None, OF_SPHERES)
     if first and scene.frequency:
         there = replace(scene, floater=replace(floater, conductivity=floater.conductivity or MAGNET_CONDUCTIVITY))
-        growth = growth_by_floater(there, levitation.rates, levitation.table, first)
+        growth = growth_by_floater(there, levitation.table, first, bool(floater.conductivity))
     return _conducting(FLOATER_CURRENTS, "floater.conductivity_S_m", bool(floater.conductivity), growth)
 
 
@@ -76,7 +76,7 @@ def _rotor_currents(levitation: Levitation, first: Equilibrium | None) -> Listed
     if scene.floater.body is not None:
         return ListedEffect(ROTOR_CURRENTS, False, None, None, OF_SPHERES)
     if first and losses and scene.frequency:
-        growth = growth_by_rotor(scene, levitation.rates, first, losses, included)
+        growth = growth_by_rotor(scene, first, losses, included)
     return _conducting(ROTOR_CURRENTS, "rotor.conductivity_S_m", included, growth)
 
 

@@ -8,6 +8,8 @@ from places import SCENES
 
 from spinlev.dynamics.equilibria import full_search, survey
 from spinlev.dynamics.equilibria.found import Found, load_found, save_found
+from spinlev.dynamics.motion import Rates
+from spinlev.dynamics.steady import Balance
 from spinlev.geometry.scenes import AbsoluteStart, changed, load_scene
 from spinlev.studies.one_scene import Levitation
 from spinlev.studies.terminal import Models
@@ -111,6 +113,13 @@ def test_a_damaged_file_is_reported_and_made_anew(cache, caplog):
     assert load_found(file).points.shape == (len(first.equilibria), 6)
 
 
+def test_what_is_known_needs_no_compiled_equations(cache, monkeypatch):
+    first = Levitation(SCENE, DIPOLE).without_plate
+    monkeypatch.setattr(Rates, "_compiled", None)
+    again = Levitation(SCENE, DIPOLE).without_plate
+    assert repr(again.equilibria) == repr(first.equilibria)
+
+
 def test_what_was_not_used_for_long_makes_room(cache, monkeypatch):
     for frequency in (108.0, 109.0, 110.0):
         Levitation(replace(SCENE, frequency=frequency), DIPOLE).without_plate  # noqa: B018
@@ -120,10 +129,12 @@ def test_what_was_not_used_for_long_makes_room(cache, monkeypatch):
 
 
 def test_nothing_found_is_kept_as_well(tmp_path):
-    save_found(Found(np.zeros((0, 6)), np.zeros((0, 2)), ()), tmp_path / "none.nc")
+    balance = Balance(None, np.zeros(0), 0.0)  # of which nothing is asked
+    save_found(Found.at(balance, np.zeros((0, 6)), np.zeros((0, 2))), tmp_path / "none.nc")
     found = load_found(tmp_path / "none.nc")
     assert found.points.shape == (0, 6)
     assert found.doubts.shape == (0, 2)
+    assert found.jacobians.shape == (0, 12, 12)
     assert found.curves == ()
 
 
