@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from importlib import import_module
+from importlib.abc import MetaPathFinder
 from threading import RLock
 from types import ModuleType
 from typing import Any
@@ -33,9 +34,19 @@ def load_late(*names: str) -> None:
             vars(sleeping[package]).update({"__path__": [], part: module})
 
 
-def leave_out(name: str) -> None:
-    """Let a module that others try to import be missing in this process, unless it is there already."""
-    sys.modules.setdefault(name, None)  # type: ignore[arg-type]  # as the import statement has it
+def leave_out(*names: str) -> None:
+    """Let modules that others try to import be missing in this process; what is loaded already stays."""
+    sys.meta_path.insert(0, _Missing(names))
+
+
+class _Missing(MetaPathFinder):
+    def __init__(self, names: tuple[str, ...]) -> None:
+        self._names = names
+
+    def find_spec(self, name: str, path: object, target: object = None) -> None:
+        """None, to go on with others, or ModuleNotFoundError."""
+        if name in self._names:
+            raise ModuleNotFoundError(f"{name} is left out here.", name=name)
 
 
 class _StandIn(ModuleType):

@@ -15,7 +15,7 @@ def printed(tmp_path):
 
     def run(program):
         start = f"import sys; sys.path.append({str(tmp_path)!r})\n"
-        start += "from spinlev.studies.command_line.late import load_late\n"
+        start += "from spinlev.studies.command_line.late import leave_out, load_late\n"
         done = subprocess.run(
             [sys.executable, "-P", "-c", start + program], capture_output=True, text=True, check=False
         )
@@ -41,6 +41,13 @@ def test_a_part_taken_from_its_package_waits_too(printed):
 def test_what_is_loaded_stays(printed):
     program = "import whole; load_late('whole', 'whole.part'); import whole as again; print(again is whole)"
     assert printed(program)[0] == ["whole", "part", "True"]
+
+
+def test_what_is_left_out_is_as_if_it_were_not_installed(printed):
+    """And leaves no trace: libraries look among the loaded modules for what an array may be."""
+    program = "leave_out('whole.part')\ntry: import whole\nexcept ImportError as error: print('no', *error.name.split('.')[1:])\n"
+    answers, complaints = printed(program + "print('whole.part' in sys.modules)")
+    assert answers == ["whole", "no", "part", "False"], complaints
 
 
 def test_what_is_missing_is_said_as_ever(printed):
