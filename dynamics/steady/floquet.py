@@ -4,7 +4,7 @@ import numpy as np
 
 from ...geometry.basics import Array
 from .harmonic_balance import Orbit
-from .stability import Modes, tangent_spaces
+from .stability import Modes, left_eigenvectors, tangent_spaces
 
 STEPS, MOST = 24, 384
 """Steps in a turn, doubled once for the error, and again until it is small: so often at most."""
@@ -40,7 +40,7 @@ def floquet_modes(orbit: Orbit) -> Modes:
         matrices = _propagated(orbit.derivatives, steps)
         turn = projection @ matrices[-1] @ tangent
         multipliers, right = np.linalg.eig(turn)
-        left = np.linalg.pinv(right)
+        left = left_eigenvectors(right)
         own = np.argsort(-np.linalg.norm(right[:10], axis=0))[:10]
         stepped = SHARE * np.abs(np.einsum("ij,ji->i", left @ (turn - projection @ coarse @ tangent), right))
         if stepped[own].max() < ENOUGH or steps >= MOST:

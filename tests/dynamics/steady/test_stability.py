@@ -10,6 +10,7 @@ from spinlev.dynamics.flights.compiled_flight import compile_flight
 from spinlev.dynamics.flights.integration import integrate
 from spinlev.dynamics.motion import Rates, Scales, parameters
 from spinlev.dynamics.steady import modes
+from spinlev.dynamics.steady.stability import left_eigenvectors
 from spinlev.fem.harmonics import uniform_moments
 from spinlev.fem.rotor_tables import RotorTable
 from spinlev.geometry.bodies import article_rotors as rotor
@@ -132,3 +133,14 @@ def test_of_a_pair_that_does_not_oscillate_the_growing_one_is_told():
     assert far.modes[0].name == "bounce"
     assert far.modes[0].frequency_hz == pytest.approx(0, abs=1e-6)
     assert far.modes[0].growth_per_s == pytest.approx(far.growth_per_s)
+
+
+def test_left_eigenvectors_are_dual_to_the_right_ones():
+    """To round-off; where eigenvectors have run together (one Jordan block among others) what is found is finite."""
+    matrices = np.random.default_rng(2).normal(size=(3, 10, 10))
+    right = np.linalg.eig(matrices)[1]
+    np.testing.assert_allclose(left_eigenvectors(right) @ right, np.eye(10) + np.zeros((3, 1, 1)), atol=1e-12)
+    right[1, :, 4] = right[1, :, 3] = np.eye(10)[3]
+    found = left_eigenvectors(right)
+    np.testing.assert_allclose(found[::2] @ right[::2], np.eye(10) + np.zeros((2, 1, 1)), atol=1e-12)
+    assert np.isfinite(found).all()
