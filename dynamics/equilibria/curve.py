@@ -7,27 +7,19 @@ folds included.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 import scipy
 
 from ...geometry.basics import Array, Watch, unwatched
-from ..steady import AXIAL, LATERAL, Balance, Indices, solve
+from ..steady import AXIAL, LATERAL, Balance, Indices
 from .continuation import AtRest, Steps
-from .search import SearchRange
+from .search import SearchRange, from_starts
 from .tracing import whole_curves
 
 STEPS = Steps(longest=0.1, shortest=1e-6, turn=0.15, most=5000, first=1 / 4, far=3.0)
-THINNED = 8
-"""One of so many starts is tried in the whole balance too where there is a rough one."""
-ITERATIONS = 30
-"""Of Newton's method from the starts; none of those that have not met by then was seen to meet in twice as many."""
-STEPS_TOGETHER, CELL, COARSER, AWAY = 3, 0.1, 1.3, 1.0
-"""Steps after which the starts are thinned: within a cell of such an edge (radii, and of the moment), which grows by
-that factor each time, one is kept, and those that are as far outside the range, in radii, are left out; a test compares
-what is found with what all find."""
 TOGETHER = 8
 """Curves that are followed at once."""
 
@@ -121,59 +113,3 @@ def all_curves(balance: Balance, where: SearchRange, watch: Watch = unwatched) -
                 curves.append(curve)
         seeds = np.array([seed for seed in seeds[~chosen] if not any(curve.passes(seed) for curve in curves)])
     return curves
-
-
-def from_starts(balance: Balance, where: SearchRange, free: Indices, every: int = 1, watch: Watch = unwatched) -> Array:
-    """Distinct points (n, 6) in the range, lowest first, at which the balances of `free` vanish, see `fixed_points`.
-
-    One of so many starts is taken.
-    """
-    position, moment = where.starts()
-    return solutions(balance, where, position[::every], moment[::every], free, watch=watch)
-
-
-def solutions(
-    balance: Balance,
-    where: SearchRange,
-    position: Array,
-    moment: Array,
-    free: Indices,
-    margin: float = 0.0,
-    watch: Watch = unwatched,
-) -> Array:
-    """The same from starts (n, 3), up to `margin` (radii) outside the range."""
-    if balance.rates.has_rough:
-        rough = replace(balance, rates=balance.rates.rough)
-        near, turned = _newton(rough, position, moment, where, free, margin, watch)
-        position, moment = np.concatenate([near, position[::THINNED]]), np.concatenate([turned, moment[::THINNED]])
-    return _distinct(np.concatenate(_newton(balance, position, moment, where, free, margin, watch), axis=1))
-
-
-def _newton(
-    balance: Balance, position: Array, moment: Array, where: SearchRange, free: Indices, margin: float, watch: Watch
-) -> tuple[Array, Array]:
-    """Distinct places and moments (n, 3) in the range, or at most `margin` outside, that Newton's method finds.
-
-    Every few steps those that ran away are given up, and of those that have come together one goes on.
-    """
-    found = []
-    for turn in range(ITERATIONS // STEPS_TOGETHER):
-        watch("Newton's method from many starts", turn / (ITERATIONS // STEPS_TOGETHER))
-        with np.errstate(all="ignore"):
-            position, moment, step = solve(balance, position, moment, free, STEPS_TOGETHER)
-        points, met = np.concatenate([position, moment], axis=1), step < 1e-8
-        found.append(points[met & where.holds(position, margin)])
-        going = points[~met & np.isfinite(step) & where.holds(position, AWAY)]
-        cell = CELL * COARSER**turn
-        going = going[np.unique(np.round(going / cell), axis=0, return_index=True)[1]]
-        position, moment = going[:, :3], going[:, 3:]
-        if not len(going):
-            break
-    points = _distinct(np.concatenate(found))
-    return points[:, :3], points[:, 3:]
-
-
-def _distinct(points: Array) -> Array:
-    """Points (n, 6) that differ by more than 1e-6, lowest first."""
-    _, first = np.unique(np.round(points, 6), axis=0, return_index=True)
-    return np.asarray(points[first[np.argsort(points[first, 2])]])

@@ -8,8 +8,8 @@ import numpy as np
 
 from ...geometry.basics import Array, Watch, unwatched
 from ..steady import EVERY, Balance, solve
-from .curve import Curve, all_curves, from_starts
-from .search import SearchRange
+from .curve import Curve, all_curves
+from .search import SearchRange, from_starts
 
 SPARE = 3
 """One of so many starts is tried for what lies on none of the curves: a test of 90 scenes finds no such equilibrium."""

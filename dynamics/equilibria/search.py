@@ -1,13 +1,24 @@
-"""Where equilibria are looked for: the range, and the starts of the search."""
+"""Where equilibria are looked for, from what starts, and Newton's method from all of these at once."""
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ...geometry.basics import Array
+from ...geometry.basics import Array, Watch, unwatched
 from ...geometry.scenes import Scene
+from ..steady import Balance, Indices, solve
+
+THINNED = 8
+"""One of so many starts is tried in the whole balance too where there is a rough one."""
+ITERATIONS = 30
+"""Of Newton's method from the starts; none of those that have not met by then was seen to meet in twice as many."""
+STEPS_TOGETHER, CELL, COARSER, AWAY = 3, 0.1, 1.3, 1.0
+"""Steps after which the starts are thinned: within a cell of such an edge (radii, and of the moment), which grows by
+that factor each time, one is kept, and those that are as far outside the range, in radii, are left out; a test compares
+what is found with what all find."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,3 +71,85 @@ def _rings(heights: Array, radii: Array, number: int) -> Array:
     angles = np.arange(number) * (2 * np.pi / number)
     rings = product(heights, radii)
     return np.array([(r * np.cos(a), r * np.sin(a), z) for z, r in rings for a in (angles if r else angles[:1])])
+
+
+@dataclass(frozen=True, eq=False)
+class Search:
+    """Newton's method from many starts, in one problem or in several side by side.
+
+    Parameters
+    ----------
+    balance : of problems (n,), one for each point
+    holds : which of the scaled positions (n, 3) lie in the ranges of problems (n,), or at most a margin (radii) outside
+    free : which balances shall vanish and which unknowns move, see `steady.solve`
+    margin : so far outside the range (radii) solutions are kept
+    watch : is told the stage of the search and its share that is done
+    """
+
+    balance: Callable[[Indices], Balance]
+    holds: Callable[[Indices, Array, float], NDArray[np.bool_]]
+    free: Indices
+    margin: float = 0.0
+    watch: Watch = unwatched
+
+    def solutions(self, problem: Indices, position: Array, moment: Array) -> tuple[Indices, Array]:
+        """What the starts (n, 3), (n, 3) of problems (n,) lead to, each solution once.
+
+        Returns
+        -------
+        Problems (k,) in order, and positions with moments (k, 6), of each problem the lowest first.
+        """
+        points = np.concatenate([position, moment], axis=1)
+        if self.balance(problem).rates.has_rough:
+            near = self._newton(problem, points, rough=True)
+            problem, points = _together(near, (problem[::THINNED], points[::THINNED]))
+        return self._newton(problem, points)
+
+    def _newton(self, problem: Indices, points: Array, rough: bool = False) -> tuple[Indices, Array]:
+        """Every few steps those that ran away are given up, and of those that have come together one goes on."""
+        found = [(problem[:0], points[:0])]
+        for turn in range(ITERATIONS // STEPS_TOGETHER):
+            self.watch("Newton's method from many starts", turn / (ITERATIONS // STEPS_TOGETHER))
+            balance = self.balance(problem)
+            if rough:
+                balance = replace(balance, rates=balance.rates.rough)
+            with np.errstate(all="ignore"):
+                position, moment, step = solve(balance, points[:, :3], points[:, 3:], self.free, STEPS_TOGETHER)
+            points, met = np.concatenate([position, moment], axis=1), step < 1e-8
+            kept = met & self.holds(problem, position, self.margin)
+            found.append((problem[kept], points[kept]))
+            going = ~met & np.isfinite(step) & self.holds(problem, position, AWAY)
+            problem, points = problem[going], points[going]
+            first = _first_in_cells(problem, points, CELL * COARSER**turn)
+            problem, points = problem[first], points[first]
+            if not len(points):
+                break
+        problem, points = _together(*found)
+        first = _first_in_cells(problem, points, 1e-6)
+        problem, points = problem[first], points[first]
+        order = np.lexsort([points[:, 2], problem])
+        return problem[order], points[order]
+
+
+def _together(*found: tuple[Indices, Array]) -> tuple[Indices, Array]:
+    problem, points = (np.concatenate(part) for part in zip(*found, strict=True))
+    return problem, points
+
+
+def _first_in_cells(problem: Indices, points: Array, edge: float) -> Indices:
+    """Numbers (k,) of the first of those points (n, 6) of a problem that round to the same multiples of an edge."""
+    keys = np.column_stack([problem, np.round(points / edge)])
+    order = np.lexsort(keys.T[::-1])
+    new = np.ones(len(keys), bool)
+    new[1:] = (np.diff(keys[order], axis=0) != 0).any(axis=1)
+    return order[new]
+
+
+def from_starts(balance: Balance, where: SearchRange, free: Indices, every: int = 1, watch: Watch = unwatched) -> Array:
+    """Distinct points (n, 6) in the range, lowest first, at which the balances of `free` vanish, see `fixed_points`.
+
+    One of so many starts is taken.
+    """
+    position, moment = (part[::every] for part in where.starts())
+    search = Search(lambda _: balance, lambda _, position, margin: where.holds(position, margin), free, watch=watch)
+    return search.solutions(np.zeros(len(position), int), position, moment)[1]

@@ -13,7 +13,7 @@ from collections.abc import Callable
 import numpy as np
 
 from ...geometry.basics import Array
-from ..equilibria import solutions
+from ..equilibria import Search
 from ..steady import EVERY, Indices, solve
 from .between import between
 from .grid import Atlas, Grid
@@ -22,6 +22,8 @@ SPACING = 5
 """Points of the map between two searches."""
 WHOLE, PART = 8, 8
 """Every eighth search has all starts, the others an eighth of them."""
+TOGETHER = 8
+"""Searches that are made side by side."""
 MARGIN = 0.3
 """Sheets are followed so far beyond the range (radii): what its border cuts into pieces is whole there."""
 JUMP = 0.15
@@ -30,25 +32,26 @@ JUMP = 0.15
 
 def filled(grid: Grid, nodes: Indices, progress: Callable[[float], None] | None = None) -> Atlas:
     """What is found from searches at `nodes`; an equilibrium that is carried is good to round-off like any other."""
-    atlas, seeds, random = Atlas(len(grid)), [], np.random.default_rng(0)
-    for number, point in enumerate(nodes):
-        seeds.append(_searched(grid, int(point), None if number % WHOLE == 0 else random))
+    search, random, seeds = Search(grid.balance, grid.holds, EVERY, MARGIN), np.random.default_rng(0), []
+    for first in range(0, len(nodes), TOGETHER):
+        some = range(first, min(first + TOGETHER, len(nodes)))
+        starts = [_starts(grid, int(nodes[k]), None if k % WHOLE == 0 else random) for k in some]
+        seeds.append(search.solutions(*(np.concatenate(part) for part in zip(*starts, strict=True))))
         if progress is not None:
-            progress(0.9 * (number + 1) / len(nodes))
-    point, position, moment = (np.concatenate(part) for part in zip(*seeds, strict=True))
-    _spread(grid, atlas, point, position, moment)
+            progress(0.9 * (some[-1] + 1) / len(nodes))
+    point, places = (np.concatenate(part) for part in zip(*seeds, strict=True))
+    atlas = Atlas(len(grid))
+    _spread(grid, atlas, point, places[:, :3], places[:, 3:])
     return atlas
 
 
-def _searched(grid: Grid, point: int, random: np.random.Generator | None) -> tuple[Indices, Array, Array]:
-    """Equilibria of one point, from all starts or from some."""
-    where = grid.range(point)
-    position, moment = where.starts()
+def _starts(grid: Grid, point: int, random: np.random.Generator | None) -> tuple[Indices, Array, Array]:
+    """All starts at a point, or some: the point and scaled positions and moments, (n,), (n, 3) and (n, 3)."""
+    position, moment = grid.range(point).starts()
     if random is not None:
         chosen = random.choice(len(position), len(position) // PART, replace=False)
         position, moment = position[chosen], moment[chosen]
-    found = solutions(grid.alone(point), where, position, moment, EVERY, MARGIN)
-    return np.full(len(found), point), found[:, :3], found[:, 3:]
+    return np.full(len(position), point), position, moment
 
 
 def _spread(grid: Grid, atlas: Atlas, point: Indices, position: Array, moment: Array) -> None:

@@ -8,7 +8,7 @@ import pytest
 from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
-from spinlev.dynamics.equilibria import SearchRange, curve as searching, find_equilibria, fixed_points, survey
+from spinlev.dynamics.equilibria import SearchRange, find_equilibria, fixed_points, search as searching, survey
 from spinlev.dynamics.equilibria.continuation import stepped
 from spinlev.dynamics.motion import Rates, Scales, parameters
 from spinlev.dynamics.steady import EVERY, LATERAL, Balance, EquilibriumError, solve

@@ -1,0 +1,43 @@
+"""Searches at the points of a map: side by side, with few starts and long steps they find what careful ones find."""
+
+import numpy as np
+
+from spinlev.dynamics.equilibria import Search
+from spinlev.dynamics.maps import filling, rotor_family
+from spinlev.dynamics.maps.mapping import family_grid
+from spinlev.dynamics.steady import EVERY
+from spinlev.geometry.bodies import article_rotors as rotor
+from spinlev.geometry.scenes import Drag, Floater, Scene
+
+SHAPE = (10e-3, 1.305, 1.05)
+FLOATER = Floater(radius=6.35e-3, remanence=1.305, recoil_permeability=1.05, density=7500.0)
+ROTORS = {
+    "horizontal": (rotor.horizontal(2e-3, *SHAPE), (0.6e-3, 5e-3)),
+    "vertical": (rotor.vertical(14e-3, *SHAPE), (10e-3, 20e-3)),
+    "tilt": (rotor.tilt(np.radians(10.0), *SHAPE), (np.radians(3.0), np.radians(25.0))),
+}
+
+
+def grid_of(name, side, model="dipole"):
+    """A map of side × side points."""
+    magnets, ends = ROTORS[name]
+    family = rotor_family(Scene(110.0, magnets, FLOATER, Drag(0.0, 0.0)), name, model)
+    return family_grid(family, np.linspace(20.0, 300.0, side), np.linspace(*ends, side), 0.0, 0.1)
+
+
+def found_by(search, grid, points, random=None):
+    """Points (k,) and places (k, 6) that one call finds at several points of a grid."""
+    starts = [filling._starts(grid, point, random) for point in points]
+    return search.solutions(*(np.concatenate(part) for part in zip(*starts, strict=True)))
+
+
+def test_searches_side_by_side_find_what_each_finds_alone():
+    """The same to the round-off of machine code that takes its points in groups, and in the same order."""
+    grid, points = grid_of("horizontal", 3), [0, 4, 8]
+    search = Search(grid.balance, grid.holds, EVERY, filling.MARGIN)
+    point, places = found_by(search, grid, points, np.random.default_rng(0))
+    random = np.random.default_rng(0)
+    alone = [found_by(search, grid, [k], random) for k in points]
+    np.testing.assert_array_equal(point, np.concatenate([part[0] for part in alone]))
+    np.testing.assert_allclose(places, np.concatenate([part[1] for part in alone]), atol=1e-10)
+    assert set(point) == set(points)
