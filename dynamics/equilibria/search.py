@@ -83,6 +83,7 @@ class Search:
     holds : which of the scaled positions (n, 3) lie in the ranges of problems (n,), or at most a margin (radii) outside
     free : which balances shall vanish and which unknowns move, see `steady.solve`
     margin : so far outside the range (radii) solutions are kept
+    reach, far : longest steps, see `steady.solve`
     watch : is told the stage of the search and its share that is done
     """
 
@@ -90,6 +91,8 @@ class Search:
     holds: Callable[[Indices, Array, float], NDArray[np.bool_]]
     free: Indices
     margin: float = 0.0
+    reach: float = 0.3
+    far: float = np.inf
     watch: Watch = unwatched
 
     def solutions(self, problem: Indices, position: Array, moment: Array) -> tuple[Indices, Array]:
@@ -114,7 +117,9 @@ class Search:
             if rough:
                 balance = replace(balance, rates=balance.rates.rough)
             with np.errstate(all="ignore"):
-                position, moment, step = solve(balance, points[:, :3], points[:, 3:], self.free, STEPS_TOGETHER)
+                position, moment, step = solve(
+                    balance, points[:, :3], points[:, 3:], self.free, STEPS_TOGETHER, self.reach, self.far
+                )
             points, met = np.concatenate([position, moment], axis=1), step < 1e-8
             kept = met & self.holds(problem, position, self.margin)
             found.append((problem[kept], points[kept]))

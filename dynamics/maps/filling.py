@@ -22,6 +22,9 @@ SPACING = 5
 """Points of the map between two searches."""
 WHOLE, PART = 8, 8
 """Every eighth search has all starts, the others an eighth of them."""
+REACH, FAR = 0.8, 1.0
+"""Longest steps of the searches, rad of the moment and as a part of the distance from the rotor: with 0.3 rad and radii
+they take more than twice as many, and an eighth of the starts misses more."""
 TOGETHER = 8
 """Searches that are made side by side."""
 MARGIN = 0.3
@@ -32,7 +35,8 @@ JUMP = 0.15
 
 def filled(grid: Grid, nodes: Indices, progress: Callable[[float], None] | None = None) -> Atlas:
     """What is found from searches at `nodes`; an equilibrium that is carried is good to round-off like any other."""
-    search, random, seeds = Search(grid.balance, grid.holds, EVERY, MARGIN), np.random.default_rng(0), []
+    search = Search(grid.balance, grid.holds, EVERY, MARGIN, REACH, FAR)
+    random, seeds = np.random.default_rng(0), []
     for first in range(0, len(nodes), TOGETHER):
         some = range(first, min(first + TOGETHER, len(nodes)))
         starts = [_starts(grid, int(nodes[k]), None if k % WHOLE == 0 else random) for k in some]

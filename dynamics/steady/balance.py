@@ -92,7 +92,13 @@ def moved_pose(position: Array, moment: Array, step: Array) -> tuple[Array, Arra
 
 
 def solve(
-    balance: Balance, position: Array, moment: Array, free: Indices, iterations: int = 60, reach: float = 0.3
+    balance: Balance,
+    position: Array,
+    moment: Array,
+    free: Indices,
+    iterations: int = 60,
+    reach: float = 0.3,
+    far: float = np.inf,
 ) -> tuple[Array, Array, Array]:
     """Newton's method from many starts at once.
 
@@ -103,6 +109,8 @@ def solve(
     free : which unknowns move and which balances count, e.g. `LATERAL` to keep the height
     iterations : at most
     reach : longest step of the position (floater radii) and of the moment (rad)
+    far : where the position is farther than this from the origin, in floater radii, its longest step grows with the
+        distance, as the scale of the field does
 
     Returns
     -------
@@ -120,8 +128,10 @@ def solve(
         step = np.zeros((len(active), 5))
         good = np.isfinite(slope).all(axis=(1, 2))
         step[np.ix_(good, free)] = -_divided(slope[good][:, free[:, None], free], value[good][:, free])
-        size = np.maximum(np.linalg.norm(step[:, :3], axis=1), np.linalg.norm(step[:, 3:], axis=1))
-        step *= np.minimum(1.0, reach / np.maximum(size, reach))[:, None]
+        shift, tilt = np.linalg.norm(step[:, :3], axis=1), np.linalg.norm(step[:, 3:], axis=1)
+        scale = np.maximum(1.0, np.linalg.norm(position[active], axis=1) / far)
+        step *= (reach / np.maximum(np.maximum(shift / scale, tilt), reach))[:, None]
+        size = np.maximum(shift, tilt)
         position[active], moment[active] = moved_pose(position[active], moment[active], step)
         done = ~good | (size < 1e-11)
         length[active] = np.where(good, size, np.inf)
