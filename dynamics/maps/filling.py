@@ -20,8 +20,9 @@ from .grid import Atlas, Grid
 
 SPACING = 5
 """Points of the map between two searches."""
-WHOLE, PART = 8, 8
-"""Every eighth search has all starts, the others an eighth of them."""
+WHOLE, PART = 64, 8
+"""One of so many searches has all starts, the others an eighth of them, which miss one in some hundred equilibria at a
+point: a sheet is lost if it is missed at every search that meets it."""
 REACH, FAR = 0.8, 1.0
 """Longest steps of the searches, rad of the moment and as a part of the distance from the rotor: with 0.3 rad and radii
 they take more than twice as many, and an eighth of the starts misses more."""

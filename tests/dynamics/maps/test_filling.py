@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from spinlev.dynamics.equilibria import Search
-from spinlev.dynamics.maps import filling, rotor_family
+from spinlev.dynamics.maps import equilibrium_map, filling, rotor_family
 from spinlev.dynamics.maps.mapping import family_grid
 from spinlev.dynamics.steady import EVERY
 from spinlev.geometry.bodies import article_rotors as rotor
@@ -17,13 +17,23 @@ ROTORS = {
     "vertical": (rotor.vertical(14e-3, *SHAPE), (10e-3, 20e-3)),
     "tilt": (rotor.tilt(np.radians(10.0), *SHAPE), (np.radians(3.0), np.radians(25.0))),
 }
+CASES = [
+    ("horizontal", "dipole"),
+    *(pytest.param(name, "dipole", marks=pytest.mark.slow) for name in ("vertical", "tilt")),
+    *(pytest.param(name, "cuboid", marks=pytest.mark.slow) for name in ROTORS),
+]
+
+
+def map_of(name, side, model="dipole"):
+    """The family and the axes of a map of side × side points."""
+    magnets, ends = ROTORS[name]
+    family = rotor_family(Scene(110.0, magnets, FLOATER, Drag(0.0, 0.0)), name, model)
+    return family, np.linspace(20.0, 300.0, side), np.linspace(*ends, side)
 
 
 def grid_of(name, side, model="dipole"):
-    """A map of side × side points."""
-    magnets, ends = ROTORS[name]
-    family = rotor_family(Scene(110.0, magnets, FLOATER, Drag(0.0, 0.0)), name, model)
-    return family_grid(family, np.linspace(20.0, 300.0, side), np.linspace(*ends, side), 0.0, 0.1)
+    """Its points."""
+    return family_grid(*map_of(name, side, model), 0.0, 0.1)
 
 
 def found_by(grid, points, random=None, reach=filling.REACH, far=filling.FAR):
@@ -34,7 +44,7 @@ def found_by(grid, points, random=None, reach=filling.REACH, far=filling.FAR):
 
 
 def missed(expected, found):
-    """How many of the expected places are not among those found at their point, to round-off: 1e-9 radii and rad."""
+    """How many of the expected places are not among those found at their point, to 1e-9: round-off near a fold."""
     (points, places), (point, near) = expected, found
     return sum(
         np.linalg.norm(near[point == k] - place, axis=1).min(initial=np.inf) > 1e-9
@@ -53,8 +63,7 @@ def test_searches_side_by_side_find_what_each_finds_alone():
     assert set(point) == set(points)
 
 
-@pytest.mark.parametrize("model", ["dipole", pytest.param("cuboid", marks=pytest.mark.slow)])
-@pytest.mark.parametrize("name", ROTORS)
+@pytest.mark.parametrize(("name", "model"), CASES)
 def test_long_steps_miss_nothing_that_short_ones_find(name, model):
     """From all starts at sixteen points of a map."""
     grid = grid_of(name, 4, model)
@@ -63,11 +72,25 @@ def test_long_steps_miss_nothing_that_short_ones_find(name, model):
     assert missed(short, long) == 0
 
 
-@pytest.mark.parametrize("model", ["dipole", pytest.param("cuboid", marks=pytest.mark.slow)])
-@pytest.mark.parametrize("name", ROTORS)
+@pytest.mark.parametrize(("name", "model"), CASES)
 def test_an_eighth_of_the_starts_misses_one_in_a_hundred_at_most(name, model):
     """Of five draws at sixteen points (none to three in a thousand); a map has the sheet at the points beside it."""
     grid = grid_of(name, 4, model)
     every = found_by(grid, range(16))
     some = [found_by(grid, range(16), np.random.default_rng(seed)) for seed in range(5)]
     assert sum(missed(every, draw) for draw in some) <= 0.01 * 5 * len(every[0])
+
+
+@pytest.mark.parametrize(("name", "model"), CASES)
+def test_a_map_has_every_equilibrium_that_whole_searches_by_short_steps_find(name, model, monkeypatch):
+    """Of 900 points each: the same numbers, at the same places."""
+    quick = equilibrium_map(*map_of(name, 30, model))
+    for constant, careful in {"WHOLE": 1, "REACH": 0.3, "FAR": np.inf}.items():
+        monkeypatch.setattr(filling, constant, careful)
+    whole = equilibrium_map(*map_of(name, 30, model))
+    np.testing.assert_array_equal(quick.number, whole.number)
+    quickly, wholly = (
+        (found.row * 30 + found.column, np.concatenate([found.position, found.moment * FLOATER.radius], axis=1))
+        for found in (quick, whole)
+    )
+    assert missed(wholly, quickly) == 0
