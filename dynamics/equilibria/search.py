@@ -69,8 +69,9 @@ class SearchRange:
 def _rings(heights: Array, radii: Array, number: int) -> Array:
     """Points (n, 3) on rings about the axis, `number` on each."""
     angles = np.arange(number) * (2 * np.pi / number)
-    rings = product(heights, radii)
-    return np.array([(r * np.cos(a), r * np.sin(a), z) for z, r in rings for a in (angles if r else angles[:1])])
+    z, r, a = (part.ravel() for part in np.meshgrid(heights, radii, angles, indexing="ij"))
+    points = np.column_stack([r * np.cos(a), r * np.sin(a), z])
+    return np.asarray(points[(r > 0) | (a == 0)])  # a ring of no radius is one point
 
 
 @dataclass(frozen=True, eq=False)
