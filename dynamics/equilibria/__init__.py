@@ -29,5 +29,5 @@ from .full_search import (
 from .nearby_scene import carried as carried
 from .perturbed import PerturbedBalance as PerturbedBalance, Shift as Shift
 from .plate_effect import plate_action as plate_action
-from .search import Search as Search, SearchRange as SearchRange
+from .search import SAME as SAME, Search as Search, SearchRange as SearchRange
 from .tracing import near_curve as near_curve, whole_curves as whole_curves

@@ -19,6 +19,9 @@ STEPS_TOGETHER, CELL, COARSER, AWAY = 3, 0.1, 1.3, 1.0
 """Steps after which the starts are thinned: within a cell of such an edge (radii, and of the moment), which grows by
 that factor each time, one is kept, and those that are as far outside the range, in radii, are left out; a test compares
 what is found with what all find."""
+MET, SAME = 1e-8, 1e-6
+"""Newton's method has met a solution when its last step was shorter than the first (radii or rad), which leaves
+round-off; solutions nearer to each other than the second, a hundred times that, are one."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -121,7 +124,7 @@ class Search:
                 position, moment, step = solve(
                     balance, points[:, :3], points[:, 3:], self.free, STEPS_TOGETHER, self.reach, self.far
                 )
-            points, met = np.concatenate([position, moment], axis=1), step < 1e-8
+            points, met = np.concatenate([position, moment], axis=1), step < MET
             kept = met & self.holds(problem, position, self.margin)
             found.append((problem[kept], points[kept]))
             going = ~met & np.isfinite(step) & self.holds(problem, position, AWAY)
@@ -131,13 +134,14 @@ class Search:
             if not len(points):
                 break
         problem, points = _together(*found)
-        first = _first_in_cells(problem, points, 1e-6)
+        first = _first_in_cells(problem, points, SAME)
         problem, points = problem[first], points[first]
         order = np.lexsort([points[:, 2], problem])
         return problem[order], points[order]
 
 
 def _together(*found: tuple[Indices, Array]) -> tuple[Indices, Array]:
+    """Problems and points, (n,) and (n, 6), of several sets of them."""
     problem, points = (np.concatenate(part) for part in zip(*found, strict=True))
     return problem, points
 

@@ -21,13 +21,14 @@ from .grid import Atlas, Grid
 SPACING = 5
 """Points of the map between two searches."""
 WHOLE, PART = 64, 8
-"""One of so many searches has all starts, the others an eighth of them, which miss one in some hundred equilibria at a
-point: a sheet is lost if it is missed at every search that meets it."""
+"""One of so many searches has all starts, the others an eighth of them, which misses less than one in a hundred of a
+point's equilibria: a sheet is lost only if every search that meets it does."""
 REACH, FAR = 0.8, 1.0
-"""Longest steps of the searches, rad of the moment and as a part of the distance from the rotor: with 0.3 rad and radii
-they take more than twice as many, and an eighth of the starts misses more."""
+"""Longest steps of the searches, rad of the moment and radii of the position, and beyond that distance (radii) as a
+part of it, as the field changes: with 0.3 rad and radii they are more than twice as many, and an eighth of the starts
+misses several times as much."""
 TOGETHER = 8
-"""Searches that are made side by side."""
+"""Searches that are made side by side: enough that NumPy's calls cost less than what they compute."""
 MARGIN = 0.3
 """Sheets are followed so far beyond the range (radii): what its border cuts into pieces is whole there."""
 JUMP = 0.15

@@ -8,12 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...geometry.basics import Array
-from ..equilibria import SearchRange
+from ..equilibria import SAME, SearchRange
 from ..motion import Rates
 from ..steady import Balance, Indices
-
-SAME = 1e-6
-"""Equilibria nearer to each other than this, in radii and rad together, are one."""
 
 
 @dataclass(frozen=True, eq=False)
