@@ -12,7 +12,7 @@ from .arrays import Array, frozen_array
 from .pose import Posed
 from .text import millimetres
 
-CHUNK = 2_000_000
+CHUNK = 100_000
 """Points times triangles at once."""
 SMOOTH = float(np.cos(np.radians(30.0)))
 """Cosine between the normals of triangles from which on their common side is no edge."""
