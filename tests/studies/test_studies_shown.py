@@ -9,7 +9,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import pyvista as pv
 import xarray as xr
 from places import QUICK, SCENES
 
@@ -28,7 +27,6 @@ from spinlev.studies.field_quality.hard_cases import CASES
 from spinlev.studies.one_scene import reaction as plate_job
 from spinlev.studies.pictures import plate_currents, question_figure
 from spinlev.studies.rendering import Currents, current_places
-from spinlev.studies.rendering.still import add_floater, add_plate, new_plotter
 from spinlev.studies.results import write_dataset
 
 
@@ -58,6 +56,10 @@ def test_no_net_current_flows_through_a_section_of_the_plate(scene):
 @pytest.mark.usefixtures("needs_3d")
 def test_arrows_show_the_currents_under_the_face_that_the_floater_is_before(scene):
     """All places lie in the plate, a hundredth of its thickness below that face; the longest arrow is 12 mm."""
+    import pyvista as pv
+
+    from spinlev.studies.rendering.still import add_plate, new_plotter
+
     box, floater = scene.plate.box, np.array([0.0, 0.0, -0.02])
     points = current_places(box, floater)
     inside = box.to_body(points) / box.size
@@ -78,6 +80,8 @@ def test_arrows_show_the_currents_under_the_face_that_the_floater_is_before(scen
 
 @pytest.mark.usefixtures("needs_3d")
 def test_a_floater_without_a_direction_has_no_arrow(scene):
+    from spinlev.studies.rendering.still import add_floater, new_plotter
+
     plotter = new_plotter((300, 200))
     drawn = [add_floater(plotter, scene, np.zeros(3), moment) for moment in (np.zeros(3), np.array([0.0, 0.0, 1.0]))]
     assert [len(actors) for actors in drawn] == [1, 2]

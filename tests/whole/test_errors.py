@@ -1,6 +1,7 @@
 """One tree of errors, and one way from an error to the status with which the command line exits."""
 
 import io
+import re
 from importlib import import_module
 
 import pytest
@@ -11,31 +12,41 @@ from spinlev.geometry.basics import ComputationError, InputError, SpinlevError
 from spinlev.studies.command_line import cli
 
 FILES = sorted(path for folder in ("geometry", "fem", "dynamics", "studies") for path in (ROOT / folder).rglob("*.py"))
+MODULES = {
+    "spinlev." + ".".join(path.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__"): path
+    for path in FILES
+}
+NAMED = {
+    name: module
+    for module, path in MODULES.items()
+    for name in re.findall(r"^class (\w+Error)\(", path.read_text(encoding="utf-8"), re.MULTILINE)
+}
+"""Errors as their files have them, and where: to know them, nothing need be loaded."""
 
 
 def error_classes():
     """Every exception class that a module of the project defines."""
-    for path in FILES:
-        name = ".".join(path.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__")
-        for kind in vars(import_module(f"spinlev.{name}")).values():
-            own = isinstance(kind, type) and kind.__module__ == f"spinlev.{name}"
+    for module in MODULES:
+        for kind in vars(import_module(module)).values():
+            own = isinstance(kind, type) and kind.__module__ == module
             if own and issubclass(kind, BaseException) and not issubclass(kind, Warning):
                 yield kind
 
 
-CLASSES = set(error_classes())
-
-
 def test_every_error_is_of_bad_input_or_of_a_computation_without_answer():
     """But for the root of the tree, and the user's own interrupt, which brings the finished part of a flight."""
-    assert {"AccuracyError", "TableFileError", "SceneError", "EquilibriumError"} < {kind.__name__ for kind in CLASSES}
-    for kind in CLASSES - {SpinlevError, FlightStopped}:
+    classes = set(error_classes())
+    assert {kind.__name__: kind.__module__ for kind in classes - {FlightStopped}} == NAMED
+    assert {"AccuracyError", "TableFileError", "SceneError", "EquilibriumError"} < set(NAMED)
+    for kind in classes - {SpinlevError, FlightStopped}:
         assert issubclass(kind, InputError) != issubclass(kind, ComputationError), kind
     assert issubclass(FlightStopped, KeyboardInterrupt)
 
 
-@pytest.mark.parametrize("kind", sorted(CLASSES - {FlightStopped}, key=lambda kind: kind.__name__))
-def test_every_error_exits_with_its_status(kind, monkeypatch, capsys):
+@pytest.mark.parametrize("name", sorted(NAMED))
+def test_every_error_exits_with_its_status(name, monkeypatch, capsys):
+    kind = getattr(import_module(NAMED[name]), name)
+
     def fails(*arguments, **options):
         raise kind.__new__(kind, "That is why.")
 

@@ -6,7 +6,6 @@ import pytest
 import spinlev as sl
 from spinlev.geometry.basics import InputError
 from spinlev.studies.live.state import first_state
-from spinlev.studies.rendering.still import add_floater
 
 MATERIAL = {"remanence_T": 1.305, "recoil_permeability": 1.0, "density_kg_m3": 7500.0}
 BRICK = {"shape": "cuboid", "size_mm": [12.0, 10.0, 8.0], **MATERIAL}
@@ -87,6 +86,8 @@ def test_what_other_shapes_cannot_do_is_told(attempt, said):
 
 @pytest.mark.parametrize(("keys", "size"), [(BRICK, [12, 10, 8]), (DISC, [12, 12, 8])], ids=["brick", "disc"])
 def test_the_picture_has_the_body_as_it_lies(keys, size):
+    from spinlev.studies.rendering.still import add_floater
+
     drawn = []
 
     class Plotter:
