@@ -1,4 +1,4 @@
-"""Plate in any pose: frame, tolerance, refinement; TEAM problem 7."""
+"""Plate in any pose: frame, tolerance, refinement."""
 
 from __future__ import annotations
 
@@ -13,8 +13,6 @@ from spinlev.fem.slab import Slab, reaction_tensor
 from spinlev.geometry.basics import Box, rotation_matrix
 from spinlev.geometry.meshes import MeshRule
 from spinlev.geometry.scenes import Plate
-from spinlev.studies.plates.team7 import compared, compute_line, measured_line, team7, team7_mesh
-from spinlev.studies.plates.team7_figure import team7_lines
 
 SetNumThreads(1)
 LYING = Plate(Box((0.1, 0.24, 0.03), (0.0, 0.0, -0.015)), 3.5e7)
@@ -103,28 +101,3 @@ def test_self_convergence_of_every_entry(frequency):
     assert difference.max() < 1e-4
     assert (abs(found.tensors - found.tensors.swapaxes(1, 2)).max(axis=(1, 2)) < 1e-9 * size).all()  # of the solver
     assert (mean_loss(found.tensors, [1, -1j, 0.2], frequency) > 0).all()
-
-
-def test_team7_coarse():
-    """50 Hz on a mesh good to about 1 % of the peak: within 6 %."""
-    x, measured = measured_line()
-    computed = compute_line(50.0, x, team7_mesh(50.0, 80.0, 3.0, 3.0), order=2)
-    assert abs(computed - measured[:, :2]).max() < 0.06 * np.hypot(*measured[:, :2].T).max()
-
-
-def test_team7_report_finds_a_common_phase():
-    """Computed values that are the measured ones, turned by -5° at 50 Hz: turned back, nothing is left."""
-    x, measured = measured_line()
-    turned = (measured[:, 0] - 1j * measured[:, 1]) * np.exp(-1j * np.radians(5.0))
-    computed = np.column_stack([turned.real, -turned.imag, measured[:, 2:]])
-    lines = team7_lines(compared(x, measured, computed))
-    assert "50 Hz, all phases turned by +5.00°: largest 0.00, mean 0.00" in lines[-2]
-    assert "200 Hz, all phases turned by +0.00°: largest 0.00, mean 0.00" in lines[-1]
-
-
-@pytest.mark.slow
-def test_team7_measured():
-    """All 68 measured values (Fujiwara, Nakata 1990) within 5 % of the line's peak, 1.5 % in the mean."""
-    deviation = abs(team7()["deviation"].values)
-    assert deviation.max() < 0.05
-    assert deviation.mean() < 0.015

@@ -1,4 +1,4 @@
-"""The studies of the rotor's field and of TEAM problem 7: every method against the field that it should give."""
+"""The studies of the rotor's field: every method against the field that it should give."""
 
 import numpy as np
 import pytest
@@ -8,8 +8,6 @@ from spinlev.studies.field_quality import dipole_validity, speed_accuracy
 from spinlev.studies.field_quality.dipole_validity_figure import LEVELS
 from spinlev.studies.field_quality.field_methods import methods
 from spinlev.studies.field_quality.method_cost import DISTANCES, cube, measure, sphere_points
-from spinlev.studies.plates import team7
-from spinlev.studies.plates.team7_figure import team7_figure, team7_lines
 
 QUICK = methods(quick=True)
 
@@ -133,21 +131,3 @@ def test_more_of_the_field_is_right_nearer_to_the_rotor(validity):
     assert float(error.sel(model="cuboid, true moment").max()) < ordered[0]
     gradient = validity["gradient_error"].sel(model="dipole, true moment")
     assert np.all(gradient.max("offset") > validity["field_error"].sel(model="dipole, true moment").max("offset"))
-
-
-def test_team_problem_7_with_coarse_elements():
-    """Elements of order 1 are within 10 % of the peak that was measured, where order 3 is within 5 %."""
-    result = team7.team7(order=1)
-    assert result["measured"].sizes == {"x": 17, "curve": 4}
-    size = np.abs(result["deviation"].values)
-    assert 0 < size.max() < 0.1
-    np.testing.assert_allclose(result["x"][[0, -1]], [0.0, 0.288])
-    whole = team7_lines(result)[5]
-    assert whole.startswith("  all 68 values")
-    assert f"largest {100 * size.max():5.2f}" in whole
-    left, right = team7_figure(result).axes
-    for number, curve in enumerate(team7.CURVES):
-        (drawn,) = [line for line in left.lines if line.get_label() == curve]
-        np.testing.assert_allclose(drawn.get_ydata(), 1e3 * result["computed"][:, number])
-        (drawn,) = [line for line in right.lines if line.get_label() == curve]
-        np.testing.assert_allclose(drawn.get_ydata(), 100 * result["deviation"][:, number])
