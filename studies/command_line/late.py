@@ -46,7 +46,7 @@ class _Missing(MetaPathFinder):
     def find_spec(self, name: str, path: object, target: object = None) -> None:
         """None, to go on with others, or ModuleNotFoundError."""
         if name in self._names:
-            raise ModuleNotFoundError(f"{name} is left out here.", name=name)
+            raise ModuleNotFoundError(name, name=name)
 
 
 class _StandIn(ModuleType):

@@ -26,6 +26,7 @@ RELAYED = {
     "refusal(plate, frequency, rtol, best)": "plate_network/reaction: a sentence of limits",
     "str(error)": "an error's own sentence, with another class",
     "[str(error)]": "scenes/assembly: the sentence of bodies/step_file about a magnet's file",
+    "name": "late: as Python has it of a module that is not installed",
     "str(path)": "whole_files: the system's own error, with the name of the file",
     "way_out(scene, table, known)": "simulation: says what would levitate",
 }

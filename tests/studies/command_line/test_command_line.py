@@ -7,12 +7,7 @@ import sys
 
 import numpy as np
 import pytest
-import xarray as xr
 from places import SCENES
-
-import spinlev as sl
-from spinlev.studies.command_line.cli import _status
-from spinlev.studies.rendering import unavailable
 
 NO_PLATE = ("--plate-model", "none")
 GOOD = (SCENES / "horizontal.toml").read_text()
@@ -31,28 +26,9 @@ def process(tmp_path):
     return run
 
 
-@pytest.fixture
-def spinlev(tmp_path, monkeypatch, capsys):
-    """The same within this process, whose libraries are loaded."""
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr("sys.argv", ["spinlev", "test"])
-
-    def run(*arguments):
-        status = _status([str(argument) for argument in arguments], sys.stdout)
-        return status, *capsys.readouterr()
-
-    return run
-
-
-def points_file(folder, text="x_mm,y_mm,z_mm\n0,0,-20\n1,2,-30\n"):
-    path = folder / "points.csv"
-    path.write_text(text)
-    return path
-
-
-def test_a_process_answers_on_standard_output_and_complains_on_the_other(process, tmp_path):
+def test_a_process_answers_on_standard_output_and_complains_on_the_other(process, tmp_path, points):
     """One answer, and one message without a file."""
-    status, out, err = process("field", SCENES / "horizontal.toml", "--points", points_file(tmp_path), "--json")
+    status, out, err = process("field", SCENES / "horizontal.toml", "--points", points, "--json")
     assert status == 0, err
     assert np.shape(json.loads(out)["B_T"]) == (2, 3)
     status, out, err = process("run", "none.toml", "--out", "none")
@@ -71,11 +47,11 @@ def test_help_comes_without_what_computes():
     assert not loaded & {"numpy", "xarray", "matplotlib", "scipy", "pyngcore", "heyoka", "pandas", "pyvista"}
 
 
-def test_an_answer_comes_without_finite_elements_unless_they_make_it(tmp_path):
+def test_an_answer_comes_without_finite_elements_unless_they_make_it(tmp_path, points):
     """They take a fourth of a second to load: one module of them calls for the other, and for pyngcore."""
     code = "import sys; from spinlev.studies.command_line.start import main; sys.argv[1:] = {}\n"
     code += "try: main()\nfinally: print('pyngcore' in sys.modules)"
-    arguments = ["field", str(SCENES / "horizontal.toml"), "--points", str(points_file(tmp_path)), "--json"]
+    arguments = ["field", str(SCENES / "horizontal.toml"), "--points", str(points), "--json"]
     arguments += ["--out", str(tmp_path / "out"), "--model"]
     environment = os.environ | {"SPINLEV_CACHE": str(tmp_path / "cache")}
     for model, loaded in [("dipole", "False"), ("fem", "True"), ("fem", "False")]:
@@ -85,10 +61,8 @@ def test_an_answer_comes_without_finite_elements_unless_they_make_it(tmp_path):
 
 
 @pytest.mark.parametrize("model", ["dipole", "cuboid", "fem", "auto"])
-def test_field(spinlev, tmp_path, model):
-    status, out, err = spinlev(
-        "field", SCENES / "horizontal.toml", "--points", points_file(tmp_path), "--model", model, "--json"
-    )
+def test_field(spinlev, tmp_path, points, model):
+    status, out, err = spinlev("field", SCENES / "horizontal.toml", "--points", points, "--model", model, "--json")
     assert status == 0, err
     answer = json.loads(out)
     assert {"model", "error_estimate", "seconds", "B_T", "dB_T_per_m", "tables_from_cache"} <= set(answer)
@@ -174,20 +148,6 @@ def test_the_plate_is_in_the_equilibria_and_the_motion(spinlev):
     assert answer["beyond_plate_table"] == 0
 
 
-def test_run_writes_everything_and_finds_its_table_again(spinlev, tmp_path):
-    status, out, err = spinlev("run", SCENES / "horizontal.toml", "--duration-s", "0.1", *NO_PLATE)
-    assert status == 0, err
-    assert "A point dipole in the rotor's place would hold it 0.16(1) mm lower." in out
-    made = {path.name for path in (tmp_path / "out").iterdir()}
-    drawn = set() if unavailable() else {"scene.png"}
-    figures = {f"{name}.{kind}" for name in ("field", "force", "trajectory") for kind in ("png", "pdf")}
-    assert made == {"result.nc", "summary.json", *figures, *drawn}
-    summary = json.loads((tmp_path / "out" / "summary.json").read_text())
-    assert summary["comparison"]["difference_error_mm"] < 0.01 * abs(summary["comparison"]["difference_mm"])
-    status, out, err = spinlev("field", SCENES / "horizontal.toml", "--points", points_file(tmp_path), "--json")
-    assert json.loads(out)["tables_from_cache"] == ["fem"]
-
-
 BAD_SCENES = {
     "not TOML": "not toml",
     "unknown key": GOOD + "\nfoo = 1\n",
@@ -229,8 +189,8 @@ def test_wrong_scenes_end_with_status_2_one_message_and_no_file(spinlev, tmp_pat
         (("run", "S", "--frequency", "3"), "--frequency"),
     ],
 )
-def test_wrong_command_lines_end_with_status_2(spinlev, tmp_path, arguments, said):
-    names = {"S": SCENES / "horizontal.toml", "P": points_file(tmp_path)}
+def test_wrong_command_lines_end_with_status_2(spinlev, tmp_path, points, arguments, said):
+    names = {"S": SCENES / "horizontal.toml", "P": points}
     status, out, err = spinlev(*[names.get(a, a) for a in arguments])
     assert status == 2
     assert out == ""
@@ -250,56 +210,12 @@ def test_wrong_command_lines_end_with_status_2(spinlev, tmp_path, arguments, sai
         ("x_mm,y_mm,z_mm\n7,5,0\n", "must not lie on an edge of a magnet"),
     ],
 )
-def test_wrong_points_end_with_status_2(spinlev, tmp_path, text, said):
-    path = points_file(tmp_path, text)
+def test_wrong_points_end_with_status_2(spinlev, points, text, said):
+    points.write_text(text)
     status, out, err = spinlev("field", SCENES / "horizontal.toml", "--points", path, "--model", "cuboid", "--json")
     assert status == 2
     assert out == ""
     assert said in err
-
-
-@pytest.mark.usefixtures("undrawn")
-def test_a_run_is_of_the_body_spin_asked_for(spinlev, tmp_path):
-    """Its first equilibrium is that of `equilibria`, its flight begins with that spin, its files say so."""
-    path, spin = tmp_path / "s.toml", 0.3
-    path.write_text(GOOD.replace("recoil_permeability = 1.05", "recoil_permeability = 1.0"))
-    options = ("--model", "dipole", *NO_PLATE, "--spin", spin, "--duration-s", "0.01", "--json")
-    status, out, err = spinlev("run", path, *options)
-    assert status == 0, err
-    answer = json.loads(out)
-    known = sl.equilibria(path, model="dipole", plate_model="none", spin=spin).isel(equilibrium=0)
-    np.testing.assert_allclose(answer["equilibria"][0]["position_mm"], 1e3 * known.position, atol=1e-9)
-    with xr.open_dataset(tmp_path / "out" / "result.nc") as result:
-        assert result.attrs["body_spin"] == answer["body_spin"] == spin
-        begun = result.isel(time=0)
-        assert float(begun.spin @ begun.moment) == pytest.approx(spin * 2 * np.pi * 110, rel=1e-6)
-
-
-@pytest.mark.usefixtures("undrawn")
-def test_no_equilibrium_is_a_failed_computation_that_keeps_what_was_finished(spinlev, tmp_path):
-    path = tmp_path / "s.toml"
-    path.write_text(GOOD.replace("frequency_hz = 110.0", "frequency_hz = 30.0"))
-    status, _, err = spinlev("run", path, "--model", "dipole", *NO_PLATE)
-    assert status == 1
-    assert "Traceback" not in err
-    assert (tmp_path / "out" / "force.png").exists()
-    assert "failed" in json.loads((tmp_path / "out" / "summary.json").read_text())
-
-
-@pytest.mark.usefixtures("undrawn")
-def test_a_rotor_at_rest_has_no_equilibrium_but_its_floater_still_falls(spinlev, tmp_path):
-    path = tmp_path / "s.toml"
-    at_rest = GOOD.replace("frequency_hz = 110.0", "frequency_hz = 0.0")
-    path.write_text(at_rest)
-    status, _, err = spinlev("equilibria", path, "--model", "dipole", *NO_PLATE)
-    assert status == 1
-    assert "Earnshaw" in err
-    path.write_text(at_rest + "\n[start]\nposition_mm = [0.0, 0.0, -60.0]\n")
-    status, out, err = spinlev("run", path, "--model", "dipole", "--duration-s", "1", *NO_PLATE, "--json")
-    assert status == 0, err
-    answer = json.loads(out)
-    assert answer["ended_by"] == "lost"
-    assert "Earnshaw" in answer["failed"]
 
 
 def test_plate_takes_a_place_that_begins_with_a_minus(spinlev):

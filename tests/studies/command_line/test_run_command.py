@@ -1,0 +1,72 @@
+"""`spinlev run` as a user sees it: what it answers, and the files that it leaves."""
+
+import json
+
+import numpy as np
+import pytest
+import xarray as xr
+from places import SCENES
+
+import spinlev as sl
+from spinlev.studies.rendering import unavailable
+
+NO_PLATE = ("--plate-model", "none")
+GOOD = (SCENES / "horizontal.toml").read_text()
+
+
+def test_run_writes_everything_and_finds_its_table_again(spinlev, tmp_path, points):
+    status, out, err = spinlev("run", SCENES / "horizontal.toml", "--duration-s", "0.1", *NO_PLATE)
+    assert status == 0, err
+    assert "A point dipole in the rotor's place would hold it 0.16(1) mm lower." in out
+    made = {path.name for path in (tmp_path / "out").iterdir()}
+    drawn = set() if unavailable() else {"scene.png"}
+    figures = {f"{name}.{kind}" for name in ("field", "force", "trajectory") for kind in ("png", "pdf")}
+    assert made == {"result.nc", "summary.json", *figures, *drawn}
+    summary = json.loads((tmp_path / "out" / "summary.json").read_text())
+    assert summary["comparison"]["difference_error_mm"] < 0.01 * abs(summary["comparison"]["difference_mm"])
+    status, out, err = spinlev("field", SCENES / "horizontal.toml", "--points", points, "--json")
+    assert json.loads(out)["tables_from_cache"] == ["fem"]
+
+
+@pytest.mark.usefixtures("undrawn")
+def test_a_run_is_of_the_body_spin_asked_for(spinlev, tmp_path):
+    """Its first equilibrium is that of `equilibria`, its flight begins with that spin, its files say so."""
+    path, spin = tmp_path / "s.toml", 0.3
+    path.write_text(GOOD.replace("recoil_permeability = 1.05", "recoil_permeability = 1.0"))
+    options = ("--model", "dipole", *NO_PLATE, "--spin", spin, "--duration-s", "0.01", "--json")
+    status, out, err = spinlev("run", path, *options)
+    assert status == 0, err
+    answer = json.loads(out)
+    known = sl.equilibria(path, model="dipole", plate_model="none", spin=spin).isel(equilibrium=0)
+    np.testing.assert_allclose(answer["equilibria"][0]["position_mm"], 1e3 * known.position, atol=1e-9)
+    with xr.open_dataset(tmp_path / "out" / "result.nc") as result:
+        assert result.attrs["body_spin"] == answer["body_spin"] == spin
+        begun = result.isel(time=0)
+        assert float(begun.spin @ begun.moment) == pytest.approx(spin * 2 * np.pi * 110, rel=1e-6)
+
+
+@pytest.mark.usefixtures("undrawn")
+def test_no_equilibrium_is_a_failed_computation_that_keeps_what_was_finished(spinlev, tmp_path):
+    path = tmp_path / "s.toml"
+    path.write_text(GOOD.replace("frequency_hz = 110.0", "frequency_hz = 30.0"))
+    status, _, err = spinlev("run", path, "--model", "dipole", *NO_PLATE)
+    assert status == 1
+    assert "Traceback" not in err
+    assert (tmp_path / "out" / "force.png").exists()
+    assert "failed" in json.loads((tmp_path / "out" / "summary.json").read_text())
+
+
+@pytest.mark.usefixtures("undrawn")
+def test_a_rotor_at_rest_has_no_equilibrium_but_its_floater_still_falls(spinlev, tmp_path):
+    path = tmp_path / "s.toml"
+    at_rest = GOOD.replace("frequency_hz = 110.0", "frequency_hz = 0.0")
+    path.write_text(at_rest)
+    status, _, err = spinlev("equilibria", path, "--model", "dipole", *NO_PLATE)
+    assert status == 1
+    assert "Earnshaw" in err
+    path.write_text(at_rest + "\n[start]\nposition_mm = [0.0, 0.0, -60.0]\n")
+    status, out, err = spinlev("run", path, "--model", "dipole", "--duration-s", "1", *NO_PLATE, "--json")
+    assert status == 0, err
+    answer = json.loads(out)
+    assert answer["ended_by"] == "lost"
+    assert "Earnshaw" in answer["failed"]
