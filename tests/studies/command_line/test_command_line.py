@@ -212,7 +212,7 @@ def test_wrong_command_lines_end_with_status_2(spinlev, tmp_path, points, argume
 )
 def test_wrong_points_end_with_status_2(spinlev, points, text, said):
     points.write_text(text)
-    status, out, err = spinlev("field", SCENES / "horizontal.toml", "--points", path, "--model", "cuboid", "--json")
+    status, out, err = spinlev("field", SCENES / "horizontal.toml", "--points", points, "--model", "cuboid", "--json")
     assert status == 2
     assert out == ""
     assert said in err
