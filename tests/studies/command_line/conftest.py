@@ -9,7 +9,7 @@ from spinlev.studies.command_line.cli import _status
 
 @pytest.fixture
 def spinlev(tmp_path, monkeypatch, capsys):
-    """The same within this process, whose libraries are loaded."""
+    """Run the command in this process, in an empty folder; gives exit status, standard output and error."""
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr("sys.argv", ["spinlev", "test"])
 

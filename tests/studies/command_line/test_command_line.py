@@ -15,7 +15,7 @@ GOOD = (SCENES / "horizontal.toml").read_text()
 
 @pytest.fixture
 def process(tmp_path):
-    """Run the command in a process of its own, in an empty folder; gives exit status, standard output and error."""
+    """The same in a process of its own, as from a shell."""
     call = "import sys; from spinlev.studies.command_line.start import main; sys.argv[0] = 'spinlev'; main()"
 
     def run(*arguments):
