@@ -7,6 +7,7 @@ does; what it would tell the main process it tells its worker, who passes it on,
 import multiprocessing
 import signal
 from contextlib import suppress
+from importlib import import_module
 
 import pytest
 
@@ -14,6 +15,8 @@ PATIENCE = 60.0
 """For the end of a process whose tests are over, s."""
 STATE = ("testsfailed", "shouldfail", "shouldstop")
 """What a session counts and decides while tests run."""
+LATE = ("dask.array",)
+"""What every third file would load while it runs: loaded once, before."""
 
 
 def how_it_ended(status):
@@ -42,6 +45,10 @@ class FileProcesses:
         self.worker = next(each for each in config.pluginmanager.get_plugins() if hasattr(each, "sendevent"))
         self.elsewhere = Elsewhere()
         config.pluginmanager.register(self.elsewhere)
+
+    def pytest_collection_finish(self):
+        for name in LATE:
+            import_module(name)
 
     @pytest.hookimpl(wrapper=True, tryfirst=True)
     def pytest_runtest_protocol(self, item, nextitem):
