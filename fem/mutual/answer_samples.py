@@ -31,6 +31,8 @@ NEAR_GAPS = (0.1, 0.13, 0.16, 0.2, 0.25, 0.35, 0.5, 1.0)
 """Gaps between the bodies at which samples are taken, in floater radii; the last for several magnets."""
 ALIKE = 1e-4
 """Part of the largest energy of a field in the magnets below which one counts as none: 6e-5 of an answer in contact."""
+CHUNK = 512
+"""Points in the magnets at once, so that the fields of all dipoles there take some megabytes."""
 TAIL, MOST_ADDED, MOST_RETURNED = 1e-4, 16, 24
 """Part of the sphere's answer that the degrees left out may hold, and the most degrees of the small parts."""
 
@@ -85,8 +87,12 @@ def _direct(magnets: Sequence[Magnet], places: Array) -> Array:
     """The products by the direct part of the magnetisation, exact but for round-off."""
     nearest = min(float(np.min(magnet.body.distance(places))) for magnet in magnets)
     points, tensors = direct_rule(magnets, nearest)
-    fields = unit_dipole_fields(points, places)
-    return np.asarray(np.einsum("pni,qnj,nij->pq", fields, fields, tensors, optimize=True) / MU_0)
+    products = np.zeros((3 * len(places), 3 * len(places)))
+    for start in range(0, len(points), CHUNK):
+        some = slice(start, start + CHUNK)
+        fields = unit_dipole_fields(points[some], places)
+        products += np.einsum("pni,qnj,nij->pq", fields, fields, tensors[some], optimize=True)
+    return products / MU_0
 
 
 def _beyond(rotor: RotorResponse, fine: RotorResponse, places: Array, size: Array, watch: Watch) -> Array:
@@ -95,9 +101,13 @@ def _beyond(rotor: RotorResponse, fine: RotorResponse, places: Array, size: Arra
     Their fields in the magnets are sums of far fewer, which the coarse elements' points tell.
     """
     points, weights, _ = rotor.linear_response(direct=False)
-    fields = unit_dipole_fields(points, places) * (np.sqrt(weights)[:, None] / size[:, None, None])
-    rows = fields.reshape(len(size), -1)
-    values, vectors = np.linalg.eigh(rows @ rows.T)
+    alike = np.zeros((len(size), len(size)))
+    for start in range(0, len(points), CHUNK):
+        some = slice(start, start + CHUNK)
+        fields = unit_dipole_fields(points[some], places) * (np.sqrt(weights[some])[:, None] / size[:, None, None])
+        rows = fields.reshape(len(size), -1)
+        alike += rows @ rows.T
+    values, vectors = np.linalg.eigh(alike)
     kept = values > ALIKE * values[-1]
     shares = vectors[:, kept] * np.sqrt(values[kept])
     points, weights, magnetized = fine.linear_response(direct=False)
@@ -107,7 +117,8 @@ def _beyond(rotor: RotorResponse, fine: RotorResponse, places: Array, size: Arra
         given = unit_dipole_fields(points, place[None]) / size[own, None, None]
         parts += np.einsum("ak,ani->kni", vectors[own][:, kept] / np.sqrt(values[kept]), given)
     answers = np.array([magnetized(part) for part in watched(parts, watch, "rotor's answer")])
-    found = np.einsum("kni,lni,n->kl", parts, answers, weights, optimize=True) / MU_0
+    parts *= weights[:, None]
+    found = parts.reshape(len(parts), -1) @ answers.reshape(len(parts), -1).T / MU_0
     return np.asarray(shares @ ((found + found.T) / 2) @ shares.T)
 
 
