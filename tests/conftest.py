@@ -36,8 +36,20 @@ def pytest_collection_finish():
 
 @pytest.fixture(autouse=True, scope="module")
 def memory_given_back():
-    """After each file: compiled functions that later ones read again, and what glibc keeps of freed memory."""
+    """After each file."""
     yield
+    give_memory_back()
+
+
+@pytest.fixture
+def memory_given_back_at_once():
+    """After the test: where one test does what is else done by a process of its own."""
+    yield
+    give_memory_back()
+
+
+def give_memory_back():
+    """Compiled functions that later tests read again, and what glibc keeps of freed memory."""
     from spinlev.fem.storage import compiled_code  # after the session's cache is known
 
     compiled_code._functions.clear()

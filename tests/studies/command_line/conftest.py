@@ -8,7 +8,7 @@ from spinlev.studies.command_line.cli import _status
 
 
 @pytest.fixture
-def spinlev(tmp_path, monkeypatch, capsys):
+def spinlev(tmp_path, monkeypatch, capsys, memory_given_back_at_once):
     """Run the command in this process, in an empty folder; gives exit status, standard output and error."""
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr("sys.argv", ["spinlev", "test"])
