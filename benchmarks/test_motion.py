@@ -127,7 +127,7 @@ def _over_plate(benchmark, start, model, plate_model, rtol, compiler):
     table = rotor_nearby(table, SCENE.rotor, start.position, SCENE.floater.radius, 3e-6)
     equilibria = with_plate(SCENE, table, survey(SCENE, table), memory, Rates(table)).equilibria
     begun, currents = initial_state(SCENE, table, equilibria, memory)
-    flight = compiler(SCENE, table, 0.5, PLATE_TOLERANCE, True, memory)
+    flight = compiler(SCENE, table, LONG, PLATE_TOLERANCE, True, memory)
     integrate(SCENE, flight, begun, 0.05, currents=currents)
     fly_on = lambda: integrate(SCENE, flight, begun, 0.5, currents=currents)  # noqa: E731
     flown = benchmark.pedantic(fly_on, rounds=3)

@@ -1,4 +1,4 @@
-"""Libraries that are loaded when something of them is used: an answer from the cache does without finite elements."""
+"""Libraries that are loaded when they are used, or not at all: an answer from the cache needs no finite elements."""
 
 from __future__ import annotations
 

@@ -100,7 +100,7 @@ def _with_axes(figure: Figure, rows: int, columns: int, **options: Any) -> tuple
 
 
 def power_of_ten(value: float, _: int) -> str:
-    """The number at a decade of a logarithmic axis, in letters: formulas take as long as the rest of a drawing."""
+    """The number at a decade of a logarithmic axis, in letters: a formula would have to be read."""
     return "10" + f"{math.log10(value):.0f}".translate(RAISED)
 
 
