@@ -7,7 +7,7 @@ import pytest
 
 from spinlev.dynamics.effects import Mutual, RotorCurrents, rough_force, with_effects
 from spinlev.dynamics.equilibria import find_equilibria, growth_by_floater, growth_by_rotor, shift_by_answers
-from spinlev.dynamics.motion import Interaction
+from spinlev.dynamics.motion import Interaction, Rates, Scales, parameters
 from spinlev.fem.mutual import cached_mutual_table
 from spinlev.fem.rotor_losses import ball_losses, pieces_of
 from spinlev.fem.rotor_tables import rotor_table
@@ -28,6 +28,12 @@ def table():
 @pytest.fixture(scope="module")
 def alone(table):
     return find_equilibria(SCENE, table)[0]
+
+
+def with_rates(equilibrium, scene, rates):
+    """The same place, with the Jacobian of other equations of motion there."""
+    state, values = Scales.of(scene).pack(equilibrium.state), parameters(scene, Scales.of(scene), frozen_spin=True)
+    return replace(equilibrium, jacobian=rates(state[None], values)[1][0])
 
 
 @pytest.mark.slow
@@ -52,6 +58,8 @@ def test_growth_by_the_currents_of_the_floater(table, alone):
     whole = with_effects(CONDUCTING, table)
     there = find_equilibria(CONDUCTING, whole)[0]
     said = growth_by_floater(CONDUCTING, table, alone, False)
+    same = with_rates(alone, CONDUCTING, Rates(whole))
+    assert growth_by_floater(CONDUCTING, table, same, True) == pytest.approx(said, rel=1e-9)
     assert growth_by_floater(CONDUCTING, table, there, True) == pytest.approx(said, rel=1e-3)
     assert 0.01 < said < 0.1
     assert said == pytest.approx(there.growth_per_s - alone.growth_per_s, rel=0.02)
@@ -63,5 +71,7 @@ def test_growth_by_the_currents_of_the_rotor(table, alone):
     there = find_equilibria(SCENE, whole)[0]
     said = growth_by_rotor(SCENE, alone, LOSSES, False)
     assert 0.01 < said < 0.1
+    same = with_rates(alone, SCENE, Rates(whole))
+    assert growth_by_rotor(SCENE, same, LOSSES, True) == pytest.approx(said, rel=1e-9)
     assert growth_by_rotor(SCENE, there, LOSSES, True) == pytest.approx(said, rel=1e-3)
     assert said == pytest.approx(there.growth_per_s - alone.growth_per_s, rel=0.02)
