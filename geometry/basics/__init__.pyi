@@ -7,7 +7,14 @@ from .arrays import (
 from .box import Box as Box, rotation_angles as rotation_angles, rotation_matrix as rotation_matrix
 from .constants import MAGNET_CONDUCTIVITY as MAGNET_CONDUCTIVITY, MU_0 as MU_0
 from .cylinder import Cylinder as Cylinder
-from .errors import ComputationError as ComputationError, InputError as InputError, SpinlevError as SpinlevError
+from .errors import (
+    ComputationError as ComputationError,
+    InputError as InputError,
+    SpinlevError as SpinlevError,
+    printable as printable,
+    shown as shown,
+)
+from .files import file_content as file_content, regular_file as regular_file
 from .part import Part as Part
 from .pose import Posed as Posed
 from .ring import Ring as Ring

@@ -18,3 +18,19 @@ class InputError(SpinlevError, ValueError):
 
 class ComputationError(SpinlevError, RuntimeError):
     """The computation ended without an answer; the message says why, and what would help."""
+
+
+def shown(value: object, most: int = 80) -> str:
+    """What was received, for a message: as Python writes it, on one line, no longer than `most`."""
+    try:
+        text = repr(value)
+    except (ValueError, RecursionError):  # an integer of thousands of digits; lists in lists by the thousand
+        return f"a value ({type(value).__name__}) that is too long to be shown"
+    return text if len(text) <= most else f"{text[: most - 3]}..."
+
+
+def printable(text: str) -> str:
+    """The same on a terminal, which must not obey what a file or a name holds: control characters are escaped."""
+    if text.isprintable():
+        return text
+    return "".join(c if c.isprintable() or c in "\n\t" else c.encode("unicode_escape").decode() for c in text)
