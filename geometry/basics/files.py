@@ -54,7 +54,7 @@ def regular_file(path: str | Path, most_bytes: int, name: str, kind: str) -> Bin
         found.close()
         raise InputError(
             f"Input {name} must be {kind} of at most {most_bytes / MEGA:g} MB; instead {_named(path)} holds "
-            f"{size / MEGA:.4g} MB."
+            f"{size / MEGA:.1f} MB."
         )
     return found
 

@@ -7,6 +7,11 @@ from .assembly import assemble
 from .contents import Scene
 from .parts import Table
 
+DEEPEST = 10
+"""Tables and lists in each other; a scene has five."""
+LARGEST = 2**1000
+"""Integers below it are floats."""
+
 
 def scene(
     *,
@@ -61,12 +66,18 @@ def scene(
     return assemble(_plain(keys), "scene")
 
 
-def _plain(value: Any) -> Any:
-    """Tuples and arrays as lists, NumPy's numbers and integers as floats: as a scene file has them."""
+def _plain(value: Any, depth: int = 0) -> Any:
+    """Tuples and arrays as lists, NumPy's numbers and integers as floats: as a scene file has them.
+
+    What is deeper than any scene, or too large for a float, is left as it is: the schema refuses it.
+    """
+    if depth > DEEPEST:
+        return value
     if isinstance(value, Mapping):
-        return {str(key): _plain(item) for key, item in value.items()}
+        return {str(key): _plain(item, depth + 1) for key, item in value.items()}
     if hasattr(value, "tolist"):
-        return _plain(value.tolist())
+        return _plain(value.tolist(), depth + 1)
     if isinstance(value, list | tuple):
-        return [_plain(item) for item in value]
-    return float(value) if isinstance(value, int) and not isinstance(value, bool) else value
+        return [_plain(item, depth + 1) for item in value]
+    whole = isinstance(value, int) and not isinstance(value, bool) and abs(value) < LARGEST
+    return float(value) if whole else value

@@ -9,7 +9,7 @@ import numpy as np
 from pydantic import BaseModel
 from pydantic_core import ErrorDetails
 
-from ..basics import InputError, Solid
+from ..basics import InputError, Solid, shown
 from ..bodies import TOUCHING, body_overlap, deepest_overlap_in_a_turn
 from . import schema
 from .contents import AbsoluteStart, Scene
@@ -29,6 +29,10 @@ TABLES: dict[str, type[BaseModel]] = {
     "drag": schema.DragSection,
     "start": schema.StartSection,
 }
+LONGEST = 60
+"""Characters of a key in a message."""
+MOST = 20
+"""Faults of a scene that are told; the rest are counted."""
 RULES = {
     "greater_than": "greater than {gt:g}",
     "greater_than_equal": "at least {ge:g}",
@@ -49,7 +53,9 @@ class SceneError(InputError):
 
     def __init__(self, source: str, faults: Sequence[str]) -> None:
         self.faults = tuple(faults)
-        super().__init__("\n".join(f"{source}: {fault}" for fault in self.faults))
+        told = [f"{source}: {fault}" for fault in self.faults[:MOST]]
+        more = len(self.faults) - len(told)
+        super().__init__("\n".join([*told, f"{source}: and {more} more faults."] if more else told))
 
 
 def describe_fault(detail: ErrorDetails) -> str:
@@ -65,22 +71,26 @@ def describe_fault(detail: ErrorDetails) -> str:
         configuration = received.get("configuration") if isinstance(received, dict) else received
         return (
             "Input rotor.configuration must be one of 'horizontal', 'vertical', 'tilt' (or rotor.magnets a list of "
-            f"magnets); instead received {_shown(configuration)}."
+            f"magnets); instead received {shown(configuration)}."
         )
     if place[-1] == "recoil_permeability" or place[-2:-1] == ["recoil_permeability"]:
         rule = RULES.get(kind, detail["msg"]).format(**detail.get("ctx", {}))
         if kind in ("too_short", "too_long"):
             rule = "a number, or two: along the easy axis and across it"
-        return f"Input {key.removesuffix('[0]')} must be {rule}; instead received {_shown(received)}."
+        return f"Input {key.removesuffix('[0]')} must be {rule}; instead received {shown(received)}."
     if kind in ("too_short", "too_long") and place[-1] != "magnets":
-        return f"Input {key} must be a list of exactly 3 numbers; instead received {_shown(received)}."
+        return f"Input {key} must be a list of exactly 3 numbers; instead received {shown(received)}."
+    if kind == "float_type" and isinstance(received, int) and not isinstance(received, bool):
+        kind = "finite_number"  # no float is so large
     rule = RULES.get(kind, detail["msg"]).format(**detail.get("ctx", {}))
-    return f"Input {key} must be {rule}; instead received {_shown(received)}."
+    return f"Input {key} must be {rule}; instead received {shown(received)}."
 
 
 def _named(key: str) -> str:
-    """A key as it stands in the file: in quotes where TOML wants them."""
-    return key if key.replace("_", "").replace("-", "").isalnum() else repr(key)
+    """A key as it stands in the file: in quotes where TOML wants them, and letters that look like others escaped."""
+    plain = key.isascii() and key.replace("_", "").replace("-", "").isalnum() and len(key) <= LONGEST
+    escaped = key[:LONGEST].encode("unicode_escape").decode() + ("..." if len(key) > LONGEST else "")
+    return key if plain else repr(key) if key.isascii() and len(key) <= LONGEST else f'"{escaped}"'
 
 
 def _allowed(place: list[Any], tag: Any) -> str:
@@ -93,14 +103,9 @@ def _allowed(place: list[Any], tag: Any) -> str:
     else:
         table = TABLES[names[-1]]
     keys = list(table.model_fields)
-    close = difflib.get_close_matches(str(place[-1]), keys, n=1)
+    close = difflib.get_close_matches(str(place[-1])[:LONGEST], keys, n=1)
     hint = f"did you mean {close[0]}? " if close else ""
     return f"{hint}allowed are {', '.join(keys)}"
-
-
-def _shown(value: Any) -> str:
-    text = repr(value)
-    return text if len(text) <= 80 else text[:77] + "..."
 
 
 def overlap_faults(scene: Scene) -> list[str]:

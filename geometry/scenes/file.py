@@ -1,17 +1,26 @@
 """Reads a scene file and tells every fault of it at once."""
 
 import logging
-import os
+import re
 import tomllib
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from ..basics import InputError, file_content, regular_file, shown
 from .assembly import assemble
 from .contents import Scene
 from .faults import SceneError
 from .writing import scene_keys
+
+MOST = 5_000_000
+"""Bytes of a scene file; one with a thousand magnets has 200 000."""
+MOST_OF_MAP = 1_000_000_000
+"""Bytes of a map of the field."""
+LONGEST_KEY = re.compile(r"""(?<![\w-])(?:(?:[\w-]+|"(?:[^"\\\n]|\\.)*"|'[^'\n]*')[ \t]*\.[ \t]*){20}""")
+"""A dotted key of so many parts: reading it takes time and memory that grow with their square."""
+DECIMAL_COMMA = re.compile(r"(?m)^[^#\n\[]*=\s*[-+]?\d+,\s*\d")
 
 
 def load_scene(path: str | Path) -> Scene:
@@ -30,19 +39,21 @@ def load_scene(path: str | Path) -> Scene:
     Raises
     ------
     SceneError
-        The file is missing or unreadable, is not TOML, has unknown, missing or wrong keys, or its bodies overlap, or
-        its map of the field is no file.
+        The file is missing, no file, too large or unreadable, is not TOML, has unknown, missing or wrong keys, or its
+        bodies overlap, or its map of the field is no file.
     """
     source = str(path)
     try:
-        text = Path(path).read_text(encoding="utf-8")
-    except FileNotFoundError:
-        raise SceneError(source, ["Input scene must be a TOML file that exists; instead there is none."]) from None
-    except (OSError, UnicodeDecodeError) as error:
-        raise SceneError(source, [f"Input scene must be a readable UTF-8 text; instead: {error}."]) from None
-    scene = parse_scene(text, source)
-    if scene.field_map and not os.path.isfile(scene.field_map):  # unlike Path.is_file never raises
-        raise SceneError(source, [f"Input rotor.field_map must be a file; instead there is no {scene.field_map}."])
+        text = file_content(path, MOST, "scene", "a TOML file").decode("utf-8-sig")
+        scene = parse_scene(text.replace("\r\n", "\n").replace("\r", "\n"), source)
+        if scene.field_map:
+            regular_file(scene.field_map, MOST_OF_MAP, "rotor.field_map", "a map of the field").close()
+    except UnicodeDecodeError as error:
+        raise SceneError(source, [f"Input scene must be a text in UTF-8; instead: {error}."]) from None
+    except SceneError:
+        raise
+    except InputError as error:
+        raise SceneError(source, [str(error)]) from None
     for remark in scene.remarks:
         logging.getLogger("spinlev").info(remark)
     return scene
@@ -70,14 +81,28 @@ def parse_scene(text: str, source: str = "scene", changes: Mapping[str, float] |
     SceneError
         As `load_scene`, also for a change that no key takes.
     """
-    try:
-        keys = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        raise SceneError(source, [f"Input scene must be TOML; instead: {error}."]) from None
+    keys = _keys(text, source)
     for key, value in (changes or {}).items():
         _replace(keys, key, value, source)
     scene = assemble(keys, source)
     return scene if changes else replace(scene, text=text)
+
+
+def _keys(text: str, source: str) -> dict[str, Any]:
+    """The tables of a text, of which TOML's parser survives the reading."""
+    if LONGEST_KEY.search(text):
+        raise SceneError(source, ["Input key must have fewer than 20 parts; instead there is one with more."])
+    try:
+        return tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        point = " Decimals have a point, lists square brackets." if DECIMAL_COMMA.search(text) else ""
+        raise SceneError(source, [f"Input scene must be TOML; instead: {str(error)[:200]}.{point}"]) from None
+    except RecursionError:
+        said = "Input scene must be TOML with few lists in each other; instead some are nested too deep."
+        raise SceneError(source, [said]) from None
+    except ValueError:  # Python's own limit
+        said = "Input scene must have numbers of a few digits; instead one has thousands."
+        raise SceneError(source, [said]) from None
 
 
 def changed(scene: Scene, changes: Mapping[str, float], source: str = "scene") -> Scene:
@@ -90,15 +115,14 @@ def changed(scene: Scene, changes: Mapping[str, float], source: str = "scene") -
 
 def _replace(raw: Any, key: str, value: float, source: str) -> None:
     """Put a number in the place of `key`: names of tables, and numbers of list entries from 0, joined by dots."""
-    *path, last = (int(part) if part.isdecimal() else part for part in key.split("."))
     try:
+        *path, last = (int(part) if part.isdecimal() else part for part in key.split("."))
         for part in path:
             raw = raw[part]
         if isinstance(last, int):
             raw[last] = value
         else:
             raw.update({last: value})
-    except (KeyError, IndexError, TypeError, AttributeError):
-        raise SceneError(
-            source, [f"Input {key} must be a key inside the tables and lists that the scene has; instead it is not."]
-        ) from None
+    except (ValueError, KeyError, IndexError, TypeError, AttributeError):
+        said = f"Input {shown(key)} must be a key inside the tables and lists that the scene has; instead it is not."
+        raise SceneError(source, [said]) from None

@@ -129,7 +129,8 @@ def rotor_kind(rotor: Any) -> str | None:
     """Which of the rotor tables a `[rotor]` table is."""
     if not isinstance(rotor, dict):
         return None
-    return "magnets" if "magnets" in rotor else str(rotor.get("configuration"))
+    configuration = rotor.get("configuration")
+    return "magnets" if "magnets" in rotor else configuration if isinstance(configuration, str) else None
 
 
 Rotor = Annotated[

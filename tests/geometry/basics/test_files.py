@@ -38,7 +38,7 @@ def test_a_larger_file_is_named_with_its_size(tmp_path):
     assert tracemalloc.get_traced_memory()[1] < 100_000  # bytes: nothing of it was read
     tracemalloc.stop()
     assert "a CSV file of at most 1 MB; instead" in said
-    assert said.endswith("holds 1e+04 MB.")
+    assert said.endswith("holds 10000.0 MB.")
 
 
 def test_what_is_no_file_is_named(tmp_path):

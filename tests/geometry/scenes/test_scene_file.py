@@ -7,7 +7,18 @@ import pytest
 from places import SCENES
 
 from spinlev.geometry.basics import MU_0
-from spinlev.geometry.scenes import AbsoluteStart, Drag, OffsetStart, SceneError, load_scene, parse_scene, scene_text
+from spinlev.geometry.scenes import (
+    AbsoluteStart,
+    Drag,
+    OffsetStart,
+    SceneError,
+    load_scene,
+    parse_scene,
+    scene,
+    scene_text,
+    sphere,
+    tilt,
+)
 
 GOOD = (SCENES / "horizontal.toml").read_text()
 
@@ -129,10 +140,101 @@ def test_files_that_are_no_scene(tmp_path, content):
 
 
 def test_missing_file_and_folder(tmp_path):
-    with pytest.raises(SceneError, match="a TOML file that exists"):
+    with pytest.raises(SceneError, match="a TOML file; instead there is no"):
         load_scene(tmp_path / "none.toml")
-    with pytest.raises(SceneError, match="readable"):
+    with pytest.raises(SceneError, match="is a folder"):
         load_scene(tmp_path)
+
+
+def nested(levels):
+    found = 1.0
+    for _ in range(levels):
+        found = [found]
+    return found
+
+
+@pytest.mark.parametrize(
+    ("value", "said"),
+    [
+        ("[" * 5000 + "]" * 5000, "few lists in each other; instead some are nested too deep"),
+        ("{a=" * 3000 + "1" + "}" * 3000, "few lists in each other; instead some are nested too deep"),
+        ("[" * 90 + "]" * 90, "frequency_hz must be a number; instead received [[[["),
+        ("9" * 5000, "numbers of a few digits; instead one has thousands"),
+        ("9" * 400, "frequency_hz must be a finite number; instead received 999"),
+        ("0x" + "f" * 5000, "frequency_hz must be a finite number; instead received a value (int) that is too long"),
+        ("'" + "x" * 100_000 + "'", "frequency_hz must be a number; instead received 'xxx"),
+        (r'"\u001b[2J"', r"frequency_hz must be a number; instead received '\x1b[2J'."),
+        ("130,5", "Decimals have a point"),
+        ("1979-05-27", "frequency_hz must be a number"),
+    ],
+    ids=["lists", "tables", "some lists", "digits", "no float", "no text", "long", "control", "comma", "date"],
+)
+def test_values_that_break_parsers_are_one_short_sentence(value, said):
+    (fault,) = faults(GOOD.replace("frequency_hz = 110.0", f"frequency_hz = {value}"))
+    assert said in fault
+    assert len(fault) < 400
+
+
+@pytest.mark.parametrize(
+    ("line", "said"),
+    [
+        (".".join(["a"] * 20_000) + " = 1", "Input key must have fewer than 20 parts"),
+        ("[" + " . ".join(['"a\\"."'] * 20_000) + "]", "Input key must have fewer than 20 parts"),
+        ("'" + "k" * 100_000 + "' = 1", '"' + "k" * 60 + '..." must be a known key'),
+        ('"fr\u0435quency_hz" = 1', r'drag."fr\u0435quency_hz" must be a known key'),
+        (r'"\u001b[2J" = 1', r"drag.'\x1b[2J' must be a known key"),
+        ('"" = 1', "drag.'' must be a known key"),
+    ],
+    ids=["dots", "quoted dots", "long", "Cyrillic", "control", "empty"],
+)
+def test_keys_that_break_parsers_are_one_short_sentence(line, said):
+    (fault,) = faults(GOOD + line)  # behind [drag]; as many parts as these took 20 s and 2.4 GB
+    assert said in fault
+    assert len(fault) < 400
+
+
+def test_a_thousand_faults_are_counted_and_not_all_told():
+    with pytest.raises(SceneError) as error:
+        parse_scene("\n".join(f"k{i} = 1" for i in range(1000)) + "\n" + GOOD)
+    assert len(error.value.faults) == 1000
+    assert str(error.value).count("\n") == 20
+    assert str(error.value).endswith("and 980 more faults.")
+
+
+def test_values_from_python_that_no_file_can_have():
+    rotor = tilt(angle_deg=10, edge_mm=10, remanence_T=1.3)
+    floater = sphere(diameter_mm=10, remanence_T=1.3, density_kg_m3=7500)
+    for value, said in [
+        (nested(100_000), "a value (list) that is too long"),
+        (10**5000, "a finite number; instead received a value (int)"),
+        (True, "a number; instead received True"),
+        (np.array("1979-05-27", "datetime64[D]"), "a number; instead received datetime"),
+    ]:
+        with pytest.raises(SceneError) as error:
+            scene(frequency_hz=value, rotor=rotor, floater=floater)
+        assert said in str(error.value)
+        with pytest.raises(SceneError) as error:
+            scene(frequency_hz=1, rotor=rotor, floater={"remanence_T": value, "density_kg_m3": 1.0, "diameter_mm": 1})
+        assert said in str(error.value)
+    round_in_itself = {}
+    round_in_itself["configuration"] = round_in_itself
+    with pytest.raises(SceneError, match=r"rotor\.configuration must be one of"):
+        scene(frequency_hz=1, rotor=round_in_itself, floater=floater)
+
+
+def test_a_mark_of_byte_order_and_ends_of_lines_of_other_systems_do_no_harm(tmp_path):
+    path = tmp_path / "s.toml"
+    for content in ("\ufeff" + GOOD, GOOD.replace("\n", "\r\n"), GOOD.replace("\n", "\r")):
+        path.write_bytes(content.encode())
+        assert load_scene(path).text == GOOD
+
+
+@pytest.mark.parametrize("key", ["9" * 5000, "rotor." + "9" * 5000, "a." * 50_000 + "b", "\x1b[2J.x"])
+def test_keys_to_change_that_no_scene_has(key):
+    with pytest.raises(SceneError, match="must be a key inside the tables") as error:
+        parse_scene(GOOD, changes={key: 1.0})
+    assert len(str(error.value)) < 300
+    assert str(error.value).isprintable()
 
 
 def test_a_start_has_one_place_and_a_direction():

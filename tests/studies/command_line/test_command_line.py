@@ -176,7 +176,7 @@ def test_wrong_scenes_end_with_status_2_one_message_and_no_file(spinlev, tmp_pat
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
-        (("run", "none.toml"), "none.toml: Input scene must be a TOML file that exists"),
+        (("run", "none.toml"), "none.toml: Input scene must be a TOML file; instead there is no none.toml."),
         (("field", "S", "--points", "none.csv"), "none.csv: Input points must be a CSV file"),
         (("field", "S", "--points", "P", "--model", "magic"), "magic"),
         (("field", "S", "--points", "P", "--rtol", "-1"), "--rtol must be at least"),

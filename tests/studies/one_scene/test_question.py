@@ -122,7 +122,7 @@ def test_field_over_one_parameter(spinlev):
     [
         (("study", SCENE), "A scene needs --vary"),
         (("study", "--vary", "frequency_hz=1"), "must be a scene file"),
-        (("study", "none.toml", "--vary", "frequency_hz=1"), "must be a TOML file that exists"),
+        (("study", "none.toml", "--vary", "frequency_hz=1"), "must be a TOML file; instead there is no none.toml."),
         (("study", SCENE, "--vary", "frequency_hz=-1"), "frequency_hz must be at least 0"),
         (("study", SCENE, "--vary", "frequency_hz=1", "--at", "1,2"), "--at must be three numbers"),
         (("study", SCENE, "--vary", "frequency_hz=1", "--workers", "0"), "--workers must be between"),
