@@ -6,6 +6,11 @@ BIN := $(VENV)/bin
 export OPENBLAS_NUM_THREADS ?= 1
 # Where the user forbids it, every process would compile the sources of all libraries anew: seconds each time.
 export PYTHONDONTWRITEBYTECODE =
+PIN := $(BIN)/pip install --quiet --disable-pip-version-check --no-compile --require-hashes --no-deps
+# A solver that takes the version to solve for: pip's own would ask for the Python that runs it. 3.11 means 3.11.0 to it.
+OLDEST = $(shell sed -n 's/^requires-python = ">=\(.*\)"/\1/p' pyproject.toml)
+SOLVE = out/solver/bin/uv pip compile pyproject.toml --quiet --python-version $(OLDEST) --generate-hashes \
+  --no-emit-index-url --no-emit-find-links --custom-compile-command "make lock"
 OLD ?= benchmarks/measured.json
 NEW ?= out/benchmarks.json
 SOURCES := $(shell find spinlev geometry fem dynamics studies scenes -type f -not -name "*.pyc") setup.py pyproject.toml README.md LICENSE
@@ -13,9 +18,13 @@ SOURCES := $(shell find spinlev geometry fem dynamics studies scenes -type f -no
 # Slow tests are run by `validate`, those that need a browser by `test-browser`, which `validate` begins with.
 FAST := not slow and not browser
 
-.PHONY: install run test test-browser lint types coverage bench bench-compare bench-peers dist dependencies docs validate fuzz lock clean
+.PHONY: install run develop test test-browser lint types check-pins coverage bench bench-compare bench-peers dist dependencies docs \
+  validate fuzz lock clean
 
+# What the program needs, the page in the browser included; `develop` adds what tests it and writes its pages.
 install: $(VENV)/installed
+
+develop: $(VENV)/installed $(VENV)/developing
 
 $(VENV)/dependencies: requirements.txt
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \
@@ -24,7 +33,13 @@ $(VENV)/dependencies: requirements.txt
 	  { echo "$(PYTHON) cannot make environments. On Debian or Ubuntu: apt-get install python3-venv"; exit 1; }
 	@echo "Installing the libraries into $(VENV), half a minute to two ..."
 	$(PYTHON) -m venv $(VENV)
-	$(BIN)/pip install --quiet --disable-pip-version-check --no-compile --require-hashes --no-deps -r requirements.txt
+	$(PIN) -r requirements.txt
+	@touch $@
+
+# After the package, so that a machine that cannot load the libraries says so before it gets the rest.
+$(VENV)/developing: requirements-dev.txt $(VENV)/dependencies | $(VENV)/installed
+	@echo "Installing what tests and documents it, half a minute ..."
+	$(PIN) -r requirements-dev.txt
 	@touch $@
 
 $(VENV)/installed: $(VENV)/dependencies $(SOURCES)
@@ -39,24 +54,24 @@ $(VENV)/installed: $(VENV)/dependencies $(SOURCES)
 run: install
 	$(BIN)/spinlev run scenes/tilt-over-plate.toml
 
-lint: install
+lint: develop
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 
-types: install
+types: develop
 	cd $(VENV) && bin/mypy --config-file ../pyproject.toml --cache-dir ../.mypy_cache --num-workers 2 -p spinlev
 
-test: lint types
+test: lint types check-pins
 	$(BIN)/pytest -n 2 --dist worksteal -m "$(FAST)"
 
 # Report, documentation and the live page in headless Chromium (Debian: apt-get install chromium); skipped where there is none.
 # The gallery's programs are not run for it: the pages are then without their output. It says how fast a slider is.
-test-browser: install
+test-browser: develop
 	$(BIN)/sphinx-build --quiet -D plot_gallery=0 -b html docs docs/_build/unrun
 	$(BIN)/pytest -n 2 --dist worksteal tests/whole/test_explore_browser.py tests/whole/test_browser.py
 
 # Lines that the fast tests run, in child processes too; what a killed process has left of its own count is removed.
-coverage: install
+coverage: develop
 	$(BIN)/pytest -n 2 --dist worksteal -m "$(FAST)" --cov --cov-report=
 	@rm -f .coverage.*
 	$(BIN)/coverage report --fail-under=95
@@ -67,7 +82,7 @@ validate: test-browser
 	$(BIN)/pytest -m slow -s
 
 # Processor times, so that other work on the machine matters little; the report says them as ratios to the peers.
-bench: install
+bench: develop
 	@mkdir -p out
 	$(BIN)/pytest benchmarks --benchmark-timer=time.process_time --benchmark-columns=min,median,rounds \
 	  --benchmark-json=$(NEW)
@@ -75,27 +90,27 @@ bench: install
 
 # Other people's programs on the same problems, in environments of their own under out/peers; WORK=plate does one of them.
 # A row that is finished stays; RUN=--again does them anew, RUN=--second fills the second run, whose times give the spread.
-bench-peers: install
+bench-peers: develop
 	$(BIN)/python benchmarks/peer_runs/run.py $(WORK) $(RUN)
 
 # Two commits: make bench in both, then make bench-compare OLD=theirs.json; by default with the one in the repository.
 bench-compare: install
 	$(BIN)/python benchmarks/ratios.py $(OLD) $(NEW)
 
-fuzz: install
+fuzz: develop
 	$(BIN)/python tests/fuzzing.py all 10000
 
 # Runs the gallery's programs too, those that have changed since.
-docs: install
+docs: develop
 	$(BIN)/sphinx-build --fail-on-warning --quiet -b html docs docs/_build/html
 	@echo docs/_build/html/index.html
 
 # The page that lists them, with licences.
-dependencies: install
+dependencies: develop
 	$(BIN)/python docs/list_dependencies.py
 
 # Wheel and source distribution in dist/, without a network; then the wheel is tested outside the repository.
-dist: install
+dist: develop
 	rm -rf dist build/lib build/bdist*
 	@$(BIN)/python -c 'import setuptools.build_meta as b; b.build_sdist("dist"); b.build_wheel("dist")' >build/log 2>&1 || \
 	  { cat build/log; exit 1; }
@@ -103,10 +118,17 @@ dist: install
 	@ls dist
 	sh tests/try_wheel.sh $(BIN)/python dist
 
-# Pin anew (needs pip-tools in the environment that calls it).
+# Pin anew for the oldest Python that the package takes, whichever Python runs this. Pins that may stay do;
+# LOCK=--upgrade takes the newest. What is needed to run has the same pins.
 lock:
-	pip-compile --quiet --extra dev --extra explore --generate-hashes --allow-unsafe --strip-extras --no-emit-index-url \
-	  --no-emit-trusted-host --no-emit-find-links --output-file requirements.txt pyproject.toml
+	$(PYTHON) -m venv out/solver
+	out/solver/bin/pip install --quiet --disable-pip-version-check uv
+	$(SOLVE) $(LOCK) --extra explore --extra build --extra dev --output-file requirements-dev.txt
+	$(SOLVE) --extra explore --extra build --constraints requirements-dev.txt --no-annotate --output-file requirements.txt
+
+# Every pin admits that Python and needs nothing that is not pinned.
+check-pins: develop
+	$(BIN)/python tests/check_pins.py
 
 clean:
 	rm -rf $(VENV) build dist out docs/_build docs/gallery .coverage*

@@ -15,7 +15,7 @@ KNOWN = {"matplotlib": "PSF-based (BSD compatible)", "dynesty": "MIT"}
 """What a package's text says in many words."""
 HEAD = """# Dependencies
 
-Written by `docs/list_dependencies.py` from `pyproject.toml`, `requirements.txt` and what the packages say of their
+Written by `docs/list_dependencies.py` from `pyproject.toml`, `requirements-dev.txt` and what the packages say of their
 licences; `tests/whole/test_documentation.py` keeps it up to date. spinlev itself has the MIT licence. Licences with a
 condition on changed copies of the library are LGPL (NGSolve, Netgen and Open CASCADE) and MPL (heyoka and some small
 ones); all are used unchanged, as separate packages.
@@ -54,7 +54,7 @@ def page():
     run, _, rest = (ROOT / "pyproject.toml").read_text("utf-8").partition("[project.optional-dependencies]")
     extra, _, dev = rest.partition("[project.scripts]")[0].partition("\ndev = [")
     run, extra, dev = reasons(run.partition("dependencies = [")[2]), reasons(extra), reasons(dev)
-    pinned = needed_by((ROOT / "requirements.txt").read_text("utf-8"))
+    pinned = needed_by((ROOT / "requirements-dev.txt").read_text("utf-8"))
     lines = [HEAD]
     for title, names in (
         ("To run", run),

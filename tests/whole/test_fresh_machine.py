@@ -7,7 +7,10 @@ import platform
 import re
 import subprocess
 import sys
+from importlib.metadata import PackageNotFoundError
+from types import SimpleNamespace
 
+import check_pins
 import pytest
 from places import HORIZONTAL
 
@@ -183,3 +186,49 @@ def test_a_command_on_a_terminal_that_knows_only_ascii(tmp_path, settings):
     assert done.returncode == 0, done.stderr
     assert re.search(rb"tilted \d+\.\ddeg; stable", done.stdout)
     assert (done.stdout + done.stderr).isascii()
+
+
+def test_what_is_installed_to_run_has_no_tools_in_it():
+    run = check_pins.pins((check_pins.ROOT / "requirements.txt").read_text("utf-8"))
+    assert {"ngsolve", "heyoka", "bokeh", "plotly", "tornado", "setuptools"} <= set(run)
+    assert not {"pytest", "mypy", "ruff", "hypothesis", "coverage", "numpydoc", "docutils"} & set(run)
+    assert [name for name in run if "sphinx" in name] == []
+
+
+def test_both_lists_of_pins_admit_the_oldest_python():
+    assert check_pins.oldest() == "3.11.0"
+    assert not check_pins.main()
+
+
+@pytest.mark.parametrize(
+    ("package", "said"),
+    [
+        ({}, []),
+        ({"python": ">=3.11.5"}, ["a 1.0 wants Python >=3.11.5"]),
+        ({"python": "!=3.11.0,>=3.8"}, ["a 1.0 wants Python !=3.11.0,>=3.8"]),
+        ({"version": "1.1"}, ["a 1.0 is installed as 1.1"]),
+        ({"hash": ""}, ["a has no hash"]),
+        ({"installed": "b"}, ["a 1.0 is not installed"]),
+        # backports that only the first releases of a Python want are what a newer one's environment does not have
+        (
+            {"requires": ['b; python_full_version < "3.11.3"']},
+            ['a 1.0 needs b; python_full_version < "3.11.3"; pinned is none'],
+        ),
+        ({"requires": ['b; python_version < "3.11"', 'c; extra == "d"']}, []),
+        ({"requires": ["A>1"]}, ["a 1.0 needs A>1; pinned is 1.0"]),
+        ({"asked": ["c>=2"]}, ["spinlev needs c>=2; pinned is none"]),
+    ],
+)
+def test_a_pin_that_the_oldest_python_cannot_install_is_found(package, said):
+    """Whatever Python runs the check."""
+
+    def find(name):
+        if name != package.get("installed", "a"):
+            raise PackageNotFoundError(name)
+        metadata = {"Requires-Python": package.get("python")}
+        return SimpleNamespace(
+            version=package.get("version", "1.0"), metadata=metadata, requires=package.get("requires", [])
+        )
+
+    line = "a==1.0" + package.get("hash", " \\\n    --hash=sha256:0123")
+    assert check_pins.faults(line, "3.11.0", package.get("asked", ()), find) == said
