@@ -1,9 +1,13 @@
 """A folder of what was computed before: found again by its name, made by one process at a time."""
 
 import errno
+import logging
 import os
+import stat
+import tempfile
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
+from functools import cache
 from pathlib import Path
 from typing import TypeVar
 
@@ -17,8 +21,66 @@ NO_LOCKS = (errno.ENOLCK, errno.ENOSYS, errno.EOPNOTSUPP)
 
 
 def cache_folder() -> Path:
-    """$SPINLEV_CACHE, else spinlev in the place of a user's caches: $XDG_CACHE_HOME or ~/.cache on Linux."""
-    return Path(os.environ.get("SPINLEV_CACHE") or platformdirs.user_cache_dir("spinlev", appauthor=False))
+    """$SPINLEV_CACHE, else spinlev in the place of a user's caches: $XDG_CACHE_HOME or ~/.cache on Linux.
+
+    Who has no home, or none to write in, has a folder in the system's temporary one.
+    """
+    if named := os.environ.get("SPINLEV_CACHE"):
+        return Path(named)
+    try:
+        return _usable(Path(platformdirs.user_cache_dir("spinlev", appauthor=False)))
+    except RuntimeError:  # neither $HOME nor an entry in the list of users
+        return _usable(Path())
+
+
+@cache
+def _usable(folder: Path) -> Path:
+    with suppress(OSError):
+        if folder.is_absolute():  # older platformdirs leave a ~ that nobody knows, which would be a folder's name
+            folder.mkdir(mode=0o755, parents=True, exist_ok=True)
+            return folder
+    try:
+        instead = Path(tempfile.gettempdir()) / f"spinlev-{os.getuid()}"
+        instead.mkdir(mode=0o700, exist_ok=True)
+        if others_may_write(instead):  # somebody else was there first
+            instead = Path(tempfile.mkdtemp(prefix=f"{instead.name}-"))
+    except OSError:
+        return Path(os.devnull) / "spinlev"  # where nothing can be kept, which each table says
+    text = "There is no home folder: tables are kept in %s, as long as the system does; SPINLEV_CACHE names another."
+    logging.getLogger("spinlev").info(text, instead)
+    return instead
+
+
+def own_folder(name: str) -> Path:
+    """A folder of the cache for this user alone, made if it is missing. Raises OSError.
+
+    In a cache that several users share each has one: what is in it can be trusted as far as `others_may_write` says.
+    """
+    # Not as the user's mask would have it, which often lets a group write.
+    (root := cache_folder()).mkdir(mode=0o755, parents=True, exist_ok=True)
+    (folder := root / f"{name}-{os.getuid()}").mkdir(mode=0o700, exist_ok=True)
+    return folder
+
+
+def others_may_write(folder: Path) -> str | None:
+    """Who but this user and root can put files into a folder of the cache, or another in its place, and the way out.
+
+    None if nobody can. Raises OSError.
+    """
+    for path, found in ((folder.parent, folder.parent.stat()), (folder, folder.lstat())):
+        kept_apart = path != folder and found.st_mode & stat.S_ISVTX  # each may remove only what is his
+        if not stat.S_ISDIR(found.st_mode):
+            return f"{path} is a link or no folder; remove it"
+        if not ours(found):
+            return f"{path} belongs to another user; set SPINLEV_CACHE to a folder of your own"
+        if found.st_mode & (stat.S_IWGRP | stat.S_IWOTH) and not kept_apart:
+            return f"others may write in {path}; chmod {'+t' if path != folder else 'go-w'} {path} mends it"
+    return None
+
+
+def ours(found: os.stat_result) -> bool:
+    """Whether a file is this user's or root's."""
+    return found.st_uid in (0, os.getuid())
 
 
 def from_cache(
@@ -56,7 +118,7 @@ def alone(path: Path, report: Callable[[str], None]) -> Iterator[None]:
     """
     lock = FileLock(path)
     try:
-        path.parent.mkdir(parents=True, exist_ok=True)
+        path.parent.mkdir(mode=0o755, parents=True, exist_ok=True)
         _take(lock, report)
     except OSError as error:
         if error.errno in NO_LOCKS:

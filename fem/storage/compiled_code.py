@@ -1,7 +1,11 @@
 """Compiled code of earlier processes: whole files with a checksum, under a key of what was compiled.
 
+Who writes such a file decides what the processor does: each user has a folder of his own, and nothing is read that
+another one could have written.  A file is what heyoka writes of a thing, which only that kind of thing reads; a pickle
+would begin with the name of anything.
+
 heyoka can keep machine code by itself, in a database without checksums: one flipped bit in a constant is a wrong
-number.  What it has compiled can be pickled with the code in it, which is read again in hundredths of a second.
+number, or the end of the process.  It would also have all expressions written anew by each command: a second of `run`.
 """
 
 import hashlib
@@ -9,15 +13,15 @@ import io
 import logging
 import os
 import pickle
+import stat
 import zlib
 from collections import OrderedDict
 from collections.abc import Callable, Sequence
-from contextlib import suppress
 from functools import cache
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, TypeVar, cast
 
-from .cache import cache_folder, make_room
+from .cache import cache_folder, make_room, others_may_write, ours, own_folder
 from .program_text import digest_of
 from .whole_files import seal, unsealed, write_whole
 
@@ -26,6 +30,9 @@ LIMIT = 2**29
 SHARED = 2**23
 """The same of functions that this process keeps at hand, which take 20 times as much of its memory; those in use are
 not lost by it, and integrators, which have a state, are read anew each time."""
+KINDS = ("cfunc_dbl", "taylor_adaptive_dbl", "taylor_adaptive_batch_dbl")
+"""What is kept, by its name in heyoka."""
+LOG = logging.getLogger("spinlev")
 Compiled = TypeVar("Compiled")
 _functions: OrderedDict[Path, tuple[Any, int]] = OrderedDict()
 
@@ -60,23 +67,41 @@ def compiled_later(
 
 
 def _kept(asked: tuple[Any, ...], make: Callable[[], Compiled]) -> Compiled:
-    path = cache_folder() / "code" / f"{hashlib.sha256(_target() + _Asked.of(asked)).hexdigest()}.code"
-    known, size = _functions.pop(path, (None, 0))
-    found: Compiled | None = known or _read(path)
+    name = f"{hashlib.sha256(_target() + _Asked.of(asked)).hexdigest()}.code"
+    path = cache_folder() / name  # in this process; on the disk it is in the user's folder there
+    found, size = _functions.pop(path, (None, 0))
     if found is None:
-        found = make()
-        _keep(found, path)
+        folder = _folder()
+        found, size = _read(folder / name) if folder else (None, 0)
+        if found is None:
+            content = _written(found := make())
+            size = len(content)
+            if folder:
+                _keep(content, folder / name)
     if asked[0].__name__ == "cfunc":
-        _functions[path] = found, size or _size(path)
+        _functions[path] = found, size
         while sum(size for _, size in _functions.values()) > SHARED and len(_functions) > 1:
             _functions.popitem(last=False)
-    return found
+    return cast(Compiled, found)
 
 
-def _size(path: Path) -> int:
-    with suppress(OSError):  # it could not be kept
-        return path.stat().st_size
-    return 0
+def _folder() -> Path | None:
+    """The user's folder for code, if no other user can write there; else that is said, once."""
+    try:
+        folder = own_folder("code")
+        reason = others_may_write(folder)
+    except OSError as error:  # costs time only
+        LOG.debug("Compiled code could not be kept: %s", error)
+        return None
+    if reason is None:
+        return folder
+    _say(reason)
+    return None
+
+
+@cache
+def _say(reason: str) -> None:
+    LOG.info("Compiled code is neither read nor kept, which costs seconds: %s.", reason)
 
 
 class _Asked(pickle.Pickler):
@@ -120,20 +145,36 @@ def _target() -> bytes:
     return f"{hy.__version__} {hy.cfunc([x], [x]).llvm_states}".encode()
 
 
-def _read(path: Path) -> Any:
+def _written(made: Any) -> bytes:
+    state, _ = made.__getstate__()
+    return seal(zlib.compress(type(made).__name__.encode() + b"\n" + state, 1))
+
+
+def _read(path: Path) -> tuple[Any, int]:
+    """What was kept, and its size; None where there is none to be trusted."""
+    import heyoka as hy
+
     try:
+        found = path.lstat()
+        # A folder that others could write in once may have something left of theirs.
+        if not ours(found) or found.st_mode & (stat.S_IWGRP | stat.S_IWOTH):
+            return None, 0
         content = unsealed(path)
         if content is None:
-            return None
+            return None, 0
+        kind, _, state = zlib.decompress(content).partition(b"\n")
+        form = getattr(hy, KINDS[KINDS.index(kind.decode())])
+        made = form.__new__(form)
+        made.__setstate__((state, {}))
         os.utime(path)
-        return pickle.loads(zlib.decompress(content))
+        return made, found.st_size
     except Exception:  # missing, or of a heyoka that was built otherwise: it raises what it likes
-        return None
+        return None, 0
 
 
-def _keep(made: object, path: Path) -> None:
+def _keep(content: bytes, path: Path) -> None:
     try:
-        write_whole(path, seal(zlib.compress(pickle.dumps(made), 1)))
+        write_whole(path, content)
         make_room(path.parent, LIMIT)
     except OSError as error:  # costs time only
-        logging.getLogger("spinlev").debug("Compiled code could not be kept: %s", error)
+        LOG.debug("Compiled code could not be kept: %s", error)

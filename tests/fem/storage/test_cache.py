@@ -4,9 +4,11 @@ import errno
 import multiprocessing
 import os
 import platform
+import pwd
 import signal
 import subprocess
 import sys
+import tempfile
 import time
 from pathlib import Path
 
@@ -14,6 +16,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
+from spinlev.fem import storage
 from spinlev.fem.storage import from_cache, read_checked, seal, write_checked, write_whole
 from spinlev.fem.storage.cache import cache_folder
 
@@ -65,6 +68,61 @@ def test_where_the_cache_is(tmp_path, monkeypatch):
     assert cache_folder() == tmp_path / ".cache" / "spinlev"
     monkeypatch.setenv("SPINLEV_CACHE", str(tmp_path / "own"))
     assert cache_folder() == tmp_path / "own"
+
+
+HOMES = ("no home", "a home that is not there", "a home in which nothing can be written")
+
+
+@pytest.fixture
+def homeless(tmp_path, monkeypatch, request):
+    """A user without a home; gives the system's folder for temporary files."""
+    for name in ("SPINLEV_CACHE", "XDG_CACHE_HOME", "HOME"):
+        monkeypatch.delenv(name, raising=False)
+    if request.param == "no home":  # and no entry in the list of users
+
+        def unknown(number):
+            raise KeyError(f"getpwuid(): uid not found: {number}")
+
+        monkeypatch.setattr(pwd, "getpwuid", unknown)
+    else:
+        monkeypatch.setenv("HOME", "/dev/null" if request.param == HOMES[1] else "/sys")
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    monkeypatch.chdir(tmp_path)
+    storage.cache._usable.cache_clear()
+    yield tmp_path
+    storage.cache._usable.cache_clear()
+
+
+@pytest.mark.parametrize("homeless", HOMES, indirect=True)
+def test_who_has_no_home_has_a_cache_among_the_temporary_files(homeless, caplog):
+    """It is the user's alone, is found again, and is told once."""
+    with caplog.at_level("INFO", "spinlev"):
+        assert cache_folder() == cache_folder() == homeless / f"spinlev-{os.getuid()}"
+    (said,) = caplog.messages
+    assert str(cache_folder()) in said
+    assert "SPINLEV_CACHE" in said
+    assert cache_folder().stat().st_mode & 0o777 == 0o700
+    assert text("made") == ("made", False, [])
+    storage.cache._usable.cache_clear()
+    assert text("another") == ("made", True, [])
+    assert [path.name for path in homeless.iterdir()] == [cache_folder().name]
+
+
+@pytest.mark.parametrize("homeless", HOMES[:1], indirect=True)
+def test_who_has_no_home_does_not_take_what_others_can_write(homeless):
+    (homeless / f"spinlev-{os.getuid()}").mkdir()
+    (homeless / f"spinlev-{os.getuid()}").chmod(0o777)
+    assert cache_folder().name.startswith(f"spinlev-{os.getuid()}-")
+    assert cache_folder().stat().st_mode & 0o777 == 0o700
+
+
+@pytest.mark.parametrize("homeless", HOMES, indirect=True)
+def test_who_can_write_nowhere_computes_without_a_cache(homeless, monkeypatch):
+    monkeypatch.setattr(tempfile, "tempdir", "/sys")
+    found, there, said = text("made")
+    assert (found, there) == ("made", False)
+    assert "could not be cached" in said[0]
+    assert list(homeless.iterdir()) == []
 
 
 def test_the_tests_have_a_cache_of_their_own():

@@ -20,6 +20,16 @@ VALUE = CONSTANT * np.sin(1.0) + np.exp(1.0)
 CALLS = []
 
 
+RUN = []
+
+
+class Planted:
+    """What runs code where it is unpickled."""
+
+    def __reduce__(self):
+        return RUN.append, (1,)
+
+
 def counted(*arguments, **options):
     """heyoka's compiler, every call of which is counted."""
     CALLS.append(arguments)
@@ -38,7 +48,7 @@ def value():
 def folder(tmp_path, monkeypatch):
     """The code of a cache of its own."""
     monkeypatch.setenv("SPINLEV_CACHE", str(tmp_path))
-    return tmp_path / "code"
+    return tmp_path / f"code-{os.getuid()}"
 
 
 @pytest.fixture
@@ -119,7 +129,9 @@ def test_a_flipped_bit_of_a_constant_is_not_computed_with(file):
     for place in places:
         damaged = zlib.compress(flip(content, place + 6, 1))
         hy.llvm_state.clear_memcache()
-        ran.append(pickle.loads(zlib.decompress(damaged))([1.0])[0])
+        changed = hy.cfunc_dbl.__new__(hy.cfunc_dbl)
+        changed.__setstate__((zlib.decompress(damaged).partition(b"\n")[2], {}))
+        ran.append(changed([1.0])[0])
         file.write_bytes(damaged + whole[-len(seal(b"")) :])
         assert value() == (VALUE, True)
         assert file.read_bytes() == whole
@@ -140,16 +152,125 @@ DAMAGES = {
     "other bytes": lambda content: b"\x89HDF" * 999,
     "without a checksum": lambda content: content[: -len(seal(b""))],
     "whole, but no code": lambda content: seal(b"something else"),
-    "of a heyoka that was built otherwise": lambda content: seal(zlib.compress(b"cheyoka\nno_such_class\n.")),
+    "of a heyoka that was built otherwise": lambda content: seal(zlib.compress(b"cfunc_dbl\nsomething else")),
+    "of another kind": lambda content: seal(zlib.compress(b"expression\n" + pickle.dumps(2))),
+    "a pickle": lambda content: seal(zlib.compress(pickle.dumps(Planted()))),
+    "a pickle under a known name": lambda content: seal(zlib.compress(b"cfunc_dbl\n" + pickle.dumps(Planted()))),
+    "a bare pickle": lambda content: pickle.dumps(Planted()),
 }
 
 
 @pytest.mark.parametrize("damage", DAMAGES)
-def test_a_damaged_file_is_made_anew(file, damage):
+def test_a_damaged_file_is_made_anew_and_a_planted_one_runs_nothing(file, damage):
     whole = file.read_bytes()
     file.write_bytes(DAMAGES[damage](whole))
     assert value() == (VALUE, True)
     assert file.read_bytes() == whole
+    assert RUN == []
+
+
+def other(path, monkeypatch):
+    """Make a file another user's: really where root tests, else for this program."""
+    if os.getuid() == 0:
+        os.chown(path, 12345, -1)
+    else:
+        path_stat, user = path.stat(), os.getuid()
+        same = lambda found: (found.st_dev, found.st_ino) != (path_stat.st_dev, path_stat.st_ino)  # noqa: E731
+        monkeypatch.setattr("spinlev.fem.storage.cache.ours", lambda found: found.st_uid in (0, user) and same(found))
+        monkeypatch.setattr(compiled_code, "ours", lambda found: found.st_uid in (0, user) and same(found))
+
+
+DOORS = {
+    "the folder is open to all": (0o777, 0o755, "chmod go-w "),
+    "the folder is open to a group": (0o770, 0o755, "chmod go-w "),
+    "the cache is open to all": (0o700, 0o777, "chmod +t "),
+    "the cache is open to a group": (0o700, 0o2775, "chmod +t "),
+}
+
+
+@pytest.mark.parametrize("door", DOORS)
+def test_code_is_neither_read_nor_written_where_others_may_write(file, door, caplog):
+    """It is compiled; one line says so, once, and what it names mends it."""
+    mode, outer, mends = DOORS[door]
+    evil = seal(b"code of somebody else")
+    file.write_bytes(evil)
+    file.parent.chmod(mode)
+    file.parent.parent.chmod(outer)
+    compiled_code._say.cache_clear()
+    with caplog.at_level("INFO", "spinlev"):
+        for _ in range(2):
+            compiled_code._functions.clear()
+            assert value() == (VALUE, True)
+    (said,) = caplog.messages
+    assert mends in said
+    assert file.read_bytes() == evil
+    command = said.partition(mends.split()[0])[2].partition(" mends it")[0].split()
+    subprocess.run(["chmod", *command], check=True)
+    compiled_code._functions.clear()
+    assert value() == (VALUE, True)
+    compiled_code._functions.clear()
+    assert value() == (VALUE, False)
+
+
+@pytest.mark.parametrize("place", ["file", "folder", "cache"])
+def test_code_that_is_another_users_is_not_read(file, place, caplog, monkeypatch):
+    """Also where it was left from a time when the folder was open."""
+    path = {"file": file, "folder": file.parent, "cache": file.parent.parent}[place]
+    before = file.read_bytes()
+    other(path, monkeypatch)
+    compiled_code._say.cache_clear()
+    compiled_code._functions.clear()
+    with caplog.at_level("INFO", "spinlev"):
+        assert value() == (VALUE, True)
+    assert [f"{path} belongs to another user" in text for text in caplog.messages] == (
+        [] if place == "file" else [True]
+    )
+    assert file.read_bytes() == before
+
+
+@pytest.mark.parametrize("place", ["file", "folder"])
+def test_a_link_in_the_place_of_code_is_not_followed_to_what_is_another_users(
+    file, tmp_path, place, caplog, monkeypatch
+):
+    elsewhere = tmp_path / "elsewhere"
+    if place == "file":
+        file.rename(elsewhere)
+        file.symlink_to(elsewhere)
+        monkeypatch.setattr(compiled_code, "ours", lambda found: found.st_ino != elsewhere.stat().st_ino)
+    else:
+        file.parent.rename(elsewhere)
+        file.parent.symlink_to(elsewhere)
+    compiled_code._say.cache_clear()
+    compiled_code._functions.clear()
+    with caplog.at_level("INFO", "spinlev"):
+        assert value()[0] == VALUE
+    assert ["is a link" in text for text in caplog.messages] == ([True] if place == "folder" else [])
+
+
+def test_a_cache_that_users_share_has_a_folder_for_each(folder, tmp_path):
+    """As in /tmp: everybody may write, and remove only what is his own."""
+    tmp_path.chmod(0o1777)
+    before = os.umask(0)
+    try:
+        assert value() == (VALUE, True)
+        compiled_code._functions.clear()
+        assert value() == (VALUE, False)
+    finally:
+        os.umask(before)
+    assert folder.stat().st_mode & 0o777 == 0o700
+    assert [file.stat().st_mode & 0o022 for file in folder.iterdir()] == [0]
+
+
+def test_a_new_cache_is_closed_to_a_group_whatever_the_users_mask_is(tmp_path, monkeypatch):
+    monkeypatch.setenv("SPINLEV_CACHE", str(tmp_path / "new" / "cache"))
+    before = os.umask(0o002)
+    try:
+        assert value() == (VALUE, True)
+    finally:
+        os.umask(before)
+    assert (tmp_path / "new" / "cache").stat().st_mode & 0o777 == 0o755
+    compiled_code._functions.clear()
+    assert value() == (VALUE, False)
 
 
 def test_where_nothing_can_be_kept_code_is_compiled(file, tmp_path, monkeypatch):
