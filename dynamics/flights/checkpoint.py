@@ -8,18 +8,25 @@ from __future__ import annotations
 
 import hashlib
 import io
+import os
 import zipfile
+import zlib
 from dataclasses import astuple, dataclass
 from pathlib import Path
 
 import numpy as np
 
 from ...fem.storage import write_whole
-from ...geometry.basics import Array, InputError
+from ...geometry.basics import Array, InputError, regular_file
 from .compiled_flight import Flight
 from .local_flight import LocalFlight
 from .recorder import Recorder
 from .trajectory import FieldChanges
+
+MOST = 2_000_000_000
+"""Bytes of a checkpoint."""
+BROKEN = (OSError, ValueError, KeyError, TypeError, EOFError, RuntimeError, MemoryError)
+"""What damage to a file of arrays is told by; its header may say any size."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,14 +106,16 @@ class Checkpoint:
         ------
         InputError : the file is damaged, or belongs to another flight
         """
-        if not self.path.exists():
+        if not os.path.lexists(self.path):
             return None
         try:
-            with self.path.open("rb") as stream, np.load(stream) as data:
+            with regular_file(self.path, MOST, "checkpoint", "a regular file") as stream, np.load(stream) as data:
                 content = {name: data[name] for name in data.files}
             key = str(content.pop("key"))
             found = Progress(**{**content, "interval": float(content["interval"]), "steps": int(content["steps"])})
-        except (OSError, ValueError, KeyError, TypeError, EOFError, RuntimeError, zipfile.BadZipFile) as error:
+        except InputError:
+            raise
+        except (*BROKEN, zipfile.BadZipFile, zlib.error) as error:
             raise InputError(f"Input {self.path} must be a checkpoint; instead it is damaged: delete it.") from error
         if key != self._key:
             raise InputError(

@@ -45,10 +45,12 @@ def read_checked(path: str | Path, file_format: str | None = None) -> xr.Dataset
 
     Raises
     ------
-    TableFileError : the file is damaged, is no netCDF, or is not of this format
-    FileNotFoundError : it is missing
+    TableFileError : the file is missing, no file, too large, damaged, no netCDF, or not of this format
     """
-    whole = sealed(Path(path))
+    try:
+        whole = sealed(Path(path))
+    except InputError as error:
+        raise TableFileError(str(error)) from None
     if whole is False:
         raise TableFileError(f"Input {path} must be as it was written; instead its checksum does not match.")
     if whole is None and file_format:

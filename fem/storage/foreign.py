@@ -12,6 +12,8 @@ SCRIPT = Path(__file__)
 SIGNATURE = b"\x89HDF\r\n\x1a\n"
 LONGEST = 20.0
 """Seconds to look through a small file, which takes a fraction of one."""
+LARGEST = 1_000_000_000
+"""Bytes of numbers that a file may unfold to: a few of it can stand for any number of zeros."""
 PACE = 10e6
 """Bytes for each second more; disks and HDF5's filters are ten times as fast."""
 
@@ -48,9 +50,17 @@ def look_through(path: str | Path) -> None:
     """Read every attribute and every dataset of an HDF5 file. Raises whatever HDF5 makes of a damaged one."""
     import h5py
 
+    left = LARGEST
+
     def read(_: str, item: h5py.Group | h5py.Dataset) -> None:
+        nonlocal left
         dict(item.attrs)
         if isinstance(item, h5py.Dataset):
+            left -= item.nbytes
+            if left < 0:
+                raise ValueError(
+                    f"Input file must hold at most {LARGEST / 1e6:g} MB of numbers; instead it holds more."
+                )
             item[()]
 
     with h5py.File(path, "r") as file:

@@ -14,8 +14,12 @@ from pathlib import Path
 
 import psutil
 
+from ...geometry.basics import file_content
+
 MARK = b"\nspinlev sha256 "
 LENGTH = len(MARK) + 64
+MOST = 1_000_000_000
+"""Bytes of a file that is read."""
 
 
 def write_whole(path: str | Path, content: bytes) -> None:
@@ -71,14 +75,18 @@ def seal(content: bytes) -> bytes:
 
 
 def sealed(path: Path) -> bool | None:
-    """Whether the file is as it was when it was sealed; None if it never was. Raises OSError if it cannot be read."""
-    content = path.read_bytes()
-    if content[-LENGTH:-64] != MARK:
-        return None
-    return seal(content[:-LENGTH]) == content
+    """Whether the file is as it was when it was sealed; None if it never was. Raises InputError, see `file_content`."""
+    content = file_content(path, MOST, "file", "a regular file")
+    return _as_sealed(content) if content[-LENGTH:-64] == MARK else None
 
 
 def unsealed(path: Path) -> bytes | None:
-    """What was sealed, if the file is as it was then, else None. Raises OSError if it cannot be read."""
-    content = path.read_bytes()
-    return content[:-LENGTH] if content == seal(content[:-LENGTH]) else None
+    """What was sealed, if the file is as it was then, else None. Raises InputError, see `file_content`."""
+    content = file_content(path, MOST, "file", "a regular file")
+    return content[:-LENGTH] if _as_sealed(content) else None
+
+
+def _as_sealed(content: bytes) -> bool:
+    """Whether a content ends in its checksum; it is large, and not copied for that."""
+    digest = hashlib.sha256(memoryview(content)[:-LENGTH]).hexdigest()
+    return content[-LENGTH:] == MARK + digest.encode()

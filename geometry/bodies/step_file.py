@@ -5,9 +5,11 @@ from pathlib import Path
 
 import numpy as np
 
-from ..basics import Array, InputError, Part
+from ..basics import Array, InputError, Part, file_content
 
 MILLI = 1e-3
+MOST = 100_000_000
+"""Bytes of a STEP file."""
 FINE = 3.0
 """Triangles in a radius of curvature of the surface by which distances are told."""
 
@@ -19,11 +21,8 @@ def read_part(path: Path) -> Part:
     ------
     InputError : no such file, not a STEP file, or anything in it but one closed solid
     """
-    try:
-        text = path.read_text(encoding="utf-8", errors="replace")
-    except OSError:
-        raise InputError(f"Input file must be a STEP file; instead there is no {path}.") from None
-    return part_of(text, path)
+    content = file_content(path, MOST, "file", "a STEP file")
+    return part_of(content.decode("utf-8", errors="replace"), path)
 
 
 def part_of(text: str, path: Path) -> Part:

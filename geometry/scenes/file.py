@@ -98,11 +98,13 @@ def _keys(text: str, source: str) -> dict[str, Any]:
         point = " Decimals have a point, lists square brackets." if DECIMAL_COMMA.search(text) else ""
         raise SceneError(source, [f"Input scene must be TOML; instead: {str(error)[:200]}.{point}"]) from None
     except RecursionError:
-        said = "Input scene must be TOML with few lists in each other; instead some are nested too deep."
-        raise SceneError(source, [said]) from None
+        raise SceneError(
+            source, ["Input scene must be TOML with few lists in each other; instead some are nested too deep."]
+        ) from None
     except ValueError:  # Python's own limit
-        said = "Input scene must have numbers of a few digits; instead one has thousands."
-        raise SceneError(source, [said]) from None
+        raise SceneError(
+            source, ["Input scene must have numbers of a few digits; instead one has thousands."]
+        ) from None
 
 
 def changed(scene: Scene, changes: Mapping[str, float], source: str = "scene") -> Scene:
@@ -124,5 +126,7 @@ def _replace(raw: Any, key: str, value: float, source: str) -> None:
         else:
             raw.update({last: value})
     except (ValueError, KeyError, IndexError, TypeError, AttributeError):
-        said = f"Input {shown(key)} must be a key inside the tables and lists that the scene has; instead it is not."
-        raise SceneError(source, [said]) from None
+        raise SceneError(
+            source,
+            [f"Input {shown(key)} must be a key inside the tables and lists that the scene has; instead it is not."],
+        ) from None

@@ -39,12 +39,7 @@ def read_result(path: Path) -> xr.Dataset:
         raise InputError(
             f"Input {path} must be a result; instead it is a scene. Its result is made by: spinlev run {path}"
         )
-    try:
-        result = read_checked(path)
-    except FileNotFoundError:
-        raise InputError(f"Input {path} must be a file that exists; instead it is missing.") from None
-    except OSError as error:
-        raise InputError(f"Input {path} must be a readable file; instead: {error.strerror}.") from None
+    result = read_checked(path)
     if "study" not in result.attrs:
         raise InputError(f"Input {path} must be a result of spinlev; instead it has no attribute 'study'.")
     return result

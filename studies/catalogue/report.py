@@ -13,7 +13,7 @@ import numpy as np
 import xarray as xr
 
 from ...fem.storage import write_whole
-from ...geometry.basics import InputError
+from ...geometry.basics import InputError, file_content
 from ..pictures import question_lines
 from ..rendering import RenderError, Turnable, View, drawn, inlined, page
 from ..results import figure_bytes
@@ -30,6 +30,8 @@ SUMMARIES = {
 PLACE = b"the scene comes here"
 LONGEST = 400
 """Characters of a value that are shown."""
+MOST = 100_000_000
+"""Bytes of a file beside a result."""
 LARGEST = 2_500_000
 """Bytes of pictures on a page; what comes later is named, not shown."""
 CAPTIONS = {
@@ -74,7 +76,11 @@ def _part(path: Path) -> dict[str, Any]:
     pictures = [(_caption(name), _embedded(figure_bytes(figure, "png"), "png")) for name, figure in drawn]
     beside = [path.parent / "scene.png"] if kind == "run" else []
     beside += [path.parent / f"{path.stem}-{name}" for name in ("scene.png", "flight.gif")]
-    pictures += [(_caption(f.stem), _embedded(f.read_bytes(), f.suffix[1:])) for f in beside if f.exists()]
+    pictures += [
+        (_caption(f.stem), _embedded(file_content(f, MOST, "picture", "a file"), f.suffix[1:]))
+        for f in beside
+        if f.exists()
+    ]
     summary = _summary(path) if kind == "run" else {}
     return {
         "name": path.stem,
@@ -135,8 +141,10 @@ def _summary(path: Path) -> dict[str, Any]:
     if not summary.exists():
         return {}
     try:
-        return dict(json.loads(summary.read_text(encoding="utf-8")))
-    except (ValueError, TypeError) as error:
+        return dict(json.loads(file_content(summary, MOST, "summary", "a JSON file")))
+    except InputError:
+        raise
+    except (ValueError, TypeError, RecursionError) as error:
         raise InputError(f"Input {summary} must be a JSON object; instead: {error}.") from None
 
 

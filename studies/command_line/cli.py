@@ -15,13 +15,16 @@ from typing import Any
 from cyclopts import App, CycloptsError
 from rich.console import Console
 
-from ...geometry.basics import SpinlevError
+from ...geometry.basics import SpinlevError, printable
 from ..terminal import FORTRAN, Answer, answers_only, heard, is_missing_library, note, to_json, way_out
 from .file_commands import add_file_commands
 from .page_command import add_page_command
 from .result_commands import add_result_commands
 from .scene_commands import add_scene_commands
 from .start import STOPPED
+
+LONGEST = 1000
+"""Characters of a line of a message."""
 
 app = App(
     name="spinlev",
@@ -53,10 +56,10 @@ def _answered(arguments: list[str], out: Any, stop: threading.Event | None) -> i
     try:
         _answer(arguments, out)
     except CycloptsError as error:
-        note(f"spinlev: {error}\nTry: spinlev --help")
+        note(f"{_told(error)}\nTry: spinlev --help")
         return 2
     except SpinlevError as error:
-        note(f"spinlev: {error}")
+        note(_told(error))
         return error.exit_status
     except OSError as error:
         where = error.filename or "standard output"
@@ -76,6 +79,12 @@ def _answered(arguments: list[str], out: Any, stop: threading.Event | None) -> i
     return 0
 
 
+def _told(error: Exception) -> str:
+    """An error as a message, what was received in it cut where it is longer than anybody reads."""
+    lines = f"spinlev: {error}".split("\n")
+    return "\n".join(line if len(line) <= LONGEST else f"{line[:LONGEST]} ..." for line in lines)
+
+
 def _unforeseen(error: Exception) -> str:
     """What failed and where; of a library that the system lacks, what to do."""
     if is_missing_library(error):
@@ -93,7 +102,8 @@ def _answer(arguments: list[str], out: Any) -> None:
     answer = app(arguments, console=said_of_itself, **how)
     if isinstance(answer, Answer):
         values = {**answer.values, "seconds": time.perf_counter() - began}
-        said = to_json(values, getattr(out, "encoding", None)) if answer.json else "\n".join(answer.lines)
+        lines = printable("\n".join(answer.lines))
+        said = to_json(values, getattr(out, "encoding", None)) if answer.json else lines
         print(said, file=out, flush=True)
         if answer.then:
             answer.then()

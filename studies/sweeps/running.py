@@ -11,7 +11,7 @@ import numpy as np
 import xarray as xr
 
 from ...fem.storage import digest_of, seal, unsealed, write_whole
-from ...geometry.basics import ComputationError
+from ...geometry.basics import ComputationError, InputError
 from ..results import LIBRARIES, Point, Study
 from ..terminal import Workers, note, progress, to_json
 from .workers import Failure, computed
@@ -58,7 +58,7 @@ class Journal:
     def _read(self, path: Path) -> xr.Dataset | None:
         try:
             content = unsealed(path)
-        except OSError:
+        except InputError:
             content = None
         if content is None:
             self.report(f"The finished point {path} is damaged and is computed anew.")

@@ -12,6 +12,7 @@ from typing import Any, Protocol, TextIO
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
 
+from ...geometry.basics import printable
 from .heartbeat import Heartbeat
 from .plain_text import READABLE
 
@@ -44,7 +45,7 @@ class _Printed(logging.Handler):
         self.heartbeat = Heartbeat(lambda text: ERRORS.print(text, markup=False))
 
     def emit(self, record: logging.LogRecord) -> None:
-        text = record.getMessage()
+        text = printable(record.getMessage())
         self.heartbeat.said(text)
         ERRORS.print(text, markup=False)
 

@@ -3,17 +3,23 @@
 from __future__ import annotations
 
 import csv
+import io
 import math
 from numbers import Real
 from pathlib import Path
+from sys import float_info
 from typing import TYPE_CHECKING, Any
 
-from ...geometry.basics import InputError
+from ...geometry.basics import InputError, file_content, shown
 
 if TYPE_CHECKING:
     from ...geometry.basics import Array
 
 COLUMNS = ("x_mm", "y_mm", "z_mm")
+MOST = 50_000_000
+"""Bytes of a file of points: a million of them."""
+FARTHEST = 1e9
+"""Largest coordinate, mm: beyond, powers of it overflow."""
 
 
 def three_numbers(name: str, text: str) -> Array:
@@ -22,8 +28,10 @@ def three_numbers(name: str, text: str) -> Array:
         numbers = [float(part) for part in text.split(",")]
     except ValueError:
         numbers = []
-    if len(numbers) != 3 or not all(map(math.isfinite, numbers)):
-        raise InputError(f"Input {name} must be three numbers X,Y,Z; instead received {text!r}.")
+    if len(numbers) != 3 or not all(abs(number) <= FARTHEST for number in numbers):
+        raise InputError(
+            f"Input {name} must be three numbers X,Y,Z of at most {FARTHEST:g} mm; instead received {shown(text)}."
+        )
     return _in_array(numbers)
 
 
@@ -39,48 +47,55 @@ def map_extent(text: str) -> Array:
     if not (sound and numbers[0] < numbers[1] and numbers[2] < numbers[3]):
         raise InputError(
             "Input --extent-mm must be one positive number, or LEFT,RIGHT,LOWER,UPPER in rising order; instead "
-            f"received {text!r}."
+            f"received {shown(text)}."
         )
     return _in_array(numbers) * 1e-3
 
 
+def is_number(value: Any) -> bool:
+    """Whether it is a finite number that a float holds."""
+    return isinstance(value, Real) and not isinstance(value, bool) and abs(value) <= float_info.max
+
+
 def positive(name: str, value: float) -> None:
     """Raises InputError where the value is no positive finite number."""
-    if not (isinstance(value, Real) and 0 < value < float("inf")):
-        raise InputError(f"Input {name} must be a positive number; instead received {value}.")
+    if not (is_number(value) and value > 0):
+        raise InputError(f"Input {name} must be a positive number; instead received {shown(value)}.")
 
 
 def finite(name: str, value: float) -> float:
     """The value. Raises InputError where it is no finite number."""
-    if not (isinstance(value, Real) and abs(value) < float("inf")):
-        raise InputError(f"Input {name} must be a finite number; instead received {value!r}.")
+    if not is_number(value):
+        raise InputError(f"Input {name} must be a finite number; instead received {shown(value)}.")
     return float(value)
 
 
 def read_points(path: Path) -> Array:
     """Points (n, 3) in m from a CSV file with a header that has the columns x_mm, y_mm, z_mm.
 
-    Raises `InputError` where the file is missing, empty, lacks a column or has an entry that is no finite number.
+    Raises `InputError` where the file is missing, no file, too large, empty, lacks a column or has an entry that is no
+    finite number or too large a one.
     """
+    content = file_content(path, MOST, "points", f"a CSV file with {', '.join(COLUMNS)}")
     try:
-        with path.open(newline="", encoding="utf-8-sig") as stream:
-            rows = list(csv.reader(stream, skipinitialspace=True))
-    except FileNotFoundError:
-        raise InputError(
-            f"{path}: Input points must be a CSV file with {', '.join(COLUMNS)}; instead there is no such file."
-        ) from None
-    except (OSError, UnicodeDecodeError, csv.Error) as error:
+        rows = csv.reader(io.StringIO(content.decode("utf-8-sig"), newline=""), skipinitialspace=True)
+        header = [name.strip() for name in next(rows, [])]
+        if any(column not in header for column in COLUMNS):
+            received = shown(", ".join(header))
+            raise InputError(
+                f"{path}: Input header must have the columns {', '.join(COLUMNS)}; instead received {received}."
+            )
+        where = [header.index(column) for column in COLUMNS]
+        found = [
+            [_number(path, line, row, i) for i in where]
+            for line, row in enumerate(rows, start=2)
+            if any(cell.strip() for cell in row)
+        ]
+    except (UnicodeDecodeError, csv.Error) as error:
         raise InputError(f"{path}: Input points must be a readable CSV text; instead: {error}.") from None
-    header = [name.strip() for name in rows[0]] if rows else []
-    if any(column not in header for column in COLUMNS):
-        raise InputError(
-            f"{path}: Input header must have the columns {', '.join(COLUMNS)}; instead received {', '.join(header)!r}."
-        )
-    where = [header.index(column) for column in COLUMNS]
-    filled = [(line, row) for line, row in enumerate(rows[1:], start=2) if any(cell.strip() for cell in row)]
-    if not filled:
+    if not found:
         raise InputError(f"{path}: Input points must be at least one line below the header; instead received none.")
-    return _in_array([[_number(path, line, row, i) for i in where] for line, row in filled]) * 1e-3
+    return _in_array(found) * 1e-3
 
 
 def _in_array(numbers: list[Any]) -> Array:
@@ -97,5 +112,9 @@ def _number(path: Path, line: int, row: list[str], column: int) -> float:
     except ValueError:
         value = math.nan
     if not math.isfinite(value):
-        raise InputError(f"{path}: Input line {line} must have three finite numbers; instead received {text!r}.")
+        raise InputError(f"{path}: Input line {line} must have three finite numbers; instead received {shown(text)}.")
+    if abs(value) > FARTHEST:
+        raise InputError(
+            f"{path}: Input line {line} must have numbers of at most {FARTHEST:g} mm; instead received {value:g}."
+        )
     return value

@@ -3,10 +3,10 @@
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from itertools import product
-from numbers import Real
 from typing import Any
 
-from ...geometry.basics import InputError
+from ...geometry.basics import InputError, shown
+from .numbers import is_number
 
 MOST = 100_000
 """Points of a sweep, at most."""
@@ -27,7 +27,7 @@ def parse_vary(asked: Sequence[str]) -> dict[str, list[Any]]:
         if not equals or not key:
             raise _wrong(text)
         if key in found:
-            raise InputError(f"Input --vary must give each key once; instead received {key} twice.")
+            raise InputError(f"Input --vary must give each key once; instead received {shown(key)} twice.")
         found[key] = [part.strip() for part in values.split(",")] if key in NAMED else _values(text, values)
     return checked_values(found, "--vary")
 
@@ -44,12 +44,12 @@ def checked_values(values: Mapping[str, Sequence[Any]], name: str = "values") ->
     found = {}
     for key, given in values.items():
         listed = list(given) if isinstance(given, Iterable) and not isinstance(given, str) else [given]
-        fine = all(isinstance(v, str) if key in NAMED else isinstance(v, Real) and math.isfinite(v) for v in listed)
+        fine = all(isinstance(v, str) if key in NAMED else is_number(v) for v in listed)
         if not listed or not fine:
             what = "names" if key in NAMED else "finite numbers"
-            raise InputError(f"Input {key} must be varied over {what}; instead received {given!r}.")
+            raise InputError(f"Input {key} must be varied over {what}; instead received {shown(given)}.")
         if len(set(listed)) < len(listed):
-            raise InputError(f"Input {name} must give {key} each value once; instead received {given!r}.")
+            raise InputError(f"Input {name} must give {key} each value once; instead received {shown(given)}.")
         found[key] = listed if key in NAMED else [float(value) for value in listed]
     points = math.prod(len(each) for each in found.values())
     if points > MOST:
@@ -83,5 +83,5 @@ def _values(text: str, values: str) -> list[float]:
 def _wrong(text: str) -> InputError:
     return InputError(
         f"Input --vary must be KEY=FIRST:LAST:STEP or KEY=VALUE,VALUE,... with a key of the scene file, such as "
-        f"rotor.displacement_mm=1:4:0.5; instead received {text!r}."
+        f"rotor.displacement_mm=1:4:0.5; instead received {shown(text)}."
     )
