@@ -23,6 +23,7 @@ class FieldMap:
     points : (n, 3) m, rotor's frame
     field : (n, 3) T; NaN where a component was not observed
     errors : (n, 3) standard errors of `field`, T, or what broadcasts to it; None if they are not known
+    read_as : units of length and of B that the file was taken to have
 
     Raises
     ------
@@ -32,6 +33,7 @@ class FieldMap:
     points: Array
     field: Array
     errors: Array | None = None
+    read_as: tuple[str, str] = ("m", "T")
 
     def __post_init__(self) -> None:
         points, field = np.asarray(self.points, float), np.asarray(self.field, float)
@@ -65,7 +67,8 @@ class FieldMap:
     def where(self, chosen: ArrayLike) -> FieldMap:
         """The part of the map at `chosen` points: (n,) booleans or indices."""
         chosen = np.asarray(chosen)
-        return FieldMap(self.points[chosen], self.field[chosen], None if self.errors is None else self.errors[chosen])
+        errors = None if self.errors is None else self.errors[chosen]
+        return FieldMap(self.points[chosen], self.field[chosen], errors, self.read_as)
 
     def outside(self, center: ArrayLike, radius: float) -> FieldMap:
         """The part of the map farther than `radius` (m) from `center` (3,) m: to leave out what lies in a magnet."""

@@ -7,33 +7,40 @@ import numpy as np
 import xarray as xr
 
 from ...geometry.bodies import Magnet
+from ...geometry.scenes import MapReading
 from ..rotor_tables import from_dataset, to_dataset
 from ..storage import read_checked, write_checked
 from .field_map import FieldMapError
 from .fit import fit_field_map
 from .fitted_table import GriddedTable
+from .plausible import require_plausible
 from .readers import read_field_map
 
 FORMAT = "spinlev gridded table 1"
 
 
-def map_table(path: Path | None, magnets: Sequence[Magnet]) -> GriddedTable:
+def map_table(path: Path | None, magnets: Sequence[Magnet], reading: MapReading | None = None) -> GriddedTable:
     """Table of a map of B in the rotor's frame; the sources lie in the smallest spheres about the magnets.
 
-    What the map holds inside those spheres is left out. Only the magnets' shapes and places matter, not their strength.
+    What the map holds inside those spheres is left out. The magnets' shapes and places say where sources can be; their
+    strength, whether the map is theirs.
 
     Raises
     ------
-    FieldMapError : no map, a file that is none, or too few values outside the spheres
+    FieldMapError : no map, a file that is none, one that contradicts the magnets, or too few values outside the spheres
     """
     if path is None:
         raise FieldMapError("Input rotor.field_map must name a file for the model map; instead it is missing.")
-    field_map = read_field_map(path)
+    field_map = read_field_map(path, reading)
     radius = max(magnet.body.circumradius for magnet in magnets)
     centers = np.array([magnet.box.center for magnet in magnets])
-    for center in centers:
-        field_map = field_map.outside(center, radius)
-    return fit_field_map(field_map, centers, radius)
+    try:
+        require_plausible(field_map, magnets, radius)
+        for center in centers:
+            field_map = field_map.outside(center, radius)
+        return fit_field_map(field_map, centers, radius)
+    except FieldMapError as error:
+        raise FieldMapError(f"{path}: {error}") from None
 
 
 def save_gridded(table: GriddedTable, path: str | Path) -> None:

@@ -7,6 +7,7 @@ from .contents import (
     AbsoluteStart as AbsoluteStart,
     Drag as Drag,
     Lowering as Lowering,
+    MapReading as MapReading,
     OffsetStart as OffsetStart,
     Plate as Plate,
     Scene as Scene,

@@ -10,7 +10,7 @@ from pydantic import ValidationError
 
 from ..basics import Array, Box, Cylinder, InputError, Part, Solid, rotation_matrix
 from ..bodies import Conductor, Magnet, horizontal, known_shape, tilt, vertical
-from .contents import AbsoluteStart, Drag, Lowering, OffsetStart, Plate, Scene
+from .contents import AbsoluteStart, Drag, Lowering, MapReading, OffsetStart, Plate, Scene
 from .faults import SceneError, describe_fault, overlap_faults
 from .floater import Floater
 from .key_rules import key_faults
@@ -66,6 +66,7 @@ def _scene(table: SceneSection, folder: Path) -> Scene:
         drag=_drag(drag, floater),
         start=_start(table.start),
         field_map=folder / table.rotor.field_map if table.rotor.field_map else None,
+        map_reading=MapReading(table.rotor.map_length_unit, table.rotor.map_field_unit, table.rotor.map_columns),
         conductors=tuple(
             Conductor(solid(c, c.center_mm, c.rotation_deg), c.conductivity_S_m) for c in table.rotor.conductors
         ),

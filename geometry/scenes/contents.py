@@ -79,6 +79,21 @@ class OffsetStart:
     offset: Array = field(default_factory=lambda: frozen_array((0.0, 0.0, 1e-4), (3,)))
 
 
+@dataclass(frozen=True)
+class MapReading:
+    """How a map of the field is to be read where its file does not tell.
+
+    Parameters
+    ----------
+    length_unit, field_unit : of the coordinates and of B, whatever the file says; None: as it says
+    columns : what the titles of the columns to take have and others have not, as of one of several solutions; or None
+    """
+
+    length_unit: str | None = None
+    field_unit: str | None = None
+    columns: str | None = None
+
+
 @dataclass(frozen=True, eq=False)
 class Scene:
     """All that a computation needs to know.
@@ -93,6 +108,7 @@ class Scene:
     drag : of the surrounding medium
     start : where a simulation begins
     field_map : file of a map of the rotor's B in its frame, or None
+    map_reading : how the map is read
     text : the scene file as it was read, for the record
     conductors : metal beside the magnets that turns with the rotor
     remarks : what was found out about its files, sentences for people
@@ -106,6 +122,7 @@ class Scene:
     plate: Plate | None = None
     start: OffsetStart | AbsoluteStart = field(default_factory=OffsetStart)
     field_map: Path | None = None
+    map_reading: MapReading = MapReading()
     text: str = ""
     conductors: tuple[Conductor, ...] = ()
     remarks: tuple[str, ...] = ()

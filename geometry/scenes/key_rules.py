@@ -6,7 +6,11 @@ from .shapes import ARTICLE_SIZES, FLOATER_SIZES, shape_faults
 
 def key_faults(table: SceneSection) -> list[str]:
     """One sentence for each rule that is broken."""
-    return _start_faults(table.start) + _drag_faults(table.drag) + _shape_faults(table.rotor) + _floater_faults(table)
+    faults = _start_faults(table.start) + _drag_faults(table.drag) + _shape_faults(table.rotor) + _floater_faults(table)
+    if table.rotor.field_map is None:
+        alone = [k for k in ("map_length_unit", "map_field_unit", "map_columns") if getattr(table.rotor, k) is not None]
+        faults += [f"Input rotor.{key} must come with rotor.field_map; instead received it alone." for key in alone]
+    return faults
 
 
 def _start_faults(start: StartSection | None) -> list[str]:

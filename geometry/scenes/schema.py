@@ -72,6 +72,9 @@ class ConductorSection(_Table):
 
 class _AnyRotor(_Table):
     field_map: Annotated[str, Field(min_length=1)] | None = None
+    map_length_unit: Literal["m", "cm", "mm", "um", "in"] | None = None
+    map_field_unit: Literal["T", "mT", "uT", "nT", "G", "mG", "kG"] | None = None
+    map_columns: Annotated[str, Field(min_length=1)] | None = None
     conductivity_S_m: Conductivity | None = None
     coercivity_kA_m: Coercivity | None = None
     conductors: list[ConductorSection] = []

@@ -3,7 +3,7 @@
 import json
 import tomllib
 from collections.abc import Mapping
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
@@ -51,7 +51,7 @@ def _keys(scene: Scene) -> dict[str, Any]:
     keys: dict[str, Any] = {
         "frequency_hz": _number(scene.frequency),
         "gravity_m_s2": _numbers(scene.gravity),
-        "rotor": _rotor(scene.rotor) | ({"field_map": str(scene.field_map)} if scene.field_map else {}),
+        "rotor": _rotor(scene.rotor) | _field_map(scene),
         "floater": _floater(scene.floater),
     }
     if scene.conductors:
@@ -65,6 +65,11 @@ def _keys(scene: Scene) -> dict[str, Any]:
         keys["drag"] = {"linear_N_s_m": scene.drag.linear, "angular_N_m_s": scene.drag.angular}
     start = _start(scene)
     return keys if start == DEFAULT_START else keys | {"start": start}
+
+
+def _field_map(scene: Scene) -> dict[str, str]:
+    told = {f"map_{name}": value for name, value in asdict(scene.map_reading).items() if value is not None}
+    return ({"field_map": str(scene.field_map)} if scene.field_map else {}) | told
 
 
 def _floater(floater: Floater) -> dict[str, Any]:

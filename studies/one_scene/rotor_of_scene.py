@@ -41,7 +41,9 @@ class RotorTables:
         ------
         InputError : the map cannot be used
         """
-        key = f"{rotor_key(scene.rotor, name, rtol, nearest_faces(scene.floater))} {scene.field_map}"
+        key = (
+            f"{rotor_key(scene.rotor, name, rtol, nearest_faces(scene.floater))} {scene.field_map} {scene.map_reading}"
+        )
         return self.once(key, lambda: self._field(scene, name, rtol))
 
     def answers(self, scene: Scene) -> MutualTable:
@@ -62,7 +64,7 @@ class RotorTables:
     def _field(self, scene: Scene, name: str, rtol: float) -> RotorField:
         if name == "map":
             note("Rotor's field from its map ...")
-            return map_table(scene.field_map, scene.rotor)
+            return map_table(scene.field_map, scene.rotor, scene.map_reading)
         if name != "fem":  # closed forms are quicker to make than to read
             return rotor_table(scene.rotor, name, rtol, nearest_faces(scene.floater))
         make = partial(cached_rotor_table, scene.rotor, name, rtol, note, nearest_faces(scene.floater))
@@ -109,7 +111,8 @@ def equations_key(scene: Scene, models: Models) -> str:
     return " ".join(
         (
             rotor_key(scene.rotor, models.model, models.rtol, scene.floater.radius),
-            f"{scene.field_map} {bool(scene.floater.conductivity)} {scene.drag.air} {models.interaction}",
+            f"{scene.field_map} {scene.map_reading}",
+            f"{bool(scene.floater.conductivity)} {scene.drag.air} {models.interaction}",
             "" if models.interaction == "rigid" else mutual_key(scene.rotor, scene.floater),
             losses_key(scene) if pieces_of(scene.rotor, scene.conductors) else "",
             _shape_key(scene.floater),

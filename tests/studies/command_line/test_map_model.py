@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from spinlev.fem.rotor_tables import RotorTable
-from spinlev.geometry.scenes import SceneError, load_scene
+from spinlev.geometry.scenes import SceneError, changed, load_scene, scene_text
 from spinlev.studies.command_line import cli
 from spinlev.studies.terminal import shipped_scene
 
@@ -65,6 +65,28 @@ def test_a_map_with_wrong_columns_is_refused(called, folder, capfd):
     (wrong / "map.csv").write_text("x_mm,y_mm,z_mm,B_total\n0,0,-20,1\n")
     assert called(wrong, "field", "--points", str(folder / "points.csv"), "--model", "map") == 2
     assert "map.csv: Input columns must hold x, y, z and at least one of Bx, By, Bz" in capfd.readouterr().err
+
+
+def test_the_scene_tells_what_the_map_does_not(called, folder, capfd):
+    """Two solutions side by side, in units that no title has; and keys that are there without a map."""
+    several, rows = folder / "several", np.loadtxt(folder / "map.csv", delimiter=",", skiprows=1)
+    several.mkdir()
+    titles = ",".join(["x", "y", "z", *(f"{name}.B{axis}" for name in ("one", "two") for axis in "xyz")])
+    both = np.hstack([rows[:, :3], 0.5 * rows[:, 3:], rows[:, 3:]])
+    np.savetxt(several / "map.csv", both, delimiter=";", header=titles.replace(",", ";"), comments="# ")
+    told = '[rotor]\nmap_columns = "two"\nmap_length_unit = "mm"\nmap_field_unit = "mT"\n'
+    text = (folder / "scene.toml").read_text()
+    (several / "scene.toml").write_text(text.replace("[rotor]\n", told))
+    found = []
+    for scene in (several, folder):
+        assert called(scene, "field", "--points", str(folder / "points.csv"), "--model", "map", "--json") == 0
+        found.append(json.loads(capfd.readouterr().out)["B_T"])
+    assert found[0] == found[1]
+    written = scene_text(changed(load_scene(several / "scene.toml"), {}))
+    assert all(line in written for line in told.splitlines())
+    (several / "scene.toml").write_text(text.replace("[rotor]\n", told).replace('field_map = "map.csv"\n', ""))
+    assert called(several, "field", "--points", str(folder / "points.csv")) == 2
+    assert "Input rotor.map_columns must come with rotor.field_map" in " ".join(capfd.readouterr().err.split())
 
 
 def test_no_map(called, folder, capfd):

@@ -1,0 +1,270 @@
+"""Columns of a map from a text: a probe's, a spreadsheet's, COMSOL's, Maxwell's or CST's, in whatever dialect it is.
+
+How often a character comes, by which libraries tell the dialects of tables of any content, need not be asked: a map has
+titles of coordinates and of B. The separator is the one under which they are there, with numbers below them.
+"""
+
+import codecs
+import csv
+import re
+from array import array
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from ...geometry.basics import Array, file_content, shown
+from ...geometry.scenes import MapReading
+from .columns import (
+    AXES,
+    COMPONENTS,
+    GHOSTS,
+    MASK,
+    METERS,
+    NEEDED,
+    UNITS,
+    VALID,
+    Column,
+    chosen,
+    known_columns,
+    unit_named,
+)
+from .field_map import FieldMapError
+
+MOST_BYTES = 250_000_000
+HEADER_LINES = 300
+"""Lines in which the titles must be."""
+COMMENT = re.compile(r"\s*(?:%+|#+|//+|!+|\*+)\s?")
+RULE = re.compile(r"[\s=_+|-]*")
+"""An empty line, or one that is drawn."""
+LENGTH_UNIT = re.compile(r"length unit\W+(\w+)", re.IGNORECASE)
+"""COMSOL's unit of the coordinates, in a comment."""
+SEP = re.compile(r"\"?sep=(.)\"?", re.IGNORECASE)
+"""A spreadsheet's first line."""
+GRID = re.compile(r"Grid Output Min:\s*\[(\S+) (\S+) (\S+)\]", re.IGNORECASE)
+VECTOR_DATA = re.compile(r"\s*X,\s*Y,\s*Z,\s*Vector data\s*\"(.*)\"\s*", re.IGNORECASE)
+"""Maxwell's titles: coordinates and B are in m and T."""
+TITLE = re.compile(r"\"[^\"]*\"|\S+(?:[ ]?(?:\[[^\]]*\]|\([^)]*\)))?(?:[ ]@[ ][^\s=]+=\S+(?:(?<=,)[ ][^\s=]+=\S+)*)?")
+"""One of titles that only spaces part, such as `mf.Bx (T) @ freq=50`."""
+MISSING = {"", "na", "n/a", "#n/a", "null", "none", "-", "--", "nan(ind)", "-nan(ind)", "1.#qnan", "-1.#ind"}
+FORTRAN = str.maketrans("dD−", "eE-")
+GROUPED = re.compile(r"[+-]?[1-9]\d{0,2}(?:,\d{3})+")
+"""Where a comma may part thousands."""
+
+
+@dataclass(frozen=True)
+class _Table:
+    """Titles and the lines below them; `usual` units of length and of B hold for titles without one."""
+
+    separator: str | None
+    titles: list[str]
+    lines: list[str]
+    usual: tuple[str | None, str | None] = (None, None)
+
+    def rows(self) -> Iterator[list[str]]:
+        """Cells of every line that is no comment."""
+        lines = (line for line in self.lines if not RULE.fullmatch(line) and not COMMENT.match(line))
+        return _cells(lines, self.separator)
+
+
+def text_columns(path: Path, reading: MapReading) -> tuple[dict[str, Array], dict[str, str]]:
+    """Columns x, y, z, Bx, By, Bz, Bx_err, By_err, Bz_err in SI units, as far as they are there, and VTK's masks.
+
+    The second are the units in which the file has them.
+
+    Raises
+    ------
+    FieldMapError : no text, no titles of a map, a cell that is no number, or one that could be two
+    """
+    lines = _lines(file_content(path, MOST_BYTES, "map", "a file"))
+    separators: Sequence[str | None] = (",", ";", "\t", "|", None)
+    if said := SEP.fullmatch(lines[0].strip()):
+        lines, separators = lines[1:], (said[1],)
+    maxwell = _maxwell(lines)
+    tables = [maxwell] if maxwell else [t for s in separators if (t := _table(lines, s, reading))]
+    if not tables:
+        received = _nearest_titles(lines, separators, reading)
+        raise FieldMapError(f"Input columns must hold {NEEDED}; instead received {received}. {VALID}")
+    faults = []
+    for table in tables:
+        try:
+            return _columns(table, reading)
+        except FieldMapError as error:
+            faults.append(error)
+    raise faults[0]
+
+
+def _lines(content: bytes) -> list[str]:
+    """Lines of a text in the encoding that its first bytes tell, in UTF-8, or as Windows writes western languages."""
+    marks = ((codecs.BOM_UTF8, "utf-8-sig"), (codecs.BOM_UTF16_LE, "utf-16"), (codecs.BOM_UTF16_BE, "utf-16"))
+    encodings = [name for mark, name in marks if content.startswith(mark)] or ["utf-8", "cp1252"]
+    if b"\0" in content[:100] and len(encodings) == 2:
+        encodings = ["utf-16-le" if content[1:2] == b"\0" else "utf-16-be"]
+    for encoding in encodings:
+        try:
+            text = content.decode(encoding)
+        except UnicodeDecodeError:
+            continue
+        if "\0" not in text:
+            return text.replace("\r\n", "\n").replace("\r", "\n").split("\n")
+    raise FieldMapError(
+        "Input map must be a text, netCDF or a mesh; instead its bytes are neither. Save a spreadsheet or a program's "
+        "own file as CSV."
+    )
+
+
+def _cells(lines: Iterator[str], separator: str | None) -> Iterator[list[str]]:
+    if separator is None:
+        yield from (line.split() for line in lines)
+        return
+    try:
+        rows = csv.reader(lines, delimiter=separator, skipinitialspace=True)
+        yield from (row for row in rows if any(cell.strip() for cell in row))
+    except csv.Error as error:
+        raise FieldMapError(f"Input map must be a readable CSV text; instead: {error}.") from None
+
+
+def _table(lines: list[str], separator: str | None, reading: MapReading) -> _Table | None:
+    """What is below the last line of titles of a map before the numbers; None if there is no such line."""
+    found, length = None, None
+    for number, line in enumerate(lines[:HEADER_LINES], 1):
+        bare = COMMENT.sub("", line, count=1)
+        in_comment = bare != line
+        if in_comment and (said := LENGTH_UNIT.search(bare)):
+            length = said[1]
+        titles = _titles(bare, separator, lines[number:])
+        if _is_complete(known_columns(titles, reading).values()):
+            usual = (length or "m", "T") if line.lstrip().startswith("%") else (length, None)
+            found = _Table(separator, titles, lines[number:], usual)
+        elif found and not in_comment and not RULE.fullmatch(line):
+            break
+    return found
+
+
+def _titles(line: str, separator: str | None, below: list[str]) -> list[str]:
+    """Titles in a line; where only spaces part them, as many as there are cells below."""
+    if separator is not None:
+        return next(_cells(iter([line]), separator), [])
+    cells = len(next(_Table(None, [], below[:HEADER_LINES]).rows(), []))
+    ways = (re.split(r"\s{2,}|\t", line.strip()), TITLE.findall(line))
+    return next((titles for titles in ways if len(titles) == cells), line.split())
+
+
+def _is_complete(columns: Iterable[Column]) -> bool:
+    names = {column.name for column in columns}
+    return names.issuperset(AXES) and not names.isdisjoint(COMPONENTS)
+
+
+def _nearest_titles(lines: list[str], separators: Sequence[str | None], reading: MapReading) -> str:
+    """Known columns, and titles, of the line that comes nearest to a header of a map."""
+    heads = [COMMENT.sub("", line, count=1) for line in lines[:HEADER_LINES] if line.strip()]
+    splits = [_titles(line, separator, []) for line in heads for separator in separators]
+    nearest = max(splits, key=lambda titles: len(known_columns(titles, reading)), default=[])
+    known = [column.name for column in known_columns(nearest, reading).values()]
+    received = ", ".join(known) or "none that is known"
+    if any(title.strip() for title in nearest):
+        received += f" of the titles {shown(', '.join(title.strip() for title in nearest), 200)}"
+    return received
+
+
+def _maxwell(lines: list[str]) -> _Table | None:
+    """Maxwell's export of a field, `.fld`; its grid tells whether the coordinates are in m."""
+    for number, line in enumerate(lines[:HEADER_LINES], 1):
+        if not (found := VECTOR_DATA.fullmatch(line)):
+            continue
+        if not re.search(r"(?<![a-z])B", found[1], re.IGNORECASE):
+            raise FieldMapError(f"Input vector data of the map must be B; instead received {found[1]!r}.")
+        table = _Table(None, [*AXES, *COMPONENTS], lines[number:], ("m", "T"))
+        corner = next((said for before in lines[:number] if (said := GRID.search(before))), None)
+        return table if corner is None else replace(table, usual=(_grid_unit(table, corner.groups()), "T"))
+    return None
+
+
+def _grid_unit(table: _Table, corner: Sequence[str]) -> str:
+    """The unit in which the first point is the lowest corner of the grid, such as `-20mm`."""
+    split = [re.fullmatch(r"(.*?\d\.?)([^\W\d]+)", entry) for entry in corner]
+    said = [
+        _number(entry[1], False, "grid", 0) * METERS.get(str(unit_named(entry[2])), np.nan) for entry in split if entry
+    ]
+    first = [_number(cell, False, axis, 1) for axis, cell in zip(AXES, next(table.rows(), []), strict=False)]
+    for unit, scale in METERS.items():
+        if len(said) == len(first) == 3 and np.allclose(np.array(first) * scale, said, rtol=1e-6, atol=1e-12):
+            return unit
+    raise FieldMapError(
+        f"Input grid must begin at its lowest corner ({', '.join(corner)}); instead the first point is {first}."
+    )
+
+
+def _columns(table: _Table, reading: MapReading) -> tuple[dict[str, Array], dict[str, str]]:
+    columns = chosen(table.titles, reading)
+    if below := _units_below(table, columns):
+        columns = {k: replace(column, unit=column.unit or below.get(k)) for k, column in columns.items()}
+    length, field = table.usual
+    units = {
+        k: column.known_unit(reading, length if column.name in AXES else field)
+        for k, column in columns.items()
+        if column.name not in (MASK, GHOSTS)
+    }
+    values = _numbers(table, columns, skipped=1 if below else 0)
+    found = {c.name: UNITS.get(units.get(k, ""), 1.0) * np.frombuffer(values[k]) for k, c in columns.items()}
+    return found, {columns[k].name: unit for k, unit in units.items()}
+
+
+def _units_below(table: _Table, columns: dict[int, Column]) -> dict[int, str]:
+    """Units of the columns in a line of their own below the titles."""
+    row = next(table.rows(), [])
+    units = {k: row[k].strip(" ()[]{}<>\"'") for k in columns if k < len(row)}
+    said = {k: unit for k, unit in units.items() if unit}
+    return said if said and all(map(unit_named, said.values())) else {}
+
+
+def _numbers(table: _Table, columns: dict[int, Column], skipped: int) -> dict[int, "array[float]"]:
+    values = {k: array("d") for k in columns}
+    comma, is_decimal = _has_decimal_comma(table, columns), False
+    for number, row in enumerate(table.rows(), 1 - skipped):
+        if number < 1:
+            continue
+        _require_width(table, number, row)
+        for k, column in columns.items():
+            cell = row[k].strip(" \t\"'\u00a0\u202f") if k < len(row) else ""
+            values[k].append(_number(cell, comma, column.title, number))
+            is_decimal |= comma and "," in cell and not GROUPED.fullmatch(cell)
+    if comma and not is_decimal:
+        raise FieldMapError(
+            "Input numbers must be such that a comma means one thing; instead each may part decimals or thousands. "
+            "Write them with a decimal point."
+        )
+    if not all(values.values()):
+        raise FieldMapError("Input map must have numbers below its titles; instead it has none.")
+    return values
+
+
+def _has_decimal_comma(table: _Table, columns: dict[int, Column]) -> bool:
+    """Whether the first number with a mark of decimals has a comma for it."""
+    cells = (row[k] for row in table.rows() for k in columns if k < len(row))
+    return next((mark == "," for cell in cells for mark in cell if mark in ",."), False)
+
+
+def _require_width(table: _Table, number: int, row: list[str]) -> None:
+    """Raise FieldMapError for a row that is longer than the titles, or shorter where only spaces part the cells."""
+    width = len(table.titles)
+    if any(map(str.strip, row[width:])) or (len(row) < width and table.separator is None):
+        hint = " A decimal comma needs another separator than a comma." if table.separator == "," else ""
+        raise FieldMapError(
+            f"Input row {number} below the titles must have {width} cells as they; instead it has {len(row)}.{hint}"
+        )
+
+
+def _number(cell: str, comma: bool, title: str, line: int) -> float:
+    if cell.casefold() in MISSING:
+        return np.nan
+    text = cell.replace(",", ".") if comma and "." not in cell else cell
+    try:
+        if "_" in text:  # which Python takes for a separator of thousands
+            raise ValueError
+        return float(text.translate(FORTRAN))
+    except ValueError:
+        raise FieldMapError(
+            f"Input {title} in row {line} below the titles must be a number or empty; instead received {shown(cell)}."
+        ) from None
