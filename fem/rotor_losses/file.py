@@ -76,5 +76,5 @@ def cached_rotor_losses(
 
 
 def _bytes(body: Solid) -> bytes:
-    parts = [np.ascontiguousarray(part + 0.0, dtype="<f8") for part in (body.size, body.center, body.rotation)]
+    parts = [np.ascontiguousarray(part + 0.0, dtype="<f8") for part in (body.shape_numbers, body.center, body.rotation)]
     return type(body).__name__.encode() + b"".join(part.tobytes() for part in parts)

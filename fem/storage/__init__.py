@@ -1,6 +1,6 @@
 """How is a file kept whole, found again, and known to be damaged?"""
 
-from .cache import from_cache as from_cache, make_room as make_room
+from .cache import from_cache as from_cache, make_room as make_room, owned as owned
 from .checked_files import (
     TableFileError as TableFileError,
     described as described,

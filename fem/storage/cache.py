@@ -1,8 +1,10 @@
 """A folder of what was computed before: found again by its name, made by one process at a time."""
 
 import errno
+import fcntl
 import logging
 import os
+import platform
 import stat
 import tempfile
 from collections.abc import Callable, Iterator
@@ -14,9 +16,11 @@ from typing import TypeVar
 import platformdirs
 from filelock import FileLock, Timeout
 
+from ...geometry.basics import InputError
 from .checked_files import TableFileError
 
 Table = TypeVar("Table")
+OWNER = "in-use.lock"
 NO_LOCKS = (errno.ENOLCK, errno.ENOSYS, errno.EOPNOTSUPP)
 
 
@@ -135,6 +139,54 @@ def _take(lock: FileLock, report: Callable[[str], None]) -> None:
     except Timeout:
         report("Another process is making this table: waiting for it ...")
         lock.acquire()
+
+
+@contextmanager
+def owned(folder: Path) -> Iterator[None]:
+    """Be the only process that computes into a folder while the block lasts.
+
+    The system frees the lock of a process that has ended, however it did. Where there are no locks the block runs
+    without.
+
+    Raises
+    ------
+    InputError : another process is at work there
+    OSError : the folder cannot be made or written
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    path = folder / OWNER
+    descriptor = _lock(path)
+    try:
+        with suppress(OSError):  # a full disk: who owns the folder is said for people only
+            os.ftruncate(descriptor, 0)
+            os.write(descriptor, f"process {os.getpid()} on {platform.node()}".encode())
+        yield
+    finally:
+        path.unlink(missing_ok=True)
+        os.close(descriptor)
+
+
+def _lock(path: Path) -> int:
+    """Descriptor of the file at a path, locked; it is a new one if another process has just removed its own."""
+    while True:
+        descriptor = os.open(path, os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW, 0o644)
+        try:
+            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            owner = os.read(descriptor, 200).decode(errors="replace") or "another process"
+            os.close(descriptor)
+            raise InputError(
+                f"Input --out must be a folder into which no other spinlev computes; instead {owner} does so in "
+                f"{path.parent}. Wait until it has ended, or choose another --out."
+            ) from None
+        except OSError as error:
+            if error.errno not in NO_LOCKS:
+                os.close(descriptor)
+                raise
+        with suppress(FileNotFoundError):
+            if os.path.samestat(os.fstat(descriptor), path.stat()):
+                return descriptor
+        os.close(descriptor)
 
 
 def make_room(folder: Path, limit: int) -> None:

@@ -11,12 +11,14 @@ ROOT = Path(__file__).resolve().parents[2]
 LIBRARIES = ("heyoka", "netgen-mesher", "ngsolve", "numpy", "scipy")
 """That decide the digits of a table; the others read, write and show."""
 TEXTS = (".py", ".csv")
+SHOWN = ("figure.py", "figures.py", "report.py", "style.py")
+"""How the names of files end that show what others compute: a label can be mended and no result is lost."""
 IMPORT = re.compile(r"^\s*from (\.+)([\w.]+) import", re.MULTILINE)
 
 
-def program_of(package: str) -> str:
-    """The versions of what computes a package's tables: digest of the text, and libraries."""
-    return " ".join([digest_of(package), _libraries()])
+def program_of(*packages: str) -> str:
+    """The versions of what computes in packages: digest of their text, and libraries."""
+    return " ".join([digest_of(*packages), _libraries()])
 
 
 @cache
@@ -54,7 +56,7 @@ def _texts(package: str, root: Path) -> list[Path]:
     folder = root.joinpath(*package.split(".")[1:])
     if not folder.is_dir():
         raise FileNotFoundError(f"Input packages must be of this program; instead received '{package}'.")
-    return [path for path in folder.rglob("*") if path.suffix in TEXTS]
+    return [path for path in folder.rglob("*") if path.suffix in TEXTS and not path.name.endswith(SHOWN)]
 
 
 def _imported(package: str, root: Path) -> set[str]:

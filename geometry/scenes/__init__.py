@@ -13,7 +13,12 @@ from .contents import (
     Scene as Scene,
 )
 from .faults import SceneError as SceneError
-from .file import changed as changed, load_scene as load_scene, parse_scene as parse_scene
+from .file import (
+    changed as changed,
+    check_files as check_files,
+    load_scene as load_scene,
+    parse_scene as parse_scene,
+)
 from .floater import Floater as Floater
 from .parts import (
     horizontal as horizontal,
@@ -23,4 +28,10 @@ from .parts import (
     tilt as tilt,
     vertical as vertical,
 )
-from .writing import scene_keys as scene_keys, scene_text as scene_text, startless_text as startless_text
+from .writing import (
+    map_digest as map_digest,
+    scene_digest as scene_digest,
+    scene_keys as scene_keys,
+    scene_text as scene_text,
+    startless_text as startless_text,
+)

@@ -1,7 +1,10 @@
 """From the keys of a scene file to the scene in SI units."""
 
-from collections.abc import Mapping
+import hashlib
+import os
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -29,9 +32,16 @@ from .schema import (
 )
 from .shapes import MILLI, part, solid
 
+FILES = ("file", "field_map")
+"""Keys that name one."""
+LARGEST = 2**30
+"""Bytes of a file that a scene may name."""
 
-def assemble(keys: Mapping[str, Any], source: str) -> Scene:
-    """The scene of a scene file's keys; `source` names it in messages, and lies where its map of the field does.
+
+def assemble(keys: Mapping[str, Any], source: str, folder: Path | None = None) -> Scene:
+    """The scene of a scene file's keys; `source` names it in messages.
+
+    The files that it names lie in `folder`, left out: where `source` does.
 
     Raises
     ------
@@ -45,13 +55,41 @@ def assemble(keys: Mapping[str, Any], source: str) -> Scene:
     if faults:
         raise SceneError(source, faults)
     try:
-        scene = _scene(table, Path(source).parent)
+        folder = Path(source).parent if folder is None else folder
+        files = tuple((str(folder / name), content_digest(folder / name)) for name in _named_files(keys))
+        scene = replace(_scene(table, folder), folder=folder, files=files)
     except InputError as error:  # a file of a magnet
         raise SceneError(source, [str(error)]) from None
     faults = overlap_faults(scene)
     if faults:
         raise SceneError(source, faults)
     return scene
+
+
+def content_digest(path: Path) -> str:
+    """SHA-256 of a file's content; empty where there is no file, or one so large that no reader takes it."""
+    try:
+        found = os.stat(path)
+        if not os.path.isfile(path) or found.st_size > LARGEST:
+            return ""
+        return _digest(path, (found.st_ino, found.st_size, found.st_mtime_ns, found.st_ctime_ns))
+    except (OSError, ValueError):
+        return ""
+
+
+@lru_cache(16)
+def _digest(path: Path, state: tuple[int, ...]) -> str:
+    """Once while the file is in a state: a map can have a hundred megabytes, and every point of a sweep asks."""
+    with path.open("rb") as stream:
+        return hashlib.file_digest(stream, "sha256").hexdigest()
+
+
+def _named_files(keys: Any) -> Iterator[str]:
+    """Names of files in keys, at any depth."""
+    if isinstance(keys, Mapping):
+        yield from (keys[key] for key in FILES if isinstance(keys.get(key), str))
+    for entry in keys.values() if isinstance(keys, Mapping) else keys if isinstance(keys, list) else ():
+        yield from _named_files(entry)
 
 
 def _scene(table: SceneSection, folder: Path) -> Scene:

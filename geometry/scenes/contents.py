@@ -112,6 +112,8 @@ class Scene:
     text : the scene file as it was read, for the record
     conductors : metal beside the magnets that turns with the rotor
     remarks : what was found out about its files, sentences for people
+    folder : where the files lie that `text` names
+    files : path of each file that it names, with the SHA-256 of its content when the scene was read
     """
 
     frequency: float
@@ -126,6 +128,8 @@ class Scene:
     text: str = ""
     conductors: tuple[Conductor, ...] = ()
     remarks: tuple[str, ...] = ()
+    folder: Path = field(default_factory=Path)
+    files: tuple[tuple[str, str], ...] = ()
 
     @property
     def angular_velocity(self) -> float:

@@ -9,10 +9,10 @@ from pathlib import Path
 from typing import Any
 
 from ..basics import InputError, file_content, regular_file, shown
-from .assembly import assemble
+from .assembly import assemble, content_digest
 from .contents import Scene
 from .faults import SceneError
-from .writing import scene_keys
+from .writing import keys_and_folder
 
 MOST = 5_000_000
 """Bytes of a scene file; one with a thousand magnets has 200 000."""
@@ -108,11 +108,38 @@ def _keys(text: str, source: str) -> dict[str, Any]:
 
 
 def changed(scene: Scene, changes: Mapping[str, float], source: str = "scene") -> Scene:
-    """The scene with numbers replaced by key, as in `parse_scene`. Raises SceneError."""
-    keys = scene_keys(scene)
+    """The scene with numbers replaced by key, as in `parse_scene`.
+
+    Raises
+    ------
+    SceneError : as there, or a file that the scene names has another content than when the scene was read
+    """
+    keys, folder = keys_and_folder(scene)
     for key, value in changes.items():
         _replace(keys, key, value, source)
-    return assemble(keys, source)
+    found = assemble(keys, source, folder)
+    before = dict(scene.files)
+    for path, digest in found.files:
+        if before.get(path, digest) != digest:
+            raise _replaced(path, source)
+    return found
+
+
+def check_files(scene: Scene, source: str = "scene") -> None:
+    """Raise SceneError if a file that a scene names has another content than when the scene was read."""
+    for path, digest in scene.files:
+        if content_digest(Path(path)) != digest:
+            raise _replaced(path, source)
+
+
+def _replaced(path: str, source: str) -> SceneError:
+    return SceneError(
+        source,
+        [
+            f"Input {path} must stay as it was when the scene was read; instead its content is another one. Begin "
+            "again, and what needs the file is computed anew."
+        ],
+    )
 
 
 def _replace(raw: Any, key: str, value: float, source: str) -> None:

@@ -1,5 +1,6 @@
 """A scene as the keys of a scene file: what is written beside a result, also of a scene that was made in Python."""
 
+import hashlib
 import json
 import tomllib
 from collections.abc import Mapping
@@ -11,7 +12,7 @@ import numpy as np
 
 from ..basics import Array, Box, Part, Ring, Solid, moved, rotation_angles
 from ..bodies import Conductor, Magnet, horizontal, tilt, vertical
-from .assembly import assemble
+from .assembly import assemble, content_digest
 from .contents import AbsoluteStart, Drag, OffsetStart, Plate, Scene
 from .faults import SceneError
 from .floater import Floater
@@ -37,10 +38,36 @@ def scene_keys(scene: Scene) -> dict[str, Any]:
     return tomllib.loads(scene_text(scene))
 
 
-def _says(text: str, scene: Scene) -> bool:
-    """Whether a scene file describes this scene; the folder of its map of the field is not in the file."""
+def keys_and_folder(scene: Scene) -> tuple[dict[str, Any], Path]:
+    """The keys that describe a scene, those of its file if it still says so, and where the files lie they name."""
+    if scene.text and _says(scene.text, scene, scene.folder):
+        return tomllib.loads(scene.text), scene.folder
+    return tomllib.loads(_toml(_keys(scene))), Path()
+
+
+def scene_digest(scene: Scene) -> str:
+    """SHA-256 of what a scene says and of the content of the files that it names, whatever their names are.
+
+    Comments do not count. Of a file that was read with the scene it is the content that was read.
+    """
+    keys, contents = _keys(scene), [map_digest(scene)]
+    keys["rotor"].pop("field_map", None)
+    for magnet, body in zip(keys["rotor"].get("magnets", ()), (m.body for m in scene.rotor), strict=False):
+        if magnet.pop("file", None):
+            contents.append(str(body.shape_numbers.tolist()))
+    return hashlib.sha256(json.dumps([keys, contents], sort_keys=True).encode()).hexdigest()
+
+
+def map_digest(scene: Scene) -> str:
+    """SHA-256 of the content of a scene's map of the field; empty where it has none."""
+    path = scene.field_map
+    return "" if path is None else dict(scene.files).get(str(path)) or content_digest(path)
+
+
+def _says(text: str, scene: Scene, folder: Path = Path()) -> bool:
+    """Whether a scene file in a folder describes this scene; where its map of the field lies does not matter."""
     try:
-        both = [_keys(assemble(tomllib.loads(text), "scene")), _keys(scene)]
+        both = [_keys(assemble(tomllib.loads(text), "scene", folder)), _keys(scene)]
     except (SceneError, tomllib.TOMLDecodeError):
         return False
     told, used = (str(keys["rotor"].pop("field_map", "")) for keys in both)

@@ -8,6 +8,7 @@ from typing import Any
 
 import xarray as xr
 
+from ...fem.storage import owned
 from ..one_scene import Job, Question
 from ..pictures import question_figure, question_lines
 from ..results import Point, Study, save_figures, write_dataset
@@ -56,11 +57,12 @@ def question_study(question: Question, values: Mapping[str, Sequence[Any]]) -> S
 
 def _studied(study: Study, points: Sequence[Point], engine: Workers, out: Path) -> Job:
     name = study.name
-    result = swept(name, study, dict(enumerate(points)), engine, out)
     path = out / f"{name}.nc"
-    write_dataset(result, path)
-    forget(name, out)
-    figures = save_figures(figures_of(result), out)
+    with owned(out):
+        result = swept(name, study, dict(enumerate(points)), engine, out)
+        write_dataset(result, path)
+        forget(name, out)
+        figures = save_figures(figures_of(result), out)
     lines = [*study.report(result), *failure_lines(result)]
     values = {
         "study": name,

@@ -69,10 +69,11 @@ def run(
     positive("--duration-s", duration_s)
     _check_spin(spin)
     loaded = _loaded(scene or default_scene())
+    from ...fem.storage import owned
     from ..one_scene import main_job
     from ..rendering import copied
 
-    with copied() as drawing:
+    with copied() as drawing, owned(output.out):
         return Answer(*main_job(loaded, asked.checked(), spin, duration_s, output.out, drawing), output.json)
 
 

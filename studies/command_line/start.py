@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gc
+import os
 import signal
 import sys
 import threading
@@ -19,12 +20,14 @@ def main() -> None:
     stop = threading.Event()
     _listen(stop)
     gc.set_threshold(MANY)
+    os.environ["PYTHONSAFEPATH"] = "1"  # no process begun here loads what lies in the folder that it is begun in
     try:
         from ..terminal import make_readable
         from .late import leave_out, load_late
 
         load_late("netgen", "netgen.occ", "netgen.meshing", "ngsolve")
-        leave_out("dask.array")  # xarray would load it, for as long as a flight takes, to ask whether data are of it
+        if not any(argument.startswith("--scheduler") for argument in sys.argv):
+            leave_out("dask.array")  # xarray would load it, for as long as a flight takes, to see if data are of it
         make_readable()
         from .cli import run
 

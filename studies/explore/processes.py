@@ -9,12 +9,15 @@ import threading
 from collections.abc import Callable, Collection
 from dataclasses import dataclass
 from functools import cache
+from multiprocessing import forkserver, resource_tracker
 from multiprocessing.connection import Connection
 from multiprocessing.context import ForkServerContext
 from typing import Any
 
 from bokeh.document import Document
 from tornado.ioloop import IOLoop
+
+from ..sweeps import safe_path
 
 Task = Callable[..., None]
 """Runs in the other process, with a `Connection` first."""
@@ -29,6 +32,9 @@ def _context() -> ForkServerContext:
     """Processes are copies of one that has loaded the numeric libraries, and begin in hundredths of a second."""
     context = multiprocessing.get_context("forkserver")
     context.set_forkserver_preload([LIBRARIES])
+    with safe_path():
+        resource_tracker.ensure_running()
+        forkserver.ensure_running()
     return context
 
 

@@ -22,6 +22,7 @@ from ...fem.rotor_tables import FieldTable
 from ...fem.storage import compiled
 from ...geometry.basics import Array
 from ...geometry.bodies import Magnet, horizontal
+from ..sweeps import safe_path
 from .field_methods import methods
 
 DISTANCES = (0.013, 0.015, 0.02, 0.03, 0.05)
@@ -127,7 +128,7 @@ def apart(name: str, quick: bool) -> Measured:
     """`measure` in a process of its own with an empty cache, forked from one that has only imported the libraries."""
     fresh = get_context("forkserver")
     fresh.set_forkserver_preload([__name__])
-    with tempfile.TemporaryDirectory() as cache, ProcessPoolExecutor(1, mp_context=fresh) as pool:
+    with safe_path(), tempfile.TemporaryDirectory() as cache, ProcessPoolExecutor(1, mp_context=fresh) as pool:
         return pool.submit(_measured_with, cache, name, quick).result()
 
 

@@ -2,8 +2,6 @@
 
 import os
 from collections.abc import Mapping
-from concurrent.futures import ProcessPoolExecutor
-from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +14,7 @@ from ...geometry.basics import InputError
 from ...geometry.scenes import Scene, scene_text
 from ..one_scene import Levitation
 from ..results import AXIS, variable
+from ..sweeps import mapped
 from ..terminal import FieldModel, InteractionModel, Models, Workers, heard, positive
 from .starts import drawn_starts, given_starts
 
@@ -67,8 +66,7 @@ def ensemble(
     interaction : {"auto", "rigid", "mutual"}
         Whether rotor and floater magnetise each other.
     workers : int or None
-        Processes, None for one a core; more than one needs the caller's script to be guarded by
-        `if __name__ == "__main__":`.
+        Processes, None for one a core.
     progress : bool
         Whether messages go to standard error.
 
@@ -104,11 +102,7 @@ def ensemble(
         count = len(begun.position)
         together = min(TOGETHER, -(-count // number))
         asked = levitation.scene, levitation.interaction, begun, duration
-        if number == 1:
-            found = flown(*asked, together=together)
-        else:
-            with ProcessPoolExecutor(number, get_context("spawn")) as pool:
-                found = flown(*asked, pool.map, together)
+        found = flown(*asked, map if number == 1 else mapped(number), together)
         drawn = {} if starts is not None else {"seed": seed, "spread": repr(spread)}
         labels = {**levitation.labels, "scene": scene_text(levitation.scene), "duration_s": duration, **drawn}
     return _dataset(begun, found).assign_attrs(study="ensemble", **labels)

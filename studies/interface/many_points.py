@@ -6,6 +6,7 @@ from pathlib import Path
 import xarray as xr
 from matplotlib.figure import Figure
 
+from ...fem.storage import owned
 from ...geometry.basics import InputError
 from ...geometry.scenes import Scene
 from ..catalogue import CATALOGUE, QUESTION, figures_of, question_study
@@ -69,8 +70,7 @@ def sweep(
     interaction : {"auto", "rigid", "mutual"}
         Whether rotor and floater magnetise each other, unless it is varied.
     workers : int or None
-        Processes here, None for one a core; more than one needs the caller's script to be guarded by
-        `if __name__ == "__main__":`.
+        Processes here, None for one a core.
     scheduler : str or None
         Address of a dask scheduler that computes instead.
     out : str or Path
@@ -118,8 +118,7 @@ def run_study(
     quick : bool
         Coarser, in less than a minute.
     workers : int or None
-        Processes here, None for one a core; more than one needs the caller's script to be guarded by
-        `if __name__ == "__main__":`.
+        Processes here, None for one a core.
     scheduler : str or None
         Address of a dask scheduler that computes instead.
     out : str or Path
@@ -170,6 +169,7 @@ def draw(result: xr.Dataset) -> Mapping[str, Figure]:
 def _computed(
     name: str, study: Study, points: Sequence[Mapping[str, object]], by: tuple[int | None, str | None], out: str | Path
 ) -> xr.Dataset:
-    result = swept(name, study, dict(enumerate(points)), Workers(*by).checked(), Path(out))
-    forget(name, Path(out))
+    with owned(Path(out)):
+        result = swept(name, study, dict(enumerate(points)), Workers(*by).checked(), Path(out))
+        forget(name, Path(out))
     return result

@@ -10,7 +10,7 @@ import numpy as np
 import xarray as xr
 
 from ...geometry.basics import Array, InputError, SpinlevError
-from ...geometry.scenes import Scene, changed, scene_text
+from ...geometry.scenes import Scene, changed, scene_digest, scene_text
 from ..results import AXIS, Point, found_dataset, variable
 from ..terminal import Models, Quantity, positive
 from .answers import kind_of_flight
@@ -57,8 +57,9 @@ class Question:
 
     @property
     def settings(self) -> Point:
-        """The same in types that JSON knows."""
-        return vars(self) | {"scene": scene_text(self.scene), "models": asdict(self.models)}
+        """All that decides the answers, in types that JSON knows: not how the scene's file is called."""
+        asked = vars(self) | {"scene": scene_digest(self.scene), "models": asdict(self.models)}
+        return {key: value for key, value in asked.items() if key != "source"}
 
     def levitation(self, point: Point) -> Levitation:
         """The scene of a point with the models of a point. Raises SceneError, and InputError for an unknown model."""

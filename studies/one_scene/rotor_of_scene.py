@@ -11,7 +11,7 @@ from ...fem.mutual import MutualTable, cached_mutual_table, mutual_key
 from ...fem.rotor_losses import RotorLosses, cached_rotor_losses, losses_key, pieces_of
 from ...fem.rotor_tables import RotorTable, cached_rotor_table, resolve_model, rotor_key, rotor_table
 from ...geometry.basics import Watch
-from ...geometry.scenes import Floater, Scene
+from ...geometry.scenes import Floater, Scene, check_files, map_digest
 from ..terminal import Models, note, stages
 
 RotorField = RotorTable | GriddedTable
@@ -41,9 +41,7 @@ class RotorTables:
         ------
         InputError : the map cannot be used
         """
-        key = (
-            f"{rotor_key(scene.rotor, name, rtol, nearest_faces(scene.floater))} {scene.field_map} {scene.map_reading}"
-        )
+        key = f"{rotor_key(scene.rotor, name, rtol, nearest_faces(scene.floater))} {_map_key(scene)}"
         return self.once(key, lambda: self._field(scene, name, rtol))
 
     def answers(self, scene: Scene) -> MutualTable:
@@ -64,7 +62,9 @@ class RotorTables:
     def _field(self, scene: Scene, name: str, rtol: float) -> RotorField:
         if name == "map":
             note("Rotor's field from its map ...")
-            return map_table(scene.field_map, scene.rotor, scene.map_reading)
+            table = map_table(scene.field_map, scene.rotor, scene.map_reading)
+            check_files(scene)  # the map may have been replaced since the scene was read
+            return table
         if name != "fem":  # closed forms are quicker to make than to read
             return rotor_table(scene.rotor, name, rtol, nearest_faces(scene.floater))
         make = partial(cached_rotor_table, scene.rotor, name, rtol, note, nearest_faces(scene.floater))
@@ -110,14 +110,19 @@ def equations_key(scene: Scene, models: Models) -> str:
     """All that decides a scene's tables and equations of motion without plate; what it leaves out are parameters."""
     return " ".join(
         (
-            rotor_key(scene.rotor, models.model, models.rtol, scene.floater.radius),
-            f"{scene.field_map} {scene.map_reading}",
+            rotor_key(scene.rotor, models.model, models.rtol, nearest_faces(scene.floater)),
+            _map_key(scene),
             f"{bool(scene.floater.conductivity)} {scene.drag.air} {models.interaction}",
             "" if models.interaction == "rigid" else mutual_key(scene.rotor, scene.floater),
             losses_key(scene) if pieces_of(scene.rotor, scene.conductors) else "",
             _shape_key(scene.floater),
         )
     )
+
+
+def _map_key(scene: Scene) -> str:
+    """What the map of a scene's field says: its content, and how it is read."""
+    return f"{map_digest(scene)} {scene.map_reading}"
 
 
 def _shape_key(floater: Floater) -> str:

@@ -10,9 +10,9 @@ import numpy as np
 
 from ...dynamics.flights import Checkpoint, FlightStopped, Trajectory
 from ...fem.rotor_tables import NEAR_RTOL, RotorTable, complete
-from ...fem.storage import program_of, write_whole
+from ...fem.storage import owned, program_of, write_whole
 from ...geometry.basics import Array
-from ...geometry.scenes import OffsetStart, Scene, scene_text
+from ...geometry.scenes import OffsetStart, Scene, scene_digest
 from ..results import lowering_times, save_figures, trajectory_dataset, trajectory_figure, write_dataset
 from ..terminal import COLUMNS, Models, note, to_json
 from .answers import equilibria_answer, field_answer, flight_answer
@@ -55,7 +55,12 @@ def equilibria_job(scene: Scene, asked: Models, spin: float, out: Path) -> Job:
 
 def simulate_job(scene: Scene, asked: Models, duration: float, out: Path, resume: bool) -> Job:
     """The motion; writes trajectory.nc and its figure, and keeps a checkpoint while it lasts."""
-    asked_of = {"scene": scene_text(scene), "duration_s": duration, **vars(asked)}
+    with owned(out):
+        return _simulated(scene, asked, duration, out, resume)
+
+
+def _simulated(scene: Scene, asked: Models, duration: float, out: Path, resume: bool) -> Job:
+    asked_of = {"scene": scene_digest(scene), "duration_s": duration, **vars(asked)}
     identity = to_json({**asked_of, "program": program_of(__package__)})
     checkpoint = Checkpoint(out / "checkpoint.npz", identity)
     if not resume:

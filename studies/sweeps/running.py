@@ -1,23 +1,24 @@
 """Runs a study: its points one by one on the engine, kept as they come on disk, then joined."""
 
+import hashlib
 import json
 import shutil
+import sys
 from collections.abc import Callable, Mapping
-from importlib.metadata import version
+from contextlib import closing
 from itertools import count
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import xarray as xr
 
-from ...fem.storage import digest_of, seal, unsealed, write_whole
+from ...fem.storage import program_of, seal, unsealed, write_whole
 from ...geometry.basics import ComputationError, InputError
-from ..results import LIBRARIES, Point, Study
+from ..results import Point, Study
 from ..terminal import Workers, note, progress, to_json
+from .processes import FLOORS
 from .workers import Failure, computed
-
-FLOORS = ("spinlev.geometry", "spinlev.fem", "spinlev.dynamics", "spinlev.studies")
-"""What another program has computed is not mixed into a result."""
 
 
 class Journal:
@@ -26,7 +27,7 @@ class Journal:
     Parameters
     ----------
     folder : made when the first point is kept
-    identity : tells this sweep from every other; points that another one left in the folder are not used
+    identity : all that decides the sweep's points, and tells it from every other; each point's file says of which it is
     report : told about what is not used, and where it is
     """
 
@@ -35,18 +36,23 @@ class Journal:
 
     def finished(self) -> dict[int, xr.Dataset]:
         """The points that an earlier run of the same sweep has finished."""
-        if not self.folder.exists():
-            return {}
-        label = self.folder / "identity.json"
-        if not label.exists() or label.read_bytes() != self.identity.encode():
+        if self.folder.exists() and not self._is_ours(self.folder):
             aside = self._set_aside()
             self.report(
-                f"{self.folder} is of another sweep or another version of the program: all is computed anew. "
-                f"What it held is in {aside}; delete that when you need it no more."
+                f"{self.folder} is of another sweep, of files that were replaced, or of another version of the "
+                f"program. What it held is in {aside}; delete that when you need it no more."
             )
-            return {}
+        if not self.folder.exists():
+            older = [path for path in self.folder.parent.glob(f"{self.folder.name}.old*") if self._is_ours(path)]
+            if not older:
+                return {}
+            older[0].rename(self.folder)
         found = {int(path.stem): self._read(path) for path in sorted(self.folder.glob("[0-9]*.json"))}
         return {number: point for number, point in found.items() if point is not None}
+
+    def _is_ours(self, folder: Path) -> bool:
+        label = folder / "identity.json"
+        return label.is_file() and label.read_bytes() == self.identity.encode()
 
     def _set_aside(self) -> Path:
         """Give the folder a name that is free: its points may be hours of work."""
@@ -63,28 +69,35 @@ class Journal:
         if content is None:
             self.report(f"The finished point {path} is damaged and is computed anew.")
             return None
-        return _unpacked(content)
+        kept = json.loads(content)
+        if kept.get("of") != self._of(int(path.stem)):
+            self.report(f"The finished point {path} is of another sweep and is computed anew.")
+            return None
+        return _unpacked(kept)
+
+    def _of(self, number: int) -> str:
+        return hashlib.sha256(f"{number} {self.identity}".encode()).hexdigest()
 
     def keep(self, number: int, result: xr.Dataset) -> None:
         """Keep the result of a point. Raises OSError where the folder cannot be written."""
         label = self.folder / "identity.json"
         if not label.exists():
             write_whole(label, self.identity.encode())
-        write_whole(self.folder / f"{number:06}.json", seal(_packed(result)))
+        packed = {"of": self._of(number), **_packed(result)}
+        text = json.dumps(packed, default=lambda value: value.tolist())
+        write_whole(self.folder / f"{number:06}.json", seal(text.encode()))
 
 
-def _packed(result: xr.Dataset) -> bytes:
-    """A small dataset as text, to the last bit: written in 1.3 ms, which as a netCDF file takes 0.2 s."""
+def _packed(result: xr.Dataset) -> dict[str, Any]:
+    """A small dataset for a text, to the last bit: written in 1.3 ms, which as a netCDF file takes 0.2 s."""
     variables = {
         name: [list(v.dims), list(v.shape), v.dtype.str, v.values.ravel().tolist(), v.attrs]
         for name, v in result.variables.items()
     }
-    whole = {"variables": variables, "coordinates": list(result.coords), "attributes": result.attrs}
-    return json.dumps(whole, default=lambda value: value.tolist()).encode()
+    return {"variables": variables, "coordinates": list(result.coords), "attributes": result.attrs}
 
 
-def _unpacked(content: bytes) -> xr.Dataset:
-    kept = json.loads(content)
+def _unpacked(kept: Mapping[str, Any]) -> xr.Dataset:
     variables = {
         name: (dims, np.array(data, dtype).reshape(shape), attributes)
         for name, (dims, shape, dtype, data, attributes) in kept["variables"].items()
@@ -105,12 +118,12 @@ def swept(name: str, study: Study, points: Mapping[int, Point], engine: Workers,
     Raises
     ------
     SweepError : all points failed
-    InputError : the scheduler does not answer
+    InputError : the scheduler does not answer, or has no workers of this version of the program
+    ComputationError : the scheduler is lost; the finished points are kept
     OSError : `out` cannot be written
     """
-    versions = {library: version(library) for library in LIBRARIES}
     asked = {"study": name, "settings": study.settings, "points": list(points.values())}
-    identity = to_json({**asked, **versions, "program": digest_of(*FLOORS)})
+    identity = to_json({**asked, "program": _program(study)})
     journal = Journal(out / f"{name}.points", identity, note)
     finished = {k: point for k, point in journal.finished().items() if k in points}
     if finished:
@@ -120,19 +133,32 @@ def swept(name: str, study: Study, points: Mapping[int, Point], engine: Workers,
     engine = Workers(workers=1) if study.timed else engine
     with progress(f"{name}: {len(points)} points") as advance:
         advance(len(finished) / len(points))
-        for k, result in computed(engine, study, points, missing) if missing else ():
-            if isinstance(result, Failure):
-                failed[k] = result.reason
-                note(f"Point {to_json(points[k])} failed: {result.reason}")
-            else:
-                journal.keep(k, result)
-                finished[k] = result
-            advance((len(finished) + len(failed)) / len(points))
+        with closing(computed(engine, study, points, missing)) as attempts:
+            for k, result in attempts:
+                if isinstance(result, Failure):
+                    failed[k] = result.reason
+                    note(f"Point {to_json(points[k])} failed: {result.reason}")
+                else:
+                    journal.keep(k, result)
+                    finished[k] = result
+                advance((len(finished) + len(failed)) / len(points))
     if not finished:
         raise SweepError(f"All {len(points)} points failed; the first: {failed[min(failed)]}")
     reasons = [{"point": points[k], "reason": failed[k]} for k in sorted(failed)]
     joined = study.gather([finished[k] for k in sorted(finished)])
     return joined.assign_attrs(study=name, failed_points=to_json({"failed": reasons}))
+
+
+def _program(study: Study) -> str:
+    """What computes a study's points: the rooms of its function, or of a user's own the text of its file as well."""
+    function = getattr(study.compute, "compute", study.compute)  # of a study that is computed as a whole
+    module = sys.modules.get(function.__module__)
+    room = ".".join(function.__module__.split(".")[:3])
+    if room.startswith("spinlev."):
+        return program_of(room)
+    path = Path(getattr(module, "__file__", None) or "")
+    own = hashlib.sha256(path.read_bytes()).hexdigest() if path.is_file() else ""
+    return f"{program_of(*FLOORS)} {own}"
 
 
 def forget(name: str, out: Path) -> None:

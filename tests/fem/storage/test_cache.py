@@ -17,8 +17,9 @@ import pytest
 import xarray as xr
 
 from spinlev.fem import storage
-from spinlev.fem.storage import from_cache, read_checked, seal, write_checked, write_whole
+from spinlev.fem.storage import from_cache, owned, read_checked, seal, write_checked, write_whole
 from spinlev.fem.storage.cache import cache_folder
+from spinlev.geometry.basics import InputError
 
 IMPORT_ALL = """
 import importlib, os, pkgutil, spinlev
@@ -179,6 +180,40 @@ def test_a_killed_holder_frees_its_lock(cache):
     assert done.returncode == -signal.SIGKILL
     assert (cache / "a.lock").exists()
     assert text("made") == ("made", False, [])
+
+
+HOLD = """
+import sys, time; from pathlib import Path; from spinlev.fem.storage import owned
+with owned(Path(sys.argv[1])):
+    print("mine", flush=True)
+    sys.stdin.read()
+"""
+
+
+def test_a_folder_has_one_owner_and_a_dead_one_is_none(tmp_path):
+    """Another process is refused while the first lives, and not once it was killed; no file is left."""
+    command = [sys.executable, "-P", "-c", HOLD, str(tmp_path)]
+    with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as process:
+        assert process.stdout.readline() == "mine\n"
+        with (
+            pytest.raises(InputError, match=f"instead process {process.pid} on .* choose another --out"),
+            owned(tmp_path),
+        ):
+            pass
+        process.kill()
+    with owned(tmp_path), pytest.raises(InputError, match=f"process {os.getpid()} on"), owned(tmp_path):
+        pass
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_folder_on_a_file_system_without_locks_can_be_used(tmp_path, monkeypatch):
+    def refused(*_):
+        raise OSError(errno.ENOLCK, os.strerror(errno.ENOLCK))
+
+    monkeypatch.setattr("fcntl.flock", refused)
+    with owned(tmp_path):
+        assert (tmp_path / "in-use.lock").exists()
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_an_error_frees_the_lock(cache):

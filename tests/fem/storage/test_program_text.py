@@ -44,7 +44,8 @@ def test_the_same_text_has_the_same_digest_wherever_it_lies(copy):
         ("geometry/basics/constants.py", "MU_0 = 4e-7", [ROTOR, PLATE, SCENE]),
         ("fem/plate_tables/field_functions.py", "SPACING = 2.5", [PLATE, SCENE]),
         ("dynamics/flights/compiled_flight.py", "TOLERANCE = 1e-16", [SCENE]),
-        ("studies/sweeps/running.py", '"spinlev.geometry', []),
+        ("studies/sweeps/workers.py", "TRIES = 3", []),
+        ("studies/results/figures.py", "Field on the axis", []),
     ],
 )
 def test_a_changed_constant_changes_the_keys_of_what_is_made_with_it(copy, file, constant, expected):

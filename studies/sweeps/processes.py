@@ -1,0 +1,249 @@
+"""Processes of this machine that work for this one, each over a pair of sockets that nobody else can open.
+
+No port and no shared memory is needed, and no guard in the user's script: a process begins as `python -P`, so that it
+loads nothing from the folder it happens to be in, and is then told where this one looks for modules.
+"""
+
+from __future__ import annotations
+
+import os
+import pickle
+import select
+import signal
+import subprocess
+import sys
+import threading
+from collections import deque
+from collections.abc import Callable, Generator, Iterable, Iterator
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
+from multiprocessing import Pipe
+from multiprocessing.connection import Connection, wait
+from typing import Any
+
+import cloudpickle
+
+from ...fem.storage import program_of
+from ...geometry.basics import ComputationError
+
+FLOORS = ("spinlev.geometry", "spinlev.fem", "spinlev.dynamics", "spinlev.studies")
+PATIENCE = 5.0
+"""Seconds for a process to tidy up its unfinished files before it is killed."""
+THREADS = ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS")
+BEGIN = "import sys, pickle; from multiprocessing.connection import Connection; c = Connection(int(sys.argv[1])); \
+sys.path[:] = pickle.loads(c.recv_bytes()); from {module} import serve; serve(c)"
+Job = tuple[Any, ...]
+"""A function that gives an iterable, and its arguments."""
+
+
+@dataclass(frozen=True)
+class Death:
+    """How the process of a job ended before the job was done."""
+
+    status: int
+
+    def __str__(self) -> str:
+        if self.status == -signal.SIGKILL:
+            return "was killed (out of memory?)"
+        how = signal.strsignal(-self.status) if self.status < 0 else f"exit status {self.status}"
+        return f"died ({how})"
+
+
+class NoProcessError(ComputationError):
+    """The system lets no process begin; the message says why."""
+
+
+@dataclass(frozen=True)
+class _Ready:
+    program: str
+
+
+@dataclass(frozen=True)
+class _Raised:
+    text: str
+
+
+class _Done:
+    """A job has no more results."""
+
+
+def program() -> str:
+    """What tells this version of the program from any other: digest of its text, and its libraries."""
+    return program_of(*FLOORS)
+
+
+def results(number: int, jobs: deque[Job]) -> Generator[tuple[Job, Any], None, None]:
+    """What jobs give, as it comes, each result with its job; a `Death` in place of what is missing.
+
+    Parameters
+    ----------
+    number : of processes, at most
+    jobs : who iterates may append others
+
+    Raises
+    ------
+    NoProcessError : not one process can begin; `jobs` still has all that was not begun
+    ComputationError : a job raised, or the program was changed since this process began
+    """
+    busy: dict[Connection, tuple[_Process, Job]] = {}
+    free: list[_Process] = []
+    try:
+        while jobs or busy:
+            while jobs and (free or len(busy) < number):
+                try:
+                    process = free.pop() if free else _Process()
+                except OSError as error:  # too many open files or processes, too little memory
+                    number = _fewer(len(busy), str(error))
+                    break
+                job = jobs.popleft()
+                process.send(job)
+                busy[process.connection] = process, job
+            for connection in wait(list(busy)):
+                assert isinstance(connection, Connection)
+                process, job = busy[connection]
+                message = process.receive()
+                if isinstance(message, _Ready):
+                    process.ready = True
+                    if message.program != program():
+                        raise ComputationError(
+                            "The program was changed while it computed: what is finished is kept; begin again."
+                        )
+                    continue
+                if isinstance(message, _Raised):
+                    raise ComputationError(f"A process of this sweep failed: {message.text}.")
+                if isinstance(message, Death) and not process.ready:
+                    del busy[connection]
+                    process.stop()
+                    jobs.appendleft(job)
+                    number = _fewer(len(busy), f"it {message}")
+                    continue
+                if isinstance(message, Death):
+                    del busy[connection]
+                    process.stop()
+                if isinstance(message, _Done):
+                    del busy[connection]
+                    free.append(process)
+                else:
+                    yield job, message
+    finally:
+        for process in [*free, *(process for process, _ in busy.values())]:
+            process.end()
+        for process in [*free, *(process for process, _ in busy.values())]:
+            process.stop()
+
+
+def mapped(number: int) -> Callable[[Callable[[Any], Any], Iterable[Any]], Iterator[Any]]:
+    """A function like `map` that uses so many processes.
+
+    What it gives raises ComputationError where a process died, a call raised, or no process can begin.
+    """
+
+    def map_in_processes(function: Callable[[Any], Any], items: Iterable[Any]) -> Iterator[Any]:
+        jobs: deque[Job] = deque((_one, function, k, item) for k, item in enumerate(items))
+        found: dict[int, Any] = {}
+        for _, answer in results(number, jobs):
+            if isinstance(answer, Death):
+                raise ComputationError(f"A process {answer}: choose fewer workers, or a machine with more memory.")
+            found[answer[0]] = answer[1]
+        return (found[k] for k in sorted(found))
+
+    return map_in_processes
+
+
+@contextmanager
+def safe_path() -> Iterator[None]:
+    """Python processes that libraries begin in this block load nothing from the folder they happen to be in."""
+    before = os.environ.get("PYTHONSAFEPATH")
+    os.environ["PYTHONSAFEPATH"] = "1"
+    try:
+        yield
+    finally:
+        if before is None:
+            del os.environ["PYTHONSAFEPATH"]
+        else:
+            os.environ["PYTHONSAFEPATH"] = before
+
+
+def _one(function: Callable[[Any], Any], number: int, item: Any) -> list[tuple[int, Any]]:
+    return [(number, function(item))]
+
+
+def _fewer(left: int, why: str) -> int:
+    """So many processes as there are, if there are any."""
+    if not left:
+        raise NoProcessError(f"No process can begin: {why}.")
+    return left
+
+
+class _Process:
+    def __init__(self) -> None:
+        self.ready = False
+        self.connection, other = Pipe()
+        one_thread = dict.fromkeys(THREADS, "1") | {"MALLOC_TRIM_THRESHOLD_": "65536"}
+        try:
+            with other:
+                self._process = subprocess.Popen(
+                    [sys.executable, "-P", "-c", BEGIN.format(module=__name__), str(other.fileno())],
+                    pass_fds=(other.fileno(),),
+                    stdin=subprocess.DEVNULL,
+                    env=one_thread | dict(os.environ),
+                    process_group=0,  # Ctrl-C at the terminal is for this process, which then ends the other
+                )
+        except BaseException:
+            self.connection.close()
+            raise
+        here = [os.getcwd()] if "" in sys.path else []
+        self._put(pickle.dumps([place for place in sys.path if place] + here))
+
+    def send(self, job: Job) -> None:
+        self._put(cloudpickle.dumps(job))  # functions of a notebook as well
+
+    def _put(self, content: bytes) -> None:
+        with suppress(OSError):  # it has ended, which `receive` finds out
+            self.connection.send_bytes(content)
+
+    def receive(self) -> Any:
+        try:
+            return pickle.loads(self.connection.recv_bytes())
+        except (EOFError, OSError):
+            return Death(self._process.wait())
+
+    def end(self) -> None:
+        """Ask it to end at once."""
+        self._process.terminate()
+
+    def stop(self) -> None:
+        """End it."""
+        self.connection.close()
+        self._process.terminate()
+        try:
+            self._process.wait(PATIENCE)
+        except subprocess.TimeoutExpired:  # deep in a library
+            self._process.kill()
+            self._process.wait()
+
+
+def serve(connection: Connection) -> None:
+    """The life of such a process: jobs come, results go, until the other end is closed."""
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(1))  # unfinished files are removed on the way out
+    threading.Thread(target=_end_with, args=(connection.fileno(),), daemon=True).start()
+    try:
+        connection.send_bytes(pickle.dumps(_Ready(program())))
+        while True:
+            function, *arguments = pickle.loads(connection.recv_bytes())
+            try:
+                for result in function(*arguments):
+                    connection.send_bytes(cloudpickle.dumps(result))
+                connection.send_bytes(pickle.dumps(_Done()))
+            except Exception as error:
+                connection.send_bytes(pickle.dumps(_Raised(f"{type(error).__name__}: {error}")))
+    except (EOFError, ConnectionError):  # it is over
+        return
+
+
+def _end_with(descriptor: int) -> None:
+    """End when the other process has: it closes its end of the sockets, or is killed."""
+    poll = select.poll()
+    poll.register(descriptor, select.POLLHUP)
+    poll.poll()
+    os._exit(1)
