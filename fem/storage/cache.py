@@ -44,15 +44,21 @@ def _usable(folder: Path) -> Path:
             folder.mkdir(mode=0o755, parents=True, exist_ok=True)
             return folder
     try:
-        instead = Path(tempfile.gettempdir()) / f"spinlev-{os.getuid()}"
-        instead.mkdir(mode=0o700, exist_ok=True)
-        if others_may_write(instead):  # somebody else was there first
-            instead = Path(tempfile.mkdtemp(prefix=f"{instead.name}-"))
+        instead = temporary_home()
     except OSError:
         return Path(os.devnull) / "spinlev"  # where nothing can be kept, which each table says
     text = "There is no home folder: tables are kept in %s, as long as the system does; SPINLEV_CACHE names another."
     logging.getLogger("spinlev").info(text, instead)
     return instead
+
+
+def temporary_home() -> Path:
+    """A folder among the temporary files that is this user's alone, the same each time if it can be. Raises OSError."""
+    home = Path(tempfile.gettempdir()) / f"spinlev-{os.getuid()}"
+    home.mkdir(mode=0o700, exist_ok=True)
+    if others_may_write(home):  # somebody else was there first
+        return Path(tempfile.mkdtemp(prefix=f"{home.name}-"))
+    return home
 
 
 def own_folder(name: str) -> Path:

@@ -3,6 +3,7 @@
 Exit status 0: done; 2: bad input, with one message that says what is allowed; 1: the computation failed.
 """
 
+import errno
 import os
 import sys
 import threading
@@ -21,7 +22,7 @@ from .file_commands import add_file_commands
 from .page_command import add_page_command
 from .result_commands import add_result_commands
 from .scene_commands import add_scene_commands
-from .start import STOPPED
+from .start import STOPPED, TOO_MANY_FILES
 
 LONGEST = 1000
 """Characters of a line of a message."""
@@ -62,6 +63,9 @@ def _answered(arguments: list[str], out: Any, stop: threading.Event | None) -> i
         note(_told(error))
         return error.exit_status
     except OSError as error:
+        if error.errno == errno.EMFILE:
+            note(f"spinlev: {TOO_MANY_FILES}")
+            return 1
         where = error.filename or "standard output"
         note(f"spinlev: the computation failed to write or read {where}: {error.strerror or error}; see --out.")
         return 1

@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+import errno
 import gc
 import os
 import signal
 import sys
 import threading
+from contextlib import suppress
 
 STOPPED = "spinlev: stopped; what was finished is kept."
+TOO_MANY_FILES = (
+    "the computation failed to open a file: this shell allows too few at a time; `ulimit -n 256` allows more."
+)
 AGAIN = 0.01
 """Seconds until an interrupt is raised again that fell where Python drops exceptions."""
 MANY = 50_000
@@ -18,6 +23,7 @@ MANY = 50_000
 def main() -> None:
     """Load the command line, run it, and leave with its exit status."""
     stop = threading.Event()
+    _open_streams()
     _listen(stop)
     gc.set_threshold(MANY)
     os.environ["PYTHONSAFEPATH"] = "1"  # no process begun here loads what lies in the folder that it is begun in
@@ -29,23 +35,65 @@ def main() -> None:
         if not any(argument.startswith("--scheduler") for argument in sys.argv):
             leave_out("dask.array")  # xarray would load it, for as long as a flight takes, to see if data are of it
         make_readable()
+        _find_home()
         from .cli import run
 
         status = run(sys.argv[1:], stop)
-    except BaseException:  # libraries make something else of an interrupt while they are loaded
-        if not stop.is_set():
+    except BaseException as error:  # libraries make something else of an interrupt while they are loaded
+        if not stop.is_set() and getattr(error, "errno", None) != errno.EMFILE:
             raise
-        print(STOPPED, file=sys.stderr)
+        print(STOPPED if stop.is_set() else f"spinlev: {TOO_MANY_FILES}", file=sys.stderr)
         status = 1
     gc.freeze()  # the system takes all memory back: nothing need be looked through once more
     sys.exit(status)
 
 
-def _listen(stop: threading.Event) -> None:
-    """Raise KeyboardInterrupt at Ctrl-C and at SIGTERM: a batch system stops like a person."""
+def _open_streams() -> None:
+    """Put something in the place of standard streams that are closed, lest the next opened file be taken for one.
 
-    def stopped(*_: object) -> None:
+    What is said on standard error is then lost; the answer cannot be written, which is an error, as on a full disk.
+    """
+    for number, name, mode in ((0, "stdin", os.O_RDONLY), (1, "stdout", os.O_RDONLY), (2, "stderr", os.O_WRONLY)):
+        if getattr(sys, name) is not None:
+            continue
+        opened = os.open(os.devnull, mode)
+        if opened != number:
+            os.dup2(opened, number)
+            os.close(opened)
+        os.set_inheritable(number, True)
+        setattr(sys, name, os.fdopen(number, "r" if number == 0 else "w", closefd=False))
+
+
+def _find_home() -> None:
+    """Give a user whose home is not known, or not there, one among the temporary files: libraries ask for it."""
+    home = os.path.expanduser("~")
+    if os.path.isabs(home) and os.path.isdir(home):
+        return
+    from ...fem.storage import temporary_home
+
+    with suppress(OSError):
+        os.environ["HOME"] = str(instead := temporary_home())
+        said = f"spinlev: there is no home folder: {instead} takes its place; HOME and SPINLEV_CACHE name others."
+        if "SPINLEV_CACHE" not in os.environ:
+            print(said, file=sys.stderr)
+
+
+def _listen(stop: threading.Event) -> None:
+    """Raise KeyboardInterrupt at Ctrl-C, at SIGTERM and at SIGHUP: a batch system stops like a person.
+
+    A terminal that is closed says so more than once, and takes no more words: neither may disturb what is still kept.
+    """
+    terminals = [number for number in (1, 2) if os.isatty(number)]
+
+    def stopped(number: int, _: object) -> None:
         stop.set()
+        if number == signal.SIGHUP:
+            signal.signal(signal.SIGHUP, signal.SIG_IGN)
+            nowhere = os.open(os.devnull, os.O_WRONLY)
+            for gone in terminals:
+                if not os.isatty(gone):
+                    os.dup2(nowhere, gone)
+            os.close(nowhere)
         raise KeyboardInterrupt
 
     def dropped(what: sys.UnraisableHookArgs) -> None:  # in a destructor
@@ -56,4 +104,6 @@ def _listen(stop: threading.Event) -> None:
 
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGALRM):
         signal.signal(number, stopped)
+    if signal.getsignal(signal.SIGHUP) != signal.SIG_IGN:  # else `nohup` wants it to go on
+        signal.signal(signal.SIGHUP, stopped)
     sys.unraisablehook = dropped

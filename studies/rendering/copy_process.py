@@ -64,6 +64,8 @@ def _draw(asked: int, tell: int, others: tuple[int, int]) -> None:
     os.setpgid(0, 0)
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGALRM):
         signal.signal(number, signal.SIG_DFL)
+    if signal.getsignal(signal.SIGHUP) != signal.SIG_IGN:
+        signal.signal(signal.SIGHUP, signal.SIG_DFL)
     for descriptor in others:
         os.close(descriptor)
     if "SPINLEV_TRACEBACK" not in os.environ:

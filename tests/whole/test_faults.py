@@ -28,6 +28,7 @@ from spinlev.fem.storage import hdf5_fault, read_checked, write_checked, write_w
 from spinlev.fem.storage.cache import cache_folder
 from spinlev.fem.storage.whole_files import replacing
 from spinlev.studies.command_line.cli import _status
+from spinlev.studies.command_line.start import STOPPED
 
 SCENE, OVER_PLATE = str(places.HORIZONTAL), str(places.OVER_PLATE)
 DIPOLE = ("--model", "dipole", "--plate-model", "none")
@@ -262,7 +263,10 @@ def test_ctrl_c_in_every_phase(spinlev, monkeypatch, phase):
     same(answer, undisturbed[1])
 
 
-@pytest.mark.parametrize(("library", "blow"), [("cyclopts", "SIGTERM"), ("numpy", "SIGINT"), ("matplotlib", "SIGINT")])
+@pytest.mark.parametrize(
+    ("library", "blow"),
+    [("cyclopts", "SIGTERM"), ("numpy", "SIGINT"), ("matplotlib", "SIGINT"), ("numpy", "SIGHUP")],
+)
 def test_ctrl_c_while_the_program_is_loaded(library, blow):
     """When it first looks for a library, which may make something else of it."""
     code = (
@@ -296,6 +300,87 @@ def test_ctrl_c_that_falls_into_a_destructor_is_not_lost():
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
     assert done.returncode == 1
     assert done.stderr.strip() == "spinlev: stopped; what was finished is kept."
+
+
+ANSWERED = (
+    "import os, signal\n"
+    "from spinlev.studies.command_line import cli, start\n"
+    "def answer(_, out):\n"
+    "    {}\n"
+    "    print('answered', file=out, flush=True)\n"
+    "cli._answer = answer\n"
+    "start.main()\n"
+)
+"""The command line with another thing to do."""
+
+
+def test_sighup_is_heard_but_where_it_is_ignored():
+    """As `nohup` starts a program; a second one comes while the first is answered."""
+    ignoring = f"signal.signal(signal.SIGHUP, signal.SIG_IGN)\n{ANSWERED}".replace("import os, signal\n", "", 1)
+    hang_up = "os.kill(os.getpid(), signal.SIGHUP)"
+    twice = f"try: {hang_up}\n    finally: {hang_up}"
+    for code, status, said in ((ANSWERED, 1, STOPPED), (f"import os, signal\n{ignoring}", 0, "")):
+        command = [sys.executable, "-P", "-c", code.replace("{}", twice)]
+        done = subprocess.run(command, capture_output=True, text=True, check=False)
+        assert (done.returncode, done.stderr.strip()) == (status, said)
+        assert done.stdout == ("" if status else "answered\n")
+
+
+@pytest.mark.parametrize(
+    ("closed", "status", "answer", "said"),
+    [
+        ("<&-", 0, "answered\n", ""),
+        ("2>&-", 0, "answered\n", ""),
+        ("<&- 2>&-", 0, "answered\n", ""),
+        (">&-", 1, "", "standard output: Bad file descriptor"),
+        (">&- 2>&-", 1, "", ""),
+        ("<&- >&- 2>&-", 1, "", ""),
+    ],
+)
+def test_streams_that_are_closed(tmp_path, closed, status, answer, said):
+    """What is opened next does not get what libraries print; an answer that nobody can read is an error."""
+    do = "f = open('file', 'w'); assert f.fileno() > 2; os.system('echo printed >&2'); os.write(1, b'printed')"
+    shell = ["sh", "-c", f'exec "$@" {closed}', "sh", sys.executable, "-P", "-c", ANSWERED.replace("{}", do)]
+    done = subprocess.run(shell, capture_output=True, text=True, check=False, cwd=tmp_path)
+    assert (done.returncode, done.stdout) == (status, answer)
+    assert (said in done.stderr) if said else "spinlev" not in done.stderr
+    assert "Traceback" not in done.stderr
+    assert (tmp_path / "file").read_text() == ""
+
+
+def test_a_shell_that_allows_too_few_open_files(tmp_path):
+    """40 are enough; of fewer one sentence says what to do."""
+    arguments = ("equilibria", SCENE, *DIPOLE, "--json", "--out", str(tmp_path))
+    code = "from spinlev.studies.command_line.start import main; main()"
+    for number, status in ((40, 0), (5, 1)):
+        shell = ["sh", "-c", f'ulimit -n {number}; exec "$@"', "sh", sys.executable, "-P", "-c", code, *arguments]
+        done = subprocess.run(shell, capture_output=True, text=True, check=False)
+        assert done.returncode == status, done.stderr
+        assert "Traceback" not in done.stderr
+        assert ("ulimit -n 256" in done.stderr) == bool(status)
+
+
+def test_a_user_without_a_home_or_a_name(tmp_path):
+    """What is kept goes among the temporary files, for libraries too, and one sentence says so."""
+    code = (
+        "import os, pwd, tempfile\n"
+        "def unknown(number): raise KeyError(number)\n"
+        "pwd.getpwuid = unknown\n"
+        f"tempfile.tempdir = {str(tmp_path)!r}\n"
+    ) + ANSWERED.replace("{}", "import matplotlib; print(matplotlib.get_cachedir(), cli.__name__, file=out)")
+    environment = {name: value for name, value in os.environ.items() if name not in ("HOME", "SPINLEV_CACHE")}
+    environment = {k: v for k, v in environment.items() if not k.startswith(("XDG_", "MPLCONFIGDIR"))}
+    for home in ({}, {"HOME": "/dev/null"}):
+        command = [sys.executable, "-P", "-c", code]
+        done = subprocess.run(
+            command, capture_output=True, text=True, check=False, cwd=tmp_path, env=environment | home
+        )
+        place = tmp_path / f"spinlev-{os.getuid()}"
+        (said,) = done.stderr.splitlines()
+        assert f"there is no home folder: {place} takes its place" in said
+        assert done.returncode == 0
+        assert done.stdout.startswith(str(place))
+        assert [path.name for path in tmp_path.iterdir()] == [place.name]
 
 
 def test_ctrl_c_that_a_library_takes_for_its_own_failure(spinlev, monkeypatch, capsys):

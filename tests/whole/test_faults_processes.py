@@ -2,6 +2,7 @@
 
 import json
 import os
+import pty
 import resource
 import signal
 import subprocess
@@ -116,6 +117,26 @@ def test_a_blow_in_every_phase(spinlev, phase, blow):
     assert json.loads(Path("answer").read_text())
     assert [path for path in Path().rglob(".*") if path.is_file()] == []
     assert spinlev(*arguments, "--out", "undisturbed").wait(timeout=300) == 0
+    same("undisturbed", "out")
+
+
+def test_a_terminal_that_is_closed_leaves_the_flight(spinlev):
+    """It says so twice, and whatever is printed there then is an error."""
+    process, terminal = pty.fork()
+    if process == 0:
+        os.execv(sys.executable, [sys.executable, "-c", CALL, *FLIGHT])
+    shown = b""
+    while b"Motion" not in shown:
+        shown += os.read(terminal, 4096)
+    while not list(Path("out").glob("checkpoint*")):  # some seconds of flight
+        os.read(terminal, 4096)
+    os.close(terminal)
+    assert os.waitstatus_to_exitcode(os.waitpid(process, 0)[1]) == 1
+    begun = read_checked("out/trajectory.nc")
+    assert begun.attrs["ended_by"] == "stopped"
+    assert begun.time[-1] > 0
+    assert spinlev(*FLIGHT, "--resume").wait(timeout=300) == 0, Path("said").read_text()
+    assert spinlev(*FLIGHT, "--out", "undisturbed").wait(timeout=300) == 0
     same("undisturbed", "out")
 
 
