@@ -26,6 +26,7 @@ from ..motion import (
     equations_of_motion,
     flight_events,
     interaction_of,
+    range_events,
     seen_by_plate,
 )
 from .compiled_flight import STRAIGHT_TURNS, Flight, compile_flight, flight_of
@@ -100,7 +101,8 @@ class Parts:
         meanings, tolerance = [LEFT] * len(events), LOOSER * self.tolerance
         if plate is not None:
             lost, meaning = flight_events(replace(scene, rotor=(), conductors=(), plate=None), equations.variables[:3])
-            events, meanings, tolerance = [*events, *lost], [*meanings, *meaning], self.tolerance
+            ends, told = range_events(plate, equations.variables[:3])
+            events, meanings, tolerance = [*events, *lost, *ends], [*meanings, *meaning, *told], self.tolerance
         long = memory is None and degree == SMALL.degree and scene.frequency * self.duration > STRAIGHT_TURNS
         straight = long if self.compact is None else not self.compact
         return flight_of(scene, equations, (events, meanings), self.duration, tolerance, not straight, plate)

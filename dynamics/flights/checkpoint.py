@@ -42,6 +42,7 @@ class Progress:
     interval : of the samples
     steps : Taylor steps so far
     changes : (4,) numbers of `FieldChanges` so far, energies scaled
+    region : (2, 3) bounds of the plate's table, m, in the plate's frame; zeros without one
     """
 
     time: Array
@@ -52,14 +53,17 @@ class Progress:
     interval: float
     steps: int
     changes: Array
+    region: Array
 
     @classmethod
     def of(cls, flight: Flight, values: Array, recorder: Recorder, steps: int, changes: FieldChanges) -> Progress:
         """Where a flight is now."""
-        integrator = flight.integrator
+        integrator, known = flight.integrator, flight.memory
+        region = np.zeros((2, 3)) if known is None else np.array([known.table.region.lower, known.table.region.upper])
         return cls(
             np.array(integrator.dtime), integrator.state.copy(), values.copy(),
             recorder.times.copy(), recorder.states.copy(), recorder.interval, steps, np.array(astuple(changes)),
+            region,
         )  # fmt: skip
 
     def restore(self, flight: Flight | LocalFlight, recorder: Recorder) -> tuple[Array, int, FieldChanges]:

@@ -25,6 +25,7 @@ from ..motion import (
     flight_events,
     parameters,
     plate_depth,
+    range_events,
 )
 from .trajectory import FieldChanges
 
@@ -149,6 +150,8 @@ def compile_flight(
     plate = None if memory is None else WholePlate(memory)
     equations = equations_of_motion(with_effects(scene, table), tilted, plate)
     events = flight_events(scene, equations.variables[:3])
+    if plate is not None:
+        events = tuple(a + b for a, b in zip(events, range_events(plate, equations.variables[:3]), strict=True))
     if compact is None:
         compact = not _worth_compiling(equations, scene, duration)
     return flight_of(scene, equations, events, duration, tolerance, compact, plate)

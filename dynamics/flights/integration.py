@@ -10,7 +10,7 @@ import numpy as np
 
 from ...geometry.basics import Array
 from ...geometry.scenes import Scene
-from ..motion import Parameter, State, lost_distance, plate_legs
+from ..motion import BEYOND, Parameter, PlateMemory, State, lost_distance, plate_depth, plate_legs
 from .ball_parts import LEFT
 from .checkpoint import Checkpoint, Progress
 from .compiled_flight import Flight
@@ -58,6 +58,9 @@ def integrate(
     if known is not None:
         values, log.steps, log.changes = known.restore(flight, recorder)
     began_at = recorder.times[-1]
+    if known is None and not in_plate_range(flight.part(values).memory, start):
+        log.ended_by = BEYOND  # no event tells of a range in which it never was
+        return flown(scene, recorder, log, duration, scale, 0.0, flight.compile_seconds)
     try:
         fly(scene, flight, values, duration, recorder, log, progress, checkpoint)
     except KeyboardInterrupt:
@@ -70,6 +73,14 @@ def integrate(
     if log.ended_by == STOPPED:
         raise FlightStopped(found)
     return found
+
+
+def in_plate_range(memory: PlateMemory | None, lab: State, time: float = 0.0) -> bool:
+    """Whether a plate's table, if there is one, knows the field at a place along the laboratory's axes at a time, s."""
+    if memory is None:
+        return True
+    seen = lab.position + plate_depth(memory.plate, np.array([time])) * [0.0, 0.0, 1.0]
+    return bool(memory.table.in_range(memory.plate.box.to_body(seen))[0])
 
 
 def begun(flight: Flight | LocalFlight, start: State, currents: Array, log: Log) -> Array:

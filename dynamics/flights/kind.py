@@ -7,6 +7,8 @@ from .trajectory import DURATION, STOPPED, Trajectory
 
 STABLE, LINEAR_FALL, OSCILLATING_LOSS = "stable", "linear fall", "oscillating loss"
 DRIFTING, GROWING, NOT_HELD = "drifting", "growing oscillation", "not held"
+NOT_FOLLOWED = "not followed"
+"""To its end: it left the range of the plate's table."""
 WINDOWS = 20
 """Parts into which a flight is divided; the last one, in which the floater may already fall freely, is left out."""
 VISIBLE = 2e-5
@@ -24,6 +26,8 @@ def flight_kind(flight: Trajectory) -> str:
     became more than twice as large, or "drifting" if the distance goes on changing steadily in the second half, both
     by 0.02 mm at least; else "stable".
     """
+    if flight.left_plate_table:
+        return NOT_FOLLOWED
     lasted = flight.ended_by in (DURATION, STOPPED)
     distance = np.linalg.norm(flight.lab.position, axis=1)
     if len(distance) < 4 * WINDOWS or flight.levitated_s <= HELD:

@@ -11,11 +11,11 @@ from ...geometry.scenes import Scene
 from ..motion import PlateMemory, State, turned_about_z
 from ..steady import Equilibrium
 from .compiled_flight import TOLERANCE
-from .integration import begun, fly_on
+from .integration import begun, fly_on, in_plate_range
 from .local_flight import compile_local_flight
 from .pieces import Log
 from .recorder import Recorder
-from .simulation import PLATE_TOLERANCE, check_free, initial_state
+from .simulation import PLATE_TOLERANCE, StartError, check_free, initial_state
 from .trajectory import DURATION
 
 FEWEST, MOST, A_SECOND = 8, 256, 400
@@ -31,7 +31,7 @@ class Piece:
     time : (n,) s
     lab : motion (n, 3) along the laboratory's axes, SI units
     angle : of the rotor at the last sample, rad
-    ended_by : "duration" where the flight can go on, else "contact" or "lost"
+    ended_by : "duration" where the flight can go on, else "contact", "lost", or "beyond" the range of the plate's table
     """
 
     time: Array
@@ -52,7 +52,7 @@ class LiveFlight:
     Raises
     ------
     EquilibriumError : it shall begin near a stable equilibrium and there is none
-    StartError : it would begin in contact
+    StartError : it would begin in contact, or where the plate's table does not reach
     """
 
     def __init__(
@@ -60,13 +60,14 @@ class LiveFlight:
     ) -> None:
         start, currents = initial_state(scene, table, equilibria, memory)
         tolerance = TOLERANCE if memory is None else PLATE_TOLERANCE
-        self.scene = scene
+        self.scene, self.memory = scene, memory
         self.flight = compile_local_flight(scene, table, np.inf, tolerance, True, memory)
         self.log = Log()
         self.values = begun(self.flight, start, currents, self.log)
         self.state = self.flight.part(self.values).whole
         self.time = 0.0
         """Since the flight began, s."""
+        self._check_range(self.now.position)
 
     @property
     def now(self) -> State:
@@ -99,13 +100,25 @@ class LiveFlight:
 
         Raises
         ------
-        StartError : it would overlap a magnet or the plate; nothing is changed
+        StartError : it would overlap a magnet or the plate, or the field of the plate's currents is not known there;
+            nothing is changed
         """
         check_free("position", self.scene, np.asarray(position, float), self.time)
         place = turned_about_z(position, self.scene.angular_velocity * self.time)
+        self._check_range(place)
         turning = np.cross([0.0, 0.0, self.scene.angular_velocity], place)
         self.log.ended_by = DURATION
         self._become(replace(self.now, position=place, velocity=turning))
+
+    def _check_range(self, place: Array) -> None:
+        """Raises StartError where the plate's table does not know the field at a place (3,) m in the laboratory."""
+        if not in_plate_range(self.memory, replace(self.now, position=place), self.time):
+            where = ", ".join(f"{1e3 * c:.4g}" for c in place)
+            raise StartError(
+                f"Input position must be where the field of the plate's currents was computed; instead received "
+                f"({where}) mm. Put it nearer to where it began, choose no plate model, or begin there: "
+                "start.position_mm."
+            )
 
     def _become(self, lab: State) -> None:
         state = lab.to_rotor(self.scene.angular_velocity * self.time)

@@ -10,7 +10,7 @@ import numpy as np
 
 from ...geometry.basics import Array, ComputationError
 from ...geometry.scenes import Scene
-from ..motion import CONTACT, Parameter, Scales, clearance, plate_places
+from ..motion import BEYOND, CONTACT, LOST, Parameter, Scales, clearance, plate_places
 from .ball_parts import LEFT
 from .checkpoint import Progress
 from .compiled_flight import Flight
@@ -94,11 +94,12 @@ def flown(
         time=time,
         lab=scales.unpack(recorder.states).to_lab(scene.angular_velocity * time),
         angular_velocity=scene.angular_velocity,
-        ended_by=log.ended_by,
+        ended_by=LOST if log.ended_by == BEYOND else log.ended_by,
         energy_error=violation(recorder.states, scale),
         realtime_factor=speed,
         steps=log.steps,
         compile_seconds=compile_seconds,
+        left_plate_table=log.ended_by == BEYOND,
         field_changes=log.changes.relative(scale),
     )
 

@@ -46,6 +46,7 @@ class Trajectory:
     steps : number of Taylor steps
     compile_seconds : time spent on compilation (little where heyoka's cache knows the system)
     beyond_plate_table : part of the samples at which the floater was out of the range of the plate's table
+    left_plate_table : whether it ended, as "lost", where that range does: the plate's field is not known farther on
     field_changes : from one representation of the rotor's field to another; the ledger is that of the motion between
         them
     """
@@ -59,6 +60,7 @@ class Trajectory:
     steps: int
     compile_seconds: float
     beyond_plate_table: float = 0.0
+    left_plate_table: bool = False
     field_changes: FieldChanges = field(default_factory=FieldChanges)
 
     def __repr__(self) -> str:

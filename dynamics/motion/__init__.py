@@ -21,13 +21,16 @@ from .equations import (
     parameters as parameters,
 )
 from .events import (
+    BEYOND as BEYOND,
     CONTACT as CONTACT,
+    LOST as LOST,
     clearance as clearance,
     flight_events as flight_events,
     lost_distance as lost_distance,
     plate_depth as plate_depth,
     plate_legs as plate_legs,
     plate_places as plate_places,
+    range_events as range_events,
     rotor_gap as rotor_gap,
 )
 from .interaction import Interaction as Interaction, interaction_of as interaction_of

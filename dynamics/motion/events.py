@@ -12,10 +12,12 @@ import numpy as np
 from ...geometry.basics import Array, Box, Solid
 from ...geometry.bodies import body_overlap
 from ...geometry.scenes import Plate, Scene
+from .plate_terms import PlateFormula, seen_by_plate
 from .state import turned_about_z
 from .symbols import Parameter, Vector
 
-CONTACT, LOST = "contact", "lost"
+CONTACT, LOST, BEYOND = "contact", "lost", "beyond"
+"""The last: where the range of a plate's table ends, beyond which nobody knows its currents' field."""
 
 
 def flight_events(scene: Scene, position: Vector) -> tuple[list[hy.t_event], list[str]]:
@@ -30,6 +32,17 @@ def flight_events(scene: Scene, position: Vector) -> tuple[list[hy.t_event], lis
     events = [hy.t_event(gap / (length * length) - within, direction=falling) for gap in gaps]
     reach = hy.par[Parameter.LOST_DISTANCE] ** 2.0 - hy.sum([p * p for p in position])
     return [*events, hy.t_event(reach, direction=falling)], [CONTACT] * len(gaps) + [LOST]
+
+
+def range_events(formula: PlateFormula, position: Vector) -> tuple[list[hy.t_event], list[str]]:
+    """Terminal events where a scaled position leaves the range of a plate's table, and what each of them means."""
+    region = formula.memory.table.region
+    away = [x - float(c) for x, c in zip(seen_by_plate(formula, position), region.center, strict=True)]
+    half = (region.upper - region.lower) / 2
+    falling = hy.event_direction.negative
+    return [hy.t_event(1.0 - (a * a) / float(h) ** 2, direction=falling) for a, h in zip(away, half, strict=True)], [
+        BEYOND
+    ] * 3
 
 
 def _excess(body: Solid, position: Vector) -> hy.expression:

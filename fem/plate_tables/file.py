@@ -8,7 +8,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike
 
-from ...geometry.basics import MU_0, Watch, unwatched
+from ...geometry.basics import Watch, unwatched
 from ...geometry.scenes import Plate
 from ..harmonics import FOUR_PI
 from ..plate_currents import Region, cached_solver, digest
@@ -113,10 +113,12 @@ def driven_plate_key(
         plate.box.rotation,
         [plate.lowering.distance if plate.lowering else 0.0],
     ]
+    # By the magnets' strengths, not by their sum, which opposite ones leave no more of than round-off.
+    strength = sum(float(np.linalg.norm(m.polarization)) * m.body.volume for m in rotor.magnets) or 1.0
     for magnet in rotor.uniform:
         numbers += [magnet.body.shape_numbers, magnet.body.center, magnet.body.rotation, magnet.polarization]
     for expansion in rotor.expansions:
-        scaled = expansion.coefficients * (expansion.radius**3 * FOUR_PI / MU_0 / np.linalg.norm(rotor.moment))
+        scaled = expansion.coefficients * (expansion.radius**3 * FOUR_PI / strength)
         numbers += [expansion.center, [expansion.radius], np.round(scaled.real, 9), np.round(scaled.imag, 9)]
     return digest(f"{program_of(room)} {plate_key(plate, region, frequencies, rtol)}", numbers)
 

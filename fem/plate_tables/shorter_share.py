@@ -48,5 +48,7 @@ def _parts(share: RotorShare, table: PlateTable) -> Array:
         currents = phasors * (rate / (table.rates + rate))[:, :, None]
         for kind in (functions, slopes.reshape(*slopes.shape[:2], 9)):
             sizes = np.linalg.norm(np.einsum("hsd,psa->hpda", currents, kind, optimize=True), axis=3)
-            found = np.maximum(found, (sizes / np.linalg.norm(sizes, axis=0)).max(axis=(1, 2)))
+            whole = np.linalg.norm(sizes, axis=0)  # zero of a rotor without a field, or at rest
+            parts = np.divide(sizes, whole, out=np.zeros_like(sizes), where=whole > 0)
+            found = np.maximum(found, parts.max(axis=(1, 2)))
     return found

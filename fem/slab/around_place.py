@@ -19,7 +19,7 @@ from ..plate_tables import (
     driven_plate_key,
     reachable_region,
 )
-from ..rotor_tables import Accuracy, RotorTable, shortened_table
+from ..rotor_tables import Accuracy, AccuracyError, RotorTable, shortened_table
 from .table import slab_and_rotor_table
 
 REACH = 0.003
@@ -30,6 +30,16 @@ LOWEST, HIGHEST, HARMONICS = 0.5, 250.0, 2.0
 """Frequencies of a table, Hz, at least; and the multiple of the rotor's that it must hold."""
 COARSE = 50.0
 """The highest frequency is a multiple of this, Hz, for the same reason."""
+FACING, BESIDE = 2.0, 0.5
+"""How far a bound that a floater has left is moved out, in widths of the region: across the plate's face, and along it,
+where terms grow with the square of the width."""
+WIDEST = 3.0
+"""Half the width of a wider region along the face, in distances from it: at 2.3 a slab takes 230 states, at 4.6 it
+takes minutes."""
+AT = 1e-6
+"""Distance from a bound, in widths of the region, at which it counts as crossed: that is where the event is."""
+SKIN = 0.9
+"""Nearest that a region comes to the plate, in radii of the floater, which touches it at one."""
 PLUMB = 1e-9
 """Cosine of the angle between a slab's normal and the vertical below which it stands upright."""
 
@@ -70,7 +80,14 @@ class PlateAround:
 
 
 def plate_around(
-    plate: Plate, model: str, table: RotorTable, place: Array, radius: float, frequency: float, rtol: float
+    plate: Plate,
+    model: str,
+    table: RotorTable,
+    place: Array,
+    radius: float,
+    frequency: float,
+    rtol: float,
+    region: Region | None = None,
 ) -> PlateAround:
     """The plate's table for a floater about a place, to be made.
 
@@ -80,6 +97,7 @@ def plate_around(
     table : the rotor's field
     place : (3,) m, in the frame that turns with the rotor
     radius, frequency : of the floater, m, and of the rotor, Hz
+    region : in the frame of the plate, where the floater may be; left out, `REACH` about the place, all the way down
 
     Raises
     ------
@@ -87,10 +105,60 @@ def plate_around(
     """
     if model == "slab" and plate.lowering and abs(plate.box.rotation[2, np.argmin(plate.box.size)]) < PLUMB:
         plate = replace(plate, lowering=None)  # an infinite slab that moves along itself stays where it is
-    sideways = float(np.hypot(place[0], place[1])) + REACH
-    region = _rastered(reachable_region(plate, [0.0, 0.0, place[2]], [sideways, sideways, REACH], radius))
+    if region is None:
+        sideways = float(np.hypot(place[0], place[1])) + REACH
+        region = reachable_region(plate, [0.0, 0.0, place[2]], [sideways, sideways, REACH], radius)
+        region = _off_the_face(_rastered(region), plate, radius)
     highest = max(HIGHEST, COARSE * math.ceil(HARMONICS * frequency / COARSE - 1e-9))
     return PlateAround(plate, model, table, region, (LOWEST, highest), rtol)
+
+
+def wider_region(plate: Plate, region: Region, radius: float, seen: Array) -> Region:
+    """The region of a table for a floater that left another one at `seen` (3,) m, in the frame of the plate.
+
+    Bounds that it crossed are moved out by so much that a fall from far off to the face needs few tables; along the
+    face all, as a floater that turns with the rotor comes to the others next.  Nearer to the face than the floater's
+    radius (m) it has touched it.
+
+    Raises
+    ------
+    AccuracyError : the region would be too wide for its distance from the plate
+    """
+    half, size = plate.box.half_edges, region.upper - region.lower
+    facing = int(np.argmax(np.abs(region.center) - half))
+    below, above = seen < region.lower + AT * size, seen > region.upper - AT * size
+    across = np.arange(3) == facing
+    if (below | above)[~across].any():
+        below, above = below | ~across, above | ~across
+    out = np.where(across, FACING, BESIDE) * size
+    lower = np.where(below, np.minimum(region.lower - out, seen - out / 2), region.lower)
+    upper = np.where(above, np.maximum(region.upper + out, seen + out / 2), region.upper)
+    touching = half[facing] + radius
+    if region.center[facing] > 0 and lower[facing] < touching + radius:  # what is left to the face is not worth a table
+        lower[facing] = touching
+    if region.center[facing] < 0 and upper[facing] > -touching - radius:
+        upper[facing] = -touching
+    found = _off_the_face(_rastered(Region(lower, upper)), plate, radius)
+    gap = float(max(found.lower[facing], -found.upper[facing]) - half[facing])
+    wide = float(np.max((found.upper - found.lower)[~across])) / 2
+    if wide > WIDEST * gap:
+        raise AccuracyError(
+            f"A table of the plate's response reaches {WIDEST:g} times its distance from the plate to the sides at "
+            f"most: {WIDEST * gap * 1e3:.3g} mm here, where {wide * 1e3:.3g} mm are needed."
+        )
+    return found
+
+
+def _off_the_face(region: Region, plate: Plate, radius: float) -> Region:
+    """The region without what is nearer to the face that it lies over than `SKIN` radii (m): the raster is coarse."""
+    half, lower, upper = plate.box.half_edges, region.lower.copy(), region.upper.copy()
+    facing = int(np.argmax(np.maximum(lower, -upper) - half))
+    near = half[facing] + SKIN * radius
+    if region.center[facing] > 0:
+        lower[facing] = max(lower[facing], near)
+    else:
+        upper[facing] = min(upper[facing], -near)
+    return Region(lower, upper)
 
 
 def rotor_nearby(table: RotorTable, rotor: tuple[Magnet, ...], place: Array, radius: float, rtol: float) -> RotorTable:

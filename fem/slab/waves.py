@@ -63,7 +63,10 @@ def _(source: ExpansionSource, vectors: ComplexArray, shift: ComplexArray) -> Co
 def _(source: RotorSource, vectors: ComplexArray, shift: ComplexArray) -> ComplexArray:
     seen = vectors @ source.turn
     there = shift - seen @ source.center
-    return np.asarray(np.sum([wave_moment(part, seen, there) for part in source.parts], axis=0))
+    total: ComplexArray = np.zeros(shift.shape, complex)  # a rotor without a field has no parts
+    for part in source.parts:
+        total = total + wave_moment(part, seen, there)
+    return total
 
 
 def cylinder_moments(

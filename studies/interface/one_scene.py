@@ -148,7 +148,8 @@ def simulate(
     """
     with heard(progress):
         levitation = Levitation(scene, Models(model, plate_model, rtol, plate_rtol, interaction))
-        flown = trajectory_dataset(levitation.flight(duration))
+        flight = levitation.flight(duration)
+        flown = trajectory_dataset(flight, levitation.flight_plate)
         return flown.assign_attrs(_labels(levitation), **lowering_times(levitation.scene))
 
 

@@ -17,7 +17,11 @@ FRAME = 1 / 12
 """Seconds between two pictures, if the page draws so fast."""
 SLOWEST = 0.25
 """Most seconds that are flown for a picture."""
-ENDS = {"contact": "touched the rotor or the plate", "lost": "lost: it is too far away to come back"}
+ENDS = {
+    "beyond": "left the region for which the plate's response was computed",
+    "contact": "touched the rotor or the plate",
+    "lost": "lost: it is too far away to come back",
+}
 
 
 @dataclass(frozen=True)

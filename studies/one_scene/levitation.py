@@ -8,6 +8,8 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any, cast
 
+import numpy as np
+
 from ...dynamics.effects import (
     BESIDE_METAL,
     WITHOUT_METAL,
@@ -17,17 +19,27 @@ from ...dynamics.effects import (
     with_effects,
 )
 from ...dynamics.equilibria import Found, cached_found, found_key, survey, with_plate
-from ...dynamics.flights import Checkpoint, LiveFlight, Trajectory, most_like_levitation, simulate, starting_point
-from ...dynamics.motion import FORCE_ALONE, Interaction, PlateMemory, Rates, interaction_of
+from ...dynamics.flights import (
+    Checkpoint,
+    FlightStopped,
+    LiveFlight,
+    Trajectory,
+    initial_state,
+    most_like_levitation,
+    simulate,
+    starting_point,
+)
+from ...dynamics.motion import FORCE_ALONE, Interaction, PlateMemory, Rates, interaction_of, plate_depth
 from ...dynamics.steady import Equilibrium, EquilibriumError, Survey
 from ...fem.measured_maps import GriddedTable
 from ...fem.mutual import MutualTable
+from ...fem.plate_currents import Region
 from ...fem.rotor_losses import RotorLosses, check_slow_enough, pieces_of
-from ...fem.rotor_tables import FieldTable, RotorTable
-from ...fem.slab import resolve_plate_model, rotor_nearby
-from ...geometry.basics import Array, InputError, Watch, millimetre_size, unwatched
+from ...fem.rotor_tables import AccuracyError, FieldTable, RotorTable
+from ...fem.slab import edge_error, resolve_plate_model, rotor_nearby, wider_region
+from ...geometry.basics import Array, InputError, SpinlevError, Watch, millimetre_size, unwatched
 from ...geometry.scenes import AbsoluteStart, Scene, load_scene
-from ..terminal import FieldModel, Models, detail, finite, note, positive, progress, stages
+from ..terminal import FieldModel, Models, detail, finite, note, positive, progress, silence, stages
 from .plate_of_scene import check_room, check_way, plate_memory
 from .rotor_of_scene import RotorField, RotorTables, equations_key
 
@@ -36,6 +48,14 @@ PLATE_WORDS = {
     "slab": "taken as an infinite slab, {thickness:.4g} mm thick",
     "reduced": "finite, {size}",
 }
+
+
+AHEAD = 1.0
+"""Of a flight, s, that is looked at beforehand."""
+LOOSER, ROUGHEST = 4.0, 0.1
+"""How much more error a plate's table may have for a large region, and the most; it is said with the result."""
+PLACES = 50
+"""On a flight's way, at which the error by a slab's missing edges is looked at."""
 
 
 class Levitation:
@@ -65,6 +85,11 @@ class Levitation:
         self._tables = RotorTables()
         self._plate_cached = False
         self._flown: dict[float, Trajectory] = {}
+        self._wider: PlateMemory | None = None
+        self._nearest: Array | None = None
+        self._ahead = 0.0
+        self.no_wider = ""
+        """Why the plate's table could not be made for where a flight went, if so."""
 
     @cached_property
     def interaction(self) -> Interaction:
@@ -182,7 +207,8 @@ class Levitation:
         place = self._place(() if alone else self.without_plate.equilibria)
         if place is not None:
             check_room(scene, place)
-        choice = resolve_plate_model(scene, self.models.plate_model, place, self.models.plate_rtol, note)
+        nearest = place if self._nearest is None else self._nearest
+        choice = resolve_plate_model(scene, self.models.plate_model, nearest, self.models.plate_rtol, note)
         if scene.plate is not None:
             size = scene.plate.box.size
             said = PLATE_WORDS[choice.model].format(size=millimetre_size(size), thickness=1e3 * min(size))
@@ -200,9 +226,25 @@ class Levitation:
             self.models.plate_rtol,
             choice.edges,
             self._tables,
+            self._foreseen() if choice.model == "reduced" else None,
         )
         self._plate_cached = found
         return memory
+
+    def _foreseen(self) -> Region | None:
+        """Where a flight goes at first, by an infinite slab: its tables take seconds, the finite elements' minutes."""
+        if not self.absolute or not self._ahead:
+            return None
+        note("Where the floater goes, by an infinite slab ...")
+        slab = self.elsewhere(replace(self.models, plate_model="slab"))
+        try:
+            with silence():
+                slab.flight(min(self._ahead, AHEAD))
+        except FlightStopped:
+            raise KeyboardInterrupt from None  # it is not the flight that was asked for
+        except SpinlevError:
+            return None  # the plate is no slab for it
+        return None if slab._wider is None else slab._wider.table.region
 
     @cached_property
     def survey(self) -> Survey:
@@ -230,11 +272,16 @@ class Levitation:
             )
         return chosen
 
-    @cached_property
+    @property
+    def flight_plate(self) -> PlateMemory | None:
+        """The plate's currents as a flight has them: by a table for all of its way, where that about its place ends."""
+        return self._wider or self.plate
+
+    @property
     def flight_table(self) -> RotorField:
         """The rotor's field for the motion: beside a plate, whose own table reaches no farther, with fewer terms."""
         table = self.table
-        if self.plate is None or not isinstance(table, RotorTable):
+        if self._wider or self.plate is None or not isinstance(table, RotorTable):
             return table
         place = self._place(() if self.absolute else self.equilibria)
         if place is None:
@@ -243,6 +290,10 @@ class Levitation:
 
     def flight(self, duration: float, checkpoint: Checkpoint | None = None) -> Trajectory:
         """The motion for `duration` (s) from where the scene says, kept in `checkpoint` while it lasts.
+
+        A floater that leaves the range of the plate's table begins anew with one for where it goes: states of other
+        currents know nothing of what these remember.  Where none can be made, the flight ends there as lost
+        (`Trajectory.left_plate_table`).
 
         Raises
         ------
@@ -253,16 +304,103 @@ class Levitation:
         positive("duration", duration)
         if duration in self._flown:
             return self._flown[duration]
-        known = () if self.absolute else self.equilibria
-        table, plate = self._with_effects(self.flight_table), self.plate
+        self._ahead = duration
+        kept = checkpoint.read() if checkpoint else None
+        if kept is not None and self.plate is not None:
+            bounds = self.plate.table.region
+            if not np.array_equal(kept.region, [bounds.lower, bounds.upper]):
+                self._plate_for(Region(*kept.region))
+        while True:
+            flown = self._simulated(duration, checkpoint)
+            if flown.left_plate_table:
+                again = self._followed(flown.lab.position[-1], flown.levitated_s)
+            else:
+                again = self._plate_matters(flown)
+            if not again:
+                return self._with_edges(flown)
+            if checkpoint:
+                checkpoint.remove()
+
+    def _simulated(self, duration: float, checkpoint: Checkpoint | None) -> Trajectory:
+        table, plate, known = self._with_effects(self.flight_table), self.flight_plate, self._known_for_flight
         note("Motion ...")
         with progress("Motion") as advance:
             return simulate(self.scene, table, duration, known, progress=advance, memory=plate, checkpoint=checkpoint)
 
+    @property
+    def _known_for_flight(self) -> Sequence[Equilibrium]:
+        """The equilibria at which a flight may begin, with the currents of its own table."""
+        if self.absolute:
+            return ()
+        if self._wider is None:
+            return self.equilibria
+        return with_plate(self.scene, self.interaction, self.without_plate, self._wider, self.rates).equilibria
+
+    def _followed(self, place: Array, time: float) -> bool:
+        """Whether there is now a plate's table for a floater that left the last one at a place (3,) m at a time, s."""
+        memory, radius = self.flight_plate, self.scene.floater.radius
+        assert memory is not None
+        seen = place + plate_depth(memory.plate, np.array([time])) * [0.0, 0.0, 1.0]
+        body = memory.plate.box.to_body(seen)
+        try:
+            region = wider_region(memory.plate, memory.table.region, radius, body)
+            note(f"After {time:.4g} s the floater leaves the range of the plate's table: again, with a larger one.")
+            return self._plate_for(region)
+        except SpinlevError as error:
+            self.no_wider = str(error)
+            return False
+
+    def _plate_matters(self, flown: Trajectory) -> bool:
+        """Whether a plate that was left out where the flight began can be felt where it went; then it is there now."""
+        plate = self.scene.plate
+        if plate is None or self.plate is not None or self.models.plate_model != "auto" or self._nearest is not None:
+            return False
+        way = flown.lab.position + plate_depth(plate, flown.time)[:, None] * [0.0, 0.0, 1.0]
+        self._nearest = way[int(np.argmin(plate.box.distance(way)))]
+        if resolve_plate_model(self.scene, "auto", self._nearest, self.models.plate_rtol, note).model == "none":
+            return False
+        note("The floater comes so near to the plate that its currents count; it begins anew with them.")
+        del self.plate
+        return True
+
+    def _plate_for(self, region: Region) -> bool:
+        """Have the plate's table for a region, plate's frame, with more error than asked for where it must be."""
+        try:
+            self._wider = self._plate_memory(region, self.models.plate_rtol)
+        except AccuracyError:
+            self._wider = self._plate_memory(
+                region, max(self.models.plate_rtol, min(LOOSER * self.models.plate_rtol, ROUGHEST))
+            )
+        return True
+
+    def _plate_memory(self, region: Region, rtol: float) -> PlateMemory:
+        scene, known, place = self.scene, self.plate, self._place(() if self.absolute else self.equilibria)
+        assert scene.plate is not None
+        assert known is not None
+        assert place is not None
+        table = sources(self.table)
+        return plate_memory(scene, scene.plate, known.model, table, place, rtol, known.neglected, self._tables, region)[
+            0
+        ]
+
+    def _with_edges(self, flown: Trajectory) -> Trajectory:
+        """The flight, and the error by a slab's missing edges for where it went."""
+        memory, place = self._wider, self._place(() if self.absolute else self.equilibria)
+        if memory is not None and place is not None and memory.neglected:
+            depths = plate_depth(memory.plate, flown.time)[:, None] * [0.0, 0.0, 1.0]
+            way = (flown.lab.position + depths)[:: max(1, len(depths) // PLACES)]
+            there = max(edge_error(memory.plate, seen) for seen in way) / edge_error(memory.plate, place)
+            self._wider = replace(memory, neglected=min(1.0, memory.neglected * max(1.0, there)))
+        return flown
+
     def live_flight(self) -> LiveFlight:
         """A flight to play with, from where the scene says. Raises what `flight` raises."""
-        known = () if self.absolute else self.equilibria
-        return LiveFlight(self.scene, self._with_effects(self.flight_table), known, self.plate)
+        memory = self.plate
+        if memory is not None:
+            begins = initial_state(self.scene, self.table, self._known_for_flight, memory)[0].position
+            if not memory.table.in_range(memory.plate.box.to_body(begins))[0]:
+                self._followed(begins, 0.0)
+        return LiveFlight(self.scene, self._with_effects(self.flight_table), self._known_for_flight, self.flight_plate)
 
     def field(self, model: str) -> RotorField:
         """The rotor's field by any model, accurate wherever the floater can be: from its radius off the magnets on."""

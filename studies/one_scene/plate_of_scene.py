@@ -5,6 +5,7 @@ from time import perf_counter
 import numpy as np
 
 from ...dynamics.motion import PlateMemory
+from ...fem.plate_currents import Region
 from ...fem.plate_tables import PlateTable, RotorShare
 from ...fem.rotor_tables import RotorTable
 from ...fem.slab import PlateAround, plate_around
@@ -24,13 +25,15 @@ def plate_memory(
     rtol: float,
     edges: float = 0.0,
     tables: RotorTables | None = None,
+    region: Region | None = None,
 ) -> tuple[PlateMemory, bool]:
     """The plate's currents for a floater about `place` (3,) m that turns with the rotor; whether they were cached.
 
-    `edges`: relative error by edges that the model leaves out. `tables` are shared with other scenes. Errors are those
-    of `plate_around` and of its model.
+    `edges`: relative error by edges that the model leaves out. `tables` are shared with other scenes. `region`: where
+    the floater may be, if not near the place, in the frame of the plate. Errors are those of `plate_around` and of its
+    model.
     """
-    asked = plate_around(plate, model, table, place, scene.floater.radius, scene.frequency, rtol)
+    asked = plate_around(plate, model, table, place, scene.floater.radius, scene.frequency, rtol, region)
     made, share, found = (tables or RotorTables()).once(asked.key, lambda: _told(asked))
     return PlateMemory(asked.plate, made, share, model, edges), found
 

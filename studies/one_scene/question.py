@@ -138,7 +138,7 @@ def _equilibria(question: Question, levitation: Levitation) -> xr.Dataset:
 
 def _flight(question: Question, levitation: Levitation) -> xr.Dataset:
     flight = levitation.flight(question.duration)
-    height = flight.lab.position[:, 2]
+    height, memory = flight.lab.position[:, 2], levitation.flight_plate
     return xr.Dataset(
         {
             "levitated": variable((), flight.levitated_s, "s", "levitation time"),
@@ -147,6 +147,8 @@ def _flight(question: Question, levitation: Levitation) -> xr.Dataset:
             "mean_height": variable((), height.mean(), "m", "mean height"),
             "height_spread": variable((), np.ptp(height), "m", "highest less lowest height"),
             "energy_error": variable((), flight.energy_error, "1", "violation of the energy ledger"),
+            "left_plate_table": variable((), flight.left_plate_table, "1", "whether it left the plate's table"),
+            "plate_error": variable((), memory.error if memory else 0.0, "1", "relative error of the plate's response"),
         },
         attrs=levitation.labels,
     )

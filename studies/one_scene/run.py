@@ -9,6 +9,7 @@ import numpy as np
 import xarray as xr
 
 from ...dynamics.flights import FlightStopped, Trajectory
+from ...dynamics.motion import PlateMemory
 from ...dynamics.steady import EquilibriumError, Survey
 from ...fem.rotor_tables import FieldTable
 from ...fem.storage import write_whole
@@ -32,7 +33,7 @@ from .answers import equilibria_answer, flight_answer
 from .demagnetising import write_working_point
 from .levitation import Levitation
 from .single import Job
-from .words import bracketed, effects_words, equilibria_words, flight_words, headline, tell_details
+from .words import bracketed, effects_words, equilibria_words, flight_words, headline, plate_words, tell_details
 
 MODELS = ("dipole", "cuboid", "fem")
 DEEPEST = 0.05
@@ -78,7 +79,7 @@ def main_job(scene: Scene, asked: Models, spin: float, duration: float, out: Pat
         try:
             flight = levitation.flight(duration)
             values |= flight_answer(levitation, flight)
-            lines.append(flight_words(levitation, flight))
+            lines += [flight_words(levitation, flight), *plate_words(levitation)]
             tell_details(flight)
         except EquilibriumError as error:
             failure = error
@@ -94,7 +95,8 @@ def main_job(scene: Scene, asked: Models, spin: float, duration: float, out: Pat
         lines.append(str(failure))
     tables = {name: levitation.field(name) for name in MODELS}
     result = _static_dataset(scene, tables, surveys, alone, best.model).assign_attrs(levitation.labels, body_spin=spin)
-    _write(scene, chosen, result, values, flight, out, drawing)
+    memory = levitation.flight_plate if flight else None
+    _write(scene, chosen, result, values, flight, memory, out, drawing)
     if failure and (flight is None or isinstance(failure, FlightStopped)):
         raise failure
     return values, [*lines, f"Results and figures in {out}/"]
@@ -164,6 +166,7 @@ def _write(
     result: xr.Dataset,
     values: dict[str, Any],
     flight: Trajectory | None,
+    memory: PlateMemory | None,
     out: Path,
     drawing: Drawer,
 ) -> None:
@@ -171,7 +174,7 @@ def _write(
     note("Files and figures ...")
     (out / "summary.json").unlink(missing_ok=True)  # an older one must not stand beside the new result
     if flight:
-        flown = trajectory_dataset(flight).assign_attrs(study="run", **lowering_times(scene))
+        flown = trajectory_dataset(flight, memory).assign_attrs(study="run", **lowering_times(scene))
         result = xr.merge([result, flown], combine_attrs="no_conflicts")
     write_dataset(result, out / "result.nc", scene)
     write_whole(out / "summary.json", f"{to_json(values)}\n".encode())

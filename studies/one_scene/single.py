@@ -17,7 +17,7 @@ from ..results import lowering_times, save_figures, trajectory_dataset, trajecto
 from ..terminal import COLUMNS, Models, note, to_json
 from .answers import equilibria_answer, field_answer, flight_answer
 from .levitation import Levitation
-from .words import effects_words, equilibria_words, flight_words, tell_details
+from .words import effects_words, equilibria_words, flight_words, plate_words, tell_details
 
 Job = tuple[Mapping[str, Any], list[str]]
 """Numbers for a program, lines for a person."""
@@ -50,7 +50,7 @@ def equilibria_job(scene: Scene, asked: Models, spin: float, out: Path) -> Job:
     levitation = Levitation(scene, asked, spin)
     values = {**equilibria_answer(levitation), "tables_from_cache": levitation.from_cache}
     write_whole(out / "equilibria.json", f"{to_json(values)}\n".encode())
-    return values, [*equilibria_words(levitation), *effects_words(values)]
+    return values, [*equilibria_words(levitation), *plate_words(levitation), *effects_words(values)]
 
 
 def simulate_job(scene: Scene, asked: Models, duration: float, out: Path, resume: bool) -> Job:
@@ -74,7 +74,7 @@ def _simulated(scene: Scene, asked: Models, duration: float, out: Path, resume: 
 
     def keep(flight: Trajectory) -> None:
         labels = {**levitation.labels, **lowering_times(scene), "headline": flight_words(levitation, flight)}
-        flown = trajectory_dataset(flight).assign_attrs(labels)
+        flown = trajectory_dataset(flight, levitation.flight_plate).assign_attrs(labels)
         write_dataset(flown, out / "trajectory.nc", scene)
         save_figures({"trajectory": trajectory_figure(flown)}, out)
 
@@ -92,5 +92,5 @@ def _simulated(scene: Scene, asked: Models, duration: float, out: Path, resume: 
         "tables_from_cache": levitation.from_cache,
     }
     tell_details(flight)
-    told = [flight_words(levitation, flight), *effects_words(values)]
+    told = [flight_words(levitation, flight), *plate_words(levitation), *effects_words(values)]
     return values, [*told, f"Trajectory in {values['trajectory']}, figure in {out / 'trajectory.png'}"]

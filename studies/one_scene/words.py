@@ -24,6 +24,12 @@ SPOKEN = {"side, backward": "backward side motion", "side, forward": "forward si
 COLUMNS = ("below (mm)", "aside (mm)", "tilt (°)", "lag (°)", "slowest motion", "growth (1/s)", "")
 FINEST = 0.01
 """Of distances from the axis, mm."""
+CLEARLY_SLOW = 0.02
+"""Relative error of what an effect adds to the growth of motions that goes without saying."""
+NOT_SLOW = (
+    "Of the {name} torque and lift are exact in a steady turn; motions are taken as slow against them: the growth that "
+    "they add may be wrong by {motion_error:.0%}."
+)
 LONG = 7200.0
 """From here on (s) hours are said too."""
 
@@ -148,6 +154,11 @@ def equilibria_rows(levitation: Levitation, equilibria: Sequence[Equilibrium]) -
 def flight_words(levitation: Levitation, flight: Trajectory) -> str:
     """How a flight went, in one sentence."""
     kind = kind_of_flight(levitation, flight)
+    if flight.left_plate_table:
+        return (
+            f"Flew {_time(flight.levitated_s)}, then left the region in which the plate's response could be computed; "
+            f"what it does farther on is not known. {levitation.no_wider}".rstrip()
+        )
     if flight.ended_by == "contact":
         return f"Flew {_time(flight.levitated_s)}, then touched something ({kind})."
     if flight.ended_by == "lost":
@@ -159,6 +170,15 @@ def flight_words(levitation: Levitation, flight: Trajectory) -> str:
     if start is not None and not start.stable:
         how = f"; the oscillation grows (e-fold in {1 / start.growth_per_s:.2g} s)"
     return f"Flew {_time(flight.levitated_s)}, still up{how}."
+
+
+def plate_words(levitation: Levitation) -> list[str]:
+    """How well the plate's response is known, where that is worse than asked for."""
+    memory, asked = levitation.flight_plate, levitation.models.plate_rtol
+    if memory is None or memory.error <= asked:
+        return []
+    edges = " (an infinite slab leaves out the plate's edges)" if memory.neglected > asked else ""
+    return [f"The plate's response may be wrong by {memory.error:.2g} of itself{edges}; {asked:g} was asked for."]
 
 
 def _time(seconds: float) -> str:
@@ -176,7 +196,8 @@ def effects_words(values: Mapping[str, Any]) -> list[str]:
     widths = [max(len(row[k]) for row in rows) for k in range(4)]
     table = [f"  {row[0]:{widths[0]}}  " + "  ".join(map(str.rjust, row[1:], widths[1:])) for row in rows]
     plate = [PLATE_NOT_MODELLED] if PLATE_NOT_MODELLED in values["not_modelled"] else []
-    return [*(line.rstrip() for line in table), *plate]
+    fast = [NOT_SLOW.format(**effect) for effect in values["effects"] if effect["motion_error"] > CLEARLY_SLOW]
+    return [*(line.rstrip() for line in table), *plate, *fast]
 
 
 def tell_details(flight: Trajectory) -> None:

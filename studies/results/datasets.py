@@ -11,6 +11,7 @@ import numpy as np
 import xarray as xr
 
 from ...dynamics.flights import Trajectory
+from ...dynamics.motion import PlateMemory
 from ...dynamics.steady import SIDE, TILT, Equilibrium, ForceCurve
 from ...fem.rotor_tables import FieldTable
 from ...fem.storage import write_checked
@@ -142,8 +143,21 @@ def found_dataset(rows: Sequence[Equilibrium]) -> xr.Dataset:
     )
 
 
-def trajectory_dataset(flight: Trajectory) -> xr.Dataset:
-    """A flight in the laboratory frame, with its position in the rotor's frame as well."""
+def trajectory_dataset(flight: Trajectory, memory: PlateMemory | None = None) -> xr.Dataset:
+    """A flight in the laboratory frame, with its position in the rotor's frame as well.
+
+    Of the plate's currents, if there are some, the attributes say how well they are known, and whether the flight ended
+    where that ends.
+    """
+    plate = (
+        {}
+        if memory is None
+        else {
+            "plate_error_estimate": memory.error,
+            "beyond_plate_table": flight.beyond_plate_table,
+            "left_plate_table": int(flight.left_plate_table),
+        }
+    )
     lab, rotor = flight.lab, flight.rotor
     dims = ("time", "axis")
     far = np.linalg.norm(lab.position, axis=1)
@@ -164,6 +178,7 @@ def trajectory_dataset(flight: Trajectory) -> xr.Dataset:
             "ended_by": str(flight.ended_by),
             "levitated_s": flight.levitated_s,
             "energy_error": flight.energy_error,
+            **plate,
         },
     )
 
