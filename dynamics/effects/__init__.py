@@ -13,7 +13,11 @@ from .catalogue import (
     WITHOUT_METAL as WITHOUT_METAL,
     with_effects as with_effects,
 )
-from .floater_currents import FLOATER_CURRENTS as FLOATER_CURRENTS, FloaterCurrents as FloaterCurrents
+from .floater_currents import (
+    FLOATER_CURRENTS as FLOATER_CURRENTS,
+    FloaterCurrents as FloaterCurrents,
+    slow_error as slow_error,
+)
 from .floater_shape import FLOATER_SHAPE as FLOATER_SHAPE, FloaterShape as FloaterShape
 from .mutual import MUTUAL as MUTUAL, Mutual as Mutual
 from .rigid_or_mutual import NOTHING_ANSWERS as NOTHING_ANSWERS, mutual_choice as mutual_choice

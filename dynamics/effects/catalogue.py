@@ -6,7 +6,7 @@ from ...fem.rotor_tables import FieldFormula
 from ...geometry.scenes import Scene
 from ..motion import FORCE_ALONE, Effect, Interaction, interaction_of
 from .air import RealAir
-from .floater_currents import FloaterCurrents
+from .floater_currents import FloaterCurrents, check_floater_metal
 from .floater_shape import FLOATER_SHAPE, FloaterShape
 from .rotor_losses import ROTOR_CURRENTS, RotorCurrents
 
@@ -19,10 +19,11 @@ def with_effects(scene: Scene, table: FieldFormula) -> Interaction:
 
     Raises
     ------
-    InputError : the rotor turns too fast for its metal, or metal turns with it beside a floater that is no sphere, or
-        the floater is a cuboid
+    InputError : the rotor turns too fast for its metal or the floater's, or metal turns with it beside a floater that
+        is no sphere, or the floater is a cuboid
     """
     whole = interaction_of(table)
+    check_floater_metal(scene)
     effects: list[Effect] = [FloaterCurrents()] if scene.floater.conductivity else []
     if scene.floater.body is not None and FLOATER_SHAPE not in {effect.name for effect in whole.effects}:
         scene.floater.must_be("sphere", "cylinder", where="where it moves", instead=FORCE_ALONE)

@@ -23,9 +23,9 @@ from dataclasses import dataclass
 import heyoka as hy
 import numpy as np
 
-from ...fem.closed_forms import rotating_torque
+from ...fem.closed_forms import thin_field_torque
 from ...fem.rotor_tables import FieldFormula
-from ...geometry.basics import Array
+from ...geometry.basics import MU_0, Array
 from ...geometry.scenes import Scene
 from .effect import Motion
 from .interaction import interaction_of
@@ -74,10 +74,10 @@ def parameters(scene: Scene, scales: Scales, frozen_spin: bool = False) -> Array
     values[Parameter.LINEAR_DRAG] = drag.linear * time / floater.mass
     values[Parameter.TILT_DRAG] = drag.angular * time / floater.inertia
     values[Parameter.SPIN_DRAG] = 0.0 if frozen_spin else values[Parameter.TILT_DRAG] / floater.spin_ratio
-    if floater.conductivity and scene.frequency:
-        turning = float(rotating_torque(floater.radius, floater.conductivity, scene.frequency, 1.0))
-        values[Parameter.TILT_EDDY] = turning / scene.angular_velocity * time / floater.inertia
+    if floater.conductivity:
+        values[Parameter.TILT_EDDY] = thin_field_torque(floater.radius, floater.conductivity) * time / floater.inertia
         values[Parameter.SPIN_EDDY] = 0.0 if frozen_spin else values[Parameter.TILT_EDDY]
+        values[Parameter.SLOWNESS] = MU_0 * floater.conductivity * floater.radius**2 / time
     values[Parameter.TIME] = time
     values[Parameter.PLATE_MOMENT] = floater.moment / root_energy
     values[Parameter.PLATE_SHARE] = 1 / root_energy

@@ -13,7 +13,8 @@ class Parameter(IntEnum):
 
     PLATE_MOMENT is the floater's moment by the root of the unit of energy (A m²/√J), PLATE_SHARE one by that root.
     INDUCED is the moment that 1 T induces in the floater, by the same root, A m²/(T √J).
-    TILT_EDDY and SPIN_EDDY are the floater's own eddy currents, 1/T²: accelerations by unit field and relative turn.
+    TILT_EDDY and SPIN_EDDY are the floater's own eddy currents, 1/T²: accelerations by unit field and relative turn;
+    SLOWNESS is μ0σR² of it in units of time.
     MEASURE is that of a rotor whose shape is a parameter, m or rad (`rotor_family`); no other rotor has it.
     """
 
@@ -36,6 +37,7 @@ class Parameter(IntEnum):
     INDUCED = auto()
     TILT_EDDY = auto()
     SPIN_EDDY = auto()
+    SLOWNESS = auto()
     MEASURE = auto()
 
 

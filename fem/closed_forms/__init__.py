@@ -16,7 +16,12 @@ from .closed_moments import (
 from .demagnetization import remanent_field as remanent_field
 from .quadrature import oblique_contact as oblique_contact, volume_rule as volume_rule
 from .racetrack import Racetrack as Racetrack
-from .sphere_eddy import ComplexArray as ComplexArray, rotating_torque as rotating_torque
+from .sphere_eddy import (
+    ComplexArray as ComplexArray,
+    rotating_torque as rotating_torque,
+    skin_number as skin_number,
+    thin_field_torque as thin_field_torque,
+)
 from .uniform import UniformField as UniformField, squared_distance as squared_distance
 from .vector_potentials import (
     Dipole as Dipole,

@@ -53,3 +53,8 @@ def thin_field_torque(radius: float, conductivity: float) -> float:
     relative error is (ωμ0σR²)²/105: for a floater of NdFeB with R = 6.35 mm 4e-6 at 100 Hz.
     """
     return 2 * np.pi / 15 * conductivity * radius**5
+
+
+def skin_number(radius: float, conductivity: float, frequency: float) -> float:
+    """ωμ0σR² of a sphere (m, S/m) at a frequency (Hz): twice the square of its radius over the skin depth."""
+    return float(2 * np.pi * frequency * MU_0 * conductivity * radius**2)

@@ -11,6 +11,7 @@ from ...dynamics.effects import (
     REAL_AIR,
     ROTOR_CURRENTS,
     reynolds,
+    slow_error,
     swinging,
 )
 from ...dynamics.equilibria import growth_by_floater, growth_by_rotor, shift_by_answers
@@ -35,6 +36,7 @@ class ListedEffect:
     shift_mm : how far it moves the first equilibrium, about; None where that is not known
     growth_per_s : what it adds to the fastest growth there, about; None where that is not known
     why : it is in the motion or not
+    motion_error : relative error of what it adds to the growth of motions, as they are taken as slow against it
     """
 
     name: str
@@ -42,6 +44,7 @@ class ListedEffect:
     shift_mm: float | None
     growth_per_s: float | None
     why: str
+    motion_error: float = 0.0
 
 
 def listed_effects(levitation: Levitation, equilibria: Sequence[Equilibrium]) -> list[ListedEffect]:
@@ -65,7 +68,10 @@ def _floater_currents(levitation: Levitation, first: Equilibrium | None) -> List
     if first and scene.frequency:
         there = replace(scene, floater=replace(floater, conductivity=floater.conductivity or MAGNET_CONDUCTIVITY))
         growth = growth_by_floater(there, levitation.table, first, bool(floater.conductivity))
-    return _conducting(FLOATER_CURRENTS, "floater.conductivity_S_m", bool(floater.conductivity), growth)
+    listed = _conducting(FLOATER_CURRENTS, "floater.conductivity_S_m", bool(floater.conductivity), growth)
+    metal = replace(floater, conductivity=floater.conductivity or MAGNET_CONDUCTIVITY)
+    doubt = slow_error(replace(scene, floater=metal))
+    return replace(listed, motion_error=doubt)
 
 
 def _rotor_currents(levitation: Levitation, first: Equilibrium | None) -> ListedEffect:
