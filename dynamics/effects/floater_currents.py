@@ -23,7 +23,6 @@ import numpy as np
 
 from ...fem.closed_forms import skin_number
 from ...geometry.basics import InputError
-from ...geometry.meshes import skin_depth
 from ...geometry.scenes import Scene
 from ..motion import Added, Motion, Parameter, Vector, cross, dissipative, dot
 
@@ -53,7 +52,7 @@ def check_floater_metal(scene: Scene) -> None:
     floater = scene.floater
     number = skin_number(floater.radius, floater.conductivity or 0.0, scene.frequency)
     if number > THINNEST:
-        depth, most = skin_depth(floater.conductivity or 0.0, scene.frequency), THINNEST / number
+        depth, most = floater.radius * np.sqrt(2 / number), THINNEST / number
         raise InputError(
             f"Input floater.conductivity_S_m must leave its skin depth at least {np.sqrt(2 / THINNEST):.2g} of its "
             f"radius; instead received {floater.conductivity:.3g} S/m: {depth * 1e3:.3g} mm at {scene.frequency:.4g} "

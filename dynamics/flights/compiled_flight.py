@@ -151,7 +151,8 @@ def compile_flight(
     equations = equations_of_motion(with_effects(scene, table), tilted, plate)
     events = flight_events(scene, equations.variables[:3])
     if plate is not None:
-        events = tuple(a + b for a, b in zip(events, range_events(plate, equations.variables[:3]), strict=True))
+        ends = range_events(plate, equations.variables[:3])
+        events = events[0] + ends[0], events[1] + ends[1]
     if compact is None:
         compact = not _worth_compiling(equations, scene, duration)
     return flight_of(scene, equations, events, duration, tolerance, compact, plate)

@@ -143,8 +143,9 @@ def wider_region(plate: Plate, region: Region, radius: float, seen: Array) -> Re
     wide = float(np.max((found.upper - found.lower)[~across])) / 2
     if wide > WIDEST * gap:
         raise AccuracyError(
-            f"A table of the plate's response reaches {WIDEST:g} times its distance from the plate to the sides at "
-            f"most: {WIDEST * gap * 1e3:.3g} mm here, where {wide * 1e3:.3g} mm are needed."
+            f"Input region of a table of the plate's response must reach at most {WIDEST:g} times its distance from "
+            f"the plate to the sides, {WIDEST * gap * 1e3:.3g} mm here; instead received {wide * 1e3:.3g} mm. "
+            "Begin the flight where it stays nearer, or simulate a shorter one."
         )
     return found
 

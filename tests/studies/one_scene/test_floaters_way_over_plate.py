@@ -83,7 +83,7 @@ def test_a_flight_beyond_what_a_table_can_reach_ends_there_and_says_so():
     assert flown.beyond_plate_table == 0.0
     words = flight_words(levitation, flown)
     assert "left the region in which the plate's response could be computed" in words
-    assert "18 mm here, where 24 mm are needed" in words
+    assert "18 mm here; instead received 24 mm" in words
     assert "may be wrong by" in plate_words(levitation)[0]
 
 

@@ -56,7 +56,9 @@ def test_a_flight_from_an_unstable_equilibrium_is_never_called_stable():
     time = np.linspace(0, 1.0, 400)
     resting = np.tile(start.position, (400, 1))
     places = SimpleNamespace(position=resting)
-    flight = SimpleNamespace(time=time, lab=places, rotor=places, ended_by="duration", levitated_s=1.0)
+    flight = SimpleNamespace(
+        time=time, lab=places, rotor=places, ended_by="duration", levitated_s=1.0, left_plate_table=False
+    )
     assert kind_of_flight(unstable, flight) == "growing oscillation"
     assert flight_words(unstable, flight) == "Flew 1 s, still up; the oscillation grows (e-fold in 11 s)."
     at_rest = SimpleNamespace(absolute=False, stability=equilibrium())
