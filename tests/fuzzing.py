@@ -1,12 +1,14 @@
 """Broken inputs by the thousand: `python tests/fuzzing.py KIND NUMBER [SEED]`, or `make fuzz`.
 
-Every input must end in exit status 0, 1 or 2 with a message, within seconds, and leave no partial file.
+Every input must end in exit status 0, 1 or 2 with a message, no traceback, within seconds, and leave no partial file.
+Scenes are tried in processes of their own: none may warn, be silent for a minute, or take 2 GB.
 """
 
 import contextlib
 import io
 import os
 import random
+import re
 import signal
 import string
 import sys
@@ -33,7 +35,11 @@ from spinlev.studies.command_line import cli
 
 SCENES = sorted(places.SCENES.glob("*.toml"))
 LONGEST = 60
-"""Seconds after which an input counts as a hang."""
+"""Seconds after which an input counts as a hang; of a scene, seconds of silence."""
+MOST = 2_000_000_000
+"""Bytes of memory that a scene may take."""
+GIVEN_UP = 300
+"""Seconds after which a scene that says how far it is is left alone."""
 PATIENCE = 3
 """Seconds that HDF5 has for a file of another program, which it reads in a few milliseconds."""
 ODD = [
@@ -107,6 +113,159 @@ def damaged(content: bytes, chance: random.Random) -> bytes:
     return bytes(found)
 
 
+OTHERS = [
+    """frequency_hz = 120.0
+[rotor]
+configuration = "tilt"
+angle_deg = 8.0
+shape = "cylinder"
+diameter_mm = 11.0
+height_mm = 9.0
+remanence_T = 1.28
+coercivity_kA_m = 900.0
+conductivity_S_m = 6.7e5
+[floater]
+shape = "cylinder"
+diameter_mm = 9.0
+height_mm = 8.0
+remanence_T = 1.3
+density_kg_m3 = 7600.0
+""",
+    """frequency_hz = 90.0
+gravity_m_s2 = [0.0, 9.81, 0.0]
+[[rotor.magnets]]
+shape = "ring"
+diameter_mm = 17.0
+inner_diameter_mm = 7.0
+height_mm = 5.2
+center_mm = [1.5, 0.0, 0.0]
+polarization_T = [0.0, 0.2, 1.18]
+recoil_permeability = [1.05, 1.15]
+[[rotor.magnets]]
+shape = "sphere"
+diameter_mm = 8.0
+center_mm = [0.0, 0.0, 14.0]
+rotation_deg = [10.0, 20.0, 30.0]
+polarization_T = [1.3, 0.0, 0.0]
+[[rotor.magnets]]
+size_mm = [4.0, 5.0, 6.0]
+center_mm = [0.0, 20.0, 0.0]
+polarization_T = [0.0, 0.0, -1.2]
+recoil_permeability = 1.0
+[[rotor.conductors]]
+shape = "cylinder"
+diameter_mm = 5.0
+height_mm = 30.0
+center_mm = [0.0, 0.0, 40.0]
+conductivity_S_m = 5.8e7
+[floater]
+shape = "cuboid"
+size_mm = [6.0, 6.0, 7.0]
+remanence_T = 1.3
+recoil_permeability = 1.1
+density_kg_m3 = 7500.0
+[drag]
+model = "stokes"
+""",
+    """frequency_hz = 150.0
+[rotor]
+configuration = "vertical"
+displacement_mm = 15.0
+shape = "sphere"
+diameter_mm = 9.0
+remanence_T = 1.3
+field_map = "map.csv"
+[floater]
+diameter_mm = 6.0
+remanence_T = 1.3
+density_kg_m3 = 7500.0
+conductivity_S_m = 1.0e6
+[plate]
+size_mm = [100.0, 100.0, 10.0]
+center_mm = [0.0, 0.0, -60.0]
+rotation_deg = [0.0, 15.0, 0.0]
+conductivity_S_m = 5.8e7
+[plate.lowering]
+start_s = 0.001
+speed_mm_s = 5.0
+distance_mm = 20.0
+[drag]
+model = "air"
+[start]
+position_mm = [0.0, 0.0, -30.0]
+velocity_mm_s = [1.0, 0.0, 0.0]
+moment = [1.0, 0.0, -0.2]
+spin_hz = [0.0, 0.0, 150.0]
+""",
+]
+"""Scenes with all keys that the shipped ones lack."""
+NUMBER = re.compile(r"-?\d+\.?\d*(?:e-?\d+)?")
+EXTREMES = ["0.0", "-0.0", "5e-324", "1e-310", "1e-300", "1e-30", "1e30", "1e300", "1.7e308", "-5e-324", "9" * 400]
+BREAKERS = [
+    "[" * 5000 + "]" * 5000, "{a=" * 3000 + "1" + "}" * 3000, "[" * 80 + "]" * 80, "9" * 5000, "0x" + "f" * 5000,
+    "1" + "0" * 400, "18446744073709551616", "'" + "x" * 100_000 + "'", r'"\u001b[2J\u0007"', "1979-05-27", "07:32:00",
+    "130,5", "[nan, inf, -inf]", "[true, true, true]", "[[1.0, 2.0, 3.0]]", "{diameter_mm = 1.0}", "'../../etc/passwd'",
+    "'/dev/zero'", "'a\\u0000b'", "'.'", "'map.csv'", '"a\\u0000b"',
+]  # fmt: skip
+KEYS = [
+    ".".join(["a"] * 20_000), '"fr\\u0435quency_hz"', '""', "'a.b'", '"\\u001b[2J"', "k" * 10_000, "rotor.x.y",
+    "plate.size_mm",
+]  # fmt: skip
+
+
+def stretched(text: str, chance: random.Random) -> str:
+    """A scene with a number, or all of a body's, made larger or smaller by up to six decades, or extreme."""
+    lines = text.split("\n")
+    valued = [k for k, line in enumerate(lines) if NUMBER.search(line.partition("=")[2].partition("#")[0])]
+    if not valued:
+        return text
+    first = chance.choice(valued)
+    factor, extreme = 10 ** chance.uniform(-6, 6), chance.choice(EXTREMES)
+    kind = chance.randrange(4)  # a number; an extreme; all lengths from there on; all lengths
+    for k in [first] if kind < 2 else valued:
+        if (kind == 2 and k < first) or (kind > 1 and "_mm" not in lines[k]):
+            continue
+        key, _, value = lines[k].partition("=")
+        value = value.partition("#")[0]
+        if kind == 1:
+            value = NUMBER.sub(extreme, value, count=1)
+        else:
+            value = NUMBER.sub(lambda number: f"{float(number[0]) * factor:.6g}", value)
+        lines[k] = f"{key}={value}"
+    return "\n".join(lines)
+
+
+def broken(text: str, chance: random.Random) -> str:
+    """A scene with what parsers break on: as a value, as a key, or in the text."""
+    lines = text.split("\n")
+    k = chance.randrange(len(lines))
+    if chance.random() < 0.6 and "=" in lines[k]:
+        lines[k] = f"{lines[k].partition('=')[0]}= {chance.choice(BREAKERS)}"
+    elif chance.random() < 0.5:
+        lines.insert(k, f"{chance.choice(KEYS)} = {chance.choice(['1.0', *BREAKERS])}")
+    else:
+        lines[k] = chance.choice(["\ufeff", "\0", "\x1b[2J", "\r", "\u202e", "\ud800", "[a]", "[[rotor]]"]) + lines[k]
+    return "\n".join(lines)
+
+
+def unusual(path: Path, content: bytes, chance: random.Random) -> None:
+    """Something in the place of a file."""
+    kind = chance.randrange(8)
+    if kind == 0:
+        os.mkfifo(path)
+    elif kind == 1:
+        path.mkdir()
+    elif kind < 6:
+        path.symlink_to(["/dev/zero", path.name, "nowhere", "/proc/self/pagemap"][kind - 2])
+    elif kind == 6:
+        path.touch()
+        os.truncate(path, 10**10)
+    else:
+        path.write_bytes(
+            chance.choice([content.decode(errors="replace").encode("utf-16"), content[::-1], b"\xff", b""])
+        )
+
+
 def answered(arguments: list[str]) -> int:
     """The exit status of the command line, in this process; a traceback or a silent failure is an error here."""
     said, answer = io.StringIO(), io.StringIO()
@@ -139,11 +298,109 @@ def fault_in_fork(path: Path) -> str | None:
 
 
 def scene(chance: random.Random, folder: Path) -> int:
-    path = folder / "scene.toml"
-    path.write_text(mutated(chance.choice(SCENES).read_text(), chance), errors="replace")
-    points = folder / "points.csv"
+    """A scene with faults of all kinds, and a cheap command about it, in a process of its own."""
+    path, points = folder / "scene.toml", folder / "points.csv"
+    for file in (path, points):
+        _remove(file)
+    if not (folder / "map.csv").exists():
+        _write_map(folder / "map.csv")
+        _load(folder)
+    text = chance.choice([*(shipped.read_text() for shipped in SCENES), *OTHERS])
+    for change in chance.choices([mutated, stretched, broken], [3, 6, 1], k=chance.choice([1, 1, 1, 2, 3])):
+        text = change(text, chance)
+    content = text.encode(errors="surrogatepass")
+    if chance.random() < 0.01:
+        unusual(path, content, chance)
+    else:
+        path.write_bytes(content)
+    if chance.random() < 0.01:
+        unusual(points, b"x_mm,y_mm,z_mm\n0,0,-40\n", chance)
+    else:
+        points.write_text("x_mm,y_mm,z_mm\n0,0,-40\n")
+    asked = chance.choices(list(SCENE_COMMANDS), [40, 2, 2, 2, 1])[0]
+    arguments = [part.format(points=points) for part in SCENE_COMMANDS[asked]]
+    return apart([asked.partition(" ")[0], str(path), *arguments, "--out", str(folder / "out")], folder)
+
+
+SCENE_COMMANDS = {
+    "field": ["--points", "{points}", "--model", "dipole"],
+    "field map": ["--points", "{points}", "--model", "map"],
+    "equilibria": ["--model", "dipole", "--plate-model", "none", "--interaction", "rigid"],
+    "simulate": ["--model", "dipole", "--plate-model", "none", "--interaction", "rigid", "--duration-s", "0.01"],
+    "plate": ["--at", "0,0,-40", "--frequency-hz", "100", "--model", "slab"],
+}
+"""Cheap commands about a scene."""
+
+
+def _load(folder: Path) -> None:
+    """Let this process load all that its copies need: they would do so again and again."""
+    points = folder / "few.csv"
     points.write_text("x_mm,y_mm,z_mm\n0,0,-40\n")
-    return answered(["field", str(path), "--points", str(points), "--model", "dipole", "--out", str(folder / "out")])
+    for asked, arguments in SCENE_COMMANDS.items():
+        if asked != "field map":
+            told = [part.format(points=points) for part in arguments]
+            answered([asked, str(places.SCENES / "tilt-over-plate.toml"), *told, "--out", str(folder / "out")])
+
+
+PEAKS = {"MB": 0.0, "s": 0.0}
+"""Most memory and time that a scene has taken so far."""
+
+
+def apart(arguments: list[str], folder: Path) -> int:
+    """The exit status of the command line in a copy of this process; what it must not do is an error here."""
+    signal.alarm(0)
+    said, rest = folder / "said", folder / "tmp"
+    rest.mkdir(exist_ok=True)
+    with warnings.catch_warnings():  # the copy of a process with threads that it does not use
+        warnings.simplefilter("ignore", DeprecationWarning)
+        child = os.fork()
+    if child == 0:
+        _tried(arguments, said, rest)
+    began = heard = time.monotonic()
+    size, ended, status, used = -1, 0, 0, None
+    while not ended:
+        time.sleep(0.005 if time.monotonic() < began + 1 else 0.1)
+        ended, status, used = os.wait4(child, os.WNOHANG)
+        if said.exists() and said.stat().st_size != size:
+            size, heard = said.stat().st_size, time.monotonic()
+        if not ended and (time.monotonic() > heard + LONGEST or time.monotonic() > began + GIVEN_UP):
+            os.kill(child, signal.SIGKILL)
+    text = said.read_text(errors="replace")
+    said.unlink()
+    PEAKS["MB"] = max(PEAKS["MB"], used.ru_maxrss / 1e3)
+    PEAKS["s"] = max(PEAKS["s"], time.monotonic() - began)
+    code = os.waitstatus_to_exitcode(status)
+    told = f"{' '.join(arguments)}: {text[-600:]}"
+    assert time.monotonic() < heard + LONGEST, f"silent for a minute: {told}"
+    assert code in (0, 1, 2) or time.monotonic() > began + GIVEN_UP, f"ended with {code}: {told}"
+    assert used.ru_maxrss * 1024 < MOST, f"took {used.ru_maxrss / 1e6:.1f} GB: {told}"
+    assert code == 0 or text.strip(), f"no message: {told}"
+    for word in ("Traceback", "Warning", "failed at", "Error:"):
+        assert word not in text, f"{word}: {told}"
+    assert not any(rest.iterdir()), f"left behind: {list(rest.iterdir())}: {told}"
+    return code
+
+
+def _tried(arguments: list[str], said: Path, rest: Path) -> None:
+    """The command line in the copy, whose end this is."""
+    status = 70
+    try:
+        signal.alarm(0)
+        with said.open("w") as heard:
+            os.dup2(heard.fileno(), 2)
+            sys.stderr = heard
+            tempfile.tempdir = str(rest)
+            warnings.simplefilter("always")
+            status = cli._status(arguments, io.StringIO())
+    finally:
+        os._exit(status)
+
+
+def _remove(path: Path) -> None:
+    if path.is_dir() and not path.is_symlink():
+        path.rmdir()
+    else:
+        path.unlink(missing_ok=True)
 
 
 def points(chance: random.Random, folder: Path) -> int:
@@ -258,8 +515,11 @@ KINDS: dict[str, Callable[[random.Random, Path], int]] = {
 }  # fmt: skip
 
 
-def fuzz(kind: str, number: int, seed: int = 0) -> Counter[int]:
-    """Try `number` inputs of a kind; the number of each exit status. AssertionError names the seed of a failure."""
+def fuzz(kind: str, number: int, seed: int = 0, faults: list[str] | None = None) -> Counter[int]:
+    """Try `number` inputs of a kind; the number of each exit status.
+
+    AssertionError names the seed of the first failure, unless `faults` takes them all.
+    """
 
     def too_long(*_: object) -> None:
         raise HangError
@@ -280,23 +540,41 @@ def fuzz(kind: str, number: int, seed: int = 0) -> Counter[int]:
         folder = Path(name)
         try:
             for k in range(seed, seed + number):
-                signal.alarm(LONGEST)
                 try:
-                    counts[KINDS[kind](random.Random(f"{kind} {k}"), folder)] += 1
-                except BaseException as error:
-                    raise AssertionError(f"{kind}, seed {k}: {type(error).__name__}: {error}") from error
-                finally:
-                    signal.alarm(0)
-                assert not ignored, f"{kind}, seed {k}: {ignored}"
-                assert not [f for f in folder.glob("out/.*") if f.is_file()], f"{kind}, seed {k}: a partial file"
+                    counts[_one(kind, k, folder, ignored)] += 1
+                except AssertionError as error:
+                    if faults is None:
+                        raise
+                    faults.append(str(error))
+                    print(error, file=sys.__stderr__, flush=True)
         finally:
             sys.unraisablehook = sys.__unraisablehook__
     return counts
 
 
+def _one(kind: str, seed: int, folder: Path, ignored: list[BaseException | None]) -> int:
+    """The exit status of one input. Raises AssertionError where it is not what it must be."""
+    signal.alarm(LONGEST)
+    try:
+        status = KINDS[kind](random.Random(f"{kind} {seed}"), folder)
+    except KeyboardInterrupt:
+        raise
+    except BaseException as error:
+        raise AssertionError(f"{kind}, seed {seed}: {type(error).__name__}: {error}") from error
+    finally:
+        signal.alarm(0)
+    assert not ignored, f"{kind}, seed {seed}: {ignored}"
+    assert not [f for f in folder.glob("out/.*") if f.is_file()], f"{kind}, seed {seed}: a partial file"
+    return status
+
+
 if __name__ == "__main__":
     asked, many, first = sys.argv[1], int(sys.argv[2]), int(sys.argv[3]) if len(sys.argv) > 3 else 0
+    wrong: list[str] = []
     for one in KINDS if asked == "all" else [asked]:
         began = time.perf_counter()
-        found = fuzz(one, many, first)
-        print(f"{one:8} {dict(sorted(found.items()))} in {time.perf_counter() - began:.0f} s", flush=True)
+        found = fuzz(one, many, first, wrong)
+        most = f", at most {PEAKS['MB']:.0f} MB and {PEAKS['s']:.0f} s" if one == "scene" else ""
+        print(f"{one:8} {dict(sorted(found.items()))} in {time.perf_counter() - began:.0f} s{most}", flush=True)
+    print(f"{len(wrong)} faults")
+    sys.exit(bool(wrong))

@@ -17,6 +17,12 @@ BETWEEN = 0.8
 """What may be left out, by what is allowed: between these places it is up to a fifth more than there."""
 
 
+NEAREST = 0.25
+"""Least distance from faces from which on a table is to be accurate, by the edge of the largest magnet, if it were a
+cube: a floater far smaller than the rotor floats as far away as a large one, and the number of pieces that are
+needed grows as the third power of the reciprocal."""
+
+
 class AccuracyError(InputError):
     """A tolerance below what can be reached; the message names it and the smallest that can."""
 
@@ -28,8 +34,8 @@ class Accuracy:
     Parameters
     ----------
     rtol : relative error of B
-    nearest : distance from the magnets' faces from which on `rtol` holds, m; None: 0.8 of the largest magnet's edge,
-        if it were a cube
+    nearest : distance from the magnets' faces from which on `rtol` holds, m, `NEAREST` of the largest magnet's edge at
+        least; None: 0.8 of that edge, if it were a cube
     """
 
     rtol: float = 3e-6
@@ -43,7 +49,8 @@ class Accuracy:
 
     def clearance(self, magnets: tuple[Magnet, ...]) -> float:
         """The distance from faces from which on `rtol` holds, m."""
-        return self.nearest or 0.8 * max(magnet.body.volume for magnet in magnets) ** (1 / 3)
+        edge = float(max(magnet.body.volume for magnet in magnets) ** (1 / 3))
+        return 0.8 * edge if self.nearest is None else max(self.nearest, NEAREST * edge)
 
 
 def error_points(magnets: tuple[Magnet, ...], clearance: float) -> tuple[Array, Array]:

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..basics import Array, Box, Solid
-from .pieces import CONVERGENCE
+from .pieces import CONVERGENCE, cut_further
 
 SAMPLES = 12
 """Places along each edge of a cell at which it is looked at."""
@@ -47,7 +47,7 @@ class Cells:
 def cells_of(body: Solid, nearest: float) -> Cells:
     """Cells for expansions that are used from the distance `nearest` (m) from the surface on; a cuboid stays whole.
 
-    A cuboid that is too long is cut before, see `cut_magnets`.
+    A cuboid that is too long is cut before, see `cut_magnets`. Raises InputError as that does.
     """
     counts = np.ones(3, dtype=int)
     while True:
@@ -55,7 +55,7 @@ def cells_of(body: Solid, nearest: float) -> Cells:
         depth = -body.distance(cells.centers)
         if isinstance(body, Box) or np.all(nearest + depth >= CONVERGENCE * cells.radii):
             return cells
-        counts[np.argmax(body.half_edges / counts)] += 1
+        cut_further(counts, body.half_edges / counts, body, nearest)
 
 
 def _cells(body: Solid, counts: tuple[int, int, int]) -> Cells:

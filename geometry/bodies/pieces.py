@@ -5,11 +5,13 @@ from itertools import product
 
 import numpy as np
 
-from ..basics import Array, Box
+from ..basics import Array, Box, InputError, Solid
 from .magnet import Magnet
 
 CONVERGENCE = 1.3
 """Least distance of a point from a piece's centre, in circumradii of the piece."""
+MOST = 1000
+"""Pieces of a body."""
 
 
 def cut_magnets(
@@ -21,21 +23,35 @@ def cut_magnets(
     ----------
     whole : least distance of a point from the centre of a magnet that stays whole, in circumradii; at 1.3 a cube does
         down to 0.63 of its edge from a face.  Magnets of other shapes stay whole here, see `cells_of`.
+
+    Raises
+    ------
+    InputError : a magnet would need more than `MOST` pieces
     """
     return tuple(
-        tuple(_pieces(magnet, _counts(magnet.box.size, nearest, whole))) if isinstance(magnet.body, Box) else (magnet,)
+        tuple(_pieces(magnet, _counts(magnet.box, nearest, whole))) if isinstance(magnet.body, Box) else (magnet,)
         for magnet in magnets
     )
 
 
-def _counts(size: Array, nearest: float, whole: float) -> tuple[int, ...]:
+def _counts(box: Box, nearest: float, whole: float) -> tuple[int, ...]:
     """Number of pieces along each axis: the longest side of the pieces is cut until they are compact enough."""
     counts = np.ones(3, dtype=int)
     while True:
-        half = size / counts / 2
+        half = box.size / counts / 2
         if nearest + half.min() >= (CONVERGENCE if counts.max() > 1 else whole) * np.linalg.norm(half):
             return tuple(int(n) for n in counts)
-        counts[np.argmax(half)] += 1
+        cut_further(counts, half, box, nearest)
+
+
+def cut_further(counts: Array, half: Array, body: Solid, nearest: float) -> None:
+    """One more piece along the axis on which pieces are longest. Raises InputError where there are too many."""
+    counts[np.argmax(half)] += 1
+    if counts.prod() > MOST:
+        raise InputError(
+            f"Input bodies must be such that {MOST} compact pieces make one up; instead a {body.described_size} "
+            f"needs more for its field to be known {nearest * 1e3:.3g} mm from its faces. Give it as several bodies."
+        )
 
 
 def _pieces(magnet: Magnet, counts: tuple[int, ...]) -> list[Magnet]:
