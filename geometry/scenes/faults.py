@@ -9,7 +9,7 @@ import numpy as np
 from pydantic import BaseModel
 from pydantic_core import ErrorDetails
 
-from ..basics import InputError, Solid, shown
+from ..basics import InputError, Solid, printable, shown
 from ..bodies import TOUCHING, body_overlap, deepest_overlap_in_a_turn
 from . import schema
 from .contents import AbsoluteStart, Scene
@@ -31,6 +31,8 @@ TABLES: dict[str, type[BaseModel]] = {
 }
 LONGEST = 60
 """Characters of a key in a message."""
+LONGEST_SOURCE = 300
+"""Characters of a file's name in a message."""
 MOST = 20
 """Faults of a scene that are told; the rest are counted."""
 RULES = {
@@ -53,6 +55,9 @@ class SceneError(InputError):
 
     def __init__(self, source: str, faults: Sequence[str]) -> None:
         self.faults = tuple(faults)
+        source = printable(source).replace("\n", "\\n")
+        if len(source) > LONGEST_SOURCE:
+            source = f"…{source[-LONGEST_SOURCE:]}"
         told = [f"{source}: {fault}" for fault in self.faults[:MOST]]
         more = len(self.faults) - len(told)
         super().__init__("\n".join([*told, f"{source}: and {more} more faults."] if more else told))

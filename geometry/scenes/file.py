@@ -42,7 +42,7 @@ def load_scene(path: str | Path) -> Scene:
         The file is missing, no file, too large or unreadable, is not TOML, has unknown, missing or wrong keys, or its
         bodies overlap, or its map of the field is no file.
     """
-    source = str(path)
+    source = str(path) if isinstance(path, str | Path) else "scene"
     try:
         text = file_content(path, MOST, "scene", "a TOML file").decode("utf-8-sig")
         scene = parse_scene(text.replace("\r\n", "\n").replace("\r", "\n"), source)

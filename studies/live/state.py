@@ -7,7 +7,7 @@ from functools import cached_property
 from typing import Any, Self, cast, get_args
 from urllib.parse import urlencode
 
-from ...geometry.basics import InputError
+from ...geometry.basics import InputError, shown
 from ...geometry.scenes import Scene, assemble, changed, scene_keys
 from ..terminal import FieldModel, Models, PlateModel, finite
 
@@ -106,8 +106,8 @@ class PageState:
         rotor = keys.get("rotor")
         if isinstance(rotor, dict) and rotor.get("field_map", own_map) != own_map:
             raise InputError(
-                f"Input rotor.field_map must not be in an address; instead received {rotor['field_map']}. Give the "
-                "scene to the command line."
+                "Input rotor.field_map must not be in an address; instead received "
+                f"{shown(rotor['field_map'])}. Give the scene to the command line."
             )
         return assemble(keys, self.source)
 
@@ -128,7 +128,7 @@ def first_state(scene: Scene, source: str = "scene") -> PageState:
 
 def _choice(name: str, value: str, known: tuple[Any, ...]) -> Any:
     if value not in known:
-        raise InputError(f"Input {name} must be one of {', '.join(known)}; instead received {value}.")
+        raise InputError(f"Input {name} must be one of {', '.join(known)}; instead received {shown(value)}.")
     return value
 
 
@@ -136,9 +136,9 @@ def _spin(value: str | float) -> float:
     try:
         spin = finite("spin", float(value))
     except ValueError:
-        raise InputError(f"Input spin must be a number; instead received {value}.") from None
+        raise InputError(f"Input spin must be a number; instead received {shown(value)}.") from None
     if not -1e3 <= spin <= 1e3:
-        raise InputError(f"Input spin must be between -1000 and 1000; instead received {value}.")
+        raise InputError(f"Input spin must be between -1000 and 1000; instead received {shown(value)}.")
     return spin
 
 
@@ -166,5 +166,5 @@ def _put(keys: Any, path: list[str], value: Any) -> None:
 def _value(text: str) -> Any:
     try:
         return json.loads(text)
-    except ValueError:
+    except (ValueError, RecursionError):  # a text, or lists in lists by the thousand
         return text

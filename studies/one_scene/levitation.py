@@ -37,7 +37,7 @@ from ...fem.plate_currents import Region
 from ...fem.rotor_losses import RotorLosses, check_slow_enough, pieces_of
 from ...fem.rotor_tables import AccuracyError, FieldTable, RotorTable
 from ...fem.slab import edge_error, resolve_plate_model, rotor_nearby, wider_region
-from ...geometry.basics import Array, InputError, SpinlevError, Watch, millimetre_size, unwatched
+from ...geometry.basics import Array, InputError, SpinlevError, Watch, millimetre_size, shown, unwatched
 from ...geometry.scenes import AbsoluteStart, Scene, load_scene
 from ..terminal import FieldModel, Models, detail, finite, note, positive, progress, silence, stages
 from .plate_of_scene import check_room, check_way, plate_memory
@@ -456,7 +456,7 @@ def given_scene(scene: Scene | str | Path) -> Scene:
         return scene
     if isinstance(scene, str | Path):
         return load_scene(scene)
-    raise InputError(f"Input scene must be a Scene or the path of a scene file; instead received {scene!r}.")
+    raise InputError(f"Input scene must be a Scene or the path of a scene file; instead received {shown(scene)}.")
 
 
 def _first(known: Sequence[Equilibrium]) -> Equilibrium | None:

@@ -8,7 +8,8 @@ from typing import Annotated, Any, Literal, Self, get_args
 
 from cyclopts import Parameter
 
-from ...geometry.basics import InputError
+from ...geometry.basics import InputError, shown
+from .numbers import is_number
 
 FieldModel = Literal["dipole", "cuboid", "fem", "map", "auto"]
 InteractionModel = Literal["rigid", "mutual", "auto"]
@@ -62,13 +63,16 @@ class Models:
         """
         choices = (("model", FieldModel), ("plate_model", PlateModel), ("interaction", InteractionModel))
         for name, known in ((name, get_args(kind)) for name, kind in choices):
-            if (value := getattr(self, name)) not in known:
-                raise InputError(f"Input {name} must be one of {', '.join(known)}; instead received {value}.")
-        if not 1e-13 <= self.rtol < 1:
-            raise InputError(f"Input --rtol must be at least 1e-13 and less than 1; instead received {self.rtol}.")
-        if not 1e-5 <= self.plate_rtol <= 0.1:
+            value = getattr(self, name)
+            if not isinstance(value, str) or value not in known:
+                raise InputError(f"Input {name} must be one of {', '.join(known)}; instead received {shown(value)}.")
+        if not is_number(self.rtol) or not 1e-13 <= self.rtol < 1:
             raise InputError(
-                f"Input --plate-rtol must be at least 1e-5 and at most 0.1; instead received {self.plate_rtol}."
+                f"Input --rtol must be at least 1e-13 and less than 1; instead received {shown(self.rtol)}."
+            )
+        if not is_number(self.plate_rtol) or not 1e-5 <= self.plate_rtol <= 0.1:
+            raise InputError(
+                f"Input --plate-rtol must be at least 1e-5 and at most 0.1; instead received {shown(self.plate_rtol)}."
             )
         return self
 

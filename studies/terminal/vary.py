@@ -39,11 +39,15 @@ def checked_values(values: Mapping[str, Sequence[Any]], name: str = "values") ->
     ------
     InputError : no key, no value, one that is no finite number, one that is given twice, or too many points
     """
+    if not isinstance(values, Mapping) or not all(isinstance(key, str) for key in values):
+        raise InputError(f"Input {name} must be lists of values by key; instead received {shown(values)}.")
     if not values:
         raise InputError(f"Input {name} must have at least one key; instead received none.")
     found = {}
     for key, given in values.items():
-        listed = list(given) if isinstance(given, Iterable) and not isinstance(given, str) else [given]
+        listed = (
+            list(given) if isinstance(given, Iterable) and not isinstance(given, str | bytes | Mapping) else [given]
+        )
         fine = all(isinstance(v, str) if key in NAMED else is_number(v) for v in listed)
         if not listed or not fine:
             what = "names" if key in NAMED else "finite numbers"

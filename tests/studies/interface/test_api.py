@@ -36,6 +36,42 @@ def test_a_flight_and_its_figure():
     assert set(sl.draw(flight)) == {"trajectory"}
 
 
+def nested(levels):
+    found = 1.0
+    for _ in range(levels):
+        found = [found]
+    return found
+
+
+@pytest.mark.parametrize(
+    "value",
+    [nested(100_000), 10**5000, 10**400, True, "x" * 100_000, "\x1b[2J", float("nan"), b"x", None, {1: 2}, [[1.0]]],
+    ids=["nested", "digits", "no float", "bool", "long", "control", "nan", "bytes", "None", "dict", "lists"],
+)
+def test_no_value_of_another_kind_goes_further_than_a_sentence(tmp_path, value):
+    scene, few = sl.load_scene(HORIZONTAL), {"model": "dipole", "plate_model": "none"}
+    for call in (
+        lambda: sl.load_scene(value),
+        lambda: sl.equilibria(value),
+        lambda: sl.equilibria(scene, model=value),
+        lambda: sl.equilibria(scene, **few, spin=value),
+        lambda: sl.equilibria(scene, **few, rtol=value),
+        lambda: sl.simulate(scene, value, **few),
+        lambda: sl.sweep(scene, [value], **few, out=tmp_path),
+        lambda: sl.sweep(scene, {"frequency_hz": [value]}, **few, out=tmp_path),
+        lambda: sl.sweep(scene, {"frequency_hz": value}, **few, out=tmp_path),
+        lambda: sl.sweep(scene, {repr(type(value)): [1.0]}, **few, out=tmp_path),
+        lambda: sl.sweep(scene, {"frequency_hz": [1.0]}, "field", **few, place=(value, 0, 0), out=tmp_path),
+    ):
+        with pytest.raises(sl.InputError) as error:
+            call()
+        said = str(error.value)
+        assert " must be " in said
+        assert len(said) < 700
+        assert said.isprintable()
+    assert not list(tmp_path.iterdir())
+
+
 def test_wrong_input(tmp_path):
     scene = sl.load_scene(HORIZONTAL)
     with pytest.raises(sl.InputError, match=r"must be one of .*dipole-validity"):
@@ -169,7 +205,7 @@ def test_a_sweep_over_a_parameter_and_a_model(tmp_path):
     ("values", "said"),
     [
         ({}, "at least one key"),
-        ({"model": ["magic"]}, "Input model must be one of dipole, cuboid, fem, map, auto; instead received magic."),
+        ({"model": ["magic"]}, "Input model must be one of dipole, cuboid, fem, map, auto; instead received 'magic'."),
         ({"model": [1.0]}, "Input model must be varied over names"),
         ({"frequency": [110.0]}, "did you mean frequency_hz?"),
         ({"frequency_hz": [110.0, float("nan")]}, "finite numbers"),

@@ -42,6 +42,10 @@ def test_a_short_address_changes_what_it_names():
         ({"colour": "red"}, "colour"),
         ({"rotor.configuration": "tilt"}, "rotor"),
         ({"frequency_hz.more": "1"}, "frequency_hz"),
+        ({"frequency_hz": "[" * 9000 + "]" * 9000}, r"frequency_hz must be a number; instead received '\[\[\["),
+        ({"frequency_hz": "9" * 5000}, "frequency_hz must be a number; instead received '999"),
+        ({"rotor": '{"a":' * 3000 + "1" + "}" * 3000}, r"rotor\.configuration must be one of"),
+        ({"rotor." + "a." * 4000 + "b": "1"}, r"rotor\.configuration must be one of"),
     ],
 )
 def test_a_scene_that_cannot_be(asked, says):
@@ -57,6 +61,8 @@ def test_a_scene_that_cannot_be(asked, says):
         ({"spin": "much"}, "spin must be a number"),
         ({"spin": "nan"}, "spin must be"),
         ({"spin": "1e6"}, "between -1000 and 1000"),
+        ({"spin": "9" * 5000}, "spin must be a number; instead received '999"),
+        ({"rotor.field_map": "[" * 900 + "]" * 900}, "must not be in an address"),
         ({"rotor.field_map": "/etc/passwd"}, "must not be in an address"),
         ({"gravity_m_s2": "1" * 30_000}, "at most 20000 characters"),
     ],

@@ -59,7 +59,22 @@ def test_decimal_steps_give_decimal_values():
 
 @pytest.mark.parametrize(
     "wrong",
-    ["x", "=1", "a=", "a=1:2", "a=2:1:1", "a=1:2:0", "a=1:2:nan", "a=1,x", "a=inf", "a=1,1", "a=0:1:1e-9", "a=1:2:3:4"],
+    [
+        "x",
+        "=1",
+        "a=",
+        "a=1:2",
+        "a=2:1:1",
+        "a=1:2:0",
+        "a=1:2:nan",
+        "a=1,x",
+        "a=inf",
+        "a=1,1",
+        "a=0:1:1e-9",
+        "a=1:2:3:4",
+        "a=" + "9" * 5000,
+        "a=" + "[" * 5000,
+    ],
 )
 def test_wrong_values(wrong):
     with pytest.raises(InputError, match="Input --vary must"):
