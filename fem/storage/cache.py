@@ -18,6 +18,7 @@ from filelock import FileLock, Timeout
 
 from ...geometry.basics import InputError
 from .checked_files import TableFileError
+from .whole_files import closed, ours
 
 Table = TypeVar("Table")
 OWNER = "in-use.lock"
@@ -75,22 +76,20 @@ def own_folder(name: str) -> Path:
 def others_may_write(folder: Path) -> str | None:
     """Who but this user and root can put files into a folder of the cache, or another in its place, and the way out.
 
-    None if nobody can. Raises OSError.
+    None if nobody can, or only the owner of a cache in which each may remove no more than what is his: the folder that
+    he puts there is his own, and is known by that. Raises OSError.
     """
-    for path, found in ((folder.parent, folder.parent.stat()), (folder, folder.lstat())):
-        kept_apart = path != folder and found.st_mode & stat.S_ISVTX  # each may remove only what is his
-        if not stat.S_ISDIR(found.st_mode):
-            return f"{path} is a link or no folder; remove it"
-        if not ours(found):
-            return f"{path} belongs to another user; set SPINLEV_CACHE to a folder of your own"
-        if found.st_mode & (stat.S_IWGRP | stat.S_IWOTH) and not kept_apart:
-            return f"others may write in {path}; chmod {'+t' if path != folder else 'go-w'} {path} mends it"
-    return None
-
-
-def ours(found: os.stat_result) -> bool:
-    """Whether a file is this user's or root's."""
-    return found.st_uid in (0, os.getuid())
+    above, found = folder.parent.stat(), folder.lstat()
+    if not above.st_mode & stat.S_ISVTX:
+        if not ours(above):
+            return f"{folder.parent} belongs to another user; set SPINLEV_CACHE to a folder of your own"
+        if not closed(above):
+            return f"others may write in {folder.parent}; chmod +t {folder.parent} mends it"
+    if not stat.S_ISDIR(found.st_mode):
+        return f"{folder} is a link or no folder; remove it"
+    if not ours(found):
+        return f"{folder} belongs to another user; set SPINLEV_CACHE to a folder of your own"
+    return None if closed(found) else f"others may write in {folder}; chmod go-w {folder} mends it"
 
 
 def from_cache(

@@ -13,7 +13,6 @@ import io
 import logging
 import os
 import pickle
-import stat
 import zlib
 from collections import OrderedDict
 from collections.abc import Callable, Sequence
@@ -21,7 +20,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any, TypeVar, cast
 
-from .cache import cache_folder, make_room, others_may_write, ours, own_folder
+from .cache import cache_folder, make_room, others_may_write, own_folder
 from .program_text import digest_of
 from .whole_files import seal, unsealed, write_whole
 
@@ -155,11 +154,7 @@ def _read(path: Path) -> tuple[Any, int]:
     import heyoka as hy
 
     try:
-        found = path.lstat()
-        # A folder that others could write in once may have something left of theirs.
-        if not ours(found) or found.st_mode & (stat.S_IWGRP | stat.S_IWOTH):
-            return None, 0
-        content = unsealed(path)
+        content = unsealed(path, mine=True)  # a folder that was open once may have something left of others
         if content is None:
             return None, 0
         kind, _, state = zlib.decompress(content).partition(b"\n")
@@ -167,7 +162,7 @@ def _read(path: Path) -> tuple[Any, int]:
         made = form.__new__(form)
         made.__setstate__((state, {}))
         os.utime(path)
-        return made, found.st_size
+        return made, len(content)
     except Exception:  # missing, or of a heyoka that was built otherwise: it raises what it likes
         return None, 0
 

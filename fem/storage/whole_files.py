@@ -7,6 +7,7 @@ end; given a damaged file it may print, raise anything, or not return at all.
 import hashlib
 import os
 import platform
+import stat
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -14,7 +15,7 @@ from pathlib import Path
 
 import psutil
 
-from ...geometry.basics import file_content
+from ...geometry.basics import file_content, regular_file
 
 MARK = b"\nspinlev sha256 "
 LENGTH = len(MARK) + 64
@@ -80,10 +81,28 @@ def sealed(path: Path) -> bool | None:
     return _as_sealed(content) if content[-LENGTH:-64] == MARK else None
 
 
-def unsealed(path: Path) -> bytes | None:
-    """What was sealed, if the file is as it was then, else None. Raises InputError, see `file_content`."""
-    content = file_content(path, MOST, "file", "a regular file")
+def unsealed(path: Path, mine: bool = False) -> bytes | None:
+    """What was sealed, if the file is as it was then, else None. Raises InputError, see `regular_file`, and OSError.
+
+    Parameters
+    ----------
+    mine : None too where another user than this one and root may have written it
+    """
+    with regular_file(path, MOST, "file", "a regular file") as stream:
+        if mine and not (ours(found := os.fstat(stream.fileno())) and closed(found)):
+            return None
+        content = stream.read(MOST)
     return content[:-LENGTH] if _as_sealed(content) else None
+
+
+def ours(found: os.stat_result) -> bool:
+    """Whether a file is this user's or root's."""
+    return found.st_uid in (0, os.getuid())
+
+
+def closed(found: os.stat_result) -> bool:
+    """Whether no other than a file's owner may write there."""
+    return not found.st_mode & (stat.S_IWGRP | stat.S_IWOTH)
 
 
 def _as_sealed(content: bytes) -> bool:

@@ -6,11 +6,13 @@ The same with signals to real processes is in test_faults_processes.py.
 import errno
 import json
 import os
+import pickle
 import re
 import shutil
 import subprocess
 import sys
 import threading
+import zlib
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -24,7 +26,7 @@ import xarray as xr
 from spinlev.fem.elements import memory
 from spinlev.fem.measured_maps import FieldMapError
 from spinlev.fem.measured_maps.readers import read_field_map
-from spinlev.fem.storage import hdf5_fault, read_checked, write_checked, write_whole
+from spinlev.fem.storage import hdf5_fault, read_checked, seal, write_checked, write_whole
 from spinlev.fem.storage.cache import cache_folder
 from spinlev.fem.storage.whole_files import replacing
 from spinlev.studies.command_line.cli import _status
@@ -144,6 +146,34 @@ def test_every_flipped_bit_is_found(table, tmp_path):
         (tmp_path / "t.nc").write_bytes(flipped(content, chance))
         with pytest.raises(ValueError, match="checksum"):
             read_checked(tmp_path / "t.nc", "spinlev rotor table 1")
+
+
+class Planted:
+    """What runs a command where it is unpickled."""
+
+    def __reduce__(self):
+        return os.system, ("touch planted",)
+
+
+def test_nothing_that_lies_in_the_cache_is_run(spinlev):
+    """Whoever wrote it, sealed or not; compiled code, which is the user's alone: `test_code_cache`."""
+    undisturbed = spinlev(*FIELD, "--out", "undisturbed")
+    files = [path for path in Path("cache").rglob("*") if path.is_file()]
+    assert any(path.suffix == ".nc" for path in files)
+    for content in (
+        pickle.dumps(Planted()),
+        seal(pickle.dumps(Planted())),
+        seal(zlib.compress(pickle.dumps(Planted()))),
+    ):
+        for path in files:
+            path.write_bytes(content)
+        status, answer, said = spinlev(*FIELD)
+        assert status == 0
+        assert "damaged and is computed anew" in said
+        same(answer, undisturbed[1])
+    assert not Path("planted").exists()
+    pickle.loads(pickle.dumps(Planted()))
+    assert Path("planted").exists()
 
 
 def test_a_cache_that_cannot_be_written_costs_time_only(spinlev, monkeypatch, table):
