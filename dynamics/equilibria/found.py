@@ -1,16 +1,14 @@
 """What a full search finds, and its file: the same search is not done again."""
 
 import hashlib
-import os
 from collections.abc import Callable
-from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Self
 
 import numpy as np
 
-from ...fem.storage import described, from_cache, make_room, program_of, read_checked, write_checked
+from ...fem.storage import described, from_cache, program_of, read_checked, write_checked
 from ...geometry.basics import Array
 from ...geometry.scenes import Scene
 from ..motion import Scales, parameters
@@ -69,19 +67,7 @@ def found_key(scene: Scene, equations: str, spin: float) -> str:
 
 def cached_found(key: str, make: Callable[[], Found], report: Callable[[str], None]) -> tuple[Found, bool]:
     """What a search found, from the cache if it is there under its `found_key`, and whether it was."""
-    return from_cache(f"equilibria/{key}.nc", _used, make, _kept, report)
-
-
-def _used(path: Path) -> Found:
-    found = load_found(path)
-    with suppress(OSError):  # of a cache that cannot be written
-        os.utime(path)
-    return found
-
-
-def _kept(found: Found, path: Path) -> None:
-    save_found(found, path)
-    make_room(path.parent, LIMIT)
+    return from_cache(f"equilibria/{key}.nc", load_found, make, save_found, report, LIMIT)
 
 
 def save_found(found: Found, path: str | Path) -> None:

@@ -1,13 +1,13 @@
 """How is a file kept whole, found again, and known to be damaged?"""
 
 from .cache import (
+    TableFileError as TableFileError,
     from_cache as from_cache,
     make_room as make_room,
     owned as owned,
     temporary_home as temporary_home,
 )
 from .checked_files import (
-    TableFileError as TableFileError,
     described as described,
     read_checked as read_checked,
     write_checked as write_checked,

@@ -17,12 +17,17 @@ import platformdirs
 from filelock import FileLock, Timeout
 
 from ...geometry.basics import InputError
-from .checked_files import TableFileError
 from .whole_files import closed, ours
 
 Table = TypeVar("Table")
 OWNER = "in-use.lock"
+LIMIT = 2.0
+"""Size of all tables that are kept, GB, if SPINLEV_CACHE_GB names no other."""
 NO_LOCKS = (errno.ENOLCK, errno.ENOSYS, errno.EOPNOTSUPP)
+
+
+class TableFileError(InputError):
+    """A table file that is damaged, or is not one."""
 
 
 def cache_folder() -> Path:
@@ -92,28 +97,58 @@ def others_may_write(folder: Path) -> str | None:
     return None if closed(found) else f"others may write in {folder}; chmod go-w {folder} mends it"
 
 
+def cache_limit() -> int:
+    """Size of all tables that are kept, bytes. Raises InputError where SPINLEV_CACHE_GB is no positive number."""
+    text = os.environ.get("SPINLEV_CACHE_GB") or str(LIMIT)
+    try:
+        limit = float(text)
+    except ValueError:
+        limit = 0.0
+    if not 0 < limit < 1e9:
+        raise InputError(f"Input SPINLEV_CACHE_GB must be a positive number; instead received {text!r}.")
+    return int(1e9 * limit)
+
+
+def key_of(path: str | Path) -> str:
+    """Name by which a file in the cache is found again; empty for a file anywhere else."""
+    path, folder = Path(path), cache_folder()
+    return path.relative_to(folder).as_posix() if path.is_relative_to(folder) else ""
+
+
 def from_cache(
     name: str,
     load: Callable[[Path], Table],
     make: Callable[[], Table],
     save: Callable[[Table, Path], None],
     report: Callable[[str], None],
+    most: int = 2**63,
 ) -> tuple[Table, bool]:
     """A table, from the cache if it is there under `name`, and whether it was.
 
-    A damaged entry is reported, computed anew and replaced; a cache that cannot be written is reported and
-    does no harm.  While one process makes a table, others that need the same one wait for it.
+    A damaged entry, or one that was kept under another name, is reported, computed anew and replaced; a cache that
+    cannot be written is reported and does no harm.  While one process makes a table, others that need the same one wait
+    for it.  All tables in its folder together keep `cache_limit` and `most`, bytes; what was not used for the longest
+    time makes room.
+
+    Raises
+    ------
+    InputError : SPINLEV_CACHE_GB is no positive number
     """
-    path = cache_folder() / name
+    path, limit = cache_folder() / name, min(most, cache_limit())
     with alone(path.with_suffix(".lock"), report):
         if path.exists():
             try:
-                return load(path), True
+                found = load(path)
             except (TableFileError, OSError) as error:
                 report(f"The cached table is damaged and is computed anew: {error}")
+            else:
+                with suppress(OSError):  # of a cache that cannot be written
+                    os.utime(path)
+                return found, True
         table = make()
         try:
             save(table, path)
+            make_room(path.parent, limit)
         except OSError as error:
             report(f"The table could not be cached: {error}")
         return table, False
@@ -195,15 +230,26 @@ def _lock(path: Path) -> int:
 
 
 def make_room(folder: Path, limit: int) -> None:
-    """Remove what was not used for the longest time until all files of a folder together keep the limit, bytes."""
+    """Remove what was not used for the longest time until the files of a folder together keep the limit, bytes.
+
+    The newest stays, and what a process has locked.
+    """
     kept = []
     for path in folder.iterdir():
-        try:
-            kept.append((path.stat().st_mtime_ns, path.stat().st_size, path))
-        except FileNotFoundError:  # another process makes room too
-            continue
-    total = 0
-    for _, size, path in sorted(kept, reverse=True):
-        total += size
-        if total > limit:
-            path.unlink(missing_ok=True)
+        with suppress(FileNotFoundError):  # another process makes room too
+            found = path.stat()
+            if stat.S_ISREG(found.st_mode) and path.suffix != ".lock":
+                kept.append((found.st_mtime_ns, found.st_size, path))
+    kept.sort(reverse=True)
+    total = sum(size for _, size, _ in kept)
+    while total > limit and len(kept) > 1:
+        _, size, path = kept.pop()
+        with suppress(OSError, Timeout):  # of another user, or it is being read
+            lock = path.with_suffix(".lock")
+            if not lock.exists():  # of what needs none
+                path.unlink(missing_ok=True)
+            else:
+                with FileLock(lock, timeout=0):
+                    path.unlink(missing_ok=True)
+                    lock.unlink()
+        total -= size

@@ -9,6 +9,7 @@ import xarray as xr
 from xarray.backends import H5NetCDFStore
 
 from ...geometry.basics import InputError
+from .cache import TableFileError, key_of
 from .foreign import hdf5_fault
 from .netcdf import read_netcdf
 from .whole_files import seal, sealed, write_whole
@@ -17,23 +18,22 @@ Variables = Mapping[str, tuple[tuple[str, ...], Any, str]]
 """Dimensions, values and unit by name."""
 
 
-class TableFileError(InputError):
-    """A table file that is damaged, or is not one."""
-
-
 def described(variables: Variables, attributes: Mapping[str, Any]) -> xr.Dataset:
     """A dataset in which every variable carries its unit."""
     return xr.Dataset({n: xr.Variable(d, v, {"units": u}) for n, (d, v, u) in variables.items()}, attrs=attributes)
 
 
 def write_checked(dataset: xr.Dataset, path: str | Path) -> None:
-    """Write a dataset with the checksum of the file at its end; the file is whole or absent. Raises OSError."""
+    """Write a dataset with the checksum of the file at its end; the file is whole or absent. Raises OSError.
+
+    In the cache the name of a file says what its content is of, and the checksum counts it.
+    """
     memory = io.BytesIO()  # on a full disk HDF5 itself would crash
     # As `to_netcdf`, which would load a cluster's libraries and ask for a lock of memory that is its own.
     store = H5NetCDFStore.open(memory, mode="w", lock=False)
     dataset.dump_to_store(store)
     store.close()
-    write_whole(path, seal(memory.getvalue()))
+    write_whole(path, seal(memory.getvalue(), key_of(path)))
 
 
 def read_checked(path: str | Path, file_format: str | None = None) -> xr.Dataset:
@@ -48,7 +48,7 @@ def read_checked(path: str | Path, file_format: str | None = None) -> xr.Dataset
     TableFileError : the file is missing, no file, too large, damaged, no netCDF, or not of this format
     """
     try:
-        whole = sealed(Path(path))
+        whole = sealed(Path(path), key_of(path))
     except InputError as error:
         raise TableFileError(str(error)) from None
     if whole is False:

@@ -20,15 +20,17 @@ from functools import cache
 from pathlib import Path
 from typing import Any, TypeVar, cast
 
-from .cache import cache_folder, make_room, others_may_write, own_folder
+from .cache import cache_folder, cache_limit, make_room, others_may_write, own_folder
 from .program_text import digest_of
 from .whole_files import seal, unsealed, write_whole
 
 LIMIT = 2**29
 """Size of all that is kept, bytes; what was not used for the longest time makes room."""
-SHARED = 2**23
-"""The same of functions that this process keeps at hand, which take 20 times as much of its memory; those in use are
-not lost by it, and integrators, which have a state, are read anew each time."""
+SHARED = 2**26
+"""Memory of functions that this process keeps at hand, bytes; those in use are not lost by it, and integrators, which
+have a state, are read anew each time."""
+EACH, TIMES = 3_000_000, 20
+"""What a function takes of it: so many bytes where it was compiled here, and so many times its file."""
 KINDS = ("cfunc_dbl", "taylor_adaptive_dbl", "taylor_adaptive_batch_dbl")
 """What is kept, by its name in heyoka."""
 LOG = logging.getLogger("spinlev")
@@ -68,7 +70,7 @@ def compiled_later(
 def _kept(asked: tuple[Any, ...], make: Callable[[], Compiled]) -> Compiled:
     name = f"{hashlib.sha256(_target() + _Asked.of(asked)).hexdigest()}.code"
     path = cache_folder() / name  # in this process; on the disk it is in the user's folder there
-    found, size = _functions.pop(path, (None, 0))
+    found, taken = _functions.pop(path, (None, 0))
     if found is None:
         folder = _folder()
         found, size = _read(folder / name) if folder else (None, 0)
@@ -77,9 +79,10 @@ def _kept(asked: tuple[Any, ...], make: Callable[[], Compiled]) -> Compiled:
             size = len(content)
             if folder:
                 _keep(content, folder / name)
+        taken = EACH + TIMES * size
     if asked[0].__name__ == "cfunc":
-        _functions[path] = found, size
-        while sum(size for _, size in _functions.values()) > SHARED and len(_functions) > 1:
+        _functions[path] = found, taken
+        while sum(taken for _, taken in _functions.values()) > SHARED and len(_functions) > 1:
             _functions.popitem(last=False)
     return cast(Compiled, found)
 
@@ -146,7 +149,7 @@ def _target() -> bytes:
 
 def _written(made: Any) -> bytes:
     state, _ = made.__getstate__()
-    return seal(zlib.compress(type(made).__name__.encode() + b"\n" + state, 1))
+    return zlib.compress(type(made).__name__.encode() + b"\n" + state, 1)
 
 
 def _read(path: Path) -> tuple[Any, int]:
@@ -154,7 +157,7 @@ def _read(path: Path) -> tuple[Any, int]:
     import heyoka as hy
 
     try:
-        content = unsealed(path, mine=True)  # a folder that was open once may have something left of others
+        content = unsealed(path, path.name, mine=True)  # a folder that was open once may have something left of others
         if content is None:
             return None, 0
         kind, _, state = zlib.decompress(content).partition(b"\n")
@@ -169,7 +172,7 @@ def _read(path: Path) -> tuple[Any, int]:
 
 def _keep(content: bytes, path: Path) -> None:
     try:
-        write_whole(path, content)
-        make_room(path.parent, LIMIT)
+        write_whole(path, seal(content, path.name))
+        make_room(path.parent, min(LIMIT, cache_limit()))
     except OSError as error:  # costs time only
         LOG.debug("Compiled code could not be kept: %s", error)

@@ -70,29 +70,30 @@ def _tidy(path: Path) -> None:
             left.unlink(missing_ok=True)
 
 
-def seal(content: bytes) -> bytes:
-    """The content with its checksum."""
-    return content + MARK + hashlib.sha256(content).hexdigest().encode()
+def seal(content: bytes, name: str = "") -> bytes:
+    """The content with its checksum, which counts the name under which alone it may be read, if there is one."""
+    return content + MARK + _digest(content, name)
 
 
-def sealed(path: Path) -> bool | None:
+def sealed(path: Path, name: str = "") -> bool | None:
     """Whether the file is as it was when it was sealed; None if it never was. Raises InputError, see `file_content`."""
     content = file_content(path, MOST, "file", "a regular file")
-    return _as_sealed(content) if content[-LENGTH:-64] == MARK else None
+    return _as_sealed(content, name) if content[-LENGTH:-64] == MARK else None
 
 
-def unsealed(path: Path, mine: bool = False) -> bytes | None:
+def unsealed(path: Path, name: str = "", mine: bool = False) -> bytes | None:
     """What was sealed, if the file is as it was then, else None. Raises InputError, see `regular_file`, and OSError.
 
     Parameters
     ----------
+    name : under which alone it may be read, if it was sealed for one
     mine : None too where another user than this one and root may have written it
     """
     with regular_file(path, MOST, "file", "a regular file") as stream:
         if mine and not (ours(found := os.fstat(stream.fileno())) and closed(found)):
             return None
         content = stream.read(MOST)
-    return content[:-LENGTH] if _as_sealed(content) else None
+    return content[:-LENGTH] if _as_sealed(content, name) else None
 
 
 def ours(found: os.stat_result) -> bool:
@@ -105,7 +106,12 @@ def closed(found: os.stat_result) -> bool:
     return not found.st_mode & (stat.S_IWGRP | stat.S_IWOTH)
 
 
-def _as_sealed(content: bytes) -> bool:
+def _as_sealed(content: bytes, name: str) -> bool:
     """Whether a content ends in its checksum; it is large, and not copied for that."""
-    digest = hashlib.sha256(memoryview(content)[:-LENGTH]).hexdigest()
-    return content[-LENGTH:] == MARK + digest.encode()
+    return content[-LENGTH:] == MARK + _digest(memoryview(content)[:-LENGTH], name)
+
+
+def _digest(content: bytes | memoryview, name: str) -> bytes:
+    found = hashlib.sha256(content)
+    found.update(name.encode())
+    return found.hexdigest().encode()

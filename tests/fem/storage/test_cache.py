@@ -15,6 +15,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import xarray as xr
+from filelock import FileLock
 
 from spinlev.fem import storage
 from spinlev.fem.storage import from_cache, owned, read_checked, seal, write_checked, write_whole
@@ -180,6 +181,58 @@ def test_a_killed_holder_frees_its_lock(cache):
     assert done.returncode == -signal.SIGKILL
     assert (cache / "a.lock").exists()
     assert text("made") == ("made", False, [])
+
+
+def numbers(name, values):
+    """Ask the cache for an array; gives it, whether it was there, and what was said."""
+    said = []
+    found, there = from_cache(
+        name,
+        lambda path: read_checked(path)["x"].values.tolist(),
+        lambda: values,
+        lambda made, path: write_checked(xr.Dataset({"x": ("k", made)}), path),
+        said.append,
+    )
+    return found, there, said
+
+
+def test_a_table_under_another_name_is_not_used(cache):
+    """Its name says what it is of; the whole folder may be moved."""
+    numbers("one.nc", [1.0])
+    numbers("two.nc", [2.0])
+    (cache / "two.nc").write_bytes((cache / "one.nc").read_bytes())
+    found, there, (said,) = numbers("two.nc", [2.0])
+    assert (found, there) == ([2.0], False)
+    assert "two.nc must be as it was written; instead its checksum does not match" in said
+    assert numbers("two.nc", [0.0]) == ([2.0], True, [])
+    cache.rename(cache.with_name("moved"))
+    os.environ["SPINLEV_CACHE"] = str(cache.with_name("moved"))
+    assert numbers("one.nc", [0.0]) == ([1.0], True, [])
+
+
+def test_the_longest_unused_tables_make_room(cache, monkeypatch):
+    """A used one is kept, the newest in any case, and one that another process has locked."""
+    for name in "abcd":
+        numbers(f"{name}.nc", [1.0])
+        os.utime(cache / f"{name}.nc", (1e9, 1e9 + ord(name)))
+    size = (cache / "a.nc").stat().st_size
+    monkeypatch.setenv("SPINLEV_CACHE_GB", str(3.5 * size * 1e-9))
+    assert numbers("a.nc", [0.0])[:2] == ([1.0], True)  # from now on the newest
+    with FileLock(cache / "b.lock"):
+        numbers("e.nc", [1.0])
+    assert sorted(path.name for path in cache.glob("*.nc")) == ["a.nc", "b.nc", "d.nc", "e.nc"]
+    numbers("f.nc", [1.0])
+    assert sorted(path.name for path in cache.iterdir()) == [f"{n}.{end}" for n in "aef" for end in ("lock", "nc")]
+    monkeypatch.setenv("SPINLEV_CACHE_GB", "1e-9")
+    numbers("g.nc", [1.0])
+    assert [path.name for path in cache.glob("*.nc")] == ["g.nc"]
+
+
+@pytest.mark.parametrize("text", ["much", "-1", "0", "nan", "inf", "2 GB"])
+def test_a_wrong_size_of_the_cache(cache, monkeypatch, text):
+    monkeypatch.setenv("SPINLEV_CACHE_GB", text)
+    with pytest.raises(InputError, match=f"SPINLEV_CACHE_GB must be a positive number; instead received '{text}'"):
+        numbers("a.nc", [1.0])
 
 
 HOLD = """

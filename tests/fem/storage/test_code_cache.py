@@ -122,7 +122,7 @@ def test_an_integrator_from_the_disk_flies_to_the_same_bits_and_hears_its_events
 def test_a_flipped_bit_of_a_constant_is_not_computed_with(file):
     """Without the checksum it would be: wherever the constant is in the machine code, the value is another one."""
     whole = file.read_bytes()
-    content = zlib.decompress(unsealed(file))
+    content = zlib.decompress(unsealed(file, file.name))
     pattern = struct.pack("<d", CONSTANT)
     places = [k for k in range(len(content)) if content.startswith(pattern, k)]
     ran = []
@@ -147,23 +147,27 @@ def test_any_flipped_bit_leaves_the_value_as_it_was(file):
 
 
 DAMAGES = {
-    "cut off": lambda content: content[:1000],
-    "empty": lambda content: b"",
-    "other bytes": lambda content: b"\x89HDF" * 999,
-    "without a checksum": lambda content: content[: -len(seal(b""))],
-    "whole, but no code": lambda content: seal(b"something else"),
-    "of a heyoka that was built otherwise": lambda content: seal(zlib.compress(b"cfunc_dbl\nsomething else")),
-    "of another kind": lambda content: seal(zlib.compress(b"expression\n" + pickle.dumps(2))),
-    "a pickle": lambda content: seal(zlib.compress(pickle.dumps(Planted()))),
-    "a pickle under a known name": lambda content: seal(zlib.compress(b"cfunc_dbl\n" + pickle.dumps(Planted()))),
-    "a bare pickle": lambda content: pickle.dumps(Planted()),
+    "cut off": lambda content, name: content[:1000],
+    "empty": lambda content, name: b"",
+    "other bytes": lambda content, name: b"\x89HDF" * 999,
+    "without a checksum": lambda content, name: content[: -len(seal(b""))],
+    "whole, but no code": lambda content, name: seal(b"something else", name),
+    "of a heyoka that was built otherwise": lambda content, name: seal(
+        zlib.compress(b"cfunc_dbl\nsomething else"), name
+    ),
+    "of another kind": lambda content, name: seal(zlib.compress(b"expression\n" + pickle.dumps(2)), name),
+    "a pickle": lambda content, name: seal(zlib.compress(pickle.dumps(Planted())), name),
+    "a pickle under a known name": lambda content, name: seal(
+        zlib.compress(b"cfunc_dbl\n" + pickle.dumps(Planted())), name
+    ),
+    "a bare pickle": lambda content, name: pickle.dumps(Planted()),
 }
 
 
 @pytest.mark.parametrize("damage", DAMAGES)
 def test_a_damaged_file_is_made_anew_and_a_planted_one_runs_nothing(file, damage):
     whole = file.read_bytes()
-    file.write_bytes(DAMAGES[damage](whole))
+    file.write_bytes(DAMAGES[damage](whole, file.name))
     assert value() == (VALUE, True)
     assert file.read_bytes() == whole
     assert RUN == []
@@ -328,8 +332,9 @@ def test_a_process_keeps_what_it_used_last_within_a_limit(folder, monkeypatch):
     """What is dropped is read from the disk again, as another function of the same values."""
     x = hy.make_vars("x")
     compiled_code._functions.clear()
-    first, size = compiled(hy.cfunc, [hy.sin(x)], [x]), next(iter(folder.iterdir())).stat().st_size
-    monkeypatch.setattr(compiled_code, "SHARED", 3 * size)
+    first = compiled(hy.cfunc, [hy.sin(x)], [x])
+    ((_, taken),) = compiled_code._functions.values()
+    monkeypatch.setattr(compiled_code, "SHARED", int(3.01 * taken))
     for number in range(2):
         assert compiled(hy.cfunc, [hy.sin(x)], [x]) is first
         compiled(hy.cfunc, [hy.cos(x) + float(number)], [x])
@@ -339,6 +344,28 @@ def test_a_process_keeps_what_it_used_last_within_a_limit(folder, monkeypatch):
     assert again is not first
     assert again([0.5])[0] == first([0.5])[0]
     assert len(compiled_code._functions) < 4
+
+
+def test_many_small_functions_take_no_more_memory_than_a_process_may_keep(folder):
+    """Those of a sweep have files of 10 kB, and 2.8 MB of memory each: counted by their files 1500 were kept."""
+    x = hy.make_vars("x")
+    compiled_code._functions.clear()
+    for number in range(60):
+        compiled(hy.cfunc, [hy.cos(x) + float(number)], [x])
+    assert len(compiled_code._functions) * 2.8e6 < compiled_code.SHARED
+
+
+def test_code_under_another_name_is_not_run(folder):
+    """Its name says of what it is."""
+    x = hy.make_vars("x")
+    compiled(hy.cfunc, [x + 2.0], [x])
+    (other,) = folder.iterdir()
+    content = other.read_bytes()
+    compiled(hy.cfunc, [x + 3.0], [x])
+    (mine,) = set(folder.iterdir()) - {other}
+    mine.write_bytes(content)
+    compiled_code._functions.clear()
+    assert compiled(hy.cfunc, [x + 3.0], [x])([1.0])[0] == 4.0
 
 
 def test_compiled_code_runs_in_one_thread():
