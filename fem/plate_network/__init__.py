@@ -1,7 +1,12 @@
 """How do a plate's currents become a network of few states?"""
 
 from .energy_basis import OrderedBasis as OrderedBasis, ordered_basis as ordered_basis
-from .network_error import coupling_error as coupling_error, fewest_fields as fewest_fields
+from .network_error import (
+    ENOUGH as ENOUGH,
+    coupling_error as coupling_error,
+    fewest_fields as fewest_fields,
+    unreached as unreached,
+)
 from .reduction import (
     NETWORK_SHARE as NETWORK_SHARE,
     PlateNetwork as PlateNetwork,

@@ -1,5 +1,6 @@
 """The error of a network of currents, and how many of its fields a tolerance needs."""
 
+import math
 from collections.abc import Callable, Sequence
 
 import numpy as np
@@ -7,6 +8,12 @@ import numpy as np
 from ...geometry.basics import Array
 from ..closed_forms import ComplexArray
 from .energy_basis import OrderedBasis
+
+OPTION = "--plate-rtol (plate_rtol in Python, --rtol of the command plate)"
+LARGEST = 0.1
+"""Tolerance that may be asked at most."""
+ENOUGH = 2.0
+"""A tolerance that is met with certainty, in units of the errors of a table that was to meet a smaller one."""
 
 
 def coupling_error(found: ComplexArray, truth: ComplexArray, places: int) -> float:
@@ -41,3 +48,15 @@ def fewest_fields(
         low, high = (low, middle) if error <= tolerance else (middle + 1, high)
     chosen = [part.leading(levels[low]) for part in basis]
     return chosen, worst(chosen)
+
+
+def unreached(rtol: float, enough: float, conductor: str) -> str:
+    """What to say where a table misses its tolerance and `enough` can be met."""
+    unit = 10.0 ** math.floor(math.log10(enough))
+    enough = math.ceil(enough / unit - 1e-9) * unit
+    if enough > LARGEST:
+        return (
+            f"Input {OPTION} must be at least {enough:.2g} for {conductor}, more than the {LARGEST:g} that is allowed; "
+            f"instead received {rtol:g}. Move the plate away from the floater, or choose another model of it."
+        )
+    return f"Input {OPTION} must be at least {enough:.2g} for {conductor}; instead received {rtol:g}."

@@ -17,7 +17,7 @@ from ...geometry.scenes import Plate
 from ..eddy_currents import Source
 from ..plate_currents import STRICT, CurrentSpace, OtherSources, PlateSolution, Region, grid_counts, solve_currents
 from ..rotor_tables import AccuracyError
-from .network_error import fewest_fields
+from .network_error import ENOUGH, fewest_fields, unreached
 from .training import Group, prepare_training
 
 NETWORK_SHARE, STRICT_SHARE = 0.9, 0.8
@@ -98,27 +98,27 @@ def reduce_currents(
     rtol: float,
     others: OtherSources,
     space_error: float,
+    functions_error: float = 0.0,
 ) -> PlateNetwork:
     """The network for a region within the boxes and frequencies within those of a `solution`.
 
     Parameters
     ----------
     space_error : what the solution's states miss of reaction tensors and of the others' fields, relative
+    functions_error : what field functions will miss, where that is more than the share left to them
 
     Raises
     ------
     AccuracyError : all of the solution's states do not suffice
     """
     share = NETWORK_SHARE if rtol >= STRICT else STRICT_SHARE
-    allowed = share * rtol - solution.mesh_error - space_error
+    allowed = min(share * rtol, rtol - functions_error) - solution.mesh_error - space_error
     counts = grid_counts(region, plate.box.half_edges)
     training = prepare_training(solution.space, region, counts, frequencies, others)
     chosen, state_error = fewest_fields(training.worst, training.basis(), allowed)
     if state_error > allowed:
-        raise AccuracyError(
-            f"Input rtol must be larger: the states leave {state_error:.1e}, allowed is {allowed:.1e}; "
-            f"instead received {rtol:.1e}."
-        )
+        missed = state_error + functions_error + solution.mesh_error + space_error
+        raise AccuracyError(unreached(rtol, ENOUGH * max(missed, rtol), "this plate and this place of the floater"))
     rates, fields = zip(*[part.diagonalised() for part in chosen], strict=True)
     return PlateNetwork(
         plate, region, frequencies, part_of_space(solution.space, training.groups, fields), tuple(training.groups),

@@ -17,7 +17,7 @@ from .rotor_source import DOWN, posed_rotor, rotor_parts
 from .sampled_share import rotor_share
 from .share import RotorShare
 from .shorter_share import MISSED, without_high_harmonics
-from .tabulate import tabulate
+from .tabulate import CONDUCTOR, tabulate
 
 ANGLES, DEPTHS = 8, 5
 """Training: the rotor at so many angles of a turn and depths of the plate; probes stand between them."""
@@ -76,10 +76,16 @@ def plate_and_rotor_table(
         solution = solve(plate, boxes, outer, rtol, rule, others)
         error = solution.space_error
     watch("network of the scene", 0.5)
-    network = reduce_currents(plate, solution, region, frequencies, rtol, others, max(error, solution.space_error))
-    share = rotor_share(network, plate, rotor, SHARE_PART * rtol, watch=watch)
+    missed = max(error, solution.space_error)
+    network = reduce_currents(plate, solution, region, frequencies, rtol, others, missed)
     watch("field functions", 0.0)
     table = tabulate(network, rtol, watch)
+    if table.errors.total > rtol:  # more states leave room for what the field functions miss
+        functions = table.errors.functions
+        network = reduce_currents(plate, solution, region, frequencies, rtol, others, missed, functions)
+        table = tabulate(network, rtol, watch)
+        table.errors.check(rtol, CONDUCTOR)
+    share = rotor_share(network, plate, rotor, SHARE_PART * rtol, watch=watch)
     return table, without_high_harmonics(share, table, MISSED * rtol)
 
 

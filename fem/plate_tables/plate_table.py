@@ -9,7 +9,8 @@ from numpy.typing import ArrayLike, NDArray
 from ...geometry.basics import Array, frozen_array, millimetres
 from ..closed_forms import ComplexArray
 from ..plate_currents import Region
-from ..rotor_tables import RangeError
+from ..plate_network import ENOUGH, unreached
+from ..rotor_tables import AccuracyError, RangeError
 from .field_functions import Multipoles
 
 
@@ -25,6 +26,19 @@ class PlateErrors:
     def total(self) -> float:
         """Their sum."""
         return self.mesh + self.states + self.functions
+
+    def check(self, rtol: float, conductor: str) -> None:
+        """Refuse a table of a conductor, in words, that misses its tolerance.
+
+        The states follow what is asked, while what the field functions miss hardly does: with more than the sum of
+        both there are states enough.
+
+        Raises
+        ------
+        AccuracyError : it names a tolerance that can be met
+        """
+        if self.total > rtol:
+            raise AccuracyError(unreached(rtol, ENOUGH * self.total, conductor))
 
 
 @dataclass(frozen=True, eq=False)
