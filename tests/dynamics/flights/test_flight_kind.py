@@ -27,6 +27,8 @@ def flown(distance, ended_by, time=TIME):
 
 
 WAVE = np.sin(60 * TIME)
+LATE = (2e-5 + 9e-4 * np.exp(4 * (TIME - 20))) * np.sin(180 * TIME)
+"""An oscillation of 29 Hz that grows to 0.9 mm within the last second; the floater has sunk by 2 mm before."""
 
 
 @pytest.mark.parametrize(
@@ -41,6 +43,8 @@ WAVE = np.sin(60 * TIME)
         (0.02 + 1e-4 * WAVE + 2e-4 * TIME, "lost", LINEAR_FALL),
         (0.02 + 1e-6 * np.exp(0.4 * TIME) * WAVE, "contact", OSCILLATING_LOSS),
         (0.02 + 1e-6 * np.exp(0.4 * TIME) * WAVE + 1e-5 * TIME, "lost", OSCILLATING_LOSS),
+        (0.02 + 1e-4 * TIME + LATE, "lost", OSCILLATING_LOSS),
+        (0.02 + 1e-4 * TIME + 5e-3 * np.exp(8 * (TIME - 20)) + 1e-4 * WAVE, "lost", LINEAR_FALL),  # round a fold
     ],
 )
 def test_plain_cases(distance, ended_by, kind):

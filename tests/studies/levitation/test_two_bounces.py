@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import spinlev as sl
+from spinlev.dynamics.flights import flight_kind
 from spinlev.studies.article import article_scene
 from spinlev.studies.one_scene import Levitation
 from spinlev.studies.terminal import Models
@@ -31,7 +32,9 @@ def test_two_bounces_in_one_precession_lose_the_floater():
         modes = {mode.name: mode.frequency_hz for mode in stable.modes}
         assert stable.stable
         assert (abs(2 * modes["bounce"] - modes["precession"]) < 0.1) == resonant
-        assert levitation.flight(10.0).ended_by == ("lost" if resonant else "duration")
+        flight = levitation.flight(10.0)
+        assert flight.ended_by == ("lost" if resonant else "duration")
+        assert (flight_kind(flight) == "oscillating loss") == resonant
 
 
 @pytest.mark.slow  # 60 s
