@@ -21,10 +21,10 @@ from .starts import drawn_starts, given_starts
 TOGETHER = 512
 """Flights that a worker gets at once, at most."""
 COLUMNS = {
-    "position": ("m", "position, rotor's frame"),
-    "velocity": ("m/s", "velocity along the rotor's axes"),
-    "moment": ("1", "direction of the moment, rotor's frame"),
-    "spin": ("rad/s", "angular velocity along the rotor's axes"),
+    "position": ("m", "position, laboratory frame,"),
+    "velocity": ("m/s", "velocity, laboratory frame,"),
+    "moment": ("1", "direction of the moment, laboratory frame,"),
+    "spin": ("rad/s", "angular velocity, laboratory frame,"),
 }
 
 
@@ -74,8 +74,9 @@ def ensemble(
     -------
     xarray.Dataset
         Over `flight` and `axis`, SI units: `levitated`, `ended_by` ("duration", "contact", "lost"), the state at
-        the end and, as ``start_...``, at the beginning. Accuracy: the field errs by 1e-6 of its gradient, steps
-        by round-off.
+        the end and, as ``start_...``, at the beginning, in the laboratory frame as in `simulate`;
+        `position_rotor_frame` is where the end is in the frame that turns with the rotor.
+        Accuracy: the field errs by 1e-6 of its gradient, steps by round-off.
 
     Raises
     ------
@@ -105,7 +106,7 @@ def ensemble(
         found = flown(*asked, map if number == 1 else mapped(number), together)
         drawn = {} if starts is not None else {"seed": seed, "spread": repr(spread)}
         labels = {**levitation.labels, "scene": scene_text(levitation.scene), "duration_s": duration, **drawn}
-    return _dataset(begun, found).assign_attrs(study="ensemble", **labels)
+    return _dataset(begun, found, levitation.scene.angular_velocity).assign_attrs(study="ensemble", **labels)
 
 
 def _begun(
@@ -121,10 +122,13 @@ def _begun(
     return drawn_starts(levitation, int(n or 0), int(seed), spread or {})
 
 
-def _dataset(begun: State, found: Endings) -> xr.Dataset:
+def _dataset(begun: State, found: Endings, angular_velocity: float) -> xr.Dataset:
+    """Ends in the laboratory, whose axes are the rotor's at t = 0; angular velocity of the rotor, rad/s."""
     dims = ("flight", "axis")
-    states = {}
-    for prefix, when, state in (("", " at the end", found.last), ("start_", " at t = 0", begun)):
+    label = "position, rotor's frame, at the end"
+    states = {"position_rotor_frame": variable(dims, found.last.position, "m", label)}
+    last = found.last.to_lab(angular_velocity * found.levitated_s)
+    for prefix, when, state in (("", " at the end", last), ("start_", " at t = 0", begun)):
         for (name, (unit, label)), values in zip(COLUMNS.items(), state.vectors, strict=True):
             states[prefix + name] = variable(dims, values, unit, label + when)
     ends = {
