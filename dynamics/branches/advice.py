@@ -11,7 +11,7 @@ from ...geometry.basics import Array
 from ...geometry.scenes import Scene
 from ..effects import with_effects
 from ..equilibria import SearchRange, Steps, find_equilibria, scattered
-from ..motion import Rates, Scales
+from ..motion import PlateMemory, Rates, Scales
 from ..steady import Equilibrium, EquilibriumError
 from .arclength import follow_branch
 from .branch import BranchPoint, Family, frequencies
@@ -27,24 +27,35 @@ SAME = 1e-4
 """Equilibria nearer to each other than this, in radii and rad together, are one."""
 
 
-def way_out(scene: Scene, table: FieldTable, equilibria: Sequence[Equilibrium], widest: float = WIDEST) -> str:
+def way_out(
+    scene: Scene,
+    table: FieldTable,
+    equilibria: Sequence[Equilibrium],
+    widest: float = WIDEST,
+    memory: PlateMemory | None = None,
+) -> str:
     """What is wrong with a scene of which these are all equilibria, and what would help.
 
-    Branches are followed in frequency from these equilibria, and from those of one search at each end of what is looked
-    at, up to `widest` times the scene's frequency and down to as small a part of it: of the frequencies between which
-    one of them is stable the nearest ones count.
+    Without the plate branches are followed in frequency from these equilibria, and from those of one search at each
+    end of what is looked at, up to `widest` times the scene's frequency and down to as small a part of it: of the
+    frequencies between which one of them is stable the nearest ones count.  Where there is a plate, or gravity across
+    the axis, a search with these has to find the equilibrium too before its frequency is named.
+
+    Parameters
+    ----------
+    memory : the plate's currents, if they are modelled
     """
     kinds = dict.fromkeys(f"{1e3 * e.distance:.2f} mm (grows e-fold in {1 / e.growth_per_s:.2g} s)" for e in equilibria)
     found = f"only unstable ones at {', '.join(kinds)}" if kinds else "nor any unstable one below the rotor"
-    other = _levitating_frequency(scene, table, equilibria, widest)
+    other = _levitating_frequency(scene, table, equilibria, widest, memory)
     advice = f"About {other:.4g} Hz has one; or" if other else f"None was found within a factor of {widest:g};"
     return f"At {scene.frequency:g} Hz the floater has no stable equilibrium, {found}. {advice} give start.position_mm."
 
 
 def _levitating_frequency(
-    scene: Scene, table: FieldTable, equilibria: Sequence[Equilibrium], widest: float
+    scene: Scene, table: FieldTable, equilibria: Sequence[Equilibrium], widest: float, memory: PlateMemory | None
 ) -> float | None:
-    """A frequency (Hz) in the nearest window in which a branch is stable."""
+    """A frequency (Hz) in the nearest window in which a branch is stable; not one that holds the scene's own."""
     rates, own = Rates(with_effects(scene, table)), scene.frequency
     where = SearchRange(scene, FARTHEST)
 
@@ -55,13 +66,23 @@ def _levitating_frequency(
     branches = _branches(scene, Family(rates, frequencies(scene), own / 2), known, where, widest)
     windows = [window for branch in branches for window in _windows(branch, counts)]
     for low, high in sorted(windows, key=lambda window: abs(np.log(np.clip(own, *window) / own))):
+        if low <= own <= high:  # there the floater is held, were it not for the plate or gravity across the axis
+            continue
         near, far = (low, high) if low > own else (high, low)
-        frequency = near + INSIDE * (far - near)
-        there = replace(scene, frequency=float(frequency))
-        across = np.any(scene.gravity[:2])  # then equilibria are periodic motions, and a search says
-        if not across or any(e.stable for e in find_equilibria(there, table, rates=rates)):
+        there = replace(scene, frequency=float(near + INSIDE * (far - near)))
+        if _levitates(there, table, rates, memory):
             return there.frequency
     return None
+
+
+def _levitates(scene: Scene, table: FieldTable, rates: Rates, memory: PlateMemory | None) -> bool:
+    """Whether a scene on a stable branch has a stable equilibrium too with its plate and its whole gravity."""
+    if scene.plate is None and not np.any(scene.gravity[:2]):
+        return True
+    if memory is not None and scene.frequency > memory.table.frequencies[1]:
+        return False
+    found = find_equilibria(scene, table, rates=rates, memory=memory)
+    return any(e.stable and (memory is None or e.currents is not None) for e in found)
 
 
 def _branches(

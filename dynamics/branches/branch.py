@@ -8,16 +8,14 @@ import numpy as np
 
 from ...geometry.basics import Array
 from ...geometry.scenes import Scene
-from ..equilibria import AtRest, directions
+from ..equilibria import DIFFERENCE, AtRest, directions
 from ..motion import Parameter, Rates, Scales, parameters
-from ..steady import EVERY, Balance, Indices, Modes, modes, solve
+from ..steady import EVERY, FOLD as FOLD, Balance, Indices, Modes, modes, solve
 
 Problem = Callable[[float], tuple[Array, float]]
 """Parameter -> values of the runtime parameters, with the drag along the moment left out, and body spin s."""
-FOLD, OSCILLATORY, REAL = "fold", "oscillatory", "real"
-"""Kinds of marked points; `REAL` is a real eigenvalue through zero away from a fold (a crossing of branches)."""
-DIFFERENCE = 1e-5
-"""Step of the central difference by the parameter, in its units."""
+OSCILLATORY, REAL = "oscillatory", "real"
+"""Kinds of marked points beside `FOLD`; `REAL` is a real eigenvalue through zero away from a fold: branches cross."""
 
 
 def scenes(make: Callable[[float], Scene], spin: float = 0.0) -> Problem:

@@ -1,6 +1,7 @@
 """Which equilibria does a scene have, all of them?"""
 
 from .continuation import (
+    DIFFERENCE as DIFFERENCE,
     END as END,
     ON as ON,
     SHORTER as SHORTER,
@@ -21,12 +22,15 @@ from .found import Found as Found, cached_found as cached_found, found_key as fo
 from .full_search import (
     field_doubts as field_doubts,
     find_equilibria as find_equilibria,
+    free_of_bodies as free_of_bodies,
+    own_spin as own_spin,
     survey as survey,
     told as told,
     turning as turning,
     with_plate as with_plate,
 )
 from .nearby_scene import carried as carried
+from .periodic_equilibrium import OrbitCurve as OrbitCurve
 from .perturbed import PerturbedBalance as PerturbedBalance, Shift as Shift
 from .plate_effect import plate_action as plate_action
 from .search import SAME as SAME, Search as Search, SearchRange as SearchRange

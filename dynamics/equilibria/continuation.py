@@ -25,6 +25,10 @@ GROWTH = 1.4
 """Ratio of a step to the one before that succeeded."""
 CLOSE, CORRECTIONS = 1e-10, 8
 """A point is on its curve when Newton's method moves it less than this, and how often it may move it."""
+ROUNDED = 1e-7
+"""Or when a move that is shorter than this has not halved since the one before: what is left is round-off."""
+DIFFERENCE = 1e-5
+"""Step of the central difference by a parameter of a curve, in its units."""
 ONE: Indices = np.zeros(1, int)
 """The number of a curve that is followed alone."""
 
@@ -139,6 +143,7 @@ def _corrected(
     """The same, and the derivatives (n, k, k + 1) of the last correction."""
     slopes = np.full((len(points), points.shape[1] - 1, points.shape[1]), np.nan)
     points, good, active = points.copy(), np.zeros(len(points), bool), np.arange(len(points))
+    before = np.full(len(points), np.inf)
     for _ in range(CORRECTIONS):
         value, slope = equations.linear(points[active], which[active])
         slopes[active] = slope
@@ -147,8 +152,10 @@ def _corrected(
         near = size <= reach[active]  # not a number is not near
         active, change, size = active[near], change[near], size[near]
         points[active] = equations.onto(points[active] + change)
-        good[active[size < CLOSE]] = True
-        active = active[size >= CLOSE]
+        met = (size < CLOSE) | ((size < ROUNDED) & (size > before[active] / 2))
+        before[active] = size
+        good[active[met]] = True
+        active = active[~met]
         if not len(active):
             break
     return points, good, slopes

@@ -10,7 +10,7 @@ from ...geometry.basics import Array
 from ...geometry.scenes import Scene
 from ..effects import FloaterCurrents, Mutual, brake_slope, rough_force
 from ..motion import Interaction, Parameter, Rates, Scales, State, parameters
-from ..steady import Equilibrium, modes, tangent_basis
+from ..steady import Equilibrium, left_eigenvectors, tangent_basis, tangent_spaces
 
 EXACT_SLOPES = 4
 """Degree of a potential that has all derivatives which the slopes of the floater's currents ask for."""
@@ -34,23 +34,33 @@ def shift_by_answers(scene: Scene, table: FieldTable, equilibrium: Equilibrium, 
 
 
 def growth_by_floater(scene: Scene, table: FieldTable, equilibrium: Equilibrium, included: bool) -> float:
-    """What the floater's own currents add to the growth of what grows fastest, 1/s; whether the motion had them."""
+    """What the floater's own currents add to the growth of the mode that grows fastest with them, 1/s.
+
+    `included`: whether the motion of the equilibrium had them.
+    """
     fixed = equilibrium.without or equilibrium
     return _growth(scene, fixed, floater_slope(scene, table, fixed.state), included)
 
 
 def growth_by_rotor(scene: Scene, equilibrium: Equilibrium, losses: RotorLosses, included: bool) -> float:
-    """What losses in the rotor add to the growth of what grows fastest, 1/s; whether the motion had them."""
+    """What losses in the rotor add to the growth of the mode that grows fastest with them, 1/s; see above."""
     fixed = equilibrium.without or equilibrium
     return _growth(scene, fixed, brake_slope(losses, scene, fixed.state), included)
 
 
 def _growth(scene: Scene, fixed: Equilibrium, brake: Array, included: bool) -> float:
-    """What a part (12, 12) of the Jacobian, which it has or has not, adds to the growth, 1/s."""
+    """What a part (12, 12) of the Jacobian, which it has or has not, adds to the growth, 1/s.
+
+    To first order, of the mode that grows fastest with it: the fastest one without it may be another mode, and the
+    difference of their growth rates is no effect.
+    """
     scales = Scales.of(scene)
-    state = scales.pack(fixed.state)
-    without = fixed.jacobian - brake if included else fixed.jacobian
-    return (modes(state, without + brake).growth - modes(state, without).growth) / scales.time
+    tangents, projections = (found[0] for found in tangent_spaces(scales.pack(fixed.state)[None]))
+    whole = fixed.jacobian if included else fixed.jacobian + brake
+    values, right = np.linalg.eig(projections @ whole @ tangents)
+    leading = int(np.argmax(values.real))
+    added = left_eigenvectors(right)[leading] @ (projections @ brake @ tangents) @ right[:, leading]
+    return float(added.real) / scales.time
 
 
 def floater_slope(scene: Scene, table: FieldTable, state: State) -> Array:

@@ -51,7 +51,7 @@ class Found:
         return cls(points, doubts, *near(position, moment), jacobians, curves)
 
 
-def found_key(scene: Scene, equations: str, spin: float) -> str:
+def found_key(scene: Scene, equations: str, spin: float, top: float = 0.0) -> str:
     """SHA-256 of all that decides what a search finds, and the programs.
 
     Parameters
@@ -59,8 +59,9 @@ def found_key(scene: Scene, equations: str, spin: float) -> str:
     scene : its plate and its start decide nothing
     equations : tells the rotor's table and the equations of motion from all others
     spin : body spin
+    top : spin about the moment beside a rotor at rest, rad/s
     """
-    digest = hashlib.sha256(f"{FORMAT} {program_of(__package__)} {equations} {spin!r}".encode())
+    digest = hashlib.sha256(f"{FORMAT} {program_of(__package__)} {equations} {spin!r} {top!r}".encode())
     digest.update(parameters(scene, Scales.of(scene), frozen_spin=True).tobytes())
     return digest.hexdigest()
 

@@ -1,21 +1,22 @@
 """All synchronous equilibria of a floater: fixed points in the frame that turns with the rotor."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import suppress
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...fem.rotor_tables import FieldTable, RangeError
 from ...geometry.basics import Array, Watch, unwatched
-from ...geometry.scenes import Scene
+from ...geometry.scenes import AbsoluteStart, Scene
 from ..effects import FloaterShape, with_effects
 from ..motion import Parameter, PlateMemory, Rates, Scales, parameters, rotor_gap
-from ..steady import Balance, Equilibrium, EquilibriumError, ForceCurve, Survey, modes, named_modes
+from ..steady import Balance, Equilibrium, EquilibriumError, ForceCurve, LeftOut, Survey, modes, named_modes
 from .curve import Curve
 from .fixed_points import fixed_points
 from .found import Found
-from .periodic_equilibrium import Shaken
+from .periodic_equilibrium import Shaken, overlap
 from .search import SearchRange
 
 BEYOND = 0.1
@@ -30,10 +31,11 @@ def find_equilibria(
     rates: Rates | None = None,
     memory: PlateMemory | None = None,
 ) -> list[Equilibrium]:
-    """All synchronous equilibria below the rotor, the stable ones first, then by distance; see `survey`."""
+    """All synchronous equilibria free of the bodies, the stable ones first, then by distance; see `survey`."""
     rates = rates or Rates(with_effects(scene, table))
     found = survey(scene, table, spin, farthest, rates)
-    return list((found if memory is None else with_plate(scene, table, found, memory, rates)).equilibria)
+    found = free_of_bodies(scene, found) if memory is None else with_plate(scene, table, found, memory, rates)
+    return list(found.equilibria)
 
 
 def survey(
@@ -51,7 +53,8 @@ def survey(
     ----------
     scene : the scene; its plate is left out
     table : the rotor's field
-    spin : body spin s = Ω·m̂/ω, which magnetic torque does not change
+    spin : body spin s = Ω·m̂/ω, which magnetic torque does not change; beside a rotor at rest the scene's start says
+        how fast the floater spins about its moment, of which stability depends, as of a spinning top
     farthest : largest depth, and distance from the axis, m
     rates : `Rates` of the same table, to compile them once for many scenes
     remembered : gets the search and gives what it finds, perhaps from before, see `cached_found`
@@ -67,12 +70,13 @@ def survey(
 
     Raises
     ------
-    EquilibriumError : the rotor is at rest
+    EquilibriumError : the rotor is at rest and the floater does not spin
     """
     turning(scene)
     scales = Scales.of(scene)
     equations = rates or Rates(with_effects(scene, table))
-    balance = Balance(equations, parameters(scene, scales, frozen_spin=True), spin * scales.spin_ratio)
+    top = own_spin(scene) * scales.time * scales.spin_ratio
+    balance = Balance(equations, parameters(scene, scales, frozen_spin=True), spin * scales.spin_ratio, top)
     found = remembered(lambda: _search(scene, table, balance, farthest, watch))
     return told(scene, balance, found)
 
@@ -113,10 +117,17 @@ def _of_shape(
 def told(scene: Scene, balance: Balance, known: Found) -> Survey:
     """The survey of a scene of which all fixed points are known."""
     rows = zip(known.points, known.doubts, known.residuals, known.slopes, known.jacobians, strict=True)
-    found = [_equilibrium(Scales.of(scene), balance, *row) for row in rows]
+    found, left_out = [_equilibrium(Scales.of(scene), balance, *row) for row in rows], list[LeftOut]()
     if np.any(scene.gravity[:2]):
-        found = _shaken(Shaken(scene, balance.rates, balance.values, None), found)
-    return Survey(_in_order(found), known.curves)
+        found, left_out = _shaken(Shaken(replace(scene, plate=None), balance.rates, balance.values, None), found)
+    return Survey(_in_order(found), known.curves, tuple(left_out))
+
+
+def free_of_bodies(scene: Scene, known: Survey) -> Survey:
+    """A survey without the plate's currents, of whose equilibria those that would overlap a body are left out."""
+    over = {id(e): overlap(scene, e) for e in known.equilibria}
+    left_out = [LeftOut(e, over[id(e)]) for e in known.equilibria if over[id(e)]]
+    return Survey(tuple(e for e in known.equilibria if not over[id(e)]), known.curves, (*known.left_out, *left_out))
 
 
 def field_doubts(table: FieldTable, places: Array) -> tuple[NDArray[np.bool_], Array]:
@@ -133,40 +144,48 @@ def field_doubts(table: FieldTable, places: Array) -> tuple[NDArray[np.bool_], A
 def with_plate(
     scene: Scene, table: FieldTable, known: Survey, memory: PlateMemory, rates: Rates | None = None
 ) -> Survey:
-    """The equilibria of a survey with the plate's currents: periodic motions, followed from the fixed points without.
+    """The equilibria of a survey with the plate's currents: periodic motions, followed from those without.
 
-    Those beyond the range of the plate's table stay as they are, without `currents`; those that the plate undoes, or
-    pushes against a body, are left out.
+    Those beyond the range of the plate's table stay as they are, without `currents`; those that the plate undoes or
+    pushes against a body, and those that overlap one, are left out.
     """
+    known = free_of_bodies(scene, known)
     values = parameters(scene, Scales.of(scene), frozen_spin=True)
-    fixed = [equilibrium.without or equilibrium for equilibrium in known.equilibria]
-    found = _shaken(Shaken(scene, rates or Rates(with_effects(scene, table)), values, memory), fixed)
-    return Survey(_in_order(found), known.curves)
+    problem = Shaken(scene, rates or Rates(with_effects(scene, table)), values, memory)
+    found, left_out = _shaken(problem, known.equilibria)
+    return Survey(_in_order(found), known.curves, (*known.left_out, *left_out))
 
 
 def _in_order(found: list[Equilibrium]) -> tuple[Equilibrium, ...]:
     return tuple(sorted(found, key=lambda equilibrium: (not equilibrium.stable, equilibrium.distance)))
 
 
+def own_spin(scene: Scene) -> float:
+    """Spin about its own moment with which a floater begins beside a rotor at rest, rad/s; else 0."""
+    if scene.frequency or not isinstance(scene.start, AbsoluteStart):
+        return 0.0
+    return float(scene.start.spin @ scene.start.moment / np.linalg.norm(scene.start.moment))
+
+
 def turning(scene: Scene) -> None:
-    """Raises EquilibriumError for a rotor at rest."""
-    if not scene.frequency:
+    """Raises EquilibriumError beside a rotor at rest, but for a floater that spins and gravity along the axis."""
+    if not scene.frequency and not own_spin(scene):
         raise EquilibriumError(
-            "At 0 Hz nothing levitates: a magnet has no stable equilibrium in a static field and gravity "
-            "(S. Earnshaw, 1842), and no synchronous one without a turning rotor. Give the rotor a frequency."
+            "Beside a rotor at rest a magnet without spin has no stable equilibrium (S. Earnshaw, 1842). "
+            "Give the rotor a frequency, or let the floater spin about its moment, which can make it stable: "
+            "start.position_mm, start.moment and start.spin_hz."
+        )
+    if not scene.frequency and np.any(scene.gravity[:2]):
+        raise EquilibriumError(
+            "Beside a rotor at rest equilibria are known for gravity along its axis alone; this scene's has a part "
+            "across it. Turn the scene's axes, or simulate its motion."
         )
 
 
-def _shaken(problem: Shaken, found: list[Equilibrium]) -> list[Equilibrium]:
-    """The same equilibria with the plate's currents and the whole gravity."""
-    kept = []
-    for fixed in found:
-        if problem.reaches(fixed.position):
-            moved = problem.equilibrium(fixed)
-            kept += [] if moved is None else [moved]
-        elif not np.any(problem.scene.gravity[:2]):
-            kept.append(fixed)
-    return kept
+def _shaken(problem: Shaken, known: Sequence[Equilibrium]) -> tuple[list[Equilibrium], list[LeftOut]]:
+    """The same equilibria with the plate's currents and the whole gravity, and those that are none."""
+    moved = [problem.equilibrium(e) if problem.reaches(e) else e for e in known]
+    return [e for e in moved if isinstance(e, Equilibrium)], [e for e in moved if isinstance(e, LeftOut)]
 
 
 def _equilibrium(
@@ -182,6 +201,7 @@ def _equilibrium(
     return Equilibrium(
         state=scales.unpack(state),
         spin=float(balance.spin) / scales.spin_ratio,
+        steady_frame=not values[Parameter.RATE],
         residual=float(np.abs(residual).max() / (gravity or 1.0)),
         position_error=error * scales.length,
         stable=motion.stable,

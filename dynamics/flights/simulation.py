@@ -100,7 +100,7 @@ def initial_state(
         known = find_equilibria(scene, table, memory=memory) if equilibria is None else equilibria
         chosen = starting_point(known)
         if chosen is None:
-            raise EquilibriumError(way_out(scene, table, known))
+            raise EquilibriumError(way_out(scene, table, known, memory=memory))
         state = displaced(chosen.start, scene.start.offset, scene.angular_velocity)
         currents = currents if chosen.currents is None else chosen.currents[0]
     check_free("start", scene, state.position, moment=state.moment)

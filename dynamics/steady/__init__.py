@@ -11,9 +11,15 @@ from .balance import (
     tangent_basis as tangent_basis,
 )
 from .equilibrium import (
+    FOLD as FOLD,
+    IN_PLATE as IN_PLATE,
+    IN_ROTOR as IN_ROTOR,
+    NOT_CONVERGED as NOT_CONVERGED,
+    PAST_TABLE as PAST_TABLE,
     Equilibrium as Equilibrium,
     EquilibriumError as EquilibriumError,
     ForceCurve as ForceCurve,
+    LeftOut as LeftOut,
     Survey as Survey,
 )
 from .floquet import floquet_modes as floquet_modes
@@ -23,12 +29,14 @@ from .harmonic_balance import (
     conserved as conserved,
     orbit_near as orbit_near,
     periodic_orbit as periodic_orbit,
+    resampled as resampled,
 )
 from .stability import (
     SIDE as SIDE,
     TILT as TILT,
     Modes as Modes,
     is_stable as is_stable,
+    left_eigenvectors as left_eigenvectors,
     modes as modes,
     named_modes as named_modes,
     spectra as spectra,

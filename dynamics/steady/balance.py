@@ -33,11 +33,13 @@ class Balance:
     rates : compiled rates and their derivatives
     values : their parameters, with the drag along the moment left out: (p,), or (n, p) where every point has its own
     spin : body spin s = Ω·m̂/ω, of all points or (n,)
+    top : beside a rotor at rest, where s means nothing, the spin about the moment itself
     """
 
     rates: Rates
     values: Array
     spin: float | Array
+    top: float = 0.0
 
     @property
     def rate(self) -> Array:
@@ -61,6 +63,7 @@ class Balance:
         rate = self.rate
         velocity = rate * np.stack([-position[:, 1], position[:, 0], 0 * position[:, 0]], axis=1)
         spin = rate * ((np.asarray(self.spin)[..., None] - moment[:, 2:]) * moment + np.array([0.0, 0.0, 1.0]))
+        spin = spin + self.top * moment
         return np.concatenate([position, velocity, moment, spin], axis=1)
 
     def __call__(self, position: Array, moment: Array) -> tuple[Array, Array]:

@@ -3,12 +3,23 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 
 from ...geometry.basics import Array, ComputationError, html_table, millimetres
 from ..motion import State
+from .harmonic_balance import resampled
 from .stability import Mode
+
+INSTANTS = 129
+"""Of a turn, at which quantities in the laboratory are looked at; odd."""
+UPRIGHT = 1e-9
+"""Part of the moment across the axis that is round-off."""
+IN_PLATE, IN_ROTOR = "in the plate", "in the rotor"
+FOLD, NOT_CONVERGED, PAST_TABLE = "fold", "not converged", "past the plate's table"
+"""Why a solution is no equilibrium of a scene: the floater would overlap a body; with growing response of the plate it
+meets another and both cease to be; it could not be computed; the plate's field functions are not known there."""
 
 
 class EquilibriumError(ComputationError):
@@ -37,6 +48,7 @@ class Equilibrium:
     without : the fixed point that it would be without the plate and with gravity along the axis
     slope : (5, 5) derivatives of the scaled balances, see `Balance`; NaN for a periodic motion
     jacobian : (12, 12) derivatives of the scaled state's rates by the state; NaN for a periodic motion
+    steady_frame : whether the rotor is at rest, so that its frame is the laboratory's
     """
 
     state: State
@@ -53,6 +65,7 @@ class Equilibrium:
     without: Equilibrium | None = None
     slope: Array = field(default_factory=lambda: np.full((5, 5), np.nan))
     jacobian: Array = field(default_factory=lambda: np.full((12, 12), np.nan))
+    steady_frame: bool = False
 
     @property
     def start(self) -> State:
@@ -66,33 +79,92 @@ class Equilibrium:
         """(3,) m."""
         return self.state.position
 
+    @cached_property
+    def laboratory_turn(self) -> State:
+        """The motion (n, 3) along the laboratory's axes at equal intervals of a turn, the first at t = 0."""
+        angles = 2 * np.pi * np.arange(INSTANTS) / INSTANTS
+        if self.turn is None:
+            turn = State(*(np.tile(vector, (INSTANTS, 1)) for vector in self.state.vectors))
+        else:
+            turn = State(*(resampled(vectors, INSTANTS) for vectors in self.turn.vectors))
+        return turn if self.steady_frame else turn.to_lab(angles)
+
+    @property
+    def laboratory_position(self) -> Array:
+        """(3,) mean over a turn along the laboratory's axes, m: on the axis for a steady motion."""
+        return np.asarray(self.laboratory_turn.position.mean(axis=0))
+
     @property
     def distance(self) -> float:
-        """Distance from the rotor's origin, m."""
-        return float(np.linalg.norm(self.position))
+        """Distance from the rotor's origin, mean over a turn, m."""
+        return float(np.linalg.norm(self.position)) if self.turn is None else float(self._distances.mean())
+
+    @property
+    def distance_swing(self) -> Array:
+        """(2,) smallest and largest distance from the rotor's origin in a turn, m."""
+        return self._swing(self._distances)
+
+    @property
+    def lateral_offset(self) -> float:
+        """Distance from the axis of rotation, mean over a turn, m."""
+        return float(np.hypot(*self.position[:2])) if self.turn is None else float(self._offsets.mean())
+
+    @property
+    def lateral_offset_swing(self) -> Array:
+        """(2,) smallest and largest distance from the axis of rotation in a turn, m."""
+        return self._swing(self._offsets)
 
     @property
     def polar_angle_deg(self) -> float:
-        """Angle between the moment and +z."""
-        x, y, z = self.state.moment
-        return float(np.degrees(np.arctan2(np.hypot(x, y), z)))
+        """Angle between the moment and +z, mean over a turn."""
+        return float(self._angles[0]) if self.turn is None else float(self._angles.mean())
+
+    @property
+    def polar_angle_swing_deg(self) -> Array:
+        """(2,) smallest and largest angle between the moment and +z in a turn."""
+        return self._swing(self._angles)
+
+    @property
+    def _distances(self) -> Array:
+        return np.asarray(np.linalg.norm(self.laboratory_turn.position, axis=1))
+
+    @property
+    def _offsets(self) -> Array:
+        return np.asarray(np.hypot(*self.laboratory_turn.position[:, :2].T))
+
+    @property
+    def _angles(self) -> Array:
+        x, y, z = (self.state if self.turn is None else self.laboratory_turn).moment.reshape(-1, 3).T
+        return np.asarray(np.degrees(np.arctan2(np.hypot(x, y), z)))
+
+    def _swing(self, values: Array) -> Array:
+        return np.array([values.min(), values.max()])
 
     @property
     def lag_deg(self) -> float:
-        """Angle by which the moment's azimuth is behind the rotor's +x, in (-180, 180]."""
+        """Angle by which the part of the moment that turns with the rotor is behind its +x, in (-180, 180]; or 0."""
         x, y = self.state.moment[:2]
+        if np.hypot(x, y) < UPRIGHT:
+            return 0.0
         lag = float(np.degrees(np.arctan2(-y, x)))
         return 180.0 if lag < -180 + 1e-9 else lag + 0.0
 
+    @property
+    def spin_rate(self) -> float:
+        """Angular velocity about the moment, rad/s."""
+        return float(self.start.spin @ self.start.moment)
+
     def __repr__(self) -> str:
-        x, y, z = 1e3 * self.position
+        x, y, z = 1e3 * (self.position if self.turn is None else self.laboratory_position)
         place = f"({x:.4f}, {y:.4f}, {z:.4f}) ± {1e3 * self.position_error:.1g} mm"
+        place += "" if self.turn is None else ", mean over a turn in the laboratory"
         kind = "stable" if self.stable else f"unstable, e-fold in {1 / self.growth_per_s:.2g} s"
         return f"Equilibrium at {place}, polar angle {self.polar_angle_deg:.3f}°, spin {self.spin:g}, {kind}"
 
     def _repr_html_(self) -> str:
         rows = {
-            "position": f"{millimetres(self.position)} ± {1e3 * self.position_error:.1g} mm",
+            "position": f"{millimetres(self.position)} ± {1e3 * self.position_error:.1g} mm, rotor's frame",
+            "mean position": f"{millimetres(self.laboratory_position)}, laboratory",
             "polar angle": f"{self.polar_angle_deg:.3f}°",
             "body spin": f"{self.spin:g}",
             "growth": f"{self.growth_per_s:.3g} /s",
@@ -118,8 +190,25 @@ class ForceCurve:
 
 
 @dataclass(frozen=True, eq=False)
+class LeftOut:
+    """A solution that is no equilibrium of the scene, or is not known to be one.
+
+    Parameters
+    ----------
+    known : the solution, or what it would be without the plate
+    why : `IN_PLATE`, `IN_ROTOR`, `FOLD`, `NOT_CONVERGED` or `PAST_TABLE`
+    part : of the plate's response, and of gravity across the axis, up to which it was followed
+    """
+
+    known: Equilibrium
+    why: str
+    part: float = 1.0
+
+
+@dataclass(frozen=True, eq=False)
 class Survey:
-    """Equilibria, the stable ones first and then by distance, and the curves on which they lie."""
+    """Equilibria, the stable ones first and then by distance, the curves on which they lie, and what is left out."""
 
     equilibria: tuple[Equilibrium, ...]
     curves: tuple[ForceCurve, ...]
+    left_out: tuple[LeftOut, ...] = ()

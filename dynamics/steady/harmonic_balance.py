@@ -21,6 +21,8 @@ FEWEST, MOST = 9, 65
 TAIL = 1e-10
 """Size of the highest harmonics, in floater radii and rad, below which there are enough instants."""
 CONVERGED, LONGEST_STEP = 1e-11, 0.3
+ROUNDED = 1e-7
+"""Steps of Newton's method that are shorter than this, in floater radii and rad, and no longer shrink are round-off."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,7 +64,7 @@ def periodic_orbit(rates: Rates, values: Array, spin: float, plate: PlateForce |
     states = np.broadcast_to(guess, (count, 12)) if guess.ndim == 1 else resampled(guess, count)
     while True:
         found = orbit_near(rates, values, spin, plate, states)
-        if found is None or found.error < TAIL or count >= MOST:
+        if found is None or _tail(found.states) < TAIL or count >= MOST:
             return found
         count = 2 * count - 1
         states = resampled(found.states, count)
@@ -73,6 +75,7 @@ def orbit_near(rates: Rates, values: Array, spin: float, plate: PlateForce | Non
     problem = OrbitProblem(rates, values, plate, len(states))
     states, size = states.copy(), np.inf
     for _ in range(25):
+        before = size
         residual, slope = problem(states)
         rows, aims = conserved(states, spin * abs(values[Parameter.RATE]))
         if not np.isfinite(slope).all():
@@ -82,13 +85,17 @@ def orbit_near(rates: Rates, values: Array, spin: float, plate: PlateForce | Non
         step = step.reshape(states.shape)
         size = float(np.abs(step).max())
         states = states + step * min(1.0, LONGEST_STEP / size)
-        if size < CONVERGED:
+        # Quadratic convergence would have squared a step that is so short: one that has not shrunk is round-off.
+        if size < CONVERGED or before / 2 < size < ROUNDED:
             break
     else:
         return None
-    spectrum = np.abs(np.fft.rfft(states, axis=0)) / len(states)
-    tail = float(spectrum[-2:].max()) if plate or np.any(values[Parameter.GRAVITY_X : Parameter.GRAVITY_Z]) else 0.0
-    return Orbit(states, *problem.whole(states), max(size, tail))
+    return Orbit(states, *problem.whole(states), max(size, _tail(states)))
+
+
+def _tail(states: Array) -> float:
+    """Size of the highest harmonics of a turn (n, 12): what more instants would add."""
+    return float((np.abs(np.fft.rfft(states, axis=0)) / len(states))[-2:].max())
 
 
 def conserved(states: Array, spin: float) -> tuple[Array, Array]:

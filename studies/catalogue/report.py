@@ -14,8 +14,8 @@ import xarray as xr
 
 from ...fem.storage import write_whole
 from ...geometry.basics import InputError, file_content
-from ..pictures import question_lines
-from ..rendering import RenderError, Turnable, View, drawn, inlined, page
+from ..pictures import question_lines, seen_from
+from ..rendering import RenderError, Turnable, drawn, inlined, page
 from ..results import figure_bytes
 from .drawings import QUESTION, figures_of, read_result
 from .entries import CATALOGUE
@@ -103,7 +103,7 @@ def _view(result: xr.Dataset) -> dict[str, str]:
         return {}
     scene, motion = flight_of(result, "scene")
     try:
-        view = View(scene, motion.position[-1], motion.moment[-1], motion.position)
+        view = seen_from(scene, result["time"].values, motion)
         return {"view": inlined(drawn(Turnable(view)))}
     except RenderError as error:
         return {"no_view": str(error)}

@@ -33,16 +33,17 @@ def show_job(path: Path, out: Path, html: bool = False) -> list[str]:
         )
     scene, motion = flight_of(result, str(path))
     table = Levitation(scene, Models(result.attrs.get("model", "auto"))).table
-    view = last_view(scene, table, motion)
+    time = result["time"].values
+    view = last_view(scene, table, time, motion)
     if scene.plate is not None:
         note("Currents in the plate ...")
         places = current_places(scene.plate.box, view.position)
-        floater = State(*(vector[-1] for vector in motion.vectors))
+        floater = replace(State(*(vector[-1] for vector in motion.vectors)), position=view.position)
         density = plate_currents(scene, scene.plate, sources(table), floater, places)
         view = replace(view, currents=Currents(places, density))
     picture, animation = (out / f"{path.stem}-{name}" for name in ("scene.png", "flight.gif"))
     with progress("Pictures") as advance:
-        render({picture: view, animation: flight_frames(scene, result["time"].values, motion)}, advance)
+        render({picture: view, animation: flight_frames(scene, time, motion)}, advance)
     files = [str(picture), str(animation)]
     if html:
         turned = out / f"{path.stem}-view.html"

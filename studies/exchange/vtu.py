@@ -14,6 +14,7 @@ from typing import Any
 import meshio
 import numpy as np
 
+from ...dynamics.equilibria import free_of_bodies
 from ...dynamics.motion import State
 from ...fem.closed_forms import closed_form_error, fields_of_magnets, fields_of_sphere
 from ...fem.storage import write_whole
@@ -67,10 +68,11 @@ def _floater_state(levitation: Levitation) -> State | None:
     start = levitation.scene.start
     if isinstance(start, AbsoluteStart):
         return State(start.position, start.velocity, start.moment, start.spin)
-    if not levitation.scene.frequency or not levitation.without_plate.equilibria:
+    known = free_of_bodies(levitation.scene, levitation.without_plate) if levitation.scene.frequency else None
+    if known is None or not known.equilibria:
         note("There is no equilibrium: the floater is left out.")
         return None
-    return levitation.without_plate.equilibria[0].state
+    return known.equilibria[0].start
 
 
 def _bounds(scene: Scene, state: State | None) -> tuple[Array, Array]:

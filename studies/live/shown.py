@@ -27,7 +27,7 @@ class Shown:
     modes : of the eigenvalues of the first equilibrium, the head first
     sign : by which models
     complete : whether all equilibria were searched for here; else they were carried here from a scene nearby
-    places : position mm, direction of the moment, and whether it is stable, of each equilibrium
+    places : position mm and direction of the moment at t = 0, and whether it is stable, of each equilibrium
     """
 
     headline: str
@@ -51,7 +51,7 @@ def shown(levitation: Levitation, known: tuple[Equilibrium, ...] | None = None) 
         modes=_modes(useful[0]) if useful else [],
         sign=f"{MODEL_WORDS.get(levitation.table.model, levitation.table.model)}{mutual}{plate}",
         complete=levitation.searched,
-        places=[((1e3 * e.position).tolist(), e.state.moment.tolist(), e.stable) for e in useful],
+        places=[((1e3 * e.start.position).tolist(), e.start.moment.tolist(), e.stable) for e in useful],
     )
 
 

@@ -1,13 +1,12 @@
 """What the commands answer, as mappings ready for JSON."""
 
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
 from ...dynamics.flights import GROWING, STABLE, Trajectory, flight_kind
 from ...dynamics.motion import PlateMemory
-from ...dynamics.steady import Equilibrium
+from ...dynamics.steady import Equilibrium, LeftOut, Survey
 from ...fem.rotor_tables import CompleteTable, FieldTable
 from ...geometry.basics import MU_0, Array
 from ..results import EQUILIBRIUM_FIELDS
@@ -62,10 +61,23 @@ def equilibrium_answer(equilibrium: Equilibrium) -> dict[str, Any]:
     }
 
 
-def equilibria_answer(levitation: Levitation, equilibria: Sequence[Equilibrium] | None = None) -> dict[str, Any]:
+def left_out_answer(left_out: LeftOut) -> dict[str, Any]:
+    """One solution that is no equilibrium of the scene, or is not known to be one."""
+    known = left_out.known
+    return {
+        "position_mm": known.position / 1e-3,
+        "laboratory_position_mm": known.laboratory_position / 1e-3,
+        "with_plate": known.currents is not None,
+        "why": left_out.why,
+        "followed_to": left_out.part,
+    }
+
+
+def equilibria_answer(levitation: Levitation, known: Survey | None = None) -> dict[str, Any]:
     """All equilibria, or those given; the error estimate is the field's largest relative error at any of them."""
-    found = levitation.equilibria if equilibria is None else equilibria
-    places = np.array([e.position for e in found]).reshape(-1, 3)
+    known = levitation.survey if known is None else known
+    found, left_out = known.equilibria, known.left_out
+    places = np.array([e.start.position for e in found]).reshape(-1, 3)
     return {
         "model": levitation.table.model,
         "body_spin": levitation.spin,
@@ -73,6 +85,7 @@ def equilibria_answer(levitation: Levitation, equilibria: Sequence[Equilibrium] 
         **effects_answer(levitation, found),
         **plate_answer(levitation.plate),
         "equilibria": [equilibrium_answer(equilibrium) for equilibrium in found],
+        "left_out": [left_out_answer(one) for one in left_out],
     }
 
 

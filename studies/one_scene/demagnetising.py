@@ -52,7 +52,7 @@ def working_point_dataset(levitation: Levitation) -> xr.Dataset:
             "easy_axis": variable(("magnet", "axis"), [easy_axis(scene.rotor[k]) for k in numbers], "1", "easy axis"),
             "center": variable(("magnet", "axis"), [scene.rotor[k].body.center for k in numbers], "m", "centre"),
             "floater": variable(
-                ("axis",), np.full(3, np.nan) if place is None else place.position, "m", "place of the floater"
+                ("axis",), np.full(3, np.nan) if place is None else place.start.position, "m", "place of the floater"
             ),
         },
         {
@@ -98,7 +98,7 @@ def _floating(levitation: Levitation) -> Equilibrium | None:
 
 
 def _ball(floater: Floater, place: Equilibrium) -> Magnet:
-    return floater.magnet(place.position, place.state.moment)
+    return floater.magnet(place.start.position, place.start.moment)
 
 
 def working_point_answer(found: xr.Dataset) -> dict[str, Any]:

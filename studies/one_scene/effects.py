@@ -34,7 +34,8 @@ class ListedEffect:
     name : of the effect
     included : whether it is in the motion
     shift_mm : how far it moves the first equilibrium, about; None where that is not known
-    growth_per_s : what it adds to the fastest growth there, about; None where that is not known
+    growth_per_s : what it adds there to the growth of the mode that grows fastest with it, about; None where that is
+        not known
     why : it is in the motion or not
     motion_error : relative error of what it adds to the growth of motions, as they are taken as slow against it
     """

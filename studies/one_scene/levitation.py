@@ -18,7 +18,7 @@ from ...dynamics.effects import (
     mutual_choice,
     with_effects,
 )
-from ...dynamics.equilibria import Found, cached_found, found_key, survey, with_plate
+from ...dynamics.equilibria import Found, cached_found, found_key, free_of_bodies, own_spin, survey, with_plate
 from ...dynamics.flights import (
     Checkpoint,
     FlightStopped,
@@ -187,7 +187,7 @@ class Levitation:
         def remembered(search: Callable[[], Found]) -> Found:
             if self.scene.field_map:  # the file can have another content than it had
                 return search()
-            found, known = cached_found(found_key(self.scene, equations, self.spin), search, note)
+            found, known = cached_found(found_key(self.scene, equations, self.spin, own_spin(self.scene)), search, note)
             if known:
                 detail("  from the cache.")
             return found
@@ -248,9 +248,11 @@ class Levitation:
 
     @cached_property
     def survey(self) -> Survey:
-        """All equilibria, the stable ones first, with the plate where its currents are modelled."""
+        """All equilibria free of the bodies, the stable ones first, with the plate where its currents are modelled."""
         found = self.without_plate
-        return found if self.plate is None else with_plate(self.scene, self.interaction, found, self.plate, self.rates)
+        if self.plate is None:
+            return free_of_bodies(self.scene, found)
+        return with_plate(self.scene, self.interaction, found, self.plate, self.rates)
 
     @property
     def equilibria(self) -> tuple[Equilibrium, ...]:
@@ -267,9 +269,8 @@ class Levitation:
         """
         chosen = _first(self.equilibria)
         if chosen is None:
-            raise EquilibriumError(
-                f"At {self.scene.frequency:g} Hz the floater has no equilibrium with body spin {self.spin:g}."
-            )
+            with_spin = f"with body spin {self.spin:g}" if self.scene.frequency else "for any spin"
+            raise EquilibriumError(f"At {self.scene.frequency:g} Hz the floater has no equilibrium {with_spin}.")
         return chosen
 
     @property
@@ -443,11 +444,13 @@ class Levitation:
         return isinstance(self.scene.start, AbsoluteStart)
 
     def _place(self, known: Sequence[Equilibrium]) -> Array | None:
-        """Where the floater is while it levitates, (3,) m."""
+        """Where the floater levitates, (3,) m: rotor's frame, or the laboratory's if it does not turn with it."""
         if isinstance(self.scene.start, AbsoluteStart):
             return self.scene.start.position
         chosen = _first(known)
-        return None if chosen is None else chosen.position
+        if chosen is None:
+            return None
+        return chosen.laboratory_position if np.any(self.scene.gravity[:2]) else chosen.position
 
 
 def given_scene(scene: Scene | str | Path) -> Scene:

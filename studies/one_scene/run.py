@@ -17,6 +17,7 @@ from ...geometry.scenes import AbsoluteStart, Scene
 from ..pictures import last_view
 from ..rendering import Drawer, RenderError, render
 from ..results import (
+    NAMES,
     axis_dataset,
     curve_dataset,
     equilibria_dataset,
@@ -36,6 +37,8 @@ from .single import Job
 from .words import bracketed, effects_words, equilibria_words, flight_words, headline, plate_words, tell_details
 
 MODELS = ("dipole", "cuboid", "fem")
+SAME = 1e-6
+"""Difference of two levitation distances that is none whatever their errors, mm: round-off and stopped iterations."""
 DEEPEST = 0.05
 """The field figure reaches this far below the rotor's origin, m."""
 
@@ -65,15 +68,16 @@ def main_job(scene: Scene, asked: Models, spin: float, duration: float, out: Pat
         failure = error
         best = levitation.field(exact)
         surveys = alone = {name: Survey((), ()) for name in ("dipole", best.model, chosen.model)}
-    found = surveys[chosen.model].equilibria
+    known = surveys[chosen.model]
     compared = comparison(alone["dipole"], alone[best.model], best.model)
     values: dict[str, Any] = {
-        "headline": headline(levitation, found),
-        **equilibria_answer(levitation, found),
+        "headline": str(failure) if failure else headline(levitation, known.equilibria, known.left_out),
+        **equilibria_answer(levitation, known),
         "comparison": compared,
         "tables_from_cache": levitation.from_cache,
     }
-    lines = [*equilibria_words(levitation, found), *comparison_lines(compared)]
+    lines = [str(failure)] if failure else equilibria_words(levitation, known)
+    lines += comparison_lines(compared)
     flight = None
     if failure is None or isinstance(scene.start, AbsoluteStart):
         try:
@@ -92,7 +96,7 @@ def main_job(scene: Scene, asked: Models, spin: float, duration: float, out: Pat
         lines += told
     if failure:
         values["failed"] = str(failure)
-        lines.append(str(failure))
+        lines += [] if str(failure) in lines else [str(failure)]
     tables = {name: levitation.field(name) for name in MODELS}
     result = _static_dataset(scene, tables, surveys, alone, best.model).assign_attrs(levitation.labels, body_spin=spin)
     memory = levitation.flight_plate if flight else None
@@ -131,8 +135,11 @@ def comparison_lines(compared: Mapping[str, Any] | None) -> list[str]:
     if compared is None:
         return []
     apart, error = compared["difference_mm"], compared["difference_error_mm"]
-    where = "lower" if apart > 0 else "higher"
-    return [f"A point dipole in the rotor's place would hold it {bracketed(abs(apart), error, 2)} mm {where}."]
+    said = f"Point-dipole model, same conditions: levitation distance {compared['dipole_distance_mm']:.2f} mm, "
+    if abs(apart) <= max(error, SAME):
+        return [f"{said}no difference beyond its error of {max(error, SAME):.0e} mm."]
+    more = "more" if apart > 0 else "less"
+    return [f"{said}{bracketed(abs(apart), error, 2)} mm {more} than with {NAMES[compared['true_model']]}."]
 
 
 def _static_dataset(
@@ -183,7 +190,7 @@ def _write(
         save_figures(figures, out)
         return
     with ThreadPoolExecutor(1) as beside:  # in three dimensions another process draws, meanwhile
-        view = {out / "scene.png": last_view(scene, table, flight.rotor)}
+        view = {out / "scene.png": last_view(scene, table, flight.time, flight.rotor)}
         in_space = beside.submit(render, view, command=drawing)
         save_figures(figures | {"trajectory": trajectory_figure(result)}, out)
         try:

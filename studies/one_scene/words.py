@@ -5,7 +5,16 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from ...dynamics.flights import Trajectory
-from ...dynamics.steady import Equilibrium
+from ...dynamics.steady import (
+    FOLD,
+    IN_PLATE,
+    IN_ROTOR,
+    NOT_CONVERGED,
+    PAST_TABLE,
+    Equilibrium,
+    LeftOut,
+    Survey,
+)
 from ..terminal import detail
 from .answers import kind_of_flight
 from .effects import PLATE_NOT_MODELLED
@@ -14,6 +23,8 @@ from .levitation import Levitation
 MILLI = 1e-3
 DIGITS = 4
 """Significant digits of a number, at most."""
+NOTHING = 1e-9
+"""Lengths below this are round-off, mm."""
 USELESS = 1.0
 """Relative error of a distance from which on an equilibrium is not worth a row."""
 CLEAR = 0.5
@@ -21,7 +32,9 @@ CLEAR = 0.5
 
 SPOKEN = {"side, backward": "backward side motion", "side, forward": "forward side motion"}
 """Names of small motions in a sentence, where they are others."""
-COLUMNS = ("below (mm)", "aside (mm)", "tilt (°)", "lag (°)", "slowest motion", "growth (1/s)", "")
+COLUMNS = (
+    "distance (mm)", "lateral offset (mm)", "polar angle (°)", "phase lag (°)", "slowest motion", "growth (1/s)", "",
+)  # fmt: skip
 FINEST = 0.01
 """Of distances from the axis, mm."""
 CLEARLY_SLOW = 0.02
@@ -30,6 +43,8 @@ NOT_SLOW = (
     "Of the {name} torque and lift are exact in a steady turn; motions are taken as slow against them: the growth that "
     "they add may be wrong by {motion_error:.0%}."
 )
+SWINGS = 0.1
+"""Polar angles that differ by more in a turn (°) are told with their extremes."""
 LONG = 7200.0
 """From here on (s) hours are said too."""
 
@@ -40,8 +55,8 @@ def bracketed(value: float, error: float, digits: int = DIGITS) -> str:
     >>> bracketed(17.2138, 2e-6), bracketed(17.2138, 0.023), bracketed(-2.871, 0.12), bracketed(0.0, 0.0)
     ('17.21(1)', '17.21(3)', '-2.9(2)', '0')
     """
-    if not value or not math.isfinite(value):
-        return f"{value:g}"
+    if abs(value) < NOTHING or not math.isfinite(value):
+        return "0" if abs(value) < NOTHING else f"{value:g}"
     places = digits - 1 - math.floor(math.log10(abs(value)))
     if error > 0:
         places = min(places, -math.floor(math.log10(error)))
@@ -55,23 +70,46 @@ def rate(value: float) -> str:
     return f"{abs(value):.2g} /s"
 
 
-def headline(levitation: Levitation, equilibria: Sequence[Equilibrium]) -> str:
+def headline(levitation: Levitation, equilibria: Sequence[Equilibrium], left_out: Sequence[LeftOut] = ()) -> str:
     """Where the floater floats and whether it stays there, in one sentence."""
     useful = worth_a_row(equilibria)
     if not useful:
-        why = (
-            "the field model is too rough to tell where an equilibrium is" if equilibria else "there is no equilibrium"
-        )
+        if equilibria:
+            why = "the field model is too rough to tell where an equilibrium is"
+        elif any(one.why in (NOT_CONVERGED, PAST_TABLE) for one in left_out):
+            return f"No equilibrium was found at {levitation.scene.frequency:g} Hz, but not all could be computed."
+        elif left_out:
+            why = "no solution is an equilibrium"
+        else:
+            why = "there is no equilibrium"
         return f"Nothing floats at {levitation.scene.frequency:g} Hz: {why}."
     first = useful[0]
-    side = "below" if first.position[2] < 0 else "above"
-    place = f"{_distance(first).lstrip('-')} mm {side} the rotor, tilted {first.polar_angle_deg:.1f}°"
     if first.stable:
-        return f"Floats {place}; stable, {_damping(first)}."
+        return f"Floats {_place(first)}; stable, {_damping(first)}."
     name, growing = slowest(first)
     return (
-        f"Does not stay up: the equilibrium {place}, is unstable; the {name} grows at {rate(growing)}{_blame(first)}."
+        f"Does not stay up: the equilibrium {_place(first)}, is unstable; the {name} grows at "
+        f"{rate(growing)}{_blame(first)}."
     )
+
+
+def _place(equilibrium: Equilibrium) -> str:
+    """Where the floater is in the laboratory, and how its moment points."""
+    side = "below" if equilibrium.position[2] < 0 else "above"
+    distance, error = _distance(equilibrium).lstrip("-"), equilibrium.position_error / MILLI
+    angle = f"polar angle {_polar_angle(equilibrium, 1, '°')}"
+    aside = equilibrium.lateral_offset / MILLI
+    if math.hypot(*equilibrium.laboratory_position[:2]) / MILLI > max(aside / 2, FINEST):  # it stays on one side
+        offset = bracketed(aside, max(error, FINEST))
+        return f"{distance} mm along the axis from the rotor's centre, lateral offset {offset} mm, {angle}"
+    return f"{distance} mm {side} the rotor's centre, {angle}"
+
+
+def _polar_angle(equilibrium: Equilibrium, digits: int, unit: str = "") -> str:
+    """The mean over a turn, and the extremes where they matter."""
+    low, high = equilibrium.polar_angle_swing_deg
+    swing = f" ({low:.1f} to {high:.1f}{unit})" if high - low > SWINGS else ""
+    return f"{equilibrium.polar_angle_deg:.{digits}f}{unit}{swing}"
 
 
 def slowest(equilibrium: Equilibrium) -> tuple[str, float]:
@@ -112,10 +150,37 @@ def _blame(equilibrium: Equilibrium) -> str:
     return " (without the plate it would be stable)" if by_plate else ""
 
 
-def equilibria_words(levitation: Levitation, equilibria: Sequence[Equilibrium] | None = None) -> list[str]:
-    """The headline, and the equilibria, all or those given, as a table."""
-    found = levitation.equilibria if equilibria is None else equilibria
-    return [headline(levitation, found), *equilibria_table(levitation, found)]
+def equilibria_words(levitation: Levitation, known: Survey | None = None) -> list[str]:
+    """The headline, the equilibria as a table, and what was left out; of all, or of those given."""
+    known = levitation.survey if known is None else known
+    return [
+        headline(levitation, known.equilibria, known.left_out),
+        *equilibria_table(levitation, known.equilibria),
+        *left_out_words(levitation, known.left_out),
+    ]
+
+
+def left_out_words(levitation: Levitation, left_out: Sequence[LeftOut]) -> list[str]:
+    """Which solutions are no equilibria of the scene, or could not be computed, and why: a sentence each kind."""
+    cause = "the plate's response" if levitation.plate is not None else "gravity across the axis"
+    said = []
+    for body, where in ((IN_PLATE, "plate"), (IN_ROTOR, "rotor")):
+        depths = [_distance(one.known) for one in left_out if one.why == body]
+        if depths:
+            count = "a solution" if len(depths) == 1 else f"{len(depths)} solutions"
+            said.append(f"Left out: {count} at {', '.join(depths)} mm, where the floater would overlap the {where}.")
+    for one in left_out:
+        place = f"equilibrium at {_distance(one.known)} mm"
+        if one.why == FOLD:
+            said.append(f"The {place} without {cause} ends at {one.part:.1%} of it, where it meets another (fold).")
+        elif one.why == NOT_CONVERGED:
+            said.append(
+                f"Not known: what becomes of the {place} without {cause}. Newton's method did not converge beyond "
+                f"{one.part:.1%} of it, so that there may be an equilibrium."
+            )
+        elif one.why == PAST_TABLE:
+            said.append(f"Not known: the {place}, beyond the range of the plate's precomputed field, is left out.")
+    return said
 
 
 def equilibria_table(levitation: Levitation, equilibria: Sequence[Equilibrium]) -> list[str]:
@@ -134,14 +199,14 @@ def equilibria_rows(levitation: Levitation, equilibria: Sequence[Equilibrium]) -
     rows: list[tuple[str, ...]] = [COLUMNS]
     for e in useful:
         name, growth = slowest(e)
-        aside, doubt = math.hypot(*e.position[:2]) / MILLI, e.position_error / MILLI
+        aside, doubt = e.lateral_offset / MILLI, e.position_error / MILLI
         angle = e.position_error / e.distance  # of a direction, rad: all that is known of its size
         verdict = "stable" if e.stable else "unstable"
         rows.append(
             (
                 _distance(e),
                 bracketed(aside, max(doubt, FINEST)) if aside > FINEST / 2 else "0",
-                f"{e.polar_angle_deg:.2f}" if angle < 1e-4 else f"{e.polar_angle_deg:.1f}",
+                _polar_angle(e, 2 if angle < 1e-4 else 1),
                 f"{e.lag_deg + 0.0:.2f}".replace("-0.00", "0.00"),
                 name,
                 f"{growth:.2g}",

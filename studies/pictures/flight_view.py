@@ -1,5 +1,7 @@
 """From a flight and its tables to what is shown of it in three dimensions, the currents in the plate included."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from ...dynamics.motion import State
@@ -14,14 +16,30 @@ from ..rendering import FieldPlane, Frames, View, frame_times
 
 ORDER = 3
 """Of the elements: a picture needs no more."""
+LATEST = 200
+"""Samples at the end of a flight among which one is shown."""
 ANGLES = 8
 """Of the rotor, from which the part of its field at the rotor's frequency is taken."""
 
 
-def last_view(scene: Scene, table: FieldTable, motion: State) -> View:
-    """The end of a flight (n, 3) along the rotor's axes, with its path and the field."""
-    position, moment = motion.position[-1], motion.moment[-1]
-    return View(scene, position, moment, motion.position, _field_plane(scene, table, -1e3 * float(position[2])))
+def last_view(scene: Scene, table: FieldTable, time: Array, motion: State) -> View:
+    """The end of a flight (n, 3) along the rotor's axes at times (n,) s, with its path and the field."""
+    view = seen_from(scene, time, motion)
+    return replace(view, plane=_field_plane(scene, table, -1e3 * float(view.position[2])))
+
+
+def seen_from(scene: Scene, time: Array, motion: State) -> View:
+    """The end of a flight (n, 3) along the rotor's axes at times (n,) s, with its path.
+
+    A floater that gravity across the axis keeps on one side of it does not turn with the rotor: its path is that in the
+    laboratory, and it stands where it is at an instant near the end at which the rotor's axes are the laboratory's.
+    """
+    frame, last = "rotor's frame", len(time) - 1
+    if np.any(scene.gravity[:2]):
+        frame, angle = "laboratory", scene.angular_velocity * time
+        motion = motion.to_lab(angle)
+        last -= int(np.argmax(np.cos(angle[:-LATEST:-1])))
+    return View(scene, motion.position[last], motion.moment[last], motion.position, frame=frame)
 
 
 def _field_plane(scene: Scene, table: FieldTable, depth: float) -> FieldPlane:

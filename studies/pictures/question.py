@@ -13,8 +13,12 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-SHOWN = {"equilibria": ("depth", "growth"), "flight": ("levitated", "height_spread"), "field": ("size", "B_error")}
-"""Quantities drawn for each question."""
+SHOWN = {
+    "equilibria": ("depth", "lateral_offset", "polar_angle", "growth"),
+    "flight": ("levitated", "height_spread"),
+    "field": ("size", "B_error"),
+}
+"""Quantities drawn for each question, those of the motion in the laboratory."""
 
 
 def drawable(result: xr.Dataset) -> bool:
@@ -26,9 +30,9 @@ def drawable(result: xr.Dataset) -> bool:
 def question_figure(result: xr.Dataset) -> Figure:
     """Curves over one parameter or maps over two."""
     shown = _derived(result)
-    names, varied = SHOWN[str(result.attrs["ask"])], _varied(result)
-    figure, (axes,) = panels(1, 2, (8.4, 3.6))
-    for panel, name in zip(axes, names, strict=True):
+    names, varied = _shown(shown), _varied(result)
+    figure, axes = panels(-(-len(names) // 2), 2, (8.4, 3.6 * -(-len(names) // 2)))
+    for panel, name in zip(axes.ravel(), names, strict=True):
         if len(varied) == 1:
             _curves(panel, shown, name, varied[0])
         else:
@@ -36,11 +40,20 @@ def question_figure(result: xr.Dataset) -> Figure:
     return figure
 
 
+def _shown(result: xr.Dataset) -> list[str]:
+    """Names of what is drawn of a result; one of an older version has less."""
+    return [name for name in SHOWN[str(result.attrs["ask"])] if name in result]
+
+
 def _derived(result: xr.Dataset) -> xr.Dataset:
     """The result with what is drawn instead of what is kept."""
     if "position" in result:
-        depth = -1e3 * result["position"].sel(axis="z")
-        return result.assign(depth=depth.assign_attrs(units="mm", long_name="distance below the rotor"))
+        depth = (-1e3 * result["position"].sel(axis="z")).assign_attrs(units="mm", long_name="levitation distance")
+        result = result.assign(depth=depth)
+    if "lateral_offset" in result:
+        aside = (1e3 * result["lateral_offset"]).assign_attrs(units="mm", long_name="lateral offset")
+        angle = result["polar_angle"].assign_attrs(long_name="polar angle")
+        result = result.assign(lateral_offset=aside, polar_angle=angle)
     if "B" in result:
         size = 1e3 * (result["B"] ** 2).sum("axis", skipna=False) ** 0.5
         return result.assign(size=size.assign_attrs(units="mT", long_name="|B|"))
@@ -93,7 +106,7 @@ def question_lines(result: xr.Dataset) -> list[str]:
         some = (shown["stable"] == 1).any("equilibrium")
         lines.append(f"A stable equilibrium at {int(some.sum())} of {some.size} points.")
         shown = shown.where(shown["stable"] == 1)
-    for name in SHOWN[ask]:
+    for name in _shown(shown):
         values = shown[name].values[np.isfinite(shown[name].values)]
         if len(values):
             what = f"{shown[name].attrs['long_name']}{' where stable' if 'stable' in shown else ''}"

@@ -38,7 +38,7 @@ def draw_view(plotter: pv.Plotter, view: View) -> None:
         corners = corners_mm(scene.plate.box)
         names["plate"] = corners[corners[:, 1].argsort()[:4]].mean(axis=0)
     if times:
-        names[f"its path, {times:g} times enlarged"] = beside - np.array([0.0, 0.0, 0.8 * radius])
+        names[f"path × {times:g}, {view.frame}"] = beside - np.array([0.0, 0.0, 0.8 * radius])
     labels = {"font_size": 22, "text_color": "black", "shape_color": "white", "shape_opacity": 0.7, "margin": 4}
     plotter.add_point_labels(
         np.array(list(names.values())), list(names), show_points=False, always_visible=True, **labels

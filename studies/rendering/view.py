@@ -56,9 +56,10 @@ class View:
     Parameters
     ----------
     position, moment : of the floater, (3,) m, and the direction (3,) of its moment
-    path : (n, 3) positions of the flight, rotor's frame, m
+    path : (n, 3) positions of the flight, m, in `frame`
     plane : the field; None for none
     currents : in the plate; None for none
+    frame : of the path; "laboratory" where the floater does not turn with the rotor
     """
 
     scene: Scene
@@ -67,6 +68,7 @@ class View:
     path: Array
     plane: FieldPlane | None = None
     currents: Currents | None = None
+    frame: str = "rotor's frame"
 
     def draw(self, progress: Callable[[float], None]) -> bytes:
         """A PNG."""

@@ -20,6 +20,7 @@ from ...geometry.scenes import Scene, scene_text
 from .equilibrium_fields import EQUILIBRIUM_FIELDS, Field
 
 AXIS = ("x", "y", "z")
+EXTREMES = ("smallest", "largest")
 MODES = ("bounce", *SIDE, *TILT)
 Columns = Mapping[str, tuple[tuple[str, ...], str, str]]
 """Dimensions, unit and a name for an axis label, by name."""
@@ -117,7 +118,7 @@ def equilibria_dataset(found: Mapping[str, Sequence[Equilibrium]]) -> xr.Dataset
 
 def found_dataset(rows: Sequence[Equilibrium]) -> xr.Dataset:
     """Equilibria of one scene and one model over `equilibrium`, with their small motions over `mode`."""
-    sizes = {"axis": 3, "mode": len(MODES)}
+    sizes = {"axis": 3, "mode": len(MODES), "extreme": len(EXTREMES)}
 
     def column(field: Field) -> xr.Variable:
         shape = (len(rows), *(sizes[dim] for dim in field.dims))
@@ -139,7 +140,7 @@ def found_dataset(rows: Sequence[Equilibrium]) -> xr.Dataset:
             ),
             "number": variable((), len(rows), "1", "number of equilibria"),
         },
-        {"axis": list(AXIS), "equilibrium": np.arange(len(rows)), "mode": list(MODES)},
+        {"axis": list(AXIS), "equilibrium": np.arange(len(rows)), "mode": list(MODES), "extreme": list(EXTREMES)},
     )
 
 

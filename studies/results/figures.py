@@ -147,7 +147,10 @@ def trajectory_figure(result: xr.Dataset) -> Figure:
             panel.axvspan(*lowered, color="0.88", lw=0, zorder=0, label="plate is lowered")
         panel.set_xlabel(f"time ({unit})")
     axes[0, 0].legend(frameon=True, framealpha=0.9, edgecolor="none")
-    turned = 1e3 * result["position_rotor_frame"].values[near]
+    seen = {"rotor's frame": "position_rotor_frame", "laboratory": "position"}  # the one in which it moves less
+    moved = {frame: np.ptp(result[name].values[near], axis=0).max() for frame, name in seen.items()}
+    frame = min(moved, key=lambda frame: moved[frame])
+    turned = 1e3 * result[seen[frame]].values[near]
     step = float(np.diff(seconds[near]).max(initial=0.0))
     look = "A closer look"
     if step > COARSE:
@@ -159,10 +162,10 @@ def trajectory_figure(result: xr.Dataset) -> Figure:
         axes[1, 1].plot(*_smooth(time[near], turned[:, 0], turned[:, 1]), lw=0.8)
     axes[1, 1].plot(*turned[-1, :2], "o", color=PALETTE[1], ms=4, label="end")
     axes[1, 1].legend()
-    axes[0, 0].set(ylabel="distance below the rotor (mm)", title="Distance: smallest, mean, largest")
+    axes[0, 0].set(ylabel="distance along the axis (mm)", title="Distance: smallest, mean, largest")
     axes[1, 0].set(ylabel="polar angle of the moment (°)", title="Polar angle: smallest, mean, largest")
-    axes[0, 1].set(xlabel=f"time ({unit})", ylabel="distance below the rotor (mm)", title=look)
-    axes[1, 1].set(xlabel="x (mm)", ylabel="y (mm)", title="The same from above, rotor's frame")
+    axes[0, 1].set(xlabel=f"time ({unit})", ylabel="distance along the axis (mm)", title=look)
+    axes[1, 1].set(xlabel="x (mm)", ylabel="y (mm)", title=f"The same from above, {frame}")
     axes[1, 1].set(aspect="equal", adjustable="datalim")
     axes[1, 1].locator_params(axis="x", nbins=5)
     return figure

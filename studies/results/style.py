@@ -37,15 +37,30 @@ STYLE: Any = {
 }
 COLUMN, PAGE = 3.4, 7.0
 """Width of a figure in one column of a journal and across its page, inches."""
-NAMES = {
-    "dipole": "point dipole",
-    "cuboid": "cuboid, closed form (μr = 1)",
-    "fem": "finite elements",
-    "moments": "moments",
-    "map": "map",
-}
-COLORS = dict(zip(NAMES, PALETTE, strict=False))
-DASHES = {"dipole": "--", "cuboid": "-.", "fem": "-", "moments": ":", "map": "-"}
+
+
+class _Looks(dict[str, str]):
+    """How each field model is shown; one of a user's own has its own name, or looks as `other`."""
+
+    def __init__(self, known: Mapping[str, str], other: str | None = None) -> None:
+        super().__init__(known)
+        self.other = other
+
+    def __missing__(self, model: str) -> str:
+        return self.other or model
+
+
+NAMES = _Looks(
+    {
+        "dipole": "point dipole",
+        "cuboid": "cuboid, closed form (μr = 1)",
+        "fem": "finite elements",
+        "moments": "moments",
+        "map": "map",
+    }
+)
+COLORS = _Looks(dict(zip(NAMES, PALETTE, strict=False)), other=PALETTE[len(NAMES)])
+DASHES = _Looks({"dipole": "--", "cuboid": "-.", "fem": "-", "moments": ":", "map": "-"}, other="-")
 RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 Draw = TypeVar("Draw", bound="Callable[..., Figure]")
 

@@ -28,7 +28,7 @@ RELAYED = {
     "[str(error)]": "scenes/assembly: the sentence of bodies/step_file about a magnet's file",
     "name": "late: as Python has it of a module that is not installed",
     "str(path)": "whole_files: the system's own error, with the name of the file",
-    "way_out(scene, table, known)": "simulation: says what would levitate",
+    "way_out(scene, table, known, memory=memory)": "simulation: says what would levitate",
 }
 
 

@@ -13,9 +13,9 @@ from spinlev.dynamics.equilibria.continuation import stepped
 from spinlev.dynamics.motion import Rates, Scales, parameters
 from spinlev.dynamics.steady import EVERY, LATERAL, Balance, EquilibriumError, solve
 from spinlev.fem.harmonics import uniform_moments
-from spinlev.fem.rotor_tables import RotorTable
+from spinlev.fem.rotor_tables import RotorTable, rotor_table
 from spinlev.geometry.bodies import article_rotors as rotor
-from spinlev.geometry.scenes import Drag, Floater, Scene
+from spinlev.geometry.scenes import Drag, Floater, Scene, parse_scene
 
 FLOATER = Floater(radius=6.35e-3, remanence=1.305, recoil_permeability=1.0, density=7500.0)
 SHAPE = {"body": 10e-3, "remanence": 1.305, "recoil_permeability": 1.0}
@@ -203,6 +203,54 @@ def test_what_has_no_fixed_point_says_so():
     table = table_of(scene, "dipole")
     with pytest.raises(EquilibriumError, match="Earnshaw"):
         find_equilibria(replace(scene, frequency=0.0), table)
+
+
+TOP = """
+frequency_hz = 0.0
+gravity_m_s2 = [0.0, 0.0, 9.81]
+[[rotor.magnets]]
+shape = "ring"
+diameter_mm = 78.0
+inner_diameter_mm = 60.0
+height_mm = 10.0
+center_mm = [0.0, 0.0, 0.0]
+polarization_T = [0.0, 0.0, 1.2]
+recoil_permeability = 1.0
+[floater]
+diameter_mm = 20.0
+remanence_T = 0.5
+recoil_permeability = 1.0
+density_kg_m3 = 6350.0
+[drag]
+linear_N_s_m = 0.0
+angular_N_m_s = 0.0
+[start]
+position_mm = [0.0, 0.0, -61.0]
+moment = [0.0, 0.0, -1.0]
+spin_hz = [0.0, 0.0, -40.0]
+"""
+"""A floater that spins about its moment above a ring at rest, upside down."""
+
+
+def test_a_spinning_top_floats_above_a_ring_at_rest():
+    """M. D. Simon et al., Am. J. Phys. 65 (1997) 286: between two spin rates; numbers of a quadrature of the ring."""
+    scene = parse_scene(TOP, "top")
+    table = rotor_table(scene.rotor, "cuboid")
+    rates, growth = Rates(table), {}
+    for spin_hz in (40.0, 25.0, 130.0):
+        start = replace(scene.start, spin=np.array([0.0, 0.0, -2 * np.pi * spin_hz]))
+        found = find_equilibria(replace(scene, start=start), table, rates=rates)
+        (top,) = (e for e in found if abs(e.position[2] + 61.469e-3) < 1e-6)  # of the quadrature, in its last digit
+        assert np.hypot(*top.position[:2]) < 1e-9
+        assert top.polar_angle_deg == pytest.approx(180.0)
+        assert top.spin_rate == pytest.approx(2 * np.pi * spin_hz)
+        assert top.stable == (spin_hz == 40.0)
+        growth[spin_hz] = top.growth_per_s
+    assert growth[25.0] == pytest.approx(66.7, abs=0.1)  # its last digit
+    assert growth[130.0] > 1.0
+    still = replace(scene, start=replace(scene.start, spin=np.array([10.0, 0.0, 0.0])))  # across the moment
+    with pytest.raises(EquilibriumError, match=r"without spin has no stable equilibrium.*start\.spin_hz"):
+        find_equilibria(still, table, rates=rates)
 
 
 def test_a_step_that_meets_no_solution_fails_and_asks_no_further():

@@ -1,6 +1,9 @@
 """`spinlev run` as a user sees it: what it answers, and the files that it leaves."""
 
 import json
+import re
+from dataclasses import replace
+from typing import Literal
 
 import numpy as np
 import pytest
@@ -8,7 +11,11 @@ import xarray as xr
 from places import SCENES
 
 import spinlev as sl
+from spinlev.fem.rotor_tables.choice import MODELS
+from spinlev.fem.rotor_tables.simple_models import dipole_table
+from spinlev.studies.one_scene import main_job
 from spinlev.studies.rendering import unavailable
+from spinlev.studies.terminal import Models
 
 NO_PLATE = ("--plate-model", "none")
 GOOD = (SCENES / "horizontal.toml").read_text()
@@ -17,7 +24,9 @@ GOOD = (SCENES / "horizontal.toml").read_text()
 def test_run_writes_everything_and_finds_its_table_again(spinlev, tmp_path, points):
     status, out, err = spinlev("run", SCENES / "horizontal.toml", "--duration-s", "0.1", *NO_PLATE)
     assert status == 0, err
-    assert "A point dipole in the rotor's place would hold it 0.16(1) mm lower." in out
+    assert re.search(
+        r"Point-dipole model, same conditions: levitation distance [\d.]+ mm, 0\.16\(1\) mm more than", out
+    )
     made = {path.name for path in (tmp_path / "out").iterdir()}
     drawn = set() if unavailable() else {"scene.png"}
     figures = {f"{name}.{kind}" for name in ("field", "force", "trajectory") for kind in ("png", "pdf")}
@@ -26,6 +35,18 @@ def test_run_writes_everything_and_finds_its_table_again(spinlev, tmp_path, poin
     assert summary["comparison"]["difference_error_mm"] < 0.01 * abs(summary["comparison"]["difference_mm"])
     status, out, err = spinlev("field", SCENES / "horizontal.toml", "--points", points, "--json")
     assert json.loads(out)["tables_from_cache"] == ["fem"]
+
+
+@pytest.mark.usefixtures("undrawn")
+def test_a_field_model_of_one_s_own_is_run_and_drawn(tmp_path, monkeypatch):
+    """The recipe of docs/own-field-model.md: a function in `MODELS`, and its name in `FieldModel`."""
+    monkeypatch.setitem(MODELS, "own", lambda magnets, accuracy: replace(dipole_table(magnets, accuracy), model="own"))
+    monkeypatch.setattr("spinlev.studies.terminal.options.FieldModel", Literal["dipole", "own"])
+    scene = sl.parse_scene(GOOD.replace("recoil_permeability = 1.05", "recoil_permeability = 1.0"))
+    values, lines = main_job(scene, Models("own", "none"), 0.0, 0.01, tmp_path, drawing=("unused",))
+    assert values["model"] == "own"
+    assert lines[0].startswith("Floats ")
+    assert (tmp_path / "force.png").exists()
 
 
 @pytest.mark.usefixtures("undrawn")
