@@ -89,7 +89,8 @@ def others_may_write(folder: Path) -> str | None:
         if not ours(above):
             return f"{folder.parent} belongs to another user; set SPINLEV_CACHE to a folder of your own"
         if not closed(above):
-            return f"others may write in {folder.parent}; chmod +t {folder.parent} mends it"
+            mends = f"chmod go-w {folder.parent} mends it (chmod +t where several users share it)"
+            return f"others may write in {folder.parent}; {mends}"
     if not stat.S_ISDIR(found.st_mode):
         return f"{folder} is a link or no folder; remove it"
     if not ours(found):

@@ -190,8 +190,8 @@ def other(path, monkeypatch):
 DOORS = {
     "the folder is open to all": (0o777, 0o755, "chmod go-w "),
     "the folder is open to a group": (0o770, 0o755, "chmod go-w "),
-    "the cache is open to all": (0o700, 0o777, "chmod +t "),
-    "the cache is open to a group": (0o700, 0o2775, "chmod +t "),
+    "the cache is open to all": (0o700, 0o777, "share it"),
+    "the cache is open to a group": (0o700, 0o2775, "share it"),
 }
 
 
@@ -211,7 +211,7 @@ def test_code_is_neither_read_nor_written_where_others_may_write(file, door, cap
     (said,) = caplog.messages
     assert mends in said
     assert file.read_bytes() == evil
-    command = said.partition(mends.split()[0])[2].partition(" mends it")[0].split()
+    command = said.partition("chmod ")[2].partition(" mends it")[0].split()
     subprocess.run(["chmod", *command], check=True)
     compiled_code._functions.clear()
     assert value() == (VALUE, True)
