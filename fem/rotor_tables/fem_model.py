@@ -21,6 +21,7 @@ from ..closed_forms import carrier, closed_part
 from ..harmonics import MultipoleExpansion, trimmed_expansions, without_noise
 from ..magnetostatics import RotorSolution, refined, refinement_of, solve_rotor, strongest
 from .accuracy import BETWEEN, Accuracy, error_points, guards
+from .simple_models import part_doubts
 from .table import KNOWN, RotorTable
 
 HIGHEST_DEGREE = 44
@@ -75,6 +76,7 @@ def fem_table(
         "quadrature": nonzero(solution.expansions(unsure)),
         "tail": nonzero(extrapolated_tail(whole, min(ratios))),
         "gap": nonzero(gap_doubt(magnets, solution)),
+        **part_doubts(magnets),
     }
     doubts = {cause: parts for cause, parts in doubts.items() if parts}
     rest = RotorTable("fem", magnets, polarized, (), doubts).absolute_error(points)[0]

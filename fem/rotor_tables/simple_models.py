@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ...geometry.basics import Part
+from ...geometry.basics import Part, Sphere
 from ...geometry.bodies import Magnet, cut_magnets
 from ..closed_forms import first_order_moments, uniform_cells
 from ..harmonics import Coefficients, MultipoleExpansion, trimmed_expansions, uniform_moments
@@ -16,6 +16,8 @@ from .table import KNOWN, RotorTable
 
 DEGREE = 25
 """Degree up to which the part that a model leaves out is computed."""
+PART_ERROR = 1e-8
+"""How exactly curved elements fill a part, relative to its dipole; seen: 4e-10 of a third of a ring."""
 FIRST_ORDER_SAFETY = 1.1
 """The first-order magnetisation is right to a few per cent at low degrees, to χ at high ones, for χ = μ - 1 ≤ 0.2."""
 Rotor = tuple[Magnet, ...]
@@ -45,7 +47,21 @@ def cuboid_table(rotor: Rotor, accuracy: Accuracy) -> RotorTable:
     known = tuple(magnet for magnet in rotor if not isinstance(magnet.body, Part))
     parts = [magnet for magnet in rotor if isinstance(magnet.body, Part)]
     moments = tuple(cell for magnet in parts for cell in uniform_cells(magnet, accuracy.clearance(rotor)))
-    return _finished(RotorTable("cuboid", rotor, known, moments), accuracy, start)
+    return _finished(RotorTable("cuboid", rotor, known, moments, part_doubts(rotor)), accuracy, start)
+
+
+def part_doubts(rotor: Rotor) -> dict[str, tuple[MultipoleExpansion, ...]]:
+    """What curved elements leave out of parts or add to them: a share of the dipole of each."""
+    found = []
+    for magnet in rotor:
+        body = magnet.body
+        if isinstance(body, Part):
+            dipole = uniform_moments(
+                Magnet(Sphere(body.circumradius, body.center, body.rotation), magnet.polarization), 1
+            )
+            share = PART_ERROR * body.volume / Sphere(body.circumradius).volume
+            found.append(replace(dipole, coefficients=share * dipole.coefficients))
+    return {"part": tuple(found)} if found else {}
 
 
 def _finished(table: RotorTable, accuracy: Accuracy, start: float) -> RotorTable:

@@ -2,6 +2,7 @@
 
 from .cache import (
     TableFileError as TableFileError,
+    cache_folder as cache_folder,
     from_cache as from_cache,
     make_room as make_room,
     owned as owned,

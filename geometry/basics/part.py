@@ -18,6 +18,8 @@ SMOOTH = float(np.cos(np.radians(30.0)))
 """Cosine between the normals of triangles from which on their common side is no edge."""
 SAME, EDGES = 1e-7, 64
 """Of the size: distance of corners that are one; edges at once."""
+FACES = 100
+"""Normals of so many faces are enough to find the one along which another body touches it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,6 +70,20 @@ class Part(Posed):
         """How far (n,) it reaches from its middle along unit vectors (n, 3), m, or against them if that is more."""
         along = (directions @ self.rotation) @ self.triangles.reshape(-1, 3).T
         return np.asarray(np.abs(along).max(axis=1))
+
+    def support(self, directions: Array) -> Array:
+        """How far (n,) it reaches from its middle along unit vectors (n, 3), m, whatever lies against them."""
+        return np.asarray(((directions @ self.rotation) @ self.triangles.reshape(-1, 3).T).max(axis=1))
+
+    @cached_property
+    def face_normals(self) -> Array:
+        """(n, 3) outward unit normals of its largest flat faces along the body axes, each once; `FACES` at most."""
+        normals = np.cross(self.triangles[:, 1] - self.triangles[:, 0], self.triangles[:, 2] - self.triangles[:, 0])
+        areas = np.linalg.norm(normals, axis=1)
+        normals = normals[areas > 0] / areas[areas > 0, None]
+        alike, first, number = np.unique(np.round(normals, 7), axis=0, return_index=True, return_inverse=True)
+        order = np.argsort(-np.bincount(number.ravel(), areas[areas > 0], len(alike)))
+        return np.asarray(normals[first[order[:FACES]]])
 
     def distance(self, points: ArrayLike) -> Array:
         """Signed distance (...,) of `points` (..., 3) from the triangles, m; negative inside."""

@@ -8,7 +8,7 @@ import numpy as np
 import scipy
 from numpy.typing import ArrayLike
 
-from ..basics import Array, Box, Ring, Solid, Sphere, moved, rotation_matrix
+from ..basics import Array, Box, Part, Ring, Solid, Sphere, moved, rotation_matrix
 from .magnet import Magnet
 
 TOUCHING = 1e-9
@@ -63,12 +63,17 @@ def _convex_separation(first: Solid, second: Solid) -> tuple[float, Array]:
 
     def gap(directions: Array) -> Array:
         ways = directions / np.linalg.norm(directions, axis=1)[:, None]
-        return np.asarray(ways @ offset - first.reach(ways) - second.reach(ways))
+        return np.asarray(ways @ offset - _support(first, ways) - _support(second, -ways))
 
     axes = np.vstack([first.rotation.T, second.rotation.T])
     crossed = np.cross(first.rotation.T[:, None], second.rotation.T).reshape(9, 3)
     across = np.vstack([offset, *(offset - (offset @ axis) * axis for axis in axes)])
-    tried = np.vstack([axes, -axes, crossed, -crossed, across, np.random.default_rng(0).normal(size=(200, 3))])
+    faces = [
+        sign * body.face_normals @ body.rotation.T
+        for body, sign in ((first, 1), (second, -1))
+        if isinstance(body, Part)
+    ]
+    tried = np.vstack([axes, -axes, crossed, -crossed, across, *faces, np.random.default_rng(0).normal(size=(200, 3))])
     tried = tried[np.linalg.norm(tried, axis=1) > 1e-12]
     tried /= np.linalg.norm(tried, axis=1)[:, None]
     best = tried[int(np.argmax(gap(tried)))]
@@ -85,6 +90,11 @@ def _convex_separation(first: Solid, second: Solid) -> tuple[float, Array]:
     return float(gap(best[None])[0]), best
 
 
+def _support(body: Solid, ways: Array) -> Array:
+    """How far (n,) a body reaches from its centre along unit vectors (n, 3), m; but for a part as far against them."""
+    return body.support(ways) if isinstance(body, Part) else body.reach(ways)
+
+
 def _gap_in_hole(ring: Ring, body: Solid) -> tuple[float, Array, bool]:
     """Gap between a convex body and the wall of the endless hole of a ring, the way (3,) off that wall, if it fits."""
     x, y, _ = ring.rotation.T
@@ -92,7 +102,7 @@ def _gap_in_hole(ring: Ring, body: Solid) -> tuple[float, Array, bool]:
 
     def stands_off(angle: Array) -> Array:
         ways = np.multiply.outer(np.cos(angle), x) + np.multiply.outer(np.sin(angle), y)
-        return np.asarray(ring.inner_radius - ways @ offset - body.reach(ways))
+        return np.asarray(ring.inner_radius - ways @ offset - _support(body, ways))
 
     angles = np.linspace(0.0, 2 * np.pi, 361)
     best = angles[int(np.argmin(stands_off(angles)))]

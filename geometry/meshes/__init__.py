@@ -7,3 +7,10 @@ from .magnets import MagnetMesh as MagnetMesh, MeshSettings as MeshSettings, mes
 from .metal import MetalMesh as MetalMesh, mesh_metal as mesh_metal
 from .plate import MeshRule as MeshRule, plate_mesh as plate_mesh, skin_depth as skin_depth
 from .solids import part_rule as part_rule
+from .step_writing import (
+    Body as Body,
+    Facets as Facets,
+    Segment as Segment,
+    lies_within as lies_within,
+    step_text as step_text,
+)

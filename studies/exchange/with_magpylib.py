@@ -1,5 +1,9 @@
 """Rotors from magpylib's magnets, and the field of a table as a source of magpylib."""
 
+import hashlib
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any
 
 import magpylib
@@ -7,30 +11,55 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from ...fem.rotor_tables import RotorTable
-from ...geometry.basics import MU_0, Array, Cylinder, InputError, Part, Ring, Solid, Sphere
+from ...fem.storage import cache_folder, write_whole
+from ...geometry.basics import MU_0, Array, Box, Cylinder, InputError, Part, Ring, Solid, Sphere, rotation_angles
+from ...geometry.meshes import Body, Facets, Segment, lies_within, step_text
 from ...geometry.scenes import magnets
 
+KINDS = (
+    magpylib.magnet.Cuboid,
+    magpylib.magnet.Cylinder,
+    magpylib.magnet.CylinderSegment,
+    magpylib.magnet.Sphere,
+    magpylib.magnet.Tetrahedron,
+    magpylib.magnet.TriangularMesh,
+)
+SIZES = ("diameter", "dimension", "vertices")
+MOST_TESLA = 10.0
+"""Four times what iron saturates at; in millitesla every magnet has more."""
+MOST_TRIANGLES = 2000
+SAME, SAME_ANGLE = 1e-9, 1e-7
+"""Relative difference of sizes, and of angles in degrees, that are one."""
 
-def from_magpylib(collection: Any, recoil_permeability: float = 1.05) -> dict[str, Any]:
+
+def from_magpylib(
+    collection: Any, recoil_permeability: float = 1.05, folder: str | Path | None = None
+) -> dict[str, Any]:
     """The rotor that magpylib's magnets make, for `spinlev.scene(rotor=...)`.
 
     Parameters
     ----------
-    collection : magpylib.Collection or one of its magnets
-        Cuboids, cylinders, spheres and rings (segments of 360°) without a path, in the rotor's frame: the axis of
-        rotation is z.
+    collection : magpylib.Collection, one of its magnets, or a list of both
+        Cuboids, cylinders and their segments, spheres, tetrahedra and closed triangular meshes without a path, in the
+        rotor's frame: the axis of rotation is z. A magnet that lies within another and has the opposite polarisation is
+        a cavity in it, as in a ring made of two cylinders.
     recoil_permeability : float
         Relative permeability of all magnets; magpylib itself has none.
+    folder : str or Path, optional
+        Where STEP files are written of what the keys of a scene file do not describe: segments, tetrahedra, meshes, and
+        bodies with a cavity. By default the user's cache.
 
     Returns
     -------
     dict
-        The table `[rotor]` of a scene file, lengths in mm; the same field to 1e-12 where the permeability is 1.
+        The table `[rotor]` of a scene file, lengths in mm; the same field to 1e-12 where the permeability is 1, and
+        to 1e-6 that of a STEP file.
 
     Raises
     ------
     InputError
-        Nothing in it, a source of another kind, one without size or polarisation, or one that moves along a path.
+        Nothing in it, a source of another kind, one without size or polarisation, or one that moves along a path;
+        a mesh that is open, or in several pieces; values in millimetres and millitesla, as magpylib 4 had them.
 
     Examples
     --------
@@ -39,48 +68,217 @@ def from_magpylib(collection: Any, recoil_permeability: float = 1.05) -> dict[st
     >>> from_magpylib(cube)["magnets"][0]["center_mm"]
     [2.0, 0.0, 0.0]
     """
-    found = collection.sources_all if isinstance(collection, magpylib.Collection) else [collection]
-    if not found:
+    sources = list(_sources(collection))
+    if not sources:
         raise InputError("Input collection must hold at least one magnet; instead it is empty.")
-    return dict(magnets(*(_magnet(source, recoil_permeability) for source in found)))
+    found = _joined([_magnet(source) for source in sources])
+    parts = Path(folder) if folder else cache_folder() / "parts"
+    cavities = _cavities(found)
+    return dict(
+        magnets(
+            *(
+                {**_keys(magnet, inside, parts), "recoil_permeability": float(recoil_permeability)}
+                for magnet, inside in cavities
+            )
+        )
+    )
 
 
-def _magnet(source: Any, recoil_permeability: float) -> dict[str, Any]:
-    shape = _shape(source)
-    if shape is None or source.polarization is None:
+@dataclass(frozen=True)
+class _Magnet:
+    """A source: its body in the rotor's frame, and its polarisation (3,) T along the body's axes."""
+
+    body: Body
+    polarization: Array
+    source: Any
+
+    @property
+    def in_rotor(self) -> Array:
+        return self.body.rotation @ self.polarization
+
+
+def _sources(collection: Any) -> Iterator[Any]:
+    """All sources of collections and lists in each other."""
+    if isinstance(collection, magpylib.Collection):
+        yield from collection.sources_all
+    elif isinstance(collection, list | tuple | set):
+        for entry in collection:
+            yield from _sources(entry)
+    else:
+        yield collection
+
+
+def _magnet(source: Any) -> _Magnet:
+    if not isinstance(source, KINDS):
+        raise InputError(
+            "Input collection must hold cuboids, cylinders and their segments, spheres, tetrahedra and triangular "
+            f"meshes only; instead received {source!r}."
+        )
+    size = next((getattr(source, name) for name in SIZES if getattr(source, name, None) is not None), None)
+    if size is None or source.polarization is None:
         raise InputError(f"Input collection must have magnets with a size and a polarisation; instead: {source!r}.")
-    if np.ndim(source.position) != 1:
+    if np.ndim(source.position) != 1 or np.ndim(source.polarization) != 1:
         raise InputError(f"Input collection must hold magnets at rest; instead {source!r} has a path.")
+    polarization = np.asarray(source.polarization, float)
+    if np.linalg.norm(polarization) > MOST_TESLA:
+        raise InputError(
+            f"Input polarization must be in T, and lengths in m, as in magpylib 5; instead {source!r} has "
+            f"{np.linalg.norm(polarization):.4g} T. These look like the millimetres and millitesla of magpylib 4: "
+            "divide both by 1000."
+        )
+    pose = np.asarray(source.position, float), source.orientation.as_matrix()
+    return _Magnet(_body(source, np.asarray(size, float), pose), polarization, source)
+
+
+def _body(source: Any, size: Array, pose: tuple[Array, Array]) -> Body:
+    if isinstance(source, magpylib.magnet.Sphere):
+        return Sphere(float(size) / 2, *pose)
+    if isinstance(source, magpylib.magnet.Cuboid):
+        return Box(size, *pose)
+    if isinstance(source, magpylib.magnet.Cylinder):
+        return Cylinder(float(size[0]) / 2, float(size[1]), *pose)
+    if isinstance(source, magpylib.magnet.CylinderSegment):
+        inner, outer, height, start, end = map(float, size)
+        return _ring(Segment(inner, outer, height, start, end, *pose))
+    if isinstance(source, magpylib.magnet.Tetrahedron):
+        return Facets(size[[[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]]], *pose)
+    for fault in ("open", "disconnected", "selfintersecting"):
+        if getattr(source, f"status_{fault}"):
+            raise InputError(f"Input mesh must be one closed surface; instead {source!r} is {fault}.")
+    if len(source.mesh) > MOST_TRIANGLES:
+        raise InputError(
+            f"Input mesh must have at most {MOST_TRIANGLES} triangles; instead {source!r} has {len(source.mesh)}. "
+            "Simplify it, as PyVista's decimate does."
+        )
+    return Facets(np.asarray(source.mesh, float), *pose)
+
+
+def _ring(segment: Segment) -> Body:
+    """The segment, or where it goes all around the ring or cylinder that it is."""
+    pose = segment.center, segment.rotation
+    if abs(segment.end - segment.start - 360) > SAME_ANGLE:
+        return segment
+    if not segment.inner_radius:
+        return Cylinder(segment.radius, segment.height, *pose)
+    return Ring(segment.radius, segment.inner_radius, segment.height, *pose)
+
+
+def _joined(found: Sequence[_Magnet]) -> list[_Magnet]:
+    """Magnets, of which segments that together go all around, with one polarisation, are one ring."""
+    left, joined = list(found), list[_Magnet]()
+    while left:
+        first = left.pop(0)
+        if isinstance(first.body, Segment):
+            others = [other for other in left if _same_ring(first, other)]
+            turns = sorted(_angles(first.body, one.body) for one in (first, *others))  # type: ignore[arg-type]
+            ends = [end % 360 for _, end in turns]
+            begins = [start % 360 for start, _ in turns[1:] + turns[:1]]
+            meet = all(
+                abs((end - begin + 180) % 360 - 180) < SAME_ANGLE for end, begin in zip(ends, begins, strict=True)
+            )
+            if others and meet and abs(sum(end - start for start, end in turns) - 360) < SAME_ANGLE:
+                whole = replace(first.body, start=0.0, end=360.0)
+                first = replace(first, body=_ring(whole))
+                left = [other for other in left if not any(other is one for one in others)]
+        joined.append(first)
+    return joined
+
+
+def _same_ring(one: _Magnet, other: _Magnet) -> bool:
+    a, b = one.body, other.body
+    if not (isinstance(a, Segment) and isinstance(b, Segment)):
+        return False
+    sizes, others = ((s.inner_radius, s.radius, s.height) for s in (a, b))
+    return (
+        bool(np.allclose(sizes, others, rtol=SAME, atol=0.0))
+        and float(np.linalg.norm(a.center - b.center)) < SAME * a.radius
+        and float(a.rotation[:, 2] @ b.rotation[:, 2]) > 1 - SAME
+        and _alike(one.in_rotor, other.in_rotor)
+    )
+
+
+def _angles(frame: Segment, segment: Segment) -> tuple[float, float]:
+    """Where a segment of the same axis begins and ends about that of a frame, degrees; it begins within a turn."""
+    turn = frame.rotation.T @ segment.rotation
+    start = segment.start + float(np.degrees(np.arctan2(turn[1, 0], turn[0, 0])))
+    start_within = round(start % 360, 9) % 360
+    return start_within, start_within + segment.end - segment.start
+
+
+def _alike(one: Array, other: Array) -> bool:
+    return float(np.linalg.norm(one - other)) <= SAME * float(np.linalg.norm(one))
+
+
+def _cavities(found: Sequence[_Magnet]) -> list[tuple[_Magnet, list[Body]]]:
+    """Every magnet that is none with the cavities that opposite ones within it make.
+
+    A cylinder in one of its height about the same axis makes it a ring, which has a closed form.
+    """
+    holes: dict[int, list[Body]] = {}
+    used: set[int] = set()
+    for k, inner in enumerate(found):
+        for j, outer in enumerate(found):
+            near = float(np.linalg.norm(inner.body.center - outer.body.center)) < outer.body.circumradius
+            opposite = inner.in_rotor.any() and _alike(outer.in_rotor, -inner.in_rotor)
+            if j != k and j not in used and near and opposite and lies_within(inner.body, outer.body):
+                holes.setdefault(j, []).append(inner.body)
+                used.add(k)
+                break
+    result = list[tuple[_Magnet, list[Body]]]()
+    for k, magnet in enumerate(found):
+        if k in used:
+            continue
+        bodies = holes.get(k, [])
+        ring = _bored(magnet.body, bodies[0]) if len(bodies) == 1 else None
+        result.append((replace(magnet, body=ring), []) if ring is not None else (magnet, bodies))
+    return result
+
+
+def _bored(outer: Body, inner: Body) -> Ring | None:
+    """The ring that a cylinder within another leaves, where both have the same axis and height."""
+    if not (isinstance(outer, Cylinder) and isinstance(inner, Cylinder)):
+        return None
+    apart = float(np.linalg.norm(outer.center - inner.center))
+    along = abs(float(outer.rotation[:, 2] @ inner.rotation[:, 2]))
+    if apart > SAME * outer.radius or along < 1 - SAME or abs(outer.height - inner.height) > SAME * outer.height:
+        return None
+    return Ring(outer.radius, inner.radius, outer.height, outer.center, outer.rotation)
+
+
+def _keys(magnet: _Magnet, cavities: Sequence[Body], folder: Path) -> dict[str, Any]:
+    """A table `[[rotor.magnets]]`, but for its permeability."""
+    body = magnet.body
     return {
-        **shape,
-        "center_mm": _listed(1e3 * source.position),
-        "rotation_deg": _listed(source.orientation.as_euler("xyz", degrees=True)),
-        "polarization_T": _listed(source.polarization),
-        "recoil_permeability": float(recoil_permeability),
+        **(_file(magnet, cavities, folder) if cavities or isinstance(body, Segment | Facets) else _shape(body)),
+        "center_mm": _listed(1e3 * body.center),
+        "rotation_deg": _listed(rotation_angles(body.rotation)),
+        "polarization_T": _listed(magnet.polarization),
     }
 
 
-def _shape(source: Any) -> dict[str, Any] | None:
-    """The keys of a source's shape; None where it has no size yet."""
-    if isinstance(source, magpylib.magnet.Sphere):
-        return None if source.diameter is None else {"shape": "sphere", "diameter_mm": 1e3 * float(source.diameter)}
-    if not isinstance(source, magpylib.magnet.Cuboid | magpylib.magnet.Cylinder | magpylib.magnet.CylinderSegment):
-        raise InputError(
-            f"Input collection must hold cuboids, cylinders, rings and spheres only; instead received {source!r}."
-        )
-    if source.dimension is None:
-        return None
-    size = _listed(1e3 * np.asarray(source.dimension))
-    if isinstance(source, magpylib.magnet.Cuboid):
-        return {"size_mm": size}
-    if isinstance(source, magpylib.magnet.Cylinder):
-        return {"shape": "cylinder", "diameter_mm": size[0], "height_mm": size[1]}
-    inner, outer, height = size[:3]
-    if abs(source.dimension[4] - source.dimension[3] - 360) > 1e-9:
-        raise InputError(f"Input collection must hold whole rings, of 360°; instead received {source!r}.")
-    if not inner:
-        return {"shape": "cylinder", "diameter_mm": 2 * outer, "height_mm": height}
-    return {"shape": "ring", "diameter_mm": 2 * outer, "inner_diameter_mm": 2 * inner, "height_mm": height}
+def _file(magnet: _Magnet, cavities: Sequence[Body], folder: Path) -> dict[str, Any]:
+    """The file of a magnet, written if it is not there; its name tells its content."""
+    try:
+        content = step_text(magnet.body, cavities).encode()
+    except InputError as error:
+        raise InputError(f"{magnet.source!r}: {error}") from None
+    path = (folder / f"{hashlib.sha256(content).hexdigest()[:20]}.step").absolute()
+    if not path.exists() or path.read_bytes() != content:
+        write_whole(path, content)
+    return {"file": str(path)}
+
+
+def _shape(body: Solid) -> dict[str, Any]:
+    """The keys of a shape, mm."""
+    if isinstance(body, Sphere):
+        return {"shape": "sphere", "diameter_mm": 2e3 * body.radius}
+    if isinstance(body, Box):
+        return {"size_mm": _listed(1e3 * body.size)}
+    assert isinstance(body, Cylinder | Ring)
+    size = {"diameter_mm": 2e3 * body.radius, "height_mm": 1e3 * body.height}
+    if isinstance(body, Ring):
+        return {"shape": "ring", "inner_diameter_mm": 2e3 * body.inner_radius, **size}
+    return {"shape": "cylinder", **size}
 
 
 def _listed(values: Any) -> list[float]:
