@@ -263,8 +263,11 @@ def _file(magnet: _Magnet, cavities: Sequence[Body], folder: Path) -> dict[str, 
     except InputError as error:
         raise InputError(f"{magnet.source!r}: {error}") from None
     path = (folder / f"{hashlib.sha256(content).hexdigest()[:20]}.step").absolute()
-    if not path.exists() or path.read_bytes() != content:
-        write_whole(path, content)
+    try:
+        if not path.exists() or path.read_bytes() != content:
+            write_whole(path, content)
+    except OSError as error:
+        raise InputError(f"Input folder must be one that files can be written to; instead: {error}.") from None
     return {"file": str(path)}
 
 
