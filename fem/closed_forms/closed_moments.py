@@ -123,8 +123,19 @@ def closed_moments(
 
 
 def first_order_moments(body: Magnet, sources: Sequence[Magnet], degree: int) -> Coefficients:
-    """What the permeability of a body adds, to a few per cent: (μ - 1) H0 / (1 + χ/3), χ the largest of μ - 1."""
-    return induced_moments(body, sources, degree) / (1 + body.contrast / 3)
+    """What the permeability of a body adds, to a few per cent: (μ - 1) H0 / (1 + χ/3), χ the largest of μ - 1.
+
+    A part, whose H0 has no closed form, counts as the cuboid of its volume with the proportions of the box about it.
+    """
+    return induced_moments(body, [_closed(source) for source in sources], degree) / (1 + body.contrast / 3)
+
+
+def _closed(magnet: Magnet) -> Magnet:
+    if not isinstance(magnet.body, Part):
+        return magnet
+    box = magnet.box
+    size = box.size * (magnet.body.volume / box.volume) ** (1 / 3)
+    return Magnet(Box(size, box.center, box.rotation), magnet.polarization)
 
 
 def added_by_closed_form(

@@ -5,9 +5,6 @@ import numpy as np
 from ...geometry.basics import Array, Box, Part, Ring, Solid, Sphere
 from ...geometry.meshes import part_rule
 
-ROUND = 12
-"""Degrees beside the polynomial's own that curved elements of a part need."""
-
 
 def polynomial_rule(body: Solid, degree: int) -> tuple[Array, Array]:
     """Points (n, 3) m and weights (n,) m³ that integrate polynomials up to `degree` over a body.
@@ -15,7 +12,7 @@ def polynomial_rule(body: Solid, degree: int) -> tuple[Array, Array]:
     To round-off, but for a part: as well as curved elements fill it, 1e-8.
     """
     if isinstance(body, Part):
-        return part_rule(body, degree + ROUND)
+        return part_rule(body, degree)
     if isinstance(body, Box):
         return box_rule(body, (degree // 2 + 1,) * 3)
     if isinstance(body, Sphere):

@@ -6,7 +6,7 @@ from itertools import product
 
 import numpy as np
 
-from ...geometry.basics import Array, Solid
+from ...geometry.basics import Array, MeshError, Solid
 from ...geometry.bodies import (
     Cells,
     Magnet,
@@ -21,7 +21,7 @@ from ...geometry.meshes import MagnetMesh, MeshSettings, mesh_magnets
 from ..closed_forms import by_cells
 from ..harmonics import Coefficients, MultipoleExpansion, rotated_harmonics
 from .moments import reaction_dipoles, reaction_moments, trace_moments
-from .solver import Formulation, MeshError, Solution, System, assemble, solve
+from .solver import Formulation, Solution, System, assemble, solve
 
 SIZES = (1.0, 0.8, 0.5)
 """Of elements in magnets, relative to what is asked for, that are tried."""

@@ -23,7 +23,7 @@ import netgen.meshing as netgen
 import ngsolve as ng
 import numpy as np
 
-from ...geometry.basics import Array, ComputationError
+from ...geometry.basics import Array, MeshError
 from ...geometry.bodies import Magnet
 from ...geometry.meshes import MagnetMesh
 from ..closed_forms import remanent_field
@@ -31,10 +31,6 @@ from ..elements import OpenBoundary, TooLargeError, require_memory, solve_open, 
 
 Formulation = Literal["split", "direct"]
 WAY_OUT = "Allow a larger error of the field (--rtol)"
-
-
-class MeshError(ComputationError):
-    """The elements of a mesh do not match each other."""
 
 
 @dataclass(frozen=True, eq=False)

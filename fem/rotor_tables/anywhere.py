@@ -14,8 +14,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ...geometry.basics import Array, InputError
-from ...geometry.bodies import Magnet
+from ...geometry.bodies import CONVERGENCE, Magnet
 from ..closed_forms import UniformField
+from .accuracy import Accuracy
 from .near_elements import NearElements
 from .table import RotorTable
 
@@ -66,7 +67,8 @@ def field_anywhere(
 ) -> NearField:
     """A table's field at points (n, 3) m, and where it does not reach that of `near_field`.
 
-    A table of closed forms (μr = 1) is continued by them.
+    A table of closed forms (μr = 1) is continued by them, one of finite elements also where its series converge so
+    slowly that they leave more than `rtol`, relative to the largest remanence.
 
     Raises
     ------
@@ -77,21 +79,44 @@ def field_anywhere(
     if table.model in CONTINUED:
         refuse_edges(table.magnets, places)
     reached = table.in_range(places)
-    if table.model not in CONTINUED or reached.all():
+    if table.model not in CONTINUED:
         flux, gradient = table.evaluate(places)
         return NearField(flux, flux, gradient, *table.absolute_error(places), np.full(len(places), -1), 0)
+    error, steep = np.zeros(len(places)), np.zeros(len(places))
+    slow = _slow_series(table, places[reached])
+    error[reached], steep[reached] = slow * RotorTable.absolute_error(table, places[reached])
+    largest = max((float(np.linalg.norm(magnet.polarization)) for magnet in table.magnets), default=0.0)
+    reached[reached] = (slow == 1) | (error[reached] <= rtol * largest)
+    if reached.all():
+        flux, gradient = RotorTable.evaluate(table, places)
+        return NearField(flux, flux, gradient, error, steep, np.full(len(places), -1), 0)
     near = near_field(continued_by(table), places[~reached], rtol, elements=elements)
-    flux, gradient = table.evaluate(places[reached])
-    error, steep = table.absolute_error(places[reached])
+    flux, gradient = RotorTable.evaluate(table, places[reached])
     return NearField(
         _joined(reached, flux, near.flux_density),
         _joined(reached, flux, near.field),
         _joined(reached, gradient, near.gradient),
-        _joined(reached, error, near.error),
-        _joined(reached, steep, near.gradient_error),
+        _joined(reached, error[reached], near.error),
+        _joined(reached, steep[reached], near.gradient_error),
         owners(table.magnets, places),
         near.order,
     )
+
+
+def _slow_series(table: RotorTable, points: Array) -> Array:
+    """Factor (n,) on the stated errors of a table near its magnets: what series leave out grows there as 1/(q² - 1).
+
+    q is the distance from a centre in radii of the ball about the sources; tables count on at least `CONVERGENCE`.
+    """
+    factor = np.ones(len(points))
+    clear = Accuracy().clearance(table.magnets)
+    beside = np.min([magnet.body.distance(points) for magnet in table.magnets], axis=0) < clear
+    for part in table.expansions if table.model == "fem" else ():
+        if part.nearest and beside.any():
+            square = (np.linalg.norm(points[beside] - part.center, axis=1) / part.nearest) ** 2
+            slower = (CONVERGENCE**2 - 1) / np.maximum(square - 1, np.finfo(float).tiny)
+            factor[beside] = np.maximum(factor[beside], slower)
+    return factor
 
 
 def _off_faces(magnets: Sequence[Magnet], points: Array) -> Array:
@@ -182,8 +207,8 @@ def refuse_edges(magnets: Sequence[Magnet], points: Array) -> None:
 class CompleteTable(RotorTable):
     """A table of closed forms or finite elements that knows the field everywhere but on edges; made by `complete`.
 
-    Where the table of the outer field does not reach (`in_range`), `near_field` continues it: its finite elements are
-    solved when they are first asked for, and kept.  The motion's expressions are those of the outer field.
+    Where the table of the outer field does not reach, `field_anywhere` continues it: its finite elements are solved
+    when they are first asked for, and kept.  The motion's expressions are those of the outer field.
 
     Parameters
     ----------
@@ -208,7 +233,7 @@ class CompleteTable(RotorTable):
         InputError : a point lies on an edge of a magnet
         """
         places = np.asarray(points, float).reshape(-1, 3)
-        if not self.in_range(places).all():
+        if not self._all_reached(places):
             found = self.fields(places)
             return found.flux_density, found.gradient
         refuse_edges(self.magnets, places)
@@ -217,10 +242,13 @@ class CompleteTable(RotorTable):
     def absolute_error(self, points: ArrayLike) -> tuple[Array, Array]:
         """Estimated errors (n,) of B (T) and of its gradient (T/m)."""
         places = np.asarray(points, float).reshape(-1, 3)
-        if self.in_range(places).all():
+        if self._all_reached(places):
             return super().absolute_error(places)
         found = self.fields(places)
         return found.error, found.gradient_error
+
+    def _all_reached(self, places: Array) -> bool:
+        return bool(self.in_range(places).all() and (_slow_series(self, places) == 1).all())
 
 
 def complete(table: RotorTable, near_rtol: float = NEAR_RTOL) -> RotorTable:

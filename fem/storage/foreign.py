@@ -1,14 +1,12 @@
 """HDF5 files without our checksum: looked through by a process of its own before this one reads them.
 
-HDF5 does not return from some damaged files, whatever signal comes, and may crash on others. That process runs this
-file as a script, which therefore imports nothing of the package.
+HDF5 does not return from some damaged files, whatever signal comes, and may crash on others.
 """
 
-import subprocess
-import sys
 from pathlib import Path
 
-SCRIPT = Path(__file__)
+from ...geometry.basics import LostError, call_apart
+
 SIGNATURE = b"\x89HDF\r\n\x1a\n"
 LONGEST = 20.0
 """Seconds to look through a small file, which takes a fraction of one."""
@@ -31,19 +29,13 @@ def hdf5_fault(path: Path, longest: float = LONGEST) -> str | None:
 
     A small file is given up after `longest` seconds.
     """
-    command = [sys.executable, "-P", str(SCRIPT), str(path)]  # without this package's folder on the path
     try:
-        done = subprocess.run(command, capture_output=True, text=True, timeout=longest + _reading(path), check=False)
-    except subprocess.TimeoutExpired:
-        return "HDF5 does not come to an end with it"
-    if done.returncode < 0:
-        return "HDF5 crashes on it"
-    return done.stderr.strip().rpartition("\n")[2] or "HDF5 cannot read it" if done.returncode else None
-
-
-def _reading(path: Path) -> float:
-    """Seconds to read a file of its size."""
-    return path.stat().st_size / PACE
+        call_apart(longest + path.stat().st_size / PACE, look_through, path)
+    except LostError as error:
+        return f"HDF5 {error}"
+    except Exception as error:
+        return str(error).strip().rpartition("\n")[2] or "HDF5 cannot read it"
+    return None
 
 
 def look_through(path: str | Path) -> None:
@@ -66,7 +58,3 @@ def look_through(path: str | Path) -> None:
     with h5py.File(path, "r") as file:
         dict(file.attrs)
         file.visititems(read)
-
-
-if __name__ == "__main__":
-    look_through(sys.argv[1])

@@ -1,15 +1,18 @@
+from .apart import LostError as LostError, call_apart as call_apart
 from .arrays import (
+    MAGNET_CONDUCTIVITY as MAGNET_CONDUCTIVITY,
+    MU_0 as MU_0,
     Array as Array,
     even_directions as even_directions,
     frozen_array as frozen_array,
     spread_points as spread_points,
 )
 from .box import Box as Box, rotation_angles as rotation_angles, rotation_matrix as rotation_matrix
-from .constants import MAGNET_CONDUCTIVITY as MAGNET_CONDUCTIVITY, MU_0 as MU_0
 from .cylinder import Cylinder as Cylinder
 from .errors import (
     ComputationError as ComputationError,
     InputError as InputError,
+    MeshError as MeshError,
     SpinlevError as SpinlevError,
     printable as printable,
     shown as shown,

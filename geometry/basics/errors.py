@@ -20,6 +20,10 @@ class ComputationError(SpinlevError, RuntimeError):
     """The computation ended without an answer; the message says why, and what would help."""
 
 
+class MeshError(ComputationError):
+    """No mesh of the bodies, or one whose elements do not match each other."""
+
+
 def shown(value: object, most: int = 80) -> str:
     """What was received, for a message: as Python writes it, on one line, no longer than `most`."""
     try:

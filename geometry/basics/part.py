@@ -30,6 +30,7 @@ class Part(Posed):
     ----------
     file : where it was read
     step : the file's text
+    brep : the solid as OpenCASCADE writes it for itself, mm
     triangles : (n, 3, 3) m, corners of triangles on the surface, outwards, from the middle along the body axes
     extent : (3,) m, edges of the box about it
     origin : (3,) m, the file's origin, from the middle along the body axes
@@ -41,6 +42,7 @@ class Part(Posed):
 
     file: Path
     step: str
+    brep: str
     triangles: Array
     extent: Array
     origin: Array

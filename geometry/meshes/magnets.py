@@ -16,13 +16,18 @@ import netgen.occ as occ
 import ngsolve as ng
 import numpy as np
 
-from ..basics import Array, Box, Cylinder, Part, Ring, Solid, frozen_array, moved
+from ..basics import Array, Box, Cylinder, LostError, MeshError, Part, Ring, Solid, call_apart, frozen_array, moved
 from ..bodies import Magnet, overlapping_magnets
-from .solids import occ_solid, part_edges
+from .solids import LONGEST, SIMPLER, SMALLEST, occ_solid
 
 LARGE = 100.0
 TINY = 1e-7
 """Lengths in units of the mesh; a gap of a micrometre between centimetres is 1e-4."""
+GRADED = 0.5
+"""Size of the elements at the edges of a part, for each layer that others have there: netgen's layers know no corner of
+more than three edges, and crash."""
+ON_EDGE = 5e-3
+"""How near to the edges of a part's triangles its own lie, in circumradii."""
 
 
 @dataclass(frozen=True)
@@ -105,6 +110,7 @@ def mesh_magnets(
     Raises
     ------
     ValueError : no magnet, or two that overlap
+    MeshError : a part from a file cannot be meshed
     """
     settings = settings or MeshSettings()
     magnets = tuple(magnets)
@@ -116,19 +122,46 @@ def mesh_magnets(
     places = np.array([magnet.body.center for magnet in magnets])
     center = ((places - reach).min(axis=0) + (places + reach).max(axis=0)) / 2
     unit = max(_farthest(magnet.body, center) for magnet in magnets)
+    bodies = [magnet.body for magnet in magnets] if edges_of is None else list(edges_of)
+    given = magnets, bodies, center, unit, settings, planes
+    if any(isinstance(body, Part) for body in bodies):  # on whose shape the mesher may crash
+        try:
+            mesh = call_apart(LONGEST, _meshed, *given)
+        except LostError as error:
+            raise MeshError(f"The mesher {error}: {_files(bodies)}. {SIMPLER}") from None
+    else:
+        mesh = _meshed(*given)
+    return MagnetMesh(mesh, magnets, frozen_array(center, (3,)), unit, settings.ball_radius, planes)
+
+
+def _files(bodies: Sequence[Solid]) -> str:
+    return ", ".join(sorted({body.file.name for body in bodies if isinstance(body, Part)}))
+
+
+def _meshed(
+    magnets: Sequence[Magnet],
+    bodies: Sequence[Solid],
+    center: Array,
+    unit: float,
+    settings: MeshSettings,
+    planes: tuple[int, ...],
+) -> Any:
+    """The mesh of `mesh_magnets`, in `unit` from `center`; at the edges of `bodies` elements are small."""
     kept = _kept_side(planes)
     solids = []
     for k, magnet in enumerate(magnets):
         solid = occ_solid(magnet.body, center, unit) * kept
         solid.mat(f"magnet{k}")
-        thinnest, cube = float(magnet.body.size.min()), magnet.body.volume ** (1 / 3)
-        solid.maxh = settings.magnet_size * (min(thinnest, cube) * cube) ** 0.5 / unit
+        solid.maxh = _size(magnet.body, settings) / unit
         if solid.solids:
             solids.append(solid)
-    bodies = [magnet.body for magnet in magnets] if edges_of is None else edges_of
-    placed = [moved(body, body.center - center) for body in bodies]
-    mesh = _generate(solids, kept, planes, placed, unit, settings)
-    return MagnetMesh(mesh, magnets, frozen_array(center, (3,)), unit, settings.ball_radius, planes)
+    return _generate(solids, kept, planes, [moved(body, body.center - center) for body in bodies], unit, settings)
+
+
+def _size(body: Solid, settings: MeshSettings) -> float:
+    """Largest element in a magnet, m."""
+    thinnest, cube = float(body.size.min()), body.volume ** (1 / 3)
+    return float(settings.magnet_size * (min(thinnest, cube) * cube) ** 0.5)
 
 
 def _farthest(body: Solid, center: Array) -> float:
@@ -159,15 +192,35 @@ def _generate(
         for axis in planes:
             if abs(face.center[axis]) < TINY:
                 face.name = f"plane{axis}"
-    if settings.hp_layers:
+    parts = [body for body in bodies if isinstance(body, Part)]
+    layered = settings.hp_layers and len(parts) < len(bodies)
+    if layered:
         _mark_singular(shape, bodies, unit)
-        _mark_parts(shape, bodies, unit)
-    sizes = {"maxh": settings.air_size, "grading": settings.grading, "curvaturesafety": settings.curvature}
-    mesh = ng.Mesh(occ.OCCGeometry(shape).GenerateMesh(**sizes, parallel_meshing=False))
-    if settings.hp_layers:
+    for edge in shape.edges if parts else ():
+        edge.maxh = min(
+            [
+                edge.maxh,
+                *(_size(b, settings) * GRADED**settings.hp_layers / unit for b in parts if _sharp(edge, b, unit)),
+            ]
+        )
+    smallest = min((SMALLEST * body.volume ** (1 / 3) / unit for body in parts), default=0.0)
+    sizes = {"maxh": settings.air_size, "minh": smallest, "grading": settings.grading}
+    sizes["curvaturesafety"] = settings.curvature
+    try:
+        mesh = ng.Mesh(occ.OCCGeometry(shape).GenerateMesh(**sizes, parallel_meshing=False))
+    except Exception as error:  # netgen raises several kinds
+        if not parts:
+            raise
+        raise MeshError(f"The mesher gives up {_files(parts)}: {error}. {SIMPLER}") from None
+    if layered:
         mesh.RefineHP(settings.hp_layers, settings.hp_factor)
     mesh.Curve(settings.curve_order)
     return mesh
+
+
+def _sharp(edge: Any, body: Part, unit: float) -> bool:
+    """Whether an edge of the mesh's geometry is one at which faces of a part meet at an angle."""
+    return edge.mass > TINY and float(body.edge_distance(_middle(edge)[None] * unit)[0]) < ON_EDGE * body.circumradius
 
 
 def _mark_singular(shape: Any, bodies: Sequence[Solid], unit: float) -> None:
@@ -181,23 +234,6 @@ def _mark_singular(shape: Any, bodies: Sequence[Solid], unit: float) -> None:
         directions = _edge_directions(np.array([vertex.p.x, vertex.p.y, vertex.p.z]), bodies, unit)
         if any(abs(first @ second) < 1 - TINY for first, second in combinations(directions, 2)):
             vertex.hpref = 1
-
-
-def _mark_parts(shape: Any, bodies: Sequence[Solid], unit: float) -> None:
-    """Mark the edges of parts, and the points where three of them meet."""
-    sharp = [edge for body in bodies if isinstance(body, Part) for edge in part_edges(body, np.zeros(3), unit)]
-    for edge in shape.edges if sharp else ():
-        if edge.mass > TINY and _touched(_middle(edge), sharp):
-            edge.hpref = 1
-    for vertex in shape.vertices if sharp else ():
-        if _touched(np.array([vertex.p.x, vertex.p.y, vertex.p.z]), sharp) > 2:
-            vertex.hpref = 1
-
-
-def _touched(point: Array, edges: Sequence[Any]) -> int:
-    """On how many of the edges a point lies."""
-    place = occ.Vertex(occ.Pnt(*map(float, point)))
-    return sum(place.Distance(edge) < TINY for edge in edges)
 
 
 def _middle(edge: Any) -> Array:

@@ -599,7 +599,7 @@ def test_a_foreign_file_that_hdf5_does_not_return_from_is_given_up(tmp_path):
 def test_a_foreign_file_that_hdf5_crashes_on_is_refused(spinlev, monkeypatch, tmp_path):
     """The process that looks through it dies, as HDF5 has made it on damaged files; the program does not."""
     foreign_file("r.nc")
-    crashing(monkeypatch, tmp_path / "dies", "foreign.py")
+    crashing(monkeypatch, tmp_path / "dies", "storage.foreign")
     status, _, said = spinlev("cite", "r.nc")
     assert status == 2
     assert "HDF5 crashes on it" in said.replace("\n", " ")
@@ -609,6 +609,6 @@ def test_hdf5_of_a_mesh_is_looked_through_too(monkeypatch, tmp_path):
     points = np.random.default_rng(0).uniform(-1e-2, 1e-2, (8, 3))
     meshio.Mesh(points, [("vertex", np.arange(8)[:, None])], {"B": points}).write(tmp_path / "map.xdmf")
     np.testing.assert_array_equal(read_field_map(tmp_path / "map.xdmf").field, points)
-    crashing(monkeypatch, tmp_path / "dies", "foreign.py")
+    crashing(monkeypatch, tmp_path / "dies", "storage.foreign")
     with pytest.raises(FieldMapError, match="HDF5 crashes on it"):
         read_field_map(tmp_path / "map.xdmf")

@@ -1,5 +1,6 @@
 """Magnets from STEP files: beside the same shape by key, and what no magnet can be made of."""
 
+import re
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -13,6 +14,7 @@ from spinlev.fem.rotor_tables.accuracy import error_points
 from spinlev.fem.rotor_tables.table_file import load_table, save_table
 from spinlev.geometry.basics import Box, Cylinder, InputError, moved, rotation_matrix
 from spinlev.geometry.bodies import Magnet, known_shape, overlapping_magnets, read_part
+from spinlev.geometry.bodies.step_file import _refuse_open, _roots
 from spinlev.geometry.scenes import SceneError, magnets, parse_scene, scene, scene_text, sphere
 
 BALL = sphere(diameter_mm=12.7, remanence_T=1.305, density_kg_m3=7500.0)
@@ -31,9 +33,25 @@ def folder(tmp_path_factory):
     (cube - occ.Box(occ.Pnt(0, 0, -5), occ.Pnt(5, 5, 5))).WriteStep(str(path / "ell.step"))
     two = [occ.Box(occ.Pnt(0, 0, z), occ.Pnt(1, 1, z + 1)) for z in (0, 3)]
     occ.Compound(two).WriteStep(str(path / "two.step"))
+    cube_text, plane = ((path / f"{name}.step").read_text() for name in ("cube", "open"))
+    (path / "roots.step").write_text(joined(cube_text, (path / "cylinder.step").read_text()))
+    (path / "plane_first.step").write_text(joined(plane, cube_text))
+    (path / "gap.step").write_text(re.sub(r"CLOSED_SHELL\('',\(#\d+,", "CLOSED_SHELL('',(", cube_text))
+    (path / "bare.step").write_text(re.sub(r"#\d+ = MANIFOLD_SOLID_BREP[^;]*;", "", cube_text))
+    occ.Box(occ.Pnt(0, 0, 0), occ.Pnt(1e6, 1e6, 1e6)).WriteStep(str(path / "huge.step"))
     (path / "empty.step").write_text("")
     (path / "text.step").write_text("solid of revolution")
     return path
+
+
+def joined(first, second):
+    """A STEP file with the roots of two."""
+    head, _, data = first.partition("DATA;")
+    data = data.partition("ENDSEC;")[0]
+    beyond = max(int(number) for number in re.findall(r"#(\d+)", data))
+    more = second.partition("DATA;")[2].partition("ENDSEC;")[0]
+    more = re.sub(r"#(\d+)", lambda found: f"#{int(found[1]) + beyond}", more)
+    return f"{head}DATA;{data}{more}ENDSEC;\nEND-ISO-10303-21;\n"
 
 
 def worst(one, other, magnet):
@@ -143,11 +161,22 @@ def test_a_table_with_a_part_needs_its_file_no_more(folder, tmp_path):
 @pytest.mark.parametrize(
     ("keys", "said"),
     [
-        ({"file": "open.step"}, "must hold one closed solid; instead .*open.step holds none, and 1 open faces"),
+        ({"file": "open.step"}, "must hold one closed solid; instead .*open.step holds none, and 1 open face"),
         ({"file": "empty.step"}, "must be a STEP file; instead .*empty.step is empty"),
         ({"file": "none.step"}, "must be a STEP file; instead there is no .*none.step"),
         ({"file": "text.step"}, "must be a STEP file; instead .*text.step does not begin with ISO-10303-21"),
-        ({"file": "two.step"}, "must hold one closed solid; instead .*two.step holds 2 solids"),
+        ({"file": "two.step"}, "must hold one closed solid; instead .*two.step holds 2 solids. Export one"),
+        ({"file": "roots.step"}, "must hold one closed solid; instead .*roots.step holds 2 solids. Export one"),
+        (
+            {"file": "gap.step"},
+            "must hold one closed solid; instead .*gap.step holds 1 solid, of which OpenCASCADE reads none",
+        ),
+        (
+            {"file": "huge.step"},
+            "must hold one closed solid; instead .*huge.step holds one of 1e\\+06 × 1e\\+06 × 1e\\+06 mm",
+        ),
+        ({"file": "bare.step"}, "must hold one closed solid; instead .*bare.step holds none, and 0 open faces"),
+        ({"file": "."}, "must be a STEP file; instead .* is no regular file"),
         ({"file": "cube.step", "shape": "sphere"}, "shape must be left out beside file; instead received 'sphere'"),
         ({"file": "cube.step", "size_mm": [1.0, 1.0, 1.0]}, "must have no size beside file; instead received size_mm"),
     ],
@@ -187,3 +216,94 @@ def test_mutual_magnetisation_of_a_part_is_refused_for_what_it_is(folder):
         False,
         "the answer of magnet 1 is not known: it is a part from a STEP file, whose remanence has no closed form",
     )
+
+
+@pytest.mark.parametrize("lost", [[0], [0, 1], list(range(6))], ids=["half a face", "a face", "three faces"])
+def test_triangles_that_do_not_close_are_no_solid(folder, lost):
+    triangles = read_part(folder / "cube.step").triangles
+    _refuse_open(triangles, 1e-6)
+    with pytest.raises(InputError, match="surface does not close"):
+        _refuse_open(np.delete(triangles, lost, axis=0), 1e-6)
+
+
+def test_a_solid_is_found_behind_a_root_without_one(folder):
+    assert read_part(folder / "plane_first.step").volume == pytest.approx(1e-6, rel=1e-12)
+
+
+def test_a_component_is_no_root_of_its_own():
+    """An assembly of one part: two definitions of shapes, of which one is the other's component."""
+    rows = [
+        "#1=SHAPE_DEFINITION_REPRESENTATION(#2,#9);", "#2=PRODUCT_DEFINITION_SHAPE('a;#7','',#3);",
+        "#4=SHAPE_DEFINITION_REPRESENTATION(#5,#9);", "#5=PRODUCT_DEFINITION_SHAPE('','',#6);",
+        "#7=NEXT_ASSEMBLY_USAGE_OCCURRENCE('1','','',#3,#6,$);",
+    ]  # fmt: skip
+    assert _roots("\n".join(rows)) == ["\n".join(rows)]
+    first, second = _roots("\n".join(rows[:4]))
+    assert [text.count("SHAPE_DEFINITION_REPRESENTATION") for text in (first, second)] == [1, 1]
+    assert ("#1=" in first, "#4=" in second) == (True, True)
+
+
+def test_the_box_about_splines_is_that_of_the_solid(tmp_path):
+    """A cylinder and a ball of spline faces: to 1e-4 of the size, where the box of their control points is twice it."""
+    same = occ.gp_GTrsf(mat=[1, 0, 0, 0, 1, 0, 0, 0, 1], vec=[0, 0, 0])
+    solids = {"rod": occ.Cylinder(occ.Pnt(0, 0, 0), occ.Z, r=5, h=8), "ball": occ.Sphere(occ.Pnt(0, 0, 0), 5)}
+    for name, height in (("rod", 8e-3), ("ball", 10e-3)):
+        same(solids[name]).WriteStep(str(tmp_path / f"{name}.step"))
+        part = read_part(tmp_path / f"{name}.step")
+        assert part.size == pytest.approx([10e-3, 10e-3, height], rel=1e-4)
+
+
+ROUNDED = {
+    "chamfered cube": lambda: cube(lambda c: c.MakeChamfer(c.edges, 1.0)),
+    "rounded cube": lambda: cube(lambda c: c.MakeFillet(c.edges, 0.5)),
+    "three edges": lambda: cube(lambda c: c.MakeChamfer(c.edges[:3], 1.3)),
+    "rod": lambda: disc(5, 8, lambda c: c.MakeChamfer(rims(c, 4), 0.5)),
+    "disc": lambda: disc(5, 3, lambda c: c.MakeFillet(rims(c, 1.5), 0.6)),
+    "ring": lambda: (lambda r: r.MakeChamfer(rims(r, 2.5), 0.4))(disc(8, 5) - disc(3.5, 5)),
+    "bored": lambda: cube() - disc(1.5, 20),
+}
+"""Solids as magnets are sold, mm."""
+
+
+def cube(edged=lambda solid: solid):
+    return edged(occ.Box(occ.Pnt(-5, -5, -5), occ.Pnt(5, 5, 5)))
+
+
+def disc(radius, height, edged=lambda solid: solid):
+    return edged(occ.Cylinder(occ.Pnt(0, 0, -height / 2), occ.Z, r=radius, h=height))
+
+
+def rims(solid, height):
+    return [edge for edge in solid.edges if abs(abs(edge.center.z) - height) < 1e-6]
+
+
+VOLUMES = {
+    "chamfered cube": 945 + 1 / 3,
+    "rounded cube": 9**3 + 6 * 9**2 * 0.5 + 3 * 9 * np.pi * 0.5**2 + 4 / 3 * np.pi * 0.5**3,
+    "three edges": None,
+    "rod": np.pi * (25 * 7 + 2 * (0.5 * (25 + 5 * 4.5 + 4.5**2) / 3)),
+    "disc": None,
+    "ring": np.pi * (64 - 3.5**2) * 5 - np.pi * 0.4**2 * 2 * ((8 - 0.4 / 3) + (3.5 + 0.4 / 3)),
+    "bored": 1000 - np.pi * 1.5**2 * 10,
+}
+"""mm³, where a line does."""
+
+
+@pytest.mark.parametrize(
+    "name", [n if n == "chamfered cube" else pytest.param(n, marks=pytest.mark.slow) for n in ROUNDED]
+)
+def test_a_chamfered_or_rounded_magnet_has_its_moment_and_converges(tmp_path, name):
+    """μr = 1: M V. μr = 1.05: 1e-3 is reached and stated, and 1e-4 lies within the two statements of it."""
+    ROUNDED[name]().WriteStep(str(tmp_path / "part.step"))
+    part = read_part(tmp_path / "part.step")
+    if VOLUMES[name] is not None:
+        assert part.volume == pytest.approx(VOLUMES[name] * 1e-9, rel=1e-6)  # that of OpenCASCADE's quadrature
+    rigid = Magnet(part, (0.3, 0.0, 1.0))
+    assert rotor_table((rigid,), "dipole").moment == pytest.approx(rigid.moment, rel=1e-5, abs=1e-7 * rigid.moment[2])
+    magnet = Magnet(part, (0.3, 0.0, 1.0), 1.05)
+    tables = [rotor_table((magnet,), "fem", rtol) for rtol in (1e-3, 1e-4)]
+    points, scale = error_points((magnet,), 0.8 * part.volume ** (1 / 3))
+    apart = np.linalg.norm(tables[0].evaluate(points)[0] - tables[1].evaluate(points)[0], axis=1)
+    stated = [table.absolute_error(points)[0] for table in tables]
+    assert np.all(apart < stated[0] + stated[1])
+    assert np.max(stated[0] / scale) < 1e-3

@@ -41,7 +41,7 @@ def test_the_same_text_has_the_same_digest_wherever_it_lies(copy):
     ("file", "constant", "expected"),
     [
         ("fem/magnetostatics/refinement_ladder.py", "SAFETY = 1.25", [ROTOR, PLATE, SCENE]),
-        ("geometry/basics/constants.py", "MU_0 = 4e-7", [ROTOR, PLATE, SCENE]),
+        ("geometry/basics/arrays.py", "MU_0 = 4e-7", [ROTOR, PLATE, SCENE]),
         ("fem/plate_tables/field_functions.py", "SPACING = 2.5", [PLATE, SCENE]),
         ("dynamics/flights/compiled_flight.py", "TOLERANCE = 1e-16", [SCENE]),
         ("studies/sweeps/workers.py", "TRIES = 3", []),
