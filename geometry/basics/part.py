@@ -134,31 +134,48 @@ class Part(Posed):
         """Points (n, 3) m of its elements as they are."""
         return points
 
+    @cached_property
+    def _balls(self) -> tuple[Array, Array]:
+        """Centroids (n, 3) of the triangles and how far each reaches from its own (n,), m."""
+        middles = self.triangles.mean(axis=1)
+        return middles, np.linalg.norm(self.triangles - middles[:, None], axis=2).max(axis=1)
+
     def _distance(self, points: Array) -> Array:
+        middles, radii = self._balls
+        apart = np.linalg.norm(points[:, None] - middles, axis=2)
+        # a triangle all of which lies beyond the nearest centroid is not the nearest: most are left out
+        who, which = np.nonzero(apart - radii <= apart.min(axis=1)[:, None])
+        a, b, c = (self.triangles[which, k] - points[who] for k in range(3))
+        each = np.min([_segment(a, b), _segment(b, c), _segment(c, a), _plane(a, b, c)], axis=0)
+        nearest = np.minimum.reduceat(each, np.flatnonzero(np.diff(who, prepend=-1)))
+        inside = np.all(np.abs(points) <= self.extent / 2, axis=1)
+        inside[inside] = self._around(points[inside]) > np.pi  # half of the solid angle
+        return np.asarray(np.where(inside, -nearest, nearest))
+
+    def _around(self, points: Array) -> Array:
+        """Half of the solid angle (n,) that the triangles take as seen from points."""
         a, b, c = (self.triangles[None, :, k] - points[:, None] for k in range(3))
         la, lb, lc = (np.linalg.norm(v, axis=2) for v in (a, b, c))
         volume = np.einsum("nti,nti->nt", a, np.cross(b, c))
         base = la * lb * lc + np.einsum("nti,nti->nt", a, b) * lc
         base += np.einsum("nti,nti->nt", b, c) * la + np.einsum("nti,nti->nt", c, a) * lb
-        inside = np.arctan2(volume, base).sum(axis=1) > np.pi  # half of the solid angle
-        nearest = np.min([_segment(a, b), _segment(b, c), _segment(c, a), _plane(a, b, c)], axis=0).min(axis=1)
-        return np.asarray(np.where(inside, -nearest, nearest))
+        return np.asarray(np.arctan2(volume, base).sum(axis=1))
 
 
 def _segment(a: Array, b: Array) -> Array:
-    """Distance (n, t) of the origin from segments."""
+    """Distance (...,) of the origin from segments."""
     way = b - a
-    share = np.clip(-np.sum(a * way, axis=2) / np.maximum(np.sum(way * way, axis=2), 1e-300), 0.0, 1.0)
-    return np.asarray(np.linalg.norm(a + share[..., None] * way, axis=2))
+    share = np.clip(-np.sum(a * way, axis=-1) / np.maximum(np.sum(way * way, axis=-1), 1e-300), 0.0, 1.0)
+    return np.asarray(np.linalg.norm(a + share[..., None] * way, axis=-1))
 
 
 def _plane(a: Array, b: Array, c: Array) -> Array:
-    """Distance (n, t) of the origin from the planes of triangles over which it lies; else infinite."""
+    """Distance (...,) of the origin from the planes of triangles over which it lies; else infinite."""
     normal = np.cross(b - a, c - a)
-    size = np.maximum(np.linalg.norm(normal, axis=2), 1e-300)
-    height = np.sum(a * normal, axis=2) / size
+    size = np.maximum(np.linalg.norm(normal, axis=-1), 1e-300)
+    height = np.sum(a * normal, axis=-1) / size
     foot = height[..., None] * normal / size[..., None]
     over = np.ones(height.shape, bool)
     for first, second in ((a, b), (b, c), (c, a)):
-        over &= np.sum(np.cross(second - first, foot - first) * normal, axis=2) >= 0
+        over &= np.sum(np.cross(second - first, foot - first) * normal, axis=-1) >= 0
     return np.where(over, np.abs(height), np.inf)
