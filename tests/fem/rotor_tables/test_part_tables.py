@@ -176,7 +176,7 @@ def test_a_table_with_a_part_needs_its_file_no_more(folder, tmp_path):
             "must hold one closed solid; instead .*huge.step holds one of 1e\\+06 × 1e\\+06 × 1e\\+06 mm",
         ),
         ({"file": "bare.step"}, "must hold one closed solid; instead .*bare.step holds none, and 0 open faces"),
-        ({"file": "."}, "must be a STEP file; instead .* is no regular file"),
+        ({"file": "."}, "must be a STEP file; instead .* is a folder"),
         ({"file": "cube.step", "shape": "sphere"}, "shape must be left out beside file; instead received 'sphere'"),
         ({"file": "cube.step", "size_mm": [1.0, 1.0, 1.0]}, "must have no size beside file; instead received size_mm"),
     ],
