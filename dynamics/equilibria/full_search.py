@@ -168,7 +168,10 @@ def own_spin(scene: Scene) -> float:
 
 
 def turning(scene: Scene) -> None:
-    """Raises EquilibriumError beside a rotor at rest, but for a floater that spins and gravity along the axis."""
+    """Raises EquilibriumError beside a rotor at rest, but for a floater that spins and gravity along the axis.
+
+    So it does where rotor or floater is not magnetised.
+    """
     if not scene.frequency and not own_spin(scene):
         raise EquilibriumError(
             "Beside a rotor at rest a magnet without spin has no stable equilibrium (S. Earnshaw, 1842). "
@@ -179,6 +182,13 @@ def turning(scene: Scene) -> None:
         raise EquilibriumError(
             "Beside a rotor at rest equilibria are known for gravity along its axis alone; this scene's has a part "
             "across it. Turn the scene's axes, or simulate its motion."
+        )
+    rotor = any(magnet.polarization.any() for magnet in scene.rotor)
+    if not (rotor and scene.floater.remanence):
+        key, what = ("floater.remanence_T", "floater") if rotor else ("rotor.remanence_T or polarization_T", "rotor")
+        raise EquilibriumError(
+            f"Nothing levitates: the {what} is not magnetised, so that it does not turn with the other. Give {key}, or "
+            "simulate from a start.position_mm."
         )
 
 

@@ -10,6 +10,9 @@ from numpy.typing import ArrayLike
 from ...geometry.basics import Array
 from ...geometry.scenes import Scene
 
+WEIGHTLESS = 1e-9
+"""Gravity, m/s², that sets no unit of time."""
+
 
 @dataclass(frozen=True, eq=False)
 class State:
@@ -76,7 +79,7 @@ class Scales:
         ratio = scene.floater.spin_ratio
         if scene.frequency:
             return cls(radius, 1 / abs(scene.angular_velocity), ratio)
-        return cls(radius, float(np.sqrt(radius / weight)) if weight else 1.0, ratio)
+        return cls(radius, float(np.sqrt(radius / weight)) if weight > WEIGHTLESS else 1.0, ratio)
 
     def pack(self, state: State) -> Array:
         """Scaled state (..., 12): position, velocity, moment, spin."""

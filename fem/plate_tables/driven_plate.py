@@ -100,6 +100,8 @@ def turning_rotor(plate: Plate, rotor: RotorTable) -> OtherSources:
     between = (depths[1:] + depths[:-1]) / 2 if way else depths
     probes = [posed_rotor(parts, plate, angle + step / 2, depth) for depth in between for angle in angles[:3]]
     centers = np.array([magnet.box.center for magnet in rotor.magnets])
+    if not parts:  # a rotor without a field
+        training, probes = [], []
     return OtherSources(training, probes, plate.box.to_body(centers))
 
 

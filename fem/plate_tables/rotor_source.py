@@ -65,7 +65,9 @@ class RotorSource:
     def vector_potential(self, points: Array) -> Array:
         """A (n, 3), T m, at points (n, 3), m, in the plate's frame."""
         places = self.center + points @ self.turn
-        total = np.sum([part.vector_potential(places) for part in self.parts], axis=0)
+        total = np.zeros(places.shape)  # a rotor without a field has no parts
+        for part in self.parts:
+            total = total + part.vector_potential(places)
         return np.asarray(total @ self.turn.T)
 
 

@@ -56,6 +56,8 @@ def rotor_share(
     while True:
         series, samples = _sampled(listen, distance, angles, depths)
         size = np.abs(samples).max()
+        if not size:  # a rotor without a field
+            return RotorShare(distance, series[:3, :, :1] * 0.0, 0.0)
         turns = float(np.abs(series[-4:]).max() / size)  # of two harmonics: symmetry may forbid one
         ways = float(np.abs(series[..., -1]).max() / size) if distance else 0.0
         if max(turns, ways) <= tolerance / 2:

@@ -196,6 +196,8 @@ def _start(start: StartSection | None) -> OffsetStart | AbsoluteStart:
     if start.position_mm is None:
         return OffsetStart(_metres(start.offset_mm or [0.0, 0.0, 0.1]))
     moment = np.array(start.moment or [0.0, 0.0, 1.0])
+    if not 1e-100 < np.abs(moment).max() < 1e100:  # squares of its parts are no numbers
+        moment = moment / np.abs(moment).max()
     return AbsoluteStart(
         position=_metres(start.position_mm),
         velocity=_metres(start.velocity_mm_s or [0.0, 0.0, 0.0]),

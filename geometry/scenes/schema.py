@@ -2,7 +2,21 @@
 
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Discriminator, Field, Tag
+from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Discriminator, Field, Tag
+from pydantic_core import PydanticCustomError
+
+
+def _zero_or(least: float) -> AfterValidator:
+    """Refuse numbers, or lists of them, that are nearly zero: nobody means them, and their inverses are infinite."""
+
+    def checked(value: Any) -> Any:
+        size = max(abs(entry) for entry in value) if isinstance(value, list) else abs(value)
+        if 0 < size < least:
+            raise PydanticCustomError("nearly_zero", "zero, or at least {least}", {"least": f"{least:g}"})
+        return value
+
+    return AfterValidator(checked)
+
 
 Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]
 NotNegative = Annotated[Number, Field(ge=0.0)]
@@ -11,15 +25,20 @@ Length = Annotated[Positive, Field(ge=1e-3, le=1e6)]
 Coordinate = Annotated[Number, Field(ge=-1e6, le=1e6)]
 Angle = Annotated[Number, Field(ge=-360.0, le=360.0)]
 Polarization = Annotated[Number, Field(ge=-100.0, le=100.0)]
-Remanence = Annotated[NotNegative, Field(le=100.0)]
+Remanence = Annotated[NotNegative, Field(le=100.0), _zero_or(1e-12)]
 Permeability = Annotated[Number, Field(ge=1.0, le=1e6)]
-Conductivity = Annotated[NotNegative, Field(le=1e9)]
-Coercivity = Annotated[Positive, Field(le=1e5)]
+Conductivity = Annotated[NotNegative, Field(le=1e9), _zero_or(1e-3)]
+Metal = Annotated[Number, Field(ge=1e-3, le=1e9)]
+Coercivity = Annotated[Positive, Field(ge=1e-6, le=1e5)]
+Brake = Annotated[NotNegative, Field(le=1e6), _zero_or(1e-30)]
+Acceleration = Annotated[Number, Field(ge=-1e6, le=1e6)]
+Speed = Annotated[Number, Field(ge=-1e9, le=1e9)]
+Turns = Annotated[Number, Field(ge=-1e6, le=1e6)]
 Vector = Annotated[list[Number], Field(min_length=3, max_length=3)]
 Sizes = Annotated[list[Length], Field(min_length=3, max_length=3)]
 Coordinates = Annotated[list[Coordinate], Field(min_length=3, max_length=3)]
 Angles = Annotated[list[Angle], Field(min_length=3, max_length=3)]
-Polarizations = Annotated[list[Polarization], Field(min_length=3, max_length=3)]
+Polarizations = Annotated[list[Polarization], Field(min_length=3, max_length=3), _zero_or(1e-12)]
 RECOIL_PERMEABILITY = 1.05
 """Default: sintered NdFeB."""
 
@@ -67,7 +86,7 @@ class ConductorSection(_Table):
     height_mm: Length | None = None
     center_mm: Coordinates
     rotation_deg: Angles = [0.0, 0.0, 0.0]
-    conductivity_S_m: Annotated[Positive, Field(le=1e9)]
+    conductivity_S_m: Metal
 
 
 class _AnyRotor(_Table):
@@ -154,16 +173,16 @@ class FloaterSection(_Table):
     height_mm: Length | None = None
     remanence_T: Remanence
     recoil_permeability: Permeability = RECOIL_PERMEABILITY
-    density_kg_m3: Annotated[Positive, Field(le=1e6)]
+    density_kg_m3: Annotated[Positive, Field(ge=1e-3, le=1e6)]
     conductivity_S_m: Conductivity | None = None
 
 
 class LoweringSection(_Table):
     """The plate's way down."""
 
-    start_s: NotNegative
-    speed_mm_s: Annotated[Positive, Field(le=1e6)]
-    distance_mm: Annotated[NotNegative, Field(le=1e6)]
+    start_s: Annotated[NotNegative, Field(le=1e9)]
+    speed_mm_s: Annotated[Positive, Field(ge=1e-6, le=1e6)]
+    distance_mm: Annotated[NotNegative, Field(le=1e6), _zero_or(1e-6)]
 
 
 class PlateSection(_Table):
@@ -172,7 +191,7 @@ class PlateSection(_Table):
     size_mm: Sizes
     center_mm: Coordinates
     rotation_deg: Angles = [0.0, 0.0, 0.0]
-    conductivity_S_m: Annotated[Positive, Field(le=1e9)]
+    conductivity_S_m: Metal
     lowering: LoweringSection | None = None
 
 
@@ -180,8 +199,8 @@ class DragSection(_Table):
     """Drag on the floater: of air by a model, or numbers."""
 
     model: Literal["stokes", "air"] | None = None
-    linear_N_s_m: NotNegative | None = None
-    angular_N_m_s: NotNegative | None = None
+    linear_N_s_m: Brake | None = None
+    angular_N_m_s: Brake | None = None
 
 
 class StartSection(_Table):
@@ -189,16 +208,16 @@ class StartSection(_Table):
 
     offset_mm: Coordinates | None = None
     position_mm: Coordinates | None = None
-    velocity_mm_s: Vector | None = None
+    velocity_mm_s: Annotated[list[Speed], Field(min_length=3, max_length=3)] | None = None
     moment: Vector | None = None
-    spin_hz: Vector | None = None
+    spin_hz: Annotated[list[Turns], Field(min_length=3, max_length=3)] | None = None
 
 
 class SceneSection(_Table):
     """The whole file."""
 
-    frequency_hz: Annotated[NotNegative, Field(le=1e6)]
-    gravity_m_s2: Vector = [0.0, 0.0, -9.81]
+    frequency_hz: Annotated[NotNegative, Field(le=1e6), _zero_or(1e-3)]
+    gravity_m_s2: Annotated[list[Acceleration], Field(min_length=3, max_length=3)] = [0.0, 0.0, -9.81]
     rotor: Rotor
     floater: FloaterSection
     plate: PlateSection | None = None

@@ -345,7 +345,10 @@ class Levitation:
         body = memory.plate.box.to_body(seen)
         try:
             region = wider_region(memory.plate, memory.table.region, radius, body)
-            note(f"After {time:.4g} s the floater leaves the range of the plate's table: again, with a larger one.")
+            note(
+                f"After {time:.4g} s the floater leaves the range of the plate's table: again from the start, with a "
+                "larger one."
+            )
             return self._plate_for(region)
         except SpinlevError as error:
             self.no_wider = str(error)

@@ -175,3 +175,15 @@ def air_cube():
 def test_meshes_that_make_no_sense_are_refused(make, said):
     with pytest.raises(ValueError, match=said):
         make()
+
+
+@pytest.mark.parametrize(("change", "what"), [("rotor", "rotor"), ("floater", "floater")])
+def test_what_is_not_magnetised_has_no_equilibria_and_is_said(change: str, what: str):
+    bare = replace(SCENE.rotor[0], polarization=np.zeros(3))
+    scenes = {
+        "rotor": replace(SCENE, rotor=(bare,)),
+        "floater": replace(SCENE, floater=replace(FLOATER, remanence=0.0)),
+    }
+    scene = scenes[change]
+    with pytest.raises(EquilibriumError, match=f"Nothing levitates: the {what} is not magnetised"):
+        find_equilibria(scene, rotor_table(scene.rotor, "dipole"))

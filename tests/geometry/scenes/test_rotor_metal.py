@@ -54,7 +54,7 @@ def test_magnets_that_conduct_differently_are_written_one_by_one():
     ("rotor", "message"),
     [
         ({"conductivity_S_m": -1.0}, "rotor.conductivity_S_m must be at least 0"),
-        ({"conductors": [SHAFT | {"conductivity_S_m": -2.0}]}, "conductors[0].conductivity_S_m must be greater than 0"),
+        ({"conductors": [SHAFT | {"conductivity_S_m": -2.0}]}, "conductors[0].conductivity_S_m must be at least 0.001"),
         ({"conductors": [SHAFT | {"center_mm": [0.0, 0.0, 15.0]}]}, "magnet 1 and conductor 1 overlap by 5 mm"),
         ({"conductors": [SHAFT, SHAFT]}, "conductor 1 and conductor 2 overlap by 8 mm"),
         ({"conductors": [SHAFT | {"size_mm": [1.0, 1.0, 1.0]}]}, "must have diameter_mm and height_mm"),

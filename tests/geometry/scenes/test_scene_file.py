@@ -1,11 +1,18 @@
 """Scene files: what loads, and what is said of what does not."""
 
+import copy
+import operator
+from collections.abc import Iterator
 from dataclasses import replace
+from functools import reduce
+from typing import Any
 
 import numpy as np
 import pytest
 from places import SCENES
 
+import spinlev as sl
+from spinlev.dynamics.motion import Scales, parameters
 from spinlev.geometry.basics import MU_0
 from spinlev.geometry.scenes import (
     AbsoluteStart,
@@ -111,7 +118,7 @@ def test_all_faults_are_listed_at_once():
         (("recoil_permeability = 1.05", "recoil_permeability = [1.0, 1.0, 1.0]"), "along the easy axis and across it"),
         (("displacement_mm", "angle_deg"), "rotor.angle_deg must be a known key"),
         (("density_kg_m3 = 7500.0", ""), "floater.density_kg_m3 must be given"),
-        (("conductivity_S_m = 3.5e7", "conductivity_S_m = 0.0"), "greater than 0"),
+        (("conductivity_S_m = 3.5e7", "conductivity_S_m = 0.0"), "at least 0.001"),
         (("linear_N_s_m = 2.2e-6", "linear_N_s_m = -1"), "drag.linear_N_s_m must be at least 0"),
         (("[35.0, 0.0, -21.0]", "[20.0, 0.0, -21.0]"), "overlaps magnet 1 by"),
         (("[drag]", "[start]\nmoment = [1, 0, 0]\n[drag]"), "must come with start.position_mm"),
@@ -267,3 +274,58 @@ def test_air_survives_writing():
 def with_drag(text):
     """The good scene with other keys under [drag], its last table."""
     return GOOD.partition("[drag]")[0] + "[drag]\n" + text
+
+
+EXTREMES = (5e-324, 1e-300, 1e-200, -5e-324, 1e200, 1.7e308)
+"""Numbers that TOML has and nobody means: subnormal ones, and such whose squares or inverses are no numbers."""
+LOWERING = {"start_s": 0.001, "speed_mm_s": 10.0, "distance_mm": 1.0}
+TABLE: dict[str, Any] = {
+    "frequency_hz": 130.0,
+    "gravity_m_s2": [0.0, 0.0, -9.81],
+    "rotor": sl.magnets({"size_mm": [10.0] * 3, "center_mm": [0.0] * 3, "polarization_T": [1.3, 0.0, 0.2]}),
+    "floater": sl.sphere(diameter_mm=12.7, remanence_T=1.3, density_kg_m3=7500.0, conductivity_S_m=6.7e5),
+    "plate": sl.plate(
+        size_mm=[100.0, 240.0, 30.0], center_mm=[0.0, 0.0, -65.0], conductivity_S_m=3.5e7,
+        lowering=LOWERING,
+    ),
+    "drag": {"linear_N_s_m": 1e-6, "angular_N_m_s": 1e-10},
+    "start": {
+        "position_mm": [0.0, 0.0, -22.0], "velocity_mm_s": [0.0] * 3, "moment": [0.0, 0.0, 1.0], "spin_hz": [0.0] * 3
+    },
+}  # fmt: skip
+
+
+def leaves(table: Any, path: tuple[Any, ...] = ()) -> Iterator[tuple[Any, ...]]:
+    """Paths of all numbers in a table."""
+    if not isinstance(table, dict | list):
+        yield path
+        return
+    for key, entry in table.items() if isinstance(table, dict) else enumerate(table):
+        yield from leaves(entry, (*path, key))
+
+
+@pytest.mark.parametrize("path", list(leaves(TABLE)), ids=lambda path: ".".join(map(str, path)))
+@pytest.mark.parametrize("extreme", EXTREMES)
+def test_extreme_numbers_are_refused_or_make_finite_equations(path: tuple[Any, ...], extreme: float):
+    """In every key: a fault of the scene, or parameters of the motion that are numbers; warnings are errors."""
+    table = copy.deepcopy(TABLE)
+    *way, last = path
+    reduce(operator.getitem, way, table)[last] = extreme
+    try:
+        scene = sl.scene(**table)
+    except SceneError:
+        return
+    scales = Scales.of(scene)
+    assert np.isfinite(parameters(scene, scales)).all()
+    assert isinstance(scene.start, AbsoluteStart)
+    assert np.linalg.norm(scene.start.moment) == pytest.approx(1.0, abs=1e-12)  # a direction, to round-off
+    assert np.isfinite(scene.start.velocity).all()
+
+
+def test_nearly_zero_is_refused_with_zero_and_the_least_as_the_way_out():
+    with pytest.raises(
+        SceneError, match=r"Input frequency_hz must be zero, or at least 0.001; instead received 1e-300"
+    ):
+        sl.scene(**{**TABLE, "frequency_hz": 1e-300})
+    with pytest.raises(SceneError, match=r"plate.lowering.speed_mm_s must be at least 1e-06; instead received 5e-324"):
+        sl.scene(**{**TABLE, "plate": {**TABLE["plate"], "lowering": LOWERING | {"speed_mm_s": 5e-324}}})
