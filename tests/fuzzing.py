@@ -38,6 +38,8 @@ LONGEST = 60
 """Seconds after which an input counts as a hang; of a scene, seconds of silence."""
 MOST = 2_000_000_000
 """Bytes of memory that a scene may take."""
+TOLD = 100
+"""Inputs after which the numbers so far are told."""
 GIVEN_UP = 300
 """Seconds after which a scene that says how far it is is left alone."""
 PATIENCE = 3
@@ -547,6 +549,10 @@ def fuzz(kind: str, number: int, seed: int = 0, faults: list[str] | None = None)
                         raise
                     faults.append(str(error))
                     print(error, file=sys.__stderr__, flush=True)
+                if faults is not None and (k + 1 - seed) % TOLD == 0:
+                    peak = f"{PEAKS['MB']:.0f} MB, {PEAKS['s']:.0f} s"
+                    told = f"{k + 1 - seed} of {number}: {dict(sorted(counts.items()))}, {peak}, {len(faults)} faults"
+                    print(told, file=sys.__stderr__, flush=True)
         finally:
             sys.unraisablehook = sys.__unraisablehook__
     return counts

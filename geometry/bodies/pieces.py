@@ -10,7 +10,7 @@ from .magnet import Magnet
 
 CONVERGENCE = 1.3
 """Least distance of a point from a piece's centre, in circumradii of the piece."""
-MOST = 1000
+MOST = 300
 """Pieces of a body."""
 
 

@@ -239,3 +239,20 @@ def test_a_box_stays_whole_where_its_moments_suffice(monkeypatch):
     assert np.all(true[0] <= stated[0] + cut.relative_error(points)[0])
     assert stated[0].max() <= rtol
     assert stated[0].max() <= 2 * true[0].max()
+
+
+@pytest.mark.parametrize("radius", [0.5e-6, 5e-5, 5e-4])
+def test_a_floater_far_smaller_than_the_magnets_needs_few_pieces(radius):
+    """A floater of 0.001 mm under a cube of 10 mm took 1e11 pieces: minutes, and 6 GB until it was given up."""
+    table = rotor_table(horizontal(2e-3, 10e-3, 1.3, 1.05), "dipole", nearest=radius)
+    assert len(table.doubts["permeability"]) == 27  # 3 along each edge, from a quarter of the edge on
+    below = np.array([[0.0, 0.0, -8e-3]])
+    assert table.in_range(below)[0]
+    assert np.isfinite(table.relative_error(below)[0])
+
+
+@pytest.mark.parametrize("size", [(1e3, 1e-6, 1e-6), (0.1, 0.1, 1e-4), (1e3, 1e3, 1e-6)])
+def test_a_magnet_of_too_many_pieces_is_refused_before_the_work(size):
+    needle = Magnet(Box(np.array(size), np.zeros(3)), np.array([1.3, 0.0, 0.0]), 1.05)
+    with pytest.raises(InputError, match=r"300 compact pieces make one up; instead .* Give it as several bodies\."):
+        rotor_table((needle,), "dipole", nearest=1e-3)
