@@ -11,7 +11,7 @@ from spinlev.fem.harmonics import trimmed_expansions, uniform_moments
 from spinlev.fem.magnetostatics import Refinement, solve_rotor
 from spinlev.fem.rotor_tables import Accuracy, AccuracyWarning, RotorTable, fem_table, rotor_table
 from spinlev.fem.rotor_tables.accuracy import error_points
-from spinlev.geometry.basics import Box
+from spinlev.geometry.basics import Box, InputError
 from spinlev.geometry.bodies import CONVERGENCE, Magnet, cut_magnets, horizontal, vertical
 from spinlev.geometry.meshes import MeshSettings
 from spinlev.studies.field_quality.field_hard_cases import extensions, reference
