@@ -180,7 +180,7 @@ def test_a_cache_that_cannot_be_written_costs_time_only(spinlev, monkeypatch, ta
     Path("cache").mkdir()
     shutil.copy(table, "cache")
     expected = spinlev(*FIELD)[1]
-    for place in (Path("points.csv", "below-a-file").absolute(), "/sys/spinlev"):
+    for place in (Path("points.csv", "below-a-file").absolute(), "/proc/spinlev"):
         monkeypatch.setenv("SPINLEV_CACHE", str(place))
         status, answer, said = spinlev(*FIELD)
         assert status == 0
@@ -240,7 +240,7 @@ def test_results_go_to_memory_before_the_disk_since_hdf5_crashes_on_a_full_one(t
     assert list(tmp_path.iterdir()) == []
 
 
-@pytest.mark.parametrize("place", ["points.csv", "points.csv/below", "/sys/spinlev"])
+@pytest.mark.parametrize("place", ["points.csv", "points.csv/below", "/proc/spinlev"])
 def test_an_output_folder_that_cannot_be_written(spinlev, place):
     """A file in its place, and a file system that even root may not write."""
     status, answer, said = spinlev(*WRITERS["field.csv"], "--out", place)

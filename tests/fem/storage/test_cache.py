@@ -87,7 +87,7 @@ def homeless(tmp_path, monkeypatch, request):
 
         monkeypatch.setattr(pwd, "getpwuid", unknown)
     else:
-        monkeypatch.setenv("HOME", "/dev/null" if request.param == HOMES[1] else "/sys")
+        monkeypatch.setenv("HOME", "/dev/null" if request.param == HOMES[1] else "/proc")
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
     monkeypatch.chdir(tmp_path)
     storage.cache._usable.cache_clear()
@@ -120,7 +120,7 @@ def test_who_has_no_home_does_not_take_what_others_can_write(homeless):
 
 @pytest.mark.parametrize("homeless", HOMES, indirect=True)
 def test_who_can_write_nowhere_computes_without_a_cache(homeless, monkeypatch):
-    monkeypatch.setattr(tempfile, "tempdir", "/sys")
+    monkeypatch.setattr(tempfile, "tempdir", "/proc")
     found, there, said = text("made")
     assert (found, there) == ("made", False)
     assert "could not be cached" in said[0]

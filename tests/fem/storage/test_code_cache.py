@@ -285,7 +285,7 @@ def test_where_nothing_can_be_kept_code_is_compiled(file, tmp_path, monkeypatch)
     file.mkdir()
     assert value() == (VALUE, True)
     (tmp_path / "file").touch()
-    for place in (tmp_path / "file", Path("/sys/spinlev")):
+    for place in (tmp_path / "file", Path("/proc/spinlev")):
         monkeypatch.setenv("SPINLEV_CACHE", str(place))
         assert value() == (VALUE, True)
 
