@@ -7,6 +7,7 @@ from .known_shapes import known_shape as known_shape
 from .magnet import Magnet as Magnet, polarizability as polarizability
 from .overlap import (
     TOUCHING as TOUCHING,
+    apart as apart,
     body_overlap as body_overlap,
     closing_shifts as closing_shifts,
     deepest_overlap_in_a_turn as deepest_overlap_in_a_turn,

@@ -2,7 +2,7 @@
 
 import hashlib
 import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 from pydantic import ValidationError
 
-from ..basics import Array, Box, Cylinder, InputError, Part, Solid, rotation_matrix
-from ..bodies import Conductor, Magnet, horizontal, known_shape, tilt, vertical
+from ..basics import Array, Box, Cylinder, InputError, Part, Solid, rotation_matrix, shown
+from ..bodies import Conductor, Magnet, horizontal, known_shape, read_part, tilt, vertical
 from .contents import AbsoluteStart, Drag, Lowering, MapReading, OffsetStart, Plate, Scene
 from .faults import SceneError, describe_fault, overlap_faults
 from .floater import Floater
@@ -30,35 +30,47 @@ from .schema import (
     TiltRotor,
     VerticalRotor,
 )
-from .shapes import MILLI, part, solid
+from .shapes import MILLI, placed, solid
 
 FILES = ("file", "field_map")
 """Keys that name one."""
 LARGEST = 2**30
 """Bytes of a file that a scene may name."""
+MOST_BODIES = 64
+"""Magnets and conductors of a scene beside a known one, unless that has more."""
 
 
-def assemble(keys: Mapping[str, Any], source: str, folder: Path | None = None) -> Scene:
-    """The scene of a scene file's keys; `source` names it in messages.
+def assemble(keys: Mapping[str, Any], source: str, folder: Path | None = None, known: Scene | None = None) -> Scene:
+    """The scene of a scene file's keys.
 
-    The files that it names lie in `folder`, left out: where `source` does.
+    Parameters
+    ----------
+    keys : as TOML has them
+    source : names it in messages
+    folder : where the files lie that it names; left out, where `source` does
+    known : for keys of which nothing is known, a scene whose files alone they may name, as it has them: no path is
+        opened, and there are at most `MOST_BODIES` or as many as it has. Left out: any file, which is read.
 
     Raises
     ------
-    SceneError : unknown, missing or wrong keys, or bodies that overlap
+    SceneError : unknown, missing or wrong keys, bodies that overlap, or a file that is not known
     """
     try:
         table = SceneSection.model_validate(keys)
     except ValidationError as error:
         raise SceneError(source, [describe_fault(detail) for detail in error.errors()]) from None
-    faults = key_faults(table)
+    faults = key_faults(table) + (_too_many(table.rotor, known) if known else [])
     if faults:
         raise SceneError(source, faults)
     try:
         folder = Path(source).parent if folder is None else folder
-        files = tuple((str(folder / name), content_digest(folder / name)) for name in _named_files(keys))
-        scene = replace(_scene(table, folder), folder=folder, files=files)
-    except InputError as error:  # a file of a magnet
+        scene = _scene(table, folder, known)
+        if known is None:
+            files = tuple((str(folder / name), content_digest(folder / name)) for name in _named_files(keys))
+        else:
+            folder, files = known.folder, known.files
+        scene = replace(scene, folder=folder, files=files)
+    except InputError as error:  # a file
         raise SceneError(source, [str(error)]) from None
     faults = overlap_faults(scene)
     if faults:
@@ -92,9 +104,10 @@ def _named_files(keys: Any) -> Iterator[str]:
         yield from _named_files(entry)
 
 
-def _scene(table: SceneSection, folder: Path) -> Scene:
+def _scene(table: SceneSection, folder: Path, known: Scene | None) -> Scene:
     drag, floater = table.drag or DragSection(model="stokes"), _floater(table.floater)
-    rotor = _rotor(table.rotor, folder)
+    parts = _parts(table.rotor, folder, known)
+    rotor = _rotor(table.rotor, parts)
     return Scene(
         frequency=table.frequency_hz,
         gravity=np.array(table.gravity_m_s2),
@@ -103,12 +116,51 @@ def _scene(table: SceneSection, folder: Path) -> Scene:
         plate=_plate(table.plate) if table.plate else None,
         drag=_drag(drag, floater),
         start=_start(table.start),
-        field_map=folder / table.rotor.field_map if table.rotor.field_map else None,
+        field_map=_field_map(table.rotor, folder, known),
         map_reading=MapReading(table.rotor.map_length_unit, table.rotor.map_field_unit, table.rotor.map_columns),
         conductors=tuple(
             Conductor(solid(c, c.center_mm, c.rotation_deg), c.conductivity_S_m) for c in table.rotor.conductors
         ),
         remarks=_recognised(table.rotor, rotor),
+        parts=tuple(parts.values()),
+    )
+
+
+def _too_many(rotor: Rotor, known: Scene) -> list[str]:
+    """What is wrong with a number of bodies whose overlaps would take minutes."""
+    number = len(rotor.conductors) + (len(rotor.magnets) if isinstance(rotor, ExplicitRotor) else 0)
+    most = max(MOST_BODIES, len(known.turning_bodies))
+    if number <= most:
+        return []
+    said = f"Input rotor must have at most {most} magnets and conductors here; instead received {number}."
+    return [f"{said} Give the scene to the command line."]
+
+
+def _parts(rotor: Rotor, folder: Path, known: Scene | None) -> dict[str, Part]:
+    """The solids of the files that a rotor names, by these names."""
+    if not isinstance(rotor, ExplicitRotor):
+        return {}
+    names = {magnet.file: f"rotor.magnets[{k}].file" for k, magnet in enumerate(rotor.magnets) if magnet.file}
+    if known is None:
+        return {name: read_part(folder / name) for name in names}
+    files = {part.file: part for part in known.parts}
+    return {name: files[_known_file(name, key, files, folder)] for name, key in names.items()}
+
+
+def _field_map(rotor: Rotor, folder: Path, known: Scene | None) -> Path | None:
+    if rotor.field_map is None or known is None:
+        return folder / rotor.field_map if rotor.field_map else None
+    return _known_file(rotor.field_map, "rotor.field_map", [known.field_map] if known.field_map else [], folder)
+
+
+def _known_file(name: str, key: str, files: Iterable[Path], folder: Path) -> Path:
+    """The one of the files that a name means: beside the scene, or by the end of its path. No disk is asked."""
+    ends = (file for file in files if file.parts[-len(Path(name).parts) :] == Path(name).parts)
+    for file in (*(file for file in files if file == folder / name), *ends):
+        return file
+    raise InputError(
+        f"Input {key} must be a file of the scene that was opened first; instead received {shown(name)}. Give the "
+        "scene to the command line."
     )
 
 
@@ -132,14 +184,14 @@ def _metres(millimetres: list[float]) -> Array:
     return np.array(millimetres) * MILLI
 
 
-def _rotor(rotor: Rotor, folder: Path) -> tuple[Magnet, ...]:
+def _rotor(rotor: Rotor, parts: Mapping[str, Part]) -> tuple[Magnet, ...]:
     if isinstance(rotor, ExplicitRotor):
-        return tuple(_magnet(magnet, rotor, folder) for magnet in rotor.magnets)
+        return tuple(_magnet(magnet, rotor, parts) for magnet in rotor.magnets)
     conductivity, knee = rotor.conductivity_S_m, _knee(rotor.coercivity_kA_m)
     return tuple(replace(magnet, conductivity=conductivity, coercivity=knee) for magnet in _of_article(rotor))
 
 
-def _magnet(magnet: MagnetSection, rotor: ExplicitRotor, folder: Path) -> Magnet:
+def _magnet(magnet: MagnetSection, rotor: ExplicitRotor, parts: Mapping[str, Part]) -> Magnet:
     """One of an explicit rotor, whose conductivity and knee it has where it has none of its own."""
     pose = magnet.center_mm, magnet.rotation_deg
     along, across = magnet.recoil_permeability
@@ -148,7 +200,7 @@ def _magnet(magnet: MagnetSection, rotor: ExplicitRotor, folder: Path) -> Magnet
     polarization = np.array(magnet.polarization_T)
     if not magnet.file:
         return Magnet(solid(magnet, *pose), polarization, *material)
-    body = part(folder / magnet.file, *pose)
+    body = placed(parts[magnet.file], *pose)
     known = known_shape(body)
     if known is None:
         return Magnet(body, polarization, *material)

@@ -6,7 +6,7 @@ from typing import Self
 
 import numpy as np
 
-from ..basics import Array, Box, Solid, frozen_array, html_table, listed, millimetres
+from ..basics import Array, Box, Part, Solid, frozen_array, html_table, listed, millimetres
 from ..bodies import Conductor, Magnet
 from .floater import Floater
 
@@ -114,6 +114,7 @@ class Scene:
     remarks : what was found out about its files, sentences for people
     folder : where the files lie that `text` names
     files : path of each file that it names, with the SHA-256 of its content when the scene was read
+    parts : the solids of the STEP files that its keys name, at home, also those that are computed as another shape
     """
 
     frequency: float
@@ -130,6 +131,7 @@ class Scene:
     remarks: tuple[str, ...] = ()
     folder: Path = field(default_factory=Path)
     files: tuple[tuple[str, str], ...] = ()
+    parts: tuple[Part, ...] = ()
 
     @property
     def angular_velocity(self) -> float:

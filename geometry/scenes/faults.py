@@ -10,7 +10,7 @@ from pydantic import BaseModel
 from pydantic_core import ErrorDetails
 
 from ..basics import InputError, Solid, printable, shown
-from ..bodies import TOUCHING, body_overlap, deepest_overlap_in_a_turn
+from ..bodies import TOUCHING, apart, body_overlap, deepest_overlap_in_a_turn
 from . import schema
 from .contents import AbsoluteStart, Scene
 
@@ -123,7 +123,7 @@ def overlap_faults(scene: Scene) -> list[str]:
         f"Input rotor must have magnets and conductors that do not overlap; instead {first} and {second} overlap by "
         f"{depth * 1e3:.4g} mm; move them apart by as much."
         for (first, one), (second, other) in combinations(bodies, 2)
-        if (depth := body_overlap(one, other)) > TOUCHING
+        if not apart(one, other) and (depth := body_overlap(one, other)) > TOUCHING
     ]
     if scene.plate:
         for name, body in bodies:

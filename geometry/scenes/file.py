@@ -59,7 +59,9 @@ def load_scene(path: str | Path) -> Scene:
     return scene
 
 
-def parse_scene(text: str, source: str = "scene", changes: Mapping[str, float] | None = None) -> Scene:
+def parse_scene(
+    text: str, source: str = "scene", changes: Mapping[str, float] | None = None, known: Scene | None = None
+) -> Scene:
     """Build a scene from the text of a scene file.
 
     Parameters
@@ -70,6 +72,8 @@ def parse_scene(text: str, source: str = "scene", changes: Mapping[str, float] |
         What messages call it.
     changes : dict of str to float, optional
         Numbers that replace those of the text, by key, such as `rotor.displacement_mm` or `plate.center_mm.2`.
+    known : Scene, optional
+        A scene whose files alone the text may name, for a text of which nothing is known: no other path is opened.
 
     Returns
     -------
@@ -84,7 +88,7 @@ def parse_scene(text: str, source: str = "scene", changes: Mapping[str, float] |
     keys = _keys(text, source)
     for key, value in (changes or {}).items():
         _replace(keys, key, value, source)
-    scene = assemble(keys, source)
+    scene = assemble(keys, source, known=known)
     return scene if changes else replace(scene, text=text)
 
 
@@ -107,7 +111,7 @@ def _keys(text: str, source: str) -> dict[str, Any]:
         ) from None
 
 
-def changed(scene: Scene, changes: Mapping[str, float], source: str = "scene") -> Scene:
+def changed(scene: Scene, changes: Mapping[str, float], source: str = "scene", known: Scene | None = None) -> Scene:
     """The scene with numbers replaced by key, as in `parse_scene`.
 
     Raises
@@ -117,7 +121,7 @@ def changed(scene: Scene, changes: Mapping[str, float], source: str = "scene") -
     keys, folder = keys_and_folder(scene)
     for key, value in changes.items():
         _replace(keys, key, value, source)
-    found = assemble(keys, source, folder)
+    found = assemble(keys, source, folder, known)
     before = dict(scene.files)
     for path, digest in found.files:
         if before.get(path, digest) != digest:

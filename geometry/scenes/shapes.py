@@ -2,13 +2,11 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from ..basics import Box, Cylinder, Part, Ring, Solid, Sphere, rotation_matrix
-from ..bodies import read_part
 from .schema import SIZES
 
 MILLI = 1e-3
@@ -58,10 +56,10 @@ def solid(
     return Ring(radius, table.inner_diameter_mm * MILLI / 2, table.height_mm * MILLI, *pose)
 
 
-def part(file: Path, center_mm: Sequence[float], rotation_deg: Sequence[float]) -> Part:
-    """The solid of a STEP file, its own origin in a place. Raises InputError where the file holds no such."""
-    found, turn = read_part(file), rotation_matrix(rotation_deg)
-    return replace(found, center=np.array(center_mm) * MILLI - turn @ found.origin, rotation=turn)
+def placed(part: Part, center_mm: Sequence[float], rotation_deg: Sequence[float]) -> Part:
+    """The solid of a STEP file, its own origin in a place."""
+    turn = rotation_matrix(rotation_deg)
+    return replace(part, center=np.array(center_mm) * MILLI - turn @ part.origin, rotation=turn)
 
 
 def shape_keys(body: Solid) -> dict[str, Any]:

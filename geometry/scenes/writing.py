@@ -40,7 +40,7 @@ def scene_keys(scene: Scene) -> dict[str, Any]:
 
 def keys_and_folder(scene: Scene) -> tuple[dict[str, Any], Path]:
     """The keys that describe a scene, those of its file if it still says so, and where the files lie they name."""
-    if scene.text and _says(scene.text, scene, scene.folder):
+    if scene.text and _says(scene.text, scene):
         return tomllib.loads(scene.text), scene.folder
     return tomllib.loads(_toml(_keys(scene))), Path()
 
@@ -64,14 +64,12 @@ def map_digest(scene: Scene) -> str:
     return "" if path is None else dict(scene.files).get(str(path)) or content_digest(path)
 
 
-def _says(text: str, scene: Scene, folder: Path = Path()) -> bool:
-    """Whether a scene file in a folder describes this scene; where its map of the field lies does not matter."""
+def _says(text: str, scene: Scene) -> bool:
+    """Whether a scene file describes this scene; the folder of its files is not in the file, and none is opened."""
     try:
-        both = [_keys(assemble(tomllib.loads(text), "scene", folder)), _keys(scene)]
+        return _keys(assemble(tomllib.loads(text), "scene", scene.folder, scene)) == _keys(scene)
     except (SceneError, tomllib.TOMLDecodeError):
         return False
-    told, used = (str(keys["rotor"].pop("field_map", "")) for keys in both)
-    return both[0] == both[1] and Path(used).parts[-len(Path(told).parts) :] == Path(told).parts
 
 
 def _keys(scene: Scene) -> dict[str, Any]:

@@ -15,7 +15,7 @@ from spinlev.fem.rotor_tables.table_file import load_table, save_table
 from spinlev.geometry.basics import Box, Cylinder, InputError, moved, rotation_matrix
 from spinlev.geometry.bodies import Magnet, known_shape, overlapping_magnets, read_part
 from spinlev.geometry.bodies.step_file import _refuse_open, _roots
-from spinlev.geometry.scenes import SceneError, magnets, parse_scene, scene, scene_text, sphere
+from spinlev.geometry.scenes import SceneError, changed, load_scene, magnets, parse_scene, scene, scene_text, sphere
 
 BALL = sphere(diameter_mm=12.7, remanence_T=1.305, density_kg_m3=7500.0)
 TURN = rotation_matrix((25.0, -40.0, 10.0))
@@ -147,6 +147,37 @@ def test_a_scene_with_a_part_is_written_and_read_with_its_place(folder, name, ce
     again = parse_scene(scene_text(made))
     assert again.rotor[0].body.center == pytest.approx(made.rotor[0].body.center)
     assert ("chamfer.step" in repr(again)) == (name == "chamfer")
+
+
+def test_beside_a_known_scene_no_file_is_opened(folder, tmp_path):
+    """What is there and what is not are refused with one sentence; its own file may be gone."""
+    beside = tmp_path / "parts"
+    beside.mkdir()
+    (beside / "part.step").write_bytes((folder / "chamfer.step").read_bytes())
+    (beside / "other.step").write_bytes((folder / "chamfer.step").read_bytes())
+    (tmp_path / "map.csv").write_text("")
+    text = """frequency_hz = 100.0
+    rotor.field_map = "map.csv"
+    rotor.magnets = [{file = "parts/part.step", center_mm = [0.0, 0.0, 0.0], polarization_T = [1.2, 0.0, 0.0]}]
+    floater = {diameter_mm = 12.7, remanence_T = 1.3, density_kg_m3 = 7500.0}"""
+    (tmp_path / "scene.toml").write_text(text)
+    first = load_scene(tmp_path / "scene.toml")
+    (beside / "part.step").unlink()
+    assert scene_text(first) == text
+    twice = changed(changed(first, {"frequency_hz": 90.0}, "a.toml", first), {"frequency_hz": 80.0}, "/b/c.toml", first)
+    assert twice.frequency == 80.0
+    assert (twice.rotor[0].body.step, twice.field_map) == (first.rotor[0].body.step, first.field_map)
+    assert parse_scene(text.replace("100.0", "90.0", 1), "x.toml", known=first).frequency == 90.0
+    for key, name in (("rotor.magnets[0].file", "parts/part.step"), ("rotor.field_map", "map.csv")):
+        said = set()
+        for other in (str(beside / "other.step"), str(beside / "none.step"), "/dev/zero", "../x"):
+            with pytest.raises(SceneError) as error:
+                parse_scene(text.replace(name, other), "x.toml", known=first)
+            said.add(str(error.value).replace(repr(other), ""))
+        assert said == {
+            f"x.toml: Input {key} must be a file of the scene that was opened first; instead received . Give the "
+            "scene to the command line."
+        }
 
 
 def test_a_table_with_a_part_needs_its_file_no_more(folder, tmp_path):

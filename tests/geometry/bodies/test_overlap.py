@@ -6,7 +6,7 @@ from hypothesis import given, settings, strategies as st
 from scipy.optimize import linprog
 
 from spinlev.geometry.basics import Box, Cylinder, Ring, Sphere, moved, rotation_matrix
-from spinlev.geometry.bodies import body_overlap, deepest_overlap_in_a_turn, sphere_overlap
+from spinlev.geometry.bodies import apart, body_overlap, deepest_overlap_in_a_turn, sphere_overlap
 from spinlev.geometry.bodies.overlap import box_overlap
 
 angle = st.floats(-180, 180)
@@ -88,3 +88,4 @@ def test_gaps_of_round_bodies_are_exact_in_any_pose(first, second, gap):
         one, other = (moved(body, turn @ body.center, turn @ body.rotation) for body in (first, second))
         assert body_overlap(one, other) == pytest.approx(-gap, abs=1e-8)
         assert body_overlap(other, one) == pytest.approx(-gap, abs=1e-8)
+        assert not apart(one, other) or gap > 0
