@@ -4,25 +4,34 @@ Every input must end in exit status 0, 1 or 2 with a message, no traceback, with
 Scenes are tried in processes of their own: none may warn, be silent for a minute, or take 2 GB.
 """
 
+import base64
 import contextlib
+import http.client
 import io
+import json
 import os
 import random
 import re
 import signal
+import socket
 import string
+import subprocess
 import sys
 import tempfile
 import time
+import urllib.error
 import warnings
 from collections import Counter
 from collections.abc import Callable
 from pathlib import Path
 from unittest import mock
+from urllib.parse import parse_qsl, quote, quote_plus, urlencode, urlsplit
 
+import devtools
 import meshio
 import numpy as np
 import places
+import psutil
 import xarray as xr
 
 from spinlev.fem.measured_maps import FieldMapError, readers
@@ -31,7 +40,9 @@ from spinlev.fem.rotor_tables.table_file import load_table, save_table
 from spinlev.fem.storage import TableFileError, checked_files, whole_files, write_checked
 from spinlev.fem.storage.foreign import look_through
 from spinlev.geometry.bodies import horizontal
+from spinlev.geometry.scenes import load_scene
 from spinlev.studies.command_line import cli
+from spinlev.studies.live import first_state
 
 SCENES = sorted(places.SCENES.glob("*.toml"))
 LONGEST = 60
@@ -512,8 +523,155 @@ def command(chance: random.Random, folder: Path) -> int:
         return answered(arguments)
 
 
+class Explored:
+    """`spinlev explore` as a process of its own, what it logs and how much memory it and its processes take."""
+
+    most = 2e9
+    """Bytes that they may take together."""
+
+    def __init__(self, folder: Path) -> None:
+        start = "import sys; from spinlev.studies.command_line.start import main; sys.argv[0] = 'spinlev'; main()"
+        command = [sys.executable, "-P", "-c", start, "explore", str(SCENES[0]), "--no-browser"]
+        self.log, self.peak = folder / "explore.log", 0
+        with self.log.open("wb") as log:
+            self.process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=log, text=True)
+        self.address = self.process.stdout.readline().strip()
+        self.parts = urlsplit(self.address)
+
+    def sent(self, content: bytes) -> int:
+        """Status of what is answered to bytes; 0 where the line is closed without a word."""
+        with socket.create_connection((self.parts.hostname, self.parts.port), timeout=LONGEST) as line:
+            with contextlib.suppress(OSError):
+                line.sendall(content)
+                line.shutdown(socket.SHUT_WR)
+            with contextlib.suppress(OSError):
+                first = line.makefile("rb").readline(100).split()
+                return int(first[1]) if len(first) > 1 else 0
+        return 0
+
+    def opened(self, query: str) -> devtools.LivePage:
+        """A page, as soon as there are few enough."""
+        while True:
+            page = devtools.LivePage(self.address, query)
+            if "message" in page.names:
+                return page
+            page.close()
+            time.sleep(0.2)  # a page that was left is closed after three seconds
+
+    def watched(self) -> None:
+        """Look at memory and log."""
+        mine = psutil.Process(self.process.pid)
+        taken = 0
+        for one in [mine, *mine.children(recursive=True)]:
+            with contextlib.suppress(psutil.Error):
+                taken += one.memory_info().rss - one.memory_info().shared
+        self.peak = max(self.peak, taken)
+        assert taken < self.most, f"{taken / 1e9:.2f} GB"
+        assert b"Traceback" not in self.log.read_bytes(), self.log.read_text(errors="replace")[-2000:]
+
+    def close(self) -> None:
+        """A normal page answers at the end; then it ends as it should."""
+        try:
+            page = self.opened("")
+            page.answered()
+            page.close()
+            self.watched()
+            print(f"explore: peak {self.peak / 1e9:.2f} GB, log {self.log.stat().st_size} bytes", file=sys.__stderr__)
+            self.process.terminate()
+            assert self.process.wait(30) == 0
+        finally:
+            self.process.kill()
+            self.process.wait()
+            self.process.stdout.close()
+
+
+EXPLORED: dict[Path, Explored] = {}
+"""The server of a run of the fuzzer, by its folder."""
+FILES = ["/etc/passwd", "/dev/zero", "/proc/self/environ", "../../x.step", "\\x00", "/nonexistent", "x" * 5000]
+HEADERS = ["Host: evil.example", "Host: 127.0.0.1:x", "Host: [::1", "Host:", "Origin: http://evil.example",
+           "Content-Length: 94000000", "Content-Length: -1", "Content-Length: x", "Transfer-Encoding: chunked",
+           "Expect: 100-continue", "Upgrade: websocket", "Connection: Upgrade", "Sec-WebSocket-Version: 13",
+           "Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==", "Sec-WebSocket-Protocol: bokeh, x.y", "Cookie: \xff=\xfe; a",
+           "Bokeh-Session-Id: x", "Range: bytes=5-1", "If-None-Match: \xff", f"X: {'y' * 60_000}",
+           "Accept-Encoding: gzip;q=x", "X-Forwarded-For: ::x", "\x00: \x00", " folded"]  # fmt: skip
+METHODS = ["GET", "HEAD", "POST", "PUT", "DELETE", "OPTIONS", "TRACE", "CONNECT", "get", "", "X" * 3000, "PRI"]
+PATHS = ["/", "/ws", "/page.js", "/plotly.js", "/static/js/bokeh.min.js", "/static/js/../x", "//", "*", "http://x/",
+         "/%2e%2e/etc/passwd", "/autoload.js", "/metadata", "/\xff", "/%ff", "/%", ""]  # fmt: skip
+
+
+def query_of(chance: random.Random) -> str:
+    """The state of a scene as an address has it, with faults in keys, values and their encoding."""
+    pairs = dict(parse_qsl(first_state(load_scene(chance.choice(SCENES))).query()))
+    for _ in range(chance.randint(1, 4)):
+        key = chance.choice(
+            [*pairs, "rotor.magnets", "rotor.field_map", "rotor.conductors", "plate", "bokeh-token", "spin"]
+        )
+        kind = chance.randrange(7)
+        magnet = {"file": chance.choice(FILES), "center_mm": [0.0, 0.0, 0.0], "polarization_T": [0.0, 0.0, 1.0]}
+        if kind == 0:
+            pairs[key] = json.dumps([magnet] * chance.choice([1, 2, 70]))
+        elif kind == 1:
+            pairs[mutated(key, chance)] = pairs.pop(key, "1")
+        elif kind == 2:
+            pairs[key] = chance.choice(FILES)
+        elif kind == 3:
+            pairs[key] = chance.choice(
+                ["[" * 3000, "9" * 5000, "1e999", "{}", '{"a": 1}', "[[]]", "null", "NaN", "true"]
+            )
+        elif kind == 4:
+            pairs.pop(key, None)
+        else:
+            pairs[key] = mutated(pairs.get(key, "1.0"), chance) if kind == 5 else chance.choice(ODD)
+    text = urlencode(pairs, quote_via=chance.choice([quote, quote_plus]))
+    return mutated(text, chance) if chance.random() < 0.2 else text
+
+
+def addresses(chance: random.Random, folder: Path) -> int:
+    """What a running page is asked: mutated addresses, requests of any kind, and scenes that are opened in it."""
+    server, kind = EXPLORED[folder], chance.random()
+    if kind < 0.4:
+        token = chance.choice([server.parts.query, "token=x", "", f"{server.parts.query}&token=y"])
+        path = f"{chance.choice(PATHS)}?{token}&{chance.choice(['', query_of(chance)])}"
+        version = chance.choice(["HTTP/1.1", "HTTP/1.1", "HTTP/1.0", "HTTP/9", ""])
+        head = [f"{chance.choice(METHODS) if chance.random() < 0.4 else 'GET'} {path} {version}"]
+        head += [f"Host: {server.parts.netloc}"] if chance.random() < 0.8 else []
+        head += [chance.choice(HEADERS) for _ in range(chance.randrange(4))] + ["Connection: close"]
+        body = bytes(chance.choice([0, 0, 10, 1_000_000]))
+        content = "\r\n".join([*head, "", ""]).encode("latin-1", "replace") + body
+        status = server.sent(damaged(content, chance) if chance.random() < 0.2 else content)
+        assert status < 500, content[:500]
+        server.watched()
+        return 0 if status in (101, 200) else 2
+    if kind < 0.8:
+        query = query_of(chance)
+        try:
+            page = server.opened(query)
+        except (urllib.error.HTTPError, ConnectionError, http.client.HTTPException) as error:
+            status = getattr(error, "code", 0)
+        else:
+            status = 200
+            page.until(lambda: "frequency_hz" in page.names)
+        if status != 200:
+            assert status < 500, query
+            server.watched()
+            return 2
+    else:
+        page = server.opened("")
+        text = mutated(chance.choice(SCENES).read_text(), chance).encode(errors="replace")
+        content = base64.b64encode(damaged(text, chance) if chance.random() < 0.3 else text).decode()
+        page.set("file", chance.choice(["scene.toml", *FILES]), "filename")
+        page.set("file", mutated(content, chance) if chance.random() < 0.1 else content)
+        page.set("frequency_hz", 123.5)  # to which something is said in any case
+        page.until(lambda: "123.5" in str(page.get("to_address", "tags")) or page.get("message"))
+    said = page.get("message")
+    page.close()
+    server.watched()
+    return 2 if said else 0
+
+
 KINDS: dict[str, Callable[[random.Random, Path], int]] = {
     "scene": scene, "points": points, "table": table, "result": result, "map": field_map, "command": command,
+    "addresses": addresses,
 }  # fmt: skip
 
 
@@ -540,6 +698,8 @@ def fuzz(kind: str, number: int, seed: int = 0, faults: list[str] | None = None)
         mock.patch.object(readers, "hdf5_fault", fault_in_fork),
     ):
         folder = Path(name)
+        if kind == "addresses":
+            EXPLORED[folder] = Explored(folder)
         try:
             for k in range(seed, seed + number):
                 try:
@@ -555,6 +715,8 @@ def fuzz(kind: str, number: int, seed: int = 0, faults: list[str] | None = None)
                     print(told, file=sys.__stderr__, flush=True)
         finally:
             sys.unraisablehook = sys.__unraisablehook__
+            if folder in EXPLORED:
+                EXPLORED.pop(folder).close()
     return counts
 
 
@@ -579,7 +741,8 @@ if __name__ == "__main__":
     wrong: list[str] = []
     for one in KINDS if asked == "all" else [asked]:
         began = time.perf_counter()
-        found = fuzz(one, many, first, wrong)
+        number = many // 10 if asked == "all" and one == "addresses" else many  # pages take a second each
+        found = fuzz(one, number, first, wrong)
         most = f", at most {PEAKS['MB']:.0f} MB and {PEAKS['s']:.0f} s" if one == "scene" else ""
         print(f"{one:8} {dict(sorted(found.items()))} in {time.perf_counter() - began:.0f} s{most}", flush=True)
     print(f"{len(wrong)} faults")

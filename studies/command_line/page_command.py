@@ -1,12 +1,19 @@
 """The command that serves a page: explore."""
 
+import html
+import tempfile
 from pathlib import Path
 from typing import Annotated
 
 from cyclopts import App, Parameter
 
 from ...geometry.basics import InputError
-from ..terminal import Answer, Output, default_scene
+from ..terminal import Answer, Output, default_scene, note
+
+LEADING = """<!DOCTYPE html><meta charset="utf-8"><title>spinlev</title><meta name="referrer" content="no-referrer">
+<meta http-equiv="refresh" content="0; url={address}"><a href="{address}">spinlev</a>
+"""
+"""A page that leads to another."""
 
 
 def add_page_command(app: App) -> None:
@@ -31,7 +38,8 @@ def explore(
     scene
         Scene file (left out: the one that comes with the program).
     host
-        Address of this machine on which the page is served; any other than 127.0.0.1 lets other machines in.
+        Address of this machine on which the page is served; any other than 127.0.0.1 lets other machines in, and
+        nothing is encrypted.
     port
         Port; 0 takes one that is free.
     no_browser
@@ -46,12 +54,23 @@ def explore(
     from ..interface import page_server
 
     pages = page_server()(loaded, str(source), host, port)
+    if not pages.local:
+        note(
+            f"Other machines can open this page (--host {host}). What it sends, the token in its address included, is "
+            "not encrypted: whoever sees the network's traffic can read it. Without --host it stays on this machine."
+        )
 
     def serving() -> None:
-        if not no_browser:
-            import webbrowser
+        if no_browser:
+            pages.run()
+            return
+        import webbrowser
 
-            webbrowser.open(pages.address)
-        pages.run()
+        # Any user of the machine can read the command line of a browser, but this file only its owner.
+        with tempfile.NamedTemporaryFile("w", prefix="spinlev-", suffix=".html", encoding="utf-8") as leading:
+            leading.write(LEADING.format(address=html.escape(pages.address)))
+            leading.flush()
+            webbrowser.open(Path(leading.name).as_uri())
+            pages.run()
 
     return Answer({"address": pages.address}, [pages.address], output.json, serving)

@@ -31,7 +31,7 @@ def scene_bodies(scene: Scene, lines: Sequence[Array]) -> dict[str, Any]:
     for magnet in scene.rotor:
         turning.append(_arrow(1e3 * magnet.box.center, magnet.polarization_in_rotor, 0.55 * size))
     radius = 1e3 * scene.floater.radius
-    floater = [_ball(radius), _arrow(np.zeros(3), np.array([0.0, 0.0, 1.0]), 1.45 * radius)]
+    floater = [_solid(scene.floater.solid, BALL, 1.0), _arrow(np.zeros(3), np.array([0.0, 0.0, 1.0]), 1.45 * radius)]
     fixed, edges = [], []
     if scene.plate is not None:
         near = _near(scene.plate.box)
@@ -98,10 +98,6 @@ def _solid(body: Solid, color: str, opacity: float) -> dict[str, Any]:
 def _edges(box: Box) -> list[list[list[float]]]:
     corners = 1e3 * _box_corners(box)
     return [np.round(corners[list(edge)], 3).tolist() for edge in EDGES]
-
-
-def _ball(radius: float) -> dict[str, Any]:
-    return _mesh(_ball_places(radius), _quads(SIDES // 2 + 1), BALL, 1.0)
 
 
 def _ball_places(radius: float) -> Array:

@@ -100,6 +100,7 @@ class FlightPanel:
         self.rest()
 
     def _flown(self, frame: Frame | str) -> None:
+        self.crew.rest(fly)
         if isinstance(frame, str):
             self.land()
             self.layout.flight_says(frame)

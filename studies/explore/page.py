@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import base64
 import binascii
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
 from functools import partial
 from typing import Any, cast
@@ -14,8 +14,8 @@ from bokeh.document import Document
 from bokeh.events import Tap
 from bokeh.models import Slider
 
-from ...geometry.basics import Array, InputError, SpinlevError
-from ...geometry.scenes import parse_scene
+from ...dynamics.steady import Survey
+from ...geometry.basics import Array
 from ..live import (
     FILES,
     TYPES,
@@ -25,10 +25,10 @@ from ..live import (
     Regions,
     Screen,
     Shown,
+    build,
     complete,
     controls,
     download,
-    first_state,
     fly,
     follow,
     has_map,
@@ -38,10 +38,19 @@ from ..live import (
 from .bodies import scene_bodies
 from .flight_panel import FlightPanel
 from .layout import Layout, slider
-from .processes import Crew
+from .processes import Crew, Task
 
 REST = 250
 """Milliseconds after which a slider is taken to rest."""
+LIMITS: dict[Task, tuple[float, str]] = {
+    build: (60.0, "Reading this scene"),
+    follow: (60.0, "The preview"),
+    complete: (600.0, "The answer by the chosen models"),
+    regions: (600.0, "The map"),
+    fly: (600.0, "Preparing the flight"),
+    download: (600.0, "The file"),
+}
+"""Seconds after which an answer is cut off; what takes longer is for the command line."""
 
 
 class Page:
@@ -57,19 +66,18 @@ class Page:
     def __init__(self, document: Document, state: PageState, asked: Mapping[str, str]) -> None:
         self.document, self.state, self.layout = document, state, Layout()
         self.number, self.answered, self.shown = 0, 0, cast("Shown | None", None)
-        self.crew = Crew(document, (follow, fly), self._failed)
+        self.crew = Crew(document, (build, follow, fly), LIMITS, self._failed)
         self.flight = FlightPanel(self.layout, self.crew, lambda: self.state, self._pose, self._rest_floater)
         self.resting: Any = None
         self.mapped, self.poses = "", 0
         self.drawn: tuple[str, str, tuple[Array, ...]] = ("", "", ())
-        problem = ""
-        try:
-            self.state = state.with_query(asked)
-        except SpinlevError as error:
-            problem = str(error)
+        self.begun = False
         self._listen()
-        self._begin()
-        self.layout.say(problem)
+        self._hold_ready()
+        if asked:
+            self._become("with_query", dict(asked))
+        else:
+            self._begin()
         with document.models.freeze():  # which models there are is found out once
             for root in self.layout.roots:
                 document.add_root(root)
@@ -92,6 +100,7 @@ class Page:
 
     def _begin(self) -> None:
         """Show a new scene: its sliders, and then all else."""
+        self.begun = True
         found = controls(self.state)
         self.layout.show_controls(self.state, [self._slider(control) for control in found])
         if has_map(self.state):
@@ -104,43 +113,44 @@ class Page:
         return made
 
     def _moved(self, key: str, value: float) -> None:
-        value = round(float(value), 9)
-        if (key, value) not in [(control.key, control.value) for control in controls(self.state)]:
-            self._become(lambda state: state.changed(key, value))
+        self._become("changed", key, round(float(value), 9))
 
     def _choose(self, name: str, value: str) -> None:
-        if getattr(self.state, name) != value:
-            change: dict[str, Any] = {name: value}
-            self._become(lambda state: replace(state, **change))
+        if getattr(self.state, name) != value or self.crew.waits_for(build):
+            self._become("with_query", {name: value})
 
-    def _become(self, change: Callable[[PageState], PageState]) -> None:
-        try:
-            self.state = change(self.state)
-        except SpinlevError as error:
-            self.layout.say(str(error))
-            return
-        self.layout.say("")
-        self._changed()
+    def _become(self, method: str, *arguments: Any) -> None:
+        """Ask for another state, by a method of the present one; it is made in a process of its own."""
+        if build not in self.crew:
+            self._hold_ready()
+
+        def older(other: tuple[str, tuple[Any, ...]]) -> bool:
+            return method == other[0] == "changed" and other[1][0] == arguments[0]
+
+        self.crew.ask(build, (method, arguments), older)
+
+    def _hold_ready(self) -> None:
+        """Begin the process that makes states: a slider that moves shall not wait for it."""
+        self.crew.start(build, (self.state,), self._built)
+        self.crew.rest(build)
+
+    def _built(self, answer: tuple[str, PageState | None, str]) -> None:
+        method, state, message = answer
+        self.state = state or self.state
+        self.layout.say(message)
+        if not self.begun or (state and method == "opened"):
+            self._begin()
+        elif state:
+            self._changed()
 
     def _opened(self, _: str, old: Any, content: Any) -> None:
         """A scene file of the reader's."""
         name = str(self.layout.file.filename) or "scene"
         try:
-            scene = parse_scene(base64.b64decode(str(content)).decode(), name)
-            if scene.field_map:
-                raise InputError(
-                    f"{name}: Input rotor.field_map must be left out of a scene that is opened in the page; instead "
-                    f"received {scene.field_map}. Give the scene to the command line."
-                )
-        except SpinlevError as error:
-            self.layout.say(str(error))
-            return
-        except (UnicodeDecodeError, binascii.Error):
-            self.layout.say(f"{name}: Input scene must be a readable UTF-8 text; instead it is not.")
-            return
-        self.state = first_state(scene, name)
-        self.layout.say("")
-        self._begin()
+            data = base64.b64decode(str(content))
+        except binascii.Error:
+            data = b"\xff"  # which is no text
+        self._become("opened", data, name)
 
     def _clicked(self, event: Tap) -> None:
         """Go to a point of the map, as far as the sliders reach."""
@@ -151,13 +161,7 @@ class Page:
             control.key: _nearest(control, place) for control, place in zip(found, (event.x, event.y), strict=False)
         }
 
-        def both(state: PageState) -> PageState:
-            for key, value in values.items():
-                state = state.changed(key, value)
-            return state
-
-        self._become(both)
-        self.layout.set_sliders(values)
+        self.layout.set_sliders(values)  # each of which says so
 
     # What is computed
 
@@ -169,11 +173,15 @@ class Page:
             self.flight.land()
         if follow not in self.crew:
             self.crew.start(follow, (), self._found)
-        self.crew.tell(follow, (self.number, self._quick_state, None))
+        self._ask_quickly(self.number, None)
         self.layout.point(controls(self.state))
         if self.resting is not None:
             self.document.remove_timeout_callback(self.resting)
         self.resting = self.document.add_timeout_callback(self._rest, REST)
+
+    def _ask_quickly(self, number: int, known: Survey | None) -> None:
+        """A preview, or equilibria for it to begin with; earlier questions that wait need no answer any more."""
+        self.crew.ask(follow, (number, self._quick_state, known), lambda other: other[2] is None)
 
     @property
     def _quick_state(self) -> PageState:
@@ -196,9 +204,9 @@ class Page:
             self.layout.map.forget()
             self.crew.start(regions, (self.state, tuple(spans)), self._mapped)
 
-    def _found(self, found: Found) -> None:
+    def _found(self, found: Found | None) -> None:
         """Numbers at once."""
-        if found.number <= self.answered:
+        if found is None or found.number <= self.answered:
             return
         waits = "" if self.state.whole_quickly else "; those asked for follow when the slider rests"
         self._show(found, waits if complete in self.crew or self.resting is not None else "")
@@ -210,7 +218,7 @@ class Page:
         self.answered = found.number
         self._show(found, "")
         if found.survey is not None and self.state.model == self._quick_state.model:
-            self.crew.tell(follow, (found.number, self._quick_state, found.survey))
+            self._ask_quickly(found.number, found.survey)
 
     def _show(self, found: Found, waits: str) -> None:
         if found.shown is None:
@@ -232,7 +240,7 @@ class Page:
     def _draw(self, lines: tuple[Array, ...]) -> None:
         """The bodies, where they are others than those that are drawn, with the field's lines as far as they hold."""
         keys = self.state.keys
-        rotor, whole = str(keys["rotor"]), str((keys["rotor"], keys["floater"]["diameter_mm"], keys.get("plate")))
+        rotor, whole = str(keys["rotor"]), str((keys["rotor"], keys["floater"], keys.get("plate")))
         kept = lines or (self.drawn[2] if self.drawn[0] == rotor else ())
         if lines or self.drawn[1] != whole:
             self.drawn = rotor, whole, kept
@@ -240,6 +248,8 @@ class Page:
             self.layout.side.scene(self.state.scene)
 
     def _failed(self, message: str) -> None:
+        if not self.begun:  # what the address asks for cannot be made
+            self._begin()
         if fly not in self.crew and self.flight.playing:
             self.flight.land()
         self.layout.say(message)
@@ -262,6 +272,8 @@ class Page:
             self.layout.side.place(seen[0], seen[2], 1e3 * self.state.scene.floater.radius)
 
     def _mapped(self, found: Regions) -> None:
+        if found.last:
+            self.crew.stop(regions)
         if found.message:
             self.layout.map_title(f"No map: {found.message}")
             return

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import multiprocessing
 import os
+import resource
+import select
 import signal
 import threading
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, partial
 from multiprocessing import forkserver, resource_tracker
 from multiprocessing.connection import Connection
 from multiprocessing.context import ForkServerContext
@@ -23,6 +25,8 @@ Task = Callable[..., None]
 """Runs in the other process, with a `Connection` first."""
 LIBRARIES = f"{__package__.rpartition('.')[0]}.live"
 """What every process needs."""
+MEMORY = 4 * 2**30
+"""Bytes that a process may take."""
 PATIENCE = 10
 """By how much a process is nicer than others that does not hurry."""
 
@@ -69,10 +73,11 @@ class Worker:
         self._open = True
 
     def send(self, message: Any) -> None:
-        """Ask for something; of a process that has ended nothing comes."""
+        """Ask for something; nothing comes of a process that has ended, or that has not heard the last hundreds."""
         try:
-            self._connection.send(message)
-        except OSError:  # it ends, which `_listen` will find out
+            if select.select([], [self._connection], [], 0)[1]:  # else the loop, and all pages, would wait for it
+                self._connection.send(message)
+        except (OSError, ValueError):  # it ends, which `_listen` will find out
             return
 
     def stop(self) -> None:
@@ -81,7 +86,14 @@ class Worker:
             self._open = False
             self._loop.remove_handler(self._connection.fileno())
             self._connection.close()
-        self.process.kill()
+            self.process.kill()
+            self._loop.add_handler(self.process.sentinel, self._ended, IOLoop.READ)
+
+    def _ended(self, sentinel: int, _: int) -> None:
+        """Two files that tell of its end stay open until it is asked."""
+        self._loop.remove_handler(sentinel)
+        self.process.join()
+        self.process.close()
 
     def _listen(self, *_: object) -> None:
         try:
@@ -102,12 +114,21 @@ class Crew:
     ----------
     document : of the page, in whose turn answers are heard
     hurried : tasks for which the others have to wait
+    limits : seconds after which a task that was begun or asked, and is not at rest, is cut off, and words for it
     failed : is told why a process could not go on
     """
 
-    def __init__(self, document: Document, hurried: Collection[Task], failed: Callable[[str], None]) -> None:
-        self._document, self._hurried, self._failed = document, hurried, failed
+    def __init__(
+        self,
+        document: Document,
+        hurried: Collection[Task],
+        limits: Mapping[Task, tuple[float, str]],
+        failed: Callable[[str], None],
+    ) -> None:
+        self._document, self._hurried, self._limits, self._failed = document, hurried, limits, failed
         self._workers: dict[Task, Worker] = {}
+        self._waiting: dict[Task, list[Any]] = {}
+        self._ends: dict[Task, Any] = {}
 
     def __contains__(self, task: Task) -> bool:
         """Whether a process is at a task."""
@@ -121,21 +142,60 @@ class Crew:
             self._document.add_next_tick_callback(lambda: self._hear(task, worker, heard, answer))
 
         self._workers[task] = worker = Worker(task, arguments, later, patient=task not in self._hurried)
+        self._limit(task)
 
     def tell(self, task: Task, message: Any) -> None:
         """Send a message to who is at a task, if anybody is."""
         if task in self._workers:
             self._workers[task].send(message)
 
+    def ask(self, task: Task, question: Any, instead: Callable[[Any], bool] = lambda _: False) -> None:
+        """Send a question to a task that answers each, when it has answered the last.
+
+        Of those that wait, the ones are left out `instead` of which this one is asked.
+        """
+        if task not in self._workers:
+            return
+        if task in self._waiting:
+            self._waiting[task] = [*(other for other in self._waiting[task] if not instead(other)), question]
+            return
+        self._waiting[task] = []
+        self.tell(task, question)
+        self._limit(task)
+
+    def waits_for(self, task: Task) -> bool:
+        """Whether a question is not answered yet."""
+        return task in self._waiting
+
+    def rest(self, task: Task) -> None:
+        """Nothing more is waited for: a task need not come to an end."""
+        if task in self._ends:
+            self._document.remove_timeout_callback(self._ends.pop(task))
+
     def stop(self, task: Task) -> None:
         """End a task."""
+        self.rest(task)
+        self._waiting.pop(task, None)
         if task in self._workers:
             self._workers.pop(task).stop()
 
     def close(self) -> None:
         """End all tasks."""
-        for task in list(self._workers):
-            self.stop(task)
+        for worker in self._workers.values():  # the document, and its callbacks, are gone
+            worker.stop()
+        self._workers.clear()
+
+    def _limit(self, task: Task) -> None:
+        self.rest(task)
+        if task in self._limits:
+            seconds, _ = self._limits[task]
+            self._ends[task] = self._document.add_timeout_callback(partial(self._cut_off, task), int(1000 * seconds))
+
+    def _cut_off(self, task: Task) -> None:
+        del self._ends[task]
+        seconds, words = self._limits[task]
+        self.stop(task)
+        self._failed(f"{words} took longer than {seconds:g} s and was cut off.")
 
     def _hear(self, task: Task, worker: Worker, heard: Callable[[Any], None], answer: Any) -> None:
         if self._workers.get(task) is not worker:
@@ -143,12 +203,18 @@ class Crew:
         if isinstance(answer, Failure):
             self.stop(task)
             self._failed(answer.message)
-        else:
-            heard(answer)
+            return
+        waiting = self._waiting.pop(task, None)
+        if waiting is not None:
+            self.rest(task)
+            for question in waiting:
+                self.ask(task, question)
+        heard(answer)
 
 
 def _run(patient: bool, task: Task, connection: Connection, *arguments: Any) -> None:
     os.nice(PATIENCE if patient else 0)
+    resource.setrlimit(resource.RLIMIT_DATA, (MEMORY, MEMORY))
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the server
     threading.Thread(target=_end_with_parent, daemon=True).start()
     try:

@@ -82,7 +82,7 @@ def explore(scene: Scene | str | Path, port: int = 0) -> LivePage:
         loop = asyncio.new_event_loop()
         asyncio.set_event_loop(loop)
         try:
-            pages = serve(loaded, source, "127.0.0.1", port)
+            pages = serve(loaded, source, port=port, framed=True)
         except SpinlevError as error:
             begun.set_exception(error)
         else:
@@ -96,7 +96,7 @@ def explore(scene: Scene | str | Path, port: int = 0) -> LivePage:
     return LivePage(pages, thread, loop)
 
 
-def page_server() -> Callable[[Scene, str, str, int], Pages]:
+def page_server() -> Callable[..., Pages]:
     """The function that serves pages.
 
     Raises

@@ -9,6 +9,7 @@ from .state import PageState as PageState, first_state as first_state
 from .work import (
     Found as Found,
     Regions as Regions,
+    build as build,
     complete as complete,
     download as download,
     follow as follow,

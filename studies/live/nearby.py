@@ -1,12 +1,14 @@
 """Equilibria that follow a slider: carried from a scene in which all were searched for to one nearby.
 
-A rotor of the article is a family with frequency and displacement or tilt left open, compiled once. Its edge is left
+A rotor of the article is a family with frequency and displacement or tilt left open, compiled once. Its size is left
 open by similarity.
 """
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +20,7 @@ from ...dynamics.steady import Balance, Survey
 from ...fem.rotor_tables import ROUND_OFF, RotorTable
 from ...geometry.basics import Array, SpinlevError
 from ..one_scene import Levitation
-from .sliders import MEASURES
+from .sliders import MEASURES, ROTOR_SIZES
 from .state import QUICK, PageState
 
 
@@ -117,7 +119,7 @@ class _Family:
 
     family: RotorFamily
     configuration: str
-    edge: float
+    sizes: Array
     rest: str
 
     def problem(self, state: PageState) -> _Problem | None:
@@ -125,8 +127,9 @@ class _Family:
         found = article_measure(rotor)
         if found is None or found[0] != self.configuration or _rest(state) != self.rest:
             return None
-        likeness = self.edge / rotor["edge_mm"]
-        if likeness != 1 and not has_likes(scene):
+        ratios = self.sizes / _sizes(rotor)
+        likeness = float(ratios[0])
+        if likeness != 1 and not (np.allclose(ratios, likeness, rtol=ROUND_OFF, atol=0.0) and has_likes(scene)):
             return None
         measure = found[1] if self.configuration == "tilt" else likeness * found[1]
         family = replace(self.family, scene=like(scene, likeness))
@@ -136,20 +139,26 @@ class _Family:
 def _family(state: PageState) -> _Family | None:
     rotor = state.keys["rotor"]
     configuration = rotor.get("configuration")
-    if configuration not in MEASURES or state.model not in QUICK:
+    round_floater = state.scene.floater.body is None  # of another one, size and shape are compiled
+    if configuration not in MEASURES or state.model not in QUICK or not round_floater:
         return None
     try:
         family = rotor_family(replace(state.scene, plate=None), configuration, state.model)
     except SpinlevError:  # conductors that do not move with the magnets
         return None
-    return _Family(family, configuration, rotor["edge_mm"], _rest(state))
+    return _Family(family, configuration, _sizes(rotor), _rest(state))
+
+
+def _sizes(rotor: Mapping[str, Any]) -> Array:
+    """What makes a body of the rotor as large as it is, mm."""
+    return np.array([rotor[key] for key in ROTOR_SIZES if key in rotor])
 
 
 def _rest(state: PageState) -> str:
     """What no parameter of a family's equations can change."""
-    open_ones = ("edge_mm", "displacement_mm", "angle_deg")
+    open_ones = (*ROTOR_SIZES, "displacement_mm", "angle_deg")
     rotor = {key: value for key, value in state.keys["rotor"].items() if key not in open_ones}
-    return f"{rotor} {bool(state.scene.floater.conductivity)} {state.scene.drag.air}"
+    return f"{rotor} {state.scene.floater.shape} {bool(state.scene.floater.conductivity)} {state.scene.drag.air}"
 
 
 def _without_plate(state: PageState) -> Levitation:

@@ -35,24 +35,41 @@ class Control:
     step: float
 
 
+PLATE_REACH = 20.0
+"""How far a plate whose middle is level with the rotor's can be moved, mm."""
+ROTOR_SIZES = {
+    "edge_mm": "Edge of the cube (mm)",
+    "diameter_mm": "Rotor's diameter (mm)",
+    "height_mm": "Rotor's height (mm)",
+}
+"""Titles of the sizes that a rotor of the article may have, for its shape."""
+FLOATER_SIZES = {"diameter_mm": "Floater's diameter (mm)", "height_mm": "Floater's height (mm)"}
+
+
 def controls(state: PageState) -> list[Control]:
-    """The sliders of a state, from the most to the least used."""
+    """The sliders of a state, from the most to the least used: of what its scene has."""
     found = [_control("frequency_hz", "Frequency (Hz)", state.scene.frequency, 20.0, 300.0, 0.5)]
     keys = state.keys
-    rotor = keys["rotor"]
+    rotor, floater = keys["rotor"], keys["floater"]
     if (kind := rotor.get("configuration")) in MEASURES:
         key, title, low, high = MEASURES[kind]
-        low = max(low, rotor["edge_mm"]) if kind == "vertical" else low  # where its cubes touch
+        low = max(low, 1e3 * float(state.scene.rotor[0].body.size[2])) if kind == "vertical" else low  # they touch
         found.append(_control(key, title, rotor[key.partition(".")[2]], low, high, 0.05))
-        found.append(_control("rotor.edge_mm", "Edge of the cube (mm)", rotor["edge_mm"], 3.0, 20.0, 0.05))
-    diameter = keys["floater"]["diameter_mm"]
-    found.append(_control("floater.diameter_mm", "Floater's diameter (mm)", diameter, 3.0, 30.0, 0.05))
+        sizes = [(key, title) for key, title in ROTOR_SIZES.items() if key in rotor]
+        found += [_control(f"rotor.{key}", title, rotor[key], 3.0, 20.0, 0.05) for key, title in sizes]
+    for key, title in FLOATER_SIZES.items():
+        if key in floater:
+            found.append(_control(f"floater.{key}", title, floater[key], 3.0, 30.0, 0.05))
+    for k, size in enumerate(floater.get("size_mm", ())):
+        found.append(
+            _control(f"floater.size_mm.{k}", f"Floater's edge along its {'xyz'[k]} (mm)", size, 3.0, 30.0, 0.05)
+        )
     found.append(_control("spin", "Body spin S", state.spin, -2.0, 2.0, 0.01))
     if state.scene.plate is not None:
         axis = _facing(state.scene.plate.box)
         title = ("Plate, x (mm)", "Plate, y (mm)", "Plate's height (mm)")[axis]
         place = keys["plate"]["center_mm"][axis]
-        near, far = 0.4 * place, 2.5 * place
+        near, far = (0.4 * place, 2.5 * place) if place else (-PLATE_REACH, PLATE_REACH)
         found.append(_control(f"plate.center_mm.{axis}", title, place, min(near, far), max(near, far), 0.25))
     return found
 

@@ -8,15 +8,15 @@ from typing import Any, Self, cast, get_args
 from urllib.parse import urlencode
 
 from ...geometry.basics import InputError, shown
-from ...geometry.scenes import Scene, assemble, changed, scene_keys
+from ...geometry.scenes import Scene, SceneError, assemble, changed, parse_scene, scene_keys
 from ..terminal import FieldModel, Models, PlateModel, finite
 
 QUICK: tuple[FieldModel, ...] = ("dipole", "cuboid")
 """Fields whose equilibria follow a slider at once."""
 CHOICES = ("model", "plate_model", "spin")
 """Keys of an address that are none of the scene file."""
-LONGEST = 20_000
-"""Characters of an address's state."""
+LONGEST, LARGEST = 20_000, 200_000
+"""Characters of an address's state; bytes of a scene file that is opened in a page."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,7 +29,8 @@ class PageState:
     model : of the field
     plate_model : of the plate's currents
     spin : body spin of the equilibria
-    source : the scene's file, or another name of it in messages; a map of the field lies beside it
+    source : the scene's file, or another name of it in messages
+    first : the scene that the page began with, whose files alone another one may name; None: `scene` itself
     """
 
     scene: Scene
@@ -37,6 +38,7 @@ class PageState:
     plate_model: PlateModel = "slab"
     spin: float = 0.0
     source: str = "scene"
+    first: Scene | None = None
 
     @cached_property
     def keys(self) -> Mapping[str, Any]:
@@ -64,7 +66,7 @@ class PageState:
         """With another number: of the scene file, by its dotted key, or `spin`. Raises SceneError."""
         if key == "spin":
             return replace(self, spin=finite("spin", value))
-        return replace(self, scene=changed(self.scene, {key: value}, self.source))
+        return replace(self, scene=changed(self.scene, {key: value}, self.source, self.first or self.scene))
 
     def query(self) -> str:
         """The state as the text behind the question mark of an address."""
@@ -76,8 +78,8 @@ class PageState:
 
         Raises
         ------
-        SceneError : the scene of the address cannot be
-        InputError : a model that does not exist, a spin that is no number, or a file in the address
+        SceneError : the scene of the address cannot be, or names a file that the first scene does not
+        InputError : a model that does not exist, a spin that is no number, or more than an address may hold
         """
         if sum(len(key) + len(value) for key, value in asked.items()) > LONGEST:
             raise InputError(f"Input address must have at most {LONGEST} characters of a scene; instead it is longer.")
@@ -93,9 +95,34 @@ class PageState:
             spin=_spin(asked.get("spin", self.spin)),
         )
 
+    def opened(self, content: bytes, name: str) -> Self:
+        """The state in which a page shows a scene file of its reader's.
+
+        Raises
+        ------
+        SceneError : the scene cannot be, or names a file that the first scene does not
+        InputError : no text, or more than a page takes
+        """
+        if len(content) > LARGEST:
+            raise InputError(f"Input scene must have at most {LARGEST} bytes in a page; instead it has {len(content)}.")
+        try:
+            text = content.decode("utf-8-sig")
+        except UnicodeDecodeError:
+            raise SceneError(name, ["Input scene must be a readable UTF-8 text; instead it is not."]) from None
+        known = self.first or self.scene
+        new = first_state(parse_scene(text, name, known=known), name)
+        return replace(
+            self,
+            scene=new.scene,
+            model=new.model,
+            plate_model=new.plate_model,
+            spin=new.spin,
+            source=name,
+            first=known,
+        )
+
     def _scene(self, given: Mapping[str, str]) -> Scene:
         keys: dict[str, Any] = scene_keys(self.scene)
-        own_map = keys["rotor"].get("field_map")
         tables = {key.partition(".")[0] for key in given}
         if tables >= {"frequency_hz", "rotor", "floater"}:
             keys = {}
@@ -103,27 +130,14 @@ class PageState:
             keys.pop(table, None)
         for key, text in given.items():
             _put(keys, key.split("."), _value(text))
-        rotor = keys.get("rotor")
-        if isinstance(rotor, dict) and rotor.get("field_map", own_map) != own_map:
-            raise InputError(
-                "Input rotor.field_map must not be in an address; instead received "
-                f"{shown(rotor['field_map'])}. Give the scene to the command line."
-            )
-        return assemble(keys, self.source)
+        return assemble(keys, self.source, known=self.first or self.scene)
 
 
 def first_state(scene: Scene, source: str = "scene") -> PageState:
-    """Where a page begins: everything by what can be told at once, the plate as an infinite slab.
-
-    Raises
-    ------
-    InputError : the floater is no sphere
-    """
-    scene.floater.must_be(
-        "sphere", where="on the live page", instead="spinlev run, equilibria and simulate take cylinders."
-    )
+    """Where a page begins: everything by what can be told at once, the plate as an infinite slab if that can be."""
     model: FieldModel = "map" if scene.field_map else "dipole"
-    return PageState(scene, model, "slab" if scene.plate else "none", source=source)
+    felt = scene.plate is not None and scene.floater.body is None
+    return PageState(scene, model, "slab" if felt else "none", source=source)
 
 
 def _choice(name: str, value: str, known: tuple[Any, ...]) -> Any:

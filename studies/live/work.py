@@ -47,24 +47,44 @@ class Found:
 
 @dataclass(frozen=True)
 class Regions:
-    """Where something levitates: 0 nothing, 1 only unstably, 2 stably, (n, m) over frequencies Hz and measures."""
+    """Where something levitates: 0 nothing, 1 only unstably, 2 stably, (n, m) over frequencies Hz and measures.
+
+    `last`: no finer one follows; with a `message` there is none.
+    """
 
     model: str
     frequencies: Array
     measures: Array
     kind: Array
     message: str = ""
+    last: bool = False
+
+
+def build(connection: Connection, state: PageState) -> None:
+    """Make the states that the page's reader asks for, each of the last: (name of a method of `PageState`, arguments).
+
+    To each comes (that name, state or None, message).
+    """
+    while True:
+        method, arguments = connection.recv()
+        try:
+            state = getattr(state, method)(*arguments)
+            state.keys  # noqa: B018  # travels with it: the page's own process does not look for overlaps
+            connection.send((method, state, ""))
+        except SpinlevError as error:
+            connection.send((method, None, str(error)))
 
 
 def follow(connection: Connection) -> None:
-    """Answer to states of the page one after the other, by the latest question, as soon as can be."""
+    """Answer to states of the page, as soon as can be; (number, state, survey): None where a survey is learnt."""
     nearby: Nearby | None = None
     while True:
-        number, state, known = _latest(connection)
+        number, state, known = connection.recv()
         if known is not None:
             nearby = Nearby(state)
             nearby.learn(known)
             nearby.at(state)  # what is compiled later would be waited for
+            connection.send(None)
             continue
         try:
             there = None if nearby is None else nearby.at(state)
@@ -74,14 +94,6 @@ def follow(connection: Connection) -> None:
             connection.send(Found(number, shown(there)))
         except SpinlevError as error:
             connection.send(Found(number, None, str(error)))
-
-
-def _latest(connection: Connection) -> tuple[int, PageState, Survey | None]:
-    """The last of the messages that wait; one with equilibria first, unless a later one has another state."""
-    message: tuple[int, PageState, Survey | None] = connection.recv()
-    while message[2] is None and connection.poll():
-        message = connection.recv()
-    return message
 
 
 def complete(connection: Connection, number: int, state: PageState) -> None:
@@ -125,9 +137,10 @@ def regions(connection: Connection, state: PageState, spans: tuple[tuple[float, 
                 family = rotor_family(state.scene, configuration, model)
                 found = equilibrium_map(family, axes[0], axes[1] * unit, state.spin)
             except (SpinlevError, ValueError) as error:
-                connection.send(Regions(model, *axes, np.zeros((points, points), np.uint8), str(error)))
+                connection.send(Regions(model, *axes, np.zeros((points, points), np.uint8), str(error), last=True))
                 return
-            connection.send(Regions(model, *axes, _kind(found)))
+            last = (model, points) == (models[-1], POINTS[-1])
+            connection.send(Regions(model, *axes, _kind(found), last=last))
 
 
 def _kind(found: EquilibriumMap) -> Array:

@@ -6,9 +6,10 @@ from fuzzing import KINDS, fuzz
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_broken_inputs(kind):
-    counts = fuzz(kind, 60)
-    assert sum(counts.values()) == 60
-    assert counts[2] > 10
+    number = 60 if kind != "addresses" else 12  # pages, which take a second each
+    counts = fuzz(kind, number)
+    assert sum(counts.values()) == number
+    assert counts[2] > number // 6
 
 
 @pytest.mark.parametrize(
