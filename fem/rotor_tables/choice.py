@@ -89,7 +89,7 @@ def _cheapest(rotor: tuple[Magnet, ...], accuracy: Accuracy) -> tuple[str, str]:
     for table in (dipole_table(rotor, accuracy), moments_table(rotor, accuracy)):
         error = float(np.max(table.absolute_error(points)[0] / scale))
         count = sum(np.count_nonzero(expansion.coefficients) for expansion in table.expansions)
-        if error <= accuracy.rtol and count <= FEW_MOMENTS * len(rotor):
+        if error <= accuracy.rtol and count <= FEW_MOMENTS * len(rotor) and table.in_range(points).all():
             return table.model, f"with {count} coefficients it is wrong by {error:.1e} {where}"
     if permeability == 0:
         return "cuboid", "every recoil permeability is 1, so that the closed form is exact"

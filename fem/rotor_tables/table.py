@@ -14,6 +14,8 @@ from ...geometry.bodies import Magnet
 from ..closed_forms import UniformField, squared_distance
 from ..harmonics import CompiledField, FieldExpressions, MultipoleExpansion, Number, as_columns, field_and_gradient
 
+DEEP = 0.1
+"""Of the radius of a doubt's sources: its terms are told no nearer to its centre."""
 BLUR = 0.5
 """Share of the root mean square of a doubt that is added to its field."""
 ROUND_OFF = 1e-13
@@ -161,8 +163,9 @@ class RotorTable:
         error_b, error_g = np.zeros(len(points)), np.zeros(len(points))
         for cause, doubts in self.doubts.items():
             blur = 0.0 if cause == KNOWN else BLUR
-            fields = [doubt.evaluate(points) for doubt in doubts]
-            sizes = [doubt.root_mean_square(points) for doubt in doubts]
+            places = [_off_center(doubt, points) for doubt in doubts]
+            fields = [doubt.evaluate(there) for doubt, there in zip(doubts, places, strict=True)]
+            sizes = [doubt.root_mean_square(there) for doubt, there in zip(doubts, places, strict=True)]
             error_b += np.linalg.norm(sum(b for b, _ in fields), axis=1)
             error_g += np.linalg.norm(sum(g for _, g in fields), axis=(1, 2))
             error_b += blur * np.linalg.norm([b for b, _ in sizes], axis=0)
@@ -183,6 +186,23 @@ class RotorTable:
             if expansion.nearest:
                 outside &= squared_distance(columns, expansion.center) > expansion.nearest**2
         return outside
+
+
+def _off_center(doubt: MultipoleExpansion, points: Array) -> Array:
+    """The points (n, 3) m, those near a doubt's centre moved out to `DEEP` of the sphere that holds its sources.
+
+    In there, as in the hole of a ring, its series diverges and says no more than that nothing is known: a tenth of the
+    radius says so, and the centre itself would be divided by.
+    """
+    offset = points - doubt.center
+    distance = np.linalg.norm(offset, axis=1)
+    deep = distance < DEEP * doubt.nearest
+    if not deep.any():
+        return points
+    offset[deep] = np.where(distance[deep, None] > 0, offset[deep], [0.0, 0.0, 1.0])
+    length = np.linalg.norm(offset[deep], axis=1)[:, None]
+    offset[deep] *= DEEP * doubt.nearest / length
+    return np.asarray(doubt.center + offset)
 
 
 FARTHER = 20e-3

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ...dynamics.flights import Checkpoint, FlightStopped, Trajectory
+from ...dynamics.flights import Checkpoint, FlightStopped, Trajectory, starting_point
 from ...fem.rotor_tables import NEAR_RTOL, RotorTable, complete
 from ...fem.storage import owned, program_of, write_whole
 from ...geometry.basics import Array
@@ -68,9 +68,9 @@ def _simulated(scene: Scene, asked: Models, duration: float, out: Path, resume: 
     elif checkpoint.read() is None:
         note(f"No checkpoint in {out}: the flight begins at t = 0.")
     levitation = Levitation(scene, asked)
-    if isinstance(scene.start, OffsetStart) and levitation.equilibria and not levitation.stability.stable:
-        growth = levitation.stability.growth_per_s
-        note(f"The flight begins at an unstable equilibrium: e-fold in {1 / growth:.2g} s.")
+    begin = starting_point(levitation.equilibria) if isinstance(scene.start, OffsetStart) else None
+    if begin is not None and not begin.stable:
+        note(f"The flight begins at an unstable equilibrium: e-fold in {1 / begin.growth_per_s:.2g} s.")
 
     def keep(flight: Trajectory) -> None:
         labels = {**levitation.labels, **lowering_times(scene), "headline": flight_words(levitation, flight)}
