@@ -37,7 +37,7 @@ MESHES = {*meshio.extension_to_filetypes} - {".dat"}
 """Endings of the names of meshes; a `.dat` is one if it is Tecplot's."""
 TECPLOT = re.compile(rb"\s*(?:TITLE|VARIABLES|ZONE)\b", re.IGNORECASE)
 OTHER_VTK = {".vti", ".vtr", ".vts", ".vtp", ".vtm", ".pvtu", ".pvti", ".pvts", ".pvtr", ".pvd"}
-MOST_BYTES = 2_000_000_000
+MOST_BYTES = 1_000_000_000
 Read = tuple[dict[str, Array], dict[str, str]]
 """Columns in SI units by name, and the units in which the file has them."""
 

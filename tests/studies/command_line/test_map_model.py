@@ -93,7 +93,7 @@ def test_no_map(called, folder, capfd):
     bare = folder / "bare"
     bare.mkdir()
     (bare / "scene.toml").write_text((folder / "scene.toml").read_text())
-    with pytest.raises(SceneError, match=r"Input rotor.field_map must be a file; instead there is no .*bare/map.csv"):
+    with pytest.raises(SceneError, match=r"field_map must be a map of the field; instead there is no .*bare/map.csv"):
         load_scene(bare / "scene.toml")
     (bare / "scene.toml").write_text(load_scene(shipped_scene("horizontal")).text)
     assert called(bare, "field", "--points", str(folder / "points.csv"), "--model", "map") == 2
