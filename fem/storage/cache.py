@@ -112,8 +112,9 @@ def cache_limit() -> int:
 
 def key_of(path: str | Path) -> str:
     """Name by which a file in the cache is found again; empty for a file anywhere else."""
-    path, folder = Path(path), cache_folder()
-    return path.relative_to(folder).as_posix() if path.is_relative_to(folder) else ""
+    path, folder = Path(path), cache_folder().resolve()
+    place = path.parent.resolve() / path.name  # however the path is written: from the current folder, by a link
+    return place.relative_to(folder).as_posix() if place.is_relative_to(folder) else ""
 
 
 def from_cache(
