@@ -14,7 +14,7 @@ from ...geometry.scenes import Scene
 from ..motion import Scales, parameters
 from ..steady import Balance, ForceCurve
 
-FORMAT = "spinlev equilibria 2"
+FORMAT = "spinlev equilibria 3"
 LIMIT = 2**26
 """Size of all that is kept, bytes: some thousand scenes; what was not used for the longest time makes room."""
 
@@ -26,7 +26,7 @@ class Found:
     Parameters
     ----------
     points : (n, 6) scaled positions and moments, good to round-off
-    doubts : (n, 2) of the field there: of B, T, and of its gradient, T/m
+    doubts : (n, 2 + 12 c) of the field there, see `field_doubts`
     residuals : (n, 5) what is left of the balances
     slopes : (n, 5, 5) their derivatives
     jacobians : (n, 12, 12) of the scaled state's rates by the state
@@ -77,7 +77,7 @@ def save_found(found: Found, path: str | Path) -> None:
     length = [len(curve.position) for curve in curves]
     variables = {
         "point": (("equilibrium", "component"), found.points, "1"),
-        "doubt": (("equilibrium", "order"), found.doubts, "T m-order"),
+        "doubt": (("equilibrium", "part"), found.doubts, "T or T/m"),
         "residual": (("equilibrium", "balance"), found.residuals, "1"),
         "slope": (("equilibrium", "balance", "unknown"), found.slopes, "1"),
         "jacobian": (("equilibrium", "rate", "state"), found.jacobians, "1"),

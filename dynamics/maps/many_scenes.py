@@ -52,11 +52,15 @@ def surveys(
     nodes = grid.coarse(spacing or (SPACING if places.shape[1] > 1 else 2 * SPACING))
     point, position, moment = filled(grid, nodes).within(grid)
     points = np.concatenate([position, moment], axis=1)
-    known, doubts = np.zeros(len(points), bool), np.zeros((len(points), 2))
+    known, parts = np.zeros(len(points), bool), list[tuple[Indices, Array]]()
     for table in {id(table): table for table in tables}.values():
         (mine,) = np.nonzero(np.isin(point, [k for k, other in enumerate(tables) if other is table]))
         there, unsure = field_doubts(table, points[mine, :3] * values[point[mine], Parameter.LENGTH, None])
-        known[mine], doubts[mine[there]] = there, unsure
+        known[mine] = there
+        parts.append((mine[there], unsure))
+    doubts = np.zeros((len(points), max(part.shape[1] for _, part in parts)))
+    for which, part in parts:
+        doubts[which, : part.shape[1]] = part
     point, points, doubts = point[known], points[known], doubts[known]
     found = [Found.at(grid.alone(k), points[point == k], doubts[point == k]) for k in range(len(scenes))]
     return [(told(scene, grid.alone(k), found[k]), k in nodes) for k, scene in enumerate(scenes)]

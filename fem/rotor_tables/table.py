@@ -1,7 +1,7 @@
 """The rotor's field as a table: where `fem` ends and `dynamics` begins."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Protocol
 
@@ -33,6 +33,10 @@ class FieldFormula(Protocol):
 
     def expressions(self, position: Sequence[hy.expression]) -> FieldExpressions:
         """B and its gradient as heyoka expressions of a position (m, rotor's frame)."""
+
+
+LEFT_OUT = ("shape", "permeability")
+"""Doubts that are what a model leaves out, with its sign, and no mere size of an error."""
 
 
 class FieldTable(FieldFormula, Protocol):
@@ -171,6 +175,25 @@ class RotorTable:
             error_b += blur * np.linalg.norm([b for b, _ in sizes], axis=0)
             error_g += blur * np.linalg.norm([g for _, g in sizes], axis=0)
         return error_b, error_g
+
+    def left_out(self, points: ArrayLike) -> Array:
+        """What a simple model leaves out, as far as it is known: (n, 2, 4, 3) at points (n, 3) m.
+
+        For each of `LEFT_OUT` B (T), to first order, and the three rows of its gradient (T/m); zeros where the model
+        has it.
+        """
+        points = np.asarray(points, float).reshape(-1, 3)
+        found = np.zeros((len(points), len(LEFT_OUT), 4, 3))
+        for k, cause in enumerate(LEFT_OUT):
+            for part in self.doubts.get(cause, ()):
+                field, gradient = part.evaluate(_off_center(part, points))
+                found[:, k] += np.concatenate([field[:, None], gradient], axis=1)
+        return found
+
+    @property
+    def without_left_out(self) -> "RotorTable":
+        """The same field with the other doubts alone, whose sign is not known."""
+        return replace(self, doubts={cause: parts for cause, parts in self.doubts.items() if cause not in LEFT_OUT})
 
     def in_range(self, points: ArrayLike) -> NDArray[np.bool_]:
         """Which of the points (n, 3) m lie outside the magnets and where the expansions converge: (n,)."""

@@ -75,7 +75,7 @@ class Nearby:
         return levitation
 
     def _doubts(self, levitation: Levitation, problem: _Problem, places: Array) -> tuple[NDArray[np.bool_], Array]:
-        """Which places (n, 3) m the table knows, and errors (k, 2) there of B and of its gradient as compiled."""
+        """Which places (n, 3) m the table knows, and its doubts there, see `field_doubts`, of the field as compiled."""
         family, measure = problem.family, float(problem.values[Parameter.MEASURE])
         if family is None:
             return field_doubts(levitation.table, places)
@@ -85,7 +85,9 @@ class Nearby:
         assert isinstance(table, RotorTable)  # QUICK ones are
         field, slope = family.field.evaluate(places[there], measure)
         sizes = np.linalg.norm(field, axis=1), np.linalg.norm(slope, axis=(1, 2))
-        return there, np.stack(table.absolute_error(places[there]), axis=1) + ROUND_OFF * np.stack(sizes, axis=1)
+        unsigned, left_out = table.without_left_out.absolute_error(places[there]), table.left_out(places[there])
+        errors = np.column_stack(unsigned) + ROUND_OFF * np.column_stack(sizes)
+        return there, np.concatenate([errors, left_out.reshape(len(left_out), -1)], axis=1)
 
     def _problem(self, levitation: Levitation, state: PageState) -> _Problem | None:
         """The balance of a scene in the equations that are compiled here; None where it needs others."""

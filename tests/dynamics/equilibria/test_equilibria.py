@@ -266,3 +266,44 @@ def test_a_step_that_meets_no_solution_fails_and_asks_no_further():
 
     *_, good = stepped(Nowhere(), np.zeros((1, 2)), np.array([[1.0, 0.0]]), np.array([0.1]))
     assert not good.any()
+
+
+def stated_by_true(rotor, frequency, floater, model, truth):
+    """Stated error of the place by a model, over the true one, for all equilibria free of the rotor."""
+    scene = Scene(frequency, rotor, floater, Drag(0.0, 0.0))
+    true = np.array([e.position for e in survey(scene, truth).equilibria])
+    found = [e for e in survey(scene, rotor_table(rotor, model)).equilibria if e.distance > CLEAR]
+    return [e.position_error / np.linalg.norm(true - e.position, axis=1).min() for e in found]
+
+
+CLEAR = 12.5e-3
+"""From here on the floater is free of a cube of 10 mm, m."""
+ROTORS = {
+    **{f"horizontal {d}": rotor.horizontal(d * 1e-3, 10e-3, 1.305, 1.05) for d in (0.5, 1, 2, 3, 4)},
+    **{f"vertical {d}": rotor.vertical(d * 1e-3, 10e-3, 1.305, 1.05) for d in (11, 13, 16)},
+    **{f"tilt {a}": rotor.tilt(np.radians(a), 10e-3, 1.305, 1.05) for a in (3, 5, 10, 15)},
+}
+
+
+@pytest.mark.parametrize("name", ["horizontal 0.5", "horizontal 2", "vertical 13", "tilt 10"])
+def test_the_stated_error_of_a_dipole_bounds_the_true_one_and_is_near_it(name):
+    """Within a factor of ten: what a dipole leaves out of cubes of μr = 1 moves the place in a known direction."""
+    magnets = tuple(replace(magnet, recoil_permeability=1.0) for magnet in ROTORS[name])
+    ratios = [
+        ratio
+        for frequency in (110.0, 160.0)
+        for ratio in stated_by_true(magnets, frequency, FLOATER, "dipole", rotor_table(magnets, "cuboid"))
+    ]
+    assert ratios
+    assert all(1 <= ratio <= 10 for ratio in ratios), ratios
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("model", ["dipole", "cuboid"])
+@pytest.mark.parametrize("name", ROTORS)
+def test_the_same_of_permeable_cubes_against_finite_elements(name, model):
+    """The twelve rotors; FE errors (1e-5) are a thousandth of what is compared."""
+    truth = rotor_table(ROTORS[name], "fem", 1e-5)
+    ratios = [r for f in (110.0, 160.0) for r in stated_by_true(ROTORS[name], f, FLOATER, model, truth)]
+    assert ratios
+    assert all(1 <= ratio <= 10 for ratio in ratios), ratios
