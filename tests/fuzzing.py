@@ -312,6 +312,7 @@ def fault_in_fork(path: Path) -> str | None:
 
 def scene(chance: random.Random, folder: Path) -> int:
     """A scene with faults of all kinds, and a cheap command about it, in a process of its own."""
+    signal.alarm(0)  # `apart` looks at the time
     path, points = folder / "scene.toml", folder / "points.csv"
     for file in (path, points):
         _remove(file)
@@ -361,7 +362,6 @@ PEAKS = {"MB": 0.0, "s": 0.0}
 
 def apart(arguments: list[str], folder: Path) -> int:
     """The exit status of the command line in a copy of this process; what it must not do is an error here."""
-    signal.alarm(0)
     said, rest = folder / "said", folder / "tmp"
     rest.mkdir(exist_ok=True)
     with warnings.catch_warnings():  # the copy of a process with threads that it does not use

@@ -7,7 +7,6 @@ import io
 import math
 from numbers import Real
 from pathlib import Path
-from sys import float_info
 from typing import TYPE_CHECKING, Any
 
 from ...geometry.basics import InputError, file_content, shown
@@ -54,7 +53,12 @@ def map_extent(text: str) -> Array:
 
 def is_number(value: Any) -> bool:
     """Whether it is a finite number that a float holds."""
-    return isinstance(value, Real) and not isinstance(value, bool) and abs(value) <= float_info.max
+    if not isinstance(value, Real) or isinstance(value, bool):
+        return False
+    try:
+        return math.isfinite(value)
+    except OverflowError:  # an integer larger than any float
+        return False
 
 
 def positive(name: str, value: float) -> None:
