@@ -212,3 +212,8 @@ class Survey:
     equilibria: tuple[Equilibrium, ...]
     curves: tuple[ForceCurve, ...]
     left_out: tuple[LeftOut, ...] = ()
+
+    @property
+    def unknown(self) -> tuple[LeftOut, ...]:
+        """Of what is left out that of which it is not known whether it is an equilibrium."""
+        return tuple(one for one in self.left_out if one.why in (NOT_CONVERGED, PAST_TABLE))

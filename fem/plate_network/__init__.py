@@ -5,7 +5,7 @@ from .network_error import (
     ENOUGH as ENOUGH,
     coupling_error as coupling_error,
     fewest_fields as fewest_fields,
-    unreached as unreached,
+    refuse as refuse,
 )
 from .reduction import (
     NETWORK_SHARE as NETWORK_SHARE,

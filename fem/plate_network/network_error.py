@@ -2,11 +2,13 @@
 
 import math
 from collections.abc import Callable, Sequence
+from typing import NoReturn
 
 import numpy as np
 
 from ...geometry.basics import Array
 from ..closed_forms import ComplexArray
+from ..rotor_tables import AccuracyError
 from .energy_basis import OrderedBasis
 
 OPTION = "--plate-rtol (plate_rtol in Python, --rtol of the command plate)"
@@ -50,13 +52,18 @@ def fewest_fields(
     return chosen, worst(chosen)
 
 
-def unreached(rtol: float, enough: float, conductor: str) -> str:
-    """What to say where a table misses its tolerance and `enough` can be met."""
+def refuse(rtol: float, enough: float, conductor: str) -> NoReturn:
+    """Refuse a tolerance that a table of a conductor, in words, misses, where `enough` can be met.
+
+    Raises
+    ------
+    AccuracyError : always
+    """
     unit = 10.0 ** math.floor(math.log10(enough))
     enough = math.ceil(enough / unit - 1e-9) * unit
     if enough > LARGEST:
-        return (
+        raise AccuracyError(
             f"Input {OPTION} must be at least {enough:.2g} for {conductor}, more than the {LARGEST:g} that is allowed; "
             f"instead received {rtol:g}. Move the plate away from the floater, or choose another model of it."
         )
-    return f"Input {OPTION} must be at least {enough:.2g} for {conductor}; instead received {rtol:g}."
+    raise AccuracyError(f"Input {OPTION} must be at least {enough:.2g} for {conductor}; instead received {rtol:g}.")

@@ -16,8 +16,7 @@ from ...geometry.meshes import MeshRule
 from ...geometry.scenes import Plate
 from ..eddy_currents import Source
 from ..plate_currents import STRICT, CurrentSpace, OtherSources, PlateSolution, Region, grid_counts, solve_currents
-from ..rotor_tables import AccuracyError
-from .network_error import ENOUGH, fewest_fields, unreached
+from .network_error import ENOUGH, fewest_fields, refuse
 from .training import Group, prepare_training
 
 NETWORK_SHARE, STRICT_SHARE = 0.9, 0.8
@@ -118,7 +117,7 @@ def reduce_currents(
     chosen, state_error = fewest_fields(training.worst, training.basis(), allowed)
     if state_error > allowed:
         missed = state_error + functions_error + solution.mesh_error + space_error
-        raise AccuracyError(unreached(rtol, ENOUGH * max(missed, rtol), "this plate and this place of the floater"))
+        refuse(rtol, ENOUGH * max(missed, rtol), "this plate and this place of the floater")
     rates, fields = zip(*[part.diagonalised() for part in chosen], strict=True)
     return PlateNetwork(
         plate, region, frequencies, part_of_space(solution.space, training.groups, fields), tuple(training.groups),

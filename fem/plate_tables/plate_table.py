@@ -9,8 +9,8 @@ from numpy.typing import ArrayLike, NDArray
 from ...geometry.basics import Array, frozen_array, millimetres
 from ..closed_forms import ComplexArray
 from ..plate_currents import Region
-from ..plate_network import ENOUGH, unreached
-from ..rotor_tables import AccuracyError, RangeError
+from ..plate_network import ENOUGH, refuse
+from ..rotor_tables import RangeError
 from .field_functions import Multipoles
 
 
@@ -38,7 +38,7 @@ class PlateErrors:
         AccuracyError : it names a tolerance that can be met
         """
         if self.total > rtol:
-            raise AccuracyError(unreached(rtol, ENOUGH * self.total, conductor))
+            refuse(rtol, ENOUGH * self.total, conductor)
 
 
 @dataclass(frozen=True, eq=False)

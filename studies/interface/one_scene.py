@@ -4,6 +4,7 @@ from pathlib import Path
 
 import xarray as xr
 
+from ...geometry.basics import millimetres
 from ...geometry.scenes import Scene, scene_text
 from ..one_scene import Levitation
 from ..results import found_dataset, lowering_times, trajectory_dataset
@@ -42,19 +43,21 @@ def equilibria(
     Returns
     -------
     xarray.Dataset
-        Over `equilibrium`, `mode` and `axis`, SI units.
+        Over `equilibrium`, `mode` and `axis`, SI units; attribute `left_out` names the solutions that are no equilibria
+        of the scene, or are not known to be.
 
     Raises
     ------
     EquilibriumError
-        The rotor is at rest.
+        The rotor is at rest and the floater does not spin about its moment.
     InputError
         A model, a tolerance or a file that cannot be used.
     """
     with heard(progress):
         levitation = Levitation(scene, Models(model, plate_model, rtol, plate_rtol, interaction), spin)
         found = found_dataset(levitation.equilibria)
-        return found.assign_attrs(study="equilibria", **_labels(levitation))
+        left_out = "; ".join(f"{one.why}: {millimetres(one.known.position)}" for one in levitation.survey.left_out)
+        return found.assign_attrs(study="equilibria", left_out=left_out, **_labels(levitation))
 
 
 def stability(

@@ -133,7 +133,9 @@ class Question:
 
 def _equilibria(question: Question, levitation: Levitation) -> xr.Dataset:
     found_by = "search" if levitation.searched else "neighbours"
-    return found_dataset(levitation.equilibria).assign(found_by=((), found_by)).assign_attrs(levitation.labels)
+    unknown = variable((), float(len(levitation.survey.unknown)), "1", "equilibria that could not be computed")
+    found = found_dataset(levitation.equilibria).assign(found_by=((), found_by), unknown=unknown)
+    return found.assign_attrs(levitation.labels)
 
 
 def _flight(question: Question, levitation: Levitation) -> xr.Dataset:

@@ -17,7 +17,7 @@ from ..results import lowering_times, save_figures, trajectory_dataset, trajecto
 from ..terminal import COLUMNS, Models, note, to_json
 from .answers import equilibria_answer, field_answer, flight_answer
 from .levitation import Levitation
-from .words import effects_words, equilibria_words, flight_words, plate_words, tell_details
+from .words import effects_words, equilibria_words, flight_words, left_out_words, plate_words, tell_details
 
 Job = tuple[Mapping[str, Any], list[str]]
 """Numbers for a program, lines for a person."""
@@ -68,6 +68,9 @@ def _simulated(scene: Scene, asked: Models, duration: float, out: Path, resume: 
     elif checkpoint.read() is None:
         note(f"No checkpoint in {out}: the flight begins at t = 0.")
     levitation = Levitation(scene, asked)
+    if isinstance(scene.start, OffsetStart):
+        for line in left_out_words(levitation, levitation.survey.unknown):
+            note(line)
     begin = starting_point(levitation.equilibria) if isinstance(scene.start, OffsetStart) else None
     if begin is not None and not begin.stable:
         note(f"The flight begins at an unstable equilibrium: e-fold in {1 / begin.growth_per_s:.2g} s.")

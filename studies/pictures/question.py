@@ -106,6 +106,8 @@ def question_lines(result: xr.Dataset) -> list[str]:
         some = (shown["stable"] == 1).any("equilibrium")
         lines.append(f"A stable equilibrium at {int(some.sum())} of {some.size} points.")
         shown = shown.where(shown["stable"] == 1)
+    if "unknown" in result and (result["unknown"] > 0).any():
+        lines.append(f"At {int((result['unknown'] > 0).sum())} points not all equilibria could be computed.")
     for name in _shown(shown):
         values = shown[name].values[np.isfinite(shown[name].values)]
         if len(values):

@@ -52,6 +52,7 @@ def test_a_sweep_over_gravity_across_the_axis_shows_the_moment_s_rise():
     )
     steep = found["polar_angle"].where(found["stable"]).isel(equilibrium=0).values
     assert steep == pytest.approx([7.42, 35.25], abs=0.01)  # without gravity: the sweep's own steady motion
+    assert found["unknown"].values.tolist() == [0, 0]
 
 
 def test_a_steady_motion_is_the_same_in_both_frames():
@@ -91,6 +92,7 @@ def test_gravity_across_the_axis_ends_levitation_in_the_same_fold_however_it_is_
 def test_an_equilibrium_over_copper_goes_evenly_with_the_distance_of_the_plate(face_mm, distance_mm):
     """3 mm at 650 Hz, where Newton's steps end at 5e-12 to 1e-11 radii; against a solution by other means."""
     found = sl.equilibria(fast(3.0, 650.0, face_mm), model="dipole", plate_model="slab")
+    assert found.attrs["left_out"].startswith("in the plate: (")  # the far equilibrium, 33.6 mm below the rotor
     over = found.isel(equilibrium=(-1e3 * found["position"].sel(axis="z") < face_mm).values)
     assert 1e3 * float(over["position_error"][0]) > 5e-3  # of the plate's table, asked for 5e-3
     assert -1e3 * over["position"].sel(axis="z").values == pytest.approx([distance_mm], abs=0.01)
