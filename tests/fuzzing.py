@@ -10,6 +10,7 @@ import http.client
 import io
 import json
 import os
+import pickle
 import random
 import re
 import signal
@@ -24,11 +25,13 @@ import warnings
 from collections import Counter
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 from unittest import mock
 from urllib.parse import parse_qsl, quote, quote_plus, urlencode, urlsplit
 
 import devtools
 import meshio
+import netgen.occ as occ
 import numpy as np
 import places
 import psutil
@@ -39,7 +42,9 @@ from spinlev.fem.rotor_tables import rotor_table
 from spinlev.fem.rotor_tables.table_file import load_table, save_table
 from spinlev.fem.storage import TableFileError, checked_files, whole_files, write_checked
 from spinlev.fem.storage.foreign import look_through
-from spinlev.geometry.bodies import horizontal
+from spinlev.geometry.basics import apart as own_process
+from spinlev.geometry.bodies import horizontal, step_file
+from spinlev.geometry.meshes import solids
 from spinlev.geometry.scenes import load_scene
 from spinlev.studies.command_line import cli
 from spinlev.studies.live import first_state
@@ -291,6 +296,30 @@ def answered(arguments: list[str]) -> int:
         print(f"exit status 1: {arguments}: {said.getvalue().strip()[-300:]}", file=sys.__stderr__)
     assert status == 0 or not answer.getvalue(), "an answer in spite of a failure"
     return status
+
+
+def called_in_fork(seconds: float, function: Callable[..., Any], *given: Any, **named: Any) -> Any:
+    """`call_apart` with a copy of this process instead of a new one: 20 times as fast."""
+    reading, writing = os.pipe()
+    with warnings.catch_warnings():  # the copy of a process with threads that it does not use
+        warnings.simplefilter("ignore", DeprecationWarning)
+        child = os.fork()
+    if child == 0:
+        signal.alarm(0)
+        nowhere = os.open(os.devnull, os.O_WRONLY)
+        os.dup2(nowhere, 1)
+        os.dup2(nowhere, 2)
+        try:
+            with os.fdopen(writing, "wb") as stream:
+                stream.write(own_process.sent_answer(pickle.dumps((seconds, function, given, named))))
+        finally:
+            os._exit(0)
+    os.close(writing)
+    with os.fdopen(reading, "rb") as stream:
+        sent = stream.read()
+    _, status, used = os.wait4(child, 0)
+    PEAKS["MB"], PEAKS["s"] = max(PEAKS["MB"], used.ru_maxrss / 1e3), max(PEAKS["s"], used.ru_utime + used.ru_stime)
+    return own_process.outcome(os.waitstatus_to_exitcode(status), sent)
 
 
 def fault_in_fork(path: Path) -> str | None:
@@ -669,9 +698,70 @@ def addresses(chance: random.Random, folder: Path) -> int:
     return 2 if said else 0
 
 
+NUMBERS = ["nan", "1.E400", "-0.", "1.E-300", "0.", "-1.", "9999999999", "1.E15", "$", "*", "#1", "''"]
+"""In place of a number of a STEP file."""
+PART = """frequency_hz = 100.0
+[[rotor.magnets]]
+file = "part.step"
+center_mm = [0.0, 0.0, 0.0]
+polarization_T = [0.3, 0.0, 1.0]
+recoil_permeability = 1.05
+[floater]
+diameter_mm = 12.7
+remanence_T = 1.3
+density_kg_m3 = 7500.0
+"""
+
+
+def step(chance: random.Random, folder: Path) -> int:
+    """A part whose STEP file is damaged as editors, exporters and disks do it."""
+    whole = folder / f"{chance.choice(list(_solids()))}.step"
+    if not whole.exists():
+        _solids()[whole.stem]().WriteStep(str(whole))
+    content = _damaged_step(whole.read_text(), chance).encode()
+    (folder / "part.step").write_bytes(damaged(content, chance) if chance.random() < 0.2 else content)
+    (folder / "scene.toml").write_text(PART)
+    (folder / "points.csv").write_text("x_mm,y_mm,z_mm\n0,0,-40\n")
+    given = ["field", str(folder / "scene.toml"), "--points", str(folder / "points.csv"), "--model", "dipole"]
+    return answered([*given, "--out", str(folder / "out")])
+
+
+def _solids() -> dict[str, Callable[[], Any]]:
+    cube = occ.Box(occ.Pnt(-5, -5, -5), occ.Pnt(5, 5, 5))
+    return {
+        "cube": lambda: cube,
+        "chamfered": lambda: cube.MakeChamfer(cube.edges, 1.0),
+        "cylinder": lambda: occ.Cylinder(occ.Pnt(0, 0, 0), occ.Z, r=5, h=8),
+        "two": lambda: occ.Compound([cube, occ.Box(occ.Pnt(8, 0, 0), occ.Pnt(9, 1, 1))]),
+    }
+
+
+def _damaged_step(text: str, chance: random.Random) -> str:
+    entities = text.split(";\n")
+    for _ in range(chance.randint(1, 4)):
+        k, kind = chance.randrange(len(entities)), chance.randrange(6)
+        number = re.compile(r"(?<![\w#'])-?\d+\.?\d*(?:E[+-]?\d+)?")
+        if kind == 0:
+            del entities[k : k + chance.choice([1, 1, 1, 20])]
+        elif kind == 1:
+            entities.insert(chance.randrange(len(entities) + 1), entities[k])
+        elif kind == 2:
+            entities = entities[: k + 1]
+        elif kind == 3:
+            entities[k] = re.sub(r"#\d+(?=[,)])", lambda _: f"#{chance.randint(1, 400)}", entities[k], count=1)
+        elif kind == 4 and (found := list(number.finditer(entities[k]))):
+            start, end = chance.choice(found).span()
+            entities[k] = entities[k][:start] + chance.choice(NUMBERS) + entities[k][end:]
+        else:
+            other = chance.randrange(len(entities))
+            entities[k], entities[other] = entities[other], entities[k]
+        entities = entities or [""]
+    return ";\n".join(entities)
+
+
 KINDS: dict[str, Callable[[random.Random, Path], int]] = {
     "scene": scene, "points": points, "table": table, "result": result, "map": field_map, "command": command,
-    "addresses": addresses,
+    "addresses": addresses, "step": step,
 }  # fmt: skip
 
 
@@ -696,6 +786,8 @@ def fuzz(kind: str, number: int, seed: int = 0, faults: list[str] | None = None)
         mock.patch.dict(os.environ, SPINLEV_CACHE=f"{name}/cache"),
         mock.patch.object(checked_files, "hdf5_fault", fault_in_fork),
         mock.patch.object(readers, "hdf5_fault", fault_in_fork),
+        mock.patch.object(step_file, "call_apart", called_in_fork),
+        mock.patch.object(solids, "call_apart", called_in_fork),
     ):
         folder = Path(name)
         if kind == "addresses":
@@ -743,7 +835,7 @@ if __name__ == "__main__":
         began = time.perf_counter()
         number = many // 10 if asked == "all" and one == "addresses" else many  # pages take a second each
         found = fuzz(one, number, first, wrong)
-        most = f", at most {PEAKS['MB']:.0f} MB and {PEAKS['s']:.0f} s" if one == "scene" else ""
+        most = f", at most {PEAKS['MB']:.0f} MB and {PEAKS['s']:.0f} s" if one in ("scene", "step") else ""
         print(f"{one:8} {dict(sorted(found.items()))} in {time.perf_counter() - began:.0f} s{most}", flush=True)
     print(f"{len(wrong)} faults")
     sys.exit(bool(wrong))

@@ -54,17 +54,22 @@ def call_apart(seconds: float, function: Callable[Given, Answer], *given: Given.
         )  # fmt: skip
     except subprocess.TimeoutExpired:
         raise LostError("does not come to an end with it") from None
-    if done.returncode in (-signal.SIGXCPU, -signal.SIGKILL):
+    return outcome(done.returncode, done.stdout)  # type: ignore[no-any-return]
+
+
+def outcome(status: int, sent: bytes) -> Any:
+    """The answer that a process sent which ended with a status. Raises as `call_apart`."""
+    if status in (-signal.SIGXCPU, -signal.SIGKILL):
         raise LostError("does not come to an end with it")
     try:
-        answer, error = pickle.loads(done.stdout)
+        answer, error = pickle.loads(sent)
     except (EOFError, pickle.UnpicklingError):
         raise LostError("crashes on it") from None
     if isinstance(error, MemoryError):
         raise LostError(f"needs more than {MEMORY / 1e9:g} GB of memory for it")
     if error is not None:
         raise error
-    return answer  # type: ignore[no-any-return]
+    return answer
 
 
 def _serve() -> None:
@@ -72,10 +77,17 @@ def _serve() -> None:
     answers = os.fdopen(os.dup(sys.stdout.fileno()), "wb")
     with open(os.devnull, "w") as nowhere:
         os.dup2(nowhere.fileno(), sys.stdout.fileno())
+    answers.write(sent_answer(sys.stdin.buffer.read()))
+    answers.flush()
+    os._exit(0)  # what a damaged shape left behind may crash as it is cleared away
+
+
+def sent_answer(task: bytes) -> bytes:
+    """What a process sends that has the limits of its task from here on."""
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
     with contextlib.suppress(ValueError):  # the limit of this process may be lower already
         resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
-    seconds, function, given, named = pickle.load(sys.stdin.buffer)
+    seconds, function, given, named = pickle.loads(task)
     used = sum(resource.getrusage(resource.RUSAGE_SELF)[:2])
     limit = int(used + seconds) + 1
     resource.setrlimit(resource.RLIMIT_CPU, (limit, limit + 1))
@@ -85,9 +97,6 @@ def _serve() -> None:
     except Exception as error:
         answer = None, error
     try:
-        sent = pickle.dumps(answer)
+        return pickle.dumps(answer)
     except Exception:  # an error of a library that pickle does not take: its text does
-        sent = pickle.dumps((None, RuntimeError(str(answer[1]))))
-    answers.write(sent)
-    answers.flush()
-    os._exit(0)  # what a damaged shape left behind may crash as it is cleared away
+        return pickle.dumps((None, RuntimeError(str(answer[1]))))
