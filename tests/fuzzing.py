@@ -787,6 +787,7 @@ def fuzz(kind: str, number: int, seed: int = 0, faults: list[str] | None = None)
         mock.patch.object(checked_files, "hdf5_fault", fault_in_fork),
         mock.patch.object(readers, "hdf5_fault", fault_in_fork),
         mock.patch.object(step_file, "call_apart", called_in_fork),
+        mock.patch.object(step_file, "LONGEST", PATIENCE),
         mock.patch.object(solids, "call_apart", called_in_fork),
     ):
         folder = Path(name)

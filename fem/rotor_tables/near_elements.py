@@ -1,7 +1,7 @@
 """What permeability adds to the field in and next to magnets: finite elements of growing order, kept once solved."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +17,10 @@ from .table import RotorTable
 
 LOWEST = 3
 """Order of the elements at first."""
+MOST_LAYERS = 5
+"""At the edges; one more with every order up to here, as a step between equal layers does not tell what they leave."""
+SLOWEST = 0.3
+"""Least ratio of two steps that is believed."""
 SPREAD = 2.0
 """Share of the root mean square of the last step that is added to it, whose zeros are not those of the error."""
 OUTSIDE = 1e-5
@@ -80,6 +84,9 @@ class NearElements:
     def _solution(self, order: int) -> RotorSolution:
         if order not in self._solved:
             refinement = refinement_of(order, MeshSettings(), strongest(self.magnets))
+            if not any(isinstance(magnet.body, Part) for magnet in self.magnets):
+                layers = max(refinement.mesh.hp_layers, min(order - LOWEST + 1, MOST_LAYERS))
+                refinement = replace(refinement, mesh=replace(refinement.mesh, hp_layers=layers))
             self._solved[order] = solve_rotor(self.magnets, refinement, "split", 1, carriers=self.carriers)
         return self._solved[order]
 
@@ -87,10 +94,14 @@ class NearElements:
         """∇ψ, its slope, the estimated errors of both, and the order."""
         error, steep = np.full(len(points), np.inf), np.full(len(points), np.inf)
         first, second = potential_slopes(self._solution(LOWEST), points)
+        step, step_of_slope = np.zeros(len(points)), np.zeros(len(points))
         for order in range(LOWEST + 1, highest + 1):
             before = first, second
             first, second = potential_slopes(self._solution(order), points)
-            error, steep = _spread(first - before[0]), _spread((second - before[1]).reshape(-1, 9))
+            # a step that is small by chance does not tell the error: the one before it has a say
+            step = np.maximum(np.linalg.norm(first - before[0], axis=1), SLOWEST * step)
+            step_of_slope = np.maximum(np.linalg.norm(second - before[1], axis=(1, 2)), SLOWEST * step_of_slope)
+            error, steep = _spread(step), _spread(step_of_slope)
             if error.max() <= allowed:
                 return first, second, error, steep, order
         return first, second, error, steep, highest
@@ -109,6 +120,5 @@ class NearElements:
         found.error[outside], found.slope_error[outside] = table.absolute_error(places)
 
 
-def _spread(step: Array) -> Array:
-    size = np.linalg.norm(step, axis=1)
+def _spread(size: Array) -> Array:
     return np.asarray(size + SPREAD * float(np.sqrt(np.mean(size**2))))

@@ -17,7 +17,7 @@ from ..basics import Array, InputError, LostError, Part, call_apart, counted, fi
 MILLI = 1e-3
 MOST = 50_000_000
 """Bytes of a STEP file."""
-LONGEST, PACE = 15.0, 1e6
+LONGEST, PACE = 8.0, 1e6
 """Seconds of processor time for a small file, which takes a fraction of one; bytes for each second more."""
 SMALLEST, LARGEST = 1e-3, 1e5
 """Edges of the box about a solid, mm."""
