@@ -11,6 +11,8 @@ from spinlev.geometry.scenes import SceneError, load_scene, scene_keys
 from spinlev.studies.live import controls, first_state
 
 OTHER = first_state(load_scene(HORIZONTAL))
+MAGNET = '{"file": "/etc/passwd", "center_mm": [0.0, 0.0, 0.0], "polarization_T": [0.0, 0.0, 1.0]}'
+FOREIGN = {"rotor.magnets": f"[{MAGNET}]"}
 
 
 @pytest.mark.parametrize("path", sorted(SCENES.glob("*.toml")), ids=lambda path: path.stem)
@@ -62,8 +64,8 @@ def test_a_scene_that_cannot_be(asked, says):
         ({"spin": "nan"}, "spin must be"),
         ({"spin": "1e6"}, "between -1000 and 1000"),
         ({"spin": "9" * 5000}, "spin must be a number; instead received '999"),
-        ({"rotor.field_map": "[" * 900 + "]" * 900}, "field_map"),
-        ({"rotor.field_map": "/etc/passwd"}, "must be a file of the scene that was opened first"),
+        ({"rotor.field_map": "[" * 900 + "]" * 900}, "rotor.configuration must be"),
+        (FOREIGN, "magnets.0..file must be a file of the scene that was opened first; instead received '/etc/passwd'"),
         ({"gravity_m_s2": "1" * 30_000}, "at most 20000 characters"),
     ],
 )
