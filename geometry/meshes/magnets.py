@@ -7,6 +7,7 @@ magnets.
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import combinations
@@ -125,6 +126,7 @@ def mesh_magnets(
     bodies = [magnet.body for magnet in magnets] if edges_of is None else list(edges_of)
     given = magnets, bodies, center, unit, settings, planes
     if any(isinstance(body, Part) for body in bodies):  # on whose shape the mesher may crash
+        sys.modules["ngsolve.comp"] = ng.comp  # where pickle looks for the class of a mesh: else for a file
         try:
             mesh = call_apart(LONGEST, _meshed, *given)
         except LostError as error:
