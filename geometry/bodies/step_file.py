@@ -184,7 +184,8 @@ def _box(solid: Any, triangles: Array, outer: Array) -> Array:
     """(2, 3) mm, lower and upper ends; `outer` are OpenCASCADE's."""
     edges = [edge for edge in solid.edges if edge.mass > POINT]  # the pole of a sphere is an edge without a curve
     count = max(4, ALONG_EDGES // max(1, len(edges)))
-    places = [edge.Value(t) for edge in edges for t in np.linspace(*edge.parameter_interval, count)]
+    spans = [edge.parameter_interval for edge in edges]
+    places = [e.Value(t) for e, (start, end) in zip(edges, spans, strict=True) for t in np.linspace(start, end, count)]
     found = np.concatenate([triangles.reshape(-1, 3), np.array([[p.x, p.y, p.z] for p in places]).reshape(-1, 3)])
     inner = np.array([found.min(axis=0), found.max(axis=0)])
     size = float(np.linalg.norm(inner[1] - inner[0]))
