@@ -9,7 +9,7 @@ import numpy as np
 from ...fem.rotor_tables import FieldTable
 from ...geometry.basics import Array
 from ...geometry.scenes import Scene
-from ..effects import with_effects
+from ..effects import too_slow, with_effects
 from ..equilibria import SearchRange, Steps, find_equilibria, scattered
 from ..motion import PlateMemory, Rates, Scales
 from ..steady import Equilibrium, EquilibriumError
@@ -77,6 +77,8 @@ def _levitating_frequency(
 
 def _levitates(scene: Scene, table: FieldTable, rates: Rates, memory: PlateMemory | None) -> bool:
     """Whether a scene on a stable branch has a stable equilibrium too with its plate and its whole gravity."""
+    if too_slow(scene):
+        return False
     if scene.plate is None and not np.any(scene.gravity[:2]):
         return True
     if memory is not None and scene.frequency > memory.table.frequencies[1]:

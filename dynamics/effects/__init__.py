@@ -15,8 +15,11 @@ from .catalogue import (
 )
 from .floater_currents import (
     FLOATER_CURRENTS as FLOATER_CURRENTS,
+    SLOW_ENOUGH as SLOW_ENOUGH,
     FloaterCurrents as FloaterCurrents,
+    check_floater_metal as check_floater_metal,
     slow_error as slow_error,
+    too_slow as too_slow,
 )
 from .floater_shape import FLOATER_SHAPE as FLOATER_SHAPE, FloaterShape as FloaterShape
 from .mutual import MUTUAL as MUTUAL, Mutual as Mutual

@@ -10,9 +10,10 @@ its gradient G of degree 2, the ball takes the dipole and quadrupole moments -κ
 where the sums run over the modes, c ∝ 1/z⁴, Σ c = 1, and v, w are drift and lag, seen from the rotor.  Exact for a
 steady turn at every frequency: what is odd in X of X (1 - τX)⁻¹ = X + τX² … is the torque, which the skin effect
 weakens, the even part the ball's lift, its push out of the field.  What changes the turn, and the drift through G, is
-taken as slow against the delays (`slow_error`).  Where skin depth is large against R all is that of a thin field, a
-loss κ |Ḃ|² + (2/21) R² κ |Ġ|² whose derivatives by v and w force and torque are.  Degree 3 is left out; it changes the
-growth of small motions by 1 to 2 % of this effect's at 14 to 22 mm, more nearer by.
+taken as slow against the delays (`slow_error`); a magnet's motions are not always (`too_slow`).  Where skin depth is
+large against R all is that of a thin field, a loss κ |Ḃ|² + (2/21) R² κ |Ġ|² whose derivatives by v and w force and
+torque are.  Degree 3 is left out; it changes the growth of small motions by 1 to 2 % of this effect's at 14 to 22 mm,
+more nearer by.
 """
 
 from collections.abc import Sequence
@@ -39,26 +40,38 @@ SUMS = ((1 / 90, 1 / 945), (1 / 350, 1 / 7875))
 THINNEST = 300.0
 """Largest ωμ0σR², 2 R² over the skin depth's square: there the other modes are missed by 2 % of the torque."""
 
+SLOW_ENOUGH = 0.25
+"""Largest `slow_error` beside a remanence, which makes motions fast: there it would be a growth rate's error."""
+ROUNDED = 0.995
+"""What is named as the most that would do is less by so much, so that its three digits will do."""
+
 FLOATER_CURRENTS = "currents in the floater"
 
 
 def check_floater_metal(scene: Scene) -> None:
-    """Refuse a floater whose skin depth is so small that its currents are more modes than are followed.
+    """Refuse a floater whose currents are more modes than are followed, or too slow for the motions of a magnet.
 
     Raises
     ------
     InputError : with the skin depth, and the conductivity or frequency up to which it would do
     """
-    floater = scene.floater
-    number = skin_number(floater.radius, floater.conductivity or 0.0, scene.frequency)
-    if number > THINNEST:
-        depth, most = floater.radius * np.sqrt(2 / number), THINNEST / number
-        raise InputError(
-            f"Input floater.conductivity_S_m must leave its skin depth at least {np.sqrt(2 / THINNEST):.2g} of its "
-            f"radius; instead received {floater.conductivity:.3g} S/m: {depth * 1e3:.3g} mm at {scene.frequency:.4g} "
-            f"Hz in a ball of {2e3 * floater.radius:.4g} mm. Take at most {most * (floater.conductivity or 0):.2g} S/m "
-            f"or {most * scene.frequency:.3g} Hz, or leave it out."
-        )
+    floater, frequency = scene.floater, scene.frequency
+    number = skin_number(floater.radius, floater.conductivity or 0.0, frequency)
+    if too_slow(scene):
+        rule = "leave its skin depth large against it where it has a remanence"
+        said = f"{2 * frequency:.4g} Hz, twice the rotor's frequency,"
+        depth, share = floater.radius / np.sqrt(number), np.sqrt(SLOW_ENOUGH * 105) / 2 / number
+    elif number > THINNEST:
+        rule = f"leave its skin depth at least {np.sqrt(2 / THINNEST):.2g} of its radius"
+        said, depth, share = f"{frequency:.4g} Hz", floater.radius * np.sqrt(2 / number), THINNEST / number
+    else:
+        return
+    most = ROUNDED * share
+    raise InputError(
+        f"Input floater.conductivity_S_m must {rule}; instead received {floater.conductivity:.3g} S/m: "
+        f"{depth * 1e3:.3g} mm at {said} in a ball of {2e3 * floater.radius:.4g} mm. Take at most "
+        f"{most * (floater.conductivity or 0):.3g} S/m or {most * frequency:.3g} Hz, or leave it out."
+    )
 
 
 def slow_error(scene: Scene) -> float:
@@ -68,6 +81,11 @@ def slow_error(scene: Scene) -> float:
     """
     floater = scene.floater
     return min(1.0, (2 * skin_number(floater.radius, floater.conductivity or 0.0, scene.frequency)) ** 2 / 105)
+
+
+def too_slow(scene: Scene) -> bool:
+    """Whether currents of the floater are too slow for its motions: those of a magnet are as fast as the rotor."""
+    return scene.floater.remanence > 0 and slow_error(scene) > SLOW_ENOUGH
 
 
 @dataclass(frozen=True)

@@ -15,7 +15,7 @@ from ...geometry.basics import Array, moved
 from ...geometry.bodies import Magnet
 from ...geometry.scenes import Scene
 from ..branches import Problem
-from ..effects import with_effects
+from ..effects import check_floater_metal, with_effects
 from ..motion import Effect, Interaction, Parameter, Rates, Scales, parameters
 from .blend import blend_tables, chebyshev_points
 from .family_effects import family_effects
@@ -61,6 +61,7 @@ class RotorFamily:
         frequency, measure = np.broadcast_arrays(np.atleast_1d(frequency), np.atleast_1d(measure))
         different, which = np.unique(frequency, return_inverse=True)
         check_slow_enough(pieces_of(self.rotor, ()), float(different[-1]))
+        check_floater_metal(replace(self.scene, frequency=float(different[-1])))
         scenes = [replace(self.scene, frequency=float(f)) for f in different]
         each = [parameters(scene, Scales.of(scene), frozen_spin=True) for scene in scenes]
         values = np.reshape(each, (-1, len(Parameter)))[which]

@@ -7,6 +7,6 @@ from .file import (
     losses_key as losses_key,
     save_losses as save_losses,
 )
-from .slow_enough import check_slow_enough as check_slow_enough
+from .slow_enough import check_slow_enough as check_slow_enough, slow_error as slow_error
 from .table import RotorLosses as RotorLosses
 from .tabulate import pieces_of as pieces_of, rotor_losses as rotor_losses

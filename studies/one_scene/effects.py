@@ -10,13 +10,14 @@ from ...dynamics.effects import (
     NOTHING_ANSWERS,
     REAL_AIR,
     ROTOR_CURRENTS,
+    SLOW_ENOUGH,
     reynolds,
     slow_error,
     swinging,
 )
 from ...dynamics.equilibria import growth_by_floater, growth_by_rotor, shift_by_answers
 from ...dynamics.steady import Equilibrium
-from ...fem.rotor_losses import ball_losses, pieces_of
+from ...fem.rotor_losses import ball_losses, pieces_of, slow_error as metal_error
 from ...geometry.basics import MAGNET_CONDUCTIVITY
 from .levitation import Levitation
 
@@ -37,7 +38,7 @@ class ListedEffect:
     growth_per_s : what it adds there to the growth of the mode that grows fastest with it, about; None where that is
         not known
     why : it is in the motion or not
-    motion_error : relative error of what it adds to the growth of motions, as they are taken as slow against it
+    motion_error : relative error of what it adds, or would, to the growth of motions: they are taken as slow against it
     """
 
     name: str
@@ -66,12 +67,11 @@ def _floater_currents(levitation: Levitation, first: Equilibrium | None) -> List
     scene, floater, growth = levitation.scene, levitation.scene.floater, None
     if floater.body is not None:
         return ListedEffect(FLOATER_CURRENTS, False, None, None, OF_SPHERES)
-    if first and scene.frequency:
-        there = replace(scene, floater=replace(floater, conductivity=floater.conductivity or MAGNET_CONDUCTIVITY))
+    there = replace(scene, floater=replace(floater, conductivity=floater.conductivity or MAGNET_CONDUCTIVITY))
+    doubt = slow_error(there)
+    if first and scene.frequency and doubt <= SLOW_ENOUGH:
         growth = growth_by_floater(there, levitation.table, first, bool(floater.conductivity))
-    listed = _conducting(FLOATER_CURRENTS, "floater.conductivity_S_m", bool(floater.conductivity), growth)
-    metal = replace(floater, conductivity=floater.conductivity or MAGNET_CONDUCTIVITY)
-    doubt = slow_error(replace(scene, floater=metal))
+    listed = _conducting(FLOATER_CURRENTS, "floater.conductivity_S_m", bool(floater.conductivity), growth, doubt)
     return replace(listed, motion_error=doubt)
 
 
@@ -79,17 +79,21 @@ def _rotor_currents(levitation: Levitation, first: Equilibrium | None) -> Listed
     """Those of the scene, or what those of sintered magnets, taken as balls, would be."""
     scene, growth, included = levitation.scene, None, levitation.losses is not None
     magnets = [replace(magnet, conductivity=MAGNET_CONDUCTIVITY) for magnet in scene.rotor]
-    losses = levitation.losses or (ball_losses(pieces_of(magnets, ())) if magnets else None)
+    pieces = pieces_of(magnets, ())
+    losses = levitation.losses or (ball_losses(pieces) if pieces else None)
+    doubt = 0.0 if included else metal_error(pieces, scene.frequency)
     if scene.floater.body is not None:
         return ListedEffect(ROTOR_CURRENTS, False, None, None, OF_SPHERES)
-    if first and losses and scene.frequency:
+    if first and losses and scene.frequency and doubt <= SLOW_ENOUGH:
         growth = growth_by_rotor(scene, first, losses, included)
-    return _conducting(ROTOR_CURRENTS, "rotor.conductivity_S_m", included, growth)
+    return _conducting(ROTOR_CURRENTS, "rotor.conductivity_S_m", included, growth, doubt)
 
 
-def _conducting(name: str, key: str, included: bool, growth: float | None) -> ListedEffect:
+def _conducting(name: str, key: str, included: bool, growth: float | None, doubt: float) -> ListedEffect:
     why = "a conductivity is given" if included else f"no {key}"
-    if not included and growth is not None:
+    if not included and doubt > SLOW_ENOUGH:
+        why += f"; at {MAGNET_CONDUCTIVITY:.2g} S/m, as of sintered magnets, it would be too slow to tell what it adds"
+    elif not included and growth is not None:
         why += f"; at {MAGNET_CONDUCTIVITY:.2g} S/m, as of sintered magnets, it would add {growth:.2g} /s to the growth"
     return ListedEffect(name, included, 0.0, growth, why)
 

@@ -261,7 +261,8 @@ def effects_words(values: Mapping[str, Any]) -> list[str]:
     widths = [max(len(row[k]) for row in rows) for k in range(4)]
     table = [f"  {row[0]:{widths[0]}}  " + "  ".join(map(str.rjust, row[1:], widths[1:])) for row in rows]
     plate = [PLATE_NOT_MODELLED] if PLATE_NOT_MODELLED in values["not_modelled"] else []
-    fast = [NOT_SLOW.format(**effect) for effect in values["effects"] if effect["motion_error"] > CLEARLY_SLOW]
+    told = [e for e in values["effects"] if e["included"] or e["growth_per_s"] is not None]
+    fast = [NOT_SLOW.format(**effect) for effect in told if effect["motion_error"] > CLEARLY_SLOW]
     return [*(line.rstrip() for line in table), *plate, *fast]
 
 

@@ -1,5 +1,6 @@
 """The floater's own currents as an effect: against a closed form in the floater's frame, and of what form they are."""
 
+import re
 from dataclasses import replace
 
 import heyoka as hy
@@ -7,7 +8,7 @@ import numpy as np
 import pytest
 import scipy
 
-from spinlev.dynamics.effects import FloaterCurrents, with_effects
+from spinlev.dynamics.effects import SLOW_ENOUGH, FloaterCurrents, slow_error, with_effects
 from spinlev.dynamics.motion import Interaction, Parameter, Rates, Scales, State, equations_of_motion, parameters
 from spinlev.fem.closed_forms import thin_field_torque
 from spinlev.fem.rotor_losses import ball_losses
@@ -78,7 +79,8 @@ def wrench(scene: Scene, state: State, table: RotorTable = TABLE) -> np.ndarray:
     """(6,) force, N, and torque, N m, that the currents add in a state."""
     scales, packed = Scales.of(scene), Scales.of(scene).pack(state)[None]
     values = parameters(scene, scales)
-    added = (Rates(with_effects(scene, table))(packed, values)[0] - Rates(table)(packed, values)[0])[0]
+    whole = Interaction(table, (FloaterCurrents(),))
+    added = (Rates(whole)(packed, values)[0] - Rates(table)(packed, values)[0])[0]
     floater = scene.floater
     return np.concatenate([added[3:6] * floater.mass * scales.length, added[9:] * floater.inertia]) / scales.time**2
 
@@ -155,9 +157,22 @@ def test_turns_about_any_axis_and_drift_are_those_of_the_modes_solved_one_by_one
 
 
 def test_a_floater_with_too_thin_a_skin_is_refused_with_a_way_out():
-    scene = replace(SCENE, floater=replace(FLOATER, radius=0.05, conductivity=5.8e7), frequency=400.0)
+    scene = replace(SCENE, floater=replace(FLOATER, radius=0.05, remanence=0.0, conductivity=5.8e7), frequency=400.0)
     with pytest.raises(InputError, match=r"floater.conductivity_S_m must leave its skin depth at least 0.082 of its"):
         with_effects(scene, TABLE)
+
+
+def test_a_magnet_too_fast_for_its_own_currents_is_refused_and_what_is_named_will_do():
+    """A ball without remanence has no motion as fast as the rotor, and may be of copper."""
+    copper = replace(SCENE, floater=replace(FLOATER, radius=15e-3, conductivity=5.8e7), frequency=120.0)
+    with pytest.raises(InputError, match=r"large against it where it has a remanence; .* 4\.27 mm at 240 Hz") as caught:
+        with_effects(copper, TABLE)
+    most, slowest = (float(x) for x in re.findall(r"at most (\S+) S/m or (\S+) Hz", str(caught.value))[0])
+    for conductivity, frequency in ((most, 120.0), (5.8e7, slowest)):
+        there = replace(copper, floater=replace(copper.floater, conductivity=conductivity), frequency=frequency)
+        assert with_effects(there, TABLE).effects
+        assert slow_error(there) == pytest.approx(SLOW_ENOUGH, rel=0.03)  # three digits, and half a percent less
+    assert with_effects(replace(copper, floater=replace(copper.floater, remanence=0.0)), TABLE).effects
 
 
 def test_an_effect_is_added_once_and_only_where_the_scene_asks():
