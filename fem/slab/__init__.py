@@ -7,6 +7,6 @@ from .around_place import (
     wider_region as wider_region,
 )
 from .choice import PlateChoice as PlateChoice, resolve_plate_model as resolve_plate_model
-from .edges import edge_error as edge_error
+from .edges import cached_edge_error as cached_edge_error, edge_error as edge_error
 from .reaction import Slab as Slab, reaction_tensor as reaction_tensor
 from .table import slab_and_rotor_table as slab_and_rotor_table

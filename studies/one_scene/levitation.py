@@ -36,10 +36,10 @@ from ...fem.mutual import MutualTable
 from ...fem.plate_currents import Region
 from ...fem.rotor_losses import RotorLosses, check_slow_enough, pieces_of
 from ...fem.rotor_tables import AccuracyError, FieldTable, RotorTable
-from ...fem.slab import edge_error, resolve_plate_model, rotor_nearby, wider_region
+from ...fem.slab import cached_edge_error, edge_error, resolve_plate_model, rotor_nearby, wider_region
 from ...geometry.basics import Array, InputError, SpinlevError, Watch, millimetre_size, shown, unwatched
 from ...geometry.scenes import AbsoluteStart, Scene, load_scene
-from ..terminal import FieldModel, Models, detail, finite, note, positive, progress, silence, stages
+from ..terminal import FieldModel, Models, detail, finite, note, positive, progress, stages
 from .plate_of_scene import check_room, check_way, plate_memory
 from .rotor_of_scene import RotorField, RotorTables, equations_key
 
@@ -217,34 +217,53 @@ class Levitation:
         if choice.model == "none" or scene.plate is None or place is None:
             return None
         scene.floater.must_be("sphere", where="over a plate with eddy currents", instead="Choose --plate-model none.")
+        rtol, far = self.models.plate_rtol, self._foreseen() if choice.model == "reduced" else None
+        if far is not None and self.models.plate_model == "auto":
+            edges = f"edges change an infinite slab's response by {far.neglected:.2g} of itself at most"
+            if far.neglected <= ROUGHEST:
+                note(
+                    f"The floater goes so far that finite elements take long; {edges}: it is taken. (--plate-model fem)"
+                )
+                return far
+            rtol = self._looser
+            note(f"The floater goes so far that finite elements take long, and {edges}: {rtol:.2g} is asked for.")
         memory, found = plate_memory(
             scene,
             scene.plate,
             choice.model,
             sources(self.table),
             place,
-            self.models.plate_rtol,
+            rtol,
             choice.edges,
             self._tables,
-            self._foreseen() if choice.model == "reduced" else None,
+            far.table.region if far else None,
         )
         self._plate_cached = found
         return memory
 
-    def _foreseen(self) -> Region | None:
-        """Where a flight goes at first, by an infinite slab: its tables take seconds, the finite elements' minutes."""
+    def _foreseen(self) -> PlateMemory | None:
+        """An infinite slab for where a flight goes at first, if that is far, and what it misses without edges.
+
+        Its tables take seconds, the finite elements' minutes.
+        """
         if not self.absolute or not self._ahead:
             return None
         note("Where the floater goes, by an infinite slab ...")
         slab = self.elsewhere(replace(self.models, plate_model="slab"))
         try:
-            with silence():
-                slab.flight(min(self._ahead, AHEAD))
+            flown = slab.flight(min(self._ahead, AHEAD))
         except FlightStopped:
             raise KeyboardInterrupt from None  # it is not the flight that was asked for
         except SpinlevError:
             return None  # the plate is no slab for it
-        return None if slab._wider is None else slab._wider.table.region
+        found = slab._wider
+        if found is None:
+            return None
+        way = _way(found, flown)
+        worst = way[int(np.argmax([edge_error(found.plate, place) for place in way]))]
+        rotor = np.mean([magnet.box.center for magnet in self.scene.rotor], axis=0)
+        edges = cached_edge_error(found.plate, np.array([worst, rotor]), self.scene.frequency, note)
+        return replace(found, neglected=min(1.0, edges))
 
     @cached_property
     def survey(self) -> Survey:
@@ -372,10 +391,12 @@ class Levitation:
         try:
             self._wider = self._plate_memory(region, self.models.plate_rtol)
         except AccuracyError:
-            self._wider = self._plate_memory(
-                region, max(self.models.plate_rtol, min(LOOSER * self.models.plate_rtol, ROUGHEST))
-            )
+            self._wider = self._plate_memory(region, self._looser)
         return True
+
+    @property
+    def _looser(self) -> float:
+        return max(self.models.plate_rtol, min(LOOSER * self.models.plate_rtol, ROUGHEST))
 
     def _plate_memory(self, region: Region, rtol: float) -> PlateMemory:
         scene, known, place = self.scene, self.plate, self._place(() if self.absolute else self.equilibria)
@@ -391,9 +412,8 @@ class Levitation:
         """The flight, and the error by a slab's missing edges for where it went."""
         memory, place = self._wider, self._place(() if self.absolute else self.equilibria)
         if memory is not None and place is not None and memory.neglected:
-            depths = plate_depth(memory.plate, flown.time)[:, None] * [0.0, 0.0, 1.0]
-            way = (flown.lab.position + depths)[:: max(1, len(depths) // PLACES)]
-            there = max(edge_error(memory.plate, seen) for seen in way) / edge_error(memory.plate, place)
+            there = max(edge_error(memory.plate, seen) for seen in _way(memory, flown))
+            there /= edge_error(memory.plate, place)
             self._wider = replace(memory, neglected=min(1.0, memory.neglected * max(1.0, there)))
         return flown
 
@@ -463,6 +483,12 @@ def given_scene(scene: Scene | str | Path) -> Scene:
     if isinstance(scene, str | Path):
         return load_scene(scene)
     raise InputError(f"Input scene must be a Scene or the path of a scene file; instead received {shown(scene)}.")
+
+
+def _way(memory: PlateMemory, flown: Trajectory) -> Array:
+    """Some places (n, 3) m of a flight as the plate at its start would see them."""
+    depths = plate_depth(memory.plate, flown.time)[:, None] * [0.0, 0.0, 1.0]
+    return np.asarray((flown.lab.position + depths)[:: max(1, len(depths) // PLACES)])
 
 
 def _first(known: Sequence[Equilibrium]) -> Equilibrium | None:
