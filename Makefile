@@ -18,7 +18,7 @@ SOURCES := $(shell find spinlev geometry fem dynamics studies scenes -type f -no
 # Slow tests are run by `validate`, those that need a browser by `test-browser`, which `validate` begins with.
 FAST := not slow and not browser
 
-.PHONY: install run develop test test-browser lint types check-pins coverage bench bench-compare bench-peers dist dependencies docs \
+.PHONY: install run develop test test-browser lint types check-pins coverage bench bench-compare bench-peers house dist dependencies docs \
   validate fuzz lock clean
 
 # What the program needs, the page in the browser included; `develop` adds what tests it and writes its pages.
@@ -92,6 +92,10 @@ bench: develop
 # A row that is finished stays; RUN=--again does them anew, RUN=--second fills the second run, whose times give the spread.
 bench-peers: develop
 	$(BIN)/python benchmarks/peer_runs/run.py $(WORK) $(RUN)
+
+# Size of the house, and what it should be.
+house:
+	@$(PYTHON) benchmarks/house.py
 
 # Two commits: make bench in both, then make bench-compare OLD=theirs.json; by default with the one in the repository.
 bench-compare: install
