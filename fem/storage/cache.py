@@ -195,6 +195,7 @@ def owned(folder: Path) -> Iterator[None]:
     InputError : another process is at work there
     OSError : the folder cannot be made or written
     """
+    is_new = not folder.exists()
     folder.mkdir(parents=True, exist_ok=True)
     path = folder / OWNER
     descriptor = _lock(path)
@@ -206,6 +207,9 @@ def owned(folder: Path) -> Iterator[None]:
     finally:
         path.unlink(missing_ok=True)
         os.close(descriptor)
+        if is_new:
+            with suppress(OSError):  # something was computed: it stays
+                folder.rmdir()
 
 
 def _lock(path: Path) -> int:

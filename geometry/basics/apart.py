@@ -15,6 +15,8 @@ import sys
 from collections.abc import Callable
 from typing import Any, ParamSpec, TypeVar
 
+from .errors import ComputationError
+
 MEMORY = 2_000_000_000
 """Bytes of address space; the libraries alone take a third of it."""
 SLOWER = 4.0
@@ -25,8 +27,8 @@ Given = ParamSpec("Given")
 Answer = TypeVar("Answer")
 
 
-class LostError(Exception):
-    """The process ended without an answer; the message is what a library did: "crashes on it"."""
+class LostError(ComputationError):
+    """The process ended without an answer; the message is the end of a sentence: "crashes on it"."""
 
 
 def call_apart(seconds: float, function: Callable[Given, Answer], *given: Given.args, **named: Given.kwargs) -> Answer:

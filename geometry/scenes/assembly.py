@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from pydantic import ValidationError
 
-from ..basics import Array, Box, Cylinder, InputError, Part, Solid, rotation_matrix, shown
+from ..basics import Array, Box, Cylinder, InputError, Part, Solid, regular_file, rotation_matrix, shown
 from ..bodies import Conductor, Magnet, horizontal, known_shape, read_part, tilt, vertical
 from .contents import AbsoluteStart, Drag, Lowering, MapReading, OffsetStart, Plate, Scene
 from .faults import SceneError, describe_fault, overlap_faults
@@ -81,11 +81,10 @@ def assemble(keys: Mapping[str, Any], source: str, folder: Path | None = None, k
 def content_digest(path: Path) -> str:
     """SHA-256 of a file's content; empty where there is no file, or one so large that no reader takes it."""
     try:
-        found = os.stat(path)
-        if not os.path.isfile(path) or found.st_size > LARGEST:
-            return ""
+        with regular_file(path, LARGEST, "file", "a file") as stream:
+            found = os.fstat(stream.fileno())
         return _digest(path, (found.st_ino, found.st_size, found.st_mtime_ns, found.st_ctime_ns))
-    except (OSError, ValueError):
+    except (InputError, OSError):
         return ""
 
 

@@ -136,6 +136,8 @@ def test_start_is_displaced_from_the_stable_equilibrium_and_at_rest_in_the_rotor
 def test_start_inside_the_plate_is_refused():
     plate = Plate(Box((0.1, 0.1, 0.03), (0.0, 0.0, -40e-3)), 3.5e7)
     with pytest.raises(StartError, match="free of the magnets and the plate"):
+        simulate(replace(thrown((0.0, 0.0, -24e-3), (0.0, 0.0, 0.0)), plate=plate), DIPOLE, 1.0)
+    with pytest.raises(EquilibriumError, match="no stable equilibrium"):  # where it was, the plate is
         simulate(replace(SCENE, plate=plate), DIPOLE, 1.0)
 
 

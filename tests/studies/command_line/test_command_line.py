@@ -86,7 +86,9 @@ def test_equilibria(spinlev):
     assert answer["model"] == "cuboid"
     assert answer["interaction"] == "rigid"
     effects = {effect["name"]: effect for effect in answer["effects"]}
-    assert set(next(iter(effects.values()))) == {"name", "included", "shift_mm", "growth_per_s", "why"}
+    assert set(next(iter(effects.values()))) == {
+        *("name", "included", "shift_mm", "growth_per_s", "why", "motion_error")
+    }
     assert effects["mutual magnetisation"]["shift_mm"] > 0.01  # what it would do
     assert "cuboid" in effects["mutual magnetisation"]["why"]
 
@@ -177,7 +179,10 @@ def test_wrong_scenes_end_with_status_2_one_message_and_no_file(spinlev, tmp_pat
     ("arguments", "said"),
     [
         (("run", "none.toml"), "none.toml: Input scene must be a TOML file; instead there is no none.toml."),
-        (("field", "S", "--points", "none.csv"), "none.csv: Input points must be a CSV file"),
+        (
+            ("field", "S", "--points", "none.csv"),
+            "points must be a CSV file with x_mm, y_mm, z_mm; instead there is no none.csv.",
+        ),
         (("field", "S", "--points", "P", "--model", "magic"), "magic"),
         (("field", "S", "--points", "P", "--rtol", "-1"), "--rtol must be at least"),
         (("field", "S"), "--points"),

@@ -5,7 +5,6 @@ import pytest
 
 import spinlev as sl
 from spinlev.geometry.basics import InputError
-from spinlev.studies.live.state import first_state
 
 MATERIAL = {"remanence_T": 1.305, "recoil_permeability": 1.0, "density_kg_m3": 7500.0}
 BRICK = {"shape": "cuboid", "size_mm": [12.0, 10.0, 8.0], **MATERIAL}
@@ -71,13 +70,12 @@ def test_what_is_no_pose_is_told(pose, said):
             "where many fly side by side",
         ),
         (lambda: sl.equilibria(made(DISC), model="dipole", interaction="mutual"), "Choose --interaction rigid"),
-        (lambda: first_state(made(DISC)), "on the live page"),
         (
             lambda: sl.simulate(made(DISC, plate=PLATE, start=HELD), 0.1, model="dipole", plate_model="slab"),
             "over a plate with eddy currents; .* Choose --plate-model none",
         ),
     ],
-    ids=["equilibria", "simulate", "ensemble", "mutual", "explore", "plate"],
+    ids=["equilibria", "simulate", "ensemble", "mutual", "plate"],
 )
 def test_what_other_shapes_cannot_do_is_told(attempt, said):
     with pytest.raises(InputError, match=said):

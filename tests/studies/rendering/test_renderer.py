@@ -118,7 +118,7 @@ def test_the_frames_of_a_flight_are_places_on_its_path(flight):
 
 def test_the_field_that_is_drawn_is_the_tables(flight):
     scene, table, flown = flight
-    view = last_view(scene, table, flown.rotor)
+    view = last_view(scene, table, flown.time, flown.rotor)
     points = 1e-3 * FieldPlane.points(view.plane.width, view.plane.depth)
     known = np.isfinite(view.plane.field).all(axis=1)
     np.testing.assert_array_equal(known, table.in_range(points))
@@ -128,5 +128,5 @@ def test_the_field_that_is_drawn_is_the_tables(flight):
 @pytest.mark.usefixtures("needs_3d")
 def test_a_view_is_a_png(flight, tmp_path):
     scene, table, flown = flight
-    render({tmp_path / "a.png": last_view(scene, table, flown.rotor)})
+    render({tmp_path / "a.png": last_view(scene, table, flown.time, flown.rotor)})
     assert (tmp_path / "a.png").read_bytes().startswith(b"\x89PNG")
