@@ -1,5 +1,6 @@
 """The field of a whole rotor at one level of refinement: symmetry, parity parts, moments."""
 
+import contextlib
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import product
@@ -17,14 +18,14 @@ from ...geometry.bodies import (
     parity_parts,
     shifted_magnet,
 )
-from ...geometry.meshes import MagnetMesh, MeshSettings, mesh_magnets
+from ...geometry.meshes import OTHERWISE, MagnetMesh, MeshSettings, mesh_magnets
 from ..closed_forms import by_cells
 from ..harmonics import Coefficients, MultipoleExpansion, rotated_harmonics
 from .moments import reaction_dipoles, reaction_moments, trace_moments
 from .solver import Formulation, Solution, System, assemble, solve
 
-SIZES = (1.0, 0.8, 0.5)
-"""Of elements in magnets, relative to what is asked for, that are tried."""
+SIZES = tuple(zip((1.0, 0.8, 0.5), OTHERWISE, strict=True))
+"""Of elements in magnets, and the least at round surfaces of parts, that are tried, relative to what is asked for."""
 
 
 @dataclass(frozen=True)
@@ -153,19 +154,23 @@ def _of_cells(
 def _meshed_system(
     bodies: list[Magnet], refinement: Refinement, planes: tuple[int, ...], edges_of: list[Solid]
 ) -> tuple[MagnetMesh, System, int]:
-    """Mesh, matrix, layers at the edges: where the mesher cannot match them, smaller elements, else fewer layers.
+    """Mesh, matrix, layers at the edges: where the mesher fails or they do not match, smaller elements, else fewer.
 
     Two elements that touch edges of magnets near each other may be refined otherwise on the face between them; in
     another mesh of nearly the same size they are mostly not there.
     """
-    for layers, size in product(range(refinement.mesh.hp_layers, -1, -1), SIZES):
-        settings = replace(refinement.mesh, hp_layers=layers, magnet_size=size * refinement.mesh.magnet_size)
-        mesh = mesh_magnets(bodies, settings, planes, edges_of)
+    asked = refinement.mesh
+    reason = MeshError("The mesh of the magnets does not fit together; change their positions slightly.")
+    for layers, (size, smallest) in product(range(asked.hp_layers, -1, -1), SIZES):
+        settings = replace(asked, magnet_size=size * asked.magnet_size, smallest=smallest * asked.smallest)
         try:
-            return mesh, assemble(mesh, refinement.order), layers
-        except MeshError:
+            mesh = mesh_magnets(bodies, replace(settings, hp_layers=layers), planes, edges_of)
+        except MeshError as error:
+            reason = error
             continue
-    raise MeshError("The mesh of the magnets does not fit together; change their positions slightly.")
+        with contextlib.suppress(MeshError):
+            return mesh, assemble(mesh, refinement.order), layers
+    raise reason
 
 
 def _polarizations(magnets: Sequence[Magnet], carriers: Sequence[Magnet] | None, symmetry: Symmetry) -> Array:

@@ -1,4 +1,4 @@
-from .apart import LostError as LostError, call_apart as call_apart
+from .apart import CrashError as CrashError, LostError as LostError, call_apart as call_apart
 from .arrays import (
     MAGNET_CONDUCTIVITY as MAGNET_CONDUCTIVITY,
     MU_0 as MU_0,

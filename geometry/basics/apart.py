@@ -28,7 +28,11 @@ Answer = TypeVar("Answer")
 
 
 class LostError(ComputationError):
-    """The process ended without an answer; the message is the end of a sentence: "crashes on it"."""
+    """The process ended without an answer; the message is the end of a sentence: "does not come to an end with it"."""
+
+
+class CrashError(LostError):
+    """The process crashed: asked slightly differently, the library may well answer."""
 
 
 def call_apart(seconds: float, function: Callable[Given, Answer], *given: Given.args, **named: Given.kwargs) -> Answer:
@@ -42,7 +46,8 @@ def call_apart(seconds: float, function: Callable[Given, Answer], *given: Given.
 
     Raises
     ------
-    LostError : the process crashed, took too long, or needed more than `MEMORY`
+    LostError : the process took too long, or needed more than `MEMORY`
+    CrashError : it crashed
     Exception : whatever the function raises
     """
     task = pickle.dumps((seconds, function, given, named))
@@ -66,7 +71,7 @@ def outcome(status: int, sent: bytes) -> Any:
     try:
         answer, error = pickle.loads(sent)
     except (EOFError, pickle.UnpicklingError):
-        raise LostError("crashes on it") from None
+        raise CrashError("crashes on it") from None
     if isinstance(error, MemoryError):
         raise LostError(f"needs more than {MEMORY / 1e9:g} GB of memory for it")
     if error is not None:

@@ -163,7 +163,7 @@ def _triangles(solid: Any) -> Array:
     across = np.linalg.norm(np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]), axis=1)
     triangles = triangles[~(across <= FLAT * np.max(across, initial=0.0))]  # at the poles of spheres
     held = np.sum(triangles[:, 0] * np.cross(triangles[:, 1], triangles[:, 2]))
-    return triangles if held > 0 else triangles[:, ::-1]
+    return np.asarray(triangles if held > 0 else triangles[:, ::-1])
 
 
 def _refuse_open(triangles: Array, volume: float) -> None:

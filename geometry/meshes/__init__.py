@@ -6,7 +6,7 @@ from .hexahedra import Block as Block, graded_partition as graded_partition, hex
 from .magnets import MagnetMesh as MagnetMesh, MeshSettings as MeshSettings, mesh_magnets as mesh_magnets
 from .metal import MetalMesh as MetalMesh, mesh_metal as mesh_metal
 from .plate import MeshRule as MeshRule, plate_mesh as plate_mesh, skin_depth as skin_depth
-from .solids import part_rule as part_rule
+from .solids import OTHERWISE as OTHERWISE, part_rule as part_rule
 from .step_writing import (
     Body as Body,
     Facets as Facets,

@@ -19,7 +19,7 @@ import numpy as np
 
 from ..basics import Array, Box, Cylinder, LostError, MeshError, Part, Ring, Solid, call_apart, frozen_array, moved
 from ..bodies import Magnet, overlapping_magnets
-from .solids import LONGEST, SIMPLER, SMALLEST, occ_solid
+from .solids import LONGEST, SIMPLER, SMALLEST, occ_solid, unmeshed
 
 LARGE = 100.0
 TINY = 1e-7
@@ -45,6 +45,7 @@ class MeshSettings:
     hp_factor : ratio of the sizes of two such layers
     curve_order : polynomial degree of the curved elements at the sphere and at round magnets
     curvature : elements in a radius of curvature
+    smallest : least element that a radius of curvature asks for, in cube roots of a part's volume
     """
 
     ball_radius: float = 1.3
@@ -55,6 +56,7 @@ class MeshSettings:
     hp_factor: float = 0.15
     curve_order: int = 6
     curvature: float = 2.0
+    smallest: float = SMALLEST
 
     def __post_init__(self) -> None:
         if self.ball_radius <= 1:
@@ -112,6 +114,7 @@ def mesh_magnets(
     ------
     ValueError : no magnet, or two that overlap
     MeshError : a part from a file cannot be meshed
+    ComputationError : the mesher takes too long with it, or too much memory
     """
     settings = settings or MeshSettings()
     magnets = tuple(magnets)
@@ -130,7 +133,7 @@ def mesh_magnets(
         try:
             mesh = call_apart(LONGEST, _meshed, *given)
         except LostError as error:
-            raise MeshError(f"The mesher {error}: {_files(bodies)}. {SIMPLER}") from None
+            raise unmeshed(error, _files(bodies)) from None
     else:
         mesh = _meshed(*given)
     return MagnetMesh(mesh, magnets, frozen_array(center, (3,)), unit, settings.ball_radius, planes)
@@ -205,7 +208,7 @@ def _generate(
                 *(_size(b, settings) * GRADED**settings.hp_layers / unit for b in parts if _sharp(edge, b, unit)),
             ]
         )
-    smallest = min((SMALLEST * body.volume ** (1 / 3) / unit for body in parts), default=0.0)
+    smallest = min((settings.smallest * body.volume ** (1 / 3) / unit for body in parts), default=0.0)
     sizes = {"maxh": settings.air_size, "minh": smallest, "grading": settings.grading}
     sizes["curvaturesafety"] = settings.curvature
     try:

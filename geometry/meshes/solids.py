@@ -1,5 +1,6 @@
 """Bodies as solids of OpenCASCADE."""
 
+import contextlib
 import tempfile
 from functools import lru_cache
 from typing import Any
@@ -9,13 +10,27 @@ import ngsolve as ng
 import numpy as np
 import scipy
 
-from ..basics import Array, Box, LostError, MeshError, Part, Ring, Solid, Sphere, call_apart
+from ..basics import (
+    Array,
+    Box,
+    ComputationError,
+    CrashError,
+    LostError,
+    MeshError,
+    Part,
+    Ring,
+    Solid,
+    Sphere,
+    call_apart,
+)
 
 MILLIMETRE = 1e-3
 CURVED, ROUND = 6, 2.0
 """Degree of the elements at round surfaces, and how many of them in a radius of curvature."""
 SMALLEST = 0.06
 """Least element that a radius of curvature asks for, in cube roots of a part's volume: one spans a small fillet."""
+OTHERWISE = (1.0, 0.5, 0.0)
+"""Of that, where the mesher fails: its luck with the same part is another with elements of other sizes."""
 FEW, SMALL = 8, 1.5
 """Degree of the rule in small elements, and their edge times the degree of the polynomial, by the part's, at most."""
 LONGEST = 60.0
@@ -69,25 +84,36 @@ def part_rule(body: Part, order: int) -> tuple[Array, Array]:
     Raises
     ------
     MeshError : the part cannot be meshed
+    ComputationError : the mesher takes too long, or too much memory
     """
     try:
         points, weights = _rule(body.brep, order)
     except LostError as error:
-        raise MeshError(f"The mesher {error}: {body.file}. {SIMPLER}") from None
+        raise unmeshed(error, body.file.name) from None
     local = points * MILLIMETRE + body.origin
     return body.center + local @ body.rotation.T, weights * MILLIMETRE**3
 
 
 @lru_cache(maxsize=8)
 def _rule(brep: str, order: int) -> tuple[Array, Array]:
-    return call_apart(LONGEST, rule_in_solid, brep, order)
+    *first, last = OTHERWISE
+    for share in first:
+        with contextlib.suppress(CrashError, MeshError):
+            return call_apart(LONGEST, rule_in_solid, brep, order, share * SMALLEST)
+    return call_apart(LONGEST, rule_in_solid, brep, order, last * SMALLEST)
 
 
-def rule_in_solid(brep: str, order: int) -> tuple[Array, Array]:
+def unmeshed(error: LostError, name: str) -> ComputationError:
+    """What is told of files whose mesh another process did not make; a MeshError where another mesh may do."""
+    kind = MeshError if isinstance(error, CrashError) else ComputationError
+    return kind(f"The mesher {error}: {name}. {SIMPLER}")
+
+
+def rule_in_solid(brep: str, order: int, smallest: float = SMALLEST) -> tuple[Array, Array]:
     """Points (n, 3) mm in the solid of a BREP text and weights (n,) mm³; small elements have few. Raises MeshError."""
     solid = read_brep(brep)
     unit = float(solid.mass) ** (1 / 3)
-    sizes = {"maxh": 0.6 * unit, "minh": SMALLEST * unit, "curvaturesafety": ROUND, "grading": 0.6}
+    sizes = {"maxh": 0.6 * unit, "minh": smallest * unit, "curvaturesafety": ROUND, "grading": 0.6}
     try:
         mesh = ng.Mesh(occ.OCCGeometry(solid).GenerateMesh(**sizes, parallel_meshing=False))
     except Exception as error:  # netgen raises several kinds

@@ -204,4 +204,4 @@ def test_stated_errors_hold_near_the_edges_of_round_magnets(name):
     flux, stated = (np.array([getattr(one, key)[0] for one in found]) for key in ("flux_density", "error"))
     true = np.linalg.norm(flux - truth.flux_density(points), axis=1)
     assert np.all(true < stated + 3e-7)
-    assert np.median(stated / true) < 30  # of use, too
+    assert stated.max() < 1e-3 * remanence  # of use, too: no more than was asked for

@@ -1,6 +1,8 @@
 """Magnets from STEP files: beside the same shape by key, and what no magnet can be made of."""
 
 import re
+import subprocess
+import sys
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -9,12 +11,27 @@ import numpy as np
 import pytest
 
 from spinlev.dynamics.effects import mutual_choice
+from spinlev.fem.closed_forms import carrier
+from spinlev.fem.magnetostatics import refinement_of, solve_rotor
 from spinlev.fem.rotor_tables import refuse_edges, rotor_table
 from spinlev.fem.rotor_tables.accuracy import error_points
 from spinlev.fem.rotor_tables.table_file import load_table, save_table
-from spinlev.geometry.basics import Box, Cylinder, InputError, moved, rotation_matrix
-from spinlev.geometry.bodies import Magnet, known_shape, overlapping_magnets, read_part
+from spinlev.geometry.basics import (
+    Box,
+    ComputationError,
+    CrashError,
+    Cylinder,
+    InputError,
+    LostError,
+    MeshError,
+    call_apart,
+    moved,
+    rotation_matrix,
+    shown,
+)
+from spinlev.geometry.bodies import Magnet, known_shape, overlapping_magnets, read_part, step_file
 from spinlev.geometry.bodies.step_file import _refuse_open, _roots
+from spinlev.geometry.meshes import MeshSettings, magnets as magnet_meshes
 from spinlev.geometry.scenes import SceneError, changed, load_scene, magnets, parse_scene, scene, scene_text, sphere
 
 BALL = sphere(diameter_mm=12.7, remanence_T=1.305, density_kg_m3=7500.0)
@@ -173,7 +190,7 @@ def test_beside_a_known_scene_no_file_is_opened(folder, tmp_path):
         for other in (str(beside / "other.step"), str(beside / "none.step"), "/dev/zero", "../x"):
             with pytest.raises(SceneError) as error:
                 parse_scene(text.replace(name, other), "x.toml", known=first)
-            said.add(str(error.value).replace(repr(other), ""))
+            said.add(str(error.value).replace(shown(other), ""))
         assert said == {
             f"x.toml: Input {key} must be a file of the scene that was opened first; instead received . Give the "
             "scene to the command line."
@@ -320,9 +337,8 @@ VOLUMES = {
 """mm³, where a line does."""
 
 
-@pytest.mark.parametrize(
-    "name", [n if n == "chamfered cube" else pytest.param(n, marks=pytest.mark.slow) for n in ROUNDED]
-)
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ROUNDED)
 def test_a_chamfered_or_rounded_magnet_has_its_moment_and_converges(tmp_path, name):
     """μr = 1: M V. μr = 1.05: 1e-3 is reached and stated, and 1e-4 lies within the two statements of it."""
     ROUNDED[name]().WriteStep(str(tmp_path / "part.step"))
@@ -338,3 +354,84 @@ def test_a_chamfered_or_rounded_magnet_has_its_moment_and_converges(tmp_path, na
     stated = [table.absolute_error(points)[0] for table in tables]
     assert np.all(apart < stated[0] + stated[1])
     assert np.max(stated[0] / scale) < 1e-3
+
+
+@pytest.mark.parametrize(
+    ("deed", "end"),
+    [
+        ("__import__('os').abort()", "crashes on it"),
+        ("__import__('os')._exit(0)", "crashes on it"),
+        ("sum(iter(int, 1))", "does not come to an end with it"),
+        ("bytearray(3_000_000_000)", "needs more than 2 GB of memory for it"),
+    ],
+)
+def test_a_file_that_its_reader_does_not_survive_is_one_sentence(tmp_path, monkeypatch, deed, end):
+    """The reader is `eval`, so that the file does to its process whatever it says; this one lives on."""
+    monkeypatch.setattr(step_file, "measured", eval)
+    if "end" in end:
+        monkeypatch.setattr(step_file, "LONGEST", 0.5)
+    path = tmp_path / "odd.step"
+    path.write_text(f"ISO-10303-21 if False else {deed}")
+    with pytest.raises(InputError) as refused:
+        read_part(path)
+    assert str(refused.value) == (
+        f"Input file must be a whole STEP file; instead OpenCASCADE {end}: {path}. Export it again."
+    )
+
+
+def solved(path):
+    magnet = Magnet(read_part(path), (0, 0, 1.2), 1.05)
+    return solve_rotor((magnet,), refinement_of(2, MeshSettings()), carriers=[carrier(magnet)])
+
+
+def failing(monkeypatch, error, allowed):
+    """Fails as long as the elements are larger than allowed; how often it was called."""
+    calls = []
+
+    def call(seconds, function, *given):
+        calls.append(given[4])
+        if given[4].magnet_size > allowed:
+            raise error
+        return call_apart(seconds, function, *given)
+
+    monkeypatch.setattr(magnet_meshes, "call_apart", call)
+    return calls
+
+
+def test_a_mesh_that_crashes_the_mesher_is_tried_with_other_sizes(folder, monkeypatch):
+    calls = failing(monkeypatch, CrashError("crashes on it"), 0.8)
+    solved(folder / "chamfer.step")
+    assert [(one.magnet_size, one.smallest) for one in calls] == [(1.0, 0.06), (0.8, 0.03)]
+
+
+def test_a_part_that_no_mesh_fits_is_one_sentence(folder, monkeypatch):
+    calls = failing(monkeypatch, CrashError("crashes on it"), 0.0)
+    with pytest.raises(MeshError, match=r"^The mesher crashes on it: chamfer\.step\. Leave out small features of the"):
+        solved(folder / "chamfer.step")
+    assert len(calls) == 6  # three sizes, with one layer at the edges and without
+
+
+def test_a_mesh_that_takes_too_long_is_not_tried_again(folder, monkeypatch):
+    calls = failing(monkeypatch, LostError("does not come to an end with it"), 0.0)
+    with pytest.raises(ComputationError, match=r"^The mesher does not come to an end with it: chamfer\.step\. Leave"):
+        solved(folder / "chamfer.step")
+    assert len(calls) == 1
+
+
+FRESH = """
+import sys
+from pathlib import Path
+from spinlev.studies.command_line.late import load_late
+load_late("netgen", "netgen.occ", "netgen.meshing", "ngsolve")
+from spinlev.geometry.bodies import Magnet, read_part
+from spinlev.geometry.meshes import MeshSettings, mesh_magnets
+mesh = mesh_magnets([Magnet(read_part(Path(sys.argv[1])), (0, 0, 1.2), 1.05)], MeshSettings())
+print(mesh.mesh.GetMaterials(), mesh.elements > 50)
+"""
+
+
+def test_a_mesh_from_another_process_is_understood_where_ngsolve_loads_late(folder):
+    """As from the command line, where pickle would not find the class of a mesh in a module that is no file."""
+    command = [sys.executable, "-P", "-c", FRESH, str(folder / "chamfer.step")]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.stdout.strip() == "('magnet0', 'air') True", done.stderr
