@@ -4,6 +4,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
+import numpy as np
+
 from ...dynamics.effects import (
     FLOATER_CURRENTS,
     MUTUAL,
@@ -19,10 +21,12 @@ from ...dynamics.equilibria import growth_by_floater, growth_by_rotor, shift_by_
 from ...dynamics.steady import Equilibrium
 from ...fem.rotor_losses import ball_losses, pieces_of, slow_error as metal_error
 from ...geometry.basics import MAGNET_CONDUCTIVITY
+from ...geometry.scenes import Scene
 from .levitation import Levitation
 
 PLATE_NOT_MODELLED = "The plate's eddy currents are left out: the plate is only an obstacle."
 
+UNKNOWN_NEAR = "the floater is so near to the magnets that their size is not known"
 OF_SPHERES = "known for spherical floaters alone"
 
 
@@ -84,9 +88,17 @@ def _rotor_currents(levitation: Levitation, first: Equilibrium | None) -> Listed
     doubt = 0.0 if included else metal_error(pieces, scene.frequency)
     if scene.floater.body is not None:
         return ListedEffect(ROTOR_CURRENTS, False, None, None, OF_SPHERES)
-    if first and losses and scene.frequency and doubt <= SLOW_ENOUGH:
+    near = first is not None and not included and _as_near_as_inside(scene, first)
+    if first and losses and scene.frequency and doubt <= SLOW_ENOUGH and not near:
         growth = growth_by_rotor(scene, first, losses, included)
-    return _conducting(ROTOR_CURRENTS, "rotor.conductivity_S_m", included, growth, doubt)
+    listed = _conducting(ROTOR_CURRENTS, "rotor.conductivity_S_m", included, growth, doubt)
+    return replace(listed, why=f"{listed.why}; {UNKNOWN_NEAR}") if near else listed
+
+
+def _as_near_as_inside(scene: Scene, equilibrium: Equilibrium) -> bool:
+    """Whether a floater is within the sphere about a magnet, as in the hole of a ring: no ball is like that magnet."""
+    place = (equilibrium.without or equilibrium).position
+    return any(np.linalg.norm(place - m.body.center) < m.body.circumradius for m in scene.rotor)
 
 
 def _conducting(name: str, key: str, included: bool, growth: float | None, doubt: float) -> ListedEffect:

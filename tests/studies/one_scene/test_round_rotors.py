@@ -1,11 +1,14 @@
 """Rotors of round magnets through the whole program: balance of forces with magpylib's field, and a flight."""
 
+from types import SimpleNamespace
+
 import magpylib
 import numpy as np
 import pytest
 
 import spinlev as sl
 from spinlev.geometry.basics import rotation_matrix
+from spinlev.studies.one_scene import effects
 
 BALL = sl.sphere(diameter_mm=12.7, remanence_T=1.305, density_kg_m3=7500.0, recoil_permeability=1.0)
 TILT = [0.0, -8.0, 0.0]
@@ -72,3 +75,19 @@ def test_a_map_of_sphere_rotors_is_that_of_dipoles():
     sphere, dipole = (found.distance.values for found in pair)
     assert np.isfinite(sphere).any()
     assert sphere == pytest.approx(dipole, abs=1e-9, nan_ok=True)
+
+
+def test_in_a_rings_hole_nobody_says_how_large_currents_in_it_would_be(monkeypatch):
+    """A ball in the ring's place, whose losses are told elsewhere, would be around the floater: 1e13 /s were said."""
+    scene = sl.scene(
+        frequency_hz=100.0, rotor=sl.magnets({**RING, "diameter_mm": 20.0, "height_mm": 3.0}), floater=BALL
+    )
+    told = {}
+    monkeypatch.setattr(
+        effects, "growth_by_rotor", lambda _, there, *rest: float(told.setdefault(there.position[2], -2.0))
+    )
+    for height in (-1e-5, -20e-3):
+        there = SimpleNamespace(position=np.array([0.0, 0.0, height]), without=None)
+        listed = effects._rotor_currents(sl.Levitation(scene), there)
+        assert (listed.growth_per_s is None) == ("so near" in listed.why) == (height > -10e-3)
+    assert list(told) == [-20e-3]
