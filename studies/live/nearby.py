@@ -13,10 +13,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ...dynamics.effects import check_floater_metal
 from ...dynamics.equilibria import Found, SearchRange, carried, field_doubts, told
 from ...dynamics.maps import RotorFamily, article_measure, rotor_family
 from ...dynamics.motion import Parameter, Rates, Scales, has_likes, like, parameters
 from ...dynamics.steady import Balance, Survey
+from ...fem.rotor_losses import check_slow_enough, pieces_of
 from ...fem.rotor_tables import ROUND_OFF, RotorTable
 from ...geometry.basics import Array, SpinlevError
 from ..one_scene import Levitation
@@ -52,10 +54,12 @@ class Nearby:
     def at(self, state: PageState) -> Levitation | None:
         """The scene of another state with equilibria carried to it, or None where they cannot be.
 
-        Raises EquilibriumError for a rotor at rest, as a search does.
+        Raises EquilibriumError for a rotor at rest, as a search does, and InputError where it turns too fast for metal.
         """
         if state.model != self.state.model or not state.scene.frequency or not self.state.scene.frequency:
             return None
+        check_floater_metal(state.scene)  # equations are shared, their limits are not
+        check_slow_enough(pieces_of(state.scene.rotor, state.scene.conductors), state.scene.frequency)
         levitation = _without_plate(state)
         levitation.share(self.levitation)
         problem, before = self._problem(levitation, state), self._problem(self.levitation, self.state)

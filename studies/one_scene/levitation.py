@@ -222,7 +222,8 @@ class Levitation:
             edges = f"edges change an infinite slab's response by {far.neglected:.2g} of itself at most"
             if far.neglected <= ROUGHEST:
                 note(
-                    f"The floater goes so far that finite elements take long; {edges}: it is taken. (--plate-model fem)"
+                    f"The floater goes so far that finite elements take long; {edges}, which is what is computed. "
+                    "Choose --plate-model fem for the edges."
                 )
                 return far
             rtol = self._looser

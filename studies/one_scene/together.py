@@ -67,7 +67,7 @@ def _find_together(alike: Sequence[Levitation], places: Indices) -> None:
     same: dict[str, list[Levitation]] = {}
     first_places = []
     for levitation, place in zip(alike, places, strict=True):
-        if levitation.scene.frequency:
+        if levitation.scene.frequency and _allowed(levitation):
             key = f"{startless_text(levitation.scene)} {levitation.spin!r}"
             if key not in same:
                 first_places.append(place)
@@ -84,6 +84,13 @@ def _find_together(alike: Sequence[Levitation], places: Indices) -> None:
     for some, (survey, searched) in zip(same.values(), found, strict=True):
         for levitation in some:
             levitation.adopt(survey, searched)
+
+
+def _allowed(levitation: Levitation) -> bool:
+    """Whether a scene alone is not refused for what acts in it: equations are shared, their limits are not."""
+    with suppress(SpinlevError):
+        return levitation.interaction is not None
+    return False
 
 
 def _of_family(alike: Sequence[Levitation], different: Mapping[str, Levitation]) -> tuple[Rates, Array]:

@@ -106,3 +106,8 @@ def test_what_no_table_holds_for_says_so():
     fast = scene_of(tuple(replace(m, conductivity=6e7) for m in horizontal(0.0, *SHAPE)))
     with pytest.raises(InputError, match="must leave its skin depth large"):
         rotor_family(fast, "horizontal", "dipole")
+    copper = scene_of(horizontal(0.0, *SHAPE))
+    copper = replace(copper, frequency=50.0, floater=replace(copper.floater, conductivity=5.8e7))
+    family = rotor_family(copper, "horizontal", "dipole")
+    with pytest.raises(InputError, match=r"floater.conductivity_S_m must leave its skin depth large"):
+        family.values([50.0, 400.0], 1e-3)
