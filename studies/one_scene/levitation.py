@@ -369,10 +369,11 @@ class Levitation:
                 f"After {time:.4g} s the floater leaves the range of the plate's table: again from the start, with a "
                 "larger one."
             )
-            return self._plate_for(region)
+            self._plate_for(region)
         except SpinlevError as error:
             self.no_wider = str(error)
             return False
+        return True
 
     def _plate_matters(self, flown: Trajectory) -> bool:
         """Whether a plate that was left out where the flight began can be felt where it went; then it is there now."""
@@ -387,13 +388,12 @@ class Levitation:
         del self.plate
         return True
 
-    def _plate_for(self, region: Region) -> bool:
+    def _plate_for(self, region: Region) -> None:
         """Have the plate's table for a region, plate's frame, with more error than asked for where it must be."""
         try:
             self._wider = self._plate_memory(region, self.models.plate_rtol)
         except AccuracyError:
             self._wider = self._plate_memory(region, self._looser)
-        return True
 
     @property
     def _looser(self) -> float:
