@@ -5,7 +5,6 @@ import re
 import runpy
 import tomllib
 
-import pytest
 from numpydoc.docscrape import FunctionDoc
 from numpydoc.validate import validate
 from places import ROOT
@@ -17,19 +16,25 @@ PAGES = sorted([ROOT / "README.md", *(ROOT / "docs").glob("*.md")])
 NAMED = re.compile(r"`((?:geometry|fem|dynamics|studies|tests|benchmarks|scenes|docs)/[\w/.-]+\.(?:py|toml|md))")
 
 
-@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
-def test_files_that_are_named_exist(page):
-    text = page.read_text(encoding="utf-8")
-    links = re.findall(r"\]\((?!https?:)([^)#]+)", text)
-    missing = [name for name in NAMED.findall(text) if not (ROOT / name).is_file()]
-    missing += [link for link in links if not (page.parent / link).exists()]
-    assert not missing
+def test_files_that_are_named_exist():
+    missing = []
+    for page in PAGES:
+        text = page.read_text(encoding="utf-8")
+        links = re.findall(r"\]\((?!https?:)([^)#]+)", text)
+        missing += [f"{page.name}: {name}" for name in NAMED.findall(text) if not (ROOT / name).is_file()]
+        missing += [f"{page.name}: {link}" for link in links if not (page.parent / link).exists()]
+    assert missing == []
 
 
-@pytest.mark.parametrize("page", [*PAGES, *(ROOT / "docs" / "examples").glob("*.py")], ids=lambda page: page.name)
-def test_modules_that_are_named_exist(page):
-    for name in set(re.findall(r"\bspinlev(?:\.[A-Za-z_]\w*)+", page.read_text(encoding="utf-8"))):
-        pkgutil.resolve_name(name)
+def test_modules_that_are_named_exist():
+    missing = []
+    for page in [*PAGES, *(ROOT / "docs" / "examples").glob("*.py")]:
+        for name in set(re.findall(r"\bspinlev(?:\.[A-Za-z_]\w*)+", page.read_text(encoding="utf-8"))):
+            try:
+                pkgutil.resolve_name(name)
+            except (ImportError, AttributeError):
+                missing.append(f"{page.name}: {name}")
+    assert missing == []
 
 
 FUNCTIONS = [name for name in dir(sl) if name.islower() and callable(getattr(sl, name))]
@@ -41,12 +46,18 @@ def test_the_front_door_has_its_functions():
     assert {"equilibria", "simulate", "sweep", "draw", "load_scene", "tilt", "to_magpylib"} <= set(FUNCTIONS)
 
 
-@pytest.mark.parametrize("name", FUNCTIONS)
-def test_numpydoc_finds_parameters_with_types_and_what_is_returned_and_raised(name):
-    assert [fault for fault in validate(f"spinlev.{name}")["errors"] if fault[0] in COMPLETE] == []
-    said = FunctionDoc(getattr(sl, name))
-    assert name in ("tilt", "horizontal", "vertical", "magnets", "sphere", "plate", "to_magpylib") or said["Raises"]
-    assert all(text.desc for text in said["Raises"])
+SILENT = {"tilt", "horizontal", "vertical", "magnets", "sphere", "plate", "to_magpylib"}
+"""Raise nothing of their own: what they are given is checked with the whole scene."""
+
+
+def test_numpydoc_finds_parameters_with_types_and_what_is_returned_and_raised():
+    wrong = []
+    for name in FUNCTIONS:
+        wrong += [(name, *fault) for fault in validate(f"spinlev.{name}")["errors"] if fault[0] in COMPLETE]
+        raised = FunctionDoc(getattr(sl, name))["Raises"]
+        if not (raised or name in SILENT) or not all(text.desc for text in raised):
+            wrong.append((name, "does not say what it raises, and when"))
+    assert wrong == []
 
 
 def test_every_section_of_the_mathematics_names_the_code_that_is_it():

@@ -3,7 +3,6 @@
 import ast
 from pathlib import Path
 
-import pytest
 from places import ROOT, TESTS
 
 FLOORS = {
@@ -69,6 +68,9 @@ def imported(path: Path) -> set[tuple[str, ...]]:
     return found
 
 
+IMPORTS = {path: imported(path) for path in SOURCES}
+
+
 def test_the_rooms_are_known():
     there = {tuple(path.relative_to(ROOT).parts[:-1]) for path in SOURCES}
     assert there == set(ORDER)
@@ -83,26 +85,33 @@ def test_the_tests_mirror_the_rooms():
     assert len({path.name for path in files}) == len(files)
 
 
-@pytest.mark.parametrize("path", SOURCES, ids=lambda p: "/".join(p.relative_to(ROOT).parts))
-def test_a_module_imports_only_from_rooms_before_its_own_and_from_their_faces(path):
-    own = tuple(path.relative_to(ROOT).parts[:-1])
-    for module in imported(path):
-        assert len(module) >= 2, f"{module}: from a room, not from a floor"
-        if module[:2] != own:
-            assert ORDER.index(module[:2]) < ORDER.index(own)
-            assert len(module) == 2, f"{module}: from the face of the room"
+def test_a_module_imports_only_from_rooms_before_its_own_and_from_their_faces():
+    wrong = []
+    for path, modules in IMPORTS.items():
+        own = path.relative_to(ROOT).parts[:-1]
+        for module in (each for each in modules if each[:2] != own):
+            if len(module) != 2:
+                wrong.append(f"{path}: {'.'.join(module)} is not the face of a room")
+            elif ORDER.index(module) >= ORDER.index(own):
+                wrong.append(f"{path}: {'.'.join(module)} comes after its own room")
+    assert wrong == []
 
 
-@pytest.mark.parametrize("room", ORDER, ids="/".join)
-def test_a_room_says_its_question_and_is_not_crowded(room):
-    face = ast.parse((ROOT / Path(*room) / "__init__.py").read_text())
-    assert (ast.get_docstring(face) or "").partition("\n")[0].count("?") == 1
-    if (stub := ROOT / Path(*room) / "__init__.pyi").exists():  # a face whose names are loaded when they are used
-        face = ast.parse(stub.read_text())
-    modules = {path.stem for path in (ROOT / Path(*room)).glob("*.py")} - {"__init__"}
-    assert len(modules) <= LARGEST
-    public = {alias.name for node in face.body if isinstance(node, ast.ImportFrom) for alias in node.names}
-    assert not public & modules, "a module has the name of a function that its room gives out"
+def test_a_room_says_its_question_and_is_not_crowded():
+    wrong = []
+    for room in ORDER:
+        folder = ROOT / Path(*room)
+        face = ast.parse((folder / "__init__.py").read_text())
+        if (ast.get_docstring(face) or "").partition("\n")[0].count("?") != 1:
+            wrong.append(f"{folder}: its first line is no question")
+        if (stub := folder / "__init__.pyi").exists():  # a face whose names are loaded when they are used
+            face = ast.parse(stub.read_text())
+        modules = {path.stem for path in folder.glob("*.py")} - {"__init__"}
+        if len(modules) > LARGEST:
+            wrong.append(f"{folder}: {len(modules)} modules, at most {LARGEST}")
+        public = {alias.name for node in face.body if isinstance(node, ast.ImportFrom) for alias in node.names}
+        wrong += [f"{folder}: {name} is a module and a name that the room gives out" for name in public & modules]
+    assert wrong == []
 
 
 def test_dynamics_knows_no_mesh_and_geometry_and_dynamics_no_solver():
@@ -112,4 +121,4 @@ def test_dynamics_knows_no_mesh_and_geometry_and_dynamics_no_solver():
             assert "import ngsolve" not in text
             assert "from ngsolve" not in text
         if floor == "dynamics":
-            assert ("geometry", "meshes") not in imported(path)
+            assert ("geometry", "meshes") not in IMPORTS[path]

@@ -9,7 +9,6 @@ import builtins
 import re
 from importlib import import_module
 
-import pytest
 from places import ROOT
 
 from spinlev.geometry.basics import ComputationError
@@ -60,11 +59,16 @@ def literal(node):
     return None
 
 
-def calls(path):
-    """Every call of a plain name that a module makes: the name, the last argument and the line."""
-    for node in ast.walk(ast.parse(path.read_text())):
-        if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.args:
-            yield node.func.id, node.args[-1], node.lineno
+TREES = {path: ast.parse(path.read_text()) for path in FILES}
+CALLS = {
+    path: [
+        (node.func.id, node.args[-1], node.lineno)
+        for node in ast.walk(tree)
+        if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.args
+    ]
+    for path, tree in TREES.items()
+}
+"""Every call of a plain name that a module makes: the name, the last argument and the line."""
 
 
 def meant(path, name):
@@ -73,40 +77,57 @@ def meant(path, name):
     return getattr(module, name, getattr(builtins, name, None))
 
 
-ERRORS = [(path, *call) for path in FILES for call in calls(path) if call[0].endswith(("Error", "Warning"))]
-PLACES = [f"{path.parent.name}/{path.name}:{line}" for path, *_, line in ERRORS]
-
-
-def test_the_errors_are_found():
-    """By their names: every other call is of something else."""
-    assert len(ERRORS) > 100
-    assert {"InputError", "SceneError", "RangeError", "TableFileError", "EquilibriumError"} <= {e[1] for e in ERRORS}
-    named = {(path, name) for path, name, *_ in ERRORS}
-    for path in FILES:
-        for name in {name for name, *_ in calls(path)}:
+def test_every_error_has_a_message_of_its_kind():
+    """Errors are known by their names: every other call is of something else."""
+    names, wrong = set(), []
+    for path, calls in CALLS.items():
+        for name in {name for name, *_ in calls}:
             kind = meant(path, name)
-            is_error = isinstance(kind, type) and issubclass(kind, Exception)
-            assert ((path, name) in named) == is_error, f"{path}: {name}"
+            if (isinstance(kind, type) and issubclass(kind, Exception)) != name.endswith(("Error", "Warning")):
+                wrong.append(f"{path}: {name} has the name of an error and is none, or the other way round")
+        for name, message, line in (call for call in calls if call[0].endswith(("Error", "Warning"))):
+            names.add(name)
+            if said := fault(meant(path, name), message):
+                wrong.append(f"{path}:{line}: {said}")
+    assert wrong == []
+    assert {"InputError", "SceneError", "RangeError", "TableFileError", "EquilibriumError"} <= names
 
 
-@pytest.mark.parametrize(("path", "name", "message", "line"), ERRORS, ids=PLACES)
-def test_every_error_has_a_message_of_its_kind(path, name, message, line):
-    kind, text, place = meant(path, name), literal(message), f"{path.name}:{line}"
+def fault(kind, message):
+    """What is wrong with the message that an error of some kind is given, or nothing."""
+    text = literal(message)
     if text is None:
-        assert ast.unparse(message) in RELAYED, f"{place}: {ast.unparse(message)}"
-    elif text != "{}: {}" and text not in ENDS:  # the file's name before a sentence
-        about_input = issubclass(kind, ValueError | TypeError) or text.startswith("Input ")
-        assert about_input or issubclass(kind, ComputationError), f"{place}: {kind.__name__} is no error for a user"
-        assert (INPUT if about_input else SENTENCE).fullmatch(text), f"{place}: {text}"
+        source = ast.unparse(message)
+        return "" if source in RELAYED else f"{source} is not among RELAYED"
+    if text == "{}: {}" or text in ENDS:  # the file's name before a sentence
+        return ""
+    about_input = issubclass(kind, ValueError | TypeError) or text.startswith("Input ")
+    if not about_input and not issubclass(kind, ComputationError):
+        return f"{kind.__name__} is no error for a user"
+    return "" if (INPUT if about_input else SENTENCE).fullmatch(text) else text
 
 
-@pytest.mark.parametrize("path", FILES, ids=lambda path: f"{path.parent.name}/{path.stem}")
-def test_every_sentence_about_input_follows_the_grammar(path):
+def test_a_message_of_another_grammar_is_found():
+    def of(kind, source):
+        return fault(kind, ast.parse(source, mode="eval").body)
+
+    assert of(ValueError, "'Bad frequency.'") == "Bad frequency."
+    assert of(ComputationError, "'no answer'") == "no answer"
+    assert of(RuntimeError, "'It failed.'") == "RuntimeError is no error for a user"
+    assert of(ValueError, "some_text") == "some_text is not among RELAYED"
+    assert of(ValueError, "f'Input {key} must be positive; instead received {value}.'") == ""
+
+
+def test_every_sentence_about_input_follows_the_grammar():
     """Also those that functions give back to be raised elsewhere."""
-    inner = set()
-    for node in ast.walk(ast.parse(path.read_text())):
-        if isinstance(node, ast.JoinedStr):
-            inner.update(node.values)
-        text = None if node in inner else literal(node)
-        if text and text.startswith("Input ") and text not in OTHER_FORMS:
-            assert INPUT.fullmatch(text), f"{path.name}:{node.lineno}: {text}"
+    found, wrong = 0, []
+    for path, tree in TREES.items():
+        inner = {part for node in ast.walk(tree) if isinstance(node, ast.JoinedStr) for part in node.values}
+        for node in ast.walk(tree):
+            text = None if node in inner else literal(node)
+            if text and text.startswith("Input ") and text not in OTHER_FORMS:
+                found += 1
+                if not INPUT.fullmatch(text):
+                    wrong.append(f"{path}:{node.lineno}: {text}")
+    assert wrong == []
+    assert found > 100
