@@ -56,9 +56,10 @@ def scene(
 
     Examples
     --------
-    >>> cube = tilt(angle_deg=10.0, edge_mm=10.0, remanence_T=1.305)
-    >>> ball = sphere(diameter_mm=12.7, remanence_T=1.305, density_kg_m3=7500.0)
-    >>> scene(frequency_hz=130.0, rotor=cube, floater=ball).frequency
+    >>> import spinlev as sl
+    >>> cube = sl.tilt(angle_deg=10.0, edge_mm=10.0, remanence_T=1.305)
+    >>> ball = sl.sphere(diameter_mm=12.7, remanence_T=1.305, density_kg_m3=7500.0)
+    >>> sl.scene(frequency_hz=130.0, rotor=cube, floater=ball).frequency
     130.0
     """
     keys = {"frequency_hz": frequency_hz, "gravity_m_s2": gravity_m_s2, "rotor": rotor, "floater": floater}

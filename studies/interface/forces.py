@@ -70,7 +70,7 @@ def floater_force(
     >>> scene = sl.scene(frequency_hz=130.0, rotor=cube, floater=disc)
     >>> found = sl.floater_force(scene, [0.0, 0.0, -0.02], [-1.0, 0.0, 0.0], model="cuboid")
     >>> print(f"{found.force.values[0, 2]:.3f} N")
-    -1.134 N
+    1.466 N
     """
     with heard(progress):
         levitation = Levitation(scene, Models(model, rtol=rtol))

@@ -1,9 +1,11 @@
 """What the documentation names is there: modules, tests, pictures; the dependencies are all accounted for."""
 
+import doctest
 import pkgutil
 import re
 import runpy
 import tomllib
+from importlib import import_module
 
 from numpydoc.docscrape import FunctionDoc
 from numpydoc.validate import validate
@@ -58,6 +60,21 @@ def test_numpydoc_finds_parameters_with_types_and_what_is_returned_and_raised():
         if not (raised or name in SILENT) or not all(text.desc for text in raised):
             wrong.append((name, "does not say what it raises, and when"))
     assert wrong == []
+
+
+def test_examples_in_the_code_give_what_they_show():
+    """In every module that has some."""
+    files = [
+        path for name in ("spinlev", "geometry", "fem", "dynamics", "studies") for path in (ROOT / name).rglob("*.py")
+    ]
+    shown = [path for path in files if ">>> " in path.read_text(encoding="utf-8")]
+    assert len(shown) > 4
+    for path in shown:
+        parts = path.relative_to(ROOT).with_suffix("").parts
+        name = ".".join(parts if parts[0] == "spinlev" else ("spinlev", *parts)).removesuffix(".__init__")
+        found = doctest.testmod(import_module(name))
+        assert found.attempted
+        assert found.failed == 0, f"{path}: its example gives something else"
 
 
 def test_every_section_of_the_mathematics_names_the_code_that_is_it():

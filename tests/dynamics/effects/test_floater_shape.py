@@ -11,7 +11,7 @@ from spinlev.dynamics.effects import FloaterShape, mutual_choice, with_effects
 from spinlev.dynamics.ensembles import ensemble
 from spinlev.dynamics.equilibria import survey
 from spinlev.dynamics.flights import simulate
-from spinlev.dynamics.motion import Rates, Scales, State, clearance, parameters, rotor_gap
+from spinlev.dynamics.motion import Scales, State, clearance, parameters, rotor_gap
 from spinlev.fem.floaters import floater_sources, force_and_torque
 from spinlev.fem.rotor_tables import rotor_table
 from spinlev.geometry.basics import MU_0, Box, Cylinder, InputError
@@ -189,4 +189,3 @@ def test_what_a_cuboid_cannot_do_is_told_in_one_sentence(attempt, said):
 def test_one_shape_effect_is_enough():
     once = with_effects(SCENE, TABLE)
     assert [effect.name for effect in with_effects(SCENE, once).effects] == ["the floater's shape"]
-    assert Rates(once).balance is not None

@@ -1,7 +1,5 @@
 """`sl.ensemble`: flights as simulated one by one, the same bits from a seed in any number of workers, wrong input."""
 
-import doctest
-
 import numpy as np
 import pytest
 import xarray as xr
@@ -76,9 +74,3 @@ def test_a_seed_gives_the_same_bits_in_any_number_of_workers():
 def test_wrong_input_is_told(asked, says):
     with pytest.raises(sl.InputError, match=says):
         sl.ensemble(SCENE, **asked, model="dipole")
-
-
-def test_the_example_runs():
-    from spinlev.studies.interface import many_flights
-
-    assert doctest.testmod(many_flights).failed == 0
