@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from article import PERMEABLE
 from ngsolve import SetNumThreads
 
 from spinlev.dynamics.effects import (
@@ -28,14 +29,13 @@ from spinlev.fem.rotor_tables import rotor_table
 from spinlev.geometry.basics import Box
 from spinlev.geometry.bodies import horizontal
 from spinlev.geometry.meshes import MeshRule
-from spinlev.geometry.scenes import AbsoluteStart, Drag, Floater, Lowering, Plate, Scene
+from spinlev.geometry.scenes import AbsoluteStart, Drag, Lowering, Plate, Scene
 
 SetNumThreads(1)
-FLOATER = Floater(6.35e-3, 1.305, 1.05, 7500.0)
 MAGNETS = tuple(replace(magnet, conductivity=6.7e5) for magnet in horizontal(2e-3, 10e-3, 1.305, 1.05))
 BARE = tuple(replace(magnet, conductivity=None) for magnet in MAGNETS)
 PLATE = Plate(Box((0.1, 0.24, 0.03), (0.01, 0.0, -0.055)), 3.5e7)
-SCENE = Scene(110.0, BARE, FLOATER, Drag(0.0, 0.0), plate=PLATE)
+SCENE = Scene(110.0, BARE, PERMEABLE, Drag(0.0, 0.0), plate=PLATE)
 REGION = Region(np.array([-0.014, -0.004, 0.031]), np.array([-0.006, 0.004, 0.041]))
 FIELD = rotor_table(BARE, "cuboid")
 CURRENTS = RotorCurrents(ball_losses(pieces_of(MAGNETS, ()), degree=2))
@@ -95,14 +95,14 @@ def test_multipliers_with_currents_in_the_rotor_are_the_growth_of_a_kicked_fligh
 @pytest.mark.slow
 def test_the_ledger_closes_with_every_loss(shaken, memory):
     """Mutual magnetisation, both currents, real air and a sinking plate, after a kick: 1e-10 of the energy."""
-    answers = Mutual(cached_mutual_table(BARE, FLOATER, print)[0], FLOATER.moment)
+    answers = Mutual(cached_mutual_table(BARE, PERMEABLE, print)[0], PERMEABLE.moment)
     whole = Interaction(FIELD, (answers, CURRENTS))
     plate = replace(PLATE, lowering=Lowering(0.1, 0.02, 0.002))
     start = AbsoluteStart(*replace(shaken.start, velocity=shaken.start.velocity + np.array([0.01, 0.02, 0.03])).vectors)
     scene = replace(
         SCENE,
-        floater=replace(FLOATER, conductivity=6.7e5),
-        drag=replace(Drag.stokes(FLOATER.radius), air=True),
+        floater=replace(PERMEABLE, conductivity=6.7e5),
+        drag=replace(Drag.stokes(PERMEABLE.radius), air=True),
         plate=plate,
         start=start,
     )

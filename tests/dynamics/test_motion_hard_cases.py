@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from article import FLOATER, NO_DRAG, RADIUS
 
 from spinlev.dynamics.branches import FOLD, Family, follow_branch, frequencies
 from spinlev.dynamics.equilibria import find_equilibria, with_plate
@@ -22,9 +23,6 @@ from spinlev.geometry.basics import Box
 from spinlev.geometry.bodies import article_rotors as rotor
 from spinlev.geometry.scenes import AbsoluteStart, Drag, Floater, OffsetStart, Plate, Scene
 
-RADIUS = 6.35e-3
-FLOATER = Floater(RADIUS, 1.305, 1.0, 7500.0)
-NO_DRAG = Drag(0.0, 0.0)
 SCENE = Scene(110.0, rotor.horizontal(2e-3, 10e-3, 1.305, 1.0), FLOATER, NO_DRAG, start=OffsetStart(np.zeros(3)))
 TABLE = rotor_table(SCENE.rotor, "dipole")
 LEDGER = 1e-12

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from article import FLOATER, MAGNETS
 from ngsolve import SetNumThreads
 from scipy.integrate import solve_ivp
 from second_opinions.phasor import mean_force, mean_torque
@@ -21,13 +22,10 @@ from spinlev.fem.plate_tables.driven_plate import plate_and_rotor_table
 from spinlev.fem.rotor_tables import RotorTable
 from spinlev.fem.slab import slab_and_rotor_table
 from spinlev.geometry.basics import Box
-from spinlev.geometry.bodies import article_rotors as rotor
 from spinlev.geometry.meshes import MeshRule
-from spinlev.geometry.scenes import Drag, Floater, Lowering, OffsetStart, Plate, Scene
+from spinlev.geometry.scenes import Drag, Lowering, OffsetStart, Plate, Scene
 
 SetNumThreads(1)
-FLOATER = Floater(radius=6.35e-3, remanence=1.305, recoil_permeability=1.0, density=7500.0)
-MAGNETS = rotor.horizontal(2e-3, 10e-3, 1.305, 1.0)
 CUBOID = RotorTable("cuboid", MAGNETS, MAGNETS)
 PLATE = Plate(Box((0.1, 0.24, 0.03), (0.01, 0.0, -0.055)), 3.5e7, Lowering(0.1, 0.02, 0.002))
 SCENE = Scene(110.0, MAGNETS, FLOATER, Drag(0.0, 0.0), plate=PLATE, start=OffsetStart(np.zeros(3)))

@@ -6,6 +6,7 @@ from pathlib import Path
 import heyoka as hy
 import numpy as np
 import pytest
+from article import FLOATER, SCENE
 from second_opinions.solids import Conductor, occ_mesh
 
 from spinlev.dynamics.branches import FOLD, Family, Plane, follow_boundary, follow_branch, way_out
@@ -21,10 +22,7 @@ from spinlev.fem.rotor_tables import rotor_table
 from spinlev.geometry.basics import MU_0, Box, rotation_matrix
 from spinlev.geometry.bodies import CONVERGENCE, Magnet, article_rotors as rotor, cut_magnets
 from spinlev.geometry.meshes import Block, ConductorMesh, graded_partition, hex_mesh
-from spinlev.geometry.scenes import Drag, Floater, Scene
 
-FLOATER = Floater(6.35e-3, 1.305, 1.0, 7500.0)
-SCENE = Scene(110.0, rotor.horizontal(2e-3, 10e-3, 1.305, 1.0), FLOATER, Drag(0.0, 0.0))
 TABLE = rotor_table(SCENE.rotor, "dipole")
 WEAK = replace(SCENE, floater=replace(FLOATER, remanence=1e-3))
 """A floater that no distance up to 0.1 m lets levitate."""

@@ -2,13 +2,14 @@
 
 import numpy as np
 import pytest
+from article import PERMEABLE
 
 from spinlev.dynamics.flights import simulate
 from spinlev.fem.magnetostatics import Refinement, solve_rotor
 from spinlev.fem.rotor_tables import RotorTable, rotor_table
 from spinlev.geometry.bodies import horizontal, tilt, vertical
 from spinlev.geometry.meshes import MeshSettings
-from spinlev.geometry.scenes import Drag, Floater, Scene
+from spinlev.geometry.scenes import Drag, Scene
 
 pytestmark = pytest.mark.slow
 
@@ -69,7 +70,7 @@ def test_pure_finite_elements_against_the_closed_form():
 @pytest.mark.parametrize("model", ["dipole", "cuboid", "fem"])
 def test_ten_seconds_without_drag(model):
     rotor = ROTORS["one cube"]
-    scene = Scene(110.0, rotor, Floater(6.35e-3, 1.305, 1.05, 7500.0), Drag(0.0, 0.0))
+    scene = Scene(110.0, rotor, PERMEABLE, Drag(0.0, 0.0))
     flight = simulate(scene, rotor_table(rotor, model), 10.0)
     length = float(np.abs(np.linalg.norm(flight.lab.moment, axis=1) - 1).max())
     print(

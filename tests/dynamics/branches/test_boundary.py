@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from article import FLOATER, SCENE
 
 from spinlev.dynamics.branches import FOLD, Family, Plane, follow_boundary, follow_branch
 from spinlev.dynamics.branches.boundary_equations import COLLISION, CROSSING
@@ -13,11 +14,8 @@ from spinlev.dynamics.maps import rotor_family
 from spinlev.dynamics.motion import Scales
 from spinlev.dynamics.steady import EquilibriumError
 from spinlev.fem.rotor_tables import rotor_table
-from spinlev.geometry.bodies import article_rotors as rotor
-from spinlev.geometry.scenes import Drag, Floater, Scene
+from spinlev.geometry.scenes import Drag
 
-FLOATER = Floater(radius=6.35e-3, remanence=1.305, recoil_permeability=1.0, density=7500.0)
-SCENE = Scene(110.0, rotor.horizontal(2e-3, 10e-3, 1.305, 1.0), FLOATER, Drag(0.0, 0.0))
 LOWER, UPPER, UNITS = np.array([50.0, 1e-3]), np.array([250.0, 6e-3]), np.array([50.0, 2e-3])
 
 

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from article import FLOATER
 
 from spinlev.dynamics.branches import FOLD, Family, follow_branch, frequencies, spins
 from spinlev.dynamics.branches.branch import OSCILLATORY, scenes
@@ -12,9 +13,8 @@ from spinlev.dynamics.motion import Rates, Scales
 from spinlev.dynamics.steady import EquilibriumError
 from spinlev.fem.rotor_tables import rotor_table
 from spinlev.geometry.bodies import article_rotors as rotor
-from spinlev.geometry.scenes import Drag, Floater, Scene
+from spinlev.geometry.scenes import Drag, Scene
 
-FLOATER = Floater(radius=6.35e-3, remanence=1.305, recoil_permeability=1.0, density=7500.0)
 HORIZONTAL = Scene(118.0, rotor.horizontal(1.7e-3, 10e-3, 1.305, 1.0), FLOATER, Drag(0.0, 0.0))
 VERTICAL = Scene(60.0, rotor.vertical(14e-3, 10e-3, 1.305, 1.0), FLOATER, Drag(0.0, 0.0))
 TABLES = {id(scene): rotor_table(scene.rotor, "dipole") for scene in (HORIZONTAL, VERTICAL)}

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from article import FLOATER
 
 from spinlev.dynamics.branches import FOLD, follow_branch
 from spinlev.dynamics.branches.branch import REAL
@@ -19,9 +20,8 @@ from spinlev.fem.rotor_tables import rotor_table
 from spinlev.fem.slab import slab_and_rotor_table
 from spinlev.geometry.basics import Box
 from spinlev.geometry.bodies import article_rotors as rotor
-from spinlev.geometry.scenes import Drag, Floater, Lowering, Plate, Scene
+from spinlev.geometry.scenes import Drag, Lowering, Plate, Scene
 
-FLOATER = Floater(radius=6.35e-3, remanence=1.305, recoil_permeability=1.0, density=7500.0)
 VERTICAL = Scene(80.0, rotor.vertical(14e-3, 10e-3, 1.305, 1.0), FLOATER, Drag(0.0, 0.0))
 HORIZONTAL = Scene(110.0, rotor.horizontal(2e-3, 10e-3, 1.305, 1.0), FLOATER, Drag(0.0, 0.0))
 PLATE = Plate(Box((0.1, 0.24, 0.03), (0.0, 0.0, -0.056)), 3.5e7, Lowering(0.0, 0.02, 0.002))

@@ -4,16 +4,15 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from article import FLOATER, RADIUS
 
 from spinlev.dynamics.effects import moving, reynolds, spinning, swinging, with_effects
 from spinlev.dynamics.flights import simulate
 from spinlev.dynamics.motion import Rates, Scales, State, parameters
 from spinlev.fem.rotor_tables import rotor_table
 from spinlev.geometry.bodies import horizontal
-from spinlev.geometry.scenes import AIR_VISCOSITY, AbsoluteStart, Drag, Floater, Scene
+from spinlev.geometry.scenes import AIR_VISCOSITY, AbsoluteStart, Drag, Scene
 
-RADIUS = 6.35e-3
-FLOATER = Floater(RADIUS, 1.305, 1.0, 7500.0)
 STOKES = Scene(110.0, horizontal(2e-3, 10e-3, 1.305, 1.0), FLOATER, Drag.stokes(RADIUS))
 AIR = replace(STOKES, drag=replace(STOKES.drag, air=True))
 TABLE = rotor_table(STOKES.rotor, "dipole")

@@ -5,6 +5,7 @@ from dataclasses import replace
 import heyoka as hy
 import numpy as np
 import pytest
+from article import PERMEABLE
 
 from spinlev.dynamics.effects import Mutual
 from spinlev.dynamics.ensembles import fly_together
@@ -17,10 +18,9 @@ from spinlev.dynamics.motion import Interaction, Parameter, Rates, Scales, param
 from spinlev.fem.mutual import cached_mutual_table, rotor_ladder, two_body
 from spinlev.fem.rotor_tables import cached_rotor_table
 from spinlev.geometry.bodies import horizontal, tilt, vertical
-from spinlev.geometry.scenes import Drag, Floater, Scene
+from spinlev.geometry.scenes import Drag, Scene
 
-FLOATER = Floater(6.35e-3, 1.305, 1.05, 7500.0)
-SCENE = Scene(110.0, horizontal(2e-3, 10e-3, 1.305, 1.05), FLOATER, Drag(0.0, 0.0))
+SCENE = Scene(110.0, horizontal(2e-3, 10e-3, 1.305, 1.05), PERMEABLE, Drag(0.0, 0.0))
 SCALES = Scales.of(SCENE)
 
 
@@ -48,7 +48,7 @@ def test_the_default_rotor_moves_its_floater_as_known(mutual, start):
     rigid = find_equilibria(SCENE, mutual.field)[0]
     state, values = SCALES.pack(rigid.state)[None], parameters(SCENE, SCALES)
     change = Rates(mutual)(state, values)[0] - Rates(mutual.field)(state, values)[0]
-    force = change[0, 3:6] * FLOATER.mass * SCALES.length / SCALES.time**2
+    force = change[0, 3:6] * PERMEABLE.mass * SCALES.length / SCALES.time**2
     print(f"force {force[2] * 1e3:.5f} mN, {1e3 * (start.position[2] - rigid.position[2]):.5f} mm higher")
     assert force[2] * 1e3 == pytest.approx(8.5504, abs=0.001)
     assert start.position[2] - rigid.position[2] == pytest.approx(0.0902e-3, abs=0.0001e-3)
@@ -76,7 +76,7 @@ def test_rough_rates_leave_out_all_answers_but_the_uniform_one(mutual, start):
     state, values, rates = SCALES.pack(start.state)[None], parameters(SCENE, SCALES), Rates(mutual)
     rough = rates.rough(state, values)
     for part, known in zip(
-        rough, Rates(replace(mutual, effects=(Mutual(silent, FLOATER.moment),)))(state, values), strict=True
+        rough, Rates(replace(mutual, effects=(Mutual(silent, PERMEABLE.moment),)))(state, values), strict=True
     ):
         np.testing.assert_allclose(part, known, rtol=1e-12, atol=1e-12)
     assert np.abs(rough[0] - rates(state, values)[0]).max() > 1e-4
@@ -152,13 +152,13 @@ def test_equilibria_of_other_rotors_against_both_bodies(rotor, frequency, part):
     whole = interaction(scene)
     found = find_equilibria(scene, whole)[0]
     (fine,) = rotor_ladder(rotor, (3,))
-    both = two_body(fine, FLOATER, found.position, found.state.moment, None, 1e-8)
+    both = two_body(fine, PERMEABLE, found.position, found.state.moment, None, 1e-8)
     added, (field, gradient) = both.total - both.rigid, whole.evaluate(found.position[None])
     force, _ = whole.effects[0].wrench(found.position[None], found.state.moment[None], field, gradient)
     apart, size = np.linalg.norm(force[0] - added.force), np.linalg.norm(added.force)
-    stiffness = FLOATER.mass * (2 * np.pi * min(found.frequencies_hz)) ** 2  # of the bounce, the softest
+    stiffness = PERMEABLE.mass * (2 * np.pi * min(found.frequencies_hz)) ** 2  # of the bounce, the softest
     assert apart < whole.effects[0].table.relative_error(found.position)[0][0] * size
     assert apart / stiffness < found.position_error
-    if min(magnet.box.distance(found.position) for magnet in rotor) > 2 * FLOATER.radius:
+    if min(magnet.box.distance(found.position) for magnet in rotor) > 2 * PERMEABLE.radius:
         assert apart < part * size
         assert apart / stiffness < 1e-7

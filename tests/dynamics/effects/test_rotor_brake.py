@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from article import PERMEABLE
 
 from spinlev.dynamics.effects import RotorCurrents, with_effects
 from spinlev.dynamics.equilibria import find_equilibria
@@ -17,11 +18,10 @@ from spinlev.fem.rotor_losses import ball_losses, pieces_of
 from spinlev.fem.rotor_tables import rotor_table
 from spinlev.geometry.basics import InputError
 from spinlev.geometry.bodies import horizontal
-from spinlev.geometry.scenes import AbsoluteStart, Drag, Floater, Scene
+from spinlev.geometry.scenes import AbsoluteStart, Drag, Scene
 
-FLOATER = Floater(radius=6.35e-3, remanence=1.305, recoil_permeability=1.05, density=7500.0)
 CUBE = tuple(replace(magnet, conductivity=6.7e5) for magnet in horizontal(1.5e-3, 10e-3, 1.305, 1.0))
-BARE = Scene(150.0, horizontal(1.5e-3, 10e-3, 1.305, 1.0), FLOATER, Drag(0.0, 0.0))
+BARE = Scene(150.0, horizontal(1.5e-3, 10e-3, 1.305, 1.0), PERMEABLE, Drag(0.0, 0.0))
 FIELD = rotor_table(BARE.rotor, "dipole")
 LOSSES = ball_losses(pieces_of(CUBE, ()), degree=2)
 TABLE = Interaction(FIELD, (RotorCurrents(LOSSES),))
@@ -40,11 +40,11 @@ def test_force_and_torque_are_minus_the_tables_matrix():
     added = (Rates(TABLE)(given, values)[0] - Rates(FIELD)(given, values)[0])[0]
     rotor = np.array([0.0, 0.0, BARE.angular_velocity])
     rates = np.concatenate([STATE.velocity - np.cross(rotor, STATE.position), STATE.spin - rotor])
-    matrix = LOSSES.dissipation(STATE.position[None], FLOATER.moment * STATE.moment[None])[0]
+    matrix = LOSSES.dissipation(STATE.position[None], PERMEABLE.moment * STATE.moment[None])[0]
     wrench = -matrix @ rates
     assert np.linalg.norm(wrench[:3]) > 1e-6
-    np.testing.assert_allclose(added[3:6] * FLOATER.mass * SCALES.length / SCALES.time**2, wrench[:3], rtol=1e-8)
-    np.testing.assert_allclose(added[9:] * FLOATER.inertia / SCALES.time**2, wrench[3:], rtol=1e-8)
+    np.testing.assert_allclose(added[3:6] * PERMEABLE.mass * SCALES.length / SCALES.time**2, wrench[:3], rtol=1e-8)
+    np.testing.assert_allclose(added[9:] * PERMEABLE.inertia / SCALES.time**2, wrench[3:], rtol=1e-8)
 
 
 def test_a_floater_in_step_with_the_rotor_feels_nothing():
@@ -97,8 +97,8 @@ def test_its_power_is_the_loss_of_the_table():
     found = power(SCALES.pack(STATE), pars=values)[0]
     rotor = np.array([0.0, 0.0, BARE.angular_velocity])
     rates = np.concatenate([STATE.velocity - np.cross(rotor, STATE.position), STATE.spin - rotor])
-    matrix = LOSSES.dissipation(STATE.position[None], FLOATER.moment * STATE.moment[None])[0]
-    unit = FLOATER.mass * SCALES.length**2 / SCALES.time**3
+    matrix = LOSSES.dissipation(STATE.position[None], PERMEABLE.moment * STATE.moment[None])[0]
+    unit = PERMEABLE.mass * SCALES.length**2 / SCALES.time**3
     assert found * unit == pytest.approx(-rates @ matrix @ rates, rel=1e-9)
 
 

@@ -5,6 +5,7 @@ from dataclasses import replace
 import heyoka as hy
 import numpy as np
 import pytest
+from article import PERMEABLE
 
 from spinlev.dynamics.effects import RotorCurrents, with_effects
 from spinlev.dynamics.equilibria import find_equilibria
@@ -17,12 +18,11 @@ from spinlev.fem.harmonics import uniform_moments
 from spinlev.fem.rotor_losses import ball_losses, pieces_of
 from spinlev.fem.rotor_tables import RotorTable
 from spinlev.geometry.bodies import horizontal
-from spinlev.geometry.scenes import AbsoluteStart, Drag, Floater, Scene
+from spinlev.geometry.scenes import AbsoluteStart, Drag, Scene
 
-FLOATER = Floater(radius=6.35e-3, remanence=1.305, recoil_permeability=1.05, density=7500.0)
 MAGNETS = horizontal(1.5e-3, 10e-3, 1.305, 1.0)
 CUBE = tuple(replace(magnet, conductivity=6.7e5) for magnet in MAGNETS)
-SCENE = Scene(150.0, MAGNETS, FLOATER, Drag(0.0, 0.0))
+SCENE = Scene(150.0, MAGNETS, PERMEABLE, Drag(0.0, 0.0))
 FIELD = RotorTable("moments", MAGNETS, (), tuple(uniform_moments(m, 13) for m in MAGNETS))
 LOSSES = ball_losses(pieces_of(CUBE, ()), degree=2)
 TABLE = Interaction(FIELD, (RotorCurrents(LOSSES),))
@@ -67,7 +67,7 @@ def test_the_brake_is_that_of_the_table(equilibrium, formula):
         assert apart.max() < 1e-2 * sizes.max()
     drift = states[:, 3:6] - np.cross([0.0, 0.0, values[0]], states[:, :3])
     lag = states[:, 9:] - [0.0, 0.0, values[0]]
-    inertia = FLOATER.inertia / (FLOATER.mass * SCALES.length**2)
+    inertia = PERMEABLE.inertia / (PERMEABLE.mass * SCALES.length**2)
     work = np.sum(brake[:, 3:6] * drift, axis=1) + inertia * np.sum(brake[:, 9:12] * lag, axis=1)
     np.testing.assert_allclose(brake[:, 12], work, rtol=1e-10)
     assert np.all(work < 0)

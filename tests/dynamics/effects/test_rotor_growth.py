@@ -6,6 +6,7 @@ from functools import cache
 import magpylib
 import numpy as np
 import pytest
+from article import PERMEABLE
 from second_opinions.small_motions import Levitator
 
 from spinlev.dynamics.effects import RotorCurrents
@@ -15,9 +16,8 @@ from spinlev.dynamics.motion import Interaction
 from spinlev.fem.rotor_losses import cached_rotor_losses
 from spinlev.fem.rotor_tables import cached_rotor_table
 from spinlev.geometry.bodies import horizontal, vertical
-from spinlev.geometry.scenes import AbsoluteStart, Drag, Floater, Scene
+from spinlev.geometry.scenes import AbsoluteStart, Drag, Scene
 
-FLOATER = Floater(radius=6.35e-3, remanence=1.305, recoil_permeability=1.05, density=7500.0)
 ROTORS = {
     "1 mm": horizontal(1e-3, 10e-3, 1.305, 1.05),
     "1.5 mm": horizontal(1.5e-3, 10e-3, 1.305, 1.05),
@@ -35,9 +35,9 @@ KNOWN = [
 def braked(name, share=1.0):
     """The rotor without currents, and its field with them; `share` times as strong."""
     metal = tuple(replace(magnet, conductivity=6.7e5) for magnet in ROTORS[name])
-    scene = Scene(100.0, metal, FLOATER, Drag(0.0, 0.0))
+    scene = Scene(100.0, metal, PERMEABLE, Drag(0.0, 0.0))
     losses = cached_rotor_losses(scene, print)[0]
-    field = cached_rotor_table(ROTORS[name], "fem", 3e-6, print, FLOATER.radius)[0]
+    field = cached_rotor_table(ROTORS[name], "fem", 3e-6, print, PERMEABLE.radius)[0]
     stronger = replace(losses, weights=np.sqrt(share) * losses.weights)
     return replace(scene, rotor=ROTORS[name]), Interaction(field, (RotorCurrents(stronger),))
 
@@ -67,7 +67,7 @@ def test_close_to_the_end_of_stability_growth_is_as_known_with_the_field_that_it
     """
     scene, table = braked("14 mm")
     weaker = vertical(14e-3, 10e-3, 1.305 * 3 / 3.05, 1.0)
-    field = cached_rotor_table(weaker, "cuboid", 3e-6, print, FLOATER.radius)[0]
+    field = cached_rotor_table(weaker, "cuboid", 3e-6, print, PERMEABLE.radius)[0]
     found = slowest(replace(scene, rotor=weaker), Interaction(field, table.effects), 84.0)
     whole = slowest(scene, table, 84.0)
     print(f"\nδz = 14 mm, 84 Hz: {found:.5f} /s, known 0.007; finite elements {whole:.5f} /s")
@@ -89,9 +89,9 @@ def test_growth_is_that_of_other_equations_another_field_and_other_currents(name
         )
         for magnet in scene.rotor
     ]
-    alone = Levitator(cubes, 6.7e5, FLOATER.radius, FLOATER.moment, FLOATER.density, frequency)
+    alone = Levitator(cubes, 6.7e5, PERMEABLE.radius, PERMEABLE.moment, PERMEABLE.density, frequency)
     position, direction = alone.equilibrium(guess)
-    field = cached_rotor_table(scene.rotor, "cuboid", 3e-6, print, FLOATER.radius)[0]
+    field = cached_rotor_table(scene.rotor, "cuboid", 3e-6, print, PERMEABLE.radius)[0]
     table = Interaction(field, with_currents.effects)
     found = min(
         find_equilibria(replace(scene, frequency=frequency), table), key=lambda e: np.linalg.norm(e.position - position)

@@ -6,6 +6,7 @@ from multiprocessing import get_context
 
 import numpy as np
 import pytest
+from article import MAGNETS, SCENE
 
 from spinlev.dynamics.ensembles import ensemble
 from spinlev.dynamics.flights import initial_state, simulate
@@ -13,12 +14,9 @@ from spinlev.dynamics.motion import State
 from spinlev.fem.harmonics import uniform_moments
 from spinlev.fem.rotor_tables import RotorTable
 from spinlev.geometry.basics import InputError
-from spinlev.geometry.bodies import article_rotors as rotor
-from spinlev.geometry.scenes import AbsoluteStart, Drag, Floater, Scene
+from spinlev.geometry.scenes import AbsoluteStart
 
-MAGNETS = rotor.horizontal(2e-3, 10e-3, 1.305, 1.0)
 TABLE = RotorTable("moments", MAGNETS, (), tuple(uniform_moments(m, 13) for m in MAGNETS))
-SCENE = Scene(110.0, MAGNETS, Floater(6.35e-3, 1.305, 1.0, 7500.0), Drag(0.0, 0.0))
 DURATION = 0.3
 PLACES = np.array([[0, 0, 0], [1e-4, 0, 0], [0, 1e-4, 2e-4], [0, 0, 4e-4], [0, 0, 8e-3]])
 """Displacements: at rest, two that leave their small ball, one that swings, and one drawn to the magnet."""

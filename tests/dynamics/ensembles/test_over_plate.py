@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from article import FLOATER
 
 from spinlev.dynamics.ensembles import launched
 from spinlev.dynamics.flights import initial_state
@@ -16,13 +17,13 @@ from spinlev.fem.rotor_tables import rotor_table
 from spinlev.fem.slab import slab_and_rotor_table
 from spinlev.geometry.basics import Box, InputError, rotation_matrix
 from spinlev.geometry.bodies import article_rotors as rotor
-from spinlev.geometry.scenes import AbsoluteStart, Drag, Floater, Lowering, Plate, Scene
+from spinlev.geometry.scenes import AbsoluteStart, Drag, Lowering, Plate, Scene
 
 MAGNETS = rotor.tilt(np.radians(10), 10e-3, 1.305, 1.0)
 TABLE = rotor_table(MAGNETS, "dipole")
 SIZE = np.array([0.1, 0.24, 0.03])
 PLATE = Plate(Box(SIZE, np.array([0.0, 0.0, -0.05])), 3.5e7)
-SCENE = Scene(165.0, MAGNETS, Floater(6.35e-3, 1.305, 1.0, 7500.0), Drag(0.0, 0.0), plate=PLATE)
+SCENE = Scene(165.0, MAGNETS, FLOATER, Drag(0.0, 0.0), plate=PLATE)
 PLACES = np.array(
     [[0, 0, -17], [1, 0, -17], [0, 2, -19], [0, 0, -12.5], [0, 0, -26], [3, 1, -20], [0, 0, -2], [1, 1, -18]]
 )

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from article import PERMEABLE
 
 from spinlev.dynamics.effects import Mutual, RotorCurrents, rough_force, with_effects
 from spinlev.dynamics.equilibria import find_equilibria, growth_by_floater, growth_by_rotor, shift_by_answers
@@ -12,11 +13,10 @@ from spinlev.fem.mutual import cached_mutual_table
 from spinlev.fem.rotor_losses import ball_losses, pieces_of
 from spinlev.fem.rotor_tables import rotor_table
 from spinlev.geometry.bodies import horizontal
-from spinlev.geometry.scenes import Drag, Floater, Scene
+from spinlev.geometry.scenes import Drag, Scene
 
-FLOATER = Floater(6.35e-3, 1.305, 1.05, 7500.0)
-SCENE = Scene(150.0, horizontal(1.5e-3, 10e-3, 1.305, 1.05), FLOATER, Drag(0.0, 0.0))
-CONDUCTING = replace(SCENE, floater=replace(FLOATER, conductivity=6.7e5))
+SCENE = Scene(150.0, horizontal(1.5e-3, 10e-3, 1.305, 1.05), PERMEABLE, Drag(0.0, 0.0))
+CONDUCTING = replace(SCENE, floater=replace(PERMEABLE, conductivity=6.7e5))
 LOSSES = ball_losses(pieces_of([replace(magnet, conductivity=6.7e5) for magnet in SCENE.rotor], ()))
 
 
@@ -39,8 +39,8 @@ def with_rates(equilibrium, scene, rates):
 @pytest.mark.slow
 def test_shift_by_mutual_magnetisation(table, alone):
     """To first order, 0.05 mm to a part in fifty; the rough force without the table to a factor of two."""
-    answers = cached_mutual_table(SCENE.rotor, FLOATER, print)[0]
-    effect = Mutual(answers, FLOATER.moment)
+    answers = cached_mutual_table(SCENE.rotor, PERMEABLE, print)[0]
+    effect = Mutual(answers, PERMEABLE.moment)
     there = find_equilibria(SCENE, Interaction(table, (effect,)))[0]
     moved = np.linalg.norm(there.position - alone.position)
     assert shift_by_answers(SCENE, table, alone, answers) == pytest.approx(moved, rel=0.02)
@@ -49,7 +49,7 @@ def test_shift_by_mutual_magnetisation(table, alone):
         place, direction = np.array([[1e-3, 0.0, -depth]]), np.array([[0.2, 0.0, 0.98]])
         direction /= np.linalg.norm(direction)
         force = effect.wrench(place, direction, *table.evaluate(place))[0][0]
-        rough = rough_force(SCENE.rotor, FLOATER, table, place[0], direction[0])
+        rough = rough_force(SCENE.rotor, PERMEABLE, table, place[0], direction[0])
         assert 0.5 < np.linalg.norm(rough) / np.linalg.norm(force) < 2
 
 

@@ -5,6 +5,7 @@ from dataclasses import replace
 import magpylib as magpy
 import numpy as np
 import pytest
+from article import FLOATER
 from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
@@ -15,9 +16,8 @@ from spinlev.dynamics.steady import EVERY, LATERAL, Balance, EquilibriumError, s
 from spinlev.fem.harmonics import uniform_moments
 from spinlev.fem.rotor_tables import RotorTable, rotor_table
 from spinlev.geometry.bodies import article_rotors as rotor
-from spinlev.geometry.scenes import Drag, Floater, Scene, parse_scene
+from spinlev.geometry.scenes import Drag, Scene, parse_scene
 
-FLOATER = Floater(radius=6.35e-3, remanence=1.305, recoil_permeability=1.0, density=7500.0)
 SHAPE = {"body": 10e-3, "remanence": 1.305, "recoil_permeability": 1.0}
 SCENES = {
     "horizontal": Scene(110.0, rotor.horizontal(2e-3, **SHAPE), FLOATER, Drag(0.0, 0.0)),

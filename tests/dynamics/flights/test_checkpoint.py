@@ -4,17 +4,16 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from article import FLOATER, MAGNETS
 
 from spinlev.dynamics.flights import Checkpoint, FlightStopped, simulate
 from spinlev.fem.harmonics import uniform_moments
 from spinlev.fem.rotor_tables import RotorTable
 from spinlev.geometry.basics import InputError
-from spinlev.geometry.bodies import article_rotors as rotor
-from spinlev.geometry.scenes import Drag, Floater, Scene
+from spinlev.geometry.scenes import Drag, Scene
 
-MAGNETS = rotor.horizontal(2e-3, 10e-3, 1.305, 1.0)
 DIPOLE = RotorTable("dipole", MAGNETS, (), tuple(uniform_moments(m, 1) for m in MAGNETS))
-SCENE = Scene(110.0, MAGNETS, Floater(6.35e-3, 1.305, 1.0, 7500.0), Drag(2.2e-6, 1.2e-10))
+SCENE = Scene(110.0, MAGNETS, FLOATER, Drag(2.2e-6, 1.2e-10))
 
 
 @pytest.fixture

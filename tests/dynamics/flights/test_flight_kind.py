@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from article import FLOATER, RADIUS
 
 from spinlev.dynamics.equilibria import find_equilibria
 from spinlev.dynamics.flights import Trajectory, flight_kind
@@ -13,11 +14,9 @@ from spinlev.dynamics.flights.kind import DRIFTING, GROWING, LINEAR_FALL, NOT_HE
 from spinlev.dynamics.motion import State
 from spinlev.fem.rotor_tables import rotor_table
 from spinlev.geometry.bodies import article_rotors as rotor
-from spinlev.geometry.scenes import Drag, Floater, Scene
+from spinlev.geometry.scenes import Drag, Scene
 
 TIME = np.linspace(0, 20, 5000)
-RADIUS = 6.35e-3
-FLOATER = Floater(RADIUS, 1.305, 1.0, 7500.0)
 VERTICAL = Scene(80.0, rotor.vertical(14e-3, 10e-3, 1.305, 1.0), FLOATER, Drag.stokes(RADIUS))
 
 

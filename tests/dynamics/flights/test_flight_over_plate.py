@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from article import FLOATER, MAGNETS
 
 from spinlev.dynamics.flights import Checkpoint, FlightStopped, initial_state
 from spinlev.dynamics.flights.compiled_flight import compile_flight
@@ -16,13 +17,11 @@ from spinlev.fem.plate_currents import Region
 from spinlev.fem.rotor_tables import rotor_table
 from spinlev.fem.slab import slab_and_rotor_table
 from spinlev.geometry.basics import Box
-from spinlev.geometry.bodies import article_rotors as rotor
-from spinlev.geometry.scenes import Drag, Floater, Lowering, Plate, Scene
+from spinlev.geometry.scenes import Drag, Lowering, Plate, Scene
 
-MAGNETS = rotor.horizontal(2e-3, 10e-3, 1.305, 1.0)
 TABLE = rotor_table(MAGNETS, "dipole")
 PLATE = Plate(Box((0.1, 0.24, 0.03), (0.0, 0.0, -0.047)), 3.5e7, Lowering(0.02, 0.2, 4e-3))
-SCENE = Scene(110.0, MAGNETS, Floater(6.35e-3, 1.305, 1.0, 7500.0), Drag(0.0, 0.0), plate=PLATE)
+SCENE = Scene(110.0, MAGNETS, FLOATER, Drag(0.0, 0.0), plate=PLATE)
 REGION = Region(np.array([-3e-3, -3e-3, 0.024]), np.array([3e-3, 3e-3, 0.037]))
 DURATION = 0.08
 

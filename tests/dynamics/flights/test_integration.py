@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from article import MAGNETS, RADIUS, SCENE
 
 from spinlev.dynamics.equilibria import find_equilibria
 from spinlev.dynamics.flights import FlightStopped, StartError, initial_state, simulate
@@ -15,17 +16,11 @@ from spinlev.dynamics.steady import EquilibriumError
 from spinlev.fem.harmonics import uniform_moments
 from spinlev.fem.rotor_tables import RotorTable
 from spinlev.geometry.basics import Box
-from spinlev.geometry.bodies import article_rotors as rotor
-from spinlev.geometry.scenes import AbsoluteStart, Drag, Floater, Lowering, Plate, Scene
+from spinlev.geometry.scenes import AbsoluteStart, Drag, Floater, Lowering, Plate
 
-RADIUS = 6.35e-3
-FLOATER = Floater(RADIUS, 1.305, 1.0, 7500.0)
 NEUTRAL = Floater(RADIUS, 0.0, 1.0, 7500.0)
-MAGNETS = rotor.horizontal(2e-3, 10e-3, 1.305, 1.0)
 DIPOLE = RotorTable("dipole", MAGNETS, (), tuple(uniform_moments(m, 1) for m in MAGNETS))
 CUBOID = RotorTable("cuboid", MAGNETS, MAGNETS)
-NO_DRAG = Drag(0.0, 0.0)
-SCENE = Scene(110.0, MAGNETS, FLOATER, NO_DRAG)
 
 
 def thrown(position, velocity, scene=SCENE, **changes):

@@ -4,18 +4,17 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from article import FLOATER, MAGNETS
 from places import OVER_PLATE
 
 from spinlev.dynamics.flights import LiveFlight, StartError, simulate
 from spinlev.fem.harmonics import uniform_moments
 from spinlev.fem.rotor_tables import RotorTable
 from spinlev.geometry.basics import InputError
-from spinlev.geometry.bodies import article_rotors as rotor
 from spinlev.geometry.scenes import AbsoluteStart, Drag, Floater, Scene
 from spinlev.studies.one_scene import Levitation
 from spinlev.studies.terminal import Models
 
-MAGNETS = rotor.horizontal(2e-3, 10e-3, 1.305, 1.0)
 DIPOLE = RotorTable("dipole", MAGNETS, (), tuple(uniform_moments(m, 1) for m in MAGNETS))
 UP, STILL = np.array([0.0, 0.0, 1.0]), np.zeros(3)
 START = AbsoluteStart(np.array([0.0, 0.0, -0.03]), STILL, UP, STILL)
@@ -26,7 +25,7 @@ GRAVITY = np.array([0.0, 0.0, -9.81])
 
 def test_pieces_are_the_flight_in_one_go():
     """13 turns of the rotor: a step errs by round-off, and there are other steps."""
-    scene = replace(SCENE, floater=Floater(6.35e-3, 1.305, 1.0, 7500.0), drag=Drag.stokes(6.35e-3))
+    scene = replace(SCENE, floater=FLOATER, drag=Drag.stokes(6.35e-3))
     whole = simulate(scene, DIPOLE, 0.12, compact=True)
     live = LiveFlight(scene, DIPOLE, ())
     times = np.concatenate([live.onward(seconds).time for seconds in (0.02, 0.04, 0.06)])

@@ -5,6 +5,7 @@ from dataclasses import replace
 import heyoka as hy
 import numpy as np
 import pytest
+from article import MAGNETS, SCENE
 
 from spinlev.dynamics.flights import Checkpoint, FlightStopped, initial_state, simulate
 from spinlev.dynamics.flights.balls import ERROR
@@ -18,12 +19,9 @@ from spinlev.fem.plate_currents import Region
 from spinlev.fem.rotor_tables import RotorTable
 from spinlev.fem.slab import slab_and_rotor_table
 from spinlev.geometry.basics import Box
-from spinlev.geometry.bodies import article_rotors as rotor
-from spinlev.geometry.scenes import AbsoluteStart, Drag, Floater, Lowering, Plate, Scene
+from spinlev.geometry.scenes import AbsoluteStart, Lowering, Plate
 
-MAGNETS = rotor.horizontal(2e-3, 10e-3, 1.305, 1.0)
 TABLE = RotorTable("moments", MAGNETS, (), tuple(uniform_moments(m, 21) for m in MAGNETS))
-SCENE = Scene(110.0, MAGNETS, Floater(6.35e-3, 1.305, 1.0, 7500.0), Drag(0.0, 0.0))
 
 
 @pytest.fixture(scope="module")

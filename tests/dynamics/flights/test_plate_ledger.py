@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from article import FLOATER, MAGNETS, RADIUS
 from second_opinions.phasor import mean_force, mean_loss, mean_torque
 
 from spinlev.dynamics.effects import with_effects
@@ -18,11 +19,8 @@ from spinlev.fem.rotor_tables import rotor_table
 from spinlev.fem.slab import slab_and_rotor_table
 from spinlev.geometry.basics import Box
 from spinlev.geometry.bodies import article_rotors as rotor
-from spinlev.geometry.scenes import AbsoluteStart, Drag, Floater, Plate, Scene
+from spinlev.geometry.scenes import AbsoluteStart, Drag, Plate, Scene
 
-RADIUS = 6.35e-3
-MAGNETS = rotor.horizontal(2e-3, 10e-3, 1.305, 1.0)
-FLOATER = Floater(RADIUS, 1.305, 1.0, 7500.0)
 PLATE = Plate(Box((0.1, 0.24, 0.03), (0.0, 0.0, -0.047)), 3.5e7)
 REGION = Region(np.array([-3e-3, -3e-3, 0.024]), np.array([3e-3, 3e-3, 0.031]))
 SCENE = Scene(110.0, MAGNETS, FLOATER, Drag.stokes(RADIUS), plate=PLATE)

@@ -3,6 +3,7 @@
 import heyoka as hy
 import numpy as np
 import pytest
+from article import PERMEABLE
 
 from spinlev.dynamics.equilibria import find_equilibria
 from spinlev.dynamics.equilibria.fixed_points import fixed_points
@@ -12,10 +13,9 @@ from spinlev.dynamics.motion import Parameter, Rates
 from spinlev.dynamics.steady import EquilibriumError
 from spinlev.fem.rotor_tables import rotor_table
 from spinlev.geometry.bodies import article_rotors as rotor
-from spinlev.geometry.scenes import Drag, Floater, Scene
+from spinlev.geometry.scenes import Drag, Scene
 
 SHAPE = (10e-3, 1.305, 1.05)
-FLOATER = Floater(radius=6.35e-3, remanence=1.305, recoil_permeability=1.05, density=7500.0)
 ROTORS = {
     "horizontal": (rotor.horizontal(2e-3, *SHAPE), np.linspace(1e-3, 4e-3, 9)),
     "vertical": (rotor.vertical(14e-3, *SHAPE), np.linspace(10e-3, 18e-3, 9)),
@@ -25,7 +25,7 @@ FREQUENCIES = np.linspace(60.0, 180.0, 13)
 
 
 def scene_of(name):
-    return Scene(110.0, ROTORS[name][0], FLOATER, Drag(0.0, 0.0))
+    return Scene(110.0, ROTORS[name][0], PERMEABLE, Drag(0.0, 0.0))
 
 
 @pytest.mark.parametrize(
@@ -52,7 +52,7 @@ def test_map_equals_searches_at_random_points(name, model):
         assert found.number[1][row, column] == sum(e.stable for e in expected)
         for e in expected:
             apart = np.linalg.norm(found.position[here] - e.position, axis=1)
-            apart += np.linalg.norm(found.moment[here] - e.state.moment, axis=1) * FLOATER.radius
+            apart += np.linalg.norm(found.moment[here] - e.state.moment, axis=1) * PERMEABLE.radius
             same = here[np.argmin(apart)]
             assert apart.min() < 1e-9
             assert found.stable[same] == e.stable
@@ -68,7 +68,7 @@ def test_map_misses_nothing_that_a_search_finds(name, model):
     family, measures = rotor_family(scene_of(name), name, model, 1e-4), ROTORS[name][1]
     grid = family_grid(family, FREQUENCIES, measures, 0.0, 0.1)
     found = equilibrium_map(family, FREQUENCIES, measures, spacing=3)
-    places = np.concatenate([found.position / FLOATER.radius, found.moment], axis=1)
+    places = np.concatenate([found.position / PERMEABLE.radius, found.moment], axis=1)
     for point in np.random.default_rng(5).choice(len(grid), 30, replace=False):
         here = places[found.row * len(measures) + found.column == point]
         for position, moment in fixed_points(grid.alone(int(point)), grid.range(int(point)))[1]:
@@ -114,13 +114,13 @@ def test_what_has_no_map_says_so():
 @pytest.mark.slow
 def test_mutual_magnetisation_is_interpolated():
     """Between the seven tables the field is that of a table of its own, twice the accuracy asked of each: 2e-4."""
-    family = rotor_family(scene_of("vertical"), "vertical", "fem", 1e-4, FLOATER.radius, (10e-3, 20e-3))
+    family = rotor_family(scene_of("vertical"), "vertical", "fem", 1e-4, PERMEABLE.radius, (10e-3, 20e-3))
     x, y, z = variables = hy.make_vars("x", "y", "z")
     field = hy.cfunc(family.field.expressions([x, y, z])[0], variables, compact_mode=True, opt_level=0)
     rng = np.random.default_rng(0)
     points = np.stack([*rng.uniform(-4e-3, 4e-3, (2, 100)), -rng.uniform(11.4e-3, 35e-3, 100)])
     for measure in (10e-3, 11.3e-3, 19.9e-3):
-        table = rotor_table(rotor.vertical(measure, *SHAPE), "fem", 1e-5, nearest=FLOATER.radius)
+        table = rotor_table(rotor.vertical(measure, *SHAPE), "fem", 1e-5, nearest=PERMEABLE.radius)
         expected, pars = table.evaluate(points.T)[0], np.zeros((Parameter.MEASURE + 1, 100))
         pars[Parameter.MEASURE] = measure
         apart = np.linalg.norm(field(points, pars=pars).T - expected, axis=1)

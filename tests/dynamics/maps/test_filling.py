@@ -2,16 +2,16 @@
 
 import numpy as np
 import pytest
+from article import PERMEABLE
 
 from spinlev.dynamics.equilibria import Search
 from spinlev.dynamics.maps import equilibrium_map, filling, rotor_family
 from spinlev.dynamics.maps.mapping import family_grid
 from spinlev.dynamics.steady import EVERY
 from spinlev.geometry.bodies import article_rotors as rotor
-from spinlev.geometry.scenes import Drag, Floater, Scene
+from spinlev.geometry.scenes import Drag, Scene
 
 SHAPE = (10e-3, 1.305, 1.05)
-FLOATER = Floater(radius=6.35e-3, remanence=1.305, recoil_permeability=1.05, density=7500.0)
 ROTORS = {
     "horizontal": (rotor.horizontal(2e-3, *SHAPE), (0.6e-3, 5e-3)),
     "vertical": (rotor.vertical(14e-3, *SHAPE), (10e-3, 20e-3)),
@@ -27,7 +27,7 @@ CASES = [
 def map_of(name, side, model="dipole"):
     """The family and the axes of a map of side × side points."""
     magnets, ends = ROTORS[name]
-    family = rotor_family(Scene(110.0, magnets, FLOATER, Drag(0.0, 0.0)), name, model)
+    family = rotor_family(Scene(110.0, magnets, PERMEABLE, Drag(0.0, 0.0)), name, model)
     return family, np.linspace(20.0, 300.0, side), np.linspace(*ends, side)
 
 
@@ -90,7 +90,7 @@ def test_a_map_has_every_equilibrium_that_whole_searches_by_short_steps_find(nam
     whole = equilibrium_map(*map_of(name, 30, model))
     np.testing.assert_array_equal(quick.number, whole.number)
     quickly, wholly = (
-        (found.row * 30 + found.column, np.concatenate([found.position, found.moment * FLOATER.radius], axis=1))
+        (found.row * 30 + found.column, np.concatenate([found.position, found.moment * PERMEABLE.radius], axis=1))
         for found in (quick, whole)
     )
     assert missed(wholly, quickly) == 0

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from article import PERMEABLE
 
 from spinlev.dynamics.effects import Mutual, RotorCurrents
 from spinlev.dynamics.equilibria import find_equilibria
@@ -16,15 +17,14 @@ from spinlev.fem.rotor_losses import ball_losses, pieces_of
 from spinlev.fem.rotor_tables import rotor_table
 from spinlev.geometry.basics import InputError
 from spinlev.geometry.bodies import Conductor, horizontal, tilt, vertical
-from spinlev.geometry.scenes import Drag, Floater, Scene
+from spinlev.geometry.scenes import Drag, Scene
 
 SHAPE = (10e-3, 1.305, 1.05)
-FLOATER = Floater(6.35e-3, 1.305, 1.05, 7500.0)
 MOVES = [(horizontal, 2e-3, Translation((1.0, 0.0, 0.0))), (tilt, np.radians(12.0), Rotation())]
 
 
 def scene_of(rotor):
-    return Scene(110.0, rotor, FLOATER, Drag(0.0, 0.0))
+    return Scene(110.0, rotor, PERMEABLE, Drag(0.0, 0.0))
 
 
 def states(number):
@@ -42,7 +42,7 @@ def test_a_moved_effect_is_that_of_the_moved_rotor(make, measure, move):
     scene, alone = scene_of(there), rotor_table(cube, "dipole")
     kinds = {
         "currents": lambda rotor: RotorCurrents(ball_losses(pieces_of(rotor, ()), degree=2)),
-        "answers": lambda rotor: Mutual(cached_mutual_table(rotor, FLOATER, print)[0], FLOATER.moment),
+        "answers": lambda rotor: Mutual(cached_mutual_table(rotor, PERMEABLE, print)[0], PERMEABLE.moment),
     }
     field = rotor_table(there, "dipole")
     values = parameters(scene, Scales.of(scene))
@@ -86,7 +86,7 @@ def test_a_map_has_mutual_magnetisation():
     frequencies, measures = np.array([120.0, 125.0]), np.radians([9.5, 10.0])
     found = equilibrium_map(family, frequencies, measures)
     scene = family.at(120.0, measures[1])
-    answers = Mutual(cached_mutual_table(scene.rotor, FLOATER, print)[0], FLOATER.moment)
+    answers = Mutual(cached_mutual_table(scene.rotor, PERMEABLE, print)[0], PERMEABLE.moment)
     field = rotor_table(scene.rotor, "cuboid")
     expected, rigid = find_equilibria(scene, Interaction(field, (answers,))), find_equilibria(scene, field)
     here = (found.row == 0) & (found.column == 1)

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import heyoka as hy
 import numpy as np
+from article import FLOATER
 
 from spinlev.dynamics.motion import (
     Added,
@@ -19,9 +20,8 @@ from spinlev.dynamics.motion import (
 )
 from spinlev.fem.rotor_tables import rotor_table
 from spinlev.geometry.bodies import vertical
-from spinlev.geometry.scenes import Drag, Floater, Scene
+from spinlev.geometry.scenes import Drag, Scene
 
-FLOATER = Floater(radius=6.35e-3, remanence=1.305, recoil_permeability=1.0, density=7500.0)
 SCENE = Scene(90.0, vertical(14e-3, 10e-3, 1.305, 1.0), FLOATER, Drag(0.0, 0.0))
 TABLE = rotor_table(SCENE.rotor, "cuboid")
 VALUES = parameters(SCENE, Scales.of(SCENE))

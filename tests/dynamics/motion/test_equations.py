@@ -6,6 +6,7 @@ import heyoka as hy
 import magpylib as magpy
 import numpy as np
 import pytest
+from article import FLOATER
 from scipy.integrate import solve_ivp
 
 from spinlev.dynamics.flights.compiled_flight import compile_flight
@@ -14,9 +15,8 @@ from spinlev.dynamics.motion import Rates, Scales, State, equations_of_motion, p
 from spinlev.fem.harmonics import uniform_moments
 from spinlev.fem.rotor_tables import RotorTable
 from spinlev.geometry.bodies import article_rotors as rotor
-from spinlev.geometry.scenes import Drag, Floater, Scene
+from spinlev.geometry.scenes import Drag, Scene
 
-FLOATER = Floater(radius=6.35e-3, remanence=1.305, recoil_permeability=1.0, density=7500.0)
 MAGNETS = rotor.vertical(14e-3, 10e-3, 1.305, 1.0)
 TABLES = {
     "dipole": RotorTable("dipole", MAGNETS, (), tuple(uniform_moments(m, 1) for m in MAGNETS)),

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from article import PERMEABLE
 
 from spinlev.dynamics.effects import Mutual
 from spinlev.dynamics.motion import Interaction, Rates, Scales, parameters
@@ -11,7 +12,6 @@ from spinlev.fem.rotor_tables import rotor_table
 from spinlev.geometry.bodies import horizontal, tilt, vertical
 from spinlev.geometry.scenes import Drag, Floater, Scene
 
-FLOATER = Floater(6.35e-3, 1.305, 1.05, 7500.0)
 PAIRS = {
     "horizontal": (horizontal(2e-3, 10e-3, 1.305, 1.05), horizontal(1e-3, 9.5e-3, 1.29, 1.05)),
     "vertical": (vertical(14e-3, 10e-3, 1.305, 1.05), vertical(16.5e-3, 9.8e-3, 1.31, 1.05)),
@@ -38,7 +38,7 @@ def test_rotors_of_one_kind_share_their_code_and_each_has_its_own_rates(kind, mo
     rng = np.random.default_rng(3)
     states = 0.1 * rng.normal(size=(40, 12)) + np.array([0, 0, -3.5, 0, 0, 0, 0, 0, 1, 0, 0, 0])
     for rotor, table, found in zip(PAIRS[kind], tables, rates, strict=True):
-        scene = Scene(110.0, rotor, FLOATER, Drag(0.0, 0.0))
+        scene = Scene(110.0, rotor, PERMEABLE, Drag(0.0, 0.0))
         values = parameters(scene, Scales.of(scene))
         for values_given in (values, np.tile(values, (len(states), 1))):
             exact = Rates(WrittenOut(table))(states, values_given)
@@ -55,11 +55,11 @@ def test_tilted_rotors_share_their_code_whatever_the_angle():
     assert len(functions) == 1
 
 
-@pytest.mark.parametrize("floater", [FLOATER, Floater(4.1e-3, 1.2, 1.3, 5000.0), Floater(5e-3, 0.0, 2.0, 2000.0)])
+@pytest.mark.parametrize("floater", [PERMEABLE, Floater(4.1e-3, 1.2, 1.3, 5000.0), Floater(5e-3, 0.0, 2.0, 2000.0)])
 def test_floaters_that_answer_share_their_code_and_each_has_its_own_answer(floater):
     """A rotor that does not answer: what is added to the force is α ∇B²/2."""
     rotor = horizontal(2e-3, 10e-3, 1.305, 1.0)
-    rates = [Rates(_answering(horizontal(2e-3, 9e-3, 1.305, 1.0), FLOATER)), Rates(_answering(rotor, floater))]
+    rates = [Rates(_answering(horizontal(2e-3, 9e-3, 1.305, 1.0), PERMEABLE)), Rates(_answering(rotor, floater))]
     assert rates[0]._function is rates[1]._function
     scene = Scene(110.0, rotor, floater, Drag(0.0, 0.0), gravity=np.zeros(3))
     scales = Scales.of(scene)

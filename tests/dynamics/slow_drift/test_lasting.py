@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 import pytest
+from article import RADIUS
 
 from spinlev.dynamics.effects import with_effects
 from spinlev.dynamics.equilibria import find_equilibria
@@ -12,7 +13,6 @@ from spinlev.fem.rotor_tables import rotor_table
 from spinlev.geometry.bodies import article_rotors as rotor
 from spinlev.geometry.scenes import Drag, Floater, Scene
 
-RADIUS = 6.35e-3
 SCENE = Scene(
     75.0,
     rotor.vertical(14e-3, 10e-3, 1.305, 1.0),

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from article import MAGNETS, SCENE
 
 from spinlev.dynamics.equilibria import find_equilibria
 from spinlev.dynamics.flights.compiled_flight import compile_flight
@@ -14,11 +15,8 @@ from spinlev.dynamics.steady.stability import left_eigenvectors
 from spinlev.fem.harmonics import uniform_moments
 from spinlev.fem.rotor_tables import RotorTable
 from spinlev.geometry.bodies import article_rotors as rotor
-from spinlev.geometry.scenes import Drag, Floater, Scene
+from spinlev.geometry.scenes import Drag
 
-FLOATER = Floater(radius=6.35e-3, remanence=1.305, recoil_permeability=1.0, density=7500.0)
-MAGNETS = rotor.horizontal(2e-3, 10e-3, 1.305, 1.0)
-SCENE = Scene(110.0, MAGNETS, FLOATER, Drag(0.0, 0.0))
 CUBOID = RotorTable("cuboid", MAGNETS, MAGNETS)
 
 

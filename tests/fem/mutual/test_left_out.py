@@ -2,15 +2,14 @@
 
 import numpy as np
 import pytest
+from article import PERMEABLE
 
 from spinlev.fem.harmonics import field_at_center, multipole_force, multipole_torque
 from spinlev.fem.mutual import cached_mutual_table, rotor_ladder, two_body
 from spinlev.fem.mutual.answer_samples import places_around
 from spinlev.fem.mutual.permeable_sphere import induced_sources, permanent_sources
 from spinlev.geometry.bodies import horizontal
-from spinlev.geometry.scenes import Floater
 
-FLOATER = Floater(6.35e-3, 1.305, 1.05, 7500.0)
 MAGNETS = horizontal(2e-3, 10e-3, 1.305, 1.05)
 DEGREE = 20
 
@@ -29,26 +28,26 @@ def test_the_rotors_answer_to_the_spheres_higher_degrees_is_needed_and_enough(ga
     It is -M·V: the table's V is the field that the finite elements send back, to a part that leaves 1e-3 of the whole.
     """
     (rotor,) = rotor_ladder(MAGNETS, (2,))
-    answers = cached_mutual_table(MAGNETS, FLOATER, print)[0]
+    answers = cached_mutual_table(MAGNETS, PERMEABLE, print)[0]
     generator = np.random.default_rng(4)
-    for place in places_around(MAGNETS, FLOATER.radius, (gap / FLOATER.radius,), 4, 3):
+    for place in places_around(MAGNETS, PERMEABLE.radius, (gap / PERMEABLE.radius,), 4, 3):
         direction = generator.normal(size=3)
         direction /= np.linalg.norm(direction)
-        both = two_body(rotor, FLOATER, place, direction, DEGREE, 1e-7)
+        both = two_body(rotor, PERMEABLE, place, direction, DEGREE, 1e-7)
         ball, own = both.ball, both.own
 
         def wrench(incident, sources, ball=ball):
-            torque = multipole_torque(incident, sources, ball) / FLOATER.radius
+            torque = multipole_torque(incident, sources, ball) / PERMEABLE.radius
             return np.concatenate([multipole_force(incident, sources, ball), torque])
 
-        low, high = parted(induced_sources(own, FLOATER.recoil_permeability))
-        moment = permanent_sources(FLOATER, direction, ball, DEGREE) + low
+        low, high = parted(induced_sources(own, PERMEABLE.recoil_permeability))
+        moment = permanent_sources(PERMEABLE, direction, ball, DEGREE) + low
         back = rotor.answer(moment, ball, DEGREE)
-        back_low, back_high = parted(induced_sources(back, FLOATER.recoil_permeability))
+        back_low, back_high = parted(induced_sources(back, PERMEABLE.recoil_permeability))
         table = wrench(own, low + high) + wrench(back, moment) + wrench(own, back_low)
         term = wrench(back, high) + wrench(rotor.answer(high, ball, DEGREE), moment) + wrench(own, back_high)
         added = both.total - both.rigid
-        exact = np.concatenate([added.force, added.torque / FLOATER.radius])
+        exact = np.concatenate([added.force, added.torque / PERMEABLE.radius])
         sizes = np.linalg.norm(exact[:3]), max(np.linalg.norm(exact[3:]), 0.1 * np.linalg.norm(exact[:3]))
 
         def missed(part, sizes=sizes):

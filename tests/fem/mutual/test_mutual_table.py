@@ -5,6 +5,7 @@ from dataclasses import replace
 import heyoka as hy
 import numpy as np
 import pytest
+from article import PERMEABLE
 from numpy.polynomial import legendre
 
 from spinlev.fem.harmonics import Ball, field_at_center, gradient_at_center
@@ -17,16 +18,14 @@ from spinlev.fem.storage import read_checked, write_checked
 from spinlev.geometry.basics import Box, InputError, rotation_matrix
 from spinlev.geometry.bodies import Magnet, horizontal, tilt, vertical
 from spinlev.geometry.meshes import MeshSettings, mesh_magnets
-from spinlev.geometry.scenes import Floater
 
-FLOATER = Floater(6.35e-3, 1.305, 1.05, 7500.0)
 MAGNETS = horizontal(2e-3, 10e-3, 1.305, 1.05)
 FINER = MeshSettings(magnet_size=0.6)
 
 
 @pytest.fixture(scope="module")
 def table():
-    return cached_mutual_table(MAGNETS, FLOATER, print)[0]
+    return cached_mutual_table(MAGNETS, PERMEABLE, print)[0]
 
 
 @pytest.fixture(scope="module")
@@ -37,20 +36,20 @@ def fine():
 
 def poses(gap, number, seed, magnets=MAGNETS):
     """Places (n, 3) m at a gap (radii) that the fit has not seen, and directions (n, 3)."""
-    places = places_around(magnets, FLOATER.radius, (gap,), number, seed)
+    places = places_around(magnets, PERMEABLE.radius, (gap,), number, seed)
     directions = np.random.default_rng(seed).normal(size=places.shape)
     return places, directions / np.linalg.norm(directions, axis=1)[:, None]
 
 
 def missed(table, rotor, place, direction):
     """Parts of the added force and torque that a table misses of both bodies; of a small torque, by the force's arm."""
-    degree = enough_degree(rotor.magnets, Ball(place, FLOATER.radius), 1e-6)
-    both = two_body(rotor, FLOATER, place, direction, degree, 1e-7)
+    degree = enough_degree(rotor.magnets, Ball(place, PERMEABLE.radius), 1e-6)
+    both = two_body(rotor, PERMEABLE, place, direction, degree, 1e-7)
     added = both.total - both.rigid
-    field, gradient = field_at_center(both.own), gradient_at_center(both.own, FLOATER.radius)
-    _, force, torque = answers(table, place[None], FLOATER.moment * direction[None], field[None], gradient[None])
+    field, gradient = field_at_center(both.own), gradient_at_center(both.own, PERMEABLE.radius)
+    _, force, torque = answers(table, place[None], PERMEABLE.moment * direction[None], field[None], gradient[None])
     size = float(np.linalg.norm(added.force))
-    arm = max(float(np.linalg.norm(added.torque)), 0.1 * FLOATER.radius * size)
+    arm = max(float(np.linalg.norm(added.torque)), 0.1 * PERMEABLE.radius * size)
     return np.linalg.norm(force[0] - added.force) / size, np.linalg.norm(torque[0] - added.torque) / arm
 
 
@@ -58,7 +57,7 @@ def missed(table, rotor, place, direction):
 def test_force_and_torque_are_those_of_both_bodies(table, fine, gap, seed):
     """To 1e-3 from 1 mm off contact on, at poses that the fit has not seen and at a pole; the stated error holds."""
     places, directions = poses(gap, 2, seed)
-    pole = MAGNETS[0].box.center - np.array([5e-3 + (1 + gap) * FLOATER.radius, 0.0, 0.0])
+    pole = MAGNETS[0].box.center - np.array([5e-3 + (1 + gap) * PERMEABLE.radius, 0.0, 0.0])
     for place, direction in zip([*places, pole], [*directions, np.array([-1.0, 0.0, 0.0])], strict=True):
         apart, stated = missed(table, fine, place, direction), table.relative_error(place)
         assert max(apart) < 1e-3
@@ -86,9 +85,9 @@ def test_nearer_to_contact_the_stated_error_holds(table, fine):
 )
 def test_from_a_millimetre_off_contact_on_cubes_are_met_to_a_thousandth(rotor):
     """At thirty poses of each rotor."""
-    fine, table = rotor_response(mesh_magnets(rotor, FINER), 3), cached_mutual_table(rotor, FLOATER, print)[0]
+    fine, table = rotor_response(mesh_magnets(rotor, FINER), 3), cached_mutual_table(rotor, PERMEABLE, print)[0]
     for gap in (1e-3, 2e-3, 4e-3):
-        each = zip(*poses(gap / FLOATER.radius, 10, 31, rotor), strict=True)
+        each = zip(*poses(gap / PERMEABLE.radius, 10, 31, rotor), strict=True)
         worst = np.max([missed(table, fine, place, direction) for place, direction in each], axis=0)
         print(f"\n{1e3 * gap:g} mm off contact: misses {worst[0]:.1e} of the added force, {worst[1]:.1e} of the torque")
         assert max(worst) < 1e-3
@@ -100,7 +99,7 @@ def test_written_out_and_by_points_the_energy_is_one(table):
     given = hy.make_vars(*names)
     whole = hy.cfunc([table.energy(given[:3], given[3:6], given[6:])], given, compact_mode=True, opt_level=0)
     place, direction = poses(0.6, 4, 5)
-    moment, flux = FLOATER.moment * direction, 0.02 * direction[:, ::-1]
+    moment, flux = PERMEABLE.moment * direction, 0.02 * direction[:, ::-1]
     energy = answers(table, place, moment, flux, np.zeros((4, 3, 3)))[0]
     written = whole(np.ascontiguousarray(np.concatenate([place, moment, flux], axis=1).T))[0]
     np.testing.assert_allclose(written, energy, rtol=1e-10)
@@ -126,7 +125,7 @@ def test_a_file_holds_all_of_it(table, tmp_path):
 
 def test_what_is_not_permeable_does_not_answer():
     hard = tuple(replace(magnet, recoil_permeability=1.0) for magnet in MAGNETS)
-    table = mutual_table(hard, replace(FLOATER, recoil_permeability=1.0))
+    table = mutual_table(hard, replace(PERMEABLE, recoil_permeability=1.0))
     energy, slope, second = table.derivatives(*poses(0.5, 3, 7))
     assert not energy.any()
     assert not slope.any()
@@ -137,7 +136,7 @@ def test_what_is_not_permeable_does_not_answer():
 def test_an_oblique_easy_axis_is_refused():
     oblique = Magnet(Box(np.full(3, 10e-3)), np.array([1.0, 0.0, 1.0]), 1.05, 1.15)
     with pytest.raises(InputError, match=r"easy axis along none of its edges.*--interaction rigid"):
-        mutual_table((oblique,), FLOATER)
+        mutual_table((oblique,), PERMEABLE)
 
 
 def test_a_lone_magnet_has_one_table_wherever_it_stands():
@@ -146,12 +145,12 @@ def test_a_lone_magnet_has_one_table_wherever_it_stands():
     (magnet,) = MAGNETS
     turned = (replace(magnet, body=Box(magnet.box.size, shift, turn)),)
     upright = (replace(magnet, body=Box(magnet.box.size)),)
-    (first, _), (second, found) = (cached_mutual_table(m, FLOATER, print) for m in (upright, turned))
+    (first, _), (second, found) = (cached_mutual_table(m, PERMEABLE, print) for m in (upright, turned))
     assert found
     place, direction = (values + 0.0 for values in poses(0.6, 4, 6))
     flux, slope = 0.02 * direction[:, ::-1], np.zeros((4, 3, 3))
-    here = answers(first, place, FLOATER.moment * direction, flux, slope)
-    moved = (shift + place @ turn.T, FLOATER.moment * direction @ turn.T, flux @ turn.T, slope)
+    here = answers(first, place, PERMEABLE.moment * direction, flux, slope)
+    moved = (shift + place @ turn.T, PERMEABLE.moment * direction @ turn.T, flux @ turn.T, slope)
     for there, value in zip(answers(second, *moved), here, strict=True):
         expected = value if value.ndim == 1 else value @ turn.T
         np.testing.assert_allclose(there, expected, rtol=1e-10, atol=1e-12 * np.abs(expected).max())
@@ -181,7 +180,7 @@ def test_two_magnets_written_out_and_by_pairs_have_one_energy(table):
     written = hy.cfunc([two.coupled(given[:3], given[3:])], given, compact_mode=True, opt_level=0)
     alone = [replace(table, grids=(g,), coupling=np.zeros((3, 3)), pairs=0 * pairs, mixed=0 * mixed) for g in two.grids]
     places, directions = poses(0.6, 9, 8)
-    places, directions = np.ascontiguousarray(places - [0.0, 0.0, 20e-3]), FLOATER.moment * directions
+    places, directions = np.ascontiguousarray(places - [0.0, 0.0, 20e-3]), PERMEABLE.moment * directions
     energy, slope, second = two.derivatives(places, directions)
     rest = energy - sum(t.derivatives(places, directions)[0] for t in alone)
     found = written(np.ascontiguousarray(np.concatenate([places, directions], axis=1).T))[0]

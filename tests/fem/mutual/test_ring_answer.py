@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from article import PERMEABLE
 from second_opinions.both_bodies import solve_both_bodies
 from second_opinions.ring_segments import RingOfSegments
 from second_opinions.two_bodies import mesh_two_bodies
@@ -10,9 +11,7 @@ from spinlev.fem.harmonics import field_at_center, gradient_at_center
 from spinlev.fem.mutual import Wrench, answers, cached_mutual_table, rotor_ladder, two_body
 from spinlev.geometry.basics import Ring
 from spinlev.geometry.bodies import Magnet
-from spinlev.geometry.scenes import Floater
 
-FLOATER = Floater(6.35e-3, 1.305, 1.05, 7500.0)
 INNER, OUTER, HEIGHT = 4e-3, 10e-3, 6e-3
 RING = (Magnet(Ring(OUTER, INNER, HEIGHT), np.array([1.3, 0.0, 0.0]), 1.05),)
 PLACES = np.array([[1e-3, -2e-3, -13e-3], [6e-3, 2e-3, -11.5e-3], [16e-3, 4e-3, -10e-3]])
@@ -33,14 +32,14 @@ def wrench_of_segments(ring, place, moment):
 def by_segments(places, *counts):
     """Forces and torques on the moment (places, 2, 3) by rings of so many segments."""
     rings = [RingOfSegments(INNER, OUTER, HEIGHT, 0.05, count) for count in counts]
-    moments = FLOATER.moment * DIRECTIONS[: len(places)]
+    moments = PERMEABLE.moment * DIRECTIONS[: len(places)]
     return [np.array([wrench_of_segments(ring, p, m) for p, m in zip(places, moments, strict=True)]) for ring in rings]
 
 
 def by_elements(places, order):
     (rotor,) = rotor_ladder(RING, (order,))
     found = [
-        two_body(rotor, FLOATER, p, d, 16, 1e-4).rotor_answer
+        two_body(rotor, PERMEABLE, p, d, 16, 1e-4).rotor_answer
         for p, d in zip(places, DIRECTIONS[: len(places)], strict=True)
     ]
     return np.array([(wrench.force, wrench.torque) for wrench in found])
@@ -74,16 +73,16 @@ def test_a_rings_answer_is_that_of_both_bodies_in_one_mesh():
     The mesh of both leaves the torque uncertain by 2e-3 for the cube as well (`test_two_body`).
     Points in a box stand for the round body: they miss up to 4 % at its rim, 1.1 % below it.
     """
-    table = cached_mutual_table(RING, FLOATER, print)[0]
+    table = cached_mutual_table(RING, PERMEABLE, print)[0]
     (rotor,) = rotor_ladder(RING, (3,))
     for place, direction in zip(PLACES, DIRECTIONS, strict=True):
-        both = two_body(rotor, FLOATER, place, direction, None, 1e-8)
-        whole = solve_both_bodies(mesh_two_bodies(RING, place, FLOATER.radius, 0.2), FLOATER, place, direction)
+        both = two_body(rotor, PERMEABLE, place, direction, None, 1e-8)
+        whole = solve_both_bodies(mesh_two_bodies(RING, place, PERMEABLE.radius, 0.2), PERMEABLE, place, direction)
         exact = whole - both.rigid
-        field, slope = field_at_center(both.own), gradient_at_center(both.own, FLOATER.radius)
-        _, force, torque = answers(table, place[None], FLOATER.moment * direction[None], field[None], slope[None])
+        field, slope = field_at_center(both.own), gradient_at_center(both.own, PERMEABLE.radius)
+        _, force, torque = answers(table, place[None], PERMEABLE.moment * direction[None], field[None], slope[None])
         size = float(np.linalg.norm(exact.force))
-        arm = max(float(np.linalg.norm(exact.torque)), 0.1 * FLOATER.radius * size)
+        arm = max(float(np.linalg.norm(exact.torque)), 0.1 * PERMEABLE.radius * size)
         told = Wrench(force[0], torque[0]) - exact, both.total - whole
         points, elements = (
             np.array([np.linalg.norm(wrench.force) / size, np.linalg.norm(wrench.torque) / arm]) for wrench in told

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from article import PERMEABLE, RADIUS
 from second_opinions.both_bodies import solve_both_bodies
 from second_opinions.permeable_sphere import inner_field
 from second_opinions.two_bodies import mesh_two_bodies
@@ -26,8 +27,6 @@ from spinlev.geometry.basics import MU_0
 from spinlev.geometry.bodies import horizontal, vertical
 from spinlev.geometry.scenes import Floater
 
-RADIUS = 0.00635
-FLOATER = Floater(RADIUS, 1.305, 1.05, 7500.0)
 BALL = Ball(np.array([0.001, -0.002, -0.015]), RADIUS)
 DIRECTION = np.array([0.48, 0.36, 0.8])
 PLACE = np.array([0.0015, 0.001, -0.0145])
@@ -95,7 +94,7 @@ def test_sphere_in_a_uniform_field(permeability):
 
 def test_inner_and_outer_field_meet_the_interface_conditions():
     field = np.array([0.03, -0.02, 0.01])
-    sources = permanent_sources(FLOATER, DIRECTION, BALL, 1) + induced_sources(uniform(field, 1), 1.05)
+    sources = permanent_sources(PERMEABLE, DIRECTION, BALL, 1) + induced_sources(uniform(field, 1), 1.05)
     points, normals, _ = sphere_rule(BALL.center, BALL.radius, 4)
     outside = field + outer_field(sources, BALL, points)
     b, h = inner_field(field, 1.05, 1.305 * DIRECTION)
@@ -168,8 +167,8 @@ def test_rigid_dipole_is_the_table_of_the_rotor(rotors):
     """F = (m·∇)B and m × B with the rotor's table, made by other functionals of another solution."""
     table = rotor_table(rotors[0].magnets, "fem", 1e-6)
     b, gradient = table.evaluate(PLACE[None])
-    rigid = two_body(rotors[-1], FLOATER, PLACE, DIRECTION).rigid
-    dipole = FLOATER.moment * DIRECTION
+    rigid = two_body(rotors[-1], PERMEABLE, PLACE, DIRECTION).rigid
+    dipole = PERMEABLE.moment * DIRECTION
     # 1e-6: both are below it, the table from 1.5 circumradii on (this is 1.67) by its request
     np.testing.assert_allclose(rigid.force, gradient[0] @ dipole, rtol=0, atol=3e-6 * np.linalg.norm(rigid.force))
     np.testing.assert_allclose(rigid.torque, np.cross(dipole, b[0]), rtol=0, atol=3e-6 * np.linalg.norm(rigid.torque))
@@ -177,9 +176,9 @@ def test_rigid_dipole_is_the_table_of_the_rotor(rotors):
 
 def test_both_bodies_solved_at_once_agree(rotors):
     """What the answers add, against a mesh of both bodies: 5e-4 of it, the error of order 3 elements on that mesh."""
-    both, error = two_body_ladder(rotors, FLOATER, PLACE, DIRECTION)
+    both, error = two_body_ladder(rotors, PERMEABLE, PLACE, DIRECTION)
     mesh = mesh_two_bodies(rotors[0].magnets, PLACE, RADIUS, 0.25)
-    whole = solve_both_bodies(mesh, FLOATER, PLACE, DIRECTION)
+    whole = solve_both_bodies(mesh, PERMEABLE, PLACE, DIRECTION)
     added = both.total - both.rigid
     apart = whole - both.total
     assert np.linalg.norm(apart.force) < 5e-4 * np.linalg.norm(added.force)
@@ -201,7 +200,7 @@ def test_high_permeability_settles_as_well():
 def test_action_is_reaction(rotors):
     """Stress on a sphere about the rotor against the floater's force, with the field of all magnetisation."""
     place = np.array([0.001, 0.002, -0.021])
-    both = two_body(rotors[0], FLOATER, place, DIRECTION)
+    both = two_body(rotors[0], PERMEABLE, place, DIRECTION)
     induced = rotors[0].induced_dipoles(both.sources, both.ball)
     ball = Ball(rotors[0].mesh.center, 0.01)
     permeable = [
@@ -243,7 +242,7 @@ def test_degree_follows_the_nearest_edge(rotors):
 
 def test_overlapping_bodies_are_refused(rotors):
     with pytest.raises(TwoBodyError, match="cuts magnet 0"):
-        two_body(rotors[0], FLOATER, np.array([0.0, 0.0, -0.011]), DIRECTION)
+        two_body(rotors[0], PERMEABLE, np.array([0.0, 0.0, -0.011]), DIRECTION)
 
 
 def test_dipole_sources_and_moment_are_inverse():

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from article import RADIUS
 from ngsolve import SetNumThreads
 
 from spinlev.fem.closed_forms import unit_dipoles
@@ -25,7 +26,6 @@ TURN = rotation_matrix((5.0, -10.0, 20.0))
 PLATE = Plate(Box((0.1, 0.24, 0.03), (0.004, 0.0, -0.055), TURN), 3.5e7, Lowering(0.0, 0.01, 0.02))
 RULE = MeshRule(1.6, 2.5, 2.5)
 FREQUENCIES, RTOL = (5.0, 250.0), 0.1
-RADIUS = 6.35e-3
 
 
 @pytest.fixture(scope="module")

@@ -9,6 +9,7 @@ from types import SimpleNamespace
 import netgen.occ as occ
 import numpy as np
 import pytest
+from article import BALL
 
 from spinlev.dynamics.effects import mutual_choice
 from spinlev.fem.closed_forms import carrier
@@ -32,9 +33,8 @@ from spinlev.geometry.basics import (
 from spinlev.geometry.bodies import Magnet, known_shape, overlapping_magnets, read_part, step_file
 from spinlev.geometry.bodies.step_file import _refuse_open, _roots
 from spinlev.geometry.meshes import MeshSettings, magnets as magnet_meshes
-from spinlev.geometry.scenes import SceneError, changed, load_scene, magnets, parse_scene, scene, scene_text, sphere
+from spinlev.geometry.scenes import SceneError, changed, load_scene, magnets, parse_scene, scene, scene_text
 
-BALL = sphere(diameter_mm=12.7, remanence_T=1.305, density_kg_m3=7500.0)
 TURN = rotation_matrix((25.0, -40.0, 10.0))
 NEAREST = 6e-3
 

@@ -3,14 +3,14 @@
 import netgen.occ as occ
 import numpy as np
 import pytest
+from article import BALL
 
 from spinlev.geometry.basics import Box, Cylinder, Ring, Sphere, moved, rotation_matrix
 from spinlev.geometry.bodies import known_shape, read_part
 from spinlev.geometry.meshes.solids import occ_solid
-from spinlev.geometry.scenes import load_scene, magnets, scene, sphere
+from spinlev.geometry.scenes import load_scene, magnets, scene
 
 CENTER, TURN = np.array([1e-3, -2e-3, 3e-3]), rotation_matrix((25.0, -40.0, 10.0))
-BALL = sphere(diameter_mm=12.7, remanence_T=1.305, density_kg_m3=7500.0)
 BODIES = [Box((0.01, 0.012, 0.004)), Cylinder(5e-3, 8e-3), Cylinder(1e-2, 1e-3), Ring(5e-3, 2e-3, 8e-3), Sphere(9.5e-3)]
 
 

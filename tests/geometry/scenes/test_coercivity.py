@@ -1,11 +1,11 @@
 """The knee of the demagnetisation curve in scene files."""
 
 import pytest
+from article import BALL
 
 import spinlev as sl
 from spinlev.geometry.scenes import parse_scene, scene_text
 
-BALL = sl.sphere(diameter_mm=12.7, remanence_T=1.305, density_kg_m3=7500.0)
 CUBE = {"size_mm": [10.0, 10.0, 10.0], "polarization_T": [1.3, 0.0, 0.0]}
 
 

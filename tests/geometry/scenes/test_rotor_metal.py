@@ -4,12 +4,12 @@ import re
 
 import numpy as np
 import pytest
+from article import BALL
 
 import spinlev as sl
 from spinlev.geometry.basics import Box, Cylinder
 from spinlev.geometry.scenes import SceneError, parse_scene, scene_text
 
-BALL = sl.sphere(diameter_mm=12.7, remanence_T=1.305, density_kg_m3=7500.0)
 CUBE = {"displacement_mm": 1.5, "edge_mm": 10.0, "remanence_T": 1.305}
 SHAFT = {
     "shape": "cylinder",

@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
+from article import BALL
 
 from spinlev.geometry.basics import Cylinder, Ring, Sphere
-from spinlev.geometry.scenes import SceneError, magnets, parse_scene, scene, scene_text, sphere, tilt, vertical
+from spinlev.geometry.scenes import SceneError, magnets, parse_scene, scene, scene_text, tilt, vertical
 
-BALL = sphere(diameter_mm=12.7, remanence_T=1.305, density_kg_m3=7500.0)
 DISC = {"shape": "cylinder", "diameter_mm": 20.0, "height_mm": 5.0}
 RING = {"shape": "ring", "diameter_mm": 20.0, "inner_diameter_mm": 12.0, "height_mm": 5.0}
 PLACED = {"center_mm": [0.0, 0.0, 0.0], "polarization_T": [1.3, 0.0, 0.0]}

@@ -7,6 +7,7 @@ import magpylib
 import meshio
 import numpy as np
 import pytest
+from article import BALL
 from places import SCENES
 from scipy.spatial.transform import Rotation
 
@@ -19,7 +20,6 @@ from spinlev.studies.terminal import KINDS, Models, new_scene
 
 POINTS = np.random.default_rng(0).normal(size=(50, 3)) * 0.01 + [0.0, 0.0, -0.04]
 FAR = POINTS[np.linalg.norm(POINTS, axis=1) > 0.025][:8]
-BALL = sl.sphere(diameter_mm=12.7, remanence_T=1.305, density_kg_m3=7500.0)
 
 
 def collection():

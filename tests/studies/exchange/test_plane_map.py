@@ -7,6 +7,7 @@ import meshio
 import numpy as np
 import pytest
 import xarray as xr
+from article import BALL
 
 import spinlev as sl
 from spinlev.geometry.basics import MU_0, InputError
@@ -15,7 +16,6 @@ from spinlev.studies.command_line.cli import run
 from spinlev.studies.exchange.field_map import field_map
 from spinlev.studies.terminal import map_extent
 
-BALL = sl.sphere(diameter_mm=12.7, remanence_T=1.305, density_kg_m3=7500.0)
 SPHERE = sl.tilt(angle_deg=5.0, shape="sphere", diameter_mm=10.0, remanence_T=1.3)
 
 

@@ -4,13 +4,13 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from article import BALL
 
 import spinlev as sl
 from spinlev.dynamics.flights import most_like_levitation
 from spinlev.geometry.basics import InputError
 from spinlev.studies.one_scene.plate_of_scene import check_way
 
-BALL = sl.sphere(diameter_mm=12.7, remanence_T=1.305, density_kg_m3=7500.0)
 BLOCK = {"size_mm": [4.0, 4.0, 4.0], "center_mm": [0.0, 0.0, -8.0], "conductivity_S_m": 1.4e6}
 
 

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import xarray as xr
+from article import BALL
 
 import spinlev as sl
 from spinlev.studies.catalogue import question_study
@@ -14,8 +15,7 @@ from spinlev.studies.sweeps.workers import attempts
 from spinlev.studies.terminal import Models, Workers, combinations
 
 ROTOR = sl.horizontal(displacement_mm=2.0, edge_mm=10.0, remanence_T=1.305)
-FLOATER = sl.sphere(diameter_mm=12.7, remanence_T=1.305, density_kg_m3=7500.0)
-SCENE = sl.scene(frequency_hz=120.0, rotor=ROTOR, floater=FLOATER)
+SCENE = sl.scene(frequency_hz=120.0, rotor=ROTOR, floater=BALL)
 ALONE = {"plate_model": "none", "model": "dipole"}
 
 
@@ -65,7 +65,7 @@ def test_neighbours_over_a_slab_share_its_table(tmp_path, monkeypatch):
         size_mm=[100.0, 240.0, 30.0], center_mm=[0.0, 0.0, -60.0], rotation_deg=[0.0, 0.0, 0.0], conductivity_S_m=3.6e7
     )
     models = Models("dipole", "slab", interaction="rigid")
-    over = sl.scene(frequency_hz=127.0, rotor=ROTOR, floater=FLOATER, plate=plate)
+    over = sl.scene(frequency_hz=127.0, rotor=ROTOR, floater=BALL, plate=plate)
     scenes = [over, replace(over, frequency=128.0)]
     first, second = (Levitation(scene, models) for scene in scenes)
     second.share(first)
