@@ -22,12 +22,14 @@ class Endings:
     levitated_s : (n,) when, s
     last : states (n, 3) then, along the rotor's axes, SI units
     changes : (n,) how often a floater went from one ball to another
+    left_plate_table : (n,) whether it was ever beyond the range of the plate's table, where its field is a continuation
     """
 
     ended_by: NDArray[np.str_]
     levitated_s: Array
     last: State
     changes: NDArray[np.int_]
+    left_plate_table: NDArray[np.bool_]
 
     @classmethod
     def joined(cls, parts: Sequence[Endings]) -> Endings:
@@ -38,8 +40,11 @@ class Endings:
             np.concatenate([part.levitated_s for part in parts]),
             State(*(np.concatenate(same) for same in vectors)),
             np.concatenate([part.changes for part in parts]),
+            np.concatenate([part.left_plate_table for part in parts]),
         )
 
     def __repr__(self) -> str:
         counts = ", ".join(f"{np.sum(self.ended_by == end)} by {end}" for end in np.unique(self.ended_by))
-        return f"Endings of {len(self.ended_by)} flights: {counts}"
+        left = int(np.sum(self.left_plate_table))
+        beyond = f"; {left} left the range of the plate's table" if left else ""
+        return f"Endings of {len(self.ended_by)} flights: {counts}{beyond}"

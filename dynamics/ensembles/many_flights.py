@@ -107,4 +107,5 @@ def _ended(scene: Scene, table: FieldTable, duration: float, starts: State) -> E
         np.minimum([f.seconds for f in flights], duration),
         flight.scales.unpack(np.array([f.state[:12] for f in flights])),
         np.array([f.log.changes.count for f in flights]),
+        np.zeros(count, bool),
     )

@@ -20,6 +20,7 @@ from ..effects import with_effects
 from ..flights import DURATION, IntegrationError
 from ..local_plates import WholePlate
 from ..motion import (
+    BEYOND,
     CONTACT,
     Parameter,
     PlateForce,
@@ -34,6 +35,7 @@ from ..motion import (
     parameters,
     plate_depth,
     plate_legs,
+    range_events,
 )
 from .endings import Endings
 from .lanes import LANES
@@ -70,7 +72,8 @@ def launched(
     step_error : relative, of a Taylor step
     currents : (n, k) the plate's states then, √J; if not given, those under a floater long held at rest
 
-    Accuracy: that of the tables; beyond the range of the plate's the currents' field is continued as it is.
+    Accuracy: that of the tables; beyond the range of the plate's the currents' field is continued as it is, and
+    `Endings.left_plate_table` says which flights went there.
 
     Raises
     ------
@@ -120,8 +123,9 @@ class _Launches:
         equations = equations_of_motion(with_effects(scene, table), tilted, plate)
         whole = flight_events(replace(scene, plate=None), equations.variables[:3])
         smooth = obstacles(scene, memory, equations.variables[:3])
-        events = [*(event.expression for event in whole[0]), *smooth]
-        self.meanings = [*whole[1], *[CONTACT] * len(smooth)]
+        leaving = range_events(plate, equations.variables[:3])
+        events = [*(event.expression for event in (*whole[0], *leaving[0])), *smooth]
+        self.meanings = [*whole[1], *leaving[1], *[CONTACT] * len(smooth)]
         self.scene, self.scales, self.legs = scene, Scales.of(scene), plate_legs(scene.plate, duration)
         self.memory = memory
         self.integrator = compiled(
@@ -156,6 +160,8 @@ class _Launches:
         ended, times = np.full(count, CONTACT, dtype="<U8"), np.zeros(count)
         free = clearance(self.scene, np.zeros(count), starts.position) > 0
         waiting = iter(np.flatnonzero(free).tolist())
+        box, depth = self.memory.plate.box, plate_depth(self.memory.plate, np.zeros(1))
+        left = ~self.memory.table.in_range(box.to_body(starts.position + depth[:, None] * [0.0, 0.0, 1.0]))
         self.integrator.state[:] = states[0][:, None]  # empty lanes stay there
         flying = {lane: one for lane in range(LANES) if (one := self._next(lane, waiting, states))}
         while flying:
@@ -163,7 +169,9 @@ class _Launches:
             outcomes = [result[0] for result in self.integrator.propagate_res]
             for lane, one in list(flying.items()):
                 end = self._end(lane, one, outcomes[lane])
-                if end is None:
+                if end == BEYOND:
+                    left[one.number] = True
+                if end in (None, BEYOND):
                     continue
                 ended[one.number], times[one.number] = end, self.integrator.time[lane] * self.scales.time
                 states[one.number] = self.integrator.state[:, lane]
@@ -172,10 +180,12 @@ class _Launches:
                     flying[lane] = following
                 else:
                     del flying[lane]
-        return Endings(ended, np.minimum(times, self.legs[-1][0]), self.scales.unpack(states), np.zeros(count, int))
+        return Endings(
+            ended, np.minimum(times, self.legs[-1][0]), self.scales.unpack(states), np.zeros(count, int), left
+        )
 
     def _end(self, lane: int, one: _One, outcome: hy.taylor_outcome) -> str | None:
-        """What has ended the flight on a lane; None while it goes on."""
+        """What has ended the flight on a lane, or `BEYOND`, with which it goes on as with None."""
         if outcome in (hy.taylor_outcome.success, hy.taylor_outcome.step_limit):
             return None
         if outcome == hy.taylor_outcome.err_nf_state:

@@ -132,6 +132,11 @@ def _row(
         "spin": (begun.spin if begun else empty, "1", "spin about the moment over the rotor's"),
         "levitated": (ended.levitated_s if ended else empty, "s", "time until it touched something or was lost"),
         "outcome": (outcome.astype(float), "1", "how it ended"),
+        "left_plate_table": (
+            ended.left_plate_table.astype(float) if ended else empty,
+            "1",
+            "whether it went beyond the range of the plate's table, where the plate's field is a continuation",
+        ),
     }
     single = {name: variable((), np.array(value), unit, text) for name, (value, unit, text) in numbers.items()}
     flights = {name: variable(("flight",), values, unit, text) for name, (values, unit, text) in columns.items()}

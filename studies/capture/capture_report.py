@@ -5,6 +5,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from ...geometry.basics import Array
 from ..article import CONFIGURATIONS, rotor_label
 from .outcomes import HELD, NO_EQUILIBRIUM, WORDS, Caught, Share, rotors_of
 
@@ -18,6 +19,13 @@ def capture_lines(result: xr.Dataset) -> list[str]:
         for caught in parts:
             lines.append(f"{rotor_label(configuration, measure)} ({told}), {_line(caught)}")
         every += parts
+    flown = sum(int(np.isfinite(c.flights["left_plate_table"]).sum()) for c in every)
+    beyond = [sum(int(_beyond(c)[_held(c) == held].sum()) for c in every) for held in (True, False)]
+    if sum(beyond):
+        lines.append(
+            f"{sum(beyond)} of {flown} flights, {beyond[0]} of them held, were for a while beyond the range of the "
+            "plate's table, where the field of its currents is a continuation of unknown error."
+        )
     settled, stayed = sum(c.settled for c in every), sum(c.stayed for c in every)
     if settled:
         gone = Share(settled - stayed, settled)
@@ -26,6 +34,14 @@ def capture_lines(result: xr.Dataset) -> list[str]:
             f"still up at the end: {gone} of what is called held is lost after all."
         )
     return lines
+
+
+def _beyond(caught: Caught) -> Array:
+    return np.asarray(caught.flights["left_plate_table"].values == 1)
+
+
+def _held(caught: Caught) -> Array:
+    return np.asarray(caught.flights["outcome"].values == HELD)
 
 
 def _line(caught: Caught) -> str:
@@ -51,6 +67,7 @@ def capture_numbers(result: xr.Dataset) -> dict[str, Any]:
                 "flights": caught.held.trials,
                 "held": caught.held.value,
                 "held_error": caught.held.error,
+                "left_plate_table": float(np.mean(_beyond(caught))),
                 **{WORDS[k].replace(" ", "_"): caught.share(k) for k in range(1, len(WORDS))},
             })  # fmt: skip
     return {"shares": rows, "flown_on": settled, "stayed_up": stayed}

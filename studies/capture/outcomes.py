@@ -89,7 +89,7 @@ def rotors_of(result: xr.Dataset) -> Iterator[tuple[str, float, list[Caught]]]:
 
 
 def _caught(part: xr.Dataset) -> Caught:
-    names = ("outcome", "farther", "sideways", "lean", "spin", "levitated")
+    names = ("outcome", "farther", "sideways", "lean", "spin", "levitated", "left_plate_table")
     whole = part[list(names)].drop_vars(["configuration", "measure"], errors="ignore")
     flights = whole.stack(every=("case", "flight"), create_index=False).rename(every="flight")
     flights = flights.isel(flight=np.flatnonzero(np.isfinite(flights["outcome"].values)))

@@ -63,11 +63,21 @@ def test_floaters_end_as_they_must(flown):
     np.testing.assert_array_equal(flown.levitated_s[flown.ended_by == "duration"], DURATION)
 
 
+def test_flights_that_leave_the_plates_table_are_marked(memory, flown):
+    """The table reaches from 3.4 mm under the floater that hovers to 12 mm under the rotor, and 4 mm to the side."""
+    last = memory.table.in_range(memory.plate.box.to_body(flown.last.position))
+    assert flown.left_plate_table[~last].all()
+    assert flown.left_plate_table[6]  # it begins beyond
+    assert 0 < flown.left_plate_table.sum() < len(last)
+    assert f"{flown.left_plate_table.sum()} left the range of the plate's table" in repr(flown)
+
+
 def test_the_company_does_not_matter(memory, starts, flown):
     order = np.array([5, 0, 7, 4])
     found = launched(SCENE, TABLE, memory, State(*(v[order] for v in starts.vectors)), DURATION)
     np.testing.assert_array_equal(found.ended_by, flown.ended_by[order])
     np.testing.assert_array_equal(found.levitated_s, flown.levitated_s[order])
+    np.testing.assert_array_equal(found.left_plate_table, flown.left_plate_table[order])
     for a, b in zip(found.last.vectors, flown.last.vectors, strict=True):
         np.testing.assert_array_equal(a, b[order])
 
