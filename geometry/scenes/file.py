@@ -125,23 +125,24 @@ def changed(scene: Scene, changes: Mapping[str, float], source: str = "scene", k
     before = dict(scene.files)
     for path, digest in found.files:
         if before.get(path, digest) != digest:
-            raise _replaced(path, source)
+            raise _replaced(path, digest, source)
     return found
 
 
 def check_files(scene: Scene, source: str = "scene") -> None:
     """Raise SceneError if a file that a scene names has another content than when the scene was read."""
     for path, digest in scene.files:
-        if content_digest(Path(path)) != digest:
-            raise _replaced(path, source)
+        if (found := content_digest(Path(path))) != digest:
+            raise _replaced(path, found, source)
 
 
-def _replaced(path: str, source: str) -> SceneError:
+def _replaced(path: str, digest: str, source: str) -> SceneError:
+    instead = "its content is another one" if digest else "it cannot be read any more"
     return SceneError(
         source,
         [
-            f"Input {path} must stay as it was when the scene was read; instead its content is another one. Begin "
-            "again, and what needs the file is computed anew."
+            f"Input {path} must stay as it was when the scene was read; instead {instead}. Begin again, and what needs "
+            "the file is computed anew."
         ],
     )
 

@@ -9,6 +9,7 @@ from typing import Any
 import xarray as xr
 
 from ...fem.storage import owned
+from ...geometry.scenes import check_files
 from ..one_scene import Job, Question
 from ..pictures import question_figure, question_lines
 from ..results import Point, Study, save_figures, write_dataset
@@ -52,6 +53,7 @@ def question_study(question: Question, values: Mapping[str, Sequence[Any]]) -> S
         prepared=question.prepared,
         batches=question.batches,
         settings=question.settings,
+        check=partial(check_files, question.scene, question.source),
     )
 
 

@@ -63,6 +63,7 @@ class Study:
     timed : whether it measures times, for which its points must have the machine for themselves
     settings : what all points have in common, if they do not say it themselves
     numbers : what else `--json` prints, by key, from the joined result alone
+    check : raises InputError where a file that the points are of was replaced; None where they are of none
     """
 
     name: str
@@ -77,6 +78,7 @@ class Study:
     timed: bool = False
     settings: Point = field(default_factory=dict)
     numbers: Callable[[xr.Dataset], Mapping[str, Any]] | None = None
+    check: Callable[[], None] | None = None
 
 
 def study_of_one(compute: Callable[[bool], xr.Dataset], **more: Any) -> Study:

@@ -118,7 +118,8 @@ def swept(name: str, study: Study, points: Mapping[int, Point], engine: Workers,
     Raises
     ------
     SweepError : all points failed
-    InputError : the scheduler does not answer, or has no workers of this version of the program
+    InputError : the scheduler does not answer, or has no workers of this version of the program; or a file that the
+        points are of was replaced meanwhile, and the finished ones are kept
     ComputationError : the scheduler is lost; the finished points are kept
     OSError : `out` cannot be written
     """
@@ -136,6 +137,8 @@ def swept(name: str, study: Study, points: Mapping[int, Point], engine: Workers,
         with closing(computed(engine, study, points, missing)) as attempts:
             for k, result in attempts:
                 if isinstance(result, Failure):
+                    if study.check is not None:  # else each point to come fails for the same reason
+                        study.check()
                     failed[k] = result.reason
                     note(f"Point {to_json(points[k])} failed: {result.reason}")
                 else:

@@ -14,6 +14,8 @@ import sys
 import threading
 import zlib
 from contextlib import contextmanager
+from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import h5py
@@ -26,9 +28,11 @@ import xarray as xr
 from spinlev.fem.elements import memory
 from spinlev.fem.measured_maps import FieldMapError
 from spinlev.fem.measured_maps.readers import read_field_map
+from spinlev.fem.rotor_tables import RotorTable
 from spinlev.fem.storage import hdf5_fault, read_checked, seal, write_checked, write_whole
 from spinlev.fem.storage.cache import cache_folder
 from spinlev.fem.storage.whole_files import replacing
+from spinlev.geometry.scenes import load_scene
 from spinlev.studies.command_line.cli import _status
 from spinlev.studies.command_line.start import STOPPED
 
@@ -484,6 +488,116 @@ def test_a_stopped_flight_is_no_point_of_a_sweep(spinlev, monkeypatch):
     assert status == 0
     assert "1 of 2 points are there" in said
     xr.testing.assert_equal(*(read_checked(f"{folder}/question.nc") for folder in ("undisturbed", "out")))
+
+
+def as_map(strength):
+    """A map of the field of a cube of 10 mm, 2 mm off the axis."""
+    (magnet,) = load_scene(SCENE).rotor
+    rotor = (replace(magnet, polarization=strength * magnet.polarization, recoil_permeability=1.0),)
+    ticks = np.arange(-0.036, 0.037, 0.006)
+    points = np.stack(np.meshgrid(ticks, ticks, ticks, indexing="ij"), -1).reshape(-1, 3)
+    points = points[np.linalg.norm(points, axis=1) > 0.0075]
+    rows = np.hstack([1e3 * points, RotorTable("cuboid", rotor, rotor).evaluate(points)[0]])
+    np.savetxt("named", rows, "%.10g", ",", header="x_mm,y_mm,z_mm,Bx_T,By_T,Bz_T", comments="")
+
+
+def as_step(strength, bored=False):
+    """A cube, or with a hole what has no closed form."""
+    import netgen.occ as occ
+
+    half = 5.0 * strength ** (1 / 3)
+    solid = occ.Box(occ.Pnt(-half, -half, -half), occ.Pnt(half, half, half))
+    (solid - occ.Cylinder(occ.Pnt(1, 0, -9), occ.Z, r=1, h=18) if bored else solid).WriteStep("named")
+
+
+NAMED = {
+    "known shape": (as_step, "[[rotor.magnets]]\ncenter_mm = [2.0, 0.0, 0.0]\npolarization_T = [1.3, 0.0, 0.0]\nfile"),
+    "part": (
+        partial(as_step, bored=True),
+        "[[rotor.magnets]]\ncenter_mm = [2.0, 0.0, 0.0]\npolarization_T = [1.3, 0.0, 0.0]\nfile",
+    ),
+    "map": (
+        as_map,
+        "[rotor]\nconfiguration = 'horizontal'\ndisplacement_mm = 2.0\nedge_mm = 10.0\nremanence_T = 1.305\nfield_map",
+    ),
+}
+
+
+@pytest.fixture(params=["known shape", pytest.param("part", marks=pytest.mark.slow), "map"])
+def replaceable(request, spinlev):
+    """The command line beside a scene with a file, and what gives that file another content."""
+    write, rotor = NAMED[request.param]
+    floater = "[floater]\ndiameter_mm = 12.7\nremanence_T = 1.3\ndensity_kg_m3 = 7500.0\n"
+    Path("my.toml").write_text(f"frequency_hz = 110.0\n{floater}{rotor} = 'named'\n")
+    write(1.0)
+    model = ("--model", "map" if request.param == "map" else "dipole")
+
+    def run(command, *arguments):
+        return spinlev(command, "my.toml", *model, *arguments)
+
+    return run, write
+
+
+def while_it_runs(monkeypatch, act):
+    """Do something after the first point of a sweep."""
+
+    @contextmanager
+    def progress(label):
+        yield lambda done: act() if 0 < done < 1 else None
+
+    monkeypatch.setattr("spinlev.studies.sweeps.running.progress", progress)
+
+
+def stopped():
+    raise KeyboardInterrupt
+
+
+FREQUENCIES = ("--vary", "frequency_hz=100:112:2", "--workers", "1", "--ask", "field")
+"""Seven points in two batches."""
+
+
+def test_a_file_replaced_between_two_parts_of_a_sweep(replaceable, monkeypatch):
+    """The points of the other file are put aside: those that follow and those that were there are of one file."""
+    run, write = replaceable
+    with monkeypatch.context() as patch:
+        while_it_runs(patch, stopped)
+        assert run("study", *FREQUENCIES)[0] == 1
+    assert list(Path("out/question.points").glob("0*.json"))
+    write(0.9)
+    status, _, said = run("study", *FREQUENCIES)
+    assert status == 0
+    assert "of files that were replaced" in said
+    assert "points are there" not in said
+    assert run("study", *FREQUENCIES, "--out", "undisturbed")[0] == 0
+    xr.testing.assert_equal(*(read_checked(f"{folder}/question.nc") for folder in ("undisturbed", "out")))
+
+
+def test_a_file_replaced_while_a_sweep_runs(replaceable, monkeypatch):
+    """One sentence, whatever the number of points that are left, and no result of two files."""
+    run, write = replaceable
+    with monkeypatch.context() as patch:
+        while_it_runs(patch, lambda: write(0.9))
+        status, answer, said = run("study", *FREQUENCIES)
+    assert (status, answer) == (2, None)
+    assert said.count("must stay as it was when the scene was read; instead its content is another one") == 1
+    assert not Path("out/question.nc").exists()
+
+
+@pytest.mark.parametrize("replaceable", ["known shape", "map"], indirect=True)
+def test_a_file_replaced_before_a_flight_goes_on(replaceable, monkeypatch):
+    run, write = replaceable
+    flight = ("--duration-s", "1", "--plate-model", "none", "--interaction", "rigid")
+    with monkeypatch.context() as patch:
+        pressing(patch, 2)
+        assert run("simulate", *flight)[0] == 1
+    before = Path("out/checkpoint.npz").read_bytes()
+    write(0.9)
+    status, answer, said = run("simulate", *flight, "--resume")
+    assert (status, answer) == (2, None)
+    assert "must be a checkpoint of this flight; instead it was kept by another scene" in said
+    write(1.0)
+    assert Path("out/checkpoint.npz").read_bytes() == before
+    assert run("simulate", *flight, "--resume")[0] == 0
 
 
 def test_no_solve_is_begun_that_the_memory_does_not_hold(spinlev, monkeypatch):
