@@ -8,7 +8,8 @@ import resource
 import select
 import signal
 import threading
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from functools import cache, partial
 from multiprocessing import forkserver, resource_tracker
@@ -27,6 +28,7 @@ LIBRARIES = f"{__package__.rpartition('.')[0]}.live"
 """What every process needs."""
 MEMORY = 4 * 2**30
 """Bytes that a process may take."""
+STOPS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 PATIENCE = 10
 """By how much a process is nicer than others that does not hurry."""
 
@@ -40,6 +42,30 @@ def _context() -> ForkServerContext:
         resource_tracker.ensure_running()
         forkserver.ensure_running()
     return context
+
+
+@contextmanager
+def _undisturbed() -> Iterator[None]:
+    """Signals that stop the program do so after this block.
+
+    A process that is there, but was not told its task, would end with a traceback on the console.
+    """
+    if threading.current_thread() is not threading.main_thread():  # signals are none of its business
+        yield
+        return
+    came: list[int] = []
+    handlers = {number: signal.getsignal(number) for number in STOPS}
+    try:
+        for number in STOPS:
+            if callable(handlers[number]):
+                signal.signal(number, lambda which, _: came.append(which))
+        yield
+    finally:
+        for number, handler in handlers.items():
+            if callable(handler):
+                signal.signal(number, handler)
+        if came:
+            signal.raise_signal(came[0])
 
 
 @dataclass(frozen=True)
@@ -66,7 +92,8 @@ class Worker:
         self._heard = heard
         self._connection, other = _context().Pipe()
         self.process = _context().Process(target=_run, args=(patient, task, other, *arguments), daemon=True)
-        self.process.start()
+        with _undisturbed():
+            self.process.start()
         other.close()
         self._loop = IOLoop.current()
         self._loop.add_handler(self._connection.fileno(), self._listen, IOLoop.READ)
@@ -222,7 +249,8 @@ def _run(patient: bool, task: Task, connection: Connection, *arguments: Any) -> 
     except (EOFError, BrokenPipeError, ConnectionResetError):  # the page has gone
         return
     except Exception as error:  # the last resort: the page says it
-        connection.send(Failure(f"The computation failed: {type(error).__name__}: {error}."))
+        with suppress(OSError):  # the page has gone
+            connection.send(Failure(f"The computation failed: {type(error).__name__}: {error}."))
 
 
 def _end_with_parent() -> None:
@@ -235,7 +263,8 @@ def _end_with_parent() -> None:
 def warm_up() -> None:
     """Begin to load the numeric libraries for the processes to come."""
     process = _context().Process(target=_nothing, daemon=True)
-    process.start()
+    with _undisturbed():
+        process.start()
 
 
 def _nothing() -> None:

@@ -2,6 +2,8 @@
 
 import asyncio
 import math
+import subprocess
+import sys
 import time
 
 from spinlev.studies.explore.processes import Failure, Worker
@@ -55,6 +57,38 @@ def test_a_process_at_work_ends_when_it_is_told():
     process = asyncio.run(begin())
     process.join(10)
     assert process.exitcode == -9
+
+
+STRUCK = """
+import asyncio, os, signal
+from multiprocessing import forkserver
+from spinlev.studies.explore.processes import Worker
+from spinlev.studies.live import follow
+
+def stopped(*_):
+    raise KeyboardInterrupt
+
+def struck(descriptors, connect=forkserver.connect_to_new_process):
+    found = connect(descriptors)
+    os.kill(os.getpid(), signal.SIGTERM)
+    return found
+
+async def begin():
+    Worker(follow, (), print)
+
+signal.signal(signal.SIGTERM, stopped)
+forkserver.connect_to_new_process = struck
+try:
+    asyncio.run(begin())
+except KeyboardInterrupt:
+    print("stopped", signal.getsignal(signal.SIGTERM) is stopped)
+"""
+
+
+def test_a_stop_while_a_process_begins_is_no_traceback():
+    """SIGTERM comes when the process is there and does not know its task yet; all of them have ended afterwards."""
+    ended = subprocess.run([sys.executable, "-c", STRUCK], capture_output=True, text=True, timeout=60, check=False)
+    assert (ended.returncode, ended.stdout, ended.stderr) == (0, "stopped True\n", "")
 
 
 def _sleep(connection):
