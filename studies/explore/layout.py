@@ -125,7 +125,8 @@ class Layout:
         self.headline.text = html.escape(found.headline)
         carried = "" if found.complete else "; carried here from a scene nearby"
         self.sign.text = f'<span data-number="{number}">By: {html.escape(found.sign + carried + waits)}.</span>'
-        self.table.text, self.modes.text = _table(found.rows), _table(found.modes)
+        left_out = "".join(f"<p>{html.escape(line)}</p>" for line in found.left_out)
+        self.table.text, self.modes.text = _table(found.rows) + left_out, _table(found.modes)
 
     def map_title(self, text: str) -> None:
         """Which map it is."""

@@ -4,9 +4,8 @@ from pathlib import Path
 
 import xarray as xr
 
-from ...geometry.basics import millimetres
 from ...geometry.scenes import Scene, scene_text
-from ..one_scene import Levitation
+from ..one_scene import Levitation, left_out_text
 from ..results import found_dataset, lowering_times, trajectory_dataset
 from ..terminal import FieldModel, InteractionModel, Models, PlateModel, heard
 
@@ -56,7 +55,7 @@ def equilibria(
     with heard(progress):
         levitation = Levitation(scene, Models(model, plate_model, rtol, plate_rtol, interaction), spin)
         found = found_dataset(levitation.equilibria)
-        left_out = "; ".join(f"{one.why}: {millimetres(one.known.position)}" for one in levitation.survey.left_out)
+        left_out = left_out_text(levitation.survey.left_out)
         return found.assign_attrs(study="equilibria", left_out=left_out, **_labels(levitation))
 
 

@@ -3,7 +3,7 @@
 from dataclasses import dataclass, field
 
 from ...dynamics.steady import Equilibrium
-from ..one_scene import Levitation, equilibria_rows, headline, worth_a_row
+from ..one_scene import Levitation, equilibria_rows, headline, left_out_words, worth_a_row
 
 MODEL_WORDS = {
     "dipole": "point dipole",
@@ -24,6 +24,7 @@ class Shown:
     ----------
     headline : where the floater floats and whether it stays there
     rows : of the table of equilibria, the head first; as the command line prints them
+    left_out : which solutions are no equilibria, or not known to be, in sentences
     modes : of the eigenvalues of the first equilibrium, the head first
     sign : by which models
     complete : whether all equilibria were searched for here; else they were carried here from a scene nearby
@@ -36,22 +37,24 @@ class Shown:
     sign: str
     complete: bool
     places: list[tuple[list[float], list[float], bool]] = field(default_factory=list)
+    left_out: list[str] = field(default_factory=list)
 
 
-def shown(levitation: Levitation, known: tuple[Equilibrium, ...] | None = None) -> Shown:
-    """What a page shows of a scene; `known`: its equilibria, where they are others than the levitation's own."""
-    found = levitation.equilibria if known is None else known
+def shown(levitation: Levitation) -> Shown:
+    """What a page shows of a scene."""
+    found, left_out = levitation.equilibria, levitation.survey.left_out
     useful = worth_a_row(found)
     felt = levitation.plate.model if levitation.plate is not None else "none"
     plate = f", {PLATE_WORDS[felt]}" if levitation.scene.plate is not None else ""
     mutual = ", rotor and floater magnetise each other" if levitation.interaction_model == "mutual" else ""
     return Shown(
-        headline=headline(levitation, found),
+        headline=headline(levitation, found, left_out),
         rows=equilibria_rows(levitation, found),
         modes=_modes(useful[0]) if useful else [],
         sign=f"{MODEL_WORDS.get(levitation.table.model, levitation.table.model)}{mutual}{plate}",
         complete=levitation.searched,
         places=[((1e3 * e.start.position).tolist(), e.start.moment.tolist(), e.stable) for e in useful],
+        left_out=left_out_words(levitation, left_out),
     )
 
 

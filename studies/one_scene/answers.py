@@ -1,5 +1,6 @@
 """What the commands answer, as mappings ready for JSON."""
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -8,7 +9,7 @@ from ...dynamics.flights import GROWING, STABLE, Trajectory, flight_kind
 from ...dynamics.motion import PlateMemory
 from ...dynamics.steady import Equilibrium, LeftOut, Survey
 from ...fem.rotor_tables import CompleteTable, FieldTable
-from ...geometry.basics import MU_0, Array
+from ...geometry.basics import MU_0, Array, millimetres
 from ..results import EQUILIBRIUM_FIELDS
 from .effects import effects_answer
 from .levitation import Levitation
@@ -71,6 +72,11 @@ def left_out_answer(left_out: LeftOut) -> dict[str, Any]:
         "why": left_out.why,
         "followed_to": left_out.part,
     }
+
+
+def left_out_text(left_out: Sequence[LeftOut]) -> str:
+    """The same of several, for an attribute of a dataset."""
+    return "; ".join(f"{one.why}: {millimetres(one.known.position)}" for one in left_out)
 
 
 def equilibria_answer(levitation: Levitation, known: Survey | None = None) -> dict[str, Any]:

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from ...dynamics.equilibria import free_of_bodies
 from ...dynamics.flights import FlightStopped, Trajectory
 from ...dynamics.motion import PlateMemory
 from ...dynamics.steady import EquilibriumError, Survey
@@ -30,7 +31,7 @@ from ..results import (
     write_dataset,
 )
 from ..terminal import Models, note, to_json
-from .answers import equilibria_answer, flight_answer
+from .answers import equilibria_answer, flight_answer, left_out_text
 from .demagnetising import write_working_point
 from .levitation import Levitation
 from .single import Job
@@ -98,7 +99,9 @@ def main_job(scene: Scene, asked: Models, spin: float, duration: float, out: Pat
         values["failed"] = str(failure)
         lines += [] if str(failure) in lines else [str(failure)]
     tables = {name: levitation.field(name) for name in MODELS}
-    result = _static_dataset(scene, tables, surveys, alone, best.model).assign_attrs(levitation.labels, body_spin=spin)
+    result = _static_dataset(scene, tables, surveys, alone, best.model).assign_attrs(
+        levitation.labels, body_spin=spin, left_out=left_out_text(known.left_out)
+    )
     memory = levitation.flight_plate if flight else None
     _write(scene, chosen, result, values, flight, memory, out, drawing)
     if failure and (flight is None or isinstance(failure, FlightStopped)):
@@ -149,7 +152,7 @@ def _static_dataset(
     alone: Mapping[str, Survey],
     best: str,
 ) -> xr.Dataset:
-    """Field, force and equilibria: with the plate's currents where they act, and all without them."""
+    """Field, force and equilibria free of the bodies: with the plate's currents where they act, and all without."""
     lowest = min(float(corner[2]) for magnet in scene.rotor for corner in magnet.box.corners)
     heights = np.linspace(min(lowest - scene.floater.radius, -1e-3), min(lowest - 1e-3, -DEEPEST), 200)
     parts = [
@@ -157,7 +160,10 @@ def _static_dataset(
         curve_dataset({name: found.curves for name, found in surveys.items()}),
         equilibria_dataset(
             {
-                name: [*(e for e in surveys[name].equilibria if e.currents is not None), *found.equilibria]
+                name: [
+                    *(e for e in surveys[name].equilibria if e.currents is not None),
+                    *free_of_bodies(scene, found).equilibria,
+                ]
                 for name, found in alone.items()
             }
         ),

@@ -8,7 +8,7 @@ from typing import Literal
 import numpy as np
 import pytest
 import xarray as xr
-from places import SCENES
+from places import OVER_PLATE, SCENES
 
 import spinlev as sl
 from spinlev.fem.rotor_tables.choice import MODELS
@@ -47,6 +47,19 @@ def test_a_field_model_of_one_s_own_is_run_and_drawn(tmp_path, monkeypatch):
     assert values["model"] == "own"
     assert lines[0].startswith("Floats ")
     assert (tmp_path / "force.png").exists()
+
+
+@pytest.mark.usefixtures("undrawn")
+def test_solutions_inside_the_metal_are_equilibria_in_no_file(tmp_path):
+    """Of the article's scene: there are two, at 33.8 mm, which the plate's face cuts, and at 45.2 mm."""
+    values, lines = main_job(sl.load_scene(OVER_PLATE), Models("dipole", "none"), 0.0, 0.01, tmp_path, ("unused",))
+    with xr.open_dataset(tmp_path / "result.nc") as result:
+        here = result.isel(equilibrium=np.flatnonzero(result["equilibrium_model"] == "dipole"))
+        depths = -1e3 * result["equilibrium_position"].values[:, 2]
+        assert len(here["equilibrium"]) == len(values["equilibria"])
+        assert (depths + 12.7 / 2 < 37.0).all()  # the sphere's lowest point is above the face
+        assert result.attrs["left_out"].count("plate") == len(values["left_out"]) == 2
+    assert any(line.startswith("Left out: 2 solutions at ") for line in lines)
 
 
 @pytest.mark.usefixtures("undrawn")

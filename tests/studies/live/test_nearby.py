@@ -1,5 +1,6 @@
 """Equilibria that follow a slider are those that a search finds, to the digits of the command line and beyond."""
 
+import html
 from dataclasses import replace
 
 import numpy as np
@@ -7,9 +8,11 @@ import pytest
 from places import HORIZONTAL, OVER_PLATE, SCENES
 
 from spinlev.geometry.scenes import load_scene
+from spinlev.studies.explore.layout import Layout
 from spinlev.studies.live import Nearby, controls, first_state
 from spinlev.studies.live.shown import shown
-from spinlev.studies.one_scene import Levitation, equilibria_job
+from spinlev.studies.one_scene import Levitation, equilibria_job, left_out_words
+from spinlev.studies.terminal import Models
 
 ROUND_OFF = 1e-11
 
@@ -104,3 +107,16 @@ def test_the_page_says_what_the_command_line_says(tilted, tmp_path):
         (f"{mode['frequency_hz']:.6g}", f"{mode['growth_per_s']:.6g}") for mode in modes
     ]
     assert np.allclose(found.places[0][0], values["equilibria"][0]["position_mm"], rtol=ROUND_OFF, atol=1e-12)
+
+
+def test_a_page_says_what_the_console_says_of_solutions_that_are_left_out():
+    """Two solutions lie inside the metal of the article's plate."""
+    levitation = Levitation(load_scene(OVER_PLATE), Models("dipole", "none"))
+    found = shown(levitation)
+    assert found.left_out
+    assert found.left_out == left_out_words(levitation, levitation.survey.left_out)
+    (line,) = found.left_out
+    assert line.startswith("Left out: 2 solutions at ")
+    layout = Layout()
+    layout.numbers(found, 1, "")
+    assert line in html.unescape(layout.table.text)
