@@ -304,22 +304,25 @@ def leaves(table: Any, path: tuple[Any, ...] = ()) -> Iterator[tuple[Any, ...]]:
         yield from leaves(entry, (*path, key))
 
 
-@pytest.mark.parametrize("path", list(leaves(TABLE)), ids=lambda path: ".".join(map(str, path)))
 @pytest.mark.parametrize("extreme", EXTREMES)
-def test_extreme_numbers_are_refused_or_make_finite_equations(path: tuple[Any, ...], extreme: float):
+def test_extreme_numbers_are_refused_or_make_finite_equations(extreme: float):
     """In every key: a fault of the scene, or parameters of the motion that are numbers; warnings are errors."""
-    table = copy.deepcopy(TABLE)
-    *way, last = path
-    reduce(operator.getitem, way, table)[last] = extreme
-    try:
-        scene = sl.scene(**table)
-    except SceneError:
-        return
-    scales = Scales.of(scene)
-    assert np.isfinite(parameters(scene, scales)).all()
-    assert isinstance(scene.start, AbsoluteStart)
-    assert np.linalg.norm(scene.start.moment) == pytest.approx(1.0, abs=1e-12)  # a direction, to round-off
-    assert np.isfinite(scene.start.velocity).all()
+    refused = []
+    for path in leaves(TABLE):
+        table = copy.deepcopy(TABLE)
+        *way, last = path
+        reduce(operator.getitem, way, table)[last] = extreme
+        try:
+            scene = sl.scene(**table)
+        except SceneError:
+            refused.append(path)
+            continue
+        assert np.isfinite(parameters(scene, Scales.of(scene))).all(), path
+        assert isinstance(scene.start, AbsoluteStart)
+        length = np.linalg.norm(scene.start.moment)
+        assert length == pytest.approx(1.0, abs=1e-12), path  # a direction, to round-off
+        assert np.isfinite(scene.start.velocity).all(), path
+    assert refused
 
 
 def test_nearly_zero_is_refused_with_zero_and_the_least_as_the_way_out():
