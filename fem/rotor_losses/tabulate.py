@@ -9,7 +9,7 @@ from itertools import product
 import numpy as np
 import scipy
 
-from ...geometry.basics import Array, Box, Solid, Watch, places_off, unwatched, watched
+from ...geometry.basics import Array, Box, InputError, Ring, Solid, Watch, places_off, unwatched, watched
 from ...geometry.bodies import Conductor, Magnet, cut_magnets, separate_pieces
 from ..plate_tables import Multipoles, fit_multipoles
 from .current_patterns import CurrentPatterns, current_patterns
@@ -64,11 +64,14 @@ def rotor_losses(
     Raises
     ------
     ValueError : nothing conducts
+    InputError : a ring conducts into whose hole the floater fits
     TooLargeError : the memory does not hold the finite elements
     """
     start, pieces = time.perf_counter(), pieces_of(rotor, conductors)
     if not pieces:
         raise ValueError("Input rotor must have a conductivity; instead neither magnets nor conductors have one.")
+    for group, _ in pieces:
+        _refuse_wide_holes(group, nearest)
     bodies: list[Solid] = [magnet.body for magnet in rotor] + [conductor.body for conductor in conductors]
     around = partial(places_around, bodies, directions=directions)
     metals = [metal_of(group, conductivity, ORDER) for group, conductivity in pieces]
@@ -83,6 +86,17 @@ def rotor_losses(
     distances = watched(table.distances, watch, "errors")
     errors = [_error(table, finer, around(distance, seed=1)) for distance in distances]
     return replace(table, errors=np.array(errors), provenance=_made(found, start))
+
+
+def _refuse_wide_holes(bodies: Sequence[Solid], nearest: float) -> None:
+    """Refuse rings that the floater fits into: the multipoles lie in their holes, where their fields have no end."""
+    for body in bodies:
+        if isinstance(body, Ring) and body.inner_radius > nearest:
+            raise InputError(
+                f"Input conductivity_S_m must be left out of a ring into whose hole the floater fits; instead received "
+                f"a {body.described_size} beside a floater of {2e3 * nearest:.4g} mm. Leave it out, or make the ring "
+                "of cuboids."
+            )
 
 
 def sparse(weights: Array) -> Array:

@@ -79,15 +79,14 @@ def _heights(body: Solid, axis: int) -> Array:
 def _same_body(body: Solid, other: Solid, flip: Array) -> bool:
     """Whether the mirror image of a body takes the place of another."""
     allowed = SAME_PLACE * max(body.circumradius, float(np.linalg.norm(body.center)))
-    if type(body) is not type(other):
+    if type(body) is not type(other) or np.linalg.norm(body.center * flip - other.center) > allowed:
         return False
     if isinstance(body, Box) and isinstance(other, Box):
         distance = np.linalg.norm((body.corners * flip)[:, None] - other.corners, axis=-1)
         return bool(distance.min(axis=1).max() <= allowed)
     if isinstance(body, Part):
         return False
-    same = np.linalg.norm(body.center * flip - other.center) <= allowed
-    same &= all(
+    same = all(
         abs(getattr(body, key) - getattr(other, key)) <= allowed
         for key in ("radius", "inner_radius", "height")
         if hasattr(body, key)

@@ -8,13 +8,14 @@ import numpy as np
 import pytest
 
 from spinlev.fem.closed_forms.sphere_eddy import thin_field_torque
-from spinlev.fem.rotor_losses import ball_losses
+from spinlev.fem.rotor_losses import ball_losses, rotor_losses
 from spinlev.fem.rotor_losses.balls import CUBE
 from spinlev.fem.rotor_losses.current_patterns import current_patterns
 from spinlev.fem.rotor_losses.dipole_potentials import of_motion, of_places
 from spinlev.fem.rotor_losses.metal_currents import metal_of, metal_on
 from spinlev.fem.rotor_losses.tabulate import places_around
-from spinlev.geometry.basics import Box, Cylinder
+from spinlev.geometry.basics import Box, Cylinder, InputError, Ring
+from spinlev.geometry.bodies import Conductor
 from spinlev.geometry.meshes import MetalMesh
 
 SIGMA = 6.7e5
@@ -104,3 +105,12 @@ def test_progress_is_told_block_by_block():
     found = current_patterns([metal_of([cube], SIGMA, 2)], places, 0.5, lambda *told: heard.append(told))
     found.fields(places, lambda *told: heard.append(told))
     assert heard == [(stage, k / 3) for stage in ("patterns", "their fields") for k in range(3)]
+
+
+def test_a_conducting_ring_that_the_floater_fits_into_is_refused():
+    """In a hole of 30 mm the table was wrong by up to 6e10 times the true dissipation."""
+    ring = Conductor(Ring(20e-3, 15e-3, 5e-3), 1.4e6)
+    with pytest.raises(
+        InputError, match=r"into whose hole the floater fits; instead received a .* of 12\.7 mm\. Leave"
+    ):
+        rotor_losses((), (ring,), 6.35e-3)
