@@ -1,16 +1,22 @@
 """A flight that leaves the range of the plate's table: it has a larger one, or ends there and says so."""
 
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
+import xarray as xr
 from second_opinions.thrown_over_slab import thrown_over_slab
 
 import spinlev as sl
+from spinlev.dynamics.flights import FlightStopped
+from spinlev.fem.storage import read_checked
 from spinlev.geometry.basics import Array
 from spinlev.geometry.scenes import Scene
 from spinlev.studies.one_scene import Levitation
+from spinlev.studies.one_scene.single import simulate_job
 from spinlev.studies.one_scene.words import flight_words, plate_words
 from spinlev.studies.terminal import Models
 
@@ -116,3 +122,30 @@ def test_a_magnet_falls_on_a_plate_beside_a_rotor_without_a_field():
     # The networks are trained with and without the rotor; each is good to 5 per cent of 1e-4 m of braking.
     np.testing.assert_allclose(flown.position.values[-1], faint.position.values[-1], atol=5e-6)
     assert flown.attrs["ended_by"] == "duration"
+
+
+@pytest.mark.slow
+def test_a_flight_goes_on_with_the_larger_table_to_the_last_bit(tmp_path, monkeypatch):
+    """Stopped in its third beginning, after the plate's table was made larger twice; the checkpoint knows for where."""
+    scene, models, begun = dropped(0.05, (0.0, 0.0, -0.6)), Models("auto", "slab"), []
+
+    @contextmanager
+    def progress(label: str) -> Iterator[Callable[[float], None]]:
+        begun.append(label)
+
+        def stop(done: float) -> None:
+            if len(begun) > 2 and done > 0.3:
+                raise KeyboardInterrupt
+
+        yield stop
+
+    simulate_job(scene, models, 0.12, tmp_path / "undisturbed", resume=False)
+    with monkeypatch.context() as patch:
+        patch.setattr("spinlev.studies.one_scene.levitation.progress", progress)
+        with pytest.raises(FlightStopped):
+            simulate_job(scene, models, 0.12, tmp_path / "out", resume=False)
+    values, _ = simulate_job(scene, models, 0.12, tmp_path / "out", resume=True)
+    assert (values["ended_by"], values["left_plate_table"]) == ("duration", False)
+    whole, resumed = (read_checked(tmp_path / name / "trajectory.nc") for name in ("undisturbed", "out"))
+    xr.testing.assert_equal(whole, resumed)
+    assert resumed.attrs["plate_error_estimate"] == whole.attrs["plate_error_estimate"]
