@@ -2,6 +2,7 @@
 
 from .current_space import CurrentSpace as CurrentSpace, space_couplings as space_couplings
 from .current_training import unit_power as unit_power
+from .limits import OPTION as OPTION
 from .other_sources_error import error_of as error_of
 from .reaction import plate_reaction as plate_reaction
 from .region import Region as Region

@@ -4,6 +4,8 @@ from ...geometry.meshes import skin_depth
 from ...geometry.scenes import Plate
 from ..rotor_tables import AccuracyError
 
+OPTION = "--plate-rtol (plate_rtol in Python, --rtol of the command plate)"
+"""What messages call the tolerance of a plate."""
 HIGHEST_ORDER = 5
 MOST_UNKNOWNS = 80_000
 """Coupling unknowns that are solved at most: beyond, one frequency takes many minutes and several GB."""

@@ -15,7 +15,7 @@ from ...geometry.scenes import Plate
 from ..closed_forms import ComplexArray, unit_dipoles
 from ..eddy_currents import EddySpace, solve_shifted
 from ..rotor_tables import AccuracyError
-from .limits import highest_order
+from .limits import OPTION, highest_order
 from .reaction import BEST_REDUCTION, STALLED, order_error, own_tensors, truncation_error
 
 MESH_SHARE = 0.6
@@ -40,7 +40,7 @@ class Ladder:
     ) -> None:
         self.mesh = plate_mesh(plate.box.size, plate.conductivity, corners, frequency, rule)
         self.highest = highest_order(self.mesh.mesh.ne)
-        self.corners, self.shift, self.rule, self.allowed = corners, 2 * np.pi * frequency, rule, allowed
+        self.corners, self.shift, self.allowed = corners, 2 * np.pi * frequency, allowed
         self.watch = watch
         self.reach = rule.reach * float(plate.box.size.max())
         self.order, self.error, self.change, self.truncation = 0, np.inf, np.ones(len(corners)), np.zeros(len(corners))
@@ -88,6 +88,6 @@ class Ladder:
         stalled = self.order > 2 and float(np.max(self.change / self.last)) > STALLED
         if self.order > 1 and (hopeless or stalled) and self.error > self.allowed:
             raise AccuracyError(
-                f"Input rtol must be at least {self.error / MESH_SHARE:.1e} for the mesh rule {self.rule}; instead "
-                f"received {self.allowed / MESH_SHARE:.1e}."
+                f"Input {OPTION} must be at least {self.error / MESH_SHARE:.2g} for the finite elements of this plate; "
+                f"instead received {self.allowed / MESH_SHARE:g}. Ask for less, or take another model of it."
             )

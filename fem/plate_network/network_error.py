@@ -8,10 +8,10 @@ import numpy as np
 
 from ...geometry.basics import Array
 from ..closed_forms import ComplexArray
+from ..plate_currents import OPTION
 from ..rotor_tables import AccuracyError
 from .energy_basis import OrderedBasis
 
-OPTION = "--plate-rtol (plate_rtol in Python, --rtol of the command plate)"
 LARGEST = 0.1
 """Tolerance that may be asked at most."""
 ENOUGH = 2.0

@@ -11,12 +11,13 @@ from spinlev.fem.eddy_currents import EddySpace, dipole_images, solve_eddy
 from spinlev.fem.plate_currents import Region, error_of, solve_currents, space_couplings
 from spinlev.fem.plate_currents.current_space import source_images
 from spinlev.fem.plate_currents.current_training import train
+from spinlev.fem.plate_currents.order_ladder import MESH_SHARE, Ladder
 from spinlev.fem.plate_currents.solution_file import load_solution, save_solution
 from spinlev.fem.plate_currents.sources import SourceSet
 from spinlev.fem.plate_tables import reachable_region, turning_rotor
 from spinlev.fem.plate_tables.driven_plate import plate_and_rotor_table, rotor_box
 from spinlev.fem.plate_tables.outer_box import outer_box, outer_frequencies
-from spinlev.fem.rotor_tables import rotor_table
+from spinlev.fem.rotor_tables import AccuracyError, rotor_table
 from spinlev.geometry.basics import Box
 from spinlev.geometry.bodies import horizontal, vertical
 from spinlev.geometry.meshes import MeshRule, plate_mesh
@@ -155,3 +156,17 @@ def test_a_solution_survives_the_disk(solution, tmp_path):
     assert (read.mesh_error, read.space_error, read.frequencies) == (
         solution.mesh_error, solution.space_error, solution.frequencies,
     )  # fmt: skip
+
+
+def test_a_tolerance_that_a_mesh_misses_is_named_as_the_user_gave_it():
+    """`--plate-rtol` is what was given, not `rtol`, and a mesh rule says nothing to whom did not choose one."""
+    ladder = Ladder(PLATE, REGION.grid((2, 2, 2), fold=True), FREQUENCIES[1], RULE, MESH_SHARE * 1e-5)
+    ladder.order, ladder.error = ladder.highest, 6e-3
+    with pytest.raises(AccuracyError) as refused:
+        ladder.refuse()
+    said = str(refused.value)
+    assert said.startswith(
+        "Input --plate-rtol (plate_rtol in Python, --rtol of the command plate) must be at least 0.01 "
+    )
+    assert "instead received 1e-05." in said
+    assert "MeshRule" not in said
