@@ -1,98 +1,99 @@
-"""Graded hexahedral mesh of a box-shaped plate in air, made for given places of dipoles and a given frequency.
-
-The plate is centred at the origin with its edges along the axes; all three mirror planes are used, so that
-only an eighth is meshed.  Cells in the plate are small against the distance to the nearest dipole and, at the
-faces, against the skin depth δ = (π f μ0 σ)^(-1/2); in air they grow in proportion to the distance from the plate.
-"""
+"""Structured hexahedral meshes of boxes on a tensor-product grid, and where its lines lie."""
 
 from __future__ import annotations
 
+import itertools
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import partial
 
+import netgen.meshing as netgen
+import ngsolve
 import numpy as np
-from numpy.typing import ArrayLike
 
-from ..basics import MU_0, Array
-from .conductors import MILLIMETRE, ConductorMesh
-from .hexahedra import Block, graded_partition, hex_mesh
+from ..basics import Array, frozen_array
+from .conductors import PLANES
 
-
-@dataclass(frozen=True)
-class MeshRule:
-    """How fine the mesh is; the defaults suit orders 3 to 5, for which few large cells cost least.
-
-    Parameters
-    ----------
-    distance_share : cell size in the plate, in units of the distance to the nearest dipole
-    skin_share : cell size at the faces, in units of the skin depth
-    growth : by how much a cell grows per length away from a face
-    reach : half edge of the air box in units of the plate's largest edge; the error of the truncation goes as its
-        inverse cube
-    """
-
-    distance_share: float = 1.2
-    skin_share: float = 2.0
-    growth: float = 1.6
-    reach: float = 12.0
-
-    def finer(self) -> MeshRule:
-        """The next finer mesh: cells 0.6 times as large, and a slower growth."""
-        return MeshRule(0.6 * self.distance_share, 0.6 * self.skin_share, 0.8 * self.growth, self.reach)
+SizeFunction = Callable[[Array], Array]
+SAMPLES = 4000
+HEXAHEDRON = ((0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 0, 1), (1, 0, 1), (1, 1, 1), (0, 1, 1))
+SQUARE = ((0, 0), (1, 0), (1, 1), (0, 1))
 
 
-def skin_depth(conductivity: float, frequency: float) -> float:
-    """δ = (π f μ0 σ)^(-1/2), m; infinite at 0 Hz."""
-    return float(1 / np.sqrt(np.pi * frequency * MU_0 * conductivity)) if frequency > 0 else np.inf
+def graded_partition(breakpoints: Sequence[float], size: SizeFunction) -> Array:
+    """Increasing grid lines that hold all `breakpoints` and whose spacing follows `size`.
 
-
-def plate_mesh(
-    size: ArrayLike,
-    conductivity: float,
-    positions: ArrayLike,
-    frequency: float,
-    rule: MeshRule | None = None,
-    endless: bool = False,
-) -> ConductorMesh:
-    """Mesh for a plate with edges `size` (3,) m and dipoles at `positions` (n, 3) m in the plate's own frame.
-
-    Parameters
-    ----------
-    endless : on the same cells, the plate reaches to the end of the air along its two longer edges
+    Between neighbouring breakpoints the lines share ∫ dx/size equally, so that no cell is larger than asked for.
 
     Raises
     ------
-    ValueError : a size is not positive, or a position is not outside the plate
+    ValueError : breakpoints do not increase
     """
-    rule = rule or MeshRule()
-    half = np.asarray(size, float) / 2
-    if not np.all(half > 0):
-        raise ValueError(f"Input size_m must be positive; instead received {np.asarray(size).tolist()}.")
-    places = np.abs(np.asarray(positions, float).reshape(-1, 3))
-    inside = np.all(places <= half, axis=1)
-    if inside.any():
-        raise ValueError(
-            f"Input positions_m must lie outside the plate; instead received {places[inside][0].tolist()} in its frame."
-        )
-    depth = skin_depth(conductivity, frequency)
-    far = rule.reach * 2 * half.max()
-    lines = []
+    if np.any(np.diff(breakpoints) <= 0):
+        raise ValueError(f"Input breakpoints must increase; instead received {list(breakpoints)}.")
+    lines = [float(breakpoints[0])]
+    for start, end in itertools.pairwise(breakpoints):
+        fine = np.linspace(start, end, SAMPLES)
+        density = 1 / size(fine)
+        count = np.concatenate([[0.0], np.cumsum((density[1:] + density[:-1]) / 2 * np.diff(fine))])
+        cells = max(1, int(np.ceil(count[-1] - 1e-9)))
+        lines.extend(np.interp(np.arange(1, cells) * count[-1] / cells, count, fine))
+        lines.append(float(end))
+    return np.array(lines)
+
+
+@dataclass(frozen=True, eq=False)
+class Block:
+    """An axis-parallel box of one material, from `lower` (3,) to `upper` (3,), mm; later blocks cut earlier ones."""
+
+    material: str
+    lower: Array
+    upper: Array
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "lower", frozen_array(self.lower, (3,)))
+        object.__setattr__(self, "upper", frozen_array(self.upper, (3,)))
+
+
+def hex_mesh(lines: Sequence[Array], blocks: Sequence[Block], mirrors: tuple[int, ...] = ()) -> ngsolve.Mesh:
+    """Mesh with the grid `lines` (mm) of each axis: air with `blocks` in it.
+
+    The outer boundary is named "far", and "x0", "y0", "z0" where the lower end of an axis in `mirrors` lies.
+    A cell belongs to the last block that holds its centre, so that block faces must be grid lines.
+    """
+    materials = ["air", *dict.fromkeys(block.material for block in blocks if block.material != "air")]
+    mesh = netgen.Mesh()
+    mesh.dim = 3
+    points = _add_points(mesh, lines)
+    for number in range(1, 5):
+        mesh.Add(netgen.FaceDescriptor(surfnr=number, domin=1, bc=number))
+    centers = np.stack(np.meshgrid(*[(a[1:] + a[:-1]) / 2 for a in map(np.asarray, lines)], indexing="ij"), -1)
+    number_of = np.ones(centers.shape[:3], int)
+    for block in blocks:
+        inside = np.all((centers > block.lower) & (centers < block.upper), axis=-1)
+        number_of[inside] = materials.index(block.material) + 1
+    for cell, number in np.ndenumerate(number_of):
+        corners = [points[tuple(np.add(cell, corner))] for corner in HEXAHEDRON]
+        mesh.Add(netgen.Element3D(int(number), corners))
+    _add_boundary(mesh, points, mirrors)
+    for number, name in enumerate(materials, start=1):
+        mesh.SetMaterial(number, name)
+    for number, name in enumerate([*PLANES, "far"]):
+        mesh.SetBCName(number, name)
+    return ngsolve.Mesh(mesh)
+
+
+def _add_points(mesh: netgen.Mesh, lines: Sequence[Array]) -> np.ndarray:
+    points = np.empty([len(a) for a in lines], dtype=object)
+    for index in np.ndindex(*points.shape):
+        position = (float(a[i]) for a, i in zip(lines, index, strict=True))
+        points[index] = mesh.Add(netgen.MeshPoint(netgen.Pnt(*position)))
+    return points
+
+
+def _add_boundary(mesh: netgen.Mesh, points: np.ndarray, mirrors: tuple[int, ...]) -> None:
     for axis in range(3):
-        size_along = partial(_cell_size, axis=axis, half=half, places=places, depth=depth, rule=rule)
-        lines.append(graded_partition([0.0, half[axis], far], size_along) / MILLIMETRE)
-    ends = np.where(np.arange(3) == np.argmin(half), half, far) if endless else half
-    mesh = hex_mesh(lines, [Block("plate", np.full(3, -1.0), ends / MILLIMETRE)], mirrors=(0, 1, 2))
-    return ConductorMesh(mesh, {"plate": conductivity}, mirrors=(0, 1, 2))
-
-
-def _cell_size(coordinate: Array, axis: int, half: Array, places: Array, depth: float, rule: MeshRule) -> Array:
-    """Cell size wanted at coordinates of one axis, m."""
-    edge = half[axis]
-    clamped = np.minimum(coordinate, edge)[:, None]
-    beside = np.maximum(np.delete(places - half, axis, axis=1), 0.0)
-    distance = np.sqrt((clamped - places[:, axis]) ** 2 + np.sum(beside**2, axis=1)).min(axis=1)
-    below_face = np.maximum(edge - coordinate, 0.0)
-    above_face = np.maximum(coordinate - edge, 0.0)
-    inner = np.minimum(rule.distance_share * distance, edge)
-    skin = rule.skin_share * depth + rule.growth * below_face
-    return np.asarray(np.where(coordinate <= edge, np.minimum(inner, skin), inner + rule.growth * above_face))
+        for end in (0, -1):
+            number = axis + 1 if end == 0 and axis in mirrors else 4
+            layer = np.take(points, end, axis=axis)
+            for i, j in np.ndindex(layer.shape[0] - 1, layer.shape[1] - 1):
+                mesh.Add(netgen.Element2D(number, [layer[i + a, j + b] for a, b in SQUARE]))

@@ -1,146 +1,147 @@
-"""Bodies as solids of OpenCASCADE."""
+"""STEP files of solids that no key of a scene file describes: segments of rings, facets, bodies with cavities."""
 
-import contextlib
+from __future__ import annotations
+
+import re
 import tempfile
-from functools import lru_cache
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
 import netgen.occ as occ
-import ngsolve as ng
 import numpy as np
-import scipy
+from scipy.spatial.transform import Rotation
 
-from ..basics import (
-    Array,
-    Box,
-    ComputationError,
-    CrashError,
-    LostError,
-    MeshError,
-    Part,
-    Ring,
-    Solid,
-    Sphere,
-    call_apart,
-)
+from ..basics import Array, InputError, Solid, moved
+from .solids import MILLIMETRE, occ_solid
 
-MILLIMETRE = 1e-3
-CURVED, ROUND = 6, 2.0
-"""Degree of the elements at round surfaces, and how many of them in a radius of curvature."""
-SMALLEST = 0.06
-"""Least element that a radius of curvature asks for, in cube roots of a part's volume: one spans a small fillet."""
-OTHERWISE = (1.0, 0.5, 0.0)
-"""Of that, where the mesher fails: its luck with the same part is another with elements of other sizes."""
-FEW, SMALL = 8, 1.5
-"""Degree of the rule in small elements, and their edge times the degree of the polynomial, by the part's, at most."""
-LONGEST = 60.0
-"""Seconds of processor time for a mesh of a part."""
-SIMPLER = "Leave out small features of the part, or export it again."
+ORIGIN = np.zeros(3)
+SAME = 1e-7
+"""Distance of corners of facets that are one, in sizes of the solid."""
+WITHIN = 1e-9
+"""Relative difference of volumes by which a cavity that lies within a body is told from one that does not."""
+OWN_WORDS = re.compile(r"'\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d'|(?<=translator )[\d. ]+(?=')")
+"""The time, and a count of the files that the process has written: the rest is the same for the same solid."""
 
 
-def occ_solid(body: Solid, center: Array, unit: float) -> Any:
-    """The body as a solid in a mesh's coordinates: lengths in `unit` (m) from `center` (3,) m."""
-    x, _, z = body.rotation.T
-    if isinstance(body, Sphere):
-        return occ.Sphere(occ.Pnt(*map(float, (body.center - center) / unit)), body.radius / unit)
-    if isinstance(body, Part):
-        return _part(body, center, unit)
-    foot = (body.center - center - body.half_edges[2] * z) / unit
-    if isinstance(body, Box):
-        half = body.half_edges / unit
-        corner = foot - body.rotation[:, :2] @ half[:2]
-        axes = occ.Axes(tuple(map(float, corner)), n=_direction(z), h=_direction(x))
-        return occ.WorkPlane(axes).Rectangle(2 * half[0], 2 * half[1]).Face().Extrude(float(2 * half[2]))
-    axes = occ.Axes(tuple(map(float, foot)), n=_direction(z), h=_direction(x))
-    filled = occ.Cylinder(axes, body.radius / unit, body.height / unit)
-    if isinstance(body, Ring):
-        return filled - occ.Cylinder(axes, body.inner_radius / unit, body.height / unit)
-    return filled
+@dataclass(frozen=True)
+class Segment:
+    """A part of a ring, from an angle to another about the body's z axis.
+
+    Parameters
+    ----------
+    inner_radius, radius, height : m; the first may be 0
+    start, end : degrees, at most 360 apart
+    center, rotation : (3,) m and (3, 3), as of every body
+    """
+
+    inner_radius: float
+    radius: float
+    height: float
+    start: float
+    end: float
+    center: Array = field(default_factory=lambda: np.zeros(3))
+    rotation: Array = field(default_factory=lambda: np.eye(3))
+
+    @property
+    def circumradius(self) -> float:
+        """Radius of a sphere about the centre that holds it, m."""
+        return float(np.hypot(self.radius, self.height / 2))
 
 
-def read_brep(brep: str) -> Any:
-    """The solid of a BREP text."""
-    with tempfile.NamedTemporaryFile("w", suffix=".brep", encoding="utf-8") as copy:
-        copy.write(brep)
-        copy.flush()
-        (solid,) = occ.OCCGeometry(copy.name).shape.solids
-    return solid
+@dataclass(frozen=True)
+class Facets:
+    """A solid within triangles.
+
+    Parameters
+    ----------
+    triangles : (n, 3, 3) m, corners, in any order, along the body axes from the centre
+    center, rotation : (3,) m and (3, 3), as of every body
+    """
+
+    triangles: Array
+    center: Array = field(default_factory=lambda: np.zeros(3))
+    rotation: Array = field(default_factory=lambda: np.eye(3))
+
+    @property
+    def circumradius(self) -> float:
+        """Radius of a sphere about the centre that holds it, m."""
+        return float(np.linalg.norm(self.triangles, axis=-1).max())
 
 
-def _part(body: Part, center: Array, unit: float) -> Any:
-    solid = read_brep(body.brep)
-    solid = solid.Move(_direction(body.origin / MILLIMETRE))
-    turn = scipy.spatial.transform.Rotation.from_matrix(body.rotation).as_rotvec(degrees=True)
-    angle = float(np.linalg.norm(turn))
-    if angle > 0:
-        axis = occ.Axis(occ.Pnt(0, 0, 0), occ.gp_Dir(*map(float, turn / angle)))
-        solid = solid.Rotate(axis, angle)
-    return solid.Scale(occ.Pnt(0, 0, 0), MILLIMETRE / unit).Move(_direction((body.center - center) / unit))
+Body = Solid | Segment | Facets
 
 
-def part_rule(body: Part, order: int) -> tuple[Array, Array]:
-    """Points (n, 3) m in a part and weights (n,) m³, on curved tetrahedra, for polynomials up to about `order`.
+def step_text(body: Body, cavities: Sequence[Body] = ()) -> str:
+    """A STEP file (mm) of a body without its cavities, its centre at the origin and its axes those of the file.
+
+    The text is the same for the same bodies.
 
     Raises
     ------
-    MeshError : the part cannot be meshed
-    ComputationError : the mesher takes too long, or too much memory
+    InputError : the facets do not close, or cut each other
     """
-    try:
-        points, weights = _rule(body.brep, order)
-    except LostError as error:
-        raise unmeshed(error, body.file.name) from None
-    local = points * MILLIMETRE + body.origin
-    return body.center + local @ body.rotation.T, weights * MILLIMETRE**3
+    shape = _shape(body)
+    for cavity in cavities:
+        shape = shape - _placed(cavity, body)
+    with tempfile.NamedTemporaryFile(suffix=".step") as file:
+        shape.WriteStep(file.name)
+        return OWN_WORDS.sub("''", Path(file.name).read_text(encoding="utf-8"))
 
 
-@lru_cache(maxsize=8)
-def _rule(brep: str, order: int) -> tuple[Array, Array]:
-    *first, last = OTHERWISE
-    for share in first:
-        with contextlib.suppress(CrashError, MeshError):
-            return call_apart(LONGEST, rule_in_solid, brep, order, share * SMALLEST)
-    return call_apart(LONGEST, rule_in_solid, brep, order, last * SMALLEST)
+def lies_within(body: Body, other: Body) -> bool:
+    """Whether all of a body lies within another, and fills less than it."""
+    hole, whole = _placed(body, other), _shape(other)
+    if not float(hole.mass) < float(whole.mass) * (1 - WITHIN):
+        return False
+    left = float((whole - hole).mass)
+    return abs(left + float(hole.mass) - float(whole.mass)) < WITHIN * float(whole.mass)
 
 
-def unmeshed(error: LostError, name: str) -> ComputationError:
-    """What is told of files whose mesh another process did not make; a MeshError where another mesh may do."""
-    kind = MeshError if isinstance(error, CrashError) else ComputationError
-    return kind(f"The mesher {error}: {name}. {SIMPLER}")
+def _shape(body: Body) -> Any:
+    """The body as OpenCASCADE has it, mm, about the origin along its axes."""
+    if isinstance(body, Facets):
+        return _faceted(body.triangles / MILLIMETRE)
+    if isinstance(body, Segment):
+        inner, width, height = (
+            value / MILLIMETRE for value in (body.inner_radius, body.radius - body.inner_radius, body.height)
+        )
+        section = occ.Axes((inner, 0.0, -height / 2), n=occ.gp_Dir(0, -1, 0), h=occ.X)
+        axis = occ.Axis(occ.Pnt(0, 0, 0), occ.Z)
+        half = occ.WorkPlane(section).Rectangle(width, height).Face().Revolve(axis, body.end - body.start)
+        return half.Rotate(axis, body.start)
+    return occ_solid(moved(body, ORIGIN, np.eye(3)), ORIGIN, MILLIMETRE)
 
 
-def rule_in_solid(brep: str, order: int, smallest: float = SMALLEST) -> tuple[Array, Array]:
-    """Points (n, 3) mm in the solid of a BREP text and weights (n,) mm³; small elements have few. Raises MeshError."""
-    solid = read_brep(brep)
-    unit = float(solid.mass) ** (1 / 3)
-    sizes = {"maxh": 0.6 * unit, "minh": smallest * unit, "curvaturesafety": ROUND, "grading": 0.6}
-    try:
-        mesh = ng.Mesh(occ.OCCGeometry(solid).GenerateMesh(**sizes, parallel_meshing=False))
-    except Exception as error:  # netgen raises several kinds
-        raise MeshError(f"The part cannot be meshed: {error}. {SIMPLER}") from None
-    mesh.Curve(CURVED)
-    few, all_of_it = ng.IntegrationRule(ng.TET, FEW), ng.IntegrationRule(ng.TET, max(order, FEW))
-    corners = np.array([vertex.point for vertex in mesh.vertices])
-    extent = float(np.ptp(corners, axis=0).max())
-    tets = np.array([[vertex.nr for vertex in element.vertices] for element in mesh.Elements(ng.VOL)])
-    large = np.ptp(corners[tets], axis=1).max(axis=1) * order > SMALL * extent
-    points, weights = _mapped(few, mesh.MapToAllElements(few, ng.VOL), len(tets))
-    found = [(points[~large].reshape(-1, 3), weights[~large].ravel())]
-    for number in np.flatnonzero(large):
-        places = mesh.GetTrafo(ng.ElementId(ng.VOL, int(number)))(all_of_it)
-        points, weights = _mapped(all_of_it, places, 1)
-        found.append((points[0], weights[0]))
-    points, weights = (np.concatenate(column) for column in zip(*found, strict=True))
-    return points, weights
+def _placed(body: Body, frame: Body) -> Any:
+    """A body as OpenCASCADE has it, mm, in the axes of another."""
+    turn = Rotation.from_matrix(frame.rotation.T @ body.rotation).as_rotvec(degrees=True)
+    angle, shape = float(np.linalg.norm(turn)), _shape(body)
+    if angle > 0:
+        shape = shape.Rotate(occ.Axis(occ.Pnt(0, 0, 0), occ.gp_Dir(*map(float, turn / angle))), angle)
+    offset = frame.rotation.T @ (body.center - frame.center) / MILLIMETRE
+    return shape.Move(occ.gp_Vec(*map(float, offset)))
 
 
-def _mapped(rule: Any, places: Any, elements: int) -> tuple[Array, Array]:
-    """Points (elements, n, 3) and weights (elements, n) of a rule in all of them."""
-    points = np.asarray(ng.CF((ng.x, ng.y, ng.z))(places)).reshape(elements, -1, 3)
-    # with its sign: where an element folds over at a fillet, it counts twice there and once against it
-    stretch = np.asarray(ng.Det(ng.specialcf.JacobianMatrix(3))(places)).reshape(elements, -1)
-    return points, np.array(rule.weights) * stretch
-
-
-def _direction(vector: Array) -> Any:
-    return occ.gp_Vec(*map(float, vector))
+def _faceted(triangles: Array) -> Any:
+    """The solid within triangles (n, 3, 3) mm; those of one plane are one face."""
+    size = float(np.ptp(triangles.reshape(-1, 3), axis=0).max())
+    _, numbers = np.unique(np.round(triangles.reshape(-1, 3) / (SAME * size)), axis=0, return_inverse=True)
+    corners = numbers.reshape(-1, 3)
+    sides = np.sort(np.concatenate([corners[:, [k, (k + 1) % 3]] for k in range(3)]), axis=1)
+    met = np.unique(sides, axis=0, return_counts=True)[1]
+    if not np.all(met == 2):
+        raise InputError(
+            f"Input triangles must enclose one solid, two at every side; instead {int(np.sum(met != 2))} sides have "
+            "another number."
+        )
+    faces = []
+    for triangle in triangles:
+        points = [occ.Pnt(*map(float, corner)) for corner in triangle]
+        faces.append(occ.Face(occ.Wire([occ.Segment(points[k], points[(k + 1) % 3]) for k in range(3)])))
+    shells = list(occ.Sew(faces, tolerance=SAME * size).shells)
+    solid = occ.Solid(shells[0]) if len(shells) == 1 else None
+    if solid is None or not abs(float(solid.mass)) > 0:
+        raise InputError(f"Input triangles must enclose one solid; instead they make {len(shells)} surfaces.")
+    return (solid if float(solid.mass) > 0 else solid.Reversed()).UnifySameDomain()
