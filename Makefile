@@ -48,7 +48,7 @@ $(VENV)/installed: $(VENV)/dependencies $(SOURCES)
 	$(BIN)/pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation \
 	  --config-settings editable_mode=strict --editable .
 	@rm -rf *.egg-info
-	@$(BIN)/python -P -m spinlev.studies.command_line.installation
+	@$(BIN)/python -P -m spinlev.studies.cli.installation
 	@touch $@
 
 run: install

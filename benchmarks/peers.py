@@ -8,9 +8,11 @@ from scipy.integrate import quad
 from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
-from spinlev.fem.slab import Slab
-from spinlev.geometry.basics import MU_0, Box
-from spinlev.geometry.scenes import Plate, load_scene
+from spinlev.fem.plate.slab import Slab
+from spinlev.geometry.common import MU_0
+from spinlev.geometry.scene.contents import Plate
+from spinlev.geometry.scene.files import load_scene
+from spinlev.geometry.shapes import Box
 
 SCENE = load_scene("scenes/horizontal.toml")
 PLATE = Plate(Box((0.1, 0.24, 0.03)), 3.5e7)

@@ -4,13 +4,17 @@ import numpy as np
 import pytest
 from peers import SCENE, magpylib_rotor, scipy_equilibria, scipy_equilibrium
 
-from spinlev.dynamics.equilibria import find_equilibria
-from spinlev.dynamics.maps import equilibrium_map, rotor_family
-from spinlev.dynamics.motion import Rates, Scales, parameters
-from spinlev.dynamics.steady import EVERY, Balance, modes, solve
-from spinlev.fem.rotor_tables import rotor_table
-from spinlev.studies.one_scene import Levitation
-from spinlev.studies.terminal import Models
+from spinlev.dynamics.equilibria.balance import EVERY, Balance, solve
+from spinlev.dynamics.equilibria.modes import modes
+from spinlev.dynamics.equilibria.search import find_equilibria
+from spinlev.dynamics.maps.family import rotor_family
+from spinlev.dynamics.maps.map import equilibrium_map
+from spinlev.dynamics.motion.equations import parameters
+from spinlev.dynamics.motion.rates import Rates
+from spinlev.dynamics.motion.state import Scales
+from spinlev.fem.rotor.choice import rotor_table
+from spinlev.studies.cli.options import Models
+from spinlev.studies.levitation import Levitation
 
 PEER = "least squares + magpylib, no stability"
 MODELS = ["dipole", "cuboid", "fem"]

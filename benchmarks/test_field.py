@@ -4,13 +4,14 @@ import numpy as np
 import pytest
 from peers import SCENE, around, magpylib_rotor
 
-from spinlev.fem.harmonics import uniform_moments
-from spinlev.fem.magnetostatics.moments import reaction_moments
-from spinlev.fem.magnetostatics.solver import assemble, solve
-from spinlev.fem.rotor_tables import RotorTable, rotor_table
-from spinlev.fem.verification import magnet_dipoles
-from spinlev.geometry.basics import MU_0
-from spinlev.geometry.meshes import MeshSettings, mesh_magnets
+from spinlev.fem.elements.ladder import reaction_moments
+from spinlev.fem.elements.magnetostatics import assemble, solve
+from spinlev.fem.elements.second_opinion import magnet_dipoles
+from spinlev.fem.harmonics.expansion import uniform_moments
+from spinlev.fem.rotor.choice import rotor_table
+from spinlev.fem.rotor.table import RotorTable
+from spinlev.geometry.common import MU_0
+from spinlev.geometry.meshes.magnets import MeshSettings, mesh_magnets
 
 POINTS = around(SCENE.rotor[0], 100_000)
 PEER = "magpylib, B alone"

@@ -7,18 +7,17 @@ import pytest
 from peer_flight import fly
 from peers import SCENE, magpylib_rotor
 
-from spinlev.dynamics.ensembles import ensemble
-from spinlev.dynamics.equilibria import survey, with_plate
-from spinlev.dynamics.flights import initial_state
-from spinlev.dynamics.flights.compiled_flight import compile_flight
-from spinlev.dynamics.flights.integration import integrate
-from spinlev.dynamics.flights.local_flight import compile_local_flight
-from spinlev.dynamics.flights.simulation import PLATE_TOLERANCE
-from spinlev.dynamics.motion import Rates, State
-from spinlev.fem.rotor_tables import rotor_table
-from spinlev.fem.slab import rotor_nearby
-from spinlev.studies.one_scene import Levitation, plate_memory
-from spinlev.studies.terminal import Models
+from spinlev.dynamics.equilibria.search import survey, with_plate
+from spinlev.dynamics.flights.balls import compile_local_flight
+from spinlev.dynamics.flights.batch import ensemble
+from spinlev.dynamics.flights.compiled import compile_flight
+from spinlev.dynamics.flights.flight import PLATE_TOLERANCE, initial_state, integrate
+from spinlev.dynamics.motion.rates import Rates
+from spinlev.dynamics.motion.state import State
+from spinlev.fem.plate.choice import rotor_nearby
+from spinlev.fem.rotor.choice import rotor_table
+from spinlev.studies.cli.options import Models
+from spinlev.studies.levitation import Levitation, plate_memory
 
 FREE = replace(SCENE, plate=None, drag=replace(SCENE.drag, linear=0.0, angular=0.0))
 LONG = 20.0

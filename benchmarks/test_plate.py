@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 from peers import PLATE, SLAB, scipy_slab
 
-from spinlev.fem.plate_currents import Region, plate_reaction
-from spinlev.fem.plate_tables.tabulate import plate_table
-from spinlev.fem.slab import reaction_tensor
+from spinlev.fem.plate.driven import plate_table
+from spinlev.fem.plate.reaction import plate_reaction
+from spinlev.fem.plate.region import Region
+from spinlev.fem.plate.slab import reaction_tensor
 
 HEIGHTS = np.linspace(0.008, 0.06, 50)
 REGION = Region.over_face(PLATE.box.size, (0.01, 0.04), 0.005)

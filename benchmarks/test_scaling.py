@@ -6,17 +6,18 @@ import numpy as np
 import pytest
 from peers import PLATE, SCENE, around
 
-from spinlev.dynamics.flights import initial_state
-from spinlev.dynamics.flights.compiled_flight import compile_flight
-from spinlev.dynamics.flights.integration import integrate
-from spinlev.dynamics.flights.simulation import PLATE_TOLERANCE
-from spinlev.dynamics.maps import equilibrium_map, rotor_family
-from spinlev.fem.closed_forms import carrier, unit_dipoles
-from spinlev.fem.eddy_currents import solve_eddy
-from spinlev.fem.magnetostatics import refinement_of, solve_rotor
-from spinlev.fem.rotor_tables import rotor_table
-from spinlev.geometry.meshes import MeshRule, MeshSettings, plate_mesh
-from spinlev.studies.one_scene import plate_memory
+from spinlev.dynamics.flights.compiled import compile_flight
+from spinlev.dynamics.flights.flight import PLATE_TOLERANCE, initial_state, integrate
+from spinlev.dynamics.maps.family import rotor_family
+from spinlev.dynamics.maps.map import equilibrium_map
+from spinlev.fem.closed_forms.moments import carrier
+from spinlev.fem.closed_forms.potentials import unit_dipoles
+from spinlev.fem.elements.ladder import refinement_of, solve_rotor
+from spinlev.fem.plate.eddy import solve_eddy
+from spinlev.fem.rotor.choice import rotor_table
+from spinlev.geometry.meshes.magnets import MeshSettings
+from spinlev.geometry.meshes.plate import MeshRule, plate_mesh
+from spinlev.studies.levitation import plate_memory
 
 FREE = replace(SCENE, plate=None, drag=replace(SCENE.drag, linear=0.0, angular=0.0))
 LONG = 20.0

@@ -3,7 +3,7 @@
 import matplotlib as mpl
 from sphinx_gallery.scrapers import figure_rst
 
-from spinlev.studies.results.style import STYLE
+from spinlev.studies.figures.style import STYLE
 
 FIRST = ("first_steps", "own_scene", "kick", "sweep", "field_map", "dipole_error")
 

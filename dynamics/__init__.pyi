@@ -1,33 +1,23 @@
-from .branches import (
-    BoundaryPoint as BoundaryPoint,
-    BranchPoint as BranchPoint,
-    Family as Family,
-    Plane as Plane,
-    follow_boundary as follow_boundary,
-    follow_branch as follow_branch,
-)
-from .equilibria import Steps as Steps, find_equilibria as find_equilibria, survey as survey, with_plate as with_plate
-from .flights import (
-    Checkpoint as Checkpoint,
-    FlightStopped as FlightStopped,
-    StartError as StartError,
-    Trajectory as Trajectory,
-    flight_kind as flight_kind,
-    initial_state as initial_state,
-    simulate as simulate,
-    starting_point as starting_point,
-)
-from .maps import (
-    EquilibriumMap as EquilibriumMap,
-    RotorFamily as RotorFamily,
-    equilibrium_map as equilibrium_map,
-    rotor_family as rotor_family,
-)
-from .motion import PlateMemory as PlateMemory, Rates as Rates
-from .slow_drift import Drift as Drift, drift as drift
-from .steady import (
+from .continuation.boundary import BoundaryPoint as BoundaryPoint, Plane as Plane, follow_boundary as follow_boundary
+from .continuation.engine import BranchPoint as BranchPoint, Family as Family, follow_branch as follow_branch
+from .continuation.slow_drift import Drift as Drift, drift as drift
+from .equilibria.equilibrium import (
     Equilibrium as Equilibrium,
     EquilibriumError as EquilibriumError,
     ForceCurve as ForceCurve,
     Survey as Survey,
 )
+from .equilibria.path import Steps as Steps
+from .equilibria.search import find_equilibria as find_equilibria, survey as survey, with_plate as with_plate
+from .flights.flight import (
+    StartError as StartError,
+    initial_state as initial_state,
+    simulate as simulate,
+    starting_point as starting_point,
+)
+from .flights.pieces import Checkpoint as Checkpoint
+from .flights.trajectory import FlightStopped as FlightStopped, Trajectory as Trajectory, flight_kind as flight_kind
+from .maps.family import RotorFamily as RotorFamily, rotor_family as rotor_family
+from .maps.map import EquilibriumMap as EquilibriumMap, equilibrium_map as equilibrium_map
+from .motion.plate import PlateMemory as PlateMemory
+from .motion.rates import Rates as Rates

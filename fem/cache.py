@@ -1,23 +1,95 @@
-"""A folder of what was computed before: found again by its name, made by one process at a time."""
+"""Which program a file is of: the text of the rooms that make it, and the versions of the libraries that compute it."""
 
 import errno
 import fcntl
+import hashlib
+import io
 import logging
 import os
 import platform
+import re
 import stat
 import tempfile
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from functools import cache
+from importlib.metadata import version
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import platformdirs
+import xarray as xr
 from filelock import FileLock, Timeout
+from xarray.backends import H5NetCDFStore
 
-from ...geometry.basics import InputError
-from .whole_files import closed, ours
+from ..geometry.common import InputError
+from .files import closed, hdf5_fault, ours, read_netcdf, seal, sealed, write_whole
+
+ROOT = Path(__file__).resolve().parents[1]
+"""Where the floors lie."""
+LIBRARIES = ("heyoka", "netgen-mesher", "ngsolve", "numpy", "scipy")
+"""That decide the digits of a table; the others read, write and show."""
+TEXTS = (".py", ".csv")
+IMPORT = re.compile(r"^\s*from (\.+)([\w.]+) import", re.MULTILINE)
+
+
+def program_of(*packages: str) -> str:
+    """The versions of what computes in packages: digest of their text, and libraries."""
+    return " ".join([digest_of(*packages), _libraries()])
+
+
+@cache
+def _libraries() -> str:
+    return " ".join(f"{name} {version(name)}" for name in LIBRARIES)
+
+
+@cache
+def digest_of(*names: str, root: Path = ROOT) -> str:
+    """SHA-256 of the text of modules and of all modules that they import, directly or not.
+
+    Parameters
+    ----------
+    names : of modules, or of packages for all of their modules
+    root : folder of the floors
+
+    Raises
+    ------
+    FileNotFoundError : a name is of no module of this program
+    """
+    digest = hashlib.sha256()
+    for path in sorted(modules_of(*names, root=root)):
+        content = path.read_bytes()
+        digest.update(f"{path.relative_to(root).as_posix()} {len(content)}\n".encode() + content)
+    return digest.hexdigest()
+
+
+def modules_of(*names: str, root: Path = ROOT) -> set[Path]:
+    """Files of modules or packages and of all modules that they import, directly or not."""
+    found: set[Path] = set()
+    new = {path for name in names for path in _files_of(name, root)}
+    if not all(_files_of(name, root) for name in names):
+        raise FileNotFoundError(f"Input names must be modules of this program; instead received {', '.join(names)}.")
+    while new:
+        found |= new
+        new = {path for module in new for path in _imported(module, root)} - found
+    return found
+
+
+def _files_of(name: str, root: Path) -> set[Path]:
+    place = root.joinpath(*name.split(".")[1:])
+    if place.is_dir():
+        return {path for path in place.rglob("*") if path.suffix in TEXTS}
+    return {path for path in [place.with_suffix(".py")] if path.exists()}
+
+
+def _imported(module: Path, root: Path) -> set[Path]:
+    """Files that a module imports; inside the program all imports are relative."""
+    found: set[Path] = set()
+    above = ("spinlev", *module.relative_to(root).parts[:-1])
+    for dots, name in IMPORT.findall(module.read_text(encoding="utf-8")):
+        found |= _files_of(".".join([*above[: len(above) - len(dots) + 1], *name.split(".")]), root)
+    return found
+
 
 Table = TypeVar("Table")
 OWNER = "in-use.lock"
@@ -259,3 +331,61 @@ def make_room(folder: Path, limit: int) -> None:
                     path.unlink(missing_ok=True)
                     lock.unlink()
         total -= size
+
+
+Variables = Mapping[str, tuple[tuple[str, ...], Any, str]]
+"""Dimensions, values and unit by name."""
+
+
+def described(variables: Variables, attributes: Mapping[str, Any]) -> xr.Dataset:
+    """A dataset in which every variable carries its unit."""
+    return xr.Dataset({n: xr.Variable(d, v, {"units": u}) for n, (d, v, u) in variables.items()}, attrs=attributes)
+
+
+def write_checked(dataset: xr.Dataset, path: str | Path) -> None:
+    """Write a dataset with the checksum of the file at its end; the file is whole or absent. Raises OSError.
+
+    In the cache the name of a file says what its content is of, and the checksum counts it.
+    """
+    memory = io.BytesIO()  # on a full disk HDF5 itself would crash
+    # As `to_netcdf`, which would load a cluster's libraries and ask for a lock of memory that is its own.
+    store = H5NetCDFStore.open(memory, mode="w", lock=False)
+    dataset.dump_to_store(store)
+    store.close()
+    write_whole(path, seal(memory.getvalue(), key_of(path)))
+
+
+def read_checked(path: str | Path, file_format: str | None = None) -> xr.Dataset:
+    """Read a dataset that is as it was written.
+
+    Parameters
+    ----------
+    file_format : that it must have; None for any, and for files that others have written or changed
+
+    Raises
+    ------
+    TableFileError : the file is missing, no file, too large, damaged, no netCDF, or not of this format
+    """
+    try:
+        whole = sealed(Path(path), key_of(path))
+    except InputError as error:
+        raise TableFileError(str(error)) from None
+    if whole is False:
+        raise TableFileError(f"Input {path} must be as it was written; instead its checksum does not match.")
+    if whole is None and file_format:
+        raise TableFileError(f"Input {path} must be a whole '{file_format}'; instead it does not end in its checksum.")
+    if whole is None and (reason := hdf5_fault(Path(path))):
+        raise TableFileError(f"Input {path} must be a readable netCDF file; instead: {reason}.")
+    try:
+        dataset = read_netcdf(path) if whole else _foreign(path)
+    except Exception as error:  # the HDF5 layer raises many kinds on a damaged file
+        raise TableFileError(f"Input {path} must be a readable netCDF file; instead: {error}.") from error
+    if file_format and dataset.attrs.get("format") != file_format:
+        received = dataset.attrs.get("format")
+        raise TableFileError(f"Input {path} must be a '{file_format}'; instead received '{received}'.")
+    return dataset
+
+
+def _foreign(path: str | Path) -> xr.Dataset:
+    with xr.open_dataset(path, engine="h5netcdf") as opened:
+        return opened.load()

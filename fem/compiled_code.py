@@ -20,9 +20,8 @@ from functools import cache
 from pathlib import Path
 from typing import Any, TypeVar, cast
 
-from .cache import cache_folder, cache_limit, make_room, others_may_write, own_folder
-from .program_text import digest_of
-from .whole_files import seal, unsealed, write_whole
+from .cache import cache_folder, cache_limit, digest_of, make_room, others_may_write, own_folder
+from .files import seal, unsealed, write_whole
 
 LIMIT = 2**29
 """Size of all that is kept, bytes; what was not used for the longest time makes room."""
@@ -176,3 +175,32 @@ def _keep(content: bytes, path: Path) -> None:
         make_room(path.parent, min(LIMIT, cache_limit()))
     except OSError as error:  # costs time only
         LOG.debug("Compiled code could not be kept: %s", error)
+
+
+PLAIN = (0.0, 1.0, -1.0)
+"""Numbers that symmetry makes so: they stay what they are, and make the code shorter."""
+
+
+class RuntimeNumbers:
+    """Takes a formula's numbers one by one and gives the parameter that stands for each.
+
+    Parameters
+    ----------
+    first : number of the first parameter that is free
+    """
+
+    def __init__(self, first: int) -> None:
+        self._first, self._known = first, dict[float, int]()
+
+    def __call__(self, number: float) -> Any:
+        """The parameter with this value; the same for the same value."""
+        import heyoka as hy
+
+        if number in PLAIN:
+            return float(number)
+        return hy.par[self._first + self._known.setdefault(float(number), len(self._known))]
+
+    @property
+    def values(self) -> list[float]:
+        """Of the parameters so far."""
+        return list(self._known)

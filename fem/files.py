@@ -9,13 +9,17 @@ import os
 import platform
 import stat
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
+import h5py
+import numpy as np
 import psutil
+import xarray as xr
 
-from ...geometry.basics import file_content, regular_file
+from ..geometry.files import LostError, call_apart, file_content, regular_file
 
 MARK = b"\nspinlev sha256 "
 LENGTH = len(MARK) + 64
@@ -115,3 +119,102 @@ def _digest(content: bytes | memoryview, name: str) -> bytes:
     found = hashlib.sha256(content)
     found.update(name.encode())
     return found.hexdigest().encode()
+
+
+DIMENSION = "_Netcdf4Dimid"
+OWN_TO_NETCDF = {
+    *(DIMENSION, "_Netcdf4Coordinates", "_NCProperties", "_FillValue"),
+    *("CLASS", "NAME", "DIMENSION_LIST", "REFERENCE_LIST"),
+}
+"""Attributes by which netCDF keeps dimensions and the like in HDF5."""
+
+
+def read_netcdf(path: str | Path) -> xr.Dataset:
+    """The dataset of a whole file that xarray wrote by h5netcdf; of another HDF5 makes many kinds of errors."""
+    with h5py.File(path) as file:
+        stored = {name: item for name, item in file.items() if isinstance(item, h5py.Dataset)}
+        dimensions = {item.attrs[DIMENSION]: name for name, item in stored.items() if "CLASS" in item.attrs}
+        variables = {
+            name: _variable(item, dimensions)
+            for name, item in stored.items()
+            if not str(item.attrs.get("NAME", b""), "ascii").startswith("This is a netCDF dimension but not")
+        }
+        attributes = _attributes(file)
+    told = [held.pop("coordinates", "") for held in (attributes, *(v.attrs for v in variables.values()))]
+    return xr.Dataset(variables, attrs=attributes).set_coords(" ".join(told).split())
+
+
+def _variable(item: h5py.Dataset, dimensions: Mapping[int, str]) -> xr.Variable:
+    attributes = _attributes(item)
+    values = np.array(item.asstr()[()], str) if h5py.check_string_dtype(item.dtype) else item[()]
+    if attributes.pop("dtype", None) == "bool":
+        values = values.astype(bool)
+    along = item.attrs.get("_Netcdf4Coordinates")
+    if along is None:
+        along = [item.attrs[DIMENSION]] if values.shape else []
+    return xr.Variable([dimensions[number] for number in along], values, attributes)
+
+
+def _attributes(item: h5py.Dataset | h5py.File) -> dict[str, Any]:
+    """Those that are not HDF5's and netCDF's own."""
+    return {n: _plain(v) for n, v in item.attrs.items() if n not in OWN_TO_NETCDF}
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, np.ndarray) and value.dtype == object:
+        value = [str(entry) for entry in value]
+        return value[0] if len(value) == 1 else value
+    return value[0] if isinstance(value, np.ndarray) and len(value) == 1 else value
+
+
+SIGNATURE = b"\x89HDF\r\n\x1a\n"
+LONGEST = 20.0
+"""Seconds to look through a small file, which takes a fraction of one."""
+LARGEST = 1_000_000_000
+"""Bytes of numbers that a file may unfold to: a few of it can stand for any number of zeros."""
+PACE = 10e6
+"""Bytes for each second more; disks and HDF5's filters are ten times as fast."""
+
+
+def is_hdf5(path: Path) -> bool:
+    """Whether a file is there and begins as HDF5 does."""
+    if not path.is_file():
+        return False
+    with path.open("rb") as stream:
+        return stream.read(len(SIGNATURE)) == SIGNATURE
+
+
+def hdf5_fault(path: Path, longest: float = LONGEST) -> str | None:
+    """What is wrong with an HDF5 file, as the end of a sentence; None if all of it can be read.
+
+    A small file is given up after `longest` seconds.
+    """
+    try:
+        call_apart(longest + path.stat().st_size / PACE, look_through, path)
+    except LostError as error:
+        return f"HDF5 {error}"
+    except Exception as error:
+        return str(error).strip().rpartition("\n")[2] or "HDF5 cannot read it"
+    return None
+
+
+def look_through(path: str | Path) -> None:
+    """Read every attribute and every dataset of an HDF5 file. Raises whatever HDF5 makes of a damaged one."""
+    import h5py
+
+    left = LARGEST
+
+    def read(_: str, item: h5py.Group | h5py.Dataset) -> None:
+        nonlocal left
+        dict(item.attrs)
+        if isinstance(item, h5py.Dataset):
+            left -= item.nbytes
+            if left < 0:
+                raise ValueError(
+                    f"Input file must hold at most {LARGEST / 1e6:g} MB of numbers; instead it holds more."
+                )
+            item[()]
+
+    with h5py.File(path, "r") as file:
+        dict(file.attrs)
+        file.visititems(read)

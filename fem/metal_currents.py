@@ -15,9 +15,11 @@ from typing import Any
 import ngsolve as ng
 import numpy as np
 
-from ...geometry.basics import Array, Solid
-from ...geometry.meshes import MetalMesh, mesh_metal
-from ..elements import IntegrationPoints, require_memory, volume_points
+from ..geometry.common import MU_0, Array, Watch, unwatched, watched
+from ..geometry.meshes.metal import MetalMesh, mesh_metal
+from ..geometry.solids import Solid
+from .elements.condensed import require_memory
+from .elements.spaces import IntegrationPoints, volume_points
 
 Potentials = Callable[[Array], Array]
 """Points (n, 3) m -> A (n, 3, k) of k sources."""
@@ -131,3 +133,103 @@ def metal_on(mesh: MetalMesh, conductivity: float, order: int) -> Metal:
     form.Assemble()
     points = volume_points(mesh.mesh, ".*", 2 * order)
     return Metal(mesh, conductivity, space, form.mat.Inverse(free, inverse="sparsecholesky"), points)
+
+
+def of_places(positions: Array) -> Potentials:
+    """Those of 1 A m² along x, y and z at each of `positions` (k, 3) m: A (n, 3, 3k) T m."""
+
+    def potentials(points: Array) -> Array:
+        offset = [points[:, axis, None] - positions[:, axis] for axis in range(3)]
+        square = offset[0] ** 2 + offset[1] ** 2 + offset[2] ** 2
+        strength = MU_0 / (4 * np.pi) / (square * np.sqrt(square))
+        found = np.zeros((len(points), 3, len(positions), 3))  # e_i × pull: points, component, place, i
+        for i, (j, k) in enumerate(((1, 2), (2, 0), (0, 1))):
+            found[:, j, :, i], found[:, k, :, i] = -strength * offset[k], strength * offset[j]
+        return found.reshape(len(points), 3, -1)
+
+    return potentials
+
+
+def of_motion(position: Array, moment: Array) -> Potentials:
+    """∂A/∂q (n, 3, 6) for a dipole (3,) A m² at (3,) m: T by its displacement, T m by its turn about x, y and z."""
+    turned = np.cross(np.eye(3), moment)
+    across = np.cross(moment, np.eye(3))
+
+    def potentials(points: Array) -> Array:
+        offset = points - position
+        inverse = 1 / np.linalg.norm(offset, axis=1)
+        found = np.empty((len(points), 3, 6))
+        pull = 3 * (offset @ across) * inverse[:, None] ** 2  # 3 m × r / r²
+        for a in range(3):
+            found[:, :, a] = (pull * offset[:, [a]] - across[a]) * inverse[:, None] ** 3
+            found[:, :, 3 + a] = (offset @ np.cross(turned[a], np.eye(3))) * inverse[:, None] ** 3
+        return MU_0 / (4 * np.pi) * found
+
+    return potentials
+
+
+TOGETHER = 40
+"""Places at a time."""
+
+
+@dataclass(frozen=True, eq=False)
+class CurrentPatterns:
+    """Patterns of current in several pieces of metal.
+
+    Parameters
+    ----------
+    metals : the pieces
+    patterns : (points, 3, k) of w_k σ dV at the integration points of each
+    """
+
+    metals: tuple[Metal, ...]
+    patterns: tuple[Array, ...]
+
+    @property
+    def count(self) -> int:
+        """Number of patterns."""
+        return int(self.patterns[0].shape[2])
+
+    def fields(self, positions: Array, watch: Watch = unwatched) -> Array:
+        """c_k (k, n, 3) at positions (n, 3) m, √W s/(A m²); `watch` hears of the progress."""
+        found = []
+        for start in watched(range(0, len(positions), TOGETHER), watch, "their fields"):
+            sources = of_places(positions[start : start + TOGETHER])
+            parts = [
+                flat(pattern).T @ flat(sources(metal.places))
+                for metal, pattern in zip(self.metals, self.patterns, strict=True)
+            ]
+            found.append(np.sum(parts, axis=0).reshape(self.count, -1, 3))
+        return np.concatenate(found, axis=1)
+
+
+def current_patterns(
+    metals: Sequence[Metal], positions: Array, left_out: float, watch: Watch = unwatched
+) -> CurrentPatterns:
+    """Patterns that dipoles at `positions` (n, 3) m drive, but for a part `left_out` of the loss at any place.
+
+    `watch` hears of the progress.
+    """
+    grams, loads, blocks = [], [], range(0, len(positions), TOGETHER)
+    for metal in metals:
+        parts = [metal.loads(of_places(positions[k : k + TOGETHER])) for k in watched(blocks, watch, "patterns")]
+        loads.append(np.concatenate(parts))
+        grams.append(metal.dissipation(of_places(positions), loads[-1]))
+    gram = np.sum(grams, axis=0)
+    scale = np.repeat(np.sqrt(1 / gram.diagonal().reshape(-1, 3).sum(axis=1)), 3)
+    energy, vectors = np.linalg.eigh(scale[:, None] * gram * scale)
+    energy, vectors = energy[::-1], vectors[:, ::-1]
+    shares = np.sum((energy * vectors**2).reshape(len(positions), 3, -1), axis=1)
+    missing = 1 - np.cumsum(shares, axis=1).min(axis=0)
+    count = int(np.argmax(missing <= left_out)) + 1 if np.any(missing <= left_out) else len(energy)
+    mix = scale[:, None] * vectors[:, :count] / np.sqrt(energy[:count])
+    patterns = [_pattern(metal, load, positions, mix) for metal, load in zip(metals, loads, strict=True)]
+    return CurrentPatterns(tuple(metals), tuple(patterns))
+
+
+def _pattern(metal: Metal, loads: Array, positions: Array, mix: Array) -> Array:
+    fields = -metal.gradients(metal.solutions(mix.T @ loads))
+    for start in range(0, len(positions), TOGETHER):
+        part = of_places(positions[start : start + TOGETHER])(metal.places)
+        fields += part @ mix[3 * start : 3 * (start + TOGETHER)]
+    return np.asarray(metal.weights[:, None, None] * fields)

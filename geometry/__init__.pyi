@@ -1,6 +1,7 @@
-from .basics import MU_0 as MU_0, Box as Box, InputError as InputError, rotation_matrix as rotation_matrix
-from .bodies import Magnet as Magnet, horizontal as horizontal, tilt as tilt, vertical as vertical
-from .scenes import (
+from .common import MU_0 as MU_0, InputError as InputError
+from .magnets import Magnet as Magnet
+from .rotor import horizontal as horizontal, tilt as tilt, vertical as vertical
+from .scene.contents import (
     AbsoluteStart as AbsoluteStart,
     Drag as Drag,
     Floater as Floater,
@@ -8,7 +9,7 @@ from .scenes import (
     OffsetStart as OffsetStart,
     Plate as Plate,
     Scene as Scene,
-    SceneError as SceneError,
-    load_scene as load_scene,
-    parse_scene as parse_scene,
 )
+from .scene.files import load_scene as load_scene, parse_scene as parse_scene
+from .scene.messages import SceneError as SceneError
+from .shapes import Box as Box, rotation_matrix as rotation_matrix

@@ -1,7 +1,42 @@
-"""Errors whose message is the answer: what the user gave cannot be used, or the question has no answer.
+"""Constants of nature and of the experiment's materials, and arrays that frozen objects hold."""
 
-Every error that the program makes is one of the two; which one it is says with what status the command line exits.
-"""
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from html import escape
+from typing import TypeVar
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+Array = NDArray[np.float64]
+MU_0 = 4e-7 * math.pi
+"""Vacuum permeability, T m/A (the value before 2019; the relative difference is 5e-10)."""
+MAGNET_CONDUCTIVITY = 6.7e5
+"""Electrical conductivity of sintered NdFeB, S/m; makers give 6.2e5 to 9e5."""
+
+
+def frozen_array(values: ArrayLike, shape: tuple[int, ...]) -> Array:
+    """Copy `values` into a read-only float array of the given shape."""
+    array = np.array(values, dtype=float).reshape(shape)
+    array.flags.writeable = False
+    return array
+
+
+def spread_points(lower: ArrayLike, upper: ArrayLike, number: int) -> Array:
+    """Points (number, 3) spread evenly through a box: multiples of irrational numbers, modulo 1 (H. Weyl, 1916)."""
+    parts = np.arange(1, number + 1)[:, None] * np.sqrt([2.0, 3.0, 5.0]) % 1.0
+    low, high = np.asarray(lower, float), np.asarray(upper, float)
+    return np.asarray(low + parts * (high - low))
+
+
+def even_directions(number: int) -> Array:
+    """Unit vectors (number, 3) all around, evenly: a spiral of the golden angle."""
+    steps = np.arange(number) + 0.5
+    height, angle = 1 - 2 * steps / number, np.pi * (1 + 5**0.5) * steps
+    across = np.sqrt(1 - height**2)
+    return np.stack([across * np.cos(angle), across * np.sin(angle), height], axis=1)
 
 
 class SpinlevError(Exception):
@@ -38,3 +73,46 @@ def printable(text: str) -> str:
     if text.isprintable():
         return text
     return "".join(c if c.isprintable() or c in "\n\t" else c.encode("unicode_escape").decode() for c in text)
+
+
+def millimetres(lengths: ArrayLike) -> str:
+    """Lengths (n,) in m as `(x, y, z) mm`."""
+    return f"({listed(np.asarray(lengths, float) * 1e3)}) mm"
+
+
+def millimetre_size(lengths: ArrayLike) -> str:
+    """Edges (n,) in m as `x × y × z mm`."""
+    return f"{' × '.join(f'{length:.4g}' for length in np.asarray(lengths, float) * 1e3)} mm"
+
+
+def listed(values: ArrayLike) -> str:
+    """Numbers (n,) joined by commas, round-off of 1e-9 left out."""
+    return ", ".join(f"{value:.4g}" for value in np.round(np.asarray(values, float), 9) + 0.0)
+
+
+def counted(number: int, thing: str) -> str:
+    """The number with its noun, in the plural unless it is one."""
+    return f"{number} {thing}" if number == 1 else f"{number} {thing}s"
+
+
+def html_table(title: str, rows: Mapping[str, str]) -> str:
+    """A small table for a notebook, two columns."""
+    lines = "".join(f"<tr><th>{escape(k)}</th><td>{escape(v)}</td></tr>" for k, v in rows.items())
+    return f"<table><caption>{escape(title)}</caption>{lines}</table>"
+
+
+Watch = Callable[[str, float], None]
+"""Takes the name of a stage and the share of it that is done."""
+Item = TypeVar("Item")
+
+
+def unwatched(stage: str, share: float) -> None:
+    """Nobody wants to know."""
+
+
+def watched(items: Iterable[Item], watch: Watch, stage: str) -> Iterator[Item]:
+    """The items one after the other, of which a stage of the work takes each."""
+    listed = list(items)
+    for done, item in enumerate(listed):
+        watch(stage, done / len(listed))
+        yield item

@@ -7,7 +7,9 @@ from functools import cached_property
 
 import numpy as np
 
-from ..basics import MU_0, Array, Box, Solid, frozen_array, listed, millimetres
+from .common import MU_0, Array, frozen_array, listed, millimetres
+from .shapes import Box
+from .solids import Solid
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,8 +8,10 @@ import numpy as np
 import scipy
 from numpy.typing import ArrayLike
 
-from ..basics import Array, Box, Part, Ring, Solid, Sphere, moved, rotation_matrix
-from .magnet import Magnet
+from .common import Array
+from .magnets import Magnet
+from .shapes import Box, Ring, Sphere, rotation_matrix
+from .solids import Part, Solid, moved
 
 TOUCHING = 1e-9
 """Bodies that overlap by less than this (m) only touch: it is far above round-off and far below any tolerance."""

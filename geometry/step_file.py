@@ -12,7 +12,9 @@ from typing import Any
 
 import numpy as np
 
-from ..basics import Array, InputError, LostError, Part, call_apart, counted, file_content
+from .common import Array, InputError, counted
+from .files import LostError, call_apart, file_content
+from .solids import Part
 
 MILLI = 1e-3
 MOST = 50_000_000

@@ -10,8 +10,10 @@ from itertools import product
 
 import numpy as np
 
-from ..basics import Array, Box, Part, Solid, Sphere, moved
-from .magnet import Magnet
+from .common import Array
+from .magnets import Magnet
+from .shapes import Box, Sphere
+from .solids import Part, Solid, moved
 
 SAME_PLACE = 1e-9
 """Positions that differ by less than this part of the bodies' size are the same."""

@@ -7,17 +7,18 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from ...dynamics.flights import most_like_levitation
-from ...dynamics.steady import Equilibrium, EquilibriumError
-from ...fem.rotor_tables import EasyField, WorkingPoint, easy_axis, working_points
-from ...fem.storage import write_whole
-from ...geometry.basics import InputError
-from ...geometry.bodies import Magnet
-from ...geometry.scenes import Floater
-from ..pictures import working_point_figure
-from ..results import AXIS, save_figures, variable, write_dataset
-from ..terminal import note, to_json
+from ..dynamics.equilibria.equilibrium import Equilibrium, EquilibriumError
+from ..dynamics.flights.flight import most_like_levitation
+from ..fem.files import write_whole
+from ..fem.rotor.working_point import EasyField, WorkingPoint, easy_axis, working_points
+from ..geometry.common import InputError
+from ..geometry.magnets import Magnet
+from ..geometry.scene.contents import Floater
+from .cli.console import note, to_json
+from .figures.pictures import working_point_figure
+from .figures.style import save_figures
 from .levitation import Levitation
+from .results import AXIS, variable, write_dataset
 
 STEPS, LEVELS = 101, 201
 """Points across a section; levels of the field that are kept of a magnet."""

@@ -6,22 +6,16 @@ from typing import Any
 
 import numpy as np
 
-from ...dynamics.effects import (
-    FLOATER_CURRENTS,
-    MUTUAL,
-    NOTHING_ANSWERS,
-    REAL_AIR,
-    ROTOR_CURRENTS,
-    SLOW_ENOUGH,
-    reynolds,
-    slow_error,
-    swinging,
-)
-from ...dynamics.equilibria import growth_by_floater, growth_by_rotor, shift_by_answers
-from ...dynamics.steady import Equilibrium
-from ...fem.rotor_losses import ball_losses, pieces_of, slow_error as metal_error
-from ...geometry.basics import MAGNET_CONDUCTIVITY
-from ...geometry.scenes import Scene
+from ..dynamics.equilibria.equilibrium import Equilibrium
+from ..dynamics.equilibria.perturbed import growth_by_floater, growth_by_rotor, shift_by_answers
+from ..dynamics.motion.air_and_shape import REAL_AIR, reynolds, swinging
+from ..dynamics.motion.effects import NOTHING_ANSWERS
+from ..dynamics.motion.floater_currents import FLOATER_CURRENTS, SLOW_ENOUGH, slow_error
+from ..dynamics.motion.mutual import MUTUAL
+from ..dynamics.motion.rotor_losses import ROTOR_CURRENTS
+from ..fem.rotor_metal import ball_losses, pieces_of, slow_error as metal_error
+from ..geometry.common import MAGNET_CONDUCTIVITY
+from ..geometry.scene.contents import Scene
 from .levitation import Levitation
 
 PLATE_NOT_MODELLED = "The plate's eddy currents are left out: the plate is only an obstacle."

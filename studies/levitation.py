@@ -1,4 +1,4 @@
-"""One scene from its field to its flight: each step is computed once, when it is first asked for."""
+"""The plate of a scene for its motion, as the console tells it, and whether it leaves the floater room."""
 
 from __future__ import annotations
 
@@ -6,42 +6,107 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
+from time import perf_counter
 from typing import Any, cast
 
 import numpy as np
 
-from ...dynamics.effects import (
-    BESIDE_METAL,
-    WITHOUT_METAL,
-    Mutual,
-    RotorCurrents,
-    mutual_choice,
-    with_effects,
-)
-from ...dynamics.equilibria import Found, cached_found, found_key, free_of_bodies, own_spin, survey, with_plate
-from ...dynamics.flights import (
-    Checkpoint,
-    FlightStopped,
-    LiveFlight,
-    Trajectory,
-    initial_state,
-    most_like_levitation,
-    simulate,
-    starting_point,
-)
-from ...dynamics.motion import FORCE_ALONE, Interaction, PlateMemory, Rates, interaction_of, plate_depth
-from ...dynamics.steady import Equilibrium, EquilibriumError, Survey
-from ...fem.measured_maps import GriddedTable
-from ...fem.mutual import MutualTable
-from ...fem.plate_currents import Region
-from ...fem.rotor_losses import RotorLosses, check_slow_enough, pieces_of
-from ...fem.rotor_tables import AccuracyError, FieldTable, RotorTable
-from ...fem.slab import cached_edge_error, edge_error, resolve_plate_model, rotor_nearby, wider_region
-from ...geometry.basics import Array, InputError, SpinlevError, Watch, millimetre_size, shown, unwatched
-from ...geometry.scenes import AbsoluteStart, Scene, load_scene
-from ..terminal import FieldModel, Models, detail, finite, note, positive, progress, stages
-from .plate_of_scene import check_room, check_way, plate_memory
-from .rotor_of_scene import RotorField, RotorTables, equations_key
+from ..dynamics.equilibria.equilibrium import Equilibrium, EquilibriumError, Survey
+from ..dynamics.equilibria.search import Found, cached_found, found_key, free_of_bodies, own_spin, survey, with_plate
+from ..dynamics.flights.flight import initial_state, most_like_levitation, simulate, starting_point
+from ..dynamics.flights.live import LiveFlight
+from ..dynamics.flights.pieces import Checkpoint
+from ..dynamics.flights.trajectory import FlightStopped, Trajectory
+from ..dynamics.motion.effect import Interaction, interaction_of
+from ..dynamics.motion.effects import BESIDE_METAL, WITHOUT_METAL, mutual_choice, with_effects
+from ..dynamics.motion.equations import FORCE_ALONE
+from ..dynamics.motion.events import plate_depth
+from ..dynamics.motion.mutual import Mutual
+from ..dynamics.motion.plate import PlateMemory
+from ..dynamics.motion.rates import Rates
+from ..dynamics.motion.rotor_losses import RotorCurrents
+from ..fem.maps_of_B.table import GriddedTable
+from ..fem.mutual.table import MutualTable
+from ..fem.plate.choice import PlateAround, plate_around, resolve_plate_model, rotor_nearby, wider_region
+from ..fem.plate.region import Region
+from ..fem.plate.slab import cached_edge_error, edge_error
+from ..fem.plate.table import PlateTable, RotorShare
+from ..fem.rotor.models import AccuracyError
+from ..fem.rotor.table import FieldTable, RotorTable
+from ..fem.rotor_metal import RotorLosses, check_slow_enough, pieces_of
+from ..geometry.common import Array, InputError, SpinlevError, Watch, millimetre_size, shown, unwatched
+from ..geometry.overlap import TOUCHING, sphere_overlap
+from ..geometry.scene.contents import AbsoluteStart, Plate, Scene
+from ..geometry.scene.files import load_scene
+from .cli.console import detail, note, progress, stages
+from .cli.options import FieldModel, Models, finite, positive
+from .rotor import RotorField, RotorTables, equations_key
+
+
+def plate_memory(
+    scene: Scene,
+    plate: Plate,
+    model: str,
+    table: RotorTable,
+    place: Array,
+    rtol: float,
+    edges: float = 0.0,
+    tables: RotorTables | None = None,
+    region: Region | None = None,
+) -> tuple[PlateMemory, bool]:
+    """The plate's currents for a floater about `place` (3,) m that turns with the rotor; whether they were cached.
+
+    `edges`: relative error by edges that the model leaves out. `tables` are shared with other scenes. `region`: where
+    the floater may be, if not near the place, in the frame of the plate. Errors are those of `plate_around` and of its
+    model.
+    """
+    asked = plate_around(plate, model, table, place, scene.floater.radius, scene.frequency, rtol, region)
+    made, share, found = (tables or RotorTables()).once(asked.key, lambda: _told(asked))
+    return PlateMemory(asked.plate, made, share, model, edges), found
+
+
+def _told(asked: PlateAround) -> tuple[PlateTable, RotorShare, bool]:
+    note("Plate's currents ...")
+    begun = perf_counter()
+    with stages("Plate's currents") as watch:
+        made, share, found = asked.made(note, watch)
+    note("  from the cache." if found else f"  done in {perf_counter() - begun:.1f} s.")
+    detail(f"  {len(made.rates)} states, estimated relative error {made.errors.total:.1e}.")
+    return made, share, found
+
+
+def check_way(scene: Scene, place: Array) -> None:
+    """A conductor of the rotor where the floater, at `place` (3,) m, would levitate is a wrong scene.
+
+    Raises
+    ------
+    InputError : it overlaps the floater
+    """
+    for k, conductor in enumerate(scene.conductors):
+        depth = sphere_overlap(place, scene.floater.radius, conductor.body)
+        if depth > TOUCHING:
+            raise InputError(
+                f"Input rotor.conductors[{k}] must leave the floater's way free; instead it overlaps the floater by "
+                f"{depth * 1e3:.4g} mm where it levitates, at {np.round(place * 1e3, 3).tolist()} mm; make it smaller "
+                "or move it away."
+            )
+
+
+def check_room(scene: Scene, place: Array) -> None:
+    """A plate that leaves a floater at `place` (3,) m no room is a wrong scene.
+
+    Raises
+    ------
+    InputError : it overlaps the floater
+    """
+    depth = sphere_overlap(place, scene.floater.inner_radius, scene.plate.box) if scene.plate else 0.0
+    if scene.plate and depth > TOUCHING:
+        center, levitates = (np.round(c * 1e3, 3).tolist() for c in (scene.plate.box.center, place))
+        raise InputError(
+            f"Input plate.center_mm must leave room for the floater; instead received {center}: the plate overlaps it "
+            f"by {depth * 1e3:.4g} mm where it levitates, at {levitates} mm; move the plate away."
+        )
+
 
 PLATE_WORDS = {
     "none": "only an obstacle, without eddy currents",

@@ -10,11 +10,14 @@ import magpylib
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from ...fem.rotor_tables import RotorTable
-from ...fem.storage import cache_folder, write_whole
-from ...geometry.basics import MU_0, Array, Box, Cylinder, InputError, Part, Ring, Solid, Sphere, rotation_angles
-from ...geometry.meshes import Body, Facets, Segment, lies_within, step_text
-from ...geometry.scenes import magnets
+from ..fem.cache import cache_folder
+from ..fem.files import write_whole
+from ..fem.rotor.table import RotorTable
+from ..geometry.common import MU_0, Array, InputError
+from ..geometry.meshes.solids import Body, Facets, Segment, lies_within, step_text
+from ..geometry.scene.making import magnets
+from ..geometry.shapes import Box, Cylinder, Ring, Sphere, rotation_angles
+from ..geometry.solids import Part, Solid
 
 KINDS = (
     magpylib.magnet.Cuboid,

@@ -23,8 +23,8 @@ from typing import Any
 
 import cloudpickle
 
-from ...fem.storage import program_of
-from ...geometry.basics import ComputationError
+from ..fem.cache import program_of
+from ..geometry.common import ComputationError
 
 FLOORS = ("spinlev.geometry", "spinlev.fem", "spinlev.dynamics", "spinlev.studies")
 PATIENCE = 5.0

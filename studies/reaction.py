@@ -6,15 +6,16 @@ from pathlib import Path
 
 import numpy as np
 
-from ...fem.closed_forms import ComplexArray
-from ...fem.plate_currents import Region, plate_reaction
-from ...fem.plate_tables import cached_plate_table
-from ...fem.slab import Slab, edge_error, reaction_tensor
-from ...fem.storage import write_whole
-from ...geometry.basics import Array, InputError
-from ...geometry.scenes import Plate, Scene
-from ..terminal import note, to_json
-from .single import Job
+from ..fem.closed_forms.eddy_sphere import ComplexArray
+from ..fem.files import write_whole
+from ..fem.plate.driven import cached_plate_table
+from ..fem.plate.reaction import plate_reaction
+from ..fem.plate.region import Region
+from ..fem.plate.slab import Slab, edge_error, reaction_tensor
+from ..geometry.common import Array, InputError
+from ..geometry.scene.contents import Plate, Scene
+from .cli.console import note, to_json
+from .run import Job
 
 NEARBY = 0.15
 """Half edge of the region of a reduced table, in units of the place's distance from the plate."""

@@ -5,14 +5,19 @@ from collections.abc import Callable
 from functools import partial
 from typing import Any, TypeVar
 
-from ...dynamics.motion import Interaction, Rates
-from ...fem.measured_maps import GriddedTable, map_table
-from ...fem.mutual import MutualTable, cached_mutual_table, mutual_key
-from ...fem.rotor_losses import RotorLosses, cached_rotor_losses, losses_key, pieces_of
-from ...fem.rotor_tables import RotorTable, cached_rotor_table, resolve_model, rotor_key, rotor_table
-from ...geometry.basics import Watch
-from ...geometry.scenes import Floater, Scene, check_files, map_digest
-from ..terminal import Models, note, stages
+from ..dynamics.motion.effect import Interaction
+from ..dynamics.motion.rates import Rates
+from ..fem.maps_of_B.table import GriddedTable, map_table
+from ..fem.mutual.making import cached_mutual_table, mutual_key
+from ..fem.mutual.table import MutualTable
+from ..fem.rotor.choice import cached_rotor_table, resolve_model, rotor_key, rotor_table
+from ..fem.rotor.table import RotorTable
+from ..fem.rotor_metal import RotorLosses, cached_rotor_losses, losses_key, pieces_of
+from ..geometry.common import Watch
+from ..geometry.scene.contents import Floater, Scene
+from ..geometry.scene.files import check_files, map_digest
+from .cli.console import note, stages
+from .cli.options import Models
 
 RotorField = RotorTable | GriddedTable
 """A rotor's table: computed, or from a map."""

@@ -1,24 +1,259 @@
-"""Runs a study: its points one by one on the engine, kept as they come on disk, then joined."""
+"""Who computes the points of a sweep: this process, others of this machine, or a scheduler that is already there."""
+
+from __future__ import annotations
 
 import hashlib
 import json
+import logging
+import os
 import shutil
 import sys
-from collections.abc import Callable, Mapping
-from contextlib import closing
+from collections import deque
+from collections.abc import Callable, Generator, Iterator, Mapping, Sequence, Set
+from contextlib import closing, contextmanager, suppress
+from dataclasses import dataclass
+from functools import partial
 from itertools import count
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import xarray as xr
 
-from ...fem.storage import program_of, seal, unsealed, write_whole
-from ...geometry.basics import ComputationError, InputError
-from ..results import Point, Study
-from ..terminal import Workers, note, progress, to_json
-from .processes import FLOORS
-from .workers import Failure, computed
+from ..fem.cache import program_of
+from ..fem.files import seal, unsealed, write_whole
+from ..geometry.common import ComputationError, InputError
+from .cli.console import note, progress, silence, to_json
+from .cli.options import Workers
+from .processes import FLOORS, Death, Job, NoProcessError, program, results
+from .study import Point, Study
+
+if TYPE_CHECKING:
+    from distributed import Client, Future
+
+TRIES = 3
+"""How often a point is begun whose process dies."""
+Compute = Callable[[Point], xr.Dataset]
+Prepared = Callable[[Sequence[Point]], Sequence[Callable[[], xr.Dataset]]] | None
+
+
+@dataclass(frozen=True)
+class Failure:
+    """Why a point has no result."""
+
+    reason: str
+
+
+Attempt = tuple[int, xr.Dataset | Failure]
+"""The number of a point, and its result."""
+
+
+def computed(
+    by: Workers, study: Study, points: Mapping[int, Point], missing: Set[int]
+) -> Generator[Attempt, None, None]:
+    """The results of the missing points as they come, each with its number; the others only help them.
+
+    A point that raises, or whose worker dies again and again, is a `Failure`; the others go on.
+    Raises InputError if the scheduler does not answer, ComputationError if it is lost.
+    """
+    grouped = study.batches(points) if study.batches else [[k] for k in points]
+    batches: list[Mapping[int, Point]] = [
+        {k: points[k] for k in batch} for batch in grouped if not missing.isdisjoint(batch)
+    ]
+    if batches and by.scheduler is not None:
+        yield from on_scheduler(by.scheduler, study, batches, missing)
+        return
+    number = min(by.workers or os.cpu_count() or 1, len(batches))
+    if number > 1:
+        batches = yield from _in_processes(number, study, batches, missing)
+    for batch in batches:
+        yield from attempts(study.compute, study.prepared, batch, missing)
+
+
+def attempts(compute: Compute, prepared: Prepared, points: Mapping[int, Point], missing: Set[int]) -> Iterator[Attempt]:
+    """The results of the missing ones of points that are computed together, or why there is none."""
+    asked = list(points.values())
+    jobs: Sequence[Callable[[], xr.Dataset]] = [partial(compute, point) for point in asked]
+    if prepared is not None and len(asked) > 1:
+        try:
+            jobs = prepared(asked)
+        except Exception as error:  # each for itself then, so that the others go on
+            note(f"{len(asked)} points cannot help each other: {type(error).__name__}: {error}")
+    for k, job in zip(points, jobs, strict=True):
+        if k not in missing:
+            continue
+        try:
+            yield k, job()
+        except Exception as error:  # a sweep lives longer than its points: the reason is kept with the result
+            yield k, Failure(f"{type(error).__name__}: {error}")
+
+
+def silent_attempts(
+    compute: Compute, prepared: Prepared, points: Mapping[int, Point], missing: Set[int]
+) -> Iterator[Attempt]:
+    """Attempts in a worker, whose messages would come in between those of the others."""
+    with silence():
+        yield from attempts(compute, prepared, points, missing)
+
+
+def _in_processes(
+    number: int, study: Study, batches: Sequence[Mapping[int, Point]], missing: Set[int]
+) -> Generator[Attempt, None, list[Mapping[int, Point]]]:
+    """The attempts of processes of this machine; returns the batches that are left where none can begin."""
+    finished: set[int] = set()
+    deaths: dict[int, int] = {}
+
+    def job(batch: Mapping[int, Point]) -> Job:
+        return silent_attempts, study.compute, study.prepared, batch, missing
+
+    jobs = deque(map(job, batches))
+    try:
+        with closing(results(number, jobs)) as answers:
+            for (*_, batch, _), answer in answers:
+                if not isinstance(answer, Death):
+                    finished.add(answer[0])
+                    yield answer
+                    continue
+                left = [k for k in batch if k in missing and k not in finished]
+                if len(left) > 1:  # one of them killed the process: which?
+                    jobs.extend(job({k: batch[k]}) for k in left)
+                    continue
+                for k in left:
+                    deaths[k] = deaths.get(k, 0) + 1
+                    if deaths[k] < TRIES:
+                        jobs.append(job({k: batch[k]}))
+                    else:
+                        yield k, Failure(f"its process {answer}, {TRIES} times")
+    except NoProcessError as error:
+        note(f"{error} The points are computed in this process, one after the other, as with --workers 1.")
+        return [batch for *_, batch, _ in jobs]
+    return []
+
+
+LONGEST = 10.0
+"""Seconds to wait for a scheduler, also for one that does not answer any more."""
+WAY_OUT = "install the same version of spinlev and of its libraries there, or choose --workers"
+
+
+def on_scheduler(
+    address: str, study: Study, batches: Sequence[Mapping[int, Point]], missing: Set[int]
+) -> Iterator[Attempt]:
+    """The attempts of the scheduler's workers; those of another version of the program are not used.
+
+    Raises
+    ------
+    InputError : the scheduler does not answer, or all of its workers are of another version
+    ComputationError : it is lost on the way
+    """
+    with _client(address) as client:
+        try:
+            yield from _answers(client, address, study, batches, missing)
+        except (OSError, TimeoutError, RuntimeError) as error:
+            if isinstance(error, ComputationError) or client.status == "running":
+                raise
+            raise _lost(address) from None
+
+
+def _answers(
+    client: Client, address: str, study: Study, batches: Sequence[Mapping[int, Point]], missing: Set[int]
+) -> Iterator[Attempt]:
+    from concurrent.futures import CancelledError
+
+    from distributed import as_completed
+    from distributed.scheduler import KilledWorker
+
+    of_us = _workers_of_us(client, address)
+
+    def begin(batch: Mapping[int, Point]) -> Future[Any]:
+        asked = (program(), study.compute, study.prepared, batch, missing)
+        return client.submit(answered, *asked, pure=False, workers=of_us or None)
+
+    futures = {begin(batch): batch for batch in batches}
+    running = as_completed(list(futures), loop=client.loop)
+    for future in running:
+        batch, again = futures.pop(future), list[Mapping[int, Point]]()
+        try:
+            found: list[Attempt] | None = future.result()
+        except KilledWorker as error:
+            found = []
+            if len(batch) > 1:  # one of its points killed the worker: which?
+                again = [{k: point} for k, point in batch.items() if k in missing]
+            else:
+                found = [(next(iter(batch)), Failure(f"its worker died {error.allowed_failures + 1} times"))]
+        except (CancelledError, OSError):
+            raise _lost(address) from None
+        except Exception:  # of a worker that does not know what is asked of it
+            found = None
+        future.release()
+        if found is None:  # of a worker that has come since
+            of_us, again = _workers_of_us(client, address), [batch]
+            if not of_us:
+                raise _lost(address)
+        yield from found or ()
+        fresh = {begin(part): part for part in again}
+        futures |= fresh
+        running.update(list(fresh))
+
+
+def answered(asked_by: str, *asked: Any) -> list[Attempt] | None:
+    """The attempts of a worker; None from one whose program is not that of the asking one."""
+    return list(silent_attempts(*asked)) if program() == asked_by else None
+
+
+def _workers_of_us(client: Client, address: str) -> list[str]:
+    """Addresses of the workers of this version of the program, none while there are no workers.
+
+    Raises InputError where there are workers, but no such.
+    """
+    told = client.run(program, on_error="return")
+    of_us = [worker for worker, answer in told.items() if answer == program()]
+    others = sorted(set(told) - set(of_us))
+    if others and not of_us:
+        raise InputError(
+            f"Input --scheduler must have workers of this version of the program; instead those of {address} "
+            f"({', '.join(others[:3])}{' …' if others[3:] else ''}) are of another: {WAY_OUT}."
+        )
+    if others:
+        note(f"{len(others)} of {len(told)} workers are of another version of the program and are not used.")
+    return of_us
+
+
+def _lost(address: str) -> ComputationError:
+    return ComputationError(
+        f"The scheduler {address} was lost. The finished points are kept: run the same command again, with --scheduler "
+        "once it is back, or with --workers."
+    )
+
+
+@contextmanager
+def _client(address: str) -> Iterator[Client]:
+    try:
+        from dask import config
+        from dask.utils import parse_timedelta
+        from distributed import Client
+    except ModuleNotFoundError as error:
+        raise InputError(
+            f"Input --scheduler must be left out where dask is not installed; instead received {address!r} (no module "
+            f"{error.name}). Install distributed, or choose --workers."
+        ) from None
+    patience = min(parse_timedelta(config.get("distributed.comm.timeouts.connect"), "s"), LONGEST)
+    of_dask = [name for name in logging.root.manager.loggerDict if name.partition(".")[0] == "distributed"]
+    for name in (*of_dask, "tornado.application", "asyncio"):  # what is wrong is said here
+        logging.getLogger(name).setLevel(logging.CRITICAL)
+    note(f"Scheduler {address} ...")
+    try:
+        client = Client(address, set_as_default=False, timeout=patience)
+    except (OSError, ValueError, TimeoutError, TypeError, RuntimeError) as error:
+        raise InputError(
+            f"Input --scheduler must be the address of a dask scheduler that answers, such as "
+            f"tcp://127.0.0.1:8786; instead received {address!r} ({type(error).__name__})."
+        ) from None
+    try:
+        yield client
+    finally:
+        # Of a scheduler that is gone, until the client has given up; its thread must not outlive the interpreter.
+        with suppress(OSError, TimeoutError):
+            client.close(timeout=2 * patience)
 
 
 class Journal:
@@ -156,9 +391,8 @@ def _program(study: Study) -> str:
     """What computes a study's points: the rooms of its function, or of a user's own the text of its file as well."""
     function = getattr(study.compute, "compute", study.compute)  # of a study that is computed as a whole
     module = sys.modules.get(function.__module__)
-    room = ".".join(function.__module__.split(".")[:3])
-    if room.startswith("spinlev."):
-        return program_of(room)
+    if function.__module__.startswith("spinlev."):
+        return program_of(function.__module__)
     path = Path(getattr(module, "__file__", None) or "")
     own = hashlib.sha256(path.read_bytes()).hexdigest() if path.is_file() else ""
     return f"{program_of(*FLOORS)} {own}"

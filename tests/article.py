@@ -1,7 +1,8 @@
 """The article's floater, rotor and scene (doi.org/10.1063/5.0267494), for tests in any folder; lengths in m."""
 
-from spinlev.geometry.bodies import horizontal
-from spinlev.geometry.scenes import Drag, Floater, Scene, sphere
+from spinlev.geometry.rotor import horizontal
+from spinlev.geometry.scene.contents import Drag, Floater, Scene
+from spinlev.geometry.scene.making import sphere
 
 RADIUS = 6.35e-3
 FLOATER = Floater(RADIUS, 1.305, 1.0, 7500.0)

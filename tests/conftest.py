@@ -50,7 +50,7 @@ def memory_given_back_at_once():
 
 def give_memory_back():
     """Compiled functions that later tests read again, and what glibc keeps of freed memory."""
-    from spinlev.fem.storage import compiled_code  # after the session's cache is known
+    from spinlev.fem import compiled_code
 
     compiled_code._functions.clear()
     if hasattr(libc := ctypes.CDLL(None), "malloc_trim"):
@@ -60,7 +60,7 @@ def give_memory_back():
 @pytest.fixture
 def needs_3d():
     """Skips a test where nothing can be drawn in three dimensions, and says why."""
-    from spinlev.studies.rendering import unavailable  # after the session's cache is known
+    from spinlev.studies.figures.renderer import unavailable
 
     reason = unavailable()
     if reason:
@@ -74,4 +74,4 @@ def undrawn(monkeypatch):
     def written(pictures, progress, command):
         return iter([b"not drawn"] * len(pictures))
 
-    monkeypatch.setattr("spinlev.studies.rendering.renderer._drawn", written)
+    monkeypatch.setattr("spinlev.studies.figures.renderer._drawn", written)

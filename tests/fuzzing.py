@@ -37,17 +37,19 @@ import places
 import psutil
 import xarray as xr
 
-from spinlev.fem.measured_maps import FieldMapError, readers
-from spinlev.fem.rotor_tables import rotor_table
-from spinlev.fem.rotor_tables.table_file import load_table, save_table
-from spinlev.fem.storage import TableFileError, checked_files, whole_files, write_checked
-from spinlev.fem.storage.foreign import look_through
-from spinlev.geometry.basics import apart as own_process
-from spinlev.geometry.bodies import horizontal, step_file
+from spinlev.fem import cache as checked_files, files as whole_files
+from spinlev.fem.cache import TableFileError, write_checked
+from spinlev.fem.files import look_through
+from spinlev.fem.maps_of_B import read as readers
+from spinlev.fem.maps_of_B.columns import FieldMapError
+from spinlev.fem.rotor.choice import rotor_table
+from spinlev.fem.rotor.table import load_table, save_table
+from spinlev.geometry import files as own_process, step_file
 from spinlev.geometry.meshes import solids
-from spinlev.geometry.scenes import load_scene
-from spinlev.studies.command_line import cli
-from spinlev.studies.live import first_state
+from spinlev.geometry.rotor import horizontal
+from spinlev.geometry.scene.files import load_scene
+from spinlev.studies.cli import main as cli
+from spinlev.studies.page.state import first_state
 
 SCENES = sorted(places.SCENES.glob("*.toml"))
 LONGEST = 60
@@ -480,7 +482,7 @@ def result(chance: random.Random, folder: Path) -> int:
         content = content[: -whole_files.LENGTH]
     path.write_bytes(damaged(content, chance))
     command = chance.choice(["figure", "show", "cite", "report"])
-    with mock.patch("spinlev.studies.catalogue.drawings.save_figures", return_value=[]):
+    with mock.patch("spinlev.studies.catalogue.runner.save_figures", return_value=[]):
         return answered([command, str(path.parent if command == "report" else path), "--out", str(folder / "out")])
 
 
@@ -559,7 +561,7 @@ class Explored:
     """Bytes that they may take together."""
 
     def __init__(self, folder: Path) -> None:
-        start = "import sys; from spinlev.studies.command_line.start import main; sys.argv[0] = 'spinlev'; main()"
+        start = "import sys; from spinlev.studies.cli.start import main; sys.argv[0] = 'spinlev'; main()"
         command = [sys.executable, "-P", "-c", start, "explore", str(SCENES[0]), "--no-browser"]
         self.log, self.peak = folder / "explore.log", 0
         with self.log.open("wb") as log:

@@ -11,8 +11,8 @@ import numpy as np
 from equilibria_scene import BELOW, rows, scenes
 from said import measure, say
 
-from spinlev.dynamics.equilibria import find_equilibria
-from spinlev.fem.rotor_tables import rotor_table
+from spinlev.dynamics.equilibria.search import find_equilibria
+from spinlev.fem.rotor.choice import rotor_table
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 from peers import magpylib_rotor, scipy_equilibria, scipy_equilibrium

@@ -9,7 +9,7 @@ import numpy as np
 from problems import CUBES, EDGE, RECOIL, REMANENCE, points_below, turned
 from said import measure, say
 
-from spinlev.fem.rotor_tables import rotor_table
+from spinlev.fem.rotor.choice import rotor_table
 from spinlev.geometry import Box, Magnet, tilt
 
 case, rtol = sys.argv[1], float(sys.argv[2])

@@ -5,7 +5,7 @@ from pathlib import Path
 from growth import useful
 from matplotlib.ticker import NullFormatter
 
-from spinlev.studies.results import legend_below, panels, save_figure, styled
+from spinlev.studies.figures.style import legend_below, panels, save_figure, styled
 
 PICTURES = Path("docs/pictures")
 MARKERS = "osD^vP*X"

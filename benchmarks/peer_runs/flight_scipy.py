@@ -8,7 +8,7 @@ from flight_scene import SCENE
 from problems import start_of_flight
 from said import measure, say
 
-from spinlev.dynamics.motion import State
+from spinlev.dynamics.motion.state import State
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 from peer_flight import fly

@@ -7,10 +7,10 @@ from flight_scene import SCENE
 from problems import start_of_flight
 from said import measure, say
 
-from spinlev.dynamics.flights.compiled_flight import compile_flight
-from spinlev.dynamics.flights.integration import integrate
-from spinlev.dynamics.motion import State
-from spinlev.fem.rotor_tables import rotor_table
+from spinlev.dynamics.flights.compiled import compile_flight
+from spinlev.dynamics.flights.flight import integrate
+from spinlev.dynamics.motion.state import State
+from spinlev.fem.rotor.choice import rotor_table
 
 case, tolerance = sys.argv[1], float(sys.argv[2])
 start = State(*start_of_flight(case))

@@ -10,8 +10,8 @@ import numpy as np
 from problems import EDGE, RECOIL, REMANENCE, SPHERE, SPHERE_AXIS, SPHERE_CENTER
 from said import measure, say
 
-from spinlev.fem.mutual import rotor_ladder, two_body
-from spinlev.fem.rotor_tables import rotor_table
+from spinlev.fem.mutual.response import rotor_ladder, two_body
+from spinlev.fem.rotor.choice import rotor_table
 from spinlev.geometry import Box, Floater, Magnet
 
 case = sys.argv[1]

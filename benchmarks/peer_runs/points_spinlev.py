@@ -7,7 +7,7 @@ import numpy as np
 from problems import COMPARED, EDGE, REMANENCE, points_around
 from said import measure, say
 
-from spinlev.fem.rotor_tables import rotor_table
+from spinlev.fem.rotor.choice import rotor_table
 from spinlev.geometry import Box, Magnet
 
 points = points_around()

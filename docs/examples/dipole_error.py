@@ -13,7 +13,7 @@ from importlib.resources import files
 import numpy as np
 
 from spinlev import load_scene, rotor_table
-from spinlev.studies.results import panels
+from spinlev.studies.figures.style import panels
 
 scene = load_scene(files("spinlev.scenes") / "horizontal.toml")
 distance = np.linspace(13e-3, 60e-3, 95)  # m, below the cube's centre

@@ -14,7 +14,7 @@ from importlib.resources import files
 import numpy as np
 
 from spinlev import load_scene, parse_scene, rotor_table
-from spinlev.studies.results import panels
+from spinlev.studies.figures.style import panels
 
 text = load_scene(files("spinlev.scenes") / "horizontal.toml").text
 place = np.array([[0.0, 0.0, -0.02]])  # m

@@ -14,8 +14,8 @@ from importlib.resources import files
 import numpy as np
 
 from spinlev import draw, load_scene, rotor_table, simulate
-from spinlev.dynamics.equilibria import find_equilibria
-from spinlev.geometry.scenes import AbsoluteStart
+from spinlev.dynamics.equilibria.search import find_equilibria
+from spinlev.geometry.scene.contents import AbsoluteStart
 
 scene = replace(load_scene(files("spinlev.scenes") / "horizontal.toml"), plate=None)
 rest = find_equilibria(scene, rotor_table(scene, "cuboid"))[0]

@@ -16,9 +16,9 @@ import heyoka as hy
 import numpy as np
 
 from spinlev import load_scene, rotor_table
-from spinlev.dynamics.equilibria import find_equilibria
-from spinlev.fem.harmonics import CompiledField
-from spinlev.studies.results import panels
+from spinlev.dynamics.equilibria.search import find_equilibria
+from spinlev.fem.harmonics.expressions import CompiledField
+from spinlev.studies.figures.style import panels
 
 
 class ChargeTable:

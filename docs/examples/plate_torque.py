@@ -15,8 +15,8 @@ from importlib.resources import files
 import numpy as np
 
 from spinlev import load_scene
-from spinlev.fem.slab import Slab, reaction_tensor
-from spinlev.studies.results import panels
+from spinlev.fem.plate.slab import Slab, reaction_tensor
+from spinlev.studies.figures.style import panels
 
 moment = load_scene(files("spinlev.scenes") / "horizontal.toml").floater.moment * np.sin(
     np.radians(5.0)

@@ -14,7 +14,7 @@ from importlib.resources import files
 import numpy as np
 
 from spinlev import load_scene, stability
-from spinlev.studies.results import panels
+from spinlev.studies.figures.style import panels
 
 scene = load_scene(files("spinlev.scenes") / "tilt-over-plate.toml")
 bare = stability(scene, model="cuboid", plate_model="none")

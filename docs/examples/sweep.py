@@ -14,7 +14,7 @@ from importlib.resources import files
 import xarray as xr
 
 from spinlev import equilibria, load_scene, parse_scene
-from spinlev.studies.results import panels
+from spinlev.studies.figures.style import panels
 
 text = load_scene(files("spinlev.scenes") / "horizontal.toml").text
 fixed = {"rotor.displacement_mm": 1.7, "rotor.recoil_permeability": 1.0, "floater.recoil_permeability": 1.0}

@@ -1,25 +1,92 @@
-"""An averaged flight along a branch of equilibria whose body spin drifts.
+"""What moves the body spin: torques along the floater's own moment, on which magnetic torque has no part.
 
-With arc length ℓ along the branch and ds/dt = a(ℓ), the flight is the solution of
-
-    dℓ/dτ = a,     dt/dτ = ds/dℓ,
-
-which is smooth at a fold (ds/dℓ = 0, reached in a finite time) and at a balance (a = 0, reached for t → ∞).
-
-The floater does not notice the fold at once.  Near it the slow mode obeys ẍ = αt + βx², the first equation of Painlevé,
-whose solution on the branch escapes at t = 3.40922 (αβ)^(-1/5); the mode's frequency tells αβ: Ω⁴ = 4αβ (-t).
+That of air goes beyond Stokes' range (`effects.air`): 8πηR³Ω times f for a steady spin, times h for a small swing.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
+from typing import Self
 
 import numpy as np
 from scipy.integrate import solve_ivp
 from scipy.interpolate import CubicHermiteSpline, CubicSpline, PchipInterpolator
 
-from ...geometry.basics import Array
-from ..branches import FOLD, BranchPoint
-from .slow_torque import SlowTorque
+from ...fem.rotor.table import FieldTable
+from ...geometry.common import Array
+from ...geometry.scene.contents import Scene
+from ..equilibria.equilibrium import FOLD, Equilibrium, EquilibriumError
+from ..equilibria.path import Steps
+from ..equilibria.search import find_equilibria
+from ..motion.air_and_shape import reynolds, spinning, swinging
+from ..motion.effects import with_effects
+from ..motion.equations import parameters
+from ..motion.events import rotor_gap
+from ..motion.rates import Rates
+from ..motion.state import Parameter, Scales, State
+from .engine import BranchPoint, Family, follow_branch, spins
+from .frequencies import HIGHEST, LONG_STEPS, LOWEST, by_frequency
+
+
+@dataclass(frozen=True, eq=False)
+class SlowTorque:
+    """Rate of the body spin at rest in the rotor's frame: air drag, and own eddy currents towards cos θ.
+
+    In this frame nothing changes within a turn, so that the average over it is the value itself:
+
+        ds/dt = -(γ/I) [f s_z cos θ + h (s - s_z cos θ)] + κ B⊥² (cos θ - s) / I,   B⊥² = B² - (m̂·B)²,
+
+    with γ and κ those of `motion.equations`, which are compiled and evaluated here.  Seen from the laboratory the
+    floater spins steadily about the rotor's axis, at s_z ω = (sin²θ + s cos θ) ω, and swings across it once a turn; f
+    and h are the factors of the air for these two.  Where f = h = 1, Stokes, drag is -γ s / I.  As h > f, the
+    swing, which the rotor keeps up, drives s to a small positive value instead of zero, about (h/f - 1) sin²θ.  To
+    second order in θ the swing also drives a steady flow, but none about the axis: the mean of a × (a × r) over a turn,
+    with a the turning rate of a shell of air, has no such part.
+
+    The field's gradient adds to κ as in `effects.floater_currents`, which is compiled and evaluated here: that of a
+    dipole at distance d, which turns across its way, (12/7) (R/d)² of it on a small θ, 8 % at 30 mm.  A plating of
+    copper and nickel, t thick, adds 5 σ't/(σR) to 1: a half for 5 µm of each of Ni, Cu and Ni.
+
+    Parameters
+    ----------
+    rates : compiled equations
+    values : their parameters, all slow torques included
+    radius : of the floater, m
+    beyond_stokes : whether drag goes beyond Stokes' here, as it does not in the compiled equations
+    """
+
+    rates: Rates
+    values: Array
+    radius: float
+    beyond_stokes: bool
+
+    @classmethod
+    def of(cls, scene: Scene, rates: Rates, stokes: bool = False) -> Self:
+        """The slow torques of a scene. Raises InputError for a floater that is no sphere."""
+        scene.floater.must_be("sphere", where="for its slow drift", instead="Fly it (`simulate`).")
+        return cls(rates, parameters(scene, Scales.of(scene)), scene.floater.radius, not (stokes or scene.drag.air))
+
+    @property
+    def absent(self) -> bool:
+        """Whether nothing moves the spin."""
+        return not np.any(self.values[[Parameter.SPIN_DRAG, Parameter.SPIN_EDDY]])
+
+    def __call__(self, state: Array) -> float:
+        """ds/dt, 1/s, at a scaled state (12,) at rest in the rotor's frame."""
+        moment, spin = state[6:9], state[9:]
+        change = self.rates(state[None], self.values)[0][0]
+        rate = change[9:] @ moment + spin @ change[6:9]
+        if self.beyond_stokes:
+            rate -= self.values[Parameter.SPIN_DRAG] * self._beyond_stokes(moment, spin)
+        return float(rate / self.values[Parameter.RATE] / self.values[Parameter.TIME])
+
+    def _beyond_stokes(self, moment: Array, spin: Array) -> float:
+        """Scaled spin about the moment, each part times what its drag is more than Stokes'."""
+        time, turning = self.values[Parameter.TIME], self.values[Parameter.RATE]
+        steady = float(spin[2] * moment[2])
+        more_steady = float(spinning(reynolds(self.radius, spin[2] / time))) - 1
+        more_swing = float(swinging(reynolds(self.radius, turning / time))) - 1
+        return more_steady * steady + more_swing * float(spin @ moment - steady)
+
 
 BALANCE, DURATION, INSTABILITY, CONTACT = "balance", "duration", "instability", "contact"
 SETTLED = 1e-3
@@ -133,3 +200,161 @@ def _escape(points: list[BranchPoint], arc: Array, bend: float) -> float:
     slowest = float(points[before].motion.angular_frequencies[0]) / points[before].time_unit
     remaining = abs(bend) / 2 * (arc[-1] - arc[before]) ** 2
     return float(ESCAPE * (4 * remaining / slowest**4) ** 0.2)
+
+
+def drift(
+    scene: Scene,
+    table: FieldTable,
+    spin: float = 0.0,
+    duration: float = 250.0,
+    rates: Rates | None = None,
+    start: State | None = None,
+    stokes: bool = False,
+    e_folds: float = E_FOLDS,
+) -> Drift:
+    """Follow the stable equilibrium of a scene while its body spin drifts.
+
+    Parameters
+    ----------
+    scene : its drag and the floater's conductivity are the slow torques; its plate is left out
+    table : the rotor's field
+    spin : body spin at the start
+    duration : at most, s; may be infinite where there is a slow torque
+    rates : `Rates` of the same table, to compile them once for many scenes
+    start : the equilibrium at `spin`, if it is known; else the one at which small motions grow the slowest
+    stokes : drag proportional to spin unless the scene's drag is that of real air, as in `simulate`
+    e_folds : growth of a small motion after which it has ended the flight
+
+    Raises
+    ------
+    EquilibriumError : no equilibrium at the start
+    """
+    rates = rates or Rates(with_effects(scene, table))
+    torque = SlowTorque.of(scene, rates, stokes)
+    family = Family(rates, spins(scene))
+    state = Scales.of(scene).pack(start or _start(scene, table, spin, rates).state)
+    if torque.absent:
+        return steady(family.point(state[:3], state[6:9], spin), duration, e_folds)
+    towards = spin + np.copysign(3.0, torque(state))
+
+    def over(point: BranchPoint) -> bool:
+        return point.kind == FOLD or torque(point.state) * (towards - spin) <= 0 or rotor_gap(scene, point.position) < 0
+
+    points = follow_branch(family, state, spin, towards, Steps(longest=0.03, turn=0.05), over)
+    fold = next((k for k, point in enumerate(points) if point.kind == FOLD), None)
+    if fold is not None:
+        return flown(torque, points[: fold + 1], duration, FOLD, e_folds)
+    return flown(torque, points, duration, CONTACT if rotor_gap(scene, points[-1].position) < 0 else BALANCE, e_folds)
+
+
+def _start(scene: Scene, table: FieldTable, spin: float, rates: Rates) -> Equilibrium:
+    """The equilibrium at which small motions grow the slowest."""
+    known = find_equilibria(scene, table, spin, rates=rates)
+    if not known:
+        raise EquilibriumError(f"At {scene.frequency:g} Hz the floater has no equilibrium with body spin {spin:g}.")
+    return min(known, key=lambda equilibrium: equilibrium.growth_per_s)
+
+
+BORDER = "border"
+"""The end of what was looked at, where flights still last."""
+POINTS = 16
+"""Frequencies along the branch at which flights are tried first: what lasts only between two of them is missed."""
+
+
+@dataclass(frozen=True)
+class Lasting:
+    """The lowest interval of frequencies in which averaged flights last.
+
+    Parameters
+    ----------
+    low, high : Hz; NaN where none lasts
+    ended_by : what ends flights above `high`, see `averaged.Drift`; or "border" of what was looked at; "" without one
+    growth_per_s : largest growth of a small motion during the flight at `high`
+    """
+
+    low: float = np.nan
+    high: float = np.nan
+    ended_by: str = ""
+    growth_per_s: float = np.nan
+
+
+def lasting_frequencies(
+    scene: Scene,
+    table: FieldTable,
+    rates: Rates,
+    start: Array,
+    frequency: float,
+    duration: float = 250.0,
+    e_folds: float = E_FOLDS,
+    resolution: float = 0.5,
+) -> Lasting:
+    """Where a floater that is let go with body spin 0 stays up, by its averaged flights along a branch of equilibria.
+
+    A flight is over where a small motion has grown by `e_folds`: seven are 3 µm, what is left of a launch over a plate,
+    to 3 mm.  Growth is added up along the drift of the body spin, see `averaged`.
+
+    Parameters
+    ----------
+    table, rates : of all effects that shall take part
+    start : scaled state (12,) of an equilibrium of the branch at `frequency` (Hz)
+    duration : s
+    resolution : of the two ends, Hz
+    """
+    flights = _Flights(scene, table, rates, duration, e_folds, _branch(scene, rates, start, frequency))
+    ends = flights.known[0].parameter, flights.known[-1].parameter
+    grid = [float(at) for at in np.linspace(*ends, POINTS + 2)[1:-1]]
+    first = next((at for at in grid if not flights.ended(at)[0]), None)
+    if first is None:
+        return Lasting()
+    low = flights.edge(first, max((at for at in grid if at < first), default=ends[0]), resolution)[0]
+    gone = next((at for at in grid if at > first and flights.ended(at)[0]), None)
+    last = max(at for at in grid if gone is None or at < gone)
+    if gone is None:
+        return Lasting(low, ends[1], BORDER, flights.ended(last)[1])
+    high, lost = flights.edge(last, gone, resolution)
+    return Lasting(low, high, flights.ended(lost)[0], flights.ended(high)[1])
+
+
+@dataclass(frozen=True, eq=False)
+class _Flights:
+    """Averaged flights from the equilibria of a branch, of which some are `known`, by ascending frequency."""
+
+    scene: Scene
+    table: FieldTable
+    rates: Rates
+    duration: float
+    e_folds: float
+    known: list[BranchPoint]
+    flown: dict[float, tuple[str, float]] = field(default_factory=dict)
+
+    def ended(self, frequency: float) -> tuple[str, float]:
+        """What ends the flight at a frequency (Hz), "" if it lasts; and the largest growth in it, 1/s."""
+        if frequency not in self.flown:
+            near = min(self.known, key=lambda point: abs(point.parameter - frequency))
+            family, there = by_frequency(self.scene, self.rates), replace(self.scene, frequency=frequency)
+            point = follow_branch(family, near.state, near.parameter, frequency, LONG_STEPS, tolerated=np.inf)[-1]
+            state = Scales.of(there).unpack(point.state)
+            flight = drift(there, self.table, 0.0, self.duration, self.rates, state, False, self.e_folds)
+            lasts = flight.ended_by in (BALANCE, DURATION) or flight.levitated_s >= self.duration
+            self.flown[frequency] = "" if lasts else flight.ended_by, float(flight.growth_per_s.max())
+        return self.flown[frequency]
+
+    def edge(self, kept: float, gone: float, resolution: float) -> tuple[float, float]:
+        """Between a frequency at which the flight lasts and one at which it does not: the two, nearer to each other."""
+        while abs(gone - kept) > resolution:
+            middle = (kept + gone) / 2
+            kept, gone = (kept, middle) if self.ended(middle)[0] else (middle, gone)
+        return kept, gone
+
+
+def _branch(scene: Scene, rates: Rates, start: Array, frequency: float) -> list[BranchPoint]:
+    """The branch of equilibria by ascending frequency, to its fold or contact, or the border of what is looked at."""
+
+    def over(point: BranchPoint) -> bool:
+        return point.kind == FOLD or rotor_gap(scene, point.position) < 0
+
+    family, sides = by_frequency(scene, rates), []
+    for border in (LOWEST, HIGHEST):
+        points = follow_branch(family, start, frequency, border, LONG_STEPS, over, np.inf)
+        sides.append(points[: next((k for k, point in enumerate(points) if over(point)), len(points))])
+    return [*sides[0][:0:-1], *sides[1]]

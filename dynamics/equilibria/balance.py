@@ -12,8 +12,9 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from ...geometry.basics import Array
-from ..motion import Parameter, Rates
+from ...geometry.common import Array
+from ..motion.rates import Rates
+from ..motion.state import Parameter
 
 Indices = NDArray[np.intp]
 LATERAL: Indices = np.array([0, 1, 3, 4])

@@ -1,15 +1,20 @@
 """Where equilibria are looked for, from what starts, and Newton's method from all of these at once."""
 
+from __future__ import annotations
+
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import product
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
 
-from ...geometry.basics import Array, Watch, unwatched
-from ...geometry.scenes import Scene
-from ..steady import Balance, Indices, solve
+from ...geometry.common import Array, Watch, unwatched
+from ...geometry.scene.contents import Scene
+from .balance import AXIAL, EVERY, LATERAL, Balance, Indices, solve
+from .path import AtRest, Steps, whole_curves
 
 THINNED = 8
 """One of so many starts is tried in the whole balance too where there is a rough one."""
@@ -163,3 +168,131 @@ def from_starts(balance: Balance, where: SearchRange, free: Indices, every: int 
     position, moment = (part[::every] for part in where.starts())
     search = Search(lambda _: balance, lambda _, position, margin: where.holds(position, margin), free, watch=watch)
     return search.solutions(np.zeros(len(position), int), position, moment)[1]
+
+
+STEPS = Steps(longest=0.1, shortest=1e-6, turn=0.15, most=5000, first=1 / 4, far=3.0)
+TOGETHER = 8
+"""Curves that are followed at once."""
+
+
+@dataclass(frozen=True, eq=False)
+class Curve:
+    """Points of one curve, in scaled units.
+
+    Parameters
+    ----------
+    arc : (n,) length along the curve
+    position, moment : (n, 3)
+    tangent : (n, 6) unit direction of the curve: position and moment
+    force : (n,) axial force that is left over, gravity included
+    slope : (n,) its derivative along the curve
+    """
+
+    arc: Array
+    position: Array
+    moment: Array
+    tangent: Array
+    force: Array
+    slope: Array
+
+    def passes(self, point: Array) -> bool:
+        """Whether the curve goes through a point (6,), judged by cubic interpolation at the point's own height."""
+        crossings = self._height.solve(point[2], extrapolate=False)
+        apart = self._spline(crossings[np.isfinite(crossings)]) - point
+        return bool(np.min(np.linalg.norm(apart, axis=1), initial=np.inf) < 1e-3)
+
+    def balanced(self) -> tuple[Array, Array]:
+        """Estimates (k, 3) of positions and moments where the axial force vanishes as well."""
+        crossings = scipy.interpolate.CubicHermiteSpline(self.arc, self.force, self.slope).roots(extrapolate=False)
+        points = self._spline(crossings[np.isfinite(crossings)])
+        moment = points[:, 3:]
+        return points[:, :3], moment / np.linalg.norm(moment, axis=1, keepdims=True)
+
+    @cached_property
+    def _spline(self) -> scipy.interpolate.CubicHermiteSpline:
+        return scipy.interpolate.CubicHermiteSpline(
+            self.arc, np.concatenate([self.position, self.moment], axis=1), self.tangent
+        )
+
+    @cached_property
+    def _height(self) -> scipy.interpolate.CubicHermiteSpline:
+        return scipy.interpolate.CubicHermiteSpline(self.arc, self.position[:, 2], self.tangent[:, 2])
+
+
+@dataclass(frozen=True, eq=False)
+class Lateral(AtRest):
+    """Everything but the axial force, as equations of a curve."""
+
+    balance: Balance
+
+    def linear(self, points: Array, which: Indices) -> tuple[Array, Array]:
+        """Four balances and |m̂| = 1 (n, 5) at positions and moments (n, 6), and their derivatives (n, 5, 6)."""
+        value, slope = self.balance(points[:, :3], points[:, 3:])
+        return self.extended(value[:, LATERAL], slope[:, LATERAL], points[:, 3:])
+
+
+def curves_through(balance: Balance, points: Array, where: SearchRange) -> list[Curve | None]:
+    """The curves through points (n, 6), both ways, until they leave the range or close.
+
+    None where four balances do not fix a curve (a field of revolution about the axis).
+    """
+    found = whole_curves(Lateral(balance), points, STEPS, lambda points: where.holds(points[:, :3]))
+    return [None if one is None or len(one[0]) < 2 else _curve(balance, *one) for one in found]
+
+
+def _curve(balance: Balance, points: Array, tangents: Array) -> Curve:
+    value, slope = balance(points[:, :3], points[:, 3:])
+    slope = AtRest.extended(value, slope, points[:, 3:])[1][:, AXIAL]
+    chords = np.linalg.norm(np.diff(points, axis=0), axis=1)
+    arc, along = np.append(0.0, np.cumsum(chords)), np.sum(slope * tangents, axis=1)
+    return Curve(arc, points[:, :3], points[:, 3:], tangents, value[:, AXIAL], along)
+
+
+def all_curves(balance: Balance, where: SearchRange, watch: Watch = unwatched) -> list[Curve]:
+    """Every curve that is met in the range, from its starts at their own heights."""
+    seeds = from_starts(balance, where, LATERAL, watch=watch)
+    curves: list[Curve] = []
+    count = len(seeds)
+    while len(seeds):
+        watch("curves of balance", 1 - len(seeds) / count)
+        # What is at one height lies on different curves, or on both sides of a fold.
+        heights, number = np.unique(np.round(seeds[:, 2], 6), return_counts=True)
+        chosen = np.abs(seeds[:, 2] - heights[np.argmax(number)]) < 1e-5
+        chosen &= np.cumsum(chosen) <= TOGETHER
+        for seed, curve in zip(seeds[chosen], curves_through(balance, seeds[chosen], where), strict=True):
+            if curve is not None and not any(known.passes(seed) for known in curves):
+                curves.append(curve)
+        seeds = np.array([seed for seed in seeds[~chosen] if not any(curve.passes(seed) for curve in curves)])
+    return curves
+
+
+SPARE = 3
+"""One of so many starts is tried for what lies on none of the curves: a test of 90 scenes finds no such equilibrium."""
+
+
+def fixed_points(
+    balance: Balance, where: SearchRange, watch: Watch = unwatched
+) -> tuple[list[Curve], list[tuple[Array, Array]]]:
+    """Curves of lateral balance in the range, and the scaled positions and moments of the equilibria on them."""
+    curves = all_curves(balance, where, watch)
+    guesses = [*(curve.balanced() for curve in curves), scattered(balance, where, SPARE, watch)]
+    position, moment = (np.concatenate(part) for part in zip(*guesses, strict=True))
+    return curves, [(r, m) for r, m in _polished(balance, position, moment) if r in where]
+
+
+def scattered(balance: Balance, where: SearchRange, every: int = 1, watch: Watch = unwatched) -> tuple[Array, Array]:
+    """What Newton's method in all unknowns finds from one of so many starts: short curves may pass between them."""
+    points = from_starts(balance, where, EVERY, every, watch)
+    return points[:, :3], points[:, 3:]
+
+
+def _polished(balance: Balance, position: Array, moment: Array) -> list[tuple[Array, Array]]:
+    """Distinct zeros of all five balances near the guesses (n, 3), to round-off."""
+    if not len(position):
+        return []
+    position, moment, step = solve(balance, position, moment, EVERY)
+    points: list[tuple[Array, Array]] = []
+    for r, m, size in zip(position, moment, step, strict=True):
+        if size < 1e-8 and not any(np.linalg.norm(r - q) + np.linalg.norm(m - n) < 1e-6 for q, n in points):
+            points.append((r, m))
+    return points

@@ -7,10 +7,10 @@ from functools import cached_property
 
 import numpy as np
 
-from ...geometry.basics import Array, ComputationError, html_table, millimetres
-from ..motion import State
-from .harmonic_balance import resampled
-from .stability import Mode
+from ...geometry.common import Array, ComputationError, html_table, millimetres
+from ..motion.state import State
+from .modes import Mode
+from .orbits import resampled
 
 INSTANTS = 129
 """Of a turn, at which quantities in the laboratory are looked at; odd."""

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...geometry.basics import Array
+from ...geometry.common import Array
 from .balance import tangent_basis
 
 SIDE, TILT = ("side, backward", "side, forward"), ("precession", "nutation")

@@ -6,28 +6,17 @@ from typing import ClassVar
 
 import numpy as np
 
-from ...geometry.basics import Array
-from ...geometry.scenes import Scene
-from ..motion import Parameter, PlateForce, PlateMemory, Rates, Scales, State, clearance
-from ..steady import (
-    FOLD,
-    IN_PLATE,
-    IN_ROTOR,
-    NOT_CONVERGED,
-    PAST_TABLE,
-    Equilibrium,
-    Indices,
-    LeftOut,
-    Orbit,
-    OrbitProblem,
-    conserved,
-    floquet_modes,
-    named_modes,
-    orbit_near,
-    periodic_orbit,
-    resampled,
-)
-from .continuation import DIFFERENCE, END, ON, Steps, directions, follow
+from ...geometry.common import Array
+from ...geometry.scene.contents import Scene
+from ..motion.events import clearance
+from ..motion.plate import PlateForce, PlateMemory
+from ..motion.rates import Rates
+from ..motion.state import Parameter, Scales, State
+from .balance import Indices
+from .equilibrium import FOLD, IN_PLATE, IN_ROTOR, NOT_CONVERGED, PAST_TABLE, Equilibrium, LeftOut
+from .modes import named_modes
+from .orbits import Orbit, OrbitProblem, conserved, floquet_modes, orbit_near, periodic_orbit, resampled
+from .path import DIFFERENCE, END, ON, Steps, directions, follow
 
 SMALLEST_STEP = 1 / 64
 """Of the way from no plate and gravity along the axis to the whole plate and the true gravity."""

@@ -6,12 +6,25 @@ from typing import Self
 
 import numpy as np
 
-from ...fem.rotor_tables import FieldTable
-from ...geometry.basics import Array
-from ...geometry.scenes import Scene
-from ..effects import with_effects
-from ..motion import Rates, Scales, parameters
-from ..steady import Balance, moved_pose, solve, tangent_basis
+from ...fem.harmonics.interior import Ball
+from ...fem.harmonics.local import BallField
+from ...fem.mutual.table import MutualTable
+from ...fem.rotor.table import FieldTable
+from ...fem.rotor_metal import RotorLosses
+from ...geometry.common import Array
+from ...geometry.scene.contents import Scene
+from ..motion.effect import Interaction
+from ..motion.effects import with_effects
+from ..motion.equations import parameters
+from ..motion.floater_currents import FloaterCurrents
+from ..motion.mutual import Mutual, rough_force
+from ..motion.plate import PlateForce, PlateMemory
+from ..motion.rates import Rates
+from ..motion.rotor_losses import brake_slope
+from ..motion.state import Parameter, Scales, State
+from .balance import EVERY, Balance, moved_pose, solve, tangent_basis
+from .equilibrium import Equilibrium
+from .modes import left_eigenvectors, tangent_spaces
 
 Extra = Callable[[Array, Array], tuple[Array, Array]]
 """Position (3,) m and moment direction (3,) -> additional force (3,) N and torque (3,) N m, rotor's frame."""
@@ -107,3 +120,150 @@ class PerturbedBalance:
         value[:3] += force * square / (floater.mass * self.scales.length)
         value[3:] += tangent_basis(moment[None])[0] @ torque * square / floater.inertia
         return np.asarray(value)
+
+
+@dataclass(frozen=True, eq=False)
+class PlateAction:
+    """Means over a turn, along the laboratory's axes.
+
+    Parameters
+    ----------
+    force : (3,) N
+    torque : (3,) N m
+    loss : heat in the plate, W
+    """
+
+    force: Array
+    torque: Array
+    loss: float
+
+
+def plate_action(scene: Scene, memory: PlateMemory, equilibrium: Equilibrium) -> PlateAction:
+    """The plate's mean force, torque and loss in a synchronous equilibrium that feels it.
+
+    Raises
+    ------
+    ValueError : the equilibrium was found without the plate's currents
+    """
+    if equilibrium.turn is None or equilibrium.currents is None:
+        raise ValueError("Input equilibrium must have been found with the plate's currents; instead received none.")
+    scales, floater = Scales.of(scene), scene.floater
+    force = PlateForce(memory, parameters(scene, scales, frozen_spin=True))
+    count = len(equilibrium.currents)
+    times = 2 * np.pi * np.arange(count) / count
+    heard = force(times, scales.pack(equilibrium.turn))
+    root_energy = np.sqrt(floater.mass) * scales.length / scales.time
+    currents = equilibrium.currents / root_energy - heard.signals
+    push = np.einsum("aix,ai->ax", heard.fields, currents)
+    units = floater.mass * scales.length / scales.time**2, floater.inertia / scales.time**2
+    lab = State(push[:, :3] * units[0], push[:, :3], push[:, 3:] * units[1], push[:, 3:]).to_lab(times)
+    loss = np.einsum("ai,i,ai->a", currents, memory.table.rates, currents).mean() * root_energy**2
+    return PlateAction(lab.position.mean(axis=0), lab.moment.mean(axis=0), float(loss))
+
+
+EXACT_SLOPES = 4
+"""Degree of a potential that has all derivatives which the slopes of the floater's currents ask for."""
+AROUND = 1 / 32
+"""Radius of the ball of that expansion, in radii of the floater."""
+
+
+def shift_by_answers(scene: Scene, table: FieldTable, equilibrium: Equilibrium, answers: MutualTable | None) -> float:
+    """How far mutual magnetisation moves an equilibrium, m; without its table to a factor of two."""
+    fixed = equilibrium.without or equilibrium
+    place, moment = fixed.position[None], fixed.state.moment[None]
+    if answers is None:
+        force, torque = rough_force(scene.rotor, scene.floater, table, place[0], moment[0]), np.zeros(3)
+    else:
+        effect = Mutual(answers, scene.floater.moment)
+        force, torque = (part[0] for part in effect.wrench(place, moment, *table.evaluate(place)))
+    scales = Scales.of(scene)
+    units = scales.time**2 / np.array([scene.floater.mass * scales.length, scene.floater.inertia])
+    pushed = np.concatenate([force * units[0], tangent_basis(moment)[0] @ torque * units[1]])
+    return float(np.linalg.norm(np.linalg.solve(fixed.slope, pushed)[:3]) * scales.length)
+
+
+def growth_by_floater(scene: Scene, table: FieldTable, equilibrium: Equilibrium, included: bool) -> float:
+    """What the floater's own currents add to the growth of the mode that grows fastest with them, 1/s.
+
+    `included`: whether the motion of the equilibrium had them.
+    """
+    fixed = equilibrium.without or equilibrium
+    return _growth(scene, fixed, floater_slope(scene, table, fixed.state), included)
+
+
+def growth_by_rotor(scene: Scene, equilibrium: Equilibrium, losses: RotorLosses, included: bool) -> float:
+    """What losses in the rotor add to the growth of the mode that grows fastest with them, 1/s; see above."""
+    fixed = equilibrium.without or equilibrium
+    return _growth(scene, fixed, brake_slope(losses, scene, fixed.state), included)
+
+
+def _growth(scene: Scene, fixed: Equilibrium, brake: Array, included: bool) -> float:
+    """What a part (12, 12) of the Jacobian, which it has or has not, adds to the growth, 1/s.
+
+    To first order, of the mode that grows fastest with it: the fastest one without it may be another mode, and the
+    difference of their growth rates is no effect.
+    """
+    scales = Scales.of(scene)
+    tangents, projections = (found[0] for found in tangent_spaces(scales.pack(fixed.state)[None]))
+    whole = fixed.jacobian if included else fixed.jacobian + brake
+    values, right = np.linalg.eig(projections @ whole @ tangents)
+    leading = int(np.argmax(values.real))
+    added = left_eigenvectors(right)[leading] @ (projections @ brake @ tangents) @ right[:, leading]
+    return float(added.real) / scales.time
+
+
+def floater_slope(scene: Scene, table: FieldTable, state: State) -> Array:
+    """(12, 12): what the floater's currents add to the derivatives of the scaled rates at a state.
+
+    In the field's expansion about the place, whose derivatives there are the field's, code is compiled in a tenth
+    of the time that the table's own expressions take.
+    """
+    formula = BallField(len(Parameter), EXACT_SLOPES)
+    numbers, _ = formula.fit(table.evaluate, Ball(state.position, AROUND * scene.floater.radius))
+    scales = Scales.of(scene)
+    values = np.concatenate([parameters(scene, scales, frozen_spin=True), numbers])
+    still = values.copy()
+    still[Parameter.TILT_EDDY] = 0.0
+    rates = Rates(Interaction(formula, (FloaterCurrents(),)))
+    slopes = [rates(scales.pack(state)[None], each)[1][0] for each in (values, still)]
+    return np.asarray(slopes[0] - slopes[1])
+
+
+JUMP = 0.3
+"""An equilibrium that moves farther in one step (radii and rad together) may be another one."""
+PARTS = (1, 4, 16)
+"""Steps in which the way to a scene is tried."""
+APART = 1e-6
+"""Equilibria nearer than this are one."""
+
+
+def carried(start: Balance, end: Balance, position: Array, moment: Array) -> Array | None:
+    """Scaled positions and moments (n, 6) at the end of the way; None where they cannot be followed.
+
+    Parameters
+    ----------
+    start, end : one scene each, with the same equations and other parameters
+    position, moment : (n, 3) scaled, the equilibria at the start
+    """
+    if not len(position):
+        return np.zeros((0, 6))
+    for parts in PARTS:
+        places, turned, good = position, moment, True
+        for way in np.arange(1, parts + 1) / parts:
+            values = start.values + way * (end.values - start.values)
+            balance = Balance(end.rates, values, start.spin + way * (end.spin - start.spin))
+            arrived, direction, size = solve(balance, places, turned, EVERY, 12)
+            step = np.linalg.norm(np.concatenate([arrived - places, direction - turned], axis=1), axis=1)
+            good = bool((size < 1e-8).all() and (step < JUMP).all())
+            if not good:
+                break
+            places, turned = arrived, direction
+        points = np.concatenate([places, turned], axis=1)
+        if good and _all_apart(points):
+            return points
+    return None
+
+
+def _all_apart(points: Array) -> bool:
+    apart = np.linalg.norm(points[:, None] - points[None], axis=2) + np.eye(len(points))
+    return bool((apart > APART).all())

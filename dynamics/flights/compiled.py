@@ -8,25 +8,16 @@ from time import perf_counter
 import heyoka as hy
 import numpy as np
 
-from ...fem.rotor_tables import FieldTable
-from ...fem.storage import compiled
-from ...geometry.basics import Array
-from ...geometry.scenes import Scene
-from ..effects import with_effects
-from ..local_plates import Reduction, WholePlate
-from ..motion import (
-    Equations,
-    Parameter,
-    PlateFormula,
-    PlateMemory,
-    Scales,
-    State,
-    equations_of_motion,
-    flight_events,
-    parameters,
-    plate_depth,
-    range_events,
-)
+from ...fem.compiled_code import compiled
+from ...fem.rotor.table import FieldTable
+from ...geometry.common import Array
+from ...geometry.scene.contents import Scene
+from ..motion.effects import with_effects
+from ..motion.equations import Equations, equations_of_motion, parameters
+from ..motion.events import flight_events, plate_depth, range_events
+from ..motion.plate import PlateFormula, PlateMemory
+from ..motion.state import Parameter, Scales, State
+from .plate_formula import Reduction, WholePlate
 from .trajectory import FieldChanges
 
 TOLERANCE = 1e-16

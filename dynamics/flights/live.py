@@ -5,18 +5,17 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ...fem.rotor_tables import FieldTable
-from ...geometry.basics import Array, InputError
-from ...geometry.scenes import Scene
-from ..motion import PlateMemory, State, turned_about_z
-from ..steady import Equilibrium
-from .compiled_flight import TOLERANCE
-from .integration import begun, fly_on, in_plate_range
-from .local_flight import compile_local_flight
+from ...fem.rotor.table import FieldTable
+from ...geometry.common import Array, InputError
+from ...geometry.scene.contents import Scene
+from ..equilibria.equilibrium import Equilibrium
+from ..motion.plate import PlateMemory
+from ..motion.state import State, turned_about_z
+from .balls import compile_local_flight
+from .compiled import TOLERANCE
+from .flight import PLATE_TOLERANCE, StartError, begun, check_free, fly_on, in_plate_range, initial_state
 from .pieces import Log
-from .recorder import Recorder
-from .simulation import PLATE_TOLERANCE, StartError, check_free, initial_state
-from .trajectory import DURATION
+from .trajectory import DURATION, Recorder
 
 FEWEST, MOST, A_SECOND = 8, 256, 400
 """Samples of a piece at least and at most, and between that so many a second."""

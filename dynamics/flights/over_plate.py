@@ -12,33 +12,28 @@ from dataclasses import dataclass, replace
 import heyoka as hy
 import numpy as np
 
-from ...fem.rotor_tables import FieldFormula
-from ...fem.storage import compiled
-from ...geometry.basics import Array, InputError
-from ...geometry.scenes import Scene
-from ..effects import with_effects
-from ..flights import DURATION, IntegrationError
-from ..local_plates import WholePlate
-from ..motion import (
+from ...fem.compiled_code import compiled
+from ...fem.rotor.table import FieldFormula
+from ...geometry.common import Array, InputError
+from ...geometry.scene.contents import Scene
+from ..motion.effects import with_effects
+from ..motion.equations import equations_of_motion, parameters
+from ..motion.events import (
     BEYOND,
     CONTACT,
-    Parameter,
-    PlateForce,
-    PlateMemory,
-    Scales,
-    State,
-    Vector,
     clearance,
-    equations_of_motion,
     flight_events,
     lost_distance,
-    parameters,
     plate_depth,
     plate_legs,
     range_events,
 )
-from .endings import Endings
-from .lanes import LANES
+from ..motion.plate import PlateForce, PlateMemory
+from ..motion.state import Parameter, Scales, State, Vector
+from .batch import LANES, Endings
+from .pieces import IntegrationError
+from .plate_formula import WholePlate
+from .trajectory import DURATION
 
 STEP_ERROR = 1e-9
 """Relative error of a Taylor step: a launch is chaotic, so that single flights depend on it, but not their shares."""

@@ -13,13 +13,13 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
-from ...fem.harmonics import UPPER, sphere_fit
-from ...geometry.basics import Array
-from ..motion import Parameter, PlateMemory, turned_about_z
-from .fewer import FewerStates, fewer_states
-from .formula import PlateInBall, PlateKind, at_depth
-from .functions import local_harmonics
-from .reduction import Reduction
+from ...fem.harmonics.expansion import UPPER
+from ...fem.harmonics.local import sphere_fit
+from ...geometry.common import Array
+from ..motion.plate import PlateMemory
+from ..motion.state import Parameter, turned_about_z
+from .plate_formula import FewerStates, PlateInBall, PlateKind, Reduction, at_depth, fewer_states
+from .plate_harmonics import local_harmonics
 
 SHARE = 0.1
 """Of the error that the plate's table has, for what a ball misses of reaction tensors and their gradients, and for what

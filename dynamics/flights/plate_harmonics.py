@@ -11,9 +11,11 @@ from functools import cache, cached_property
 import heyoka as hy
 import numpy as np
 
-from ...fem.harmonics import UPPER, derivatives, members, real_sizes, regular_harmonics, sphere_fit
-from ...geometry.basics import Array
-from ..motion import Vector, dotted
+from ...fem.harmonics.expansion import UPPER
+from ...fem.harmonics.expressions import members, real_sizes, regular_harmonics
+from ...fem.harmonics.local import derivatives, sphere_fit
+from ...geometry.common import Array
+from ..motion.state import Vector, dotted
 
 
 @dataclass(frozen=True, eq=False)

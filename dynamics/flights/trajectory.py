@@ -1,10 +1,78 @@
-"""A simulated flight."""
+"""Samples of a long motion: evenly spaced, and never more than fit."""
 
 from dataclasses import dataclass, field
 from typing import Self
 
-from ...geometry.basics import Array, html_table, millimetres
-from ..motion import State
+import numpy as np
+
+from ...geometry.common import Array, html_table, millimetres
+from ..equilibria.balance import Indices
+from ..motion.state import State
+
+
+class Recorder:
+    """Samples at multiples of an interval, which doubles, dropping every other sample, when there are too many.
+
+    Parameters
+    ----------
+    state : (n,) at the first time
+    interval : first spacing of the samples
+    capacity : most samples kept
+    now : the first time
+    """
+
+    def __init__(self, state: Array, interval: float, capacity: int, now: float = 0.0) -> None:
+        self.interval, self.capacity = interval, capacity
+        self.put(np.array([now]), state[None])
+
+    @property
+    def times(self) -> Array:
+        """(m,) of the samples."""
+        return self._times[: self._count]
+
+    @property
+    def states(self) -> Array:
+        """(m, n) samples."""
+        return self._states[: self._count]
+
+    def put(self, times: Array, states: Array) -> None:
+        """Forget all samples and have these instead."""
+        self._count, self._times, self._states = len(times), times.copy(), states.copy()
+
+    def grid(self, now: float, end: float, count: int) -> Array:
+        """Times to visit next: `now`, then at most `count` multiples of the interval, and `end` if they reach it."""
+        first = int(np.floor(now / self.interval + 1e-9)) + 1
+        times = self.interval * np.arange(first, first + count)
+        times = times[times < end - 1e-9 * self.interval]
+        return np.concatenate([[now], times, [end] if len(times) < count else []])
+
+    def due(self, seen: float, now: float, end: float) -> Array:
+        """Multiples of the interval after `seen`, up to `now` and before `end`."""
+        first, last = (int(np.floor(time / self.interval + 1e-9)) for time in (seen, now))
+        times = self.interval * np.arange(first + 1, last + 1)
+        return np.asarray(times[times < end - 1e-9 * self.interval])
+
+    def add(self, times: Array, states: Array, last: bool) -> None:
+        """Keep samples at multiples of the interval; of the `last` ones all."""
+        on_grid = np.abs(times / self.interval - np.round(times / self.interval)) < 1e-9
+        self._append(times[on_grid | last], states[on_grid | last])
+        while self._count > self.capacity:
+            self.interval *= 2
+            even = np.round(self.times / self.interval) * self.interval
+            kept = np.abs(self.times - even) < 1e-6 * self.interval
+            kept[-1] |= last
+            self.put(self.times[kept], self.states[kept])
+
+    def _append(self, times: Array, states: Array) -> None:
+        """At the end, in arrays that double where they are full."""
+        count = self._count + len(times)
+        if count > len(self._times):
+            roomy = np.empty(2 * count), np.empty((2 * count, states.shape[1]))
+            roomy[0][: self._count], roomy[1][: self._count] = self.times, self.states
+            self._times, self._states = roomy
+        self._times[self._count : count], self._states[self._count : count] = times, states
+        self._count = count
+
 
 DURATION, STOPPED = "duration", "stopped"
 
@@ -97,3 +165,74 @@ class FlightStopped(KeyboardInterrupt):
     def __init__(self, flown: Trajectory) -> None:
         self.flown = flown
         super().__init__(f"The flight was stopped at {flown.levitated_s:.4g} s.")
+
+
+STABLE, LINEAR_FALL, OSCILLATING_LOSS = "stable", "linear fall", "oscillating loss"
+DRIFTING, GROWING, NOT_HELD = "drifting", "growing oscillation", "not held"
+NOT_FOLLOWED = "not followed"
+"""To its end: it left the range of the plate's table."""
+WINDOWS = 20
+"""Parts into which a flight is divided; the last one, in which the floater may already fall freely, is left out."""
+FEWEST = 4
+"""Samples in a part: a trend takes three."""
+VISIBLE = 2e-5
+"""Smallest drift or oscillation that counts while the floater is still up, m."""
+HELD = 0.5
+"""A loss before this time, s, is no flight: the floater had no time for a few bounces; nor is a trend seen in less."""
+
+
+def flight_kind(flight: Trajectory) -> str:
+    """How a flight went.
+
+    Told from the mean distance, and from the size of the oscillation in the rotor's frame about its trend, in twenty
+    parts of the flight.  Lost or in contact: "not held" from the beginning; an "oscillating loss" if the oscillation
+    grew more than the mean distance changed, in the whole flight or in its last part; else a "linear fall".  Still up
+    at the end: "growing oscillation" if it became more than twice as large, or "drifting" if the distance goes on
+    changing steadily in the second half, both by 0.02 mm at least; else "stable".
+    """
+    if flight.left_plate_table:
+        return NOT_FOLLOWED
+    lasted = flight.ended_by in (DURATION, STOPPED)
+    distance = np.linalg.norm(flight.lab.position, axis=1)
+    if len(distance) < FEWEST * WINDOWS or flight.levitated_s <= HELD:
+        return STABLE if lasted else NOT_HELD
+    parts = np.array_split(np.arange(len(distance)), WINDOWS)
+    if not lasted:
+        whole, end = np.arange(len(distance)), parts[-1]
+        return OSCILLATING_LOSS if _swings(flight, whole) or _swings(flight, end) else LINEAR_FALL
+    places = flight.rotor.position
+    means = np.array([distance[part].mean() for part in parts])
+    sizes = np.array([_oscillation(flight.time[part], places[part]) for part in parts])
+    late = sizes[-WINDOWS // 4 :].mean()
+    if late > VISIBLE and late > 2 * sizes[: WINDOWS // 4].mean():
+        return GROWING
+    return DRIFTING if _drifts(means[WINDOWS // 2 :]) else STABLE
+
+
+def _swings(flight: Trajectory, samples: Indices) -> bool:
+    """Whether the oscillation grew more than the mean distance changed among samples (n,), but for the last of them.
+
+    Where there are too few it is not known, and said not to.
+    """
+    if len(samples) < FEWEST * WINDOWS:
+        return False
+    distance, places = np.linalg.norm(flight.lab.position, axis=1), flight.rotor.position
+    parts = np.array_split(samples, WINDOWS)[:-1]
+    means = [distance[part].mean() for part in parts]
+    sizes = [_oscillation(flight.time[part], places[part]) for part in parts]
+    return bool(max(sizes) - sizes[0] > abs(means[-1] - means[0]))
+
+
+def _oscillation(time: Array, places: Array) -> float:
+    """Amplitude of places (n, 3) about a smooth trend, m."""
+    terms = np.vander((time - time[0]) / np.ptp(time), 3)
+    rest = places - terms @ np.linalg.lstsq(terms, places)[0]
+    return float(np.sqrt(2 * np.mean(rest**2, axis=0).sum()))
+
+
+def _drifts(means: Array) -> bool:
+    """Whether means (n,) in turn change along a straight line, and visibly."""
+    steps = np.arange(len(means))
+    line = np.polynomial.Polynomial.fit(steps, means, 1)
+    change = abs(float(line(steps[-1]) - line(0)))
+    return change > max(VISIBLE, 3 * float(np.std(means - line(steps))))

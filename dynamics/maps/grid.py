@@ -1,16 +1,17 @@
 """The points of a map or a sweep, the balances there, and the equilibria that are known."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ...geometry.basics import Array
-from ..equilibria import SAME, SearchRange
-from ..motion import Rates
-from ..steady import Balance, Indices
+from ...geometry.common import Array
+from ..equilibria.balance import EVERY, Balance, Indices, solve
+from ..equilibria.curves import SAME, Search, SearchRange
+from ..equilibria.path import END, ON, AtRest, Steps, directions, follow
+from ..motion.rates import Rates
 
 
 @dataclass(frozen=True, eq=False)
@@ -137,3 +138,115 @@ class Atlas:
         found = self._known[point, slot]
         inside = grid.holds(point, found[:, :3])
         return point[inside], found[inside, :3], found[inside, 3:]
+
+
+UNIT = 0.1
+"""Length of the way between two points, in radii and rad."""
+STEPS = Steps(longest=0.1, shortest=1e-5, turn=0.2, most=300)
+FAR_APART = 1.5
+"""The range is left where the floater is this much farther than its farthest."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Ways(AtRest):
+    """Balances on the ways from points `start` (n,) to points `end` (n,); unknown are position, moment and λ UNIT."""
+
+    grid: Grid
+    start: Indices
+    end: Indices
+
+    def linear(self, points: Array, which: Indices) -> tuple[Array, Array]:
+        """Balances and |m̂| = 1 (n, 6), and their derivatives (n, 6, 7); that along the way by a difference: 1e-6."""
+        position, moment, way = points[:, :3], points[:, 3:6], points[:, 6] / UNIT
+        start, end = self.start[which], self.end[which]
+        value, slope = self.grid.balance(start, end, way)(position, moment)
+        ahead = self.grid.balance(start, end, way + 1e-6)(position, moment)[0]
+        along = (ahead - value) / (1e-6 * UNIT)
+        return self.extended(value, np.concatenate([slope, along[:, :, None]], axis=2), moment)
+
+
+def between(grid: Grid, start: Indices, end: Indices, position: Array, moment: Array) -> tuple[Indices, Array, Array]:
+    """Follow branches from equilibria (n, 3), (n, 3) of points `start` (n,) towards those of points `end` (n,).
+
+    Returns
+    -------
+    Points (k,), positions and moments (k, 3) of the equilibria in which they ended.
+    """
+    ways, bound = _Ways(grid, start, end), FAR_APART * max(where.bound for where in grid.ranges)
+    points = np.column_stack([position, moment, np.zeros(len(start))])
+    tangents = directions(ways, points, np.eye(7)[6] + np.zeros((len(start), 1)), np.arange(len(start)))
+    ended: list[tuple[Indices, Array]] = [(start[:0], points[:0])]
+
+    def watch(which: Indices, points: Array, tangents: Array, lengths: Array) -> NDArray[np.int_]:
+        way = points[:, 6]
+        there, back = way >= UNIT, way <= 0.0
+        ended.extend(((end[which[there]], points[there]), (start[which[back]], points[back])))
+        return np.where(there | back | (np.linalg.norm(points[:, :3], axis=1) > bound), END, ON)
+
+    follow(ways, points, tangents, STEPS, watch)
+    point, places = (np.concatenate(part) for part in zip(*ended, strict=True))
+    position, moment, size = solve(grid.balance(point), places[:, :3], places[:, 3:6], EVERY, 12)
+    good = size < 1e-8
+    return point[good], position[good], moment[good]
+
+
+SPACING = 5
+"""Points of the map between two searches."""
+WHOLE, PART = 64, 8
+"""One of so many searches has all starts, the others an eighth of them, which misses less than one in a hundred of a
+point's equilibria: a sheet is lost only if every search that meets it does."""
+REACH, FAR = 0.8, 1.0
+"""Longest steps of the searches, rad of the moment and radii of the position, and beyond that distance (radii) as a
+part of it, as the field changes: with 0.3 rad and radii they are more than twice as many, and an eighth of the starts
+misses several times as much."""
+TOGETHER = 8
+"""Searches that are made side by side: enough that NumPy's calls cost less than what they compute."""
+MARGIN = 0.3
+"""Sheets are followed so far beyond the range (radii): what its border cuts into pieces is whole there."""
+JUMP = 0.15
+"""A neighbour farther away than this (radii and rad) may be another branch's."""
+
+
+def filled(grid: Grid, nodes: Indices, progress: Callable[[float], None] | None = None) -> Atlas:
+    """What is found from searches at `nodes`; an equilibrium that is carried is good to round-off like any other."""
+    search = Search(grid.balance, grid.holds, EVERY, MARGIN, REACH, FAR)
+    random, seeds = np.random.default_rng(0), []
+    for first in range(0, len(nodes), TOGETHER):
+        some = range(first, min(first + TOGETHER, len(nodes)))
+        starts = [_starts(grid, int(nodes[k]), None if k % WHOLE == 0 else random) for k in some]
+        seeds.append(search.solutions(*(np.concatenate(part) for part in zip(*starts, strict=True))))
+        if progress is not None:
+            progress(0.9 * (some[-1] + 1) / len(nodes))
+    point, places = (np.concatenate(part) for part in zip(*seeds, strict=True))
+    atlas = Atlas(len(grid))
+    _spread(grid, atlas, point, places[:, :3], places[:, 3:])
+    return atlas
+
+
+def _starts(grid: Grid, point: int, random: np.random.Generator | None) -> tuple[Indices, Array, Array]:
+    """All starts at a point, or some: the point and scaled positions and moments, (n,), (n, 3) and (n, 3)."""
+    position, moment = grid.range(point).starts()
+    if random is not None:
+        chosen = random.choice(len(position), len(position) // PART, replace=False)
+        position, moment = position[chosen], moment[chosen]
+    return np.full(len(position), point), position, moment
+
+
+def _spread(grid: Grid, atlas: Atlas, point: Indices, position: Array, moment: Array) -> None:
+    """Carry equilibria from point to point until nothing new is found."""
+    while len(point):
+        new = atlas.add(point, position, moment)
+        point, position, moment = point[new], position[new], moment[new]
+        source, target = grid.neighbours(point)
+        if not len(source):
+            return
+        arrived, turned, size = solve(grid.balance(target), position[source], moment[source], EVERY, 12)
+        apart = np.linalg.norm(np.concatenate([arrived - position[source], turned - moment[source]], axis=1), axis=1)
+        good = (size < 1e-8) & (apart < JUMP)
+        rest = source[~good]
+        walked = between(grid, point[rest], target[~good], position[rest], moment[rest])
+        point = np.concatenate([target[good], walked[0]])
+        position = np.concatenate([arrived[good], walked[1]])
+        moment = np.concatenate([turned[good], walked[2]])
+        inside = grid.holds(point, position, MARGIN)
+        point, position, moment = point[inside], position[inside], moment[inside]

@@ -1,14 +1,24 @@
 """Equilibria of a map with the stability of each."""
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
-from ...geometry.basics import Array
-from ..motion import Parameter
-from ..steady import Indices, is_stable, spectra
-from .grid import Atlas, Grid
+from ...fem.rotor.table import FieldTable
+from ...geometry.common import Array
+from ...geometry.scene.contents import Scene
+from ..equilibria.balance import Indices
+from ..equilibria.curves import SearchRange
+from ..equilibria.equilibrium import EquilibriumError, Survey
+from ..equilibria.modes import is_stable, spectra
+from ..equilibria.search import Found, field_doubts, told, turning
+from ..motion.equations import parameters
+from ..motion.rates import Rates
+from ..motion.state import Parameter, Scales
+from .family import RotorFamily
+from .grid import SPACING, Atlas, Grid, filled
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,3 +83,102 @@ def judged(grid: Grid, atlas: Atlas, axes: tuple[Array, Array], searches: int) -
         stable=is_stable(values, errors),
         searches=searches,
     )
+
+
+def equilibrium_map(
+    family: RotorFamily,
+    frequencies: ArrayLike,
+    measures: ArrayLike,
+    spin: float = 0.0,
+    farthest: float = 0.1,
+    spacing: int = SPACING,
+    progress: Callable[[float], None] | None = None,
+) -> EquilibriumMap:
+    """All synchronous equilibria with z < 0 over a grid, with their stability; gravity along the axis, no plate.
+
+    Parameters
+    ----------
+    family : the scenes; nothing is compiled again within a family
+    frequencies, measures : axes, Hz and m or rad
+    spin : body spin s
+    farthest : largest depth, and distance from the axis, m
+    spacing : steps of the grid between two searches; a sheet between them is missed if it meets no other in a fold
+    progress : called with the finished part, 0 to 1
+
+    Raises
+    ------
+    EquilibriumError : a frequency is zero, or gravity has a part across the axis
+    """
+    axes = np.atleast_1d(np.asarray(frequencies, float)), np.atleast_1d(np.asarray(measures, float))
+    if not axes[0].all() or np.any(family.scene.gravity[:2]):
+        raise EquilibriumError(
+            "Equilibria are fixed points only where the rotor turns and gravity is along its axis. Elsewhere use "
+            "find_equilibria."
+        )
+    grid = family_grid(family, *axes, spin, farthest)
+    nodes = grid.coarse(spacing)
+    return judged(grid, filled(grid, nodes, progress), axes, len(nodes))
+
+
+def family_grid(family: RotorFamily, frequencies: Array, measures: Array, spin: float, farthest: float) -> Grid:
+    """The points of a map, numbered row by row."""
+    row, column = (part.ravel() for part in np.indices((len(frequencies), len(measures))))
+    return Grid(
+        rates=family.rates,
+        values=family.values(frequencies[row], measures[column]),
+        spin=np.full(len(row), spin),
+        ranges=[SearchRange(family.at(frequencies[0], measure), farthest) for measure in measures],
+        region=column,
+        places=np.column_stack([row, column]),
+    )
+
+
+def surveys(
+    scenes: Sequence[Scene],
+    tables: Sequence[FieldTable],
+    spin: Array,
+    places: Indices,
+    rates: Rates,
+    measures: ArrayLike = 0.0,
+    farthest: float = 0.1,
+    spacing: int | None = None,
+) -> list[tuple[Survey, bool]]:
+    """What `equilibria.survey` finds for each scene, without its curves; neighbours help each other as in a map.
+
+    Parameters
+    ----------
+    scenes : n scenes with one rotor, or of one family of rotors; their plates are left out
+    tables : (n,) the rotors' fields, for their errors
+    rates : compiled for the rotor or the family
+    spin : (n,) body spin s
+    places : (n, axes) whole-numbered coordinates by which scenes are neighbours
+    measures : (n,) of the rotors in their family, see `RotorFamily`
+    farthest : largest depth, and distance from the axis, m
+    spacing : steps between two searches, None for 5, and 10 along a single axis; a sheet between them is missed if it
+        meets no other in a fold
+
+    Returns
+    -------
+    (n,) the surveys, and whether the scene's own point was searched. Raises EquilibriumError for a rotor at rest.
+    """
+    for scene in scenes:
+        turning(scene)
+    values = np.array([parameters(scene, Scales.of(scene), frozen_spin=True) for scene in scenes])
+    values[:, Parameter.MEASURE] = measures
+    ranges = [SearchRange(scene, farthest) for scene in scenes]
+    grid = Grid(rates, values, spin, ranges, np.arange(len(scenes)), places)
+    nodes = grid.coarse(spacing or (SPACING if places.shape[1] > 1 else 2 * SPACING))
+    point, position, moment = filled(grid, nodes).within(grid)
+    points = np.concatenate([position, moment], axis=1)
+    known, parts = np.zeros(len(points), bool), list[tuple[Indices, Array]]()
+    for table in {id(table): table for table in tables}.values():
+        (mine,) = np.nonzero(np.isin(point, [k for k, other in enumerate(tables) if other is table]))
+        there, unsure = field_doubts(table, points[mine, :3] * values[point[mine], Parameter.LENGTH, None])
+        known[mine] = there
+        parts.append((mine[there], unsure))
+    doubts = np.zeros((len(points), max(part.shape[1] for _, part in parts)))
+    for which, part in parts:
+        doubts[which, : part.shape[1]] = part
+    point, points, doubts = point[known], points[known], doubts[known]
+    found = [Found.at(grid.alone(k), points[point == k], doubts[point == k]) for k in range(len(scenes))]
+    return [(told(scene, grid.alone(k), found[k]), k in nodes) for k, scene in enumerate(scenes)]

@@ -23,6 +23,8 @@ and Particles, 1978, table 5.2).  Left out is the memory of the layer in transla
 frequency f by 1 + R/δ(f) times Stokes', ten at 10 Hz.  The air is far from walls, and the rotor does not stir it.
 """
 
+from __future__ import annotations
+
 from dataclasses import dataclass
 from typing import TypeVar
 
@@ -30,9 +32,12 @@ import heyoka as hy
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...geometry.basics import Array
-from ...geometry.scenes import AIR_VISCOSITY
-from ..motion import Added, Motion, Parameter, dissipative, dot
+from ...fem.rotor.floater import FloaterSources, force_and_torque
+from ...fem.rotor.table import FieldFormula, FieldTable
+from ...geometry.common import Array
+from ...geometry.scene.contents import AIR_VISCOSITY, Floater
+from .effect import Added, Motion, dissipative
+from .state import Parameter, cross, dot
 
 REAL_AIR = "air beyond Stokes"
 AIR_DENSITY = 1.19
@@ -97,3 +102,68 @@ def _layered(q: Value) -> Value:
 
 def _separated(square: Value) -> Value:
     return 1.0 + 0.15 * square ** (0.687 / 2)
+
+
+FLOATER_SHAPE = "the floater's shape"
+HEIGHTS = np.array([0.3, 0.6, 0.9])
+"""Of the dipoles off the centre, in half heights of the floater."""
+
+
+@dataclass(frozen=True, eq=False)
+class FloaterShape:
+    """What the shape of a cylinder polarised along its axis adds to the dipole at its centre.
+
+    Parameters
+    ----------
+    field : the rotor's
+    heights : (k,) m along the moment; the first is zero
+    dipoles : (k,) by the moment of the equations
+    floater, sources : whose shape it is
+    """
+
+    field: FieldFormula
+    heights: Array
+    dipoles: Array
+    floater: Floater
+    sources: FloaterSources
+    name: str = FLOATER_SHAPE
+
+    @classmethod
+    def of(cls, floater: Floater, sources: FloaterSources, field: FieldFormula) -> FloaterShape:
+        """The dipoles with the multipoles of a floater's sources, less the one that the equations have."""
+        half = floater.solid.half_edges[2]
+        heights = half * np.array([0.0, *HEIGHTS, *-HEIGHTS])
+        degrees = 2 * np.arange(len(HEIGHTS) + 1) + 1
+        powers = (heights / half) ** (degrees[:, None] - 1)
+        wanted = sources.axial_moments(int(degrees[-1]))[degrees - 1] / (degrees * half ** (degrees - 1))
+        dipoles = np.linalg.pinv(powers) @ wanted / (floater.moment or 1.0)
+        return cls(field, heights, dipoles - (heights == 0) * bool(floater.moment), floater, sources)
+
+    def added(self, motion: Motion) -> Added:
+        """Force and torque of one energy."""
+        length, torque, inertia = (hy.par[p] for p in (Parameter.LENGTH, Parameter.TORQUE, Parameter.INERTIA))
+        moment, force, turn = motion.moment, [hy.expression(0.0)] * 3, [hy.expression(0.0)] * 3
+        energy = hy.expression(0.0)
+        for height, dipole in zip(self.heights, self.dipoles, strict=True):
+            place = [length * x + float(height) * m for x, m in zip(motion.position, moment, strict=True)]
+            field, gradient = self.field.expressions(place) if height else (motion.field, motion.gradient)
+            strength = float(dipole) * torque
+            pull = [strength * inertia * length * dot(moment, [gradient[i][j] for i in range(3)]) for j in range(3)]
+            force = [a + b for a, b in zip(force, pull, strict=True)]
+            arm = [float(height) / length / inertia * m for m in moment]
+            turns = zip(cross(moment, field), cross(arm, pull), strict=True)
+            turn = [a + strength * b + c for a, (b, c) in zip(turn, turns, strict=True)]
+            energy = energy - strength * inertia * dot(moment, field)
+        return Added(force, turn, energy=energy)
+
+    def missed(self, table: FieldTable, position: Array, moment: Array) -> Array:
+        """(n, 2) what the dipoles miss of torque and force over the moment, T and T/m, at (n, 3) m and (n, 3)."""
+        axes = np.array([self.floater.axes(m) for m in moment])
+        force, torque = force_and_torque(self.sources, table, position, axes)
+        for height, dipole in zip(self.heights, self.dipoles + (self.heights == 0), strict=True):
+            field, gradient = table.evaluate(position + height * moment)
+            strength = dipole * self.floater.moment
+            pull = strength * np.einsum("nj,nji->ni", moment, gradient)
+            force -= pull
+            torque -= strength * np.cross(moment, field) + height * np.cross(moment, pull)
+        return np.asarray(np.linalg.norm([torque, force], axis=2).T / (self.floater.moment or 1.0))

@@ -2,11 +2,18 @@
 
 import numpy as np
 
-from ...fem.mutual import unanswered
-from ...fem.rotor_tables import FieldTable
-from ...geometry.basics import InputError
-from ...geometry.scenes import Scene
-from .rough_answer import rough_force
+from ...fem.mutual.making import unanswered
+from ...fem.rotor.floater import floater_sources
+from ...fem.rotor.table import FieldFormula, FieldTable
+from ...fem.rotor_metal import cached_rotor_losses, check_slow_enough, pieces_of
+from ...geometry.common import InputError
+from ...geometry.scene.contents import Scene
+from .air_and_shape import FLOATER_SHAPE, FloaterShape, RealAir
+from .effect import Effect, Interaction, interaction_of
+from .equations import FORCE_ALONE
+from .floater_currents import FloaterCurrents, check_floater_metal
+from .mutual import rough_force
+from .rotor_losses import ROTOR_CURRENTS, RotorCurrents
 
 NOTHING_ANSWERS = "neither rotor nor floater is permeable"
 NEAR = 2.0
@@ -60,3 +67,32 @@ def rough_part(scene: Scene, table: FieldTable) -> float:
     place, direction = np.array([0.0, 0.0, lowest - NEAR * floater.radius]), np.array([0.0, 0.0, 1.0])
     force = rough_force(magnets, floater, table, place, direction)
     return float(np.linalg.norm(force) / (floater.moment * np.linalg.norm(table.evaluate(place[None])[1][0])))
+
+
+BESIDE_METAL = "beside metal that turns with the rotor"
+WITHOUT_METAL = "Leave conductivity_S_m of the rotor and rotor.conductors out."
+
+
+def with_effects(scene: Scene, table: FieldFormula) -> Interaction:
+    """A table with the effects of a scene's conductivities and air, that of the rotor's from the cache; others stay.
+
+    Raises
+    ------
+    InputError : the rotor turns too fast for its metal or the floater's, or metal turns with it beside a floater that
+        is no sphere, or the floater is a cuboid
+    """
+    whole = interaction_of(table)
+    check_floater_metal(scene)
+    effects: list[Effect] = [FloaterCurrents()] if scene.floater.conductivity else []
+    if scene.floater.body is not None and FLOATER_SHAPE not in {effect.name for effect in whole.effects}:
+        scene.floater.must_be("sphere", "cylinder", where="where it moves", instead=FORCE_ALONE)
+        effects.append(FloaterShape.of(scene.floater, floater_sources(scene.floater), whole.field))
+    if scene.drag.air:
+        effects.append(RealAir())
+    pieces = pieces_of(scene.rotor, scene.conductors)
+    check_slow_enough(pieces, scene.frequency)
+    if pieces:
+        scene.floater.must_be("sphere", where=BESIDE_METAL, instead=WITHOUT_METAL)
+    if pieces and ROTOR_CURRENTS not in {effect.name for effect in whole.effects}:
+        effects.append(RotorCurrents(cached_rotor_losses(scene, lambda _: None)[0]))
+    return whole.joined(*effects)

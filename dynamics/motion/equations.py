@@ -18,20 +18,18 @@ power to `work`.  A plate adds its currents as further states (`plate_terms`) an
 a sweep may change is a runtime parameter; only the tables' own geometry is compiled in.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import heyoka as hy
 import numpy as np
 
-from ...fem.closed_forms import thin_field_torque
-from ...fem.rotor_tables import FieldFormula
-from ...geometry.basics import MU_0, Array
-from ...geometry.scenes import Scene
-from .effect import Motion
-from .interaction import interaction_of
-from .plate_terms import PlateFormula, memory_terms
-from .state import Scales
-from .symbols import Parameter, Vector, cross, dot, subtract, turned
+from ...fem.closed_forms.eddy_sphere import thin_field_torque
+from ...fem.rotor.table import FieldFormula
+from ...geometry.common import MU_0, Array
+from ...geometry.scene.contents import Drag, Scene
+from .effect import Motion, interaction_of
+from .plate import PlateFormula, memory_terms
+from .state import Parameter, Scales, Vector, cross, dot, subtract, turned
 
 FORCE_ALONE = "spinlev.floater_force gives force and torque on it; for a motion take a cylinder or a sphere."
 NAMES = tuple(f"{vector}_{axis}" for vector in ("position", "velocity", "moment", "spin") for axis in "xyz")
@@ -164,3 +162,46 @@ def _angular_drag(moment: Vector, spin: Vector) -> Vector:
     tilt, along = hy.par[Parameter.TILT_DRAG], hy.par[Parameter.SPIN_DRAG]
     excess = (tilt - along) * dot(spin, moment)
     return [excess * moment[i] - tilt * spin[i] for i in range(3)]
+
+
+GIVEN = ("x", "y", "z", "m_x", "m_y", "m_z", "t_x", "t_y", "t_z", "u_x", "u_y", "u_z", "body_spin")
+"""Position, moment, its two tangents, and body spin s: what balances are functions of."""
+TILTS = ("tilt_t", "tilt_u")
+
+
+def balances(equations: Equations) -> tuple[list[hy.expression], list[hy.expression]]:
+    """The balances (5,) of a motion with their derivatives (5 × 5, row by row), and their variables (13,)."""
+    given, tilts = list(hy.make_vars(*GIVEN)), list(hy.make_vars(*TILTS))
+    position, tangents, spin = given[:3], (given[6:9], given[9:12]), given[12]
+    moment = [given[3 + i] + tilts[0] * tangents[0][i] + tilts[1] * tangents[1][i] for i in range(3)]
+    rates = hy.subs(list(equations.rates[:12]), dict(zip(NAMES, _state(position, moment, spin), strict=True)))
+    force, torque = rates[3:6], rates[9:12]
+    values = [*force, *(dot(tangent, torque) for tangent in tangents)]
+    free = [*position, *tilts]
+    slopes = np.asarray(hy.diff_tensors(values, diff_args=free, diff_order=1).jacobian).reshape(5, 5)
+    for k in (3, 4):
+        slopes[k, k] = slopes[k, k] - dot(moment, torque)  # the tangents turn with the moment
+    untilted = {name: hy.expression(0.0) for name in TILTS}
+    return hy.subs([*values, *slopes.ravel()], untilted), given
+
+
+def _state(position: Vector, moment: Vector, spin: hy.expression) -> list[hy.expression]:
+    rate = hy.par[Parameter.RATE]
+    along = rate * (spin - moment[2])
+    velocity = [-rate * position[1], rate * position[0], hy.expression(0.0)]
+    return [*position, *velocity, *moment, along * moment[0], along * moment[1], along * moment[2] + rate]
+
+
+def has_likes(scene: Scene) -> bool:
+    """Whether a scene has a like one of another size with the same rotor's material and air."""
+    return not scene.drag.air and not any(magnet.conductivity for magnet in scene.rotor)
+
+
+def like(scene: Scene, times: float) -> Scene:
+    """The scene, all but its rotor, so many times as large, with the same motion; its plate is left out."""
+    floater, drag = scene.floater, scene.drag
+    conductivity = None if floater.conductivity is None else floater.conductivity / times**2
+    density = floater.density / times**2
+    larger = replace(floater, radius=floater.radius * times, density=density, conductivity=conductivity)
+    air = Drag(drag.linear * times, drag.angular * times**3, drag.air)
+    return replace(scene, floater=larger, drag=air, gravity=scene.gravity * times, plate=None)

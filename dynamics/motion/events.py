@@ -9,12 +9,13 @@ from dataclasses import replace
 import heyoka as hy
 import numpy as np
 
-from ...geometry.basics import Array, Box, Solid
-from ...geometry.bodies import body_overlap
-from ...geometry.scenes import Plate, Scene
-from .plate_terms import PlateFormula, seen_by_plate
-from .state import turned_about_z
-from .symbols import Parameter, Vector
+from ...geometry.common import Array
+from ...geometry.overlap import body_overlap
+from ...geometry.scene.contents import Plate, Scene
+from ...geometry.shapes import Box
+from ...geometry.solids import Solid
+from .plate import PlateFormula, seen_by_plate
+from .state import Parameter, Vector, turned_about_z
 
 CONTACT, LOST, BEYOND = "contact", "lost", "beyond"
 """The last: where the range of a plate's table ends, beyond which nobody knows its currents' field."""

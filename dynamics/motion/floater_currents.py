@@ -22,10 +22,11 @@ from dataclasses import dataclass
 import heyoka as hy
 import numpy as np
 
-from ...fem.closed_forms import skin_number
-from ...geometry.basics import InputError
-from ...geometry.scenes import Scene
-from ..motion import Added, Motion, Parameter, Vector, cross, dissipative, dot
+from ...fem.closed_forms.eddy_sphere import skin_number
+from ...geometry.common import InputError
+from ...geometry.scene.contents import Scene
+from .effect import Added, Motion, dissipative
+from .state import Parameter, Vector, cross, dot
 
 Matrix = list[list[hy.expression]]
 GRADIENT = 2 / 21

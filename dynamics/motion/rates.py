@@ -12,15 +12,13 @@ import heyoka as hy
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...fem.harmonics import FieldExpressions
-from ...fem.rotor_tables import FieldFormula, FieldTable, RotorTable
-from ...fem.storage import RuntimeNumbers, compiled_later
-from ...geometry.basics import Array
-from .at_rest import balances
-from .effect import Effect, Placeable, Placed
-from .equations import Equations, equations_of_motion
-from .interaction import Interaction, interaction_of
-from .symbols import Parameter
+from ...fem.compiled_code import RuntimeNumbers, compiled_later
+from ...fem.harmonics.expressions import FieldExpressions
+from ...fem.rotor.table import FieldFormula, FieldTable, RotorTable
+from ...geometry.common import Array
+from .effect import Effect, Interaction, Placeable, Placed, interaction_of
+from .equations import Equations, balances, equations_of_motion
+from .state import Parameter
 
 
 class Rates:
@@ -55,7 +53,7 @@ class Rates:
         """Outputs and variables that are written from the equations, compiled."""
         source = write.__name__, self._equations.variables, self._equations.rates
         options = {"compact_mode": True, "opt_level": self._level}
-        return compiled_later(hy.cfunc, lambda: write(self._equations), source, __package__, **options)
+        return compiled_later(hy.cfunc, lambda: write(self._equations), source, __name__, **options)
 
     def __call__(self, states: ArrayLike, values: Array) -> tuple[Array, Array]:
         """Rates (n, 12) and their derivatives (n, 12, 12) at scaled `states` (n, 12).

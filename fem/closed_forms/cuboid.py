@@ -24,8 +24,8 @@ from typing import Any
 import heyoka as hy
 import numpy as np
 
-from ...geometry.basics import Array
-from ..harmonics import Number
+from ...geometry.common import Array
+from ..harmonics.expressions import Number
 
 Expression = Any
 """A heyoka expression."""
@@ -163,3 +163,61 @@ def _difference(a: tuple[Expression, Expression], b: tuple[Expression, Expressio
 
 def _sorted(*indices: int) -> tuple[int, ...]:
     return tuple(sorted(indices))
+
+
+CORNER_SIGNS = (1, -1)
+Signs = tuple[int, ...]
+
+
+def _face_integrals(points: Array, half_edges: Array) -> dict[tuple[int, int], Array]:
+    """∫ dS/r (n,), m, over each face (axis, side) of a cuboid, seen from points (n, 3), m, along its axes.
+
+    Its eight corners and twelve edges are each looked at once.
+    """
+    offset = [{s: points[:, axis] + s * half_edges[axis] for s in CORNER_SIGNS} for axis in range(3)]
+    square = [{s: values**2 for s, values in one.items()} for one in offset]
+    distance: dict[Signs, Array] = {}
+    for i, j, k in product(CORNER_SIGNS, repeat=3):
+        distance[i, j, k] = np.sqrt(square[0][i] + square[1][j] + square[2][k])
+    edges: dict[tuple[int, Signs], Array] = {}
+    for axis, first, second in product(range(3), CORNER_SIGNS, CORNER_SIGNS):
+        ends = distance[_corner(axis, 1, first, second)] + distance[_corner(axis, -1, first, second)]
+        edges[axis, _corner(axis, 0, first, second)] = 2 * np.arctanh(2 * half_edges[axis] / ends)
+    found = {}
+    for axis, side in product(range(3), CORNER_SIGNS):
+        second, third = (axis + 1) % 3, (axis + 2) % 3
+        height = np.abs(offset[axis][-side])
+        total = np.zeros_like(height)
+        for s in CORNER_SIGNS:
+            total += s * offset[second][s] * edges[third, _corner(axis, -side, s, 0)]
+            total += s * offset[third][s] * edges[second, _corner(axis, -side, 0, s)]
+            up, down = (distance[_corner(axis, -side, s, k)] for k in CORNER_SIGNS)
+            total -= s * height * _turned(height, offset[second][s], offset[third], up, down)
+        found[axis, side] = total
+    return found
+
+
+def _corner(axis: int, along: int, second: int, third: int) -> Signs:
+    """Signs along x, y and z of those along an axis and the two that follow it in turn."""
+    found = [0, 0, 0]
+    found[axis], found[(axis + 1) % 3], found[(axis + 2) % 3] = along, second, third
+    return tuple(found)
+
+
+def _turned(height: Array, v: Array, w: dict[int, Array], up: Array, down: Array) -> Array:
+    """Σ_k k atan2(v w_k, height r_k), as the angle of one product of complex numbers."""
+    real = height**2 * up * down + v**2 * w[1] * w[-1]
+    return np.asarray(np.arctan2(v * height * (w[1] * down - w[-1] * up), real))
+
+
+def attraction(points: Array, half_edges: Array) -> Array:
+    """∫ (x - x')/|x - x'|³ dV' (n, 3), m, at `points` (n, 3), m, from the centre of a cuboid along its axes."""
+    faces = _face_integrals(points, half_edges)
+    return np.stack([faces[axis, 1] - faces[axis, -1] for axis in range(3)], axis=1)
+
+
+def newton_potential(points: Array, half_edges: Array) -> Array:
+    """∫ dV'/|x - x'| (n,), m², at `points` (n, 3), m, from the centre of a cuboid along its axes."""
+    faces = _face_integrals(points, half_edges)
+    parts = [0.5 * (half_edges[axis] - side * points[:, axis]) * faces[axis, side] for axis, side in faces]
+    return np.asarray(np.sum(parts, axis=0))

@@ -12,7 +12,7 @@ it feels the torque -Im α B⊥² along the turn, and loses the power ω times t
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ...geometry.basics import MU_0, Array
+from ...geometry.common import MU_0, Array
 
 ComplexArray = NDArray[np.complex128]
 SERIES = 0.02

@@ -1,28 +1,167 @@
-"""The field of a whole rotor at one level of refinement: symmetry, parity parts, moments."""
+"""The outer field as functionals of the solution, which converge twice as fast as its values.
+
+Either moments of the magnetisation about every magnet, or the harmonics of ψ on the outer sphere about the centre.
+Those of cuboids are integrals over the faces, those of other shapes over the volume, where many centres may share them.
+"""
 
 import contextlib
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
 
+import ngsolve as ng
 import numpy as np
+from numpy.typing import NDArray
 
-from ...geometry.basics import Array, MeshError, Solid
-from ...geometry.bodies import (
-    Cells,
-    Magnet,
-    Symmetry,
-    cells_of,
-    closing_shifts,
-    find_symmetry,
-    parity_parts,
-    shifted_magnet,
-)
-from ...geometry.meshes import OTHERWISE, MagnetMesh, MeshSettings, mesh_magnets
-from ..closed_forms import by_cells
-from ..harmonics import Coefficients, MultipoleExpansion, rotated_harmonics
-from .moments import reaction_dipoles, reaction_moments, trace_moments
-from .solver import Formulation, Solution, System, assemble, solve
+from ...geometry.common import Array, MeshError, Watch, unwatched
+from ...geometry.cutting import Cells, cells_of
+from ...geometry.magnets import Magnet
+from ...geometry.meshes.magnets import MagnetMesh, MeshSettings, mesh_magnets
+from ...geometry.meshes.solids import OTHERWISE
+from ...geometry.overlap import closing_shifts, shifted_magnet
+from ...geometry.shapes import Box
+from ...geometry.solids import Solid
+from ...geometry.symmetry import SAME_PLACE, Symmetry, find_symmetry, mirror, mirror_images, parity_parts
+from ..closed_forms.moments import by_cells
+from ..harmonics.expansion import MultipoleExpansion, curvature_moments, moments_of_magnetization
+from ..harmonics.solid import Coefficients, mirrored_harmonics, rotated_harmonics
+from .magnetostatics import Formulation, Solution, System, assemble, solve
+from .spaces import surface_points, volume_points
+
+
+def trace_moments(solution: Solution) -> Coefficients:
+    """Coefficients (T) of the outer field of ψ, read from the outer sphere, about its centre; radius `mesh.unit`."""
+    return solution.boundary.expansion(solution.potential.vec.FV().NumPy())
+
+
+def reaction_moments(solution: Solution, degree: int) -> Array:
+    """Coefficients (n, degree + 1, degree + 1) in T of -(μ - 1) ∇ψ in every magnet.
+
+    About the magnets' centres, with radii their circumradii. Because the harmonics Υ_lm have no Laplacian, ∫ ∇ψ·∇Υ dV
+    over a magnet equals the integral of ψ ∂Υ/∂n over its faces. The error is of the order of (μ - 1)² times the square
+    of the error of ∇ψ/(μ - 1).
+    """
+    mesh, signs = solution.system.mesh, solution.signs
+    centers = np.array([(magnet.box.center - mesh.center) / mesh.unit for magnet in mesh.magnets])
+    result = np.zeros((len(centers), degree + 1, degree + 1), complex)
+    points, areas, potential = _faces(solution)
+    for name in mesh.mesh.GetMaterials():
+        if name == "air":
+            continue
+        k = int(name.removeprefix("magnet"))
+        if mesh.magnets[k].contrast == 0:
+            continue
+        if isinstance(mesh.magnets[k].body, Box):
+            part = -_part_moments(solution, k, degree, points, areas, potential)
+        else:
+            part = _volume_moments(solution, k, degree)
+        owners = np.array([owner for owner, _ in _image_numbers(mesh.magnets, k, mesh.planes)])
+        for place, coefficients in images(centers[k], part, mesh.planes, signs):
+            result[owners[np.argmin(np.linalg.norm(centers[owners] - place, axis=1))]] += coefficients
+    return result
+
+
+def _volume_moments(solution: Solution, k: int, degree: int) -> Coefficients:
+    """Coefficients (T) of -(μ - 1) ∇ψ of magnet number k, from its meshed share, as an integral over the volume."""
+    body = solution.system.mesh.magnets[k].body
+    return moments_of_magnetization(*_share(solution, k), body.center, body.circumradius, degree)
+
+
+def _share(solution: Solution, k: int) -> tuple[Array, Array, Array]:
+    """Points (n, 3) m and weights (n,) m³ in the meshed share of magnet number k, and -(μ - 1) ∇ψ (n, 3) T there."""
+    mesh = solution.system.mesh
+    volume = volume_points(mesh.mesh, f"magnet{k}", 2 * solution.system.order)
+    slope = volume.sample(*(ng.grad(solution.potential)[axis] for axis in range(3)))
+    values = -slope @ (mesh.magnets[k].permeability_in_rotor - np.eye(3))
+    return mesh.to_meter(volume.points), volume.weights * mesh.unit**3, values
+
+
+def reaction_dipoles(solution: Solution, number: int) -> tuple[Array, Array, Array]:
+    """-(μ - 1) ∇ψ of a magnet's share on the meshed side of the planes, and of those that are its images.
+
+    Returns
+    -------
+    Integration points (n, 3) m and weights (n,) m³ in the mirrors' frame, and values (n, 3) T there; nothing where the
+    magnet has no share but that of an image.
+    """
+    mesh = solution.system.mesh
+    parts = []
+    for k, magnet in enumerate(mesh.magnets):
+        owners = [flipped for owner, flipped in _image_numbers(mesh.magnets, k, mesh.planes) if owner == number]
+        if f"magnet{k}" not in mesh.mesh.GetMaterials() or not magnet.contrast or not owners:
+            continue
+        points, weights, values = _share(solution, k)
+        for flipped in owners:
+            flips = np.prod([np.ones(3), *(mirror(plane) for plane in flipped)], axis=0)
+            signs = [sign for plane, sign in zip(mesh.planes, solution.signs, strict=True) if plane in flipped]
+            parts.append((points * flips, weights, float(np.prod([1.0, *signs])) * values * flips))
+    if not parts:
+        return np.zeros((0, 3)), np.zeros(0), np.zeros((0, 3))
+    points, weights, values = (np.concatenate(column) for column in zip(*parts, strict=True))
+    return points, weights, values
+
+
+def _image_numbers(
+    magnets: Sequence[Magnet], number: int, planes: tuple[int, ...]
+) -> list[tuple[int, tuple[int, ...]]]:
+    """Number of the magnet that a magnet's share becomes at every set of the planes, and the set."""
+    found: list[tuple[int, tuple[int, ...]]] = [(number, ())]
+    for plane in planes:
+        image = mirror_images(magnets, plane)
+        assert image is not None
+        found += [(image[k], (*flipped, plane)) for k, flipped in found]
+    return found
+
+
+def images(
+    center: Array, coefficients: Coefficients, planes: tuple[int, ...], signs: tuple[int, ...]
+) -> list[tuple[Array, Coefficients]]:
+    """Centres and coefficients of a body and its mirror images, from the share on the positive side of the planes."""
+    found = [(center, coefficients)]
+    for plane, sign in zip(planes, signs, strict=True):
+        reflected = [(place * mirror(plane), sign * mirrored_harmonics(part, plane)) for place, part in found]
+        if abs(center[plane]) < SAME_PLACE:
+            found = [(place, part + other) for (place, part), (_, other) in zip(found, reflected, strict=True)]
+        else:
+            found += reflected
+    return found
+
+
+def _part_moments(
+    solution: Solution, k: int, degree: int, points: Array, areas: Array, potential: Array
+) -> Coefficients:
+    """Coefficients of (μ - 1) ∇ψ of magnet number k, from its meshed share; the cuts add up to nothing."""
+    mesh = solution.system.mesh
+    magnet = mesh.magnets[k]
+    box, susceptibility = magnet.box, magnet.permeability_in_rotor - np.eye(3)
+    normals, mine = _normals(magnet, points)
+    flux = (areas * potential * mesh.unit**3)[mine, None] * normals @ susceptibility
+    sphere = (box.center, box.circumradius)
+    result = moments_of_magnetization(points[mine], np.ones(len(flux)), flux, *sphere, degree)
+    if magnet.isotropic:
+        return result
+    volume = volume_points(mesh.mesh, f"magnet{k}", 2 * solution.system.order + 2)
+    source = volume.weights * volume.sample(solution.potential)[:, 0] * mesh.unit**4
+    return result - curvature_moments(mesh.to_meter(volume.points), source, susceptibility, *sphere, degree)
+
+
+def _faces(solution: Solution) -> tuple[Array, Array, Array]:
+    """Integration points (n, 3) m on all boundaries, and there the areas and ψ in the units of the mesh."""
+    mesh = solution.system.mesh
+    surface = surface_points(mesh.mesh, "faces|plane.", 2 * solution.system.order + 4)
+    used = surface.weights > 0
+    potential = surface.sample(solution.potential)[used, 0]
+    return mesh.to_meter(surface.points[used]), surface.weights[used], potential
+
+
+def _normals(magnet: Magnet, points: Array) -> tuple[Array, NDArray[np.bool_]]:
+    """Outward normals at those of the points that lie on the faces of a magnet, and which these are (mask)."""
+    box = magnet.box
+    mine = np.abs(box.distance(points)) < SAME_PLACE * box.circumradius
+    body = box.to_body(points[mine])
+    axis = np.argmax(np.abs(body) / box.half_edges, axis=1)
+    return box.rotation.T[axis] * np.sign(np.take_along_axis(body, axis[:, None], axis=1)), mine
+
 
 SIZES = tuple(zip((1.0, 0.8, 0.5), OTHERWISE, strict=True))
 """Of elements in magnets, and the least at round surfaces of parts, that are tried, relative to what is asked for."""
@@ -177,3 +316,127 @@ def _polarizations(magnets: Sequence[Magnet], carriers: Sequence[Magnet] | None,
     """(2, n, 3) T in the mirrors' frame: of the magnets and of their carriers."""
     groups = (magnets, carriers or magnets)
     return np.array([[magnet.polarization_in_rotor for magnet in group] for group in groups]) @ symmetry.axes
+
+
+WITHIN = 0.999
+"""Share of the ball's radius up to which its curved elements surely reach."""
+
+
+def in_ball(solution: RotorSolution, points: Array) -> NDArray[np.bool_]:
+    """Which of the points (n, 3) m in the rotor's frame lie in the ball of the elements: (n,)."""
+    return np.asarray(np.linalg.norm(_in_mesh(solution, points), axis=1) < WITHIN * solution.mesh.ball_radius)
+
+
+def potential_slopes(solution: RotorSolution, points: Array) -> tuple[Array, Array]:
+    """∇ψ (n, 3) T and its slope ∂_i ∂_j ψ (n, 3, 3) T/m at points (n, 3) m in the ball, rotor's frame.
+
+    On a face it is that of the side on which the mesh has the point.  ∇ψ converges as h^p, its slope one order slower.
+    """
+    mesh, planes, axes = solution.mesh, solution.symmetry.planes, solution.symmetry.axes
+    places = _in_mesh(solution, points)
+    flips = np.ones_like(places)
+    for plane in solution.mesh.planes:
+        flips[:, plane] = np.where(places[:, plane] < 0, -1.0, 1.0)
+    assert set(solution.mesh.planes) <= set(planes)
+    found = mesh.mesh(*(flips * places).T)
+    first, second = np.zeros((len(points), 3)), np.zeros((len(points), 3, 3))
+    for part in solution.parts:
+        sign = np.ones(len(points))
+        for plane, parity in zip(mesh.planes, part.signs, strict=True):
+            sign *= np.where(flips[:, plane] < 0, parity, 1.0)
+        first += sign[:, None] * np.asarray(ng.grad(part.potential)(found)).reshape(-1, 3)
+        hesse = np.asarray(part.potential.Operator("hesse")(found)).reshape(-1, 3, 3)
+        second += sign[:, None, None] * hesse
+    first, second = first * flips, second * flips[:, :, None] * flips[:, None, :] / mesh.unit
+    return first @ axes.T, np.asarray(axes @ second @ axes.T)
+
+
+def _in_mesh(solution: RotorSolution, points: Array) -> Array:
+    """Points (n, 3) in the mesh's coordinates, without regard to mirrors."""
+    symmetry, mesh = solution.symmetry, solution.mesh
+    return ((points - symmetry.center) @ symmetry.axes - mesh.center) / mesh.unit
+
+
+LAYERS = {2: 1, 3: 1, 4: 2, 5: 2, 6: 2, 7: 3, 8: 3}
+"""Layers at the edges by order of the elements."""
+LAYERS_STRONG = {2: 1, 3: 2, 4: 3, 5: 3, 6: 4, 7: 4, 8: 4}
+STRONG = 0.5
+"""μ - 1 from which on edges need `LAYERS_STRONG`; with μr = 5, two layers leave 2.4e-6 of the dipole, three 1.4e-7."""
+FIRST_RATE = 0.5
+"""Ratio of two differences that is assumed before it is known; 0.1 to 0.3 were measured."""
+DEARER = 2.3
+"""How much longer an order takes than the one before it, about: for the progress."""
+FASTEST_RATE, FASTEST_RATE_STRONG, SLOWEST_RATE = 0.1, 0.3, 0.75
+SAFETY = 1.25
+"""Factor on each of the two extrapolated differences."""
+
+
+def strongest(magnets: Sequence[Magnet]) -> float:
+    """Largest μ - 1 of magnets."""
+    return max(magnet.contrast for magnet in magnets)
+
+
+def refinement_of(order: int, settings: MeshSettings, contrast: float = 0.0) -> Refinement:
+    """The refinement that belongs to an order of the elements and to the largest μ - 1 of the magnets."""
+    layers = (LAYERS if contrast < STRONG else LAYERS_STRONG)[order] if settings.hp_layers else 0
+    return Refinement(order, replace(settings, hp_layers=layers, curve_order=min(order + 1, 8)), 2 * order + 2)
+
+
+def refined(
+    solve: Callable[[int], RotorSolution],
+    points: Array,
+    scale: Array,
+    target: float,
+    settings: MeshSettings,
+    watch: Watch = unwatched,
+) -> tuple[RotorSolution, int, dict[str, list[MultipoleExpansion]]]:
+    """The solution at the first order whose error is below the target.
+
+    Parameters
+    ----------
+    solve : solution at an order
+    points, scale : where (n, 3) m the error is looked at, and the field (n,) T to which it is relative
+    settings : of the mesh, as given to `refinement_of`
+    watch : hears of the progress, as far as the rate of convergence foretells it
+
+    Returns
+    -------
+    The last solution, its order, and the two estimates of its error, to be added, as fields.
+    """
+    first, *others = LAYERS
+    coarse, before, old = solve(first), np.inf, list[Coefficients]()
+    for order in others:
+        fine = solve(order)
+        new = [b - a for a, b in zip(coarse.coefficients, fine.coefficients, strict=True)]
+        field = sum(e.evaluate(points)[0] for e in fine.expansions(new))
+        size = float(np.max(np.linalg.norm(field, axis=1) / scale))
+        rate = _rate(size, before, _fastest(fine, order, settings))
+        factor = SAFETY * rate / (1 - rate)
+        earlier = [size / before * d for d in old] if old and before else new
+        if 2 * factor * size <= target:
+            break
+        watch("orders of the elements", _finished(order, 2 * factor * size / target, rate))
+        coarse, before, old = fine, size, new
+    doubts = {"discretisation": new, "discretisation, earlier step": earlier}
+    return fine, order, {cause: fine.expansions([factor * d for d in ds]) for cause, ds in doubts.items()}
+
+
+def _finished(order: int, missed: float, rate: float) -> float:
+    """Share of the work that orders up to this one are, if the error is still so many times too large."""
+    last = min(order + max(1, int(np.ceil(np.log(missed) / -np.log(rate)))), max(LAYERS))
+    return float((DEARER ** (order - 1) - 1) / (DEARER ** (last - 1) - 1))
+
+
+def _fastest(solution: RotorSolution, order: int, settings: MeshSettings) -> float:
+    """Rate that may be trusted: slow where layers at the edges lack, since orders then converge slowly later on."""
+    contrast = strongest(solution.mesh.magnets)
+    if solution.layers < refinement_of(order, settings, contrast).mesh.hp_layers:
+        return FIRST_RATE
+    return FASTEST_RATE if contrast < STRONG else FASTEST_RATE_STRONG
+
+
+def _rate(size: float, before: float, fastest: float) -> float:
+    """Ratio of the next difference to the last one."""
+    if np.isinf(before):
+        return FIRST_RATE
+    return min(max(size / before, fastest) if before else 0.0, SLOWEST_RATE)

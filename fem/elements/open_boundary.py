@@ -10,9 +10,10 @@ from typing import Any
 import ngsolve as ng
 import numpy as np
 
-from ...geometry.basics import Array
-from ..harmonics import FOUR_PI, Coefficients, Keys, harmonic_parity, orthonormal, orthonormal_keys, outer_coefficients
-from .integration_points import surface_points
+from ...geometry.common import Array
+from ..harmonics.interior import FOUR_PI
+from ..harmonics.solid import Coefficients, Keys, harmonic_parity, orthonormal, orthonormal_keys, outer_coefficients
+from .spaces import surface_points
 
 
 class OpenBoundary:

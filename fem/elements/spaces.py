@@ -1,20 +1,59 @@
-"""Integration points of a mesh region as NumPy arrays, and the way back into NGSolve.
+"""Mirror symmetry: any field as a sum of parts that are even or odd about each plane.
 
-Functions that exist as NumPy code (closed forms, solid harmonics) enter and leave the finite elements here, so that no
-formula has to be written a second time. Works on every element shape, those of hp-refinement included.
+A mirror R = diag(±1) takes a polar vector field A to R A(R x).  With the planes of `mirrors` (axes) there are
+2^n mirrors and 2^n parity classes; in class χ, R A(R x) = χ(R) A(x).  An odd class has no tangential
+component on its plane: a Dirichlet condition for A there.  An even class has the natural condition.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import product
 from typing import Any
 
+import ngsolve
 import ngsolve as ng
 import numpy as np
 import scipy
+from numpy.typing import NDArray
 
-from ...geometry.basics import Array
+from ...geometry.common import Array
+
+
+@dataclass(frozen=True)
+class Parity:
+    """The mirrors of a geometry.
+
+    Parameters
+    ----------
+    mirrors : axes whose plane through the origin is a mirror
+    """
+
+    mirrors: tuple[int, ...]
+
+    @property
+    def flips(self) -> Array:
+        """(2^n, 3) diagonals of the mirrors R."""
+        found = np.ones((2 ** len(self.mirrors), 3))
+        found[:, list(self.mirrors)] = list(product((1, -1), repeat=len(self.mirrors)))
+        return found
+
+    @property
+    def classes(self) -> list[tuple[int, ...]]:
+        """Sign (+1 even, -1 odd) of each class about each of `mirrors`."""
+        return list(product((1, -1), repeat=len(self.mirrors)))
+
+    @property
+    def characters(self) -> Array:
+        """(2^n, 2^n) χ(R) by class and mirror."""
+        mirrored = self.flips[:, list(self.mirrors)] < 0
+        odd = np.array(self.classes).reshape(len(self.classes), -1) < 0
+        return np.asarray((-1.0) ** (odd.astype(int) @ mirrored.astype(int).T))
+
+    def project(self, images: Array) -> Array:
+        """Parts (2^n classes, ...) of fields given as R A(R x) for each mirror (2^n mirrors, ...)."""
+        return np.tensordot(self.characters, images, axes=1) / len(self.flips)
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,3 +142,38 @@ def _sample(space: Any, region: Any, functions: tuple[Any, ...]) -> Array:
         values.Interpolate(function, definedon=region)
         columns.append(values.vec.FV().NumPy().copy())
     return np.stack(columns, axis=1)
+
+
+IntArray = NDArray[np.int64]
+
+
+def edge_vertices(mesh: ngsolve.Mesh) -> IntArray:
+    """(n, 2) vertex numbers of all edges."""
+    return np.array([[v.nr for v in edge.vertices] for edge in mesh.edges], dtype=np.int64)
+
+
+def region_edges(mesh: ngsolve.Mesh, region: ngsolve.Region) -> NDArray[np.bool_]:
+    """Which edges belong to a volume or boundary region."""
+    found = np.zeros(mesh.nedge, bool)
+    for element in region.Elements():
+        found[[edge.nr for edge in element.edges]] = True
+    return found
+
+
+def tree_edges(edges: IntArray, shrunk: NDArray[np.bool_]) -> IntArray:
+    """Numbers of the edges of a spanning tree of the graph in which all `shrunk` edges have length zero.
+
+    Parameters
+    ----------
+    edges : (n, 2) vertex numbers
+    shrunk : (n,) which edges join their ends to one vertex
+    """
+    vertices = int(edges.max()) + 1
+    joined = scipy.sparse.coo_matrix((np.ones(int(shrunk.sum())), edges[shrunk].T), shape=(vertices, vertices))
+    count, label = scipy.sparse.csgraph.connected_components(joined, directed=False)
+    ends = np.sort(label[edges], axis=1)
+    numbers = np.flatnonzero(ends[:, 0] != ends[:, 1])
+    _, first = np.unique(ends[numbers], axis=0, return_index=True)
+    numbers = numbers[first]
+    graph = scipy.sparse.coo_matrix((numbers + 1.0, ends[numbers].T), shape=(count, count))
+    return np.asarray(np.rint(scipy.sparse.csgraph.minimum_spanning_tree(graph.tocsr()).data).astype(np.int64) - 1)

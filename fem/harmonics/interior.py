@@ -14,7 +14,7 @@ from functools import cache
 
 import numpy as np
 
-from ...geometry.basics import MU_0, Array
+from ...geometry.common import MU_0, Array
 from .solid import CHUNK, Coefficients, factorials, regular_values, weighted_sums
 
 FOUR_PI = 4 * np.pi

@@ -1,10 +1,6 @@
-"""A table's field in a small ball, as an expansion about its centre: a third of the operations, always the same ones.
+"""Fields in a ball from their normal component on its surface, in the real harmonics of `regular_sums`.
 
-With lengths in radii of the ball, r̃ = (r - center)/radius, B = -∇̃ Σ conj a_lm Υ_lm(r̃) (`interior`): free of
-divergence and curl whatever the coefficients are, so that a force made of it is conservative.  All numbers of a ball
-are runtime parameters; a floater that leaves it goes on in another one with the same compiled code.
-
-What an expansion misses is harmonic in each component, hence largest on the surface of the ball, and is measured there.
+With lengths in radii of the ball, B = -∇ Σ c_k R_k, the R_k in the order of `members`.
 """
 
 from collections.abc import Callable, Sequence
@@ -14,12 +10,53 @@ from functools import cache
 import heyoka as hy
 import numpy as np
 
-from ...geometry.basics import Array
-from .compiled import FieldExpressions
-from .fit_in_ball import derivatives, sphere_fit
-from .interior import Ball
-from .multipole import UPPER
-from .regular_sums import regular_harmonics, weighted
+from ...geometry.common import Array
+from .expansion import UPPER
+from .expressions import FieldExpressions, members, real_sizes, real_weights, regular_harmonics, weighted
+from .interior import Ball, gradient_coefficients, sphere
+from .solid import factorials, regular_values
+
+
+@dataclass(frozen=True, eq=False)
+class SphereFit:
+    """What takes values on the unit sphere to an expansion, and back.
+
+    Parameters
+    ----------
+    normals : (n, 3) points
+    potential : (K, n) c_k by the normal component at one of the points, K = (degree + 1)²
+    basis : (degree², n) R_k up to one degree less, at the points
+    """
+
+    normals: Array
+    potential: Array
+    basis: Array
+
+
+@cache
+def sphere_fit(degree: int) -> SphereFit:
+    """For potentials of a degree; exact for them."""
+    normals, areas = sphere(degree)
+    found = np.zeros((len(normals), degree + 1, degree + 1), complex)
+    for (l, m), values in regular_values(degree, *normals.T).items():
+        if l:
+            found[:, l, m] = -(2 * l + 1) / (4 * np.pi * l) * values * areas
+    potential = np.stack([real_weights(np.asarray(factorials(degree) * row, complex)) for row in found], axis=1)
+    known = regular_values(degree - 1, *normals.T)
+    values = np.array([known[l, m].imag if part else known[l, m].real for l, m, part in members(degree - 1)])
+    return SphereFit(normals, potential, values / real_sizes(degree - 1)[:, None])
+
+
+@cache
+def derivatives(degree: int) -> Array:
+    """(3, degree², K): the coefficients of ∂/∂x_a Σ c_k R_k by the c_k, K = (degree + 1)²."""
+    columns = []
+    for k, (l, m, part) in enumerate(members(degree)):
+        single = np.zeros((degree + 1, degree + 1), complex)
+        single[l, m] = 1j if part else 1.0
+        single /= real_weights(single)[k]
+        columns.append([real_weights(gradient_coefficients(single, axis)) for axis in range(3)])
+    return np.asarray(np.moveaxis(np.array(columns), 0, -1))
 
 
 @dataclass(frozen=True)

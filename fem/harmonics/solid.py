@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...geometry.basics import Array, frozen_array
+from ...geometry.common import Array, frozen_array
 
 Coefficients = NDArray[np.complex128]
 """c[l, m] for 0 ≤ m ≤ l, as a square array."""
@@ -181,3 +181,89 @@ def field_sizes(degree: int) -> Array:
 def field_spectrum(coefficients: Coefficients) -> Array:
     """Root mean square of |grad f| over the unit sphere, by degree: (L+1,)."""
     return np.asarray(np.linalg.norm(np.abs(coefficients) * field_sizes(len(coefficients) - 1), axis=1))
+
+
+FOUR_PI = 4 * np.pi
+Keys = list[tuple[int, int, bool]]
+"""Degree l, order m, and whether it is the imaginary part."""
+
+
+def norm(l: int, m: int) -> float:
+    """Factor that makes Re Υ_lm, and Im Υ_lm if m > 0, orthonormal on the unit sphere."""
+    square = (2 * l + 1) / FOUR_PI * factorials(l)[l, m]
+    return float(np.sqrt(square if m == 0 else 2 * square))
+
+
+def orthonormal_keys(degree: int) -> Keys:
+    """The real harmonics up to a degree, in the order of the columns of `orthonormal`."""
+    return [
+        (l, m, imaginary)
+        for l in range(degree + 1)
+        for m in range(l + 1)
+        for imaginary in ((False,) if m == 0 else (False, True))
+    ]
+
+
+def orthonormal(keys: Keys, points: Array) -> Array:
+    """Real orthonormal harmonics (n, columns) in the directions of `points` (n, 3)."""
+    degree = max(l for l, _, _ in keys)
+    harmonics = regular_values(degree, *(points / np.linalg.norm(points, axis=1)[:, None]).T)
+    parts = [harmonics[l, m].imag if imaginary else harmonics[l, m].real for l, m, imaginary in keys]
+    return np.stack([norm(l, m) * part for (l, m, _), part in zip(keys, parts, strict=True)], axis=1)
+
+
+def harmonic_parity(key: tuple[int, int, bool], axis: int) -> int:
+    """Whether a real harmonic is even (+1) or odd (-1) at the plane across a coordinate axis."""
+    l, m, imaginary = key
+    odd = ((m + imaginary) % 2, int(imaginary), (l + m) % 2)[axis]
+    return -1 if odd else 1
+
+
+def mirrored_harmonics(coefficients: Coefficients, axis: int) -> Coefficients:
+    """Coefficients of f(S x), with S the mirror at the plane across a coordinate axis, of f = Σ c_lm Θ_lm."""
+    l, m = np.indices(coefficients.shape)
+    if axis == 2:
+        return np.asarray((-1.0) ** (l + m) * coefficients)
+    return np.asarray((-1.0) ** (m if axis == 0 else 0 * m) * np.conj(coefficients))
+
+
+def outer_coefficients(amplitudes: Array, keys: Keys, degree: int) -> Coefficients:
+    """c_lm of Σ c_lm Θ_lm that is Σ a_k Y_k on the unit sphere, `amplitudes` a_k of the orthonormal harmonics Y_k."""
+    result = np.zeros((degree + 1, degree + 1), complex)
+    for value, (l, m, imaginary) in zip(amplitudes, keys, strict=True):
+        result[l, m] += (2 * l + 1) / FOUR_PI / norm(l, m) * (-1j * value if imaginary else value)
+    return result
+
+
+def rotated_harmonics(coefficients: Coefficients, axes: Array) -> Coefficients:
+    """Coefficients of f(axesᵀ x) of f = Σ c_lm Θ_lm: from a frame with the columns of `axes` as axes to the outer one.
+
+    Exact but for round-off: 1e-14 of the largest term at degree 50, in milliseconds.
+    """
+    if np.array_equal(axes, np.eye(3)):
+        return coefficients
+    last = np.arctan2(axes[1, 2], axes[0, 2])  # first about z, then about y, then about z again
+    across = np.array([np.cos(last), np.sin(last), 0.0])
+    middle = np.arctan2(across @ axes[:, 2], axes[2, 2])
+    first = np.arctan2(*(np.array([-across[1], across[0], 0.0]) @ axes[:, :2]))
+    degrees = np.arange(len(coefficients))
+    l, m = np.meshgrid(degrees, degrees, indexing="ij")
+    size = np.sqrt(factorials(len(coefficients) - 1))
+    amplitudes = coefficients * np.where(m <= l, size, 0.0)
+    for degree in degrees[1:]:
+        orders, known = degrees[: degree + 1], amplitudes[degree, : degree + 1]
+        below = (-1.0) ** orders[:0:-1] * np.conj(known[:0:-1])
+        speeds, modes = _swings(int(degree))
+        turned = np.concatenate([below, known]) * np.exp(-1j * first * np.arange(-degree, degree + 1))
+        turned = modes @ (np.exp(-1j * middle * speeds) * (modes.conj().T @ turned))
+        amplitudes[degree, : degree + 1] = turned[degree:] * np.exp(-1j * last * orders)
+    return np.asarray(amplitudes / size)
+
+
+@cache
+def _swings(degree: int) -> tuple[Array, Coefficients]:
+    """Eigenvalues (n,) and vectors (n, n) of the angular momentum about y among orders -degree to degree."""
+    m = np.arange(-degree, degree)
+    rising = np.diag(np.sqrt((degree - m) * (degree + m + 1.0)) / 2, -1)
+    values, vectors = np.linalg.eigh((rising - rising.T) / 1j)
+    return values, vectors

@@ -9,11 +9,12 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
-from ...geometry.basics import Array, Part, Sphere, counted, millimetres
-from ...geometry.bodies import Magnet
-from ..closed_forms import remanent_field
-from .columns import METERS, TESLAS, UNITS
-from .field_map import FieldMap, FieldMapError
+from ...geometry.common import Array, counted, millimetres
+from ...geometry.magnets import Magnet
+from ...geometry.shapes import Sphere
+from ...geometry.solids import Part
+from ..closed_forms.uniform import remanent_field
+from .columns import METERS, TESLAS, UNITS, FieldMap, FieldMapError
 
 SUBSET = 400
 """Map points that are enough to compare."""

@@ -1,17 +1,24 @@
-"""A rotor's and a floater's answers fitted to finite elements: the making of a `MutualTable`."""
+"""How far a `MutualTable` is from the magnetostatics of both bodies, by their gap."""
 
+import hashlib
+import json
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
+import xarray as xr
 
-from ...geometry.basics import Array, InputError, Part, Watch, unwatched
-from ...geometry.bodies import Magnet
-from ...geometry.scenes import Floater
-from .answer_error import answer_errors
-from .answer_grid import POWERS, RETURNED, AnswerGrid, answer_box, point_counts
-from .answer_samples import (
+from ...geometry.common import Array, InputError, Watch, unwatched, watched
+from ...geometry.magnets import Magnet
+from ...geometry.scene.contents import Floater
+from ...geometry.solids import Part, places_off
+from ..cache import described, from_cache, program_of, read_checked, write_checked
+from ..harmonics.interior import Ball, field_at_center, gradient_at_center
+from ..rotor.pose import at_home
+from .grid import IMAGES, POWERS, RETURNED, AnswerGrid, answer_box, image_weights, point_counts
+from .response import RotorResponse, enough_degree, rotor_ladder, two_body
+from .samples import (
     NEAR_GAPS,
     ROTOR_GAPS,
     SPHERE_GAPS,
@@ -22,10 +29,78 @@ from .answer_samples import (
     sphere_samples,
     unit_dipole_fields,
 )
-from .permeable_sphere import IMAGES, image_weights
-from .rotor_response import rotor_ladder
-from .sphere_fit import MANY, PARALLEL, classes, least_squares, returned_fit, sphere_fit
-from .table import MutualTable
+from .table import MANY, PARALLEL, MutualTable, classes, least_squares, returned_fit, sphere_fit
+
+GAPS, PLACES_EACH = (0.03, 0.08, 0.16, 0.5, 1.5), 2
+"""Gaps at which both are compared, in floater radii, and at how many poses for each magnet beside that at its pole."""
+DEGREES, SERIES = 1e-4, 1e-5
+"""Where the degrees and the series of both bodies end."""
+SAFETY = 4.0
+"""For the poses that were not looked at."""
+ELEMENTS = 0.2
+"""Error of finite elements by what those of one degree less differ from them; 0.1 to 0.13 were measured."""
+
+
+def answers(
+    table: MutualTable, places: Array, moments: Array, field: Array, gradient: Array
+) -> tuple[Array, Array, Array]:
+    """Energy (n,) J, force (n, 3) N and torque (n, 3) N m at places (n, 3) m of moments (n, 3) A m² in B0 and ∇B0."""
+    alpha = table.polarizability
+    energy, slope, _ = table.derivatives(places, moments + alpha * field)
+    by_place, by_moment = slope[:, :3], slope[:, 3:]
+    energy = energy - alpha / 2 * np.sum(field**2, axis=1)
+    force = -by_place + alpha * np.einsum("ni,nij->nj", field - by_moment, gradient)
+    return energy, force, -np.cross(moments, by_moment)
+
+
+def answer_errors(
+    table: MutualTable, coarse: RotorResponse, rotor: RotorResponse, floater: Floater, watch: Watch
+) -> tuple[Array, Array]:
+    """Gaps (k,) m, and the largest relative errors (k, 2) of force and torque found at poses with these gaps.
+
+    Of the table against the finite elements of `rotor`, and of these by the `coarse` ones.
+    """
+    generator = np.random.default_rng(4)
+    errors = []
+    for gap in watched(GAPS, watch, "errors"):
+        worst = np.zeros(2)
+        anywhere = places_around(rotor.magnets, floater.radius, (gap,), PLACES_EACH, 3)
+        for place in (*anywhere, *_at_poles(rotor.magnets, (1 + gap) * floater.radius)):
+            direction = generator.normal(size=3)
+            direction /= np.linalg.norm(direction)
+            degree = enough_degree(rotor.magnets, Ball(place, floater.radius), DEGREES)
+            both = two_body(rotor, floater, place, direction, degree, SERIES)
+            added = both.total - both.rigid
+            rough = two_body(coarse, floater, place, direction, degree, SERIES)
+            unsure = added - (rough.total - rough.rigid)
+            field, gradient = field_at_center(both.own), gradient_at_center(both.own, floater.radius)
+            _, force, torque = answers(
+                table, place[None], floater.moment * direction[None], field[None], gradient[None]
+            )
+            missed = [
+                np.linalg.norm(told - true) + ELEMENTS * np.linalg.norm(step)
+                for told, true, step in zip(
+                    (force[0], torque[0]), (added.force, added.torque), (unsure.force, unsure.torque), strict=True
+                )
+            ]
+            arm = floater.radius * np.linalg.norm(added.force)
+            sizes = np.linalg.norm(added.force), max(float(np.linalg.norm(added.torque)), 0.1 * float(arm))
+            worst = np.maximum(worst, np.array(missed) / np.maximum(np.array(sizes), np.finfo(float).tiny))
+        errors.append(SAFETY * worst)
+    return np.array(GAPS) * floater.radius, np.array(errors)
+
+
+def _at_poles(magnets: Sequence[Magnet], distance: float) -> list[Array]:
+    """Places (3,) m at a distance (m) from where the magnets' remanence points, where no other magnet is nearer."""
+    places = []
+    for magnet in magnets:
+        size = float(np.linalg.norm(magnet.polarization))
+        if size:
+            (place,) = places_off(magnet.body, magnet.polarization_in_rotor[None] / size, distance)
+            if min(float(other.body.distance(place)) for other in magnets) > distance * (1 - 1e-6):
+                places.append(place)
+    return places
+
 
 NEAREST = 0.16
 """Gap in floater radii from which on force and torque are to be met to 1e-3: 1 mm for the article's floater."""
@@ -144,3 +219,96 @@ def _rotor_fit(
     coupling = np.zeros((whole.shape[1], whole.shape[1]))
     coupling[a, b] = coupling[b, a] = weights
     return made, coupling
+
+
+FORMAT = "spinlev mutual table 3"
+
+
+def cached_mutual_table(
+    magnets: tuple[Magnet, ...], floater: Floater, report: Callable[[str], None], watch: Watch = unwatched
+) -> tuple[MutualTable, bool]:
+    """The answers of a rotor and a floater, see `mutual_table`, from the cache if they are there, and whether.
+
+    A lone magnet answers in its own axes: one table serves it wherever it stands and however it is turned.
+    """
+    upright = at_home(magnets)
+    table, found = from_cache(
+        f"mutual-{mutual_key(upright, floater)}.nc",
+        lambda path: from_dataset(read_checked(path, FORMAT), upright),
+        lambda: mutual_table(upright, floater, watch=watch),
+        lambda table, path: write_checked(to_dataset(table), path),
+        report,
+    )
+    return _posed(table, magnets), found
+
+
+def _posed(table: MutualTable, magnets: tuple[Magnet, ...]) -> MutualTable:
+    """The table of a lone upright magnet where the magnet is; that of several as it is."""
+    if len(magnets) > 1:
+        return table
+    turns = [magnet.box.rotation for magnet in magnets]
+    turn = np.kron(np.eye(len(table.coupling) // 3), turns[0]) if turns else np.zeros((0, 0))
+    coupling = turn @ table.coupling @ turn.T
+    grids = tuple(replace(grid, box=answer_box(magnet.body)) for grid, magnet in zip(table.grids, magnets, strict=True))
+    return replace(table, magnets=magnets, grids=grids, coupling=coupling)
+
+
+def mutual_key(magnets: tuple[Magnet, ...], floater: Floater) -> str:
+    """SHA-256 of all that decides the answers, and the programs that compute them."""
+    digest = hashlib.sha256(f"{FORMAT} {program_of(__name__)}".encode())
+    sphere = np.array([floater.radius, floater.remanence, floater.recoil_permeability])
+    for magnet in magnets:
+        for part in (magnet.body.shape_numbers, magnet.body.center, magnet.body.rotation, magnet.polarization):
+            digest.update(np.ascontiguousarray(part + 0.0, dtype="<f8").tobytes())
+        digest.update(np.ascontiguousarray(magnet.permeability_in_rotor + 0.0, dtype="<f8").tobytes())
+    digest.update(np.ascontiguousarray(sphere, dtype="<f8").tobytes())
+    return digest.hexdigest()
+
+
+def to_dataset(table: MutualTable) -> xr.Dataset:
+    """All numbers of a table with their units; the magnets are known to who asks for it."""
+    grids = table.grids
+    variables = {
+        "axis": (("magnet", "body_axis"), np.array([grid.axis for grid in grids]), "1"),
+        "counts": (("magnet", "body_axis"), np.array([grid.counts for grid in grids]), "1"),
+        "strengths": (("point", "body_axis"), np.concatenate([grid.strengths for grid in grids]), "A m2/T"),
+        "degrees": (("point", "power", "kind"), np.concatenate([grid.degrees for grid in grids]), "J"),
+        "returned": (("point", "higher_power", "kind"), np.concatenate([grid.returned for grid in grids]), "T"),
+        "coupling": (("field", "other_field"), table.coupling, "A m2/T"),
+        "pairs": (("magnet", "other_magnet"), table.pairs, "J"),
+        "mixed": (("magnet", "other_magnet"), table.mixed, "T"),
+        "images": (("image",), table.images, "1"),
+        "polarizability": ((), table.polarizability, "A m2/T"),
+        "radius": ((), grids[0].radius, "m"),
+        "gaps": (("gap",), table.gaps, "m"),
+        "errors": (("gap", "of_force_or_torque"), table.errors, "1"),
+    }
+    attrs = {
+        "format": FORMAT,
+        "title": "Energies of the mutual magnetisation of a rotor and a sphere",
+        "provenance": json.dumps(table.provenance, sort_keys=True),
+    }
+    return described(variables, attrs)
+
+
+def from_dataset(dataset: xr.Dataset, magnets: tuple[Magnet, ...]) -> MutualTable:
+    """The table of a data set that `to_dataset` made for these magnets."""
+    data = {str(name): variable.values for name, variable in dataset.data_vars.items()}
+    ends = np.cumsum(np.prod(data["counts"], axis=1))[:-1]
+    parts = (np.split(data[name], ends) for name in ("strengths", "degrees", "returned"))
+    grids = [
+        AnswerGrid(answer_box(m.body), axis, float(data["radius"]), tuple(counts), *rest)
+        for m, axis, counts, *rest in zip(magnets, data["axis"], data["counts"].tolist(), *parts, strict=True)
+    ]
+    return MutualTable(
+        magnets=magnets,
+        grids=tuple(grids),
+        coupling=data["coupling"],
+        pairs=data["pairs"],
+        mixed=data["mixed"],
+        images=data["images"],
+        polarizability=float(data["polarizability"]),
+        gaps=data["gaps"],
+        errors=data["errors"],
+        provenance=json.loads(dataset.attrs["provenance"]),
+    )

@@ -1,10 +1,6 @@
-"""The field of a rotor of permeable magnets in a ball beside it: by its own remanence and in answer to sources.
+"""How many degrees the expansion of the magnets' field about the floater's centre needs."""
 
-In the magnets H0 is the closed form of the remanent polarisation J (μr = 1) plus the field of the ball's sources. The
-magnetisation (μ - 1)(H0 - ∇ψ) comes from finite elements on a mesh of the magnets alone, which serves every position of
-the ball. Its field in the ball is a volume integral over the magnets, whose error is the square of that of ∇ψ.  The
-direct part (μ - 1) H0, nearly all of it, is integrated with points apart from the mesh, which are enough for it.
-"""
+from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -12,22 +8,52 @@ from functools import cached_property
 
 import numpy as np
 
-from ...geometry.basics import Array, Box
-from ...geometry.bodies import Magnet
-from ...geometry.meshes import MagnetMesh, mesh_magnets
-from ..closed_forms import remanent_field, volume_rule
-from ..harmonics import (
-    Ball,
-    Coefficients,
-    box_rule,
-    derivative,
-    from_magnetization,
-    interior_coefficients,
-    outer_sums,
-)
-from ..magnetostatics import PermeableRegions, assemble_regions
-from ..rotor_tables import RotorTable
-from .answer_grid import point_counts
+from ...geometry.common import Array, ComputationError
+from ...geometry.magnets import Magnet
+from ...geometry.meshes.magnets import MagnetMesh, mesh_magnets
+from ...geometry.overlap import TOUCHING, sphere_overlap
+from ...geometry.scene.contents import Floater
+from ...geometry.shapes import Box, Sphere
+from ...geometry.solids import Solid
+from ..closed_forms.moments import volume_rule
+from ..closed_forms.uniform import remanent_field
+from ..elements.magnetostatics import PermeableRegions, assemble_regions
+from ..harmonics.expansion import box_rule
+from ..harmonics.interior import Ball, from_magnetization, interior_coefficients, multipole_force, multipole_torque
+from ..harmonics.solid import Coefficients, derivative, outer_sums
+from ..rotor.table import RotorTable
+from .grid import induced_sources, permanent_sources, point_counts
+
+DEGREES = range(6, 41)
+
+
+def singular_ratio(magnets: Sequence[Magnet], ball: Ball) -> float:
+    """Radius over the distance of the centre from the nearest edge of a magnet.
+
+    The field continues analytically across a face, so that edges alone bound the convergence of its expansion, and the
+    centre of a sphere or the axis of a cylinder; 1 in contact with an edge.
+    """
+    nearest = min(_singular_distance(magnet.body, ball.center) for magnet in magnets)
+    return min(ball.radius / nearest, 1.0)
+
+
+def enough_degree(magnets: Sequence[Magnet], ball: Ball, rtol: float = 1e-9) -> int:
+    """Degree l at which ρ^2l, the share of degree l in the force, has fallen below `rtol`; between 6 and 40."""
+    ratio = min(singular_ratio(magnets, ball), 0.99)
+    return int(np.clip(np.ceil(np.log(rtol) / (2 * np.log(ratio))), DEGREES[0], DEGREES[-1]))
+
+
+def _singular_distance(body: Solid, place: Array) -> float:
+    """Distance (m) of a place (3,) m from where the field of a body cannot be continued."""
+    local, half = body.to_body(place), body.half_edges
+    if isinstance(body, Box):
+        return float(body.edge_distance(place[None])[0])
+    if isinstance(body, Sphere):
+        return float(np.linalg.norm(local))
+    across = float(np.hypot(local[0], local[1]))
+    beyond = max(abs(float(local[2])) - float(half[2]), 0.0)
+    return float(min(np.hypot(across, beyond), body.edge_distance(place[None])[0]))
+
 
 NODES = 24
 """Integration points per axis in a magnet for the closed form; its logarithm at the edges is met to round-off."""
@@ -189,3 +215,123 @@ def rotor_ladder(rotor: tuple[Magnet, ...], orders: tuple[int, ...] = (3, 4)) ->
     """The same rotor on one mesh with elements of several degrees, from coarse to fine."""
     mesh = mesh_magnets(rotor)
     return tuple(rotor_response(mesh, order) for order in orders)
+
+
+MOST_TERMS = 60
+
+
+class TwoBodyError(ComputationError):
+    """The bodies overlap, or the answers of one to the other do not settle."""
+
+
+@dataclass(frozen=True, eq=False)
+class Wrench:
+    """Force (3,) N and torque (3,) N m on the floater, about its centre."""
+
+    force: Array
+    torque: Array
+
+    def __sub__(self, other: Wrench) -> Wrench:
+        return Wrench(self.force - other.force, self.torque - other.torque)
+
+
+@dataclass(frozen=True, eq=False)
+class TwoBody:
+    """A rotor and a floater in mutual equilibrium of their magnetisation.
+
+    Parameters
+    ----------
+    ball : the floater's centre and radius
+    rigid : rotor's own field on the rigid dipole
+    floater_answer : what the sphere's answer to the rotor's own field adds
+    rotor_answer : what the rotor's answer to the rigid dipole adds
+    total : both bodies answer to both; the sum of the three but for products of two answers
+    own, incident, sources : a_lm (T) of the rotor alone, a_lm and c_lm (T) of the total
+    terms : of the series
+    tail : estimated relative error by the degrees left out, of what the answers add
+    """
+
+    ball: Ball
+    rigid: Wrench
+    floater_answer: Wrench
+    rotor_answer: Wrench
+    total: Wrench
+    own: Coefficients
+    incident: Coefficients
+    sources: Coefficients
+    terms: int
+    tail: float
+
+
+def two_body(
+    rotor: RotorResponse,
+    floater: Floater,
+    position: Array,
+    direction: Array,
+    degree: int | None = None,
+    rtol: float = 1e-11,
+) -> TwoBody:
+    """Magnetostatics of both bodies for one pose.
+
+    Parameters
+    ----------
+    position : (3,) floater's centre, m, rotor's frame
+    direction : (3,) unit vector of its remanent polarisation
+    degree : highest degree about the floater's centre; None: from the distance of the nearest edge
+    rtol : where the series ends, relative to its first term
+
+    Accuracy: that of the rotor's finite elements (see `two_body_ladder`) and `tail`.
+
+    Raises
+    ------
+    TwoBodyError : the bodies overlap, or the series does not converge
+    """
+    ball = Ball(np.asarray(position, float), floater.radius)
+    degree = degree or enough_degree(rotor.magnets, ball)
+    for k, magnet in enumerate(rotor.magnets):
+        if sphere_overlap(ball.center, ball.radius, magnet.body) > TOUCHING:
+            raise TwoBodyError(
+                f"Input position must leave the floater outside the magnets; instead it cuts magnet {k}."
+            )
+    own = rotor.own_field(ball, degree)
+    permanent = permanent_sources(floater, direction, ball, degree)
+    reflected = rotor.answer(permanent, ball, degree)
+    incident, sources, terms = own + reflected, permanent, 1
+    change = induced_sources(incident, floater.recoil_permeability)
+    limit = rtol * np.abs(permanent).max()
+    while np.abs(change).max() > limit:
+        if terms == MOST_TERMS:
+            raise TwoBodyError(f"The answers of rotor and floater to each other did not settle in {terms} terms.")
+        back = rotor.answer(change, ball, degree)
+        incident, sources, terms = incident + back, sources + change, terms + 1
+        change = induced_sources(back, floater.recoil_permeability)
+    induced = induced_sources(own, floater.recoil_permeability)
+    return TwoBody(
+        ball=ball,
+        rigid=_wrench(own, permanent, ball),
+        floater_answer=_wrench(own, induced, ball),
+        rotor_answer=_wrench(reflected, permanent, ball),
+        total=_wrench(incident, sources, ball),
+        own=own,
+        incident=incident,
+        sources=sources,
+        terms=terms,
+        tail=singular_ratio(rotor.magnets, ball) ** (2 * degree),
+    )
+
+
+def two_body_ladder(
+    rotors: Sequence[RotorResponse], floater: Floater, position: Array, direction: Array
+) -> tuple[TwoBody, Wrench]:
+    """The finest of several element degrees, and how far the two finest are apart: an error estimate of the total."""
+    coarse, fine = (two_body(rotor, floater, position, direction) for rotor in rotors[-2:])
+    apart = fine.total - coarse.total
+    added = fine.total - fine.rigid
+    return fine, Wrench(
+        np.abs(apart.force) + fine.tail * np.linalg.norm(added.force),
+        np.abs(apart.torque) + fine.tail * np.linalg.norm(added.torque),
+    )
+
+
+def _wrench(incident: Coefficients, sources: Coefficients, ball: Ball) -> Wrench:
+    return Wrench(multipole_force(incident, sources, ball), multipole_torque(incident, sources, ball))

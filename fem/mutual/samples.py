@@ -6,25 +6,14 @@ from itertools import product
 
 import numpy as np
 
-from ...geometry.basics import MU_0, Array, Watch, places_off, watched
-from ...geometry.bodies import Magnet
-from ...geometry.scenes import Floater
-from ..harmonics import (
-    FOUR_PI,
-    Ball,
-    Coefficients,
-    derivative,
-    dipole_sources,
-    factorials,
-    field_at_center,
-    from_magnetization,
-    multipole_force,
-    outer_sums,
-)
-from .answer_grid import AnswerGrid
-from .degree_needed import enough_degree
-from .permeable_sphere import induced_sources, reflection
-from .rotor_response import RotorResponse, direct_rule
+from ...geometry.common import MU_0, Array, Watch, watched
+from ...geometry.magnets import Magnet
+from ...geometry.scene.contents import Floater
+from ...geometry.solids import places_off
+from ..harmonics.interior import FOUR_PI, Ball, dipole_sources, field_at_center, from_magnetization, multipole_force
+from ..harmonics.solid import Coefficients, derivative, factorials, outer_sums
+from .grid import AnswerGrid, induced_sources, reflection
+from .response import RotorResponse, direct_rule, enough_degree
 
 ROTOR_GAPS, SPHERE_GAPS = (0.1, 0.16, 0.25, 0.4, 0.7, 1.2, 2.5), (0.08, 0.16, 0.3, 0.55, 0.95, 1.6, 2.8)
 NEAR_GAPS = (0.1, 0.13, 0.16, 0.2, 0.25, 0.35, 0.5, 1.0)

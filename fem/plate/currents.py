@@ -1,27 +1,152 @@
-"""Currents of one parity class, from solutions at one real shift that follow what is still missing.
+"""A plate's currents as a network of many states, from which the few of a table are taken.
 
-Without its gradients a source A_s drives the field e with (1 + iωT) e = A_s, where T takes a current to its potential
-and is symmetric and positive in the product ∫ σ e·e' dV.  For a real shift s and any row r, e = (1 + sT)⁻¹ r is one
-real solve, X = (curl curl/μ0 + sσ)⁻¹ σ r, with
-
-    e = r - s X    and    T e = X,
-
-so that the potential of every field in the basis is known.  A Galerkin solution in the span of such fields thus has
-a residual ρ = A_s - (1 + iωT) e that is known as a row, at every frequency, and its error is bounded by it: (1 + iωT)⁻¹
-shrinks every row, so |e - e_n| ≤ |ρ|, and a coupling misses at most ω |ρ| |ρ'|.  The largest residuals over sources and
-frequencies are what the next solves start from (a rational Krylov method with a real pole: A. Ruhe, Linear Algebra
-Appl. 58 (1984) 391; L. Knizhnerman, V. Druskin, M. Zaslavsky, SIAM J. Numer. Anal. 47 (2009) 953).
+By parity class, it holds fields e_i with ∫ σ e_i·e_j dV = δ_ij and the inductance L_ij between their currents.  A
+source with couplings b_i = ∫ σ e_i·A_s dV drives them as (1 + iωL) c = b, and couples with another one by -iω b'·c.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, field
+from functools import partial
+from itertools import chain
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from ...geometry.basics import Array
-from ..closed_forms import ComplexArray
+from ...geometry.common import Array, Watch, spread_points, unwatched, watched
+from ..closed_forms.eddy_sphere import ComplexArray
+from ..elements.spaces import Parity
+from .eddy import ClassFactor, EddySpace, ShiftedSystem, Source
+from .eddy_fields import FieldRows, dipole_images
+from .region import Region
+
+CHUNK = 16
+"""Sources handled at a time: bounds the memory."""
+
+
+@dataclass(frozen=True, eq=False)
+class CurrentSpace:
+    """Fields of a plate's currents at the quadrature points of the meshed part.
+
+    Parameters
+    ----------
+    parity : mirrors of the plate
+    points : (n, 3) m
+    root : (3n,) weights of the rows
+    fields : (states, 3n) rows e_i of each parity class, orthonormal
+    inductances : (states, states) of each parity class, s
+    order, cells : of the finite elements
+    """
+
+    parity: Parity
+    points: Array
+    root: Array
+    fields: tuple[Array, ...]
+    inductances: tuple[Array, ...]
+    order: int
+    cells: int
+
+    def couplings(self, sources: Sequence[Source]) -> list[Array]:
+        """b (sources, states) of each parity class."""
+        return self.image_couplings(source_images(self.parity, self.points, sources))
+
+    def dipole_couplings(self, places: ArrayLike) -> list[Array]:
+        """b (3 × places, states) of each parity class, of unit moments along x, y and z at places (m, 3), m."""
+        places = np.asarray(places, float).reshape(-1, 3)
+        images = dipole_images(self.parity, self.points, places)
+        return self.image_couplings(part.reshape(len(part), -1, *part.shape[3:]) for part in images)
+
+    def image_couplings(self, images: Iterable[Array]) -> list[Array]:
+        """b (sources, states) of each parity class, of parts of potentials as `source_images` makes them."""
+        weighted = [field * self.root for field in self.fields]
+        found: list[list[Array]] = [[np.zeros((0, len(field)))] for field in weighted]
+        for part in images:
+            for rows, image, states in zip(found, part, weighted, strict=True):
+                rows.append(image.reshape(len(image), -1) @ states.T)
+        return [np.concatenate(rows) for rows in found]
+
+
+def source_images(parity: Parity, points: Array, sources: Sequence[Source]) -> Iterable[Array]:
+    """(classes, some sources, n, 3) parity parts of the sources' potentials at `points` (n, 3), T m."""
+    flips = parity.flips
+    mirrored = (points * flips[:, None]).reshape(-1, 3)
+    for start in range(0, len(sources), CHUNK):
+        some = [s.vector_potential(mirrored).reshape(len(flips), -1, 3) for s in sources[start : start + CHUNK]]
+        yield parity.project(np.stack(some, axis=1) * flips[:, None, None])
+
+
+def space_couplings(b: Sequence[Array], inductances: Sequence[Array], shift: complex) -> ComplexArray:
+    """(sources, sources) -s b (1 + sL)⁻¹ bᵀ, summed over the parity classes; s is iω or a real shift, rad/s."""
+    parts = [
+        b_class @ np.linalg.solve(np.eye(len(induct)) + shift * induct, b_class.T)
+        for b_class, induct in zip(b, inductances, strict=True)
+    ]
+    return np.asarray(-shift * sum(parts))
+
+
+PROBES = 6
+"""Dipoles at places off the grid, beside those at the region's corners."""
+MOST_PLACES, FEWEST_PLACES, PER_GAP = 6, 3, 1.5
+"""Places of the grid along an edge: at most, at least, and more for each distance to the plate that it is long."""
+
+
+@dataclass(frozen=True, eq=False)
+class OtherSources:
+    """What drives the plate beside a dipole in the region: the rotor.
+
+    Parameters
+    ----------
+    training : sources in the plate's frame whose currents the network shall hold
+    probes : others of the kind; the field of their currents is asked for in the region
+    places : (n, 3) m, where they are: the mesh must do for dipoles there
+    """
+
+    training: Sequence[Source] = ()
+    probes: Sequence[Source] = ()
+    places: Array = field(default_factory=lambda: np.zeros((0, 3)))
+
+
+@dataclass(frozen=True, eq=False)
+class SourceSet:
+    """Unit dipoles along x, y and z at `places` (n, 3) m, and after them other sources."""
+
+    places: Array
+    others: Sequence[Source] = ()
+
+    def __len__(self) -> int:
+        return 3 * len(self.places) + len(self.others)
+
+    def rows(self, space: EddySpace, root: Array) -> Array:
+        """(classes, sources, width) weighted potentials by parity class."""
+        found = np.empty((len(space.parity.classes), len(self), root.size))
+        images = chain(
+            dipole_images(space.parity, space.points, self.places),
+            source_images(space.parity, space.points, self.others),
+        )
+        start = 0
+        for part in images:
+            rows = part.reshape(len(found), -1, root.size)
+            found[:, start : start + rows.shape[1]] = rows
+            start += rows.shape[1]
+        found *= root
+        return found
+
+
+def grid_counts(region: Region, half_edges: Array) -> tuple[int, int, int]:
+    """Places along each edge of a region: more where it is long against its distance from the plate."""
+    of_region, of_plate = region.nearest(half_edges)
+    gap = float(np.linalg.norm(of_region - of_plate))
+    wanted = np.ceil(2 + PER_GAP * (region.upper - region.lower) / gap)
+    x, y, z = np.clip(wanted, FEWEST_PLACES, MOST_PLACES).astype(int)
+    return int(x), int(y), int(z)
+
+
+def probe_places(region: Region, fold: bool = False) -> Array:
+    """(n, 3) m: corners of the region, folded those not mirrored, and some places within."""
+    inside = spread_points(region.lower, region.upper, PROBES)
+    return np.concatenate([region.surface((2, 2, 2), fold), inside])
+
 
 Solve = Callable[[Array], tuple[Array, Array]]
 """Fields e and their potentials T e for rows r."""
@@ -137,3 +262,97 @@ def class_basis(sources: Array, solve: Solve, angular_frequencies: Array, allowe
             break
         starts = left.largest(angular_frequencies, strengths / np.sqrt(shares)[:, None], NEXT_SHARE * allowed)
     return basis
+
+
+SHIFT = 0.25
+"""The real shift in units of the highest angular frequency; a second one gave the same states for more work."""
+FREQUENCIES = 6
+"""At so many, in equal ratios, residuals are looked at."""
+
+
+@dataclass(frozen=True, eq=False)
+class Missing:
+    """What a space misses of some sources, at angular frequencies (rad/s).
+
+    Parameters
+    ----------
+    angular_frequencies : (k,)
+    residuals : (k, sources, sources) products of the residuals ρ, whose norms are bounds of the errors of fields
+    couplings : (k, sources, sources)
+    places : of the dipoles among the sources; they come first
+    """
+
+    angular_frequencies: Array
+    residuals: ComplexArray
+    couplings: ComplexArray
+    places: int
+
+    @property
+    def worst(self) -> float:
+        """Largest relative error of a dipole's own tensor, and of another source's field at the places."""
+        n, omega = self.places, self.angular_frequencies[:, None]
+        tensors = np.einsum("kiaib->kiab", self.couplings[:, : 3 * n, : 3 * n].reshape(-1, n, 3, n, 3))
+        sizes = np.einsum("kii->ki", self.residuals).real
+        powers = sizes[:, : 3 * n].reshape(-1, n, 3)
+        own = omega * powers.sum(axis=2) / np.linalg.norm(tensors, axis=(2, 3))
+        products = np.sqrt(sizes[:, 3 * n :] * powers.sum(axis=(1, 2))[:, None])
+        others = omega * products / np.linalg.norm(self.couplings[:, 3 * n :, : 3 * n], axis=2)
+        return float(max(own.max(), others.max(initial=0.0)))
+
+
+def train(
+    space: EddySpace,
+    training: SourceSet,
+    probes: SourceSet,
+    frequencies: tuple[float, float],
+    allowed: float,
+    watch: Watch = unwatched,
+) -> tuple[CurrentSpace, Missing]:
+    """Currents of the `training` sources at all frequencies (Hz) between the two, and what is missing of the `probes`.
+
+    Parameters
+    ----------
+    allowed : |ρ|² of a source relative to what it drives, and thus relative error of its coupling with itself
+    watch : hears of the progress
+    """
+    watch("potentials of sources", 0.0)
+    rows = FieldRows(space)
+    omegas = 2 * np.pi * np.geomspace(*frequencies, FREQUENCIES)
+    system = ShiftedSystem(space, SHIFT * omegas[-1])
+    sources, tests = (part.rows(space, rows.root) for part in (training, probes))
+    for done, (part, other, parity_class) in enumerate(zip(sources, tests, space.parity.classes, strict=True)):
+        watch("potentials of sources", 0.3 + 0.7 * done / len(sources))
+        both = rows.without_gradients(np.concatenate([part, other]), parity_class)
+        part[:], other[:] = both[: len(part)], both[len(part) :]
+    scale = unit_power(np.einsum("csw,csw->s", sources, sources), len(training.others))
+    fields, inductances = [], []
+    couplings = np.zeros((len(omegas), *[tests.shape[1]] * 2), complex)
+    residuals = np.zeros_like(couplings)
+    classes = zip(space.parity.classes, sources, tests, strict=True)
+    for parity_class, driving, testing in watched(classes, watch, f"currents at order {space.order}"):
+        solve = partial(_solved, rows, system.factor(parity_class))
+        basis = class_basis(driving * scale[:, None], solve, omegas, allowed / len(sources))
+        left = Residuals.of(testing, basis)
+        for k, omega in enumerate(omegas):
+            residuals[k] += left.gram(omega)
+            couplings[k] -= 1j * omega * left.couplings @ basis.response(left.couplings, omega).T
+        fields.append(basis.fields)
+        inductances.append(basis.inductance)
+    made = CurrentSpace(
+        space.parity, space.points, rows.root, tuple(fields), tuple(inductances),
+        space.order, int(space.conductors.mesh.ne),
+    )  # fmt: skip
+    return made, Missing(omegas, residuals, couplings, len(probes.places))
+
+
+def unit_power(power: Array, others: int) -> Array:
+    """Factors (sources,) that give each place of three dipoles, and each of the last `others` sources, unit power."""
+    dipoles = len(power) - others
+    place = np.repeat(power[:dipoles].reshape(-1, 3).sum(axis=1), 3)
+    return np.asarray(1 / np.sqrt(np.concatenate([place, power[dipoles:]])))
+
+
+def _solved(rows: FieldRows, factor: ClassFactor, starts: Array) -> tuple[Array, Array]:
+    """Fields and potentials (n, width) that `starts` (n, width) drive at a real shift."""
+    reaction = rows.values(factor.solve(rows.loads(starts)))
+    return starts + reaction, -reaction / float(np.real(factor.shift))

@@ -1,28 +1,180 @@
-"""Time-harmonic eddy currents by finite elements: reduced vector potential, analytic sources.
+"""Finite-element space of the eddy-current problem and the loads of its sources.
 
-With the source's potential A_s and the unknown reaction A, for all test functions v (phasors e^{+iωt})
+Nédélec elements of the second kind, full order.  Gradients are kept in the conductors only.  Sources enter by
+their vector potential at the quadrature points of the conductors, so that any function of position will do.
 
-    ∫ curl A · curl v + iωμ0 ∫ σ A · v = -iωμ0 ∫ σ A_s · v,     A × n = 0 far away.
-
-The currents are J = -iωσ(A_s + A).  Their field at a receiver follows by reciprocity: for a dipole m'
-whose potential is A' = A_s of m', m'·B = ∫ J · A', so that the coupling of a receiver and a source is
-
-    -iω ∫ σ A' · (A_s + A) dV,
-
-symmetric and superconvergent (its error is the square of the energy error).  A. Bossavit, Computational
-Electromagnetism (1998), ch. 8; O. Bíró, Comput. Methods Appl. Mech. Engrg. 169 (1999) 391.
+S. Zaglmayr, High order finite element methods for electromagnetic field computation, thesis, Linz 2006 (the space).
 """
+
+from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any, Protocol
 
+import ngsolve
 import numpy as np
+import scipy
+from numpy.typing import NDArray
 
-from ...geometry.basics import MU_0, Array
-from ...geometry.meshes import ConductorMesh
-from ..closed_forms import ComplexArray
-from .shifted_system import ShiftedSystem
-from .space import EddySpace, Source
+from ...geometry.common import MU_0, Array
+from ...geometry.meshes.metal import MILLIMETRE, PLANES, ConductorMesh
+from ..closed_forms.eddy_sphere import ComplexArray
+from ..elements.condensed import require_memory, solve_condensed
+from ..elements.spaces import Parity, edge_vertices, region_edges, tree_edges, value_matrix
+
+
+class Source(Protocol):
+    """Anything with a vector potential: a field applied from outside the conductors."""
+
+    def vector_potential(self, points: Array) -> Array:
+        """A (n, 3), T m, at points (n, 3), m."""
+
+
+class EddySpace:
+    """Space, quadrature and gauge on one mesh with one order.
+
+    Parameters
+    ----------
+    conductors : mesh and conductivities
+    order : polynomial order, at least 1
+
+    Attributes
+    ----------
+    points : (n, 3) quadrature points in the conductors, m
+    weights : (n,) σ times quadrature weights, S m²
+    """
+
+    def __init__(self, conductors: ConductorMesh, order: int) -> None:
+        if order < 1:
+            raise ValueError(f"Input order must be at least 1; instead received {order}.")
+        self.conductors, self.order = conductors, order
+        self.parity = Parity(conductors.mirrors)
+        mesh = conductors.mesh
+        self.region = mesh.Materials(conductors.pattern)
+        self.sigma = mesh.MaterialCF(dict(conductors.conductivity), default=0.0)
+        self.real = self._space(complex_valued=False)
+        scalar = ngsolve.comp.IntegrationRuleSpace(mesh, order=order + 2, definedon=self.region)
+        self._rules = scalar.GetIntegrationRules()
+        self._carrier = ngsolve.GridFunction(scalar**3)
+        self._carrier.Interpolate(ngsolve.CF((ngsolve.x, ngsolve.y, ngsolve.z)), definedon=self.region)
+        self.points = np.stack([c.vec.FV().NumPy() for c in self._carrier.components], axis=1) * MILLIMETRE
+        weight = ngsolve.LinearForm(scalar)
+        weight += self.sigma * scalar.TestFunction() * ngsolve.dx(definedon=self.region, intrules=self._rules)
+        weight.Assemble()
+        self.weights = np.array(weight.vec.FV().NumPy()) * MILLIMETRE**3
+        self._edges = edge_vertices(mesh)
+        self._conducting = region_edges(mesh, self.region)
+
+    def _space(self, complex_valued: bool) -> ngsolve.FESpace:
+        mesh = self.conductors.mesh
+        inside = [int(name in self.conductors.conductivity) for name in mesh.GetMaterials()]
+        return ngsolve.HCurl(
+            mesh,
+            order=self.order,
+            complex=complex_valued,
+            gradientdomains=inside,
+            gradientboundaries=[0] * len(mesh.GetBoundaries()),
+            dirichlet="far",
+        )
+
+    def complex_space(self) -> ngsolve.FESpace:
+        """The same space with complex coefficients and the same numbering."""
+        return self._space(complex_valued=True)
+
+    def class_images(self, sources: Sequence[Source]) -> NDArray[np.float64]:
+        """(classes, sources, n, 3) parity parts of the sources' potentials at the quadrature points, T m."""
+        flips = self.parity.flips
+        images = [[flip * s.vector_potential(self.points * flip) for s in sources] for flip in flips]
+        return self.parity.project(np.array(images))
+
+    def loads(self, potentials: Array) -> Array:
+        """∫ σ A·v dV (sources, unknowns), S m³ T, of potentials (sources, n, 3) at the quadrature points, T m."""
+        test = self.real.TestFunction()
+        form = ngsolve.LinearForm(self.real)
+        form += self.sigma * self._carrier * test * ngsolve.dx(definedon=self.region, intrules=self._rules)
+        found = np.zeros((len(potentials), self.real.ndof))
+        for row, potential in zip(found, potentials, strict=True):
+            for component, values in zip(self._carrier.components, potential.T, strict=True):
+                component.vec.FV().NumPy()[:] = values
+            form.Assemble()
+            row[:] = form.vec.FV().NumPy() * MILLIMETRE**3
+        return found
+
+    def point_values(self, function: ngsolve.GridFunction) -> Array:
+        """(n, 3) values of a real function of this space at the quadrature points."""
+        self._carrier.Interpolate(function, definedon=self.region)
+        return np.stack([c.vec.FV().NumPy() for c in self._carrier.components], axis=1)
+
+    def value_matrix(self, space: ngsolve.FESpace, basis: ngsolve.CoefficientFunction) -> scipy.sparse.csr_matrix:
+        """(3n, unknowns) values of a space's `basis` at the quadrature points, the components of one point together."""
+        points = ngsolve.comp.IntegrationRuleSpace(self.conductors.mesh, order=self.order + 2, definedon=self.region)
+
+        def integral(integrand: Any) -> Any:
+            # Not vectorised: NGSolve's vectorised integrals are wrong beyond 256 points an element (order 4 on).
+            found = ngsolve.SymbolicBFI(self.sigma * integrand, definedon=self.region, simd_evaluate=False)
+            for element, rule in self._rules.items():
+                found.SetIntegrationRule(element, rule)
+            return found
+
+        return value_matrix(space, basis, points, integral, self.weights / MILLIMETRE**3)
+
+    def free_unknowns(self, parity_class: Sequence[int], space: ngsolve.FESpace) -> ngsolve.BitArray:
+        """Coupling unknowns of one parity class: without odd planes, the far boundary and a spanning tree in air."""
+        mesh = self.conductors.mesh
+        odd = [PLANES[a] for a, sign in zip(self.parity.mirrors, parity_class, strict=True) if sign < 0]
+        fixed = mesh.Boundaries("|".join(["far", *odd]))
+        free = ngsolve.BitArray(space.FreeDofs(True))
+        free &= ~space.GetDofs(fixed)
+        for edge in tree_edges(self._edges, self._conducting | region_edges(mesh, fixed)):
+            free[int(edge)] = False
+        return free
+
+
+class ShiftedSystem:
+    """Condensed matrix of curl curl + s μ0 σ, factorised once for each parity class.
+
+    Parameters
+    ----------
+    space : finite elements
+    shift : s, rad/s: iω at a frequency; a real one needs half the memory and a quarter of the work
+    """
+
+    def __init__(self, space: EddySpace, shift: complex) -> None:
+        self.space, self.shift = space, shift
+        self.fes = space.complex_space() if np.iscomplexobj(shift) else space.real
+        require_memory(
+            self.fes,
+            self.fes.FreeDofs(True),
+            "Allow a larger error of the plate (--plate-rtol, or --rtol of the command plate)",
+        )
+        trial, test = self.fes.TnT()
+        form = ngsolve.BilinearForm(self.fes, symmetric=True, condense=True)
+        form += ngsolve.curl(trial) * ngsolve.curl(test) * ngsolve.dx
+        form += shift * MU_0 * MILLIMETRE**2 * space.sigma * trial * test * ngsolve.dx(definedon=space.region)
+        form.Assemble()
+        self.form = form
+
+    def factor(self, parity_class: Sequence[int]) -> ClassFactor:
+        """The factor of one parity class."""
+        free = self.space.free_unknowns(parity_class, self.fes)
+        inverse = self.form.mat.Inverse(free, inverse="sparsecholesky")
+        return ClassFactor(self.form, inverse, self.shift, sum(free))
+
+
+@dataclass(frozen=True, eq=False)
+class ClassFactor:
+    """Factorised matrix of one shift and parity class, with the number of its coupling unknowns."""
+
+    form: ngsolve.BilinearForm
+    inverse: ngsolve.BaseMatrix
+    shift: complex
+    unknowns: int
+
+    def solve(self, loads: Array) -> NDArray[Any]:
+        """Reactions A = -s (curl curl + s μ0 σ)⁻¹ μ0 ∫ σ A_s·v (sources, unknowns), T m; complex as the shift is."""
+        return solve_condensed(self.form, self.inverse, -self.shift * MU_0 / MILLIMETRE * loads)
+
 
 RESISTIVE = 1e-2
 """ωμ0σL² below which the response is resistive: A = a0 + iω a1, with a0 (charges) and a1 (currents) real and constant.

@@ -1,24 +1,61 @@
-"""Reaction of a box-shaped plate in any pose to dipoles, by finite elements to a wanted accuracy.
+"""How large a plate's finite-element problem may be, and what is said of one that is larger."""
 
-The order is raised on one mesh until the estimated error meets the tolerance; where raising it does not help, the
-mesh is too coarse and is refined.  With d_p the change of G from order p-1 to p, the error left at order p is
-estimated as d_p times the last observed reduction d_p/d_(p-1), taken as at least a fifth.  To it comes the
-truncation: a sphere of radius R without normal field answers a moment with the uniform field μ0 m/(2πR³), which acts
-on the plate's induced moment α m, so that G is off by up to |α|² μ0/(2πR³), with R the half edge of the air box.
-"""
+from __future__ import annotations
 
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...geometry.basics import MU_0, Array
-from ...geometry.meshes import MeshRule, plate_mesh
-from ...geometry.scenes import Plate
-from ..closed_forms import ComplexArray, HomogeneousField, unit_dipoles
-from ..eddy_currents import EddyResponse, solve_eddy
-from ..rotor_tables import AccuracyError
-from .limits import MeshTooLargeError, highest_order, refusal
+from ...geometry.common import MU_0, Array, Watch, unwatched
+from ...geometry.meshes.plate import MeshRule, plate_mesh, skin_depth
+from ...geometry.scene.contents import Plate
+from ..closed_forms.eddy_sphere import ComplexArray
+from ..closed_forms.potentials import HomogeneousField, unit_dipoles
+from ..rotor.models import AccuracyError
+from .eddy import EddyResponse, EddySpace, solve_eddy, solve_shifted
+
+OPTION = "--plate-rtol (plate_rtol in Python, --rtol of the command plate)"
+"""What messages call the tolerance of a plate."""
+HIGHEST_ORDER = 5
+MOST_UNKNOWNS = 80_000
+"""Coupling unknowns that are solved at most: beyond, one frequency takes many minutes and several GB."""
+
+
+class MeshTooLargeError(AccuracyError):
+    """A mesh has more unknowns than are solved."""
+
+
+def highest_order(cells: int) -> int:
+    """The highest order, at most `HIGHEST_ORDER`, within `MOST_UNKNOWNS` on a mesh of so many hexahedra.
+
+    Raises
+    ------
+    MeshTooLargeError : it is below 3
+    """
+    found = [p for p in range(3, HIGHEST_ORDER + 1) if cells * (3 * p * (p + 2) + 2 * p + 1) <= MOST_UNKNOWNS]
+    if not found:
+        raise MeshTooLargeError(
+            f"Input mesh must have at most {MOST_UNKNOWNS} unknowns; instead one of {cells} cells has more. Lower the "
+            "frequency, allow a larger error, or take the infinite slab (model slab), which has no such limit."
+        )
+    return found[-1]
+
+
+def refusal(plate: Plate, frequency: float, rtol: float, best: float) -> str:
+    """What to say where `best` is the smallest relative error reached; infinite if nothing was solved."""
+    depth = 1e3 * skin_depth(plate.conductivity, frequency)
+    if best < 1:
+        return (
+            f"Input rtol of the plate must be at least {best:.1e} at {frequency:g} Hz (skin depth {depth:.2g} mm); "
+            f"instead received {rtol:.1e}."
+        )
+    return (
+        f"Input frequency_hz must be lower for finite elements with {MOST_UNKNOWNS} unknowns: a skin depth of "
+        f"{depth:.2g} mm is too small for this plate; instead received {frequency:g}. The infinite slab (model slab) "
+        "has no such limit."
+    )
+
 
 LEAST_REDUCTION = 0.2
 """The smallest error reduction from one order to the next that is believed without having seen the next."""
@@ -148,3 +185,78 @@ def _to_laboratory(couplings: ComplexArray, rotation: Array) -> ComplexArray:
     n = len(couplings) // 3
     blocks = couplings.reshape(n, 3, n, 3)
     return np.asarray(np.einsum("ca,iajb,db->icjd", rotation, blocks, rotation, optimize=True))
+
+
+MESH_SHARE = 0.6
+"""Share of the tolerance for the finite elements."""
+MODULUS = 2.0
+"""Most that |s/(1 + sτ)|² can grow from s = ω to s = iω, whatever the time constant τ."""
+
+
+class Ladder:
+    """Orders of the finite elements on one mesh, one after the other, and the error of each.
+
+    Parameters
+    ----------
+    corners : (n, 3) m, places of the dipoles whose tensors are compared, plate's frame
+    frequency : Hz
+    allowed : relative error
+    watch : hears of the progress
+    """
+
+    def __init__(
+        self, plate: Plate, corners: Array, frequency: float, rule: MeshRule, allowed: float, watch: Watch = unwatched
+    ) -> None:
+        self.mesh = plate_mesh(plate.box.size, plate.conductivity, corners, frequency, rule)
+        self.highest = highest_order(self.mesh.mesh.ne)
+        self.corners, self.shift, self.allowed = corners, 2 * np.pi * frequency, allowed
+        self.watch = watch
+        self.reach = rule.reach * float(plate.box.size.max())
+        self.order, self.error, self.change, self.truncation = 0, np.inf, np.ones(len(corners)), np.zeros(len(corners))
+        self.last = self.change
+        self.tensors: ComplexArray = np.zeros((len(corners), 3, 3), complex)
+        self.take(self.solved())
+
+    def next_space(self) -> EddySpace:
+        """Of the next order."""
+        return EddySpace(self.mesh, self.order + 1)
+
+    def solved(self) -> ComplexArray:
+        """Couplings of the corners' dipoles at the next order and the shift s."""
+        self.watch(f"error at order {self.order + 1}", 0.0)
+        response = solve_shifted(self.next_space(), self.shift, unit_dipoles(self.corners))
+        self.truncation = MODULUS * truncation_error(response, self.reach)
+        return response.couplings
+
+    def take(self, couplings: ComplexArray) -> None:
+        """Take the next order's couplings."""
+        tensors = own_tensors(couplings)
+        self.order += 1
+        if self.order > 1:
+            size = np.linalg.norm(tensors, axis=(1, 2))
+            self.last, self.change = self.change, np.linalg.norm(tensors - self.tensors, axis=(1, 2)) / size
+            self.error = float(np.max(order_error(self.change, self.last) + self.truncation / size))
+        self.tensors = tensors
+
+    def expected(self) -> float:
+        """Error of the next order, if it helps as the last did; nothing is expected of the first two."""
+        if self.order < 2 or self.error <= self.allowed:
+            return np.inf if self.order < 2 else 0.0
+        reduction = self.change / self.last
+        size = np.linalg.norm(self.tensors, axis=(1, 2))
+        return float(np.max(order_error(self.change * reduction, self.change) + self.truncation / size))
+
+    def refuse(self) -> None:
+        """Go on only where that can help.
+
+        Raises
+        ------
+        AccuracyError : the mesh is too coarse
+        """
+        hopeless = self.error * BEST_REDUCTION ** (self.highest - self.order) > self.allowed
+        stalled = self.order > 2 and float(np.max(self.change / self.last)) > STALLED
+        if self.order > 1 and (hopeless or stalled) and self.error > self.allowed:
+            raise AccuracyError(
+                f"Input {OPTION} must be at least {self.error / MESH_SHARE:.2g} for the finite elements of this plate; "
+                f"instead received {self.allowed / MESH_SHARE:g}. Ask for less, or take another model of it."
+            )

@@ -1,30 +1,218 @@
-"""Reduction of an infinite slab's currents to a passive network, to a wanted accuracy.
+"""What a magnetisation gives to harmonic waves: ∫ M·∇e^{a·x} dV with a·a = 0, exact for every kind of source.
 
-Snapshots are answers to dipoles on a meridian of the region and to the rotor, at frequencies in equal ratios; probes
-are dipoles and rotors elsewhere, at these frequencies and at those between.
+e^{a·x} is harmonic everywhere.  A uniformly polarised cuboid gives a product of three sinh(a_i h_i)/a_i.  A multipole
+expansion gives, with a± = a_x ± i a_y and lengths in units of its radius, from e^{a·r} = Σ ψ_lm Υ_lm(r),
+
+    ψ_lm = a_z^(l-m) (-a₋)^m,    ψ_l(-m) = a_z^(l-m) a₊^m    (m ≥ 0):
+
+the derivatives of Υ_lm, see `harmonics.solid`, make each side a_i times itself.
+
+Turning waves add up to the waves of a cylinder, by DLMF 10.9.2:
+
+    J_m(kρ) e^{imφ} e^{-kz} = (-i)^m (1/2π) ∫ e^{a·x} e^{imα} dα,    a = k (i cos α, i sin α, -1).
 """
 
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import singledispatch
 
 import numpy as np
 
-from ...geometry.basics import Array
-from ...geometry.scenes import Plate
-from ..closed_forms import ComplexArray, Dipole
-from ..eddy_currents import Source
-from ..plate_currents import OtherSources, Region, probe_places, unit_power
-from ..plate_network import (
-    OrderedBasis,
-    checked_ranges,
-    coupling_error,
-    fewest_fields,
+from ...geometry.common import MU_0, Array
+from ...geometry.scene.contents import Plate
+from ..closed_forms.eddy_sphere import ComplexArray
+from ..closed_forms.potentials import Dipole, PolarizedCuboid
+from ..harmonics.expansion import without_noise
+from ..harmonics.solid import Coefficients, rotated_harmonics
+from ..rotor.table import RotorTable
+from .currents import OtherSources, probe_places, unit_power
+from .driven import FUNCTION_SHARE, SHARE_PART, tensor_error, turning_rotor
+from .eddy import Source
+from .field_functions import Fit, Multipoles, fit_multipoles
+from .network import NETWORK_SHARE, OrderedBasis, checked_ranges, coupling_error, fewest_fields, ordered_basis
+from .region import Region
+from .rotor_share import MISSED, ExpansionSource, RotorSource, rotor_share, without_high_harmonics
+from .slab import (
+    SlabFrame,
+    SlabModes,
+    corners,
+    modes_needed,
+    mutual_tensor,
+    reaction_tensor,
+    rotor_reach,
+    slab_frame,
+    slab_modes,
 )
-from .frame import SlabFrame, corners, slab_frame
-from .network import SlabWaves, slab_waves
-from .reaction import reaction_tensor
-from .two_places import mutual_tensor
+from .table import PlateErrors, PlateTable, RotorShare
+
+
+@singledispatch
+def wave_moment(source: Source, vectors: ComplexArray, shift: ComplexArray) -> ComplexArray:
+    """∫ M·∇e^{a·x + shift} dV (...), A m, of a source for vectors a (..., 3), 1/m, and shifts (...)."""
+    raise TypeError(f"Input source must be a magnetisation; instead received a {type(source).__name__}.")
+
+
+@wave_moment.register
+def _(source: Dipole, vectors: ComplexArray, shift: ComplexArray) -> ComplexArray:
+    return np.asarray(vectors @ source.moment * np.exp(vectors @ source.position + shift))
+
+
+@wave_moment.register
+def _(source: PolarizedCuboid, vectors: ComplexArray, shift: ComplexArray) -> ComplexArray:
+    moment = source.polarization * source.box.volume / MU_0
+    along = vectors @ source.box.rotation * source.box.half_edges
+    shape = np.prod(np.sinc(1j * along / np.pi), axis=-1)  # sin(ix)/(ix) = sinh(x)/x
+    return np.asarray(vectors @ moment * shape * np.exp(vectors @ source.box.center + shift))
+
+
+@wave_moment.register
+def _(source: ExpansionSource, vectors: ComplexArray, shift: ComplexArray) -> ComplexArray:
+    expansion = source.expansion
+    x, y, z = np.moveaxis(expansion.radius * vectors, -1, 0)
+    plus, minus = x + 1j * y, x - 1j * y
+    total = np.zeros(z.shape, complex)
+    for m in range(expansion.degree + 1):
+        c = expansion.coefficients[max(m, 1) :, m]
+        if c.any():
+            part = np.polynomial.polynomial.polyval(z, np.conj(c)) * (-minus) ** m
+            if m:
+                part = part + np.polynomial.polynomial.polyval(z, c) * (-plus) ** m
+            total += part * (1 if m else z)
+    scale = 4 * np.pi * expansion.radius**2 / MU_0
+    return np.asarray(scale * total * np.exp(vectors @ expansion.center + shift))
+
+
+@wave_moment.register
+def _(source: RotorSource, vectors: ComplexArray, shift: ComplexArray) -> ComplexArray:
+    seen = vectors @ source.turn
+    there = shift - seen @ source.center
+    total: ComplexArray = np.zeros(shift.shape, complex)  # a rotor without a field has no parts
+    for part in source.parts:
+        total = total + wave_moment(part, seen, there)
+    return total
+
+
+def cylinder_moments(
+    sources: Sequence[Source], origin: Array, axes: Array, wave_numbers: Array, orders: int, directions: int
+) -> ComplexArray:
+    """∫ M·∇[J_m(kρ) e^{imφ} e^{-kz}] dV (sources, n, orders), A m, for m = 0 … orders - 1.
+
+    Parameters
+    ----------
+    origin, axes : (3,) m and (3, 3) of the cylinder's frame; columns are its axes, the last is the cylinder's
+    wave_numbers : (n,) k, 1/m
+    directions : number of equidistant α; the sum over them confuses the orders m and directions - m
+    """
+    angle = 2 * np.pi * np.arange(directions) / directions
+    local: ComplexArray = np.stack([1j * np.cos(angle), 1j * np.sin(angle), -np.ones(directions) + 0j], axis=1)
+    vectors: ComplexArray = wave_numbers[:, None, None] * (local @ axes.T)
+    shift: ComplexArray = -vectors @ origin
+    values = np.array([wave_moment(source, vectors, shift) for source in sources])
+    return np.asarray((-1j) ** np.arange(orders) * np.fft.ifft(values, axis=-1)[..., :orders])
+
+
+NEGLIGIBLE_MODE = 1e-5
+"""Squared part of the training sources, in units of the tolerance, below which a combination of them is left out."""
+
+
+@dataclass(frozen=True, eq=False)
+class SlabWaves:
+    """The full network.
+
+    Parameters
+    ----------
+    frame : of the cylinder
+    modes : of the slab at each of n wave numbers
+    weights : (n, orders) √(k w_k / a_m), 1/m
+    directions : of waves that make up those of the cylinder
+    """
+
+    frame: SlabFrame
+    modes: SlabModes
+    weights: Array
+    directions: int
+
+    def amplitudes(self, sources: Sequence[Source]) -> ComplexArray:
+        """Signals but for γ (sources, n, orders): real for the shapes with cos mφ, imaginary for sin mφ."""
+        count = self.weights.shape[1]
+        origin, axes, k = self.frame.origin, self.frame.axes, self.modes.wave_numbers
+        return np.asarray(-self.weights * cylinder_moments(sources, origin, axes, k, count, self.directions))
+
+    def couplings(self, amplitudes: ComplexArray, frequency: float) -> ComplexArray:
+        """(sources, sources) -iω Σ s s' / (λ + iω)."""
+        rate = 2j * np.pi * frequency
+        response = -rate * np.sum(self.modes.strengths**2 / (self.modes.rates + rate), axis=1)[:, None]
+        shape = (len(amplitudes), -1)
+        parts = [
+            (response * part).reshape(shape) @ part.reshape(shape).T for part in (amplitudes.real, amplitudes.imag)
+        ]
+        return np.asarray(sum(parts))
+
+    def power(self, amplitudes: ComplexArray) -> Array:
+        """(sources,) Σ s² / λ: their squared potential in the slab."""
+        return np.asarray(np.einsum("skm,k->s", np.abs(amplitudes) ** 2, self._squares))
+
+    @property
+    def _squares(self) -> Array:
+        return np.asarray(np.sum(self.modes.strengths**2 / self.modes.rates, axis=1))
+
+    def basis(
+        self, amplitudes: ComplexArray, scale: Array, frequencies: Sequence[float], counts: Sequence[float], rtol: float
+    ) -> list[OrderedBasis]:
+        """For every order the basis from the answers to sources, its `fields` summed over the slab's modes.
+
+        Parameters
+        ----------
+        scale : (sources,) how much each counts
+        frequencies, counts : Hz, and how much the answers at each count
+        """
+        weight = np.sqrt(self._squares)
+        found, largest = [], 0.0
+        for m in range(amplitudes.shape[2]):
+            scaled = amplitudes[:, :, m] * scale[:, None] * weight
+            _, sizes, shapes = np.linalg.svd(np.concatenate([scaled.real, scaled.imag]), full_matrices=False)
+            largest = max(largest, float(sizes[0]))
+            kept = sizes**2 > NEGLIGIBLE_MODE * rtol * largest**2
+            found.append(self._order(sizes[kept, None] * shapes[kept] / weight, frequencies, counts))
+        return found
+
+    def _order(self, rows: Array, frequencies: Sequence[float], counts: Sequence[float]) -> OrderedBasis:
+        rates = self.modes.rates.ravel()
+        to_modes = self.modes.strengths / np.sqrt(self.modes.rates)
+        sources = (rows[:, :, None] * to_modes).reshape(len(rows), len(rates))
+        omegas = 2 * np.pi * np.asarray(frequencies)
+        reactions = [-1j * omega / (rates + 1j * omega) * sources for omega in omegas]
+        full = ordered_basis(sources, reactions, omegas.tolist(), [np.full(len(rows), count) for count in counts])
+        fields = full.fields.reshape(len(full.fields), *self.modes.rates.shape)
+        return replace(full, fields=np.einsum("skn,kn->sk", fields, to_modes))
+
+
+def slab_waves(frame: SlabFrame, near: Array, far: Array, frequency: float, tolerance: float) -> SlabWaves:
+    """The full network for a relative accuracy and frequencies up to one (Hz).
+
+    Parameters
+    ----------
+    near : (n, 3) m, corners of the floater's region, in the cylinder's frame
+    far : (n, 3) m, corners of the rotor in all its places
+    """
+    radius, low = np.hypot(near[:, 0], near[:, 1]).max(), near[:, 2].min()
+    every = np.concatenate([[[radius, 0.0, low]], far])
+    lateral, height = np.hypot(every[:, 0], every[:, 1]), every[:, 2]
+    digits = -np.log(tolerance)
+    aperture = min(np.pi / 4, 0.8 * float(np.min(np.arctan2(low + height, radius + lateral))))
+    bounds = np.log([np.sqrt(tolerance) / max(near[:, 2].max(), height.max()), (digits + 4 * np.log(digits)) / 2 / low])
+    count = int(np.ceil((bounds[1] - bounds[0]) * digits / (2 * np.pi * aperture))) + 1
+    nodes, step = np.linspace(float(bounds[0]), float(bounds[1]), count, retstep=True)
+    k = np.exp(nodes)
+    # J_m(kρ) e^{-kz} falls with the order as the power of this
+    falls = np.log((height + np.hypot(height, lateral)) / np.maximum(lateral, 1e-9 * low))
+    orders = int(np.ceil(digits / float(np.min(falls + falls[0])))) + 3
+    directions = orders + int(np.ceil(digits / falls.min())) + 8
+    modes = slab_modes(frame.slab, k, modes_needed(frame.slab, digits / (4 * low), frequency, tolerance))
+    angular = np.where(np.arange(orders) == 0, 2 * np.pi, np.pi)
+    return SlabWaves(frame, modes, k[:, None] * np.sqrt(step / angular), directions)
+
 
 SUMS_SHARE = 0.01
 """Share of the tolerance for the sums over wave numbers, orders and modes."""
@@ -34,7 +222,7 @@ FAVOUR = 0.3
 """Power of the frequency by which the snapshots' weights grow: found to need the fewest states."""
 SLOW = 100.0
 """How much slower than the lowest frequency changes may be: a slab without end has no slowest mode."""
-POINTS = 8
+REDUCTION_POINTS = 8
 """Places of the training along radius and height."""
 
 
@@ -152,7 +340,7 @@ def _trained(
     waves: SlabWaves, region: Region, others: OtherSources, frequencies: Array, places: Array, rtol: float
 ) -> list[OrderedBasis]:
     """Bases of all orders; each place and each other source counts alike, and each frequency by its reactions."""
-    grid = meridian(region, waves.frame, POINTS)
+    grid = meridian(region, waves.frame, REDUCTION_POINTS)
     amplitudes = waves.amplitudes([*local_dipoles(waves.frame, grid), *others.training])
     scale = unit_power(waves.power(amplitudes), len(others.training))
     sizes = [np.linalg.norm(reaction_tensor(waves.frame.slab, places[:, 2], f)) for f in frequencies]
@@ -172,3 +360,166 @@ def _sums_error(waves: SlabWaves, places: Array, sources: Array, frequency: floa
     found = waves.couplings(waves.amplitudes(local_dipoles(waves.frame, points)), frequency)
     truth = mutual_tensor(waves.frame.slab, points[:, None], points, frequency)
     return coupling_error(found, truth.swapaxes(1, 2).reshape(found.shape), len(places))
+
+
+DEPTHS = (0.0, 0.25, 0.5, 0.75, 1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0, 12.0, 16.0)
+"""Depths of the centres below the face, in units of the distance between region and face."""
+DEGREES = 2
+"""Degrees of the multipoles for each order: m and m + 1."""
+POINTS = 13
+"""Places of the fit along radius and height."""
+COARSEST, HALVINGS = 4.0, 8
+"""First tolerance of the fits, in units of that for the tensors, and how often it may be halved."""
+ROUND_OFF = 1e-12
+Functions = list[Array]
+"""For every order (states, n, 3): b_i along ρ, φ and z, where cos mφ = sin mφ."""
+
+
+def slab_functions(network: SlabNetwork, tolerance: float) -> tuple[Multipoles, Array, float]:
+    """Multipoles in the plate's frame, their weights (states, k), 1/√J, and the relative error of tensors they leave.
+
+    The states are in the order of the network's groups; the error may be more than the tolerance.
+    """
+    grid = meridian(network.region, network.waves.frame, POINTS)
+    radius, height = grid[:, 0], grid[:, 2]
+    places = grid[(radius == radius.max()) | (height == height.min()) | (height == height.max())]
+    values = _on_meridian(network, places)
+    omegas = 2 * np.pi * np.geomspace(*network.frequencies, 3)
+    rates = np.concatenate([np.tile(part, 2) for part in network.rates])
+    scales = [1 / np.sqrt(part + omegas[1]) for part in network.rates]
+    point_scale = 1 / np.linalg.norm(
+        np.concatenate([value * scale[:, None, None] for value, scale in zip(values, scales, strict=True)]), axis=(0, 2)
+    )
+    choices = [_candidates(m, float(height.min())) for m in range(len(values))]
+    for halving in range(HALVINGS):
+        part = COARSEST * tolerance / 2**halving
+        fits = [
+            _fit(choice, places, value, scale, point_scale, part)
+            for choice, value, scale in zip(choices, values, scales, strict=True)
+        ]
+        left = _pairs([fit.error @ _turn(m) for m, fit in enumerate(fits)])
+        error = max(tensor_error(_pairs(values), left, rates, omega) for omega in omegas)
+        if error <= tolerance:
+            break
+    return *_in_plate(fits, network.waves.frame), error
+
+
+def _on_meridian(network: SlabNetwork, places: Array) -> Functions:
+    """From φ = 0, where one partner shows ρ and z and the other φ, which grows with the other sign."""
+    couplings = network.couplings(local_dipoles(network.waves.frame, places))
+    zero, *rest = (part.T.reshape(part.shape[1], len(places), 3) for part in couplings)
+    return [zero, *((even - odd) / np.sqrt(2) for even, odd in zip(rest[::2], rest[1::2], strict=True))]
+
+
+def _pairs(values: Functions) -> Array:
+    """Both partners of every order on the meridian φ = 0: (2 states, n, 3)."""
+    found = []
+    for m, value in enumerate(values):
+        whole = value * np.sqrt(2 if m else 1)
+        found += [whole * [1, 0, 1], whole * [0, 1, 0]]
+    return np.concatenate(found)
+
+
+def _turn(order: int) -> Array:
+    """To the meridian where cos mφ = sin mφ."""
+    angle = np.pi / (4 * order) if order else 0.0
+    return np.array([[np.cos(angle), -np.sin(angle), 0], [np.sin(angle), np.cos(angle), 0], [0, 0, 1.0]])
+
+
+def _candidates(order: int, gap: float) -> Multipoles:
+    """Multipoles of one order that go with cos mφ, in the cylinder's frame."""
+    pairs = [(depth, degree) for depth in DEPTHS for degree in range(order, order + DEGREES)]
+    centers = np.array([[0.0, 0.0, -depth * gap] for depth, _ in pairs])
+    return Multipoles(centers, np.array([[degree, order, 0.0] for _, degree in pairs]), gap)
+
+
+def _fit(choice: Multipoles, places: Array, value: Array, scale: Array, point_scale: Array, tolerance: float) -> Fit:
+    turn = _turn(int(choice.kinds[0, 1]))
+    return fit_multipoles(choice, places @ turn.T, value @ turn.T, scale, point_scale, tolerance, lambda _: True, 1)
+
+
+def _in_plate(fits: Sequence[Fit], frame: SlabFrame) -> tuple[Multipoles, Array]:
+    """All orders with both partners, in the plate's frame, where other axes mix the orders of one degree."""
+    columns: dict[tuple[float, ...], int] = {}
+    entries: list[tuple[int, int, Array]] = []
+    start = 0
+    for m, fit in enumerate(fits):
+        for factor in (1.0, -1j)[: 1 + (m > 0)]:  # of Θ_lm; the real parts are 2 Re Θ_lm and 2 Im Θ_lm
+            for center, degree, weights in zip(
+                frame.to_plate(fit.multipoles.centers), fit.multipoles.kinds[:, 0], fit.weights.T, strict=True
+            ):
+                for kind, share in _kinds(int(degree), m, factor, frame.axes):
+                    column = columns.setdefault((*center.tolist(), *kind), len(columns))
+                    entries.append((start, column, share * weights))
+            start += len(fit.weights)
+    total = np.zeros((start, len(columns)))
+    for row, column, part in entries:
+        total[row : row + len(part), column] += part
+    keys = np.array(list(columns))
+    return Multipoles(keys[:, :3], keys[:, 3:], fits[0].multipoles.scale), total
+
+
+def _kinds(degree: int, order: int, factor: complex, axes: Array) -> list[tuple[tuple[int, int, int], float]]:
+    """What kinds of multipoles the real part of `factor` Θ_lm along some axes is, and how much of each."""
+    single: Coefficients = np.zeros((degree + 1, degree + 1), complex)
+    single[degree, order] = factor
+    row = without_noise(rotated_harmonics(single, axes), ROUND_OFF)[degree]
+    parts = [((degree, m, i), float(c)) for m, value in enumerate(row) for i, c in enumerate((value.real, value.imag))]
+    return [(kind, share) for kind, share in parts if abs(share) > ROUND_OFF * np.abs(row).max()]
+
+
+CONDUCTOR = "this plate, taken as an infinite slab, and this place of the floater"
+"""In words, of which tolerances are told."""
+ENDLESS = 1e6
+"""Edges of a plate without edges, m."""
+
+
+def slab_and_rotor_table(
+    plate: Plate,
+    rotor: RotorTable,
+    region: Region,
+    frequencies: tuple[float, float] = (0.5, 250.0),
+    rtol: float = 1e-3,
+) -> tuple[PlateTable, RotorShare]:
+    """As `plate_and_rotor_table`, but for a plate that is infinite along its two longer edges.
+
+    The errors do not tell how far the plate is from infinite.
+
+    Raises
+    ------
+    InputError : the region is not over one of the plate's two largest faces, or the rotor not on its side of the slab
+    ValueError : a parameter out of range
+    AccuracyError : `rtol` not reached
+    """
+    frame = slab_frame(plate, region)
+    far = rotor_reach(plate, rotor, frame)
+    size = np.where(np.arange(3) == np.argmin(plate.box.size), plate.box.size, ENDLESS)
+    endless = replace(plate, box=replace(plate.box, size=size))
+    trained = train_slab(plate, region, frequencies, rtol, turning_rotor(endless, rotor), far)
+    network = trained.network(NETWORK_SHARE * rtol)
+    table = tabulate_slab(network, rtol)
+    if table.errors.total > rtol:  # more states leave room for what the field functions miss
+        network = trained.network(rtol - table.errors.functions)
+        table = tabulate_slab(network, rtol)
+        table.errors.check(rtol, CONDUCTOR)
+    share = rotor_share(network, endless, rotor, SHARE_PART * rtol)
+    return table, without_high_harmonics(share, table, MISSED * rtol)
+
+
+def tabulate_slab(network: SlabNetwork, rtol: float) -> PlateTable:
+    """Field functions of a slab's network as multipoles, whose errors may add up to more than `rtol`."""
+    start = time.perf_counter()
+    multipoles, weights, error = slab_functions(network, FUNCTION_SHARE * rtol)
+    errors = PlateErrors(network.sums_error, network.state_error, error)
+    provenance: dict[str, str | float] = {
+        "conductor": "infinite slab",
+        "wave_numbers": float(network.waves.modes.rates.shape[0]),
+        "modes": float(network.waves.modes.rates.shape[1]),
+        "rtol": rtol,
+        "seconds": network.seconds + time.perf_counter() - start,
+    }
+    return PlateTable(
+        network.plate.box.size, network.plate.conductivity, network.region, network.frequencies,
+        np.concatenate([network.rates[0], *(np.tile(rates, 2) for rates in network.rates[1:])]),
+        multipoles, weights, errors, provenance,
+    )  # fmt: skip

@@ -1,17 +1,17 @@
 """The field models of a rotor, and the choice between them."""
 
+import hashlib
 from collections.abc import Callable
 from functools import partial
 
 import numpy as np
 
-from ...geometry.basics import Watch, unwatched
-from ...geometry.bodies import Magnet
-from .accuracy import Accuracy, error_points
-from .fem_model import fem_table
-from .home import at_home, taken_along
-from .simple_models import cuboid_table, dipole_table, moments_table
-from .table import RotorTable
+from ...geometry.common import Watch, unwatched
+from ...geometry.magnets import Magnet
+from ..cache import from_cache, program_of
+from .models import Accuracy, cuboid_table, dipole_table, error_points, fem_table, moments_table
+from .pose import at_home, taken_along
+from .table import FORMAT, RotorTable, load_table, save_table
 
 MODELS: dict[str, Callable[[tuple[Magnet, ...], Accuracy], RotorTable]] = {
     "dipole": dipole_table,
@@ -94,3 +94,32 @@ def _cheapest(rotor: tuple[Magnet, ...], accuracy: Accuracy) -> tuple[str, str]:
     if permeability == 0:
         return "cuboid", "every recoil permeability is 1, so that the closed form is exact"
     return "cuboid", f"leaving out the recoil permeability is wrong by only {permeability:.1e} {where}"
+
+
+def rotor_key(rotor: tuple[Magnet, ...], model: str, rtol: float, nearest: float | None = None) -> str:
+    """SHA-256 of the magnets, the model, the accuracy asked for and where, and the programs that compute them."""
+    digest = hashlib.sha256(f"{FORMAT} {program_of(__name__)} {model} {rtol!r} {nearest!r}".encode())
+    for magnet in rotor:
+        for part in (magnet.body.shape_numbers, magnet.body.center, magnet.body.rotation, magnet.polarization):
+            digest.update(np.ascontiguousarray(part + 0.0, dtype="<f8").tobytes())
+        digest.update(np.ascontiguousarray(magnet.permeability_in_rotor + 0.0, dtype="<f8").tobytes())
+    return digest.hexdigest()
+
+
+def cached_rotor_table(
+    rotor: tuple[Magnet, ...],
+    model: str,
+    rtol: float,
+    report: Callable[[str], None],
+    nearest: float | None = None,
+    watch: Watch = unwatched,
+) -> tuple[RotorTable, bool]:
+    """A rotor table, see `rotor_table`, from the cache if it is there, and whether it was.
+
+    A lone magnet has one, wherever it is in the rotor.
+    """
+    home = at_home(rotor)
+    name = f"rotor-{rotor_key(home, model, rtol, nearest)}.nc"
+    make = partial(rotor_table, home, model, rtol, nearest, watch)
+    table, found = from_cache(name, load_table, make, save_table, report)
+    return taken_along(table, rotor), found

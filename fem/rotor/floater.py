@@ -14,11 +14,14 @@ from dataclasses import dataclass
 import numpy as np
 import scipy
 
-from ...geometry.basics import MU_0, Array
-from ...geometry.bodies import Magnet
-from ...geometry.scenes import Floater
-from ..harmonics import MultipoleExpansion, factorials, polynomial_rule, regular_values, sphere
-from ..rotor_tables import FieldTable, cached_rotor_table
+from ...geometry.common import MU_0, Array
+from ...geometry.magnets import Magnet
+from ...geometry.scene.contents import Floater
+from ..harmonics.expansion import MultipoleExpansion, polynomial_rule
+from ..harmonics.interior import sphere
+from ..harmonics.solid import factorials, regular_values
+from .choice import cached_rotor_table
+from .table import FieldTable
 
 FOUR_PI = 4 * np.pi
 DEGREE = 20
@@ -113,3 +116,31 @@ def _charges(expansion: MultipoleExpansion, radius: float) -> tuple[Array, Array
     values = regular_values(degree, *normals.T)
     density = sum((2.0 if m else 1.0) * np.real(scaled[l, m] * value) for (l, m), value in values.items())
     return expansion.center + radius * normals, radius**2 / MU_0 * areas * density
+
+
+Field = Callable[[Array], tuple[Array, Array]]
+
+
+def force_and_torque(sources: FloaterSources, table: FieldTable, position: Array, axes: Array) -> tuple[Array, Array]:
+    """Force (n, 3) N and torque (n, 3) N m about the centre in the rotor's field.
+
+    Parameters
+    ----------
+    position : (n, 3) of the centre, m, rotor's frame
+    axes : (n, 3, 3) whose columns are the body's axes, the third that of its remanence
+
+    Raises
+    ------
+    RangeError : part of the floater is where the table does not know the field, such as in a magnet
+    """
+    found = [_one(sources, table.evaluate, place, turn) for place, turn in zip(position, axes, strict=True)]
+    return np.array([force for force, _ in found]), np.array([torque for _, torque in found])
+
+
+def _one(sources: FloaterSources, field: Field, place: Array, turn: Array) -> tuple[Array, Array]:
+    arms, moments, ends = (part @ turn.T for part in (sources.places, sources.moments, sources.corners))
+    b, gradient = field(place + np.concatenate([arms, ends]))
+    pulls = np.einsum("ni,nij->nj", moments, gradient[: len(arms)])
+    pushes = sources.charges[:, None] * b[len(arms) :]
+    turns = np.cross(moments, b[: len(arms)]) + np.cross(arms, pulls)
+    return pulls.sum(axis=0) + pushes.sum(axis=0), turns.sum(axis=0) + np.cross(ends, pushes).sum(axis=0)

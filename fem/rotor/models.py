@@ -1,28 +1,213 @@
-"""Tables of finite-element fields with a stated error.
-
-What the elements add comes from a ladder of refinements, see `refined`, whose last two steps give the doubts of
-the discretisation.
-The closed part of the moments is exact; what is cut off the expansions is known and kept as the doubt "truncation".
-"""
+"""What a table must reach, and where."""
 
 import importlib.metadata
 import resource
 import time
 import warnings
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ...geometry.basics import Array, Part, Watch, unwatched
-from ...geometry.bodies import CONVERGENCE, Cells, Magnet, cells_of, cut_magnets, largest_shift
-from ...geometry.meshes import MeshSettings
-from ..closed_forms import carrier, closed_part
-from ..harmonics import MultipoleExpansion, trimmed_expansions, without_noise
-from ..magnetostatics import RotorSolution, refined, refinement_of, solve_rotor, strongest
-from .accuracy import BETWEEN, Accuracy, error_points, guards
-from .simple_models import part_doubts
+from ...geometry.common import Array, InputError, Watch, even_directions, unwatched
+from ...geometry.cutting import CONVERGENCE, Cells, cells_of, cut_magnets
+from ...geometry.magnets import Magnet
+from ...geometry.meshes.magnets import MeshSettings
+from ...geometry.overlap import largest_shift
+from ...geometry.shapes import Sphere
+from ...geometry.solids import Part, places_off
+from ..closed_forms.moments import carrier, closed_part, first_order_moments, uniform_cells
+from ..elements.ladder import RotorSolution, refined, refinement_of, solve_rotor, strongest
+from ..harmonics.expansion import MultipoleExpansion, trimmed_expansions, uniform_moments, without_noise
+from ..harmonics.solid import Coefficients
+from .pose import added_moments, shape_moments
 from .table import KNOWN, RotorTable
+
+OFFSETS = (0.0, 1.0, 3.0, 10.0, 100.0)
+"""Errors are looked at this far out, beyond the nearest distance, in sizes of the rotor."""
+NEAR, FARTHER = 600, 150
+"""In how many directions; nearest by, what is left out of a series changes within 10°."""
+BETWEEN = 0.8
+"""What may be left out, by what is allowed: between these places it is up to a fifth more than there."""
+
+
+NEAREST = 0.25
+"""Least distance from faces from which on a table is to be accurate, by the edge of the largest magnet, if it were a
+cube: a floater far smaller than the rotor floats as far away as a large one, and the number of pieces that are
+needed grows as the third power of the reciprocal."""
+
+
+class AccuracyError(InputError):
+    """A tolerance below what can be reached; the message names it and the smallest that can."""
+
+
+@dataclass(frozen=True)
+class Accuracy:
+    """What a table must reach.
+
+    Parameters
+    ----------
+    rtol : relative error of B
+    nearest : distance from the magnets' faces from which on `rtol` holds, m, `NEAREST` of the largest magnet's edge at
+        least; None: 0.8 of that edge, if it were a cube
+    """
+
+    rtol: float = 3e-6
+    nearest: float | None = None
+
+    def __post_init__(self) -> None:
+        if not 0 < self.rtol < 1:
+            raise ValueError(f"Input rtol must lie between 0 and 1; instead received {self.rtol}.")
+        if self.nearest is not None and self.nearest <= 0:
+            raise ValueError(f"Input nearest must be positive; instead received {self.nearest}.")
+
+    def clearance(self, magnets: tuple[Magnet, ...]) -> float:
+        """The distance from faces from which on `rtol` holds, m."""
+        edge = float(max(magnet.body.volume for magnet in magnets) ** (1 / 3))
+        return 0.8 * edge if self.nearest is None else max(self.nearest, NEAREST * edge)
+
+
+def error_points(magnets: tuple[Magnet, ...], clearance: float) -> tuple[Array, Array]:
+    """Points (n, 3) m at which errors are looked at, and the scale (n,) of B (T) there.
+
+    They lie at a distance `clearance` from the magnets and farther out. The scale is that of the magnets' dipoles with
+    their permeability, which is right to a few per cent, but at least a third of its median at like distances, where
+    fields cancel; 1 T if nothing is magnetised.
+    """
+    size = max(float(np.linalg.norm(m.box.corners - magnets[0].box.center, axis=1).max()) for m in magnets)
+    shells = [points_around(magnets, clearance + f * size, FARTHER if f else NEAR) for f in OFFSETS]
+    points, scales = zip(*[(points, typical_field(magnets, points)) for points in shells], strict=True)
+    return np.concatenate(points), np.concatenate(scales)
+
+
+def points_around(magnets: tuple[Magnet, ...], offset: float, number: int = FARTHER) -> Array:
+    """Points (n, 3) m at a distance `offset` (m) from the nearest of the magnets' faces, in directions all around."""
+    directions = even_directions(number)
+    points = np.concatenate([places_off(magnet.body, directions, offset) for magnet in magnets])
+    outside = np.all([magnet.body.distance(points) >= offset * (1 - 1e-6) for magnet in magnets], axis=0)
+    return np.asarray(points[outside])
+
+
+def typical_field(magnets: tuple[Magnet, ...], points: Array) -> Array:
+    """B (n,) T to which errors at points (n, 3) m, all about as far away, are relative: see `error_points`."""
+    dipoles = [uniform_moments(_carrier(magnet), 1) for magnet in magnets]
+    field = np.linalg.norm(sum(dipole.evaluate(points)[0] for dipole in dipoles), axis=1)
+    return np.maximum(field, np.median(field) / 3) if field.any() else np.ones(len(field))
+
+
+def _carrier(magnet: Magnet) -> Magnet:
+    return magnet if isinstance(magnet.body, Part) else carrier(magnet)
+
+
+def guards(magnets: tuple[Magnet, ...], clearance: float) -> tuple[Array, Array]:
+    """Points (n, 3) m nearer to edges and corners than `clearance`, as far from a magnet's centre as its faces' places.
+
+    They see to it that a fit, which need only hold at `error_points`, does not run wild beside them. With the scale
+    (n,) of B (T) there.
+    """
+    directions = np.random.default_rng(2).normal(size=(150, 3))
+    directions /= np.linalg.norm(directions, axis=1)[:, None]
+    spheres = [m.box.center + (clearance + m.box.half_edges.max()) * directions for m in magnets]
+    points = np.concatenate(spheres)
+    gaps = np.min([magnet.body.distance(points) for magnet in magnets], axis=0)
+    points = points[(gaps >= clearance / 2) & (gaps < clearance)]
+    return points, typical_field(magnets, points)
+
+
+DEGREE = 25
+"""Degree up to which the part that a model leaves out is computed."""
+PART_ERROR = 1e-8
+"""How exactly curved elements fill a part, relative to its dipole; seen: 4e-10 of a third of a ring."""
+NEAREST_OF_MODEL = 1 / 8
+"""Of the smallest edge of the magnets: distance from faces down to which series of what is left out converge."""
+FIRST_ORDER_SAFETY = 1.1
+"""The first-order magnetisation is right to a few per cent at low degrees, to χ at high ones, for χ = μ - 1 ≤ 0.2."""
+Rotor = tuple[Magnet, ...]
+
+
+def dipole_table(rotor: Rotor, accuracy: Accuracy) -> RotorTable:
+    """Moments J V/μ0 of the remanence at the magnets' centres."""
+    start = time.perf_counter()
+    dipoles = tuple(uniform_moments(magnet, 1) for magnet in rotor)
+    doubts = {"shape": tuple(_without_dipole(magnet) for magnet in rotor)}
+    return _finished(RotorTable("dipole", rotor, (), dipoles, doubts), accuracy, start)
+
+
+def moments_table(rotor: Rotor, accuracy: Accuracy) -> RotorTable:
+    """As many moments of the remanence about the magnets' pieces as the accuracy needs."""
+    start = time.perf_counter()
+    points, scale = error_points(rotor, accuracy.clearance(rotor))
+    pieces = [piece for whole in _cut(rotor, accuracy) for piece in whole]
+    full = [uniform_moments(piece, 2 * DEGREE - 1) for piece in pieces]
+    apart = [np.linalg.norm(points - one.center, axis=1) > one.nearest for one in full]
+    there = np.all(apart, axis=0)  # elsewhere, as in the hole of a ring, no number of moments makes the field
+    kept, dropped = trimmed_expansions(full, points[there], scale[there] * accuracy.rtol / 2)
+    return _finished(RotorTable("moments", rotor, (), tuple(kept), {KNOWN: tuple(dropped)}), accuracy, start)
+
+
+def cuboid_table(rotor: Rotor, accuracy: Accuracy) -> RotorTable:
+    """The closed form of the remanence; moments of parts, which have none."""
+    start = time.perf_counter()
+    known = tuple(magnet for magnet in rotor if not isinstance(magnet.body, Part))
+    parts = [magnet for magnet in rotor if isinstance(magnet.body, Part)]
+    moments = tuple(cell for magnet in parts for cell in uniform_cells(magnet, accuracy.clearance(rotor)))
+    return _finished(RotorTable("cuboid", rotor, known, moments, part_doubts(rotor)), accuracy, start)
+
+
+def part_doubts(rotor: Rotor) -> dict[str, tuple[MultipoleExpansion, ...]]:
+    """What curved elements leave out of parts or add to them: a share of the dipole of each."""
+    found = []
+    for magnet in rotor:
+        body = magnet.body
+        if isinstance(body, Part):
+            dipole = uniform_moments(
+                Magnet(Sphere(body.circumradius, body.center, body.rotation), magnet.polarization), 1
+            )
+            share = PART_ERROR * body.volume / Sphere(body.circumradius).volume
+            found.append(replace(dipole, coefficients=share * dipole.coefficients))
+    return {"part": tuple(found)} if found else {}
+
+
+def _finished(table: RotorTable, accuracy: Accuracy, start: float) -> RotorTable:
+    doubts = {**table.doubts, "permeability": neglected_permeability(table.magnets, accuracy)}
+    known = {cause: parts for cause, parts in doubts.items() if parts}
+    return replace(table, doubts=known, provenance={"seconds": time.perf_counter() - start})
+
+
+def neglected_permeability(rotor: Rotor, accuracy: Accuracy) -> tuple[MultipoleExpansion, ...]:
+    """What the permeability adds, to first order, about every piece of the magnets that have one."""
+    found = []
+    for magnet, pieces in zip(rotor, _cut(rotor, accuracy), strict=True):
+        if magnet.contrast:
+            alone = len(rotor) == 1
+            added = added_moments(magnet, pieces, DEGREE) if alone else _added_together(rotor, pieces)
+            factor = FIRST_ORDER_SAFETY * np.sqrt(1 + magnet.contrast)
+            found += [
+                MultipoleExpansion(piece.body.center, piece.body.circumradius, factor * one)
+                for piece, one in zip(pieces, added, strict=True)
+            ]
+    return tuple(found)
+
+
+def _cut(rotor: Rotor, accuracy: Accuracy) -> tuple[Rotor, ...]:
+    """Pieces whose series converge as near as is asked, or as `NEAREST` of an edge: nearer by they say too much.
+
+    Their number grows with the cube of edge by distance: for a floater of 1 mm below a cube of 10 mm it was 2000, of
+    which each keeps some 10 kB and takes tenths of a second.
+    """
+    edge = min(float(magnet.box.size.min()) for magnet in rotor)
+    return cut_magnets(rotor, max(accuracy.clearance(rotor), NEAREST_OF_MODEL * edge))
+
+
+def _added_together(rotor: Rotor, pieces: Sequence[Magnet]) -> list[Coefficients]:
+    return [first_order_moments(piece, rotor, DEGREE) for piece in pieces]
+
+
+def _without_dipole(magnet: Magnet) -> MultipoleExpansion:
+    rest = np.array(shape_moments(magnet, DEGREE))
+    rest[1:2] = 0.0
+    return MultipoleExpansion(magnet.body.center, magnet.body.circumradius, rest)
+
 
 HIGHEST_DEGREE = 44
 BEFORE, WHOLE = 4, 0.6
@@ -162,3 +347,28 @@ def provenance(
         "seconds": seconds,
         "peak_memory_MB": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024,
     }
+
+
+AT_LEAST = 0.5
+"""Share of the tolerance that what is left out may always have, even if the table itself does not meet it."""
+
+
+def shortened_table(table: RotorTable, accuracy: Accuracy) -> RotorTable:
+    """The same field within `accuracy.rtol` from `accuracy.nearest` off the magnets' faces on.
+
+    What is left out is known and a doubt of the new table, which still says how wrong it is, nearer too.  A table
+    without expansions stays as it is.
+    """
+    if not table.expansions:
+        return table
+    points, scale = error_points(table.magnets, accuracy.clearance(table.magnets))
+    beside, scale_beside = guards(table.magnets, accuracy.clearance(table.magnets))
+    rest = table.absolute_error(points)[0]
+    allowed = np.maximum(BETWEEN * (scale * accuracy.rtol - rest), AT_LEAST * scale * accuracy.rtol)
+    kept, dropped = trimmed_expansions(
+        table.expansions,
+        np.concatenate([points, beside]),
+        np.concatenate([allowed, AT_LEAST * BESIDE * accuracy.rtol * scale_beside]),
+    )
+    doubts = {**table.doubts, KNOWN: (*table.doubts.get(KNOWN, ()), *nonzero(dropped))}
+    return replace(table, expansions=nonzero(kept), doubts={cause: parts for cause, parts in doubts.items() if parts})

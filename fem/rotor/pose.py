@@ -6,10 +6,13 @@ from functools import lru_cache
 
 import numpy as np
 
-from ...geometry.basics import Array, Box, Part, moved, solid_of
-from ...geometry.bodies import Magnet
-from ..closed_forms import first_order_moments
-from ..harmonics import Coefficients, MultipoleExpansion, rotated_harmonics, uniform_moments, without_noise
+from ...geometry.common import Array
+from ...geometry.magnets import Magnet
+from ...geometry.shapes import Box
+from ...geometry.solids import Part, moved, solid_of
+from ..closed_forms.moments import first_order_moments
+from ..harmonics.expansion import MultipoleExpansion, uniform_moments, without_noise
+from ..harmonics.solid import Coefficients, rotated_harmonics
 from .table import RotorTable
 
 DIGITS = 13

@@ -12,11 +12,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ...geometry.basics import MU_0, Array, moved, rotation_matrix
-from ...geometry.bodies import Magnet
-from ..closed_forms import carrier, remanent_field
-from .anywhere import NearField, near_field
-from .near_elements import NearElements
+from ...geometry.common import MU_0, Array
+from ...geometry.magnets import Magnet
+from ...geometry.shapes import rotation_matrix
+from ...geometry.solids import moved
+from ..closed_forms.moments import carrier
+from ..closed_forms.uniform import remanent_field
+from .near_field import NearElements, NearField, near_field
 
 RTOL = 1e-3
 """Error asked for, relative to the largest remanence: knees are known to per cents."""

@@ -9,9 +9,10 @@ import numpy as np
 from pydantic import BaseModel
 from pydantic_core import ErrorDetails
 
-from ..basics import InputError, Solid, printable, shown
-from ..bodies import TOUCHING, apart, body_overlap, deepest_overlap_in_a_turn
-from . import schema
+from ..common import InputError, printable, shown
+from ..overlap import TOUCHING, apart, body_overlap, deepest_overlap_in_a_turn
+from ..scene import schema
+from ..solids import Solid
 from .contents import AbsoluteStart, Scene
 
 ROTORS: dict[str, type[BaseModel]] = {

@@ -5,17 +5,24 @@ J. M. Hermansen, F. L. Durhuus and R. Bjørk, Appl. Phys. Lett. 127 (2025) 01240
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
+from typing import Any
 
+import matplotlib as mpl
 import numpy as np
+import scipy
 import xarray as xr
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 from numpy.typing import ArrayLike, NDArray
 
-from ...geometry.basics import MAGNET_CONDUCTIVITY
-from ...geometry.bodies import Magnet, horizontal, tilt, vertical
-from ...geometry.scenes import Drag, Floater, Scene
-from ..one_scene import Levitation
-from ..results import Point, cases_with
-from ..terminal import FieldModel, InteractionModel, Models
+from ...geometry.common import MAGNET_CONDUCTIVITY, MU_0, Array
+from ...geometry.magnets import Magnet
+from ...geometry.rotor import horizontal, tilt, vertical
+from ...geometry.scene.contents import Drag, Floater, Scene
+from ..cli.options import FieldModel, InteractionModel, Models
+from ..figures.style import PAGE, panels
+from ..levitation import Levitation
+from ..study import Point, cases_with
 
 EDGE, REMANENCE, PERMEABILITY = 10e-3, 1.305, 1.05
 """Of the rotor's cubes: m; T, the middle of 1.29 to 1.32; recoil permeability usual for NdFeB, which is not given."""
@@ -144,3 +151,170 @@ def by_configuration(result: xr.Dataset) -> Iterator[tuple[str, xr.Dataset]]:
 def stable_in_flight(growth: ArrayLike) -> NDArray[np.bool_]:
     """Where no disturbance grows e-fold within `FLIGHT`; False where there is no equilibrium (NaN)."""
     return np.asarray(np.asarray(growth) <= 1 / FLIGHT)
+
+
+INTERACTION = 1e-7 * FLOATER.moment * REMANENCE * EDGE**3 / MU_0
+"""G = μ0 m_f m_r / 4π, N m⁴."""
+NEAREST, FARTHEST = CONTACT, 0.12
+"""Distances between which roots of the force are looked for, m; nearer, the side mode's radius has no bound."""
+
+
+@dataclass(frozen=True)
+class AxialForce:
+    """Parts of the magnetic force along the axis, each like the distances: N, attraction upwards positive.
+
+    Parameters
+    ----------
+    attracting : by the on-axis field, the terms with cos θ
+    repelling : by the rotating field, the terms with sin θ
+    polar_angle : θ of the floater, rad; NaN where the formula has no solution
+    side : radius a of the side mode, m
+    """
+
+    attracting: Array
+    repelling: Array
+    polar_angle: Array
+    side: Array
+
+    @property
+    def total(self) -> Array:
+        """Both parts, N."""
+        return self.attracting + self.repelling
+
+
+def field(configuration: str, value: float, distance: Array) -> tuple[Array, Array]:
+    """|B⊥| and B_z (T) on the axis at `distance` (m), by the formulas of the polar angle without a side mode."""
+    across, along, _, _ = PARTS[configuration](CONFIGURATIONS[configuration].si(value), distance, 0 * distance)
+    unit = INTERACTION / FLOATER.moment
+    return np.abs(unit * across), unit * along
+
+
+def side_radius(distance: ArrayLike, frequency: ArrayLike) -> Array:
+    """Radius a = 𝒢/(μ_f ω²) of the side mode, m (equation 5)."""
+    distance, rate = np.asarray(distance, float), 2 * np.pi * np.asarray(frequency, float)
+    return np.asarray(3 * INTERACTION / (distance**4 * FLOATER.mass * rate**2))
+
+
+def force(configuration: str, value: float, distance: ArrayLike, frequency: float, simple: bool = False) -> AxialForce:
+    """Force on the floater at `distance` (m): the semi-analytic form, or the `simple` one for small angles.
+
+    The simple form (horizontal and tilt) has θ = m_f B⊥/(I ω²), and in the tilted case no side mode.  `value` is in the
+    configuration's unit.
+    """
+    d, parameter = np.asarray(distance, float), CONFIGURATIONS[configuration].si(value)
+    scale, a = 3 * INTERACTION / d**4, side_radius(d, frequency)
+    stiffness = FLOATER.inertia * (2 * np.pi * frequency) ** 2
+    if simple:
+        angle = INTERACTION / (d**3 * stiffness)
+        attracting = {"horizontal": 4 * (parameter - a) / d, "tilt": 2 * parameter + 0 * d}[configuration]
+        return AxialForce(scale * attracting, -scale * angle, angle, a if configuration == "horizontal" else 0 * a)
+    across, along, with_cosine, with_sine = PARTS[configuration](parameter, d, a)
+    slack = stiffness - INTERACTION * along
+    angle = np.where(slack > 0, INTERACTION * across / np.where(slack > 0, slack, 1.0), np.nan)
+    return AxialForce(scale * with_cosine * np.cos(angle), scale * with_sine * np.sin(angle), angle, a)
+
+
+def _horizontal(displacement: float, d: Array, a: Array) -> tuple[Array, Array, Array, Array]:
+    u = (displacement - a) / d
+    return (1 - 3 * u**2) / d**3, 3 * u / d**3, 4 * u, 5 * u**2 - 1
+
+
+def _vertical(displacement: float, d: Array, a: Array) -> tuple[Array, Array, Array, Array]:
+    u, far = a / d, d + displacement
+    return (
+        (1 - 3 * u**2) / d**3 + 3 * a / far**4,
+        2 / far**3 - 3 * u / d**3,
+        2 * (d / far) ** 4 - 4 * u,
+        5 * u**2 - 1 - 4 * a * d**4 / far**5,
+    )
+
+
+def _tilt(angle: float, d: Array, a: Array) -> tuple[Array, Array, Array, Array]:
+    u, cosine, sine = a / d, np.cos(angle), np.sin(angle)
+    return (
+        (cosine - 3 * u * (u * cosine - sine)) / d**3,
+        (2 * sine - 3 * u * cosine) / d**3,
+        2 * sine - 4 * u * cosine,
+        (5 * u**2 - 1) * cosine - 4 * u * sine,
+    )
+
+
+PARTS = {"horizontal": _horizontal, "vertical": _vertical, "tilt": _tilt}
+"""B⊥ and B_z by μ0 m_r/4π (1/m³), and the factors of cos θ and sin θ in the force, by 𝒢 (equations 7, 11 and 13)."""
+
+
+def balanced(configuration: str, value: float, frequency: float, load: float) -> tuple[float, float]:
+    """Distances (m) of the stable and of the unstable point at which the semi-analytic force is `load` (N), else NaN.
+
+    Unstable is the farthest place at which attraction falls below the load, stable the next nearer one.
+    """
+    grid = np.geomspace(NEAREST, FARTHEST, 600)
+
+    def excess(d: ArrayLike) -> Array:
+        return force(configuration, value, d, frequency).total - load
+
+    enough = excess(grid) >= 0
+    steps = np.flatnonzero(enough[:-1] != enough[1:])
+    roots = [float(scipy.optimize.brentq(excess, grid[k], grid[k + 1])) for k in steps[-2:]]
+    if not len(roots):
+        return np.nan, np.nan
+    return (np.nan, roots[0]) if len(roots) == 1 else (roots[0], roots[1])
+
+
+def analytic_distance(configuration: str, value: float, frequency: ArrayLike) -> Array:
+    """Distance without gravity and for small angles, m: equations 17 and 36 of the supplement; NaN for vertical."""
+    rate = 2 * np.pi * np.asarray(frequency, float)
+    parameter = CONFIGURATIONS[configuration].si(value)
+    angular, linear = INTERACTION / (FLOATER.inertia * rate**2), INTERACTION / (FLOATER.mass * rate**2)
+    if configuration == "horizontal":
+        half = angular / (8 * parameter)
+        return np.asarray(np.sqrt(half + np.sqrt(half**2 + 3 * linear / parameter)))
+    return np.asarray(np.cbrt(angular / (2 * parameter))) if configuration == "tilt" else np.full(rate.shape, np.nan)
+
+
+TITLES = {
+    "horizontal": "Cube displaced by δx",
+    "vertical": "Two cubes, δz apart",
+    "tilt": "Cube tilted by δθ",
+}
+
+
+def one_panel_each(height: float, **shared: Any) -> tuple[Figure, Any]:
+    """A panel (3,) side by side for each configuration, `height` inches high; `shared` are options of `panels`."""
+    figure, (axes,) = panels(1, len(CONFIGURATIONS), (PAGE, height), **shared)
+    for panel, configuration in zip(axes, CONFIGURATIONS, strict=True):
+        panel.set_title(TITLES[configuration])
+    return figure, axes
+
+
+def rotor_panels(result: xr.Dataset, height: float, **shared: Any) -> tuple[Figure, Any]:
+    """A panel (3,) for each configuration of a joined result, with a numbered place for each of its rotors."""
+    figure, (axes,) = panels(1, len(CONFIGURATIONS), (PAGE, height), **shared)
+    for panel, (configuration, part) in zip(axes, by_configuration(result), strict=False):
+        panel.set_xticks(range(part.sizes["case"]), [f"{m:g}" for m in part["measure"].values])
+        panel.set(xlabel=axis_label(configuration), xlim=(-0.6, part.sizes["case"] - 0.4), title=TITLES[configuration])
+    return figure, axes
+
+
+def rotor_color(configuration: str, value: float) -> tuple[float, ...]:
+    """Colour of a rotor: dark to bright along viridis, which all kinds of colour vision tell apart."""
+    tested = CONFIGURATIONS[configuration].tested
+    place = (value - tested[0]) / (tested[-1] - tested[0])
+    return tuple(mpl.colormaps["viridis"](0.92 * float(np.clip(place, 0, 1))))
+
+
+def legend_name(configuration: str, value: float) -> str:
+    """A rotor in a legend; with a star if it levitated in the experiment."""
+    return rotor_label(configuration, value) + ("*" if value in CONFIGURATIONS[configuration].levitated else "")
+
+
+def values_of(result: xr.Dataset, configuration: str) -> list[float]:
+    """The values of a configuration's parameter that a result holds, ascending."""
+    return sorted(set(result["value"].values[result["configuration"].values == configuration].tolist()))
+
+
+def plot_branch(axes: Axes, x: Array, y: Array, solid: NDArray[np.bool_], **style: Any) -> None:
+    """A curve, solid where `solid`, else dashed, without a gap between."""
+    inside = solid & np.append(solid[1:], True) & np.append(True, solid[:-1])
+    axes.plot(x, np.where(inside, np.nan, y), "--", **{**style, "label": None})
+    axes.plot(x, np.where(solid, y, np.nan), "-", **style)

@@ -1,15 +1,127 @@
-"""The inverse question: which rotor holds the floater at a wanted distance and frequency, with the most to spare?"""
+"""The search for the displacement or tilt that holds the floater at a wanted distance and frequency."""
+
+from dataclasses import dataclass
 
 import numpy as np
 import xarray as xr
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import PercentFormatter
 
-from ...dynamics.steady import EquilibriumError
-from ...geometry.basics import Array
-from ..article import CONFIGURATIONS, article_scene, levitation_of
-from ..results import Point, Study, by_case, one_case, variable
-from ..terminal import note
-from .design_figure import FIGURES, design_lines
-from .design_search import designed
+from ...dynamics.continuation.engine import BranchPoint
+from ...dynamics.continuation.frequencies import HIGHEST, LOWEST, by_frequency, levitates, stability_end
+from ...dynamics.equilibria.balance import AXIAL, LATERAL, Balance, solve
+from ...dynamics.equilibria.equilibrium import EquilibriumError
+from ...dynamics.motion.equations import parameters
+from ...dynamics.motion.events import rotor_gap
+from ...dynamics.motion.rates import Rates
+from ...dynamics.motion.state import Scales
+from ...geometry.common import MU_0, Array
+from ...geometry.scene.contents import Scene
+from ..cli.console import note
+from ..figures.style import PAGE, PALETTE, panels, styled
+from ..results import variable
+from ..study import Point, Study, by_case, cases_with, one_case
+from .article import CONFIGURATIONS, FLOATER, REMANENCE, article_scene, axis_label, levitation_of
+
+
+@dataclass(frozen=True, eq=False)
+class Design:
+    """A rotor that holds the floater where it is wanted.
+
+    Parameters
+    ----------
+    measure : displacement, mm, or tilt, °
+    here : the equilibrium
+    low, high : where its stability ends below and above the wanted frequency; `here` where it is not stable
+    """
+
+    measure: float
+    here: BranchPoint
+    low: BranchPoint
+    high: BranchPoint
+
+    @property
+    def margin(self) -> float:
+        """Smallest relative change of the frequency that ends stable levitation; zero where it is not stable."""
+        frequency = self.here.parameter
+        return min(frequency - self.low.parameter, self.high.parameter - frequency) / frequency
+
+
+def first_guess(configuration: str, edge: float, distance: float, frequency: float) -> tuple[float, float, float]:
+    """Displacement (mm) or tilt (°), side orbit's radius (m) and polar angle (rad) by the article's formulas.
+
+    Balance of the axial force of point dipoles to first order in the polar angle, solved for the measure; gravity kept.
+    """
+    rate, moments = 2 * np.pi * frequency, FLOATER.moment * REMANENCE * edge**3 / MU_0
+    strength = MU_0 * moments / (4 * np.pi)
+    force = 3 * strength / distance**4
+    angle = strength / (distance**3 * FLOATER.inertia * rate**2)
+    radius = force / (FLOATER.mass * rate**2)
+    pull = angle + 9.81 * FLOATER.mass / force
+    if configuration == "horizontal":
+        return 1e3 * (radius + distance * pull / 4), radius, angle
+    if configuration == "tilt":
+        return float(np.degrees((pull + 4 * radius / distance) / 2)), radius, angle
+    ratio = max(2 / (pull + 4 * radius / distance), 1.0)
+    return 1e3 * distance * (ratio**0.25 - 1), radius, angle
+
+
+def designed(configuration: str, edge: float, distance: float, frequency: float) -> Design:
+    """The measure that gives a distance (m) at a frequency (Hz) with cubes of an edge (m), by the closed form.
+
+    Raises
+    ------
+    EquilibriumError : there is none, or the bodies would overlap
+    """
+    measure, radius, angle = first_guess(configuration, edge, distance, frequency)
+    place, moment = np.array([radius, 0.0, -distance]), np.array([np.sin(angle), 0.0, np.cos(angle)])
+    known: list[tuple[float, float]] = []
+    for _ in range(30):
+        least = 1e3 * edge if configuration == "vertical" else 0.0
+        if not least <= measure < (90 if configuration == "tilt" else 100) or measure == 0:
+            raise EquilibriumError(f"The rotor would need a measure of {measure:.3g}.")
+        scene = article_scene(configuration, measure, frequency, drag=False, edge=edge, permeability=1.0)
+        rates = levitation_of(scene, "cuboid").rates
+        place, moment, force = _lateral(scene, rates, place * distance / np.linalg.norm(place), moment)
+        if known and abs(measure - known[-1][0]) < 1e-9 * measure:
+            return _judged(scene, rates, measure, place, moment)
+        known.append((measure, force))
+        measure = _secant(known)
+    raise EquilibriumError("The search for the measure did not settle.")
+
+
+def _secant(known: list[tuple[float, float]]) -> float:
+    here, miss = known[-1]
+    if len(known) == 1:
+        return 1.01 * here
+    before, missed = known[-2]
+    step = -miss * (here - before) / (miss - missed)
+    return here + float(np.clip(step, -0.2 * here, 0.2 * here))
+
+
+def _lateral(scene: Scene, rates: Rates, place: Array, moment: Array) -> tuple[Array, Array, float]:
+    """Place (3,) m at the same height and moment (3,) where all but the axial force is balanced, and that force.
+
+    There is no fold at a given height, so that this always leads on.
+    """
+    balance = Balance(rates, parameters(scene, Scales.of(scene), frozen_spin=True), 0.0)
+    places, moments, step = solve(balance, place[None] / scene.floater.radius, moment[None], LATERAL)
+    if not step[0] < 1e-8:
+        raise EquilibriumError("There is no lateral balance at the wanted distance.")
+    return places[0] * scene.floater.radius, moments[0], float(balance(places, moments)[0][0, AXIAL])
+
+
+def _judged(scene: Scene, rates: Rates, measure: float, place: Array, moment: Array) -> Design:
+    family = by_frequency(scene, rates)
+    here = family.point(place / scene.floater.radius, moment, scene.frequency)
+    if rotor_gap(scene, here.position) < 0:
+        raise EquilibriumError("The floater would overlap with the rotor.")
+    if not levitates(here):
+        return Design(measure, here, here, here)
+    low, high = (stability_end(scene, family, here.state, scene.frequency, end) for end in (LOWEST, HIGHEST))
+    return Design(measure, here, low, high)
+
 
 EDGES = (6.0, 8.0, 10.0, 12.7, 16.0)
 """Edges of the cubes that are tried, mm."""
@@ -110,6 +222,83 @@ def _row(configuration: str, edge: float, distance: float, frequency: float) -> 
     angle = float(np.degrees(np.arctan2(np.hypot(moment[0], moment[1]), moment[2])))
     ends = found.low.parameter, found.high.parameter
     return [found.measure, found.margin, *ends, found.here.growth_per_s, angle]
+
+
+def wanted(result: xr.Dataset) -> list[tuple[float, float]]:
+    """The pairs of distance (m) and frequency (Hz) that were asked for."""
+    pairs = zip(result["wanted_distance"].values, result["wanted_frequency"].values, strict=True)
+    return sorted({(float(d), float(f)) for d, f in pairs})
+
+
+def _wish(result: xr.Dataset, distance: float, frequency: float) -> list[xr.Dataset]:
+    """What each configuration answers to one of them."""
+    found = cases_with(result, wanted_distance=distance, wanted_frequency=frequency)
+    return [found.isel(case=k) for k in range(found.sizes["case"])]
+
+
+@styled
+def design_figure(result: xr.Dataset) -> Figure:
+    """Stability margin against the cubes' edge for every configuration and wish, with the measure that it takes."""
+    wishes = wanted(result)
+    columns = len({f for _, f in wishes})
+    figure, axes = panels(len(wishes) // columns, columns, (PAGE, 2.3 * len(wishes) / columns + 0.2))
+    for place, (distance, frequency) in zip(axes.flat, wishes, strict=True):
+        for one in _wish(result, distance, frequency):
+            _margins(place, one)
+        place.set_title(f"{1e3 * distance:g} mm at {frequency:g} Hz")
+        place.yaxis.set_major_formatter(PercentFormatter(1.0))
+        place.margins(y=0.15)
+        place.set(ylim=(-0.02, None))
+        place.legend(loc="upper left")
+    for place in axes[-1]:
+        place.set_xlabel("edge of the cubes (mm)")
+    for place in axes[:, 0]:
+        place.set_ylabel("margin in frequency")
+    return figure
+
+
+FIGURES = {"design": design_figure}
+
+
+def _margins(place: Axes, one: xr.Dataset) -> None:
+    kind = str(one["configuration"].values)
+    color = PALETTE[list(CONFIGURATIONS).index(kind)]
+    edges, margin, measure = 1e3 * one["edge"].values, one["margin"].values, one["measure"].values
+    place.plot(edges, margin, "o-", ms=3, color=color, label=f"{kind}, {axis_label(kind)}")
+    for edge, height, value in zip(edges, margin, measure, strict=True):
+        if np.isfinite(height) and height > 0:
+            place.annotate(
+                f"{value:.2g}", (edge, height), xytext=(0, 3), textcoords="offset points", ha="center",
+                fontsize=6, color=color,
+            )  # fmt: skip
+
+
+def design_lines(result: xr.Dataset) -> list[str]:
+    """The best rotor for each wish, checked by a forward search in the true field."""
+    lines = []
+    for distance, frequency in wanted(result):
+        lines.append(f"{1e3 * distance:g} mm at {frequency:g} Hz:")
+        lines += [f"  {_best(one)}" for one in _wish(result, distance, frequency)]
+    return lines
+
+
+def _best(one: xr.Dataset) -> str:
+    kind, best = str(one["configuration"].values), int(one["best"])
+    if best < 0 or not float(one["margin"][best]) > 0:
+        return f"{kind}: no edge gives stable levitation there."
+    at = one.isel(edge=best)
+    symbol, unit = CONFIGURATIONS[kind].symbol, CONFIGURATIONS[kind].unit
+    found = (
+        f"{kind}: edge {1e3 * float(at['edge']):g} mm, {symbol} = {float(at['measure']):.3f} {unit} (closed "
+        f"form), margin {100 * float(at['margin']):.1f} % ({float(at['lowest']):.1f} to {float(at['highest']):.1f} Hz)"
+    )
+    if not np.isfinite(float(one["true_distance"])):
+        return f"{found}; the true field was not met."
+    state = "stable" if float(one["true_stable"]) else f"UNSTABLE, {float(one['true_growth']):.2g} /s"
+    return (
+        f"{found}; true field: {symbol} = {float(one['true_measure']):.3f} {unit} gives "
+        f"{1e3 * float(one['true_distance']):.4f} ± {1e3 * float(one['true_distance_error']):.1g} mm, {state}."
+    )
 
 
 STUDY = Study(

@@ -1,28 +1,117 @@
-"""Levitation at chosen heights and body spins: at which frequency, how the spin drifts there and what small motions do.
+"""The rotors of the reported facts, and in which box of inputs each is looked at.
 
-With the height given and the frequency unknown there is no fold: the equilibria are a smooth function of height and
-spin, and the fold is the least of the frequencies.  Each effect enters to first order, so that any strength of it is
-had afterwards by a factor: with left and right eigenvectors w and v of a small motion without losses, an effect that
-adds M to the derivatives of the rates makes it grow by Re w*Mv/(w*v).
+By similarity a scene of other sizes, densities and remanences is one of these with another radius and gravity, see
+`dynamics.motion.likeness`; so four numbers or five tell a rotor: how far and how tilted its magnets are, and these two.
+The cube's displacement and its tilt do about the same, each by its field on the axis; tilts are therefore counted from
+what a displacement does already.
 """
 
-from collections.abc import Callable, Sequence
+import hashlib
+import json
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cache, cached_property
+from pathlib import Path
 
 import numpy as np
+import xarray as xr
 from numpy.typing import ArrayLike
 from scipy.optimize import brentq
+from scipy.stats import qmc
 
-from ...dynamics.branches import Family, frequencies
-from ...dynamics.effects import Dissipation, brake_slope, with_effects
-from ...dynamics.motion import Interaction, Parameter, Rates, Scales, parameters
-from ...dynamics.slow_drift import SlowTorque
-from ...dynamics.steady import EquilibriumError, modes, named_modes, tangent_spaces
-from ...fem.harmonics import CompiledField
-from ...fem.rotor_tables import FieldTable
-from ...geometry.basics import MAGNET_CONDUCTIVITY, Array
-from ...geometry.scenes import Drag, Scene
+from ...dynamics.continuation.engine import Family, frequencies
+from ...dynamics.continuation.slow_drift import SlowTorque
+from ...dynamics.equilibria.equilibrium import EquilibriumError
+from ...dynamics.equilibria.modes import modes, named_modes, tangent_spaces
+from ...dynamics.motion.effect import Interaction
+from ...dynamics.motion.effects import with_effects
+from ...dynamics.motion.equations import parameters
+from ...dynamics.motion.rates import Rates
+from ...dynamics.motion.rotor_losses import Dissipation, brake_slope
+from ...dynamics.motion.state import Parameter, Scales
+from ...fem.cache import digest_of, from_cache, read_checked, write_checked
+from ...fem.harmonics.expressions import CompiledField
+from ...fem.rotor.table import FieldTable
+from ...fem.rotor_metal import RotorLosses, cached_rotor_losses
+from ...geometry.common import MAGNET_CONDUCTIVITY, Array
+from ...geometry.magnets import Magnet
+from ...geometry.rotor import horizontal, tilt, vertical
+from ...geometry.scene.contents import Drag, Scene
+from ...geometry.solids import moved
+from ..cli.options import FieldModel
+from ..results import variable
+from ..study import Point
+from .article import EDGE, FLOATER, REMANENCE, levitation_of
+from .upper_limit import spacer
+
+GRAVITY = 9.81
+PER_MILLIMETRE = 5.0
+"""Tilt, in degrees, that does about what a millimetre of displacement does."""
+SPACER = spacer(1e-3)
+"""The block of steel that balances a cube displaced by 1 mm."""
+
+
+@dataclass(frozen=True)
+class Kind:
+    """One kind of rotor.
+
+    Parameters
+    ----------
+    box : ends of each input, by name: `on_axis` (°, tilt and displacement of the cube together), `displacement` (mm),
+        `stack` (mm, of the second cube), `radius` (of the floater, over the article's), `weight` (gravity over 9.81)
+    near, far : part of the way from contact to where the attraction alone carries the weight, ends of what is looked at
+    """
+
+    box: Mapping[str, tuple[float, float]]
+    near: float
+    far: float
+
+    @property
+    def inputs(self) -> tuple[str, ...]:
+        """Names of the inputs."""
+        return tuple(self.box)
+
+    def at(self, unit: Array) -> dict[str, float]:
+        """Inputs at a point (k,) of the unit cube."""
+        return {
+            name: low + (high - low) * float(u) for (name, (low, high)), u in zip(self.box.items(), unit, strict=True)
+        }
+
+
+KINDS = {
+    "single": Kind(
+        {"on_axis": (4.0, 13.0), "displacement": (-0.2, 2.2), "radius": (0.97, 1.03), "weight": (0.93, 1.07)},
+        0.15,
+        0.86,
+    ),
+    "stack": Kind(
+        {
+            "on_axis": (-4.5, 6.5), "displacement": (-1.2, 1.2), "stack": (9.9, 21.0), "radius": (0.97, 1.03),
+            "weight": (0.93, 1.07),
+        },
+        0.3,
+        0.88,
+    ),
+}  # fmt: skip
+
+
+def magnets_of(inputs: Mapping[str, float], permeability: float) -> tuple[Magnet, ...]:
+    """The magnets of a rotor: a cube displaced along +x and tilted about y, and the second one if there is a stack."""
+    angle = np.radians(inputs["on_axis"] - PER_MILLIMETRE * inputs["displacement"])
+    cube = tilt(angle, EDGE, REMANENCE, permeability)[0]
+    shift = np.array([1e-3 * inputs["displacement"], 0.0, 0.0])
+    cube = replace(cube, body=moved(cube.body, cube.body.center + shift, cube.body.rotation))
+    if "stack" not in inputs:
+        return (cube,)
+    return (cube, vertical(1e-3 * inputs["stack"], EDGE, REMANENCE, permeability)[1])
+
+
+def scene_of(inputs: Mapping[str, float], permeability: float = 1.0) -> Scene:
+    """The scene of a rotor, in vacuum and without metal; its frequency is any."""
+    floater = replace(FLOATER, radius=FLOATER.radius * inputs["radius"])
+    gravity = np.array([0.0, 0.0, -GRAVITY * inputs["weight"]])
+    return Scene(100.0, magnets_of(inputs, permeability), floater, Drag(0.0, 0.0), gravity=gravity)
+
 
 EFFECTS = ("floater", "magnets", "steel", "air")
 """What may make a small motion grow: currents in the floater, the rotor's magnets and the holder's steel, and air."""
@@ -189,3 +278,104 @@ def _without(values: Array, off: Sequence[int]) -> Array:
     found = values.copy()
     found[list(off)] = 0.0
     return found
+
+
+SPINS = (-0.12, 0.6)
+"""Ends of the body spins."""
+SEED, LONGEST_DESIGN = 20250701, 256
+CONTACT = 11.35e-3
+"""Distance from which parts of the way are counted, m: that on the axis at which floater and cube touch."""
+FORMAT = "spinlev design of an experiment 1"
+
+
+@dataclass(frozen=True, eq=False)
+class CarriedLosses:
+    """The losses of magnets that keep their own currents wherever they are: tables of each at home, carried along.
+
+    Parameters
+    ----------
+    table : of a cube about the origin, its axes along the frame's
+    magnets : the cubes as they are
+    """
+
+    table: RotorLosses
+    magnets: tuple[Magnet, ...]
+
+    def dissipation(self, positions: ArrayLike, moments: ArrayLike) -> Array:
+        """D (n, 6, 6) of dipoles (n, 3) A m² at (n, 3) m, summed over the magnets."""
+        places, dipoles = np.asarray(positions, float), np.asarray(moments, float)
+        total = np.zeros((len(places), 6, 6))
+        for magnet in self.magnets:
+            turn = magnet.body.rotation
+            own = self.table.dissipation((places - magnet.body.center) @ turn, dipoles @ turn)
+            both = np.kron(np.eye(2), turn)
+            total = total + both @ own @ both.T
+        return total
+
+
+def design_inputs(kind: str, number: int) -> dict[str, float]:
+    """Inputs of one rotor of a design: that number of Sobol's sequence (I. M. Sobol, 1967; scrambled by A. B. Owen)."""
+    box = KINDS[kind]
+    return box.at(qmc.Sobol(len(box.inputs), seed=SEED).random(LONGEST_DESIGN)[number])
+
+
+def cached_row(point: Point) -> xr.Dataset:
+    """`design_row` from the cache if it is there: whoever fits a surrogate finds the rotors that others computed."""
+    digest = hashlib.sha256(
+        f"{FORMAT} {digest_of('spinlev.dynamics')} {json.dumps(dict(point), sort_keys=True)}".encode()
+    )
+    digest.update(Path(__file__).read_bytes())
+    return from_cache(
+        f"experiment-{digest.hexdigest()}.nc",
+        lambda path: read_checked(path, FORMAT),
+        lambda: design_row(point),
+        lambda row, path: write_checked(row.assign_attrs(format=FORMAT), path),
+        lambda _: None,
+    )[0].drop_attrs()
+
+
+def design_row(point: Point) -> xr.Dataset:
+    """One rotor of a design, computed.
+
+    Returns
+    -------
+    Dataset over `height` and `body_spin`: its nodes (NaN where nothing levitates), how far the attraction alone carries
+    the weight, and its inputs
+    """
+    kind, model = KINDS[point["rotor"]], point["model"]
+    inputs = design_inputs(point["rotor"], point["number"])
+    scene = scene_of(inputs, 1.0 if model == "cuboid" else 1.05)
+    field: FieldModel = "cuboid" if model == "cuboid" else "fem"
+    levitation = levitation_of(scene, field, interaction="mutual" if model == "mutual" else "rigid")
+    spins, steps = np.linspace(*SPINS, point["spins"]), np.arange(point["heights"]) + 0.5
+    part = kind.near + (kind.far - kind.near) * (1 - np.cos(np.pi * steps / len(steps))) / 2
+    floater = Levitating.of(scene, levitation.interaction, lambda: losses_of(scene, point["steel"]))
+    hanging = floater.hanging
+    nodes = floater.nodes(CONTACT + part * (hanging - CONTACT), spins)
+    return xr.Dataset(
+        {
+            "node": variable(("height", "body_spin", "quantity"), nodes, "see quantity", "what is known of a node"),
+            "hanging": variable((), np.array(hanging), "m", "distance at which the attraction carries the weight"),
+            "part": variable(("height",), part, "1", "part of the way from contact to there"),
+            "input": variable(("name",), np.array(list(inputs.values())), "see name", "input of the rotor"),
+        },
+        {"body_spin": spins, "quantity": list(QUANTITIES), "name": list(inputs)},
+    )
+
+
+def losses_of(scene: Scene, steel: bool) -> tuple[Dissipation, Dissipation | None]:
+    """Losses of a scene's magnets and, if asked for, of the block that balances a displaced cube."""
+    magnet, block = _losses_at_home(scene.rotor[0].recoil_permeability, steel)
+    return CarriedLosses(magnet, scene.rotor), block
+
+
+@cache
+def _losses_at_home(permeability: float, steel: bool) -> tuple[RotorLosses, RotorLosses | None]:
+    """Those of a cube about the origin, and of the block above it."""
+    cube = replace(horizontal(0.0, EDGE, REMANENCE, permeability)[0], conductivity=MAGNET_CONDUCTIVITY)
+    alone = Scene(100.0, (cube,), FLOATER, Drag(0.0, 0.0))
+    magnet = cached_rotor_losses(alone, lambda _: None)[0]
+    if not steel:
+        return magnet, None
+    block = replace(alone, rotor=(replace(cube, conductivity=None),), conductors=(SPACER,))
+    return magnet, cached_rotor_losses(block, lambda _: None)[0]

@@ -1,4 +1,4 @@
-"""Figures and sentences of the study of the field's components, from its dataset alone."""
+"""On-axis and off-axis field at several places of the floater against the parameter of each of the article's rotors."""
 
 from collections.abc import Callable
 from functools import partial
@@ -10,13 +10,61 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter
 
-from ...geometry.basics import Array
-from ..results import DASHES, NAMES, PALETTE, cases_with, styled
-from .article import CONFIGURATIONS
-from .article_figure import one_panel_each
+from ...geometry.common import Array
+from ..figures.style import DASHES, NAMES, PALETTE, styled
+from ..levitation import sources
+from ..results import variable
+from ..study import Point, Study, by_case, cases_with, one_case
+from .article import CONFIGURATIONS, article_scene, field, levitation_of, one_panel_each
+
+DISTANCES = (15e-3, 20e-3, 25e-3, 30e-3, 40e-3)
+"""Places of the floater on the axis below the rotor, m; the article's text does not give its own."""
+MODELS = ("article", "dipole", "cuboid", "fem")
+
+
+def field_points(quick: bool) -> list[Point]:
+    """Every rotor of the article; `quick` takes the first, the middle and the last of each configuration."""
+    return [
+        {"configuration": name, "value": value, "model": model}
+        for name, kind in CONFIGURATIONS.items()
+        for value in (kind.tested[:: (len(kind.tested) - 1) // 2] if quick else kind.tested)
+        for model in MODELS
+    ]
+
+
+def field_components(point: Point) -> xr.Dataset:
+    """Field of one rotor by one model.
+
+    Returns
+    -------
+    Dataset over `distance`: |B⊥| and B_z, in tesla, and the model's own estimate of the error of either (0 for the
+    article's formula, which states none).
+    """
+    distance = np.array(DISTANCES)
+    if point["model"] == "article":
+        across, along = field(point["configuration"], point["value"], distance)
+        error = np.zeros_like(distance)
+    else:
+        scene = article_scene(point["configuration"], point["value"])
+        table = sources(levitation_of(scene, point["model"]).table)
+        places = distance[:, None] * np.array([0.0, 0.0, -1.0])
+        b, _ = table.evaluate(places)
+        across, along, error = np.hypot(b[:, 0], b[:, 1]), b[:, 2], table.absolute_error(places)[0]
+    return one_case(
+        point,
+        xr.Dataset(
+            {
+                "off_axis": variable(("distance",), across, "T", "field across the axis"),
+                "on_axis": variable(("distance",), along, "T", "field along the axis"),
+                "field_error": variable(("distance",), error, "T", "estimated error of the field"),
+            },
+            {"distance": variable(("distance",), distance, "m", "distance below the rotor's origin")},
+        ),
+    )
+
 
 PARTS = {"off_axis": "off-axis field $B_\\perp$ (mT)", "on_axis": "on-axis field $B_z$ (mT)"}
-MODELS = ("fem", "dipole", "article")
+DRAWN_MODELS = ("fem", "dipole", "article")
 
 
 @styled
@@ -68,7 +116,7 @@ def _logarithmic_panels(result: xr.Dataset) -> tuple[Figure, Any]:
 
 def _component(axes: Axes, part: xr.Dataset, quantity: str) -> None:
     for k, color in zip(range(part.sizes["distance"]), PALETTE, strict=False):
-        for model in MODELS:
+        for model in DRAWN_MODELS:
             value, field = _curve(part, model, quantity, k)
             axes.plot(value, 1e3 * field, "+" if model == "article" else DASHES[model], color=color, ms=4)
         value, field = _curve(part, "fem", quantity, k)
@@ -118,3 +166,14 @@ def components_lines(result: xr.Dataset) -> list[str]:
                 f"{100 * (_curve(part, 'fem', 'field_error', k)[1] / np.hypot(across, along)).max():.1g} %."
             )
     return lines
+
+
+STUDY = Study(
+    name="field-components",
+    summary="off-axis and on-axis field against the parameter of each rotor of the article, by four models",
+    points=field_points,
+    compute=field_components,
+    gather=by_case,
+    figures=FIGURES,
+    report=components_lines,
+)

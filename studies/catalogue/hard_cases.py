@@ -1,28 +1,134 @@
-"""True and stated error of the rotor's table in hard cases, against an independent solution.
-
-The reference has another mesh with smaller elements, a higher order and all moments; for μr = 1 it is Coulomb's law.
-What it is worth its own last step in order tells.
-"""
+"""Rotors whose field is hard to compute, and how fine an independent solution must be to judge a table of them."""
 
 import time
 import warnings
-from collections.abc import Mapping
-from dataclasses import replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from itertools import product
+from textwrap import fill
 
 import numpy as np
 import xarray as xr
+from matplotlib.figure import Figure
+from matplotlib.ticker import LogLocator
 
-from ...fem.closed_forms import added_by_closed_form, carrier, oblique_contact
-from ...fem.magnetostatics import Refinement, solve_rotor
-from ...fem.rotor_tables import Accuracy, AccuracyWarning, RotorTable, fem_table, points_around, typical_field
-from ...fem.verification import coulomb_field
-from ...geometry.basics import Array
-from ...geometry.bodies import cells_of, cut_magnets
-from ..results import study_of_one, variable
-from ..terminal import progress
-from .field_hard_cases_figure import FIGURES, hard_case_lines
-from .hard_cases import CASES, HardCase
+from ...fem.closed_forms.moments import added_by_closed_form, carrier, oblique_contact
+from ...fem.elements.ladder import Refinement, solve_rotor
+from ...fem.elements.second_opinion import coulomb_field
+from ...fem.rotor.models import Accuracy, AccuracyWarning, fem_table, points_around, typical_field
+from ...fem.rotor.table import RotorTable
+from ...geometry.common import Array
+from ...geometry.cutting import cells_of, cut_magnets
+from ...geometry.magnets import Magnet
+from ...geometry.meshes.magnets import MeshSettings
+from ...geometry.rotor import horizontal, tilt, vertical
+from ...geometry.shapes import Box, Cylinder, Ring, rotation_matrix
+from ..cli.console import progress
+from ..figures.style import PAGE, PALETTE, panels, styled
+from ..results import variable
+from ..study import study_of_one
+
+CUBE = (0.01, 0.01, 0.01)
+REMANENCE, PERMEABILITY = 1.305, 1.05
+CONTACT = 0.00635
+"""The floater's radius (m): it touches a face of the cube when their centres are 11.35 mm apart."""
+OTHER_MESH = MeshSettings(ball_radius=1.2, magnet_size=0.6, hp_layers=2, hp_factor=0.2, curve_order=8)
+MORE_LAYERS = replace(OTHER_MESH, hp_layers=4, hp_factor=0.15, magnet_size=0.4)
+"""Near an edge of a very permeable magnet the field grows as r^-1/3, not as log r."""
+BESIDE_EACH_OTHER = replace(OTHER_MESH, magnet_size=0.8, air_size=0.4)
+"""Small elements in the air between magnets, where layers at their edges must match."""
+
+
+@dataclass(frozen=True)
+class HardCase:
+    """A rotor, and the reference that judges its table.
+
+    Parameters
+    ----------
+    magnets : of the rotor
+    nearest : distance from the faces from which on the tolerance holds, m; None: `Accuracy`'s own
+    order : of the reference's elements; 0: Coulomb's law in 80-bit numbers (all permeabilities are 1)
+    mesh : of the reference
+    extensions : look along the extensions of edges and faces instead of all around
+    quick : short enough for a quick run
+    """
+
+    magnets: tuple[Magnet, ...]
+    nearest: float | None = None
+    order: int = 5
+    mesh: MeshSettings = OTHER_MESH
+    extensions: bool = False
+    quick: bool = False
+
+    @property
+    def clearance(self) -> float:
+        """Distance from the faces from which on the tolerance holds, m."""
+        return Accuracy(nearest=self.nearest).clearance(self.magnets)
+
+
+def _box(size: Sequence[float], center: Sequence[float] = (0.0, 0.0, 0.0), rotation: Array | None = None) -> Box:
+    return Box(np.array(size, float), np.array(center, float), np.eye(3) if rotation is None else rotation)
+
+
+def _magnet(box: Box, polarization: Sequence[float], along: float, across: float | None = None) -> Magnet:
+    return Magnet(box, np.array(polarization, float), along, across)
+
+
+def _round(body: Cylinder | Ring, polarization: tuple[float, float, float]) -> tuple[Magnet, ...]:
+    return (Magnet(body, np.array(polarization), PERMEABILITY),)
+
+
+def _cube(permeability: float) -> tuple[Magnet, ...]:
+    return horizontal(0.002, 0.01, REMANENCE, permeability)
+
+
+def _pair(distance: float) -> tuple[Magnet, ...]:
+    return vertical(distance, 0.01, REMANENCE, PERMEABILITY)
+
+
+def _plate(polarization: tuple[float, float, float]) -> tuple[Magnet, ...]:
+    return (_magnet(_box((0.02, 0.02, 0.0005)), polarization, PERMEABILITY),)
+
+
+EDGE_WITHIN_A_FACE = (
+    _magnet(_box(CUBE), (1, 0, 0), PERMEABILITY),
+    _magnet(_box((0.006,) * 3, (0.001, 0.0015, 0.008), rotation_matrix((0, 0, 30))), (0, 0.5, 1), PERMEABILITY),
+)
+EIGHT = tuple(
+    _magnet(
+        _box((0.006,) * 3, (0.012 * np.cos(a), 0.012 * np.sin(a), 0.001 * k), rotation_matrix((10 * k, 20, 30))),
+        (1.2 + 0.01 * k, 0.1 * k, 0),
+        PERMEABILITY,
+    )
+    for k, a in enumerate(np.arange(8) * np.pi / 4)
+)
+OBLIQUE = (_magnet(_box(CUBE, rotation=rotation_matrix((15, 40, 70))), (1, 0, 0), 1.05, 1.15),)
+DISC, THIN_RING = Cylinder(10e-3, 1e-3), Ring(10e-3, 9e-3, 5e-3)
+LONG = (_magnet(_box((0.005, 0.005, 0.04)), (1.3, 0, 0), PERMEABILITY),)
+CASES = {
+    "contact distance": HardCase(_cube(PERMEABILITY), CONTACT, quick=True),
+    "extensions of edges and faces": HardCase(_cube(PERMEABILITY), extensions=True),
+    "extensions, μr = 1": HardCase(_cube(1.0), order=0, extensions=True, quick=True),
+    "μr = 1 + 1e-9": HardCase(_cube(1 + 1e-9)),
+    "μr = 5": HardCase(_cube(5.0), order=8, mesh=MORE_LAYERS),
+    "μr = 1000": HardCase(_cube(1000.0), order=8, mesh=MORE_LAYERS),
+    "flat, across": HardCase(_plate((0, 0, 1.3)), CONTACT, order=4),
+    "flat, along": HardCase(_plate((1.3, 0, 0)), CONTACT, order=4),
+    "long": HardCase(LONG, CONTACT),
+    "disc of 20 : 1, across": HardCase(_round(DISC, (0, 0, 1.3)), CONTACT, order=4),
+    "disc of 20 : 1, along": HardCase(_round(DISC, (1.3, 0, 0)), CONTACT, order=4),
+    "thin ring": HardCase(_round(THIN_RING, (1.3, 0, 0)), CONTACT, order=4),
+    "touching": HardCase(_pair(0.01)),
+    "gap of 1 µm": HardCase(_pair(0.010001)),
+    "gap of 50 µm": HardCase(_pair(0.01005), order=4),
+    "any angle": HardCase(tilt(0.3, 0.01, REMANENCE, PERMEABILITY), quick=True),
+    "anisotropic, any angle": HardCase(OBLIQUE),
+    "an edge within a face": HardCase(EDGE_WITHIN_A_FACE, order=4),
+    "eight magnets": HardCase(EIGHT, order=4, mesh=BESIDE_EACH_OTHER),
+    "no polarisation": HardCase((_magnet(_box(CUBE), (0, 0, 0), PERMEABILITY),), quick=True),
+}
+"""By name, in the order of the figure."""
+
 
 RTOL = 1e-5
 FARTHEST = 1.0
@@ -123,6 +229,64 @@ def _errors(table: RotorTable, case: HardCase, points: Array, before: Array, tru
     own = np.linalg.norm(truth - before, axis=1) / scale
     stated = table.absolute_error(points)[0] / scale + ROUND_OFF
     return float(true.max()), float(stated.max()), float(own.max()), float((true / (stated + own)).max())
+
+
+COLUMNS = 4
+SMALL = 1e-11
+"""Panels with errors below it show round-off too."""
+LINES = {
+    "stated_error": ("stated by the table", "--", PALETTE[1], "s"),
+    "true_error": ("difference from the reference", "-", PALETTE[0], "o"),
+    "reference_step": ("last step of the reference", ":", "0.45", ""),
+}
+
+
+@styled
+def hard_case_figure(result: xr.Dataset) -> Figure:
+    """True and stated error over the distance, a panel for each case with a field."""
+    names = [name for name in result["case"].values if float(result["true_error"].sel(case=name).max()) > 0]
+    rows = -(-len(names) // COLUMNS)
+    figure, axes = panels(rows, COLUMNS, (PAGE, 1.5 * rows + 0.7))
+    for panel, name in zip(axes.flat, names, strict=False):
+        row = result.sel(case=name)
+        for key, (label, dash, color, marker) in LINES.items():
+            values = np.where(row[key] > 0, np.maximum(row[key], 1e-17), np.nan)
+            panel.loglog(1e3 * row["distance"], values, dash, color=color, marker=marker, ms=3, label=label)
+        panel.axhline(1e-5, color="0.2", lw=0.7, label="tolerance asked for")
+        panel.set_title(fill(name, 22))
+        small = float(row["true_error"].min()) < SMALL
+        panel.set(xlim=(4, 1300), ylim=(3e-17 if small else 1e-10, 1e-4))
+        panel.yaxis.set_major_locator(LogLocator(numticks=6))
+    for panel in axes.flat[len(names) :]:
+        panel.set_visible(False)
+    figure.supxlabel("distance from the magnets' faces (mm)", fontsize="medium")
+    figure.supylabel("largest relative error of B", fontsize="medium")
+    figure.legend(*axes.flat[0].get_legend_handles_labels(), loc="outside upper center", ncols=4)
+    return figure
+
+
+FIGURES = {"field-hard-cases": hard_case_figure}
+
+
+def hard_case_lines(result: xr.Dataset) -> list[str]:
+    """The study's table."""
+    ends = f"{'at the nearest distance':27}  {'10 cm and farther':27}"
+    lines = [
+        "Largest relative error of B: true / stated / last step of the reference",
+        f"{'case':30} {'mm':>6}  {ends} {'cover':>6} {'order':>5} {'CPU s':>6}",
+    ]
+    for name in result["case"].values:
+        row = result.sel(case=name)
+        near, far = row.isel(place=0), row.where(row["distance"] >= 0.1).max()
+        lines.append(
+            f"{name:30} {1e3 * float(near['distance']):6.2f}  {_three(near)}  {_three(far)} "
+            f"{float(row['shortfall'].max()):6.2f} {int(row['order']):5d} {float(row['seconds']):6.1f}"
+        )
+    return [*lines, "cover: true error over stated error and reference's step; above 1 the table states too little."]
+
+
+def _three(row: xr.Dataset) -> str:
+    return " / ".join(f"{float(row[key]):7.1e}" for key in ("true_error", "stated_error", "reference_step"))
 
 
 STUDY = study_of_one(

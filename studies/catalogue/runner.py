@@ -1,22 +1,90 @@
-"""The command `study`: computes, writes, draws and tells."""
+"""The figures of any result, from its file alone."""
 
 import json
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import xarray as xr
+from matplotlib.figure import Figure
 
-from ...fem.storage import owned
-from ...geometry.scenes import check_files
-from ..one_scene import Job, Question
-from ..pictures import question_figure, question_lines
-from ..results import Point, Study, save_figures, write_dataset
-from ..sweeps import forget, swept
-from ..terminal import Workers, combinations
-from .drawings import QUESTION, figures_of
+from ...dynamics.motion.state import State
+from ...fem.cache import owned, read_checked
+from ...fem.files import write_whole
+from ...geometry.common import InputError
+from ...geometry.scene.contents import Scene
+from ...geometry.scene.files import check_files, parse_scene
+from ..cli.console import note, progress
+from ..cli.options import Models, Workers, combinations
+from ..figures.pictures import (
+    drawable,
+    flight_frames,
+    last_view,
+    modes_figure,
+    plate_currents,
+    question_figure,
+    question_lines,
+)
+from ..figures.renderer import drawn, render
+from ..figures.run import field_figure, force_figure, trajectory_figure
+from ..figures.style import save_figures
+from ..figures.turnable import page
+from ..figures.view import Currents, Turnable, current_places
+from ..levitation import Levitation, sources
+from ..question import Question
+from ..results import write_dataset
+from ..run import Job
+from ..study import Point, Study
+from ..sweep import forget, swept
 from .entries import CATALOGUE
+
+QUESTION = "question"
+"""What the result of one's own question is called."""
+DRAWN = {
+    "axis_field": ("field", field_figure),
+    "curve_force": ("force", force_figure),
+    "position_rotor_frame": ("trajectory", trajectory_figure),
+    "mode_growth": ("modes", modes_figure),
+}
+"""By variable of a result that is no study: name of the figure and who draws it."""
+
+
+def draw_result(path: Path, out: Path) -> list[str]:
+    """Draw a result file anew; returns the files written.
+
+    Raises
+    ------
+    InputError : the file cannot be read, or is no result of this program
+    """
+    return save_figures(figures_of(read_result(path)), out)
+
+
+def read_result(path: Path) -> xr.Dataset:
+    """The whole of a result file. Raises InputError if it cannot be read, or is no result of this program."""
+    if path.suffix == ".toml":
+        raise InputError(
+            f"Input {path} must be a result; instead it is a scene. Its result is made by: spinlev run {path}"
+        )
+    result = read_checked(path)
+    if "study" not in result.attrs:
+        raise InputError(f"Input {path} must be a result of spinlev; instead it has no attribute 'study'.")
+    return result
+
+
+def figures_of(result: xr.Dataset) -> Mapping[str, Figure]:
+    """The figures of a result by name."""
+    kind = str(result.attrs["study"])
+    if kind in CATALOGUE:
+        return {name: draw(result) for name, draw in CATALOGUE[kind].figures.items()}
+    if kind == QUESTION:
+        return {QUESTION: question_figure(result)} if drawable(result) else {}
+    found = {name: draw(result) for key, (name, draw) in DRAWN.items() if key in result}
+    if not found:
+        raise InputError(f"Input study must be one that this version knows; instead the result is of '{kind}'.")
+    return found
 
 
 def study_job(name: str, quick: bool, engine: Workers, out: Path) -> Job:
@@ -86,3 +154,55 @@ def failed_points(result: xr.Dataset) -> list[dict[str, Any]]:
 def failure_lines(result: xr.Dataset) -> list[str]:
     """The same for a person."""
     return [f"No value at {json.dumps(f['point'], ensure_ascii=False)}: {f['reason']}" for f in failed_points(result)]
+
+
+def show_job(path: Path, out: Path, html: bool = False) -> list[str]:
+    """Write NAME-scene.png, NAME-flight.gif and, if `html`, NAME-view.html of a flight; returns the files.
+
+    Raises
+    ------
+    InputError : the file is no result of this program, or of a study, in which there is no single scene to be seen
+    RenderError : no picture can be drawn, or not all; those that could be are written
+    """
+    result = read_result(path)
+    if "scene" not in result.attrs or "position_rotor_frame" not in result:
+        raise InputError(
+            f"Input {path} must hold a flight (result.nc of `run`, trajectory.nc of `simulate`); instead it is of "
+            f"'{result.attrs['study']}'. Its figures: spinlev figure {path}"
+        )
+    scene, motion = flight_of(result, str(path))
+    table = Levitation(scene, Models(result.attrs.get("model", "auto"))).table
+    time = result["time"].values
+    view = last_view(scene, table, time, motion)
+    if scene.plate is not None:
+        note("Currents in the plate ...")
+        places = current_places(scene.plate.box, view.position)
+        floater = replace(State(*(vector[-1] for vector in motion.vectors)), position=view.position)
+        density = plate_currents(scene, scene.plate, sources(table), floater, places)
+        view = replace(view, currents=Currents(places, density))
+    picture, animation = (out / f"{path.stem}-{name}" for name in ("scene.png", "flight.gif"))
+    with progress("Pictures") as advance:
+        render({picture: view, animation: flight_frames(scene, time, motion)}, advance)
+    files = [str(picture), str(animation)]
+    if html:
+        turned = out / f"{path.stem}-view.html"
+        write_whole(turned, page(drawn(Turnable(view))))
+        files.append(str(turned))
+    return files
+
+
+def flight_of(result: xr.Dataset, source: str) -> tuple[Scene, State]:
+    """The scene at the end of the flight that a result holds, and its motion along the rotor's axes."""
+    scene = _at_end(parse_scene(str(result.attrs["scene"]), source), float(result["time"][-1]))
+    names = ("position", "velocity", "moment", "spin")
+    laboratory = State(*(result[name].values for name in names))
+    return scene, laboratory.to_rotor(scene.angular_velocity * result["time"].values)
+
+
+def _at_end(scene: Scene, time: float) -> Scene:
+    """The scene with its plate where the lowering has brought it."""
+    plate = scene.plate
+    if plate is None or plate.lowering is None:
+        return scene
+    center = plate.box.center - np.array([0.0, 0.0, plate.lowering.depth(time)])
+    return replace(scene, plate=replace(plate, box=replace(plate.box, center=center), lowering=None))

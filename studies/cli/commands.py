@@ -3,26 +3,34 @@
 The numeric libraries are imported once the input has been found good: a wrong scene is answered at once.
 """
 
+import html
+import tempfile
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
 from cyclopts import App, Parameter
 
-from ...geometry.basics import InputError
-from ..terminal import (
+from ...geometry.common import InputError
+from .console import note
+from .options import (
     Answer,
+    Beside,
     FieldModel,
     Models,
     Output,
+    Quantity,
+    Workers,
     default_scene,
     map_extent,
+    new_scene,
+    parse_vary,
     positive,
     read_points,
     three_numbers,
 )
 
 if TYPE_CHECKING:
-    from ...geometry.scenes import Scene
+    from ...geometry.scene.contents import Scene
 
 ReactionModel = Literal["slab", "fem", "reduced", "auto"]
 Plane = Literal["xy", "xz", "yz"]
@@ -35,7 +43,7 @@ def add_scene_commands(app: App) -> None:
 
 
 def _loaded(scene: Path) -> "Scene":
-    from ...geometry.scenes import load_scene
+    from ...geometry.scene.files import load_scene
 
     return load_scene(scene)
 
@@ -69,9 +77,9 @@ def run(
     positive("--duration-s", duration_s)
     _check_spin(spin)
     loaded = _loaded(scene or default_scene())
-    from ...fem.storage import owned
-    from ..one_scene import main_job
-    from ..rendering import copied
+    from ...fem.cache import owned
+    from ..figures.renderer import copied
+    from ..run import main_job
 
     with copied() as drawing, owned(output.out):
         return Answer(*main_job(loaded, asked.checked(), spin, duration_s, output.out, drawing), output.json)
@@ -122,7 +130,8 @@ def field(
             f"Input --points must be given, or --plane, or --working-point; instead received {given or 'none'} of them."
         )
     if working_point:
-        from ..one_scene import Levitation, working_point_job
+        from ..demagnetising import working_point_job
+        from ..levitation import Levitation
 
         return Answer(*working_point_job(Levitation(_loaded(scene), asked), output.out), output.json)
     if plane is not None:
@@ -134,7 +143,7 @@ def field(
         return Answer(*field_map_job(_loaded(scene), plane, extent, offset_mm * 1e-3, steps, output.out), output.json)
     assert points is not None
     loaded, places = _loaded(scene), read_points(points)
-    from ..one_scene import field_job
+    from ..run import field_job
 
     return Answer(*field_job(loaded, places, asked, output.out), output.json)
 
@@ -157,7 +166,7 @@ def equilibria(
     """
     _check_spin(spin)
     loaded = _loaded(scene)
-    from ..one_scene import equilibria_job
+    from ..run import equilibria_job
 
     return Answer(*equilibria_job(loaded, asked.checked(), spin, output.out), output.json)
 
@@ -183,7 +192,7 @@ def simulate(
     """
     positive("--duration-s", duration_s)
     loaded = _loaded(scene)
-    from ..one_scene import simulate_job
+    from ..run import simulate_job
 
     return Answer(*simulate_job(loaded, asked.checked(), duration_s, output.out, resume), output.json)
 
@@ -215,6 +224,250 @@ def plate(
     positive("--rtol", rtol)
     place = three_numbers("--at", at)
     loaded = _loaded(scene)
-    from ..one_scene import plate_job
+    from ..reaction import plate_job
 
     return Answer(*plate_job(loaded, place * 1e-3, frequency_hz, model, rtol, output.out), output.json)
+
+
+def add_result_commands(app: App) -> None:
+    """Let the command line know these commands."""
+    for command in (study, figure, show, report, cite):
+        app.command(command)
+
+
+def study(
+    name: str | None = None,
+    *,
+    list: Annotated[bool, Parameter(negative="")] = False,
+    quick: Annotated[bool, Parameter(negative="")] = False,
+    vary: Annotated[tuple[str, ...], Parameter(negative="")] = (),
+    ask: Quantity = "equilibria",
+    at: Annotated[str, Parameter(allow_leading_hyphen=True)] = "0,0,-20",
+    spin: float = 0.0,
+    duration_s: float = 3.0,
+    asked: Models = Models(),
+    engine: Workers = Workers(),
+    output: Output = Output(),
+) -> Answer:
+    """One study of the catalogue, or any quantity of a scene over any of its parameters.
+
+    Writes NAME.nc (question.nc for your own), its figures as PNG and PDF, and says what it found. A study that was
+    stopped goes on where it was.
+
+    Parameters
+    ----------
+    name
+        Name of the study; with --vary a scene file.
+    list
+        Show the catalogue.
+    quick
+        Coarser, in less than a minute.
+    vary
+        A parameter of the scene and its values, KEY=FIRST:LAST:STEP or KEY=VALUE,VALUE,...; may be given again.
+    ask
+        What is computed with --vary.
+    at
+        Place X,Y,Z of the field asked for, mm, rotor's frame.
+    spin
+        Body spin S = Ω·m̂/ω of the equilibria asked for.
+    duration_s
+        Duration of the flights asked for, s.
+    """
+    if vary:
+        return _own_question(name, vary, (ask, at, spin, duration_s), asked, engine, output)
+    from ..catalogue.entries import CATALOGUE
+
+    if list:
+        summaries = {key: entry.summary for key, entry in CATALOGUE.items()}
+        return Answer({"studies": summaries}, [f"{k:22} {v}" for k, v in summaries.items()], output.json)
+    if name not in CATALOGUE:
+        scene = " A scene needs --vary." if name and name.endswith(".toml") else ""
+        raise InputError(f"Input name must be one of {', '.join(CATALOGUE)}; instead received {name}.{scene}")
+    from ..catalogue.runner import study_job
+
+    return Answer(*study_job(name, quick, engine.checked(), output.out), output.json)
+
+
+def _own_question(
+    scene: str | None,
+    vary: tuple[str, ...],
+    what: tuple[Quantity, str, float, float],
+    asked: Models,
+    engine: Workers,
+    output: Output,
+) -> Answer:
+    if scene is None:
+        raise InputError("Input name must be a scene file where --vary is given; instead it is missing.")
+    values, place = parse_vary(vary), three_numbers("--at", what[1])
+    positive("--duration-s", what[3])
+    from ...geometry.scene.files import load_scene
+
+    loaded = load_scene(scene)
+    from ..catalogue.runner import question_job
+    from ..question import Question
+
+    question = Question(loaded, scene, what[0], asked.checked(), what[2], what[3], tuple(1e-3 * place))
+    return Answer(*question_job(question, values, engine.checked(), output.out), output.json)
+
+
+def figure(result: Path, *, output: Beside = Beside()) -> Answer:
+    """The figures of a result as PNG and PDF, from its file alone; beside it, unless --out is given.
+
+    Parameters
+    ----------
+    result
+        A netCDF file that spinlev has written.
+    """
+    from ..catalogue.runner import draw_result
+
+    files = draw_result(result, output.out or result.parent)
+    return Answer({"figures": files}, [f"Figure in {file}" for file in files], output.json)
+
+
+def show(result: Path, *, html: Annotated[bool, Parameter(negative="")] = False, output: Beside = Beside()) -> Answer:
+    """Three-dimensional pictures of a flight, beside its file: scene and currents in the plate, animation, page.
+
+    Parameters
+    ----------
+    result
+        result.nc of `run` or trajectory.nc of `simulate`.
+    html
+        Also write a page in which the scene can be turned with the mouse.
+    """
+    from ..catalogue.runner import show_job
+
+    files = show_job(result, output.out or result.parent, html)
+    return Answer({"pictures": files}, [f"Picture in {file}" for file in files], output.json)
+
+
+def report(folder: Path, *, output: Beside = Beside()) -> Answer:
+    """One page, report.html, about all results in a folder: figures, numbers, errors and where they come from.
+
+    Parameters
+    ----------
+    folder
+        Where `run` and `study` have written.
+    """
+    from ..catalogue.report import report_job
+
+    page, names = report_job(folder, output.out or folder)
+    return Answer({"report": str(page), "results": names}, [f"Report in {page}"], output.json)
+
+
+def cite(result: Path, *, output: Output = Output()) -> Answer:
+    """The papers behind what a result used.
+
+    Parameters
+    ----------
+    result
+        A netCDF file that spinlev has written.
+    """
+    from ..catalogue.report import cite_job
+
+    references = cite_job(result)
+    return Answer({"references": references}, references, output.json)
+
+
+def add_file_commands(app: App) -> None:
+    """Let the command line know these commands."""
+    for command in (new, export):
+        app.command(command)
+
+
+def new(name: str, file: Path, *, output: Output = Output()) -> Answer:
+    """A commented scene file to start from.
+
+    Parameters
+    ----------
+    name
+        Kind of rotor: tilt, horizontal, vertical or magnets.
+    file
+        Where to write it; an existing file is left alone.
+    """
+    path = new_scene(name, file)
+    said = f"Written: {path}. Next: spinlev run {path}"
+    return Answer({"file": str(path)}, [said], output.json)
+
+
+def export(scene: Path, file: Path, *, asked: Models = Models(), output: Output = Output()) -> Answer:
+    """B, H and M inside and around the bodies, and J in the plate, for ParaView.
+
+    Parameters
+    ----------
+    scene
+        Scene file.
+    file
+        File to write, OUT.vtu.
+    """
+    from ...geometry.scene.files import load_scene
+
+    loaded = load_scene(scene)
+    from ..exchange import export_job
+
+    return Answer(*export_job(loaded, asked.checked(), file), output.json)
+
+
+LEADING = """<!DOCTYPE html><meta charset="utf-8"><title>spinlev</title><meta name="referrer" content="no-referrer">
+<meta http-equiv="refresh" content="0; url={address}"><a href="{address}">spinlev</a>
+"""
+"""A page that leads to another."""
+
+
+def add_page_command(app: App) -> None:
+    """Let the command line know this command."""
+    app.command(explore)
+
+
+def explore(
+    scene: Path | None = None,
+    *,
+    host: str = "127.0.0.1",
+    port: int = 0,
+    no_browser: Annotated[bool, Parameter(negative="")] = False,
+    output: Output = Output(),
+) -> Answer:
+    """A page in the browser to play with a scene: sliders, equilibria at once, where it levitates, a live flight.
+
+    It serves until Ctrl-C. The address is the first line of standard output; only who has its token sees the page.
+
+    Parameters
+    ----------
+    scene
+        Scene file (left out: the one that comes with the program).
+    host
+        Address of this machine on which the page is served; any other than 127.0.0.1 lets other machines in, and
+        nothing is encrypted.
+    port
+        Port; 0 takes one that is free.
+    no_browser
+        Only print the address.
+    """
+    if not 0 <= port <= 65535:
+        raise InputError(f"Input --port must be between 0 and 65535; instead received {port}.")
+    from ...geometry.scene.files import load_scene
+
+    source = scene or default_scene()
+    loaded = load_scene(source)
+    from ..interface_many import page_server
+
+    pages = page_server()(loaded, str(source), host, port)
+    if not pages.local:
+        note(
+            f"Other machines can open this page (--host {host}). What it sends, the token in its address included, is "
+            "not encrypted: whoever sees the network's traffic can read it. Without --host it stays on this machine."
+        )
+
+    def serving() -> None:
+        if no_browser:
+            pages.run()
+            return
+        import webbrowser
+
+        # Any user of the machine can read the command line of a browser, but this file only its owner.
+        with tempfile.NamedTemporaryFile("w", prefix="spinlev-", suffix=".html", encoding="utf-8") as leading:
+            leading.write(LEADING.format(address=html.escape(pages.address)))
+            leading.flush()
+            webbrowser.open(Path(leading.name).as_uri())
+            pages.run()
+
+    return Answer({"address": pages.address}, [pages.address], output.json, serving)

@@ -1,20 +1,210 @@
-"""What a person and what a program sees: messages and progress on standard error, answers on standard output."""
+"""Text for terminals that do not know all characters: ω is written omega there, µ is u, … is three dots."""
 
+import codecs
+import ctypes
+import importlib.util
+import io
 import json
 import logging
 import math
 import os
+import platform
 import sys
+import threading
+import time
+import unicodedata
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
+from pathlib import Path
 from typing import Any, Protocol, TextIO
 
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
 
-from ...geometry.basics import printable
-from .heartbeat import Heartbeat
-from .plain_text import READABLE
+from ...geometry.common import printable
+
+READABLE = "spinlev-readable"
+"""Name of the error handler for encodings: it writes what an encoding lacks in ASCII instead of raising an error."""
+DASHES, QUOTES, APOSTROPHES = dict.fromkeys("−–—‐‑", "-"), dict.fromkeys("“”„", '"'), dict.fromkeys("‘’", "'")
+SIGNS = {"±": "+-", "×": "x", "·": ".", "•": "*", "⁄": "/", "≤": "<=", "≥": ">=", "≠": "!=", "≈": "~", "→": "->"}
+UNITS = {"°": "deg", "µ": "u", "μ": "u", "∞": "inf", "√": "sqrt", "∂": "d", "ß": "ss", "ø": "o", "Ø": "O"}
+ASCII = DASHES | QUOTES | APOSTROPHES | SIGNS | UNITS
+GREEK = {"LAMDA": "lambda"}
+
+
+def make_readable() -> None:
+    """Let standard output and standard error write everything."""
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors=READABLE)
+
+
+def in_ascii(text: str) -> str:
+    """The same in ASCII: Greek letters by their names, accents left out, ? for what has no name here."""
+    parts = unicodedata.normalize("NFKD", "".join(ASCII.get(character, character) for character in text))
+    return "".join(_character(part) for part in parts if not unicodedata.combining(part))
+
+
+def _character(character: str) -> str:
+    if character.isascii():
+        return character
+    kind, _, letter = unicodedata.name(character, "").partition(" LETTER ")
+    if kind in ("GREEK SMALL", "GREEK CAPITAL"):
+        name = GREEK.get(letter.split()[-1], letter.split()[-1].lower())
+        return name if kind == "GREEK SMALL" else name.capitalize()
+    return ASCII.get(character, "?")
+
+
+def _readable(error: UnicodeError) -> tuple[str, int]:
+    if not isinstance(error, UnicodeEncodeError):
+        raise error
+    return in_ascii(error.object[error.start : error.end]), error.end
+
+
+codecs.register_error(READABLE, _readable)
+
+
+FORTRAN, DRAWING = "libraries of Fortran", "3-D pictures"
+PACKAGES = {
+    "Debian or Ubuntu": {FORTRAN: "apt-get install libquadmath0", DRAWING: "apt-get install libegl1 libgl1"},
+    "Fedora": {FORTRAN: "dnf install libquadmath", DRAWING: "dnf install mesa-libEGL mesa-libGL mesa-dri-drivers"},
+    "macOS": {FORTRAN: "brew install gcc", DRAWING: "nothing to install, the system draws"},
+}
+FAMILIES = {"debian": "Debian or Ubuntu", "ubuntu": "Debian or Ubuntu", "fedora": "Fedora", "rhel": "Fedora"}
+"""By a word of /etc/os-release."""
+QUADMATH = "libquadmath.so.0"
+
+
+def way_out(need: str) -> str:
+    """A sentence: what to install for FORTRAN or DRAWING, on this system or, where it is not known here, on each."""
+    system = _system()
+    ways = [f"{name}: {needs[need]}" for name, needs in PACKAGES.items() if system in (name, None)]
+    return f"{'; '.join(ways)}."
+
+
+def is_missing_library(error: Exception) -> bool:
+    """Whether an error is that a module's compiled code did not find a library of the system."""
+    return isinstance(error, ImportError) and any(word in str(error) for word in ("shared object", "dlopen"))
+
+
+def _system() -> str | None:
+    """The key of PACKAGES that names this system."""
+    if sys.platform == "darwin":
+        return "macOS"
+    try:
+        release = platform.freedesktop_os_release()
+    except OSError:
+        return None
+    words = [release.get("ID", ""), *release.get("ID_LIKE", "").split()]
+    return next((FAMILIES[word] for word in words if word in FAMILIES), None)
+
+
+def lend_quadmath() -> Path | None:
+    """Give NGSolve's Fortran library the libquadmath that numpy's or scipy's wheel brings, where the system has none.
+
+    NGSolve's wheel brings a libgfortran that needs libquadmath and looks for it beside itself, but does not bring it.
+    Returns the link that was made; None where it is not needed or no wheel has one. Raises OSError where the folder
+    cannot be written.
+    """
+    home = _folder("ngsolve_openblas")
+    if home is None or not list(home.glob("libgfortran.so*")) or _loads(QUADMATH):
+        return None
+    for owner in ("numpy", "scipy"):
+        package = _folder(owner)
+        lent = sorted(package.with_name(f"{owner}.libs").glob("libquadmath*.so*")) if package else []
+        if lent and _loads(str(lent[0])):
+            link = home / QUADMATH
+            link.unlink(missing_ok=True)  # an older one, of a version of numpy that is no more
+            link.symlink_to(lent[0])
+            return link
+    return None
+
+
+def _folder(package: str) -> Path | None:
+    """Where a package is installed, without importing it."""
+    found = importlib.util.find_spec(package)
+    return Path(found.origin).parent if found and found.origin else None
+
+
+def _loads(library: str) -> bool:
+    try:
+        ctypes.CDLL(library)
+    except OSError:
+        return False
+    return True
+
+
+PAUSE = 2.5
+"""Silence after which a line is said, s."""
+SHARE = 1 / 60
+"""The same as a part of the time that the step has taken, once that is longer."""
+TELLING = 0.01
+"""Finished share from which the time left can be told."""
+ALL = 0.995
+"""Share that would be shown as the whole; what still goes on then has no share."""
+
+
+class Heartbeat(threading.Thread):
+    """Says for how long a step of the work has gone on, as often as nothing else was said for a while.
+
+    The thread begins with the first step.
+
+    Parameters
+    ----------
+    say : prints a line
+    pause : the silence, s
+    """
+
+    def __init__(self, say: Callable[[str], None], pause: float = PAUSE) -> None:
+        super().__init__(name="heartbeat", daemon=True)
+        self._say, self._pause, self._over = say, pause, threading.Event()
+        self._began: float | None = None
+        self._said = time.monotonic()
+        self._stage, self._stage_began, self._fraction, self._advanced = "", self._said, 0.0, self._said
+
+    def said(self, text: str = "") -> None:
+        """Something was shown; a text that ends in " ..." begins a step, any other ends it."""
+        self._said = time.monotonic()
+        if text:
+            self._began = self._said if text.endswith(" ...") else None
+            self.advanced(0.0)
+        if self._began and self.ident is None:
+            self.start()
+
+    def advanced(self, fraction: float, stage: str = "") -> None:
+        """How much of the step is finished, 0 to 1, or of one of its stages."""
+        now = time.monotonic()
+        if stage != self._stage or fraction < self._fraction:
+            self._stage, self._stage_began = stage, now
+        self._fraction, self._advanced = fraction, now
+
+    def stop(self) -> None:
+        """Say no more; returns when the thread has ended."""
+        self._over.set()
+        if self.ident is not None:
+            self.join()
+
+    def run(self) -> None:
+        """The thread's work."""
+        while not self._over.wait(self._pause / 5):
+            now, began = time.monotonic(), self._began
+            if began is not None and now - self._said > max(self._pause, SHARE * (now - began)):
+                self._said = now
+                self._say(f"  {self._progress(now, began)}")
+
+    def _progress(self, now: float, began: float) -> str:
+        if not TELLING <= self._fraction < ALL:
+            return f"{self._stage}{self._stage and ', '}{_rounded(now - began)} so far"
+        left = (self._advanced - self._stage_began) * (1 / self._fraction - 1) - (now - self._advanced)
+        told = f", {_rounded(left)} left" if left > 0 else ""  # a part that takes longer than its share tells no time
+        return f"{self._stage}{self._stage and ', '}{self._fraction:.0%}{told}"
+
+
+def _rounded(seconds: float) -> str:
+    if seconds < 300:
+        return f"{seconds:.0f} s"
+    return f"{seconds / 60:.0f} min" if seconds < 7200 else f"{seconds / 3600:.1f} h"
+
 
 LOG = logging.getLogger("spinlev")
 ERRORS = Console(stderr=True, highlight=False, soft_wrap=True)

@@ -4,12 +4,12 @@ import importlib
 import sys
 from collections.abc import Sequence
 
-from ..rendering import unavailable
-from ..terminal import FORTRAN, lend_quadmath, way_out
+from ..figures.renderer import unavailable
+from .console import FORTRAN, lend_quadmath, way_out
 
 MODULES = (
     *("ngsolve", "netgen.occ", "heyoka", "h5py", "matplotlib.backends.backend_pdf", "distributed"),
-    *("spinlev.studies.interface", "spinlev.studies.command_line.cli"),
+    *("spinlev.studies", "spinlev.studies.cli.main"),
 )
 """Those with compiled code, and what stands on them: what is loaded here, Python has compiled before the first run."""
 

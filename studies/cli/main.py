@@ -16,12 +16,10 @@ from typing import Any
 from cyclopts import App, CycloptsError
 from rich.console import Console
 
-from ...geometry.basics import SpinlevError, printable
-from ..terminal import FORTRAN, Answer, answers_only, heard, is_missing_library, note, to_json, way_out
-from .file_commands import add_file_commands
-from .page_command import add_page_command
-from .result_commands import add_result_commands
-from .scene_commands import add_scene_commands
+from ...geometry.common import SpinlevError, printable
+from .commands import add_file_commands, add_page_command, add_result_commands, add_scene_commands
+from .console import FORTRAN, answers_only, heard, is_missing_library, note, to_json, way_out
+from .options import Answer
 from .start import STOPPED, TOO_MANY_FILES
 
 LONGEST = 1000

@@ -1,15 +1,135 @@
-"""What every command is asked: which scene and tables, who computes, and where its answers go."""
+"""Numbers given on the command line, and points to evaluate a field at, from a CSV file."""
 
-from collections.abc import Callable, Mapping, Sequence
+from __future__ import annotations
+
+import csv
+import io
+import math
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from importlib.resources import files
+from itertools import product
+from numbers import Real
 from pathlib import Path
-from typing import Annotated, Any, Literal, Self, get_args
+from typing import TYPE_CHECKING, Annotated, Any, Literal, Self, get_args
 
 from cyclopts import Parameter
 
-from ...geometry.basics import InputError, shown
-from .numbers import is_number
+from ...geometry.common import InputError, shown
+from ...geometry.files import file_content
+
+if TYPE_CHECKING:
+    from ...geometry.common import Array
+
+COLUMNS = ("x_mm", "y_mm", "z_mm")
+MOST = 50_000_000
+"""Bytes of a file of points: a million of them."""
+FARTHEST = 1e9
+"""Largest coordinate, mm: beyond, powers of it overflow."""
+
+
+def three_numbers(name: str, text: str) -> Array:
+    """(3,) from X,Y,Z. Raises InputError where they are not three finite numbers."""
+    try:
+        numbers = [float(part) for part in text.split(",")]
+    except ValueError:
+        numbers = []
+    if len(numbers) != 3 or not all(abs(number) <= FARTHEST for number in numbers):
+        raise InputError(
+            f"Input {name} must be three numbers X,Y,Z of at most {FARTHEST:g} mm; instead received {shown(text)}."
+        )
+    return _in_array(numbers)
+
+
+def map_extent(text: str) -> Array:
+    """(4,) m left, right, lower and upper end of a map, from HALF or the four in mm. Raises InputError."""
+    try:
+        numbers = [float(part) for part in text.split(",")]
+    except ValueError:
+        numbers = []
+    if len(numbers) == 1:
+        numbers = [-numbers[0], numbers[0]] * 2
+    sound = len(numbers) == 4 and all(map(math.isfinite, numbers))
+    if not (sound and numbers[0] < numbers[1] and numbers[2] < numbers[3]):
+        raise InputError(
+            "Input --extent-mm must be one positive number, or LEFT,RIGHT,LOWER,UPPER in rising order; instead "
+            f"received {shown(text)}."
+        )
+    return _in_array(numbers) * 1e-3
+
+
+def is_number(value: Any) -> bool:
+    """Whether it is a finite number that a float holds."""
+    if not isinstance(value, Real) or isinstance(value, bool):
+        return False
+    try:
+        return math.isfinite(value)
+    except OverflowError:  # an integer larger than any float
+        return False
+
+
+def positive(name: str, value: float) -> None:
+    """Raises InputError where the value is no positive finite number."""
+    if not (is_number(value) and value > 0):
+        raise InputError(f"Input {name} must be a positive number; instead received {shown(value)}.")
+
+
+def finite(name: str, value: float) -> float:
+    """The value. Raises InputError where it is no finite number."""
+    if not is_number(value):
+        raise InputError(f"Input {name} must be a finite number; instead received {shown(value)}.")
+    return float(value)
+
+
+def read_points(path: Path) -> Array:
+    """Points (n, 3) in m from a CSV file with a header that has the columns x_mm, y_mm, z_mm.
+
+    Raises `InputError` where the file is missing, no file, too large, empty, lacks a column or has an entry that is no
+    finite number or too large a one.
+    """
+    content = file_content(path, MOST, "points", f"a CSV file with {', '.join(COLUMNS)}")
+    try:
+        rows = csv.reader(io.StringIO(content.decode("utf-8-sig"), newline=""), skipinitialspace=True)
+        header = [name.strip() for name in next(rows, [])]
+        if any(column not in header for column in COLUMNS):
+            received = shown(", ".join(header))
+            raise InputError(
+                f"{path}: Input header must have the columns {', '.join(COLUMNS)}; instead received {received}."
+            )
+        where = [header.index(column) for column in COLUMNS]
+        found = [
+            [_number(path, line, row, i) for i in where]
+            for line, row in enumerate(rows, start=2)
+            if any(cell.strip() for cell in row)
+        ]
+    except (UnicodeDecodeError, csv.Error) as error:
+        raise InputError(f"{path}: Input points must be a readable CSV text; instead: {error}.") from None
+    if not found:
+        raise InputError(f"{path}: Input points must be at least one line below the header; instead received none.")
+    return _in_array(found) * 1e-3
+
+
+def _in_array(numbers: list[Any]) -> Array:
+    """As an array; NumPy is loaded when the first number is read, not with the command line."""
+    import numpy as np
+
+    return np.array(numbers)
+
+
+def _number(path: Path, line: int, row: list[str], column: int) -> float:
+    text = row[column].strip() if column < len(row) else ""
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not math.isfinite(value):
+        raise InputError(f"{path}: Input line {line} must have three finite numbers; instead received {shown(text)}.")
+    if abs(value) > FARTHEST:
+        raise InputError(
+            f"{path}: Input line {line} must have numbers of at most {FARTHEST:g} mm; instead received {value:g}."
+        )
+    return value
+
 
 FieldModel = Literal["dipole", "cuboid", "fem", "map", "auto"]
 InteractionModel = Literal["rigid", "mutual", "auto"]
@@ -156,3 +276,112 @@ class Workers:
         if self.workers is not None and self.scheduler is not None:
             raise InputError("Input --workers must be left out where --scheduler is given; instead received both.")
         return self
+
+
+MOST_VALUES = 100_000
+"""Points of a sweep, at most."""
+NAMED = ("model", "plate_model", "interaction")
+"""Keys whose values are names."""
+
+
+def parse_vary(asked: Sequence[str]) -> dict[str, list[Any]]:
+    """Values by key, in the order given.
+
+    Raises
+    ------
+    InputError : not of this form, no number, no value, a key given twice, or too many points
+    """
+    found: dict[str, list[Any]] = {}
+    for text in asked:
+        key, equals, values = text.partition("=")
+        if not equals or not key:
+            raise _wrong(text)
+        if key in found:
+            raise InputError(f"Input --vary must give each key once; instead received {shown(key)} twice.")
+        found[key] = [part.strip() for part in values.split(",")] if key in NAMED else _values(text, values)
+    return checked_values(found, "--vary")
+
+
+def checked_values(values: Mapping[str, Sequence[Any]], name: str = "values") -> dict[str, list[Any]]:
+    """Values by key as lists of floats and, for `NAMED` keys, of texts; `name` is what messages call them.
+
+    Raises
+    ------
+    InputError : no key, no value, one that is no finite number, one that is given twice, or too many points
+    """
+    if not isinstance(values, Mapping) or not all(isinstance(key, str) for key in values):
+        raise InputError(f"Input {name} must be lists of values by key; instead received {shown(values)}.")
+    if not values:
+        raise InputError(f"Input {name} must have at least one key; instead received none.")
+    found = {}
+    for key, given in values.items():
+        listed = (
+            list(given) if isinstance(given, Iterable) and not isinstance(given, str | bytes | Mapping) else [given]
+        )
+        fine = all(isinstance(v, str) if key in NAMED else is_number(v) for v in listed)
+        if not listed or not fine:
+            what = "names" if key in NAMED else "finite numbers"
+            raise InputError(f"Input {key} must be varied over {what}; instead received {shown(given)}.")
+        if len(set(listed)) < len(listed):
+            raise InputError(f"Input {name} must give {key} each value once; instead received {shown(given)}.")
+        found[key] = listed if key in NAMED else [float(value) for value in listed]
+    points = math.prod(len(each) for each in found.values())
+    if points > MOST_VALUES:
+        raise InputError(f"Input {name} must make at most {MOST_VALUES} points; instead received {points}.")
+    return found
+
+
+def combinations(values: Mapping[str, Sequence[Any]]) -> list[dict[str, Any]]:
+    """Every combination; the last key changes fastest."""
+    return [dict(zip(values, chosen, strict=True)) for chosen in product(*values.values())]
+
+
+def _values(text: str, values: str) -> list[float]:
+    separator = ":" if ":" in values else ","
+    try:
+        numbers = [float(part) for part in values.split(separator)]
+    except ValueError:
+        raise _wrong(text) from None
+    if not all(map(math.isfinite, numbers)):
+        raise _wrong(text)
+    if separator == ",":
+        return numbers
+    if len(numbers) != 3 or numbers[2] == 0 or (numbers[1] - numbers[0]) / numbers[2] < 0:
+        raise _wrong(text)
+    first, last, step = numbers
+    count = int(min((last - first) / step + 1e-6, MOST_VALUES)) + 1
+    # Rounded to 12 digits: 0.1, 0.2, 0.3 and not 0.30000000000000004.
+    return [float(f"{first + k * step:.12g}") for k in range(count)]
+
+
+def _wrong(text: str) -> InputError:
+    return InputError(
+        f"Input --vary must be KEY=FIRST:LAST:STEP or KEY=VALUE,VALUE,... with a key of the scene file, such as "
+        f"rotor.displacement_mm=1:4:0.5; instead received {shown(text)}."
+    )
+
+
+KINDS: Mapping[str, str] = {
+    "tilt": "tilt-over-plate",
+    "horizontal": "horizontal",
+    "vertical": "vertical-24h",
+    "magnets": "explicit-magnets",
+}
+"""Which of the scenes that come with the program shows which kind of rotor."""
+
+
+def new_scene(name: str, path: Path) -> Path:
+    """Write a scene file; returns its path.
+
+    Raises
+    ------
+    InputError : an unknown kind of rotor, or a file that is there already
+    """
+    if name not in KINDS:
+        raise InputError(f"Input NAME must be one of {', '.join(KINDS)}; instead received {name}.")
+    if path.exists():
+        raise InputError(f"Input FILE must not exist yet; instead {path} is there. Choose another name.")
+    from ...fem.files import write_whole
+
+    write_whole(path, shipped_scene(KINDS[name]).read_bytes())
+    return path

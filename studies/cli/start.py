@@ -1,4 +1,4 @@
-"""Where the command begins: Ctrl-C is heard while all the rest, which takes about a second, is still being loaded."""
+"""Libraries that are loaded when they are used, or not at all: an answer from the cache needs no finite elements."""
 
 from __future__ import annotations
 
@@ -9,6 +9,57 @@ import signal
 import sys
 import threading
 from contextlib import suppress
+from importlib import import_module
+from importlib.abc import MetaPathFinder
+from threading import RLock
+from types import ModuleType
+from typing import Any
+
+
+def load_late(*names: str) -> None:
+    """Let `import` find stand-ins for these modules, which load all of them at the first use of any.
+
+    The parts of a package follow it. What is loaded already stays as it is.
+    """
+    if any(name in sys.modules for name in names):
+        return
+    sleeping, loading = {name: _StandIn(name) for name in names}, RLock()
+
+    def wake() -> None:
+        with loading:
+            for name in [name for name in names if sys.modules.get(name) is sleeping[name]]:
+                del sys.modules[name]
+            for name in names:
+                import_module(name)
+
+    for name, module in sleeping.items():
+        vars(module)["_wake"] = wake
+        sys.modules[name] = module
+        package, _, part = name.rpartition(".")
+        if package:
+            vars(sleeping[package]).update({"__path__": [], part: module})
+
+
+def leave_out(*names: str) -> None:
+    """Let modules that others try to import be missing in this process; what is loaded already stays."""
+    sys.meta_path.insert(0, _Missing(names))
+
+
+class _Missing(MetaPathFinder):
+    def __init__(self, names: tuple[str, ...]) -> None:
+        self._names = names
+
+    def find_spec(self, name: str, path: object, target: object = None) -> None:
+        """None, to go on with others, or ModuleNotFoundError."""
+        if name in self._names:
+            raise ModuleNotFoundError(name, name=name)
+
+
+class _StandIn(ModuleType):
+    def __getattr__(self, name: str) -> Any:
+        self._wake()
+        return getattr(import_module(self.__name__), name)
+
 
 STOPPED = "spinlev: stopped; what was finished is kept."
 TOO_MANY_FILES = (
@@ -28,15 +79,14 @@ def main() -> None:
     gc.set_threshold(MANY)
     os.environ["PYTHONSAFEPATH"] = "1"  # no process begun here loads what lies in the folder that it is begun in
     try:
-        from ..terminal import make_readable
-        from .late import leave_out, load_late
+        from .console import make_readable
 
         load_late("netgen", "netgen.occ", "netgen.meshing", "ngsolve")
         if not any(argument.startswith("--scheduler") for argument in sys.argv):
             leave_out("dask.array")  # xarray would load it, for as long as a flight takes, to see if data are of it
         make_readable()
         _find_home()
-        from .cli import run
+        from .main import run
 
         status = run(sys.argv[1:], stop)
     except BaseException as error:  # libraries make something else of an interrupt while they are loaded
@@ -69,7 +119,7 @@ def _find_home() -> None:
     home = os.path.expanduser("~")
     if os.path.isabs(home) and os.path.isdir(home):
         return
-    from ...fem.storage import temporary_home
+    from ...fem.cache import temporary_home
 
     with suppress(OSError):
         os.environ["HOME"] = str(instead := temporary_home())

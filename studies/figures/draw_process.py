@@ -27,7 +27,7 @@ def answer_all(questions: BinaryIO, answers: BinaryIO) -> None:
         for number, picture in enumerate(pictures):
             _send(answers, picture.draw(partial(_progress, answers, number, len(pictures))))
     except Exception as error:  # whatever it is, the other process says it in a line
-        from ..terminal import DRAWING, is_missing_library, way_out
+        from ..cli.console import DRAWING, is_missing_library, way_out
 
         reason = " ".join(f"{type(error).__name__}: {error}.".split())  # in one line
         _send(answers, f"{reason} {way_out(DRAWING)}" if is_missing_library(error) else reason)

@@ -7,13 +7,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import xarray as xr
 
-from ...geometry.basics import Array
+from ...geometry.common import Array
 from .style import COLORS, DASHES, NAMES, PALETTE, fixed_panels, power_of_ten, styled
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-
 
 RIGHT_ABOVE: Any = {"ha": "left", "va": "bottom", "xytext": (4, 2)}
 LEFT_BELOW: Any = {"ha": "right", "va": "top", "xytext": (-4, -2)}

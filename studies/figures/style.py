@@ -9,9 +9,9 @@ from functools import wraps
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar, cast
 
-from ...fem.storage import write_whole
+from ...fem.files import write_whole
 
-if TYPE_CHECKING:  # loading matplotlib takes as long as many an answer
+if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 PALETTE = ["#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9"]

@@ -1,5 +1,6 @@
 """A scene as numbers that a browser draws and turns: the state of VTK's objects, for the viewer of trame-vtk."""
 
+import base64
 import io
 import json
 import zipfile
@@ -15,11 +16,10 @@ from trame_vtk.modules.vtk.serializers import (
     serialize,
 )
 
-from ...geometry.basics import Array
-from ...geometry.scenes import Scene
-from .field_lines import add_lines
+from ...geometry.common import Array
+from ...geometry.scene.contents import Scene
 from .still import axes_of_view, draw_bodies, new_plotter
-from .view import View
+from .view import View, add_lines
 
 STEP = 2.0
 """Longest step along a field line, mm: a line that a browser draws needs no more."""
@@ -88,3 +88,17 @@ def _exported(plotter: pv.Plotter) -> bytes:
     with zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED) as archive:
         archive.writestr("index.json", json.dumps({"scene": state, "hashes": arrays}))
     return file.getvalue()
+
+
+def page(scene: bytes) -> bytes:
+    """The page around a scene that was drawn as `Turnable`."""
+    from trame_vtk.tools.vtksz2html import write_html
+
+    text = io.StringIO()
+    write_html(scene, text)
+    return text.getvalue().encode()
+
+
+def inlined(scene: bytes) -> str:
+    """A scene as `page` writes it, to be put in the place of another one."""
+    return base64.b64encode(scene).decode()

@@ -14,31 +14,13 @@ from bokeh.document import Document
 from bokeh.events import Tap
 from bokeh.models import Slider
 
-from ...dynamics.steady import Survey
-from ...geometry.basics import Array
-from ..live import (
-    FILES,
-    TYPES,
-    Control,
-    Found,
-    PageState,
-    Regions,
-    Screen,
-    Shown,
-    build,
-    complete,
-    controls,
-    download,
-    fly,
-    follow,
-    has_map,
-    map_key,
-    regions,
-)
-from .bodies import scene_bodies
-from .flight_panel import FlightPanel
-from .layout import Layout, slider
+from ...dynamics.equilibria.equilibrium import Survey
+from ...geometry.common import Array
+from .layout import FlightPanel, Layout, slider
+from .plots import scene_bodies
 from .processes import Crew, Task
+from .state import FILES, TYPES, Control, PageState, Screen, Shown, controls
+from .work import Found, Regions, build, complete, download, fly, follow, has_map, map_key, regions
 
 REST = 250
 """Milliseconds after which a slider is taken to rest."""

@@ -20,11 +20,11 @@ from typing import Any
 from bokeh.document import Document
 from tornado.ioloop import IOLoop
 
-from ..sweeps import safe_path
+from ..processes import safe_path
 
 Task = Callable[..., None]
 """Runs in the other process, with a `Connection` first."""
-LIBRARIES = f"{__package__.rpartition('.')[0]}.live"
+LIBRARIES = f"{__package__}.work"
 """What every process needs."""
 MEMORY = 4 * 2**30
 """Bytes that a process may take."""

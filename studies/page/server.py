@@ -24,12 +24,12 @@ from tornado.httpserver import HTTPServer
 from tornado.ioloop import IOLoop
 from tornado.iostream import IOStream
 
-from ...geometry.basics import ComputationError, InputError
-from ...geometry.scenes import Scene
-from ..live import PageState, first_state
+from ...geometry.common import ComputationError, InputError
+from ...geometry.scene.contents import Scene
 from .gate import Gate
 from .page import Page
 from .processes import warm_up
+from .state import PageState, first_state
 
 LOOPBACK = "127.0.0.1"
 GONE = 3000

@@ -6,24 +6,33 @@ open by similarity.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import time
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from multiprocessing.connection import Connection
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ...dynamics.effects import check_floater_metal
-from ...dynamics.equilibria import Found, SearchRange, carried, field_doubts, told
-from ...dynamics.maps import RotorFamily, article_measure, rotor_family
-from ...dynamics.motion import Parameter, Rates, Scales, has_likes, like, parameters
-from ...dynamics.steady import Balance, Survey
-from ...fem.rotor_losses import check_slow_enough, pieces_of
-from ...fem.rotor_tables import ROUND_OFF, RotorTable
-from ...geometry.basics import Array, SpinlevError
-from ..one_scene import Levitation
-from .sliders import MEASURES, ROTOR_SIZES
-from .state import QUICK, PageState
+from ...dynamics.equilibria.balance import Balance
+from ...dynamics.equilibria.curves import SearchRange
+from ...dynamics.equilibria.equilibrium import Survey
+from ...dynamics.equilibria.perturbed import carried
+from ...dynamics.equilibria.search import Found as FoundSearch, field_doubts, told
+from ...dynamics.flights.live import LiveFlight, Piece
+from ...dynamics.maps.family import RotorFamily, article_measure, rotor_family
+from ...dynamics.maps.map import EquilibriumMap, equilibrium_map
+from ...dynamics.motion.equations import has_likes, like, parameters
+from ...dynamics.motion.floater_currents import check_floater_metal
+from ...dynamics.motion.rates import Rates
+from ...dynamics.motion.state import Parameter, Scales
+from ...fem.rotor.table import ROUND_OFF, RotorTable
+from ...fem.rotor_metal import check_slow_enough, pieces_of
+from ...geometry.common import Array, SpinlevError
+from ...geometry.scene.files import scene_keys
+from ..levitation import Levitation
+from .state import MEASURES, QUICK, ROTOR_SIZES, PageState, Shown, content, field_lines, shown
 
 
 class Nearby:
@@ -74,7 +83,7 @@ class Nearby:
             return None
         points = points[SearchRange(state.scene, 0.1).holds(points[:, :3])]
         there, doubts = self._doubts(levitation, problem, points[:, :3] * state.scene.floater.radius)
-        found = Found.at(problem.balance, points[there], doubts)
+        found = FoundSearch.at(problem.balance, points[there], doubts)
         levitation.adopt(told(state.scene, problem.balance, found), searched=False)
         return levitation
 
@@ -169,3 +178,269 @@ def _rest(state: PageState) -> str:
 
 def _without_plate(state: PageState) -> Levitation:
     return Levitation(state.scene, replace(state.models, plate_model="none"), state.spin)
+
+
+FRAME = 1 / 12
+"""Seconds between two pictures, if the page draws so fast."""
+SLOWEST = 0.25
+"""Most seconds that are flown for a picture."""
+ENDS = {
+    "beyond": "left the region for which the plate's response was computed",
+    "contact": "touched the rotor or the plate",
+    "lost": "lost: it is too far away to come back",
+}
+
+
+@dataclass(frozen=True)
+class Frame:
+    """A moment of a flight and what was flown since the last.
+
+    Parameters
+    ----------
+    time : (n,) s
+    height, tilt : (n,) mm and degrees from +z
+    position, moment : (3,) now, mm and direction, along the laboratory's axes
+    seen : (3,) mm, the same position along the rotor's axes
+    angle : of the rotor, rad
+    ended : how the flight has ended, in words; empty while it lasts
+    message : what was wrong with a wish
+    """
+
+    time: Array
+    height: Array
+    tilt: Array
+    position: list[float]
+    moment: list[float]
+    seen: list[float]
+    angle: float
+    ended: str = ""
+    message: str = ""
+
+
+def fly(connection: Connection, state: PageState) -> None:
+    """Fly a scene's floater by what the page says: ("play", speed), ("pause",), ("drawn",), ("push", m/s), ("put", m).
+
+    After a frame the next one waits until the page has drawn it. A flight or a page that is too slow for its speed
+    falls behind; what is shown is always what was flown.
+    """
+    try:
+        flight = Levitation(state.scene, state.models, state.spin).live_flight()
+    except SpinlevError as error:
+        connection.send(str(error))
+        return
+    connection.send(_frame(flight, _still(flight)))
+    speed, due, drawn = 0.0, time.monotonic(), False
+    while True:
+        going = speed > 0 and drawn
+        if connection.poll(max(0.0, due - time.monotonic()) if going else None):
+            message = connection.recv()
+            if message[0] == "drawn":
+                drawn = True
+            elif message[0] == "pause":
+                speed = 0.0
+            elif message[0] == "play":
+                speed, due = message[1], max(due, time.monotonic())
+            else:
+                connection.send(_wished(flight, *message))
+                drawn = False
+        elif going:
+            now = time.monotonic()
+            frame = _flown(flight, speed * min(FRAME + now - due, SLOWEST))
+            due, drawn = now + FRAME, False
+            speed = 0.0 if frame.ended else speed
+            connection.send(frame)
+
+
+def _flown(flight: LiveFlight, seconds: float) -> Frame:
+    try:
+        return _frame(flight, flight.onward(seconds))
+    except SpinlevError as error:
+        return _frame(flight, _still(flight), str(error), ended="stopped: the motion could not be computed")
+
+
+def _wished(flight: LiveFlight, what: str, vector: list[float]) -> Frame:
+    message = ""
+    try:
+        if what == "push":
+            flight.push(np.array(vector))
+        else:
+            flight.put(np.array(vector))
+    except SpinlevError as error:
+        message = str(error)
+    return _frame(flight, _still(flight), message)
+
+
+def _still(flight: LiveFlight) -> Piece:
+    turned = flight.scene.angular_velocity * flight.time
+    lab = flight.now
+    row = type(lab)(*(vector[None] for vector in lab.vectors))
+    return Piece(np.array([flight.time]), row, turned, flight.log.ended_by)
+
+
+def _frame(flight: LiveFlight, piece: Piece, message: str = "", ended: str = "") -> Frame:
+    places, moments = piece.lab.position, piece.lab.moment
+    tilt = np.degrees(np.arctan2(np.hypot(moments[:, 0], moments[:, 1]), moments[:, 2]))
+    now = piece.lab.to_rotor(flight.scene.angular_velocity * piece.time)
+    words = ENDS.get(piece.ended_by, "")
+    said = f"After {flight.time:.3g} s {words}." if words else ended
+    return Frame(
+        time=piece.time,
+        height=1e3 * places[:, 2],
+        tilt=tilt,
+        position=(1e3 * places[-1]).tolist(),
+        moment=moments[-1].tolist(),
+        seen=(1e3 * now.position[-1]).tolist(),
+        angle=float(np.fmod(piece.angle, 2 * np.pi)),
+        ended=said,
+        message=message,
+    )
+
+
+POINTS = (13, 41)
+"""Of a map along each axis: first, and then."""
+
+
+@dataclass(frozen=True)
+class Found:
+    """An answer to a state of a page.
+
+    Parameters
+    ----------
+    number : of the question
+    shown : what the page shows; None where nothing could be found
+    message : why not
+    lines : field lines, m, where they were asked for
+    survey : the equilibria without the plate, all searched for, for neighbours to begin with
+    """
+
+    number: int
+    shown: Shown | None
+    message: str = ""
+    lines: tuple[Array, ...] = ()
+    survey: Survey | None = None
+
+
+@dataclass(frozen=True)
+class Regions:
+    """Where something levitates: 0 nothing, 1 only unstably, 2 stably, (n, m) over frequencies Hz and measures.
+
+    `last`: no finer one follows; with a `message` there is none.
+    """
+
+    model: str
+    frequencies: Array
+    measures: Array
+    kind: Array
+    message: str = ""
+    last: bool = False
+
+
+def build(connection: Connection, state: PageState) -> None:
+    """Make the states that the page's reader asks for, each of the last: (name of a method of `PageState`, arguments).
+
+    To each comes (that name, state or None, message).
+    """
+    while True:
+        method, arguments = connection.recv()
+        try:
+            state = getattr(state, method)(*arguments)
+            state.keys  # noqa: B018  # travels with it: the page's own process does not look for overlaps
+            connection.send((method, state, ""))
+        except SpinlevError as error:
+            connection.send((method, None, str(error)))
+
+
+def follow(connection: Connection) -> None:
+    """Answer to states of the page, as soon as can be; (number, state, survey): None where a survey is learnt."""
+    nearby: Nearby | None = None
+    while True:
+        number, state, known = connection.recv()
+        if known is not None:
+            nearby = Nearby(state)
+            nearby.learn(known)
+            nearby.at(state)  # what is compiled later would be waited for
+            connection.send(None)
+            continue
+        try:
+            there = None if nearby is None else nearby.at(state)
+            if there is None:
+                nearby = Nearby(state)
+                there = nearby.searched()
+            connection.send(Found(number, shown(there)))
+        except SpinlevError as error:
+            connection.send(Found(number, None, str(error)))
+
+
+def complete(connection: Connection, number: int, state: PageState) -> None:
+    """All equilibria by the models asked for, as the command line finds them, and the field's lines."""
+    try:
+        levitation = Levitation(state.scene, state.models, state.spin)
+        without = levitation.without_plate
+        found = shown(levitation)
+    except SpinlevError as error:
+        connection.send(Found(number, None, str(error)))
+        return
+    lines = field_lines(state.scene, _field(levitation))
+    connection.send(Found(number, found, lines=tuple(lines), survey=without))
+
+
+def _field(levitation: Levitation) -> Callable[[Array], Array]:
+    """The field at points (n, 3) m, zero inside the magnets, for lines as thick as they are drawn.
+
+    Tables by finite elements and maps do not reach to the magnets: there the closed form does, which is off by 2 %.
+    """
+    table = levitation.table if levitation.table.model in QUICK else levitation.field("cuboid")
+
+    def field(points: Array) -> Array:
+        b, known = np.zeros((len(points), 3)), table.in_range(points)
+        if known.any():
+            b[known] = table.evaluate(points[known])[0]
+        return b
+
+    return field
+
+
+def regions(connection: Connection, state: PageState, spans: tuple[tuple[float, float], tuple[float, float]]) -> None:
+    """Maps of where something levitates, first by a dipole and coarse; spans in Hz, and mm or degrees."""
+    configuration = state.keys["rotor"]["configuration"]
+    unit = np.radians(1.0) if configuration == "tilt" else 1e-3
+    models = ["dipole", *(["cuboid"] if state.model == "cuboid" else [])]
+    for model in models:
+        for points in POINTS:
+            axes = np.linspace(*spans[0], points), np.linspace(*spans[1], points)
+            try:
+                family = rotor_family(state.scene, configuration, model)
+                found = equilibrium_map(family, axes[0], axes[1] * unit, state.spin)
+            except (SpinlevError, ValueError) as error:
+                connection.send(Regions(model, *axes, np.zeros((points, points), np.uint8), str(error), last=True))
+                return
+            last = (model, points) == (models[-1], POINTS[-1])
+            connection.send(Regions(model, *axes, _kind(found), last=last))
+
+
+def _kind(found: EquilibriumMap) -> Array:
+    every, stable = found.number
+    return np.asarray((every > 0).astype(np.uint8) + (stable > 0))
+
+
+def has_map(state: PageState) -> bool:
+    """Whether a scene's rotor has a measure for a map's second axis, and its equilibria are fixed points."""
+    known = state.keys["rotor"].get("configuration") in MEASURES
+    return known and not np.any(state.scene.gravity[:2])
+
+
+def map_key(state: PageState) -> str:
+    """All that a map depends on: neither its own axes, nor the plate, nor where a flight begins."""
+    whole = scene_keys(replace(state.scene, text=""))  # with every key, whatever the scene's file left out
+    keys = {key: value for key, value in whole.items() if key not in ("frequency_hz", "plate", "start")}
+    open_ones = ("displacement_mm", "angle_deg")
+    keys["rotor"] = {key: value for key, value in keys["rotor"].items() if key not in open_ones}
+    return f"{keys} {state.spin} {state.model == 'cuboid'}"
+
+
+def download(connection: Connection, kind: str, state: PageState, extra: Any) -> None:
+    """The content of a file, or why there is none."""
+    try:
+        connection.send((kind, content(kind, state, extra), ""))
+    except SpinlevError as error:
+        connection.send((kind, b"", str(error)))

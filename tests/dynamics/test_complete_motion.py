@@ -7,29 +7,30 @@ import pytest
 from article import PERMEABLE
 from ngsolve import SetNumThreads
 
-from spinlev.dynamics.effects import (
-    FLOATER_CURRENTS,
-    MUTUAL,
-    REAL_AIR,
-    ROTOR_CURRENTS,
-    Mutual,
-    RotorCurrents,
-    with_effects,
-)
-from spinlev.dynamics.equilibria import survey, with_plate
-from spinlev.dynamics.flights import simulate
-from spinlev.dynamics.flights.compiled_flight import compile_flight
-from spinlev.dynamics.motion import Interaction, Parameter, PlateForce, PlateMemory, Rates, Scales, parameters
-from spinlev.dynamics.steady import Survey, floquet_modes, periodic_orbit
-from spinlev.fem.mutual import cached_mutual_table
-from spinlev.fem.plate_currents import Region
-from spinlev.fem.plate_tables.driven_plate import plate_and_rotor_table
-from spinlev.fem.rotor_losses import ball_losses, pieces_of
-from spinlev.fem.rotor_tables import rotor_table
-from spinlev.geometry.basics import Box
-from spinlev.geometry.bodies import horizontal
-from spinlev.geometry.meshes import MeshRule
-from spinlev.geometry.scenes import AbsoluteStart, Drag, Lowering, Plate, Scene
+from spinlev.dynamics.equilibria.equilibrium import Survey
+from spinlev.dynamics.equilibria.orbits import floquet_modes, periodic_orbit
+from spinlev.dynamics.equilibria.search import survey, with_plate
+from spinlev.dynamics.flights.compiled import compile_flight
+from spinlev.dynamics.flights.flight import simulate
+from spinlev.dynamics.motion.air_and_shape import REAL_AIR
+from spinlev.dynamics.motion.effect import Interaction
+from spinlev.dynamics.motion.effects import with_effects
+from spinlev.dynamics.motion.equations import parameters
+from spinlev.dynamics.motion.floater_currents import FLOATER_CURRENTS
+from spinlev.dynamics.motion.mutual import MUTUAL, Mutual
+from spinlev.dynamics.motion.plate import PlateForce, PlateMemory
+from spinlev.dynamics.motion.rates import Rates
+from spinlev.dynamics.motion.rotor_losses import ROTOR_CURRENTS, RotorCurrents
+from spinlev.dynamics.motion.state import Parameter, Scales
+from spinlev.fem.mutual.making import cached_mutual_table
+from spinlev.fem.plate.driven import plate_and_rotor_table
+from spinlev.fem.plate.region import Region
+from spinlev.fem.rotor.choice import rotor_table
+from spinlev.fem.rotor_metal import ball_losses, pieces_of
+from spinlev.geometry.meshes.plate import MeshRule
+from spinlev.geometry.rotor import horizontal
+from spinlev.geometry.scene.contents import AbsoluteStart, Drag, Lowering, Plate, Scene
+from spinlev.geometry.shapes import Box
 
 SetNumThreads(1)
 MAGNETS = tuple(replace(magnet, conductivity=6.7e5) for magnet in horizontal(2e-3, 10e-3, 1.305, 1.05))

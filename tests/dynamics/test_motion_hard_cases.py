@@ -9,19 +9,20 @@ import numpy as np
 import pytest
 from article import FLOATER, NO_DRAG, RADIUS
 
-from spinlev.dynamics.branches import FOLD, Family, follow_branch, frequencies
-from spinlev.dynamics.equilibria import find_equilibria, with_plate
-from spinlev.dynamics.flights import simulate
-from spinlev.dynamics.flights.compiled_flight import compile_flight
-from spinlev.dynamics.flights.integration import integrate
-from spinlev.dynamics.motion import PlateMemory, Rates, Scales
-from spinlev.dynamics.steady import EquilibriumError, Survey
-from spinlev.fem.plate_currents import Region
-from spinlev.fem.rotor_tables import rotor_table
-from spinlev.fem.slab import slab_and_rotor_table
-from spinlev.geometry.basics import Box
-from spinlev.geometry.bodies import article_rotors as rotor
-from spinlev.geometry.scenes import AbsoluteStart, Drag, Floater, OffsetStart, Plate, Scene
+from spinlev.dynamics.continuation.engine import Family, follow_branch, frequencies
+from spinlev.dynamics.equilibria.equilibrium import FOLD, EquilibriumError, Survey
+from spinlev.dynamics.equilibria.search import find_equilibria, with_plate
+from spinlev.dynamics.flights.compiled import compile_flight
+from spinlev.dynamics.flights.flight import integrate, simulate
+from spinlev.dynamics.motion.plate import PlateMemory
+from spinlev.dynamics.motion.rates import Rates
+from spinlev.dynamics.motion.state import Scales
+from spinlev.fem.plate.region import Region
+from spinlev.fem.plate.slab_network import slab_and_rotor_table
+from spinlev.fem.rotor.choice import rotor_table
+from spinlev.geometry import rotor
+from spinlev.geometry.scene.contents import AbsoluteStart, Drag, Floater, OffsetStart, Plate, Scene
+from spinlev.geometry.shapes import Box
 
 SCENE = Scene(110.0, rotor.horizontal(2e-3, 10e-3, 1.305, 1.0), FLOATER, NO_DRAG, start=OffsetStart(np.zeros(3)))
 TABLE = rotor_table(SCENE.rotor, "dipole")

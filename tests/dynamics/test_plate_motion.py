@@ -9,21 +9,24 @@ from ngsolve import SetNumThreads
 from scipy.integrate import solve_ivp
 from second_opinions.phasor import mean_force, mean_torque
 
-from spinlev.dynamics.equilibria import find_equilibria, plate_action, survey, with_plate
-from spinlev.dynamics.flights import simulate
-from spinlev.dynamics.flights.compiled_flight import compile_flight
-from spinlev.dynamics.flights.integration import integrate
-from spinlev.dynamics.motion import Parameter, PlateForce, PlateMemory, Rates, Scales, parameters
-from spinlev.dynamics.steady import Survey, floquet_modes, periodic_orbit
-from spinlev.dynamics.steady.harmonic_balance import differentiation, resampled
-from spinlev.fem.plate_currents import Region
-from spinlev.fem.plate_tables import RotorShare
-from spinlev.fem.plate_tables.driven_plate import plate_and_rotor_table
-from spinlev.fem.rotor_tables import RotorTable
-from spinlev.fem.slab import slab_and_rotor_table
-from spinlev.geometry.basics import Box
-from spinlev.geometry.meshes import MeshRule
-from spinlev.geometry.scenes import Drag, Lowering, OffsetStart, Plate, Scene
+from spinlev.dynamics.equilibria.equilibrium import Survey
+from spinlev.dynamics.equilibria.orbits import differentiation, floquet_modes, periodic_orbit, resampled
+from spinlev.dynamics.equilibria.perturbed import plate_action
+from spinlev.dynamics.equilibria.search import find_equilibria, survey, with_plate
+from spinlev.dynamics.flights.compiled import compile_flight
+from spinlev.dynamics.flights.flight import integrate, simulate
+from spinlev.dynamics.motion.equations import parameters
+from spinlev.dynamics.motion.plate import PlateForce, PlateMemory
+from spinlev.dynamics.motion.rates import Rates
+from spinlev.dynamics.motion.state import Parameter, Scales
+from spinlev.fem.plate.driven import plate_and_rotor_table
+from spinlev.fem.plate.region import Region
+from spinlev.fem.plate.slab_network import slab_and_rotor_table
+from spinlev.fem.plate.table import RotorShare
+from spinlev.fem.rotor.table import RotorTable
+from spinlev.geometry.meshes.plate import MeshRule
+from spinlev.geometry.scene.contents import Drag, Lowering, OffsetStart, Plate, Scene
+from spinlev.geometry.shapes import Box
 
 SetNumThreads(1)
 CUBOID = RotorTable("cuboid", MAGNETS, MAGNETS)
@@ -179,7 +182,7 @@ def test_the_stated_error_of_growth_is_that_of_the_steps(shaken, memory, rates, 
     force = PlateForce(memory, VALUES)
     orbit = periodic_orbit(rates, VALUES, 0.0, force, Scales.of(SCENE).pack(shaken.state))
     modes = floquet_modes(orbit)
-    monkeypatch.setattr("spinlev.dynamics.steady.floquet.STEPS", 192)
+    monkeypatch.setattr("spinlev.dynamics.equilibria.orbits.STEPS", 192)
     exact = floquet_modes(orbit)
     for rate, error in zip(modes.eigenvalues, modes.errors, strict=True):
         assert np.abs(exact.eigenvalues - rate).min() < error

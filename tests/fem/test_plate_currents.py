@@ -6,22 +6,20 @@ import numpy as np
 import pytest
 from ngsolve import SetNumThreads
 
-from spinlev.fem.closed_forms import unit_dipoles
-from spinlev.fem.eddy_currents import EddySpace, dipole_images, solve_eddy
-from spinlev.fem.plate_currents import Region, error_of, solve_currents, space_couplings
-from spinlev.fem.plate_currents.current_space import source_images
-from spinlev.fem.plate_currents.current_training import train
-from spinlev.fem.plate_currents.order_ladder import MESH_SHARE, Ladder
-from spinlev.fem.plate_currents.solution_file import load_solution, save_solution
-from spinlev.fem.plate_currents.sources import SourceSet
-from spinlev.fem.plate_tables import reachable_region, turning_rotor
-from spinlev.fem.plate_tables.driven_plate import plate_and_rotor_table, rotor_box
-from spinlev.fem.plate_tables.outer_box import outer_box, outer_frequencies
-from spinlev.fem.rotor_tables import AccuracyError, rotor_table
-from spinlev.geometry.basics import Box
-from spinlev.geometry.bodies import horizontal, vertical
-from spinlev.geometry.meshes import MeshRule, plate_mesh
-from spinlev.geometry.scenes import Plate
+from spinlev.fem.closed_forms.potentials import unit_dipoles
+from spinlev.fem.plate.currents import SourceSet, source_images, space_couplings, train
+from spinlev.fem.plate.driven import plate_and_rotor_table, reachable_region, rotor_box, turning_rotor
+from spinlev.fem.plate.eddy import EddySpace, solve_eddy
+from spinlev.fem.plate.eddy_fields import dipole_images
+from spinlev.fem.plate.reaction import MESH_SHARE, Ladder
+from spinlev.fem.plate.region import Region, outer_box, outer_frequencies
+from spinlev.fem.plate.solution import error_of, load_solution, save_solution, solve_currents
+from spinlev.fem.rotor.choice import rotor_table
+from spinlev.fem.rotor.models import AccuracyError
+from spinlev.geometry.meshes.plate import MeshRule, plate_mesh
+from spinlev.geometry.rotor import horizontal, vertical
+from spinlev.geometry.scene.contents import Plate
+from spinlev.geometry.shapes import Box
 
 SetNumThreads(1)
 PLATE = Plate(Box((0.1, 0.24, 0.03), (0.0, 0.0, -0.055)), 3.5e7)

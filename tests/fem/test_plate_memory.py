@@ -14,17 +14,17 @@ from second_opinions.dipole_derivative import DipoleDerivative
 from second_opinions.phasor import mean_force, mean_loss, mean_torque
 from second_opinions.time_stepping import TimeStepper, work_on
 
-from spinlev.fem.closed_forms import Dipole, unit_dipoles
-from spinlev.fem.eddy_currents import EddySpace
-from spinlev.fem.plate_currents import Region
-from spinlev.fem.plate_network import reduce_plate
-from spinlev.fem.plate_tables.tabulate import tabulate
-from spinlev.fem.rotor_tables import rotor_table
-from spinlev.fem.slab import slab_and_rotor_table
-from spinlev.geometry.basics import Box
-from spinlev.geometry.bodies import horizontal
-from spinlev.geometry.meshes import MeshRule, plate_mesh
-from spinlev.geometry.scenes import Lowering, Plate
+from spinlev.fem.closed_forms.potentials import Dipole, unit_dipoles
+from spinlev.fem.plate.driven import tabulate
+from spinlev.fem.plate.eddy import EddySpace
+from spinlev.fem.plate.network import reduce_plate
+from spinlev.fem.plate.region import Region
+from spinlev.fem.plate.slab_network import slab_and_rotor_table
+from spinlev.fem.rotor.choice import rotor_table
+from spinlev.geometry.meshes.plate import MeshRule, plate_mesh
+from spinlev.geometry.rotor import horizontal
+from spinlev.geometry.scene.contents import Lowering, Plate
+from spinlev.geometry.shapes import Box
 
 SetNumThreads(1)
 PLATE = Plate(Box((0.1, 0.24, 0.03), (0.0, 0.0, -0.055)), 3.5e7, Lowering(0.0, 0.02, 0.02))

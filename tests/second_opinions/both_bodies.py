@@ -7,23 +7,21 @@ polarisations, and one finite-element solution gives the magnetisation that the 
 import numpy as np
 
 from second_opinions.two_bodies import TwoBodyMesh
-from spinlev.fem.closed_forms import remanent_field
-from spinlev.fem.harmonics import (
+from spinlev.fem.closed_forms.uniform import remanent_field
+from spinlev.fem.elements.magnetostatics import assemble_regions
+from spinlev.fem.harmonics.expansion import moments_of_magnetization
+from spinlev.fem.harmonics.interior import (
     Ball,
-    derivative,
     dipole_sources,
     from_magnetization,
     interior_coefficients,
-    moments_of_magnetization,
     multipole_force,
     multipole_torque,
-    outer_sums,
 )
-from spinlev.fem.magnetostatics import assemble_regions
-from spinlev.fem.mutual import Wrench
-from spinlev.fem.mutual.rotor_response import closed_dipoles
-from spinlev.geometry.basics import Array
-from spinlev.geometry.scenes import Floater
+from spinlev.fem.harmonics.solid import derivative, outer_sums
+from spinlev.fem.mutual.response import Wrench, closed_dipoles
+from spinlev.geometry.common import Array
+from spinlev.geometry.scene.contents import Floater
 
 
 def solve_both_bodies(

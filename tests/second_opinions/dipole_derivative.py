@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from spinlev.geometry.basics import MU_0, Array, frozen_array
+from spinlev.geometry.common import MU_0, Array, frozen_array
 
 
 @dataclass(frozen=True, eq=False)

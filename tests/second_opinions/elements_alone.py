@@ -4,13 +4,12 @@ import time
 
 import numpy as np
 
-from spinlev.fem.harmonics import without_noise
-from spinlev.fem.magnetostatics import Refinement, RotorSolution, refined, refinement_of, solve_rotor, strongest
-from spinlev.fem.rotor_tables import Accuracy, RotorTable
-from spinlev.fem.rotor_tables.accuracy import error_points
-from spinlev.fem.rotor_tables.fem_model import extrapolated_tail, nonzero, provenance
-from spinlev.geometry.bodies import Magnet
-from spinlev.geometry.meshes import MeshSettings
+from spinlev.fem.elements.ladder import Refinement, RotorSolution, refined, refinement_of, solve_rotor, strongest
+from spinlev.fem.harmonics.expansion import without_noise
+from spinlev.fem.rotor.models import Accuracy, error_points, extrapolated_tail, nonzero, provenance
+from spinlev.fem.rotor.table import RotorTable
+from spinlev.geometry.magnets import Magnet
+from spinlev.geometry.meshes.magnets import MeshSettings
 
 SETTINGS = MeshSettings(ball_radius=1.15)
 DEGREE = 24

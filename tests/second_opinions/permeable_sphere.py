@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from spinlev.geometry.basics import Array
+from spinlev.geometry.common import Array
 
 
 def inner_field(incident: Array, permeability: float, polarization: Array) -> tuple[Array, Array]:

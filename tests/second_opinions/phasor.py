@@ -12,7 +12,7 @@ J. D. Jackson, Classical Electrodynamics (3rd ed. 1999), sections 5.16 and 6.9.
 import numpy as np
 from numpy.typing import ArrayLike
 
-from spinlev.geometry.basics import Array
+from spinlev.geometry.common import Array
 
 
 def mean_torque(reaction: ArrayLike, moment: ArrayLike) -> Array:

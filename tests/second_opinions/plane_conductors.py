@@ -5,9 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from spinlev.fem.closed_forms import ComplexArray
-from spinlev.fem.slab.reaction import Slab, checked, power_integral
-from spinlev.geometry.basics import MU_0
+from spinlev.fem.closed_forms.eddy_sphere import ComplexArray
+from spinlev.fem.plate.slab import Slab, checked, power_integral
+from spinlev.geometry.common import MU_0
 
 
 @dataclass(frozen=True)

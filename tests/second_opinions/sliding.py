@@ -13,9 +13,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from second_opinions.plane_conductors import PlaneConductor
-from spinlev.fem.rotor_tables import AccuracyError
-from spinlev.fem.slab.reaction import Slab, checked, wave_numbers
-from spinlev.geometry.basics import MU_0, Array
+from spinlev.fem.plate.slab import Slab, checked, wave_numbers
+from spinlev.fem.rotor.models import AccuracyError
+from spinlev.geometry.common import MU_0, Array
 
 PRECISION = 1e-11
 MOST_DIRECTIONS = 2**16

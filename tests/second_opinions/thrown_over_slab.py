@@ -13,7 +13,7 @@ Nothing of it is the package's: its slab has closed modes, waves of cylinders an
 import numpy as np
 import scipy
 
-from spinlev.geometry.basics import MU_0, Array
+from spinlev.geometry.common import MU_0, Array
 
 
 def thrown_over_slab(

@@ -14,10 +14,10 @@ from collections.abc import Callable, Iterator, Sequence
 import ngsolve
 import numpy as np
 
-from spinlev.fem.eddy_currents import EddySpace, Source
-from spinlev.fem.elements import solve_condensed
-from spinlev.geometry.basics import MU_0, Array
-from spinlev.geometry.meshes import MILLIMETRE
+from spinlev.fem.elements.condensed import solve_condensed
+from spinlev.fem.plate.eddy import EddySpace, Source
+from spinlev.geometry.common import MU_0, Array
+from spinlev.geometry.meshes.metal import MILLIMETRE
 
 GAMMA = 1 - np.sqrt(0.5)
 """Diagonal entry of the method, and time of its first stage."""

@@ -8,8 +8,8 @@ import netgen.occ as occ
 import ngsolve as ng
 import numpy as np
 
-from spinlev.geometry.basics import Array, frozen_array
-from spinlev.geometry.bodies import Magnet
+from spinlev.geometry.common import Array, frozen_array
+from spinlev.geometry.magnets import Magnet
 from spinlev.geometry.meshes.solids import occ_solid
 
 

@@ -5,20 +5,24 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from spinlev.dynamics.branches import at_frequency, levitating_ranges, reference_state, stable_range
-from spinlev.dynamics.effects import Mutual
-from spinlev.dynamics.equilibria import PerturbedBalance, find_equilibria
-from spinlev.dynamics.motion import Interaction, Rates, Scales, parameters, rotor_gap
-from spinlev.dynamics.steady import Balance
-from spinlev.fem.mutual import cached_mutual_table, rotor_ladder, two_body
-from spinlev.fem.rotor_tables import cached_rotor_table, rotor_table
-from spinlev.studies.article import FLOATER, article_scene
-from spinlev.studies.levitation import dipole_vs_fem
-from spinlev.studies.levitation.dipole_vs_fem_figure import CAUSES, TOTAL, change
-from spinlev.studies.margins import stability_map
-from spinlev.studies.margins.design_search import designed
-from spinlev.studies.margins.sensitivity import slope_by
-from spinlev.studies.margins.tolerances import PARAMETERS, QUANTITIES, levitation, nominal, scene_of
+from spinlev.dynamics.continuation.frequencies import at_frequency, levitating_ranges, reference_state, stable_range
+from spinlev.dynamics.equilibria.balance import Balance
+from spinlev.dynamics.equilibria.perturbed import PerturbedBalance
+from spinlev.dynamics.equilibria.search import find_equilibria
+from spinlev.dynamics.motion.effect import Interaction
+from spinlev.dynamics.motion.equations import parameters
+from spinlev.dynamics.motion.events import rotor_gap
+from spinlev.dynamics.motion.mutual import Mutual
+from spinlev.dynamics.motion.rates import Rates
+from spinlev.dynamics.motion.state import Scales
+from spinlev.fem.mutual.making import cached_mutual_table
+from spinlev.fem.mutual.response import rotor_ladder, two_body
+from spinlev.fem.rotor.choice import cached_rotor_table, rotor_table
+from spinlev.studies.catalogue import dipole_vs_fem, stability_map
+from spinlev.studies.catalogue.article import FLOATER, article_scene
+from spinlev.studies.catalogue.design import designed
+from spinlev.studies.catalogue.dipole_vs_fem import CAUSES, TOTAL, change
+from spinlev.studies.catalogue.sensitivity import PARAMETERS, QUANTITIES, levitation, nominal, scene_of, slope_by
 
 
 @pytest.fixture(scope="module")

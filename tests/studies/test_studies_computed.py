@@ -5,21 +5,21 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from spinlev.dynamics.branches import (
-    FOLD,
-    reference_state,
-    stable_frequencies as stable_range,
-)
-from spinlev.dynamics.effects import Mutual
-from spinlev.dynamics.equilibria import find_equilibria
-from spinlev.dynamics.motion import Interaction, Rates, Scales, parameters
-from spinlev.dynamics.steady import Balance, EquilibriumError
-from spinlev.fem.mutual import cached_mutual_table
-from spinlev.fem.rotor_tables import rotor_table
-from spinlev.studies.article import article_scene
-from spinlev.studies.levitation import dipole_vs_fem
-from spinlev.studies.margins import design, sensitivity, stability_map
-from spinlev.studies.margins.design_search import designed
+from spinlev.dynamics.continuation import frequencies as stable_range
+from spinlev.dynamics.continuation.frequencies import reference_state
+from spinlev.dynamics.equilibria.balance import Balance
+from spinlev.dynamics.equilibria.equilibrium import FOLD, EquilibriumError
+from spinlev.dynamics.equilibria.search import find_equilibria
+from spinlev.dynamics.motion.effect import Interaction
+from spinlev.dynamics.motion.equations import parameters
+from spinlev.dynamics.motion.mutual import Mutual
+from spinlev.dynamics.motion.rates import Rates
+from spinlev.dynamics.motion.state import Scales
+from spinlev.fem.mutual.making import cached_mutual_table
+from spinlev.fem.rotor.choice import rotor_table
+from spinlev.studies.catalogue import design, dipole_vs_fem, sensitivity, stability_map
+from spinlev.studies.catalogue.article import article_scene
+from spinlev.studies.catalogue.design import designed
 
 
 def nearest(scene, model, distance):

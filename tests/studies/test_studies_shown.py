@@ -13,20 +13,20 @@ import xarray as xr
 from places import QUICK, SCENES
 
 import spinlev as sl
-from spinlev.dynamics.equilibria import find_equilibria
-from spinlev.fem.rotor_tables import rotor_table
-from spinlev.geometry.basics import InputError
-from spinlev.geometry.scenes import load_scene
-from spinlev.studies.catalogue import CATALOGUE, report_job, show_job
-from spinlev.studies.catalogue.drawings import read_result
-from spinlev.studies.catalogue.report import LONGEST
-from spinlev.studies.command_line import cli
-from spinlev.studies.command_line.cli import _status
-from spinlev.studies.field_quality import field_hard_cases
-from spinlev.studies.field_quality.hard_cases import CASES
-from spinlev.studies.one_scene import reaction as plate_job
-from spinlev.studies.pictures import plate_currents, question_figure
-from spinlev.studies.rendering import Currents, current_places
+from spinlev.dynamics.equilibria.search import find_equilibria
+from spinlev.fem.rotor.choice import rotor_table
+from spinlev.geometry.common import InputError
+from spinlev.geometry.scene.files import load_scene
+from spinlev.studies import reaction as plate_job
+from spinlev.studies.catalogue import hard_cases as field_hard_cases
+from spinlev.studies.catalogue.entries import CATALOGUE
+from spinlev.studies.catalogue.hard_cases import CASES
+from spinlev.studies.catalogue.report import LONGEST, report_job
+from spinlev.studies.catalogue.runner import read_result, show_job
+from spinlev.studies.cli import main as cli
+from spinlev.studies.cli.main import _status
+from spinlev.studies.figures.pictures import plate_currents, question_figure
+from spinlev.studies.figures.view import Currents, current_places
 from spinlev.studies.results import write_dataset
 
 
@@ -58,7 +58,7 @@ def test_arrows_show_the_currents_under_the_face_that_the_floater_is_before(scen
     """All places lie in the plate, a hundredth of its thickness below that face; the longest arrow is 12 mm."""
     import pyvista as pv
 
-    from spinlev.studies.rendering.still import add_plate, new_plotter
+    from spinlev.studies.figures.still import add_plate, new_plotter
 
     box, floater = scene.plate.box, np.array([0.0, 0.0, -0.02])
     points = current_places(box, floater)
@@ -80,7 +80,7 @@ def test_arrows_show_the_currents_under_the_face_that_the_floater_is_before(scen
 
 @pytest.mark.usefixtures("needs_3d")
 def test_a_floater_without_a_direction_has_no_arrow(scene):
-    from spinlev.studies.rendering.still import add_floater, new_plotter
+    from spinlev.studies.figures.still import add_floater, new_plotter
 
     plotter = new_plotter((300, 200))
     drawn = [add_floater(plotter, scene, np.zeros(3), moment) for moment in (np.zeros(3), np.array([0.0, 0.0, 1.0]))]
@@ -101,8 +101,8 @@ def test_a_flight_is_shown_with_the_plate_where_it_has_been_lowered_to(tmp_path,
         asked.append(plate)
         return np.zeros_like(points)
 
-    monkeypatch.setattr("spinlev.studies.rendering.view.FRAMES", 1)
-    monkeypatch.setattr("spinlev.studies.catalogue.show.plate_currents", currents)
+    monkeypatch.setattr("spinlev.studies.figures.view.FRAMES", 1)
+    monkeypatch.setattr("spinlev.studies.catalogue.runner.plate_currents", currents)
     files = [Path(name) for name in show_job(path, tmp_path)]
     assert [file.suffix for file in files] == [".png", ".gif"]
     assert all(file.stat().st_size for file in files)

@@ -14,15 +14,16 @@ import pytest
 from PIL import Image
 from places import ROOT, SCENES
 
-from spinlev.fem.rotor_tables import rotor_table
-from spinlev.geometry.scenes import load_scene
-from spinlev.studies.catalogue import report_job
-from spinlev.studies.catalogue.drawings import read_result
-from spinlev.studies.catalogue.show import flight_of
-from spinlev.studies.one_scene import simulate_job
-from spinlev.studies.pictures import last_view
-from spinlev.studies.rendering import Turnable, View, drawn, page, unavailable
-from spinlev.studies.terminal import Models
+from spinlev.fem.rotor.choice import rotor_table
+from spinlev.geometry.scene.files import load_scene
+from spinlev.studies.catalogue.report import report_job
+from spinlev.studies.catalogue.runner import flight_of, read_result
+from spinlev.studies.cli.options import Models
+from spinlev.studies.figures.pictures import last_view
+from spinlev.studies.figures.renderer import drawn, unavailable
+from spinlev.studies.figures.turnable import page
+from spinlev.studies.figures.view import Turnable, View
+from spinlev.studies.run import simulate_job
 
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
 SITE = ROOT / "docs" / "_build" / "unrun"

@@ -12,7 +12,7 @@ from numpydoc.validate import validate
 from places import ROOT
 
 import spinlev as sl
-from spinlev.studies.terminal.system_libraries import PACKAGES
+from spinlev.studies.cli.console import PACKAGES
 
 PAGES = sorted([ROOT / "README.md", *(ROOT / "docs").glob("*.md")])
 NAMED = re.compile(r"`((?:geometry|fem|dynamics|studies|tests|benchmarks|scenes|docs)/[\w/.-]+\.(?:py|toml|md))")

@@ -6,9 +6,9 @@ from importlib import import_module
 
 from places import ROOT
 
-from spinlev.dynamics.flights import FlightStopped
-from spinlev.geometry.basics import ComputationError, InputError, SpinlevError
-from spinlev.studies.command_line import cli
+from spinlev.dynamics.flights.trajectory import FlightStopped
+from spinlev.geometry.common import ComputationError, InputError, SpinlevError
+from spinlev.studies.cli import main as cli
 
 FILES = sorted(path for folder in ("geometry", "fem", "dynamics", "studies") for path in (ROOT / folder).rglob("*.py"))
 MODULES = {

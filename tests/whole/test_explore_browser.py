@@ -18,9 +18,9 @@ from PIL import Image
 from places import OVER_PLATE
 
 import spinlev as sl
-from spinlev.geometry.scenes import load_scene
-from spinlev.studies.one_scene import equilibria_job
-from spinlev.studies.terminal import Models
+from spinlev.geometry.scene.files import load_scene
+from spinlev.studies.cli.options import Models
+from spinlev.studies.run import equilibria_job
 
 DESK, PHONE = (1400, 1250), (390, 844)
 pytestmark = [
@@ -57,7 +57,7 @@ def click(tab, name):
 @pytest.fixture(scope="module")
 def server():
     """`spinlev explore` of a scene, as a process; its first line is the address."""
-    start = "import sys; from spinlev.studies.command_line.start import main; sys.argv[0] = 'spinlev'; main()"
+    start = "import sys; from spinlev.studies.cli.start import main; sys.argv[0] = 'spinlev'; main()"
     command = [sys.executable, "-c", start, "explore", str(OVER_PLATE), "--no-browser"]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
         process.address = process.stdout.readline().strip()

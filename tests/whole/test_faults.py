@@ -25,16 +25,15 @@ import places
 import pytest
 import xarray as xr
 
-from spinlev.fem.elements import memory
-from spinlev.fem.measured_maps import FieldMapError
-from spinlev.fem.measured_maps.readers import read_field_map
-from spinlev.fem.rotor_tables import RotorTable
-from spinlev.fem.storage import hdf5_fault, read_checked, seal, write_checked, write_whole
-from spinlev.fem.storage.cache import cache_folder
-from spinlev.fem.storage.whole_files import replacing
-from spinlev.geometry.scenes import load_scene
-from spinlev.studies.command_line.cli import _status
-from spinlev.studies.command_line.start import STOPPED
+from spinlev.fem.cache import cache_folder, read_checked, write_checked
+from spinlev.fem.elements import condensed as memory
+from spinlev.fem.files import hdf5_fault, replacing, seal, write_whole
+from spinlev.fem.maps_of_B.columns import FieldMapError
+from spinlev.fem.maps_of_B.read import read_field_map
+from spinlev.fem.rotor.table import RotorTable
+from spinlev.geometry.scene.files import load_scene
+from spinlev.studies.cli.main import _status
+from spinlev.studies.cli.start import STOPPED
 
 SCENE, OVER_PLATE = str(places.HORIZONTAL), str(places.OVER_PLATE)
 DIPOLE = ("--model", "dipole", "--plate-model", "none")
@@ -61,7 +60,7 @@ def spinlev(tmp_path, monkeypatch, capsys):
     Tables have a cache of their own there; compiled code is that of the session, for it is no matter of these tests.
     """
     session = cache_folder()
-    monkeypatch.setattr("spinlev.fem.storage.compiled_code.cache_folder", lambda: session)
+    monkeypatch.setattr("spinlev.fem.compiled_code.cache_folder", lambda: session)
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("SPINLEV_CACHE", str(tmp_path / "cache"))
     monkeypatch.setattr("sys.argv", ["spinlev", "test"])
@@ -232,7 +231,7 @@ def test_a_full_disk(spinlev, monkeypatch, name):
 def test_results_go_to_memory_before_the_disk_since_hdf5_crashes_on_a_full_one(tmp_path):
     """A child that may write 20 kB: an error in words (HDF5 itself, on a real full disk, ended with SIGSEGV)."""
     code = (
-        "import resource, sys, numpy, xarray; from spinlev.fem.storage.checked_files import write_checked\n"
+        "import resource, sys, numpy, xarray; from spinlev.fem.cache import write_checked\n"
         "resource.setrlimit(resource.RLIMIT_FSIZE, (20000, 20000))\n"
         "write_checked(xarray.Dataset({'a': ('x', numpy.arange(9999.0))}), sys.argv[1])\n"
     )
@@ -262,14 +261,14 @@ def test_a_full_disk_behind_standard_output(spinlev, capsys):
 
 
 PHASES = {
-    "table": ("spinlev.fem.rotor_tables.cache.rotor_table", FIELD),
-    "table, when it is written": ("spinlev.fem.storage.checked_files.write_whole", FIELD),
-    "equilibria": ("spinlev.studies.one_scene.levitation.survey", WRITERS["equilibria.json"]),
-    "files": ("spinlev.studies.one_scene.single.write_whole", WRITERS["equilibria.json"]),
-    "sweep": ("spinlev.studies.one_scene.rotor_of_scene.rotor_table", SWEEP),
-    "sweep, when a point is kept": ("spinlev.studies.sweeps.running.write_whole", SWEEP),
-    "sweep, when all are joined": ("spinlev.studies.catalogue.jobs.write_dataset", SWEEP),
-    "figures": ("spinlev.studies.catalogue.jobs.save_figures", SWEEP),
+    "table": ("spinlev.fem.rotor.choice.rotor_table", FIELD),
+    "table, when it is written": ("spinlev.fem.cache.write_whole", FIELD),
+    "equilibria": ("spinlev.studies.levitation.survey", WRITERS["equilibria.json"]),
+    "files": ("spinlev.studies.run.write_whole", WRITERS["equilibria.json"]),
+    "sweep": ("spinlev.studies.rotor.rotor_table", SWEEP),
+    "sweep, when a point is kept": ("spinlev.studies.sweep.write_whole", SWEEP),
+    "sweep, when all are joined": ("spinlev.studies.catalogue.runner.write_dataset", SWEEP),
+    "figures": ("spinlev.studies.catalogue.runner.save_figures", SWEEP),
 }
 
 
@@ -309,7 +308,7 @@ def test_ctrl_c_while_the_program_is_loaded(library, blow):
         "    def find_spec(self, name, *_):\n"
         f"        if name == '{library}': os.kill(os.getpid(), signal.{blow})\n"
         "sys.meta_path.insert(0, Pressed())\n"
-        "from spinlev.studies.command_line.start import main\n"
+        "from spinlev.studies.cli.start import main\n"
         "main()\n"
     )
     done = subprocess.run([sys.executable, "-c", code, "study", "--list"], capture_output=True, text=True, check=False)
@@ -321,7 +320,7 @@ def test_ctrl_c_that_falls_into_a_destructor_is_not_lost():
     """Python drops what is raised there; the program would go on."""
     code = (
         "import os, signal, threading\n"
-        "from spinlev.studies.command_line import cli, start\n"
+        "from spinlev.studies.cli import cli, start\n"
         "class Dropped:\n"
         "    def __del__(self):\n"
         "        os.kill(os.getpid(), signal.SIGINT)\n"
@@ -338,7 +337,7 @@ def test_ctrl_c_that_falls_into_a_destructor_is_not_lost():
 
 ANSWERED = (
     "import os, signal\n"
-    "from spinlev.studies.command_line import cli, start\n"
+    "from spinlev.studies.cli import cli, start\n"
     "def answer(_, out):\n"
     "    {}\n"
     "    print('answered', file=out, flush=True)\n"
@@ -385,7 +384,7 @@ def test_streams_that_are_closed(tmp_path, closed, status, answer, said):
 def test_a_shell_that_allows_too_few_open_files(tmp_path):
     """40 are enough; of fewer one sentence says what to do."""
     arguments = ("equilibria", SCENE, *DIPOLE, "--json", "--out", str(tmp_path))
-    code = "from spinlev.studies.command_line.start import main; main()"
+    code = "from spinlev.studies.cli.start import main; main()"
     for number, status in ((40, 0), (5, 1)):
         shell = ["sh", "-c", f'ulimit -n {number}; exec "$@"', "sh", sys.executable, "-P", "-c", code, *arguments]
         done = subprocess.run(shell, capture_output=True, text=True, check=False)
@@ -425,7 +424,7 @@ def test_ctrl_c_that_a_library_takes_for_its_own_failure(spinlev, monkeypatch, c
         stop.set()
         raise ImportError("No module named vtk")
 
-    monkeypatch.setattr("spinlev.studies.one_scene.single.write_whole", pressed)
+    monkeypatch.setattr("spinlev.studies.run.write_whole", pressed)
     assert _status([*WRITERS["field.csv"]], sys.stderr, stop) == 1
     assert "stopped; what was finished is kept" in capsys.readouterr().err
 
@@ -443,7 +442,7 @@ def pressing(monkeypatch, after):
     def progress(label):
         yield advance
 
-    monkeypatch.setattr("spinlev.studies.one_scene.levitation.progress", progress)
+    monkeypatch.setattr("spinlev.studies.levitation.progress", progress)
 
 
 def test_ctrl_c_in_a_flight_keeps_it_and_it_goes_on_to_the_last_bit(spinlev, monkeypatch):
@@ -481,7 +480,7 @@ def test_a_stopped_flight_is_no_point_of_a_sweep(spinlev, monkeypatch):
         yield pressed
 
     with monkeypatch.context() as patch:
-        patch.setattr("spinlev.studies.one_scene.levitation.progress", progress)
+        patch.setattr("spinlev.studies.levitation.progress", progress)
         assert spinlev(*arguments)[0] == 1
     assert [path.name for path in Path("out/question.points").glob("0*.json")] == ["000000.json"]
     status, _, said = spinlev(*arguments)
@@ -545,7 +544,7 @@ def while_it_runs(monkeypatch, act):
     def progress(label):
         yield lambda done: act() if 0 < done < 1 else None
 
-    monkeypatch.setattr("spinlev.studies.sweeps.running.progress", progress)
+    monkeypatch.setattr("spinlev.studies.sweep.progress", progress)
 
 
 def stopped():
@@ -614,7 +613,7 @@ def test_no_solve_is_begun_that_the_memory_does_not_hold(spinlev, monkeypatch):
 def test_files_of_killed_processes_are_tidied_and_those_of_living_ones_are_not(tmp_path):
     """A process that dies between two bytes leaves a file under a temporary name; the next writer removes it."""
     code = (
-        "import os, signal, sys; from spinlev.fem.storage.whole_files import replacing\n"
+        "import os, signal, sys; from spinlev.fem.files import replacing\n"
         "with replacing(sys.argv[1]) as temporary:\n"
         "    temporary.write_text('half')\n"
         "    os.kill(os.getpid(), signal.SIGKILL)\n"
@@ -639,9 +638,7 @@ def test_a_result_and_its_summary_are_of_the_same_run(spinlev, monkeypatch):
     """A run that dies after its result is written leaves no summary of the run before."""
     Path("out").mkdir()
     Path("out/summary.json").write_text("{}")
-    monkeypatch.setattr(
-        "spinlev.studies.one_scene.run.write_dataset", lambda *_: (_ for _ in ()).throw(KeyboardInterrupt)
-    )
+    monkeypatch.setattr("spinlev.studies.run.write_dataset", lambda *_: (_ for _ in ()).throw(KeyboardInterrupt))
     status, _, said = spinlev("run", SCENE, "--duration-s", "0.1", "--rtol", "1e-2", *DIPOLE)
     assert status == 1
     assert "stopped" in said
@@ -667,7 +664,7 @@ def test_a_renderer_that_dies_takes_no_result_with_it(spinlev, monkeypatch, tmp_
     Path("out/scene.png").write_text("of an older result")
     with monkeypatch.context() as patch:
         crashing(patch, tmp_path / "dies", "draw_process")
-        patch.setattr("spinlev.studies.catalogue.show.plate_currents", lambda *given: np.zeros_like(given[-1]))
+        patch.setattr("spinlev.studies.catalogue.runner.plate_currents", lambda *given: np.zeros_like(given[-1]))
         status, answer, said = spinlev(*arguments)
         shown = spinlev("show", "out/result.nc")
     assert status == 0

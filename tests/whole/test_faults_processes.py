@@ -14,12 +14,12 @@ import numpy as np
 import pytest
 from places import HORIZONTAL
 
-from spinlev.fem.storage import read_checked
+from spinlev.fem.cache import read_checked
 
 pytestmark = pytest.mark.slow
 
 SCENE = str(HORIZONTAL)
-CALL = "import sys; from spinlev.studies.command_line.start import main; sys.argv[0] = 'spinlev'; main()"
+CALL = "import sys; from spinlev.studies.cli.start import main; sys.argv[0] = 'spinlev'; main()"
 DIPOLE = ("--model", "dipole", "--plate-model", "none")
 FIELD = ("field", SCENE, "--points", "points.csv", "--model", "fem", "--rtol", "3e-5", "--json")
 FLIGHT = ("simulate", SCENE, "--duration-s", "300", *DIPOLE, "--json")
@@ -173,7 +173,7 @@ def test_a_disk_that_takes_no_more_than_so_many_bytes_a_file(spinlev, arguments,
 def test_too_little_memory(spinlev, arguments):
     """2 MB of address space left (and NGSolve's heap) when the solve begins: refused in words; else all is well."""
     code = (
-        "import resource, psutil; from spinlev.fem.magnetostatics import rotor_solution\n"
+        "import resource, psutil; from spinlev.fem.elements import rotor_solution\n"
         "meshed, (_, most) = rotor_solution.mesh_magnets, resource.getrlimit(resource.RLIMIT_AS)\n"
         "def starved(*a):\n"
         "    resource.setrlimit(resource.RLIMIT_AS, (most, most))\n"

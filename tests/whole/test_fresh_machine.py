@@ -14,10 +14,9 @@ import check_pins
 import pytest
 from places import HORIZONTAL
 
-from spinlev.studies.command_line import cli, installation
-from spinlev.studies.command_line.cli import _status
-from spinlev.studies.terminal import DRAWING, FORTRAN, lend_quadmath, make_readable, system_libraries, way_out
-from spinlev.studies.terminal.plain_text import READABLE, in_ascii
+from spinlev.studies.cli import console as system_libraries, installation, main as cli
+from spinlev.studies.cli.console import DRAWING, FORTRAN, READABLE, in_ascii, lend_quadmath, make_readable, way_out
+from spinlev.studies.cli.main import _status
 
 SCENE = str(HORIZONTAL)
 
@@ -122,7 +121,7 @@ def test_a_command_tells_of_a_library_that_is_missing(monkeypatch, capsys):
     assert _status([], io.StringIO()) == 1
     said = capsys.readouterr().err
     assert "a library cannot be loaded: libopenblas.so.0: cannot open shared object file." in said
-    assert "-m spinlev.studies.command_line.installation" in said
+    assert "-m spinlev.studies.cli.installation" in said
     assert way_out(FORTRAN) in said
 
 
@@ -179,7 +178,7 @@ def test_no_output_dies_of_an_encoding(monkeypatch, encoding):
     [{"PYTHONIOENCODING": "ascii"}, pytest.param({"LC_ALL": "C", "PYTHONUTF8": "0"}, marks=pytest.mark.slow)],
 )
 def test_a_command_on_a_terminal_that_knows_only_ascii(tmp_path, settings):
-    command = [sys.executable, "-c", "from spinlev.studies.command_line.start import main; main()"]
+    command = [sys.executable, "-c", "from spinlev.studies.cli.start import main; main()"]
     arguments = ["equilibria", SCENE, "--model", "dipole", "--plate-model", "none", "--out", str(tmp_path)]
     environment = {**os.environ, "PYTHONCOERCECLOCALE": "0", **settings}
     done = subprocess.run([*command, *arguments], capture_output=True, check=False, env=environment)

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 from places import DOCS, HORIZONTAL
 
-from spinlev.geometry.basics import MU_0
-from spinlev.geometry.scenes import load_scene
-from spinlev.studies.catalogue import CATALOGUE
-from spinlev.studies.results.style import STYLE
+from spinlev.geometry.common import MU_0
+from spinlev.geometry.scene.files import load_scene
+from spinlev.studies.catalogue.entries import CATALOGUE
+from spinlev.studies.figures.style import STYLE
 
 EXAMPLES, BUILT = DOCS / "examples", DOCS / "_build" / "html"
 MOMENT = load_scene(HORIZONTAL).floater.moment * np.sin(np.radians(5.0))

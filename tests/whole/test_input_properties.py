@@ -8,10 +8,19 @@ import pytest
 from hypothesis import HealthCheck, example, given, settings, strategies as st
 from places import HORIZONTAL
 
-from spinlev.geometry.basics import InputError
-from spinlev.geometry.scenes import Scene, SceneError, parse_scene
-from spinlev.studies.terminal import Models, combinations, parse_vary, positive, read_points, three_numbers
-from spinlev.studies.terminal.vary import MOST
+from spinlev.geometry.common import InputError
+from spinlev.geometry.scene.contents import Scene
+from spinlev.geometry.scene.files import parse_scene
+from spinlev.geometry.scene.messages import SceneError
+from spinlev.studies.cli.options import (
+    MOST_VALUES as MOST,
+    Models,
+    combinations,
+    parse_vary,
+    positive,
+    read_points,
+    three_numbers,
+)
 
 GOOD = HORIZONTAL.read_text()
 NUMBERS = dict(re.findall(r"^(\w+) = (-?[\d.e+-]+)", GOOD, re.MULTILINE))

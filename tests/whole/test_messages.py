@@ -11,7 +11,7 @@ from importlib import import_module
 
 from places import ROOT
 
-from spinlev.geometry.basics import ComputationError
+from spinlev.geometry.common import ComputationError
 
 FILES = sorted(path for folder in ("geometry", "fem", "dynamics", "studies") for path in (ROOT / folder).rglob("*.py"))
 INPUT = re.compile(r"(\{\}: )?Input \S.* must .+; instead[ :].+", re.DOTALL)

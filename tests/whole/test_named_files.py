@@ -8,7 +8,7 @@ import signal
 import pytest
 from places import SCENES
 
-from spinlev.studies.command_line import cli
+from spinlev.studies.cli import main as cli
 
 SCENE = (SCENES / "horizontal.toml").read_text()
 STEP = """frequency_hz = 130.0

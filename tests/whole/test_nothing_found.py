@@ -9,19 +9,27 @@ import pytest
 from article import FLOATER, SCENE
 from second_opinions.solids import Conductor, occ_mesh
 
-from spinlev.dynamics.branches import FOLD, Family, Plane, follow_boundary, follow_branch, way_out
-from spinlev.dynamics.equilibria import PerturbedBalance, find_equilibria
-from spinlev.dynamics.equilibria.perturbed import TILTS
-from spinlev.dynamics.maps import rotor_family
-from spinlev.dynamics.motion import Parameter, Rates, Scales
-from spinlev.dynamics.slow_drift import drift
-from spinlev.dynamics.steady import EVERY, EquilibriumError, solve
-from spinlev.fem.closed_forms import Racetrack
-from spinlev.fem.eddy_currents.export import write_vtu
-from spinlev.fem.rotor_tables import rotor_table
-from spinlev.geometry.basics import MU_0, Box, rotation_matrix
-from spinlev.geometry.bodies import CONVERGENCE, Magnet, article_rotors as rotor, cut_magnets
-from spinlev.geometry.meshes import Block, ConductorMesh, graded_partition, hex_mesh
+from spinlev.dynamics.continuation.boundary import Plane, follow_boundary
+from spinlev.dynamics.continuation.engine import Family, follow_branch
+from spinlev.dynamics.continuation.frequencies import way_out
+from spinlev.dynamics.continuation.slow_drift import drift
+from spinlev.dynamics.equilibria.balance import EVERY, solve
+from spinlev.dynamics.equilibria.equilibrium import FOLD, EquilibriumError
+from spinlev.dynamics.equilibria.perturbed import TILTS, PerturbedBalance
+from spinlev.dynamics.equilibria.search import find_equilibria
+from spinlev.dynamics.maps.family import rotor_family
+from spinlev.dynamics.motion.rates import Rates
+from spinlev.dynamics.motion.state import Parameter, Scales
+from spinlev.fem.closed_forms.potentials import Racetrack
+from spinlev.fem.plate.eddy_fields import write_vtu
+from spinlev.fem.rotor.choice import rotor_table
+from spinlev.geometry import rotor
+from spinlev.geometry.common import MU_0
+from spinlev.geometry.cutting import CONVERGENCE, cut_magnets
+from spinlev.geometry.magnets import Magnet
+from spinlev.geometry.meshes.metal import ConductorMesh
+from spinlev.geometry.meshes.plate import Block, graded_partition, hex_mesh
+from spinlev.geometry.shapes import Box, rotation_matrix
 
 TABLE = rotor_table(SCENE.rotor, "dipole")
 WEAK = replace(SCENE, floater=replace(FLOATER, remanence=1e-3))

@@ -4,12 +4,13 @@ import numpy as np
 import pytest
 from article import PERMEABLE
 
-from spinlev.dynamics.flights import simulate
-from spinlev.fem.magnetostatics import Refinement, solve_rotor
-from spinlev.fem.rotor_tables import RotorTable, rotor_table
-from spinlev.geometry.bodies import horizontal, tilt, vertical
-from spinlev.geometry.meshes import MeshSettings
-from spinlev.geometry.scenes import Drag, Scene
+from spinlev.dynamics.flights.flight import simulate
+from spinlev.fem.elements.ladder import Refinement, solve_rotor
+from spinlev.fem.rotor.choice import rotor_table
+from spinlev.fem.rotor.table import RotorTable
+from spinlev.geometry.meshes.magnets import MeshSettings
+from spinlev.geometry.rotor import horizontal, tilt, vertical
+from spinlev.geometry.scene.contents import Drag, Scene
 
 pytestmark = pytest.mark.slow
 

@@ -4,7 +4,7 @@ import io
 
 import pytest
 
-from spinlev.studies.command_line import cli
+from spinlev.studies.cli import main as cli
 
 BALL = "[floater]\ndiameter_mm = 12.7\nremanence_T = 1.305\ndensity_kg_m3 = 7500.0\n"
 SMALL = "[floater]\ndiameter_mm = 2.0\nremanence_T = 1.305\ndensity_kg_m3 = 7500.0\n"

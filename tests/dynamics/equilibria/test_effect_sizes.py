@@ -6,14 +6,20 @@ import numpy as np
 import pytest
 from article import PERMEABLE
 
-from spinlev.dynamics.effects import Mutual, RotorCurrents, rough_force, with_effects
-from spinlev.dynamics.equilibria import find_equilibria, growth_by_floater, growth_by_rotor, shift_by_answers
-from spinlev.dynamics.motion import Interaction, Rates, Scales, parameters
-from spinlev.fem.mutual import cached_mutual_table
-from spinlev.fem.rotor_losses import ball_losses, pieces_of
-from spinlev.fem.rotor_tables import rotor_table
-from spinlev.geometry.bodies import horizontal
-from spinlev.geometry.scenes import Drag, Scene
+from spinlev.dynamics.equilibria.perturbed import growth_by_floater, growth_by_rotor, shift_by_answers
+from spinlev.dynamics.equilibria.search import find_equilibria
+from spinlev.dynamics.motion.effect import Interaction
+from spinlev.dynamics.motion.effects import with_effects
+from spinlev.dynamics.motion.equations import parameters
+from spinlev.dynamics.motion.mutual import Mutual, rough_force
+from spinlev.dynamics.motion.rates import Rates
+from spinlev.dynamics.motion.rotor_losses import RotorCurrents
+from spinlev.dynamics.motion.state import Scales
+from spinlev.fem.mutual.making import cached_mutual_table
+from spinlev.fem.rotor.choice import rotor_table
+from spinlev.fem.rotor_metal import ball_losses, pieces_of
+from spinlev.geometry.rotor import horizontal
+from spinlev.geometry.scene.contents import Drag, Scene
 
 SCENE = Scene(150.0, horizontal(1.5e-3, 10e-3, 1.305, 1.05), PERMEABLE, Drag(0.0, 0.0))
 CONDUCTING = replace(SCENE, floater=replace(PERMEABLE, conductivity=6.7e5))

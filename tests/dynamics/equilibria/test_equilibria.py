@@ -9,14 +9,21 @@ from article import FLOATER
 from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
-from spinlev.dynamics.equilibria import SearchRange, find_equilibria, fixed_points, search as searching, survey
-from spinlev.dynamics.equilibria.continuation import stepped
-from spinlev.dynamics.motion import Rates, Scales, parameters
-from spinlev.dynamics.steady import EVERY, LATERAL, Balance, EquilibriumError, solve
-from spinlev.fem.harmonics import uniform_moments
-from spinlev.fem.rotor_tables import RotorTable, rotor_table
-from spinlev.geometry.bodies import article_rotors as rotor
-from spinlev.geometry.scenes import Drag, Scene, parse_scene
+from spinlev.dynamics.equilibria import curves as fixed_points, curves as searching
+from spinlev.dynamics.equilibria.balance import EVERY, LATERAL, Balance, solve
+from spinlev.dynamics.equilibria.curves import SearchRange
+from spinlev.dynamics.equilibria.equilibrium import EquilibriumError
+from spinlev.dynamics.equilibria.path import stepped
+from spinlev.dynamics.equilibria.search import find_equilibria, survey
+from spinlev.dynamics.motion.equations import parameters
+from spinlev.dynamics.motion.rates import Rates
+from spinlev.dynamics.motion.state import Scales
+from spinlev.fem.harmonics.expansion import uniform_moments
+from spinlev.fem.rotor.choice import rotor_table
+from spinlev.fem.rotor.table import RotorTable
+from spinlev.geometry import rotor
+from spinlev.geometry.scene.contents import Drag, Scene
+from spinlev.geometry.scene.files import parse_scene
 
 SHAPE = {"body": 10e-3, "remanence": 1.305, "recoil_permeability": 1.0}
 SCENES = {

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 import spinlev as sl
-from spinlev.dynamics.equilibria import survey
-from spinlev.dynamics.motion import Rates
-from spinlev.dynamics.steady import FOLD
-from spinlev.fem.rotor_tables import rotor_table
+from spinlev.dynamics.equilibria.equilibrium import FOLD
+from spinlev.dynamics.equilibria.search import survey
+from spinlev.dynamics.motion.rates import Rates
+from spinlev.fem.rotor.choice import rotor_table
 
 MATERIAL = {"remanence_T": 1.18, "recoil_permeability": 1.0}
 """Of rotor and floater in the cases below; the point dipole is exact for both."""

@@ -6,11 +6,13 @@ import numpy as np
 import pytest
 from article import FLOATER, MAGNETS
 
-from spinlev.dynamics.flights import Checkpoint, FlightStopped, simulate
-from spinlev.fem.harmonics import uniform_moments
-from spinlev.fem.rotor_tables import RotorTable
-from spinlev.geometry.basics import InputError
-from spinlev.geometry.scenes import Drag, Scene
+from spinlev.dynamics.flights.flight import simulate
+from spinlev.dynamics.flights.pieces import Checkpoint
+from spinlev.dynamics.flights.trajectory import FlightStopped
+from spinlev.fem.harmonics.expansion import uniform_moments
+from spinlev.fem.rotor.table import RotorTable
+from spinlev.geometry.common import InputError
+from spinlev.geometry.scene.contents import Drag, Scene
 
 DIPOLE = RotorTable("dipole", MAGNETS, (), tuple(uniform_moments(m, 1) for m in MAGNETS))
 SCENE = Scene(110.0, MAGNETS, FLOATER, Drag(2.2e-6, 1.2e-10))

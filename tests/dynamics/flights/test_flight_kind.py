@@ -6,15 +6,23 @@ import numpy as np
 import pytest
 from article import FLOATER, RADIUS
 
-from spinlev.dynamics.equilibria import find_equilibria
-from spinlev.dynamics.flights import Trajectory, flight_kind
-from spinlev.dynamics.flights.compiled_flight import compile_flight
-from spinlev.dynamics.flights.integration import integrate
-from spinlev.dynamics.flights.kind import DRIFTING, GROWING, LINEAR_FALL, NOT_HELD, OSCILLATING_LOSS, STABLE
-from spinlev.dynamics.motion import State
-from spinlev.fem.rotor_tables import rotor_table
-from spinlev.geometry.bodies import article_rotors as rotor
-from spinlev.geometry.scenes import Drag, Scene
+from spinlev.dynamics.equilibria.search import find_equilibria
+from spinlev.dynamics.flights.compiled import compile_flight
+from spinlev.dynamics.flights.flight import integrate
+from spinlev.dynamics.flights.trajectory import (
+    DRIFTING,
+    GROWING,
+    LINEAR_FALL,
+    NOT_HELD,
+    OSCILLATING_LOSS,
+    STABLE,
+    Trajectory,
+    flight_kind,
+)
+from spinlev.dynamics.motion.state import State
+from spinlev.fem.rotor.choice import rotor_table
+from spinlev.geometry import rotor
+from spinlev.geometry.scene.contents import Drag, Scene
 
 TIME = np.linspace(0, 20, 5000)
 VERTICAL = Scene(80.0, rotor.vertical(14e-3, 10e-3, 1.305, 1.0), FLOATER, Drag.stokes(RADIUS))

@@ -6,18 +6,18 @@ import numpy as np
 import pytest
 from article import FLOATER, MAGNETS
 
-from spinlev.dynamics.flights import Checkpoint, FlightStopped, initial_state
-from spinlev.dynamics.flights.compiled_flight import compile_flight
-from spinlev.dynamics.flights.integration import integrate
-from spinlev.dynamics.flights.local_flight import compile_local_flight
-from spinlev.dynamics.flights.simulation import PLATE_TOLERANCE
-from spinlev.dynamics.local_plates import SHARE
-from spinlev.dynamics.motion import PlateMemory
-from spinlev.fem.plate_currents import Region
-from spinlev.fem.rotor_tables import rotor_table
-from spinlev.fem.slab import slab_and_rotor_table
-from spinlev.geometry.basics import Box
-from spinlev.geometry.scenes import Drag, Lowering, Plate, Scene
+from spinlev.dynamics.flights.balls import compile_local_flight
+from spinlev.dynamics.flights.compiled import compile_flight
+from spinlev.dynamics.flights.flight import PLATE_TOLERANCE, initial_state, integrate
+from spinlev.dynamics.flights.pieces import Checkpoint
+from spinlev.dynamics.flights.plate_balls import SHARE
+from spinlev.dynamics.flights.trajectory import FlightStopped
+from spinlev.dynamics.motion.plate import PlateMemory
+from spinlev.fem.plate.region import Region
+from spinlev.fem.plate.slab_network import slab_and_rotor_table
+from spinlev.fem.rotor.choice import rotor_table
+from spinlev.geometry.scene.contents import Drag, Lowering, Plate, Scene
+from spinlev.geometry.shapes import Box
 
 TABLE = rotor_table(MAGNETS, "dipole")
 PLATE = Plate(Box((0.1, 0.24, 0.03), (0.0, 0.0, -0.047)), 3.5e7, Lowering(0.02, 0.2, 4e-3))

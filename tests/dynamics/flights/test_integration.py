@@ -7,16 +7,16 @@ import numpy as np
 import pytest
 from article import MAGNETS, RADIUS, SCENE
 
-from spinlev.dynamics.equilibria import find_equilibria
-from spinlev.dynamics.flights import FlightStopped, StartError, initial_state, simulate
-from spinlev.dynamics.flights.compiled_flight import SHORT_TURNS, STRAIGHT_TURNS, compile_flight
-from spinlev.dynamics.flights.integration import integrate
-from spinlev.dynamics.motion import clearance
-from spinlev.dynamics.steady import EquilibriumError
-from spinlev.fem.harmonics import uniform_moments
-from spinlev.fem.rotor_tables import RotorTable
-from spinlev.geometry.basics import Box
-from spinlev.geometry.scenes import AbsoluteStart, Drag, Floater, Lowering, Plate
+from spinlev.dynamics.equilibria.equilibrium import EquilibriumError
+from spinlev.dynamics.equilibria.search import find_equilibria
+from spinlev.dynamics.flights.compiled import SHORT_TURNS, STRAIGHT_TURNS, compile_flight
+from spinlev.dynamics.flights.flight import StartError, initial_state, integrate, simulate
+from spinlev.dynamics.flights.trajectory import FlightStopped
+from spinlev.dynamics.motion.events import clearance
+from spinlev.fem.harmonics.expansion import uniform_moments
+from spinlev.fem.rotor.table import RotorTable
+from spinlev.geometry.scene.contents import AbsoluteStart, Drag, Floater, Lowering, Plate
+from spinlev.geometry.shapes import Box
 
 NEUTRAL = Floater(RADIUS, 0.0, 1.0, 7500.0)
 DIPOLE = RotorTable("dipole", MAGNETS, (), tuple(uniform_moments(m, 1) for m in MAGNETS))

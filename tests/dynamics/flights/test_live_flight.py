@@ -7,13 +7,14 @@ import pytest
 from article import FLOATER, MAGNETS
 from places import OVER_PLATE
 
-from spinlev.dynamics.flights import LiveFlight, StartError, simulate
-from spinlev.fem.harmonics import uniform_moments
-from spinlev.fem.rotor_tables import RotorTable
-from spinlev.geometry.basics import InputError
-from spinlev.geometry.scenes import AbsoluteStart, Drag, Floater, Scene
-from spinlev.studies.one_scene import Levitation
-from spinlev.studies.terminal import Models
+from spinlev.dynamics.flights.flight import StartError, simulate
+from spinlev.dynamics.flights.live import LiveFlight
+from spinlev.fem.harmonics.expansion import uniform_moments
+from spinlev.fem.rotor.table import RotorTable
+from spinlev.geometry.common import InputError
+from spinlev.geometry.scene.contents import AbsoluteStart, Drag, Floater, Scene
+from spinlev.studies.cli.options import Models
+from spinlev.studies.levitation import Levitation
 
 DIPOLE = RotorTable("dipole", MAGNETS, (), tuple(uniform_moments(m, 1) for m in MAGNETS))
 UP, STILL = np.array([0.0, 0.0, 1.0]), np.zeros(3)

@@ -7,19 +7,21 @@ import numpy as np
 import pytest
 from article import MAGNETS, SCENE
 
-from spinlev.dynamics.flights import Checkpoint, FlightStopped, initial_state, simulate
-from spinlev.dynamics.flights.balls import ERROR
-from spinlev.dynamics.flights.compiled_flight import compile_flight
-from spinlev.dynamics.flights.integration import integrate
-from spinlev.dynamics.flights.local_flight import LocalFlight, compile_local_flight
-from spinlev.dynamics.local_plates import SHARE
-from spinlev.dynamics.motion import PlateMemory
-from spinlev.fem.harmonics import Ball, BallField, uniform_moments
-from spinlev.fem.plate_currents import Region
-from spinlev.fem.rotor_tables import RotorTable
-from spinlev.fem.slab import slab_and_rotor_table
-from spinlev.geometry.basics import Box
-from spinlev.geometry.scenes import AbsoluteStart, Lowering, Plate
+from spinlev.dynamics.flights.balls import ERROR, LocalFlight, compile_local_flight
+from spinlev.dynamics.flights.compiled import compile_flight
+from spinlev.dynamics.flights.flight import initial_state, integrate, simulate
+from spinlev.dynamics.flights.pieces import Checkpoint
+from spinlev.dynamics.flights.plate_balls import SHARE
+from spinlev.dynamics.flights.trajectory import FlightStopped
+from spinlev.dynamics.motion.plate import PlateMemory
+from spinlev.fem.harmonics.expansion import uniform_moments
+from spinlev.fem.harmonics.interior import Ball
+from spinlev.fem.harmonics.local import BallField
+from spinlev.fem.plate.region import Region
+from spinlev.fem.plate.slab_network import slab_and_rotor_table
+from spinlev.fem.rotor.table import RotorTable
+from spinlev.geometry.scene.contents import AbsoluteStart, Lowering, Plate
+from spinlev.geometry.shapes import Box
 
 TABLE = RotorTable("moments", MAGNETS, (), tuple(uniform_moments(m, 21) for m in MAGNETS))
 

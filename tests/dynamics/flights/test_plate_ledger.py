@@ -7,19 +7,20 @@ import pytest
 from article import FLOATER, MAGNETS, RADIUS
 from second_opinions.phasor import mean_force, mean_loss, mean_torque
 
-from spinlev.dynamics.effects import with_effects
-from spinlev.dynamics.equilibria import find_equilibria, with_plate
-from spinlev.dynamics.flights import initial_state, starting_point
-from spinlev.dynamics.flights.compiled_flight import compile_flight
-from spinlev.dynamics.flights.integration import integrate
-from spinlev.dynamics.motion import PlateMemory, Rates, State
-from spinlev.dynamics.steady import Survey
-from spinlev.fem.plate_currents import Region
-from spinlev.fem.rotor_tables import rotor_table
-from spinlev.fem.slab import slab_and_rotor_table
-from spinlev.geometry.basics import Box
-from spinlev.geometry.bodies import article_rotors as rotor
-from spinlev.geometry.scenes import AbsoluteStart, Drag, Plate, Scene
+from spinlev.dynamics.equilibria.equilibrium import Survey
+from spinlev.dynamics.equilibria.search import find_equilibria, with_plate
+from spinlev.dynamics.flights.compiled import compile_flight
+from spinlev.dynamics.flights.flight import initial_state, integrate, starting_point
+from spinlev.dynamics.motion.effects import with_effects
+from spinlev.dynamics.motion.plate import PlateMemory
+from spinlev.dynamics.motion.rates import Rates
+from spinlev.dynamics.motion.state import State
+from spinlev.fem.plate.region import Region
+from spinlev.fem.plate.slab_network import slab_and_rotor_table
+from spinlev.fem.rotor.choice import rotor_table
+from spinlev.geometry import rotor
+from spinlev.geometry.scene.contents import AbsoluteStart, Drag, Plate, Scene
+from spinlev.geometry.shapes import Box
 
 PLATE = Plate(Box((0.1, 0.24, 0.03), (0.0, 0.0, -0.047)), 3.5e7)
 REGION = Region(np.array([-3e-3, -3e-3, 0.024]), np.array([3e-3, 3e-3, 0.031]))

@@ -4,10 +4,9 @@ import heyoka as hy
 import numpy as np
 import pytest
 
-from spinlev.dynamics.maps.blend import blend_tables, chebyshev_points
-from spinlev.dynamics.maps.movable import Translation
-from spinlev.dynamics.motion import Parameter
-from spinlev.fem.harmonics import MultipoleExpansion
+from spinlev.dynamics.maps.family import Translation, blend_tables, chebyshev_points
+from spinlev.dynamics.motion.state import Parameter
+from spinlev.fem.harmonics.expansion import MultipoleExpansion
 
 RADIUS = 8e-3
 CENTER = np.array([1e-3, -2e-3, 3e-3])

@@ -5,15 +5,16 @@ import numpy as np
 import pytest
 from article import PERMEABLE
 
-from spinlev.dynamics.equilibria import find_equilibria
-from spinlev.dynamics.equilibria.fixed_points import fixed_points
-from spinlev.dynamics.maps import equilibrium_map, rotor_family
-from spinlev.dynamics.maps.mapping import family_grid
-from spinlev.dynamics.motion import Parameter, Rates
-from spinlev.dynamics.steady import EquilibriumError
-from spinlev.fem.rotor_tables import rotor_table
-from spinlev.geometry.bodies import article_rotors as rotor
-from spinlev.geometry.scenes import Drag, Scene
+from spinlev.dynamics.equilibria.curves import fixed_points
+from spinlev.dynamics.equilibria.equilibrium import EquilibriumError
+from spinlev.dynamics.equilibria.search import find_equilibria
+from spinlev.dynamics.maps.family import rotor_family
+from spinlev.dynamics.maps.map import equilibrium_map, family_grid
+from spinlev.dynamics.motion.rates import Rates
+from spinlev.dynamics.motion.state import Parameter
+from spinlev.fem.rotor.choice import rotor_table
+from spinlev.geometry import rotor
+from spinlev.geometry.scene.contents import Drag, Scene
 
 SHAPE = (10e-3, 1.305, 1.05)
 ROTORS = {

@@ -4,12 +4,13 @@ import numpy as np
 import pytest
 from article import PERMEABLE
 
-from spinlev.dynamics.equilibria import Search
-from spinlev.dynamics.maps import equilibrium_map, filling, rotor_family
-from spinlev.dynamics.maps.mapping import family_grid
-from spinlev.dynamics.steady import EVERY
-from spinlev.geometry.bodies import article_rotors as rotor
-from spinlev.geometry.scenes import Drag, Scene
+from spinlev.dynamics.equilibria.balance import EVERY
+from spinlev.dynamics.equilibria.curves import Search
+from spinlev.dynamics.maps import grid as filling
+from spinlev.dynamics.maps.family import rotor_family
+from spinlev.dynamics.maps.map import equilibrium_map, family_grid
+from spinlev.geometry import rotor
+from spinlev.geometry.scene.contents import Drag, Scene
 
 SHAPE = (10e-3, 1.305, 1.05)
 ROTORS = {

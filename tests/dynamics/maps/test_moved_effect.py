@@ -6,18 +6,21 @@ import numpy as np
 import pytest
 from article import PERMEABLE
 
-from spinlev.dynamics.effects import Mutual, RotorCurrents
-from spinlev.dynamics.equilibria import find_equilibria
-from spinlev.dynamics.maps import equilibrium_map, rotor_family
-from spinlev.dynamics.maps.movable import Rotation, Translation
-from spinlev.dynamics.maps.moved_effect import MovedEffect
-from spinlev.dynamics.motion import Interaction, Parameter, Rates, Scales, equations_of_motion, parameters
-from spinlev.fem.mutual import cached_mutual_table
-from spinlev.fem.rotor_losses import ball_losses, pieces_of
-from spinlev.fem.rotor_tables import rotor_table
-from spinlev.geometry.basics import InputError
-from spinlev.geometry.bodies import Conductor, horizontal, tilt, vertical
-from spinlev.geometry.scenes import Drag, Scene
+from spinlev.dynamics.equilibria.search import find_equilibria
+from spinlev.dynamics.maps.family import MovedEffect, Rotation, Translation, rotor_family
+from spinlev.dynamics.maps.map import equilibrium_map
+from spinlev.dynamics.motion.effect import Interaction
+from spinlev.dynamics.motion.equations import equations_of_motion, parameters
+from spinlev.dynamics.motion.mutual import Mutual
+from spinlev.dynamics.motion.rates import Rates
+from spinlev.dynamics.motion.rotor_losses import RotorCurrents
+from spinlev.dynamics.motion.state import Parameter, Scales
+from spinlev.fem.mutual.making import cached_mutual_table
+from spinlev.fem.rotor.choice import rotor_table
+from spinlev.fem.rotor_metal import ball_losses, pieces_of
+from spinlev.geometry.common import InputError
+from spinlev.geometry.rotor import Conductor, horizontal, tilt, vertical
+from spinlev.geometry.scene.contents import Drag, Scene
 
 SHAPE = (10e-3, 1.305, 1.05)
 MOVES = [(horizontal, 2e-3, Translation((1.0, 0.0, 0.0))), (tilt, np.radians(12.0), Rotation())]

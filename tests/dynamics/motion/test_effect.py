@@ -6,21 +6,13 @@ import heyoka as hy
 import numpy as np
 from article import FLOATER
 
-from spinlev.dynamics.motion import (
-    Added,
-    Interaction,
-    Parameter,
-    Rates,
-    Scales,
-    conservative,
-    dissipative,
-    dot,
-    equations_of_motion,
-    parameters,
-)
-from spinlev.fem.rotor_tables import rotor_table
-from spinlev.geometry.bodies import vertical
-from spinlev.geometry.scenes import Drag, Scene
+from spinlev.dynamics.motion.effect import Added, Interaction, conservative, dissipative
+from spinlev.dynamics.motion.equations import equations_of_motion, parameters
+from spinlev.dynamics.motion.rates import Rates
+from spinlev.dynamics.motion.state import Parameter, Scales, dot
+from spinlev.fem.rotor.choice import rotor_table
+from spinlev.geometry.rotor import vertical
+from spinlev.geometry.scene.contents import Drag, Scene
 
 SCENE = Scene(90.0, vertical(14e-3, 10e-3, 1.305, 1.0), FLOATER, Drag(0.0, 0.0))
 TABLE = rotor_table(SCENE.rotor, "cuboid")

@@ -9,13 +9,15 @@ import pytest
 from article import FLOATER
 from scipy.integrate import solve_ivp
 
-from spinlev.dynamics.flights.compiled_flight import compile_flight
-from spinlev.dynamics.flights.integration import integrate
-from spinlev.dynamics.motion import Rates, Scales, State, equations_of_motion, parameters, turned_about_z
-from spinlev.fem.harmonics import uniform_moments
-from spinlev.fem.rotor_tables import RotorTable
-from spinlev.geometry.bodies import article_rotors as rotor
-from spinlev.geometry.scenes import Drag, Scene
+from spinlev.dynamics.flights.compiled import compile_flight
+from spinlev.dynamics.flights.flight import integrate
+from spinlev.dynamics.motion.equations import equations_of_motion, parameters
+from spinlev.dynamics.motion.rates import Rates
+from spinlev.dynamics.motion.state import Scales, State, turned_about_z
+from spinlev.fem.harmonics.expansion import uniform_moments
+from spinlev.fem.rotor.table import RotorTable
+from spinlev.geometry import rotor
+from spinlev.geometry.scene.contents import Drag, Scene
 
 MAGNETS = rotor.vertical(14e-3, 10e-3, 1.305, 1.0)
 TABLES = {

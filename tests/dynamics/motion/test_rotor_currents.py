@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from spinlev.dynamics.motion.rotor_currents import RotorCurrents
-from spinlev.fem.plate_tables import RotorShare
+from spinlev.dynamics.motion.plate import RotorCurrents
+from spinlev.fem.plate.table import RotorShare
 
 RATES = np.array([30.0, 400.0, 9000.0])
 SHARE = RotorShare(0.02, np.random.default_rng(0).normal(size=(7, 3, 4)), 0.0)

@@ -4,13 +4,16 @@ import numpy as np
 import pytest
 from article import PERMEABLE
 
-from spinlev.dynamics.effects import Mutual
-from spinlev.dynamics.motion import Interaction, Rates, Scales, parameters
-from spinlev.fem.mutual import MutualTable
-from spinlev.fem.mutual.answer_grid import AnswerGrid, answer_box
-from spinlev.fem.rotor_tables import rotor_table
-from spinlev.geometry.bodies import horizontal, tilt, vertical
-from spinlev.geometry.scenes import Drag, Floater, Scene
+from spinlev.dynamics.motion.effect import Interaction
+from spinlev.dynamics.motion.equations import parameters
+from spinlev.dynamics.motion.mutual import Mutual
+from spinlev.dynamics.motion.rates import Rates
+from spinlev.dynamics.motion.state import Scales
+from spinlev.fem.mutual.grid import AnswerGrid, answer_box
+from spinlev.fem.mutual.table import MutualTable
+from spinlev.fem.rotor.choice import rotor_table
+from spinlev.geometry.rotor import horizontal, tilt, vertical
+from spinlev.geometry.scene.contents import Drag, Floater, Scene
 
 PAIRS = {
     "horizontal": (horizontal(2e-3, 10e-3, 1.305, 1.05), horizontal(1e-3, 9.5e-3, 1.29, 1.05)),

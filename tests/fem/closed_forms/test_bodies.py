@@ -8,8 +8,9 @@ import pytest
 from places import HORIZONTAL
 
 import spinlev as sl
-from spinlev.fem.closed_forms import closed_form_error, fields_of_magnets, fields_of_sphere, volume_rule
-from spinlev.geometry.basics import MU_0
+from spinlev.fem.closed_forms.moments import volume_rule
+from spinlev.fem.closed_forms.uniform import closed_form_error, fields_of_magnets, fields_of_sphere
+from spinlev.geometry.common import MU_0
 
 MAGNET = sl.load_scene(HORIZONTAL).rotor[0]
 AROUND = np.random.default_rng(3).uniform(-9e-3, 9e-3, size=(200, 3))

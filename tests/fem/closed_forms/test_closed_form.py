@@ -4,12 +4,14 @@ import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
 
-from spinlev.fem.closed_forms import UniformField
-from spinlev.fem.harmonics import CompiledField, uniform_moments
-from spinlev.fem.rotor_tables import RangeError, RotorTable
-from spinlev.fem.verification import coulomb_field
-from spinlev.geometry.basics import Box, rotation_matrix
-from spinlev.geometry.bodies import Magnet, horizontal, tilt, vertical
+from spinlev.fem.closed_forms.uniform import UniformField
+from spinlev.fem.elements.second_opinion import coulomb_field
+from spinlev.fem.harmonics.expansion import uniform_moments
+from spinlev.fem.harmonics.expressions import CompiledField
+from spinlev.fem.rotor.table import RangeError, RotorTable
+from spinlev.geometry.magnets import Magnet
+from spinlev.geometry.rotor import horizontal, tilt, vertical
+from spinlev.geometry.shapes import Box, rotation_matrix
 
 ROTORS = {
     "horizontal": horizontal(0.002, 0.01, 1.305, 1.0),

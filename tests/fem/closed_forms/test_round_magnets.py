@@ -5,11 +5,11 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from spinlev.fem.closed_forms import remanent_field
-from spinlev.fem.closed_forms.round_magnets import round_slope, round_tensor
-from spinlev.fem.rotor_tables import rotor_table
-from spinlev.geometry.basics import Cylinder, Ring, Sphere, rotation_matrix
-from spinlev.geometry.bodies import Magnet
+from spinlev.fem.closed_forms.round import round_slope, round_tensor
+from spinlev.fem.closed_forms.uniform import remanent_field
+from spinlev.fem.rotor.choice import rotor_table
+from spinlev.geometry.magnets import Magnet
+from spinlev.geometry.shapes import Cylinder, Ring, Sphere, rotation_matrix
 
 POLARIZATION = np.array([1.1, -0.4, 0.6])
 TURN = rotation_matrix((25.0, -40.0, 10.0))

@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from spinlev.fem.closed_forms import Dipole, HomogeneousField, PolarizedCuboid, Racetrack
-from spinlev.fem.closed_forms.newton import attraction, newton_potential
-from spinlev.geometry.basics import MU_0, Box
+from spinlev.fem.closed_forms.cuboid import attraction, newton_potential
+from spinlev.fem.closed_forms.potentials import Dipole, HomogeneousField, PolarizedCuboid, Racetrack
+from spinlev.geometry.common import MU_0
+from spinlev.geometry.shapes import Box
 
 COIL = Racetrack((0.194, 0.1, 0.099), (0.2, 0.2), 0.1, 0.025, 0.05, 2742.0)
 POINTS = np.array([[0.021, 0.004, -0.013], [-0.03, 0.05, 0.02], [0.0, 0.0, 0.025]])

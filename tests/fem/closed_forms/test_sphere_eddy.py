@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 from scipy.special import spherical_in
 
-from spinlev.fem.closed_forms import rotating_torque
-from spinlev.fem.closed_forms.sphere_eddy import SERIES, polarizability, thin_field_torque
-from spinlev.geometry.basics import MU_0
+from spinlev.fem.closed_forms.eddy_sphere import SERIES, polarizability, rotating_torque, thin_field_torque
+from spinlev.geometry.common import MU_0
 
 RADIUS, CONDUCTIVITY = 6.35e-3, 6.7e5
 

@@ -10,14 +10,15 @@ import ngsolve
 import pytest
 from netgen.meshing import NgException
 
-from spinlev.fem.eddy_currents import EddySpace, ShiftedSystem
-from spinlev.fem.elements import TooLargeError, memory
-from spinlev.fem.elements.memory import free_memory, memory_need
-from spinlev.fem.magnetostatics import refinement_of
-from spinlev.fem.magnetostatics.solver import assemble
-from spinlev.fem.rotor_tables import rotor_table
-from spinlev.geometry.bodies import horizontal, vertical
-from spinlev.geometry.meshes import MeshSettings, mesh_magnets, plate_mesh
+from spinlev.fem.elements import condensed as memory
+from spinlev.fem.elements.condensed import TooLargeError, free_memory, memory_need
+from spinlev.fem.elements.ladder import refinement_of
+from spinlev.fem.elements.magnetostatics import assemble
+from spinlev.fem.plate.eddy import EddySpace, ShiftedSystem
+from spinlev.fem.rotor.choice import rotor_table
+from spinlev.geometry.meshes.magnets import MeshSettings, mesh_magnets
+from spinlev.geometry.meshes.plate import plate_mesh
+from spinlev.geometry.rotor import horizontal, vertical
 
 ROTOR = vertical(0.014, 0.01, 1.305, 1.05)
 

@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from spinlev.fem.closed_forms import UniformField
-from spinlev.fem.harmonics import CompiledField, uniform_moments
-from spinlev.fem.harmonics.compiled import FEW
-from spinlev.fem.verification import coulomb_field
-from spinlev.geometry.basics import Box
-from spinlev.geometry.bodies import Magnet
+from spinlev.fem.closed_forms.uniform import UniformField
+from spinlev.fem.elements.second_opinion import coulomb_field
+from spinlev.fem.harmonics.expansion import uniform_moments
+from spinlev.fem.harmonics.expressions import FEW, CompiledField
+from spinlev.geometry.magnets import Magnet
+from spinlev.geometry.shapes import Box
 
 WAY = np.random.default_rng(3).normal(size=(100, 3))
 POINTS = np.linspace(0.013, 0.04, 100)[:, None] * WAY / np.linalg.norm(WAY, axis=1)[:, None]

@@ -3,9 +3,10 @@
 import numpy as np
 import pytest
 
-from spinlev.fem.harmonics import MultipoleExpansion, rotated_harmonics, uniform_moments
-from spinlev.geometry.basics import Box, rotation_matrix
-from spinlev.geometry.bodies import Magnet
+from spinlev.fem.harmonics.expansion import MultipoleExpansion, uniform_moments
+from spinlev.fem.harmonics.solid import rotated_harmonics
+from spinlev.geometry.magnets import Magnet
+from spinlev.geometry.shapes import Box, rotation_matrix
 
 RNG = np.random.default_rng(5)
 WAYS = RNG.normal(size=(40, 3))

@@ -4,11 +4,12 @@ import numpy as np
 import pytest
 from article import PERMEABLE
 
-from spinlev.fem.harmonics import field_at_center, multipole_force, multipole_torque
-from spinlev.fem.mutual import cached_mutual_table, rotor_ladder, two_body
-from spinlev.fem.mutual.answer_samples import places_around
-from spinlev.fem.mutual.permeable_sphere import induced_sources, permanent_sources
-from spinlev.geometry.bodies import horizontal
+from spinlev.fem.harmonics.interior import field_at_center, multipole_force, multipole_torque
+from spinlev.fem.mutual.grid import induced_sources, permanent_sources
+from spinlev.fem.mutual.making import cached_mutual_table
+from spinlev.fem.mutual.response import rotor_ladder, two_body
+from spinlev.fem.mutual.samples import places_around
+from spinlev.geometry.rotor import horizontal
 
 MAGNETS = horizontal(2e-3, 10e-3, 1.305, 1.05)
 DEGREE = 20

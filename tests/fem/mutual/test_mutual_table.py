@@ -8,16 +8,17 @@ import pytest
 from article import PERMEABLE
 from numpy.polynomial import legendre
 
-from spinlev.fem.harmonics import Ball, field_at_center, gradient_at_center
-from spinlev.fem.mutual import answers, cached_mutual_table, enough_degree, mutual_table, two_body
-from spinlev.fem.mutual.answer_samples import places_around
-from spinlev.fem.mutual.permeable_sphere import answer_to_charge, image_weights, reflection
-from spinlev.fem.mutual.rotor_response import rotor_response
-from spinlev.fem.mutual.table_file import FORMAT, from_dataset, to_dataset
-from spinlev.fem.storage import read_checked, write_checked
-from spinlev.geometry.basics import Box, InputError, rotation_matrix
-from spinlev.geometry.bodies import Magnet, horizontal, tilt, vertical
-from spinlev.geometry.meshes import MeshSettings, mesh_magnets
+from spinlev.fem.cache import read_checked, write_checked
+from spinlev.fem.harmonics.interior import Ball, field_at_center, gradient_at_center
+from spinlev.fem.mutual.grid import answer_to_charge, image_weights, reflection
+from spinlev.fem.mutual.making import FORMAT, answers, cached_mutual_table, from_dataset, mutual_table, to_dataset
+from spinlev.fem.mutual.response import enough_degree, rotor_response, two_body
+from spinlev.fem.mutual.samples import places_around
+from spinlev.geometry.common import InputError
+from spinlev.geometry.magnets import Magnet
+from spinlev.geometry.meshes.magnets import MeshSettings, mesh_magnets
+from spinlev.geometry.rotor import horizontal, tilt, vertical
+from spinlev.geometry.shapes import Box, rotation_matrix
 
 MAGNETS = horizontal(2e-3, 10e-3, 1.305, 1.05)
 FINER = MeshSettings(magnet_size=0.6)

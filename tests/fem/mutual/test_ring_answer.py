@@ -7,10 +7,11 @@ from second_opinions.both_bodies import solve_both_bodies
 from second_opinions.ring_segments import RingOfSegments
 from second_opinions.two_bodies import mesh_two_bodies
 
-from spinlev.fem.harmonics import field_at_center, gradient_at_center
-from spinlev.fem.mutual import Wrench, answers, cached_mutual_table, rotor_ladder, two_body
-from spinlev.geometry.basics import Ring
-from spinlev.geometry.bodies import Magnet
+from spinlev.fem.harmonics.interior import field_at_center, gradient_at_center
+from spinlev.fem.mutual.making import answers, cached_mutual_table
+from spinlev.fem.mutual.response import Wrench, rotor_ladder, two_body
+from spinlev.geometry.magnets import Magnet
+from spinlev.geometry.shapes import Ring
 
 INNER, OUTER, HEIGHT = 4e-3, 10e-3, 6e-3
 RING = (Magnet(Ring(OUTER, INNER, HEIGHT), np.array([1.3, 0.0, 0.0]), 1.05),)

@@ -7,25 +7,24 @@ from second_opinions.both_bodies import solve_both_bodies
 from second_opinions.permeable_sphere import inner_field
 from second_opinions.two_bodies import mesh_two_bodies
 
-from spinlev.fem.closed_forms import remanent_field
-from spinlev.fem.harmonics import (
+from spinlev.fem.closed_forms.uniform import remanent_field
+from spinlev.fem.harmonics.expansion import moments_of_magnetization, uniform_moments
+from spinlev.fem.harmonics.interior import (
     Ball,
-    derivative,
     dipole_sources,
+    field_at_center,
     from_magnetization,
-    moments_of_magnetization,
+    moment,
     multipole_force,
     multipole_torque,
-    outer_sums,
-    uniform_moments,
 )
-from spinlev.fem.harmonics.interior import field_at_center, moment
-from spinlev.fem.mutual import TwoBodyError, enough_degree, rotor_ladder, two_body, two_body_ladder
-from spinlev.fem.mutual.permeable_sphere import induced_sources, permanent_sources
-from spinlev.fem.rotor_tables import rotor_table
-from spinlev.geometry.basics import MU_0
-from spinlev.geometry.bodies import horizontal, vertical
-from spinlev.geometry.scenes import Floater
+from spinlev.fem.harmonics.solid import derivative, outer_sums
+from spinlev.fem.mutual.grid import induced_sources, permanent_sources
+from spinlev.fem.mutual.response import TwoBodyError, enough_degree, rotor_ladder, two_body, two_body_ladder
+from spinlev.fem.rotor.choice import rotor_table
+from spinlev.geometry.common import MU_0
+from spinlev.geometry.rotor import horizontal, vertical
+from spinlev.geometry.scene.contents import Floater
 
 BALL = Ball(np.array([0.001, -0.002, -0.015]), RADIUS)
 DIRECTION = np.array([0.48, 0.36, 0.8])

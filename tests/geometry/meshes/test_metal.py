@@ -4,8 +4,8 @@ import ngsolve as ng
 import numpy as np
 import pytest
 
-from spinlev.geometry.basics import Box, Cylinder, rotation_matrix
-from spinlev.geometry.meshes import mesh_metal
+from spinlev.geometry.meshes.metal import mesh_metal
+from spinlev.geometry.shapes import Box, Cylinder, rotation_matrix
 
 TURN = rotation_matrix((20.0, -35.0, 50.0))
 CENTER = np.array([1e-3, -2e-3, 4e-3])

@@ -7,9 +7,10 @@ import numpy as np
 import pytest
 from places import QUICK
 
-from spinlev.studies.catalogue import CATALOGUE, cite_job, figures_of, report_job
-from spinlev.studies.catalogue.drawings import read_result
-from spinlev.studies.results import figure_bytes
+from spinlev.studies.catalogue.entries import CATALOGUE
+from spinlev.studies.catalogue.report import cite_job, report_job
+from spinlev.studies.catalogue.runner import figures_of, read_result
+from spinlev.studies.figures.style import figure_bytes
 
 STORED = sorted(QUICK.glob("*.nc"))
 

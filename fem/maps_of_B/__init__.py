@@ -1,0 +1,1 @@
+"""Measured and foreign maps of B as field tables."""

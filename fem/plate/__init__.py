@@ -1,0 +1,1 @@
+"""Eddy currents in a conducting plate, as passive networks."""

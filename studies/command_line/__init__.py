@@ -1,1 +1,0 @@
-"""How does a user call the program?"""

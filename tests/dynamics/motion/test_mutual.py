@@ -1,0 +1,166 @@
+"""Mutual magnetisation in the motion: known numbers of the default scene, derivatives, the ledger."""
+
+from dataclasses import replace
+
+import heyoka as hy
+import numpy as np
+import pytest
+from article import PERMEABLE
+
+from spinlev.dynamics.equilibria.search import find_equilibria
+from spinlev.dynamics.flights.balls import LARGE, SMALL, Balls, ball_equations, compile_local_flight
+from spinlev.dynamics.flights.batch import fly_together
+from spinlev.dynamics.flights.flight import integrate
+from spinlev.dynamics.motion.effect import Interaction
+from spinlev.dynamics.motion.equations import parameters
+from spinlev.dynamics.motion.mutual import Mutual
+from spinlev.dynamics.motion.rates import Rates
+from spinlev.dynamics.motion.state import Parameter, Scales
+from spinlev.fem.mutual.making import cached_mutual_table
+from spinlev.fem.mutual.response import rotor_ladder, two_body
+from spinlev.fem.rotor.choice import cached_rotor_table
+from spinlev.geometry.rotor import horizontal, tilt, vertical
+from spinlev.geometry.scene.contents import Drag, Scene
+
+SCENE = Scene(110.0, horizontal(2e-3, 10e-3, 1.305, 1.05), PERMEABLE, Drag(0.0, 0.0))
+SCALES = Scales.of(SCENE)
+
+
+def interaction(scene):
+    table = cached_rotor_table(scene.rotor, "fem", 3e-6, print, scene.floater.radius)[0]
+    answers = cached_mutual_table(scene.rotor, scene.floater, print)[0]
+    return Interaction(table, (Mutual(answers, scene.floater.moment),))
+
+
+@pytest.fixture(scope="module")
+def mutual():
+    return interaction(SCENE)
+
+
+@pytest.fixture(scope="module")
+def start(mutual):
+    return find_equilibria(SCENE, mutual)[0]
+
+
+def test_the_default_rotor_moves_its_floater_as_known(mutual, start):
+    """PHYSICS.md, tiles and Newell's tensors: 8.5504 ± 0.001 mN at the rigid equilibrium, and 0.0902 mm higher.
+
+    The table knows the force to 2e-4.
+    """
+    rigid = find_equilibria(SCENE, mutual.field)[0]
+    state, values = SCALES.pack(rigid.state)[None], parameters(SCENE, SCALES)
+    change = Rates(mutual)(state, values)[0] - Rates(mutual.field)(state, values)[0]
+    force = change[0, 3:6] * PERMEABLE.mass * SCALES.length / SCALES.time**2
+    print(f"force {force[2] * 1e3:.5f} mN, {1e3 * (start.position[2] - rigid.position[2]):.5f} mm higher")
+    assert force[2] * 1e3 == pytest.approx(8.5504, abs=0.001)
+    assert start.position[2] - rigid.position[2] == pytest.approx(0.0902e-3, abs=0.0001e-3)
+    assert start.position_error < 2e-7
+
+
+def test_rates_and_their_derivatives_agree(mutual, start):
+    """What stands for the table about a pose has its second derivatives: against differences of the rates."""
+    rates, values, state = Rates(mutual), parameters(SCENE, SCALES), SCALES.pack(start.state)
+    slope, step = rates(state[None], values)[1][0], 1e-6
+    for k in (0, 1, 2, 6, 7, 8):
+        ends = state + step * np.array([1, -1])[:, None] * np.eye(12)[k]
+        found = rates(ends, values)[0]
+        np.testing.assert_allclose((found[0] - found[1]) / (2 * step), slope[:, k], atol=1e-8 * np.abs(slope).max())
+
+
+def test_rough_rates_leave_out_all_answers_but_the_uniform_one(mutual, start):
+    """A search begins with them: they are the rates with a table whose points answer nothing."""
+    table = mutual.effects[0].table
+    nothing = [{name: 0 * getattr(g, name) for name in ("strengths", "degrees", "returned")} for g in table.grids]
+    grids = [replace(grid, **zeros) for grid, zeros in zip(table.grids, nothing, strict=True)]
+    silent = replace(
+        table, grids=tuple(grids), coupling=0 * table.coupling, pairs=0 * table.pairs, mixed=0 * table.mixed
+    )
+    state, values, rates = SCALES.pack(start.state)[None], parameters(SCENE, SCALES), Rates(mutual)
+    rough = rates.rough(state, values)
+    for part, known in zip(
+        rough, Rates(replace(mutual, effects=(Mutual(silent, PERMEABLE.moment),)))(state, values), strict=True
+    ):
+        np.testing.assert_allclose(part, known, rtol=1e-12, atol=1e-12)
+    assert np.abs(rough[0] - rates(state, values)[0]).max() > 1e-4
+
+
+@pytest.mark.parametrize("formula", [SMALL, LARGE])
+def test_in_a_ball_force_and_torque_come_from_one_energy(mutual, start, formula):
+    """∇J · rates = 0 at any state in the ball, and the rates are those of the table."""
+    from spinlev.dynamics.flights.balls import fitted
+
+    equations, _ = ball_equations(SCENE, mutual, formula)
+    slopes = [hy.diff(hy.sum(list(equations.jacobi)), v) for v in equations.variables]
+    terms = [a * b for a, b in zip(slopes, equations.rates, strict=True)]
+    function = hy.cfunc([*terms, *equations.rates], list(equations.variables), compact_mode=True, opt_level=0)
+    numbers, error = Balls(SCENE, mutual.evaluate, formula, 0.1, fitted(mutual, formula)).at(start.position)
+    values = np.concatenate([parameters(SCENE, SCALES), [0.0], numbers])
+    states = np.tile(SCALES.pack(start.state), (6, 1))
+    generator = np.random.default_rng(2)
+    states[:, :3] += 0.02 * generator.normal(size=(6, 3))
+    states[:, 3:] += 0.1 * generator.normal(size=(6, 9))
+    states[:, 6:9] /= np.linalg.norm(states[:, 6:9], axis=1)[:, None]
+    found = function(np.ascontiguousarray(states.T), pars=np.tile(values[: function.nparams, None], 6)).T
+    assert np.abs(found[:, :-12].sum(axis=1)).max() < 1e-13 * np.abs(found).max()
+    exact = Rates(mutual)(states, parameters(SCENE, SCALES))[0]
+    weight = values[Parameter.GRAVITY_Z]
+    assert error < 1e-5
+    assert np.abs(found[:, -12:] - exact)[:, 3:6].max() < 1e-4 * abs(weight)  # 1e-4 mm at the default bounce
+    np.testing.assert_allclose(found[:, -12:], exact, atol=1e-5 * np.abs(exact).max())
+
+
+def test_a_kicked_floater_keeps_the_jacobi_integral(mutual, start):
+    kicked = replace(start.state, velocity=start.state.velocity + np.array([5e-3, 3e-3, 12e-3]))
+    flight = integrate(SCENE, compile_local_flight(SCENE, mutual, 1.0, compact=True), kicked, 1.0)
+    assert flight.ended_by == "duration"
+    assert flight.energy_error < 1e-12
+    assert np.ptp(flight.lab.position[:, 2]) > 1e-4
+
+
+def test_a_floater_at_its_equilibrium_stays_there(mutual, start):
+    """The search and the flight have the energy in two forms; they part by the error of the ball."""
+    flight = integrate(SCENE, compile_local_flight(SCENE, mutual, 0.5, compact=True), start.state, 0.5)
+    assert np.ptp(flight.lab.position[:, 2]) < 2e-7
+
+
+def test_flights_in_lanes_of_which_some_stay_empty_are_those_alone(mutual, start):
+    """Three side by side: where nobody flies the equations are asked for all the same, and must be finite."""
+    scenes = [replace(SCENE, frequency=frequency) for frequency in (109.0, 110.0, 111.0)]
+    begun = replace(start.state, position=start.state.position + np.array([0.0, 0.0, 1e-4]))
+    flown = fly_together(scenes, mutual, [begun] * 3, 0.1)
+    for scene, found in zip(scenes, flown, strict=True):
+        alone = integrate(scene, compile_local_flight(scene, mutual, 0.1, compact=True), begun, 0.1)
+        assert np.abs(found.lab.position - alone.lab.position).max() < 1e-10 * 0.02
+        assert found.energy_error < 1e-12
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("rotor", "frequency", "part"),
+    [
+        (horizontal(1.5e-3, 10e-3, 1.305, 1.05), 150.0, 1e-3),
+        (horizontal(3e-3, 10e-3, 1.305, 1.05), 100.0, 1e-3),
+        (tilt(np.radians(10.0), 10e-3, 1.305, 1.05), 120.0, 1e-3),
+        (vertical(14e-3, 10e-3, 1.305, 1.05), 75.0, 1e-3),
+        (vertical(10e-3, 10e-3, 1.305, 1.05), 60.0, 1e-3),  # touching
+    ],
+)
+def test_equilibria_of_other_rotors_against_both_bodies(rotor, frequency, part):
+    """At the equilibrium the magnetostatics of both bodies differ by less than is stated, in force and in place.
+
+    Where floaters levitate, a radius off the rotor and farther, by less than a part of the answers and 1e-4 mm.
+    """
+    scene = replace(SCENE, frequency=frequency, rotor=rotor)
+    whole = interaction(scene)
+    found = find_equilibria(scene, whole)[0]
+    (fine,) = rotor_ladder(rotor, (3,))
+    both = two_body(fine, PERMEABLE, found.position, found.state.moment, None, 1e-8)
+    added, (field, gradient) = both.total - both.rigid, whole.evaluate(found.position[None])
+    force, _ = whole.effects[0].wrench(found.position[None], found.state.moment[None], field, gradient)
+    apart, size = np.linalg.norm(force[0] - added.force), np.linalg.norm(added.force)
+    stiffness = PERMEABLE.mass * (2 * np.pi * min(found.frequencies_hz)) ** 2  # of the bounce, the softest
+    assert apart < whole.effects[0].table.relative_error(found.position)[0][0] * size
+    assert apart / stiffness < found.position_error
+    if min(magnet.box.distance(found.position) for magnet in rotor) > 2 * PERMEABLE.radius:
+        assert apart < part * size
+        assert apart / stiffness < 1e-7

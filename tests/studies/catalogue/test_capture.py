@@ -1,0 +1,137 @@
+"""The study of capture: launches, shares and their errors, one small point, and what is drawn and said of a result."""
+
+import numpy as np
+import pytest
+from scipy.stats import binomtest, norm
+
+from spinlev.dynamics.flights.batch import ensemble
+from spinlev.dynamics.flights.over_plate import launched
+from spinlev.dynamics.flights.trajectory import DURATION
+from spinlev.studies.catalogue.capture import (
+    FARTHER,
+    HELD,
+    LEAN,
+    NEARER,
+    NO_EQUILIBRIUM,
+    SETTLED,
+    SIDEWAYS,
+    SPIN,
+    STUDY as CAPTURE,
+    WORDS,
+    Share,
+    field_of,
+    launches,
+    place_of,
+    plate_under,
+    seed_of,
+)
+from spinlev.studies.cli.options import Workers
+from spinlev.studies.sweep import swept
+
+POINT = {"configuration": "vertical", "measure": 14.0, "part": 0.5, "batch": 0, "flights": 12, "checked": 0}
+
+
+@pytest.fixture(scope="module")
+def place():
+    return place_of("vertical", 14.0, 0.5)
+
+
+def test_points_are_ten_thousand_launches_of_every_rotor_that_was_tried():
+    points = CAPTURE.points(False)
+    flights = {}
+    for p in points:
+        key = p["configuration"], p["measure"], p["part"]
+        flights[key] = flights.get(key, 0) + p["flights"]
+    assert len(flights) == (8 + 6 + 9) * 3
+    assert set(flights.values()) == {10000}
+    first = points[: len(flights)]
+    assert len({(p["configuration"], p["measure"], p["part"]) for p in first}) == len(flights)  # equal shares at a stop
+
+
+def test_errors_of_shares_are_those_of_another_program():
+    one_sigma = norm.cdf(1) - norm.cdf(-1)
+    for hits, trials in ((0, 10), (3, 24), (500, 1000), (7, 7)):
+        known = binomtest(hits, trials).proportion_ci(one_sigma, method="wilson")
+        assert Share(hits, trials).bounds == pytest.approx((known.low, known.high), abs=1e-12)
+    assert np.isnan(Share(0, 0).value)
+    assert [str(share) for share in (Share(142, 200), Share(3, 4000), Share(0, 4000), Share(0, 10_000))] == [
+        "71.0 ± 3.2 %",
+        "0.07 ± 0.05 %",
+        "0.00 ± 0.01 %",
+        "0.000 ± 0.005 %",
+    ]
+
+
+def test_launches_are_within_their_bounds_evenly_and_the_same_for_the_same_seed(place):
+    found, again = (launches(place, 4000, [1, 2]) for _ in range(2))
+    for a, b in zip(found.states.vectors, again.states.vectors, strict=True):
+        np.testing.assert_array_equal(a, b)
+    assert not np.array_equal(launches(place, 4000, [1, 3]).farther, found.farther)
+    evenly = (
+        (found.farther + NEARER) / (FARTHER + NEARER),
+        (found.sideways / SIDEWAYS) ** 2,
+        (1 - np.cos(found.lean)) / (1 - np.cos(LEAN)),
+        (found.spin / SPIN + 1) / 2,
+    )
+    for share in evenly:  # of a uniform variable; five standard deviations of 4000 draws
+        assert share.min() >= 0
+        assert share.max() <= 1
+        assert share.mean() == pytest.approx(0.5, abs=5 / np.sqrt(12 * 4000))
+        assert share.std() == pytest.approx(np.sqrt(1 / 12), rel=0.05)
+    states = found.states
+    np.testing.assert_allclose(np.hypot(*states.position.T[:2]), found.sideways, atol=1e-15)
+    np.testing.assert_allclose(np.sum(states.moment**2, axis=1), 1, atol=1e-14)
+    along = np.sum(states.spin * states.moment, axis=1) / place.scene.angular_velocity
+    np.testing.assert_allclose(along, found.spin, atol=1e-14)
+
+
+def test_seeds_differ_from_rotor_to_rotor_and_from_batch_to_batch():
+    asked = [("vertical", 14.0, 0.5, 0), ("vertical", 16.0, 0.5, 0), ("tilt", 14.0, 0.5, 0), ("vertical", 14.0, 0.5, 1)]
+    assert len({tuple(seed_of(*a)) for a in asked}) == 4
+
+
+def test_a_small_point_is_computed_drawn_and_told():
+    row = CAPTURE.compute(POINT)
+    assert set(np.unique(row["outcome"])) <= set(range(4))
+    held = (row["outcome"] == HELD).values
+    np.testing.assert_array_equal(row["levitated"].values[held], 1.0)
+    assert (row["levitated"].values[~held] < 1.0).all()
+    assert 2 <= held.sum() <= 11  # the share of 200 flights is 57 %: beyond this is one in thousands
+    other = row.assign(batch=row["batch"] + 1)
+    shorter = row.isel(flight=slice(0, 4)).assign_coords(measure=("case", [18.0])) if "measure" in row.coords else None
+    result = CAPTURE.gather([row, other, *([shorter] if shorter is not None else [])])
+    numbers = CAPTURE.numbers(result)["shares"]
+    assert numbers[0]["flights"] == 24
+    assert numbers[0]["held"] == pytest.approx(held.mean())
+    assert numbers[0]["held"] + sum(numbers[0][word.replace(" ", "_")] for word in WORDS[1:]) == pytest.approx(1)
+    assert f"{row['rotor_frequency'].item():.1f} Hz" in CAPTURE.report(result)[0]
+    beyond = int(sum(result["left_plate_table"].values.ravel() == 1))
+    assert any(line.startswith(f"{beyond} of ") and "plate's table" in line for line in CAPTURE.report(result))
+    for draw in CAPTURE.figures.values():
+        assert draw(result).axes
+
+
+def test_a_rotor_without_a_stable_frequency_is_said_not_left_out():
+    row = CAPTURE.compute({**POINT, "configuration": "tilt", "measure": 45.0})
+    assert (row["outcome"] == NO_EQUILIBRIUM).all()
+    assert "no stable frequency" in CAPTURE.report(CAPTURE.gather([row]))[0]
+    assert CAPTURE.numbers(CAPTURE.gather([row]))["shares"][0]["frequency_hz"] is None
+
+
+@pytest.mark.slow
+def test_without_the_plates_currents_nothing_is_held(place):
+    begun = launches(place, 200, seed_of("vertical", 14.0, 0.5, 0))
+    braked = launched(place.scene, field_of(place), plate_under(place, place.scene), begun.states, SETTLED)
+    unbraked = ensemble(place.scene, field_of(place), begun.states, SETTLED)
+    held, none = (Share(int(np.sum(ended.ended_by == DURATION)), 200) for ended in (braked, unbraked))
+    print(f"\nheld over aluminium {held}, over a plate that does not conduct {none}")
+    assert 0.6 < held.value < 0.8
+    assert none.hits == 0
+
+
+@pytest.mark.slow
+def test_the_number_of_workers_does_not_matter(tmp_path):
+    points = {k: {**POINT, "batch": k, "flights": 10, "checked": 1 - k} for k in range(2)}
+    one, two = (swept("capture", CAPTURE, points, Workers(workers=n), tmp_path / str(n)) for n in (1, 2))
+    for name in one.data_vars:
+        np.testing.assert_array_equal(one[name].values, two[name].values)

@@ -1,0 +1,31 @@
+"""A conductor of the rotor where the floater would levitate is a wrong scene."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from article import BALL
+
+import spinlev as sl
+from spinlev.dynamics.flights.flight import most_like_levitation
+from spinlev.geometry.common import InputError
+from spinlev.studies.levitation import check_way
+
+BLOCK = {"size_mm": [4.0, 4.0, 4.0], "center_mm": [0.0, 0.0, -8.0], "conductivity_S_m": 1.4e6}
+
+
+def test_a_conductor_in_the_floaters_way_is_said_with_its_depth():
+    """The block ends 10 mm below the axis of the cube; a floater at 17 mm begins at 10.65 mm, at 16 mm at 9.65 mm."""
+    rotor = sl.horizontal(displacement_mm=0.0, edge_mm=10.0, remanence_T=1.305, conductors=[BLOCK])
+    scene = sl.scene(frequency_hz=150.0, rotor=rotor, floater=BALL)
+    check_way(scene, np.array([0.0, 0.0, -17e-3]))
+    with pytest.raises(InputError, match=r"conductors\[0\] must leave the floater's way free.* by 0.35 mm"):
+        check_way(scene, np.array([0.0, 0.0, -16e-3]))
+
+
+def test_where_a_brake_undoes_every_equilibrium_the_least_growing_is_the_floaters_way():
+    """As found for a block of steel 14 mm below the cube: 702 /s beside the rotor, 2.4 /s where it would float."""
+    beside, below, far = (
+        SimpleNamespace(growth_per_s=growth, stable=False, without=None) for growth in (702.0, 2.4, 36.0)
+    )
+    assert most_like_levitation([beside, below, far]) is below
