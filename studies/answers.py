@@ -24,7 +24,7 @@ from ..geometry.common import MU_0, Array, millimetres
 from .cli.console import detail
 from .effects import PLATE_NOT_MODELLED, effects_answer
 from .levitation import Levitation
-from .results import EQUILIBRIUM_FIELDS
+from .result import EQUILIBRIUM_FIELDS
 
 
 def field_answer(table: FieldTable, points: Array) -> dict[str, Any]:

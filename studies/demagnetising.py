@@ -18,7 +18,7 @@ from .cli.console import note, to_json
 from .figures.pictures import working_point_figure
 from .figures.style import save_figures
 from .levitation import Levitation
-from .results import AXIS, variable, write_dataset
+from .result import AXIS, variable, write_dataset
 
 STEPS, LEVELS = 101, 201
 """Points across a section; levels of the field that are kept of a magnet."""

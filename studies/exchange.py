@@ -25,7 +25,7 @@ from .cli.options import Models
 from .figures.pictures import plate_currents
 from .figures.style import NAMES, PAGE, panels, save_figures, styled
 from .levitation import Levitation, sources
-from .results import write_dataset
+from .result import write_dataset
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -24,7 +24,7 @@ from .cli.console import heard, note
 from .cli.options import FieldModel, InteractionModel, Models, PlateModel
 from .demagnetising import working_point_dataset
 from .levitation import Levitation
-from .results import found_dataset, lowering_times, trajectory_dataset, variable
+from .result import found_dataset, lowering_times, trajectory_dataset, variable
 
 UNITS = {"offset_mm": 1e-3, "position_mm": 1e-3, "velocity_mm_s": 1e-3, "moment": 1.0, "spin_hz": 2 * np.pi}
 """SI units of the keys of `[start]`."""

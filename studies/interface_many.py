@@ -40,7 +40,7 @@ from .interface import drawn_starts, given_starts
 from .levitation import Levitation, given_scene
 from .processes import mapped
 from .question import Question
-from .results import AXIS, variable
+from .result import AXIS, variable
 from .study import Study
 from .sweep import forget, swept
 

@@ -26,7 +26,7 @@ from ..geometry.scene.files import changed, scene_digest, scene_keys, scene_text
 from .answers import kind_of_flight
 from .cli.options import Models, Quantity, positive
 from .levitation import Levitation
-from .results import AXIS, found_dataset, variable
+from .result import AXIS, found_dataset, variable
 from .rotor import equations_key, nearest_faces
 from .study import Point
 

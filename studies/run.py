@@ -45,7 +45,7 @@ from .figures.renderer import Drawer, RenderError, render
 from .figures.run import field_figure, force_figure, trajectory_figure
 from .figures.style import NAMES, save_figures
 from .levitation import Levitation
-from .results import axis_dataset, curve_dataset, equilibria_dataset, lowering_times, trajectory_dataset, write_dataset
+from .result import axis_dataset, curve_dataset, equilibria_dataset, lowering_times, trajectory_dataset, write_dataset
 
 Job = tuple[Mapping[str, Any], list[str]]
 """Numbers for a program, lines for a person."""

@@ -18,7 +18,7 @@ import xarray as xr
 from spinlev import draw, load_scene, parse_scene, run_study, stability
 from spinlev.studies.catalogue.entries import CATALOGUE
 from spinlev.studies.figures.style import panels, styled
-from spinlev.studies.results import variable
+from spinlev.studies.result import variable
 from spinlev.studies.study import Study, by_case
 
 TEXT = load_scene(files("spinlev.scenes") / "horizontal.toml").text

@@ -30,7 +30,7 @@ from ...geometry.scene.contents import Lowering, Plate, Scene
 from ...geometry.shapes import Box
 from ..figures.style import PAGE, PALETTE, legend_below, panels, styled
 from ..levitation import sources
-from ..results import variable
+from ..result import variable
 from ..study import Point, Study, by_case, cases_with, one_case
 from .article import (
     CONFIGURATIONS,

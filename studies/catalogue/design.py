@@ -20,7 +20,7 @@ from ...geometry.common import MU_0, Array
 from ...geometry.scene.contents import Scene
 from ..cli.console import note
 from ..figures.style import PAGE, PALETTE, panels, styled
-from ..results import variable
+from ..result import variable
 from ..study import Point, Study, by_case, cases_with, one_case
 from .article import CONFIGURATIONS, FLOATER, REMANENCE, article_scene, axis_label, levitation_of
 

@@ -18,7 +18,7 @@ from ...geometry.common import Array
 from ...geometry.magnets import Magnet
 from ...geometry.rotor import horizontal, tilt, vertical
 from ..figures.style import PAGE, panels, styled
-from ..results import variable
+from ..result import variable
 from ..study import study_of_one
 
 EDGE, REMANENCE, PERMEABILITY = 0.01, 1.305, 1.05

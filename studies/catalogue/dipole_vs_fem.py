@@ -16,7 +16,7 @@ from ...dynamics.motion.rates import Rates
 from ...geometry.common import Array
 from ...geometry.scene.contents import Scene
 from ..figures.style import PAGE, PALETTE, panels, styled
-from ..results import variable
+from ..result import variable
 from ..study import Point, Study, by_case, one_case
 from .article import TITLES, article_scene, by_configuration, levitated_rotors, levitation_of, rotor_label, rotor_panels
 

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from ...geometry.common import Array
 from ..figures.style import PAGE, PALETTE, panels, styled
-from ..results import variable
+from ..result import variable
 from ..study import Point, Study
 from .experiment_design import cached_row
 from .experiment_facts import FACTS, NAMES, QUICK_FACTS, UNKNOWNS, Fact, Models

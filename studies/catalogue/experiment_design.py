@@ -39,7 +39,7 @@ from ...geometry.rotor import horizontal, tilt, vertical
 from ...geometry.scene.contents import Drag, Scene
 from ...geometry.solids import moved
 from ..cli.options import FieldModel
-from ..results import variable
+from ..result import variable
 from ..study import Point
 from .article import EDGE, FLOATER, REMANENCE, levitation_of
 from .upper_limit import spacer

@@ -13,7 +13,7 @@ from matplotlib.ticker import FuncFormatter
 from ...geometry.common import Array
 from ..figures.style import DASHES, NAMES, PALETTE, styled
 from ..levitation import sources
-from ..results import variable
+from ..result import variable
 from ..study import Point, Study, by_case, cases_with, one_case
 from .article import CONFIGURATIONS, article_scene, field, levitation_of, one_panel_each
 

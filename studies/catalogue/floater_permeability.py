@@ -17,7 +17,7 @@ from ...geometry.scene.files import load_scene
 from ..cli.options import Models, shipped_scene
 from ..figures.style import PAGE, PALETTE, panels, styled
 from ..levitation import Levitation
-from ..results import AXIS, variable
+from ..result import AXIS, variable
 from ..study import study_of_one
 
 LEVELS = (0.1, 0.01, 1e-3, 1e-4)

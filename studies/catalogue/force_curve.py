@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from ...geometry.common import Array
 from ..figures.style import PAGE, PALETTE, panels, styled
 from ..levitation import Levitation, sources
-from ..results import variable
+from ..result import variable
 from ..study import Point, Study, by_case, cases_with, one_case
 from .article import CONTACT, FLOATER, WEIGHT, article_scene, force, levitation_of
 

@@ -25,7 +25,7 @@ from ...geometry.rotor import horizontal, tilt, vertical
 from ...geometry.shapes import Box, Cylinder, Ring, rotation_matrix
 from ..cli.console import progress
 from ..figures.style import PAGE, PALETTE, panels, styled
-from ..results import variable
+from ..result import variable
 from ..study import study_of_one
 
 CUBE = (0.01, 0.01, 0.01)

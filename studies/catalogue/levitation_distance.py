@@ -18,7 +18,7 @@ from ...fem.rotor.table import FieldTable
 from ...geometry.common import Array
 from ...geometry.scene.contents import Scene
 from ..figures.style import styled
-from ..results import Columns, columns, variable
+from ..result import Columns, columns, variable
 from ..study import Point, Study, by_case, cases_with, one_case
 from .article import (
     CONFIGURATIONS,

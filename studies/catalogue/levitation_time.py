@@ -23,7 +23,7 @@ from ...geometry.rotor import horizontal, tilt, vertical
 from ...geometry.scene.contents import Drag, Floater, Scene
 from ..cli.options import FieldModel
 from ..figures.style import PAGE, PALETTE, panels, styled
-from ..results import variable
+from ..result import variable
 from ..study import Point, Study
 from .article import levitation_of
 

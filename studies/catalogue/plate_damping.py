@@ -21,7 +21,7 @@ from ...geometry.shapes import Box, rotation_matrix
 from ..cli.options import PlateModel
 from ..figures.style import PAGE, PALETTE, legend_below, panels, styled
 from ..levitation import Levitation
-from ..results import AXIS, MODES, Columns, columns, variable
+from ..result import AXIS, MODES, Columns, columns, variable
 from ..study import Point, Study, cases_with
 from .article import (
     CONFIGURATIONS,

@@ -35,7 +35,7 @@ from ..figures.turnable import page
 from ..figures.view import Currents, Turnable, current_places
 from ..levitation import Levitation, sources
 from ..question import Question
-from ..results import write_dataset
+from ..result import write_dataset
 from ..run import Job
 from ..study import Point, Study
 from ..sweep import forget, swept

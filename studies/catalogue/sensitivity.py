@@ -27,7 +27,7 @@ from ...geometry.common import Array
 from ...geometry.scene.contents import Floater, Scene
 from ..cli.options import FieldModel
 from ..figures.style import PAGE, PALETTE, panels, styled
-from ..results import variable
+from ..result import variable
 from ..study import Point, Study, by_case, one_case
 from .article import (
     CONFIGURATIONS,

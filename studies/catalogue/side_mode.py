@@ -13,7 +13,7 @@ from ...geometry.common import Array
 from ...geometry.scene.contents import Scene
 from ..figures.style import PAGE, PALETTE, panels, styled
 from ..levitation import sources
-from ..results import Columns, columns, variable
+from ..result import Columns, columns, variable
 from ..study import Point, Study, by_case, cases_with, one_case
 from .article import (
     CONFIGURATIONS,

@@ -35,7 +35,7 @@ from ...geometry.rotor import horizontal
 from ..cli.console import note
 from ..figures.style import PAGE, PALETTE, panels, styled
 from ..processes import safe_path
-from ..results import variable
+from ..result import variable
 from ..study import study_of_one
 
 Magnets = tuple[Magnet, ...]

@@ -21,7 +21,7 @@ from ...geometry.shapes import Box
 from ..cli.console import note
 from ..figures.style import COLORS, NAMES, PAGE, PALETTE, panels, styled
 from ..levitation import Levitation
-from ..results import variable
+from ..result import variable
 from ..study import Point, Study, by_case, cases_with, one_case
 from .article import (
     CONFIGURATIONS,

@@ -20,7 +20,7 @@ from ...geometry.common import Array
 from ...geometry.meshes.metal import ConductorMesh
 from ...geometry.meshes.plate import Block, graded_partition, hex_mesh, skin_depth
 from ..figures.style import PAGE, PALETTE, panels, styled
-from ..results import variable
+from ..result import variable
 from ..study import study_of_one
 
 CONDUCTIVITY = 3.526e7

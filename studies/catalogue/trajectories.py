@@ -24,7 +24,7 @@ from ...fem.rotor.table import FieldTable
 from ...geometry.common import Array
 from ...geometry.scene.contents import Scene
 from ..figures.style import PAGE, PALETTE, panels, styled
-from ..results import variable
+from ..result import variable
 from ..study import Point, Study, by_case, one_case
 from .article import FLIGHT, HIGHEST, article_scene, conducting, levitation_of, rotor_label
 

@@ -21,7 +21,7 @@ from ...geometry.rotor import Conductor
 from ...geometry.scene.contents import Scene
 from ...geometry.shapes import Box
 from ..figures.style import PAGE, PALETTE, legend_below, panels, styled
-from ..results import variable
+from ..result import variable
 from ..study import Point, Study, by_case, cases_with, one_case
 from .article import EDGE, FLIGHT, article_scene, conducting, levitated_rotors, levitation_of, rotor_label
 

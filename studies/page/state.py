@@ -25,7 +25,7 @@ from ..cli.console import to_json
 from ..cli.options import FieldModel, Models, PlateModel, finite
 from ..figures.style import PAGE, PALETTE, figure_bytes, panels, styled
 from ..levitation import Levitation
-from ..results import found_dataset, write_dataset
+from ..result import found_dataset, write_dataset
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -27,7 +27,7 @@ from spinlev.studies.cli import main as cli
 from spinlev.studies.cli.main import _status
 from spinlev.studies.figures.pictures import plate_currents, question_figure
 from spinlev.studies.figures.view import Currents, current_places
-from spinlev.studies.results import write_dataset
+from spinlev.studies.result import write_dataset
 
 
 @pytest.fixture(scope="module")

@@ -22,7 +22,7 @@ from spinlev.geometry.common import ComputationError, InputError
 from spinlev.studies import processes
 from spinlev.studies.cli.options import Workers
 from spinlev.studies.processes import safe_path
-from spinlev.studies.results import write_dataset
+from spinlev.studies.result import write_dataset
 from spinlev.studies.study import Study, by_case
 from spinlev.studies.sweep import Journal, SweepError, answered, forget, swept
 
