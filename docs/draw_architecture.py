@@ -22,20 +22,28 @@ Room = tuple[str, str]
 
 
 def rooms() -> dict[Room, set[Room]]:
-    """Every room with the rooms that it imports from."""
+    """Every room, and every module that lies in none, with those that it imports from at the top of its modules."""
     found: dict[Room, set[Room]] = {}
     for floor in FLOORS:
-        for path in sorted((ROOT / floor).glob("*/*.py")):
-            room = (floor, path.parent.name)
-            found.setdefault(room, set()).update(_imported(path, room) - {room})
+        for path in sorted((ROOT / floor).rglob("*.py")):
+            if path.name != "__init__.py":
+                room = _room(path)
+                found.setdefault(room, set()).update(_imported(path) - {room})
     return found
 
 
-def _imported(path: Path, room: Room) -> set[Room]:
-    nodes = [node for node in ast.walk(ast.parse(path.read_text())) if isinstance(node, ast.ImportFrom) and node.module]
-    near = {(room[0], str(node.module).split(".")[0]) for node in nodes if node.level == 2}
-    far = {tuple(str(node.module).split(".")[:2]) for node in nodes if node.level == 3}
-    return near | {(module[0], module[1]) for module in far if len(module) == 2}
+def _room(path: Path) -> Room:
+    floor, name, *_ = path.relative_to(ROOT).with_suffix("").parts
+    return floor, name
+
+
+def _imported(path: Path) -> set[Room]:
+    package, found = path.relative_to(ROOT).parts[:-1], set()
+    for node in ast.parse(path.read_text()).body:
+        if isinstance(node, ast.ImportFrom) and node.level and node.module:
+            base = (*package[: len(package) - node.level + 1], *node.module.split("."))
+            found |= {(base[0], base[1])} if len(base) > 1 else set()
+    return found
 
 
 def essential(graph: Mapping[Room, set[Room]]) -> dict[Room, set[Room]]:
@@ -75,7 +83,8 @@ def draw_house() -> Figure:
                 places[room] = (1.9 * k, bottom + j + (height - len(stack)) / 2)
         bottom += height + 0.4
     files = {room: len(list((ROOT / Path(*room)).glob("*.py"))) - 1 for room in graph}
-    boxes = {room: _box(axes, place, f"{_words(room)}\n{files[room]} files") for room, place in places.items()}
+    names = {room: _words(room) + (f"\n{count} files" if count > 0 else "") for room, count in files.items()}
+    boxes = {room: _box(axes, place, names[room]) for room, place in places.items()}
     for room, others in essential(graph).items():
         for other in others:
             _arrow(axes, boxes[room], boxes[other], places[room], places[other])
@@ -118,7 +127,7 @@ def _arrow(
 
 def members() -> dict[str, set[str]]:
     """What each public member of `Levitation` asks of the others."""
-    tree = ast.parse((ROOT / "studies" / "one_scene" / "levitation.py").read_text())
+    tree = ast.parse((ROOT / "studies" / "levitation.py").read_text())
     (body,) = (node for node in tree.body if isinstance(node, ast.ClassDef))
     functions = {node.name: node for node in body.body if isinstance(node, ast.FunctionDef)}
     uses = {
