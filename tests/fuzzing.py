@@ -534,9 +534,9 @@ VALUES = ["", "0", "1", "-1", "3.5", "1e-5", "nan", "inf", "dipole", "slab", "au
           "/nonexistent", "../..", "ä", "9" * 400,
           "-1,0,-40"]  # fmt: skip
 JOBS = [
-    "one_scene.main_job", "one_scene.field_job", "one_scene.equilibria_job", "one_scene.simulate_job",
-    "one_scene.plate_job", "catalogue.study_job", "catalogue.question_job", "catalogue.draw_result",
-    "catalogue.show_job", "catalogue.report_job",
+    "run.main_job", "run.field_job", "run.equilibria_job", "run.simulate_job", "reaction.plate_job",
+    *(f"catalogue.runner.{job}" for job in ("study_job", "question_job", "draw_result", "show_job")),
+    "catalogue.report.report_job",
 ]  # fmt: skip
 
 

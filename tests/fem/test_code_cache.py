@@ -88,7 +88,7 @@ def test_each_expression_has_its_place_in_the_name(folder):
 @pytest.mark.slow
 def test_the_same_code_has_the_same_name_in_every_process(folder):
     code = (
-        "import heyoka as hy; from spinlev.fem import compiled; x, y = hy.make_vars('x', 'y')\n"
+        "import heyoka as hy; from spinlev.fem.compiled_code import compiled; x, y = hy.make_vars('x', 'y')\n"
         "r = hy.sqrt(x**2 + y**2 + 1.5); compiled(hy.cfunc, [y / r**3, hy.diff(x * y / r, x)], [x, y], fast_math=True)"
     )
     for seed in "123":

@@ -70,7 +70,7 @@ def test_no_module_that_another_loads_is_missed(package):
 
 
 def test_a_package_that_is_none_of_the_program_is_refused():
-    with pytest.raises(FileNotFoundError, match="must be of this program"):
+    with pytest.raises(FileNotFoundError, match="must be modules of this program"):
         digest_of("spinlev.fem.nowhere")
 
 

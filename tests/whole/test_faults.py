@@ -320,7 +320,7 @@ def test_ctrl_c_that_falls_into_a_destructor_is_not_lost():
     """Python drops what is raised there; the program would go on."""
     code = (
         "import os, signal, threading\n"
-        "from spinlev.studies.cli import cli, start\n"
+        "from spinlev.studies.cli import main as cli, start\n"
         "class Dropped:\n"
         "    def __del__(self):\n"
         "        os.kill(os.getpid(), signal.SIGINT)\n"
@@ -337,7 +337,7 @@ def test_ctrl_c_that_falls_into_a_destructor_is_not_lost():
 
 ANSWERED = (
     "import os, signal\n"
-    "from spinlev.studies.cli import cli, start\n"
+    "from spinlev.studies.cli import main as cli, start\n"
     "def answer(_, out):\n"
     "    {}\n"
     "    print('answered', file=out, flush=True)\n"
@@ -710,7 +710,7 @@ def test_a_foreign_file_that_hdf5_does_not_return_from_is_given_up(tmp_path):
 def test_a_foreign_file_that_hdf5_crashes_on_is_refused(spinlev, monkeypatch, tmp_path):
     """The process that looks through it dies, as HDF5 has made it on damaged files; the program does not."""
     foreign_file("r.nc")
-    crashing(monkeypatch, tmp_path / "dies", "storage.foreign")
+    crashing(monkeypatch, tmp_path / "dies", "fem.files.look")
     status, _, said = spinlev("cite", "r.nc")
     assert status == 2
     assert "HDF5 crashes on it" in said.replace("\n", " ")
@@ -720,6 +720,6 @@ def test_hdf5_of_a_mesh_is_looked_through_too(monkeypatch, tmp_path):
     points = np.random.default_rng(0).uniform(-1e-2, 1e-2, (8, 3))
     meshio.Mesh(points, [("vertex", np.arange(8)[:, None])], {"B": points}).write(tmp_path / "map.xdmf")
     np.testing.assert_array_equal(read_field_map(tmp_path / "map.xdmf").field, points)
-    crashing(monkeypatch, tmp_path / "dies", "storage.foreign")
+    crashing(monkeypatch, tmp_path / "dies", "fem.files.look")
     with pytest.raises(FieldMapError, match="HDF5 crashes on it"):
         read_field_map(tmp_path / "map.xdmf")

@@ -173,7 +173,7 @@ def test_a_disk_that_takes_no_more_than_so_many_bytes_a_file(spinlev, arguments,
 def test_too_little_memory(spinlev, arguments):
     """2 MB of address space left (and NGSolve's heap) when the solve begins: refused in words; else all is well."""
     code = (
-        "import resource, psutil; from spinlev.fem.elements import rotor_solution\n"
+        "import resource, psutil; from spinlev.fem.elements import ladder as rotor_solution\n"
         "meshed, (_, most) = rotor_solution.mesh_magnets, resource.getrlimit(resource.RLIMIT_AS)\n"
         "def starved(*a):\n"
         "    resource.setrlimit(resource.RLIMIT_AS, (most, most))\n"

@@ -420,8 +420,9 @@ import sys
 from pathlib import Path
 from spinlev.studies.cli.start import load_late
 load_late("netgen", "netgen.occ", "netgen.meshing", "ngsolve")
-from spinlev.geometry import Magnet, read_part
-from spinlev.geometry.meshes import MeshSettings, mesh_magnets
+from spinlev.geometry.magnets import Magnet
+from spinlev.geometry.step_file import read_part
+from spinlev.geometry.meshes.magnets import MeshSettings, mesh_magnets
 mesh = mesh_magnets([Magnet(read_part(Path(sys.argv[1])), (0, 0, 1.2), 1.05)], MeshSettings())
 print(mesh.mesh.GetMaterials(), mesh.elements > 50)
 """

@@ -63,7 +63,7 @@ STRUCK = """
 import asyncio, os, signal
 from multiprocessing import forkserver
 from spinlev.studies.page.processes import Worker
-from spinlev.studies.page import follow
+from spinlev.studies.page.work import follow
 
 def stopped(*_):
     raise KeyboardInterrupt
