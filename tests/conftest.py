@@ -7,7 +7,6 @@ import shutil
 import tempfile
 
 import pytest
-from file_processes import FileProcesses
 
 
 def pytest_configure(config):
@@ -17,9 +16,7 @@ def pytest_configure(config):
     $SPINLEV_TEST_CACHE is a folder to keep for whoever runs one test again and again.
     """
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-    if hasattr(config, "workerinput"):
-        config.pluginmanager.register(FileProcesses(config))
-    else:
+    if not hasattr(config, "workerinput"):
         os.environ["SPINLEV_CACHE"] = os.environ.get("SPINLEV_TEST_CACHE") or tempfile.mkdtemp(prefix="spinlev-tests-")
 
 
