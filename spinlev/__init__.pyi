@@ -15,20 +15,18 @@ from .geometry.scene.making import (
 from .geometry.scene.messages import SceneError as SceneError
 from .studies.cli.options import Models as Models
 from .studies.interface import (
+    draw as draw,
+    ensemble as ensemble,
     equilibria as equilibria,
+    explore as explore,
     floater_force as floater_force,
     plate_table as plate_table,
     rotor_table as rotor_table,
+    run_study as run_study,
     simulate as simulate,
     stability as stability,
-    working_point as working_point,
-)
-from .studies.interface_many import (
-    draw as draw,
-    ensemble as ensemble,
-    explore as explore,
-    run_study as run_study,
     sweep as sweep,
+    working_point as working_point,
 )
 from .studies.levitation import Levitation as Levitation
 from .studies.magpylib import from_magpylib as from_magpylib, to_magpylib as to_magpylib

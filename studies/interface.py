@@ -1,135 +1,101 @@
-"""Where the flights of an ensemble begin: given, or drawn at random about where the scene begins."""
+"""What one does from Python: the functions behind `import spinlev as sl`, which answer with labelled data."""
 
-from collections.abc import Mapping
+from __future__ import annotations
+
+import asyncio
+import html
+import os
+import threading
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import Future
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any, TypedDict, Unpack
 
 import numpy as np
 import xarray as xr
+from matplotlib.figure import Figure
 from numpy.typing import ArrayLike
 
-from ..dynamics.flights.flight import displaced, initial_state
+from ..dynamics.flights.batch import ensemble as flown
 from ..dynamics.motion.plate import PlateMemory
-from ..dynamics.motion.state import State
+from ..fem.cache import owned
 from ..fem.rotor.floater import FloaterSources, floater_sources, force_and_torque
 from ..fem.rotor.near_field import NEAR_RTOL, complete
 from ..fem.rotor.table import FieldTable, RangeError, RotorTable
-from ..geometry.common import Array, InputError
+from ..geometry.common import Array, ComputationError, InputError, SpinlevError
 from ..geometry.overlap import body_overlap
-from ..geometry.scene.contents import OffsetStart, Scene
+from ..geometry.scene.contents import Scene
 from ..geometry.scene.files import scene_text
 from ..geometry.solids import moved
 from .answers import left_out_text
+from .catalogue.entries import CATALOGUE
+from .catalogue.runner import QUESTION, figures_of, question_study
 from .cli.console import heard, note
-from .cli.options import FieldModel, InteractionModel, Models, PlateModel
+from .cli.options import (
+    FieldModel,
+    InteractionModel,
+    Models,
+    PlateModel,
+    Quantity,
+    Workers,
+    checked_values,
+    combinations,
+    finite,
+    positive,
+)
 from .demagnetising import working_point_dataset
-from .levitation import Levitation
-from .result import found_dataset, lowering_times, trajectory_dataset, variable
+from .levitation import Levitation, given_scene
+from .processes import mapped
+from .question import Question
+from .result import AXIS, found_dataset, lowering_times, trajectory_dataset, variable
+from .starts import drawn_starts, given_starts
+from .study import Study
+from .sweep import forget, swept
 
-UNITS = {"offset_mm": 1e-3, "position_mm": 1e-3, "velocity_mm_s": 1e-3, "moment": 1.0, "spin_hz": 2 * np.pi}
-"""SI units of the keys of `[start]`."""
-SPREADS = {"offset_mm": 1e-3, "velocity_mm_s": 1e-3, "moment_deg": np.pi / 180, "spin_hz": 2 * np.pi}
+if TYPE_CHECKING:
+    from .page.server import Pages
 
-
-def given_starts(levitation: Levitation, starts: Mapping[Any, Any]) -> State:
-    """States (n, 3) at t = 0 from the keys of a scene's `[start]`, each three numbers a flight, or three for all.
-
-    Raises
-    ------
-    InputError : a key, a shape or a number that is not allowed, with the way out
-    EquilibriumError : offsets are given, and there is no equilibrium
-    """
-    columns = {str(key): _rows("starts", str(key), values, UNITS) for key, values in starts.items()}
-    if ("offset_mm" in columns) == ("position_mm" in columns):
-        raise InputError(f"Input starts must have either offset_mm or position_mm; instead received {list(columns)}.")
-    if "offset_mm" in columns and len(columns) > 1:
-        raise InputError(f"Input starts must have offset_mm alone, or position_mm; instead received {list(columns)}.")
-    lengths = {key: len(rows) for key, rows in columns.items() if len(rows) != 1}
-    if len(set(lengths.values())) > 1:
-        raise InputError(f"Input starts must have as many rows in each key; instead received {lengths}.")
-    count = next(iter(lengths.values()), 1)
-    if "offset_mm" in columns:
-        scene = levitation.elsewhere(start=OffsetStart(np.zeros(3)))
-        begun, _ = initial_state(scene.scene, levitation.interaction, levitation.equilibria)
-        return displaced(begun, columns["offset_mm"], levitation.scene.angular_velocity)
-    defaults = {"velocity_mm_s": (0.0, 0.0, 0.0), "moment": (0.0, 0.0, 1.0), "spin_hz": (0.0, 0.0, 0.0)}
-    whole = {key: columns.get(key, np.array([defaults.get(key)])) for key in list(UNITS)[1:]}
-    position, velocity, moment, spin = (np.tile(v, (count, 1)) if len(v) == 1 else v for v in whole.values())
-    sizes = np.linalg.norm(moment, axis=1)
-    if not sizes.all():
-        raise InputError("Input starts.moment must be directions, not zero; instead received one that is.")
-    return State(position, velocity, moment / sizes[:, None], spin)
+SceneLike = Scene | str | Path
+"""A scene, or the path of its file."""
+COARSE = 12
+"""Degree of the rule whose difference from the full one is told as an error."""
+TOGETHER = 512
+"""Flights that a worker gets at once, at most."""
+COLUMNS = {
+    "position": ("m", "position, laboratory frame,"),
+    "velocity": ("m/s", "velocity, laboratory frame,"),
+    "moment": ("1", "direction of the moment, laboratory frame,"),
+    "spin": ("rad/s", "angular velocity, laboratory frame,"),
+}
+HEIGHT = 900
+"""Of the page in a notebook, pixels."""
 
 
-def drawn_starts(levitation: Levitation, count: int, seed: int, spread: Mapping[str, Any]) -> State:
-    """States (count, 3) about where the scene begins, each component normal with the standard deviations of `spread`.
+class Asked(TypedDict, total=False):
+    """Further fields of `Models` that the functions take by name."""
 
-    The same seed gives the same numbers; those of one key do not depend on what the others' spreads are.
-    """
-    sizes = {key: _rows("spread", key, values, SPREADS)[0] for key, values in spread.items()}
-    if not sizes or any((size < 0).any() for size in sizes.values()):
-        raise InputError(
-            f"Input spread must have standard deviations, not negative, of some of {', '.join(SPREADS)}; "
-            f"instead received {dict(spread)}."
-        )
-    draws = np.random.default_rng(seed).normal(size=(count, len(SPREADS), 3))
-    offset, velocity, moment, spin = (
-        draws[:, k] * sizes.get(key, np.zeros(3)) for k, key in enumerate(SPREADS)
-    )  # fmt: skip
-    known = () if levitation.absolute else levitation.equilibria
-    begun, _ = initial_state(levitation.scene, levitation.interaction, known)
-    begun = displaced(begun, offset, levitation.scene.angular_velocity)
-    turned = begun.moment + moment
-    turned = turned / np.linalg.norm(turned, axis=1)[:, None]
-    return State(begun.position, begun.velocity + velocity, turned, begun.spin + spin)
-
-
-def _rows(name: str, key: str, values: Any, units: Mapping[str, float]) -> Array:
-    """Numbers (n, 3), SI units."""
-    if key not in units:
-        raise InputError(f"Input {name} must have keys among {', '.join(units)}; instead received {key!r}.")
-    try:
-        rows = np.asarray(values, float)
-    except (TypeError, ValueError):
-        raise InputError(f"Input {name}.{key} must be numbers; instead received {values!r}.") from None
-    if name == "spread" and rows.ndim == 0:
-        rows = np.full(3, rows)
-    fine = rows.ndim in (1, 2) and rows.shape[-1] == 3 and rows.size and np.isfinite(rows).all()
-    if not fine or (name == "spread" and rows.ndim > 1):
-        shape = "one or three finite numbers" if name == "spread" else "three finite numbers for each flight, (n, 3)"
-        what = values if rows.ndim == 0 else f"an array of shape {rows.shape}"
-        raise InputError(f"Input {name}.{key} must be {shape}; instead received {what}.")
-    return np.atleast_2d(rows) * units[key]
+    rtol: float
+    plate_rtol: float
+    interaction: InteractionModel
 
 
 def equilibria(
-    scene: Scene | str | Path,
+    scene: SceneLike,
     model: FieldModel = "auto",
     plate_model: PlateModel = "auto",
     spin: float = 0.0,
-    rtol: float = Models.rtol,
-    plate_rtol: float = Models.plate_rtol,
-    interaction: InteractionModel = "auto",
     progress: bool = False,
+    **asked: Unpack[Asked],
 ) -> xr.Dataset:
     """All synchronous equilibria, the stable ones first, with errors, growth and frequency of each small motion.
 
     Parameters
     ----------
-    scene : Scene, str or Path
-        The scene, or the path of its file.
-    model : {"auto", "dipole", "cuboid", "fem", "map"}
-        Model of the rotor's field.
-    plate_model : {"auto", "none", "slab", "reduced", "fem"}
-        Model of the plate.
-    spin : float
-        Body spin S = Ω·m̂/ω of the floater about its own moment.
-    rtol, plate_rtol : float
-        Relative accuracy asked of the field and of the plate's reaction.
-    interaction : {"auto", "rigid", "mutual"}
-        Whether rotor and floater magnetise each other.
-    progress : bool
-        Whether messages go to standard error.
+    scene : a scene, or the path of its file
+    model, plate_model : of the rotor's field and of the plate, see `Models`
+    spin : body spin S = Ω·m̂/ω of the floater about its own moment
+    progress : whether messages go to standard error
+    asked : `rtol`, `plate_rtol` and `interaction` of `Models`
 
     Returns
     -------
@@ -139,46 +105,27 @@ def equilibria(
 
     Raises
     ------
-    EquilibriumError
-        The rotor is at rest and the floater does not spin about its moment.
-    InputError
-        A model, a tolerance or a file that cannot be used.
+    EquilibriumError : the rotor is at rest and the floater does not spin about its moment
+    InputError : a model, a tolerance or a file that cannot be used
     """
     with heard(progress):
-        levitation = Levitation(scene, Models(model, plate_model, rtol, plate_rtol, interaction), spin)
+        levitation = Levitation(scene, Models(model, plate_model, **asked), spin)
         found = found_dataset(levitation.equilibria)
         left_out = left_out_text(levitation.survey.left_out)
         return found.assign_attrs(study="equilibria", left_out=left_out, **_labels(levitation))
 
 
 def stability(
-    scene: Scene | str | Path,
+    scene: SceneLike,
     model: FieldModel = "auto",
     plate_model: PlateModel = "auto",
     spin: float = 0.0,
-    rtol: float = Models.rtol,
-    plate_rtol: float = Models.plate_rtol,
-    interaction: InteractionModel = "auto",
     progress: bool = False,
+    **asked: Unpack[Asked],
 ) -> xr.Dataset:
     """The five small motions about the equilibrium at which a flight begins, the nearest stable one if there is one.
 
-    Parameters
-    ----------
-    scene : Scene, str or Path
-        The scene, or the path of its file.
-    model : {"auto", "dipole", "cuboid", "fem", "map"}
-        Model of the rotor's field.
-    plate_model : {"auto", "none", "slab", "reduced", "fem"}
-        Model of the plate.
-    spin : float
-        Body spin S = Ω·m̂/ω of the floater about its own moment.
-    rtol, plate_rtol : float
-        Relative accuracy asked of the field and of the plate's reaction.
-    interaction : {"auto", "rigid", "mutual"}
-        Whether rotor and floater magnetise each other.
-    progress : bool
-        Whether messages go to standard error.
+    Parameters are those of `equilibria`.
 
     Returns
     -------
@@ -188,45 +135,24 @@ def stability(
 
     Raises
     ------
-    EquilibriumError
-        There is no equilibrium to begin at.
-    InputError
-        A model, a tolerance or a file that cannot be used.
+    EquilibriumError : there is no equilibrium to begin at
+    InputError : a model, a tolerance or a file that cannot be used
     """
     with heard(progress):
-        levitation = Levitation(scene, Models(model, plate_model, rtol, plate_rtol, interaction), spin)
+        levitation = Levitation(scene, Models(model, plate_model, **asked), spin)
         found = found_dataset((levitation.stability,)).isel(equilibrium=0, drop=True).drop_vars("number")
         return found.assign_attrs(study="stability", **_labels(levitation))
 
 
 def simulate(
-    scene: Scene | str | Path,
+    scene: SceneLike,
     duration: float,
     model: FieldModel = "auto",
     plate_model: PlateModel = "auto",
-    rtol: float = Models.rtol,
-    plate_rtol: float = Models.plate_rtol,
-    interaction: InteractionModel = "auto",
     progress: bool = False,
+    **asked: Unpack[Asked],
 ) -> xr.Dataset:
-    """The floater's motion from where the scene says.
-
-    Parameters
-    ----------
-    scene : Scene, str or Path
-        The scene, or the path of its file.
-    duration : float
-        Simulated time, s.
-    model : {"auto", "dipole", "cuboid", "fem", "map"}
-        Model of the rotor's field.
-    plate_model : {"auto", "none", "slab", "reduced", "fem"}
-        Model of the plate.
-    rtol, plate_rtol : float
-        Relative accuracy asked of the field and of the plate's reaction.
-    interaction : {"auto", "rigid", "mutual"}
-        Whether rotor and floater magnetise each other.
-    progress : bool
-        Whether messages go to standard error.
+    """The floater's motion for `duration` (s) from where the scene says; other parameters are those of `equilibria`.
 
     Returns
     -------
@@ -235,13 +161,11 @@ def simulate(
 
     Raises
     ------
-    EquilibriumError
-        The scene starts from an equilibrium and has none.
-    InputError
-        A model, a tolerance or a file that cannot be used.
+    EquilibriumError : the scene starts from an equilibrium and has none
+    InputError : a model, a tolerance or a file that cannot be used
     """
     with heard(progress):
-        levitation = Levitation(scene, Models(model, plate_model, rtol, plate_rtol, interaction))
+        levitation = Levitation(scene, Models(model, plate_model, **asked))
         flight = levitation.flight(duration)
         flown = trajectory_dataset(flight, levitation.flight_plate)
         return flown.assign_attrs(_labels(levitation), **lowering_times(levitation.scene))
@@ -253,20 +177,9 @@ def _labels(levitation: Levitation) -> dict[str, str]:
 
 
 def rotor_table(
-    scene: Scene | str | Path, model: FieldModel = "auto", rtol: float = Models.rtol, progress: bool = False
+    scene: SceneLike, model: FieldModel = "auto", rtol: float = Models.rtol, progress: bool = False
 ) -> FieldTable:
-    """The rotor's field as a table, accurate to `rtol` wherever the floater can be.
-
-    Parameters
-    ----------
-    scene : Scene, str or Path
-        The scene, or the path of its file.
-    model : {"auto", "dipole", "cuboid", "fem", "map"}
-        Model of the rotor's field.
-    rtol : float
-        Relative accuracy asked of the field.
-    progress : bool
-        Whether messages go to standard error.
+    """The rotor's field as a table, accurate to `rtol` wherever the floater can be; `model` as of `Models`.
 
     Returns
     -------
@@ -277,10 +190,8 @@ def rotor_table(
 
     Raises
     ------
-    InputError
-        A model, a tolerance or a file that cannot be used; of `evaluate`, a point on an edge of a magnet.
-    AccuracyError
-        The accuracy cannot be reached.
+    InputError : a model, a tolerance or a file that cannot be used; of `evaluate`, a point on an edge of a magnet
+    AccuracyError : the accuracy cannot be reached
     """
     with heard(progress):
         table = Levitation(scene, Models(model, rtol=rtol)).table
@@ -288,48 +199,23 @@ def rotor_table(
 
 
 def plate_table(
-    scene: Scene | str | Path,
+    scene: SceneLike,
     model: FieldModel = "auto",
     plate_model: PlateModel = "auto",
-    rtol: float = Models.rtol,
-    plate_rtol: float = Models.plate_rtol,
-    interaction: InteractionModel = "auto",
     progress: bool = False,
+    **asked: Unpack[Asked],
 ) -> PlateMemory | None:
-    """The plate's currents around the place where the floater levitates.
+    """The plate's currents around the place where the floater levitates; None where no currents are modelled.
 
-    Parameters
-    ----------
-    scene : Scene, str or Path
-        The scene, or the path of its file.
-    model : {"auto", "dipole", "cuboid", "fem", "map"}
-        Model of the rotor's field.
-    plate_model : {"auto", "none", "slab", "reduced", "fem"}
-        Model of the plate.
-    rtol, plate_rtol : float
-        Relative accuracy asked of the field and of the plate's reaction.
-    interaction : {"auto", "rigid", "mutual"}
-        Whether rotor and floater magnetise each other.
-    progress : bool
-        Whether messages go to standard error.
-
-    Returns
-    -------
-    PlateMemory or None
-        Its `table` holds the network, `share` what the rotor drives, `error` the estimated relative error; None where
-        no currents are modelled.
-
-    Raises
-    ------
-    InputError
-        A model, a tolerance or a file that cannot be used.
+    Parameters are those of `equilibria`. Of what is returned, `table` holds the network, `share` what the rotor drives,
+    `error` the estimated relative error. Raises InputError for a model, a tolerance or a file that cannot be used.
     """
     with heard(progress):
-        return Levitation(scene, Models(model, plate_model, rtol, plate_rtol, interaction)).plate
+        return Levitation(scene, Models(model, plate_model, **asked)).plate
 
 
 def working_point(
-    scene: Scene | str | Path,
+    scene: SceneLike,
     model: FieldModel = "auto",
     rtol: float = Models.rtol,
     interaction: InteractionModel = "auto",
@@ -343,16 +229,10 @@ def working_point(
 
     Parameters
     ----------
-    scene : Scene, str or Path
-        The scene, or the path of its file.
-    model : {"auto", "dipole", "cuboid", "fem", "map"}
-        Model of the rotor's field that places the floater; in the magnets the field is always of finite elements.
-    rtol : float
-        Relative accuracy asked of that field.
-    interaction : {"auto", "rigid", "mutual"}
-        Whether rotor and floater magnetise each other where the floater is placed; in the magnets they always do.
-    progress : bool
-        Whether messages go to standard error.
+    scene : a scene, or the path of its file
+    model, rtol, interaction : with which the floater is placed, see `Models`; in the magnets the field is always of
+        finite elements, and rotor and floater magnetise each other
+    progress : whether messages go to standard error
 
     Returns
     -------
@@ -362,20 +242,15 @@ def working_point(
 
     Raises
     ------
-    InputError
-        No magnet has a polarisation, or a model, a tolerance or a file that cannot be used.
+    InputError : no magnet has a polarisation, or a model, a tolerance or a file that cannot be used
     """
     with heard(progress):
         levitation = Levitation(scene, Models(model, rtol=rtol, interaction=interaction))
         return working_point_dataset(levitation).assign_attrs(study="working-point", scene=scene_text(levitation.scene))
 
 
-COARSE = 12
-"""Degree of the rule whose difference from the full one is told as an error."""
-
-
 def floater_force(
-    scene: Scene | str | Path,
+    scene: SceneLike,
     position: ArrayLike,
     moment: ArrayLike,
     body_x: ArrayLike | None = None,
@@ -390,20 +265,12 @@ def floater_force(
 
     Parameters
     ----------
-    scene : Scene, str or Path
-        The scene, or the path of its file.
-    position : array_like
-        (n, 3) or (3,) of the floater's centre, m, rotor's frame.
-    moment : array_like
-        (n, 3) or (3,) directions of its moment, the body's z.
-    body_x : array_like, optional
-        (n, 3) or (3,) directions near which the body's x lies; left out, near the rotor's x. It matters to a cuboid.
-    model : {"auto", "dipole", "cuboid", "fem", "map"}
-        Model of the rotor's field.
-    rtol : float
-        Relative accuracy asked of that field.
-    progress : bool
-        Whether messages go to standard error.
+    scene : a scene, or the path of its file
+    position : (n, 3) or (3,) of the floater's centre, m, rotor's frame
+    moment : (n, 3) or (3,) directions of its moment, the body's z
+    body_x : (n, 3) or (3,) directions near which the body's x lies; left out, the rotor's x; it matters to a cuboid
+    model, rtol : of the rotor's field, see `Models`
+    progress : whether messages go to standard error
 
     Returns
     -------
@@ -413,8 +280,7 @@ def floater_force(
 
     Raises
     ------
-    InputError
-        A pose in which the floater overlaps the rotor, or that is none.
+    InputError : a pose in which the floater overlaps the rotor, or that is none
 
     Examples
     --------
@@ -430,8 +296,7 @@ def floater_force(
     with heard(progress):
         levitation = Levitation(scene, Models(model, rtol=rtol))
         floater, table = levitation.scene.floater, levitation.table
-        places, pointing = _vectors("position", position), _directions("moment", moment)
-        places, pointing = np.broadcast_arrays(places, pointing)
+        places, pointing = np.broadcast_arrays(_vectors("position", position), _directions("moment", moment))
         axes = np.array([floater.axes(m) for m in pointing])
         if body_x is not None:
             axes = _turned(axes, np.broadcast_to(_directions("body_x", body_x), places.shape))
@@ -453,7 +318,7 @@ def floater_force(
             "force_error": variable(("pose",), errors[0], "N", "estimated error of the force"),
             "torque_error": variable(("pose",), errors[1], "N m", "estimated error of the torque"),
         },
-        coords={"axis": list("xyz")},
+        coords={"axis": list(AXIS)},
         attrs={"study": "floater-force", "model": table.model, "scene": scene_text(levitation.scene)},
     )
 
@@ -506,3 +371,247 @@ def _acting(sources: FloaterSources, table: FieldTable, places: Array, axes: Arr
             f"Input position must be where the field of the rotor is known all over the floater; instead {error} "
             'Move it away, or take model="cuboid".'
         ) from None
+
+
+def ensemble(
+    scene: SceneLike,
+    starts: Mapping[Any, Any] | None = None,
+    duration: float = 3.0,
+    n: int | None = None,
+    seed: int = 0,
+    spread: Mapping[str, Any] | None = None,
+    model: FieldModel = "auto",
+    rtol: float = Models.rtol,
+    interaction: InteractionModel = "auto",
+    workers: int | None = 1,
+    progress: bool = False,
+) -> xr.Dataset:
+    """How very many flights of one scene end, flown side by side; a plate is an obstacle, its currents are left out.
+
+    Parameters
+    ----------
+    scene : a scene, or the path of its file
+    starts : dict or Dataset by key of the scene file's `[start]`, three numbers for each flight (n, 3), or three for
+        all: "offset_mm" from the stable equilibrium, or "position_mm" with "velocity_mm_s", "moment" and "spin_hz"
+    duration : of each flight, s
+    n : instead of `starts`: so many flights from about where the scene begins
+    seed : of the random numbers; the same gives the same flights, to the last bit, with any number of workers
+    spread : standard deviations of "offset_mm" (at rest in the turning frame), "velocity_mm_s", "moment_deg" and
+        "spin_hz", each one number or three
+    model, rtol, interaction : see `Models`
+    workers : processes, None for one a core
+    progress : whether messages go to standard error
+
+    Returns
+    -------
+    xarray.Dataset
+        Over `flight` and `axis`, SI units: `levitated`, `ended_by` ("duration", "contact", "lost"), the state at
+        the end and, as ``start_...``, at the beginning, in the laboratory frame as in `simulate`;
+        `position_rotor_frame` is where the end is in the frame that turns with the rotor.
+        Accuracy: the field errs by 1e-6 of its gradient, steps by round-off.
+
+    Raises
+    ------
+    InputError : starts that are not allowed, with what is
+    EquilibriumError : a flight shall begin near an equilibrium, and there is none
+
+    Examples
+    --------
+    >>> import spinlev as sl
+    >>> cube = sl.tilt(angle_deg=10.0, edge_mm=10.0, remanence_T=1.305)
+    >>> ball = sl.sphere(diameter_mm=12.7, remanence_T=1.305, density_kg_m3=7500.0)
+    >>> scene = sl.scene(frequency_hz=130.0, rotor=cube, floater=ball)
+    >>> flights = sl.ensemble(scene, {"offset_mm": [[0, 0, 0.1], [0, 0, 9.0]]}, 0.2, model="dipole")
+    >>> flights.ended_by.values.tolist()
+    ['duration', 'contact']
+    """
+    positive("duration", duration)
+    if (starts is None) == (n is None):
+        raise InputError("Input starts must be given, or n with spread; instead received both or neither.")
+    number = Workers(workers).checked().workers or os.cpu_count() or 1
+    with heard(progress):
+        levitation = Levitation(scene, Models(model, "none", rtol, interaction=interaction))
+        if starts is not None:
+            begun, drawn = given_starts(levitation, starts), {}
+        else:
+            begun, drawn = drawn_starts(levitation, n, seed, spread or {}), {"seed": seed, "spread": repr(spread)}
+        together = min(TOGETHER, -(-len(begun.position) // number))
+        asked = levitation.scene, levitation.interaction, begun, duration
+        found = flown(*asked, map if number == 1 else mapped(number), together)
+    dims = ("flight", "axis")
+    where = variable(dims, found.last.position, "m", "position, rotor's frame, at the end")
+    states: dict[str, Any] = {"position_rotor_frame": where}
+    # In the laboratory, whose axes are the rotor's at t = 0.
+    last = found.last.to_lab(levitation.scene.angular_velocity * found.levitated_s)
+    for prefix, when, state in (("", " at the end", last), ("start_", " at t = 0", begun)):
+        for (name, (unit, label)), values in zip(COLUMNS.items(), state.vectors, strict=True):
+            states[prefix + name] = variable(dims, values, unit, label + when)
+    ends = {
+        "levitated": variable(("flight",), found.levitated_s, "s", "levitation time"),
+        "ended_by": (("flight",), found.ended_by),
+    }
+    labels = {"study": "ensemble", **_labels(levitation), "duration_s": duration, **drawn}
+    return xr.Dataset({**ends, **states}, {"axis": list(AXIS)}, labels)
+
+
+def sweep(
+    scene: SceneLike,
+    values: Mapping[str, Sequence[float] | Sequence[str]],
+    ask: Quantity = "equilibria",
+    model: FieldModel = "auto",
+    plate_model: PlateModel = "auto",
+    spin: float = 0.0,
+    duration: float = 3.0,
+    place: Sequence[float] = (0.0, 0.0, -0.02),
+    workers: int | None = 1,
+    scheduler: str | None = None,
+    out: str | Path = "out",
+    progress: bool = False,
+    **asked: Unpack[Asked],
+) -> xr.Dataset:
+    """Any quantity of a scene over a grid of its parameters; each key becomes a dimension.
+
+    Parameters
+    ----------
+    scene : a scene, or the path of its file
+    values : by key, numbers for keys of the scene file (`frequency_hz`, `rotor.angle_deg`, `plate.center_mm.2`) and for
+        `spin`, names for `model`, `plate_model` and `interaction`
+    ask : "equilibria", "flight" or "field": what is computed at each point
+    model, plate_model, spin : of `equilibria`, at all points unless they are varied
+    duration : simulated time of a flight, s
+    place : (3,) where the field is asked for, m, rotor's frame
+    workers : processes here, None for one a core
+    scheduler : address of a dask scheduler that computes instead
+    out : folder in which finished points are kept until all are done; the same sweep goes on there
+    progress : whether messages and a progress bar go to standard error
+    asked : `rtol`, `plate_rtol` and `interaction` of `Models`
+
+    Returns
+    -------
+    xarray.Dataset
+        Over the keys; points that failed are NaN and named in the attribute `failed_points`.
+
+    Raises
+    ------
+    InputError : a key, a value or a model that is not allowed
+    SweepError : no point could be computed
+    """
+    loaded = given_scene(scene)
+    models = Models(model, plate_model, **asked).checked()
+    where = tuple(finite("place", coordinate) for coordinate in place)
+    if len(where) != 3:
+        raise InputError(f"Input place must be three numbers, m; instead received {place!r}.")
+    question = Question(loaded, "scene", ask, models, finite("spin", spin), finite("duration", duration), where)
+    grid = checked_values(values)
+    with heard(progress):
+        return _computed(QUESTION, question_study(question, grid), combinations(grid), (workers, scheduler), out)
+
+
+def run_study(
+    name: str,
+    quick: bool = True,
+    workers: int | None = 1,
+    scheduler: str | None = None,
+    out: str | Path = "out",
+    progress: bool = False,
+) -> xr.Dataset:
+    """The result of a study of the catalogue, SI units; points finished before an interruption are kept.
+
+    Parameters
+    ----------
+    name : of the study, as `spinlev study --list` has it
+    quick : coarser, in less than a minute
+    workers, scheduler, out, progress : as of `sweep`
+
+    Raises
+    ------
+    InputError : the name is unknown
+    SweepError : no point could be computed
+    """
+    if name not in CATALOGUE:
+        raise InputError(f"Input name must be one of {', '.join(CATALOGUE)}; instead received {name}.")
+    study = CATALOGUE[name]
+    with heard(progress):
+        return _computed(name, study, study.points(quick), (workers, scheduler), out)
+
+
+def _computed(
+    name: str, study: Study, points: Sequence[Mapping[str, object]], by: tuple[int | None, str | None], out: str | Path
+) -> xr.Dataset:
+    with owned(Path(out)):
+        result = swept(name, study, dict(enumerate(points)), Workers(*by).checked(), Path(out))
+        forget(name, Path(out))
+    return result
+
+
+def draw(result: xr.Dataset) -> Mapping[str, Figure]:
+    """The figures, by name, of a result of any function here or read from a file; a notebook shows them.
+
+    Raises InputError where the result has no figure.
+    """
+    return figures_of(result)
+
+
+class LivePage:
+    """A page that is served in the background; in a notebook it shows itself."""
+
+    def __init__(self, pages: Pages, thread: threading.Thread, loop: asyncio.AbstractEventLoop) -> None:
+        self._pages, self._thread, self._loop = pages, thread, loop
+
+    @property
+    def address(self) -> str:
+        """For a browser on this machine."""
+        return self._pages.address
+
+    def stop(self) -> None:
+        """Close the page and end its work."""
+        if self._thread.is_alive():
+            self._loop.call_soon_threadsafe(self._loop.stop)
+            self._thread.join()
+
+    def __repr__(self) -> str:
+        return f"LivePage at {self.address}"
+
+    def _repr_html_(self) -> str:
+        return f'<iframe src="{html.escape(self.address)}" width="100%" height="{HEIGHT}" style="border:0"></iframe>'
+
+
+def explore(scene: SceneLike, port: int = 0) -> LivePage:
+    """A page in the browser to play with a scene: sliders, equilibria at once, where it levitates, a live flight.
+
+    `port` is on 127.0.0.1; 0 takes one that is free. The page shows itself in a notebook; has an `address` for a
+    browser, and `stop`. Raises SceneError, or ComputationError where libraries are missing or the port is taken.
+    """
+    loaded, serve = given_scene(scene), page_server()
+    source = "scene" if isinstance(scene, Scene) else str(scene)
+    begun: Future[tuple[Pages, asyncio.AbstractEventLoop]] = Future()
+
+    def work() -> None:
+        loop = asyncio.new_event_loop()
+        asyncio.set_event_loop(loop)
+        try:
+            pages = serve(loaded, source, port=port, framed=True)
+        except SpinlevError as error:
+            begun.set_exception(error)
+        else:
+            begun.set_result((pages, loop))
+            pages.run()
+        loop.close()
+
+    thread = threading.Thread(target=work, name="spinlev explore", daemon=True)
+    thread.start()
+    pages, loop = begun.result()
+    return LivePage(pages, thread, loop)
+
+
+def page_server() -> Callable[..., Pages]:
+    """The function that serves pages. Raises ComputationError where its libraries are missing."""
+    try:
+        from .page.server import serve
+    except ModuleNotFoundError as error:
+        if (error.name or "").partition(".")[0] not in ("bokeh", "plotly", "tornado"):
+            raise
+        raise ComputationError(
+            f"The page needs {error.name}, which is not installed. Write pip install 'spinlev[explore]' and try again."
+        ) from None
+    return serve

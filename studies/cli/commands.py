@@ -448,7 +448,7 @@ def explore(
 
     source = scene or default_scene()
     loaded = load_scene(source)
-    from ..interface_many import page_server
+    from ..interface import page_server
 
     pages = page_server()(loaded, str(source), host, port)
     if not pages.local:

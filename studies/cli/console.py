@@ -1,4 +1,4 @@
-"""Text for terminals that do not know all characters: ω is written omega there, µ is u, … is three dots."""
+"""What goes to the terminal: messages and progress, answers, and what to install where a library is missing."""
 
 import codecs
 import ctypes
@@ -25,11 +25,10 @@ from ...geometry.common import printable
 
 READABLE = "spinlev-readable"
 """Name of the error handler for encodings: it writes what an encoding lacks in ASCII instead of raising an error."""
-DASHES, QUOTES, APOSTROPHES = dict.fromkeys("−–—‐‑", "-"), dict.fromkeys("“”„", '"'), dict.fromkeys("‘’", "'")
-SIGNS = {"±": "+-", "×": "x", "·": ".", "•": "*", "⁄": "/", "≤": "<=", "≥": ">=", "≠": "!=", "≈": "~", "→": "->"}
-UNITS = {"°": "deg", "µ": "u", "μ": "u", "∞": "inf", "√": "sqrt", "∂": "d", "ß": "ss", "ø": "o", "Ø": "O"}
-ASCII = DASHES | QUOTES | APOSTROPHES | SIGNS | UNITS
-GREEK = {"LAMDA": "lambda"}
+LETTERS = {"Ω": "Omega", "ω": "omega", "Δ": "Delta", "δ": "delta", "λ": "lambda", "μ": "u", "π": "pi", "θ": "theta"}
+SIGNS = {"±": "+-", "×": "x", "·": ".", "•": "*", "⁄": "/", "≤": "<=", "≥": ">=", "≈": "~", "→": "->", "°": "deg"}
+MARKS = {"∞": "inf", "√": "sqrt", "∂": "d", **dict.fromkeys("−–—‐", "-"), **dict.fromkeys("“”", '"'), "’": "'"}
+ASCII = str.maketrans(LETTERS | SIGNS | MARKS)
 
 
 def make_readable() -> None:
@@ -39,26 +38,11 @@ def make_readable() -> None:
             stream.reconfigure(errors=READABLE)
 
 
-def in_ascii(text: str) -> str:
-    """The same in ASCII: Greek letters by their names, accents left out, ? for what has no name here."""
-    parts = unicodedata.normalize("NFKD", "".join(ASCII.get(character, character) for character in text))
-    return "".join(_character(part) for part in parts if not unicodedata.combining(part))
-
-
-def _character(character: str) -> str:
-    if character.isascii():
-        return character
-    kind, _, letter = unicodedata.name(character, "").partition(" LETTER ")
-    if kind in ("GREEK SMALL", "GREEK CAPITAL"):
-        name = GREEK.get(letter.split()[-1], letter.split()[-1].lower())
-        return name if kind == "GREEK SMALL" else name.capitalize()
-    return ASCII.get(character, "?")
-
-
 def _readable(error: UnicodeError) -> tuple[str, int]:
     if not isinstance(error, UnicodeEncodeError):
         raise error
-    return in_ascii(error.object[error.start : error.end]), error.end
+    text = unicodedata.normalize("NFKD", error.object[error.start : error.end]).translate(ASCII)
+    return "".join(c if c.isascii() else "?" for c in text if not unicodedata.combining(c)), error.end
 
 
 codecs.register_error(READABLE, _readable)

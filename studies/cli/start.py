@@ -1,65 +1,13 @@
-"""Libraries that are loaded when they are used, or not at all: an answer from the cache needs no finite elements."""
+"""How the command line begins: streams, signals and a home folder, before anything large is loaded."""
 
 from __future__ import annotations
 
 import errno
-import gc
 import os
 import signal
 import sys
 import threading
 from contextlib import suppress
-from importlib import import_module
-from importlib.abc import MetaPathFinder
-from threading import RLock
-from types import ModuleType
-from typing import Any
-
-
-def load_late(*names: str) -> None:
-    """Let `import` find stand-ins for these modules, which load all of them at the first use of any.
-
-    The parts of a package follow it. What is loaded already stays as it is.
-    """
-    if any(name in sys.modules for name in names):
-        return
-    sleeping, loading = {name: _StandIn(name) for name in names}, RLock()
-
-    def wake() -> None:
-        with loading:
-            for name in [name for name in names if sys.modules.get(name) is sleeping[name]]:
-                del sys.modules[name]
-            for name in names:
-                import_module(name)
-
-    for name, module in sleeping.items():
-        vars(module)["_wake"] = wake
-        sys.modules[name] = module
-        package, _, part = name.rpartition(".")
-        if package:
-            vars(sleeping[package]).update({"__path__": [], part: module})
-
-
-def leave_out(*names: str) -> None:
-    """Let modules that others try to import be missing in this process; what is loaded already stays."""
-    sys.meta_path.insert(0, _Missing(names))
-
-
-class _Missing(MetaPathFinder):
-    def __init__(self, names: tuple[str, ...]) -> None:
-        self._names = names
-
-    def find_spec(self, name: str, path: object, target: object = None) -> None:
-        """None, to go on with others, or ModuleNotFoundError."""
-        if name in self._names:
-            raise ModuleNotFoundError(name, name=name)
-
-
-class _StandIn(ModuleType):
-    def __getattr__(self, name: str) -> Any:
-        self._wake()
-        return getattr(import_module(self.__name__), name)
-
 
 STOPPED = "spinlev: stopped; what was finished is kept."
 TOO_MANY_FILES = (
@@ -67,8 +15,6 @@ TOO_MANY_FILES = (
 )
 AGAIN = 0.01
 """Seconds until an interrupt is raised again that fell where Python drops exceptions."""
-MANY = 50_000
-"""New objects until Python looks for garbage: at its own 700 that is a tenth of a short run, for next to none."""
 
 
 def main() -> None:
@@ -76,14 +22,10 @@ def main() -> None:
     stop = threading.Event()
     _open_streams()
     _listen(stop)
-    gc.set_threshold(MANY)
     os.environ["PYTHONSAFEPATH"] = "1"  # no process begun here loads what lies in the folder that it is begun in
     try:
         from .console import make_readable
 
-        load_late("netgen", "netgen.occ", "netgen.meshing", "ngsolve")
-        if not any(argument.startswith("--scheduler") for argument in sys.argv):
-            leave_out("dask.array")  # xarray would load it, for as long as a flight takes, to see if data are of it
         make_readable()
         _find_home()
         from .main import run
@@ -94,7 +36,6 @@ def main() -> None:
             raise
         print(STOPPED if stop.is_set() else f"spinlev: {TOO_MANY_FILES}", file=sys.stderr)
         status = 1
-    gc.freeze()  # the system takes all memory back: nothing need be looked through once more
     sys.exit(status)
 
 

@@ -1,8 +1,6 @@
 """Magnets from STEP files: beside the same shape by key, and what no magnet can be made of."""
 
 import re
-import subprocess
-import sys
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -413,23 +411,3 @@ def test_a_mesh_that_takes_too_long_is_not_tried_again(folder, monkeypatch):
     with pytest.raises(ComputationError, match=r"^The mesher does not come to an end with it: chamfer\.step\. Leave"):
         solved(folder / "chamfer.step")
     assert len(calls) == 1
-
-
-FRESH = """
-import sys
-from pathlib import Path
-from spinlev.studies.cli.start import load_late
-load_late("netgen", "netgen.occ", "netgen.meshing", "ngsolve")
-from spinlev.geometry.magnets import Magnet
-from spinlev.geometry.step_file import read_part
-from spinlev.geometry.meshes.magnets import MeshSettings, mesh_magnets
-mesh = mesh_magnets([Magnet(read_part(Path(sys.argv[1])), (0, 0, 1.2), 1.05)], MeshSettings())
-print(mesh.mesh.GetMaterials(), mesh.elements > 50)
-"""
-
-
-def test_a_mesh_from_another_process_is_understood_where_ngsolve_loads_late(folder):
-    """As from the command line, where pickle would not find the class of a mesh in a module that is no file."""
-    command = [sys.executable, "-P", "-c", FRESH, str(folder / "chamfer.step")]
-    done = subprocess.run(command, capture_output=True, text=True, check=False)
-    assert done.stdout.strip() == "('magnet0', 'air') True", done.stderr

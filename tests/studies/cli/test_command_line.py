@@ -1,7 +1,6 @@
 """The command line as a user sees it: keys, files, messages and exit statuses."""
 
 import json
-import os
 import subprocess
 import sys
 
@@ -45,19 +44,6 @@ def test_help_comes_without_what_computes():
     loaded = set(found.stdout.splitlines()[-1].split())
     assert "rich" in loaded
     assert not loaded & {"numpy", "xarray", "matplotlib", "scipy", "pyngcore", "heyoka", "pandas", "pyvista"}
-
-
-def test_an_answer_comes_without_finite_elements_unless_they_make_it(tmp_path, points):
-    """They take a fourth of a second to load: one module of them calls for the other, and for pyngcore."""
-    code = "import sys; from spinlev.studies.cli.start import main; sys.argv[1:] = {}\n"
-    code += "try: main()\nfinally: print('pyngcore' in sys.modules)"
-    arguments = ["field", str(SCENES / "horizontal.toml"), "--points", str(points), "--json"]
-    arguments += ["--out", str(tmp_path / "out"), "--model"]
-    environment = os.environ | {"SPINLEV_CACHE": str(tmp_path / "cache")}
-    for model, loaded in [("dipole", "False"), ("fem", "True"), ("fem", "False")]:
-        command = [sys.executable, "-P", "-c", code.format([*arguments, model])]
-        done = subprocess.run(command, capture_output=True, text=True, check=True, env=environment)
-        assert done.stdout.splitlines()[-1] == loaded
 
 
 @pytest.mark.parametrize("model", ["dipole", "cuboid", "fem", "auto"])

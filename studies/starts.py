@@ -1,0 +1,88 @@
+"""Where the flights of an ensemble begin: given, or drawn at random about where the scene begins."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from ..dynamics.flights.flight import displaced, initial_state
+from ..dynamics.motion.state import State
+from ..geometry.common import Array, InputError
+from ..geometry.scene.contents import OffsetStart
+from .levitation import Levitation
+
+UNITS = {"offset_mm": 1e-3, "position_mm": 1e-3, "velocity_mm_s": 1e-3, "moment": 1.0, "spin_hz": 2 * np.pi}
+"""SI units of the keys of `[start]`."""
+SPREADS = {"offset_mm": 1e-3, "velocity_mm_s": 1e-3, "moment_deg": np.pi / 180, "spin_hz": 2 * np.pi}
+
+
+def given_starts(levitation: Levitation, starts: Mapping[Any, Any]) -> State:
+    """States (n, 3) at t = 0 from the keys of a scene's `[start]`, each three numbers a flight, or three for all.
+
+    Raises
+    ------
+    InputError : a key, a shape or a number that is not allowed, with the way out
+    EquilibriumError : offsets are given, and there is no equilibrium
+    """
+    columns = {str(key): _rows("starts", str(key), values, UNITS) for key, values in starts.items()}
+    if ("offset_mm" in columns) == ("position_mm" in columns):
+        raise InputError(f"Input starts must have either offset_mm or position_mm; instead received {list(columns)}.")
+    if "offset_mm" in columns and len(columns) > 1:
+        raise InputError(f"Input starts must have offset_mm alone, or position_mm; instead received {list(columns)}.")
+    lengths = {key: len(rows) for key, rows in columns.items() if len(rows) != 1}
+    if len(set(lengths.values())) > 1:
+        raise InputError(f"Input starts must have as many rows in each key; instead received {lengths}.")
+    count = next(iter(lengths.values()), 1)
+    if "offset_mm" in columns:
+        scene = levitation.elsewhere(start=OffsetStart(np.zeros(3)))
+        begun, _ = initial_state(scene.scene, levitation.interaction, levitation.equilibria)
+        return displaced(begun, columns["offset_mm"], levitation.scene.angular_velocity)
+    defaults = {"velocity_mm_s": (0.0, 0.0, 0.0), "moment": (0.0, 0.0, 1.0), "spin_hz": (0.0, 0.0, 0.0)}
+    whole = {key: columns.get(key, np.array([defaults.get(key)])) for key in list(UNITS)[1:]}
+    position, velocity, moment, spin = (np.tile(v, (count, 1)) if len(v) == 1 else v for v in whole.values())
+    sizes = np.linalg.norm(moment, axis=1)
+    if not sizes.all():
+        raise InputError("Input starts.moment must be directions, not zero; instead received one that is.")
+    return State(position, velocity, moment / sizes[:, None], spin)
+
+
+def drawn_starts(levitation: Levitation, count: int | None, seed: int, spread: Mapping[str, Any]) -> State:
+    """States (count, 3) about where the scene begins, each component normal with the standard deviations of `spread`.
+
+    The same seed gives the same numbers; those of one key do not depend on what the others' spreads are.
+    """
+    for name, value, least in (("n", count, 1), ("seed", seed, 0)):
+        if not isinstance(value, int | np.integer) or isinstance(value, bool) or value < least:
+            raise InputError(f"Input {name} must be a whole number, {least} at least; instead received {value!r}.")
+    sizes = {key: _rows("spread", key, values, SPREADS)[0] for key, values in spread.items()}
+    if not sizes or any((size < 0).any() for size in sizes.values()):
+        raise InputError(
+            f"Input spread must have standard deviations, not negative, of some of {', '.join(SPREADS)}; "
+            f"instead received {dict(spread)}."
+        )
+    draws = np.random.default_rng(int(seed)).normal(size=(int(count or 0), len(SPREADS), 3))
+    offset, velocity, moment, spin = (draws[:, k] * sizes.get(key, np.zeros(3)) for k, key in enumerate(SPREADS))
+    known = () if levitation.absolute else levitation.equilibria
+    begun, _ = initial_state(levitation.scene, levitation.interaction, known)
+    begun = displaced(begun, offset, levitation.scene.angular_velocity)
+    turned = begun.moment + moment
+    turned = turned / np.linalg.norm(turned, axis=1)[:, None]
+    return State(begun.position, begun.velocity + velocity, turned, begun.spin + spin)
+
+
+def _rows(name: str, key: str, values: Any, units: Mapping[str, float]) -> Array:
+    """Numbers (n, 3), SI units."""
+    if key not in units:
+        raise InputError(f"Input {name} must have keys among {', '.join(units)}; instead received {key!r}.")
+    try:
+        rows = np.asarray(values, float)
+    except (TypeError, ValueError):
+        raise InputError(f"Input {name}.{key} must be numbers; instead received {values!r}.") from None
+    if name == "spread" and rows.ndim == 0:
+        rows = np.full(3, rows)
+    fine = rows.ndim in (1, 2) and rows.shape[-1] == 3 and rows.size and np.isfinite(rows).all()
+    if not fine or (name == "spread" and rows.ndim > 1):
+        shape = "one or three finite numbers" if name == "spread" else "three finite numbers for each flight, (n, 3)"
+        what = values if rows.ndim == 0 else f"an array of shape {rows.shape}"
+        raise InputError(f"Input {name}.{key} must be {shape}; instead received {what}.")
+    return np.atleast_2d(rows) * units[key]
