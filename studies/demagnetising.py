@@ -15,7 +15,7 @@ from ..geometry.common import InputError
 from ..geometry.magnets import Magnet
 from ..geometry.scene.contents import Floater
 from .cli.console import note, to_json
-from .figures.pictures import working_point_figure
+from .figures.run import working_point_figure
 from .figures.style import save_figures
 from .levitation import Levitation
 from .result import AXIS, variable, write_dataset

@@ -41,7 +41,7 @@ from .cli.console import note, to_json
 from .cli.options import COLUMNS, Models
 from .demagnetising import write_working_point
 from .figures.pictures import last_view
-from .figures.renderer import Drawer, RenderError, render
+from .figures.renderer import RenderError, render
 from .figures.run import field_figure, force_figure, trajectory_figure
 from .figures.style import NAMES, save_figures
 from .levitation import Levitation
@@ -134,10 +134,8 @@ DEEPEST = 0.05
 """The field figure reaches this far below the rotor's origin, m."""
 
 
-def main_job(scene: Scene, asked: Models, spin: float, duration: float, out: Path, drawing: Drawer) -> Job:
+def main_job(scene: Scene, asked: Models, spin: float, duration: float, out: Path) -> Job:
     """Compute everything of a scene for a body spin; writes result.nc, summary.json and the figures.
-
-    `drawing` is what draws in three dimensions.
 
     What is finished before a failure is kept: a scene without a stable equilibrium still leaves its fields and force
     curves, a flight that the user stops its beginning; then the error goes on to the caller.
@@ -193,7 +191,7 @@ def main_job(scene: Scene, asked: Models, spin: float, duration: float, out: Pat
         levitation.labels, body_spin=spin, left_out=left_out_text(known.left_out)
     )
     memory = levitation.flight_plate if flight else None
-    _write(scene, chosen, result, values, flight, memory, out, drawing)
+    _write(scene, chosen, result, values, flight, memory, out)
     if failure and (flight is None or isinstance(failure, FlightStopped)):
         raise failure
     return values, [*lines, f"Results and figures in {out}/"]
@@ -271,7 +269,6 @@ def _write(
     flight: Trajectory | None,
     memory: PlateMemory | None,
     out: Path,
-    drawing: Drawer,
 ) -> None:
     """The result and its summary first, then what is drawn of them."""
     note("Files and figures ...")
@@ -287,7 +284,7 @@ def _write(
         return
     with ThreadPoolExecutor(1) as beside:  # in three dimensions another process draws, meanwhile
         view = {out / "scene.png": last_view(scene, table, flight.time, flight.rotor)}
-        in_space = beside.submit(render, view, command=drawing)
+        in_space = beside.submit(render, view)
         save_figures(figures | {"trajectory": trajectory_figure(result)}, out)
         try:
             in_space.result()

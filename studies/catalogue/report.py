@@ -15,10 +15,10 @@ import xarray as xr
 from ...fem.files import write_whole
 from ...geometry.common import InputError
 from ...geometry.files import file_content
-from ..figures.pictures import question_lines, seen_from
-from ..figures.renderer import RenderError, drawn
+from ..figures.pictures import seen_from
+from ..figures.renderer import RenderError, drawn, turnable_page
+from ..figures.run import question_lines
 from ..figures.style import figure_bytes
-from ..figures.turnable import inlined, page
 from ..figures.view import Turnable
 from .entries import CATALOGUE
 from .runner import QUESTION, failure_lines, figures_of, flight_of, read_result
@@ -150,7 +150,7 @@ def _view(result: xr.Dataset) -> dict[str, str]:
     scene, motion = flight_of(result, "scene")
     try:
         view = seen_from(scene, result["time"].values, motion)
-        return {"view": inlined(drawn(Turnable(view)))}
+        return {"view": base64.b64encode(drawn(Turnable(view))).decode()}
     except RenderError as error:
         return {"no_view": str(error)}
 
@@ -159,7 +159,8 @@ def _viewer(parts: list[dict[str, Any]]) -> dict[str, str]:
     """The program that draws the views, packed, and the text in it for which each view stands."""
     if not any("view" in part for part in parts):
         return {}
-    return {"viewer": base64.b64encode(gzip.compress(page(PLACE))).decode(), "place": inlined(PLACE)}
+    packed = gzip.compress(turnable_page(PLACE))
+    return {"viewer": base64.b64encode(packed).decode(), "place": base64.b64encode(PLACE).decode()}
 
 
 def _embedded(content: bytes, kind: str) -> str:

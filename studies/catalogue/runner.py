@@ -19,20 +19,19 @@ from ...geometry.scene.contents import Scene
 from ...geometry.scene.files import check_files, parse_scene
 from ..cli.console import note, progress
 from ..cli.options import Models, Workers, combinations
-from ..figures.pictures import (
+from ..figures.pictures import flight_frames, last_view, plate_currents
+from ..figures.renderer import drawn, render, turnable_page
+from ..figures.run import (
     drawable,
-    flight_frames,
-    last_view,
+    field_figure,
+    force_figure,
     modes_figure,
-    plate_currents,
     question_figure,
     question_lines,
+    trajectory_figure,
 )
-from ..figures.renderer import drawn, render
-from ..figures.run import field_figure, force_figure, trajectory_figure
 from ..figures.style import save_figures
-from ..figures.turnable import page
-from ..figures.view import Currents, Turnable, current_places
+from ..figures.view import SEEN, Currents, Turnable, current_places, near_plate
 from ..levitation import Levitation, sources
 from ..question import Question
 from ..result import write_dataset
@@ -176,7 +175,7 @@ def show_job(path: Path, out: Path, html: bool = False) -> list[str]:
     view = last_view(scene, table, time, motion)
     if scene.plate is not None:
         note("Currents in the plate ...")
-        places = current_places(scene.plate.box, view.position)
+        places = current_places(near_plate(scene.plate.box, SEEN), view.position)
         floater = replace(State(*(vector[-1] for vector in motion.vectors)), position=view.position)
         density = plate_currents(scene, scene.plate, sources(table), floater, places)
         view = replace(view, currents=Currents(places, density))
@@ -186,7 +185,7 @@ def show_job(path: Path, out: Path, html: bool = False) -> list[str]:
     files = [str(picture), str(animation)]
     if html:
         turned = out / f"{path.stem}-view.html"
-        write_whole(turned, page(drawn(Turnable(view))))
+        write_whole(turned, turnable_page(drawn(Turnable(view))))
         files.append(str(turned))
     return files
 

@@ -78,11 +78,10 @@ def run(
     _check_spin(spin)
     loaded = _loaded(scene or default_scene())
     from ...fem.cache import owned
-    from ..figures.renderer import copied
     from ..run import main_job
 
-    with copied() as drawing, owned(output.out):
-        return Answer(*main_job(loaded, asked.checked(), spin, duration_s, output.out, drawing), output.json)
+    with owned(output.out):
+        return Answer(*main_job(loaded, asked.checked(), spin, duration_s, output.out), output.json)
 
 
 def field(

@@ -1,30 +1,25 @@
-"""Pictures in three dimensions, drawn by a process of its own.
+"""Pictures in three dimensions, drawn by a process of its own: `python -m` this module.
 
 VTK ends the process that calls it, without a word, where it finds no graphics library: a computation must survive that.
+Pictures go to the process pickled, through its standard input; its answers come back the same way: a finished picture
+(bytes), the part of all that is done (float), or the reason why there is no more (str).
 """
 
-import gc
+import io
 import os
 import pickle
 import signal
 import subprocess
 import sys
-import threading
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
 from functools import cache
-from multiprocessing import get_context
 from pathlib import Path
-from types import TracebackType
-from typing import Protocol, TypeAlias
+from typing import Any, Protocol
 
 from ...geometry.common import ComputationError
-from .draw_process import answer_all
 from .view import Sample
 
-COMMAND = (sys.executable, "-P", "-m", f"{__package__}.draw_process")
-Drawer: TypeAlias = "Sequence[str] | Copy"
-"""What draws: a command that begins a process, or a process that waits."""
+COMMAND = (sys.executable, "-P", "-m", f"{__package__}.renderer")
 
 
 class RenderError(ComputationError):
@@ -41,9 +36,15 @@ class Picture(Protocol):
 def render(
     pictures: Mapping[Path, Picture],
     progress: Callable[[float], None] = lambda fraction: None,
-    command: Drawer = COMMAND,
+    command: Sequence[str] = COMMAND,
 ) -> None:
-    """Draw pictures, all in one process, which a command begins or which waits; write each as soon as it is finished.
+    """Draw pictures, all in one process, and write each as soon as it is finished.
+
+    Parameters
+    ----------
+    pictures : by the file that each becomes
+    progress : is told the part of all that is done
+    command : begins the process
 
     Raises
     ------
@@ -62,12 +63,21 @@ def render(
         write_whole(left.pop(0), answer)
 
 
-def drawn(picture: Picture, command: Sequence[str] = COMMAND) -> bytes:
+def drawn(picture: Picture) -> bytes:
     """One picture as the content of a file. Raises RenderError where it cannot be drawn."""
-    (answer,) = _drawn([picture], lambda fraction: None, command)
+    (answer,) = _drawn([picture], lambda fraction: None, COMMAND)
     if isinstance(answer, str):
         raise RenderError(f"The view in three dimensions is left out: {answer}")
     return answer
+
+
+def turnable_page(scene: bytes) -> bytes:
+    """The page around a scene that was drawn as `Turnable`."""
+    from trame_vtk.tools.vtksz2html import write_html
+
+    text = io.StringIO()
+    write_html(scene, text)
+    return text.getvalue().encode()
 
 
 @cache
@@ -77,9 +87,14 @@ def unavailable(command: Sequence[str] = COMMAND) -> str | None:
     return f"No 3-D pictures can be drawn: {answer}" if isinstance(answer, str) else None
 
 
-def _drawn(pictures: Sequence[Picture], progress: Callable[[float], None], command: Drawer) -> Iterator[bytes | str]:
+def _drawn(
+    pictures: Sequence[Picture], progress: Callable[[float], None], command: Sequence[str]
+) -> Iterator[bytes | str]:
     """The files' contents, one after the other; where that fails, last the reason."""
-    with _begun(command) if isinstance(command, Sequence) else command as process:
+    messages = None if "SPINLEV_TRACEBACK" in os.environ else subprocess.DEVNULL
+    pipe = subprocess.PIPE
+    # Ctrl-C at the terminal is for this process, which then ends the other: hence a group of its own.
+    with subprocess.Popen(command, stdin=pipe, stdout=pipe, stderr=messages, process_group=0) as process:
         try:
             unfinished = len(pictures)
             for answer in _answers(process, pickle.dumps(pictures)):
@@ -96,14 +111,7 @@ def _drawn(pictures: Sequence[Picture], progress: Callable[[float], None], comma
             raise
 
 
-def _begun(command: Sequence[str]) -> subprocess.Popen[bytes]:
-    messages = None if "SPINLEV_TRACEBACK" in os.environ else subprocess.DEVNULL
-    pipe = subprocess.PIPE
-    # Ctrl-C at the terminal is for this process, which then ends the other: hence a group of its own.
-    return subprocess.Popen(command, stdin=pipe, stdout=pipe, stderr=messages, process_group=0)
-
-
-def _answers(process: "subprocess.Popen[bytes] | Copy", question: bytes) -> Iterator[bytes | float | str]:
+def _answers(process: subprocess.Popen[bytes], question: bytes) -> Iterator[bytes | float | str]:
     """What the process says until it ends."""
     assert process.stdin
     assert process.stdout
@@ -126,62 +134,27 @@ def _death(status: int) -> str:
     return f"the process that draws them died ({how}), as it does without graphics libraries. {way_out(DRAWING)}"
 
 
-class Copy:
-    """What `subprocess.Popen` offers, of a copy of this process that waits for pictures to draw."""
-
-    def __init__(self) -> None:
-        (asked, ask), (told, tell) = os.pipe(), os.pipe()
-        self._process = get_context("fork").Process(target=_draw, args=(asked, tell, (ask, told)), daemon=True)
-        self._process.start()
-        os.close(asked)
-        os.close(tell)
-        self.stdin, self.stdout = os.fdopen(ask, "wb"), os.fdopen(told, "rb")
-
-    def wait(self) -> int:
-        """The exit status, negative for the signal that ended it."""
-        self._process.join()
-        return self._process.exitcode or 0
-
-    def kill(self) -> None:
-        """End it."""
-        self._process.kill()
-
-    def __enter__(self) -> "Copy":
-        return self
-
-    def __exit__(self, kind: type[BaseException] | None, error: object, trace: TracebackType | None) -> None:
-        self.stdin.close()
-        self.stdout.close()
-        self.wait()
-
-
-@contextmanager
-def copied() -> Iterator[Drawer]:
-    """A copy of this process, made before the work begins; where copies are not safe, the command of a new one.
-
-    A copy has what other threads held locked, for ever: hence this one must have no others yet. It ends with the block.
-    """
-    if sys.platform != "linux" or threading.active_count() > 1:
-        yield COMMAND
-        return
-    import matplotlib.pyplot  # noqa: F401  # for the figures here and for VTK there
-
-    gc.freeze()  # what is loaded lives to the end, here and there
-    with Copy() as copy:
-        yield copy
-
-
-def _draw(asked: int, tell: int, others: tuple[int, int]) -> None:
-    """The copy's life: pictures from one pipe, answers to the other."""
-    os.setpgid(0, 0)
-    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGALRM):
-        signal.signal(number, signal.SIG_DFL)
-    if signal.getsignal(signal.SIGHUP) != signal.SIG_IGN:
-        signal.signal(signal.SIGHUP, signal.SIG_DFL)
-    for descriptor in others:
-        os.close(descriptor)
-    if "SPINLEV_TRACEBACK" not in os.environ:
-        os.dup2(os.open(os.devnull, os.O_WRONLY), 2)
+def _main() -> None:
+    """The life of the process that draws."""
+    answers = os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)  # what libraries print is no answer
-    with os.fdopen(asked, "rb") as questions, os.fdopen(tell, "wb") as answers:
-        answer_all(questions, answers)
+
+    def send(answer: Any) -> None:
+        pickle.dump(answer, answers)
+        answers.flush()
+
+    try:
+        pictures = pickle.load(sys.stdin.buffer)
+        for number, picture in enumerate(pictures):
+            send(picture.draw(lambda fraction, number=number: send((number + fraction) / len(pictures))))
+    except Exception as error:  # whatever it is, the other process says it in a line
+        from ..cli.console import DRAWING, is_missing_library, way_out
+
+        reason = " ".join(f"{type(error).__name__}: {error}.".split())
+        send(f"{reason} {way_out(DRAWING)}" if is_missing_library(error) else reason)
+        if "SPINLEV_TRACEBACK" in os.environ:
+            raise
+
+
+if __name__ == "__main__":
+    _main()

@@ -1,4 +1,4 @@
-"""Figures of a run, drawn from its result file alone."""
+"""Figures of results, each drawn from its dataset alone."""
 
 from __future__ import annotations
 
@@ -6,46 +6,68 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import xarray as xr
+from scipy.interpolate import CubicSpline
 
 from ...geometry.common import Array
-from .style import COLORS, DASHES, NAMES, PALETTE, fixed_panels, power_of_ten, styled
+from .style import COLORS, DASHES, NAMES, PAGE, PALETTE, legend_below, panels, styled
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-RIGHT_ABOVE: Any = {"ha": "left", "va": "bottom", "xytext": (4, 2)}
-LEFT_BELOW: Any = {"ha": "right", "va": "top", "xytext": (-4, -2)}
+DISTANCE = "distance below the rotor (mm)"
+MARKS = (
+    ("o", None, "stable, no plate"),
+    ("o", "white", "unstable, no plate"),
+    ("D", None, "stable, with the plate"),
+    ("D", "white", "unstable, with the plate"),
+)
+PARTS = 120
+"""Intervals of an envelope: more than a printed figure tells apart."""
+SHOWN = 200
+"""Samples of a flight that are drawn one by one."""
+COARSE = 0.05
+"""Interval of samples (s) that lets a bounce pass unseen: a line through them would show slow motions that are none."""
+HOURS = 7200.0
+"""Flights that take longer are drawn over hours, s."""
+MODE_MARKERS = "osD^v"
+NO_GROWTH = 1e-9
+"""Growth that counts as none on the axis, 1/s."""
+QUANTITIES = {
+    "equilibria": ("depth", "lateral_offset", "polar_angle", "growth"),
+    "flight": ("levitated", "height_spread"),
+    "field": ("size", "B_error"),
+}
+"""Quantities drawn for each question, those of the motion in the laboratory."""
 
 
 @styled
 def field_figure(result: xr.Dataset) -> Figure:
     """Field components on the axis below the rotor for every model, and how far the models are apart."""
-    figure, ((left, right),) = fixed_panels(1, 2, (8.0, 3.4))
+    figure, ((left, right),) = panels(1, 2, (8.0, 3.4))
     distance = -1e3 * result["axis_height"].values
     reference = str(result.attrs["best_model"])
     true = result["axis_field"].sel(model=reference).values
     for model in result["model"].values.tolist():
-        field, color = result["axis_field"].sel(model=model).values, COLORS[model]
-        left.semilogy(
-            distance, 1e3 * np.hypot(field[:, 0], field[:, 1]), DASHES[model], color=color, label=NAMES[model]
-        )
-        left.semilogy(distance, 1e3 * np.abs(field[:, 2]), DASHES[model], color=color)
+        field = result["axis_field"].sel(model=model).values
+        look: dict[str, Any] = {"color": COLORS[model], "linestyle": DASHES[model]}
+        left.semilogy(distance, 1e3 * np.hypot(field[:, 0], field[:, 1]), label=NAMES[model], **look)
+        left.semilogy(distance, 1e3 * np.abs(field[:, 2]), **look)
         if model != reference:
             apart = np.linalg.norm(field - true, axis=1) / np.linalg.norm(true, axis=1)
-            right.semilogy(distance, apart, DASHES[model], color=color, label=NAMES[model])
+            right.semilogy(distance, apart, label=NAMES[model], **look)
     error = result["axis_error"].sel(model=reference).values
     right.fill_between(distance, np.nanmin(error) / 3, error, color="0.85", label=f"error estimate, {NAMES[reference]}")
     middle = len(distance) // 2
-    sizes = {"across the axis": 1e3 * np.hypot(*true[middle, :2]), "along the axis": 1e3 * np.abs(true[middle, 2])}
-    for name, size in sizes.items():
-        where = RIGHT_ABOVE if size == max(sizes.values()) else LEFT_BELOW
-        left.annotate(name, (distance[middle], size), textcoords="offset points", **where)
-    left.set(xlabel="distance below the rotor (mm)", ylabel="B (mT)", title="Field on the axis")
-    right.set(xlabel="distance below the rotor (mm)", ylabel="|ΔB| / |B|", title=f"Difference from {NAMES[reference]}")
-    right.minorticks_off()  # many decades
-    for panel in (left, right):
-        panel.yaxis.set_major_formatter(power_of_ten)
+    across, along = 1e3 * np.hypot(*true[middle, :2]), 1e3 * np.abs(true[middle, 2])
+    above, below = (4, 2, "left", "bottom"), (-4, -2, "right", "top")
+    for name, size, (x, y, ha, va) in (
+        ("across the axis", across, above if across > along else below),
+        ("along the axis", along, below if across > along else above),
+    ):
+        left.annotate(name, (distance[middle], size), xytext=(x, y), textcoords="offset points", ha=ha, va=va)
+    left.set(xlabel=DISTANCE, ylabel="|B component| (mT)", title="Field on the axis")
+    right.set(xlabel=DISTANCE, ylabel="|ΔB| / |B|", title=f"Difference from {NAMES[reference]}")
     left.legend(loc="upper right")  # fields fall
     right.legend()
     return figure
@@ -54,7 +76,7 @@ def field_figure(result: xr.Dataset) -> Figure:
 @styled
 def force_figure(result: xr.Dataset) -> Figure:
     """Axial force against distance with its equilibria marked, for every model that has them; a zoom on the first."""
-    figure, ((axes, near),) = fixed_panels(1, 2, (8.0, 3.8), lines_below=3)
+    figure, ((axes, near),) = panels(1, 2, (8.0, 3.8))
     weight = -1e3 * float(result.attrs["weight_N"])
     for panel in (axes, near):
         panel.axhline(weight, color="0.3", lw=0.8, label="weight of the floater")
@@ -63,25 +85,18 @@ def force_figure(result: xr.Dataset) -> Figure:
             _mark_equilibria(panel, result, model, weight)
         for marker, fill, label in MARKS if _with_plate(result).any() else MARKS[:2]:
             panel.plot([], [], marker, color="0.3", mfc=fill or "0.3", label=label)
-        panel.set(xlabel="distance below the rotor (mm)")
+        panel.set(xlabel=DISTANCE)
     axes.set(xlim=(5, 60), ylabel="axial magnetic force (mN), up positive", title="Force on the balanced floater")
     if weight > 0:
         axes.set_ylim(-2.5 * weight, 3.5 * weight)
-    first = _first_distance(result)
-    if first is None or weight <= 0:
-        near.set_axis_off()
+    stable = result["equilibrium_position"].sel(axis="z").where(result["equilibrium_stable"] == 1).dropna("equilibrium")
+    if stable.size and weight > 0:
+        first = -1e3 * float(stable[0])
+        near.set(xlim=(first - 1.0, first + 1.0), ylim=(0.0, 2 * weight), title="Where it levitates")
     else:
-        near.set(xlim=(first - 1.0, first + 1.0), ylim=(0.0, 2 * weight), title="Where it floats")
-    figure.legend(*axes.get_legend_handles_labels(), loc="lower center", ncols=3)
+        near.set_axis_off()
+    legend_below(figure, axes, columns=3)
     return figure
-
-
-MARKS = (
-    ("o", None, "stable, no plate"),
-    ("o", "white", "unstable, no plate"),
-    ("D", None, "stable, with the plate"),
-    ("D", "white", "unstable, with the plate"),
-)
 
 
 def _draw_curves(axes: Axes, result: xr.Dataset, model: str) -> None:
@@ -90,14 +105,13 @@ def _draw_curves(axes: Axes, result: xr.Dataset, model: str) -> None:
     for number in np.unique(curves["curve_number"]):
         points = curves.isel(curve_point=(curves["curve_number"] == number).values)
         distance, force = -1e3 * points["curve_position"].sel(axis="z").values, 1e3 * points["curve_force"].values
-        axes.plot(*_smooth(np.arange(len(force), dtype=float), distance, force), DASHES[model], color=COLORS[model])
+        axes.plot(*_smooth(np.arange(float(len(force))), distance, force), DASHES[model], color=COLORS[model])
     axes.plot([], [], DASHES[model], color=COLORS[model], label=NAMES[model])
 
 
 def _mark_equilibria(axes: Axes, result: xr.Dataset, model: str, weight: float) -> None:
     """Circles without the plate's currents, diamonds with them; filled where stable."""
-    here = result["equilibrium_model"] == model
-    felt = _with_plate(result)
+    here, felt = result["equilibrium_model"] == model, _with_plate(result)
     for plate, marker in ((False, "o"), (True, "D")):
         for stable, fill in ((1, COLORS[model]), (0, "white")):
             chosen = here & (felt == plate) & (result["equilibrium_stable"] == stable)
@@ -110,69 +124,46 @@ def _with_plate(result: xr.Dataset) -> xr.DataArray:
     return xr.DataArray(result.get("equilibrium_with_plate", 0 * result["equilibrium_stable"]) == 1)
 
 
-def _first_distance(result: xr.Dataset) -> float | None:
-    """Where the first stable equilibrium is, mm."""
-    chosen = result["equilibrium_position"].sel(axis="z").where(result["equilibrium_stable"] == 1)
-    distances = -1e3 * chosen.dropna("equilibrium").values
-    return float(distances[0]) if len(distances) else None
-
-
-PARTS = 120
-"""Intervals of an envelope: more than a printed figure tells apart."""
-SHOWN = 200
-"""Samples of a flight that are drawn one by one."""
-COARSE = 0.05
-"""Interval of samples (s) that lets a bounce pass unseen: a line through them would show slow motions that are none."""
-HOURS = 7200.0
-"""Flights that take longer are drawn over hours, s."""
-
-
 @styled
 def trajectory_figure(result: xr.Dataset) -> Figure:
     """Distance and polar angle of a flight as envelopes, and a closer look at its beginning, or at its end if lost."""
-    figure, axes = fixed_panels(2, 2, (8.0, 5.4))
+    figure, axes = panels(2, 2, (8.0, 5.4))
     seconds, moment = result["time"].values, result["moment"].values
     time, unit = (seconds / 3600, "h") if seconds[-1] > HOURS else (seconds, "s")
     distance = -1e3 * result["position"].sel(axis="z").values
     angle = np.degrees(np.arctan2(np.hypot(moment[:, 0], moment[:, 1]), moment[:, 2]))
     up = str(result.attrs.get("ended_by", "duration")) in ("duration", "stopped")
     near = slice(0, SHOWN) if up else slice(-SHOWN, None)
-    _envelope(axes[0, 0], time, distance)
-    _envelope(axes[1, 0], time, angle)
-    for panel in axes[:, 0]:
+    for panel, values in ((axes[0, 0], distance), (axes[1, 0], angle)):
+        _envelope(panel, time, values)
         panel.axvspan(time[near][0], time[near][-1], color=PALETTE[4], alpha=0.4, lw=0, label="shown on the right")
         if "lowered_from_s" in result.attrs:
-            lowered = np.array(_lowering(result, seconds)) * time[-1] / seconds[-1]
-            panel.axvspan(*lowered, color="0.88", lw=0, zorder=0, label="plate is lowered")
+            lowered = [min(float(result.attrs[f"lowered_{word}_s"]), seconds[-1]) for word in ("from", "until")]
+            span = np.array(lowered) * time[-1] / seconds[-1]
+            panel.axvspan(*span, color="0.88", lw=0, zorder=0, label="plate is lowered")
         panel.set_xlabel(f"time ({unit})")
     axes[0, 0].legend(frameon=True, framealpha=0.9, edgecolor="none")
     seen = {"rotor's frame": "position_rotor_frame", "laboratory": "position"}  # the one in which it moves less
     moved = {frame: np.ptp(result[name].values[near], axis=0).max() for frame, name in seen.items()}
     frame = min(moved, key=lambda frame: moved[frame])
-    turned = 1e3 * result[seen[frame]].values[near]
+    here, x, y = time[near], *(1e3 * result[seen[frame]].values[near].T[:2])
     step = float(np.diff(seconds[near]).max(initial=0.0))
-    look = "A closer look"
-    if step > COARSE:
-        look = f"{look}: a sample every {step:.2g} s"
-        axes[0, 1].plot(time[near], distance[near], ".", ms=3)
-        axes[1, 1].plot(turned[:, 0], turned[:, 1], ".", ms=3)
-    else:
-        axes[0, 1].plot(*_smooth(time[near], time[near], distance[near]), lw=0.8)
-        axes[1, 1].plot(*_smooth(time[near], turned[:, 0], turned[:, 1]), lw=0.8)
-    axes[1, 1].plot(*turned[-1, :2], "o", color=PALETTE[1], ms=4, label="end")
+    title, look = (f"A closer look: a sample every {step:.2g} s", ".") if step > COARSE else ("A closer look", "-")
+    close: tuple[Array, ...] = (here, distance[near], x, y)
+    close = close if step > COARSE else _smooth(here, *close)
+    axes[0, 1].plot(close[0], close[1], look, lw=0.8, ms=3)
+    axes[1, 1].plot(close[2], close[3], look, lw=0.8, ms=3)
+    axes[1, 1].plot(x[0], y[0], "o", color=PALETTE[2], ms=4, label="start")
+    axes[1, 1].plot(x[-1], y[-1], "o", color=PALETTE[1], ms=4, label="end")
     axes[1, 1].legend()
     axes[0, 0].set(ylabel="distance along the axis (mm)", title="Distance: smallest, mean, largest")
     axes[1, 0].set(ylabel="polar angle of the moment (°)", title="Polar angle: smallest, mean, largest")
-    axes[0, 1].set(xlabel=f"time ({unit})", ylabel="distance along the axis (mm)", title=look)
+    axes[0, 1].set(xlabel=f"time ({unit})", ylabel="distance along the axis (mm)", title=title)
     axes[1, 1].set(xlabel="x (mm)", ylabel="y (mm)", title=f"The same from above, {frame}")
     axes[1, 1].set(aspect="equal", adjustable="datalim")
-    axes[1, 1].locator_params(axis="x", nbins=5)
+    for panel in axes.flat:
+        panel.locator_params(axis="x", nbins=6)
     return figure
-
-
-def _lowering(result: xr.Dataset, time: Array) -> tuple[float, float]:
-    begins, ends = (min(float(result.attrs[f"lowered_{word}_s"]), float(time[-1])) for word in ("from", "until"))
-    return begins, ends
 
 
 def _envelope(axes: Axes, time: Array, values: Array) -> None:
@@ -184,23 +175,167 @@ def _envelope(axes: Axes, time: Array, values: Array) -> None:
     axes.plot(middle, mean, color=PALETTE[0], lw=1.0)
 
 
-def _smooth(parameter: Array, x: Array, y: Array) -> tuple[Array, Array]:
-    """Points of a smooth curve through samples (n,) at a growing parameter (n,): cubics that share slopes.
-
-    SciPy's splines take longer to load than the figure to draw.
-    """
+def _smooth(parameter: Array, *curves: Array) -> tuple[Array, ...]:
+    """Points of smooth curves through samples (n,) at a growing parameter (n,)."""
+    parameter, kept = np.unique(parameter, return_index=True)
     if len(parameter) < 4:
-        return x, y
+        return curves
     fine = np.linspace(parameter[0], parameter[-1], 12 * len(parameter))
-    before = np.clip(np.searchsorted(parameter, fine, side="right") - 1, 0, len(parameter) - 2)
-    step = np.diff(parameter)[before]
-    part = (fine - parameter[before]) / step
-    rest = 1 - part
+    return tuple(CubicSpline(parameter, np.column_stack(curves)[kept])(fine).T)
 
-    def between(values: Array) -> Array:
-        slope = np.gradient(values, parameter, edge_order=2)
-        low, high = values[before], values[before + 1]
-        leaving, coming = step * slope[before], step * slope[before + 1]
-        return rest**2 * (low + part * (2 * low + leaving)) + part**2 * (high + rest * (2 * high - coming))
 
-    return between(x), between(y)
+@styled
+def working_point_figure(found: xr.Dataset) -> Figure:
+    """A row per magnet: a section along the easy axis through the lowest place, and the field over the volume."""
+    count = found.sizes["magnet"]
+    figure, axes = panels(count, 2, (PAGE, 2.9 * count))
+    for k, (section, volume) in enumerate(axes):
+        one = found.isel(magnet=k)
+        u, v, knee = 1e3 * one["along"].values, 1e3 * one["across"].values, float(one["knee"])
+        shown = section.pcolormesh(u, v, one["section"].values, cmap="viridis", shading="nearest", rasterized=True)
+        figure.colorbar(shown, ax=section, label="μ0 H along the easy axis (T)")
+        if np.nanmin(one["section"].values) < knee:
+            below = np.where(one["section"].values < knee, 1.0, np.nan)
+            section.contourf(u, v, below, levels=[0.5, 1.5], colors="none", hatches=["////"])
+            section.contour(u, v, np.nan_to_num(one["section"].values), levels=[knee], colors="white", linewidths=1)
+        away = one["place"].values - one["center"].values
+        where = [1e3 * float(away @ one[name].values) for name in ("easy_axis", "across_axis")]
+        section.plot(*where, "o", color=PALETTE[1], markersize=5, markeredgecolor="white", clip_on=False)
+        section.set(title=f"Magnet {int(one['magnet'])}", xlabel="along the easy axis (mm)", ylabel="across (mm)")
+        section.set_aspect("equal")
+        section.grid(False)
+        volume.plot(one["levels"], 100 * found["share"])
+        volume.axvline(float(one["lowest"]), color=PALETTE[1], linestyle="--", label="lowest, off the edges")
+        if np.isfinite(knee):
+            volume.axvline(knee, color="black", label="knee")
+        volume.set(xlabel="μ0 H along the easy axis (T)", ylabel="share of the volume below (%)", ylim=(0, 100))
+        volume.legend()
+    return figure
+
+
+@styled
+def modes_figure(result: xr.Dataset) -> Figure:
+    """Growth against frequency of every small motion, from a result of `equilibria` or `stability`."""
+    figure, ((axes,),) = panels(1, 1, (5.5, 3.6))
+    listed = result if "equilibrium" in result.dims else result.expand_dims("equilibrium")
+    for k, color in zip(range(listed.sizes["equilibrium"]), PALETTE * 9, strict=False):
+        one = listed.isel(equilibrium=k)
+        height = 1e3 * float(one["position"].sel(axis="z"))
+        axes.plot([], [], "s", color=color, label=f"z = {height:.2f} mm, {'stable' if one['stable'] else 'unstable'}")
+        for name, marker in zip(one["mode"].values.tolist(), MODE_MARKERS, strict=True):
+            mode = one.sel(mode=name)
+            axes.plot(mode["mode_frequency"], mode["mode_growth"], marker, color=color, mfc="none", ms=6)
+    for name, marker in zip(listed["mode"].values.tolist(), MODE_MARKERS, strict=True):
+        axes.plot([], [], marker, color="0.3", mfc="none", label=name)
+    axes.axhline(0.0, color="0.3", lw=0.8)
+    sizes = np.abs(listed["mode_growth"].values)
+    smallest = sizes[sizes > NO_GROWTH].min(initial=1.0)
+    axes.set_yscale("symlog", linthresh=10.0 ** np.floor(np.log10(smallest)))
+    axes.margins(0.08)
+    axes.set(xlabel="frequency, rotor's frame (Hz)", ylabel="growth (1/s), negative: dies out", title="Small motions")
+    axes.legend(ncols=2, loc="center left")
+    return figure
+
+
+def drawable(result: xr.Dataset) -> bool:
+    """Whether there is a figure for so many parameters."""
+    return len(_varied(result)) <= 2
+
+
+@styled
+def question_figure(result: xr.Dataset) -> Figure:
+    """Curves over one parameter, one for each model if these were varied too, or maps over two numbers."""
+    shown = _derived(result)
+    names, varied = _shown(shown), _varied(result)
+    figure, axes = panels(-(-len(names) // 2), 2, (8.4, 3.6 * -(-len(names) // 2)))
+    words = [key for key in varied if result[key].dtype.kind not in "iuf"]
+    for panel in axes.ravel()[len(names) :]:
+        panel.set_axis_off()
+    for panel, name in zip(axes.ravel(), names, strict=False):
+        if len(varied) == 1:
+            _curves(panel, shown, name, varied[0], PALETTE[0])
+        elif len(words) == 1:
+            (number,) = set(varied) - set(words)
+            for value, color in zip(shown[words[0]].values, PALETTE * 9, strict=False):
+                _curves(panel, shown.sel({words[0]: value}), name, number, color, f"{NAMES[str(value)]}, ")
+            panel.legend()
+        else:
+            _map(panel, shown, name, varied)
+    return figure
+
+
+def _shown(result: xr.Dataset) -> list[str]:
+    """Names of what is drawn of a result; one of an older version has less."""
+    return [name for name in QUANTITIES[str(result.attrs["ask"])] if name in result]
+
+
+def _derived(result: xr.Dataset) -> xr.Dataset:
+    """The result with what is drawn instead of what is kept."""
+    if "position" in result:
+        depth = (-1e3 * result["position"].sel(axis="z")).assign_attrs(units="mm", long_name="levitation distance")
+        result = result.assign(depth=depth)
+    if "lateral_offset" in result:
+        aside = (1e3 * result["lateral_offset"]).assign_attrs(units="mm", long_name="lateral offset")
+        angle = result["polar_angle"].assign_attrs(long_name="polar angle")
+        result = result.assign(lateral_offset=aside, polar_angle=angle)
+    if "B" in result:
+        size = 1e3 * (result["B"] ** 2).sum("axis", skipna=False) ** 0.5
+        return result.assign(size=size.assign_attrs(units="mT", long_name="|B|"))
+    return result
+
+
+def _curves(axes: Axes, result: xr.Dataset, name: str, key: str, color: str, of: str = "") -> None:
+    values, x = result[name], result[key].values
+    if "equilibrium" not in values.dims:
+        axes.plot(x, values.values, "o-", ms=3, color=color, label=of.rstrip(", "))
+    else:
+        for stable, fill in ((1, color), (0, "white")):
+            chosen = values.where(result["stable"] == stable).transpose(key, "equilibrium").values
+            axes.plot([], [], "o", color=color, mfc=fill, ms=4, label=f"{of}{'stable' if stable else 'unstable'}")
+            axes.plot(x, chosen, "o", color=color, mfc=fill, ms=4)
+        axes.legend()
+    axes.set(xlabel=key, ylabel=_label(values))
+    if name == "growth":
+        axes.set_yscale("symlog", linthresh=1e-3)
+
+
+def _map(axes: Axes, result: xr.Dataset, name: str, keys: list[str]) -> None:
+    values = result[name]
+    if "equilibrium" in values.dims:  # the first is stable wherever any is
+        values = values.where(result["stable"] == 1).isel(equilibrium=0).assign_attrs(values.attrs)
+        axes.set_title("stable equilibrium nearest to the rotor")
+    drawn = axes.pcolormesh(
+        result[keys[1]].values, result[keys[0]].values, values.transpose(*keys).values, shading="nearest"
+    )
+    axes.set(xlabel=keys[1], ylabel=keys[0])
+    if axes.figure is not None:
+        axes.figure.colorbar(drawn, ax=axes, label=_label(values))
+
+
+def _label(values: xr.DataArray) -> str:
+    return f"{values.attrs['long_name']} ({values.attrs['units']})"
+
+
+def _varied(result: xr.Dataset) -> list[str]:
+    return [str(key) for key in np.atleast_1d(result.attrs["varied"])]
+
+
+def question_lines(result: xr.Dataset) -> list[str]:
+    """What was found, in a few lines."""
+    varied, ask = _varied(result), str(result.attrs["ask"])
+    grid = " × ".join(f"{key} ({result.sizes[key]})" for key in varied)
+    lines = [f"Asked for {ask} over {grid}."]
+    shown = _derived(result)
+    if "stable" in shown:
+        some = (shown["stable"] == 1).any("equilibrium")
+        lines.append(f"A stable equilibrium at {int(some.sum())} of {some.size} points.")
+        shown = shown.where(shown["stable"] == 1)
+    if "unknown" in result and (result["unknown"] > 0).any():
+        lines.append(f"At {int((result['unknown'] > 0).sum())} points not all equilibria could be computed.")
+    for name in _shown(shown):
+        values = shown[name].values[np.isfinite(shown[name].values)]
+        if len(values):
+            what = f"{shown[name].attrs['long_name']}{' where stable' if 'stable' in shown else ''}"
+            units = {"1": ""}.get(shown[name].attrs["units"], shown[name].attrs["units"])
+            lines.append(f"{what}: {values.min():.6g} to {values.max():.6g} {units}".rstrip())
+    return lines

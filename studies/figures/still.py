@@ -1,7 +1,13 @@
-"""A 3-D picture of rotor, floater, field and path, rendered off screen."""
+"""What VTK draws: a scene as a picture, a flight as an animation, and a scene that a page lets its reader turn.
+
+Lengths are mm here. Only the process that draws loads this module.
+"""
 
 import io
+import json
+import zipfile
 from collections.abc import Callable
+from itertools import product
 from typing import Any
 
 import imageio
@@ -11,53 +17,43 @@ from vtkmodules.vtkCommonCore import vtkLogger
 
 from ...geometry.common import Array
 from ...geometry.scene.contents import Scene
-from ...geometry.shapes import Box, Ring, Sphere, rotation_matrix
-from ...geometry.solids import Part, Solid
-from .view import MILLI, Currents, Frames, View, add_field, add_path, add_turning, beside_the_rotor, corners_mm
+from ...geometry.shapes import Box, Sphere, rotation_matrix
+from ...geometry.solids import Solid
+from .view import FINE, SEEN, Currents, Frames, View, arrow, near_plate, triangles
 
-NORTH = "#D55E00"
-METAL = "#9AA5B1"
-ROUND = 72
-"""Facets of a circle."""
+NORTH, METAL, DARK = "#D55E00", "#9AA5B1", "#4C566A"
+PER_SECOND = 12
+FIELD, CURRENT = "B (mT)", "J (A/mm²)"
+BAR: dict[str, Any] = {"color": "black", "vertical": True, "position_y": 0.3, "height": 0.4}
+BAR |= {"title_font_size": 24, "label_font_size": 22}
+NAME: dict[str, Any] = {"font_size": 22, "text_color": "black", "shape_color": "white", "shape_opacity": 0.7}
+NAME |= {"margin": 4, "show_points": False, "always_visible": True}
+TURNABLE_HEIGHT = 0.25
+"""Of the camera over its way to a scene to turn: more than in a still picture, for a near plate is in perspective."""
+TURNABLE_MARGIN = 0.92
+"""Part of the window's width and height that a scene to turn fills."""
 
 
 def scene_picture(view: View) -> bytes:
-    """A PNG of rotor, floater, plate, field and path, seen in the rotor's frame."""
-    plotter = new_plotter()
-    draw_view(plotter, view)
-    return _png(plotter)
-
-
-def draw_view(plotter: pv.Plotter, view: View) -> None:
-    """Draw rotor, floater, plate, field and path, with their names."""
-    scene, center = view.scene, view.position / MILLI
-    times = draw_bodies(plotter, view)
+    """A PNG of rotor, floater, plate, field and path, with their names, seen in the rotor's frame."""
+    plotter, scene, center = new_plotter(), view.scene, 1e3 * view.position
+    times = _add_bodies(plotter, view)
     if view.plane is not None:
-        add_field(plotter, view.plane, scene)
-    radius = scene.floater.radius / MILLI
+        _add_field(plotter, view)
+    radius = 1e3 * scene.floater.radius
     beside = center + np.array([1.2 * radius, 0.0, 0.0])
-    names = {"floater": beside, f"rotor, {scene.frequency:g} Hz": beside_the_rotor(scene)}
+    rotor = _rotor_corners(scene)
+    names = {"floater": beside, f"rotor, {scene.frequency:g} Hz": [rotor[:, 0].max() + 3.0, 0.0, rotor[:, 2].max()]}
     if scene.plate is not None:
-        corners = corners_mm(scene.plate.box)
-        names["plate"] = corners[corners[:, 1].argsort()[:4]].mean(axis=0)
+        near = near_plate(scene.plate.box, SEEN)
+        corners = 1e3 * near.corners
+        whole = np.allclose(near.size, scene.plate.box.size)
+        names["plate" if whole else "part of the plate"] = corners[corners[:, 1].argsort()[:4]].mean(axis=0)
     if times:
         names[f"path × {times:g}, {view.frame}"] = beside - np.array([0.0, 0.0, 0.8 * radius])
-    labels = {"font_size": 22, "text_color": "black", "shape_color": "white", "shape_opacity": 0.7, "margin": 4}
-    plotter.add_point_labels(
-        np.array(list(names.values())), list(names), show_points=False, always_visible=True, **labels
-    )
-    look(plotter, scene, -float(center[2]))
-
-
-def draw_bodies(plotter: pv.Plotter, view: View) -> float:
-    """Draw rotor, floater, plate and path; returns how many times the path is enlarged, 0 for none."""
-    scene = view.scene
-    add_rotor(plotter, scene)
-    add_plate(plotter, scene, view.currents)
-    add_floater(plotter, scene, view.position, view.moment)
-    if scene.frequency:
-        add_turning(plotter, scene)
-    return add_path(plotter, view.path / MILLI, scene.floater.radius / MILLI) if len(view.path) > 1 else 0.0
+    plotter.add_point_labels(np.array(list(names.values())), list(names), **NAME)
+    _look(plotter, scene, -float(center[2]))
+    return _png(plotter)
 
 
 def sample_picture() -> bytes:
@@ -67,9 +63,65 @@ def sample_picture() -> bytes:
     return _png(plotter)
 
 
-def _png(plotter: pv.Plotter) -> bytes:
+def flight_animation(frames: Frames, progress: Callable[[float], None]) -> bytes:
+    """A GIF of the frames, one after the other."""
+    plotter, file = new_plotter((800, 640)), io.BytesIO()
+    magnets = _add_rotor(plotter, frames.scene)
+    add_plate(plotter, frames.scene)
+    _look(plotter, frames.scene, float(-frames.position[:, 2].max()) * 1e3)
+    floater: list[pv.Actor] = []
+    gif: Any = imageio.get_writer(file, format="GIF", mode="I", loop=0, duration=1000 / PER_SECOND)
+    with gif:
+        for number, instant in enumerate(frames.time):
+            pose = np.eye(4)
+            pose[:3, :3] = rotation_matrix((0.0, 0.0, np.degrees(frames.scene.angular_velocity * instant)))
+            for actor in magnets:
+                actor.user_matrix = pose
+            for actor in floater:
+                plotter.remove_actor(actor, render=False)
+            floater = add_floater(plotter, frames.scene, frames.position[number], frames.moment[number])
+            plotter.add_text(f"t = {instant:.4f} s", color="black", font_size=10, name="time")
+            gif.append_data(plotter.screenshot(return_img=True))
+            progress((number + 1) / len(frames.time))
+    plotter.close()
+    return file.getvalue()
+
+
+def turnable_scene(view: View) -> bytes:
+    """Bodies, path and field lines of a view as the viewer of trame-vtk takes them, without names.
+
+    PyVista's own `export_html` gives the same file, but starts a web server to make it.
+    """
+    from trame_vtk.modules.vtk.serializers import (
+        SynchronizationContext,
+        extract_array_hash,
+        initialize_serializers,
+        reference_id,
+        serialize,
+    )
+
+    plotter = new_plotter((900, 700))
+    _add_bodies(plotter, view)
+    if view.lines:
+        plotter.add_mesh(_polylines(view.lines), color="#2E3440", line_width=1)
+    _look_from_near(plotter, view.scene)
+    plotter.render()
+    initialize_serializers()
+    context, window = SynchronizationContext(), plotter.render_window
+    camera = plotter.renderer.GetActiveCamera()
+    state = serialize(None, window, reference_id(window), context, 1)
+    state["extra"] = {
+        "vtkRefId": reference_id(window),
+        "centerOfRotation": camera.GetFocalPoint(),
+        "camera": reference_id(camera),
+    }
+    arrays = {
+        entry["hash"]: {**entry, "content": context.get_cached_data_array(entry["hash"], False)}
+        for entry in extract_array_hash(state)
+    }
     file = io.BytesIO()
-    plotter.screenshot(file)
+    with zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED) as archive:
+        archive.writestr("index.json", json.dumps({"scene": state, "hashes": arrays}))
     plotter.close()
     return file.getvalue()
 
@@ -82,59 +134,122 @@ def new_plotter(size: tuple[int, int] = (1400, 1100)) -> pv.Plotter:
     return plotter
 
 
-def add_rotor(plotter: pv.Plotter, scene: Scene) -> list[pv.Actor]:
-    """Draw the magnets with their polarisation; returns the actors, which turn together."""
-    actors = []
-    for magnet in scene.rotor:
-        actors.append(plotter.add_mesh(_surface(magnet.body), color="#4C566A", show_edges=isinstance(magnet.body, Box)))
-        center, radius = magnet.body.center / MILLI, magnet.body.circumradius / MILLI
-        actors += _arrow(plotter, center, magnet.polarization_in_rotor, radius)
-    return actors
-
-
 def add_floater(plotter: pv.Plotter, scene: Scene, position: Array, moment: Array) -> list[pv.Actor]:
     """Draw the floater's body and its moment; positions m."""
-    radius, center = scene.floater.radius / MILLI, position / MILLI
-    surface = pv.Sphere(radius=radius, center=center, theta_resolution=60, phi_resolution=60)
-    if scene.floater.body is not None:
-        surface = _surface(scene.floater.placed(position, moment / np.linalg.norm(moment)))
-    drawn = plotter.add_mesh(surface, color=METAL, specular=0.6, opacity=0.45)
-    return [drawn, *_arrow(plotter, center, moment, radius)]
+    floater = scene.floater
+    direction = moment / (np.linalg.norm(moment) or 1.0)
+    body = Sphere(floater.radius, position) if floater.body is None else floater.placed(position, direction)
+    drawn = _add_body(plotter, body, METAL, opacity=0.45, specular=0.6)
+    return [*drawn, *_add_arrow(plotter, 1e3 * position, moment, 1e3 * floater.radius)]
 
 
 def add_plate(plotter: pv.Plotter, scene: Scene, currents: Currents | None = None) -> None:
-    """Draw the plate, with its currents where they are given."""
+    """Draw the part of the plate near the rotor, with its currents where they are given: the longest arrow is 12 mm."""
     if scene.plate is None:
         return
-    box = _box(scene.plate.box)
-    plotter.add_mesh(box, color=METAL, opacity=0.2)
-    plotter.add_mesh(box.extract_feature_edges(), color="#4C566A", line_width=3)
+    _add_body(plotter, near_plate(scene.plate.box, SEEN), METAL, opacity=0.2)
     if currents is not None:
-        _add_currents(plotter, currents)
+        cloud = pv.PolyData(1e3 * currents.points)
+        cloud["J"], cloud[CURRENT] = 1e-6 * currents.density, 1e-6 * np.linalg.norm(currents.density, axis=1)
+        longest = float(cloud[CURRENT].max()) or 1.0
+        arrows = cloud.glyph(orient="J", scale=CURRENT, factor=12.0 / longest, geom=pv.Arrow())
+        bar = {**BAR, "title": CURRENT, "fmt": "%.2g", "position_x": 0.04}  # the field's is on the right
+        plotter.add_mesh(arrows, scalars=CURRENT, cmap="magma_r", scalar_bar_args=bar)
 
 
-def _add_currents(plotter: pv.Plotter, currents: Currents) -> None:
-    """Arrows of the current density; the longest is 12 mm."""
-    current = 1e-6 * currents.density
-    cloud = pv.PolyData(currents.points / MILLI)
-    cloud["J"], cloud["|J| (A/mm²)"] = current, np.linalg.norm(current, axis=1)
-    longest = float(cloud["|J| (A/mm²)"].max()) or 1.0
-    arrows = cloud.glyph(orient="J", scale="|J| (A/mm²)", factor=12.0 / longest, geom=pv.Arrow())
-    place = {"position_x": 0.04, "position_y": 0.3, "height": 0.4}  # the field's is on the right
-    look_of_it = {"title_font_size": 24, "label_font_size": 22}
-    bar = {"title": "J (A/mm²)", "color": "black", "fmt": "%.2g", "vertical": True, **place, **look_of_it}
-    plotter.add_mesh(arrows, scalars="|J| (A/mm²)", cmap="magma_r", scalar_bar_args=bar)
+def _png(plotter: pv.Plotter) -> bytes:
+    file = io.BytesIO()
+    plotter.screenshot(file)
+    plotter.close()
+    return file.getvalue()
 
 
-def look(plotter: pv.Plotter, scene: Scene, depth: float) -> None:
+def _add_bodies(plotter: pv.Plotter, view: View) -> float:
+    """Draw rotor, floater, plate and path; returns how many times the path is enlarged, 0 for none."""
+    scene = view.scene
+    _add_rotor(plotter, scene)
+    add_plate(plotter, scene, view.currents)
+    add_floater(plotter, scene, view.position, view.moment)
+    if scene.frequency:
+        _add_turning(plotter, scene, -1.5e3 * float(view.position[2]))
+    if len(view.path) < 2:
+        return 0.0
+    path = 1e3 * view.path
+    middle = (path.max(axis=0) + path.min(axis=0)) / 2
+    reach = float(np.abs(path - middle).max())
+    # Enlarged by a round number until it can be seen inside the floater.
+    steps = [times for k in range(7) for times in (10.0**k, 2 * 10.0**k, 5 * 10.0**k)]
+    times = max([1.0, *(t for t in steps if t * reach <= 800 * scene.floater.radius)])
+    shown = middle + times * (path - middle)[:: max(1, len(path) // 20000)]
+    plotter.add_mesh(pv.MultipleLines(shown), color="#0072B2", line_width=2, opacity=0.8)
+    return times
+
+
+def _add_rotor(plotter: pv.Plotter, scene: Scene) -> list[pv.Actor]:
+    """Draw the magnets with their polarisation; returns the actors, which turn together."""
+    actors = []
+    for magnet in scene.rotor:
+        actors += _add_body(plotter, magnet.body, DARK)
+        center, radius = 1e3 * magnet.body.center, 1e3 * magnet.body.circumradius
+        actors += _add_arrow(plotter, center, magnet.polarization_in_rotor, radius)
+    return actors
+
+
+def _add_turning(plotter: pv.Plotter, scene: Scene, depth: float) -> None:
+    """The axis, and above the rotor an arrow in the sense in which it turns: in front of the field's plane."""
+    corners = _rotor_corners(scene)
+    height, radius = float(corners[:, 2].max()) + 3.0, float(np.linalg.norm(corners[:, :2], axis=1).max())
+    angles = np.radians(np.linspace(-170, -25, 60))
+    arc = np.column_stack([radius * np.cos(angles), radius * np.sin(angles), np.full(60, height)])
+    plotter.add_mesh(pv.MultipleLines(arc).tube(radius=0.45), color="black")
+    tip = pv.Cone(center=arc[-1], direction=arc[-1] - arc[-3], height=4.0, radius=1.6, resolution=30)
+    plotter.add_mesh(tip, color="black")
+    plotter.add_mesh(pv.Line((0, 0, -depth), (0, 0, height + 5)).tube(radius=0.12), color="black")
+
+
+def _add_field(plotter: pv.Plotter, view: View) -> None:
+    """|B| on the plane y = 0 about the rotor, field lines, and how long 10 mm are."""
+    plane = view.plane
+    assert plane is not None
+    size = 1e3 * np.linalg.norm(plane.field, axis=1)
+    width, depth = plane.width, plane.depth
+    grid = pv.ImageData(dimensions=(FINE, 1, FINE), spacing=(2 * width / (FINE - 1), 1.0, 2.4 * depth / (FINE - 1)))
+    grid.origin = (-width, 0.0, -1.6 * depth)
+    grid[FIELD] = size
+    low, high = np.floor(np.log10(np.nanpercentile(size, 0.1))), np.ceil(np.log10(np.nanpercentile(size, 99)))
+    bar = {**BAR, "title": f"{FIELD}\n ", "fmt": "%.0f" if low >= 0 else "%g", "position_x": 0.9}
+    bar["n_labels"] = int(high - low) + 1
+    look: dict[str, Any] = {"log_scale": True, "cmap": "viridis", "opacity": 0.6, "nan_opacity": 0.0}
+    plotter.add_mesh(grid, scalars=FIELD, clim=[10**low, 10**high], scalar_bar_args=bar, lighting=False, **look)
+    if view.lines:
+        plotter.add_mesh(_polylines(view.lines).tube(radius=0.004 * width), color="#2E3440")
+    ends = np.array([(-width, 0.0, 0.8 * depth + 2), (10 - width, 0.0, 0.8 * depth + 2)])
+    plotter.add_mesh(pv.Line(*ends).tube(radius=0.3), color="black")
+    plotter.add_point_labels(ends[1:] + 1.0, ["10 mm"], **NAME)
+
+
+def _polylines(lines: Any) -> pv.PolyData:
+    """Lines (n, 3) m each."""
+    numbers, count = [], 0
+    for line in lines:
+        numbers += [len(line), *range(count, count + len(line))]
+        count += len(line)
+    return pv.PolyData(1e3 * np.concatenate(lines), lines=numbers)
+
+
+def _rotor_corners(scene: Scene) -> Array:
+    return np.concatenate([1e3 * magnet.box.corners for magnet in scene.rotor])
+
+
+def _look(plotter: pv.Plotter, scene: Scene, depth: float) -> None:
     """Look from the front, a little from above and from the side where no plate stands in the way, at everything.
 
     `depth` of the floater below the rotor, mm.
     """
-    away, right, upwards = axes_of_view(scene, 0.15)
+    away, right, upwards = _axes_of_view(scene, 0.15)
     seen = np.array([(s * 1.6 * depth, 0, z) for s in (-1, 1) for z in (-1.6 * depth, 0.8 * depth)])
     if scene.plate is not None:
-        seen = np.concatenate([seen, corners_mm(scene.plate.box)])
+        seen = np.concatenate([seen, 1e3 * near_plate(scene.plate.box, SEEN).corners])
     across, up = seen @ right, seen @ upwards
     across = np.append(across, across.max() + 0.16 * np.ptp(across))  # room for the scale of colours
     middle = right * (across.max() + across.min()) / 2 + upwards * (up.max() + up.min()) / 2
@@ -146,8 +261,29 @@ def look(plotter: pv.Plotter, scene: Scene, depth: float) -> None:
     plotter.add_axes()
 
 
-def axes_of_view(scene: Scene, height: float) -> tuple[Array, Array, Array]:
-    """Unit vectors (3,) to the camera, to the right and upwards, as of `look`; `height` of the camera over its way."""
+def _look_from_near(plotter: pv.Plotter, scene: Scene) -> None:
+    """From the front and a little from above, from so near that a square window just shows everything.
+
+    From a finite distance and with VTK's usual angle of view: the viewer knows no other. A corner at (x, z) across and
+    towards the camera at (c, d) is within the half angle of tangent t if |x - c| <= t (d - z); two corners decide c and
+    d, and the same holds for the height.
+    """
+    away, right, upwards = _axes_of_view(scene, TURNABLE_HEIGHT)
+    boxes = [actor.bounds for actor in plotter.renderer.actors.values() if actor.bounds]
+    corners = np.array([corner for b in boxes for corner in product(b[:2], b[2:4], b[4:])])
+    slope = TURNABLE_MARGIN * np.tan(np.radians(plotter.camera.view_angle) / 2)
+    middle, distance = np.zeros(3), 0.0
+    for axis in (right, upwards):
+        more, less = (float((corners @ (slope * away + side * axis)).max()) for side in (1, -1))
+        middle += axis * (more - less) / 2
+        distance = max(distance, (more + less) / 2 / slope)
+    depth = float((corners @ away).mean())
+    plotter.camera_position = [middle + distance * away, middle + depth * away, (0, 0, 1)]
+    plotter.reset_camera_clipping_range()
+
+
+def _axes_of_view(scene: Scene, height: float) -> tuple[Array, Array, Array]:
+    """Unit vectors (3,) to the camera, to the right and upwards; `height` of the camera over its way."""
     side = -1.0 if scene.plate and scene.plate.box.center[0] > 0 else 1.0
     away = np.array([side * 0.14, -1.0, height])
     away /= np.linalg.norm(away)
@@ -156,75 +292,19 @@ def axes_of_view(scene: Scene, height: float) -> tuple[Array, Array, Array]:
     return away, right, np.cross(away, right)
 
 
-def _box(box: Box) -> pv.DataSet:
-    x, y, z = box.size / MILLI
-    return _posed(pv.Cube(x_length=x, y_length=y, z_length=z), box)
-
-
-def _surface(body: Solid) -> pv.DataSet:
-    """A body's surface, mm."""
+def _add_body(plotter: pv.Plotter, body: Solid, color: str, **look: Any) -> list[pv.Actor]:
+    """Draw a body, with its edges where it is a box."""
+    corners, faces = triangles(body)
+    mesh = pv.PolyData.from_regular_faces(1e3 * corners, faces)
     if isinstance(body, Box):
-        return _box(body)
-    if isinstance(body, Part):
-        corners = body.triangles.reshape(-1, 3) / MILLI
-        faces = np.arange(len(corners)).reshape(-1, 3)
-        return _posed(pv.PolyData.from_regular_faces(corners, faces), body)
-    radius = body.radius / MILLI
-    if isinstance(body, Sphere):
-        return _posed(pv.Sphere(radius=radius, theta_resolution=ROUND, phi_resolution=ROUND), body)
-    height = body.height / MILLI
-    if isinstance(body, Ring):
-        inner = body.inner_radius / MILLI
-        disc = pv.Disc(center=(0, 0, -height / 2), inner=inner, outer=radius, c_res=ROUND)
-        return _posed(disc.extrude((0, 0, height), capping=True), body)
-    return _posed(pv.Cylinder(direction=(0, 0, 1), radius=radius, height=height, resolution=ROUND), body)
+        edges = mesh.extract_feature_edges()
+        return [plotter.add_mesh(mesh, color=color, **look), plotter.add_mesh(edges, color="#2E3440", line_width=3)]
+    return [plotter.add_mesh(mesh.clean(), color=color, smooth_shading=True, split_sharp_edges=True, **look)]
 
 
-def _posed(mesh: pv.DataSet, body: Solid) -> pv.DataSet:
-    pose = np.eye(4)
-    pose[:3, :3], pose[:3, 3] = body.rotation, body.center / MILLI
-    return mesh.transform(pose, inplace=False)
-
-
-def _arrow(plotter: pv.Plotter, center: Array, direction: Array, radius: float) -> list[pv.Actor]:
+def _add_arrow(plotter: pv.Plotter, center: Array, direction: Array, radius: float) -> list[pv.Actor]:
     """An arrow of three radii through `center`; none where there is no direction."""
-    length = float(np.linalg.norm(direction))
-    if not length:
+    if not (length := float(np.linalg.norm(direction))):
         return []
-    unit = np.asarray(direction) / length
-    arrow = pv.Arrow(
-        start=center - 1.5 * radius * unit, direction=unit, scale=3.0 * radius, shaft_radius=0.03, tip_radius=0.09
-    )
-    return [plotter.add_mesh(arrow, color=NORTH)]
-
-
-PER_SECOND = 12
-
-
-def flight_animation(frames: Frames, progress: Callable[[float], None]) -> bytes:
-    """A GIF of the frames, one after the other."""
-    plotter, file = new_plotter((800, 640)), io.BytesIO()
-    magnets = add_rotor(plotter, frames.scene)
-    add_plate(plotter, frames.scene)
-    look(plotter, frames.scene, float(-frames.position[:, 2].max()) * 1e3)
-    floater: list[pv.Actor] = []
-    gif: Any = imageio.get_writer(file, format="GIF", mode="I", loop=0, duration=1000 / PER_SECOND)
-    with gif:
-        for number, instant in enumerate(frames.time):
-            turn = rotation_matrix((0.0, 0.0, np.degrees(frames.scene.angular_velocity * instant)))
-            for actor in magnets:
-                actor.user_matrix = _pose(turn)
-            for actor in floater:
-                plotter.remove_actor(actor, render=False)
-            floater = add_floater(plotter, frames.scene, frames.position[number], frames.moment[number])
-            plotter.add_text(f"t = {instant:.4f} s", color="black", font_size=10, name="time")
-            gif.append_data(plotter.screenshot(return_img=True))
-            progress((number + 1) / len(frames.time))
-    plotter.close()
-    return file.getvalue()
-
-
-def _pose(turn: Array) -> Array:
-    pose = np.eye(4)
-    pose[:3, :3] = turn
-    return pose
+    corners, faces = arrow(center, direction / length, 1.5 * radius)
+    return [plotter.add_mesh(pv.PolyData.from_regular_faces(corners, faces), color=NORTH)]

@@ -1,31 +1,41 @@
-"""What is shown in three dimensions: numbers only, which go to the process that draws them."""
+"""What is shown in three dimensions: numbers only, which go to the process that draws them, and to the live page."""
 
-from collections.abc import Callable
-from dataclasses import dataclass
-from typing import Any
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import TypeAlias
 
 import numpy as np
-import pyvista as pv
+from numpy.typing import NDArray
 
 from ...geometry.common import Array
 from ...geometry.scene.contents import Scene
-from ...geometry.shapes import Box
+from ...geometry.shapes import Box, Ring, Sphere
+from ...geometry.solids import Part, Solid
 
 FINE = 161
 """Points of a plane of the field along each of its edges."""
 TURNS, FRAMES = 3, 16
 """Turns of the rotor that an animation shows at once, and frames for each."""
+LINES = 36
+"""Field lines, each followed both ways."""
+STEP = 1e-3
+"""Length of a step along a field line, m."""
+STEPS = 200
+"""Of a field line in one direction, at most."""
+SEEN = 0.03
+"""How far along its edges a plate is drawn in a picture, m."""
+SIDES = 48
+"""Of what is round."""
+Surface: TypeAlias = "tuple[Array, NDArray[np.intp]]"
+SQUARES = np.array([(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)])
+"""Faces of a box whose corners are numbered by the signs of x, y and z, the last changing fastest."""
 
 
 @dataclass(frozen=True, eq=False)
 class FieldPlane:
-    """B at the points of a thin grid about the plane y = 0 around the rotor.
+    """B (n, 3) T at the points of a grid in the plane y = 0 around the rotor, x running fastest; NaN in the magnets.
 
-    Parameters
-    ----------
-    width, depth : of the view, mm: the grid reaches from -width to width, and from 1.6 depth below the rotor's origin
-        to 0.8 depth above it
-    field : (n, 3) T, x running fastest; NaN inside the magnets
+    It reaches from -width to width, mm, and from 1.6 depth below the rotor's origin to 0.8 depth above it.
     """
 
     width: float
@@ -35,13 +45,10 @@ class FieldPlane:
     @staticmethod
     def points(width: float, depth: float) -> Array:
         """The points of the grid, (n, 3) mm."""
-        axes = (
-            np.linspace(-1.6 * depth, 0.8 * depth, FINE),
-            np.array([-0.5, 0.0, 0.5]),
-            np.linspace(-width, width, FINE),
+        z, x = np.meshgrid(
+            np.linspace(-1.6 * depth, 0.8 * depth, FINE), np.linspace(-width, width, FINE), indexing="ij"
         )
-        z, y, x = np.meshgrid(*axes, indexing="ij")
-        return np.stack([x, y, z], axis=-1).reshape(-1, 3)
+        return np.stack([x, 0 * x, z], axis=-1).reshape(-1, 3)
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,10 +65,11 @@ class View:
 
     Parameters
     ----------
+    scene : what is shown
     position, moment : of the floater, (3,) m, and the direction (3,) of its moment
     path : (n, 3) positions of the flight, m, in `frame`
-    plane : the field; None for none
-    currents : in the plate; None for none
+    plane, lines : the field's size and its lines, (n, 3) m each
+    currents : in the plate
     frame : of the path; "laboratory" where the floater does not turn with the rotor
     """
 
@@ -70,6 +78,7 @@ class View:
     moment: Array
     path: Array
     plane: FieldPlane | None = None
+    lines: Sequence[Array] = ()
     currents: Currents | None = None
     frame: str = "rotor's frame"
 
@@ -87,21 +96,15 @@ class Turnable:
     view: View
 
     def draw(self, progress: Callable[[float], None]) -> bytes:
-        """The scene of a `page`."""
-        from .turnable import turnable_scene
+        """The scene of a `still.page`."""
+        from .still import turnable_scene
 
         return turnable_scene(self.view)
 
 
 @dataclass(frozen=True, eq=False)
 class Frames:
-    """A flight in the laboratory frame, frame by frame.
-
-    Parameters
-    ----------
-    time : (n,) s
-    position, moment : of the floater (n, 3), laboratory frame, m
-    """
+    """A flight in the laboratory frame, frame by frame: time (n,) s, the floater's position and moment (n, 3)."""
 
     scene: Scene
     time: Array
@@ -144,101 +147,99 @@ def frame_times(scene: Scene, duration: float) -> Array:
     return np.concatenate([begin + steps for begin in begins])
 
 
-MILLI = 1e-3
+def triangles(body: Solid) -> Surface:
+    """A body's surface: corners (n, 3) m and triangles (k, 3) of their numbers, seen from outside anticlockwise."""
+    if isinstance(body, Box):
+        return body.corners, SQUARES[:, [(0, 1, 2), (0, 2, 3)]].reshape(-1, 3)
+    if isinstance(body, Part):
+        corners = body.center + body.triangles.reshape(-1, 3) @ body.rotation.T
+        return corners, np.arange(len(corners)).reshape(-1, 3)
+    if isinstance(body, Sphere):
+        polar = np.linspace(np.pi, 0, SIDES // 2 + 1)
+        return revolved(body.radius * np.column_stack([np.sin(polar), np.cos(polar)]), body.center)
+    half, inner = body.height / 2, body.inner_radius if isinstance(body, Ring) else 0.0
+    profile = [(inner, -half), (body.radius, -half), (body.radius, half), (inner, half), (inner, -half)]
+    return revolved(np.array(profile), body.center, body.rotation[:, 2])
 
 
-def corners_mm(box: Box) -> Array:
-    """(8, 3) mm."""
-    return np.asarray(box.corners / MILLI)
+def revolved(profile: Array, center: Array, axis: Array | Sequence[float] = (0.0, 0.0, 1.0)) -> Surface:
+    """A surface of revolution about `axis` (3,) as `triangles`; the profile (n, 2) has radius and height from below."""
+    side = np.cross(axis, np.eye(3)[int(np.abs(axis).argmin())])
+    side /= np.linalg.norm(side)
+    angles = np.arange(SIDES) * (2 * np.pi / SIDES)
+    circle = np.outer(np.cos(angles), side) + np.outer(np.sin(angles), np.cross(axis, side))
+    corners = np.concatenate([center + r * circle + h * np.asarray(axis) for r, h in profile])
+    low = (np.arange(len(profile) - 1)[:, None] * SIDES + np.arange(SIDES)).ravel()
+    low_next = low - low % SIDES + (low + 1) % SIDES
+    squares = np.column_stack([low, low_next, low_next + SIDES, low + SIDES])
+    return corners, squares[:, [(0, 1, 2), (0, 2, 3)]].reshape(-1, 3)
 
 
-def beside_the_rotor(scene: Scene) -> Array:
-    """A place for the rotor's name, mm."""
-    corners = np.concatenate([corners_mm(magnet.box) for magnet in scene.rotor])
-    return np.array([corners[:, 0].max() + 3.0, 0.0, corners[:, 2].max()])
+def arrow(center: Array, direction: Array, half: float) -> Surface:
+    """An arrow through a centre along a unit vector (3,), `half` of its length to each side, as of `triangles`."""
+    profile = np.array([(0, -1), (0.07, -1), (0.07, 0.45), (0.2, 0.45), (0, 1)])
+    return revolved(half * profile, center, direction)
 
 
-def add_path(plotter: pv.Plotter, path: Array, radius: float) -> float:
-    """The path (n, 3) mm about its middle, enlarged until it can be seen inside the floater; by how much."""
-    middle = (path.max(axis=0) + path.min(axis=0)) / 2
-    reach = float(np.abs(path - middle).max())
-    steps = [times for k in range(7) for times in (10.0**k, 2 * 10.0**k, 5 * 10.0**k)]
-    times = max([1.0, *(t for t in steps if t * reach <= 0.8 * radius)])
-    shown = middle + times * (path - middle)[:: max(1, len(path) // 20000)]
-    plotter.add_mesh(pv.MultipleLines(shown), color="#0072B2", line_width=2, opacity=0.8)
-    return times
+def near_plate(plate: Box, reach: float) -> Box:
+    """The part of a plate that is shown: along its edges so far (m) from its point nearest to the rotor's origin."""
+    middle = np.clip(plate.to_body(np.zeros(3)), -plate.size / 2, plate.size / 2)
+    low, high = np.maximum(-plate.size / 2, middle - reach), np.minimum(plate.size / 2, middle + reach)
+    return replace(plate, size=high - low, center=plate.center + plate.rotation @ ((low + high) / 2))
 
 
-def add_turning(plotter: pv.Plotter, scene: Scene) -> None:
-    """An arrow above the rotor in the sense in which it turns."""
-    corners = np.concatenate([corners_mm(magnet.box) for magnet in scene.rotor])
-    height, radius = float(corners[:, 2].max()) + 3.0, float(np.linalg.norm(corners[:, :2], axis=1).max())
-    angles = np.radians(np.linspace(-200, 60, 60))
-    arc = np.column_stack([radius * np.cos(angles), radius * np.sin(angles), np.full(60, height)])
-    plotter.add_mesh(pv.MultipleLines(arc).tube(radius=0.45), color="black")
-    tip = pv.Cone(center=arc[-1], direction=arc[-1] - arc[-3], height=4.0, radius=1.6, resolution=30)
-    plotter.add_mesh(tip, color="black")
-    plotter.add_mesh(pv.Line((0, 0, height - 2), (0, 0, height + 5)).tube(radius=0.15), color="black")
+def field_lines(scene: Scene, field: Callable[[Array], Array], low: Array, high: Array) -> list[Array]:
+    """Lines (n, 3) m of a field outside the magnets; between neighbours is equal flux.
+
+    Parameters
+    ----------
+    scene : whose magnets the lines begin and end at
+    field : B (n, 3) at points (n, 3) m
+    low, high : (3,) corners m of the box in which they are followed
+
+    Runge and Kutta's fourth order in steps of equal length: a line is off by less than it is thick.
+    """
+    seeds = _seeds(scene, field)
+    ways = [_followed(scene, field, seeds, sign, low, high) for sign in (-1.0, 1.0)]
+    lines = [np.concatenate([back[::-1], ahead[1:]]) for back, ahead in zip(*ways, strict=True)]
+    seen = [line[((line > low) & (line < high)).all(axis=1)] for line in lines]
+    return [line for line in seen if len(line) > 2]
 
 
-NAME = "field B (mT)"
-LINES = 36
-"""Field lines in the picture."""
-
-
-def add_field(plotter: pv.Plotter, shown: FieldPlane, scene: Scene) -> None:
-    """|B| on the plane y = 0 about the rotor, and field lines in it."""
-    grid = _grid(shown)
-    size = 1e3 * np.linalg.norm(shown.field, axis=1)
-    grid[NAME] = size
-    decades = np.floor(np.log10(np.nanpercentile(size, 0.1))), np.ceil(np.log10(np.nanpercentile(size, 99)))
-    bar: dict[str, Any] = {
-        "title": NAME,
-        "color": "black",
-        "fmt": "%.0f" if decades[0] >= 0 else "%g",
-        "vertical": True,
-    }
-    bar |= {"n_labels": int(decades[1] - decades[0]) + 1, "position_x": 0.9, "position_y": 0.3, "height": 0.4}
-    bar |= {"title_font_size": 24, "label_font_size": 22}
-    look_of_it: dict[str, Any] = {"log_scale": True, "cmap": "viridis", "opacity": 0.6, "nan_opacity": 0.0}
-    plane = grid.slice(normal="y", origin=(0, 0, 0))
-    plotter.add_mesh(plane, scalars=NAME, clim=[10**d for d in decades], scalar_bar_args=bar, **look_of_it)
-    lines = _lines(grid, shown.width, scene, 0.5)
-    if lines.n_points:
-        plotter.add_mesh(lines.tube(radius=0.004 * shown.width), color="#2E3440")
-
-
-def add_lines(plotter: pv.Plotter, shown: FieldPlane, scene: Scene, step: float) -> None:
-    """The field lines alone, thin, with steps of at most so many mm."""
-    lines = _lines(_grid(shown), shown.width, scene, step)
-    if lines.n_points:
-        plotter.add_mesh(lines, color="#2E3440", line_width=1)
-
-
-def _grid(shown: FieldPlane) -> pv.ImageData:
-    width, depth = shown.width, shown.depth
-    grid = pv.ImageData(dimensions=(FINE, 3, FINE), spacing=(2 * width / (FINE - 1), 0.5, 2.4 * depth / (FINE - 1)))
-    grid.origin = (-width, -0.5, -1.6 * depth)
-    grid["B"] = np.nan_to_num(shown.field)
-    return grid
-
-
-def _lines(grid: pv.ImageData, width: float, scene: Scene, step: float) -> pv.PolyData:
-    seeds = pv.PolyData(_seeds(grid, scene))
-    how: dict[str, Any] = {"vectors": "B", "max_length": 20 * width, "initial_step_length": 0.2}
-    how |= {"max_step_length": step, "step_unit": "l", "max_steps": 5000, "integration_direction": "both"}
-    return grid.streamlines_from_source(seeds, **how)
-
-
-def _seeds(grid: pv.ImageData, scene: Scene) -> Array:
-    """Places (LINES, 3) mm around the magnets where field lines start; between neighbours is equal flux."""
-    corners = np.concatenate([corners_mm(magnet.box) for magnet in scene.rotor])
+def _seeds(scene: Scene, field: Callable[[Array], Array]) -> Array:
+    """Places (LINES, 3) m on a circle around the magnets."""
+    corners = np.concatenate([magnet.box.corners for magnet in scene.rotor])
     middle = corners.mean(axis=0) * (1, 0, 1)
-    radius = 1.02 * np.linalg.norm((corners - middle)[:, [0, 2]], axis=1).max()
+    radius = 1.03 * np.linalg.norm((corners - middle)[:, [0, 2]], axis=1).max()
     angles = np.linspace(-np.pi, np.pi, 721)
-    outwards = np.column_stack([np.cos(angles), np.zeros(721), np.sin(angles)])
-    circle = pv.PolyData(middle + radius * outwards).sample(grid)
-    flux = np.cumsum(np.abs(np.einsum("nk,nk->n", circle["B"], outwards)))
-    shares = (np.arange(LINES) + 0.5) / LINES * flux[-1]
-    chosen = np.searchsorted(flux, shares)
-    return np.asarray(middle + radius * outwards[chosen])
+    outwards = np.column_stack([np.cos(angles), 0 * angles, np.sin(angles)])
+    flux = np.cumsum(np.abs(np.einsum("nk,nk->n", field(middle + radius * outwards), outwards)))
+    if not flux[-1] > 0:
+        return np.zeros((0, 3))
+    return np.asarray(middle + radius * outwards[np.searchsorted(flux, (np.arange(LINES) + 0.5) / LINES * flux[-1])])
+
+
+def _followed(
+    scene: Scene, field: Callable[[Array], Array], start: Array, sign: float, low: Array, high: Array
+) -> list[Array]:
+    """From each start (n, 3) along the field or against it, to a magnet or out of the box."""
+
+    def slope(places: Array) -> Array:
+        b = field(places)
+        return np.asarray(sign * b / np.maximum(np.linalg.norm(b, axis=1, keepdims=True), 1e-30))
+
+    lines, active, places = [[place] for place in start], np.arange(len(start)), start
+    for _ in range(STEPS):
+        free = ((places > low) & (places < high)).all(axis=1)
+        for magnet in scene.rotor:
+            free &= magnet.body.distance(places) > 0.2 * STEP
+        active, places = active[free], places[free]
+        if not len(active):
+            break
+        one = slope(places)
+        two = slope(places + STEP / 2 * one)
+        three = slope(places + STEP / 2 * two)
+        places = places + STEP / 6 * (one + 2 * two + 2 * three + slope(places + STEP * three))
+        for k, place in zip(active, places, strict=True):
+            lines[k].append(place)
+    return [np.array(line) for line in lines]

@@ -25,7 +25,8 @@ from spinlev.studies.catalogue.report import LONGEST, report_job
 from spinlev.studies.catalogue.runner import read_result, show_job
 from spinlev.studies.cli import main as cli
 from spinlev.studies.cli.main import _status
-from spinlev.studies.figures.pictures import plate_currents, question_figure
+from spinlev.studies.figures.pictures import plate_currents
+from spinlev.studies.figures.run import question_figure
 from spinlev.studies.figures.view import Currents, current_places
 from spinlev.studies.result import write_dataset
 

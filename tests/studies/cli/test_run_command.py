@@ -43,7 +43,7 @@ def test_a_field_model_of_one_s_own_is_run_and_drawn(tmp_path, monkeypatch):
     monkeypatch.setitem(MODELS, "own", lambda magnets, accuracy: replace(dipole_table(magnets, accuracy), model="own"))
     monkeypatch.setattr("spinlev.studies.cli.options.FieldModel", Literal["dipole", "own"])
     scene = sl.parse_scene(GOOD.replace("recoil_permeability = 1.05", "recoil_permeability = 1.0"))
-    values, lines = main_job(scene, Models("own", "none"), 0.0, 0.01, tmp_path, drawing=("unused",))
+    values, lines = main_job(scene, Models("own", "none"), 0.0, 0.01, tmp_path)
     assert values["model"] == "own"
     assert lines[0].startswith("Floats ")
     assert (tmp_path / "force.png").exists()
@@ -52,7 +52,7 @@ def test_a_field_model_of_one_s_own_is_run_and_drawn(tmp_path, monkeypatch):
 @pytest.mark.usefixtures("undrawn")
 def test_solutions_inside_the_metal_are_equilibria_in_no_file(tmp_path):
     """Of the article's scene: there are two, at 33.8 mm, which the plate's face cuts, and at 45.2 mm."""
-    values, lines = main_job(sl.load_scene(OVER_PLATE), Models("dipole", "none"), 0.0, 0.01, tmp_path, ("unused",))
+    values, lines = main_job(sl.load_scene(OVER_PLATE), Models("dipole", "none"), 0.0, 0.01, tmp_path)
     with xr.open_dataset(tmp_path / "result.nc") as result:
         here = result.isel(equilibrium=np.flatnonzero(result["equilibrium_model"] == "dipole"))
         depths = -1e3 * result["equilibrium_position"].values[:, 2]

@@ -5,7 +5,7 @@ import pytest
 import xarray as xr
 
 from spinlev.studies.figures.run import field_figure, force_figure, trajectory_figure
-from spinlev.studies.figures.style import figure_bytes, power_of_ten
+from spinlev.studies.figures.style import figure_bytes
 
 
 def flight(time, height):
@@ -86,7 +86,3 @@ def has_room(figure):
     figure_bytes(figure, "png")
     needed, (wide, high) = figure.get_tightbbox(), figure.get_size_inches()
     return bool(min(needed.x0, needed.y0) >= 0 and needed.x1 <= wide and needed.y1 <= high)
-
-
-def test_decades_are_powers_of_ten_in_letters():
-    assert [power_of_ten(10.0**n, 0) for n in (-12, -1, 0, 3, 20)] == ["10⁻¹²", "10⁻¹", "10⁰", "10³", "10²⁰"]
