@@ -1,105 +1,255 @@
-"""Which program a file is of: the text of the rooms that make it, and the versions of the libraries that compute it."""
+"""The user's cache of tables: keys of what decides a table, one kind of file for each solver, and their folder.
 
-import errno
-import fcntl
+A key holds all inputs exactly, the number of the solver that turns them into a table, and the versions of the libraries
+that compute. The numbers stand here, so that `make lint` can hold each against the code of its solver.
+"""
+
 import hashlib
 import io
 import logging
 import os
 import platform
-import re
 import stat
 import tempfile
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
+from dataclasses import dataclass, fields, is_dataclass
+from errno import ENOLCK, ENOSYS, EOPNOTSUPP
 from functools import cache
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, Generic, TypeVar
 
+import numpy as np
 import platformdirs
 import xarray as xr
 from filelock import FileLock, Timeout
 from xarray.backends import H5NetCDFStore
 
 from ..geometry.common import InputError
-from .files import closed, hdf5_fault, ours, read_netcdf, seal, sealed, write_whole
+from ..geometry.files import regular_file
+from .codec import CodecError, from_dataset, to_dataset
+from .files import MOST, closed, hdf5_fault, ours, seal, sealed, user, write_whole
 
-ROOT = Path(__file__).resolve().parents[1]
-"""Where the floors lie."""
+FORMATS = {
+    "rotor": 6,
+    "mutual": 4,
+    "map": 2,
+    "plate": 2,
+    "driven-plate": 2,
+    "plate-currents": 2,
+    "slab": 2,
+    "edges": 2,
+    "rotor-losses": 2,
+    "equilibria": 4,
+    "experiment": 2,
+    "code": 1,
+}
+"""Number of each solver whose answers are kept, or of what writes the formulas that are compiled: another answer, or
+another shape of its file, has the next number, and nothing of the old one is read any more."""
 LIBRARIES = ("heyoka", "netgen-mesher", "ngsolve", "numpy", "scipy")
 """That decide the digits of a table; the others read, write and show."""
+FLOORS = ("geometry", "fem", "dynamics", "studies")
 TEXTS = (".py", ".csv")
-IMPORT = re.compile(r"^\s*from (\.+)([\w.]+) import", re.MULTILINE)
+OWNER = "in-use.lock"
+LIMIT = 2.0
+"""Size of all tables that are kept, GB, if SPINLEV_CACHE_GB names no other."""
+NO_LOCKS = (ENOLCK, ENOSYS, EOPNOTSUPP)
+Table = TypeVar("Table")
 
 
-def program_of(*packages: str) -> str:
-    """The versions of what computes in packages: digest of their text, and libraries."""
-    return " ".join([digest_of(*packages), _libraries()])
+class TableFileError(InputError):
+    """A table file that is damaged, or is not one."""
 
 
 @cache
-def _libraries() -> str:
+def libraries() -> str:
+    """Names and versions of the libraries that decide digits."""
     return " ".join(f"{name} {version(name)}" for name in LIBRARIES)
 
 
+def program_version() -> str:
+    """What tells the numbers of this program from those of any other: its version, its solvers' and its libraries'."""
+    return f"spinlev {version('spinlev')} {FORMATS} {libraries()}"
+
+
 @cache
-def digest_of(*names: str, root: Path = ROOT) -> str:
-    """SHA-256 of the text of modules and of all modules that they import, directly or not.
-
-    Parameters
-    ----------
-    names : of modules, or of packages for all of their modules
-    root : folder of the floors
-
-    Raises
-    ------
-    FileNotFoundError : a name is of no module of this program
-    """
-    digest = hashlib.sha256()
-    for path in sorted(modules_of(*names, root=root)):
+def program_digest() -> str:
+    """SHA-256 of this program's text and its libraries' versions: processes that compute together have one."""
+    root = Path(__file__).resolve().parents[1]
+    digest = hashlib.sha256(libraries().encode())
+    for path in sorted(path for floor in FLOORS for path in (root / floor).rglob("*") if path.suffix in TEXTS):
         content = path.read_bytes()
         digest.update(f"{path.relative_to(root).as_posix()} {len(content)}\n".encode() + content)
     return digest.hexdigest()
 
 
-def modules_of(*names: str, root: Path = ROOT) -> set[Path]:
-    """Files of modules or packages and of all modules that they import, directly or not."""
-    found: set[Path] = set()
-    new = {path for name in names for path in _files_of(name, root)}
-    if not all(_files_of(name, root) for name in names):
-        raise FileNotFoundError(f"Input names must be modules of this program; instead received {', '.join(names)}.")
-    while new:
-        found |= new
-        new = {path for module in new for path in _imported(module, root)} - found
-    return found
+def key_of(name: str, *inputs: Any) -> str:
+    """SHA-256 of the inputs of a solver, of its number in `FORMATS`, and of the libraries' versions.
+
+    Counted are types, shapes and every bit of dataclasses, arrays, numbers, texts, tuples and mappings; of a path the
+    content of its file. A field of a dataclass that decides nothing has `compare=False`.
+
+    Raises
+    ------
+    TypeError : an input of another type
+    """
+    digest = hashlib.sha256(f"{name} {FORMATS[name]} {libraries()}".encode())
+    _count(inputs, digest.update)
+    return digest.hexdigest()
 
 
-def _files_of(name: str, root: Path) -> set[Path]:
-    place = root.joinpath(*name.split(".")[1:])
-    if place.is_dir():
-        return {path for path in place.rglob("*") if path.suffix in TEXTS}
-    return {path for path in [place.with_suffix(".py")] if path.exists()}
+def _count(value: Any, update: Callable[[bytes], None]) -> None:
+    """Feed a digest; every piece begins with its kind and length, so that no two inputs are the same bytes."""
+    if isinstance(value, np.generic):
+        value = value.item()
+    if isinstance(value, np.ndarray) and not value.dtype.hasobject:
+        plain = value + 0.0 if value.dtype.kind in "fc" else value  # -0.0 is 0.0
+        update(f"array {value.dtype.str} {value.shape} ".encode() + plain.tobytes())
+    elif is_dataclass(value) and not isinstance(value, type):
+        counted = [each.name for each in fields(value) if each.compare]
+        update(f"class {type(value).__name__} {len(counted)} ".encode())
+        for name in counted:
+            _count((name, getattr(value, name)), update)
+    elif isinstance(value, tuple | list):
+        update(f"tuple {len(value)} ".encode())
+        for item in value:
+            _count(item, update)
+    elif isinstance(value, Mapping):
+        _count(("mapping", *sorted(value.items())), update)
+    elif isinstance(value, Path):
+        with regular_file(value, MOST, "file", "a file") as stream:
+            _count(("file", hashlib.sha256(stream.read()).hexdigest()), update)
+    elif value is None or isinstance(value, bool | int | str):
+        said = str(value).encode()
+        update(f"{type(value).__name__} {len(said)} ".encode() + said)
+    elif isinstance(value, float):
+        update(f"float {(float(value) + 0.0).hex()} ".encode())
+    else:
+        raise TypeError(f"Input of a key must be of what tables are made from; instead it is {type(value).__name__}.")
 
 
-def _imported(module: Path, root: Path) -> set[Path]:
-    """Files that a module imports; inside the program all imports are relative."""
-    found: set[Path] = set()
-    above = ("spinlev", *module.relative_to(root).parts[:-1])
-    for dots, name in IMPORT.findall(module.read_text(encoding="utf-8")):
-        found |= _files_of(".".join([*above[: len(above) - len(dots) + 1], *name.split(".")]), root)
-    return found
+@dataclass(frozen=True)
+class TableKind(Generic[Table]):
+    """One kind of tables, and their files.
+
+    Parameters
+    ----------
+    name : its entry in `FORMATS`; names of files begin with it
+    form : type of a table: a dataclass, or `tuple[...]`
+    title : of the files, for people
+    most : size of all of them, bytes, which are in a folder of their own then; None: with the others in the cache
+    """
+
+    name: str
+    form: type[Table]
+    title: str = ""
+    most: int | None = None
+
+    @property
+    def format(self) -> str:
+        """What the files say that they are."""
+        return f"spinlev {self.name} {FORMATS[self.name]}"
+
+    def key(self, *inputs: Any) -> str:
+        """The `key_of` a table's inputs."""
+        return key_of(self.name, *inputs)
+
+    def save(self, table: Table, path: str | Path, key: str = "") -> None:
+        """Write a table; the file is whole or absent. Raises OSError."""
+        labels = {"format": self.format, "title": self.title, "key": key}
+        write_checked(to_dataset(table).assign_attrs(labels), path)
+
+    def load(self, path: str | Path, key: str = "") -> Table:
+        """Read a table, with a key only the one that was saved with it.
+
+        Raises
+        ------
+        TableFileError : the file is not of this kind and key, or its content is not what was written
+        """
+        dataset = read_checked(path, self.format)
+        if key and dataset.attrs.get("key") != key:
+            raise TableFileError(f"Input {path} must be what its name says; instead it is the table of other inputs.")
+        try:
+            return from_dataset(dataset, self.form)
+        except CodecError as error:
+            raise TableFileError(f"Input {path} must be a '{self.format}'; instead {error}.") from error
+
+    def cached(
+        self, inputs: tuple[Any, ...], make: Callable[[], Table], report: Callable[[str], None]
+    ) -> tuple[Table, bool]:
+        """The table of some inputs, from the cache if it is there, and whether it was.
+
+        A damaged entry, or one that was kept under another key, is reported, computed anew and replaced; a cache that
+        cannot be written is reported and does no harm.  While one process makes a table, others that need the same one
+        wait for it.  All tables in its folder together keep `cache_limit` and `most`; what was not used for the longest
+        time makes room.
+
+        Raises
+        ------
+        InputError : SPINLEV_CACHE_GB is no positive number
+        """
+        key, limit = self.key(*inputs), min(self.most or 2**63, cache_limit())
+        path = cache_folder() / (self.name if self.most else "") / f"{self.name}-{key}.nc"
+        with alone(path.with_suffix(".lock"), report):
+            if path.exists():
+                try:
+                    found = self.load(path, key)
+                except (TableFileError, OSError) as error:
+                    report(f"The cached table is damaged and is computed anew: {error}")
+                else:
+                    with suppress(OSError):  # of a cache that cannot be written
+                        os.utime(path)
+                    return found, True
+            table = make()
+            try:
+                self.save(table, path, key)
+                make_room(path.parent, limit)
+            except OSError as error:
+                report(f"The table could not be cached: {error}")
+            return table, False
 
 
-Table = TypeVar("Table")
-OWNER = "in-use.lock"
-LIMIT = 2.0
-"""Size of all tables that are kept, GB, if SPINLEV_CACHE_GB names no other."""
-NO_LOCKS = (errno.ENOLCK, errno.ENOSYS, errno.EOPNOTSUPP)
+def write_checked(dataset: xr.Dataset, path: str | Path) -> None:
+    """Write a dataset with the checksum of the file at its end; the file is whole or absent. Raises OSError."""
+    memory = io.BytesIO()  # on a full disk HDF5 itself would crash
+    # As `to_netcdf`, which would load a cluster's libraries and ask for a lock of memory that is its own.
+    store = H5NetCDFStore.open(memory, mode="w", lock=False)
+    dataset.dump_to_store(store)
+    store.close()
+    write_whole(path, seal(memory.getvalue()))
 
 
-class TableFileError(InputError):
-    """A table file that is damaged, or is not one."""
+def read_checked(path: str | Path, file_format: str | None = None) -> xr.Dataset:
+    """Read a dataset that is as it was written.
+
+    Parameters
+    ----------
+    file_format : that it must have; None for any, and for files that others have written or changed
+
+    Raises
+    ------
+    TableFileError : the file is missing, no file, too large, damaged, no netCDF, or not of this format
+    """
+    try:
+        whole = sealed(Path(path))
+    except InputError as error:
+        raise TableFileError(str(error)) from None
+    if whole is False:
+        raise TableFileError(f"Input {path} must be as it was written; instead its checksum does not match.")
+    if whole is None and file_format:
+        raise TableFileError(f"Input {path} must be a whole '{file_format}'; instead it does not end in its checksum.")
+    if whole is None and (reason := hdf5_fault(Path(path))):
+        raise TableFileError(f"Input {path} must be a readable netCDF file; instead: {reason}.")
+    try:
+        with xr.open_dataset(path, engine="h5netcdf") as opened:
+            dataset = opened.load()
+    except Exception as error:  # the HDF5 layer raises many kinds on a damaged file
+        raise TableFileError(f"Input {path} must be a readable netCDF file; instead: {error}.") from error
+    if file_format and dataset.attrs.get("format") != file_format:
+        received = dataset.attrs.get("format")
+        raise TableFileError(f"Input {path} must be a '{file_format}'; instead received '{received}'.")
+    return dataset
 
 
 def cache_folder() -> Path:
@@ -132,7 +282,7 @@ def _usable(folder: Path) -> Path:
 
 def temporary_home() -> Path:
     """A folder among the temporary files that is this user's alone, the same each time if it can be. Raises OSError."""
-    home = Path(tempfile.gettempdir()) / f"spinlev-{os.getuid()}"
+    home = Path(tempfile.gettempdir()) / f"spinlev-{user()}"
     home.mkdir(mode=0o700, exist_ok=True)
     if others_may_write(home):  # somebody else was there first
         return Path(tempfile.mkdtemp(prefix=f"{home.name}-"))
@@ -146,7 +296,7 @@ def own_folder(name: str) -> Path:
     """
     # Not as the user's mask would have it, which often lets a group write.
     (root := cache_folder()).mkdir(mode=0o755, parents=True, exist_ok=True)
-    (folder := root / f"{name}-{os.getuid()}").mkdir(mode=0o700, exist_ok=True)
+    (folder := root / f"{name}-{user()}").mkdir(mode=0o700, exist_ok=True)
     return folder
 
 
@@ -182,131 +332,6 @@ def cache_limit() -> int:
     return int(1e9 * limit)
 
 
-def key_of(path: str | Path) -> str:
-    """Name by which a file in the cache is found again; empty for a file anywhere else."""
-    path, folder = Path(path), cache_folder().resolve()
-    place = path.parent.resolve() / path.name  # however the path is written: from the current folder, by a link
-    return place.relative_to(folder).as_posix() if place.is_relative_to(folder) else ""
-
-
-def from_cache(
-    name: str,
-    load: Callable[[Path], Table],
-    make: Callable[[], Table],
-    save: Callable[[Table, Path], None],
-    report: Callable[[str], None],
-    most: int = 2**63,
-) -> tuple[Table, bool]:
-    """A table, from the cache if it is there under `name`, and whether it was.
-
-    A damaged entry, or one that was kept under another name, is reported, computed anew and replaced; a cache that
-    cannot be written is reported and does no harm.  While one process makes a table, others that need the same one wait
-    for it.  All tables in its folder together keep `cache_limit` and `most`, bytes; what was not used for the longest
-    time makes room.
-
-    Raises
-    ------
-    InputError : SPINLEV_CACHE_GB is no positive number
-    """
-    path, limit = cache_folder() / name, min(most, cache_limit())
-    with alone(path.with_suffix(".lock"), report):
-        if path.exists():
-            try:
-                found = load(path)
-            except (TableFileError, OSError) as error:
-                report(f"The cached table is damaged and is computed anew: {error}")
-            else:
-                with suppress(OSError):  # of a cache that cannot be written
-                    os.utime(path)
-                return found, True
-        table = make()
-        try:
-            save(table, path)
-            make_room(path.parent, limit)
-        except OSError as error:
-            report(f"The table could not be cached: {error}")
-        return table, False
-
-
-@contextmanager
-def alone(path: Path, report: Callable[[str], None]) -> Iterator[None]:
-    """Be the only process in this block with the same lock file; the system frees it if the process dies.
-
-    Where no lock can be had, the block runs without: at worst a table is made twice.
-    """
-    lock = FileLock(path)
-    try:
-        path.parent.mkdir(mode=0o755, parents=True, exist_ok=True)
-        _take(lock, report)
-    except OSError as error:
-        if error.errno in NO_LOCKS:
-            report("The cache's file system has no locks.")
-    try:
-        yield
-    finally:
-        lock.release()  # does nothing if there is none
-
-
-def _take(lock: FileLock, report: Callable[[str], None]) -> None:
-    try:
-        lock.acquire(timeout=0)
-    except Timeout:
-        report("Another process is making this table: waiting for it ...")
-        lock.acquire()
-
-
-@contextmanager
-def owned(folder: Path) -> Iterator[None]:
-    """Be the only process that computes into a folder while the block lasts.
-
-    The system frees the lock of a process that has ended, however it did. Where there are no locks the block runs
-    without.
-
-    Raises
-    ------
-    InputError : another process is at work there
-    OSError : the folder cannot be made or written
-    """
-    is_new = not folder.exists()
-    folder.mkdir(parents=True, exist_ok=True)
-    path = folder / OWNER
-    descriptor = _lock(path)
-    try:
-        with suppress(OSError):  # a full disk: who owns the folder is said for people only
-            os.ftruncate(descriptor, 0)
-            os.write(descriptor, f"process {os.getpid()} on {platform.node()}".encode())
-        yield
-    finally:
-        path.unlink(missing_ok=True)
-        os.close(descriptor)
-        if is_new:
-            with suppress(OSError):  # something was computed: it stays
-                folder.rmdir()
-
-
-def _lock(path: Path) -> int:
-    """Descriptor of the file at a path, locked; it is a new one if another process has just removed its own."""
-    while True:
-        descriptor = os.open(path, os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW, 0o644)
-        try:
-            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
-            owner = os.read(descriptor, 200).decode(errors="replace") or "another process"
-            os.close(descriptor)
-            raise InputError(
-                f"Input --out must be a folder into which no other spinlev computes; instead {owner} does so in "
-                f"{path.parent}. Wait until it has ended, or choose another --out."
-            ) from None
-        except OSError as error:
-            if error.errno not in NO_LOCKS:
-                os.close(descriptor)
-                raise
-        with suppress(FileNotFoundError):
-            if os.path.samestat(os.fstat(descriptor), path.stat()):
-                return descriptor
-        os.close(descriptor)
-
-
 def make_room(folder: Path, limit: int) -> None:
     """Remove what was not used for the longest time until the files of a folder together keep the limit, bytes.
 
@@ -333,59 +358,63 @@ def make_room(folder: Path, limit: int) -> None:
         total -= size
 
 
-Variables = Mapping[str, tuple[tuple[str, ...], Any, str]]
-"""Dimensions, values and unit by name."""
+@contextmanager
+def alone(path: Path, report: Callable[[str], None]) -> Iterator[None]:
+    """Be the only process in this block with the same lock file; the system frees it if the process dies.
 
-
-def described(variables: Variables, attributes: Mapping[str, Any]) -> xr.Dataset:
-    """A dataset in which every variable carries its unit."""
-    return xr.Dataset({n: xr.Variable(d, v, {"units": u}) for n, (d, v, u) in variables.items()}, attrs=attributes)
-
-
-def write_checked(dataset: xr.Dataset, path: str | Path) -> None:
-    """Write a dataset with the checksum of the file at its end; the file is whole or absent. Raises OSError.
-
-    In the cache the name of a file says what its content is of, and the checksum counts it.
+    Where no lock can be had, the block runs without: at worst a table is made twice.
     """
-    memory = io.BytesIO()  # on a full disk HDF5 itself would crash
-    # As `to_netcdf`, which would load a cluster's libraries and ask for a lock of memory that is its own.
-    store = H5NetCDFStore.open(memory, mode="w", lock=False)
-    dataset.dump_to_store(store)
-    store.close()
-    write_whole(path, seal(memory.getvalue(), key_of(path)))
+    lock = FileLock(path)
+    try:
+        path.parent.mkdir(mode=0o755, parents=True, exist_ok=True)
+        try:
+            lock.acquire(timeout=0)
+        except Timeout:
+            report("Another process is making this table: waiting for it ...")
+            lock.acquire()
+    except OSError as error:
+        if error.errno in NO_LOCKS:
+            report("The cache's file system has no locks.")
+    try:
+        yield
+    finally:
+        lock.release()  # does nothing if there is none
 
 
-def read_checked(path: str | Path, file_format: str | None = None) -> xr.Dataset:
-    """Read a dataset that is as it was written.
+@contextmanager
+def owned(folder: Path) -> Iterator[None]:
+    """Be the only process that computes into a folder while the block lasts.
 
-    Parameters
-    ----------
-    file_format : that it must have; None for any, and for files that others have written or changed
+    The system frees the lock of a process that has ended, however it did. Where there are no locks the block runs
+    without.
 
     Raises
     ------
-    TableFileError : the file is missing, no file, too large, damaged, no netCDF, or not of this format
+    InputError : another process is at work there
+    OSError : the folder cannot be made or written
     """
+    is_new = not folder.exists()
+    folder.mkdir(parents=True, exist_ok=True)
+    path = folder / OWNER
+    lock = FileLock(path)
     try:
-        whole = sealed(Path(path), key_of(path))
-    except InputError as error:
-        raise TableFileError(str(error)) from None
-    if whole is False:
-        raise TableFileError(f"Input {path} must be as it was written; instead its checksum does not match.")
-    if whole is None and file_format:
-        raise TableFileError(f"Input {path} must be a whole '{file_format}'; instead it does not end in its checksum.")
-    if whole is None and (reason := hdf5_fault(Path(path))):
-        raise TableFileError(f"Input {path} must be a readable netCDF file; instead: {reason}.")
+        lock.acquire(timeout=0)
+        with suppress(OSError):  # a full disk: who owns the folder is said for people only
+            path.write_text(f"process {os.getpid()} on {platform.node()}")
+    except Timeout:
+        owner = path.read_text(errors="replace")[:200] if path.exists() else ""
+        raise InputError(
+            f"Input --out must be a folder into which no other spinlev computes; instead {owner or 'another process'} "
+            f"does so in {folder}. Wait until it has ended, or choose another --out."
+        ) from None
+    except OSError as error:
+        if error.errno not in NO_LOCKS:
+            raise
     try:
-        dataset = read_netcdf(path) if whole else _foreign(path)
-    except Exception as error:  # the HDF5 layer raises many kinds on a damaged file
-        raise TableFileError(f"Input {path} must be a readable netCDF file; instead: {error}.") from error
-    if file_format and dataset.attrs.get("format") != file_format:
-        received = dataset.attrs.get("format")
-        raise TableFileError(f"Input {path} must be a '{file_format}'; instead received '{received}'.")
-    return dataset
-
-
-def _foreign(path: str | Path) -> xr.Dataset:
-    with xr.open_dataset(path, engine="h5netcdf") as opened:
-        return opened.load()
+        yield
+    finally:
+        path.unlink(missing_ok=True)
+        lock.release()
+        if is_new:
+            with suppress(OSError):  # something was computed: it stays
+                folder.rmdir()

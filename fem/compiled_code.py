@@ -8,19 +8,19 @@ heyoka can keep machine code by itself, in a database without checksums: one fli
 number, or the end of the process.  It would also have all expressions written anew by each command: a second of `run`.
 """
 
-import hashlib
 import io
 import logging
 import os
 import pickle
 import zlib
 from collections import OrderedDict
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
 from typing import Any, TypeVar, cast
 
-from .cache import cache_folder, cache_limit, digest_of, make_room, others_may_write, own_folder
+from .cache import cache_folder, cache_limit, key_of, make_room, others_may_write, own_folder
 from .files import seal, unsealed, write_whole
 
 LIMIT = 2**29
@@ -47,11 +47,11 @@ def compiled(compiler: Callable[..., Compiled], *arguments: Any, **options: Any)
     compiler : ``heyoka.cfunc`` or ``heyoka.taylor_adaptive``
     arguments, options : the compiler's
     """
-    return _kept((compiler, arguments, options), lambda: compiler(*arguments, **options))
+    return compiled_later(compiler, lambda: arguments, arguments, **options)
 
 
 def compiled_later(
-    compiler: Callable[..., Compiled], write: Callable[[], Sequence[Any]], source: Any, package: str, **options: Any
+    compiler: Callable[..., Compiled], write: Callable[[], Sequence[Any]], source: Any, **options: Any
 ) -> Compiled:
     """What a compiler makes of arguments that take longer to write than to say what they are written from.
 
@@ -59,31 +59,57 @@ def compiled_later(
     ----------
     compiler, options : as of `compiled`
     write : the compiler's arguments; called only where nothing is in the cache
-    source : all that they depend on, which can be pickled
-    package : the room of `write`, with all that it imports: its text is part of the key
+    source : all that they depend on, which can be pickled; what else `write` does has the number of "code" in `FORMATS`
     """
-    asked = compiler, source, digest_of(package), options
-    return _kept(asked, lambda: compiler(*write(), **options))
-
-
-def _kept(asked: tuple[Any, ...], make: Callable[[], Compiled]) -> Compiled:
-    name = f"{hashlib.sha256(_target() + _Asked.of(asked)).hexdigest()}.code"
+    name = f"{key_of('code', _target(), _content((compiler, source, options)))}.code"
     path = cache_folder() / name  # in this process; on the disk it is in the user's folder there
     found, taken = _functions.pop(path, (None, 0))
     if found is None:
         folder = _folder()
         found, size = _read(folder / name) if folder else (None, 0)
         if found is None:
-            content = _written(found := make())
+            with _alone():
+                found = compiler(*write(), **options)
+            content = _written(found, name)
             size = len(content)
             if folder:
                 _keep(content, folder / name)
         taken = EACH + TIMES * size
-    if asked[0].__name__ == "cfunc":
+    if compiler.__name__ == "cfunc":
         _functions[path] = found, taken
         while sum(taken for _, taken in _functions.values()) > SHARED and len(_functions) > 1:
             _functions.popitem(last=False)
     return cast(Compiled, found)
+
+
+@contextmanager
+def one_thread() -> Iterator[None]:
+    """Let heyoka evaluate in this thread alone; others wait busily for small work: 1.6 times the time of a search."""
+    import heyoka as hy
+
+    before = hy.get_nthreads()
+    hy.set_nthreads(1)
+    try:
+        yield
+    finally:
+        hy.set_nthreads(before)
+
+
+@contextmanager
+def _alone() -> Iterator[None]:
+    """Let heyoka keep nothing by itself, in this process neither: that would be 2 GB of what is kept here anyway."""
+    import heyoka as hy
+
+    states, limit = hy.llvm_state, hy.llvm_state.get_memcache_limit()
+    on_disk = states.get_diskcache_enabled()
+    states.set_memcache_limit(0)
+    states.set_diskcache_enabled(False)
+    try:
+        with one_thread():
+            yield
+    finally:
+        states.set_memcache_limit(limit)
+        states.set_diskcache_enabled(on_disk)
 
 
 def _folder() -> Path | None:
@@ -94,10 +120,9 @@ def _folder() -> Path | None:
     except OSError as error:  # costs time only
         LOG.debug("Compiled code could not be kept: %s", error)
         return None
-    if reason is None:
-        return folder
-    _say(reason)
-    return None
+    if reason:
+        _say(reason)
+    return None if reason else folder
 
 
 @cache
@@ -105,50 +130,37 @@ def _say(reason: str) -> None:
     LOG.info("Compiled code is neither read nor kept, which costs seconds: %s.", reason)
 
 
-class _Asked(pickle.Pickler):
-    """Writes what is asked for with all its expressions as one: what they share is written once, not in each."""
+def _content(asked: object) -> str:
+    """What is asked for as a text, all its expressions as one: what they share is written once, not in each."""
+    import heyoka as hy
 
-    def __init__(self, stream: io.BytesIO) -> None:
-        import heyoka as hy
+    expressions: list[Any] = []
 
-        super().__init__(stream)
-        self._kind, self._found = hy.expression, list[Any]()
+    class Writer(pickle.Pickler):
+        def persistent_id(self, thing: Any) -> int | None:
+            """The number of an expression; None for what is no expression."""
+            if not isinstance(thing, hy.expression):
+                return None
+            expressions.append(thing)
+            return len(expressions)
 
-    def persistent_id(self, thing: Any) -> int | None:
-        """The number of an expression; None for what is no expression."""
-        if not isinstance(thing, self._kind):
-            return None
-        self._found.append(thing)
-        return len(self._found)
-
-    @classmethod
-    def of(cls, asked: object) -> bytes:
-        """All of it as bytes."""
-        import heyoka as hy
-
-        writer = cls(stream := io.BytesIO())
-        writer.dump(asked)
-        return stream.getvalue() + pickle.dumps(hy.dfun("asked", writer._found))
+    Writer(stream := io.BytesIO()).dump(asked)
+    return (stream.getvalue() + pickle.dumps(hy.dfun("asked", expressions))).hex()
 
 
 @cache
-def _target() -> bytes:
-    """What code is compiled for: heyoka, and the processor as its compiler sees it.
-
-    From here on heyoka keeps none by itself, in a process neither: that would be 2 GB of what is kept here anyway.
-    """
+def _target() -> str:
+    """What code is compiled for: heyoka, and the processor as its compiler sees it."""
     import heyoka as hy
 
-    hy.set_nthreads(1)  # a second one waits busily for small work to share: 1.6 times the processor time of a search
-    hy.llvm_state.set_diskcache_enabled(False)
-    hy.llvm_state.set_memcache_limit(0)
-    x = hy.make_vars("x")
-    return f"{hy.__version__} {hy.cfunc([x], [x]).llvm_states}".encode()
+    with _alone():
+        x = hy.make_vars("x")
+        return f"{hy.__version__} {hy.cfunc([x], [x]).llvm_states}"
 
 
-def _written(made: Any) -> bytes:
+def _written(made: Any, name: str) -> bytes:
     state, _ = made.__getstate__()
-    return zlib.compress(type(made).__name__.encode() + b"\n" + state, 1)
+    return zlib.compress(f"{name}\n{type(made).__name__}\n".encode() + state, 1)
 
 
 def _read(path: Path) -> tuple[Any, int]:
@@ -156,13 +168,16 @@ def _read(path: Path) -> tuple[Any, int]:
     import heyoka as hy
 
     try:
-        content = unsealed(path, path.name, mine=True)  # a folder that was open once may have something left of others
+        content = unsealed(path, mine=True)  # a folder that was open once may have something left of others
         if content is None:
             return None, 0
-        kind, _, state = zlib.decompress(content).partition(b"\n")
+        name, kind, state = zlib.decompress(content).split(b"\n", 2)
+        if name.decode() != path.name:
+            return None, 0
         form = getattr(hy, KINDS[KINDS.index(kind.decode())])
         made = form.__new__(form)
-        made.__setstate__((state, {}))
+        with _alone():
+            made.__setstate__((state, {}))
         os.utime(path)
         return made, len(content)
     except Exception:  # missing, or of a heyoka that was built otherwise: it raises what it likes
@@ -171,7 +186,7 @@ def _read(path: Path) -> tuple[Any, int]:
 
 def _keep(content: bytes, path: Path) -> None:
     try:
-        write_whole(path, seal(content, path.name))
+        write_whole(path, seal(content))
         make_room(path.parent, min(LIMIT, cache_limit()))
     except OSError as error:  # costs time only
         LOG.debug("Compiled code could not be kept: %s", error)

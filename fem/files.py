@@ -9,15 +9,11 @@ import os
 import platform
 import stat
 import tempfile
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
 
-import h5py
-import numpy as np
 import psutil
-import xarray as xr
 
 from ..geometry.files import LostError, call_apart, file_content, regular_file
 
@@ -74,97 +70,47 @@ def _tidy(path: Path) -> None:
             left.unlink(missing_ok=True)
 
 
-def seal(content: bytes, name: str = "") -> bytes:
-    """The content with its checksum, which counts the name under which alone it may be read, if there is one."""
-    return content + MARK + _digest(content, name)
+def seal(content: bytes) -> bytes:
+    """The content with its checksum."""
+    return content + MARK + hashlib.sha256(content).hexdigest().encode()
 
 
-def sealed(path: Path, name: str = "") -> bool | None:
+def sealed(path: Path) -> bool | None:
     """Whether the file is as it was when it was sealed; None if it never was. Raises InputError, see `file_content`."""
     content = file_content(path, MOST, "file", "a regular file")
-    return _as_sealed(content, name) if content[-LENGTH:-64] == MARK else None
+    return _as_sealed(content) if content[-LENGTH:-64] == MARK else None
 
 
-def unsealed(path: Path, name: str = "", mine: bool = False) -> bytes | None:
+def unsealed(path: Path, mine: bool = False) -> bytes | None:
     """What was sealed, if the file is as it was then, else None. Raises InputError, see `regular_file`, and OSError.
 
-    Parameters
-    ----------
-    name : under which alone it may be read, if it was sealed for one
-    mine : None too where another user than this one and root may have written it
+    With `mine` it is None too where another user than this one and root may have written it.
     """
     with regular_file(path, MOST, "file", "a regular file") as stream:
         if mine and not (ours(found := os.fstat(stream.fileno())) and closed(found)):
             return None
         content = stream.read(MOST)
-    return content[:-LENGTH] if _as_sealed(content, name) else None
+    return content[:-LENGTH] if _as_sealed(content) else None
+
+
+def _as_sealed(content: bytes) -> bool:
+    """Whether a content ends in its checksum; it is large, and not copied for that."""
+    return content[-LENGTH:] == MARK + hashlib.sha256(memoryview(content)[:-LENGTH]).hexdigest().encode()
+
+
+def user() -> int:
+    """Number of this user; 0 on systems without numbers, where files are told by folders that are the user's own."""
+    return os.getuid() if hasattr(os, "getuid") else 0
 
 
 def ours(found: os.stat_result) -> bool:
     """Whether a file is this user's or root's."""
-    return found.st_uid in (0, os.getuid())
+    return found.st_uid in (0, user())
 
 
 def closed(found: os.stat_result) -> bool:
     """Whether no other than a file's owner may write there."""
     return not found.st_mode & (stat.S_IWGRP | stat.S_IWOTH)
-
-
-def _as_sealed(content: bytes, name: str) -> bool:
-    """Whether a content ends in its checksum; it is large, and not copied for that."""
-    return content[-LENGTH:] == MARK + _digest(memoryview(content)[:-LENGTH], name)
-
-
-def _digest(content: bytes | memoryview, name: str) -> bytes:
-    found = hashlib.sha256(content)
-    found.update(name.encode())
-    return found.hexdigest().encode()
-
-
-DIMENSION = "_Netcdf4Dimid"
-OWN_TO_NETCDF = {
-    *(DIMENSION, "_Netcdf4Coordinates", "_NCProperties", "_FillValue"),
-    *("CLASS", "NAME", "DIMENSION_LIST", "REFERENCE_LIST"),
-}
-"""Attributes by which netCDF keeps dimensions and the like in HDF5."""
-
-
-def read_netcdf(path: str | Path) -> xr.Dataset:
-    """The dataset of a whole file that xarray wrote by h5netcdf; of another HDF5 makes many kinds of errors."""
-    with h5py.File(path) as file:
-        stored = {name: item for name, item in file.items() if isinstance(item, h5py.Dataset)}
-        dimensions = {item.attrs[DIMENSION]: name for name, item in stored.items() if "CLASS" in item.attrs}
-        variables = {
-            name: _variable(item, dimensions)
-            for name, item in stored.items()
-            if not str(item.attrs.get("NAME", b""), "ascii").startswith("This is a netCDF dimension but not")
-        }
-        attributes = _attributes(file)
-    told = [held.pop("coordinates", "") for held in (attributes, *(v.attrs for v in variables.values()))]
-    return xr.Dataset(variables, attrs=attributes).set_coords(" ".join(told).split())
-
-
-def _variable(item: h5py.Dataset, dimensions: Mapping[int, str]) -> xr.Variable:
-    attributes = _attributes(item)
-    values = np.array(item.asstr()[()], str) if h5py.check_string_dtype(item.dtype) else item[()]
-    if attributes.pop("dtype", None) == "bool":
-        values = values.astype(bool)
-    along = item.attrs.get("_Netcdf4Coordinates")
-    if along is None:
-        along = [item.attrs[DIMENSION]] if values.shape else []
-    return xr.Variable([dimensions[number] for number in along], values, attributes)
-
-
-def _attributes(item: h5py.Dataset | h5py.File) -> dict[str, Any]:
-    """Those that are not HDF5's and netCDF's own."""
-    return {n: _plain(v) for n, v in item.attrs.items() if n not in OWN_TO_NETCDF}
-
-
-def _plain(value: Any) -> Any:
-    if isinstance(value, np.ndarray) and value.dtype == object:
-        value = [str(entry) for entry in value]
-        return value[0] if len(value) == 1 else value
-    return value[0] if isinstance(value, np.ndarray) and len(value) == 1 else value
 
 
 SIGNATURE = b"\x89HDF\r\n\x1a\n"

@@ -5,14 +5,12 @@ the rotor's frame and its turn relative to the rotor) it is C q̇, and the force
 negative, whatever the fields are.  The fields are sums over a few multipoles in the metal, free of divergence and curl.
 """
 
-import hashlib
-import json
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from itertools import product
-from pathlib import Path
+from typing import Any
 
 import numpy as np
 import scipy
@@ -26,7 +24,7 @@ from ..geometry.rotor import Conductor, separate_pieces
 from ..geometry.scene.contents import Scene
 from ..geometry.shapes import Box, Ring
 from ..geometry.solids import Solid, places_off
-from .cache import described, from_cache, program_of, read_checked, write_checked
+from .cache import TableKind
 from .harmonics.solid import factorials, norm
 from .metal_currents import CurrentPatterns, Metal, current_patterns, metal_of, of_motion
 from .plate.field_functions import Multipoles, fit_multipoles
@@ -46,8 +44,8 @@ class RotorLosses:
     """
 
     multipoles: Multipoles
-    weights: Array
-    distances: Array
+    weights: Array = field(metadata={"units": "W^0.5 s A-1 m-2 T-1"})
+    distances: Array = field(metadata={"units": "m"})
     errors: Array
     provenance: Mapping[str, str | float] = field(default_factory=dict)
 
@@ -278,49 +276,17 @@ def _radius(bodies: Sequence[Solid]) -> float:
     return float((3 * sum(body.volume for body in bodies) / (4 * np.pi)) ** (1 / 3))
 
 
-FORMAT = "spinlev rotor losses 1"
+LOSSES = TableKind("rotor-losses", RotorLosses, "Dissipation in a rotor's metal: power Σ (d/dt m·c)²")
 
 
-def save_losses(table: RotorLosses, path: str | Path) -> None:
-    """Write a table; the file is whole or absent."""
-    multipoles = table.multipoles
-    variables = {
-        "center": (("multipole", "axis"), multipoles.centers, "m"),
-        "kind": (("multipole", "number"), multipoles.kinds, "1"),
-        "weight": (("field", "multipole"), table.weights, "W^0.5 s A-1 m-2 T-1"),
-        "distance": (("distance",), table.distances, "m"),
-        "error": (("distance",), table.errors, "1"),
-    }
-    attributes = {
-        "format": FORMAT,
-        "title": "Dissipation in a rotor's metal: power is the sum of squares of d/dt m·c",
-        "scale": multipoles.scale,
-        "provenance": json.dumps(dict(table.provenance), sort_keys=True),
-    }
-    write_checked(described(variables, attributes), path)
-
-
-def load_losses(path: str | Path) -> RotorLosses:
-    """Read a table.
-
-    Raises
-    ------
-    TableFileError : the file is not a table of this format, or its content is not what was written
-    """
-    data = read_checked(path, FORMAT)
-    multipoles = Multipoles(data["center"].values, data["kind"].values, float(data.attrs["scale"]))
-    weights, distances, errors = (data[name].values for name in ("weight", "distance", "error"))
-    return RotorLosses(multipoles, weights, distances, errors, json.loads(data.attrs["provenance"]))
+def _deciding(scene: Scene) -> tuple[Any, ...]:
+    """The rotor's bodies, which conduct together, and how near the floater can come."""
+    return scene.turning_bodies, pieces_of(scene.rotor, scene.conductors), scene.floater.radius
 
 
 def losses_key(scene: Scene) -> str:
-    """SHA-256 of the rotor's bodies and what conducts, how near the floater can come, and the programs."""
-    digest = hashlib.sha256(f"{FORMAT} {program_of(__name__)} {scene.floater.radius!r}".encode())
-    for body in scene.turning_bodies:
-        digest.update(_bytes(body))
-    for bodies, conductivity in pieces_of(scene.rotor, scene.conductors):
-        digest.update(f"piece {conductivity!r}".encode() + b"".join(map(_bytes, bodies)))
-    return digest.hexdigest()
+    """SHA-256 of all of a scene that decides the losses in its rotor, and of what computes them."""
+    return LOSSES.key(*_deciding(scene))
 
 
 def cached_rotor_losses(
@@ -330,15 +296,5 @@ def cached_rotor_losses(
 
     `watch` hears of the progress.  At which frequencies they hold, `check_slow_enough` says.
     """
-    return from_cache(
-        f"rotor-losses-{losses_key(scene)}.nc",
-        load_losses,
-        lambda: rotor_losses(scene.rotor, scene.conductors, scene.floater.radius, watch=watch),
-        save_losses,
-        report,
-    )
-
-
-def _bytes(body: Solid) -> bytes:
-    parts = [np.ascontiguousarray(part + 0.0, dtype="<f8") for part in (body.shape_numbers, body.center, body.rotation)]
-    return type(body).__name__.encode() + b"".join(part.tobytes() for part in parts)
+    make = partial(rotor_losses, scene.rotor, scene.conductors, scene.floater.radius, watch=watch)
+    return LOSSES.cached(_deciding(scene), make, report)

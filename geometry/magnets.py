@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -31,11 +31,11 @@ class Magnet:
     """
 
     body: Solid
-    polarization: Array
+    polarization: Array = field(metadata={"units": "T"})
     recoil_permeability: float = 1.0
     transverse_permeability: float | None = None
-    conductivity: float | None = None
-    coercivity: float | None = None
+    conductivity: float | None = field(default=None, metadata={"units": "S/m"})
+    coercivity: float | None = field(default=None, metadata={"units": "A/m"})
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "polarization", frozen_array(self.polarization, (3,)))

@@ -51,8 +51,8 @@ class Box:
     rotation : (3, 3) matrix whose columns are the body axes (default: none turned)
     """
 
-    size: Array
-    center: Array = field(default_factory=lambda: np.zeros(3))
+    size: Array = field(metadata={"units": "m"})
+    center: Array = field(default_factory=lambda: np.zeros(3), metadata={"units": "m"})
     rotation: Array = field(default_factory=lambda: np.eye(3))
 
     def __post_init__(self) -> None:
@@ -209,9 +209,9 @@ class Cylinder(Posed):
     rotation : (3, 3) matrix whose columns are the body axes; the third is that of the cylinder (default: none turned)
     """
 
-    radius: float
-    height: float
-    center: Array = field(default_factory=lambda: np.zeros(3))
+    radius: float = field(metadata={"units": "m"})
+    height: float = field(metadata={"units": "m"})
+    center: Array = field(default_factory=lambda: np.zeros(3), metadata={"units": "m"})
     rotation: Array = field(default_factory=lambda: np.eye(3))
 
     @property
@@ -276,10 +276,10 @@ class Ring(Posed):
     ValueError : the inner radius is not smaller than the outer one
     """
 
-    radius: float
-    inner_radius: float
-    height: float
-    center: Array = field(default_factory=lambda: np.zeros(3))
+    radius: float = field(metadata={"units": "m"})
+    inner_radius: float = field(metadata={"units": "m"})
+    height: float = field(metadata={"units": "m"})
+    center: Array = field(default_factory=lambda: np.zeros(3), metadata={"units": "m"})
     rotation: Array = field(default_factory=lambda: np.eye(3))
 
     def __post_init__(self) -> None:
@@ -357,8 +357,8 @@ class Sphere(Posed):
     rotation : (3, 3) matrix whose columns are the body axes (default: none turned)
     """
 
-    radius: float
-    center: Array = field(default_factory=lambda: np.zeros(3))
+    radius: float = field(metadata={"units": "m"})
+    center: Array = field(default_factory=lambda: np.zeros(3), metadata={"units": "m"})
     rotation: Array = field(default_factory=lambda: np.eye(3))
 
     @property

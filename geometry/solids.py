@@ -41,16 +41,16 @@ class Part(Posed):
     rotation : (3, 3) matrix whose columns are the body axes (default: none turned)
     """
 
-    file: Path
+    file: Path = field(compare=False)
     step: str
     brep: str
-    triangles: Array
-    extent: Array
-    origin: Array
-    volume: float
-    area: float
-    centroid: Array
-    center: Array = field(default_factory=lambda: np.zeros(3))
+    triangles: Array = field(metadata={"units": "m"})
+    extent: Array = field(metadata={"units": "m"})
+    origin: Array = field(metadata={"units": "m"})
+    volume: float = field(metadata={"units": "m3"})
+    area: float = field(metadata={"units": "m2"})
+    centroid: Array = field(metadata={"units": "m"})
+    center: Array = field(default_factory=lambda: np.zeros(3), metadata={"units": "m"})
     rotation: Array = field(default_factory=lambda: np.eye(3))
 
     def __post_init__(self) -> None:

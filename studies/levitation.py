@@ -12,7 +12,7 @@ from typing import Any, cast
 import numpy as np
 
 from ..dynamics.equilibria.equilibrium import Equilibrium, EquilibriumError, Survey
-from ..dynamics.equilibria.search import Found, cached_found, found_key, free_of_bodies, own_spin, survey, with_plate
+from ..dynamics.equilibria.search import Found, cached_found, free_of_bodies, own_spin, survey, with_plate
 from ..dynamics.flights.flight import initial_state, most_like_levitation, simulate, starting_point
 from ..dynamics.flights.live import LiveFlight
 from ..dynamics.flights.pieces import Checkpoint
@@ -252,7 +252,7 @@ class Levitation:
         def remembered(search: Callable[[], Found]) -> Found:
             if self.scene.field_map:  # the file can have another content than it had
                 return search()
-            found, known = cached_found(found_key(self.scene, equations, self.spin, own_spin(self.scene)), search, note)
+            found, known = cached_found(self.scene, equations, self.spin, own_spin(self.scene), search, note)
             if known:
                 detail("  from the cache.")
             return found

@@ -23,10 +23,9 @@ from typing import Any
 
 import cloudpickle
 
-from ..fem.cache import program_of
+from ..fem.cache import program_digest
 from ..geometry.common import ComputationError
 
-FLOORS = ("spinlev.geometry", "spinlev.fem", "spinlev.dynamics", "spinlev.studies")
 PATIENCE = 5.0
 """Seconds for a process to tidy up its unfinished files before it is killed."""
 THREADS = ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS")
@@ -68,8 +67,8 @@ class _Done:
 
 
 def program() -> str:
-    """What tells this version of the program from any other: digest of its text, and its libraries."""
-    return program_of(*FLOORS)
+    """What tells this version of the program from any other."""
+    return program_digest()
 
 
 def results(number: int, jobs: deque[Job]) -> Generator[tuple[Job, Any], None, None]:

@@ -16,7 +16,7 @@ from ..dynamics.flights.flight import starting_point
 from ..dynamics.flights.pieces import Checkpoint
 from ..dynamics.flights.trajectory import FlightStopped, Trajectory
 from ..dynamics.motion.plate import PlateMemory
-from ..fem.cache import owned, program_of
+from ..fem.cache import owned, program_digest
 from ..fem.files import write_whole
 from ..fem.rotor.near_field import NEAR_RTOL, complete
 from ..fem.rotor.table import FieldTable, RotorTable
@@ -89,7 +89,7 @@ def simulate_job(scene: Scene, asked: Models, duration: float, out: Path, resume
 
 def _simulated(scene: Scene, asked: Models, duration: float, out: Path, resume: bool) -> Job:
     asked_of = {"scene": scene_digest(scene), "duration_s": duration, **vars(asked)}
-    identity = to_json({**asked_of, "program": program_of(__name__)})
+    identity = to_json({**asked_of, "program": program_digest()})
     checkpoint = Checkpoint(out / "checkpoint.npz", identity)
     if not resume:
         checkpoint.remove()

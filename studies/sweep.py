@@ -20,12 +20,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import xarray as xr
 
-from ..fem.cache import program_of
+from ..fem.cache import program_version
 from ..fem.files import seal, unsealed, write_whole
 from ..geometry.common import ComputationError, InputError
 from .cli.console import note, progress, silence, to_json
 from .cli.options import Workers
-from .processes import FLOORS, Death, Job, NoProcessError, program, results
+from .processes import Death, Job, NoProcessError, program, results
 from .study import Point, Study
 
 if TYPE_CHECKING:
@@ -388,14 +388,12 @@ def swept(name: str, study: Study, points: Mapping[int, Point], engine: Workers,
 
 
 def _program(study: Study) -> str:
-    """What computes a study's points: the rooms of its function, or of a user's own the text of its file as well."""
+    """What computes a study's points: this program's solvers, and the text of a user's own file."""
     function = getattr(study.compute, "compute", study.compute)  # of a study that is computed as a whole
     module = sys.modules.get(function.__module__)
-    if function.__module__.startswith("spinlev."):
-        return program_of(function.__module__)
     path = Path(getattr(module, "__file__", None) or "")
-    own = hashlib.sha256(path.read_bytes()).hexdigest() if path.is_file() else ""
-    return f"{program_of(*FLOORS)} {own}"
+    is_own = not function.__module__.startswith("spinlev.") and path.is_file()
+    return f"{program_version()} {hashlib.sha256(path.read_bytes()).hexdigest() if is_own else ''}"
 
 
 def forget(name: str, out: Path) -> None:

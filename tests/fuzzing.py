@@ -43,7 +43,7 @@ from spinlev.fem.files import look_through
 from spinlev.fem.maps_of_B import read as readers
 from spinlev.fem.maps_of_B.columns import FieldMapError
 from spinlev.fem.rotor.choice import rotor_table
-from spinlev.fem.rotor.table import load_table, save_table
+from spinlev.fem.rotor.table import ROTOR
 from spinlev.geometry import files as own_process, step_file
 from spinlev.geometry.meshes import solids
 from spinlev.geometry.rotor import horizontal
@@ -458,11 +458,11 @@ def points(chance: random.Random, folder: Path) -> int:
 def table(chance: random.Random, folder: Path) -> int:
     whole = folder / "whole.nc"
     if not whole.exists():
-        save_table(rotor_table(horizontal(2e-3, 10e-3, 1.3, 1.0), "cuboid"), whole)
+        ROTOR.save(rotor_table(horizontal(2e-3, 10e-3, 1.3, 1.0), "cuboid"), whole)
     path = folder / "table.nc"
     path.write_bytes(damaged(whole.read_bytes(), chance))
     try:
-        load_table(path)
+        ROTOR.load(path)
     except TableFileError:
         return 2
     return 0

@@ -184,9 +184,9 @@ class ForceCurve:
     magnetic_force : (n,) along +z, N
     """
 
-    position: Array
+    position: Array = field(metadata={"units": "m"})
     moment: Array
-    magnetic_force: Array
+    magnetic_force: Array = field(metadata={"units": "N"})
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,16 +1,14 @@
 """What a full search finds, and its file: the same search is not done again."""
 
-import hashlib
 from collections.abc import Callable, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
-from pathlib import Path
+from dataclasses import dataclass, field, replace
 from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ...fem.cache import described, from_cache, program_of, read_checked, write_checked
+from ...fem.cache import TableKind
 from ...fem.rotor.table import ROUND_OFF, FieldTable, RangeError, RotorTable
 from ...geometry.common import Array, Watch, unwatched
 from ...geometry.scene.contents import AbsoluteStart, Scene
@@ -28,10 +26,6 @@ from .equilibrium import Equilibrium, EquilibriumError, ForceCurve, LeftOut, Sur
 from .modes import modes, named_modes
 from .periodic import Shaken, overlap
 
-FORMAT = "spinlev equilibria 3"
-LIMIT = 2**26
-"""Size of all that is kept, bytes: some thousand scenes; what was not used for the longest time makes room."""
-
 
 @dataclass(frozen=True, eq=False)
 class Found:
@@ -48,7 +42,7 @@ class Found:
     """
 
     points: Array
-    doubts: Array
+    doubts: Array = field(metadata={"units": "T or T/m"})
     residuals: Array
     slopes: Array
     jacobians: Array
@@ -65,8 +59,14 @@ class Found:
         return cls(points, doubts, *near(position, moment), jacobians, curves)
 
 
-def found_key(scene: Scene, equations: str, spin: float, top: float = 0.0) -> str:
-    """SHA-256 of all that decides what a search finds, and the programs.
+FOUND = TableKind("equilibria", Found, "Fixed points of a scene without plate", most=2**26)
+"""In a folder of their own, of some thousand scenes."""
+
+
+def cached_found(
+    scene: Scene, equations: str, spin: float, top: float, make: Callable[[], Found], report: Callable[[str], None]
+) -> tuple[Found, bool]:
+    """What a search finds, from the cache if it is there, and whether it was.
 
     Parameters
     ----------
@@ -75,44 +75,8 @@ def found_key(scene: Scene, equations: str, spin: float, top: float = 0.0) -> st
     spin : body spin
     top : spin about the moment beside a rotor at rest, rad/s
     """
-    digest = hashlib.sha256(f"{FORMAT} {program_of(__name__)} {equations} {spin!r} {top!r}".encode())
-    digest.update(parameters(scene, Scales.of(scene), frozen_spin=True).tobytes())
-    return digest.hexdigest()
-
-
-def cached_found(key: str, make: Callable[[], Found], report: Callable[[str], None]) -> tuple[Found, bool]:
-    """What a search found, from the cache if it is there under its `found_key`, and whether it was."""
-    return from_cache(f"equilibria/{key}.nc", load_found, make, save_found, report, LIMIT)
-
-
-def save_found(found: Found, path: str | Path) -> None:
-    """Write it; the file is whole or absent. Raises OSError."""
-    curves = found.curves
-    length = [len(curve.position) for curve in curves]
-    variables = {
-        "point": (("equilibrium", "component"), found.points, "1"),
-        "doubt": (("equilibrium", "part"), found.doubts, "T or T/m"),
-        "residual": (("equilibrium", "balance"), found.residuals, "1"),
-        "slope": (("equilibrium", "balance", "unknown"), found.slopes, "1"),
-        "jacobian": (("equilibrium", "rate", "state"), found.jacobians, "1"),
-        "points_of_curve": (("curve",), np.array(length, np.int64), "1"),
-        "position": (("sample", "axis"), np.concatenate([np.zeros((0, 3)), *(c.position for c in curves)]), "m"),
-        "moment": (("sample", "axis"), np.concatenate([np.zeros((0, 3)), *(c.moment for c in curves)]), "1"),
-        "magnetic_force": (("sample",), np.concatenate([np.zeros(0), *(c.magnetic_force for c in curves)]), "N"),
-    }
-    write_checked(described(variables, {"format": FORMAT, "title": "Fixed points of a scene without plate"}), path)
-
-
-def load_found(path: str | Path) -> Found:
-    """Read it. Raises TableFileError if the file is not of this format, or its content is not what was written."""
-    data = read_checked(path, FORMAT)
-    ends = np.cumsum(data["points_of_curve"].values)[:-1]
-    samples = (np.split(data[name].values, ends) for name in ("position", "moment", "magnetic_force"))
-    curves = tuple(ForceCurve(*part) for part in zip(*samples, strict=True) if len(part[0]))
-    points, doubts, residuals, slopes, jacobians = (
-        data[name].values for name in ("point", "doubt", "residual", "slope", "jacobian")
-    )
-    return Found(points, doubts, residuals, slopes, jacobians, curves)
+    inputs = equations, spin, top, parameters(scene, Scales.of(scene), frozen_spin=True)
+    return FOUND.cached(inputs, make, report)
 
 
 SECOND_ORDER = 0.25

@@ -12,7 +12,7 @@ import heyoka as hy
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...fem.compiled_code import RuntimeNumbers, compiled_later
+from ...fem.compiled_code import RuntimeNumbers, compiled_later, one_thread
 from ...fem.harmonics.expressions import FieldExpressions
 from ...fem.rotor.table import FieldFormula, FieldTable, RotorTable
 from ...geometry.common import Array
@@ -53,7 +53,7 @@ class Rates:
         """Outputs and variables that are written from the equations, compiled."""
         source = write.__name__, self._equations.variables, self._equations.rates
         options = {"compact_mode": True, "opt_level": self._level}
-        return compiled_later(hy.cfunc, lambda: write(self._equations), source, __name__, **options)
+        return compiled_later(hy.cfunc, lambda: write(self._equations), source, **options)
 
     def __call__(self, states: ArrayLike, values: Array) -> tuple[Array, Array]:
         """Rates (n, 12) and their derivatives (n, 12, 12) at scaled `states` (n, 12).
@@ -142,4 +142,5 @@ class _Written:
 def _called(function: Any, given: Array, values: Array) -> Array:
     """Machine code (k, n) at variables (v, n) with the parameters that it has of `values` (p,) or (n, p)."""
     pars = np.broadcast_to(values[..., : function.nparams], (given.shape[1], function.nparams)).T
-    return np.asarray(function(np.ascontiguousarray(given), pars=np.ascontiguousarray(pars)))
+    with one_thread():
+        return np.asarray(function(np.ascontiguousarray(given), pars=np.ascontiguousarray(pars)))

@@ -104,9 +104,9 @@ class MultipoleExpansion:
     axes : (3, 3) along whose columns its expressions are written, because fewer terms are left there
     """
 
-    center: Array
-    radius: float
-    coefficients: Coefficients
+    center: Array = field(metadata={"units": "m"})
+    radius: float = field(metadata={"units": "m"})
+    coefficients: Coefficients = field(metadata={"units": "T"})
     axes: Array = field(default_factory=lambda: np.eye(3))
 
     def __post_init__(self) -> None:

@@ -2,24 +2,23 @@
 
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 
 import heyoka as hy
 import numpy as np
 import scipy
-import xarray as xr
 from numpy.typing import ArrayLike, NDArray
 
 from ...geometry.common import Array, frozen_array, millimetres
 from ...geometry.magnets import Magnet
 from ...geometry.scene.contents import MapReading
-from ..cache import read_checked, write_checked
+from ..cache import TableKind
 from ..harmonics.expansion import MultipoleExpansion
 from ..harmonics.expressions import FieldExpressions
 from ..harmonics.solid import Coefficients, derivative, field_sizes, field_spectrum, irregular_values
-from ..rotor.table import RangeError, RotorTable, error_below, from_dataset, to_dataset
+from ..rotor.table import RangeError, RotorTable, error_below
 from .columns import FieldMap, FieldMapError
 from .fit import FLOOR, MARGIN, HarmonicBasis, HarmonicFit, find_center, fit_harmonics
 from .plausible import require_plausible
@@ -96,8 +95,8 @@ class GriddedTable:
     """
 
     expansions: RotorTable
-    deviations: Coefficients
-    region: Array
+    deviations: Coefficients = field(metadata={"units": "T"})
+    region: Array = field(metadata={"units": "m"})
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "region", frozen_array(self.region, (2, 3)))
@@ -314,9 +313,6 @@ def _provenance(basis: HarmonicBasis, fit: HarmonicFit, field_map: FieldMap, sec
     }
 
 
-FORMAT = "spinlev gridded table 1"
-
-
 def map_table(path: Path | None, magnets: Sequence[Magnet], reading: MapReading | None = None) -> GriddedTable:
     """Table of a map of B in the rotor's frame; the sources lie in the smallest spheres about the magnets.
 
@@ -341,24 +337,4 @@ def map_table(path: Path | None, magnets: Sequence[Magnet], reading: MapReading 
         raise FieldMapError(f"{path}: {error}") from None
 
 
-def save_gridded(table: GriddedTable, path: str | Path) -> None:
-    """Write a table; the file is whole or absent."""
-    dataset = to_dataset(table.expansions)
-    dims = ("member", "fitted_expansion", "deviation_degree", "deviation_order")
-    dataset["deviation_real"] = xr.Variable(dims, table.deviations.real, {"units": "T"})
-    dataset["deviation_imag"] = xr.Variable(dims, table.deviations.imag, {"units": "T"})
-    dataset["region"] = xr.Variable(("corner", "axis"), table.region, {"units": "m"})
-    dataset.attrs |= {"format": FORMAT, "title": "Solid-harmonic expansions fitted to a map of a magnetic field"}
-    write_checked(dataset, path)
-
-
-def load_gridded(path: str | Path) -> GriddedTable:
-    """Read a table.
-
-    Raises
-    ------
-    TableFileError : the file is not a table of this format, or its content is not what was written
-    """
-    dataset = read_checked(path, FORMAT)
-    deviations = dataset["deviation_real"].values + 1j * dataset["deviation_imag"].values
-    return GriddedTable(from_dataset(dataset), deviations, dataset["region"].values)
+MAP = TableKind("map", GriddedTable, "Solid-harmonic expansions fitted to a map of a magnetic field")

@@ -13,7 +13,7 @@ Electricity (3rd ed. 1968), section 5.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cache, cached_property
 from itertools import product
 from typing import Any
@@ -105,11 +105,11 @@ class AnswerGrid:
 
     box: Box
     axis: Array
-    radius: float
+    radius: float = field(metadata={"units": "m"})
     counts: tuple[int, int, int]
-    strengths: Array
-    degrees: Array
-    returned: Array
+    strengths: Array = field(metadata={"units": "A m2/T"})
+    degrees: Array = field(metadata={"units": "J"})
+    returned: Array = field(metadata={"units": "T"})
 
     @property
     def nodes(self) -> list[Array]:

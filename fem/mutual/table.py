@@ -192,12 +192,12 @@ class MutualTable:
 
     magnets: tuple[Magnet, ...]
     grids: tuple[AnswerGrid, ...]
-    coupling: Array
-    pairs: Array
-    mixed: Array
+    coupling: Array = field(metadata={"units": "A m2/T"})
+    pairs: Array = field(metadata={"units": "J"})
+    mixed: Array = field(metadata={"units": "T"})
     images: Array
-    polarizability: float
-    gaps: Array = field(default_factory=lambda: np.array([1.0]))
+    polarizability: float = field(metadata={"units": "A m2/T"})
+    gaps: Array = field(default_factory=lambda: np.array([1.0]), metadata={"units": "m"})
     errors: Array = field(default_factory=lambda: np.zeros((1, 2)))
     provenance: dict[str, str | float] = field(default_factory=dict)
 

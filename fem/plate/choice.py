@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import NamedTuple
 
 import numpy as np
@@ -13,14 +13,16 @@ import numpy as np
 from ...geometry.common import MU_0, Array, Watch, unwatched
 from ...geometry.magnets import Magnet
 from ...geometry.scene.contents import Plate, Scene
+from ..cache import TableKind
 from ..rotor.models import Accuracy, AccuracyError, shortened_table
 from ..rotor.table import RotorTable
-from .driven import cached_driven_plate, cached_with_share, driven_plate_key, reachable_region
+from .driven import DRIVEN, cached_driven_plate, deciding, reachable_region
 from .region import Region
 from .slab import cached_edge_error, edge_error
 from .slab_network import slab_and_rotor_table
 from .table import PlateTable, RotorShare
 
+SLAB = TableKind("slab", tuple[PlateTable, RotorShare], "Eddy currents of an infinite slab, with the rotor's share")
 NEGLIGIBLE = 1e-6
 """Part of the floater's weight below which the largest conceivable force of the plate is left out."""
 
@@ -117,13 +119,16 @@ class PlateAround:
     @cached_property
     def key(self) -> str:
         """The same for scenes that share the table."""
-        return f"{self.model}-{driven_plate_key(*self._asked, __name__)}"
+        kind = SLAB if self.model == "slab" else DRIVEN
+        return kind.key(*deciding(*self._asked))
 
     def made(self, report: Callable[[str], None], watch: Watch = unwatched) -> tuple[PlateTable, RotorShare, bool]:
         """The table, the rotor's share in it, and whether they were cached. Raises what the models raise."""
-        if self.model == "slab":
-            return cached_with_share(self.key, lambda: slab_and_rotor_table(*self._asked), report)
-        return cached_driven_plate(*self._asked, report, watch)
+        if self.model != "slab":
+            return cached_driven_plate(*self._asked, report, watch)
+        make = partial(slab_and_rotor_table, *self._asked)
+        (table, share), found = SLAB.cached(deciding(*self._asked), make, report)
+        return table, share, found
 
     @property
     def _asked(self) -> tuple[Plate, RotorTable, Region, tuple[float, float], float]:

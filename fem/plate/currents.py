@@ -40,10 +40,10 @@ class CurrentSpace:
     """
 
     parity: Parity
-    points: Array
-    root: Array
-    fields: tuple[Array, ...]
-    inductances: tuple[Array, ...]
+    points: Array = field(metadata={"units": "m"})
+    root: Array = field(metadata={"units": "S^1/2 m"})
+    fields: tuple[Array, ...] = field(metadata={"units": "1", "dtype": "float32"})
+    inductances: tuple[Array, ...] = field(metadata={"units": "s"})
     order: int
     cells: int
 

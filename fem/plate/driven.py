@@ -1,27 +1,25 @@
 """The table of a plate: the network of its currents, then its field functions."""
 
-import json
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
+from functools import partial
 from importlib.metadata import version
-from pathlib import Path
+from typing import Any
 
 import numpy as np
-import xarray as xr
 from numpy.typing import ArrayLike
 
 from ...geometry.common import Array, InputError, Watch, unwatched
 from ...geometry.meshes.plate import MeshRule
 from ...geometry.scene.contents import Plate
-from ..cache import TableFileError, described, from_cache, program_of, read_checked, write_checked
-from ..harmonics.interior import FOUR_PI
+from ..cache import TableKind
 from ..rotor.table import RotorTable
 from .currents import OtherSources
-from .field_functions import HIGHEST_DEGREE, Multipoles, candidates, fit_multipoles
+from .field_functions import HIGHEST_DEGREE, candidates, fit_multipoles
 from .network import NETWORK_SHARE, PlateNetwork, reduce_currents, reduce_plate
 from .region import Region, outer_box, outer_frequencies
 from .rotor_share import DOWN, MISSED, posed_rotor, rotor_parts, rotor_share, without_high_harmonics
-from .solution import STRICT, PlateSolution, cached_solver, digest, error_of, solve_currents
+from .solution import STRICT, PlateSolution, cached_solver, error_of, solve_currents
 from .table import PlateErrors, PlateTable, RotorShare
 
 FUNCTION_SHARE = 0.1
@@ -251,124 +249,25 @@ def reachable_region(plate: Plate, center: ArrayLike, half_edges: ArrayLike, rad
     return Region(lower, upper)
 
 
-FORMAT = "spinlev plate table 1"
-
-
-def save_plate_table(table: PlateTable, path: str | Path, share: RotorShare | None = None) -> None:
-    """Write a table, with the rotor's share of its signals if there is one; the file is whole or absent."""
-    errors = (table.errors.mesh, table.errors.states, table.errors.functions)
-    variables = {
-        "size": (("axis",), table.size, "m"),
-        "conductivity": ((), table.conductivity, "S/m"),
-        "region": (("bound", "axis"), np.array([table.region.lower, table.region.upper]), "m"),
-        "frequencies": (("bound",), np.array(table.frequencies), "Hz"),
-        "rate": (("state",), table.rates, "1/s"),
-        "multipole_center": (("multipole", "axis"), table.multipoles.centers, "m"),
-        "multipole_kind": (("multipole", "degree_order_imaginary"), table.multipoles.kinds, "1"),
-        "multipole_scale": ((), table.multipoles.scale, "m"),
-        "weight": (("state", "multipole"), table.weights, "J^-1/2"),
-        "error": (("mesh_states_functions",), np.array(errors), "1"),
-    }
-    if share:
-        variables["rotor_series"] = (("harmonic", "state", "power"), share.series, "J^1/2")
-        variables["rotor_distance"] = ((), share.distance, "m")
-        variables["rotor_error"] = ((), share.error, "1")
-    attributes = {
-        "format": FORMAT,
-        "title": "Eddy currents of a plate: passive network with harmonic field functions, in the plate's frame",
-        "provenance": json.dumps(dict(table.provenance), sort_keys=True),
-    }
-    write_checked(described(variables, attributes), path)
-
-
-def load_plate_table(path: str | Path) -> PlateTable:
-    """Read a table.
-
-    Raises
-    ------
-    TableFileError : the file is not a table of this format, or its content is not what was written
-    """
-    return _table(read_checked(path, FORMAT))
-
-
-def load_driven_plate(path: str | Path) -> tuple[PlateTable, RotorShare]:
-    """Read a table and the rotor's share of its signals.
-
-    Raises
-    ------
-    TableFileError : as `load_plate_table`, or there is no share in the file
-    """
-    dataset = read_checked(path, FORMAT)
-    if "rotor_series" not in dataset:
-        raise TableFileError(f"Input {path} must hold a rotor's share of the signals; instead it has none.")
-    distance, error = float(dataset["rotor_distance"]), float(dataset["rotor_error"])
-    return _table(dataset), RotorShare(distance, dataset["rotor_series"].values, error)
-
-
-def _table(dataset: xr.Dataset) -> PlateTable:
-    data = {str(name): variable.values for name, variable in dataset.data_vars.items()}
-    low, high = data["frequencies"]
-    return PlateTable(
-        size=data["size"],
-        conductivity=float(data["conductivity"]),
-        region=Region(*data["region"]),
-        frequencies=(float(low), float(high)),
-        rates=data["rate"],
-        multipoles=Multipoles(data["multipole_center"], data["multipole_kind"], float(data["multipole_scale"])),
-        weights=data["weight"],
-        errors=PlateErrors(*(float(e) for e in data["error"])),
-        provenance=json.loads(dataset.attrs["provenance"]),
-    )
-
-
-def plate_key(plate: Plate, region: Region, frequencies: tuple[float, float], rtol: float) -> str:
-    """SHA-256 of the plate's size and conductivity, the ranges, the tolerance, and the programs; not of its pose."""
-    return _hash("plate", [plate.box.size, [plate.conductivity, rtol], region.lower, region.upper, frequencies])
-
-
-def driven_plate_key(
-    plate: Plate,
-    rotor: RotorTable,
-    region: Region,
-    frequencies: tuple[float, float],
-    rtol: float,
-    room: str = __name__,
-) -> str:
-    """SHA-256 of what is in `plate_key`, the plate's pose and the length of its way, and the rotor's field.
-
-    `room` is that whose program makes the table. Coefficients of expansions count to nine digits: solved again, they
-    differ in the last ones.
-    """
-    numbers: list[ArrayLike] = [
-        plate.box.center,
-        plate.box.rotation,
-        [plate.lowering.distance if plate.lowering else 0.0],
-    ]
-    # By the magnets' strengths, not by their sum, which opposite ones leave no more of than round-off.
-    strength = sum(float(np.linalg.norm(m.polarization)) * m.body.volume for m in rotor.magnets) or 1.0
-    for magnet in rotor.uniform:
-        numbers += [magnet.body.shape_numbers, magnet.body.center, magnet.body.rotation, magnet.polarization]
-    for expansion in rotor.expansions:
-        scaled = expansion.coefficients * (expansion.radius**3 * FOUR_PI / strength)
-        numbers += [expansion.center, [expansion.radius], np.round(scaled.real, 9), np.round(scaled.imag, 9)]
-    return digest(f"{program_of(room)} {plate_key(plate, region, frequencies, rtol)}", numbers)
-
-
-def _hash(name: str, parts: Sequence[ArrayLike]) -> str:
-    return digest(f"{FORMAT} {program_of(__name__)} {name}", parts)
+TITLE = "Eddy currents of a plate: passive network with harmonic field functions, in the plate's frame"
+PLATE = TableKind("plate", PlateTable, TITLE)
+DRIVEN = TableKind("driven-plate", tuple[PlateTable, RotorShare], f"{TITLE}, and the rotor's share of their signals")
 
 
 def cached_plate_table(
     plate: Plate, region: Region, frequencies: tuple[float, float], rtol: float, report: Callable[[str], None]
 ) -> tuple[PlateTable, bool]:
-    """A plate table, from the cache if it is there, and whether it was."""
-    return from_cache(
-        f"plate-{plate_key(plate, region, frequencies, rtol)}.nc",
-        load_plate_table,
-        lambda: plate_table(plate, region, frequencies, rtol),
-        save_plate_table,
-        report,
-    )
+    """A plate table, from the cache if it is there, and whether it was; it is the same for every pose of the plate."""
+    inputs = plate.box.size, plate.conductivity, region, frequencies, rtol
+    return PLATE.cached(inputs, lambda: plate_table(plate, region, frequencies, rtol), report)
+
+
+def deciding(
+    plate: Plate, rotor: RotorTable, region: Region, frequencies: tuple[float, float], rtol: float
+) -> tuple[Any, ...]:
+    """What decides a plate's table and the rotor's share: the way of a lowering does, but not when and how fast."""
+    way = plate.lowering.distance if plate.lowering else 0.0
+    return plate.box, plate.conductivity, way, rotor.uniform, rotor.expansions, region, frequencies, rtol
 
 
 def cached_driven_plate(
@@ -381,20 +280,7 @@ def cached_driven_plate(
     watch: Watch = unwatched,
 ) -> tuple[PlateTable, RotorShare, bool]:
     """`plate_and_rotor_table` from the cache if it is there, and whether it was."""
-    return cached_with_share(
-        f"driven-plate-{driven_plate_key(plate, rotor, region, frequencies, rtol)}",
-        lambda: plate_and_rotor_table(
-            plate, rotor, region, frequencies, rtol, solve=cached_solver(report, watch), watch=watch
-        ),
-        report,
-    )
-
-
-def cached_with_share(
-    name: str, make: Callable[[], tuple[PlateTable, RotorShare]], report: Callable[[str], None]
-) -> tuple[PlateTable, RotorShare, bool]:
-    """A plate's table with the rotor's share, from the cache if it is there under a name, and whether it was."""
-    (table, share), found = from_cache(
-        f"{name}.nc", load_driven_plate, make, lambda made, path: save_plate_table(made[0], path, made[1]), report
-    )
+    asked, solve = (plate, rotor, region, frequencies, rtol), cached_solver(report, watch)
+    make = partial(plate_and_rotor_table, *asked, solve=solve, watch=watch)
+    (table, share), found = DRIVEN.cached(deciding(*asked), make, report)
     return table, share, found

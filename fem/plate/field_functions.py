@@ -8,7 +8,7 @@ for what is close to the surface, far ones for the rest.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import combinations_with_replacement, product
 
@@ -50,9 +50,9 @@ class Multipoles:
     scale : length that makes coordinates free of units, m
     """
 
-    centers: Array
+    centers: Array = field(metadata={"units": "m"})
     kinds: Array
-    scale: float
+    scale: float = field(metadata={"units": "m"})
 
     def __post_init__(self) -> None:
         for name in ("centers", "kinds"):
@@ -79,8 +79,8 @@ class Multipoles:
     def _compiled(self) -> hy.cfunc_dbl:
         variables = hy.make_vars("x", "y", "z")
         outputs: list[hy.expression] = []
-        for field, gradient in self.expressions(variables):
-            outputs += [*field, *(gradient[i][j] for i in range(3) for j in range(i, 3))]
+        for flux, gradient in self.expressions(variables):
+            outputs += [*flux, *(gradient[i][j] for i in range(3) for j in range(i, 3))]
         # Optimised it would be twice as fast at best, and compiled in ten times the time.
         return compiled(hy.cfunc, outputs, variables, compact_mode=len(outputs) > 2000, opt_level=0, batch_size=1)
 

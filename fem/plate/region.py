@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -26,8 +26,8 @@ class Region:
     ValueError : an upper bound is not above the lower one
     """
 
-    lower: Array
-    upper: Array
+    lower: Array = field(metadata={"units": "m"})
+    upper: Array = field(metadata={"units": "m"})
 
     def __post_init__(self) -> None:
         for name in ("lower", "upper"):

@@ -20,7 +20,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 import scipy
@@ -30,14 +29,13 @@ from ...geometry.common import MU_0, Array, InputError
 from ...geometry.meshes.plate import MeshRule, plate_mesh
 from ...geometry.scene.contents import Plate
 from ...geometry.shapes import rotation_matrix
-from ..cache import described, from_cache, program_of, read_checked, write_checked
+from ..cache import TableKind
 from ..closed_forms.eddy_sphere import ComplexArray
 from ..closed_forms.potentials import unit_dipoles
 from ..rotor.table import RotorTable
 from .eddy import EddySpace, solve_shifted
 from .region import Region
 from .rotor_share import DOWN
-from .solution import digest
 
 LOWEST, HIGHEST = -37.0, 3.5
 """Range of ln(k (z+z')/2): the integrand goes as k or faster below, and as e^{-66} above."""
@@ -294,7 +292,7 @@ LOW = 10.0
 """Hz, of the floater's slow motions: edges count more there than at the rotor's frequency."""
 DOUBT = 1.5
 """Against converged elements at iω, changes were 0.75 and 0.81 times the truth at 10 Hz, 1.14 to 1.34 at 110 Hz."""
-FORMAT = "spinlev edges 1"
+EDGE_ERROR = TableKind("edges", float, "Change of an infinite slab's reaction by a plate's edges")
 
 
 def edge_error(plate: Plate, place: Array) -> float:
@@ -345,16 +343,5 @@ def _change(plate: Plate, body: Array, frequency: float) -> float:
 def cached_edge_error(plate: Plate, places: Array, frequency: float, report: Callable[[str], None]) -> float:
     """`measured_edge_error` at places and frequency rounded to 0.1 mm and 1 Hz, from the cache if it is there."""
     places, frequency = np.round(places, 4), float(round(frequency))
-    body = plate.box.to_body(places)
-    key = digest(f"{FORMAT} {program_of(__name__)}", [plate.box.size, [plate.conductivity, frequency], body])
-
-    def save(error: float, path: Path) -> None:
-        write_checked(described({"error": ((), error, "1")}, {"format": FORMAT}), path)
-
-    return from_cache(
-        f"edges-{key}.nc",
-        lambda path: float(read_checked(path, FORMAT)["error"]),
-        lambda: measured_edge_error(plate, places, frequency),
-        save,
-        report,
-    )[0]
+    inputs = plate.box.size, plate.conductivity, frequency, plate.box.to_body(places)
+    return EDGE_ERROR.cached(inputs, lambda: measured_edge_error(plate, places, frequency), report)[0]

@@ -44,8 +44,8 @@ class RotorShare:
         because the floater does not feel them (`shorter_share`), what they miss of the field of the rotor's currents
     """
 
-    distance: float
-    series: Array
+    distance: float = field(metadata={"units": "m"})
+    series: Array = field(metadata={"units": "J^1/2"})
     error: float
 
     def __post_init__(self) -> None:
@@ -147,13 +147,13 @@ class PlateTable:
     provenance : how the table was made; texts and numbers
     """
 
-    size: Array
-    conductivity: float
+    size: Array = field(metadata={"units": "m"})
+    conductivity: float = field(metadata={"units": "S/m"})
     region: Region
-    frequencies: tuple[float, float]
-    rates: Array
+    frequencies: tuple[float, float] = field(metadata={"units": "Hz"})
+    rates: Array = field(metadata={"units": "1/s"})
     multipoles: Multipoles
-    weights: Array
+    weights: Array = field(metadata={"units": "J^-1/2"})
     errors: PlateErrors
     provenance: Mapping[str, str | float] = field(default_factory=dict)
 

@@ -1,6 +1,5 @@
 """The field models of a rotor, and the choice between them."""
 
-import hashlib
 from collections.abc import Callable
 from functools import partial
 
@@ -8,10 +7,9 @@ import numpy as np
 
 from ...geometry.common import Watch, unwatched
 from ...geometry.magnets import Magnet
-from ..cache import from_cache, program_of
 from .models import Accuracy, cuboid_table, dipole_table, error_points, fem_table, moments_table
 from .pose import at_home, taken_along
-from .table import FORMAT, RotorTable, load_table, save_table
+from .table import ROTOR, RotorTable
 
 MODELS: dict[str, Callable[[tuple[Magnet, ...], Accuracy], RotorTable]] = {
     "dipole": dipole_table,
@@ -97,13 +95,8 @@ def _cheapest(rotor: tuple[Magnet, ...], accuracy: Accuracy) -> tuple[str, str]:
 
 
 def rotor_key(rotor: tuple[Magnet, ...], model: str, rtol: float, nearest: float | None = None) -> str:
-    """SHA-256 of the magnets, the model, the accuracy asked for and where, and the programs that compute them."""
-    digest = hashlib.sha256(f"{FORMAT} {program_of(__name__)} {model} {rtol!r} {nearest!r}".encode())
-    for magnet in rotor:
-        for part in (magnet.body.shape_numbers, magnet.body.center, magnet.body.rotation, magnet.polarization):
-            digest.update(np.ascontiguousarray(part + 0.0, dtype="<f8").tobytes())
-        digest.update(np.ascontiguousarray(magnet.permeability_in_rotor + 0.0, dtype="<f8").tobytes())
-    return digest.hexdigest()
+    """SHA-256 of the magnets, the model, the accuracy asked for and where, and of what computes them."""
+    return ROTOR.key(rotor, model, rtol, nearest)
 
 
 def cached_rotor_table(
@@ -119,7 +112,6 @@ def cached_rotor_table(
     A lone magnet has one, wherever it is in the rotor.
     """
     home = at_home(rotor)
-    name = f"rotor-{rotor_key(home, model, rtol, nearest)}.nc"
     make = partial(rotor_table, home, model, rtol, nearest, watch)
-    table, found = from_cache(name, load_table, make, save_table, report)
+    table, found = ROTOR.cached((home, model, rtol, nearest), make, report)
     return taken_along(table, rotor), found

@@ -238,12 +238,12 @@ class Scene:
     start: OffsetStart | AbsoluteStart = field(default_factory=OffsetStart)
     field_map: Path | None = None
     map_reading: MapReading = MapReading()
-    text: str = ""
+    text: str = field(default="", compare=False)
     conductors: tuple[Conductor, ...] = ()
-    remarks: tuple[str, ...] = ()
-    folder: Path = field(default_factory=Path)
-    files: tuple[tuple[str, str], ...] = ()
-    parts: tuple[Part, ...] = ()
+    remarks: tuple[str, ...] = field(default=(), compare=False)
+    folder: Path = field(default_factory=Path, compare=False)
+    files: tuple[tuple[str, str], ...] = field(default=(), compare=False)
+    parts: tuple[Part, ...] = field(default=(), compare=False)
 
     @property
     def angular_velocity(self) -> float:

@@ -6,12 +6,9 @@ The cube's displacement and its tilt do about the same, each by its field on the
 what a displacement does already.
 """
 
-import hashlib
-import json
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache, cached_property
-from pathlib import Path
 
 import numpy as np
 import xarray as xr
@@ -29,7 +26,7 @@ from ...dynamics.motion.equations import parameters
 from ...dynamics.motion.rates import Rates
 from ...dynamics.motion.rotor_losses import Dissipation, brake_slope
 from ...dynamics.motion.state import Parameter, Scales
-from ...fem.cache import digest_of, from_cache, read_checked, write_checked
+from ...fem.cache import TableKind
 from ...fem.harmonics.expressions import CompiledField
 from ...fem.rotor.table import FieldTable
 from ...fem.rotor_metal import RotorLosses, cached_rotor_losses
@@ -285,7 +282,9 @@ SPINS = (-0.12, 0.6)
 SEED, LONGEST_DESIGN = 20250701, 256
 CONTACT = 11.35e-3
 """Distance from which parts of the way are counted, m: that on the axis at which floater and cube touch."""
-FORMAT = "spinlev design of an experiment 1"
+Nodes = tuple[Array, float]
+"""What is known of the nodes of a rotor, and how far the attraction alone carries the weight, m."""
+NODES = TableKind("experiment", tuple[Array, float], "Nodes of one rotor in the design of an experiment")
 
 
 @dataclass(frozen=True, eq=False)
@@ -321,37 +320,32 @@ def design_inputs(kind: str, number: int) -> dict[str, float]:
 
 def cached_row(point: Point) -> xr.Dataset:
     """`design_row` from the cache if it is there: whoever fits a surrogate finds the rotors that others computed."""
-    digest = hashlib.sha256(
-        f"{FORMAT} {digest_of('spinlev.dynamics')} {json.dumps(dict(point), sort_keys=True)}".encode()
-    )
-    digest.update(Path(__file__).read_bytes())
-    return from_cache(
-        f"experiment-{digest.hexdigest()}.nc",
-        lambda path: read_checked(path, FORMAT),
-        lambda: design_row(point),
-        lambda row, path: write_checked(row.assign_attrs(format=FORMAT), path),
-        lambda _: None,
-    )[0].drop_attrs()
+    return design_row(point, lambda make: NODES.cached((point,), make, lambda _: None)[0])
 
 
-def design_row(point: Point) -> xr.Dataset:
-    """One rotor of a design, computed.
+def design_row(point: Point, remembered: Callable[[Callable[[], Nodes]], Nodes] = lambda make: make()) -> xr.Dataset:
+    """One rotor of a design, computed; `remembered` gets what computes it and gives its nodes.
 
     Returns
     -------
     Dataset over `height` and `body_spin`: its nodes (NaN where nothing levitates), how far the attraction alone carries
     the weight, and its inputs
     """
-    kind, model = KINDS[point["rotor"]], point["model"]
+    kind = KINDS[point["rotor"]]
     inputs = design_inputs(point["rotor"], point["number"])
-    scene = scene_of(inputs, 1.0 if model == "cuboid" else 1.05)
-    field: FieldModel = "cuboid" if model == "cuboid" else "fem"
-    levitation = levitation_of(scene, field, interaction="mutual" if model == "mutual" else "rigid")
     spins, steps = np.linspace(*SPINS, point["spins"]), np.arange(point["heights"]) + 0.5
     part = kind.near + (kind.far - kind.near) * (1 - np.cos(np.pi * steps / len(steps))) / 2
-    floater = Levitating.of(scene, levitation.interaction, lambda: losses_of(scene, point["steel"]))
-    hanging = floater.hanging
-    nodes = floater.nodes(CONTACT + part * (hanging - CONTACT), spins)
+
+    def make() -> Nodes:
+        model = point["model"]
+        scene = scene_of(inputs, 1.0 if model == "cuboid" else 1.05)
+        field: FieldModel = "cuboid" if model == "cuboid" else "fem"
+        levitation = levitation_of(scene, field, interaction="mutual" if model == "mutual" else "rigid")
+        floater = Levitating.of(scene, levitation.interaction, lambda: losses_of(scene, point["steel"]))
+        hanging = floater.hanging
+        return floater.nodes(CONTACT + part * (hanging - CONTACT), spins), float(hanging)
+
+    nodes, hanging = remembered(make)
     return xr.Dataset(
         {
             "node": variable(("height", "body_spin", "quantity"), nodes, "see quantity", "what is known of a node"),

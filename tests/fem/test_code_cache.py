@@ -14,7 +14,7 @@ import pytest
 
 from spinlev.fem import cache, compiled_code, files as whole_files
 from spinlev.fem.cache import make_room
-from spinlev.fem.compiled_code import compiled, compiled_later
+from spinlev.fem.compiled_code import compiled, compiled_later, one_thread
 from spinlev.fem.files import seal, unsealed
 
 CONSTANT = 3.1640625
@@ -36,6 +36,11 @@ def counted(*arguments, **options):
     """heyoka's compiler, every call of which is counted."""
     CALLS.append(arguments)
     return hy.cfunc(*arguments, **options)
+
+
+def refused(*_):
+    """A compiler that fails."""
+    raise ZeroDivisionError
 
 
 def value():
@@ -70,9 +75,24 @@ def test_code_is_compiled_once(file):
     assert list(file.parent.iterdir()) == [file]
 
 
-def test_heyoka_keeps_nothing_by_itself(file):
-    assert not hy.llvm_state.get_diskcache_enabled()
-    assert hy.llvm_state.get_memcache_limit() == 0
+def settings():
+    """heyoka's, which hold for all of a process."""
+    states = hy.llvm_state
+    return hy.get_nthreads(), states.get_memcache_limit(), states.get_diskcache_enabled()
+
+
+def test_heyokas_settings_stay_those_of_the_user_and_it_keeps_nothing_by_itself(folder, monkeypatch):
+    """Neither a key nor code that is compiled, read or run changes them; what is compiled here is kept here alone."""
+    before = settings()
+    assert before[0] != 1  # what a test of one thread would not tell
+    compiled_code._target.cache_clear()
+    assert value() == (VALUE, True)
+    compiled_code._functions.clear()
+    assert value() == (VALUE, False)
+    with pytest.raises(ZeroDivisionError):
+        compiled(refused, [1.25])
+    assert settings() == before
+    assert hy.llvm_state.get_memcache_size() == 0
 
 
 def test_each_expression_has_its_place_in_the_name(folder):
@@ -102,7 +122,7 @@ def test_other_options_and_other_processors_are_other_code(folder, monkeypatch):
     for level in (0, 3):
         compiled(hy.cfunc, [x + 1.25], [x], opt_level=level)
     assert len(list(folder.iterdir())) == 2
-    monkeypatch.setattr(compiled_code, "_target", lambda: b"another processor")
+    monkeypatch.setattr(compiled_code, "_target", lambda: "another processor")
     compiled(hy.cfunc, [x + 1.25], [x], opt_level=0)
     assert len(list(folder.iterdir())) == 3
 
@@ -124,7 +144,7 @@ def test_an_integrator_from_the_disk_flies_to_the_same_bits_and_hears_its_events
 def test_a_flipped_bit_of_a_constant_is_not_computed_with(file):
     """Without the checksum it would be: wherever the constant is in the machine code, the value is another one."""
     whole = file.read_bytes()
-    content = zlib.decompress(unsealed(file, file.name))
+    content = zlib.decompress(unsealed(file))
     pattern = struct.pack("<d", CONSTANT)
     places = [k for k in range(len(content)) if content.startswith(pattern, k)]
     ran = []
@@ -132,7 +152,7 @@ def test_a_flipped_bit_of_a_constant_is_not_computed_with(file):
         damaged = zlib.compress(flip(content, place + 6, 1))
         hy.llvm_state.clear_memcache()
         changed = hy.cfunc_dbl.__new__(hy.cfunc_dbl)
-        changed.__setstate__((zlib.decompress(damaged).partition(b"\n")[2], {}))
+        changed.__setstate__((zlib.decompress(damaged).split(b"\n", 2)[2], {}))
         ran.append(changed([1.0])[0])
         file.write_bytes(damaged + whole[-len(seal(b"")) :])
         assert value() == (VALUE, True)
@@ -153,14 +173,14 @@ DAMAGES = {
     "empty": lambda content, name: b"",
     "other bytes": lambda content, name: b"\x89HDF" * 999,
     "without a checksum": lambda content, name: content[: -len(seal(b""))],
-    "whole, but no code": lambda content, name: seal(b"something else", name),
+    "whole, but no code": lambda content, name: seal(b"something else"),
     "of a heyoka that was built otherwise": lambda content, name: seal(
-        zlib.compress(b"cfunc_dbl\nsomething else"), name
+        zlib.compress(f"{name}\ncfunc_dbl\nsomething else".encode())
     ),
-    "of another kind": lambda content, name: seal(zlib.compress(b"expression\n" + pickle.dumps(2)), name),
-    "a pickle": lambda content, name: seal(zlib.compress(pickle.dumps(Planted())), name),
+    "of another kind": lambda content, name: seal(zlib.compress(f"{name}\nexpression\n".encode() + pickle.dumps(2))),
+    "a pickle": lambda content, name: seal(zlib.compress(pickle.dumps(Planted()))),
     "a pickle under a known name": lambda content, name: seal(
-        zlib.compress(b"cfunc_dbl\n" + pickle.dumps(Planted())), name
+        zlib.compress(f"{name}\ncfunc_dbl\n".encode() + pickle.dumps(Planted()))
     ),
     "a bare pickle": lambda content, name: pickle.dumps(Planted()),
 }
@@ -306,17 +326,17 @@ def test_code_that_is_read_counts_as_used(file):
     assert file.stat().st_mtime > 1.5e9
 
 
-def test_code_whose_arguments_are_written_later_is_told_by_what_they_are_written_from(folder):
-    """Nothing is written where it is there already; another source, option or room is other code."""
+def test_code_whose_arguments_are_written_later_is_told_by_what_they_are_written_from(folder, monkeypatch):
+    """Nothing is written where it is there already; another source, option or number of the writer is other code."""
     x, written = hy.make_vars("x"), []
 
-    def later(source, package="spinlev.fem", **options):
+    def later(source, **options):
         def write():
             written.append(source)
             return [hy.diff(source * hy.sin(x), x)], [x]
 
         hy.llvm_state.clear_memcache()
-        return compiled_later(hy.cfunc, write, source, package, **options)([0.5])[0]
+        return compiled_later(hy.cfunc, write, source, **options)([0.5])[0]
 
     assert later(2.0) == later(2.0) == pytest.approx(2 * np.cos(0.5), rel=1e-15)
     assert written == [2.0]
@@ -325,7 +345,8 @@ def test_code_whose_arguments_are_written_later_is_told_by_what_they_are_written
     assert written == [2.0]
     assert later(3.0) == pytest.approx(3 * np.cos(0.5), rel=1e-15)
     later(2.0, compact_mode=True)
-    later(2.0, package="spinlev.fem.harmonics")
+    monkeypatch.setitem(cache.FORMATS, "code", cache.FORMATS["code"] + 1)
+    later(2.0)
     assert written == [2.0, 3.0, 2.0, 2.0]
     assert len(list(folder.iterdir())) == 4
 
@@ -370,8 +391,9 @@ def test_code_under_another_name_is_not_run(folder):
     assert compiled(hy.cfunc, [x + 3.0], [x])([1.0])[0] == 4.0
 
 
-def test_compiled_code_runs_in_one_thread():
-    """A second one waits busily for small work; parallel work is by processes."""
-    x = hy.make_vars("x")
-    compiled(hy.cfunc, [x * 2.0], [x])
-    assert hy.get_nthreads() == 1
+def test_a_block_of_one_thread_gives_the_others_back():
+    """Others wait busily for small work; parallel work is by processes."""
+    before = hy.get_nthreads()
+    with one_thread():
+        assert hy.get_nthreads() == 1
+    assert hy.get_nthreads() == before

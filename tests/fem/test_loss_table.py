@@ -9,7 +9,7 @@ import pytest
 from spinlev.fem import rotor_metal as tabulate
 from spinlev.fem.cache import TableFileError
 from spinlev.fem.metal_currents import metal_of, of_motion
-from spinlev.fem.rotor_metal import check_slow_enough, load_losses, pieces_of, rotor_losses, save_losses
+from spinlev.fem.rotor_metal import LOSSES, check_slow_enough, pieces_of, rotor_losses
 from spinlev.geometry.common import InputError
 from spinlev.geometry.rotor import Conductor, horizontal
 from spinlev.geometry.shapes import Box, Cylinder
@@ -55,8 +55,8 @@ def test_no_motion_gains_power(table):
 
 def test_it_is_kept_on_disk_and_damage_is_noticed(table, tmp_path):
     path = tmp_path / "losses.nc"
-    save_losses(table, path)
-    again = load_losses(path)
+    LOSSES.save(table, path)
+    again = LOSSES.load(path)
     place, moment = np.array([[1e-3, 0.0, -20e-3]]), np.array([[0.1, 0.0, 1.0]])
     np.testing.assert_array_equal(again.dissipation(place, moment), table.dissipation(place, moment))
     assert repr(again) == repr(table)
@@ -65,7 +65,7 @@ def test_it_is_kept_on_disk_and_damage_is_noticed(table, tmp_path):
     content[len(content) // 2] ^= 1
     path.write_bytes(content)
     with pytest.raises(TableFileError, match="checksum"):
-        load_losses(path)
+        LOSSES.load(path)
 
 
 def test_fields_may_be_mixed_and_thinned():

@@ -13,7 +13,7 @@ from spinlev.fem.plate.eddy import EddySpace, solve_eddy
 from spinlev.fem.plate.eddy_fields import dipole_images
 from spinlev.fem.plate.reaction import MESH_SHARE, Ladder
 from spinlev.fem.plate.region import Region, outer_box, outer_frequencies
-from spinlev.fem.plate.solution import error_of, load_solution, save_solution, solve_currents
+from spinlev.fem.plate.solution import CURRENTS, error_of, solve_currents
 from spinlev.fem.rotor.choice import rotor_table
 from spinlev.fem.rotor.models import AccuracyError
 from spinlev.geometry.meshes.plate import MeshRule, plate_mesh
@@ -145,8 +145,8 @@ def test_boxes_grow_outwards_and_stay_off_the_plate():
 
 def test_a_solution_survives_the_disk(solution, tmp_path):
     """Couplings to single precision, everything else exactly."""
-    save_solution(solution, tmp_path / "s.nc")
-    read = load_solution(tmp_path / "s.nc")
+    CURRENTS.save(solution, tmp_path / "s.nc")
+    read = CURRENTS.load(tmp_path / "s.nc")
     place = REGION.center
     for kept, back in zip(solution.space.dipole_couplings(place), read.space.dipole_couplings(place), strict=True):
         assert back == pytest.approx(kept, abs=1e-6 * abs(kept).max())

@@ -7,8 +7,8 @@ from spinlev.fem.cache import TableFileError
 from spinlev.fem.harmonics.expansion import uniform_moments
 from spinlev.fem.maps_of_B.columns import FieldMap, FieldMapError
 from spinlev.fem.maps_of_B.fit import find_center
-from spinlev.fem.maps_of_B.table import fit_field_map, load_gridded, save_gridded
-from spinlev.fem.rotor.table import RangeError, RotorTable, load_table
+from spinlev.fem.maps_of_B.table import MAP, fit_field_map
+from spinlev.fem.rotor.table import ROTOR, RangeError, RotorTable
 from spinlev.geometry.magnets import Magnet
 from spinlev.geometry.rotor import horizontal, vertical
 from spinlev.geometry.shapes import Box
@@ -195,16 +195,16 @@ def test_the_centre_of_one_magnet_is_found():
 
 def test_a_table_survives_the_disk_to_the_last_bit(tmp_path):
     table = fit_field_map(grid_map(ROTORS["vertical"], 0.004, noise=1e-3), [[0, 0, 0], [0, 0, 0.012]], max_degree=7)
-    save_gridded(table, tmp_path / "t.nc")
-    read, points = load_gridded(tmp_path / "t.nc"), off_grid(ROTORS["vertical"], 50)
+    MAP.save(table, tmp_path / "t.nc")
+    read, points = MAP.load(tmp_path / "t.nc"), off_grid(ROTORS["vertical"], 50)
     points = points[table.in_range(points)]
     for question in ("evaluate", "relative_error"):
         for before, after in zip(getattr(table, question)(points), getattr(read, question)(points), strict=True):
             assert np.array_equal(before, after)
     assert read.model == "map"
     assert dict(read.expansions.provenance) == dict(table.expansions.provenance)
-    with pytest.raises(TableFileError, match="rotor table"):
-        load_table(tmp_path / "t.nc")
+    with pytest.raises(TableFileError, match="spinlev rotor"):
+        ROTOR.load(tmp_path / "t.nc")
 
 
 def test_maps_that_cannot_be_fitted_say_why():

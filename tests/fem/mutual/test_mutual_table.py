@@ -8,10 +8,9 @@ import pytest
 from article import PERMEABLE
 from numpy.polynomial import legendre
 
-from spinlev.fem.cache import read_checked, write_checked
 from spinlev.fem.harmonics.interior import Ball, field_at_center, gradient_at_center
 from spinlev.fem.mutual.grid import answer_to_charge, image_weights, reflection
-from spinlev.fem.mutual.making import FORMAT, answers, cached_mutual_table, from_dataset, mutual_table, to_dataset
+from spinlev.fem.mutual.making import MUTUAL, answers, cached_mutual_table, mutual_table
 from spinlev.fem.mutual.response import enough_degree, rotor_response, two_body
 from spinlev.fem.mutual.samples import places_around
 from spinlev.geometry.common import InputError
@@ -115,8 +114,8 @@ def test_written_out_and_by_points_the_energy_is_one(table):
 
 
 def test_a_file_holds_all_of_it(table, tmp_path):
-    write_checked(to_dataset(table), tmp_path / "table.nc")
-    back = from_dataset(read_checked(tmp_path / "table.nc", FORMAT), MAGNETS)
+    MUTUAL.save(table, tmp_path / "table.nc")
+    back = MUTUAL.load(tmp_path / "table.nc")
     place, direction = poses(0.6, 4, 6)
     for before, after in zip(table.derivatives(place, direction), back.derivatives(place, direction), strict=True):
         np.testing.assert_array_equal(after, before)

@@ -9,16 +9,13 @@ import pytest
 from article import RADIUS
 from ngsolve import SetNumThreads
 
-from spinlev.fem.cache import TableFileError
 from spinlev.fem.closed_forms.potentials import unit_dipoles
 from spinlev.fem.plate.driven import (
+    DRIVEN,
     cached_driven_plate,
-    driven_plate_key,
-    load_driven_plate,
-    load_plate_table,
+    deciding,
     plate_and_rotor_table,
     reachable_region,
-    save_plate_table,
 )
 from spinlev.fem.plate.eddy import solve_eddy
 from spinlev.fem.plate.rotor_share import posed_rotor, rotor_parts
@@ -100,17 +97,13 @@ def test_one_file_holds_table_and_share(made, rotor, region, tmp_path, monkeypat
     table, share = made
     monkeypatch.setenv("SPINLEV_CACHE", str(tmp_path))
     arguments = (PLATE, rotor, region, FREQUENCIES, RTOL)
-    path = tmp_path / f"driven-plate-{driven_plate_key(*arguments)}.nc"
-    save_plate_table(table, path, share)
+    key = DRIVEN.key(*deciding(*arguments))
+    DRIVEN.save((table, share), tmp_path / f"driven-plate-{key}.nc", key)
     read, read_share, found = cached_driven_plate(*arguments, report=pytest.fail)
     assert found
     assert np.array_equal(read.weights, table.weights)
     assert np.array_equal(read_share.series, share.series)
     assert (read_share.distance, read_share.error) == (share.distance, share.error)
-    assert np.array_equal(load_plate_table(path).rates, table.rates)
-    save_plate_table(table, tmp_path / "alone.nc")
-    with pytest.raises(TableFileError, match="must hold a rotor's share"):
-        load_driven_plate(tmp_path / "alone.nc")
 
 
 def test_everything_that_decides_is_in_the_key(rotor, region):
@@ -129,13 +122,10 @@ def test_everything_that_decides_is_in_the_key(rotor, region):
         (PLATE, rotor, region, (5.0, 251.0), RTOL),
         (PLATE, rotor, region, FREQUENCIES, 0.09),
     ]
-    keys = [driven_plate_key(*arguments) for arguments in changed]
+    keys = [DRIVEN.key(*deciding(*arguments)) for arguments in changed]
     assert len(set(keys)) == len(keys)
-    assert driven_plate_key(*changed[0], "spinlev.fem.plate") not in keys
     faster = replace(PLATE, lowering=Lowering(1.0, 0.02, 0.02))
-    assert driven_plate_key(faster, *changed[0][1:]) == keys[0]
-    again = rotor_table(rotor.magnets, "fem", 1e-4)
-    assert driven_plate_key(PLATE, again, *changed[0][2:]) == keys[0]
+    assert DRIVEN.key(*deciding(faster, *changed[0][1:])) == keys[0]
 
 
 def test_reachable_region_holds_the_box_all_the_way(region):

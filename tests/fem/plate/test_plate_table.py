@@ -9,11 +9,9 @@ from ngsolve import SetNumThreads
 
 from spinlev.fem.cache import TableFileError
 from spinlev.fem.plate.driven import (
+    PLATE as PLATES,
     cached_plate_table,
     field_values,
-    load_plate_table,
-    plate_key,
-    save_plate_table,
     tabulate,
 )
 from spinlev.fem.plate.network import reduce_plate
@@ -146,20 +144,21 @@ def _swing(share, table, frequency):
 
 
 def test_a_table_survives_the_disk_and_the_cache(table, tmp_path, monkeypatch):
-    save_plate_table(table, tmp_path / "t.nc")
-    read = load_plate_table(tmp_path / "t.nc")
+    PLATES.save(table, tmp_path / "t.nc")
+    read = PLATES.load(tmp_path / "t.nc")
     points = places(3)
     assert np.array_equal(read.reaction_tensor(points, 50.0), table.reaction_tensor(points, 50.0))
     assert (dict(read.provenance), read.errors) == (dict(table.provenance), table.errors)
     monkeypatch.setenv("SPINLEV_CACHE", str(tmp_path))
     arguments = (PLATE, REGION, (5.0, 250.0), RTOL)
-    save_plate_table(table, tmp_path / f"plate-{plate_key(*arguments)}.nc")
+    key = PLATES.key(PLATE.box.size, PLATE.conductivity, *arguments[1:])
+    PLATES.save(table, tmp_path / f"plate-{key}.nc", key)
     found, cached = cached_plate_table(*arguments, report=pytest.fail)
     assert cached
     assert np.array_equal(found.weights, table.weights)
     (tmp_path / "t.nc").write_bytes(b"no table")
     with pytest.raises(TableFileError, match="does not end in its checksum"):
-        load_plate_table(tmp_path / "t.nc")
+        PLATES.load(tmp_path / "t.nc")
 
 
 def test_bad_input_is_named(table):

@@ -15,7 +15,7 @@ from spinlev.fem.elements.ladder import refinement_of, solve_rotor
 from spinlev.fem.rotor.choice import rotor_table
 from spinlev.fem.rotor.models import error_points
 from spinlev.fem.rotor.near_field import refuse_edges
-from spinlev.fem.rotor.table import load_table, save_table
+from spinlev.fem.rotor.table import ROTOR
 from spinlev.geometry import step_file
 from spinlev.geometry.common import ComputationError, InputError, MeshError, shown
 from spinlev.geometry.files import CrashError, LostError, call_apart
@@ -194,8 +194,8 @@ def test_beside_a_known_scene_no_file_is_opened(folder, tmp_path):
 
 def test_a_table_with_a_part_needs_its_file_no_more(folder, tmp_path):
     table = rotor_table((Magnet(read_part(folder / "cube.step"), (1.0, 0.0, 0.0)),), "dipole")
-    save_table(table, tmp_path / "table.nc")
-    again = load_table(tmp_path / "table.nc")
+    ROTOR.save(table, tmp_path / "table.nc")
+    again = ROTOR.load(tmp_path / "table.nc")
     assert np.array_equal(again.moment, table.moment)
     assert again.magnets[0].body.volume == pytest.approx(1e-6)
     assert again.magnets[0].body.file == Path(folder / "cube.step")

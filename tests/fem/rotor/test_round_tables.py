@@ -6,7 +6,7 @@ import pytest
 from spinlev.fem.elements.second_opinion import magnet_dipoles
 from spinlev.fem.rotor.choice import rotor_key, rotor_table
 from spinlev.fem.rotor.models import Accuracy, error_points, fem_table
-from spinlev.fem.rotor.table import load_table, save_table
+from spinlev.fem.rotor.table import ROTOR
 from spinlev.geometry.common import MU_0
 from spinlev.geometry.magnets import Magnet
 from spinlev.geometry.meshes.magnets import MeshSettings, mesh_magnets
@@ -93,8 +93,8 @@ def test_the_stated_error_of_rings_and_discs_holds(body):
 def test_a_table_of_round_magnets_is_read_as_it_was_written(tmp_path):
     magnets = (Magnet(Ring(10e-3, 6e-3, 5e-3), (1, 0, 0)), Magnet(Sphere(5e-3, (0, 0, 10e-3)), (0, 0, 1)))
     table = rotor_table((*magnets, Magnet(Cylinder(2e-3, 3e-3, (0, 0, 20e-3), TURN), (0, 1, 0))), "cuboid")
-    save_table(table, tmp_path / "table.nc")
-    again = load_table(tmp_path / "table.nc")
+    ROTOR.save(table, tmp_path / "table.nc")
+    again = ROTOR.load(tmp_path / "table.nc")
     assert repr(again.magnets) == repr(table.magnets)
     assert np.array_equal(again.moment, table.moment)
 
