@@ -15,7 +15,6 @@ from ..dynamics.motion.mutual import MUTUAL
 from ..dynamics.motion.rotor_losses import ROTOR_CURRENTS
 from ..fem.rotor_metal import ball_losses, pieces_of, slow_error as metal_error
 from ..geometry.common import MAGNET_CONDUCTIVITY
-from ..geometry.scene.contents import Scene
 from .levitation import Levitation
 
 PLATE_NOT_MODELLED = "The plate's eddy currents are left out: the plate is only an obstacle."
@@ -47,10 +46,18 @@ class ListedEffect:
     motion_error: float = 0.0
 
 
-def listed_effects(levitation: Levitation, equilibria: Sequence[Equilibrium]) -> list[ListedEffect]:
-    """All effects that are known, with what they do to the first of the equilibria."""
+def effects_summary(levitation: Levitation, equilibria: Sequence[Equilibrium]) -> dict[str, Any]:
+    """For JSON: the interaction, all effects that are known with what they do to the first of the equilibria, and in
+    sentences what is in the scene but not in the motion."""
     first = next(iter(equilibria), None)
-    return [part(levitation, first) for part in (_mutual, _rotor_currents, _floater_currents, _air)]
+    found = [part(levitation, first) for part in (_mutual, _rotor_currents, _floater_currents, _air)]
+    missing = [PLATE_NOT_MODELLED] if levitation.scene.plate and levitation.plate is None else []
+    missing += [f"Left out: {e.name} ({e.why})." for e in found if not e.included and e.why != NOTHING_ANSWERS]
+    return {
+        "interaction": levitation.interaction_model,
+        "effects": [vars(effect) for effect in found],
+        "not_modelled": missing,
+    }
 
 
 def _mutual(levitation: Levitation, first: Equilibrium | None) -> ListedEffect:
@@ -76,23 +83,20 @@ def _floater_currents(levitation: Levitation, first: Equilibrium | None) -> List
 def _rotor_currents(levitation: Levitation, first: Equilibrium | None) -> ListedEffect:
     """Those of the scene, or what those of sintered magnets, taken as balls, would be."""
     scene, growth, included = levitation.scene, None, levitation.losses is not None
-    magnets = [replace(magnet, conductivity=MAGNET_CONDUCTIVITY) for magnet in scene.rotor]
-    pieces = pieces_of(magnets, ())
-    losses = levitation.losses or (ball_losses(pieces) if pieces else None)
-    doubt = 0.0 if included else metal_error(pieces, scene.frequency)
     if scene.floater.body is not None:
         return ListedEffect(ROTOR_CURRENTS, False, None, None, OF_SPHERES)
-    near = first is not None and not included and _as_near_as_inside(scene, first)
+    pieces = pieces_of([replace(magnet, conductivity=MAGNET_CONDUCTIVITY) for magnet in scene.rotor], ())
+    losses = levitation.losses or (ball_losses(pieces) if pieces else None)
+    doubt = 0.0 if included else metal_error(pieces, scene.frequency)
+    near = False
+    if first is not None and not included:
+        # Within the sphere about a magnet, as in the hole of a ring, no ball is like that magnet.
+        place = (first.without or first).position
+        near = any(np.linalg.norm(place - m.body.center) < m.body.circumradius for m in scene.rotor)
     if first and losses and scene.frequency and doubt <= SLOW_ENOUGH and not near:
         growth = growth_by_rotor(scene, first, losses, included)
     listed = _conducting(ROTOR_CURRENTS, "rotor.conductivity_S_m", included, growth, doubt)
     return replace(listed, why=f"{listed.why}; {UNKNOWN_NEAR}") if near else listed
-
-
-def _as_near_as_inside(scene: Scene, equilibrium: Equilibrium) -> bool:
-    """Whether a floater is within the sphere about a magnet, as in the hole of a ring: no ball is like that magnet."""
-    place = (equilibrium.without or equilibrium).position
-    return any(np.linalg.norm(place - m.body.center) < m.body.circumradius for m in scene.rotor)
 
 
 def _conducting(name: str, key: str, included: bool, growth: float | None, doubt: float) -> ListedEffect:
@@ -105,23 +109,11 @@ def _conducting(name: str, key: str, included: bool, growth: float | None, doubt
 
 
 def _air(levitation: Levitation, first: Equilibrium | None) -> ListedEffect:
-    if levitation.scene.drag.air:
-        return ListedEffect(REAL_AIR, True, 0.0, None, 'drag.model is "air"')
     scene = levitation.scene
+    if scene.drag.air:
+        return ListedEffect(REAL_AIR, True, 0.0, None, 'drag.model is "air"')
     if scene.floater.body is not None:
         return ListedEffect(REAL_AIR, False, None, None, f"{OF_SPHERES}; the drag is Stokes' on a sphere of its volume")
     h = float(swinging(reynolds(scene.floater.radius, scene.angular_velocity)))
     why = f'drag.model is not "air"; it would make the torque on a swing {h:.2g} times Stokes\''
     return ListedEffect(REAL_AIR, False, 0.0, None, why)
-
-
-def effects_answer(levitation: Levitation, equilibria: Sequence[Equilibrium]) -> dict[str, Any]:
-    """The interaction, the list of effects, and in sentences what is in the scene but not in the motion, for JSON."""
-    found = listed_effects(levitation, equilibria)
-    missing = [PLATE_NOT_MODELLED] if levitation.scene.plate and levitation.plate is None else []
-    missing += [f"Left out: {e.name} ({e.why})." for e in found if not e.included and e.why != NOTHING_ANSWERS]
-    return {
-        "interaction": levitation.interaction_model,
-        "effects": [vars(effect) for effect in found],
-        "not_modelled": missing,
-    }

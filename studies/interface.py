@@ -27,7 +27,6 @@ from ..geometry.overlap import body_overlap
 from ..geometry.scene.contents import Scene
 from ..geometry.scene.files import scene_text
 from ..geometry.solids import moved
-from .answers import left_out_text
 from .catalogue.entries import CATALOGUE
 from .catalogue.runner import QUESTION, figures_of, question_study
 from .cli.console import heard, note
@@ -47,7 +46,7 @@ from .demagnetising import working_point_dataset
 from .levitation import Levitation, given_scene
 from .processes import mapped
 from .question import Question
-from .result import AXIS, found_dataset, lowering_times, trajectory_dataset, variable
+from .result import AXIS, Result, found_dataset, variable
 from .starts import drawn_starts, given_starts
 from .study import Study
 from .sweep import forget, swept
@@ -110,9 +109,8 @@ def equilibria(
     """
     with heard(progress):
         levitation = Levitation(scene, Models(model, plate_model, **asked), spin)
-        found = found_dataset(levitation.equilibria)
-        left_out = left_out_text(levitation.survey.left_out)
-        return found.assign_attrs(study="equilibria", left_out=left_out, **_labels(levitation))
+        found = Result(levitation, levitation.survey).dataset()
+        return found.assign_attrs(study="equilibria", scene=scene_text(levitation.scene))
 
 
 def stability(
@@ -141,7 +139,7 @@ def stability(
     with heard(progress):
         levitation = Levitation(scene, Models(model, plate_model, **asked), spin)
         found = found_dataset((levitation.stability,)).isel(equilibrium=0, drop=True).drop_vars("number")
-        return found.assign_attrs(study="stability", **_labels(levitation))
+        return found.assign_attrs(study="stability", scene=scene_text(levitation.scene), **levitation.labels)
 
 
 def simulate(
@@ -166,14 +164,8 @@ def simulate(
     """
     with heard(progress):
         levitation = Levitation(scene, Models(model, plate_model, **asked))
-        flight = levitation.flight(duration)
-        flown = trajectory_dataset(flight, levitation.flight_plate)
-        return flown.assign_attrs(_labels(levitation), **lowering_times(levitation.scene))
-
-
-def _labels(levitation: Levitation) -> dict[str, str]:
-    """Models, and the scene as it was solved."""
-    return {**levitation.labels, "scene": scene_text(levitation.scene)}
+        flown = Result(levitation, flight=levitation.flight(duration)).dataset()
+        return flown.assign_attrs(scene=scene_text(levitation.scene))
 
 
 def rotor_table(
@@ -432,7 +424,7 @@ def ensemble(
     with heard(progress):
         levitation = Levitation(scene, Models(model, "none", rtol, interaction=interaction))
         if starts is not None:
-            begun, drawn = given_starts(levitation, starts), {}
+            begun, drawn = given_starts(levitation, starts), dict[str, Any]()
         else:
             begun, drawn = drawn_starts(levitation, n, seed, spread or {}), {"seed": seed, "spread": repr(spread)}
         together = min(TOGETHER, -(-len(begun.position) // number))
@@ -450,8 +442,9 @@ def ensemble(
         "levitated": variable(("flight",), found.levitated_s, "s", "levitation time"),
         "ended_by": (("flight",), found.ended_by),
     }
-    labels = {"study": "ensemble", **_labels(levitation), "duration_s": duration, **drawn}
-    return xr.Dataset({**ends, **states}, {"axis": list(AXIS)}, labels)
+    return xr.Dataset({**ends, **states}, {"axis": list(AXIS)}).assign_attrs(
+        study="ensemble", scene=scene_text(levitation.scene), duration_s=duration, **levitation.labels, **drawn
+    )
 
 
 def sweep(

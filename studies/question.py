@@ -23,12 +23,12 @@ from ..fem.rotor.pose import at_home
 from ..geometry.common import Array, InputError, SpinlevError
 from ..geometry.scene.contents import Scene
 from ..geometry.scene.files import changed, scene_digest, scene_keys, scene_text, startless_text
-from .answers import kind_of_flight
 from .cli.options import Models, Quantity, positive
 from .levitation import Levitation
 from .result import AXIS, found_dataset, variable
 from .rotor import equations_key, nearest_faces
 from .study import Point
+from .words import kind_of_flight
 
 
 def share(levitations: Sequence[Levitation], places: Sequence[tuple[int, ...]], equilibria: Sequence[bool]) -> None:

@@ -1,10 +1,13 @@
-"""What is told of an equilibrium: listed once, for labelled data and for JSON."""
+"""The result of a scene: its numbers once, as labelled data for files, as a mapping for JSON and in words."""
+
+from __future__ import annotations
 
 import math
 import shlex
 import sys
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -12,97 +15,176 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from ..dynamics.equilibria.equilibrium import Equilibrium, ForceCurve
+from ..dynamics.equilibria.equilibrium import Equilibrium, ForceCurve, LeftOut, Survey
 from ..dynamics.equilibria.modes import SIDE, TILT
 from ..dynamics.flights.trajectory import Trajectory
 from ..dynamics.motion.plate import PlateMemory
 from ..fem.cache import write_checked
 from ..fem.rotor.table import FieldTable
-from ..geometry.common import Array
+from ..geometry.common import Array, millimetres
 from ..geometry.scene.contents import Scene
 from ..geometry.scene.files import scene_text
-
-
-@dataclass(frozen=True)
-class Field:
-    """One quantity of an equilibrium.
-
-    Parameters
-    ----------
-    name, unit, label : in labelled data, SI units
-    read : takes the equilibrium
-    dims : beside `equilibrium`; over "extreme" the smallest value in a turn, then the largest
-    key, scale : its name in JSON, and the unit there in units of `unit`; None where JSON does not tell it
-    kind : float or bool
-    """
-
-    name: str
-    unit: str
-    label: str
-    read: Callable[[Equilibrium], Any]
-    dims: tuple[str, ...] = ()
-    key: str | None = None
-    scale: float = 1.0
-    kind: type = float
-
-    def shown(self, equilibrium: Equilibrium) -> Any:
-        """The value in the unit of JSON."""
-        value = self.read(equilibrium)
-        return value if self.scale == 1 else value / self.scale
-
-
-MILLI = 1e-3
-SWING = ("extreme",)
-EQUILIBRIUM_FIELDS = (
-    Field("position", "m", "mean position, rotor's frame", lambda e: e.position, ("axis",), "position_mm", MILLI),
-    Field(
-        "laboratory_position", "m", "mean position over a turn, laboratory frame", lambda e: e.laboratory_position,
-        ("axis",), "laboratory_position_mm", MILLI,
-    ),
-    Field("position_error", "m", "its estimated error", lambda e: e.position_error, (), "position_error_mm", MILLI),
-    Field(
-        "distance", "m", "distance from the rotor's origin, mean over a turn", lambda e: e.distance,
-        (), "distance_mm", MILLI,
-    ),
-    Field(
-        "distance_swing", "m", "smallest and largest distance in a turn", lambda e: e.distance_swing,
-        SWING, "distance_swing_mm", MILLI,
-    ),
-    Field(
-        "lateral_offset", "m", "distance from the axis of rotation, mean over a turn", lambda e: e.lateral_offset,
-        (), "lateral_offset_mm", MILLI,
-    ),
-    Field(
-        "lateral_offset_swing", "m", "smallest and largest lateral offset in a turn", lambda e: e.lateral_offset_swing,
-        SWING, "lateral_offset_swing_mm", MILLI,
-    ),
-    Field("moment", "1", "mean direction of the moment, rotor's frame", lambda e: e.state.moment, ("axis",)),
-    Field(
-        "polar_angle", "deg", "polar angle of the moment, mean over a turn", lambda e: e.polar_angle_deg,
-        (), "polar_angle_deg",
-    ),
-    Field(
-        "polar_angle_swing", "deg", "smallest and largest polar angle in a turn", lambda e: e.polar_angle_swing_deg,
-        SWING, "polar_angle_swing_deg",
-    ),
-    Field("lag", "deg", "lag behind the rotor of the moment's turning part", lambda e: e.lag_deg, (), "lag_deg"),
-    Field("spin", "1", "body spin S = Ω·m̂/ω", lambda e: e.spin, (), "spin"),
-    Field(
-        "spin_rate", "rad/s", "angular velocity about the moment", lambda e: e.spin_rate,
-        (), "spin_about_moment_hz", 2 * math.pi,
-    ),
-    Field("stable", "1", "whether every small motion stays small", lambda e: e.stable, (), "stable", kind=bool),
-    Field("growth", "1/s", "largest growth rate of a small motion", lambda e: e.growth_per_s, (), "growth_per_s"),
-    Field("growth_error", "1/s", "its round-off error", lambda e: e.growth_error_per_s, (), "growth_error_per_s"),
-)  # fmt: skip
-
+from .effects import effects_summary
+from .levitation import Levitation
+from .words import comparison_lines, effects_words, equilibria_words, flight_words, kind_of_flight, plate_words
 
 AXIS = ("x", "y", "z")
-EXTREMES = ("smallest", "largest")
 MODES = ("bounce", *SIDE, *TILT)
+SIZES: Mapping[str, tuple[str, ...]] = {"axis": AXIS, "extreme": ("smallest", "largest"), "mode": MODES}
+"""Labels of the dimensions of an equilibrium."""
+QUANTITIES: tuple[tuple[str, str, str, tuple[str, ...]], ...] = (
+    ("position", "m", "mean position, rotor's frame", ("axis",)),
+    ("laboratory_position", "m", "mean position over a turn, laboratory frame", ("axis",)),
+    ("position_error", "m", "its estimated error", ()),
+    ("distance", "m", "distance from the rotor's origin, mean over a turn", ()),
+    ("distance_swing", "m", "smallest and largest distance in a turn", ("extreme",)),
+    ("lateral_offset", "m", "distance from the axis of rotation, mean over a turn", ()),
+    ("lateral_offset_swing", "m", "smallest and largest lateral offset in a turn", ("extreme",)),
+    ("moment", "1", "mean direction of the moment, rotor's frame", ("axis",)),
+    ("polar_angle", "deg", "polar angle of the moment, mean over a turn", ()),
+    ("polar_angle_swing", "deg", "smallest and largest polar angle in a turn", ("extreme",)),
+    ("lag", "deg", "lag behind the rotor of the moment's turning part", ()),
+    ("spin", "1", "body spin S = Ω·m̂/ω", ()),
+    ("spin_rate", "rad/s", "angular velocity about the moment", ()),
+    ("stable", "1", "whether every small motion stays small", ()),
+    ("growth", "1/s", "largest growth rate of a small motion", ()),
+    ("growth_error", "1/s", "its round-off error", ()),
+)
+"""Of an equilibrium: name in labelled data, SI unit, label, dimensions."""
+IN_JSON = {"m": ("_mm", 1e-3), "deg": ("_deg", 1.0), "1/s": ("_per_s", 1.0), "1": ("", 1.0)}
+"""How a name ends there, for its unit, and what the number is divided by."""
+PLACES = 500
+"""Of a flight, at which the field's error is looked at."""
 Columns = Mapping[str, tuple[tuple[str, ...], str, str]]
 """Dimensions, unit and a name for an axis label, by name."""
 LIBRARIES = ("spinlev", "ngsolve", "heyoka", "numpy", "scipy", "xarray")
+
+
+@dataclass(frozen=True, eq=False)
+class Result:
+    """Equilibria, a flight, or both, of a scene by the models of its `Levitation`.
+
+    Parameters
+    ----------
+    survey, flight : what was asked for
+    comparison : levitation distances by the point dipole and the true field, see `run`
+    failed : why there are no equilibria, if so
+    """
+
+    levitation: Levitation
+    survey: Survey | None = None
+    flight: Trajectory | None = None
+    comparison: Mapping[str, Any] | None = None
+    failed: str = ""
+
+    def dataset(self) -> xr.Dataset:
+        """The flight, or else the equilibria, over `time` or `equilibrium`, SI units; the models are attributes."""
+        levitation, scene = self.levitation, self.levitation.scene
+        if self.flight is not None:
+            found = trajectory_dataset(self.flight, levitation.flight_plate)
+            if scene.plate and (down := scene.plate.lowering):
+                end = down.start + down.distance / down.speed
+                found = found.assign_attrs(lowered_from_s=down.start, lowered_until_s=end)
+        else:
+            survey = self.survey or levitation.survey
+            found = found_dataset(survey.equilibria).assign_attrs(left_out=left_out_text(survey.left_out))
+        return found.assign_attrs(levitation.labels)
+
+    @cached_property
+    def summary(self) -> dict[str, Any]:
+        """For JSON; the error estimate is the field's largest relative error at the equilibria or along the flight."""
+        levitation, values = self.levitation, dict[str, Any]()
+        if self.survey is not None:
+            found, table = self.survey.equilibria, levitation.table
+            places = np.array([e.start.position for e in found]).reshape(-1, 3)
+            values = {
+                "model": table.model,
+                "body_spin": levitation.spin,
+                "error_estimate": float(table.relative_error(places)[0].max()) if found else None,
+                **_plate(levitation.plate),
+                "equilibria": [equilibrium_summary(equilibrium) for equilibrium in found],
+                "left_out": [_left_out(one) for one in self.survey.left_out],
+            }
+        if (flight := self.flight) is not None:
+            table = levitation.flight_table
+            places = flight.rotor.position[:: max(1, len(flight.time) // PLACES)]
+            values |= {
+                "model": table.model,
+                "error_estimate": float(table.relative_error(places[table.in_range(places)])[0].max()),
+                **_plate(levitation.flight_plate),
+                "beyond_plate_table": flight.beyond_plate_table,
+                "left_plate_table": flight.left_plate_table,
+                "levitated_s": flight.levitated_s,
+                "ended_by": flight.ended_by,
+                "kind": kind_of_flight(levitation, flight),
+                "energy_error": flight.energy_error,
+                "field_changes": vars(flight.field_changes),
+                "realtime_factor": flight.realtime_factor,
+            }
+        # A flight that begins where the scene says needs no equilibrium, and searches for none.
+        alone = flight is not None and levitation.absolute
+        known = () if alone else (self.survey or levitation.survey).equilibria
+        return {**values, **effects_summary(levitation, known)}
+
+    def text(self) -> list[str]:
+        """Lines for a person."""
+        levitation, lines = self.levitation, [self.failed] if self.failed else []
+        if self.survey is not None and not self.failed:
+            lines += equilibria_words(levitation, self.survey)
+        lines += comparison_lines(self.comparison)
+        if self.flight is not None:
+            lines.append(flight_words(levitation, self.flight))
+        if self.flight is not None or not self.failed:
+            lines += plate_words(levitation)
+        return [*lines, *effects_words(self.summary)]
+
+
+def equilibrium_summary(equilibrium: Equilibrium) -> dict[str, Any]:
+    """One synchronous equilibrium, for JSON."""
+    numbers = {}
+    for name, unit, _, _ in QUANTITIES:
+        if unit in IN_JSON and name != "moment":
+            end, scale = IN_JSON[unit]
+            value = _read(equilibrium, name, unit)
+            numbers[name + end] = value if scale == 1 else value / scale
+    return {
+        **numbers,
+        "spin_about_moment_hz": equilibrium.spin_rate / (2 * math.pi),
+        "frequencies_hz": equilibrium.frequencies_hz,
+        "modes": [vars(mode) for mode in equilibrium.modes],
+        "with_plate": equilibrium.currents is not None,
+        "without_plate": None if equilibrium.without is None else equilibrium_summary(equilibrium.without),
+    }
+
+
+def _read(equilibrium: Equilibrium, name: str, unit: str) -> Any:
+    if name == "moment":
+        return equilibrium.state.moment
+    return getattr(equilibrium, name + {"deg": "_deg", "1/s": "_per_s"}.get(unit, ""))
+
+
+def _left_out(left_out: LeftOut) -> dict[str, Any]:
+    """One solution that is no equilibrium of the scene, or is not known to be one."""
+    known = left_out.known
+    return {
+        "position_mm": known.position / 1e-3,
+        "laboratory_position_mm": known.laboratory_position / 1e-3,
+        "with_plate": known.currents is not None,
+        "why": left_out.why,
+        "followed_to": left_out.part,
+    }
+
+
+def left_out_text(left_out: Sequence[LeftOut]) -> str:
+    """The same of several, for an attribute of a dataset."""
+    return "; ".join(f"{one.why}: {millimetres(one.known.position)}" for one in left_out)
+
+
+def _plate(memory: PlateMemory | None) -> dict[str, Any]:
+    """The plate's model and its estimated relative error."""
+    if memory is None:
+        return {"plate_model": "none"}
+    return {"plate_model": memory.model, "plate_error_estimate": memory.error, "plate_states": len(memory.table.rates)}
 
 
 def write_dataset(dataset: xr.Dataset, path: Path, scene: Scene | None = None) -> None:
@@ -124,11 +206,10 @@ def variable(dims: Sequence[str], values: Any, units: str, long_name: str) -> xr
 
 def columns(table: Columns, found: Mapping[str, Any], **sizes: int) -> dict[str, xr.Variable]:
     """Variables by name as a table of columns has them; NaN, in these sizes, where nothing was found."""
-
-    def values(name: str, dims: tuple[str, ...]) -> Any:
-        return found[name] if name in found else np.full([sizes[dim] for dim in dims], np.nan)
-
-    return {name: variable(dims, values(name, dims), unit, label) for name, (dims, unit, label) in table.items()}
+    return {
+        name: variable(dims, found[name] if name in found else np.full([sizes[d] for d in dims], np.nan), unit, label)
+        for name, (dims, unit, label) in table.items()
+    }
 
 
 def axis_dataset(tables: Mapping[str, FieldTable], heights: Array) -> xr.Dataset:
@@ -145,7 +226,7 @@ def axis_dataset(tables: Mapping[str, FieldTable], heights: Array) -> xr.Dataset
             "axis_field": variable(("model", "axis_height", "axis"), fields, "T", "flux density on the axis"),
             "axis_error": variable(("model", "axis_height"), errors, "1", "estimated relative error of the field"),
         },
-        coords={
+        {
             "model": list(tables),
             "axis": list(AXIS),
             "axis_height": variable(("axis_height",), heights, "m", "height on the axis"),
@@ -157,69 +238,51 @@ def curve_dataset(curves: Mapping[str, Sequence[ForceCurve]]) -> xr.Dataset:
     """Axial force along the curves of lateral balance, by model."""
     rows = [(model, number, curve) for model, found in curves.items() for number, curve in enumerate(found)]
     sizes = [len(curve.magnetic_force) for _, _, curve in rows]
+    point, place = ("curve_point",), ("curve_point", "axis")
 
     def joined(values: list[Array], *shape: int) -> Array:
         return np.concatenate([np.zeros((0, *shape)), *values])
 
+    positions, moments = joined([c.position for _, _, c in rows], 3), joined([c.moment for _, _, c in rows], 3)
+    forces = joined([c.magnetic_force for _, _, c in rows])
     return xr.Dataset(
         {
-            "curve_model": (("curve_point",), np.repeat([m for m, _, _ in rows] or [""], sizes or [0])),
-            "curve_number": (("curve_point",), np.repeat([n for _, n, _ in rows] or [0], sizes or [0])),
-            "curve_position": variable(
-                ("curve_point", "axis"), joined([c.position for _, _, c in rows], 3), "m", "position, rotor's frame"
-            ),
-            "curve_moment": variable(
-                ("curve_point", "axis"), joined([c.moment for _, _, c in rows], 3), "1", "direction of the moment"
-            ),
-            "curve_force": variable(
-                ("curve_point",), joined([c.magnetic_force for _, _, c in rows]), "N", "axial magnetic force"
-            ),
+            "curve_model": (point, np.repeat([m for m, _, _ in rows] or [""], sizes or [0])),
+            "curve_number": (point, np.repeat([n for _, n, _ in rows] or [0], sizes or [0])),
+            "curve_position": variable(place, positions, "m", "position, rotor's frame"),
+            "curve_moment": variable(place, moments, "1", "direction of the moment"),
+            "curve_force": variable(point, forces, "N", "axial magnetic force"),
         },
-        coords={"axis": list(AXIS)},
+        {"axis": list(AXIS)},
     )
 
 
 def equilibria_dataset(found: Mapping[str, Sequence[Equilibrium]]) -> xr.Dataset:
     """Equilibria of all models in one list; names begin with `equilibrium_`."""
-    models = [model for model, equilibria in found.items() for _ in equilibria]
-    rows = found_dataset([equilibrium for equilibria in found.values() for equilibrium in equilibria])
-    rows = rows.drop_vars(["number", "equilibrium"])
-    named = rows.rename({name: f"equilibrium_{name}" for name in rows.data_vars})
-    felt = [e.currents is not None for equilibria in found.values() for e in equilibria]
-    return named.assign(
-        equilibrium_model=(("equilibrium",), np.array(models, dtype=object).astype(str)),
-        equilibrium_with_plate=variable(
-            ("equilibrium",), np.array(felt, bool), "1", "whether the plate's currents act"
-        ),
+    every = [(model, equilibrium) for model, equilibria in found.items() for equilibrium in equilibria]
+    rows = found_dataset([equilibrium for _, equilibrium in every]).drop_vars(["number", "equilibrium"])
+    felt = np.array([e.currents is not None for _, e in every], bool)
+    return rows.rename({name: f"equilibrium_{name}" for name in rows.data_vars}).assign(
+        equilibrium_model=(("equilibrium",), np.array([model for model, _ in every], dtype=object).astype(str)),
+        equilibrium_with_plate=variable(("equilibrium",), felt, "1", "whether the plate's currents act"),
     )
 
 
 def found_dataset(rows: Sequence[Equilibrium]) -> xr.Dataset:
     """Equilibria of one scene and one model over `equilibrium`, with their small motions over `mode`."""
-    sizes = {"axis": 3, "mode": len(MODES), "extreme": len(EXTREMES)}
-
-    def column(field: Field) -> xr.Variable:
-        shape = (len(rows), *(sizes[dim] for dim in field.dims))
-        values: Any = np.array([field.read(e) for e in rows], field.kind).reshape(shape)
-        return variable(("equilibrium", *field.dims), values, field.unit, field.label)
-
-    def by_name(equilibrium: Equilibrium, quantity: str) -> list[float]:
-        known = {mode.name: float(getattr(mode, quantity)) for mode in equilibrium.modes}
-        return [known.get(name, np.nan) for name in MODES]
-
-    return xr.Dataset(
-        {
-            **{field.name: column(field) for field in EQUILIBRIUM_FIELDS},
-            "mode_growth": column(
-                Field("mode_growth", "1/s", "growth of a mode", lambda e: by_name(e, "growth_per_s"), ("mode",))
-            ),
-            "mode_frequency": column(
-                Field("mode_frequency", "Hz", "its frequency", lambda e: by_name(e, "frequency_hz"), ("mode",))
-            ),
-            "number": variable((), len(rows), "1", "number of equilibria"),
-        },
-        {"axis": list(AXIS), "equilibrium": np.arange(len(rows)), "mode": list(MODES), "extreme": list(EXTREMES)},
-    )
+    data = {}
+    for name, unit, label, dims in QUANTITIES:
+        values = np.array([_read(e, name, unit) for e in rows], bool if name == "stable" else float)
+        shape = (len(rows), *(len(SIZES[dim]) for dim in dims))
+        data[name] = variable(("equilibrium", *dims), values.reshape(shape), unit, label)
+    modes = [{mode.name: (mode.growth_per_s, mode.frequency_hz) for mode in e.modes} for e in rows]
+    known = np.array([[each.get(name, (np.nan, np.nan)) for name in MODES] for each in modes], float)
+    known = known.reshape(len(rows), len(MODES), 2)
+    dims = ("equilibrium", "mode")
+    data["mode_growth"] = variable(dims, known[:, :, 0], "1/s", "growth of a mode")
+    data["mode_frequency"] = variable(dims, known[:, :, 1], "Hz", "its frequency")
+    data["number"] = variable((), len(rows), "1", "number of equilibria")
+    return xr.Dataset(data, {"equilibrium": np.arange(len(rows)), **{dim: list(names) for dim, names in SIZES.items()}})
 
 
 def trajectory_dataset(flight: Trajectory, memory: PlateMemory | None = None) -> xr.Dataset:
@@ -228,20 +291,11 @@ def trajectory_dataset(flight: Trajectory, memory: PlateMemory | None = None) ->
     Of the plate's currents, if there are some, the attributes say how well they are known, and whether the flight ended
     where that ends.
     """
-    plate = (
-        {}
-        if memory is None
-        else {
-            "plate_error_estimate": memory.error,
-            "beyond_plate_table": flight.beyond_plate_table,
-            "left_plate_table": int(flight.left_plate_table),
-        }
-    )
     lab, rotor = flight.lab, flight.rotor
     dims = ("time", "axis")
     far = np.linalg.norm(lab.position, axis=1)
     tilt = np.degrees(np.arctan2(np.hypot(lab.moment[:, 0], lab.moment[:, 1]), lab.moment[:, 2]))
-    return xr.Dataset(
+    found = xr.Dataset(
         {
             "position": variable(dims, lab.position, "m", "position, laboratory frame"),
             "velocity": variable(dims, lab.velocity, "m/s", "velocity, laboratory frame"),
@@ -251,22 +305,18 @@ def trajectory_dataset(flight: Trajectory, memory: PlateMemory | None = None) ->
             "distance": variable(("time",), far, "m", "distance from the rotor's origin"),
             "polar_angle": variable(("time",), tilt, "deg", "polar angle of the moment"),
         },
-        coords={"time": variable(("time",), flight.time, "s", "time"), "axis": list(AXIS)},
-        attrs={
+        {"time": variable(("time",), flight.time, "s", "time"), "axis": list(AXIS)},
+        {
             "study": "simulate",
             "ended_by": str(flight.ended_by),
             "levitated_s": flight.levitated_s,
             "energy_error": flight.energy_error,
-            **plate,
         },
     )
-
-
-def lowering_times(scene: Scene) -> dict[str, float]:
-    """When the scene's plate is lowered, s; nothing where it is not."""
-    down = scene.plate.lowering if scene.plate else None
-    return (
-        {}
-        if down is None
-        else {"lowered_from_s": down.start, "lowered_until_s": down.start + down.distance / down.speed}
+    if memory is None:
+        return found
+    return found.assign_attrs(
+        plate_error_estimate=memory.error,
+        beyond_plate_table=flight.beyond_plate_table,
+        left_plate_table=int(flight.left_plate_table),
     )

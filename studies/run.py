@@ -1,9 +1,10 @@
-"""The commands that answer one question: field, equilibria, simulate."""
+"""The commands that answer one question about a scene: field, equilibria, simulate, and run, which asks for all."""
 
 import csv
 import io
 from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -15,40 +16,31 @@ from ..dynamics.equilibria.search import free_of_bodies
 from ..dynamics.flights.flight import starting_point
 from ..dynamics.flights.pieces import Checkpoint
 from ..dynamics.flights.trajectory import FlightStopped, Trajectory
-from ..dynamics.motion.plate import PlateMemory
 from ..fem.cache import owned, program_digest
 from ..fem.files import write_whole
-from ..fem.rotor.near_field import NEAR_RTOL, complete
+from ..fem.rotor.near_field import NEAR_RTOL, CompleteTable, complete
 from ..fem.rotor.table import FieldTable, RotorTable
-from ..geometry.common import Array
+from ..geometry.common import MU_0, Array
 from ..geometry.scene.contents import AbsoluteStart, OffsetStart, Scene
 from ..geometry.scene.files import scene_digest
-from .answers import (
-    bracketed,
-    effects_words,
-    equilibria_answer,
-    equilibria_words,
-    field_answer,
-    flight_answer,
-    flight_words,
-    headline,
-    left_out_text,
-    left_out_words,
-    plate_words,
-    tell_details,
-)
 from .cli.console import note, to_json
 from .cli.options import COLUMNS, Models
 from .demagnetising import write_working_point
 from .figures.pictures import last_view
 from .figures.renderer import RenderError, render
 from .figures.run import field_figure, force_figure, trajectory_figure
-from .figures.style import NAMES, save_figures
+from .figures.style import save_figures
 from .levitation import Levitation
-from .result import axis_dataset, curve_dataset, equilibria_dataset, lowering_times, trajectory_dataset, write_dataset
+from .result import Result, axis_dataset, curve_dataset, equilibria_dataset, left_out_text, write_dataset
+from .words import flight_words, headline, left_out_words, tell_details
 
 Job = tuple[Mapping[str, Any], list[str]]
 """Numbers for a program, lines for a person."""
+MODELS = ("dipole", "cuboid", "fem")
+SHOWN = 20
+"""Points whose field is printed, at most."""
+DEEPEST = 0.05
+"""The field figure reaches this far below the rotor's origin, m."""
 
 
 def field_job(scene: Scene, points: Array, asked: Models, out: Path) -> Job:
@@ -56,7 +48,7 @@ def field_job(scene: Scene, points: Array, asked: Models, out: Path) -> Job:
     levitation = Levitation(scene, asked)
     table = levitation.table
     known = complete(table, max(asked.rtol, NEAR_RTOL)) if isinstance(table, RotorTable) else table
-    values = field_answer(known, points)
+    values = _field(known, points)
     b, gradient, error = values["B_T"], values["dB_T_per_m"].reshape(-1, 9), values["B_relative_error"]
     slopes = (f"dB{i}_d{j}_T_per_m" for i in "xyz" for j in "xyz")
     stream = io.StringIO(newline="")
@@ -67,18 +59,47 @@ def field_job(scene: Scene, points: Array, asked: Models, out: Path) -> Job:
     lines = [f"{'x':>9} {'y':>9} {'z':>9} mm {'Bx':>14} {'By':>14} {'Bz':>14} T   relative error"]
     lines += [
         f"{x:9.3f} {y:9.3f} {z:9.3f}    {b[0]:14.6e} {b[1]:14.6e} {b[2]:14.6e}     {error:.1e}"
-        for (x, y, z), b, error in zip(points[:20] * 1e3, b, error, strict=False)
+        for (x, y, z), b, error in zip(points[:SHOWN] * 1e3, b, error, strict=False)
     ]
     lines.append(f"Model {values['model']}; {len(points)} points with gradients in {out / 'field.csv'}")
     return {**values, "tables_from_cache": levitation.from_cache}, lines
 
 
+def _field(table: FieldTable, points: Array) -> dict[str, Any]:
+    """B, its gradient and their estimated errors at points (n, 3) m; H and M too if the table does not reach all."""
+    near: dict[str, Any] = {}
+    if isinstance(table, CompleteTable) and not table.in_range(points).all():
+        found, tiny = table.fields(points), np.finfo(float).tiny
+        b, gradient = found.flux_density, found.gradient
+        error = found.error / (np.linalg.norm(b, axis=1) + tiny)
+        gradient_error = found.gradient_error / (np.linalg.norm(gradient, axis=(1, 2)) + tiny)
+        near = {
+            "H_A_per_m": found.field / MU_0,
+            "M_A_per_m": found.magnetization / MU_0,
+            "inside_magnet": (found.magnet + 1).tolist(),
+        }
+    else:
+        b, gradient = table.evaluate(points)
+        error, gradient_error = table.relative_error(points)
+    return {
+        "model": table.model,
+        "error_estimate": float(error.max()),
+        "gradient_error_estimate": float(gradient_error.max()),
+        "B_T": b,
+        "dB_T_per_m": gradient,
+        **near,
+        "B_relative_error": error,
+        "dB_relative_error": gradient_error,
+    }
+
+
 def equilibria_job(scene: Scene, asked: Models, spin: float, out: Path) -> Job:
     """All synchronous equilibria and their stability; writes equilibria.json."""
     levitation = Levitation(scene, asked, spin)
-    values = {**equilibria_answer(levitation), "tables_from_cache": levitation.from_cache}
+    result = Result(levitation, levitation.survey)
+    values = {**result.summary, "tables_from_cache": levitation.from_cache}
     write_whole(out / "equilibria.json", f"{to_json(values)}\n".encode())
-    return values, [*equilibria_words(levitation), *plate_words(levitation), *effects_words(values)]
+    return values, result.text()
 
 
 def simulate_job(scene: Scene, asked: Models, duration: float, out: Path, resume: bool) -> Job:
@@ -99,39 +120,29 @@ def _simulated(scene: Scene, asked: Models, duration: float, out: Path, resume: 
     if isinstance(scene.start, OffsetStart):
         for line in left_out_words(levitation, levitation.survey.unknown):
             note(line)
-    begin = starting_point(levitation.equilibria) if isinstance(scene.start, OffsetStart) else None
-    if begin is not None and not begin.stable:
-        note(f"The flight begins at an unstable equilibrium: e-fold in {1 / begin.growth_per_s:.2g} s.")
+        begin = starting_point(levitation.equilibria)
+        if begin is not None and not begin.stable:
+            note(f"The flight begins at an unstable equilibrium: e-fold in {1 / begin.growth_per_s:.2g} s.")
+    path = out / "trajectory.nc"
 
-    def keep(flight: Trajectory) -> None:
-        labels = {**levitation.labels, **lowering_times(scene), "headline": flight_words(levitation, flight)}
-        flown = trajectory_dataset(flight, levitation.flight_plate).assign_attrs(labels)
-        write_dataset(flown, out / "trajectory.nc", scene)
+    def kept(flight: Trajectory) -> Result:
+        result = Result(levitation, flight=flight)
+        flown = result.dataset().assign_attrs(headline=flight_words(levitation, flight))
+        write_dataset(flown, path, scene)
         save_figures({"trajectory": trajectory_figure(flown)}, out)
+        return result
 
     try:
         flight = levitation.flight(duration, checkpoint)
     except FlightStopped as stop:
-        keep(stop.flown)
-        note(f"{stop} It is in {out / 'trajectory.nc'}; --resume goes on from there.")
+        kept(stop.flown)
+        note(f"{stop} It is in {path}; --resume goes on from there.")
         raise
-    keep(flight)
+    result = kept(flight)
     checkpoint.remove()
-    values = {
-        **flight_answer(levitation, flight),
-        "trajectory": str(out / "trajectory.nc"),
-        "tables_from_cache": levitation.from_cache,
-    }
     tell_details(flight)
-    told = [flight_words(levitation, flight), *plate_words(levitation), *effects_words(values)]
-    return values, [*told, f"Trajectory in {values['trajectory']}, figure in {out / 'trajectory.png'}"]
-
-
-MODELS = ("dipole", "cuboid", "fem")
-SAME = 1e-6
-"""Difference of two levitation distances that is none whatever their errors, mm: round-off and stopped iterations."""
-DEEPEST = 0.05
-"""The field figure reaches this far below the rotor's origin, m."""
+    values = {**result.summary, "trajectory": str(path), "tables_from_cache": levitation.from_cache}
+    return values, [*result.text(), f"Trajectory in {path}, figure in {out / 'trajectory.png'}"]
 
 
 def main_job(scene: Scene, asked: Models, spin: float, duration: float, out: Path) -> Job:
@@ -142,43 +153,41 @@ def main_job(scene: Scene, asked: Models, spin: float, duration: float, out: Pat
     """
     levitation = Levitation(scene, asked, spin)
     exact = "cuboid" if all(magnet.contrast == 0 for magnet in scene.rotor) else "fem"
-    chosen = levitation.table
+    chosen = levitation.table.model
     failure: EquilibriumError | FlightStopped | None = None
-    surveys: dict[str, Survey] = {}
+    survey = Survey((), ())
     try:
-        _tell_first(levitation)
-        best = levitation.field(exact)
+        if scene.plate is not None:  # in seconds; the plate's currents can take minutes
+            said = headline(levitation, levitation.without_plate.equilibria)
+            note(f"Without the plate: {said[0].lower()}{said[1:]}")
+        best = levitation.field(exact).model
         alone = {
-            model: levitation.without_plate if model == chosen.model else levitation.survey_in(model)
-            for model in dict.fromkeys(("dipole", best.model, chosen.model))
+            model: levitation.without_plate if model == chosen else levitation.survey_in(model)
+            for model in dict.fromkeys(("dipole", best, chosen))
         }
-        surveys = alone | {chosen.model: levitation.survey}
+        survey = levitation.survey
     except EquilibriumError as error:
         failure = error
-        best = levitation.field(exact)
-        surveys = alone = {name: Survey((), ()) for name in ("dipole", best.model, chosen.model)}
-    known = surveys[chosen.model]
-    compared = comparison(alone["dipole"], alone[best.model], best.model)
-    values: dict[str, Any] = {
-        "headline": str(failure) if failure else headline(levitation, known.equilibria, known.left_out),
-        **equilibria_answer(levitation, known),
-        "comparison": compared,
-        "tables_from_cache": levitation.from_cache,
-    }
-    lines = [str(failure)] if failure else equilibria_words(levitation, known)
-    lines += comparison_lines(compared)
-    flight = None
+        best = levitation.field(exact).model
+        alone = dict.fromkeys(("dipole", best, chosen), survey)
+    compared = _compared(alone["dipole"], alone[best], best)
+    result, flight = Result(levitation, survey, comparison=compared, failed=str(failure or "")), None
     if failure is None or isinstance(scene.start, AbsoluteStart):
         try:
             flight = levitation.flight(duration)
-            values |= flight_answer(levitation, flight)
-            lines += [flight_words(levitation, flight), *plate_words(levitation)]
+            result = replace(result, flight=flight)
             tell_details(flight)
         except EquilibriumError as error:
             failure = error
         except FlightStopped as stop:
             flight = (failure := stop).flown
-    lines += effects_words(values)
+    values: dict[str, Any] = {
+        "headline": result.failed or headline(levitation, survey.equilibria, survey.left_out),
+        **result.summary,
+        "comparison": compared,
+        "tables_from_cache": levitation.from_cache,
+    }
+    lines = result.text()
     if any(magnet.coercivity is not None and magnet.polarization.any() for magnet in scene.rotor):
         worked, told, _ = write_working_point(levitation, out)
         values |= worked
@@ -186,96 +195,67 @@ def main_job(scene: Scene, asked: Models, spin: float, duration: float, out: Pat
     if failure:
         values["failed"] = str(failure)
         lines += [] if str(failure) in lines else [str(failure)]
-    tables = {name: levitation.field(name) for name in MODELS}
-    result = _static_dataset(scene, tables, surveys, alone, best.model).assign_attrs(
-        levitation.labels, body_spin=spin, left_out=left_out_text(known.left_out)
+    dataset = _static_dataset(levitation, survey, alone, best).assign_attrs(
+        levitation.labels, body_spin=spin, left_out=left_out_text(survey.left_out)
     )
-    memory = levitation.flight_plate if flight else None
-    _write(scene, chosen, result, values, flight, memory, out)
+    if flight:
+        flown = Result(levitation, flight=flight).dataset().assign_attrs(study="run")
+        dataset = xr.merge([dataset, flown], combine_attrs="no_conflicts")
+    _write(levitation, dataset, values, flight, out)
     if failure and (flight is None or isinstance(failure, FlightStopped)):
         raise failure
     return values, [*lines, f"Results and figures in {out}/"]
 
 
-def _tell_first(levitation: Levitation) -> None:
-    """The answer without the plate, which is there in seconds; the plate's currents can take minutes."""
-    found = levitation.without_plate.equilibria
-    if levitation.scene.plate is not None:
-        said = headline(levitation, found)
-        note(f"Without the plate: {said[0].lower()}{said[1:]}")
-
-
-def comparison(dipole: Survey, best: Survey, name: str) -> Mapping[str, Any] | None:
+def _compared(dipole: Survey, best: Survey, name: str) -> dict[str, Any] | None:
     """Levitation distance by the point dipole against the true field, mm; None if either has no stable equilibrium."""
-    pair = [next((e for e in found.equilibria if e.stable), None) for found in (dipole, best)]
-    if pair[0] is None or pair[1] is None:
+    rough, true = (next((e for e in found.equilibria if e.stable), None) for found in (dipole, best))
+    if rough is None or true is None:
         return None
-    distances = [-float(e.position[2]) * 1e3 for e in pair if e]
+    distances = [-float(e.position[2]) * 1e3 for e in (rough, true)]
     return {
         "true_model": name,
         "dipole_distance_mm": distances[0],
         "true_distance_mm": distances[1],
         "difference_mm": distances[0] - distances[1],
         # The dipole's own position error says how wrong its field is, which is what is measured here.
-        "difference_error_mm": pair[1].position_error * 1e3,
+        "difference_error_mm": true.position_error * 1e3,
     }
 
 
-def comparison_lines(compared: Mapping[str, Any] | None) -> list[str]:
-    """The same for a person."""
-    if compared is None:
-        return []
-    apart, error = compared["difference_mm"], compared["difference_error_mm"]
-    said = f"Point-dipole model, same conditions: levitation distance {compared['dipole_distance_mm']:.2f} mm, "
-    if abs(apart) <= max(error, SAME):
-        return [f"{said}no difference beyond its error of {max(error, SAME):.0e} mm."]
-    more = "more" if apart > 0 else "less"
-    return [f"{said}{bracketed(abs(apart), error, 2)} mm {more} than with {NAMES[compared['true_model']]}."]
-
-
-def _static_dataset(
-    scene: Scene,
-    tables: Mapping[str, FieldTable],
-    surveys: Mapping[str, Survey],
-    alone: Mapping[str, Survey],
-    best: str,
-) -> xr.Dataset:
+def _static_dataset(levitation: Levitation, survey: Survey, alone: Mapping[str, Survey], best: str) -> xr.Dataset:
     """Field, force and equilibria free of the bodies: with the plate's currents where they act, and all without."""
+    scene, chosen = levitation.scene, levitation.table.model
     lowest = min(float(corner[2]) for magnet in scene.rotor for corner in magnet.box.corners)
     heights = np.linspace(min(lowest - scene.floater.radius, -1e-3), min(lowest - 1e-3, -DEEPEST), 200)
+    surveys = {**alone, chosen: survey}
+    equilibria = {
+        model: [
+            *(e for e in surveys[model].equilibria if e.currents is not None),
+            *free_of_bodies(scene, found).equilibria,
+        ]
+        for model, found in alone.items()
+    }
     parts = [
-        axis_dataset(tables, heights),
+        axis_dataset({name: levitation.field(name) for name in MODELS}, heights),
         curve_dataset({name: found.curves for name, found in surveys.items()}),
-        equilibria_dataset(
-            {
-                name: [
-                    *(e for e in surveys[name].equilibria if e.currents is not None),
-                    *free_of_bodies(scene, found).equilibria,
-                ]
-                for name, found in alone.items()
-            }
-        ),
+        equilibria_dataset(equilibria),
     ]
-    return xr.merge(parts).assign_attrs(
-        study="run", best_model=best, weight_N=scene.floater.mass * float(scene.gravity[2])
-    )
+    weight = scene.floater.mass * float(scene.gravity[2])
+    return xr.merge(parts).assign_attrs(study="run", best_model=best, weight_N=weight)
 
 
 def _write(
-    scene: Scene,
-    table: FieldTable,
+    levitation: Levitation,
     result: xr.Dataset,
     values: dict[str, Any],
     flight: Trajectory | None,
-    memory: PlateMemory | None,
     out: Path,
 ) -> None:
     """The result and its summary first, then what is drawn of them."""
     note("Files and figures ...")
+    scene = levitation.scene
     (out / "summary.json").unlink(missing_ok=True)  # an older one must not stand beside the new result
-    if flight:
-        flown = trajectory_dataset(flight, memory).assign_attrs(study="run", **lowering_times(scene))
-        result = xr.merge([result, flown], combine_attrs="no_conflicts")
     write_dataset(result, out / "result.nc", scene)
     write_whole(out / "summary.json", f"{to_json(values)}\n".encode())
     figures = {"field": field_figure(result), "force": force_figure(result)}
@@ -283,7 +263,7 @@ def _write(
         save_figures(figures, out)
         return
     with ThreadPoolExecutor(1) as beside:  # in three dimensions another process draws, meanwhile
-        view = {out / "scene.png": last_view(scene, table, flight.time, flight.rotor)}
+        view = {out / "scene.png": last_view(scene, levitation.table, flight.time, flight.rotor)}
         in_space = beside.submit(render, view)
         save_figures(figures | {"trajectory": trajectory_figure(result)}, out)
         try:

@@ -20,12 +20,12 @@ from ...geometry.scene.files import changed, parse_scene, scene_keys, scene_text
 from ...geometry.scene.making import assemble
 from ...geometry.scene.messages import SceneError
 from ...geometry.shapes import Box
-from ..answers import equilibria_answer, equilibria_rows, headline, left_out_words, worth_a_row
 from ..cli.console import to_json
 from ..cli.options import FieldModel, Models, PlateModel, finite
 from ..figures.style import PAGE, PALETTE, figure_bytes, panels, styled
 from ..levitation import Levitation
-from ..result import found_dataset, write_dataset
+from ..result import Result, write_dataset
+from ..words import equilibria_rows, headline, left_out_words, worth_a_row
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -445,10 +445,11 @@ def content(kind: str, state: PageState, screen: Screen | None = None) -> bytes:
         assert screen is not None
         return figure_bytes(screen_figure(screen, state), "png")
     levitation = Levitation(state.scene, state.models, state.spin)
+    result = Result(levitation, levitation.survey)
     if kind == "json":
-        answer: dict[str, Any] = {**equilibria_answer(levitation), "tables_from_cache": levitation.from_cache}
+        answer: dict[str, Any] = {**result.summary, "tables_from_cache": levitation.from_cache}
         return f"{to_json(answer)}\n".encode()
-    dataset = found_dataset(levitation.equilibria).assign_attrs(study="equilibria", **levitation.labels)
+    dataset = result.dataset().assign_attrs(study="equilibria")
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / FILES["nc"]
         write_dataset(dataset, path, state.scene)

@@ -15,10 +15,10 @@ from spinlev.dynamics.flights.trajectory import FlightStopped
 from spinlev.fem.cache import read_checked
 from spinlev.geometry.common import Array
 from spinlev.geometry.scene.contents import Scene
-from spinlev.studies.answers import flight_words, plate_words
 from spinlev.studies.cli.options import Models
 from spinlev.studies.levitation import Levitation
 from spinlev.studies.run import simulate_job
+from spinlev.studies.words import flight_words, plate_words
 
 CONDUCTIVITY, THICKNESS, RADIUS = 4.6e8, 0.02, 6.35e-3
 """Copper at 77 K, as in demonstrations of magnets that are dropped on it; S/m and m."""

@@ -21,18 +21,18 @@ from spinlev.dynamics.motion.state import State
 from spinlev.geometry.rotor import Conductor
 from spinlev.geometry.scene.files import load_scene
 from spinlev.geometry.shapes import Box
-from spinlev.studies.answers import (
+from spinlev.studies.cli.options import Models
+from spinlev.studies.levitation import Levitation
+from spinlev.studies.result import Result
+from spinlev.studies.words import (
     bracketed,
-    equilibria_answer,
+    comparison_lines,
     equilibria_words,
     flight_words,
     headline,
     kind_of_flight,
     left_out_words,
 )
-from spinlev.studies.cli.options import Models
-from spinlev.studies.levitation import Levitation
-from spinlev.studies.run import comparison_lines
 
 
 def equilibrium(stable=True, growth=-2.87, error=2e-6, currents=None, without=None):
@@ -81,7 +81,7 @@ def test_places_where_the_floater_would_overlap_the_plate_are_no_equilibria(levi
     free = [z for z in heights if z - scene.floater.radius > top or z + scene.floater.radius < bottom]
     assert 0 < len(free) < len(heights)
     assert [e.position[2] for e in over.equilibria] == free
-    answer, lines = equilibria_answer(over), equilibria_words(over)
+    answer, lines = Result(over, over.survey).summary, equilibria_words(over, over.survey)
     assert [one["why"] for one in answer["left_out"]] == ["in the plate"] * (len(heights) - len(free))
     assert len(answer["equilibria"]) == len(free)
     (said,) = (line for line in lines if line.startswith("Left out: 2 solutions at 3"))

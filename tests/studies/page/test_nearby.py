@@ -8,13 +8,13 @@ import pytest
 from places import HORIZONTAL, OVER_PLATE, SCENES
 
 from spinlev.geometry.scene.files import load_scene
-from spinlev.studies.answers import left_out_words
 from spinlev.studies.cli.options import Models
 from spinlev.studies.levitation import Levitation
 from spinlev.studies.page.layout import Layout
 from spinlev.studies.page.state import controls, first_state, shown
 from spinlev.studies.page.work import Nearby
 from spinlev.studies.run import equilibria_job
+from spinlev.studies.words import left_out_words
 
 ROUND_OFF = 1e-11
 
