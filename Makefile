@@ -57,6 +57,7 @@ run: install
 lint: develop
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
+	$(BIN)/python tests/check_formats.py
 
 types: develop
 	cd $(VENV) && bin/mypy --config-file ../pyproject.toml --cache-dir ../.mypy_cache --num-workers 2 -p spinlev
