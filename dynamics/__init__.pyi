@@ -1,5 +1,4 @@
-from .continuation.boundary import BoundaryPoint as BoundaryPoint, Plane as Plane, follow_boundary as follow_boundary
-from .continuation.engine import BranchPoint as BranchPoint, Family as Family, follow_branch as follow_branch
+from .continuation.branch import BranchPoint as BranchPoint, Family as Family, follow_branch as follow_branch
 from .continuation.slow_drift import Drift as Drift, drift as drift
 from .equilibria.equilibrium import (
     Equilibrium as Equilibrium,

@@ -17,7 +17,7 @@ from ...fem.rotor.choice import rotor_table
 from ...fem.rotor.table import FieldTable
 from ...geometry.common import Array
 from ...geometry.scene.contents import AbsoluteStart, Scene
-from ..equilibria.balance import EVERY, solve
+from ..equilibria.balance import CONVERGED_STEP, EVERY, solve
 from ..equilibria.curves import SearchRange, scattered
 from ..equilibria.equilibrium import FOLD, Equilibrium, EquilibriumError
 from ..equilibria.path import Steps
@@ -29,7 +29,7 @@ from ..motion.floater_currents import too_slow
 from ..motion.plate import PlateMemory
 from ..motion.rates import Rates
 from ..motion.state import Parameter, Scales
-from .engine import BranchPoint, Family, follow_branch, frequencies
+from .branch import BranchPoint, Family, follow_branch, frequencies
 
 UP = np.array([0.0, 0.0, 1.0])
 UNIT = 50.0
@@ -76,7 +76,7 @@ class Branch:
         guess = np.array([np.interp(np.sqrt(frequency - known[0]), ahead, column) for column in states.T])
         moment = guess[6:9] / np.linalg.norm(guess[6:9])
         position, moments, size = solve(self.family.balance(frequency), guess[None, :3], moment[None], EVERY)
-        if not size[0] < 1e-8 or np.linalg.norm(position[0] - guess[:3]) > SAME:
+        if not size[0] < CONVERGED_STEP or np.linalg.norm(position[0] - guess[:3]) > SAME:
             return None
         return self.family.point(position[0], moments[0], frequency)
 

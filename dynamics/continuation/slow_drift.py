@@ -23,7 +23,7 @@ from ..motion.equations import parameters
 from ..motion.events import rotor_gap
 from ..motion.rates import Rates
 from ..motion.state import Parameter, Scales, State
-from .engine import BranchPoint, Family, follow_branch, spins
+from .branch import BranchPoint, Family, follow_branch, spins
 from .frequencies import HIGHEST, LONG_STEPS, LOWEST, by_frequency
 
 

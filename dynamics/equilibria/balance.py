@@ -21,8 +21,9 @@ LATERAL: Indices = np.array([0, 1, 3, 4])
 """The four balances but the axial force, and the four unknowns but the height."""
 EVERY: Indices = np.arange(5)
 AXIAL = 2
-CLOSE = 1e-6
-"""Steps of Newton's method from which on effects are known well enough from where the step began: to its square."""
+CONVERGED_STEP = 1e-8  # of Newton's method, in floater radii or rad: squared, it leaves round-off
+DUPLICATE_DISTANCE = 1e-6  # within which two solutions are one
+CLOSE = 1e-6  # steps from which on effects are known well enough from where the step began: to its square
 
 
 @dataclass(frozen=True, eq=False)

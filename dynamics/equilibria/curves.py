@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from ...geometry.common import Array, Watch, unwatched
 from ...geometry.scene.contents import Scene
-from .balance import AXIAL, EVERY, LATERAL, Balance, Indices, solve
+from .balance import AXIAL, CONVERGED_STEP, DUPLICATE_DISTANCE, EVERY, LATERAL, Balance, Indices, solve
 from .path import AtRest, Steps, whole_curves
 
 THINNED = 8
@@ -24,9 +24,6 @@ STEPS_TOGETHER, CELL, COARSER, AWAY = 3, 0.1, 1.3, 1.0
 """Steps after which the starts are thinned: within a cell of such an edge (radii, and of the moment), which grows by
 that factor each time, one is kept, and those that are as far outside the range, in radii, are left out; a test compares
 what is found with what all find."""
-MET, SAME = 1e-8, 1e-6
-"""Newton's method has met a solution when its last step was shorter than the first (radii or rad), which leaves
-round-off; solutions nearer to each other than the second, a hundred times that, are one."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -129,7 +126,7 @@ class Search:
                 position, moment, step = solve(
                     balance, points[:, :3], points[:, 3:], self.free, STEPS_TOGETHER, self.reach, self.far
                 )
-            points, met = np.concatenate([position, moment], axis=1), step < MET
+            points, met = np.concatenate([position, moment], axis=1), step < CONVERGED_STEP
             kept = met & self.holds(problem, position, self.margin)
             found.append((problem[kept], points[kept]))
             going = ~met & np.isfinite(step) & self.holds(problem, position, AWAY)
@@ -139,7 +136,7 @@ class Search:
             if not len(points):
                 break
         problem, points = _together(*found)
-        first = _first_in_cells(problem, points, SAME)
+        first = _first_in_cells(problem, points, DUPLICATE_DISTANCE)
         problem, points = problem[first], points[first]
         order = np.lexsort([points[:, 2], problem])
         return problem[order], points[order]
@@ -293,6 +290,8 @@ def _polished(balance: Balance, position: Array, moment: Array) -> list[tuple[Ar
     position, moment, step = solve(balance, position, moment, EVERY)
     points: list[tuple[Array, Array]] = []
     for r, m, size in zip(position, moment, step, strict=True):
-        if size < 1e-8 and not any(np.linalg.norm(r - q) + np.linalg.norm(m - n) < 1e-6 for q, n in points):
+        if size < CONVERGED_STEP and not any(
+            np.linalg.norm(r - q) + np.linalg.norm(m - n) < DUPLICATE_DISTANCE for q, n in points
+        ):
             points.append((r, m))
     return points

@@ -8,25 +8,25 @@ solved by Newton's method from x₀ + ℓt, so that a fold in any of the unknown
 Applications of Bifurcation Theory, 1977; E. L. Allgower and K. Georg, Numerical Continuation Methods, 1990, ch. 2, 6).
 """
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...geometry.common import Array
-from .balance import Indices, tangent_basis
+from .balance import CONVERGED_STEP, EVERY, Balance, Indices, solve, tangent_basis
 
 Truth = NDArray[np.bool_]
 ON, SHORTER, END = 0, 1, 2
 """What may be said of a step: go on from it, try a shorter one instead, or it is the last."""
 GROWTH = 1.4
 """Ratio of a step to the one before that succeeded."""
-CLOSE, CORRECTIONS = 1e-10, 8
-"""A point is on its curve when Newton's method moves it less than this, and how often it may move it."""
-ROUNDED = 1e-7
-"""Or when a move that is shorter than this has not halved since the one before: what is left is round-off."""
+CLOSE = 1e-10  # a correction by which a point is on its curve, in the curve's units
+CORRECTIONS = 8
+ROUNDED = 1e-7  # a correction below which one that has not halved since the one before is round-off
 DIFFERENCE = 1e-5
 """Step of the central difference by a parameter of a curve, in its units."""
 ONE: Indices = np.zeros(1, int)
@@ -61,6 +61,33 @@ class AtRest:
         slopes[:, :k, :3], slopes[:, :k, 6:] = slope[:, :, :3], slope[:, :, 5:]
         slopes[:, :k, 3:6] = slope[:, :, 3:5] @ tangent_basis(moment)
         return values, slopes
+
+
+class BalanceCurve(AtRest, ABC):
+    """All five balances on curves with one parameter each: unknown are position, moment, and the parameter by its unit.
+
+    Parameters
+    ----------
+    unit : of the parameter, a typical change over which an equilibrium moves by its radius
+    """
+
+    unit: float
+
+    @abstractmethod
+    def balances(self, parameter: Array, which: Indices) -> Balance:
+        """The balance at values (n,) of the parameters of curves `which` (n,)."""
+
+    def linear(self, points: Array, which: Indices) -> tuple[Array, Array]:
+        """Balances and |m̂| = 1 (n, 6) at points (n, 7), and their derivatives (n, 6, 7).
+
+        That by the parameter is a central difference, good to 1e-9; a fold is found where the other columns are
+        singular, which does not depend on it.
+        """
+        position, moment, parameter = points[:, :3], points[:, 3:6], points[:, 6] * self.unit
+        value, slope = self.balances(parameter, which)(position, moment)
+        ends = [self.balances(parameter + s * DIFFERENCE * self.unit, which)(position, moment)[0] for s in (1, -1)]
+        along = (ends[0] - ends[1]) / (2 * DIFFERENCE)
+        return self.extended(value, np.concatenate([slope, along[:, :, None]], axis=2), moment)
 
 
 @dataclass(frozen=True)
@@ -130,17 +157,12 @@ def stepped(
     return ahead, turned, good & np.isfinite(turned).all(axis=1)
 
 
-def corrected(
-    equations: Equations, points: Array, across: Array, reach: Array, which: Indices = ONE
-) -> tuple[Array, Truth]:
-    """Solutions in the planes through guesses (n, k + 1) across directions, and where one was within reach (n,)."""
-    return _corrected(equations, points, across, reach, which)[:2]
-
-
 def _corrected(
     equations: Equations, points: Array, across: Array, reach: Array, which: Indices
 ) -> tuple[Array, Truth, Array]:
-    """The same, and the derivatives (n, k, k + 1) of the last correction."""
+    """Solutions in the planes through guesses (n, k + 1) across directions, where one was within reach (n,), and the
+    derivatives (n, k, k + 1) of the last correction.
+    """
     slopes = np.full((len(points), points.shape[1] - 1, points.shape[1]), np.nan)
     points, good, active = points.copy(), np.zeros(len(points), bool), np.arange(len(points))
     before = np.full(len(points), np.inf)
@@ -183,15 +205,6 @@ def _solved(slope: Array, row: Array, value: Array, last: float) -> Array:
         good[good] = np.linalg.slogdet(matrices[good])[0] != 0
         found[good], found[~good] = np.linalg.solve(matrices[good], found[good]), np.nan
     return np.asarray(found[..., 0])
-
-
-def near_curve(equations: Equations, guess: Array, reach: float) -> Array | None:
-    """The point of a curve (k + 1,) across its direction at a guess (k + 1,) that is nearer than about `reach`."""
-    slope = equations.linear(guess[None], ONE)[1]
-    if not np.isfinite(slope).all():
-        return None
-    points, good = corrected(equations, guess[None], np.linalg.svd(slope)[2][:, -1], np.array([reach]))
-    return points[0] if good[0] else None
 
 
 Traced = tuple[Array, Array]
@@ -244,3 +257,69 @@ def _joined(ahead: list[Traced], behind: list[Traced]) -> Traced:
         ahead = [*((point, -tangent) for point, tangent in behind[:0:-1]), *ahead]
     points, tangents = (np.array(column) for column in zip(*ahead, strict=True))
     return points, tangents
+
+
+NEWTON_STEPS = 12
+"""Of Newton's method from a problem's equilibrium to that of one nearby."""
+NEAR = 0.15
+"""What it finds farther away than this (radii and rad) may be another branch's: then the branch itself is followed."""
+WAY_STEPS = Steps(longest=0.1, shortest=1e-5, turn=0.2, most=300)
+
+
+@dataclass(frozen=True, eq=False)
+class _Ways(BalanceCurve):
+    """The ways from balances, one of each curve, to others with the same equations; the parameter grows from 0 to 1."""
+
+    start: Balance
+    end: Balance
+    unit: float = 10.0
+
+    def balances(self, parameter: Array, which: Indices) -> Balance:
+        start, end = self.start.at(which), self.end.at(which)
+        values = start.values + parameter[:, None] * (end.values - start.values)
+        spin = np.asarray(start.spin)
+        return replace(start, values=values, spin=spin + parameter * (np.asarray(end.spin) - spin))
+
+
+def carried(
+    start: Balance, end: Balance, position: Array, moment: Array, bound: float
+) -> tuple[Indices, Truth, Array, Array]:
+    """Equilibria to which others lead while the parameters of their problem change steadily to those of another one.
+
+    Parameters
+    ----------
+    start, end : with the same equations
+    position, moment : (n, 3) of equilibria at the start, scaled
+    bound : farther from the origin than this, in floater radii, none is followed
+
+    Returns
+    -------
+    which, arrived, position, moment : the equilibria (k,) that were followed; whether they are those at the end, or
+        beyond a fold others at the start; and where they have led to, (k, 3)
+    """
+    places, turned, size = solve(end, position, moment, EVERY, NEWTON_STEPS)
+    apart = np.linalg.norm(np.concatenate([places - position, turned - moment], axis=1), axis=1)
+    good = (size < CONVERGED_STEP) & (apart < NEAR)
+    rest = np.flatnonzero(~good)
+    begin = np.column_stack([position, moment, np.zeros(len(position))])[rest]
+    ways = _Ways(start.at(rest), end.at(rest))
+    ends: list[tuple[Indices, Array]] = [(rest[:0], begin[:0])]
+
+    def watch(which: Indices, points: Array, tangents: Array, lengths: Array) -> NDArray[np.int_]:
+        over = (points[:, 6] * ways.unit >= 1) | (points[:, 6] <= 0)
+        ends.append((which[over], points[over]))
+        return np.where(over | (np.linalg.norm(points[:, :3], axis=1) > bound), END, ON)
+
+    if len(rest):
+        forward = np.tile(np.eye(7)[6], (len(rest), 1))
+        follow(ways, begin, directions(ways, begin, forward, np.arange(len(rest))), WAY_STEPS, watch)
+    which, points = (np.concatenate(part) for part in zip(*ends, strict=True))
+    there = points[:, 6] > 0
+    landed = solve(ways.balances(there.astype(float), which), points[:, :3], points[:, 3:6], EVERY, NEWTON_STEPS)
+    met = landed[2] < CONVERGED_STEP
+    return (
+        np.concatenate([np.flatnonzero(good), rest[which[met]]]),
+        np.concatenate([np.ones(good.sum(), bool), there[met]]),
+        np.concatenate([places[good], landed[0][met]]),
+        np.concatenate([turned[good], landed[1][met]]),
+    )

@@ -2,7 +2,6 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import ClassVar
 
 import numpy as np
 
@@ -15,7 +14,7 @@ from ..motion.state import Parameter, Scales, State
 from .balance import Indices
 from .equilibrium import FOLD, IN_PLATE, IN_ROTOR, NOT_CONVERGED, PAST_TABLE, Equilibrium, LeftOut
 from .modes import named_modes
-from .orbits import Orbit, OrbitProblem, conserved, floquet_modes, orbit_near, periodic_orbit, resampled
+from .orbits import Orbit, OrbitProblem, conserved, floquet_modes, periodic_orbit, resampled
 from .path import DIFFERENCE, END, ON, Steps, directions, follow
 
 SMALLEST_STEP = 1 / 64
@@ -38,14 +37,11 @@ class OrbitCurve:
     rates : compiled equations of the rotor's field
     problem : parameter -> values of the runtime parameters, drag along the moment left out, and the plate's forces
     spin : body spin s
-    unit : of the parameter, a typical change over which the motion moves by its radius
     """
 
     rates: Rates
     problem: Callable[[float], tuple[Array, PlateForce | None]]
     spin: float
-    unit: float
-    what: ClassVar[str] = "a periodic motion"
 
     def linear(self, points: Array, which: Indices) -> tuple[Array, Array]:
         """What shall vanish (1, 12 n) at one point (1, 12 n + 1), and its derivatives (1, 12 n, 12 n + 1).
@@ -53,10 +49,10 @@ class OrbitCurve:
         The equations of an orbit keep |m̂| and the spin, so that two of the 12 n + 2 follow from the others; of their
         singular value decomposition as many are taken as there are unknowns but one.
         """
-        states, parameter = self.states(points[0, :-1]), float(points[0, -1]) * self.unit
+        states, parameter = self.states(points[0, :-1]), float(points[0, -1])
         problem = self._at(states, parameter)
         residual, slope = problem(states)
-        ends = [self._at(states, parameter + s * DIFFERENCE * self.unit)(states)[0] for s in (1, -1)]
+        ends = [self._at(states, parameter + s * DIFFERENCE)(states)[0] for s in (1, -1)]
         rows, aims = conserved(states, self.spin * abs(problem.values[Parameter.RATE]))
         column = np.append((ends[0] - ends[1]) / (2 * DIFFERENCE), [0.0, 0.0])
         every = np.column_stack([np.vstack([slope, rows]) * np.sqrt(len(states)), column])
@@ -68,16 +64,6 @@ class OrbitCurve:
     def onto(self, points: Array) -> Array:
         """The points: that moments have length one is among the equations."""
         return points
-
-    def guess(self, states: Array) -> Array:
-        """Unknowns (12 n,) of states (n, 12), n odd."""
-        return np.asarray(states.ravel() / np.sqrt(len(states)))
-
-    def solution(self, guess: Array, parameter: float) -> Array | None:
-        """Unknowns (12 n + 1,) of the orbit near a guess (12 n,) at one value of the parameter."""
-        values, plate = self.problem(parameter)
-        found = orbit_near(self.rates, values, self.spin, plate, self.states(guess))
-        return None if found is None else np.append(self.guess(found.states), parameter / self.unit)
 
     @staticmethod
     def states(unknowns: Array) -> Array:
@@ -166,7 +152,7 @@ class Shaken:
             found, done, states = ahead, min(1.0, done + step), ahead.states
         if done == 1.0 or found is None:
             return found, NOT_CONVERGED, done
-        arrived, why, part = _turned(OrbitCurve(self.rates, problem, spin, 1.0), states, done)
+        arrived, why, part = _turned(OrbitCurve(self.rates, problem, spin), states, done)
         found = None if arrived is None else orbit(1.0, arrived)
         return found, why, part
 
@@ -185,7 +171,7 @@ def _turned(curve: OrbitCurve, states: Array, done: float) -> tuple[Array | None
 
     Where there is none, why, and up to which part there is one: a curve that turns back is one of a fold.
     """
-    last, tangent = np.append(curve.guess(states), done), np.zeros(states.size + 1)
+    last, tangent = np.append(states.ravel() / np.sqrt(len(states)), done), np.zeros(states.size + 1)
     farthest = done
 
     def watch(which: Indices, points: Array, tangents: Array, lengths: Array) -> int:

@@ -22,7 +22,7 @@ from ..motion.plate import PlateForce, PlateMemory
 from ..motion.rates import Rates
 from ..motion.rotor_losses import brake_slope
 from ..motion.state import Parameter, Scales, State
-from .balance import EVERY, Balance, moved_pose, solve, tangent_basis
+from .balance import CONVERGED_STEP, Balance, moved_pose, solve, tangent_basis
 from .equilibrium import Equilibrium
 from .modes import left_eigenvectors, tangent_spaces
 
@@ -68,7 +68,7 @@ class PerturbedBalance:
         """Moment direction (3,) whose torque is balanced at a place (3,) m; `guess` itself if none is near."""
         place = position[None] / self.scales.length
         _, moment, step = solve(self.balance, place, guess[None], TILTS)
-        return np.asarray(moment[0] if step[0] < 1e-8 else guess)
+        return np.asarray(moment[0] if step[0] < CONVERGED_STEP else guess)
 
     def directions(self, places: Array, start: float, guess: Array) -> Array:
         """Balanced moment directions (n, 3) at places (n, 3) m, followed downwards and upwards from `start` (m) below.
@@ -227,43 +227,3 @@ def floater_slope(scene: Scene, table: FieldTable, state: State) -> Array:
     rates = Rates(Interaction(formula, (FloaterCurrents(),)))
     slopes = [rates(scales.pack(state)[None], each)[1][0] for each in (values, still)]
     return np.asarray(slopes[0] - slopes[1])
-
-
-JUMP = 0.3
-"""An equilibrium that moves farther in one step (radii and rad together) may be another one."""
-PARTS = (1, 4, 16)
-"""Steps in which the way to a scene is tried."""
-APART = 1e-6
-"""Equilibria nearer than this are one."""
-
-
-def carried(start: Balance, end: Balance, position: Array, moment: Array) -> Array | None:
-    """Scaled positions and moments (n, 6) at the end of the way; None where they cannot be followed.
-
-    Parameters
-    ----------
-    start, end : one scene each, with the same equations and other parameters
-    position, moment : (n, 3) scaled, the equilibria at the start
-    """
-    if not len(position):
-        return np.zeros((0, 6))
-    for parts in PARTS:
-        places, turned, good = position, moment, True
-        for way in np.arange(1, parts + 1) / parts:
-            values = start.values + way * (end.values - start.values)
-            balance = Balance(end.rates, values, start.spin + way * (end.spin - start.spin))
-            arrived, direction, size = solve(balance, places, turned, EVERY, 12)
-            step = np.linalg.norm(np.concatenate([arrived - places, direction - turned], axis=1), axis=1)
-            good = bool((size < 1e-8).all() and (step < JUMP).all())
-            if not good:
-                break
-            places, turned = arrived, direction
-        points = np.concatenate([places, turned], axis=1)
-        if good and _all_apart(points):
-            return points
-    return None
-
-
-def _all_apart(points: Array) -> bool:
-    apart = np.linalg.norm(points[:, None] - points[None], axis=2) + np.eye(len(points))
-    return bool((apart > APART).all())

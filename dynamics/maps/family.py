@@ -22,7 +22,6 @@ from ...geometry.magnets import Magnet
 from ...geometry.scene.contents import Scene
 from ...geometry.shapes import rotation_matrix
 from ...geometry.solids import moved
-from ..continuation.engine import Problem
 from ..motion.effect import Added, Effect, Interaction, Motion, Placeable, Placed
 from ..motion.effects import mutual_choice, with_effects
 from ..motion.equations import parameters
@@ -420,14 +419,6 @@ class RotorFamily:
         values = np.reshape(each, (-1, len(Parameter)))[which]
         values[:, Parameter.MEASURE] = measure
         return values
-
-    def frequencies(self, measure: float, spin: float = 0.0) -> Problem:
-        """The problem whose parameter is the frequency, Hz, at one measure."""
-        return lambda frequency: (self.values(frequency, measure)[0], spin)
-
-    def measures(self, frequency: float, spin: float = 0.0) -> Problem:
-        """The problem whose parameter is the measure, m or rad, at one frequency."""
-        return lambda measure: (self.values(frequency, measure)[0], spin)
 
     @property
     def _bare(self) -> Scene:

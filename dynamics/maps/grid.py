@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...geometry.common import Array
-from ..equilibria.balance import EVERY, Balance, Indices, solve
-from ..equilibria.curves import SAME, Search, SearchRange
-from ..equilibria.path import END, ON, AtRest, Steps, directions, follow
+from ..equilibria.balance import DUPLICATE_DISTANCE, EVERY, Balance, Indices
+from ..equilibria.curves import Search, SearchRange
+from ..equilibria.path import carried
 from ..motion.rates import Rates
 
 
@@ -38,13 +38,9 @@ class Grid:
     def __len__(self) -> int:
         return len(self.values)
 
-    def balance(self, point: Indices, end: Indices | None = None, way: Array | None = None) -> Balance:
-        """The balance in which every point has its own problem, or one on the way (n,), 0 to 1, to a point `end`."""
-        values, spin = self.values[point], self.spin[point]
-        if end is not None and way is not None:
-            values = values + way[:, None] * (self.values[end] - values)
-            spin = spin + way * (self.spin[end] - spin)
-        return Balance(self.rates, values, spin)
+    def balance(self, point: Indices) -> Balance:
+        """The balance in which every point has its own problem."""
+        return Balance(self.rates, self.values[point], self.spin[point])
 
     def alone(self, point: int) -> Balance:
         """The balance of one point, for any number of positions."""
@@ -124,7 +120,7 @@ class Atlas:
         for k in range(rank.max(initial=-1) + 1):  # one of each point at a time
             chosen = np.flatnonzero(rank == k)
             apart = np.linalg.norm(self._known[point[chosen]] - places[chosen, None], axis=2)
-            fresh = chosen[~(apart < SAME).any(axis=1)]
+            fresh = chosen[~(apart < DUPLICATE_DISTANCE).any(axis=1)]
             if self._count[point[fresh]].max(initial=0) == self._known.shape[1]:
                 self._known = np.concatenate([self._known, np.full_like(self._known, np.nan)], axis=1)
             self._known[point[fresh], self._count[point[fresh]]] = places[fresh]
@@ -140,56 +136,8 @@ class Atlas:
         return point[inside], found[inside, :3], found[inside, 3:]
 
 
-UNIT = 0.1
-"""Length of the way between two points, in radii and rad."""
-STEPS = Steps(longest=0.1, shortest=1e-5, turn=0.2, most=300)
 FAR_APART = 1.5
-"""The range is left where the floater is this much farther than its farthest."""
-
-
-@dataclass(frozen=True, eq=False)
-class _Ways(AtRest):
-    """Balances on the ways from points `start` (n,) to points `end` (n,); unknown are position, moment and λ UNIT."""
-
-    grid: Grid
-    start: Indices
-    end: Indices
-
-    def linear(self, points: Array, which: Indices) -> tuple[Array, Array]:
-        """Balances and |m̂| = 1 (n, 6), and their derivatives (n, 6, 7); that along the way by a difference: 1e-6."""
-        position, moment, way = points[:, :3], points[:, 3:6], points[:, 6] / UNIT
-        start, end = self.start[which], self.end[which]
-        value, slope = self.grid.balance(start, end, way)(position, moment)
-        ahead = self.grid.balance(start, end, way + 1e-6)(position, moment)[0]
-        along = (ahead - value) / (1e-6 * UNIT)
-        return self.extended(value, np.concatenate([slope, along[:, :, None]], axis=2), moment)
-
-
-def between(grid: Grid, start: Indices, end: Indices, position: Array, moment: Array) -> tuple[Indices, Array, Array]:
-    """Follow branches from equilibria (n, 3), (n, 3) of points `start` (n,) towards those of points `end` (n,).
-
-    Returns
-    -------
-    Points (k,), positions and moments (k, 3) of the equilibria in which they ended.
-    """
-    ways, bound = _Ways(grid, start, end), FAR_APART * max(where.bound for where in grid.ranges)
-    points = np.column_stack([position, moment, np.zeros(len(start))])
-    tangents = directions(ways, points, np.eye(7)[6] + np.zeros((len(start), 1)), np.arange(len(start)))
-    ended: list[tuple[Indices, Array]] = [(start[:0], points[:0])]
-
-    def watch(which: Indices, points: Array, tangents: Array, lengths: Array) -> NDArray[np.int_]:
-        way = points[:, 6]
-        there, back = way >= UNIT, way <= 0.0
-        ended.extend(((end[which[there]], points[there]), (start[which[back]], points[back])))
-        return np.where(there | back | (np.linalg.norm(points[:, :3], axis=1) > bound), END, ON)
-
-    follow(ways, points, tangents, STEPS, watch)
-    point, places = (np.concatenate(part) for part in zip(*ended, strict=True))
-    position, moment, size = solve(grid.balance(point), places[:, :3], places[:, 3:6], EVERY, 12)
-    good = size < 1e-8
-    return point[good], position[good], moment[good]
-
-
+"""Equilibria are followed up to so many times the farthest distance of the ranges."""
 SPACING = 5
 """Points of the map between two searches."""
 WHOLE, PART = 64, 8
@@ -203,8 +151,6 @@ TOGETHER = 8
 """Searches that are made side by side: enough that NumPy's calls cost less than what they compute."""
 MARGIN = 0.3
 """Sheets are followed so far beyond the range (radii): what its border cuts into pieces is whole there."""
-JUMP = 0.15
-"""A neighbour farther away than this (radii and rad) may be another branch's."""
 
 
 def filled(grid: Grid, nodes: Indices, progress: Callable[[float], None] | None = None) -> Atlas:
@@ -234,19 +180,16 @@ def _starts(grid: Grid, point: int, random: np.random.Generator | None) -> tuple
 
 def _spread(grid: Grid, atlas: Atlas, point: Indices, position: Array, moment: Array) -> None:
     """Carry equilibria from point to point until nothing new is found."""
+    bound = FAR_APART * max(where.bound for where in grid.ranges)
     while len(point):
         new = atlas.add(point, position, moment)
         point, position, moment = point[new], position[new], moment[new]
         source, target = grid.neighbours(point)
         if not len(source):
             return
-        arrived, turned, size = solve(grid.balance(target), position[source], moment[source], EVERY, 12)
-        apart = np.linalg.norm(np.concatenate([arrived - position[source], turned - moment[source]], axis=1), axis=1)
-        good = (size < 1e-8) & (apart < JUMP)
-        rest = source[~good]
-        walked = between(grid, point[rest], target[~good], position[rest], moment[rest])
-        point = np.concatenate([target[good], walked[0]])
-        position = np.concatenate([arrived[good], walked[1]])
-        moment = np.concatenate([turned[good], walked[2]])
+        which, arrived, position, moment = carried(
+            grid.balance(point[source]), grid.balance(target), position[source], moment[source], bound
+        )
+        point = np.where(arrived, target[which], point[source[which]])
         inside = grid.holds(point, position, MARGIN)
         point, position, moment = point[inside], position[inside], moment[inside]

@@ -8,7 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import PercentFormatter
 
-from ...dynamics.continuation.engine import BranchPoint
+from ...dynamics.continuation.branch import BranchPoint
 from ...dynamics.continuation.frequencies import HIGHEST, LOWEST, by_frequency, levitates, stability_end
 from ...dynamics.equilibria.balance import AXIAL, LATERAL, Balance, solve
 from ...dynamics.equilibria.equilibrium import EquilibriumError

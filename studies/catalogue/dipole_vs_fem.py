@@ -9,7 +9,7 @@ import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from ...dynamics.continuation.engine import BranchPoint, Family
+from ...dynamics.continuation.branch import BranchPoint, Family
 from ...dynamics.continuation.frequencies import StableRange, at_frequency, by_frequency, reference_state, stable_range
 from ...dynamics.equilibria.modes import named_modes
 from ...dynamics.motion.rates import Rates

@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 from scipy.optimize import brentq
 from scipy.stats import qmc
 
-from ...dynamics.continuation.engine import Family, frequencies
+from ...dynamics.continuation.branch import Family, frequencies
 from ...dynamics.continuation.slow_drift import SlowTorque
 from ...dynamics.equilibria.equilibrium import EquilibriumError
 from ...dynamics.equilibria.modes import modes, named_modes, tangent_spaces

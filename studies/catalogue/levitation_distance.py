@@ -11,7 +11,7 @@ import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from ...dynamics.continuation.engine import BranchPoint, Family
+from ...dynamics.continuation.branch import BranchPoint, Family
 from ...dynamics.continuation.frequencies import distance_error, kicked, levitating_branch
 from ...dynamics.flights.flight import simulate
 from ...fem.rotor.table import FieldTable

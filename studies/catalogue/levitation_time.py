@@ -10,7 +10,7 @@ import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from ...dynamics.continuation.engine import Family, follow_branch, frequencies, spins
+from ...dynamics.continuation.branch import Family, follow_branch, frequencies, spins
 from ...dynamics.continuation.frequencies import LONG_STEPS, reference_state
 from ...dynamics.continuation.slow_drift import E_FOLDS, Drift, drift
 from ...dynamics.equilibria.equilibrium import EquilibriumError

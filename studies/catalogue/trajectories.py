@@ -13,7 +13,7 @@ import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from ...dynamics.continuation.engine import BranchPoint
+from ...dynamics.continuation.branch import BranchPoint
 from ...dynamics.continuation.frequencies import kicked, levitating_branch
 from ...dynamics.continuation.slow_drift import drift
 from ...dynamics.flights.flight import simulate

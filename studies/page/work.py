@@ -15,10 +15,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...dynamics.equilibria.balance import Balance
+from ...dynamics.equilibria.balance import DUPLICATE_DISTANCE, Balance
 from ...dynamics.equilibria.curves import SearchRange
 from ...dynamics.equilibria.equilibrium import Survey
-from ...dynamics.equilibria.perturbed import carried
+from ...dynamics.equilibria.path import carried
 from ...dynamics.equilibria.search import Found as FoundSearch, field_doubts, told
 from ...dynamics.flights.live import LiveFlight, Piece
 from ...dynamics.maps.family import RotorFamily, article_measure, rotor_family
@@ -78,10 +78,13 @@ class Nearby:
         size = self.state.scene.floater.radius
         position = np.reshape([e.position / size for e in known], (-1, 3))
         moment = np.reshape([e.state.moment for e in known], (-1, 3))
-        points = carried(before.balance, problem.balance, position, moment)
-        if points is None:
+        where = SearchRange(state.scene, 0.1)
+        which, arrived, position, moment = carried(before.balance, problem.balance, position, moment, where.bound)
+        points = np.concatenate([position, moment], axis=1)[np.argsort(which)]
+        apart = np.linalg.norm(points[:, None] - points, axis=2) + np.eye(len(points))
+        if len(points) < len(known) or not arrived.all() or (apart < DUPLICATE_DISTANCE).any():
             return None
-        points = points[SearchRange(state.scene, 0.1).holds(points[:, :3])]
+        points = points[where.holds(points[:, :3])]
         there, doubts = self._doubts(levitation, problem, points[:, :3] * state.scene.floater.radius)
         found = FoundSearch.at(problem.balance, points[there], doubts)
         levitation.adopt(told(state.scene, problem.balance, found), searched=False)

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from article import FLOATER, NO_DRAG, RADIUS
 
-from spinlev.dynamics.continuation.engine import Family, follow_branch, frequencies
+from spinlev.dynamics.continuation.branch import Family, follow_branch, frequencies
 from spinlev.dynamics.equilibria.equilibrium import FOLD, EquilibriumError, Survey
 from spinlev.dynamics.equilibria.search import find_equilibria, with_plate
 from spinlev.dynamics.flights.compiled import compile_flight

@@ -9,17 +9,15 @@ import pytest
 from article import FLOATER, SCENE
 from second_opinions.solids import Conductor, occ_mesh
 
-from spinlev.dynamics.continuation.boundary import Plane, follow_boundary
-from spinlev.dynamics.continuation.engine import Family, follow_branch
 from spinlev.dynamics.continuation.frequencies import way_out
 from spinlev.dynamics.continuation.slow_drift import drift
 from spinlev.dynamics.equilibria.balance import EVERY, solve
-from spinlev.dynamics.equilibria.equilibrium import FOLD, EquilibriumError
+from spinlev.dynamics.equilibria.equilibrium import EquilibriumError
 from spinlev.dynamics.equilibria.perturbed import TILTS, PerturbedBalance
 from spinlev.dynamics.equilibria.search import find_equilibria
 from spinlev.dynamics.maps.family import rotor_family
 from spinlev.dynamics.motion.rates import Rates
-from spinlev.dynamics.motion.state import Parameter, Scales
+from spinlev.dynamics.motion.state import Parameter
 from spinlev.fem.closed_forms.potentials import Racetrack
 from spinlev.fem.plate.eddy_fields import write_vtu
 from spinlev.fem.rotor.choice import rotor_table
@@ -82,18 +80,6 @@ def test_no_frequency_helps_a_floater_without_strength():
     assert "None was found within a factor of 1.2; give start.position_mm" in way_out(WEAK, TABLE, (), widest=1.2)
     with pytest.raises(EquilibriumError, match=r"At 110 Hz the floater has no equilibrium with body spin 0\.25"):
         drift(WEAK, TABLE, spin=0.25)
-
-
-def test_no_boundary_starts_away_from_one(stable):
-    """At 110 Hz the stable equilibrium is 20 Hz from its fold; the plane ends before that."""
-    family = rotor_family(SCENE, "horizontal", "dipole")
-    units = np.array([50.0, 2e-3])
-    plane = Plane(family.rates, family.values, 0.0, units, np.array([109.0, 1.9e-3]), np.array([111.0, 2.1e-3]))
-    start, problem = Scales.of(SCENE).pack(stable.state), family.frequencies(2e-3)
-    point = follow_branch(Family(family.rates, problem, 50.0), start, 110.0, 111.0)[0]
-    far = replace(point, state=np.r_[point.state[:2], -40.0, point.state[3:]])
-    with pytest.raises(EquilibriumError, match="must lie on a fold of the plane; instead there was none near it"):
-        follow_boundary(plane, far, np.array([110.0, 2e-3]), FOLD)
 
 
 def test_the_balanced_direction_feels_no_torque(rates):

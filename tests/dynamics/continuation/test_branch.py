@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from article import FLOATER
 
-from spinlev.dynamics.continuation.engine import OSCILLATORY, Family, follow_branch, frequencies, scenes, spins
+from spinlev.dynamics.continuation.branch import OSCILLATORY, Family, follow_branch, frequencies, scenes, spins
 from spinlev.dynamics.equilibria.equilibrium import FOLD, EquilibriumError
 from spinlev.dynamics.equilibria.path import Steps
 from spinlev.dynamics.equilibria.search import find_equilibria
@@ -120,6 +120,23 @@ def test_oscillatory_loss_of_stability_between_80_and_100_hz(compiled):
     for offset, stable in ((-0.02, True), (0.02, False)):
         beside = replace(scene, frequency=change.parameter + offset)
         assert nearest(beside, TABLES[id(VERTICAL)], compiled[id(VERTICAL)], 0.0).stable is stable
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("kind", "end"), [(FOLD, 60.0), (OSCILLATORY, 250.0)])
+def test_a_marked_frequency_is_where_a_search_finds_the_change(compiled, kind, end):
+    """To 1e-6 of the frequency: on one side a stable equilibrium, on the other none or an unstable one."""
+    points = followed(compiled, HORIZONTAL, 0.0, end, frequencies(HORIZONTAL), 118.0, 50.0)
+    mark = next(p for p in points if p.kind == kind)
+
+    def beside(factor):
+        scene = replace(HORIZONTAL, frequency=mark.parameter * factor)
+        found = find_equilibria(scene, TABLES[id(HORIZONTAL)], rates=compiled[id(HORIZONTAL)])
+        return [e.stable for e in found if np.linalg.norm(e.position - mark.position) < 0.05 * FLOATER.radius]
+
+    with_stable, without = (1 + 1e-6, 1 - 1e-6) if kind == FOLD else (1 - 1e-6, 1 + 1e-6)
+    assert any(beside(with_stable))
+    assert beside(without) == ([] if kind == FOLD else [False])
 
 
 def test_no_equilibrium_to_start_from(compiled):

@@ -1,0 +1,254 @@
+"""An equilibrium as a function of one parameter of its problem: points of a branch, and what happens along it."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+import scipy
+
+from ...geometry.common import Array
+from ...geometry.scene.contents import Scene
+from ..equilibria.balance import CONVERGED_STEP, EVERY, Balance, Indices, solve
+from ..equilibria.equilibrium import FOLD, EquilibriumError
+from ..equilibria.modes import Modes, modes
+from ..equilibria.path import END, ON, SHORTER, BalanceCurve, Steps, directions, follow, stepped
+from ..motion.equations import parameters
+from ..motion.rates import Rates
+from ..motion.state import Parameter, Scales
+
+Problem = Callable[[float], tuple[Array, float]]
+"""Parameter -> values of the runtime parameters, with the drag along the moment left out, and body spin s."""
+OSCILLATORY, REAL = "oscillatory", "real"
+"""Kinds of marked points beside `FOLD`; `REAL` is a real eigenvalue through zero away from a fold: branches cross."""
+
+
+def scenes(make: Callable[[float], Scene], spin: float = 0.0) -> Problem:
+    """The problem in which a parameter makes the scene: anything but the rotor, whose field is compiled in."""
+
+    def problem(parameter: float) -> tuple[Array, float]:
+        scene = make(parameter)
+        return parameters(scene, Scales.of(scene), frozen_spin=True), spin
+
+    return problem
+
+
+def frequencies(scene: Scene, spin: float = 0.0) -> Problem:
+    """The problem whose parameter is the rotor's frequency, Hz."""
+    return scenes(lambda frequency: replace(scene, frequency=frequency), spin)
+
+
+def spins(scene: Scene) -> Problem:
+    """The problem whose parameter is the body spin s."""
+    values = parameters(scene, Scales.of(scene), frozen_spin=True)
+    return lambda spin: (values, spin)
+
+
+@dataclass(frozen=True, eq=False)
+class BranchPoint:
+    """One equilibrium of a branch.
+
+    Parameters
+    ----------
+    parameter : where on the axis of the parameter
+    spin : body spin s
+    position : (3,) m, rotor's frame
+    state : (12,) scaled
+    tangent : (7,) unit direction of the branch: scaled position, moment, and the parameter by its unit
+    motion : its modes, in scaled time
+    time_unit : s
+    kind : what is marked here: "fold", "oscillatory", "real"; "" at an ordinary point
+    """
+
+    parameter: float
+    spin: float
+    position: Array
+    state: Array
+    tangent: Array
+    motion: Modes
+    time_unit: float
+    kind: str = ""
+
+    @property
+    def distance(self) -> float:
+        """Distance from the rotor's origin, m."""
+        return float(np.linalg.norm(self.position))
+
+    @property
+    def growth_per_s(self) -> float:
+        """Growth rate of the least stable mode, 1/s."""
+        return self.motion.growth / self.time_unit
+
+    @property
+    def doubt_per_s(self) -> float:
+        """What round-off may do to it, 1/s."""
+        return float(self.motion.errors.max()) / self.time_unit
+
+    @property
+    def leading_hz(self) -> float:
+        """Frequency of the least stable mode, in the rotor's frame; 0 where it does not oscillate."""
+        leading = self.motion.eigenvalues[np.argmax(self.motion.eigenvalues.real)]
+        return float(abs(leading.imag)) / (2 * np.pi * self.time_unit)
+
+    def excess(self, tolerated: float) -> float:
+        """Growth beyond its error and beyond what is tolerated, 1/s."""
+        return self.growth_per_s - max(tolerated, self.doubt_per_s)
+
+
+@dataclass(frozen=True, eq=False)
+class Family(BalanceCurve):
+    """The equilibria of a problem with one parameter, as a curve.
+
+    Parameters
+    ----------
+    rates : compiled once for all values of the parameter
+    problem : what the parameter does
+    unit : of the parameter, a typical change over which the equilibrium moves by its radius
+    """
+
+    rates: Rates
+    problem: Problem
+    unit: float = 1.0
+
+    def balance(self, parameter: float) -> Balance:
+        """Forces and torques at one value of the parameter."""
+        return Balance(self.rates, *self.problem(parameter))
+
+    def balances(self, parameter: Array, which: Indices) -> Balance:
+        """Of the one curve there is."""
+        return self.balance(float(parameter[0]))
+
+    def solution(self, guess: Array, parameter: float) -> Array | None:
+        """Unknowns (7,) of the equilibrium near a place and moment (6,) at one value of the parameter."""
+        position, moment, size = solve(self.balance(parameter), guess[None, :3], guess[None, 3:], EVERY)
+        if not size[0] < CONVERGED_STEP:
+            return None
+        return np.concatenate([position[0], moment[0], [parameter / self.unit]])
+
+    def at(self, unknowns: Array, tangent: Array, parameter: float) -> BranchPoint:
+        """The equilibrium at a solution (7,)."""
+        balance = self.balance(parameter)
+        state = balance.states(unknowns[None, :3], unknowns[None, 3:6])
+        return BranchPoint(
+            parameter=parameter,
+            spin=float(balance.spin),
+            position=unknowns[:3] * balance.values[Parameter.LENGTH],
+            state=state[0],
+            tangent=tangent,
+            motion=modes(state[0], self.rates(state, balance.values)[1][0]),
+            time_unit=float(balance.values[Parameter.TIME]),
+        )
+
+    def point(self, position: Array, moment: Array, parameter: float) -> BranchPoint:
+        """The same at scaled place and moment (3,), with the tangent towards growing values of the parameter."""
+        unknowns = np.concatenate([position, moment, [parameter / self.unit]])
+        return self.at(unknowns, directions(self, unknowns[None], np.eye(7)[6:])[0], parameter)
+
+
+def follow_branch(
+    family: Family,
+    start: Array,
+    parameter: float,
+    end: float,
+    steps: Steps | None = None,
+    until: Callable[[BranchPoint], bool] | None = None,
+    tolerated: float = 0.0,
+) -> list[BranchPoint]:
+    """The branch through an equilibrium, towards `end` of the parameter and on through every fold.
+
+    Parameters
+    ----------
+    family : the problem
+    start : scaled state (12,) of the equilibrium at `parameter`, or a guess
+    parameter : where the branch begins
+    end : the branch ends where the parameter reaches it, or comes back to `parameter` after folds
+    steps : along the branch, `Steps()` if not given
+    until : ends the branch after the first point of which it is true
+    tolerated : growth that still counts as stable, 1/s
+
+    Returns
+    -------
+    Points in order, good to round-off.  Folds and changes of stability are points of their own, by `kind`; the
+    parameter at a fold is good to round-off too.
+
+    Raises
+    ------
+    EquilibriumError : there is no equilibrium near `start`
+    """
+    first = family.solution(start[[0, 1, 2, 6, 7, 8]], parameter)
+    if first is None:
+        raise EquilibriumError(
+            f"Input start must be near an equilibrium; instead Newton's method found none at {parameter:.6g}."
+        )
+    unknowns = first
+    tangent = directions(family, unknowns[None], np.sign(end - parameter) * np.eye(7)[6:])
+    points = [family.at(unknowns, tangent[0], parameter)]
+
+    def beyond(value: float) -> float | None:
+        """The one of the two ends beyond which a value of the parameter is."""
+        if (value - end) * (end - parameter) > 0:
+            return end
+        return parameter if (value - parameter) * (end - parameter) < 0 else None
+
+    def arrived(which: Indices, places: Array, tangents: Array, lengths: Array) -> int:
+        nonlocal unknowns
+        segment = _Segment(family, unknowns, points[-1], float(lengths[0]), tolerated)
+        point = family.at(places[0], tangents[0], float(places[0, 6]) * family.unit)
+        marked = segment.marked(point)
+        if any(mark.kind == FOLD and beyond(mark.parameter) is not None for mark in marked):
+            return SHORTER  # past the end and on round a fold: the point at the end would be missed
+        border = beyond(point.parameter)
+        if border is not None:
+            landed = family.solution(places[0, :6], border)
+            if landed is not None:
+                point = family.at(landed, directions(family, landed[None], tangents)[0], border)
+            marked = segment.marked(point)
+        points.extend([*marked, point])
+        unknowns = places[0]
+        return END if border is not None or (until is not None and until(point)) else ON
+
+    follow(family, unknowns[None], tangent, steps or Steps(), arrived)
+    return points
+
+
+@dataclass(frozen=True, eq=False)
+class _Segment:
+    """A step along a branch, of a `length`, from the unknowns (7,) of the point `before`."""
+
+    family: Family
+    unknowns: Array
+    before: BranchPoint
+    length: float
+    tolerated: float
+
+    def marked(self, after: BranchPoint) -> list[BranchPoint]:
+        """Folds and changes of stability on the way to a point, in order."""
+        located = []
+        folds = self.before.tangent[6] * after.tangent[6] < 0
+        if folds:
+            located.append(self._located(lambda point: float(point.tangent[6]), FOLD))
+        excess = self.before.excess(self.tolerated), after.excess(self.tolerated)
+        if excess[0] * excess[1] < 0:
+            growing = self.before if excess[0] > 0 else after
+            kind = OSCILLATORY if growing.leading_hz * growing.time_unit > 1e-6 else REAL
+            if not (folds and kind == REAL):
+                located.append(self._located(lambda point: point.excess(self.tolerated), kind))
+        return [point for _, point in sorted(located, key=lambda pair: pair[0])]
+
+    def _located(self, measure: Callable[[BranchPoint], float], kind: str) -> tuple[float, BranchPoint]:
+        """How far along the step a measure changes its sign, and the point there."""
+        begin, step = measure(self.before), self.length
+        if begin * measure(self._at(step)) <= 0:  # else a landed end: the change is beyond it
+
+            def at(length: float) -> float:
+                return measure(self._at(length)) if length else begin
+
+            step = float(scipy.optimize.brentq(at, 0.0, step, xtol=1e-13, rtol=1e-12))
+        return step, replace(self._at(step), kind=kind)
+
+    def _at(self, length: float) -> BranchPoint:
+        points, tangents, good = stepped(
+            self.family, self.unknowns[None], self.before.tangent[None], np.array([length])
+        )
+        if not good[0]:
+            raise EquilibriumError(f"Lost the branch at {self.before.parameter:.6g}: give it shorter steps.")
+        return self.family.at(points[0], tangents[0], float(points[0, 6]) * self.family.unit)
