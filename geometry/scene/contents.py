@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
 
@@ -223,10 +224,10 @@ class Scene:
     map_reading : how the map is read
     text : the scene file as it was read, for the record
     conductors : metal beside the magnets that turns with the rotor
-    remarks : what was found out about its files, sentences for people
-    folder : where the files lie that `text` names
     files : path of each file that it names, with the SHA-256 of its content when the scene was read
     parts : the solids of the STEP files that its keys name, at home, also those that are computed as another shape
+    keys : the tables of a scene file that it was made of, and the scene that they made: what of that was not replaced
+        since is as they say. None of a scene that was put together from its parts
     """
 
     frequency: float
@@ -240,10 +241,9 @@ class Scene:
     map_reading: MapReading = MapReading()
     text: str = field(default="", compare=False)
     conductors: tuple[Conductor, ...] = ()
-    remarks: tuple[str, ...] = field(default=(), compare=False)
-    folder: Path = field(default_factory=Path, compare=False)
     files: tuple[tuple[str, str], ...] = field(default=(), compare=False)
     parts: tuple[Part, ...] = field(default=(), compare=False)
+    keys: tuple[Mapping[str, Any], Scene] | None = field(default=None, compare=False, repr=False)
 
     @property
     def angular_velocity(self) -> float:

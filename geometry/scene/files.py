@@ -1,11 +1,12 @@
-"""A scene as the keys of a scene file: what is written beside a result, also of a scene that was made in Python."""
+"""Scene files: read and checked, changed, and written again with what the user wrote of what was not replaced since."""
 
+import copy
 import hashlib
 import json
 import logging
 import re
 import tomllib
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
@@ -15,249 +16,15 @@ import numpy as np
 from ..common import Array, InputError, shown
 from ..files import file_content, regular_file
 from ..magnets import Magnet
-from ..rotor import Conductor, horizontal, tilt, vertical
-from ..shapes import Box, Ring, rotation_angles
-from ..solids import Part, Solid, moved
-from .contents import AbsoluteStart, Drag, Floater, OffsetStart, Plate, Scene
+from ..shapes import Box, Ring, Sphere, rotation_angles
+from ..solids import Part, Solid
+from .contents import AbsoluteStart, Drag, OffsetStart, Scene
 from .making import Table, assemble, content_digest
 from .messages import SceneError
-from .schema import shape_keys
+from .schema import SceneTable
 
 SAME = 1e-12
-"""Relative difference of numbers below which they are taken for the same."""
-DEFAULT_START = {"offset_mm": [0.0, 0.0, 0.1]}
-
-
-def scene_text(scene: Scene) -> str:
-    """The scene file of a scene: the one that was read if it still says the same, else one written from the object."""
-    return scene.text if scene.text and _says(scene.text, scene) else _toml(_written_keys(scene))
-
-
-def startless_text(scene: Scene) -> str:
-    """The scene file of a scene as if it did not say where a flight begins: the same for all flights of one scene."""
-    return scene_text(replace(scene, start=OffsetStart()))
-
-
-def scene_keys(scene: Scene) -> dict[str, Any]:
-    """The keys of a scene file that describe a scene, as tables within tables."""
-    return tomllib.loads(scene_text(scene))
-
-
-def keys_and_folder(scene: Scene) -> tuple[dict[str, Any], Path]:
-    """The keys that describe a scene, those of its file if it still says so, and where the files lie they name."""
-    if scene.text and _says(scene.text, scene):
-        return tomllib.loads(scene.text), scene.folder
-    return tomllib.loads(_toml(_written_keys(scene))), Path()
-
-
-def scene_digest(scene: Scene) -> str:
-    """SHA-256 of what a scene says and of the content of the files that it names, whatever their names are.
-
-    Comments do not count. Of a file that was read with the scene it is the content that was read.
-    """
-    keys, contents = _written_keys(scene), [map_digest(scene)]
-    keys["rotor"].pop("field_map", None)
-    for magnet, body in zip(keys["rotor"].get("magnets", ()), (m.body for m in scene.rotor), strict=False):
-        if magnet.pop("file", None):
-            contents.append(str(body.shape_numbers.tolist()))
-    return hashlib.sha256(json.dumps([keys, contents], sort_keys=True).encode()).hexdigest()
-
-
-def map_digest(scene: Scene) -> str:
-    """SHA-256 of the content of a scene's map of the field; empty where it has none."""
-    path = scene.field_map
-    return "" if path is None else dict(scene.files).get(str(path)) or content_digest(path)
-
-
-def _says(text: str, scene: Scene) -> bool:
-    """Whether a scene file describes this scene; the folder of its files is not in the file, and none is opened."""
-    try:
-        return _written_keys(assemble(tomllib.loads(text), "scene", scene.folder, scene)) == _written_keys(scene)
-    except (SceneError, tomllib.TOMLDecodeError):
-        return False
-
-
-def _written_keys(scene: Scene) -> dict[str, Any]:
-    keys: dict[str, Any] = {
-        "frequency_hz": _number(scene.frequency),
-        "gravity_m_s2": _numbers(scene.gravity),
-        "rotor": _rotor(scene.rotor) | _field_map(scene),
-        "floater": _floater(scene.floater),
-    }
-    if scene.conductors:
-        keys["rotor"]["conductors"] = [_conductor(conductor) for conductor in scene.conductors]
-    if scene.plate:
-        keys["plate"] = _plate(scene.plate)
-    stokes = Drag.of(scene.floater)
-    if scene.drag == replace(stokes, air=True):
-        keys["drag"] = {"model": "air"}
-    elif scene.drag != stokes:
-        keys["drag"] = {"linear_N_s_m": scene.drag.linear, "angular_N_m_s": scene.drag.angular}
-    start = _start(scene)
-    return keys if start == DEFAULT_START else keys | {"start": start}
-
-
-def _field_map(scene: Scene) -> dict[str, str]:
-    told = {f"map_{name}": value for name, value in asdict(scene.map_reading).items() if value is not None}
-    return ({"field_map": str(scene.field_map)} if scene.field_map else {}) | told
-
-
-def _floater(floater: Floater) -> dict[str, Any]:
-    shape = {"shape": floater.shape} if floater.body else {}
-    keys = {
-        **_shape(floater.solid),
-        **shape,
-        "remanence_T": _number(floater.remanence),
-        "recoil_permeability": _number(floater.recoil_permeability),
-        "density_kg_m3": _number(floater.density),
-    }
-    if not floater.body:
-        del keys["shape"]
-    return keys if floater.conductivity is None else keys | {"conductivity_S_m": _number(floater.conductivity)}
-
-
-def _rotor(rotor: tuple[Magnet, ...]) -> dict[str, Any]:
-    """A rotor of the article by its name if its magnets conduct alike, any other as its magnets."""
-    first = rotor[0]
-    body = moved(first.body, np.zeros(3), np.eye(3))
-    remanence = float(np.linalg.norm(first.polarization))
-    material = (body, remanence, first.recoil_permeability, first.transverse_permeability)
-    x, _, z = rotor[-1].body.center
-    angle = float(np.arctan2(first.polarization_in_rotor[2], first.polarization_in_rotor[0]))
-    known = {
-        ("horizontal", "displacement_mm", _milli(x)): horizontal(float(x), *material),
-        ("vertical", "displacement_mm", _milli(z)): vertical(float(z), *material),
-        ("tilt", "angle_deg", _number(float(np.degrees(angle)))): tilt(angle, *material),
-    }
-    for (configuration, key, value), like in known.items():
-        alike = len(like) == len(rotor) and len({(m.conductivity, m.coercivity) for m in rotor}) == 1
-        alike &= not (isinstance(body, Box) and np.ptp(body.size)) and not isinstance(body, Ring | Part)
-        if alike and all(map(_same, like, rotor)) and value >= (0 if key != "angle_deg" else -90):
-            return {
-                "configuration": configuration,
-                key: value,
-                **_article_shape(body),
-                "remanence_T": _number(remanence),
-                "recoil_permeability": _permeability(first),
-                **_optional(first),
-            }
-    return {"magnets": [_magnet(magnet) for magnet in rotor]}
-
-
-def _article_shape(body: Solid) -> dict[str, Any]:
-    return {"edge_mm": _milli(body.size[0])} if isinstance(body, Box) else _shape(body)
-
-
-def _shape(body: Solid) -> dict[str, Any]:
-    """A shape's keys in millimetres."""
-    return {
-        key: value if isinstance(value, str) else _millis(value) if np.ndim(value) else _milli(value)
-        for key, value in shape_keys(body).items()
-    }
-
-
-def _same(one: Magnet, other: Magnet) -> bool:
-    return type(one.body) is type(other.body) and bool(np.allclose(_parts(one), _parts(other), rtol=SAME, atol=1e-14))
-
-
-def _parts(magnet: Magnet) -> Array:
-    body = magnet.body
-    turned = (body.rotation, magnet.permeability_in_rotor)
-    return np.concatenate(
-        [body.shape_numbers, body.center, magnet.polarization, *(matrix.ravel() for matrix in turned)]
-    )
-
-
-def _magnet(magnet: Magnet) -> dict[str, Any]:
-    return {
-        **_shape(magnet.body),
-        **_pose(_at_its_origin(magnet.body)),
-        "polarization_T": _numbers(magnet.polarization),
-        "recoil_permeability": _permeability(magnet),
-        **_optional(magnet),
-    }
-
-
-def _at_its_origin(body: Solid) -> Solid:
-    """A part with the origin of its file for its middle, as a scene file places it."""
-    return moved(body, body.center + body.rotation @ body.origin) if isinstance(body, Part) else body
-
-
-def _optional(magnet: Magnet) -> dict[str, float]:
-    found = {} if magnet.conductivity is None else {"conductivity_S_m": _number(magnet.conductivity)}
-    return found if magnet.coercivity is None else found | {"coercivity_kA_m": _number(magnet.coercivity / 1e3)}
-
-
-def _conductor(conductor: Conductor) -> dict[str, Any]:
-    body, conductivity = conductor.body, {"conductivity_S_m": _number(conductor.conductivity)}
-    return {"shape": "cuboid"} | _shape(body) | _pose(body) | conductivity
-
-
-def _permeability(magnet: Magnet) -> float | list[float]:
-    across = magnet.transverse_permeability
-    return magnet.recoil_permeability if magnet.isotropic else [magnet.recoil_permeability, float(across or 1.0)]
-
-
-def _plate(plate: Plate) -> dict[str, Any]:
-    keys, down = {**_box(plate.box), "conductivity_S_m": _number(plate.conductivity)}, plate.lowering
-    if not down:
-        return keys
-    way = {"start_s": _number(down.start), "speed_mm_s": _milli(down.speed), "distance_mm": _milli(down.distance)}
-    return {**keys, "lowering": way}
-
-
-def _start(scene: Scene) -> dict[str, Any]:
-    start = scene.start
-    if not isinstance(start, AbsoluteStart):
-        return {"offset_mm": _millis(start.offset)}
-    return {
-        "position_mm": _millis(start.position),
-        "velocity_mm_s": _millis(start.velocity),
-        "moment": _numbers(start.moment),
-        "spin_hz": _numbers(start.spin / (2 * np.pi)),
-    }
-
-
-def _box(box: Box) -> dict[str, Any]:
-    return {"size_mm": _millis(box.size), **_pose(box)}
-
-
-def _pose(body: Solid) -> dict[str, Any]:
-    return {"center_mm": _millis(body.center), "rotation_deg": _numbers(rotation_angles(body.rotation))}
-
-
-def _number(value: float) -> float:
-    """A number without the round-off of its way through SI units."""
-    return float(f"{float(value):.14g}") + 0.0
-
-
-def _milli(value: float) -> float:
-    return _number(1e3 * value)
-
-
-def _numbers(values: Array) -> list[float]:
-    scale = float(np.abs(values).max()) * SAME
-    return [_number(value) if abs(value) > scale else 0.0 for value in values]
-
-
-def _millis(values: Array) -> list[float]:
-    return _numbers(1e3 * np.asarray(values))
-
-
-def _toml(keys: Mapping[str, Any], table: str = "") -> str:
-    """Keys as TOML: numbers and texts first, then tables, then lists of tables."""
-    plain, tables = "", ""
-    for key, value in keys.items():
-        name = f"{table}.{key}".lstrip(".")
-        if isinstance(value, Mapping):
-            tables += f"\n[{name}]\n{_toml(value, name)}"
-        elif isinstance(value, list) and value and isinstance(value[0], Mapping):
-            tables += "".join(f"\n[[{name}]]\n{_toml(entry, name)}" for entry in value)
-        else:
-            plain += f"{key} = {json.dumps(value)}\n"
-    return plain + tables
-
-
+"""Entry of a vector, in its largest, below which it is round-off."""
 MOST = 5_000_000
 """Bytes of a scene file; one with a thousand magnets has 200 000."""
 MOST_OF_MAP = 1_000_000_000
@@ -265,6 +32,10 @@ MOST_OF_MAP = 1_000_000_000
 LONGEST_KEY = re.compile(r"""(?<![\w-])(?:(?:[\w-]+|"(?:[^"\\\n]|\\.)*"|'[^'\n]*')[ \t]*\.[ \t]*){20}""")
 """A dotted key of so many parts: reading it takes time and memory that grow with their square."""
 DECIMAL_COMMA = re.compile(r"(?m)^[^#\n\[]*=\s*[-+]?\d+,\s*\d")
+DEEPEST = 10
+"""Tables and lists in each other; a scene has five."""
+LARGEST = 2**1000
+"""Integers below it are floats."""
 
 
 def load_scene(path: str | Path) -> Scene:
@@ -298,8 +69,12 @@ def load_scene(path: str | Path) -> Scene:
         raise
     except InputError as error:
         raise SceneError(source, [str(error)]) from None
-    for remark in scene.remarks:
-        logging.getLogger("spinlev").info(remark)
+    for keys, magnet in zip(scene_keys(scene)["rotor"].get("magnets", ()), scene.rotor, strict=False):
+        body = magnet.body
+        if keys.get("file") and not isinstance(body, Part):
+            kind = "cuboid" if isinstance(body, Box) else type(body).__name__.lower()
+            size = body.described_size.removeprefix(kind).strip()
+            logging.getLogger("spinlev").info(f"{Path(keys['file']).name} is a {kind}, {size}, and is computed as one")
     return scene
 
 
@@ -362,10 +137,10 @@ def changed(scene: Scene, changes: Mapping[str, float], source: str = "scene", k
     ------
     SceneError : as there, or a file that the scene names has another content than when the scene was read
     """
-    keys, folder = keys_and_folder(scene)
+    keys = scene_keys(scene)
     for key, value in changes.items():
         _replace(keys, key, value, source)
-    found = assemble(keys, source, folder, known)
+    found = assemble(keys, source, Path(), known)
     before = dict(scene.files)
     for path, digest in found.files:
         if before.get(path, digest) != digest:
@@ -406,12 +181,6 @@ def _replace(raw: Any, key: str, value: float, source: str) -> None:
             source,
             [f"Input {shown(key)} must be a key inside the tables and lists that the scene has; instead it is not."],
         ) from None
-
-
-DEEPEST = 10
-"""Tables and lists in each other; a scene has five."""
-LARGEST = 2**1000
-"""Integers below it are floats."""
 
 
 def scene(
@@ -483,3 +252,185 @@ def _plain(value: Any, depth: int = 0) -> Any:
         return [_plain(item, depth + 1) for item in value]
     whole = isinstance(value, int) and not isinstance(value, bool) and abs(value) < LARGEST
     return float(value) if whole else value
+
+
+def scene_text(scene: Scene) -> str:
+    """The scene file of a scene: the one that was read if nothing was replaced since, else one of its keys."""
+    untouched = scene.text and all(_as_written(scene, name) for name in FIELDS)
+    return scene.text if untouched else _toml(scene_keys(scene))
+
+
+def startless_text(scene: Scene) -> str:
+    """The scene file of a scene as if it did not say where a flight begins: the same for all flights of one scene."""
+    return scene_text(replace(scene, start=OffsetStart()))
+
+
+def scene_keys(scene: Scene) -> dict[str, Any]:
+    """The keys of a scene file that describe a scene, as tables within tables, files named from the folder at hand.
+
+    They are those that it was made of; those of what was replaced since, or never had any, are written from the object:
+    a rotor then as its magnets.
+    """
+    own = scene.keys[0] if scene.keys else {}
+    found = {
+        name: copy.deepcopy(own.get(name)) if _as_written(scene, name) else written(scene)
+        for name, (_, written) in FIELDS.items()
+    }
+    return {name: table for name, table in found.items() if table is not None}
+
+
+def canonical_keys(scene: Scene) -> dict[str, Any]:
+    """All keys that a scene file can have, with defaults, numbers as floats, and None for what is left out."""
+    return SceneTable.model_validate(scene_keys(scene)).model_dump()
+
+
+def scene_digest(scene: Scene) -> str:
+    """SHA-256 of what a scene says and of the content of the files that it names, whatever their names are.
+
+    Comments do not count. Of a file that was read with the scene it is the content that was read.
+    """
+    keys, rotor = canonical_keys(scene), [magnet.body for magnet in scene.rotor]
+    contents = {str(body.file): str(body.shape_numbers) for body in rotor if isinstance(body, Part)}
+    contents |= {path: digest for path, digest in scene.files if digest}
+    keys["rotor"]["field_map"] = map_digest(scene)
+    for magnet in keys["rotor"].get("magnets", ()):
+        magnet["file"] = contents.get(magnet["file"])
+    return hashlib.sha256(json.dumps(keys, sort_keys=True).encode()).hexdigest()
+
+
+def map_digest(scene: Scene) -> str:
+    """SHA-256 of the content of a scene's map of the field; empty where it has none."""
+    path = scene.field_map
+    return "" if path is None else dict(scene.files).get(str(path)) or content_digest(path)
+
+
+def _as_written(scene: Scene, name: str) -> bool:
+    """Whether all that a key or table of the scene file decides is still what that made."""
+    made = scene.keys[1] if scene.keys else None
+    pairs = [(getattr(scene, field), getattr(made, field, None)) for field in FIELDS[name][0]]
+    return made is not None and all(
+        now is then or (not isinstance(now, np.ndarray) and now == then) for now, then in pairs
+    )
+
+
+def _rotor(scene: Scene) -> dict[str, Any]:
+    keys: dict[str, Any] = {"magnets": [_magnet(magnet) for magnet in scene.rotor]}
+    keys |= {"field_map": str(scene.field_map)} if scene.field_map else {}
+    keys |= _given({f"map_{name}": value for name, value in asdict(scene.map_reading).items()})
+    conductors = [
+        {"shape": "cuboid", **_shape(c.body), **_pose(c.body), "conductivity_S_m": c.conductivity}
+        for c in scene.conductors
+    ]
+    return keys | ({"conductors": conductors} if conductors else {})
+
+
+def _magnet(magnet: Magnet) -> dict[str, Any]:
+    along, across = magnet.recoil_permeability, magnet.transverse_permeability
+    return {
+        **_shape(magnet.body),
+        **_pose(magnet.body),
+        "polarization_T": magnet.polarization.tolist(),
+        "recoil_permeability": along if magnet.isotropic else [along, across],
+        **_given({"conductivity_S_m": magnet.conductivity}),
+        **_given({"coercivity_kA_m": magnet.coercivity and _rounded(magnet.coercivity / 1e3)}),
+    }
+
+
+def _floater(scene: Scene) -> dict[str, Any]:
+    floater = scene.floater
+    return {
+        "shape": floater.shape,
+        **_shape(floater.solid),
+        "remanence_T": floater.remanence,
+        "recoil_permeability": floater.recoil_permeability,
+        "density_kg_m3": floater.density,
+        **_given({"conductivity_S_m": floater.conductivity}),
+    }
+
+
+def _plate(scene: Scene) -> dict[str, Any] | None:
+    if scene.plate is None:
+        return None
+    box, down = scene.plate.box, scene.plate.lowering
+    keys = {**_shape(box), **_pose(box), "conductivity_S_m": scene.plate.conductivity}
+    if down:
+        speed, distance = _rounded(1e3 * down.speed), _rounded(1e3 * down.distance)
+        keys["lowering"] = {"start_s": down.start, "speed_mm_s": speed, "distance_mm": distance}
+    return keys
+
+
+def _drag(scene: Scene) -> dict[str, Any] | None:
+    if scene.drag == (stokes := Drag.of(scene.floater)):
+        return None
+    numbers = {"linear_N_s_m": scene.drag.linear, "angular_N_m_s": scene.drag.angular}
+    return {"model": "air"} if scene.drag == replace(stokes, air=True) else numbers
+
+
+def _start(scene: Scene) -> dict[str, Any] | None:
+    start = scene.start
+    if not isinstance(start, AbsoluteStart):
+        offset = _all_rounded(1e3 * start.offset)
+        return None if offset == [0.0, 0.0, 0.1] else {"offset_mm": offset}
+    return {
+        "position_mm": _all_rounded(1e3 * start.position),
+        "velocity_mm_s": _all_rounded(1e3 * start.velocity),
+        "moment": start.moment.tolist(),
+        "spin_hz": _all_rounded(start.spin / (2 * np.pi)),
+    }
+
+
+def _shape(body: Solid) -> dict[str, Any]:
+    """The keys of a body's shape, but for its pose."""
+    if isinstance(body, Part):
+        return {"file": str(body.file)}
+    if isinstance(body, Box):
+        return {"size_mm": _all_rounded(1e3 * body.size)}
+    keys = {"shape": type(body).__name__.lower(), "diameter_mm": _rounded(2e3 * body.radius)}
+    keys |= {} if isinstance(body, Sphere) else {"height_mm": _rounded(1e3 * body.height)}
+    return keys | ({"inner_diameter_mm": _rounded(2e3 * body.inner_radius)} if isinstance(body, Ring) else {})
+
+
+def _pose(body: Solid) -> dict[str, Any]:
+    """Of a part, where the origin of its file lies."""
+    center = body.center + body.rotation @ body.origin if isinstance(body, Part) else body.center
+    return {"center_mm": _all_rounded(1e3 * center), "rotation_deg": _all_rounded(rotation_angles(body.rotation))}
+
+
+def _given(keys: dict[str, Any]) -> dict[str, Any]:
+    return {key: value for key, value in keys.items() if value is not None}
+
+
+def _rounded(value: float) -> float:
+    """A number without the round-off of its way through SI units."""
+    return float(f"{float(value):.14g}") + 0.0
+
+
+def _all_rounded(values: Array) -> list[float]:
+    scale = float(np.abs(values).max()) * SAME
+    return [_rounded(value) if abs(value) > scale else 0.0 for value in values]
+
+
+FIELDS: dict[str, tuple[tuple[str, ...], Callable[[Scene], Any]]] = {
+    "frequency_hz": (("frequency",), lambda scene: float(scene.frequency)),
+    "gravity_m_s2": (("gravity",), lambda scene: scene.gravity.tolist()),
+    "rotor": (("rotor", "conductors", "field_map", "map_reading"), _rotor),
+    "floater": (("floater",), _floater),
+    "plate": (("plate",), _plate),
+    "drag": (("drag", "floater"), _drag),
+    "start": (("start",), _start),
+}
+"""What of a scene each key or table of its file decides, and how that is written from the object."""
+
+
+def _toml(keys: Mapping[str, Any], table: str = "") -> str:
+    """Keys as TOML: numbers and texts first, then tables, then lists of tables."""
+    plain, tables = "", ""
+    for key, value in keys.items():
+        name = f"{table}.{key}".lstrip(".")
+        if isinstance(value, Mapping):
+            tables += f"\n[{name}]\n{_toml(value, name)}"
+        elif isinstance(value, list) and value and isinstance(value[0], Mapping):
+            tables += "".join(f"\n[[{name}]]\n{_toml(entry, name)}" for entry in value)
+        else:
+            plain += f"{key} = {json.dumps(value)}\n"
+    return plain + tables

@@ -1,8 +1,9 @@
-"""From the keys of a scene file to the scene in SI units."""
+"""From the keys of a scene file to the scene in SI units, and the tables of such keys in Python."""
 
+import copy
 import hashlib
 import os
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
@@ -11,43 +12,38 @@ from typing import Any
 import numpy as np
 from pydantic import ValidationError
 
-from ..common import Array, InputError, shown
+from ..common import InputError, shown
 from ..files import regular_file
 from ..magnets import Magnet
 from ..rotor import Conductor, horizontal as horizontal_rotor, tilt as tilted_rotor, vertical as vertical_rotor
-from ..shapes import Box, Cylinder, rotation_matrix
+from ..shapes import Box, Cylinder, Ring, Sphere, rotation_matrix
 from ..solids import Part, Solid, known_shape
 from ..step_file import read_part
 from .contents import AbsoluteStart, Drag, Floater, Lowering, MapReading, OffsetStart, Plate, Scene
-from .messages import SceneError, describe_fault, overlap_faults
+from .messages import SceneError, described_faults, overlap_faults
 from .schema import (
-    MILLI,
-    DragSection,
+    AnyRotor,
+    DisplacedRotor,
     ExplicitRotor,
-    FloaterSection,
-    HorizontalRotor,
-    MagnetSection,
-    PlateSection,
-    Rotor,
-    SceneSection,
-    StartSection,
+    FloaterTable,
+    MagnetTable,
+    PlateTable,
+    SceneTable,
+    StartTable,
     TiltRotor,
-    VerticalRotor,
     key_faults,
-    placed,
-    solid,
 )
 
-FILES = ("file", "field_map")
-"""Keys that name one."""
+MILLI = 1e-3
 LARGEST = 2**30
 """Bytes of a file that a scene may name."""
 MOST_BODIES = 64
 """Magnets and conductors of a scene beside a known one, unless that has more."""
+ORIGIN = (0.0, 0.0, 0.0)
 
 
 def assemble(keys: Mapping[str, Any], source: str, folder: Path | None = None, known: Scene | None = None) -> Scene:
-    """The scene of a scene file's keys.
+    """The scene of a scene file's keys, which it keeps; names of files in them are from the folder at hand then.
 
     Parameters
     ----------
@@ -62,26 +58,30 @@ def assemble(keys: Mapping[str, Any], source: str, folder: Path | None = None, k
     SceneError : unknown, missing or wrong keys, bodies that overlap, or a file that is not known
     """
     try:
-        table = SceneSection.model_validate(keys)
+        table = SceneTable.model_validate(keys)
     except ValidationError as error:
-        raise SceneError(source, [describe_fault(detail) for detail in error.errors()]) from None
+        raise SceneError(source, described_faults(error.errors())) from None
     faults = key_faults(table) + (_too_many(table.rotor, known) if known else [])
     if faults:
         raise SceneError(source, faults)
     try:
-        folder = Path(source).parent if folder is None else folder
-        scene = _scene(table, folder, known)
-        if known is None:
-            files = tuple((str(folder / name), content_digest(folder / name)) for name in _named_files(keys))
-        else:
-            folder, files = known.folder, known.files
-        scene = replace(scene, folder=folder, files=files)
+        paths = _named_files(table.rotor, Path(source).parent if folder is None else folder, known)
+        read = {part.file: part for part in known.parts} if known else {}
+        parts = {path: read.get(path) or read_part(path) for number, path in paths.items() if number is not None}
+        scene = _scene(table, paths, parts)
+        files = {str(path): content_digest(path) for path in paths.values()} if known is None else dict(known.files)
     except InputError as error:  # a file
         raise SceneError(source, [str(error)]) from None
     faults = overlap_faults(scene)
     if faults:
         raise SceneError(source, faults)
-    return scene
+    own = copy.deepcopy(dict(keys))
+    for number, path in paths.items():
+        (own["rotor"] if number is None else own["rotor"]["magnets"][number])[
+            "field_map" if number is None else "file"
+        ] = str(path)
+    scene = replace(scene, files=tuple(files.items()), parts=tuple(parts.values()))
+    return replace(scene, keys=(own, scene))
 
 
 def content_digest(path: Path) -> str:
@@ -101,37 +101,7 @@ def _digest(path: Path, state: tuple[int, ...]) -> str:
         return hashlib.file_digest(stream, "sha256").hexdigest()
 
 
-def _named_files(keys: Any) -> Iterator[str]:
-    """Names of files in keys, at any depth."""
-    if isinstance(keys, Mapping):
-        yield from (keys[key] for key in FILES if isinstance(keys.get(key), str))
-    for entry in keys.values() if isinstance(keys, Mapping) else keys if isinstance(keys, list) else ():
-        yield from _named_files(entry)
-
-
-def _scene(table: SceneSection, folder: Path, known: Scene | None) -> Scene:
-    drag, floater = table.drag or DragSection(model="stokes"), _floater(table.floater)
-    parts = _parts(table.rotor, folder, known)
-    rotor = _rotor(table.rotor, parts)
-    return Scene(
-        frequency=table.frequency_hz,
-        gravity=np.array(table.gravity_m_s2),
-        rotor=rotor,
-        floater=floater,
-        plate=_plate(table.plate) if table.plate else None,
-        drag=_drag(drag, floater),
-        start=_start(table.start),
-        field_map=_field_map(table.rotor, folder, known),
-        map_reading=MapReading(table.rotor.map_length_unit, table.rotor.map_field_unit, table.rotor.map_columns),
-        conductors=tuple(
-            Conductor(solid(c, c.center_mm, c.rotation_deg), c.conductivity_S_m) for c in table.rotor.conductors
-        ),
-        remarks=_recognised(table.rotor, rotor),
-        parts=tuple(parts.values()),
-    )
-
-
-def _too_many(rotor: Rotor, known: Scene) -> list[str]:
+def _too_many(rotor: AnyRotor, known: Scene) -> list[str]:
     """What is wrong with a number of bodies whose overlaps would take minutes."""
     number = len(rotor.conductors) + (len(rotor.magnets) if isinstance(rotor, ExplicitRotor) else 0)
     most = max(MOST_BODIES, len(known.turning_bodies))
@@ -141,125 +111,122 @@ def _too_many(rotor: Rotor, known: Scene) -> list[str]:
     return [f"{said} Give the scene to the command line."]
 
 
-def _parts(rotor: Rotor, folder: Path, known: Scene | None) -> dict[str, Part]:
-    """The solids of the files that a rotor names, by these names."""
-    if not isinstance(rotor, ExplicitRotor):
-        return {}
-    names = {magnet.file: f"rotor.magnets[{k}].file" for k, magnet in enumerate(rotor.magnets) if magnet.file}
-    if known is None:
-        return {name: read_part(folder / name) for name in names}
-    files = {part.file: part for part in known.parts}
-    return {name: files[_known_file(name, key, files, folder)] for name, key in names.items()}
+def _named_files(rotor: AnyRotor, folder: Path, known: Scene | None) -> dict[int | None, Path]:
+    """The files that a rotor names: those of magnets by their number, that of its map by None.
+
+    Beside a known scene a name means one of its files, which is `folder / name` or ends so. No disk is asked.
+    """
+    names: dict[int | None, str | None] = {None: rotor.field_map}
+    if isinstance(rotor, ExplicitRotor):
+        names |= {k: magnet.file for k, magnet in enumerate(rotor.magnets)}
+    found: dict[int | None, Path] = {}
+    for number, name in names.items():
+        if name and known is None:
+            found[number] = folder / name
+        elif name and known:
+            own = [known.field_map] if number is None else [part.file for part in known.parts]
+            files, end = [file for file in own if file], Path(name).parts
+            alike = [file for file in files if file == folder / name or file.parts[-len(end) :] == end]
+            if not alike:
+                key = "field_map" if number is None else f"magnets[{number}].file"
+                raise InputError(
+                    f"Input rotor.{key} must be a file of the scene that was opened first; instead received "
+                    f"{shown(name)}. Give the scene to the command line."
+                )
+            found[number] = folder / name if folder / name in alike else alike[0]
+    return found
 
 
-def _field_map(rotor: Rotor, folder: Path, known: Scene | None) -> Path | None:
-    if rotor.field_map is None or known is None:
-        return folder / rotor.field_map if rotor.field_map else None
-    return _known_file(rotor.field_map, "rotor.field_map", [known.field_map] if known.field_map else [], folder)
-
-
-def _known_file(name: str, key: str, files: Iterable[Path], folder: Path) -> Path:
-    """The one of the files that a name means: beside the scene, or by the end of its path. No disk is asked."""
-    ends = (file for file in files if file.parts[-len(Path(name).parts) :] == Path(name).parts)
-    for file in (*(file for file in files if file == folder / name), *ends):
-        return file
-    raise InputError(
-        f"Input {key} must be a file of the scene that was opened first; instead received {shown(name)}. Give the "
-        "scene to the command line."
+def _scene(table: SceneTable, paths: Mapping[int | None, Path], parts: Mapping[Path, Part]) -> Scene:
+    rotor, floater, drag = table.rotor, _floater(table.floater), table.drag
+    air = Drag.of(floater)
+    if drag and drag.linear_N_s_m is not None and drag.angular_N_m_s is not None:
+        air = Drag(drag.linear_N_s_m, drag.angular_N_m_s)
+    if isinstance(rotor, ExplicitRotor):
+        bodies = [parts[paths[k]] if magnet.file else None for k, magnet in enumerate(rotor.magnets)]
+        magnets = tuple(_magnet(*pair, rotor) for pair in zip(rotor.magnets, bodies, strict=True))
+    else:
+        magnets = _article_magnets(rotor)
+    return Scene(
+        frequency=table.frequency_hz,
+        gravity=np.array(table.gravity_m_s2),
+        rotor=magnets,
+        floater=floater,
+        plate=_plate(table.plate) if table.plate else None,
+        drag=replace(air, air=True) if drag and drag.model == "air" else air,
+        start=_start(table.start or StartTable()),
+        field_map=paths.get(None),
+        map_reading=MapReading(rotor.map_length_unit, rotor.map_field_unit, rotor.map_columns),
+        conductors=tuple(Conductor(_solid(c), c.conductivity_S_m) for c in rotor.conductors),
     )
 
 
-def _floater(table: FloaterSection) -> Floater:
+def _solid(table: Any) -> Solid:
+    """The body of a table's shape, in its place if the table has one."""
+    pose = (
+        MILLI * np.array(getattr(table, "center_mm", ORIGIN)),
+        rotation_matrix(getattr(table, "rotation_deg", ORIGIN)),
+    )
+    shape, radius = getattr(table, "shape", "cuboid"), (getattr(table, "diameter_mm", None) or 0.0) * MILLI / 2
+    if shape == "sphere":
+        return Sphere(radius, *pose)
+    if shape == "cylinder":
+        return Cylinder(radius, table.height_mm * MILLI, *pose)
+    if shape == "ring":
+        return Ring(radius, table.inner_diameter_mm * MILLI / 2, table.height_mm * MILLI, *pose)
+    return Box(np.array([table.edge_mm] * 3 if shape == "cube" else table.size_mm) * MILLI, *pose)
+
+
+def _magnet(table: MagnetTable, part: Part | None, rotor: AnyRotor) -> Magnet:
+    """One of an explicit rotor, whose conductivity and knee it has where it has none of its own."""
+    conductivity = rotor.conductivity_S_m if table.conductivity_S_m is None else table.conductivity_S_m
+    knee = table.coercivity_kA_m or rotor.coercivity_kA_m
+    along, across = table.recoil_permeability
+    material = along, across, conductivity, 1e3 * knee if knee else None
+    polarization = np.array(table.polarization_T)
+    if part is None:
+        return Magnet(_solid(table), polarization, *material)
+    turn = rotation_matrix(table.rotation_deg)
+    part = replace(part, center=MILLI * np.array(table.center_mm) - turn @ part.origin, rotation=turn)
+    body = known_shape(part) or part
+    return Magnet(body, body.rotation.T @ turn @ polarization if body is not part else polarization, *material)
+
+
+def _article_magnets(rotor: DisplacedRotor | TiltRotor) -> tuple[Magnet, ...]:
+    material = rotor.remanence_T, *rotor.recoil_permeability
+    if isinstance(rotor, TiltRotor):
+        magnets = tilted_rotor(float(np.radians(rotor.angle_deg)), _solid(rotor), *material)
+    else:
+        build = horizontal_rotor if rotor.configuration == "horizontal" else vertical_rotor
+        magnets = build(rotor.displacement_mm * MILLI, _solid(rotor), *material)
+    knee = None if rotor.coercivity_kA_m is None else 1e3 * rotor.coercivity_kA_m
+    return tuple(replace(magnet, conductivity=rotor.conductivity_S_m, coercivity=knee) for magnet in magnets)
+
+
+def _floater(table: FloaterTable) -> Floater:
     material = (table.remanence_T, table.recoil_permeability, table.density_kg_m3, table.conductivity_S_m)
-    body = solid(table)
+    body = _solid(table)
     return Floater(body.circumradius, *material, body if isinstance(body, Box | Cylinder) else None)
 
 
-def _box(size_mm: list[float], center_mm: list[float], rotation_deg: list[float]) -> Box:
-    return Box(_metres(size_mm), _metres(center_mm), rotation_matrix(rotation_deg))
-
-
-def _drag(drag: DragSection, floater: Floater) -> Drag:
-    if drag.linear_N_s_m is not None and drag.angular_N_m_s is not None:
-        return Drag(drag.linear_N_s_m, drag.angular_N_m_s)
-    return replace(Drag.of(floater), air=drag.model == "air")
-
-
-def _metres(millimetres: list[float]) -> Array:
-    return np.array(millimetres) * MILLI
-
-
-def _rotor(rotor: Rotor, parts: Mapping[str, Part]) -> tuple[Magnet, ...]:
-    if isinstance(rotor, ExplicitRotor):
-        return tuple(_magnet(magnet, rotor, parts) for magnet in rotor.magnets)
-    conductivity, knee = rotor.conductivity_S_m, _knee(rotor.coercivity_kA_m)
-    return tuple(replace(magnet, conductivity=conductivity, coercivity=knee) for magnet in _of_article(rotor))
-
-
-def _magnet(magnet: MagnetSection, rotor: ExplicitRotor, parts: Mapping[str, Part]) -> Magnet:
-    """One of an explicit rotor, whose conductivity and knee it has where it has none of its own."""
-    pose = magnet.center_mm, magnet.rotation_deg
-    along, across = magnet.recoil_permeability
-    conductivity = rotor.conductivity_S_m if magnet.conductivity_S_m is None else magnet.conductivity_S_m
-    material = along, across, conductivity, _knee(magnet.coercivity_kA_m or rotor.coercivity_kA_m)
-    polarization = np.array(magnet.polarization_T)
-    if not magnet.file:
-        return Magnet(solid(magnet, *pose), polarization, *material)
-    body = placed(parts[magnet.file], *pose)
-    known = known_shape(body)
-    if known is None:
-        return Magnet(body, polarization, *material)
-    return Magnet(known, known.rotation.T @ body.rotation @ polarization, *material)
-
-
-def _recognised(rotor: Rotor, magnets: tuple[Magnet, ...]) -> tuple[str, ...]:
-    """A sentence on each magnet whose file holds a shape that has a closed form."""
-    pairs = zip(rotor.magnets, magnets, strict=True) if isinstance(rotor, ExplicitRotor) else ()
-    return tuple(
-        f"{section.file} is a {_named(magnet.body)} and is computed as one"
-        for section, magnet in pairs
-        if section.file and not isinstance(magnet.body, Part)
-    )
-
-
-def _named(body: Solid) -> str:
-    """A shape with its size, such as `cylinder, Ø 10 × 8 mm`."""
-    name = "cuboid" if isinstance(body, Box) else type(body).__name__.lower()
-    return f"{name}, {body.described_size.removeprefix(name).strip()},"
-
-
-def _knee(coercivity: float | None) -> float | None:
-    return None if coercivity is None else 1e3 * coercivity
-
-
-def _of_article(rotor: HorizontalRotor | VerticalRotor | TiltRotor) -> tuple[Magnet, ...]:
-    along, across = rotor.recoil_permeability
-    material = rotor.remanence_T, along, across
-    if isinstance(rotor, TiltRotor):
-        return tilted_rotor(float(np.radians(rotor.angle_deg)), solid(rotor), *material)
-    build = horizontal_rotor if rotor.configuration == "horizontal" else vertical_rotor
-    return build(rotor.displacement_mm * MILLI, solid(rotor), *material)
-
-
-def _plate(plate: PlateSection) -> Plate:
-    down = plate.lowering
+def _plate(table: PlateTable) -> Plate:
+    down, box = table.lowering, _solid(table)
+    assert isinstance(box, Box)
     lowering = Lowering(down.start_s, down.speed_mm_s * MILLI, down.distance_mm * MILLI) if down else None
-    return Plate(_box(plate.size_mm, plate.center_mm, plate.rotation_deg), plate.conductivity_S_m, lowering)
+    return Plate(box, table.conductivity_S_m, lowering)
 
 
-def _start(start: StartSection | None) -> OffsetStart | AbsoluteStart:
-    if start is None or start == StartSection():
-        return OffsetStart()
+def _start(start: StartTable) -> OffsetStart | AbsoluteStart:
     if start.position_mm is None:
-        return OffsetStart(_metres(start.offset_mm or [0.0, 0.0, 0.1]))
+        return OffsetStart() if start.offset_mm is None else OffsetStart(MILLI * np.array(start.offset_mm))
     moment = np.array(start.moment or [0.0, 0.0, 1.0])
     if not 1e-100 < np.abs(moment).max() < 1e100:  # squares of its parts are no numbers
         moment = moment / np.abs(moment).max()
     return AbsoluteStart(
-        position=_metres(start.position_mm),
-        velocity=_metres(start.velocity_mm_s or [0.0, 0.0, 0.0]),
+        position=MILLI * np.array(start.position_mm),
+        velocity=MILLI * np.array(start.velocity_mm_s or ORIGIN),
         moment=moment / np.linalg.norm(moment),
-        spin=2 * np.pi * np.array(start.spin_hz or [0.0, 0.0, 0.0]),
+        spin=2 * np.pi * np.array(start.spin_hz or ORIGIN),
     )
 
 

@@ -6,30 +6,13 @@ from itertools import combinations
 from typing import Any
 
 import numpy as np
-from pydantic import BaseModel
 from pydantic_core import ErrorDetails
 
 from ..common import InputError, printable, shown
 from ..overlap import TOUCHING, apart, body_overlap, deepest_overlap_in_a_turn
-from ..scene import schema
-from ..solids import Solid
 from .contents import AbsoluteStart, Scene
+from .schema import TABLES, ExplicitRotor
 
-ROTORS: dict[str, type[BaseModel]] = {
-    "horizontal": schema.HorizontalRotor,
-    "vertical": schema.VerticalRotor,
-    "tilt": schema.TiltRotor,
-    "magnets": schema.ExplicitRotor,
-}
-TABLES: dict[str, type[BaseModel]] = {
-    "magnets": schema.MagnetSection,
-    "conductors": schema.ConductorSection,
-    "floater": schema.FloaterSection,
-    "plate": schema.PlateSection,
-    "lowering": schema.LoweringSection,
-    "drag": schema.DragSection,
-    "start": schema.StartSection,
-}
 LONGEST = 60
 """Characters of a key in a message."""
 LONGEST_SOURCE = 300
@@ -49,6 +32,7 @@ RULES = {
     "model_type": "a table",
     "model_attributes_type": "a table",
 }
+"""The kinds of error of pydantic."""
 
 
 class SceneError(InputError):
@@ -64,13 +48,25 @@ class SceneError(InputError):
         super().__init__("\n".join([*told, f"{source}: and {more} more faults."] if more else told))
 
 
-def describe_fault(detail: ErrorDetails) -> str:
-    """One fault found by the schema, as a sentence that says what to do."""
+def described_faults(details: Sequence[ErrorDetails]) -> list[str]:
+    """The faults found by the schema, as sentences that say what to do.
+
+    A mistyped key is one fault: that the key it was meant for is missing is not said beside it.
+    """
+    unknown = [detail["loc"] for detail in details if detail["type"] == "extra_forbidden"]
+    meant = {(*place[:-1], close) for place in unknown for close in _close(place)}
+    return [_described(detail) for detail in details if detail["type"] != "missing" or detail["loc"] not in meant]
+
+
+def _described(detail: ErrorDetails) -> str:
     place, kind, received = list(detail["loc"]), detail["type"], detail["input"]
-    tag = place.pop(1) if place[0] == "rotor" and len(place) > 2 else None
+    if place[0] == "rotor" and len(place) > 2:
+        del place[1]  # the tag of its kind
     key = "".join(f"[{p}]" if isinstance(p, int) else f".{_named(p)}" for p in place).removeprefix(".")
     if kind == "extra_forbidden":
-        return f"Input {key} must be a known key; {_allowed(place, tag)}."
+        close = _close(detail["loc"])
+        hint = f"did you mean `{close[0]}`?" if close else f"allowed are {', '.join(_allowed(detail['loc']))}"
+        return f"unknown key `{key}` ({hint})"
     if kind == "missing":
         return f"Input {key} must be given; instead it is missing."
     if kind.startswith("union_tag"):
@@ -79,16 +75,14 @@ def describe_fault(detail: ErrorDetails) -> str:
             "Input rotor.configuration must be one of 'horizontal', 'vertical', 'tilt' (or rotor.magnets a list of "
             f"magnets); instead received {shown(configuration)}."
         )
-    if place[-1] == "recoil_permeability" or place[-2:-1] == ["recoil_permeability"]:
-        rule = RULES.get(kind, detail["msg"]).format(**detail.get("ctx", {}))
-        if kind in ("too_short", "too_long"):
-            rule = "a number, or two: along the easy axis and across it"
-        return f"Input {key.removesuffix('[0]')} must be {rule}; instead received {shown(received)}."
-    if kind in ("too_short", "too_long") and place[-1] != "magnets":
-        return f"Input {key} must be a list of exactly 3 numbers; instead received {shown(received)}."
     if kind == "float_type" and isinstance(received, int) and not isinstance(received, bool):
         kind = "finite_number"  # no float is so large
     rule = RULES.get(kind, detail["msg"]).format(**detail.get("ctx", {}))
+    if "recoil_permeability" in place[-2:]:
+        key = key.removesuffix("[0]")
+        rule = "a number, or two: along the easy axis and across it" if kind in ("too_short", "too_long") else rule
+    elif kind in ("too_short", "too_long") and place[-1] != "magnets":
+        rule = "a list of exactly 3 numbers"
     return f"Input {key} must be {rule}; instead received {shown(received)}."
 
 
@@ -99,19 +93,16 @@ def _named(key: str) -> str:
     return key if plain else repr(key) if key.isascii() and len(key) <= LONGEST else f'"{escaped}"'
 
 
-def _allowed(place: list[Any], tag: Any) -> str:
-    """The keys allowed beside an unknown one, the likeliest first."""
-    names = [p for p in place[:-1] if isinstance(p, str)]
-    if not names:
-        table: type[BaseModel] = schema.SceneSection
-    elif names[-1] == "rotor":
-        table = ROTORS[tag]
-    else:
-        table = TABLES[names[-1]]
-    keys = list(table.model_fields)
-    close = difflib.get_close_matches(str(place[-1])[:LONGEST], keys, n=1)
-    hint = f"did you mean {close[0]}? " if close else ""
-    return f"{hint}allowed are {', '.join(keys)}"
+def _allowed(place: Sequence[Any]) -> list[str]:
+    """The keys allowed beside the one at a place of pydantic's."""
+    if len(place) == 3 and place[:2] == ("rotor", "magnets"):
+        return list(ExplicitRotor.model_fields)
+    return list(TABLES[next((p for p in reversed(place[:-1]) if isinstance(p, str)), "")].model_fields)
+
+
+def _close(place: Sequence[Any]) -> list[str]:
+    """The key that an unknown one was likely meant for, if there is one."""
+    return difflib.get_close_matches(str(place[-1])[:LONGEST], _allowed(place), n=1)
 
 
 def overlap_faults(scene: Scene) -> list[str]:
@@ -119,42 +110,31 @@ def overlap_faults(scene: Scene) -> list[str]:
 
     The plate is checked against the rotor over a whole turn; touching is allowed.
     """
-    bodies = named_bodies(scene)
+    bodies = [(f"magnet {i}", magnet.body) for i, magnet in enumerate(scene.rotor, 1)]
+    bodies += [(f"conductor {i}", part.body) for i, part in enumerate(scene.conductors, 1)]
     faults = [
         f"Input rotor must have magnets and conductors that do not overlap; instead {first} and {second} overlap by "
         f"{depth * 1e3:.4g} mm; move them apart by as much."
         for (first, one), (second, other) in combinations(bodies, 2)
         if not apart(one, other) and (depth := body_overlap(one, other)) > TOUCHING
     ]
-    if scene.plate:
-        for name, body in bodies:
-            depth = deepest_overlap_in_a_turn(body, scene.plate.box)
-            if depth > TOUCHING:
-                faults.append(
-                    f"Input plate must stay clear of the turning rotor; instead it overlaps {name} by "
-                    f"{depth * 1e3:.4g} mm; move the plate away or make it thinner."
-                )
-    if isinstance(scene.start, AbsoluteStart):
-        faults += _start_overlaps(scene, scene.start)
+    for name, body in bodies if scene.plate else ():
+        assert scene.plate is not None
+        depth = deepest_overlap_in_a_turn(body, scene.plate.box)
+        if depth > TOUCHING:
+            faults.append(
+                f"Input plate must stay clear of the turning rotor; instead it overlaps {name} by "
+                f"{depth * 1e3:.4g} mm; move the plate away or make it thinner."
+            )
+    if isinstance(start := scene.start, AbsoluteStart):
+        floater = scene.floater.placed(start.position, start.moment / np.linalg.norm(start.moment))
+        obstacles = [(f"rotor {name}", body) for name, body in bodies]
+        obstacles += [("the plate", scene.plate.box)] if scene.plate else []
+        place = ", ".join(f"{c * 1e3:g}" for c in start.position)
+        faults += [
+            f"Input start.position_mm must leave the floater clear of all bodies; instead received [{place}], where it "
+            f"overlaps {name} by {depth * 1e3:.4g} mm."
+            for name, body in obstacles
+            if (depth := body_overlap(body, floater)) > TOUCHING
+        ]
     return faults
-
-
-def named_bodies(scene: Scene) -> list[tuple[str, Solid]]:
-    """Magnets and conductors with the words that messages have for them."""
-    magnets = [(f"magnet {i + 1}", magnet.body) for i, magnet in enumerate(scene.rotor)]
-    return [*magnets, *((f"conductor {i + 1}", part.body) for i, part in enumerate(scene.conductors))]
-
-
-def _start_overlaps(scene: Scene, start: AbsoluteStart) -> list[str]:
-    bodies = [(f"rotor {name}", body) for name, body in named_bodies(scene)]
-    if scene.plate:
-        bodies.append(("the plate", scene.plate.box))
-    place = ", ".join(f"{c * 1e3:g}" for c in start.position)
-    floater = scene.floater.placed(start.position, start.moment / np.linalg.norm(start.moment))
-    depths = [(name, body_overlap(box, floater)) for name, box in bodies]
-    return [
-        f"Input start.position_mm must leave the floater clear of all bodies; instead received [{place}], where it "
-        f"overlaps {name} by {depth * 1e3:.4g} mm."
-        for name, depth in depths
-        if depth > TOUCHING
-    ]

@@ -1,15 +1,9 @@
-"""The scene file's keys, types and ranges; every key carries its unit."""
+"""The scene file's keys, types and ranges, and the rules between keys; every key carries its unit."""
 
-from collections.abc import Mapping, Sequence
-from dataclasses import replace
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, TypeVar
 
-import numpy as np
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Discriminator, Field, Tag
 from pydantic_core import PydanticCustomError
-
-from ..shapes import Box, Cylinder, Ring, Sphere, rotation_matrix
-from ..solids import Part, Solid
 
 
 def _zero_or(least: float) -> AfterValidator:
@@ -24,6 +18,9 @@ def _zero_or(least: float) -> AfterValidator:
     return AfterValidator(checked)
 
 
+Entry = TypeVar("Entry")
+Three = Annotated[list[Entry], Field(min_length=3, max_length=3)]
+Name = Annotated[str, Field(min_length=1)]
 Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]
 NotNegative = Annotated[Number, Field(ge=0.0)]
 Positive = Annotated[Number, Field(gt=0.0)]
@@ -37,75 +34,76 @@ Conductivity = Annotated[NotNegative, Field(le=1e9), _zero_or(1e-3)]
 Metal = Annotated[Number, Field(ge=1e-3, le=1e9)]
 Coercivity = Annotated[Positive, Field(ge=1e-6, le=1e5)]
 Brake = Annotated[NotNegative, Field(le=1e6), _zero_or(1e-30)]
-Acceleration = Annotated[Number, Field(ge=-1e6, le=1e6)]
 Speed = Annotated[Number, Field(ge=-1e9, le=1e9)]
-Turns = Annotated[Number, Field(ge=-1e6, le=1e6)]
-Vector = Annotated[list[Number], Field(min_length=3, max_length=3)]
-Sizes = Annotated[list[Length], Field(min_length=3, max_length=3)]
-Coordinates = Annotated[list[Coordinate], Field(min_length=3, max_length=3)]
-Angles = Annotated[list[Angle], Field(min_length=3, max_length=3)]
-Polarizations = Annotated[list[Polarization], Field(min_length=3, max_length=3), _zero_or(1e-12)]
 RECOIL_PERMEABILITY = 1.05
 """Default: sintered NdFeB."""
-
-
-def _both_axes(value: Any) -> Any:
-    """One permeability serves along and across the easy axis."""
-    return value if isinstance(value, list) else [value] * 2
-
-
 MagnetPermeability = Annotated[
-    list[Permeability], Field(min_length=2, max_length=2), BeforeValidator(_both_axes, json_schema_input_type=float)
+    list[Permeability],
+    Field(min_length=2, max_length=2),
+    BeforeValidator(lambda value: value if isinstance(value, list) else [value] * 2, json_schema_input_type=float),
 ]
 """Along the easy axis, and across it; a single number for both."""
-
-
-class _Table(BaseModel):
-    model_config = ConfigDict(frozen=True, extra="forbid")
-
-
-class ShapeSection(_Table):
-    """The keys of a body's shape; which of them belong to it, `SIZES` says."""
-
-    shape: Literal["cuboid", "cylinder", "ring", "sphere"] = "cuboid"
-    size_mm: Sizes | None = None
-    diameter_mm: Length | None = None
-    inner_diameter_mm: Length | None = None
-    height_mm: Length | None = None
-
-
-SIZES = {
+SIZES: dict[str, tuple[str, ...]] = {
+    "cube": ("edge_mm",),
     "cuboid": ("size_mm",),
     "cylinder": ("diameter_mm", "height_mm"),
     "ring": ("diameter_mm", "inner_diameter_mm", "height_mm"),
     "sphere": ("diameter_mm",),
 }
 """The keys of every shape; its axis, where it has one, is along the body's z."""
+SIZE_KEYS = ("size_mm", "edge_mm", "diameter_mm", "inner_diameter_mm", "height_mm")
 
 
-class ConductorSection(_Table):
-    """A piece of metal that turns with the rotor: a cuboid, or a cylinder with its axis along the body's z."""
+class Table(BaseModel):
+    """A table of the scene file."""
 
-    shape: Literal["cuboid", "cylinder"] = "cuboid"
-    size_mm: Sizes | None = None
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+
+class _Placed(Table):
+    """A body in a place, with the keys of its shape."""
+
+    size_mm: Three[Length] | None = None
     diameter_mm: Length | None = None
     height_mm: Length | None = None
-    center_mm: Coordinates
-    rotation_deg: Angles = [0.0, 0.0, 0.0]
+    center_mm: Three[Coordinate]
+    rotation_deg: Three[Angle] = [0.0, 0.0, 0.0]
+
+
+class ConductorTable(_Placed):
+    """A piece of metal that turns with the rotor."""
+
+    shape: Literal["cuboid", "cylinder"] = "cuboid"
     conductivity_S_m: Metal
 
 
-class _AnyRotor(_Table):
-    field_map: Annotated[str, Field(min_length=1)] | None = None
-    map_length_unit: Literal["m", "cm", "mm", "um", "in"] | None = None
-    map_field_unit: Literal["T", "mT", "uT", "nT", "G", "mG", "kG"] | None = None
-    map_columns: Annotated[str, Field(min_length=1)] | None = None
+class MagnetTable(_Placed):
+    """One magnet of an explicit rotor; its polarisation is along the body's axes and turns with it."""
+
+    shape: Literal["cuboid", "cylinder", "ring", "sphere"] = "cuboid"
+    inner_diameter_mm: Length | None = None
+    file: Name | None = None
+    polarization_T: Annotated[Three[Polarization], _zero_or(1e-12)]
+    recoil_permeability: MagnetPermeability = [RECOIL_PERMEABILITY, RECOIL_PERMEABILITY]
     conductivity_S_m: Conductivity | None = None
     coercivity_kA_m: Coercivity | None = None
-    conductors: list[ConductorSection] = []
 
 
-class _ArticleRotor(_AnyRotor):
+class AnyRotor(Table):
+    """What every rotor may have."""
+
+    field_map: Name | None = None
+    map_length_unit: Literal["m", "cm", "mm", "um", "in"] | None = None
+    map_field_unit: Literal["T", "mT", "uT", "nT", "G", "mG", "kG"] | None = None
+    map_columns: Name | None = None
+    conductivity_S_m: Conductivity | None = None
+    coercivity_kA_m: Coercivity | None = None
+    conductors: list[ConductorTable] = []
+
+
+class ArticleRotor(AnyRotor):
+    """One or two cubes (or cylinders, or spheres) of the article's rotors."""
+
     shape: Literal["cube", "cylinder", "sphere"] = "cube"
     edge_mm: Length | None = None
     diameter_mm: Length | None = None
@@ -114,67 +112,38 @@ class _ArticleRotor(_AnyRotor):
     recoil_permeability: MagnetPermeability = [RECOIL_PERMEABILITY, RECOIL_PERMEABILITY]
 
 
-class HorizontalRotor(_ArticleRotor):
-    """One cube (or cylinder, or sphere), displaced from the axis."""
+class DisplacedRotor(ArticleRotor):
+    """One cube beside the axis, or two, the upper magnetised along the axis."""
 
-    configuration: Literal["horizontal"]
+    configuration: Literal["horizontal", "vertical"]
     displacement_mm: Annotated[NotNegative, Field(le=1e6)]
 
 
-class VerticalRotor(_ArticleRotor):
-    """Two cubes (or cylinders, or spheres), the upper magnetised along the axis."""
-
-    configuration: Literal["vertical"]
-    displacement_mm: Annotated[NotNegative, Field(le=1e6)]
-
-
-class TiltRotor(_ArticleRotor):
-    """One cube (or cylinder, or sphere), turned about y."""
+class TiltRotor(ArticleRotor):
+    """One cube, turned about y."""
 
     configuration: Literal["tilt"]
     angle_deg: Annotated[Number, Field(ge=-90.0, le=90.0)]
 
 
-class MagnetSection(ShapeSection):
-    """One magnet of an explicit rotor; its polarisation is along the body's axes and turns with it."""
-
-    file: Annotated[str, Field(min_length=1)] | None = None
-    center_mm: Coordinates
-    rotation_deg: Angles = [0.0, 0.0, 0.0]
-    polarization_T: Polarizations
-    recoil_permeability: MagnetPermeability = [RECOIL_PERMEABILITY, RECOIL_PERMEABILITY]
-    conductivity_S_m: Conductivity | None = None
-    coercivity_kA_m: Coercivity | None = None
-
-
-class ExplicitRotor(_AnyRotor):
+class ExplicitRotor(AnyRotor):
     """Any set of magnets."""
 
-    magnets: Annotated[list[MagnetSection], Field(min_length=1)]
+    magnets: Annotated[list[MagnetTable], Field(min_length=1)]
 
 
-def rotor_kind(rotor: Any) -> str | None:
+def _rotor_kind(rotor: Any) -> str | None:
     """Which of the rotor tables a `[rotor]` table is."""
-    if not isinstance(rotor, dict):
-        return None
-    configuration = rotor.get("configuration")
-    return "magnets" if "magnets" in rotor else configuration if isinstance(configuration, str) else None
+    table = dict(rotor) if isinstance(rotor, dict | BaseModel) else {}
+    configuration = table.get("configuration")
+    return "magnets" if "magnets" in table else configuration if isinstance(configuration, str) else None
 
 
-Rotor = Annotated[
-    Annotated[HorizontalRotor, Tag("horizontal")]
-    | Annotated[VerticalRotor, Tag("vertical")]
-    | Annotated[TiltRotor, Tag("tilt")]
-    | Annotated[ExplicitRotor, Tag("magnets")],
-    Discriminator(rotor_kind),
-]
-
-
-class FloaterSection(_Table):
+class FloaterTable(Table):
     """The floating magnet: a sphere, or a cuboid or cylinder that is polarised along the body's z."""
 
     shape: Literal["sphere", "cuboid", "cylinder"] = "sphere"
-    size_mm: Sizes | None = None
+    size_mm: Three[Length] | None = None
     diameter_mm: Length | None = None
     height_mm: Length | None = None
     remanence_T: Remanence
@@ -183,7 +152,7 @@ class FloaterSection(_Table):
     conductivity_S_m: Conductivity | None = None
 
 
-class LoweringSection(_Table):
+class LoweringTable(Table):
     """The plate's way down."""
 
     start_s: Annotated[NotNegative, Field(le=1e9)]
@@ -191,17 +160,17 @@ class LoweringSection(_Table):
     distance_mm: Annotated[NotNegative, Field(le=1e6), _zero_or(1e-6)]
 
 
-class PlateSection(_Table):
+class PlateTable(Table):
     """The conducting plate."""
 
-    size_mm: Sizes
-    center_mm: Coordinates
-    rotation_deg: Angles = [0.0, 0.0, 0.0]
+    size_mm: Three[Length]
+    center_mm: Three[Coordinate]
+    rotation_deg: Three[Angle] = [0.0, 0.0, 0.0]
     conductivity_S_m: Metal
-    lowering: LoweringSection | None = None
+    lowering: LoweringTable | None = None
 
 
-class DragSection(_Table):
+class DragTable(Table):
     """Drag on the floater: of air by a model, or numbers."""
 
     model: Literal["stokes", "air"] | None = None
@@ -209,46 +178,109 @@ class DragSection(_Table):
     angular_N_m_s: Brake | None = None
 
 
-class StartSection(_Table):
+class StartTable(Table):
     """Where a simulation begins: an offset from the stable equilibrium, or absolutely."""
 
-    offset_mm: Coordinates | None = None
-    position_mm: Coordinates | None = None
-    velocity_mm_s: Annotated[list[Speed], Field(min_length=3, max_length=3)] | None = None
-    moment: Vector | None = None
-    spin_hz: Annotated[list[Turns], Field(min_length=3, max_length=3)] | None = None
+    offset_mm: Three[Coordinate] | None = None
+    position_mm: Three[Coordinate] | None = None
+    velocity_mm_s: Three[Speed] | None = None
+    moment: Three[Number] | None = None
+    spin_hz: Three[Coordinate] | None = None
 
 
-class SceneSection(_Table):
+class SceneTable(Table):
     """The whole file."""
 
     frequency_hz: Annotated[NotNegative, Field(le=1e6), _zero_or(1e-3)]
-    gravity_m_s2: Annotated[list[Acceleration], Field(min_length=3, max_length=3)] = [0.0, 0.0, -9.81]
-    rotor: Rotor
-    floater: FloaterSection
-    plate: PlateSection | None = None
-    drag: DragSection | None = None
-    start: StartSection | None = None
+    gravity_m_s2: Three[Coordinate] = [0.0, 0.0, -9.81]
+    rotor: Annotated[
+        Annotated[DisplacedRotor, Tag("horizontal")]
+        | Annotated[DisplacedRotor, Tag("vertical")]
+        | Annotated[TiltRotor, Tag("tilt")]
+        | Annotated[ExplicitRotor, Tag("magnets")],
+        Discriminator(_rotor_kind),
+    ]
+    floater: FloaterTable
+    plate: PlateTable | None = None
+    drag: DragTable | None = None
+    start: StartTable | None = None
 
 
-MILLI = 1e-3
-ARTICLE_SIZES = {"cube": ("edge_mm",), **{shape: SIZES[shape] for shape in ("cylinder", "sphere")}}
-"""The keys of every shape that may stand for the cubes of a rotor of the article."""
-FLOATER_SIZES = {shape: SIZES[shape] for shape in ("sphere", "cuboid", "cylinder")}
-"""The keys of every shape of a floater."""
-KEYS = ("size_mm", "edge_mm", "diameter_mm", "inner_diameter_mm", "height_mm")
+TABLES: dict[str, type[Table]] = {
+    "": SceneTable,
+    "horizontal": DisplacedRotor,
+    "vertical": DisplacedRotor,
+    "tilt": TiltRotor,
+    "magnets": MagnetTable,
+    "conductors": ConductorTable,
+    "floater": FloaterTable,
+    "plate": PlateTable,
+    "lowering": LoweringTable,
+    "drag": DragTable,
+    "start": StartTable,
+}
+"""By their keys; rotors by their configuration, but for that of `rotor.magnets`."""
 
 
-def shape_faults(place: str, table: Any, sizes: Mapping[str, tuple[str, ...]]) -> list[str]:
-    """What is wrong with the keys of a shape at a place of the scene file."""
+def key_faults(table: SceneTable) -> list[str]:
+    """One sentence for each rule between keys that is broken."""
+    rotor, floater, faults = table.rotor, table.floater, _start_faults(table.start or StartTable())
+    if drag := table.drag:
+        given = {key: getattr(drag, key) is not None for key in ("linear_N_s_m", "angular_N_m_s")}
+        faults += [
+            f"Input drag.{key} must be left out beside drag.model; instead received both."
+            if drag.model
+            else f"Input drag.{key} must be given; instead it is missing."
+            for key, there in given.items()
+            if there == bool(drag.model)
+        ]
+    if isinstance(rotor, ExplicitRotor):
+        for k, magnet in enumerate(rotor.magnets):
+            faults += _shape_faults(f"rotor.magnets[{k}]", magnet)
+    else:
+        faults += _shape_faults("rotor", rotor)
+    for k, conductor in enumerate(rotor.conductors):
+        faults += _shape_faults(f"rotor.conductors[{k}]", conductor)
+    faults += _shape_faults("floater", floater)
+    if floater.shape != "sphere" and floater.conductivity_S_m is not None:
+        faults.append(
+            "Input floater.conductivity_S_m must be left out where the floater is no sphere, as its currents are not "
+            f"known then; instead received {floater.conductivity_S_m:g}."
+        )
+    if floater.shape != "sphere" and drag and drag.model == "air":
+        faults.append(
+            'Input drag.model must be "stokes", or linear_N_s_m and angular_N_m_s be given, where the floater is no '
+            'sphere; instead received "air".'
+        )
+    if rotor.field_map is None:
+        alone = [k for k in ("map_length_unit", "map_field_unit", "map_columns") if getattr(rotor, k) is not None]
+        faults += [f"Input rotor.{key} must come with rotor.field_map; instead received it alone." for key in alone]
+    return faults
+
+
+def _start_faults(start: StartTable) -> list[str]:
+    faults = []
+    if start.offset_mm is not None and start.position_mm is not None:
+        faults.append("Input start must have offset_mm or position_mm; instead received both.")
+    if start.position_mm is None:
+        alone = [key for key in ("velocity_mm_s", "moment", "spin_hz") if getattr(start, key) is not None]
+        faults += [f"Input start.{key} must come with start.position_mm; instead received it alone." for key in alone]
+    if start.moment is not None and not any(start.moment):
+        faults.append(f"Input start.moment must be a direction, not zero; instead received {start.moment}.")
+    return faults
+
+
+def _shape_faults(place: str, table: Any) -> list[str]:
+    """What is wrong with the sizes of a shape at a place of the scene file."""
+    given = [key for key in SIZE_KEYS if getattr(table, key, None) is not None]
     if getattr(table, "file", None):
-        sizes = {"cuboid": ()}
-        if table.shape not in sizes:
+        if table.shape != "cuboid":
             return [f"Input {place}.shape must be left out beside file; instead received {table.shape!r}."]
-    given = tuple(key for key in KEYS if getattr(table, key, None) is not None)
-    wanted = sizes[table.shape]
-    if set(given) != set(wanted) and not wanted:
-        return [f"Input {place} must have no size beside file; instead received {' and '.join(given)}."]
+        told = " and ".join(given)
+        return [f"Input {place} must have no size beside file; instead received {told}."] if given else []
+    wanted = SIZES[table.shape]
+    if place == "floater" and not given and table.shape == "sphere":
+        return ["Input floater.diameter_mm must be given; instead it is missing."]
     if set(given) != set(wanted):
         more = " and ".join(key for key in given if key not in wanted)
         return [
@@ -261,109 +293,3 @@ def shape_faults(place: str, table: Any, sizes: Mapping[str, tuple[str, ...]]) -
             f"instead received {table.inner_diameter_mm:g}."
         ]
     return []
-
-
-def solid(
-    table: Any, center_mm: Sequence[float] = (0.0, 0.0, 0.0), rotation_deg: Sequence[float] = (0.0, 0.0, 0.0)
-) -> Solid:
-    """The body of keys without faults, in its place."""
-    pose = np.array(center_mm) * MILLI, rotation_matrix(rotation_deg)
-    if table.shape in ("cuboid", "cube"):
-        return Box(np.array(table.size_mm if table.shape == "cuboid" else [table.edge_mm] * 3) * MILLI, *pose)
-    radius = table.diameter_mm * MILLI / 2
-    if table.shape == "sphere":
-        return Sphere(radius, *pose)
-    if table.shape == "cylinder":
-        return Cylinder(radius, table.height_mm * MILLI, *pose)
-    return Ring(radius, table.inner_diameter_mm * MILLI / 2, table.height_mm * MILLI, *pose)
-
-
-def placed(part: Part, center_mm: Sequence[float], rotation_deg: Sequence[float]) -> Part:
-    """The solid of a STEP file, its own origin in a place."""
-    turn = rotation_matrix(rotation_deg)
-    return replace(part, center=np.array(center_mm) * MILLI - turn @ part.origin, rotation=turn)
-
-
-def shape_keys(body: Solid) -> dict[str, Any]:
-    """The keys of a body's shape in SI units of the body, but for its pose; a cuboid's is left out."""
-    if isinstance(body, Box):
-        return {"size_mm": body.size}
-    if isinstance(body, Part):
-        return {"file": str(body.file)}
-    if isinstance(body, Sphere):
-        return {"shape": "sphere", "diameter_mm": 2 * body.radius}
-    known: dict[str, Any] = {"diameter_mm": 2 * body.radius, "height_mm": body.height}
-    if isinstance(body, Ring):
-        return {"shape": "ring", "inner_diameter_mm": 2 * body.inner_radius, **known}
-    return {"shape": "cylinder", **known}
-
-
-def key_faults(table: SceneSection) -> list[str]:
-    """One sentence for each rule that is broken."""
-    faults = _start_faults(table.start) + _drag_faults(table.drag) + _shape_faults(table.rotor) + _floater_faults(table)
-    if table.rotor.field_map is None:
-        alone = [k for k in ("map_length_unit", "map_field_unit", "map_columns") if getattr(table.rotor, k) is not None]
-        faults += [f"Input rotor.{key} must come with rotor.field_map; instead received it alone." for key in alone]
-    return faults
-
-
-def _start_faults(start: StartSection | None) -> list[str]:
-    """Rules between the keys of `[start]`."""
-    if start is None:
-        return []
-    absolute = {key: getattr(start, key) for key in ("velocity_mm_s", "moment", "spin_hz")}
-    faults = []
-    if start.offset_mm is not None and start.position_mm is not None:
-        faults.append("Input start must have offset_mm or position_mm; instead received both.")
-    if start.position_mm is None:
-        faults += [
-            f"Input start.{key} must come with start.position_mm; instead received it alone."
-            for key, value in absolute.items()
-            if value is not None
-        ]
-    if start.moment is not None and not any(start.moment):
-        faults.append(f"Input start.moment must be a direction, not zero; instead received {start.moment}.")
-    return faults
-
-
-def _drag_faults(drag: DragSection | None) -> list[str]:
-    """A model, or both numbers."""
-    if drag is None:
-        return []
-    numbers = {key: getattr(drag, key) for key in ("linear_N_s_m", "angular_N_m_s")}
-    given = [key for key, value in numbers.items() if value is not None]
-    if drag.model is not None:
-        return [f"Input drag.{key} must be left out beside drag.model; instead received both." for key in given]
-    return [f"Input drag.{key} must be given; instead it is missing." for key in numbers if key not in given]
-
-
-def _shape_faults(rotor: Rotor) -> list[str]:
-    """Which sizes belong to which shape."""
-    faults = []
-    if isinstance(rotor, ExplicitRotor):
-        for k, magnet in enumerate(rotor.magnets):
-            faults += shape_faults(f"rotor.magnets[{k}]", magnet, SIZES)
-    else:
-        faults += shape_faults("rotor", rotor, ARTICLE_SIZES)
-    for k, conductor in enumerate(rotor.conductors):
-        faults += shape_faults(f"rotor.conductors[{k}]", conductor, SIZES)
-    return faults
-
-
-def _floater_faults(table: SceneSection) -> list[str]:
-    """The sizes of the floater's shape, and what only a sphere can have."""
-    floater, faults = table.floater, shape_faults("floater", table.floater, FLOATER_SIZES)
-    if floater.shape == "sphere":
-        missing = floater.diameter_mm is None and floater.size_mm is None and floater.height_mm is None
-        return ["Input floater.diameter_mm must be given; instead it is missing."] if missing else faults
-    if floater.conductivity_S_m is not None:
-        faults.append(
-            "Input floater.conductivity_S_m must be left out where the floater is no sphere, as its currents are not "
-            f"known then; instead received {floater.conductivity_S_m:g}."
-        )
-    if table.drag and table.drag.model == "air":
-        faults.append(
-            'Input drag.model must be "stokes", or linear_N_s_m and angular_N_m_s be given, where the floater is no '
-            'sphere; instead received "air".'
-        )
-    return faults

@@ -30,7 +30,7 @@ from ...dynamics.motion.state import Parameter, Scales
 from ...fem.rotor.table import ROUND_OFF, RotorTable
 from ...fem.rotor_metal import check_slow_enough, pieces_of
 from ...geometry.common import Array, SpinlevError
-from ...geometry.scene.files import scene_keys
+from ...geometry.scene.files import canonical_keys
 from ..levitation import Levitation
 from .state import MEASURES, QUICK, ROTOR_SIZES, PageState, Shown, content, field_lines, shown
 
@@ -434,7 +434,7 @@ def has_map(state: PageState) -> bool:
 
 def map_key(state: PageState) -> str:
     """All that a map depends on: neither its own axes, nor the plate, nor where a flight begins."""
-    whole = scene_keys(replace(state.scene, text=""))  # with every key, whatever the scene's file left out
+    whole = canonical_keys(state.scene)
     keys = {key: value for key, value in whole.items() if key not in ("frequency_hz", "plate", "start")}
     open_ones = ("displacement_mm", "angle_deg")
     keys["rotor"] = {key: value for key, value in keys["rotor"].items() if key not in open_ones}

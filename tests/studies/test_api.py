@@ -65,7 +65,7 @@ def test_no_value_of_another_kind_goes_further_than_a_sentence(tmp_path, value):
         with pytest.raises(sl.InputError) as error:
             call()
         said = str(error.value)
-        assert " must be " in said
+        assert " must be " in said or "unknown key" in said
         assert len(said) < 700
         assert said.isprintable()
     assert not list(tmp_path.iterdir())
@@ -206,7 +206,7 @@ def test_a_sweep_over_a_parameter_and_a_model(tmp_path):
         ({}, "at least one key"),
         ({"model": ["magic"]}, "Input model must be one of dipole, cuboid, fem, map, auto; instead received 'magic'."),
         ({"model": [1.0]}, "Input model must be varied over names"),
-        ({"frequency": [110.0]}, "did you mean frequency_hz?"),
+        ({"frequency": [110.0]}, "did you mean `frequency_hz`?"),
         ({"frequency_hz": [110.0, float("nan")]}, "finite numbers"),
         ({"frequency_hz": ["110"]}, "finite numbers"),
         ({"frequency_hz": [110.0, 110.0]}, "each value once"),

@@ -93,12 +93,12 @@ def test_a_change_takes_the_place_of_the_file_s_number():
 @pytest.mark.parametrize(
     ("key", "message"),
     [
-        ("rotor.displacement", "rotor.displacement must be a known key"),
+        ("rotor.displacement", "unknown key `rotor.displacement` "),
         ("plate.center_mm.3", "must be a key inside the tables"),
         ("plates.center_mm.0", "must be a key inside the tables"),
         ("rotor.magnets.x.size_mm", "must be a key inside the tables"),
         ("frequency_hz.0", "must be a key inside the tables"),
-        ("", "must be a known key"),
+        ("", "unknown key `''`"),
     ],
 )
 def test_a_change_that_no_key_takes(key, message):

@@ -24,7 +24,7 @@ from spinlev.studies.cli.options import (
 
 GOOD = HORIZONTAL.read_text()
 NUMBERS = dict(re.findall(r"^(\w+) = (-?[\d.e+-]+)", GOOD, re.MULTILINE))
-GRAMMAR = re.compile(r"(\S+: )?Input .+ must .+; .+", re.DOTALL)
+GRAMMAR = re.compile(r"(\S+: )?(Input .+ must .+; |unknown key `).+", re.DOTALL)
 ANY_TEXT = st.text(max_size=40)
 ANY_FLOAT = st.floats(allow_nan=True, allow_infinity=True)
 few = settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])

@@ -61,7 +61,10 @@ def test_magnets_that_conduct_differently_are_written_one_by_one():
         ({"conductors": [SHAFT | {"size_mm": [1.0, 1.0, 1.0]}]}, "must have diameter_mm and height_mm"),
         ({"conductors": [SHAFT | {"shape": "cuboid"}]}, "must have size_mm, as the shape is 'cuboid'"),
         ({"conductors": [SHAFT | {"shape": "ring"}]}, "shape must be 'cuboid' or 'cylinder'"),
-        ({"conductors": [SHAFT | {"heigth_mm": 1.0}]}, "did you mean height_mm?"),
+        (
+            {"conductors": [SHAFT | {"heigth_mm": 1.0}]},
+            "unknown key `rotor.conductors[0].heigth_mm` (did you mean `height_mm`?)",
+        ),
     ],
 )
 def test_what_cannot_be_is_said(rotor, message):

@@ -88,12 +88,11 @@ def test_all_faults_are_listed_at_once():
     text = GOOD.replace("frequency_hz", "frequency").replace("edge_mm = 10.0", "edge_mm = -10.0")
     text = text.replace("conductivity_S_m = 3.5e7", "conductivity_S_m = nan").replace("[35.0, 0.0, -21.0]", "[1.0]")
     found = faults(text)
-    assert len(found) == 5
-    assert "Input frequency_hz must be given; instead it is missing." in found
+    assert len(found) == 4
     assert "Input rotor.edge_mm must be at least 0.001; instead received -10.0." in found
     assert "Input plate.conductivity_S_m must be a finite number; instead received nan." in found
     assert "Input plate.center_mm must be a list of exactly 3 numbers; instead received [1.0]." in found
-    assert any("did you mean frequency_hz?" in fault for fault in found)
+    assert "unknown key `frequency` (did you mean `frequency_hz`?)" in found
 
 
 @pytest.mark.parametrize(
@@ -109,7 +108,7 @@ def test_all_faults_are_listed_at_once():
             "recoil_permeability[1] must be at least 1",
         ),
         (("recoil_permeability = 1.05", "recoil_permeability = [1.0, 1.0, 1.0]"), "along the easy axis and across it"),
-        (("displacement_mm", "angle_deg"), "rotor.angle_deg must be a known key"),
+        (("displacement_mm", "angle_deg"), "unknown key `rotor.angle_deg` (allowed are "),
         (("density_kg_m3 = 7500.0", ""), "floater.density_kg_m3 must be given"),
         (("conductivity_S_m = 3.5e7", "conductivity_S_m = 0.0"), "at least 0.001"),
         (("linear_N_s_m = 2.2e-6", "linear_N_s_m = -1"), "drag.linear_N_s_m must be at least 0"),
@@ -180,10 +179,10 @@ def test_values_that_break_parsers_are_one_short_sentence(value, said):
     [
         (".".join(["a"] * 20_000) + " = 1", "Input key must have fewer than 20 parts"),
         ("[" + " . ".join(['"a\\"."'] * 20_000) + "]", "Input key must have fewer than 20 parts"),
-        ("'" + "k" * 100_000 + "' = 1", '"' + "k" * 60 + '..." must be a known key'),
-        ('"fr\u0435quency_hz" = 1', r'drag."fr\u0435quency_hz" must be a known key'),
-        (r'"\u001b[2J" = 1', r"drag.'\x1b[2J' must be a known key"),
-        ('"" = 1', "drag.'' must be a known key"),
+        ("'" + "k" * 100_000 + "' = 1", '"' + "k" * 60 + '..."` (allowed are'),
+        ('"fr\u0435quency_hz" = 1', r'unknown key `drag."fr\u0435quency_hz"`'),
+        (r'"\u001b[2J" = 1', r"unknown key `drag.'\x1b[2J'`"),
+        ('"" = 1', "unknown key `drag.''`"),
     ],
     ids=["dots", "quoted dots", "long", "Cyrillic", "control", "empty"],
 )

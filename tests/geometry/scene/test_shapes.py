@@ -89,7 +89,7 @@ def test_an_article_rotor_of_spheres_turns_only_their_polarisation():
                     {**DISC, "center_mm": [0, 0, 9.0], "conductivity_S_m": 1e6, "polarization_T": [1.0, 0.0, 0.0]}
                 ],
             ),
-            "conductors[0].polarization_T must be a known key",
+            "unknown key `rotor.conductors[0].polarization_T`",
         ),
     ],
 )
