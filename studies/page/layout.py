@@ -1,14 +1,13 @@
-"""The widgets and plots of a page, and how they show what they are given."""
+"""The widgets and plots of a page, and how they show what they are given; lengths in mm."""
 
 from __future__ import annotations
 
 import html
 import json
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from bokeh.events import PanEnd, PanStart
 from bokeh.models import (
     Button,
     Column,
@@ -16,19 +15,23 @@ from bokeh.models import (
     CustomJS,
     Div,
     FileInput,
+    LinearColorMapper,
     Model,
+    PointDrawTool,
     RadioButtonGroup,
+    Range1d,
     Select,
     Slider,
     Spinner,
 )
+from bokeh.plotting import figure
 
-from .plots import ROLLING, MapPlot, RunningPlot, SideView
-from .processes import Crew
-from .state import Control, PageState, Shown
-from .work import Frame, fly
+from ...geometry.common import Array
+from ...geometry.scene.contents import Scene
+from ..figures.view import SQUARES, Surface, arrow, near_plate, triangles
+from .state import Control, PageState
+from .work import Regions, Shown
 
-SPEEDS = (1.0, 0.1, 0.01, 0.001)
 FIELDS = [
     ("dipole", "Field: point dipole"),
     ("cuboid", "Field: closed form (μr = 1)"),
@@ -50,6 +53,15 @@ td:nth-child(7) { white-space: normal; min-width: 6em; }
 MESSAGE = "div { color: #8f1d1d; background: #fbe9e7; padding: 6px 10px; border-radius: 4px; white-space: pre-wrap; }"
 HEADLINE = "div { font-size: 16px; font-weight: 600; }"
 WIDE: dict[str, Any] = {"sizing_mode": "stretch_width"}
+PLOT: dict[str, Any] = {"tools": "", "toolbar_location": None}
+MAGNET, METAL, NORTH, BALL = "#434C5E", "#B08D57", "#D55E00", "#9AA5B1"
+REGION_COLORS = ("#FFFFFF", "#D8DEE9", "#56B4E9")
+"""Where nothing levitates, only unstably, and stably."""
+LOW, HIGH, SIDE, TALL = -60.0, 15.0, 34.0, 300
+"""What the side view shows: heights, and to both sides; and its height in pixels."""
+SEEN = 0.06
+"""How far along its edges a plate is drawn, m."""
+NO_IMAGE: dict[str, list[Any]] = {"image": [], "x": [], "y": [], "dw": [], "dh": []}
 
 
 class Layout:
@@ -58,129 +70,126 @@ class Layout:
     def __init__(self) -> None:
         self.message = Div(name="message", visible=False, stylesheets=[MESSAGE], **WIDE)
         self.headline = Div(name="headline", stylesheets=[HEADLINE], **WIDE)
-        self.sign = Div(name="sign", **WIDE)
-        self.table = Div(name="table", stylesheets=[TABLES], **WIDE)
-        self.modes = Div(name="modes", stylesheets=[TABLES], **WIDE)
+        self.sign, self.map_says, self.says = (Div(name=name, **WIDE) for name in ("sign", "map_says", "says"))
+        self.table, self.modes = (Div(name=name, stylesheets=[TABLES], **WIDE) for name in ("table", "modes"))
         self.model = Select(name="model", **WIDE)
         self.plate_model = Select(name="plate_model", options=PLATES, **WIDE)
         self.file = FileInput(accept=".toml", name="file", **WIDE)
         self.sliders = Column(**WIDE)
-        self.map, self.side = MapPlot(), SideView()
-        self.map_says = Div(name="map_says", **WIDE)
-        self.samples = ColumnDataSource({"time": [], "height": [], "tilt": []}, name="samples")
-        self.height = RunningPlot(self.samples, "height", "Height (mm)")
-        self.tilt = RunningPlot(self.samples, "tilt", "Tilt (°)")
         self.play = Button(label="Play", button_type="primary", name="play", width=90)
         self.again = Button(label="Reset", name="again", width=80)
         self.up = Button(label="Kick up", name="up", width=90)
         self.aside = Button(label="Kick aside", name="aside", width=100)
         self.strength = Spinner(value=20, low=1, high=1000, step=1, width=90, name="strength", title="Kick (mm/s)")
         self.speed = RadioButtonGroup(labels=["real time", "1/10", "1/100", "1/1000"], active=0, name="speed")
-        self.says = Div(name="says", **WIDE)
         labels = {"toml": "Scene", "json": "Result (JSON)", "nc": "Result (netCDF)", "png": "Figure"}
         self.downloads = {kind: Button(label=label, name=f"get_{kind}") for kind, label in labels.items()}
-        self._outside = {name: _outside(name) for name in ("bodies", "pose", "address", "file")}
+        # Lines to the page's own program, page.js; the text of `pose` changes when a pose has been drawn.
+        self.program = {name: Div(name=f"to_{name}", visible=False) for name in ("bodies", "pose", "address", "file")}
+        for name, line in self.program.items():
+            line.js_on_change("tags", CustomJS(code=f"window.spinlev.{name}(cb_obj.tags[0], cb_obj)"))
 
-    @property
-    def drawn(self) -> Div:
-        """Its text changes when a pose has been drawn."""
-        return self._outside["pose"]
+        self.regions = ColumnDataSource(NO_IMAGE, name="regions")
+        self.point = ColumnDataSource({"x": [], "y": []}, name="point")
+        self.map = figure(height=300, name="map", x_axis_label="Frequency (Hz)", **PLOT, **WIDE)
+        self.map.x_range, self.map.y_range = Range1d(0, 1), Range1d(0, 1)
+        mapper = LinearColorMapper(palette=REGION_COLORS, low=-0.5, high=2.5)
+        self.map.image("image", "x", "y", "dw", "dh", source=self.regions, color_mapper=mapper)
+        self.map.scatter("x", "y", source=self.point, size=12, color=NORTH, line_color="white")
+        self.map.grid.visible = False
 
-    @property
-    def ready(self) -> CustomJS:
-        """Tells the page's own program what was said before it could hear."""
-        each = "const [name, line] of Object.entries(lines)"
-        code = f"for ({each}) if (line.tags.length) window.spinlev[name](line.tags[0], line)"
-        return CustomJS(args={"lines": dict(self._outside)}, code=code)
+        self.floater = ColumnDataSource({"x": [], "z": [], "r": []}, name="floater")
+        self.bodies, self.equilibria = (ColumnDataSource({"x": [], "z": []}) for _ in range(2))
+        size = {"frame_width": int(TALL * 2 * SIDE / (HIGH - LOW)), "frame_height": TALL}
+        self.side = figure(name="side", x_axis_label="x (mm)", y_axis_label="z (mm)", **PLOT, **size)
+        self.side.x_range, self.side.y_range = Range1d(-SIDE, SIDE), Range1d(LOW, HIGH)
+        self.side.patches("x", "z", source=self.bodies, color=MAGNET, alpha=0.8)
+        self.side.scatter("x", "z", source=self.equilibria, marker="x", size=9, color="#2E3440", line_width=2)
+        ball = self.side.circle("x", "z", radius="r", source=self.floater, color=BALL, alpha=0.6, line_color=NORTH)
+        drag = PointDrawTool(renderers=[ball], add=False)
+        self.side.add_tools(drag)
+        self.side.toolbar.active_tap = drag
+
+        self.samples = ColumnDataSource({"time": [], "height": [], "tilt": []}, name="samples")
+        self.running = []
+        for key, label in (("height", "Height (mm)"), ("tilt", "Tilt (°)")):
+            plot = figure(height=170, name=key, x_axis_label="Time (s)", y_axis_label=label, **PLOT, **WIDE)
+            plot.line("time", key, source=self.samples, color="#0072B2", line_width=1.5)
+            plot.y_range.min_interval = 0.02
+            self.running.append(plot)
 
     @property
     def roots(self) -> list[Model]:
         """What the template places, by name."""
         buttons = [self.play, self.again, self.up, self.aside, self.strength, *self.downloads.values()]
         choices = Column(children=[self.sliders, self.model, self.plate_model, self.file], name="controls", **WIDE)
-        flight = [self.speed, self.says, self.side.figure, self.height.figure, self.tilt.figure]
-        shown = [self.message, self.headline, self.sign, self.table, self.modes, self.map_says, self.map.figure]
-        return [*shown, choices, *flight, *buttons, *self._outside.values()]
+        shown = [self.message, self.headline, self.sign, self.table, self.modes, self.map_says, self.map, choices]
+        return [*shown, self.speed, self.says, self.side, *self.running, *buttons, *self.program.values()]
+
+    @property
+    def ready(self) -> CustomJS:
+        """Tells the page's own program what was said before it could hear."""
+        each = "const [name, line] of Object.entries(lines)"
+        code = f"for ({each}) if (line.tags.length) window.spinlev[name](line.tags[0], line)"
+        return CustomJS(args={"lines": dict(self.program)}, code=code)
 
     def show_controls(self, state: PageState, sliders: Sequence[Slider]) -> None:
         """The sliders and models of a scene."""
         self.sliders.children = list(sliders)
-        known = [("map", "Field: its map")] if state.scene.field_map else []
-        self.model.options = [
-            *FIELDS,
-            *known,
-            *([("auto", "Field: chosen by accuracy")] if state.model == "auto" else []),
-        ]
+        more = [("map", "Field: its map")] if state.scene.field_map else []
+        more += [("auto", "Field: chosen by accuracy")] if state.model == "auto" else []
+        self.model.options = [*FIELDS, *more]
         self.model.value, self.plate_model.value = state.model, state.plate_model
         self.plate_model.visible = state.scene.plate is not None
-
-    def set_sliders(self, values: Mapping[str, float]) -> None:
-        """Move the sliders with these keys."""
-        for moved in self.sliders.children:
-            if moved.name in values:
-                moved.value = values[str(moved.name)]
 
     def say(self, text: str) -> None:
         """A message to the reader; nothing where all is well."""
         self.message.text, self.message.visible = html.escape(text), bool(text)
 
     def numbers(self, found: Shown, number: int, waits: str) -> None:
-        """The headline, the equilibria and the eigenvalues of the first."""
+        """The headline, the equilibria and the eigenvalues of the first, as the answer of this number."""
         self.headline.text = html.escape(found.headline)
-        carried = "" if found.complete else "; carried here from a scene nearby"
-        self.sign.text = f'<span data-number="{number}">By: {html.escape(found.sign + carried + waits)}.</span>'
+        sign = f"Preview: {found.sign}. {waits}" if waits else f"By: {found.sign}."
+        self.sign.text = f'<span data-number="{number}">{html.escape(sign)}</span>'
         left_out = "".join(f"<p>{html.escape(line)}</p>" for line in found.left_out)
         self.table.text, self.modes.text = _table(found.rows) + left_out, _table(found.modes)
 
-    def map_title(self, text: str) -> None:
-        """Which map it is."""
-        self.map_says.text = html.escape(text)
+    def show_regions(self, found: Regions) -> None:
+        """Draw a map."""
+        widths = [float(axis[1] - axis[0]) for axis in (found.frequencies, found.measures)]
+        (x, dw), (y, dh) = (
+            (float(axis[0]) - width / 2, width * len(axis))  # pixels are about the values
+            for axis, width in zip((found.frequencies, found.measures), widths, strict=True)
+        )
+        self.regions.data = {"image": [found.kind.T], "x": [x], "y": [y], "dw": [dw], "dh": [dh]}
 
-    def flight_says(self, text: str) -> None:
-        """How the flight goes."""
-        self.says.text = html.escape(text)
+    def map_axes(self, frequency: Control, measure: Control) -> None:
+        """Take over what the sliders reach."""
+        self.map.x_range.update(start=frequency.low, end=frequency.high)
+        self.map.y_range.update(start=measure.low, end=measure.high)
+        self.map.yaxis.axis_label = measure.title
 
-    def point(self, found: Sequence[Control]) -> None:
-        """Mark the present point in the map."""
-        if len(found) > 1:
-            self.map.point.data = {"x": [found[0].value], "y": [found[1].value]}
+    def place(self, x: float, z: float, radius: float) -> None:
+        """Put the floater into the side view."""
+        self.floater.data = {"x": [x], "z": [z], "r": [radius]}
+        low = min(LOW, z - 2 * radius)
+        if self.side.y_range.start != low:
+            side = SIDE * (HIGH - low) / (HIGH - LOW)  # of one scale with the height
+            self.side.y_range.start = low
+            self.side.x_range.update(start=-side, end=side)
 
-    def bodies(self, drawn: Mapping[str, Any]) -> None:
-        """Draw a scene in three dimensions."""
-        self._outside["bodies"].tags = [json.dumps(drawn)]
+    def draw(self, scene: Scene, lines: Sequence[Array]) -> None:
+        """A scene from the side, and in three dimensions with these field lines, m."""
+        from scipy.spatial import ConvexHull  # slow to load
 
-    def pose(self, moved: Mapping[str, Any]) -> None:
-        """Move rotor and floater."""
-        self._outside["pose"].tags = [json.dumps(moved)]
+        flat = [1e3 * triangles(body)[0][:, [0, 2]] for body in scene.turning_bodies]
+        hulls = [shape[ConvexHull(shape).vertices] for shape in flat]
+        self.bodies.data = {"x": [hull[:, 0].tolist() for hull in hulls], "z": [hull[:, 1].tolist() for hull in hulls]}
+        self.tell("bodies", scene_bodies(scene, lines))
 
-    def address(self, query: str) -> None:
-        """Let the browser's address hold the state."""
-        self._outside["address"].tags = [query]
-
-    def give(self, name: str, kind: str, content: str) -> None:
-        """A file for the reader; its content in base 64."""
-        self._outside["file"].tags = [json.dumps({"name": name, "kind": kind, "content": content})]
-
-
-def slider(control: Control) -> Slider:
-    """The slider of a control."""
-    return Slider(
-        start=control.low,
-        end=control.high,
-        step=control.step,
-        value=control.value,
-        title=control.title,
-        name=control.key,
-        format="0[.]00",
-        **WIDE,
-    )
-
-
-def _outside(name: str) -> Div:
-    """A line to the page's own program, page.js."""
-    line = Div(name=f"to_{name}", visible=False)
-    line.js_on_change("tags", CustomJS(code=f"window.spinlev.{name}(cb_obj.tags[0], cb_obj)"))
-    return line
+    def tell(self, name: str, what: Any) -> None:
+        """Something for the page's own program."""
+        self.program[name].tags = [json.dumps(what)]
 
 
 def _table(rows: Sequence[tuple[str, ...]]) -> str:
@@ -191,102 +200,34 @@ def _table(rows: Sequence[tuple[str, ...]]) -> str:
     return f"<table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>"
 
 
-Place = list[float]
+def scene_bodies(scene: Scene, lines: Sequence[Array]) -> dict[str, Any]:
+    """What page.js draws: what turns with the rotor, what stands still, and the floater about its centre, moment up.
 
-
-class FlightPanel:
-    """Play, pause, slow motion, kicks, and a floater that can be dragged.
-
-    Parameters
-    ----------
-    layout, crew : of the page
-    state : gives the page's state
-    pose : draws position mm, moment, angle of the rotor, and position in the rotor's frame
-    rest : draws the floater where it would hang
+    `reach`: half the width of the picture, its lowest and its highest point.
     """
+    size = max(float(np.linalg.norm(magnet.box.size)) for magnet in scene.rotor)
+    turning = [_mesh(triangles(magnet.body), MAGNET) for magnet in scene.rotor]
+    turning += [_mesh(triangles(conductor.body), METAL) for conductor in scene.conductors]
+    for magnet in scene.rotor:
+        direction = magnet.polarization_in_rotor
+        if (length := np.linalg.norm(direction)) > 0:
+            turning.append(_mesh(arrow(magnet.box.center, direction / length, 0.55 * size), NORTH))
+    up = arrow(np.zeros(3), np.array([0.0, 0.0, 1.0]), 1.45 * scene.floater.radius)
+    fixed, edges = [], []
+    if scene.plate is not None:
+        near = near_plate(scene.plate.box, SEEN)
+        fixed = [_mesh(triangles(near), BALL, 0.25)]
+        edges = np.round(1e3 * near.corners[np.column_stack([SQUARES, SQUARES[:, 0]])], 3).tolist()
+    return {
+        "turning": turning,
+        "floater": [_mesh(triangles(scene.floater.solid), BALL), _mesh(up, NORTH)],
+        "fixed": fixed,
+        "edges": edges,
+        "lines": [np.round(1e3 * line, 2).tolist() for line in lines],
+        "reach": [30.0, -50.0, 16.0] if scene.plate is None else [40.0, -64.0, 16.0],
+    }
 
-    def __init__(
-        self,
-        layout: Layout,
-        crew: Crew,
-        state: Callable[[], PageState],
-        pose: Callable[[Place, Place, float, Place], None],
-        rest: Callable[[], None],
-    ) -> None:
-        self.layout, self.crew, self.state, self.pose, self.rest = layout, crew, state, pose, rest
-        self.playing, self.held, self.ended = False, False, False
-        layout.side.figure.on_event(PanStart, lambda _: self._hold())
-        layout.side.figure.on_event(PanEnd, lambda _: self._release())
-        layout.drawn.on_change("text", lambda _, old, new: crew.tell(fly, ("drawn",)))
-        layout.play.on_click(self._play)
-        layout.again.on_click(self.land)
-        layout.speed.on_change("active", lambda _, old, new: self._set_speed())
-        layout.up.on_click(lambda: self._push([0.0, 0.0, 1.0]))
-        layout.aside.on_click(lambda: self._push([1.0, 0.0, 0.0]))
 
-    def _play(self) -> None:
-        if self.ended:
-            self.land()
-        if self.playing:
-            self._tell(("pause",))
-            self._playing(False)
-        else:
-            self._playing(True)
-            self._tell(("play", self._speed))
-
-    @property
-    def _speed(self) -> float:
-        return SPEEDS[int(self.layout.speed.active or 0)]
-
-    def _set_speed(self) -> None:
-        if self.playing:
-            self._tell(("play", self._speed))
-
-    def _playing(self, yes: bool) -> None:
-        self.playing = yes
-        self.layout.play.label = "Pause" if yes else "Play"
-
-    def _push(self, way: list[float]) -> None:
-        self._tell(("push", [1e-3 * float(self.layout.strength.value or 0.0) * part for part in way]))
-
-    def _hold(self) -> None:
-        self.held = True
-        self.crew.tell(fly, ("pause",))
-
-    def _release(self) -> None:
-        """Let the floater go where it was dragged to."""
-        self.held, self.ended = False, False
-        x, z = (float(self.layout.side.floater.data[key][0]) for key in "xz")
-        self._tell(("put", [1e-3 * x, 0.0, 1e-3 * z]))
-        self._playing(True)
-        self._tell(("play", self._speed))
-
-    def _tell(self, wish: tuple[Any, ...]) -> None:
-        """A wish to the flight, which begins with the first."""
-        if fly not in self.crew:
-            self.layout.flight_says("Preparing the flight ...")
-            self.crew.start(fly, (self.state(),), self._flown)
-            self.layout.samples.data = {"time": [], "height": [], "tilt": []}
-        self.crew.tell(fly, wish)
-
-    def land(self) -> None:
-        """Forget the flight."""
-        self.crew.stop(fly)
-        self.ended = False
-        self._playing(False)
-        self.layout.flight_says("")
-        self.rest()
-
-    def _flown(self, frame: Frame | str) -> None:
-        self.crew.rest(fly)
-        if isinstance(frame, str):
-            self.land()
-            self.layout.flight_says(frame)
-            return
-        samples = {"time": frame.time, "height": frame.height, "tilt": frame.tilt}
-        self.layout.samples.stream({key: np.asarray(values) for key, values in samples.items()}, rollover=ROLLING)
-        self.pose(frame.position, frame.moment, frame.angle, frame.seen)
-        self.layout.flight_says(frame.message or frame.ended or f"t = {frame.time[-1]:.4g} s")
-        if frame.ended:
-            self.ended = True
-            self._playing(False)
+def _mesh(surface: Surface, color: str, opacity: float = 1.0) -> dict[str, Any]:
+    corners, faces = surface
+    return {"at": np.round(1e3 * corners, 3).tolist(), "faces": faces.tolist(), "color": color, "opacity": opacity}

@@ -60,7 +60,8 @@ window.spinlev = (() => {
       await draw();
       requestAnimationFrame(() => { line.text = `${performance.now()}`; });  // then the next one may come
     },
-    address: query => {
+    address: text => {
+      const query = JSON.parse(text);
       const token = new URLSearchParams(location.search).get("token");
       history.replaceState(null, "", `${location.pathname}?token=${token}&${query}`);
     },

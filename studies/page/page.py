@@ -4,35 +4,51 @@ from __future__ import annotations
 
 import base64
 import binascii
+import time
 from collections.abc import Mapping
-from dataclasses import replace
 from functools import partial
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 from bokeh.document import Document
-from bokeh.events import Tap
+from bokeh.events import PanEnd, PanStart, Tap
 from bokeh.models import Slider
 
-from ...dynamics.equilibria.equilibrium import Survey
 from ...geometry.common import Array
-from .layout import FlightPanel, Layout, slider
-from .plots import scene_bodies
-from .processes import Crew, Task
-from .state import FILES, TYPES, Control, PageState, Screen, Shown, controls
-from .work import Found, Regions, build, complete, download, fly, follow, has_map, map_key, regions
+from .layout import NO_IMAGE, Layout
+from .state import Control, PageState, controls
+from .work import (
+    FILES,
+    FRAME,
+    PATIENCE,
+    POINTS,
+    SLOWEST,
+    Frame,
+    Regions,
+    Screen,
+    Shown,
+    Worker,
+    begin_flight,
+    build,
+    complete,
+    content,
+    fly,
+    has_map,
+    map_key,
+    preview,
+    regions,
+    wish,
+)
 
 REST = 250
 """Milliseconds after which a slider is taken to rest."""
-LIMITS: dict[Task, tuple[float, str]] = {
-    build: (60.0, "Reading this scene"),
-    follow: (60.0, "The preview"),
-    complete: (600.0, "The answer by the chosen models"),
-    regions: (600.0, "The map"),
-    fly: (600.0, "Preparing the flight"),
-    download: (600.0, "The file"),
-}
-"""Seconds after which an answer is cut off; what takes longer is for the command line."""
+READING = 60.0
+"""Seconds that a scene may take to be read."""
+SPEEDS = (1.0, 0.1, 0.01, 0.001)
+ROLLING = 4000
+"""Samples in a running plot."""
+FOLLOW = "The selected models follow when you release the slider."
+NO_MAP = "No map: it needs a horizontal, vertical or tilted rotor and gravity along the axis."
 
 
 class Page:
@@ -47,15 +63,19 @@ class Page:
 
     def __init__(self, document: Document, state: PageState, asked: Mapping[str, str]) -> None:
         self.document, self.state, self.layout = document, state, Layout()
-        self.number, self.answered, self.shown = 0, 0, cast("Shown | None", None)
-        self.crew = Crew(document, (build, follow, fly), LIMITS, self._failed)
-        self.flight = FlightPanel(self.layout, self.crew, lambda: self.state, self._pose, self._rest_floater)
+        self.builder = Worker(document, "Reading this scene", READING, self._failed)
+        self.quick = Worker(document, "The preview", 60.0, self._failed)
+        self.slow = Worker(document, "The answer by the chosen models", 600.0, self._failed, PATIENCE)
+        self.mapper = Worker(document, "The map", 600.0, lambda why: self._map_says(f"No map: {why}"), PATIENCE)
+        self.porter = Worker(document, "The file", 600.0, self._failed, PATIENCE)
+        self.flight = Flight(self)
+        self.number, self.answered = 0, 0
+        self.shown: Shown | None = None
+        self.regions: Regions | None = None
         self.resting: Any = None
-        self.mapped, self.poses = "", 0
-        self.drawn: tuple[str, str, tuple[Array, ...]] = ("", "", ())
-        self.begun = False
+        self.mapped, self.begun = "", False
+        self.drawn: tuple[str, str, list[Array]] = ("", "", [])
         self._listen()
-        self._hold_ready()
         if asked:
             self._become("with_query", dict(asked))
         else:
@@ -67,7 +87,8 @@ class Page:
 
     def close(self) -> None:
         """End all work."""
-        self.crew.close()
+        for worker in (self.builder, self.quick, self.slow, self.mapper, self.porter, self.flight.worker):
+            worker.stop()
 
     # What the reader does
 
@@ -75,8 +96,8 @@ class Page:
         layout = self.layout
         layout.model.on_change("value", lambda _, old, new: self._choose("model", new))
         layout.plate_model.on_change("value", lambda _, old, new: self._choose("plate_model", new))
-        layout.file.on_change("value", self._opened)
-        layout.map.figure.on_event(Tap, self._clicked)
+        layout.file.on_change("value", lambda _, old, new: self._opened(new))
+        layout.map.on_event(Tap, self._clicked)
         for kind, button in layout.downloads.items():
             button.on_click(partial(self._download, kind))
 
@@ -86,208 +107,261 @@ class Page:
         found = controls(self.state)
         self.layout.show_controls(self.state, [self._slider(control) for control in found])
         if has_map(self.state):
-            self.layout.map.axes(found[0], found[1])
+            self.layout.map_axes(found[0], found[1])
         self._changed()
 
     def _slider(self, control: Control) -> Slider:
-        made = slider(control)
-        made.on_change("value", lambda _, old, new: self._moved(control.key, new))
+        made = Slider(
+            start=control.low,
+            end=control.high,
+            step=control.step,
+            value=control.value,
+            title=control.title,
+            name=control.key,
+            format="0[.]00",
+            sizing_mode="stretch_width",
+        )
+        made.on_change("value", lambda _, old, new: self._become("changed", control.key, round(float(new), 9)))
         return made
 
-    def _moved(self, key: str, value: float) -> None:
-        self._become("changed", key, round(float(value), 9))
-
     def _choose(self, name: str, value: str) -> None:
-        if getattr(self.state, name) != value or self.crew.waits_for(build):
+        if getattr(self.state, name) != value or self.builder.busy:
             self._become("with_query", {name: value})
 
     def _become(self, method: str, *arguments: Any) -> None:
-        """Ask for another state, by a method of the present one; it is made in a process of its own."""
-        if build not in self.crew:
-            self._hold_ready()
+        """Ask for another state, by a method of the state at that time; of moves of one slider the last counts."""
+        key = arguments[0] if method == "changed" else object()
+        call = lambda: (build, self.state, method, arguments)  # noqa: E731
+        self.builder.ask(key, call, lambda state: self._built(state, method == "opened"))
 
-        def older(other: tuple[str, tuple[Any, ...]]) -> bool:
-            return method == other[0] == "changed" and other[1][0] == arguments[0]
-
-        self.crew.ask(build, (method, arguments), older)
-
-    def _hold_ready(self) -> None:
-        """Begin the process that makes states: a slider that moves shall not wait for it."""
-        self.crew.start(build, (self.state,), self._built)
-        self.crew.rest(build)
-
-    def _built(self, answer: tuple[str, PageState | None, str]) -> None:
-        method, state, message = answer
-        self.state = state or self.state
-        self.layout.say(message)
-        if not self.begun or (state and method == "opened"):
+    def _built(self, state: PageState, is_other: bool) -> None:
+        self.state = state
+        self.layout.say("")
+        if is_other or not self.begun:
             self._begin()
-        elif state:
+        else:
             self._changed()
 
-    def _opened(self, _: str, old: Any, content: Any) -> None:
+    def _opened(self, text: Any) -> None:
         """A scene file of the reader's."""
-        name = str(self.layout.file.filename) or "scene"
         try:
-            data = base64.b64decode(str(content))
+            data = base64.b64decode(str(text))
         except binascii.Error:
             data = b"\xff"  # which is no text
-        self._become("opened", data, name)
+        self._become("opened", data, str(self.layout.file.filename) or "scene")
 
     def _clicked(self, event: Tap) -> None:
         """Go to a point of the map, as far as the sliders reach."""
         if not has_map(self.state) or event.x is None or event.y is None:
             return
-        found = controls(self.state)
-        values = {
-            control.key: _nearest(control, place) for control, place in zip(found, (event.x, event.y), strict=False)
-        }
-
-        self.layout.set_sliders(values)  # each of which says so
+        for slider, place in zip(self.layout.sliders.children, (event.x, event.y), strict=False):
+            steps = round((place - slider.start) / slider.step)
+            slider.value = round(min(max(slider.start + steps * slider.step, slider.start), slider.end), 9)
 
     # What is computed
 
     def _changed(self) -> None:
         """The state is another: answer at once, and completely when it rests."""
         self.number += 1
-        self.crew.stop(complete)
-        if fly in self.crew:
+        self.slow.stop()
+        if self.flight.begun:
             self.flight.land()
-        if follow not in self.crew:
-            self.crew.start(follow, (), self._found)
-        self._ask_quickly(self.number, None)
-        self.layout.point(controls(self.state))
+        found = controls(self.state)
+        if len(found) > 1:
+            self.layout.point.data = {"x": [found[0].value], "y": [found[1].value]}
+        self.quick.ask("", lambda: (preview, self.state), partial(self._found, self.number))
         if self.resting is not None:
             self.document.remove_timeout_callback(self.resting)
         self.resting = self.document.add_timeout_callback(self._rest, REST)
 
-    def _ask_quickly(self, number: int, known: Survey | None) -> None:
-        """A preview, or equilibria for it to begin with; earlier questions that wait need no answer any more."""
-        self.crew.ask(follow, (number, self._quick_state, known), lambda other: other[2] is None)
-
-    @property
-    def _quick_state(self) -> PageState:
-        """What can be told at once: without the plate's currents, by the closed form where elements are asked for."""
-        model = "cuboid" if self.state.model in ("fem", "auto") else self.state.model
-        return replace(self.state, model=cast("Any", model), plate_model="none")
+    def _found(self, number: int, found: Shown) -> None:
+        """Numbers at once."""
+        if number > self.answered:
+            self._show(found, number, "" if self.state.is_preview else FOLLOW)
 
     def _rest(self) -> None:
         self.resting = None
-        self.layout.address(self.state.query())
-        self.crew.start(complete, (self.number, self.state), self._completed)
-        spans = [(control.low, control.high) for control in controls(self.state)[:2]]
+        self.layout.tell("address", self.state.query())
+        self.slow.ask("", lambda: (complete, self.state), partial(self._completed, self.number))
         if not has_map(self.state):
-            self.crew.stop(regions)
-            self.layout.map_title("No map: it needs a horizontal, vertical or tilted rotor and gravity along the axis.")
-            self.layout.map.forget()
+            self._forget_map(NO_MAP)
         elif (key := map_key(self.state)) != self.mapped:
+            self._forget_map("Map: being computed ...")
             self.mapped = key
-            self.layout.map_title("Map: being computed ...")
-            self.layout.map.forget()
-            self.crew.start(regions, (self.state, tuple(spans)), self._mapped)
+            (x, y), state = ((control.low, control.high) for control in controls(self.state)[:2]), self.state
+            for model in ("dipole", "cuboid") if state.model == "cuboid" else ("dipole",):
+                for points in POINTS:
+                    call = (regions, state, (x, y), model, points)
+                    self.mapper.ask((model, points), lambda call=call: call, self._map)  # type: ignore[misc]
 
-    def _found(self, found: Found | None) -> None:
-        """Numbers at once."""
-        if found is None or found.number <= self.answered:
-            return
-        waits = "" if self.state.whole_quickly else "; those asked for follow when the slider rests"
-        self._show(found, waits if complete in self.crew or self.resting is not None else "")
+    def _completed(self, number: int, found: Shown) -> None:
+        self.slow.stop()
+        self.answered = number
+        self._show(found, number, "")
 
-    def _completed(self, found: Found) -> None:
-        if found.number != self.number:
-            return
-        self.crew.stop(complete)
-        self.answered = found.number
-        self._show(found, "")
-        if found.survey is not None and self.state.model == self._quick_state.model:
-            self._ask_quickly(found.number, found.survey)
-
-    def _show(self, found: Found, waits: str) -> None:
-        if found.shown is None:
-            self.layout.say(found.message)
-            return
-        self.shown = found.shown
+    def _show(self, found: Shown, number: int, waits: str) -> None:
+        self.shown = found
         self.document.hold("combine")
-        self.layout.numbers(found.shown, found.number, waits)
+        self.layout.numbers(found, number, waits)
         self.document.unhold()
         self.document.add_next_tick_callback(lambda: self._picture(found.lines))  # the numbers go first
 
-    def _picture(self, lines: tuple[Array, ...]) -> None:
-        self.document.hold("combine")
-        self._draw(lines)
-        if fly not in self.crew:
-            self._rest_floater()
-        self.document.unhold()
-
-    def _draw(self, lines: tuple[Array, ...]) -> None:
+    def _picture(self, lines: list[Array]) -> None:
         """The bodies, where they are others than those that are drawn, with the field's lines as far as they hold."""
+        self.document.hold("combine")
         keys = self.state.keys
         rotor, whole = str(keys["rotor"]), str((keys["rotor"], keys["floater"], keys.get("plate")))
-        kept = lines or (self.drawn[2] if self.drawn[0] == rotor else ())
+        kept = lines or (self.drawn[2] if self.drawn[0] == rotor else [])
         if lines or self.drawn[1] != whole:
             self.drawn = rotor, whole, kept
-            self.layout.bodies(scene_bodies(self.state.scene, kept))
-            self.layout.side.scene(self.state.scene)
+            self.layout.draw(self.state.scene, kept)
+        if not self.flight.begun:
+            self.flight.show_rest()
+        self.document.unhold()
 
     def _failed(self, message: str) -> None:
         if not self.begun:  # what the address asks for cannot be made
             self._begin()
-        if fly not in self.crew and self.flight.playing:
-            self.flight.land()
         self.layout.say(message)
 
-    def _rest_floater(self) -> None:
-        """Draw the floater where it would hang, and the other equilibria."""
-        places = self.shown.places if self.shown else []
-        self.layout.side.equilibria.data = {"x": [p[0] for p, _, _ in places], "z": [p[2] for p, _, _ in places]}
-        if places:
-            position, moment, _ = places[0]
-            tilt = float(np.degrees(np.arctan2(np.hypot(moment[0], moment[1]), moment[2])))
-            self.layout.samples.data = {"time": [0.0], "height": [position[2]], "tilt": [tilt]}
-            self._pose(position, moment, 0.0, position)
+    def _forget_map(self, why: str) -> None:
+        self.mapper.stop()
+        self.mapped, self.regions = "", None
+        self.layout.regions.data = NO_IMAGE
+        self._map_says(why)
 
-    def _pose(self, position: list[float], moment: list[float], angle: float, seen: list[float]) -> None:
-        self.poses += 1  # so that each is another, and is answered for
-        moved = {"position": position, "moment": moment, "angle": angle, "flying": fly in self.crew}
-        self.layout.pose({**moved, "number": self.poses})
-        if not self.flight.held:
-            self.layout.side.place(seen[0], seen[2], 1e3 * self.state.scene.floater.radius)
+    def _map_says(self, text: str) -> None:
+        self.layout.map_says.text = text.replace("<", "&lt;")
 
-    def _mapped(self, found: Regions) -> None:
-        if found.last:
-            self.crew.stop(regions)
-        if found.message:
-            self.layout.map_title(f"No map: {found.message}")
-            return
-        self.layout.map.show(found)
+    def _map(self, found: Regions) -> None:
+        self.regions = found
+        self.layout.show_regions(found)
         name = {"dipole": "point dipole", "cuboid": "closed form"}[found.model]
-        self.layout.map_title(f"Stable (blue), only unstable (grey): {name}, without the plate. Click to go there.")
+        self._map_says(f"Stable (blue), only unstable (grey): {name}, without the plate. Click to go there.")
+        if not self.mapper.waits:
+            self.mapper.stop()
 
     # What goes home
 
     def _download(self, kind: str) -> None:
         self.layout.say("")
-        self.crew.start(download, (kind, self.state, self._screen() if kind == "png" else None), self._downloaded)
+        known, samples = controls(self.state), self.layout.samples.data
+        flown = (np.asarray(samples[key]) for key in ("time", "height", "tilt"))
+        axes, point = (known[0].title, known[1].title), (known[0].value, known[1].value)
+        screen = Screen(self.shown, self.regions, axes, point, *flown) if kind == "png" else None
+        self.porter.ask(kind, lambda: (content, kind, self.state, screen), partial(self._downloaded, kind))
 
-    def _downloaded(self, answer: tuple[str, bytes, str]) -> None:
-        kind, data, problem = answer
-        self.crew.stop(download)
-        if problem:
-            self.layout.say(problem)
+    def _downloaded(self, kind: str, data: bytes) -> None:
+        name, form = FILES[kind]
+        self.layout.tell("file", {"name": name, "kind": form, "content": base64.b64encode(data).decode()})
+
+
+class Flight:
+    """Play, pause, slow motion, kicks, and a floater that can be dragged."""
+
+    def __init__(self, page: Page) -> None:
+        self.page, self.layout = page, page.layout
+        self.worker = Worker(page.document, "The flight", 600.0, self._failed)
+        self.begun, self.playing, self.held, self.ended = False, False, False, False
+        self.asked, self.due, self.poses = False, 0.0, 0
+        layout = self.layout
+        layout.side.on_event(PanStart, lambda _: self._hold())
+        layout.side.on_event(PanEnd, lambda _: self._release())
+        layout.program["pose"].on_change("text", lambda _, old, new: self._drawn())
+        layout.play.on_click(lambda: self._pause() if self.playing else self._play())
+        layout.again.on_click(self.land)
+        layout.up.on_click(lambda: self._push([0.0, 0.0, 1.0]))
+        layout.aside.on_click(lambda: self._push([1.0, 0.0, 0.0]))
+
+    def land(self) -> None:
+        """Forget the flight."""
+        self.worker.stop()
+        self.begun = self.ended = self.asked = False
+        self._pause()
+        self.layout.says.text = ""
+        self.show_rest()
+
+    def show_rest(self) -> None:
+        """Draw the floater where it would levitate, and the other equilibria."""
+        places = self.page.shown.places if self.page.shown else []
+        self.layout.equilibria.data = {"x": [p[0] for p, _ in places], "z": [p[2] for p, _ in places]}
+        if places:
+            position, moment = places[0]
+            tilt = float(np.degrees(np.arctan2(np.hypot(moment[0], moment[1]), moment[2])))
+            self.layout.samples.data = {"time": [0.0], "height": [position[2]], "tilt": [tilt]}
+            self._pose(position, moment, 0.0, position)
+
+    def _play(self) -> None:
+        if self.ended:
+            self.land()
+        self._begin()
+        self.playing, self.due = True, time.monotonic()
+        self.layout.play.label = "Pause"
+        self._drawn()
+
+    def _pause(self) -> None:
+        self.playing, self.layout.play.label = False, "Play"
+
+    def _begin(self) -> None:
+        if not self.begun:
+            self.begun = True
+            self.layout.says.text = "Preparing the flight ..."
+            self.layout.samples.data = {"time": [], "height": [], "tilt": []}
+            self.worker.ask("begin", lambda: (begin_flight, self.page.state), self._flown)
+
+    def _push(self, way: list[float]) -> None:
+        self._begin()
+        vector = [1e-3 * float(self.layout.strength.value or 0.0) * part for part in way]
+        self.worker.ask(object(), lambda: (wish, "push", vector), self._flown)
+
+    def _hold(self) -> None:
+        self.held = True
+        self._pause()
+
+    def _release(self) -> None:
+        """Let the floater go where it was dragged to."""
+        self.held = self.ended = False
+        x, z = (1e-3 * float(self.layout.floater.data[key][0]) for key in "xz")
+        self._begin()
+        self.worker.ask(object(), lambda: (wish, "put", [x, 0.0, z]), self._flown)
+        self._play()
+
+    def _drawn(self) -> None:
+        """A pose has been drawn: the next one may come, one at a time; a page too slow for its speed falls behind."""
+        if self.playing and not self.asked:
+            self.asked = True
+            wait = max(0.0, self.due - time.monotonic())
+            self.page.document.add_timeout_callback(self._fly, int(1000 * wait))
+
+    def _fly(self) -> None:
+        if not self.playing:
+            self.asked = False
             return
-        self.layout.give(FILES[kind], TYPES[kind], base64.b64encode(data).decode())
+        now = time.monotonic()
+        late, self.due = max(0.0, now - self.due), now + FRAME
+        seconds = SPEEDS[int(self.layout.speed.active or 0)] * min(FRAME + late, SLOWEST)
+        self.worker.ask("fly", lambda: (fly, seconds), self._flew)
 
-    def _screen(self) -> Screen:
-        known, found = self.layout.map.known, controls(self.state)
-        none = np.zeros(0)
-        mapped = (known.frequencies, known.measures, known.kind) if known else (none, none, none)
-        samples = {key: np.asarray(values) for key, values in self.layout.samples.data.items()}
-        title = f"Stable regions ({known.model})" if known else ""
-        axes, point = (found[0].title, found[1].title), (found[0].value, found[1].value)
-        return Screen(self.shown, title, axes, *mapped, point, samples["time"], samples["height"], samples["tilt"])
+    def _flew(self, frame: Frame) -> None:
+        self.asked = False
+        self._flown(frame)
 
+    def _flown(self, frame: Frame) -> None:
+        samples = {key: np.asarray(getattr(frame, key)) for key in ("time", "height", "tilt")}
+        self.layout.samples.stream(samples, rollover=ROLLING)
+        self._pose(frame.position, frame.moment, frame.angle, frame.seen)
+        self.layout.says.text = (frame.message or frame.ended or f"t = {frame.time[-1]:.4g} s").replace("<", "&lt;")
+        if frame.ended:
+            self.ended = True
+            self._pause()
 
-def _nearest(control: Control, value: float) -> float:
-    """The slider's value nearest to a place of the map."""
-    steps = round((value - control.low) / control.step)
-    return round(min(max(control.low + steps * control.step, control.low), control.high), 9)
+    def _failed(self, message: str) -> None:
+        self.land()
+        self.layout.says.text = message.replace("<", "&lt;")
+
+    def _pose(self, position: list[float], moment: list[float], angle: float, seen: list[float]) -> None:
+        self.poses += 1  # so that each is another, and is answered for
+        moved = {"position": position, "moment": moment, "angle": angle, "flying": self.begun, "number": self.poses}
+        self.layout.tell("pose", moved)
+        if not self.held:
+            self.layout.place(seen[0], seen[2], 1e3 * self.page.state.scene.floater.radius)

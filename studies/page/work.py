@@ -1,197 +1,337 @@
-"""Equilibria that follow a slider: carried from a scene in which all were searched for to one nearby.
-
-A rotor of the article is a family with frequency and displacement or tilt left open, compiled once. Its size is left
-open by similarity.
-"""
+"""What is computed for a page, each kind of work by a process of its own: it can be stopped, and ends with the page."""
 
 from __future__ import annotations
 
-import time
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+import multiprocessing
+import os
+import resource
+import signal
+import tempfile
+import threading
+from collections.abc import Callable, Hashable
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, field, replace
+from functools import cache, partial
+from multiprocessing import forkserver, resource_tracker
 from multiprocessing.connection import Connection
-from typing import Any
+from multiprocessing.context import ForkServerContext, ForkServerProcess
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
+from tornado.ioloop import IOLoop
 
-from ...dynamics.equilibria.balance import DUPLICATE_DISTANCE, Balance
-from ...dynamics.equilibria.curves import SearchRange
-from ...dynamics.equilibria.equilibrium import Survey
-from ...dynamics.equilibria.path import carried
-from ...dynamics.equilibria.search import Found as FoundSearch, field_doubts, told
+from ...dynamics.equilibria.search import survey
 from ...dynamics.flights.live import LiveFlight, Piece
-from ...dynamics.maps.family import RotorFamily, article_measure, rotor_family
-from ...dynamics.maps.map import EquilibriumMap, equilibrium_map
-from ...dynamics.motion.equations import has_likes, like, parameters
-from ...dynamics.motion.floater_currents import check_floater_metal
-from ...dynamics.motion.rates import Rates
-from ...dynamics.motion.state import Parameter, Scales
-from ...fem.rotor.table import ROUND_OFF, RotorTable
-from ...fem.rotor_metal import check_slow_enough, pieces_of
-from ...geometry.common import Array, SpinlevError
-from ...geometry.scene.files import canonical_keys
+from ...dynamics.maps.family import rotor_family
+from ...dynamics.maps.map import equilibrium_map
+from ...geometry.common import Array, ComputationError, SpinlevError
+from ...geometry.scene.files import canonical_keys, scene_text
+from ..cli.console import to_json
+from ..cli.options import Models
+from ..figures.pictures import drawn_field
+from ..figures.style import PAGE, PALETTE, figure_bytes, panels, styled
+from ..figures.view import field_lines
 from ..levitation import Levitation
-from .state import MEASURES, QUICK, ROTOR_SIZES, PageState, Shown, content, field_lines, shown
+from ..processes import safe_path
+from ..result import Result, write_dataset
+from ..words import equilibria_rows, headline, left_out_words, worth_a_row
+from .state import MEASURES, PageState
 
+if TYPE_CHECKING:
+    from bokeh.document import Document
+    from matplotlib.figure import Figure
 
-class Nearby:
-    """What is known around a scene: its equilibria, and compiled equations that hold for its neighbours.
-
-    Parameters
-    ----------
-    state : of the page; its plate's currents are left out
-    """
-
-    def __init__(self, state: PageState) -> None:
-        self.state = state
-        self.levitation = _without_plate(state)
-        self._family = _family(state)
-        self._known: Survey | None = None
-
-    def searched(self) -> Levitation:
-        """The scene with all its equilibria, searched for once."""
-        if self._known is not None:
-            self.levitation.adopt(self._known)
-        self._known = self.levitation.without_plate
-        return self.levitation
-
-    def learn(self, known: Survey) -> None:
-        """Equilibria of the scene that were searched for elsewhere."""
-        self._known = known
-
-    def at(self, state: PageState) -> Levitation | None:
-        """The scene of another state with equilibria carried to it, or None where they cannot be.
-
-        Raises EquilibriumError for a rotor at rest, as a search does, and InputError where it turns too fast for metal.
-        """
-        if state.model != self.state.model or not state.scene.frequency or not self.state.scene.frequency:
-            return None
-        check_floater_metal(state.scene)  # equations are shared, their limits are not
-        check_slow_enough(pieces_of(state.scene.rotor, state.scene.conductors), state.scene.frequency)
-        levitation = _without_plate(state)
-        levitation.share(self.levitation)
-        problem, before = self._problem(levitation, state), self._problem(self.levitation, self.state)
-        if problem is None or before is None or np.any(state.scene.gravity[:2]):
-            return None
-        known = self.searched().without_plate.equilibria
-        size = self.state.scene.floater.radius
-        position = np.reshape([e.position / size for e in known], (-1, 3))
-        moment = np.reshape([e.state.moment for e in known], (-1, 3))
-        where = SearchRange(state.scene, 0.1)
-        which, arrived, position, moment = carried(before.balance, problem.balance, position, moment, where.bound)
-        points = np.concatenate([position, moment], axis=1)[np.argsort(which)]
-        apart = np.linalg.norm(points[:, None] - points, axis=2) + np.eye(len(points))
-        if len(points) < len(known) or not arrived.all() or (apart < DUPLICATE_DISTANCE).any():
-            return None
-        points = points[where.holds(points[:, :3])]
-        there, doubts = self._doubts(levitation, problem, points[:, :3] * state.scene.floater.radius)
-        found = FoundSearch.at(problem.balance, points[there], doubts)
-        levitation.adopt(told(state.scene, problem.balance, found), searched=False)
-        return levitation
-
-    def _doubts(self, levitation: Levitation, problem: _Problem, places: Array) -> tuple[NDArray[np.bool_], Array]:
-        """Which places (n, 3) m the table knows, and its doubts there, see `field_doubts`, of the field as compiled."""
-        family, measure = problem.family, float(problem.values[Parameter.MEASURE])
-        if family is None:
-            return field_doubts(levitation.table, places)
-        alike = self.levitation.elsewhere(**vars(family.at(levitation.scene.frequency, measure)))
-        table, places = alike.table, places * problem.likeness
-        there = table.in_range(places)
-        assert isinstance(table, RotorTable)  # QUICK ones are
-        field, slope = family.field.evaluate(places[there], measure)
-        sizes = np.linalg.norm(field, axis=1), np.linalg.norm(slope, axis=(1, 2))
-        unsigned, left_out = table.without_left_out.absolute_error(places[there]), table.left_out(places[there])
-        errors = np.column_stack(unsigned) + ROUND_OFF * np.column_stack(sizes)
-        return there, np.concatenate([errors, left_out.reshape(len(left_out), -1)], axis=1)
-
-    def _problem(self, levitation: Levitation, state: PageState) -> _Problem | None:
-        """The balance of a scene in the equations that are compiled here; None where it needs others."""
-        scene, spin = levitation.scene, levitation.spin
-        if self._family is None:
-            if levitation.equations_key != self.levitation.equations_key:
-                return None
-            values = parameters(scene, Scales.of(scene), frozen_spin=True)
-            return _Problem(self.levitation.rates, values, spin, 1.0)
-        return self._family.problem(state)
-
-
-@dataclass(frozen=True, eq=False)
-class _Problem:
-    """Rates, their parameters, the body spin, how many times larger their scene is than the true one, its family."""
-
-    rates: Rates
-    values: Array
-    spin: float
-    likeness: float
-    family: RotorFamily | None = None
-
-    @property
-    def balance(self) -> Balance:
-        return Balance(self.rates, self.values, self.spin)
-
-
-@dataclass(frozen=True, eq=False)
-class _Family:
-    """A family of rotors, and of what else is the same in all scenes for which its equations hold."""
-
-    family: RotorFamily
-    configuration: str
-    sizes: Array
-    rest: str
-
-    def problem(self, state: PageState) -> _Problem | None:
-        rotor, scene = state.keys["rotor"], state.scene
-        found = article_measure(rotor)
-        if found is None or found[0] != self.configuration or _rest(state) != self.rest:
-            return None
-        ratios = self.sizes / _sizes(rotor)
-        likeness = float(ratios[0])
-        if likeness != 1 and not (np.allclose(ratios, likeness, rtol=ROUND_OFF, atol=0.0) and has_likes(scene)):
-            return None
-        measure = found[1] if self.configuration == "tilt" else likeness * found[1]
-        family = replace(self.family, scene=like(scene, likeness))
-        return _Problem(self.family.rates, family.values(scene.frequency, measure)[0], state.spin, likeness, family)
-
-
-def _family(state: PageState) -> _Family | None:
-    rotor = state.keys["rotor"]
-    configuration = rotor.get("configuration")
-    round_floater = state.scene.floater.body is None  # of another one, size and shape are compiled
-    if configuration not in MEASURES or state.model not in QUICK or not round_floater:
-        return None
-    try:
-        family = rotor_family(replace(state.scene, plate=None), configuration, state.model)
-    except SpinlevError:  # conductors that do not move with the magnets
-        return None
-    return _Family(family, configuration, _sizes(rotor), _rest(state))
-
-
-def _sizes(rotor: Mapping[str, Any]) -> Array:
-    """What makes a body of the rotor as large as it is, mm."""
-    return np.array([rotor[key] for key in ROTOR_SIZES if key in rotor])
-
-
-def _rest(state: PageState) -> str:
-    """What no parameter of a family's equations can change."""
-    open_ones = (*ROTOR_SIZES, "displacement_mm", "angle_deg")
-    rotor = {key: value for key, value in state.keys["rotor"].items() if key not in open_ones}
-    return f"{rotor} {state.scene.floater.shape} {bool(state.scene.floater.conductivity)} {state.scene.drag.air}"
-
-
-def _without_plate(state: PageState) -> Levitation:
-    return Levitation(state.scene, replace(state.models, plate_model="none"), state.spin)
-
-
-FRAME = 1 / 12
-"""Seconds between two pictures, if the page draws so fast."""
-SLOWEST = 0.25
-"""Most seconds that are flown for a picture."""
+MEMORY = 4 * 2**30
+"""Bytes that a process may take."""
+PATIENCE = 10
+"""By how much a process is nicer than others that does not hurry."""
+FRAME, SLOWEST = 1 / 12, 0.25
+"""Seconds between two pictures of a flight, if the page draws so fast; most seconds that are flown for one."""
+POINTS = (13, 41)
+"""Of a map along each axis: first, and then."""
+SIGHT = np.array([[-0.045], [0.045]]) * np.ones(3)
+"""The box in which field lines are drawn, m."""
 ENDS = {
     "beyond": "left the region for which the plate's response was computed",
     "contact": "touched the rotor or the plate",
     "lost": "lost: it is too far away to come back",
 }
+MODEL_WORDS = {
+    "dipole": "point dipole",
+    "cuboid": "closed form of the cuboids",
+    "fem": "finite elements",
+    "map": "map of the field",
+}
+PLATE_WORDS = {"none": "without the plate's currents", "slab": "plate as an infinite slab"}
+PLATE_WORDS |= dict.fromkeys(("reduced", "fem"), "finite plate")
+MODE_COLUMNS = ("small motion", "frequency (Hz)", "growth (1/s)")
+FILES = {
+    "toml": ("scene.toml", "text/plain"),
+    "json": ("equilibria.json", "application/json"),
+    "nc": ("equilibria.nc", "application/x-netcdf"),
+    "png": ("explore.png", "image/png"),
+}
+"""What can be taken home: a file's name and its type."""
+
+
+@cache
+def context() -> ForkServerContext:
+    """Processes are copies of one that loads the numeric libraries from now on, and begin in hundredths of a second."""
+    found = multiprocessing.get_context("forkserver")
+    found.set_forkserver_preload([__name__])
+    with safe_path():
+        resource_tracker.ensure_running()
+        forkserver.ensure_running()
+    return found
+
+
+class Worker:
+    """A process that does one kind of work for a page, one thing after the other.
+
+    Parameters
+    ----------
+    document : of the page, in whose turn answers are heard
+    words, seconds : what the work is, and after how long it is cut off; what takes longer is for the command line
+    failed : is told in a sentence why there is no answer
+    patience : by how much others go first
+    """
+
+    def __init__(
+        self, document: Document, words: str, seconds: float, failed: Callable[[str], None], patience: int = 0
+    ) -> None:
+        self.document, self.words, self.seconds, self.failed, self.patience = document, words, seconds, failed, patience
+        self.process: ForkServerProcess | None = None
+        self._waiting: dict[Hashable, tuple[Callable[[], tuple[Any, ...]], Callable[[Any], None]]] = {}
+        self._hear: Callable[[Any], None] | None = None
+        self._limit: Any = None
+
+    @property
+    def busy(self) -> bool:
+        """Whether an answer is still to come."""
+        return self._hear is not None
+
+    @property
+    def waits(self) -> bool:
+        """Whether a question still waits for its turn."""
+        return bool(self._waiting)
+
+    def ask(self, key: Hashable, call: Callable[[], tuple[Any, ...]], heard: Callable[[Any], None]) -> None:
+        """Compute something when its turn comes.
+
+        Parameters
+        ----------
+        key : an older question with this key that still waits is left out
+        call : gives the function and its arguments when the turn has come
+        heard : gets the answer
+        """
+        self._waiting.pop(key, None)
+        self._waiting[key] = call, heard
+        self._go_on()
+
+    def stop(self) -> None:
+        """End the process, whatever it is doing, and forget all questions."""
+        self._waiting.clear()
+        self._rest()
+        if self.process is not None:
+            self._loop.remove_handler(self._connection.fileno())
+            self._connection.close()
+            self.process.kill()
+            self.process.join()
+            self.process.close()
+            self.process = None
+
+    def _go_on(self) -> None:
+        if self.busy or not self._waiting:
+            return
+        if self.process is None:
+            self._begin()
+        call, self._hear = self._waiting.pop(next(iter(self._waiting)))
+        self._limit = self._loop.call_later(self.seconds, self._say, self.process, self._cut_off)
+        self._connection.send(call())
+
+    def _begin(self) -> None:
+        self._loop = IOLoop.current()
+        self._connection, other = context().Pipe()
+        self.process = context().Process(target=_serve, args=(other, self.patience), daemon=True)
+        # A signal stops the main thread anywhere; a process that begins and is not told its task says so at length.
+        with ThreadPoolExecutor(1) as beside:
+            beside.submit(self.process.start).result()
+        other.close()
+        listen = partial(self._listen, self.process)
+        self._loop.add_handler(self._connection.fileno(), listen, IOLoop.READ)
+
+    def _listen(self, process: ForkServerProcess, *_: object) -> None:
+        try:
+            answer, problem = self._connection.recv()
+        except (EOFError, ConnectionError):
+            self.stop()
+            answer, problem = None, "A computation was ended from outside; memory may be short."
+            self.document.add_next_tick_callback(lambda: self.failed(problem))
+            return
+        self._say(process, lambda: self._answered(answer, problem))
+
+    def _say(self, process: ForkServerProcess | None, what: Callable[[], None]) -> None:
+        """In the document's turn, if the process is still the same."""
+        self.document.add_next_tick_callback(lambda: what() if self.process is process else None)
+
+    def _answered(self, answer: Any, problem: str) -> None:
+        hear = self._rest()
+        if problem:
+            self.failed(problem)
+        elif hear is not None:
+            hear(answer)
+        self._go_on()
+
+    def _rest(self) -> Callable[[Any], None] | None:
+        if self._limit is not None:
+            self._loop.remove_timeout(self._limit)
+        hear, self._hear, self._limit = self._hear, None, None
+        return hear
+
+    def _cut_off(self) -> None:
+        self.stop()
+        self.failed(f"{self.words} took longer than {self.seconds:g} s and was cut off.")
+
+
+def _serve(connection: Connection, patience: int) -> None:
+    os.nice(patience)
+    resource.setrlimit(resource.RLIMIT_DATA, (MEMORY, MEMORY))
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the server
+    threading.Thread(target=_end_with_parent, daemon=True).start()
+    while True:
+        try:
+            function, *arguments = connection.recv()
+            answer, problem = None, ""
+            try:
+                answer = function(*arguments)
+            except SpinlevError as error:
+                problem = str(error)
+            except Exception as error:  # the last resort: the page says it
+                problem = f"The computation failed: {type(error).__name__}: {error}."
+            connection.send((answer, problem))
+        except (EOFError, BrokenPipeError, ConnectionResetError):  # the page has gone
+            return
+
+
+def _end_with_parent() -> None:
+    parent = multiprocessing.parent_process()
+    if parent is not None:
+        parent.join()
+        os._exit(1)
+
+
+def build(state: PageState, method: str, arguments: tuple[Any, ...]) -> PageState:
+    """Another state, by a method of `PageState`."""
+    made: PageState = getattr(state, method)(*arguments)
+    made.keys  # noqa: B018  # travels with it: the page's own process does not look for overlaps
+    return made
+
+
+@dataclass(frozen=True)
+class Shown:
+    """The numbers of a scene by some models.
+
+    Parameters
+    ----------
+    headline : where the floater floats and whether it stays there
+    rows : of the table of equilibria, the head first; as the command line prints them
+    modes : of the eigenvalues of the first equilibrium, the head first
+    sign : by which models
+    places : position mm and direction of the moment at t = 0 of each equilibrium
+    left_out : which solutions are no equilibria, or not known to be, in sentences
+    lines : of the field, m, where they were asked for
+    """
+
+    headline: str
+    rows: list[tuple[str, ...]]
+    modes: list[tuple[str, ...]]
+    sign: str
+    places: list[tuple[list[float], list[float]]]
+    left_out: list[str]
+    lines: list[Array] = field(default_factory=list)
+
+
+def preview(state: PageState) -> Shown:
+    """All equilibria by what can be told while a slider moves: the point dipole without the plate's currents."""
+    models = Models("map" if state.model == "map" else "dipole", "none")
+    levitation = Levitation(state.scene, models, state.spin)
+    # Not from the cache, which would get a file for every step of a slider.
+    levitation.adopt(survey(state.scene, levitation.interaction, state.spin, rates=levitation.rates))
+    return _shown(levitation)
+
+
+def complete(state: PageState) -> Shown:
+    """All equilibria by the models asked for, as the command line finds them, and the field's lines."""
+    levitation = Levitation(state.scene, state.models, state.spin)
+    found = _shown(levitation)
+    known = drawn_field(state.scene, levitation.table)
+    lines = field_lines(state.scene, lambda points: np.nan_to_num(known(points)), *SIGHT)
+    return replace(found, lines=[line[::2] for line in lines])
+
+
+def _shown(levitation: Levitation) -> Shown:
+    found, left_out = levitation.equilibria, levitation.survey.left_out
+    useful = worth_a_row(found)
+    felt = levitation.plate.model if levitation.plate is not None else "none"
+    plate = f", {PLATE_WORDS[felt]}" if levitation.scene.plate is not None else ""
+    mutual = ", rotor and floater magnetise each other" if levitation.interaction_model == "mutual" else ""
+    modes = [(m.name, f"{m.frequency_hz:.6g}", f"{m.growth_per_s:.6g}") for m in useful[0].modes] if useful else []
+    return Shown(
+        headline=headline(levitation, found, left_out),
+        rows=equilibria_rows(levitation, found),
+        modes=[MODE_COLUMNS, *modes] if useful else [],
+        sign=f"{MODEL_WORDS.get(levitation.table.model, levitation.table.model)}{mutual}{plate}",
+        places=[((1e3 * e.start.position).tolist(), e.start.moment.tolist()) for e in useful],
+        left_out=left_out_words(levitation, left_out),
+    )
+
+
+@dataclass(frozen=True)
+class Regions:
+    """Where something levitates: 0 nothing, 1 only unstably, 2 stably, (n, m) over frequencies Hz and measures."""
+
+    model: str
+    frequencies: Array
+    measures: Array
+    kind: Array
+
+
+def has_map(state: PageState) -> bool:
+    """Whether a scene's rotor has a measure for a map's second axis, and its equilibria are fixed points."""
+    known = state.keys["rotor"].get("configuration") in MEASURES
+    return known and not np.any(state.scene.gravity[:2])
+
+
+def map_key(state: PageState) -> str:
+    """All that a map depends on: neither its own axes, nor the plate, nor where a flight begins."""
+    whole = canonical_keys(state.scene)
+    keys = {key: value for key, value in whole.items() if key not in ("frequency_hz", "plate", "start")}
+    open_ones = ("displacement_mm", "angle_deg")
+    keys["rotor"] = {key: value for key, value in keys["rotor"].items() if key not in open_ones}
+    return f"{keys} {state.spin} {state.model == 'cuboid'}"
+
+
+def regions(
+    state: PageState, spans: tuple[tuple[float, float], tuple[float, float]], model: str, points: int
+) -> Regions:
+    """A map of where something levitates.
+
+    Parameters
+    ----------
+    state : gives all but frequency and measure of the rotor
+    spans : of the frequency, Hz, and of the measure, mm or degrees
+    model, points : of the field, and along each axis
+    """
+    configuration = state.keys["rotor"]["configuration"]
+    frequencies, measures = (np.linspace(*span, points) for span in spans)
+    unit = np.radians(1.0) if configuration == "tilt" else 1e-3
+    try:
+        family = rotor_family(state.scene, configuration, model)
+        every, stable = equilibrium_map(family, frequencies, measures * unit, state.spin).number
+    except ValueError as error:
+        raise ComputationError(str(error)) from None
+    return Regions(model, frequencies, measures, np.asarray((every > 0).astype(np.uint8) + (stable > 0)))
 
 
 @dataclass(frozen=True)
@@ -220,230 +360,124 @@ class Frame:
     message: str = ""
 
 
-def fly(connection: Connection, state: PageState) -> None:
-    """Fly a scene's floater by what the page says: ("play", speed), ("pause",), ("drawn",), ("push", m/s), ("put", m).
+_flights: list[LiveFlight] = []
+"""The one of this process."""
 
-    After a frame the next one waits until the page has drawn it. A flight or a page that is too slow for its speed
-    falls behind; what is shown is always what was flown.
-    """
+
+def begin_flight(state: PageState) -> Frame:
+    """The first frame of a flight."""
+    _flights[:] = [Levitation(state.scene, state.models, state.spin).live_flight()]
+    return _frame(_still())
+
+
+def fly(seconds: float) -> Frame:
+    """The flight, so much later."""
     try:
-        flight = Levitation(state.scene, state.models, state.spin).live_flight()
+        return _frame(_flights[0].onward(seconds))
     except SpinlevError as error:
-        connection.send(str(error))
-        return
-    connection.send(_frame(flight, _still(flight)))
-    speed, due, drawn = 0.0, time.monotonic(), False
-    while True:
-        going = speed > 0 and drawn
-        if connection.poll(max(0.0, due - time.monotonic()) if going else None):
-            message = connection.recv()
-            if message[0] == "drawn":
-                drawn = True
-            elif message[0] == "pause":
-                speed = 0.0
-            elif message[0] == "play":
-                speed, due = message[1], max(due, time.monotonic())
-            else:
-                connection.send(_wished(flight, *message))
-                drawn = False
-        elif going:
-            now = time.monotonic()
-            frame = _flown(flight, speed * min(FRAME + now - due, SLOWEST))
-            due, drawn = now + FRAME, False
-            speed = 0.0 if frame.ended else speed
-            connection.send(frame)
+        return replace(_frame(_still()), message=str(error), ended="stopped: the motion could not be computed")
 
 
-def _flown(flight: LiveFlight, seconds: float) -> Frame:
+def wish(what: str, vector: list[float]) -> Frame:
+    """The flight after its floater got a "push", m/s, or was "put" elsewhere, m."""
     try:
-        return _frame(flight, flight.onward(seconds))
+        getattr(_flights[0], what)(np.array(vector))
     except SpinlevError as error:
-        return _frame(flight, _still(flight), str(error), ended="stopped: the motion could not be computed")
+        return replace(_frame(_still()), message=str(error))
+    return _frame(_still())
 
 
-def _wished(flight: LiveFlight, what: str, vector: list[float]) -> Frame:
-    message = ""
-    try:
-        if what == "push":
-            flight.push(np.array(vector))
-        else:
-            flight.put(np.array(vector))
-    except SpinlevError as error:
-        message = str(error)
-    return _frame(flight, _still(flight), message)
+def _still() -> Piece:
+    flight = _flights[0]
+    lab = type(flight.now)(*(vector[None] for vector in flight.now.vectors))
+    return Piece(np.array([flight.time]), lab, flight.scene.angular_velocity * flight.time, flight.log.ended_by)
 
 
-def _still(flight: LiveFlight) -> Piece:
-    turned = flight.scene.angular_velocity * flight.time
-    lab = flight.now
-    row = type(lab)(*(vector[None] for vector in lab.vectors))
-    return Piece(np.array([flight.time]), row, turned, flight.log.ended_by)
-
-
-def _frame(flight: LiveFlight, piece: Piece, message: str = "", ended: str = "") -> Frame:
+def _frame(piece: Piece) -> Frame:
+    flight = _flights[0]
     places, moments = piece.lab.position, piece.lab.moment
-    tilt = np.degrees(np.arctan2(np.hypot(moments[:, 0], moments[:, 1]), moments[:, 2]))
     now = piece.lab.to_rotor(flight.scene.angular_velocity * piece.time)
     words = ENDS.get(piece.ended_by, "")
-    said = f"After {flight.time:.3g} s {words}." if words else ended
     return Frame(
         time=piece.time,
         height=1e3 * places[:, 2],
-        tilt=tilt,
+        tilt=np.degrees(np.arctan2(np.hypot(moments[:, 0], moments[:, 1]), moments[:, 2])),
         position=(1e3 * places[-1]).tolist(),
         moment=moments[-1].tolist(),
         seen=(1e3 * now.position[-1]).tolist(),
         angle=float(np.fmod(piece.angle, 2 * np.pi)),
-        ended=said,
-        message=message,
+        ended=f"After {flight.time:.3g} s {words}." if words else "",
     )
 
 
-POINTS = (13, 41)
-"""Of a map along each axis: first, and then."""
-
-
 @dataclass(frozen=True)
-class Found:
-    """An answer to a state of a page.
+class Screen:
+    """What is on a page's screen.
 
     Parameters
     ----------
-    number : of the question
-    shown : what the page shows; None where nothing could be found
-    message : why not
-    lines : field lines, m, where they were asked for
-    survey : the equilibria without the plate, all searched for, for neighbours to begin with
+    shown, regions : the numbers and the map; None where there are none
+    axes, point : names of frequency and measure, and what they are now
+    time, height, tilt : of the flight so far, s, mm and degrees
     """
 
-    number: int
     shown: Shown | None
-    message: str = ""
-    lines: tuple[Array, ...] = ()
-    survey: Survey | None = None
+    regions: Regions | None
+    axes: tuple[str, str]
+    point: tuple[float, float]
+    time: Array
+    height: Array
+    tilt: Array
 
 
-@dataclass(frozen=True)
-class Regions:
-    """Where something levitates: 0 nothing, 1 only unstably, 2 stably, (n, m) over frequencies Hz and measures.
+def content(kind: str, state: PageState, screen: Screen | None = None) -> bytes:
+    """The content of a file of `FILES`, which the command line computes alike; `screen` for a picture of it.
 
-    `last`: no finer one follows; with a `message` there is none.
+    Raises
+    ------
+    SpinlevError : the scene has no answer
     """
-
-    model: str
-    frequencies: Array
-    measures: Array
-    kind: Array
-    message: str = ""
-    last: bool = False
-
-
-def build(connection: Connection, state: PageState) -> None:
-    """Make the states that the page's reader asks for, each of the last: (name of a method of `PageState`, arguments).
-
-    To each comes (that name, state or None, message).
-    """
-    while True:
-        method, arguments = connection.recv()
-        try:
-            state = getattr(state, method)(*arguments)
-            state.keys  # noqa: B018  # travels with it: the page's own process does not look for overlaps
-            connection.send((method, state, ""))
-        except SpinlevError as error:
-            connection.send((method, None, str(error)))
+    if kind == "toml":
+        return scene_text(state.scene).encode()
+    if kind == "png":
+        assert screen is not None
+        return figure_bytes(screen_figure(screen, state), "png")
+    levitation = Levitation(state.scene, state.models, state.spin)
+    result = Result(levitation, levitation.survey)
+    if kind == "json":
+        answer: dict[str, Any] = {**result.summary, "tables_from_cache": levitation.from_cache}
+        return f"{to_json(answer)}\n".encode()
+    dataset = result.dataset().assign_attrs(study="equilibria")
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "equilibria.nc"
+        write_dataset(dataset, path, state.scene)
+        return path.read_bytes()
 
 
-def follow(connection: Connection) -> None:
-    """Answer to states of the page, as soon as can be; (number, state, survey): None where a survey is learnt."""
-    nearby: Nearby | None = None
-    while True:
-        number, state, known = connection.recv()
-        if known is not None:
-            nearby = Nearby(state)
-            nearby.learn(known)
-            nearby.at(state)  # what is compiled later would be waited for
-            connection.send(None)
-            continue
-        try:
-            there = None if nearby is None else nearby.at(state)
-            if there is None:
-                nearby = Nearby(state)
-                there = nearby.searched()
-            connection.send(Found(number, shown(there)))
-        except SpinlevError as error:
-            connection.send(Found(number, None, str(error)))
+@styled
+def screen_figure(screen: Screen, state: PageState) -> Figure:
+    """Map, running plots and the headline."""
+    from matplotlib.colors import ListedColormap
 
-
-def complete(connection: Connection, number: int, state: PageState) -> None:
-    """All equilibria by the models asked for, as the command line finds them, and the field's lines."""
-    try:
-        levitation = Levitation(state.scene, state.models, state.spin)
-        without = levitation.without_plate
-        found = shown(levitation)
-    except SpinlevError as error:
-        connection.send(Found(number, None, str(error)))
-        return
-    lines = field_lines(state.scene, _field(levitation))
-    connection.send(Found(number, found, lines=tuple(lines), survey=without))
-
-
-def _field(levitation: Levitation) -> Callable[[Array], Array]:
-    """The field at points (n, 3) m, zero inside the magnets, for lines as thick as they are drawn.
-
-    Tables by finite elements and maps do not reach to the magnets: there the closed form does, which is off by 2 %.
-    """
-    table = levitation.table if levitation.table.model in QUICK else levitation.field("cuboid")
-
-    def field(points: Array) -> Array:
-        b, known = np.zeros((len(points), 3)), table.in_range(points)
-        if known.any():
-            b[known] = table.evaluate(points[known])[0]
-        return b
-
-    return field
-
-
-def regions(connection: Connection, state: PageState, spans: tuple[tuple[float, float], tuple[float, float]]) -> None:
-    """Maps of where something levitates, first by a dipole and coarse; spans in Hz, and mm or degrees."""
-    configuration = state.keys["rotor"]["configuration"]
-    unit = np.radians(1.0) if configuration == "tilt" else 1e-3
-    models = ["dipole", *(["cuboid"] if state.model == "cuboid" else [])]
-    for model in models:
-        for points in POINTS:
-            axes = np.linspace(*spans[0], points), np.linspace(*spans[1], points)
-            try:
-                family = rotor_family(state.scene, configuration, model)
-                found = equilibrium_map(family, axes[0], axes[1] * unit, state.spin)
-            except (SpinlevError, ValueError) as error:
-                connection.send(Regions(model, *axes, np.zeros((points, points), np.uint8), str(error), last=True))
-                return
-            last = (model, points) == (models[-1], POINTS[-1])
-            connection.send(Regions(model, *axes, _kind(found), last=last))
-
-
-def _kind(found: EquilibriumMap) -> Array:
-    every, stable = found.number
-    return np.asarray((every > 0).astype(np.uint8) + (stable > 0))
-
-
-def has_map(state: PageState) -> bool:
-    """Whether a scene's rotor has a measure for a map's second axis, and its equilibria are fixed points."""
-    known = state.keys["rotor"].get("configuration") in MEASURES
-    return known and not np.any(state.scene.gravity[:2])
-
-
-def map_key(state: PageState) -> str:
-    """All that a map depends on: neither its own axes, nor the plate, nor where a flight begins."""
-    whole = canonical_keys(state.scene)
-    keys = {key: value for key, value in whole.items() if key not in ("frequency_hz", "plate", "start")}
-    open_ones = ("displacement_mm", "angle_deg")
-    keys["rotor"] = {key: value for key, value in keys["rotor"].items() if key not in open_ones}
-    return f"{keys} {state.spin} {state.model == 'cuboid'}"
-
-
-def download(connection: Connection, kind: str, state: PageState, extra: Any) -> None:
-    """The content of a file, or why there is none."""
-    try:
-        connection.send((kind, content(kind, state, extra), ""))
-    except SpinlevError as error:
-        connection.send((kind, b"", str(error)))
+    figure, ((chart, height), (words, tilt)) = panels(2, 2, (PAGE, 4.6))
+    said, rows = "No equilibrium is known.", [[""]]
+    if (known := screen.shown) is not None:
+        said = known.headline
+        rows = [[f"By: {known.sign}"], [f"spinlev equilibria scene.toml {state.command}"], [""]]
+        rows += [[f"{text:>14}" for text in row[:4]] for row in (*known.rows, ("",), *known.modes)]
+    figure.suptitle(said, fontsize=8, x=0.01, ha="left", wrap=True)
+    words.text(0, 1, "\n".join(map(" ".join, rows)), va="top", fontsize=6, family="monospace")
+    words.set_axis_off()
+    if (mapped := screen.regions) is None:
+        chart.set_axis_off()
+    else:
+        look: dict[str, Any] = {"cmap": ListedColormap(["white", "#D8DEE9", PALETTE[5]]), "vmin": 0, "vmax": 2}
+        chart.pcolormesh(mapped.frequencies, mapped.measures, mapped.kind.T, rasterized=True, **look)
+        chart.plot(*screen.point, "o", color=PALETTE[1])
+        chart.set(xlabel=screen.axes[0], ylabel=screen.axes[1], title=f"Stable regions ({mapped.model})")
+    for axes, values, label in ((height, screen.height, "Height (mm)"), (tilt, screen.tilt, "Tilt of the moment (°)")):
+        axes.plot(screen.time, values)
+        axes.set(xlabel="Time (s)", ylabel=label)
+        if not len(values):
+            axes.text(0.5, 0.5, "no flight yet", transform=axes.transAxes, ha="center", color="grey")
+    return figure

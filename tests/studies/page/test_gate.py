@@ -19,8 +19,7 @@ import spinlev as sl
 from spinlev.geometry.common import ComputationError
 from spinlev.geometry.scene.files import load_scene
 from spinlev.studies.cli import main as cli
-from spinlev.studies.page.gate import program
-from spinlev.studies.page.server import serve
+from spinlev.studies.page.server import program, serve
 
 
 @pytest.fixture(scope="module")

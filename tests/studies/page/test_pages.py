@@ -14,8 +14,7 @@ from devtools import LivePage
 from places import HORIZONTAL, OVER_PLATE
 
 import spinlev as sl
-from spinlev.studies.page import page as page_file, server
-from spinlev.studies.page.work import build
+from spinlev.studies.page import server
 
 FLOATERS = {
     "sphere": "diameter_mm = 12.7",
@@ -59,7 +58,7 @@ def reader(served):
     for one in opened:
         one.close()
     end = time.monotonic() + 120
-    while served._pages._opened:
+    while served._pages.opened:
         assert time.monotonic() < end, "a page that was left stays open"
         time.sleep(0.05)
 
@@ -128,16 +127,18 @@ def crowd(number):
     return scene_of("sphere", "sphere").replace(f"[rotor]\n{ROTORS['sphere']}\n", "") + "".join(magnets)
 
 
-def test_work_that_takes_too_long_is_cut_off_and_other_pages_answer(reader, monkeypatch):
-    patient, other = reader(), reader("frequency_hz=120")
+def test_work_that_takes_too_long_is_cut_off_and_other_pages_answer(served, reader):
+    patient = reader()
     patient.answered()
-    monkeypatch.setitem(page_file.LIMITS, build, (2.0, "Reading this scene"))
+    (its,) = served._pages.opened
+    other = reader("frequency_hz=120")
+    its.builder.seconds = 2.0
     put_in(patient, crowd(60))
     other.until(lambda: "frequency_hz" in other.names)
     other.set("frequency_hz", 125.0)
     other.until(lambda: "frequency_hz=125.0" in str(other.get("to_address", "tags")))
     patient.until(lambda: "took longer than 2 s and was cut off" in str(patient.get("message")))
-    monkeypatch.setitem(page_file.LIMITS, build, (60.0, "Reading this scene"))
+    its.builder.seconds = 60.0
     patient.set("frequency_hz", 131.0)
     patient.until(lambda: "frequency_hz=131.0" in str(patient.get("to_address", "tags")))
 

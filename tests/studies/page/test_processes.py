@@ -2,68 +2,111 @@
 
 import asyncio
 import math
+import os
 import subprocess
 import sys
 import time
 
-from spinlev.studies.page.processes import Failure, Worker
+from spinlev.studies.page.work import Worker
 
 
-def heard_from(task, *arguments):
-    """The first answer of a process, and the process itself."""
+class Turns:
+    """A document whose turn it always is."""
+
+    def add_next_tick_callback(self, call):
+        call()
+
+
+def said_by(ask, seconds=60.0):
+    """The first answer or complaint of a worker, and the worker."""
 
     async def listen():
-        answers = []
-        worker = Worker(task, arguments, answers.append)
-        while not answers:
+        said = []
+        worker = Worker(Turns(), "The work", seconds, said.append)
+        ask(worker, said.append)
+        while not said:
             await asyncio.sleep(0.01)
-        worker.stop()
-        return answers[0], worker.process
+        return said[0], worker
 
     return asyncio.run(asyncio.wait_for(listen(), 60))
 
 
-def test_a_task_that_fails_is_an_answer():
-    """The square root of a connection."""
-    answer, process = heard_from(math.sqrt)
-    assert isinstance(answer, Failure)
-    assert answer.message.startswith("The computation failed: TypeError: must be real number")
-    process.join(10)
-    assert not process.is_alive()
-
-
-def test_a_process_that_is_ended_from_outside_is_an_answer():
+def test_questions_are_answered_in_turn_and_newer_ones_take_the_place_of_those_that_wait():
     async def listen():
-        answers = []
-        worker = Worker(_sleep, (), answers.append, patient=True)
-        await asyncio.sleep(0.2)
-        worker.process.kill()
-        while not answers:
+        said = []
+        worker = Worker(Turns(), "The work", 60.0, said.append)
+        for number in range(5):
+            worker.ask("root", lambda number=number: (math.sqrt, number), said.append)
+        worker.ask("other", lambda: (math.sqrt, 100), said.append)
+        while worker.busy:
             await asyncio.sleep(0.01)
-        return answers[0]
+        worker.stop()
+        return said
 
-    answer = asyncio.run(asyncio.wait_for(listen(), 60))
-    assert isinstance(answer, Failure)
-    assert "ended from outside" in answer.message
+    assert asyncio.run(asyncio.wait_for(listen(), 60)) == [0.0, 2.0, 10.0]
+
+
+def test_a_task_that_fails_is_said_and_the_process_goes_on():
+    said, worker = said_by(lambda worker, heard: worker.ask("", lambda: (math.sqrt, "two"), heard))
+    assert said.startswith("The computation failed: TypeError: must be real number")
+    assert worker.process.is_alive()
+    worker.process.kill()
+
+
+def test_a_process_that_is_ended_from_outside_is_said():
+    said, worker = said_by(lambda worker, heard: worker.ask("", lambda: (os.abort,), heard))
+    assert "ended from outside" in said
+    assert worker.process is None
+
+
+def test_work_that_takes_too_long_is_cut_off():
+    said, worker = said_by(lambda worker, heard: worker.ask("", lambda: (time.sleep, 100), heard), 0.3)
+    assert said == "The work took longer than 0.3 s and was cut off."
+    assert worker.process is None
 
 
 def test_a_process_at_work_ends_when_it_is_told():
     async def begin():
-        worker = Worker(_sleep, (), print)
+        heard = []
+        worker = Worker(Turns(), "The work", 60.0, heard.append)
+        worker.ask("", lambda: (time.sleep, 100), heard.append)
+        number = worker.process.pid
         worker.stop()
-        worker.send("to nobody")
-        return worker.process
+        return number, heard
 
-    process = asyncio.run(begin())
-    process.join(10)
-    assert process.exitcode == -9
+    number, heard = asyncio.run(begin())
+    assert heard == []
+    assert not os.path.exists(f"/proc/{number}")
+
+
+BEGUN = """
+import asyncio, time
+from spinlev.studies.page.work import Worker
+
+async def begin():
+    worker = Worker(None, "", 60.0, print)
+    worker.ask("", lambda: (time.sleep, 100), print)
+    print(worker.process.pid, flush=True)
+    await asyncio.sleep(100)
+
+asyncio.run(begin())
+"""
+
+
+def test_a_process_at_work_ends_with_a_program_that_is_killed():
+    with subprocess.Popen([sys.executable, "-c", BEGUN], stdout=subprocess.PIPE, text=True) as program:
+        number = int(program.stdout.readline())
+        program.kill()
+    end = time.monotonic() + 30
+    while os.path.exists(f"/proc/{number}"):
+        assert time.monotonic() < end, "the process lives on"
+        time.sleep(0.05)
 
 
 STRUCK = """
-import asyncio, os, signal
+import asyncio, os, signal, time
 from multiprocessing import forkserver
-from spinlev.studies.page.processes import Worker
-from spinlev.studies.page.work import follow
+from spinlev.studies.page.work import Worker
 
 def stopped(*_):
     raise KeyboardInterrupt
@@ -71,10 +114,11 @@ def stopped(*_):
 def struck(descriptors, connect=forkserver.connect_to_new_process):
     found = connect(descriptors)
     os.kill(os.getpid(), signal.SIGTERM)
+    time.sleep(0.2)
     return found
 
 async def begin():
-    Worker(follow, (), print)
+    Worker(None, "", 60.0, print).ask("", lambda: (time.sleep, 100), print)
 
 signal.signal(signal.SIGTERM, stopped)
 forkserver.connect_to_new_process = struck
@@ -89,7 +133,3 @@ def test_a_stop_while_a_process_begins_is_no_traceback():
     """SIGTERM comes when the process is there and does not know its task yet; all of them have ended afterwards."""
     ended = subprocess.run([sys.executable, "-c", STRUCK], capture_output=True, text=True, timeout=60, check=False)
     assert (ended.returncode, ended.stdout, ended.stderr) == (0, "stopped True\n", "")
-
-
-def _sleep(connection):
-    time.sleep(100)

@@ -1,8 +1,6 @@
 """What a page's processes answer: field lines, the map, the flight, and files to take home."""
 
 import json
-import multiprocessing
-import threading
 from dataclasses import replace
 
 import numpy as np
@@ -10,45 +8,28 @@ import pytest
 import xarray as xr
 from places import OVER_PLATE
 
+from spinlev.dynamics.equilibria.equilibrium import EquilibriumError
 from spinlev.geometry.scene.files import load_scene, parse_scene
+from spinlev.studies.figures.view import field_lines
 from spinlev.studies.levitation import Levitation
-from spinlev.studies.page.state import Screen, content, field_lines, first_state
-from spinlev.studies.page.work import complete, fly, follow, has_map, map_key, regions
+from spinlev.studies.page.state import first_state
+from spinlev.studies.page.work import (
+    SIGHT,
+    Screen,
+    begin_flight,
+    complete,
+    content,
+    fly,
+    has_map,
+    map_key,
+    preview,
+    regions,
+    wish,
+)
 from spinlev.studies.run import equilibria_job
+from spinlev.studies.words import left_out_words
 
 STATE = replace(first_state(load_scene(OVER_PLATE)), plate_model="none")
-
-
-@pytest.fixture
-def line():
-    """A connection to a task, which runs in a thread and ends with the test."""
-    ends = []
-
-    def begin(task, *arguments):
-        mine, its = multiprocessing.Pipe()
-
-        def work():
-            with its:
-                try:
-                    task(its, *arguments)
-                except (EOFError, OSError):  # the test is over
-                    return
-
-        thread = threading.Thread(target=work)
-        thread.start()
-        ends.append((mine, thread))
-        return mine
-
-    yield begin
-    for mine, thread in ends:
-        mine.close()
-        thread.join()
-
-
-def heard(connection):
-    """The next answer."""
-    assert connection.poll(120)
-    return connection.recv()
 
 
 def test_lines_of_a_dipoles_field_are_its_field_lines():
@@ -59,52 +40,51 @@ def test_lines_of_a_dipoles_field_are_its_field_lines():
         r = np.linalg.norm(points, axis=1, keepdims=True)
         return 3 * points * points[:, :1] / r**5 - np.array([1.0, 0.0, 0.0]) / r**3
 
-    lines = field_lines(scene, field)
+    lines = field_lines(scene, field, *SIGHT)
     assert len(lines) > 10
     for one in lines:
         r = np.linalg.norm(one, axis=1)
         sine = 1 - (one[:, 0] / r) ** 2
-        assert r / sine == pytest.approx((r / sine)[len(r) // 2], rel=2e-3)  # steps of a tenth of the cube's edge
+        assert r / sine == pytest.approx((r / sine)[len(r) // 2], rel=2e-3)  # steps of 1 mm beside a cube of 10 mm
         assert np.abs(one[:, 1]).max() < 1e-12
 
 
 def test_where_there_is_no_field_there_are_no_lines():
-    assert field_lines(STATE.scene, lambda points: np.zeros((len(points), 3))) == []
+    assert field_lines(STATE.scene, lambda points: np.zeros((len(points), 3)), *SIGHT) == []
 
 
-def test_every_question_is_answered_and_equilibria_are_carried(line):
-    """Each question is answered from what was searched for elsewhere, which is taken in first."""
-    connection = line(complete, 7, STATE)
-    whole = heard(connection)
-    assert (whole.number, whole.shown.complete) == (7, True)
-    assert len(whole.lines) > 5
-    quick = line(follow)
-    quick.send((8, STATE, whole.survey))
-    assert heard(quick) is None
-    for number, frequency in ((9, 131.0), (10, 132.0), (11, 133.0)):
-        quick.send((number, STATE.changed("frequency_hz", frequency), None))
-    found = [heard(quick) for _ in range(3)][-1]
-    assert found.number == 11
-    assert not found.shown.complete
-    assert found.shown.sign == "point dipole, without the plate's currents"
-    assert len(found.shown.places) == len(whole.shown.places)
+def test_the_page_says_what_the_command_line_says(tmp_path):
+    """Row by row, the same characters; eigenvalues to the six digits that are shown; the preview of a dipole is whole.
+
+    Two solutions lie inside the metal of the article's plate.
+    """
+    state = STATE.changed("frequency_hz", 141.0)
+    found, quick = complete(state), preview(replace(state, model="cuboid"))
+    assert (quick.rows, quick.modes, quick.headline) == (found.rows, found.modes, found.headline)
+    assert found.sign == quick.sign == "point dipole, without the plate's currents"
+    assert len(found.lines) > 5
+    values, lines = equilibria_job(state.scene, state.models, state.spin, tmp_path)
+    assert lines[0] == found.headline
+    said = [line.split() for line in lines[1 : 1 + len(found.rows)]]
+    assert said == [" ".join(row).split() for row in found.rows]
+    modes = values["equilibria"][0]["modes"]
+    assert [row[1:] for row in found.modes[1:]] == [
+        (f"{mode['frequency_hz']:.6g}", f"{mode['growth_per_s']:.6g}") for mode in modes
+    ]
+    assert found.places[0][0] == pytest.approx(values["equilibria"][0]["position_mm"], rel=1e-11, abs=1e-12)
+    levitation = Levitation(state.scene, state.models)
+    assert found.left_out == left_out_words(levitation, levitation.survey.left_out)
+    assert found.left_out[0].startswith("Left out: 2 solutions at ")
 
 
-def test_a_question_without_an_answer_says_why(line):
-    quick = line(follow)
-    quick.send((1, STATE.changed("frequency_hz", 0.0), None))
-    found = heard(quick)
-    assert found.shown is None
-    assert "Beside a rotor at rest" in found.message
-    quick.send((2, STATE, None))
-    assert heard(quick).shown.complete
+def test_a_question_without_an_answer_says_why():
+    with pytest.raises(EquilibriumError, match="Beside a rotor at rest"):
+        preview(STATE.changed("frequency_hz", 0.0))
 
 
-def test_the_map_says_where_it_levitates(line):
+def test_the_map_says_where_it_levitates():
     """At four of its points as a search for that scene does."""
-    connection = line(regions, STATE, ((100.0, 160.0), (6.0, 18.0)))
-    first, fine = heard(connection), heard(connection)
-    assert first.kind.shape == (13, 13)
+    fine = regions(STATE, ((100.0, 160.0), (6.0, 18.0)), "dipole", 41)
     assert fine.kind.shape == (41, 41)
     assert set(np.unique(fine.kind)) == {1, 2}
     for row, column in ((0, 0), (0, 40), (20, 15), (40, 40)):
@@ -126,31 +106,23 @@ def test_what_has_no_map():
     assert not has_map(STATE.changed("gravity_m_s2", [0.1, 0.0, -9.8]))
 
 
-def test_a_flight_does_what_it_is_told(line):
-    connection = line(fly, STATE)
-    start = heard(connection)
+def test_a_flight_does_what_it_is_told():
+    start = begin_flight(STATE)
     assert start.time.tolist() == [0.0]
-    connection.send(("push", [0.0, 0.0, 0.01]))
-    assert heard(connection).position == start.position
-    connection.send(("put", [0.0, 0.0, 0.0]))
-    assert "free of the magnets" in heard(connection).message
-    connection.send(("play", 1e-3))
-    connection.send(("drawn",))
-    slow = heard(connection)
-    assert 0 < slow.time[-1] < 1e-3
-    connection.send(("put", [0.0, 0.0, -0.09]))
-    heard(connection)
-    connection.send(("play", 1.0))
-    frame = slow
+    assert wish("push", [0.0, 0.0, 0.01]).position == start.position
+    assert "free of the magnets" in wish("put", [0.0, 0.0, 0.0]).message
+    assert 0 < fly(1e-4).time[-1] < 1e-3
+    wish("put", [0.0, 0.0, -0.09])
+    frame = start
     while not frame.ended:
-        connection.send(("drawn",))
-        frame = heard(connection)
+        frame = fly(0.1)
     assert frame.ended.endswith("touched the rotor or the plate.") or "lost" in frame.ended
     assert frame.height[-1] < -60.0
 
 
-def test_a_flight_that_cannot_begin_says_why(line):
-    assert "no stable equilibrium" in heard(line(fly, STATE.changed("rotor.angle_deg", 40.0)))
+def test_a_flight_that_cannot_begin_says_why():
+    with pytest.raises(EquilibriumError, match="no stable equilibrium"):
+        begin_flight(STATE.changed("rotor.angle_deg", 40.0))
 
 
 def test_files_to_take_home_are_those_of_the_command_line(tmp_path):
@@ -162,5 +134,5 @@ def test_files_to_take_home_are_those_of_the_command_line(tmp_path):
         assert dataset.attrs["model"] == "dipole"
     moved = STATE.changed("frequency_hz", 133.0)
     assert parse_scene(content("toml", moved).decode()).frequency == 133.0
-    screen = Screen(None, "", ("Frequency (Hz)", "Tilt (°)"), *[np.zeros(0)] * 3, (130.0, 10.0), *[np.zeros(0)] * 3)
+    screen = Screen(None, None, ("Frequency (Hz)", "Tilt (°)"), (130.0, 10.0), *[np.zeros(0)] * 3)
     assert content("png", STATE, screen).startswith(b"\x89PNG")
