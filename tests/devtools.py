@@ -183,6 +183,12 @@ class LivePage:
         event = {"kind": "ModelChanged", "model": {"id": self.names[name]}, "attr": attribute, "new": value}
         self.say("PATCH-DOC", {"events": [event]})
 
+    def click(self, name: str) -> None:
+        """Press a button."""
+        values = {"type": "map", "entries": [["model", {"id": self.names[name]}]]}
+        event = {"type": "event", "name": "button_click", "values": values}
+        self.say("PATCH-DOC", {"events": [{"kind": "MessageSent", "msg_type": "bokeh_event", "msg_data": event}]})
+
     def get(self, name: str, attribute: str = "text") -> object:
         """A property as it is shown."""
         return self.shown.get(self.names.get(name, ""), {}).get(attribute)

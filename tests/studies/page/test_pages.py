@@ -208,3 +208,25 @@ def test_another_scene_of_the_page(reader):
     put_in(page, HORIZONTAL.read_text())
     page.until(lambda: "rotor.displacement_mm" in page.names)
     page.until(lambda: "rotor.configuration=horizontal" in str(page.get("to_address", "tags")))
+
+
+def test_a_flight_is_played_kicked_stopped_and_forgotten(reader):
+    """A new picture comes when the last one has been drawn, which a browser says by another text."""
+    page = reader("plate_model=none")
+    page.answered()
+    drawn = []
+
+    def said():
+        pose = str(page.get("to_pose", "tags"))
+        if pose not in drawn:
+            drawn.append(pose)
+            page.set("to_pose", str(len(drawn)), "text")
+        return str(page.get("says"))
+
+    page.click("play")
+    page.until(lambda: said().startswith("t = ") and float(said()[4:-2]) > 0.3)
+    page.click("up")
+    page.click("play")
+    page.until(lambda: page.get("play", "label") == "Play")
+    page.click("again")
+    page.until(lambda: said() == "")
