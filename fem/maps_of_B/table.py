@@ -17,66 +17,18 @@ from ...geometry.scene.contents import MapReading
 from ..cache import TableKind
 from ..harmonics.expansion import MultipoleExpansion
 from ..harmonics.expressions import FieldExpressions
-from ..harmonics.solid import Coefficients, derivative, field_sizes, field_spectrum, irregular_values
+from ..harmonics.solid import Coefficients, derivative, field_sizes, field_spectrum, outer_sums
 from ..rotor.table import RangeError, RotorTable, error_below
 from .columns import FieldMap, FieldMapError
 from .fit import FLOOR, MARGIN, HarmonicBasis, HarmonicFit, find_center, fit_harmonics
 from .plausible import require_plausible
 from .read import read_field_map
 
-CHUNK = 4096
 PAIRS = [(i, j) for i in range(3) for j in range(i, 3)]
 """Entries of a symmetric matrix."""
+TWICE = [1.0 if i == j else 2.0 for i, j in PAIRS]
 COVERAGE = 4.0
 """The error bar in standard deviations: with a spread of a dozen members, once in 500 the error is beyond it."""
-
-
-class Ensemble:
-    """Deviations of equally likely fields from the table's, all about the same centres.
-
-    Parameters
-    ----------
-    centers, radii : (k, 3) and (k,) m
-    coefficients : c_lm (T) of the deviations, complex (members, k, L+1, L+1)
-    """
-
-    def __init__(self, centers: Array, radii: Array, coefficients: Coefficients) -> None:
-        self._centers, self._radii = centers, radii
-        self.coefficients = coefficients
-        self._weights = [_weights(coefficients[:, k], radius) for k, radius in enumerate(radii)]
-
-    def spread(self, points: Array) -> tuple[Array, Array]:
-        """Root mean square (n,) of the deviations of B (T) and of its gradient (T/m) at points (n, 3) m."""
-        parts = np.array_split(points, max(len(points) // CHUNK, 1))
-        found = [self._spread(part) for part in parts]
-        return np.concatenate([b for b, _ in found]), np.concatenate([g for _, g in found])
-
-    def _spread(self, points: Array) -> tuple[Array, Array]:
-        degree, members = self.coefficients.shape[-1] + 1, len(self.coefficients)
-        values = np.zeros((9 * members, len(points)))
-        for center, radius, weights in zip(self._centers, self._radii, self._weights, strict=True):
-            harmonics = irregular_values(degree, (points - center) / radius)
-            rows = np.array([harmonics[l, m] for l in range(degree + 1) for m in range(l + 1)])
-            values += weights @ np.concatenate([rows.real, rows.imag])
-        squares = np.square(values).reshape(members, 9, -1).mean(axis=0)
-        twice = np.array([1.0 if i == j else 2.0 for i, j in PAIRS])
-        return np.sqrt(squares[:3].sum(axis=0)), np.sqrt(twice @ squares[3:])
-
-
-def _weights(coefficients: Coefficients, radius: float) -> Array:
-    """Rows (9 · members) that give B_i and ∂B_i/∂x_j of each member from the real and imaginary parts of all Θ_lm."""
-    rows = []
-    for member in coefficients:
-        field = [-derivative(member, i) for i in range(3)]
-        rows += [_row(np.pad(b, (0, 1))) for b in field]
-        rows += [_row(derivative(field[i], j)) / radius for i, j in PAIRS]
-    return np.array(rows)
-
-
-def _row(coefficients: Coefficients) -> Array:
-    """Weights of Re Θ_lm and Im Θ_lm, m ≥ 0, in a real function: the terms ±m are complex conjugates."""
-    kept = (coefficients * np.where(np.arange(len(coefficients)) == 0, 1.0, 2.0))[np.tril_indices(len(coefficients))]
-    return np.concatenate([kept.real, -kept.imag])
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,9 +63,25 @@ class GriddedTable:
         return self.expansions.model
 
     @cached_property
-    def _ensemble(self) -> Ensemble:
-        parts = self.expansions.expansions
-        return Ensemble(np.array([e.center for e in parts]), np.array([e.radius for e in parts]), self.deviations)
+    def _derivatives(self) -> list[list[Coefficients]]:
+        """About each centre B_i and ∂B_i/∂x_j of each member, nine a member, as coefficients of one size."""
+        found: list[list[Coefficients]] = []
+        for expansion, members in zip(self.expansions.expansions, self.deviations.swapaxes(0, 1), strict=True):
+            fields = [[-derivative(member, i) for i in range(3)] for member in members]
+            found.append([])
+            for b in fields:
+                found[-1] += [np.pad(part, (0, 1)) for part in b]
+                found[-1] += [derivative(b[i], j) / expansion.radius for i, j in PAIRS]
+        return found
+
+    def _spread(self, points: Array) -> tuple[Array, Array]:
+        """Root mean square (n,) of the deviations of B (T) and of its gradient (T/m) at points (n, 3) m."""
+        values = sum(
+            outer_sums(parts, (points - e.center) / e.radius)
+            for e, parts in zip(self.expansions.expansions, self._derivatives, strict=True)
+        )
+        squares = np.square(values).reshape(len(points), -1, 9).mean(axis=1)
+        return np.sqrt(squares[:, :3].sum(axis=1)), np.sqrt(squares[:, 3:] @ TWICE)
 
     def expressions(self, position: Sequence[hy.expression]) -> FieldExpressions:
         """B and its gradient as heyoka expressions of a position (m, rotor's frame)."""
@@ -145,7 +113,7 @@ class GriddedTable:
         points = np.asarray(points, float).reshape(-1, 3)
         b, g = self.evaluate(points)
         neglected_b, neglected_g = self.expansions.relative_error(points)
-        spread_b, spread_g = self._ensemble.spread(points)
+        spread_b, spread_g = self._spread(points)
         tiny = np.finfo(float).tiny
         return (
             FLOOR + neglected_b + COVERAGE * spread_b / (np.linalg.norm(b, axis=1) + tiny),
