@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from functools import cached_property
 
 import numpy as np
 
@@ -44,10 +43,10 @@ class Magnet:
                 "Input polarization must not be zero where the permeability has an easy axis; instead it is zero."
             )
 
-    @cached_property
+    @property
     def box(self) -> Box:
         """The box about the body, along its axes: the body itself where it is a cuboid."""
-        return self.body if isinstance(self.body, Box) else self.body.box
+        return self.body.box
 
     @property
     def rigid(self) -> Magnet:

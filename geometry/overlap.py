@@ -65,7 +65,7 @@ def _convex_separation(first: Solid, second: Solid) -> tuple[float, Array]:
 
     def gap(directions: Array) -> Array:
         ways = directions / np.linalg.norm(directions, axis=1)[:, None]
-        return np.asarray(ways @ offset - _support(first, ways) - _support(second, -ways))
+        return np.asarray(ways @ offset - first.support(ways) - second.support(-ways))
 
     axes = np.vstack([first.rotation.T, second.rotation.T])
     crossed = np.cross(first.rotation.T[:, None], second.rotation.T).reshape(9, 3)
@@ -92,11 +92,6 @@ def _convex_separation(first: Solid, second: Solid) -> tuple[float, Array]:
     return float(gap(best[None])[0]), best
 
 
-def _support(body: Solid, ways: Array) -> Array:
-    """How far (n,) a body reaches from its centre along unit vectors (n, 3), m; but for a part as far against them."""
-    return body.support(ways) if isinstance(body, Part) else body.reach(ways)
-
-
 def _gap_in_hole(ring: Ring, body: Solid) -> tuple[float, Array, bool]:
     """Gap between a convex body and the wall of the endless hole of a ring, the way (3,) off that wall, if it fits."""
     x, y, _ = ring.rotation.T
@@ -104,7 +99,7 @@ def _gap_in_hole(ring: Ring, body: Solid) -> tuple[float, Array, bool]:
 
     def stands_off(angle: Array) -> Array:
         ways = np.multiply.outer(np.cos(angle), x) + np.multiply.outer(np.sin(angle), y)
-        return np.asarray(ring.inner_radius - ways @ offset - _support(body, ways))
+        return np.asarray(ring.inner_radius - ways @ offset - body.support(ways))
 
     angles = np.linspace(0.0, 2 * np.pi, 361)
     best = angles[int(np.argmin(stands_off(angles)))]
@@ -136,11 +131,6 @@ def body_overlap(first: Solid, second: Solid) -> float:
     if isinstance(first, Sphere):
         return sphere_overlap(first.center, first.radius, second)
     return -separation(first, second)[0]
-
-
-def box_overlap(first: Box, second: Box) -> float:
-    """Penetration depth of two boxes, m: the shortest shift that parts them; negative if they are apart."""
-    return -_box_separation(first, second)[0]
 
 
 def sphere_overlap(center: ArrayLike, radius: float, body: Solid) -> float:

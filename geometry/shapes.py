@@ -1,9 +1,9 @@
-"""A rectangular box in any pose: the shape of every magnet and of the plate."""
+"""Solids in any pose: boxes, cylinders, rings and spheres, and what is common to all bodies."""
 
 from abc import abstractmethod
-from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -12,6 +12,8 @@ from .common import Array, frozen_array, millimetres
 
 ROUND_OFF = 4e-16
 """Of the entries of a rotation."""
+INSIDE = 1 - 1e-9
+"""Just inside of a surface, in radii."""
 
 
 def rotation_matrix(degrees_xyz: ArrayLike) -> Array:
@@ -40,92 +42,25 @@ def rotation_angles(matrix: Array) -> Array:
     return np.degrees([x, np.arctan2(-matrix[2, 0], across), np.arctan2(-second[0], second[1])])
 
 
-@dataclass(frozen=True, eq=False)
-class Box:
-    """A rectangular box.
-
-    Parameters
-    ----------
-    size : (3,) edge lengths along the body axes, m
-    center : (3,) position of the centre, m
-    rotation : (3, 3) matrix whose columns are the body axes (default: none turned)
-    """
-
-    size: Array = field(metadata={"units": "m"})
-    center: Array = field(default_factory=lambda: np.zeros(3), metadata={"units": "m"})
-    rotation: Array = field(default_factory=lambda: np.eye(3))
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "size", frozen_array(self.size, (3,)))
-        object.__setattr__(self, "center", frozen_array(self.center, (3,)))
-        object.__setattr__(self, "rotation", frozen_array(self.rotation, (3, 3)))
-
-    @cached_property
-    def half_edges(self) -> Array:
-        """(3,) half of each edge, m."""
-        return self.size / 2
-
-    @cached_property
-    def circumradius(self) -> float:
-        """Radius of the smallest sphere about the centre that holds the box, m."""
-        return float(np.linalg.norm(self.half_edges))
-
-    @property
-    def volume(self) -> float:
-        """Volume, m³."""
-        return float(np.prod(self.size))
-
-    @property
-    def corners(self) -> Array:
-        """(8, 3) corner positions, m."""
-        signs = np.stack(np.meshgrid(*[(-1.0, 1.0)] * 3, indexing="ij"), -1).reshape(8, 3)
-        return self.center + (signs * self.half_edges) @ self.rotation.T
-
-    def to_body(self, points: ArrayLike) -> Array:
-        """Coordinates of `points` (..., 3) along the body axes, from the centre, m."""
-        return (np.asarray(points, float) - self.center) @ self.rotation
-
-    def reach(self, directions: Array) -> Array:
-        """How far (n,) it reaches from its centre along unit vectors (n, 3), m."""
-        return np.asarray(np.abs(directions @ self.rotation) @ self.half_edges)
-
-    def distance(self, points: ArrayLike) -> Array:
-        """Signed distance (...,) of `points` (..., 3) from the surface, m; negative inside."""
-        excess = np.abs(self.to_body(points)) - self.half_edges
-        outside = np.linalg.norm(np.maximum(excess, 0.0), axis=-1)
-        return np.asarray(outside + np.minimum(excess.max(axis=-1), 0.0))
-
-    def edge_distance(self, points: ArrayLike) -> Array:
-        """Distances (n,) m of points (n, 3) m from the nearest edge."""
-        to_faces = np.abs(self.to_body(points)) - self.half_edges
-        along = np.maximum(to_faces, 0.0)
-        squares = [to_faces[:, (a + 1) % 3] ** 2 + to_faces[:, (a + 2) % 3] ** 2 + along[:, a] ** 2 for a in range(3)]
-        return np.asarray(np.sqrt(np.min(squares, axis=0)))
-
-    def within(self, points: Array) -> Array:
-        """Points (n, 3) m of its elements, none of which lies outside of flat faces."""
-        return points
-
-    @property
-    def shape_numbers(self) -> Array:
-        """(3,) m that tell it from another box, but for its pose: its edges."""
-        return np.array(self.size)
-
-    @property
-    def described_size(self) -> str:
-        """Its size as a person writes it, mm."""
-        return millimetres(self.size)
-
-
-INSIDE = 1 - 1e-9
-"""Just inside of a surface, in radii."""
-
-
-class Posed:
-    """A body with a centre, body axes, and edges of the box about it along those axes."""
+class Body:
+    """A solid with a centre, body axes, and edges of the box about it along those axes."""
 
     center: Array
     rotation: Array
+
+    if TYPE_CHECKING:  # a field of a cuboid; a property here would be that field's default
+
+        @property
+        def size(self) -> Array:
+            """(3,) edges of the box about it, along the body axes, m."""
+
+        @property
+        def volume(self) -> float:
+            """Volume, m³."""
+
+        @property
+        def area(self) -> float:
+            """Area of the surface, m²."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "center", frozen_array(self.center, (3,)))
@@ -133,8 +68,8 @@ class Posed:
 
     @property
     @abstractmethod
-    def size(self) -> Array:
-        """(3,) edges of the box about it, along the body axes, m."""
+    def circumradius(self) -> float:
+        """Radius of the smallest sphere about the centre that holds the body, m."""
 
     @property
     @abstractmethod
@@ -150,61 +85,177 @@ class Posed:
         """Shape and size as a person writes them, mm."""
 
     @abstractmethod
+    def reach(self, directions: Array) -> Array:
+        """How far (n,) it reaches from its centre along unit vectors (n, 3), m, or against them if that is more."""
+
+    @abstractmethod
+    def distance(self, points: ArrayLike) -> Array:
+        """Signed distance (...,) of `points` (..., 3) from the surface, m; negative inside."""
+
+    @abstractmethod
     def edge_distance(self, points: ArrayLike) -> Array:
         """Distances (n,) m of points (n, 3) m from the nearest edge; infinite where it has none."""
 
-    @abstractmethod
+    def support(self, directions: Array) -> Array:
+        """How far (n,) it reaches along unit vectors (n, 3), m, whatever lies against them."""
+        return self.reach(directions)
+
     def within(self, points: Array) -> Array:
         """Points (n, 3) m of its elements, those just outside of a round surface put just inside it."""
+        return points
 
-    @property
+    @cached_property
     def half_edges(self) -> Array:
         """(3,) half of each edge of the box about it, m."""
         return self.size / 2
 
-    @property
-    def box(self) -> Box:
-        """The box about it, along the body axes."""
+    @cached_property
+    def box(self) -> "Box":
+        """The box about it, along the body axes: itself where it is one."""
         return Box(self.size, self.center, self.rotation)
 
     @property
     def corners(self) -> Array:
         """(8, 3) corners of the box about it, m."""
-        return self.box.corners
+        signs = np.stack(np.meshgrid(*[(-1.0, 1.0)] * 3, indexing="ij"), -1).reshape(8, 3)
+        return self.center + (signs * self.half_edges) @ self.rotation.T
 
     def to_body(self, points: ArrayLike) -> Array:
         """Coordinates of `points` (..., 3) along the body axes, from the centre, m."""
         return (np.asarray(points, float) - self.center) @ self.rotation
+
+
+def _from_excess(excess: Array) -> Array:
+    """Signed distance (...,) of points that lie so far beyond faces square to each other (..., n), m."""
+    outside = np.linalg.norm(np.maximum(excess, 0.0), axis=-1)
+    return np.asarray(outside + np.minimum(excess.max(axis=-1), 0.0))
+
+
+@dataclass(frozen=True, eq=False)
+class Box(Body):
+    """A rectangular box.
+
+    Parameters
+    ----------
+    size : (3,) edge lengths along the body axes, m
+    center : (3,) position of the centre, m
+    rotation : (3, 3) matrix whose columns are the body axes (default: none turned)
+    """
+
+    size: Array = field(metadata={"units": "m"})
+    center: Array = field(default_factory=lambda: np.zeros(3), metadata={"units": "m"})
+    rotation: Array = field(default_factory=lambda: np.eye(3))
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        object.__setattr__(self, "size", frozen_array(self.size, (3,)))
+
+    @cached_property
+    def box(self) -> "Box":
+        return self
+
+    @cached_property
+    def circumradius(self) -> float:
+        return float(np.linalg.norm(self.half_edges))
+
+    @property
+    def volume(self) -> float:
+        return float(np.prod(self.size))
+
+    @property
+    def area(self) -> float:
+        return 2 * float(self.size @ np.roll(self.size, 1))
+
+    @property
+    def shape_numbers(self) -> Array:
+        return np.array(self.size)
+
+    @property
+    def described_size(self) -> str:
+        return millimetres(self.size)
+
+    def reach(self, directions: Array) -> Array:
+        return np.asarray(np.abs(directions @ self.rotation) @ self.half_edges)
+
+    def distance(self, points: ArrayLike) -> Array:
+        return _from_excess(np.abs(self.to_body(points)) - self.half_edges)
+
+    def edge_distance(self, points: ArrayLike) -> Array:
+        to_faces = np.abs(self.to_body(points)) - self.half_edges
+        along = np.maximum(to_faces, 0.0)
+        squares = [to_faces[:, (a + 1) % 3] ** 2 + to_faces[:, (a + 2) % 3] ** 2 + along[:, a] ** 2 for a in range(3)]
+        return np.asarray(np.sqrt(np.min(squares, axis=0)))
+
+
+class _Turned(Body):
+    """What a rectangle beside the body's z axis makes as it turns about that."""
+
+    if TYPE_CHECKING:
+        radius: float
+        height: float
+
+        @property
+        def inner_radius(self) -> float:
+            """Of the hole, m; zero where there is none."""
+
+    @property
+    def size(self) -> Array:
+        return np.array([2 * self.radius, 2 * self.radius, self.height])
+
+    @property
+    def circumradius(self) -> float:
+        return float(np.hypot(self.radius, self.height / 2))
+
+    @property
+    def volume(self) -> float:
+        return float(np.pi * (self.radius**2 - self.inner_radius**2) * self.height)
+
+    @property
+    def area(self) -> float:
+        hole = self.inner_radius
+        return float(2 * np.pi * (self.radius + hole) * (self.radius - hole + self.height))
+
+    def reach(self, directions: Array) -> Array:
+        along = np.abs(directions @ self.rotation[:, 2])
+        across = np.sqrt(np.maximum(1 - along**2, 0.0))
+        return np.asarray(self.radius * across + self.height / 2 * along)
+
+    def distance(self, points: ArrayLike) -> Array:
+        across, height = self._off_axis(points)
+        beside = across - self.radius
+        if self.inner_radius:  # else the axis would be a face
+            beside = np.maximum(beside, self.inner_radius - across)
+        return _from_excess(np.stack([beside, np.abs(height) - self.height / 2], axis=-1))
+
+    def edge_distance(self, points: ArrayLike) -> Array:
+        across, height = self._off_axis(points)
+        apart = np.abs(height) - self.height / 2
+        radii = [radius for radius in (self.radius, self.inner_radius) if radius]
+        return np.asarray(np.min([np.hypot(across - radius, apart) for radius in radii], axis=0))
+
+    def within(self, points: Array) -> Array:
+        local = self.to_body(points)
+        across = np.hypot(local[:, 0], local[:, 1])
+        wanted = np.clip(across, self.inner_radius / INSIDE, self.radius * INSIDE)
+        local[:, :2] *= (wanted / np.maximum(across, np.finfo(float).tiny))[:, None]
+        limit = INSIDE * self.height / 2
+        local[:, 2] = np.clip(local[:, 2], -limit, limit)
+        return np.asarray(self.center + local @ self.rotation.T)
 
     def _off_axis(self, points: ArrayLike) -> tuple[Array, Array]:
         """Distance from the body's z axis and height along it (...,) of `points` (..., 3), m."""
         body = self.to_body(points)
         return np.hypot(body[..., 0], body[..., 1]), body[..., 2]
 
-    def _between(self, points: Array, inner: float, outer: float) -> Array:
-        """Points (n, 3) m put just inside of two radii about the body's z axis, and of its faces across it."""
-        local = self.to_body(points)
-        across = np.hypot(local[:, 0], local[:, 1])
-        wanted = np.clip(across, inner / INSIDE, outer * INSIDE)
-        local[:, :2] *= (wanted / np.maximum(across, np.finfo(float).tiny))[:, None]
-        limit = INSIDE * self.half_edges[2]
-        local[:, 2] = np.clip(local[:, 2], -limit, limit)
-        return np.asarray(self.center + local @ self.rotation.T)
-
-    def _off_circles(self, points: ArrayLike, radii: Sequence[float]) -> Array:
-        """Distances (n,) m of points (n, 3) m from circles of these radii about both faces across the axis."""
-        across, height = self._off_axis(points)
-        apart = np.abs(height) - self.half_edges[2]
-        return np.asarray(np.min([np.hypot(across - radius, apart) for radius in radii], axis=0))
-
 
 @dataclass(frozen=True, eq=False)
-class Cylinder(Posed):
+class Cylinder(_Turned):
     """A straight round cylinder.
 
     Parameters
     ----------
-    radius, height : m
+    radius : m
+    height : m
     center : (3,) position of the centre, m
     rotation : (3, 3) matrix whose columns are the body axes; the third is that of the cylinder (default: none turned)
     """
@@ -215,59 +266,27 @@ class Cylinder(Posed):
     rotation: Array = field(default_factory=lambda: np.eye(3))
 
     @property
-    def size(self) -> Array:
-        """(3,) edges of the box about it, along the body axes, m."""
-        return np.array([2 * self.radius, 2 * self.radius, self.height])
-
-    @property
-    def circumradius(self) -> float:
-        """Radius of the smallest sphere about the centre that holds the cylinder, m."""
-        return float(np.hypot(self.radius, self.height / 2))
-
-    @property
-    def volume(self) -> float:
-        """Volume, m³."""
-        return float(np.pi * self.radius**2 * self.height)
-
-    def distance(self, points: ArrayLike) -> Array:
-        """Signed distance (...,) of `points` (..., 3) from the surface, m; negative inside."""
-        radial, height = self._off_axis(points)
-        excess = np.stack([radial - self.radius, np.abs(height) - self.height / 2], axis=-1)
-        outside = np.linalg.norm(np.maximum(excess, 0.0), axis=-1)
-        return np.asarray(outside + np.minimum(excess.max(axis=-1), 0.0))
-
-    def reach(self, directions: Array) -> Array:
-        """How far (n,) it reaches from its centre along unit vectors (n, 3), m."""
-        along = np.abs(directions @ self.rotation[:, 2])
-        across = np.sqrt(np.maximum(1 - along**2, 0.0))
-        return np.asarray(self.radius * across + self.height / 2 * along)
+    def inner_radius(self) -> float:
+        return 0.0
 
     @property
     def shape_numbers(self) -> Array:
-        """(2,) m: radius and height."""
         return np.array([self.radius, self.height])
 
     @property
     def described_size(self) -> str:
-        """Its size as a person writes it, mm."""
         return f"Ø {self.radius * 2e3:.4g} × {self.height * 1e3:.4g} mm"
-
-    def edge_distance(self, points: ArrayLike) -> Array:
-        """Distances (n,) m of points (n, 3) m from the nearest edge."""
-        return self._off_circles(points, [self.radius])
-
-    def within(self, points: Array) -> Array:
-        """Points (n, 3) m of its elements, those just outside of its surface put just inside it."""
-        return self._between(points, 0.0, self.radius)
 
 
 @dataclass(frozen=True, eq=False)
-class Ring(Posed):
+class Ring(_Turned):
     """A ring of rectangular section, or tube.
 
     Parameters
     ----------
-    radius, inner_radius, height : m
+    radius : m
+    inner_radius : m
+    height : m
     center : (3,) position of the centre, m
     rotation : (3, 3) matrix whose columns are the body axes; the third is that of the ring (default: none turned)
 
@@ -291,63 +310,16 @@ class Ring(Posed):
             )
 
     @property
-    def filled(self) -> Cylinder:
-        """The ring without its hole."""
-        return Cylinder(self.radius, self.height, self.center, self.rotation)
-
-    @property
-    def hole(self) -> Cylinder:
-        """The hole."""
-        return Cylinder(self.inner_radius, self.height, self.center, self.rotation)
-
-    @property
-    def size(self) -> Array:
-        """(3,) edges of the box about it, along the body axes, m."""
-        return self.filled.size
-
-    @property
-    def circumradius(self) -> float:
-        """Radius of the smallest sphere about the centre that holds the ring, m."""
-        return self.filled.circumradius
-
-    @property
-    def volume(self) -> float:
-        """Volume, m³."""
-        return self.filled.volume - self.hole.volume
-
-    def distance(self, points: ArrayLike) -> Array:
-        """Signed distance (...,) of `points` (..., 3) from the surface, m; negative inside, positive in the hole."""
-        radial, height = self._off_axis(points)
-        middle, width = (self.radius + self.inner_radius) / 2, self.radius - self.inner_radius
-        excess = np.stack([np.abs(radial - middle) - width / 2, np.abs(height) - self.height / 2], axis=-1)
-        outside = np.linalg.norm(np.maximum(excess, 0.0), axis=-1)
-        return np.asarray(outside + np.minimum(excess.max(axis=-1), 0.0))
-
-    def reach(self, directions: Array) -> Array:
-        """How far (n,) it reaches from its centre along unit vectors (n, 3), m."""
-        return self.filled.reach(directions)
-
-    @property
     def shape_numbers(self) -> Array:
-        """(4,) m: both radii, height, and zero."""
         return np.array([self.radius, self.inner_radius, self.height, 0.0])
 
     @property
     def described_size(self) -> str:
-        """Shape and size as a person writes them, mm."""
         return f"ring Ø {self.radius * 2e3:.4g} / {self.inner_radius * 2e3:.4g} × {self.height * 1e3:.4g} mm"
-
-    def edge_distance(self, points: ArrayLike) -> Array:
-        """Distances (n,) m of points (n, 3) m from the nearest edge."""
-        return self._off_circles(points, [self.radius, self.inner_radius])
-
-    def within(self, points: Array) -> Array:
-        """Points (n, 3) m of its elements, those just outside of its surface put just inside it."""
-        return self._between(points, self.inner_radius, self.radius)
 
 
 @dataclass(frozen=True, eq=False)
-class Sphere(Posed):
+class Sphere(Body):
     """A ball.
 
     Parameters
@@ -363,43 +335,38 @@ class Sphere(Posed):
 
     @property
     def size(self) -> Array:
-        """(3,) edges of the box about it, along the body axes, m."""
         return np.full(3, 2 * self.radius)
 
     @property
     def circumradius(self) -> float:
-        """Its radius, m."""
         return self.radius
 
     @property
     def volume(self) -> float:
-        """Volume, m³."""
         return float(4 / 3 * np.pi * self.radius**3)
 
-    def distance(self, points: ArrayLike) -> Array:
-        """Signed distance (...,) of `points` (..., 3) from the surface, m; negative inside."""
-        return np.asarray(np.linalg.norm(np.asarray(points, float) - self.center, axis=-1) - self.radius)
-
-    def reach(self, directions: Array) -> Array:
-        """How far (n,) it reaches from its centre along unit vectors (n, 3), m."""
-        return np.full(len(directions), self.radius)
+    @property
+    def area(self) -> float:
+        return float(4 * np.pi * self.radius**2)
 
     @property
     def shape_numbers(self) -> Array:
-        """(1,) m: the radius."""
         return np.array([self.radius])
 
     @property
     def described_size(self) -> str:
-        """Shape and size as a person writes them, mm."""
         return f"sphere Ø {self.radius * 2e3:.4g} mm"
 
+    def reach(self, directions: Array) -> Array:
+        return np.full(len(directions), self.radius)
+
+    def distance(self, points: ArrayLike) -> Array:
+        return np.asarray(np.linalg.norm(np.asarray(points, float) - self.center, axis=-1) - self.radius)
+
     def edge_distance(self, points: ArrayLike) -> Array:
-        """Infinite (n,): it has no edge."""
         return np.full(len(np.asarray(points)), np.inf)
 
     def within(self, points: Array) -> Array:
-        """Points (n, 3) m of its elements, those just outside of its surface put just inside it."""
         local, limit = self.to_body(points), self.radius * INSIDE
         size = np.linalg.norm(local, axis=1)
         return np.asarray(self.center + (local * (limit / np.maximum(size, limit))[:, None]) @ self.rotation.T)

@@ -1,7 +1,7 @@
-"""A solid of any shape, as a STEP file has it: known here by its surface in triangles."""
+"""A solid of any shape, as a STEP file has it: known here by its surface in triangles; and what all solids have."""
 
 import hashlib
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import permutations
@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .common import Array, frozen_array, millimetres
-from .shapes import Box, Cylinder, Posed, Ring, Sphere
+from .shapes import Body, Box, Cylinder, Ring, Sphere
 
 CHUNK = 100_000
 """Points times triangles at once."""
@@ -21,10 +21,17 @@ SAME, EDGES = 1e-7, 64
 """Of the size: distance of corners that are one; edges at once."""
 FACES = 100
 """Normals of so many faces are enough to find the one along which another body touches it."""
+HALVINGS, ENOUGH = 50, 1e-13
+"""Steps to a place off a body at most, and how exactly by its distance it is found."""
+SAME_SHAPE = 1e-9
+"""Distance of corners from the surface in sizes of the part, and relative difference of volumes and areas."""
+ALONG, STRAIGHT, KNOWN_FACES = 1e-6, 1e-9, 40
+"""Sine of an angle between directions that are one; entries of axes that are round-off of a file; flat faces that may
+be the end of a cylinder."""
 
 
 @dataclass(frozen=True, eq=False)
-class Part(Posed):
+class Part(Body):
     """A solid read from a file, its middle that of the box about it.
 
     Parameters
@@ -35,7 +42,8 @@ class Part(Posed):
     triangles : (n, 3, 3) m, corners of triangles on the surface, outwards, from the middle along the body axes
     extent : (3,) m, edges of the box about it
     origin : (3,) m, the file's origin, from the middle along the body axes
-    volume, area : m³, m², of the solid and its surface
+    volume : m³
+    area : m², of the surface
     centroid : (3,) m, from the middle along the body axes
     center : (3,) position of the middle, m
     rotation : (3, 3) matrix whose columns are the body axes (default: none turned)
@@ -61,57 +69,54 @@ class Part(Posed):
 
     @property
     def size(self) -> Array:
-        """(3,) edges of the box about it, along the body axes, m."""
         return self.extent
 
     @property
     def circumradius(self) -> float:
-        """Radius of a sphere about the middle that holds the solid, m."""
         return float(1.001 * np.linalg.norm(self.triangles, axis=2).max())
 
     def reach(self, directions: Array) -> Array:
-        """How far (n,) it reaches from its middle along unit vectors (n, 3), m, or against them if that is more."""
         along = (directions @ self.rotation) @ self.triangles.reshape(-1, 3).T
         return np.asarray(np.abs(along).max(axis=1))
 
     def support(self, directions: Array) -> Array:
-        """How far (n,) it reaches from its middle along unit vectors (n, 3), m, whatever lies against them."""
         return np.asarray(((directions @ self.rotation) @ self.triangles.reshape(-1, 3).T).max(axis=1))
 
     @cached_property
     def face_normals(self) -> Array:
         """(n, 3) outward unit normals of its largest flat faces along the body axes, each once; `FACES` at most."""
-        normals = np.cross(self.triangles[:, 1] - self.triangles[:, 0], self.triangles[:, 2] - self.triangles[:, 0])
-        areas = np.linalg.norm(normals, axis=1)
-        normals = normals[areas > 0] / areas[areas > 0, None]
+        normals, areas = self._normals
+        normals, areas = normals[areas > 0], areas[areas > 0]
         alike, first, number = np.unique(np.round(normals, 7), axis=0, return_index=True, return_inverse=True)
-        order = np.argsort(-np.bincount(number.ravel(), areas[areas > 0], len(alike)))
+        order = np.argsort(-np.bincount(number.ravel(), areas, len(alike)))
         return np.asarray(normals[first[order[:FACES]]])
 
+    @property
+    def _normals(self) -> tuple[Array, Array]:
+        """Unit normals (n, 3) of the triangles and twice their areas (n,), m²."""
+        a, b, c = (self.triangles[:, k] for k in range(3))
+        normals = np.cross(b - a, c - a)
+        areas = np.linalg.norm(normals, axis=1)
+        return normals / np.maximum(areas, 1e-300)[:, None], areas
+
     def distance(self, points: ArrayLike) -> Array:
-        """Signed distance (...,) of `points` (..., 3) from the triangles, m; negative inside."""
         local = self.to_body(points)
-        flat, found = local.reshape(-1, 3), []
-        for part in np.array_split(flat, max(1, len(flat) * len(self.triangles) // CHUNK)):
-            found.append(self._distance(part))
-        return np.asarray(np.concatenate(found).reshape(local.shape[:-1]))
+        flat = local.reshape(-1, 3)
+        chunks = np.array_split(flat, max(1, len(flat) * len(self.triangles) // CHUNK))
+        return np.concatenate([self._distance(part) for part in chunks]).reshape(local.shape[:-1])
 
     @property
     def shape_numbers(self) -> Array:
-        """(8,) of the digest of its file."""
-        digest = hashlib.sha256(self.step.encode()).digest()
-        return np.frombuffer(digest, dtype="<u4").astype(float)
+        return np.frombuffer(hashlib.sha256(self.step.encode()).digest(), dtype="<u4").astype(float)
 
     @property
     def described_size(self) -> str:
-        """Its file, and the edges of the box about it, mm."""
         return f"{self.file.name} {millimetres(self.size)}"
 
     @cached_property
     def edges(self) -> Array:
         """(m, 2, 3) m, sides of triangles that meet at an angle of more than 30°, along the body axes."""
-        normals = np.cross(self.triangles[:, 1] - self.triangles[:, 0], self.triangles[:, 2] - self.triangles[:, 0])
-        normals /= np.maximum(np.linalg.norm(normals, axis=1), 1e-300)[:, None]
+        normals, _ = self._normals
         unit = SAME * float(np.linalg.norm(self.extent))
         sides: dict[tuple[tuple[int, ...], ...], list[tuple[int, int]]] = {}
         for t, corners in enumerate(np.round(self.triangles / unit).astype(int)):
@@ -123,17 +128,12 @@ class Part(Posed):
         return np.array(found).reshape(-1, 2, 3)
 
     def edge_distance(self, points: ArrayLike) -> Array:
-        """Distances (n,) m of points (n, 3) m from the nearest of its `edges`; infinite where it has none."""
         local = self.to_body(points).reshape(-1, 3)
         nearest = np.full(len(local), np.inf)
         for start in range(0, len(self.edges), EDGES):
             a, b = (self.edges[None, start : start + EDGES, k] - local[:, None] for k in range(2))
             nearest = np.minimum(nearest, _segment(a, b).min(axis=1))
         return nearest
-
-    def within(self, points: Array) -> Array:
-        """Points (n, 3) m of its elements as they are."""
-        return points
 
     @cached_property
     def _balls(self) -> tuple[Array, Array]:
@@ -184,8 +184,6 @@ def _plane(a: Array, b: Array, c: Array) -> Array:
 
 Solid = Box | Cylinder | Part | Ring | Sphere
 """A body's shape and pose."""
-HALVINGS, ENOUGH = 50, 1e-13
-"""Steps to a place at most, and how exactly by its distance it is found."""
 
 
 def places_off(body: Solid, directions: Array, distance: float) -> Array:
@@ -223,12 +221,6 @@ def solid_of(numbers: Array, center: Array, rotation: Array) -> Solid:
     return Ring(float(numbers[0]), float(numbers[1]), float(numbers[2]), center, rotation)
 
 
-SAME_SHAPE = 1e-9
-"""Distance of corners from the surface in sizes of the part, and relative difference of volumes and areas."""
-ALONG, KNOWN_FACES = 1e-9, 40
-"""Sine of an angle between directions that are one; flat faces that may be the end of a cylinder."""
-
-
 def known_shape(part: Part) -> Solid | None:
     """The shape that the part has, in the same place, or None for a solid of any other shape.
 
@@ -236,29 +228,17 @@ def known_shape(part: Part) -> Solid | None:
     """
     for local in _candidates(part):
         distances = np.abs(local.distance(part.triangles.reshape(-1, 3)))
-        alike = np.allclose([local.volume, _area(local)], [part.volume, part.area], rtol=SAME_SHAPE, atol=0.0)
+        alike = np.allclose([local.volume, local.area], [part.volume, part.area], rtol=SAME_SHAPE, atol=0.0)
         if alike and distances.max() < SAME_SHAPE * part.circumradius:
             return moved(local, part.center + part.rotation @ local.center, part.rotation @ local.rotation)
     return None
-
-
-def _area(body: Solid) -> float:
-    """Of its surface, m²."""
-    if isinstance(body, Sphere):
-        return 4 * np.pi * body.radius**2
-    if isinstance(body, Cylinder):
-        return 2 * np.pi * body.radius * (body.radius + body.height)
-    if isinstance(body, Ring):
-        return 2 * np.pi * (body.radius + body.inner_radius) * (body.radius - body.inner_radius + body.height)
-    x, y, z = body.size
-    return 2 * float(x * y + y * z + z * x)
 
 
 def _candidates(part: Part) -> Iterator[Solid]:
     """Shapes of about the part's sizes about its centroid, along its body axes."""
     corners = part.triangles.reshape(-1, 3) - part.centroid
     yield Sphere(float(np.cbrt(part.volume * 0.75 / np.pi)), part.centroid)
-    normals = _face_normals(part.triangles)
+    normals = _directions(part.face_normals)
     for axis in normals[:KNOWN_FACES]:
         along = corners @ axis
         height = float(np.ptp(along))
@@ -273,18 +253,13 @@ def _candidates(part: Part) -> Iterator[Solid]:
         yield Box(np.ptp(corners @ frame, axis=0), part.centroid, frame)
 
 
-def _face_normals(triangles: Array) -> list[Array]:
-    """Directions of flat faces, the largest first; of opposite ones one."""
-    normals = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
-    areas = np.linalg.norm(normals, axis=1)
-    normals, areas = normals[areas > 0] / areas[areas > 0, None], areas[areas > 0]
-    found, left = list[tuple[float, Array]](), np.ones(len(areas), bool)
-    while left.any():
-        first = normals[left][int(np.argmax(areas[left]))]
-        alike = left & (np.linalg.norm(np.cross(normals, first), axis=1) < ALONG)
-        found.append((float(areas[alike].sum()), first))
-        left &= ~alike
-    return [direction for _, direction in sorted(found, key=lambda pair: -pair[0])]
+def _directions(normals: Iterable[Array]) -> list[Array]:
+    """Unit vectors of which opposite ones are the same, each once."""
+    found = list[Array]()
+    for normal in normals:
+        if all(np.linalg.norm(np.cross(normal, other)) > ALONG for other in found):
+            found.append(normal)
+    return found
 
 
 def _frame(directions: Sequence[Array]) -> Array:
@@ -305,4 +280,4 @@ def _frame(directions: Sequence[Array]) -> Array:
 def _tidy(frame: Array) -> Array:
     """Axes without the round-off of the file where they are those of the file."""
     straight = np.round(frame) + 0.0
-    return straight if np.abs(frame - straight).max() < ALONG else frame
+    return straight if np.abs(frame - straight).max() < STRAIGHT else frame

@@ -51,17 +51,18 @@ def find_symmetry(magnets: Sequence[Magnet]) -> Symmetry:
 
 def _symmetry_along(magnets: Sequence[Magnet], axes: Array) -> Symmetry:
     ends = np.concatenate([_ends(magnet.body, axes) for magnet in magnets])
-    middle = axes @ ((ends.min(axis=0) + ends.max(axis=0)) / 2)
-    symmetry = Symmetry(middle, axes, ())
+    symmetry = Symmetry(axes @ ((ends.min(axis=0) + ends.max(axis=0)) / 2), axes, ())
     seen = [symmetry.to_frame(magnet) for magnet in magnets]
-    mirrors = (axis for axis in range(3) if mirror_images(seen, axis) is not None)
-    return replace(symmetry, planes=tuple(axis for axis in mirrors if not _in_narrow_gap(seen, axis)))
+    planes = [a for a in range(3) if mirror_images(seen, a) is not None and not _in_narrow_gap(seen, a)]
+    return replace(symmetry, planes=tuple(planes))
 
 
 def _in_narrow_gap(magnets: Sequence[Magnet], axis: int) -> bool:
     """Whether the plane across a coordinate axis runs close by a corner of a body, but not through it."""
-    heights = np.abs(np.concatenate([_heights(magnet.body, axis) for magnet in magnets]))
-    shortest = min(float(magnet.box.size.min()) for magnet in magnets)
+    bodies = [magnet.body for magnet in magnets]
+    corners = [body.corners if isinstance(body, Box) else _ends(body, np.eye(3)) for body in bodies]
+    heights = np.abs(np.concatenate(corners)[:, axis])
+    shortest = min(float(body.size.min()) for body in bodies)
     return bool(np.any((heights > SAME_PLACE * shortest) & (heights < NARROW_SIDE * shortest)))
 
 
@@ -71,30 +72,17 @@ def _ends(body: Solid, axes: Array) -> Array:
     return np.asarray(body.center @ axes + np.array([-reach, reach]))
 
 
-def _heights(body: Solid, axis: int) -> Array:
-    """Coordinates (n,) along an axis of the corners of a body, or of its ends where it is round."""
-    if isinstance(body, Box):
-        return body.corners[:, axis]
-    return _ends(body, np.eye(3))[:, axis]
-
-
 def _same_body(body: Solid, other: Solid, flip: Array) -> bool:
     """Whether the mirror image of a body takes the place of another."""
     allowed = SAME_PLACE * max(body.circumradius, float(np.linalg.norm(body.center)))
     if type(body) is not type(other) or np.linalg.norm(body.center * flip - other.center) > allowed:
         return False
-    if isinstance(body, Box) and isinstance(other, Box):
+    if isinstance(body, Box):
         distance = np.linalg.norm((body.corners * flip)[:, None] - other.corners, axis=-1)
         return bool(distance.min(axis=1).max() <= allowed)
-    if isinstance(body, Part):
+    if isinstance(body, Part) or np.abs(body.shape_numbers - other.shape_numbers).max() > allowed:
         return False
-    same = all(
-        abs(getattr(body, key) - getattr(other, key)) <= allowed
-        for key in ("radius", "inner_radius", "height")
-        if hasattr(body, key)
-    )
-    parallel = abs((body.rotation[:, 2] * flip) @ other.rotation[:, 2]) > 1 - 1e-15
-    return bool(same and (isinstance(body, Sphere) or parallel))
+    return isinstance(body, Sphere) or bool(abs((body.rotation[:, 2] * flip) @ other.rotation[:, 2]) > 1 - 1e-15)
 
 
 def mirror_images(magnets: Sequence[Magnet], axis: int) -> list[int] | None:

@@ -259,25 +259,16 @@ def _edge_directions(point: Array, bodies: Sequence[Solid], unit: float) -> list
     """Directions of the edges of bodies on which a point of the mesh's coordinates lies."""
     found = []
     for body in bodies:
+        local = body.to_body(point * unit)
         if isinstance(body, Box):
-            excess = np.abs(body.to_body(point * unit)) - body.half_edges
+            excess = np.abs(local) - body.half_edges
             flush = np.abs(excess) < TINY * unit
             if excess.max() < TINY * unit and flush.sum() >= 2:
                 found += [body.rotation[:, axis] for axis in range(3) if np.delete(flush, axis).all()]
-        elif isinstance(body, Cylinder | Ring):
-            found += _circle_directions(body, point * unit, TINY * unit)
+        elif isinstance(body, Cylinder | Ring) and body.edge_distance((point * unit)[None])[0] < TINY * unit:
+            across = np.array([-local[1], local[0], 0.0])
+            found.append(np.asarray(body.rotation @ across / np.hypot(*local[:2])))
     return found
-
-
-def _circle_directions(body: Solid, point: Array, tolerance: float) -> list[Array]:
-    """Direction of the circle of a cylinder or ring on which a point (3,) m lies."""
-    local = body.to_body(point)
-    across = float(np.hypot(local[0], local[1]))
-    radii = [getattr(body, key) for key in ("radius", "inner_radius") if hasattr(body, key)]
-    on_mantle = any(abs(across - radius) < tolerance for radius in radii)
-    if not on_mantle or abs(abs(local[2]) - body.half_edges[2]) > tolerance:
-        return []
-    return [np.asarray(body.rotation @ np.array([-local[1], local[0], 0.0]) / across)]
 
 
 MESHIO_SHAPES = {

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings, strategies as st
 from scipy.optimize import linprog
 
-from spinlev.geometry.overlap import apart, body_overlap, box_overlap, deepest_overlap_in_a_turn, sphere_overlap
+from spinlev.geometry.overlap import apart, body_overlap, deepest_overlap_in_a_turn, sphere_overlap
 from spinlev.geometry.shapes import Box, Cylinder, Ring, Sphere, rotation_matrix
 from spinlev.geometry.solids import moved
 
@@ -16,18 +16,18 @@ shift = st.floats(-3.0, 3.0)
 
 def test_depth_of_boxes_along_an_axis_is_their_common_length():
     first, second = Box((2, 2, 2)), Box((2, 4, 6), (1.7, 0.3, 0.2))
-    assert box_overlap(first, second) == pytest.approx(0.3, abs=1e-15)
+    assert body_overlap(first, second) == pytest.approx(0.3, abs=1e-15)
 
 
 def test_touching_boxes_overlap_by_nothing():
-    assert box_overlap(Box((0.01,) * 3), Box((0.01,) * 3, (0, 0, 0.01))) == pytest.approx(0.0, abs=1e-17)
+    assert body_overlap(Box((0.01,) * 3), Box((0.01,) * 3, (0, 0, 0.01))) == pytest.approx(0.0, abs=1e-17)
 
 
 def test_edge_against_edge_needs_the_crossed_axes():
     # Two long bars crossing at right angles, each standing on its edge: only the product of edges parts them.
     first = Box((10, 1, 1), rotation=rotation_matrix((45, 0, 0)))
     second = Box((1, 10, 1), (0, 0, 1.5), rotation_matrix((0, 45, 0)))
-    assert box_overlap(first, second) == pytest.approx(np.sqrt(2) - 1.5, abs=1e-12)
+    assert body_overlap(first, second) == pytest.approx(np.sqrt(2) - 1.5, abs=1e-12)
 
 
 @settings(deadline=None)
@@ -41,7 +41,7 @@ def test_overlap_agrees_with_linear_programming(size, turn, center):
         rows += [axes, -axes]
         bounds += [box.half_edges + axes @ box.center, box.half_edges - axes @ box.center]
     solved = linprog(np.zeros(3), A_ub=np.vstack(rows), b_ub=np.concatenate(bounds), bounds=(None, None))
-    depth = box_overlap(first, second)
+    depth = body_overlap(first, second)
     if abs(depth) > 1e-7:  # within the solver's own tolerance both answers are right
         assert (depth > 0) == (solved.status == 0)
 
@@ -55,7 +55,7 @@ def test_sphere_outside_a_face_an_edge_and_a_corner():
 def test_turning_corner_reaches_farther_than_the_face():
     # At rest the face stands 5 mm from the axis; in the turn the corner comes to 7.07 mm.
     rotor, plate = Box((10, 10, 10)), Box((2, 100, 100), (7.5, 0, 0))
-    assert box_overlap(rotor, plate) < 0
+    assert body_overlap(rotor, plate) < 0
     assert deepest_overlap_in_a_turn(rotor, plate) == pytest.approx(np.sqrt(50) - 6.5, abs=1e-9)
 
 
