@@ -28,10 +28,8 @@ BAR: dict[str, Any] = {"color": "black", "vertical": True, "position_y": 0.3, "h
 BAR |= {"title_font_size": 24, "label_font_size": 22}
 NAME: dict[str, Any] = {"font_size": 22, "text_color": "black", "shape_color": "white", "shape_opacity": 0.7}
 NAME |= {"margin": 4, "show_points": False, "always_visible": True}
-TURNABLE_HEIGHT = 0.25
-"""Of the camera over its way to a scene to turn: more than in a still picture, for a near plate is in perspective."""
-TURNABLE_MARGIN = 0.92
-"""Part of the window's width and height that a scene to turn fills."""
+MARGIN = 0.92
+"""Part of the window's height that what is shown fills."""
 
 
 def scene_picture(view: View) -> bytes:
@@ -52,7 +50,8 @@ def scene_picture(view: View) -> bytes:
     if times:
         names[f"path × {times:g}, {view.frame}"] = beside - np.array([0.0, 0.0, 0.8 * radius])
     plotter.add_point_labels(np.array(list(names.values())), list(names), **NAME)
-    _look(plotter, scene, -float(center[2]))
+    _look(plotter, scene)
+    plotter.add_axes()
     return _png(plotter)
 
 
@@ -68,8 +67,8 @@ def flight_animation(frames: Frames, progress: Callable[[float], None]) -> bytes
     plotter, file = new_plotter((800, 640)), io.BytesIO()
     magnets = _add_rotor(plotter, frames.scene)
     add_plate(plotter, frames.scene)
-    _look(plotter, frames.scene, float(-frames.position[:, 2].max()) * 1e3)
-    floater: list[pv.Actor] = []
+    floater = add_floater(plotter, frames.scene, frames.position[0], frames.moment[0])
+    _look(plotter, frames.scene)
     gif: Any = imageio.get_writer(file, format="GIF", mode="I", loop=0, duration=1000 / PER_SECOND)
     with gif:
         for number, instant in enumerate(frames.time):
@@ -104,7 +103,7 @@ def turnable_scene(view: View) -> bytes:
     _add_bodies(plotter, view)
     if view.lines:
         plotter.add_mesh(_polylines(view.lines), color="#2E3440", line_width=1)
-    _look_from_near(plotter, view.scene)
+    _look(plotter, view.scene)
     plotter.render()
     initialize_serializers()
     context, window = SynchronizationContext(), plotter.render_window
@@ -241,55 +240,29 @@ def _rotor_corners(scene: Scene) -> Array:
     return np.concatenate([1e3 * magnet.box.corners for magnet in scene.rotor])
 
 
-def _look(plotter: pv.Plotter, scene: Scene, depth: float) -> None:
-    """Look from the front, a little from above and from the side where no plate stands in the way, at everything.
+def _look(plotter: pv.Plotter, scene: Scene) -> None:
+    """Look from the front and from the side where no plate stands in the way, so near that a square just shows it all.
 
-    `depth` of the floater below the rotor, mm.
+    From a little above, a finite distance and with VTK's usual angle of view: the viewer of a scene to turn knows no
+    other. A corner at (x, z) across and towards the camera at (c, d) is within the half angle of tangent t if
+    |x - c| <= t (d - z); two corners decide c and d, and the same holds upwards.
     """
-    away, right, upwards = _axes_of_view(scene, 0.15)
-    seen = np.array([(s * 1.6 * depth, 0, z) for s in (-1, 1) for z in (-1.6 * depth, 0.8 * depth)])
-    if scene.plate is not None:
-        seen = np.concatenate([seen, 1e3 * near_plate(scene.plate.box, SEEN).corners])
-    across, up = seen @ right, seen @ upwards
-    across = np.append(across, across.max() + 0.16 * np.ptp(across))  # room for the scale of colours
-    middle = right * (across.max() + across.min()) / 2 + upwards * (up.max() + up.min()) / 2
-    wide, high = plotter.window_size
-    plotter.enable_parallel_projection()
-    plotter.camera_position = [middle + 1e3 * away, middle, (0, 0, 1)]
-    plotter.camera.parallel_scale = 0.54 * max(np.ptp(up), np.ptp(across) * high / wide)
-    plotter.camera.clipping_range = (1.0, 5e3)
-    plotter.add_axes()
-
-
-def _look_from_near(plotter: pv.Plotter, scene: Scene) -> None:
-    """From the front and a little from above, from so near that a square window just shows everything.
-
-    From a finite distance and with VTK's usual angle of view: the viewer knows no other. A corner at (x, z) across and
-    towards the camera at (c, d) is within the half angle of tangent t if |x - c| <= t (d - z); two corners decide c and
-    d, and the same holds for the height.
-    """
-    away, right, upwards = _axes_of_view(scene, TURNABLE_HEIGHT)
-    boxes = [actor.bounds for actor in plotter.renderer.actors.values() if actor.bounds]
+    side = -1.0 if scene.plate and scene.plate.box.center[0] > 0 else 1.0
+    away = np.array([side * 0.14, -1.0, 0.25])
+    away /= np.linalg.norm(away)
+    right = np.cross([0.0, 0.0, 1.0], away)
+    right /= np.linalg.norm(right)
+    boxes = [actor.bounds for actor in plotter.renderer.actors.values() if isinstance(actor, pv.Actor)]
     corners = np.array([corner for b in boxes for corner in product(b[:2], b[2:4], b[4:])])
-    slope = TURNABLE_MARGIN * np.tan(np.radians(plotter.camera.view_angle) / 2)
+    slope = MARGIN * np.tan(np.radians(plotter.camera.view_angle) / 2)
     middle, distance = np.zeros(3), 0.0
-    for axis in (right, upwards):
-        more, less = (float((corners @ (slope * away + side * axis)).max()) for side in (1, -1))
+    for axis in (right, np.cross(away, right)):
+        more, less = (float((corners @ (slope * away + sign * axis)).max()) for sign in (1, -1))
         middle += axis * (more - less) / 2
         distance = max(distance, (more + less) / 2 / slope)
     depth = float((corners @ away).mean())
     plotter.camera_position = [middle + distance * away, middle + depth * away, (0, 0, 1)]
     plotter.reset_camera_clipping_range()
-
-
-def _axes_of_view(scene: Scene, height: float) -> tuple[Array, Array, Array]:
-    """Unit vectors (3,) to the camera, to the right and upwards; `height` of the camera over its way."""
-    side = -1.0 if scene.plate and scene.plate.box.center[0] > 0 else 1.0
-    away = np.array([side * 0.14, -1.0, height])
-    away /= np.linalg.norm(away)
-    right = np.cross([0.0, 0.0, 1.0], away)
-    right /= np.linalg.norm(right)
-    return away, right, np.cross(away, right)
 
 
 def _add_body(plotter: pv.Plotter, body: Solid, color: str, **look: Any) -> list[pv.Actor]:

@@ -7,23 +7,8 @@ import json
 from collections.abc import Sequence
 from typing import Any
 
+import bokeh.models as bk
 import numpy as np
-from bokeh.models import (
-    Button,
-    Column,
-    ColumnDataSource,
-    CustomJS,
-    Div,
-    FileInput,
-    LinearColorMapper,
-    Model,
-    PointDrawTool,
-    RadioButtonGroup,
-    Range1d,
-    Select,
-    Slider,
-    Spinner,
-)
 from bokeh.plotting import figure
 
 from ...geometry.common import Array
@@ -68,49 +53,50 @@ class Layout:
     """All that a page shows; `roots` go into its template by their names."""
 
     def __init__(self) -> None:
-        self.message = Div(name="message", visible=False, stylesheets=[MESSAGE], **WIDE)
-        self.headline = Div(name="headline", stylesheets=[HEADLINE], **WIDE)
-        self.sign, self.map_says, self.says = (Div(name=name, **WIDE) for name in ("sign", "map_says", "says"))
-        self.table, self.modes = (Div(name=name, stylesheets=[TABLES], **WIDE) for name in ("table", "modes"))
-        self.model = Select(name="model", **WIDE)
-        self.plate_model = Select(name="plate_model", options=PLATES, **WIDE)
-        self.file = FileInput(accept=".toml", name="file", **WIDE)
-        self.sliders = Column(**WIDE)
-        self.play = Button(label="Play", button_type="primary", name="play", width=90)
-        self.again = Button(label="Reset", name="again", width=80)
-        self.up = Button(label="Kick up", name="up", width=90)
-        self.aside = Button(label="Kick aside", name="aside", width=100)
-        self.strength = Spinner(value=20, low=1, high=1000, step=1, width=90, name="strength", title="Kick (mm/s)")
-        self.speed = RadioButtonGroup(labels=["real time", "1/10", "1/100", "1/1000"], active=0, name="speed")
+        self.message = bk.Div(name="message", visible=False, stylesheets=[MESSAGE], **WIDE)
+        self.headline = bk.Div(name="headline", stylesheets=[HEADLINE], **WIDE)
+        self.sign, self.map_says, self.says = (bk.Div(name=name, **WIDE) for name in ("sign", "map_says", "says"))
+        self.table, self.modes = (bk.Div(name=name, stylesheets=[TABLES], **WIDE) for name in ("table", "modes"))
+        self.model = bk.Select(name="model", **WIDE)
+        self.plate_model = bk.Select(name="plate_model", options=PLATES, **WIDE)
+        self.file = bk.FileInput(accept=".toml", name="file", **WIDE)
+        self.sliders = bk.Column(**WIDE)
+        self.play = bk.Button(label="Play", button_type="primary", name="play", width=90)
+        self.again = bk.Button(label="Reset", name="again", width=80)
+        self.up = bk.Button(label="Kick up", name="up", width=90)
+        self.aside = bk.Button(label="Kick aside", name="aside", width=100)
+        self.strength = bk.Spinner(value=20, low=1, high=1000, step=1, width=90, name="strength", title="Kick (mm/s)")
+        self.speed = bk.RadioButtonGroup(labels=["real time", "1/10", "1/100", "1/1000"], active=0, name="speed")
         labels = {"toml": "Scene", "json": "Result (JSON)", "nc": "Result (netCDF)", "png": "Figure"}
-        self.downloads = {kind: Button(label=label, name=f"get_{kind}") for kind, label in labels.items()}
+        self.downloads = {kind: bk.Button(label=label, name=f"get_{kind}") for kind, label in labels.items()}
         # Lines to the page's own program, page.js; the text of `pose` changes when a pose has been drawn.
-        self.program = {name: Div(name=f"to_{name}", visible=False) for name in ("bodies", "pose", "address", "file")}
+        lines = ("bodies", "pose", "address", "file")
+        self.program = {name: bk.Div(name=f"to_{name}", visible=False) for name in lines}
         for name, line in self.program.items():
-            line.js_on_change("tags", CustomJS(code=f"window.spinlev.{name}(cb_obj.tags[0], cb_obj)"))
+            line.js_on_change("tags", bk.CustomJS(code=f"window.spinlev.{name}(cb_obj.tags[0], cb_obj)"))
 
-        self.regions = ColumnDataSource(NO_IMAGE, name="regions")
-        self.point = ColumnDataSource({"x": [], "y": []}, name="point")
+        self.regions = bk.ColumnDataSource(NO_IMAGE, name="regions")
+        self.point = bk.ColumnDataSource({"x": [], "y": []}, name="point")
         self.map = figure(height=300, name="map", x_axis_label="Frequency (Hz)", **PLOT, **WIDE)
-        self.map.x_range, self.map.y_range = Range1d(0, 1), Range1d(0, 1)
-        mapper = LinearColorMapper(palette=REGION_COLORS, low=-0.5, high=2.5)
+        self.map.x_range, self.map.y_range = bk.Range1d(0, 1), bk.Range1d(0, 1)
+        mapper = bk.LinearColorMapper(palette=REGION_COLORS, low=-0.5, high=2.5)
         self.map.image("image", "x", "y", "dw", "dh", source=self.regions, color_mapper=mapper)
         self.map.scatter("x", "y", source=self.point, size=12, color=NORTH, line_color="white")
         self.map.grid.visible = False
 
-        self.floater = ColumnDataSource({"x": [], "z": [], "r": []}, name="floater")
-        self.bodies, self.equilibria = (ColumnDataSource({"x": [], "z": []}) for _ in range(2))
+        self.floater = bk.ColumnDataSource({"x": [], "z": [], "r": []}, name="floater")
+        self.bodies, self.equilibria = (bk.ColumnDataSource({"x": [], "z": []}) for _ in range(2))
         size = {"frame_width": int(TALL * 2 * SIDE / (HIGH - LOW)), "frame_height": TALL}
         self.side = figure(name="side", x_axis_label="x (mm)", y_axis_label="z (mm)", **PLOT, **size)
-        self.side.x_range, self.side.y_range = Range1d(-SIDE, SIDE), Range1d(LOW, HIGH)
+        self.side.x_range, self.side.y_range = bk.Range1d(-SIDE, SIDE), bk.Range1d(LOW, HIGH)
         self.side.patches("x", "z", source=self.bodies, color=MAGNET, alpha=0.8)
         self.side.scatter("x", "z", source=self.equilibria, marker="x", size=9, color="#2E3440", line_width=2)
         ball = self.side.circle("x", "z", radius="r", source=self.floater, color=BALL, alpha=0.6, line_color=NORTH)
-        drag = PointDrawTool(renderers=[ball], add=False)
+        drag = bk.PointDrawTool(renderers=[ball], add=False)
         self.side.add_tools(drag)
         self.side.toolbar.active_tap = drag
 
-        self.samples = ColumnDataSource({"time": [], "height": [], "tilt": []}, name="samples")
+        self.samples = bk.ColumnDataSource({"time": [], "height": [], "tilt": []}, name="samples")
         self.running = []
         for key, label in (("height", "Height (mm)"), ("tilt", "Tilt (°)")):
             plot = figure(height=170, name=key, x_axis_label="Time (s)", y_axis_label=label, **PLOT, **WIDE)
@@ -119,21 +105,21 @@ class Layout:
             self.running.append(plot)
 
     @property
-    def roots(self) -> list[Model]:
+    def roots(self) -> list[bk.Model]:
         """What the template places, by name."""
         buttons = [self.play, self.again, self.up, self.aside, self.strength, *self.downloads.values()]
-        choices = Column(children=[self.sliders, self.model, self.plate_model, self.file], name="controls", **WIDE)
+        choices = bk.Column(children=[self.sliders, self.model, self.plate_model, self.file], name="controls", **WIDE)
         shown = [self.message, self.headline, self.sign, self.table, self.modes, self.map_says, self.map, choices]
         return [*shown, self.speed, self.says, self.side, *self.running, *buttons, *self.program.values()]
 
     @property
-    def ready(self) -> CustomJS:
+    def ready(self) -> bk.CustomJS:
         """Tells the page's own program what was said before it could hear."""
         each = "const [name, line] of Object.entries(lines)"
         code = f"for ({each}) if (line.tags.length) window.spinlev[name](line.tags[0], line)"
-        return CustomJS(args={"lines": dict(self.program)}, code=code)
+        return bk.CustomJS(args={"lines": dict(self.program)}, code=code)
 
-    def show_controls(self, state: PageState, sliders: Sequence[Slider]) -> None:
+    def show_controls(self, state: PageState, sliders: Sequence[bk.Slider]) -> None:
         """The sliders and models of a scene."""
         self.sliders.children = list(sliders)
         more = [("map", "Field: its map")] if state.scene.field_map else []
@@ -156,12 +142,10 @@ class Layout:
 
     def show_regions(self, found: Regions) -> None:
         """Draw a map."""
-        widths = [float(axis[1] - axis[0]) for axis in (found.frequencies, found.measures)]
-        (x, dw), (y, dh) = (
-            (float(axis[0]) - width / 2, width * len(axis))  # pixels are about the values
-            for axis, width in zip((found.frequencies, found.measures), widths, strict=True)
-        )
-        self.regions.data = {"image": [found.kind.T], "x": [x], "y": [y], "dw": [dw], "dh": [dh]}
+        x, y = found.frequencies, found.measures
+        dx, dy = float(x[1] - x[0]), float(y[1] - y[0])  # pixels are about the values
+        place = {"x": [x[0] - dx / 2], "y": [y[0] - dy / 2], "dw": [dx * len(x)], "dh": [dy * len(y)]}
+        self.regions.data = {"image": [found.kind.T], **place}
 
     def map_axes(self, frequency: Control, measure: Control) -> None:
         """Take over what the sliders reach."""

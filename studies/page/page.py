@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import binascii
+import html
 import time
 from collections.abc import Mapping
 from functools import partial
@@ -15,36 +16,20 @@ from bokeh.events import PanEnd, PanStart, Tap
 from bokeh.models import Slider
 
 from ...geometry.common import Array
+from . import work
 from .layout import NO_IMAGE, Layout
 from .state import Control, PageState, controls
-from .work import (
-    FILES,
-    FRAME,
-    PATIENCE,
-    POINTS,
-    SLOWEST,
-    Frame,
-    Regions,
-    Screen,
-    Shown,
-    Worker,
-    begin_flight,
-    build,
-    complete,
-    content,
-    fly,
-    has_map,
-    map_key,
-    preview,
-    regions,
-    wish,
-)
+from .work import Frame, Regions, Screen, Shown, Worker
 
 REST = 250
 """Milliseconds after which a slider is taken to rest."""
 READING = 60.0
 """Seconds that a scene may take to be read."""
 SPEEDS = (1.0, 0.1, 0.01, 0.001)
+FRAME, SLOWEST = 1 / 12, 0.25
+"""Seconds between two pictures of a flight, if the page draws so fast; most seconds that are flown for one."""
+POINTS = (13, 41)
+"""Of a map along each axis: first, and then."""
 ROLLING = 4000
 """Samples in a running plot."""
 FOLLOW = "The selected models follow when you release the slider."
@@ -65,9 +50,9 @@ class Page:
         self.document, self.state, self.layout = document, state, Layout()
         self.builder = Worker(document, "Reading this scene", READING, self._failed)
         self.quick = Worker(document, "The preview", 60.0, self._failed)
-        self.slow = Worker(document, "The answer by the chosen models", 600.0, self._failed, PATIENCE)
-        self.mapper = Worker(document, "The map", 600.0, lambda why: self._map_says(f"No map: {why}"), PATIENCE)
-        self.porter = Worker(document, "The file", 600.0, self._failed, PATIENCE)
+        self.slow = Worker(document, "The answer by the chosen models", 600.0, self._failed, work.PATIENCE)
+        self.mapper = Worker(document, "The map", 600.0, lambda why: self._map_says(f"No map: {why}"), work.PATIENCE)
+        self.porter = Worker(document, "The file", 600.0, self._failed, work.PATIENCE)
         self.flight = Flight(self)
         self.number, self.answered = 0, 0
         self.shown: Shown | None = None
@@ -106,7 +91,7 @@ class Page:
         self.begun = True
         found = controls(self.state)
         self.layout.show_controls(self.state, [self._slider(control) for control in found])
-        if has_map(self.state):
+        if work.has_map(self.state):
             self.layout.map_axes(found[0], found[1])
         self._changed()
 
@@ -131,7 +116,7 @@ class Page:
     def _become(self, method: str, *arguments: Any) -> None:
         """Ask for another state, by a method of the state at that time; of moves of one slider the last counts."""
         key = arguments[0] if method == "changed" else object()
-        call = lambda: (build, self.state, method, arguments)  # noqa: E731
+        call = lambda: (work.build, self.state, method, arguments)  # noqa: E731
         self.builder.ask(key, call, lambda state: self._built(state, method == "opened"))
 
     def _built(self, state: PageState, is_other: bool) -> None:
@@ -152,7 +137,7 @@ class Page:
 
     def _clicked(self, event: Tap) -> None:
         """Go to a point of the map, as far as the sliders reach."""
-        if not has_map(self.state) or event.x is None or event.y is None:
+        if not work.has_map(self.state) or event.x is None or event.y is None:
             return
         for slider, place in zip(self.layout.sliders.children, (event.x, event.y), strict=False):
             steps = round((place - slider.start) / slider.step)
@@ -169,7 +154,7 @@ class Page:
         found = controls(self.state)
         if len(found) > 1:
             self.layout.point.data = {"x": [found[0].value], "y": [found[1].value]}
-        self.quick.ask("", lambda: (preview, self.state), partial(self._found, self.number))
+        self.quick.ask("", lambda: (work.preview, self.state), partial(self._found, self.number))
         if self.resting is not None:
             self.document.remove_timeout_callback(self.resting)
         self.resting = self.document.add_timeout_callback(self._rest, REST)
@@ -182,16 +167,16 @@ class Page:
     def _rest(self) -> None:
         self.resting = None
         self.layout.tell("address", self.state.query())
-        self.slow.ask("", lambda: (complete, self.state), partial(self._completed, self.number))
-        if not has_map(self.state):
+        self.slow.ask("", lambda: (work.complete, self.state), partial(self._completed, self.number))
+        if not work.has_map(self.state):
             self._forget_map(NO_MAP)
-        elif (key := map_key(self.state)) != self.mapped:
+        elif (key := work.map_key(self.state)) != self.mapped:
             self._forget_map("Map: being computed ...")
             self.mapped = key
             (x, y), state = ((control.low, control.high) for control in controls(self.state)[:2]), self.state
             for model in ("dipole", "cuboid") if state.model == "cuboid" else ("dipole",):
                 for points in POINTS:
-                    call = (regions, state, (x, y), model, points)
+                    call = (work.regions, state, (x, y), model, points)
                     self.mapper.ask((model, points), lambda call=call: call, self._map)  # type: ignore[misc]
 
     def _completed(self, number: int, found: Shown) -> None:
@@ -231,7 +216,7 @@ class Page:
         self._map_says(why)
 
     def _map_says(self, text: str) -> None:
-        self.layout.map_says.text = text.replace("<", "&lt;")
+        self.layout.map_says.text = html.escape(text)
 
     def _map(self, found: Regions) -> None:
         self.regions = found
@@ -249,10 +234,10 @@ class Page:
         flown = (np.asarray(samples[key]) for key in ("time", "height", "tilt"))
         axes, point = (known[0].title, known[1].title), (known[0].value, known[1].value)
         screen = Screen(self.shown, self.regions, axes, point, *flown) if kind == "png" else None
-        self.porter.ask(kind, lambda: (content, kind, self.state, screen), partial(self._downloaded, kind))
+        self.porter.ask(kind, lambda: (work.content, kind, self.state, screen), partial(self._downloaded, kind))
 
     def _downloaded(self, kind: str, data: bytes) -> None:
-        name, form = FILES[kind]
+        name, form = work.FILES[kind]
         self.layout.tell("file", {"name": name, "kind": form, "content": base64.b64encode(data).decode()})
 
 
@@ -307,12 +292,12 @@ class Flight:
             self.begun = True
             self.layout.says.text = "Preparing the flight ..."
             self.layout.samples.data = {"time": [], "height": [], "tilt": []}
-            self.worker.ask("begin", lambda: (begin_flight, self.page.state), self._flown)
+            self.worker.ask("begin", lambda: (work.begin_flight, self.page.state), self._flown)
 
     def _push(self, way: list[float]) -> None:
         self._begin()
         vector = [1e-3 * float(self.layout.strength.value or 0.0) * part for part in way]
-        self.worker.ask(object(), lambda: (wish, "push", vector), self._flown)
+        self.worker.ask(object(), lambda: (work.wish, "push", vector), self._flown)
 
     def _hold(self) -> None:
         self.held = True
@@ -323,7 +308,7 @@ class Flight:
         self.held = self.ended = False
         x, z = (1e-3 * float(self.layout.floater.data[key][0]) for key in "xz")
         self._begin()
-        self.worker.ask(object(), lambda: (wish, "put", [x, 0.0, z]), self._flown)
+        self.worker.ask(object(), lambda: (work.wish, "put", [x, 0.0, z]), self._flown)
         self._play()
 
     def _drawn(self) -> None:
@@ -340,7 +325,7 @@ class Flight:
         now = time.monotonic()
         late, self.due = max(0.0, now - self.due), now + FRAME
         seconds = SPEEDS[int(self.layout.speed.active or 0)] * min(FRAME + late, SLOWEST)
-        self.worker.ask("fly", lambda: (fly, seconds), self._flew)
+        self.worker.ask("fly", lambda: (work.fly, seconds), self._flew)
 
     def _flew(self, frame: Frame) -> None:
         self.asked = False
@@ -350,14 +335,14 @@ class Flight:
         samples = {key: np.asarray(getattr(frame, key)) for key in ("time", "height", "tilt")}
         self.layout.samples.stream(samples, rollover=ROLLING)
         self._pose(frame.position, frame.moment, frame.angle, frame.seen)
-        self.layout.says.text = (frame.message or frame.ended or f"t = {frame.time[-1]:.4g} s").replace("<", "&lt;")
+        self.layout.says.text = html.escape(frame.message or frame.ended or f"t = {frame.time[-1]:.4g} s")
         if frame.ended:
             self.ended = True
             self._pause()
 
     def _failed(self, message: str) -> None:
         self.land()
-        self.layout.says.text = message.replace("<", "&lt;")
+        self.layout.says.text = html.escape(message)
 
     def _pose(self, position: list[float], moment: list[float], angle: float, seen: list[float]) -> None:
         self.poses += 1  # so that each is another, and is answered for

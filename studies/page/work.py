@@ -46,10 +46,6 @@ MEMORY = 4 * 2**30
 """Bytes that a process may take."""
 PATIENCE = 10
 """By how much a process is nicer than others that does not hurry."""
-FRAME, SLOWEST = 1 / 12, 0.25
-"""Seconds between two pictures of a flight, if the page draws so fast; most seconds that are flown for one."""
-POINTS = (13, 41)
-"""Of a map along each axis: first, and then."""
 SIGHT = np.array([[-0.045], [0.045]]) * np.ones(3)
 """The box in which field lines are drawn, m."""
 ENDS = {
