@@ -233,7 +233,7 @@ def modes_figure(result: xr.Dataset) -> Figure:
     axes.set_yscale("symlog", linthresh=10.0 ** np.floor(np.log10(smallest)))
     axes.margins(0.08)
     axes.set(xlabel="frequency, rotor's frame (Hz)", ylabel="growth (1/s), negative: dies out", title="Small motions")
-    axes.legend(ncols=2, loc="center left")
+    legend_below(figure, axes, columns=3)
     return figure
 
 
@@ -258,9 +258,9 @@ def question_figure(result: xr.Dataset) -> Figure:
             (number,) = set(varied) - set(words)
             for value, color in zip(shown[words[0]].values, PALETTE * 9, strict=False):
                 _curves(panel, shown.sel({words[0]: value}), name, number, color, f"{NAMES[str(value)]}, ")
-            panel.legend()
         else:
             _map(panel, shown, name, varied)
+    legend_below(figure, *axes.ravel())
     return figure
 
 
@@ -293,7 +293,6 @@ def _curves(axes: Axes, result: xr.Dataset, name: str, key: str, color: str, of:
             chosen = values.where(result["stable"] == stable).transpose(key, "equilibrium").values
             axes.plot([], [], "o", color=color, mfc=fill, ms=4, label=f"{of}{'stable' if stable else 'unstable'}")
             axes.plot(x, chosen, "o", color=color, mfc=fill, ms=4)
-        axes.legend()
     axes.set(xlabel=key, ylabel=_label(values))
     if name == "growth":
         axes.set_yscale("symlog", linthresh=1e-3)

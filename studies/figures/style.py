@@ -84,7 +84,8 @@ def panels(rows: int, columns: int, size: tuple[float, float], **shared: Any) ->
 def legend_below(figure: Figure, *labelled: Any, columns: int = 6) -> None:
     """One legend below all panels, of what the axes `labelled` name: nothing that is drawn lies under it."""
     entries = {n: h for axes in labelled for h, n in zip(*axes.get_legend_handles_labels(), strict=True)}
-    figure.legend(entries.values(), entries.keys(), loc="outside lower center", ncols=min(columns, len(entries)))
+    if entries:
+        figure.legend(entries.values(), entries.keys(), loc="outside lower center", ncols=min(columns, len(entries)))
 
 
 def save_figures(figures: Mapping[str, Figure], out: Path) -> list[str]:

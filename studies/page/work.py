@@ -456,13 +456,14 @@ def screen_figure(screen: Screen, state: PageState) -> Figure:
     from matplotlib.colors import ListedColormap
 
     figure, ((chart, height), (words, tilt)) = panels(2, 2, (PAGE, 4.6))
-    said, rows = "No equilibrium is known.", [[""]]
+    said, lines = "No equilibrium is known.", []
     if (known := screen.shown) is not None:
-        said = known.headline
-        rows = [[f"By: {known.sign}"], [f"spinlev equilibria scene.toml {state.command}"], [""]]
-        rows += [[f"{text:>14}" for text in row[:4]] for row in (*known.rows, ("",), *known.modes)]
+        said, lines = known.headline, [f"By: {known.sign}", f"spinlev equilibria scene.toml {state.command}"]
+        for table in (known.rows, known.modes):
+            widths = [max(map(len, column)) for column in zip(*table, strict=False)]
+            lines += ["", *(" ".join(map(str.rjust, row[:4], widths)) for row in table)]
     figure.suptitle(said, fontsize=8, x=0.01, ha="left", wrap=True)
-    words.text(0, 1, "\n".join(map(" ".join, rows)), va="top", fontsize=6, family="monospace")
+    words.text(0, 1, "\n".join(lines), va="top", fontsize=6, family="monospace")
     words.set_axis_off()
     if (mapped := screen.regions) is None:
         chart.set_axis_off()
