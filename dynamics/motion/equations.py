@@ -18,7 +18,7 @@ power to `work`.  A plate adds its currents as further states (`plate_terms`) an
 a sweep may change is a runtime parameter; only the tables' own geometry is compiled in.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import heyoka as hy
 import numpy as np
@@ -26,7 +26,7 @@ import numpy as np
 from ...fem.closed_forms.eddy_sphere import thin_field_torque
 from ...fem.rotor.table import FieldFormula
 from ...geometry.common import MU_0, Array
-from ...geometry.scene.contents import Drag, Scene
+from ...geometry.scene.contents import Scene
 from .effect import Motion, interaction_of
 from .plate import PlateFormula, memory_terms
 from .state import Parameter, Scales, Vector, cross, dot, subtract, turned
@@ -190,18 +190,3 @@ def _state(position: Vector, moment: Vector, spin: hy.expression) -> list[hy.exp
     along = rate * (spin - moment[2])
     velocity = [-rate * position[1], rate * position[0], hy.expression(0.0)]
     return [*position, *velocity, *moment, along * moment[0], along * moment[1], along * moment[2] + rate]
-
-
-def has_likes(scene: Scene) -> bool:
-    """Whether a scene has a like one of another size with the same rotor's material and air."""
-    return not scene.drag.air and not any(magnet.conductivity for magnet in scene.rotor)
-
-
-def like(scene: Scene, times: float) -> Scene:
-    """The scene, all but its rotor, so many times as large, with the same motion; its plate is left out."""
-    floater, drag = scene.floater, scene.drag
-    conductivity = None if floater.conductivity is None else floater.conductivity / times**2
-    density = floater.density / times**2
-    larger = replace(floater, radius=floater.radius * times, density=density, conductivity=conductivity)
-    air = Drag(drag.linear * times, drag.angular * times**3, drag.air)
-    return replace(scene, floater=larger, drag=air, gravity=scene.gravity * times, plate=None)
