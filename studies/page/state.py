@@ -6,12 +6,12 @@ import json
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, get_args
+from typing import Any
 from urllib.parse import urlencode
 
 import numpy as np
 
-from ...geometry.common import InputError, shown as shown_value
+from ...geometry.common import InputError, shown
 from ...geometry.scene.contents import Scene
 from ...geometry.scene.files import changed, parse_scene, scene_keys
 from ...geometry.scene.making import assemble
@@ -105,15 +105,24 @@ class PageState:
         """
         if sum(len(key) + len(value) for key, value in asked.items()) > LONGEST:
             raise InputError(f"Input address must have at most {LONGEST} characters of a scene; instead it is longer.")
+        chosen: dict[str, Any] = {key: asked.get(key, getattr(self, key)) for key in CHOICES}
+        Models(chosen["model"], chosen["plate_model"]).checked()
+        try:
+            spin = finite("spin", float(chosen["spin"]))
+        except ValueError:
+            raise InputError(f"Input spin must be a number; instead received {shown(chosen['spin'])}.") from None
+        if not -1e3 <= spin <= 1e3:
+            raise InputError(f"Input spin must be between -1000 and 1000; instead received {shown(chosen['spin'])}.")
         given = {key: value for key, value in asked.items() if key not in CHOICES}
-        scene = self._scene(given) if given else self.scene
-        return replace(
-            self,
-            scene=scene,
-            model=_choice("model", asked.get("model", self.model), get_args(FieldModel)),
-            plate_model=_choice("plate_model", asked.get("plate_model", self.plate_model), get_args(PlateModel)),
-            spin=_spin(asked.get("spin", self.spin)),
-        )
+        if not given:
+            return replace(self, **{**chosen, "spin": spin})
+        tables = {key.partition(".")[0] for key in given}
+        whole = tables >= {"frequency_hz", "rotor", "floater"}
+        kept = {} if whole else {k: v for k, v in scene_keys(self.scene).items() if k == "floater" or k not in tables}
+        for key, text in given.items():
+            _put(kept, key.split("."), text)
+        scene = assemble(kept, self.source, known=self.first or self.scene)
+        return replace(self, scene=scene, **{**chosen, "spin": spin})
 
     def opened(self, content: bytes, name: str) -> PageState:
         """The state in which a page shows a scene file of its reader's.
@@ -133,39 +142,12 @@ class PageState:
         new = first_state(parse_scene(text, name, known=known), name)
         return replace(new, first=known)
 
-    def _scene(self, given: Mapping[str, str]) -> Scene:
-        keys: dict[str, Any] = scene_keys(self.scene)
-        tables = {key.partition(".")[0] for key in given}
-        if tables >= {"frequency_hz", "rotor", "floater"}:
-            keys = {}
-        for table in tables - {"floater"}:
-            keys.pop(table, None)
-        for key, text in given.items():
-            _put(keys, key.split("."), _value(text))
-        return assemble(keys, self.source, known=self.first or self.scene)
-
 
 def first_state(scene: Scene, source: str = "scene") -> PageState:
     """Where a page begins: everything by what can be told at once, the plate as an infinite slab if that can be."""
     model: FieldModel = "map" if scene.field_map else "dipole"
     felt = scene.plate is not None and scene.floater.body is None
     return PageState(scene, model, "slab" if felt else "none", source=source)
-
-
-def _choice(name: str, value: str, known: tuple[Any, ...]) -> Any:
-    if value not in known:
-        raise InputError(f"Input {name} must be one of {', '.join(known)}; instead received {shown_value(value)}.")
-    return value
-
-
-def _spin(value: str | float) -> float:
-    try:
-        spin = finite("spin", float(value))
-    except ValueError:
-        raise InputError(f"Input spin must be a number; instead received {shown_value(value)}.") from None
-    if not -1e3 <= spin <= 1e3:
-        raise InputError(f"Input spin must be between -1000 and 1000; instead received {shown_value(value)}.")
-    return spin
 
 
 def _flat(keys: Mapping[str, Any], table: str = "") -> list[tuple[str, str]]:
@@ -180,20 +162,16 @@ def _flat(keys: Mapping[str, Any], table: str = "") -> list[tuple[str, str]]:
     return found
 
 
-def _put(keys: Any, path: list[str], value: Any) -> None:
+def _put(keys: Any, path: list[str], text: str) -> None:
     """Put a value in the place of a dotted key; where a number stands in its way, the scene's check says so."""
     for part in path[:-1]:
         if not isinstance(keys.get(part), dict):
             keys[part] = {}
         keys = keys[part]
-    keys[path[-1]] = value
-
-
-def _value(text: str) -> Any:
     try:
-        return json.loads(text)
+        keys[path[-1]] = json.loads(text)
     except (ValueError, RecursionError):  # a text, or lists in lists by the thousand
-        return text
+        keys[path[-1]] = text
 
 
 @dataclass(frozen=True)
