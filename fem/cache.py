@@ -173,7 +173,7 @@ class TableKind(Generic[Table]):
         try:
             return from_dataset(dataset, self.form)
         except CodecError as error:
-            raise TableFileError(f"Input {path} must be a '{self.format}'; instead {error}.") from error
+            raise TableFileError(f"Input {path} must be a '{self.format}'; instead: {error}") from error
 
     def cached(
         self, inputs: tuple[Any, ...], make: Callable[[], Table], report: Callable[[str], None]

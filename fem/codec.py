@@ -17,11 +17,13 @@ from typing import Any, TypeVar, get_args, get_type_hints
 import numpy as np
 import xarray as xr
 
+from ..geometry.common import InputError
+
 Table = TypeVar("Table")
 CONTENT = "content"
 
 
-class CodecError(ValueError):
+class CodecError(InputError):
     """A data set does not hold such an object."""
 
 
@@ -101,7 +103,8 @@ def from_dataset(dataset: xr.Dataset, form: type[Table]) -> Table:
     try:
         return unpacked(json.loads(str(dataset[CONTENT].item())))  # type: ignore[no-any-return]
     except (KeyError, ValueError, TypeError, IndexError, AttributeError) as error:
-        raise CodecError(f"it holds no {getattr(form, '__name__', form)} ({type(error).__name__}: {error})") from error
+        name = getattr(form, "__name__", form)
+        raise CodecError(f"Input dataset must hold a {name}; instead {type(error).__name__}: {error}.") from error
 
 
 def _variable(name: str, arrays: list[np.ndarray], label: dict[str, str]) -> xr.Variable:

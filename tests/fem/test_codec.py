@@ -126,7 +126,7 @@ CLASSES = {
 def test_of_a_file_only_the_classes_of_its_fields_are_made(case):
     dataset = to_dataset(TABLE)
     dataset["content"] = xr.Variable((), CLASSES[case])
-    with pytest.raises(CodecError, match="holds no Outer"):
+    with pytest.raises(CodecError, match="must hold a Outer"):
         from_dataset(dataset, Outer)
 
 
