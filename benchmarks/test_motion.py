@@ -8,10 +8,8 @@ from peer_flight import fly
 from peers import SCENE, magpylib_rotor
 
 from spinlev.dynamics.equilibria.search import survey, with_plate
-from spinlev.dynamics.flights.balls import compile_local_flight
 from spinlev.dynamics.flights.batch import ensemble
-from spinlev.dynamics.flights.compiled import compile_flight
-from spinlev.dynamics.flights.flight import PLATE_TOLERANCE, initial_state, integrate
+from spinlev.dynamics.flights.flight import PLATE_TOLERANCE, Flight, initial_state, integrate
 from spinlev.dynamics.motion.rates import Rates
 from spinlev.dynamics.motion.state import State
 from spinlev.fem.plate.choice import rotor_nearby
@@ -39,7 +37,7 @@ def start():
 @pytest.mark.parametrize("rtol", [1e-10, 1e-13], ids=["DOP853 + magpylib, 1e-10", "DOP853 + magpylib, 1e-13"])
 def test_flight_against_scipy(benchmark, start, rtol):
     """Time a simulated second, and the error after two turns against our tightest flight."""
-    exact = integrate(FREE, compile_flight(FREE, rotor_table(SCENE.rotor, "cuboid"), 1.0, 1e-16, False), start,
+    exact = integrate(Flight(FREE, rotor_table(SCENE.rotor, "cuboid"), 1.0, 1e-16, False), start,
                       TURNS / FREE.frequency, None).rotor.position[-1]  # fmt: skip
     magnets = magpylib_rotor(SCENE.rotor)
     benchmark.extra_info.update(peer=rtol == 1e-13, count=TURNS / FREE.frequency)
@@ -58,8 +56,8 @@ def test_flight(benchmark, start, model, compact):
     if model == "fem" and not compact:
         pytest.skip("straight code for the expansion takes minutes to compile")
     table = rotor_table(SCENE.rotor, model, nearest=SCENE.floater.radius)
-    flight = compile_flight(FREE, table, LONG, 1e-14, compact)
-    trajectory = benchmark.pedantic(lambda: integrate(FREE, flight, start, 1.0, None), rounds=3, warmup_rounds=1)
+    flight = Flight(FREE, table, LONG, 1e-14, compact)
+    trajectory = benchmark.pedantic(lambda: integrate(flight, start, 1.0, None), rounds=3, warmup_rounds=1)
     print(f"\n{model}: compiled in {flight.compile_seconds:.1f} s, {trajectory.realtime_factor:.0f} x real time")
     benchmark.extra_info["error"] = f"ledger {trajectory.energy_error:.0e} in 110 turns"
     assert trajectory.ended_by == "duration"
@@ -70,8 +68,8 @@ def test_flight(benchmark, start, model, compact):
 def test_flight_in_balls(benchmark, start, compact):
     """As `simulate` flies with finite elements."""
     table = rotor_table(SCENE.rotor, "fem", nearest=SCENE.floater.radius)
-    flight = compile_local_flight(FREE, table, LONG, compact=compact)
-    trajectory = benchmark.pedantic(lambda: integrate(FREE, flight, start, 1.0, None), rounds=3, warmup_rounds=1)
+    flight = Flight(FREE, table, LONG, compact=compact)
+    trajectory = benchmark.pedantic(lambda: integrate(flight, start, 1.0, None), rounds=3, warmup_rounds=1)
     benchmark.extra_info["error"] = f"ledger {trajectory.energy_error:.0e} in 110 turns"
     assert trajectory.ended_by == "duration"
 
@@ -84,9 +82,9 @@ def test_flight_with_effects(benchmark, start, effects):
     if "metal" in effects:
         scene = replace(FREE, rotor=tuple(replace(magnet, conductivity=6.7e5) for magnet in FREE.rotor))
     levitation = Levitation(scene, Models("fem", "none", interaction="mutual" if "mutual" in effects else "rigid"))
-    flight = compile_local_flight(scene, levitation.interaction, LONG, compact=True)
-    trajectory = benchmark.pedantic(lambda: integrate(scene, flight, start, 1.0, None), rounds=3, warmup_rounds=1)
-    operations = [len(part.integrator.decomposition) for part in flight.parts._known.values()]
+    flight = Flight(scene, levitation.interaction, LONG, compact=True)
+    trajectory = benchmark.pedantic(lambda: integrate(flight, start, 1.0, None), rounds=3, warmup_rounds=1)
+    operations = [len(part.integrator.decomposition) for part in flight.parts.values()]
     print(f"\n{effects}: {operations} operations, {trajectory.realtime_factor:.0f} x real time")
     benchmark.extra_info["error"] = f"ledger {trajectory.energy_error:.0e} in 110 turns"
     assert trajectory.ended_by == "duration"
@@ -110,25 +108,14 @@ def test_flights_side_by_side(benchmark, start):
 @pytest.mark.parametrize("model", ["cuboid", "fem"])
 def test_flight_with_plate(benchmark, start, model, plate_model, rtol):
     """A floater that hangs over the plate's currents, at the tolerance and in the fields that `simulate` uses."""
-    _over_plate(benchmark, start, model, plate_model, rtol, compile_local_flight)
-
-
-@pytest.mark.benchmark(group="a simulated second at 110 Hz")
-@pytest.mark.parametrize(("plate_model", "rtol"), PLATES, ids=["fem-network, whole tables", "fem-slab, whole tables"])
-def test_flight_with_plate_in_whole_tables(benchmark, start, plate_model, rtol):
-    """The same as while the plate moves: in the tables' own fields."""
-    _over_plate(benchmark, start, "fem", plate_model, rtol, compile_flight)
-
-
-def _over_plate(benchmark, start, model, plate_model, rtol, compiler):
     table = rotor_table(SCENE.rotor, model, nearest=SCENE.floater.radius)
     memory, _ = plate_memory(SCENE, SCENE.plate, plate_model, table, start.position, rtol)
     table = rotor_nearby(table, SCENE.rotor, start.position, SCENE.floater.radius, 3e-6)
     equilibria = with_plate(SCENE, table, survey(SCENE, table), memory, Rates(table)).equilibria
     begun, currents = initial_state(SCENE, table, equilibria, memory)
-    flight = compiler(SCENE, table, LONG, PLATE_TOLERANCE, True, memory)
-    integrate(SCENE, flight, begun, 0.05, currents=currents)
-    fly_on = lambda: integrate(SCENE, flight, begun, 0.5, currents=currents)  # noqa: E731
+    flight = Flight(SCENE, table, LONG, PLATE_TOLERANCE, True, memory)
+    integrate(flight, begun, 0.05, currents=currents)
+    fly_on = lambda: integrate(flight, begun, 0.5, currents=currents)  # noqa: E731
     flown = benchmark.pedantic(fly_on, rounds=3)
     benchmark.extra_info.update(count=0.5, error=f"ledger {flown.energy_error:.0e}, {len(currents)} states")
     print(

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 from peers import PLATE, SCENE, around
 
-from spinlev.dynamics.flights.compiled import compile_flight
-from spinlev.dynamics.flights.flight import PLATE_TOLERANCE, initial_state, integrate
+from spinlev.dynamics.flights.flight import PLATE_TOLERANCE, Flight, initial_state, integrate
 from spinlev.dynamics.maps.family import rotor_family
 from spinlev.dynamics.maps.map import equilibrium_map
 from spinlev.fem.closed_forms.moments import carrier
@@ -63,9 +62,9 @@ def test_states(benchmark, rtol):
     table = rotor_table(SCENE.rotor, "cuboid", nearest=SCENE.floater.radius)
     start, _ = initial_state(FREE, table)
     memory, _ = plate_memory(SCENE, SCENE.plate, "slab", table, start.position, rtol)
-    flight = compile_flight(SCENE, table, LONG, PLATE_TOLERANCE, True, memory)
+    flight = Flight(SCENE, table, LONG, PLATE_TOLERANCE, True, memory)
     still = np.zeros(len(memory.table.rates))
-    flown = benchmark.pedantic(lambda: integrate(SCENE, flight, start, 0.2, currents=still), rounds=10, warmup_rounds=1)
+    flown = benchmark.pedantic(lambda: integrate(flight, start, 0.2, currents=still), rounds=10, warmup_rounds=1)
     benchmark.extra_info["size"] = len(still)
     assert flown.ended_by == "duration"
 
@@ -77,9 +76,9 @@ def test_turns(benchmark, turns):
     table = rotor_table(SCENE.rotor, "dipole")
     start, _ = initial_state(FREE, table)
     duration = turns / FREE.frequency
-    flight = compile_flight(FREE, table, LONG, 1e-14, True)
+    flight = Flight(FREE, table, LONG, 1e-14, True)
     benchmark.extra_info["size"] = turns
-    flown = benchmark.pedantic(lambda: integrate(FREE, flight, start, duration, None), rounds=2, warmup_rounds=0)
+    flown = benchmark.pedantic(lambda: integrate(flight, start, duration, None), rounds=2, warmup_rounds=0)
     assert flown.ended_by == "duration"
 
 

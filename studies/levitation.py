@@ -13,9 +13,8 @@ import numpy as np
 
 from ..dynamics.equilibria.equilibrium import Equilibrium, EquilibriumError, Survey
 from ..dynamics.equilibria.search import Found, cached_found, free_of_bodies, own_spin, survey, with_plate
-from ..dynamics.flights.flight import initial_state, most_like_levitation, simulate, starting_point
+from ..dynamics.flights.flight import Checkpoint, initial_state, most_like_levitation, simulate, starting_point
 from ..dynamics.flights.live import LiveFlight
-from ..dynamics.flights.pieces import Checkpoint
 from ..dynamics.flights.trajectory import FlightStopped, Trajectory
 from ..dynamics.motion.effect import Interaction, interaction_of
 from ..dynamics.motion.effects import BESIDE_METAL, WITHOUT_METAL, mutual_choice, with_effects
@@ -394,8 +393,8 @@ class Levitation:
         kept = checkpoint.read() if checkpoint else None
         if kept is not None and self.plate is not None:
             bounds = self.plate.table.region
-            if not np.array_equal(kept.region, [bounds.lower, bounds.upper]):
-                self._plate_for(Region(*kept.region))
+            if not np.array_equal(kept["region"], [bounds.lower, bounds.upper]):
+                self._plate_for(Region(*kept["region"]))
         while True:
             flown = self._simulated(duration, checkpoint)
             if flown.left_plate_table:

@@ -7,8 +7,7 @@ from flight_scene import SCENE
 from problems import start_of_flight
 from said import measure, say
 
-from spinlev.dynamics.flights.compiled import compile_flight
-from spinlev.dynamics.flights.flight import integrate
+from spinlev.dynamics.flights.flight import Flight, integrate
 from spinlev.dynamics.motion.state import State
 from spinlev.fem.rotor.choice import rotor_table
 
@@ -19,7 +18,7 @@ start = State(*start_of_flight(case))
 def flight():
     """The table, the compiled flight, and a second of it."""
     table = rotor_table(SCENE.rotor, "cuboid" if case == "closed form" else "dipole")
-    return integrate(SCENE, compile_flight(SCENE, table, 1.0, tolerance, True), start, 1.0, None)
+    return integrate(Flight(SCENE, table, 1.0, tolerance, True), start, 1.0, None)
 
 
 flown, seconds = measure(flight, rounds=1)

@@ -1,197 +1,166 @@
-"""One of many flights, where it is now."""
+"""Many trajectories at once, in the lanes of one core's vector registers.
+
+Taylor steps of the lanes are taken together, but each lane has its own time and step, and no lane's numbers enter
+another's: a trajectory is the same to the last bit whichever fly beside it, in one worker or in many, where BLAS has
+one thread (the default).
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import partial
 from time import perf_counter
-from typing import Any
+from typing import Any, Protocol
 
 import heyoka as hy
 import numpy as np
 from numpy.typing import NDArray
 
 from ...fem.compiled_code import compiled
-from ...fem.harmonics.local import BallField
-from ...fem.rotor.table import FieldTable
+from ...fem.rotor.table import FieldFormula, FieldTable
 from ...geometry.common import Array, InputError
 from ...geometry.scene.contents import Scene
 from ...geometry.scene.files import startless_text
-from ..motion.events import CONTACT, clearance, lost_distance
-from ..motion.state import Parameter, State
-from .balls import DEGREE, LARGE, LOOSER, SMALL, LocalFlight, Parts, ball_equations
-from .compiled import TOLERANCE
-from .flight import fly_on
-from .pieces import MOST_SAMPLES, IntegrationError, Log, booked, first_interval, flown, ledger_scale
-from .trajectory import DURATION, FieldChanges, Recorder, Trajectory
-
-
-@dataclass(eq=False)
-class Flying:
-    """A flight; what is not fixed at its start changes as it flies.
-
-    Parameters
-    ----------
-    flight : gives its balls
-    values : runtime parameters, with those of its ball
-    state : scaled (13,), with the work
-    duration : of the flight, s
-    time : scaled
-    over : whether it has ended
-    recorder, scale : samples with the ledger, and its scale; none where only the end is asked for
-    """
-
-    flight: LocalFlight
-    values: Array
-    state: Array
-    duration: float
-    time: float = 0.0
-    over: bool = False
-    log: Log = field(default_factory=Log)
-    recorder: Recorder | None = None
-    scale: float = 1.0
-
-    @classmethod
-    def begun(cls, flight: LocalFlight, start: State, duration: float, recorded: bool) -> Flying:
-        """At t = 0; over if it begins in contact."""
-        start = replace(start, moment=start.moment / np.linalg.norm(start.moment))
-        values, state = flight.values, np.append(flight.scales.pack(start), 0.0)
-        values[Parameter.LOST_DISTANCE] = lost_distance(start.position) / flight.scales.length
-        found = cls(flight, values, state, duration)
-        if clearance(flight.scene, np.zeros(1), start.position[None])[0] < 0:
-            found.log.ended_by, found.over = CONTACT, True
-            return found
-        found.log.changes = FieldChanges(error=flight.enter(start, values))
-        if recorded:
-            row, part = state[None], flight.part(values)
-            found.scale = ledger_scale(flight.scene, part, values, state)
-            first = booked(flight.scene, part, values, np.zeros(1), row)[0]
-            found.recorder = Recorder(first, first_interval(flight.scene, duration), MOST_SAMPLES)
-        return found
-
-    @property
-    def end(self) -> float:
-        """Scaled time of the end, if nothing ends it before."""
-        return self.duration / self.flight.scales.time
-
-    @property
-    def seconds(self) -> float:
-        """Time since the start, s."""
-        return self.time * self.flight.scales.time
-
-    @property
-    def degree(self) -> int:
-        """Of its ball; 0 where it is in none."""
-        return int(self.values[DEGREE])
-
-    def due(self, now: float) -> Array:
-        """Scaled times (n,) of the samples since the last look."""
-        return np.zeros(0) if self.recorder is None else self.recorder.due(self.time, now, self.end)
-
-    def keep(self, times: Array, states: Array, last: bool = False) -> None:
-        """Record samples (n, 13) at scaled times (n,)."""
-        if self.recorder is not None:
-            part = self.flight.part(self.values)
-            self.recorder.add(times, booked(self.flight.scene, part, self.values, times, states), last)
-
-    def finish(self, ended_by: str) -> None:
-        """It is over."""
-        self.log.ended_by, self.over = ended_by, True
-        self.keep(np.array([self.time]), self.state[None], True)
-
-    def go_over(self) -> None:
-        """To another ball, or to none."""
-        self.log.changes = self.flight.go_over(self.time, self.state, self.values, self.log.changes)
-
-    def alone(self) -> None:
-        """Fly on to the end outside of lanes."""
-        recorder = self.recorder or Recorder(self.state, first_interval(self.flight.scene, self.duration), MOST_SAMPLES)
-        fly_on(self.flight.scene, self.flight, self.values, self.time, self.state, self.duration, recorder, self.log)
-        self.time, self.state, self.over = float(recorder.times[-1]), recorder.states[-1], True
-
-    def trajectory(self, speed: float) -> Trajectory:
-        """What was recorded, at so many simulated seconds per second."""
-        assert self.recorder is not None
-        return flown(self.flight.scene, self.recorder, self.log, self.duration, self.scale, speed, 0.0)
-
+from ..motion.effects import with_effects
+from ..motion.equations import Equations, equations_of_motion, parameters
+from ..motion.events import (
+    BEYOND,
+    CONTACT,
+    Events,
+    clearance,
+    flight_events,
+    lost_distance,
+    plate_depth,
+    plate_legs,
+    range_events,
+)
+from ..motion.plate import PlateForce, PlateMemory, plate_numbers
+from ..motion.state import Parameter, Scales, State, Vector
+from .balls import LARGE, SMALL
+from .flight import LEFT, LOOSER, MOST_SAMPLES, TOLERANCE, Course, Flight, IntegrationError
+from .trajectory import DURATION, Recorder, Trajectory
 
 LANES = 8
 """Measured: a flight in eight lanes takes a quarter of the time of one alone, in four a half, in 16 a third."""
 TOGETHER = 200
 """Steps between two looks for lanes whose flights have ended; a hundred are about 16 turns."""
+STEP_ERROR = 1e-9
+"""Of a launch, which is chaotic: single flights depend on the error of a step, but not their shares."""
+FLAT = 1e-9
+"""Sine of the angle to the horizontal that a plate may have."""
+
+
+class _Occupant(Protocol):
+    """What flies on a lane: its state is put there when it begins and after each of its events."""
+
+    values: Array
+    state: Array
+    time: tuple[float, float]
+    steps: int
+
+    @property
+    def end(self) -> float:
+        """Scaled time at which the meaning of the next event is "duration"."""
+
+    @property
+    def recorder(self) -> Recorder | None: ...
+
+    def record(self, times: Array, states: Array) -> None: ...
+
+    def follow(self, meaning: str) -> bool:
+        """After an event, with time and state as they are then: whether it goes on here."""
 
 
 class Lanes:
-    """Flies many flights whose equations are the same but for runtime parameters, in balls of one kind.
+    """An integrator for many trajectories whose equations are the same but for runtime parameters.
 
     Parameters
     ----------
-    like : one of them
-    formula : kind of the balls
+    equations, events : of the motion, and what interrupts it
+    tolerance : relative error of a step
+    with_work : whether the energy's work is integrated as the last state
     """
 
-    def __init__(self, like: LocalFlight, formula: BallField) -> None:
-        self.formula = formula
-        equations, inside = ball_equations(like.scene, like.table, formula)
+    def __init__(self, equations: Equations, events: Events, tolerance: float, with_work: bool) -> None:
+        system = list(zip(equations.variables, equations.rates, strict=True))
+        if with_work:
+            system.append((hy.expression("work"), equations.power))
+        self._meanings = [meaning for _, meaning in events]
         self._integrator = compiled(
             hy.taylor_adaptive_batch,
-            [*zip(equations.variables, equations.rates, strict=True), (hy.expression("work"), equations.power)],
-            np.zeros((len(equations.variables) + 1, LANES)),
-            tol=LOOSER * TOLERANCE,
+            system,
+            np.zeros((len(system), LANES)),
+            tol=tolerance,
             compact_mode=True,
             opt_level=1,
-            t_events=[hy.t_event_batch(inside, direction=hy.event_direction.negative)],
+            t_events=[hy.t_event_batch(each, direction=hy.event_direction.negative) for each, _ in events],
         )
 
-    def fly(self, flights: Sequence[Flying]) -> None:
-        """Fly on until flights are over or can go on in no ball of this kind.
+    def fly(self, occupants: Sequence[_Occupant]) -> None:
+        """Fly each until it does not go on here.
 
         Raises
         ------
         IntegrationError : a state became infinite
         """
-        waiting, ends = iter(flights), np.zeros(LANES)
-        self._integrator.set_time(ends)
+        integrator, waiting, ends = self._integrator, iter(occupants), np.zeros(LANES)
+        integrator.set_time(ends)
         for lane in range(LANES):  # one that stays empty must be finite too: the equations are not, where all is zero
-            self._put(lane, flights[0])
+            self._put(lane, occupants[0])
         flying = {lane: first for lane in range(LANES) if (first := self._next(lane, waiting, ends))}
         while flying:
-            recorded = any(flight.recorder for flight in flying.values())
-            found, _ = self._integrator.propagate_until(ends, max_steps=TOGETHER, c_output=recorded)
+            recorded = any(one.recorder for one in flying.values())
+            found, _ = integrator.propagate_until(ends, max_steps=TOGETHER, c_output=recorded)
             if recorded:
-                self._record(flying, found)
-            for lane, (outcome, _, _, steps) in enumerate(self._integrator.propagate_res):
+                self._record(flying, ends, found)
+            for lane, (outcome, _, _, steps) in enumerate(integrator.propagate_res):
                 if lane not in flying:
                     continue
-                flying[lane].log.steps += int(steps)
+                one = flying[lane]
+                one.steps += int(steps)
+                one.time, one.state = (float(integrator.time[lane]), 0.0), integrator.state[:, lane].copy()
                 if outcome in (hy.taylor_outcome.success, hy.taylor_outcome.step_limit):
-                    flying[lane].time = float(self._integrator.time[lane])
-                elif following := self._after(lane, flying.pop(lane), outcome) or self._next(lane, waiting, ends):
+                    continue
+                if outcome == hy.taylor_outcome.err_nf_state:
+                    raise IntegrationError(
+                        f"A floater's state became infinite at scaled time {one.time[0]:.6g}: it began in a magnet, or "
+                        "the plate's table is too small for this start."
+                    )
+                timed = outcome == hy.taylor_outcome.time_limit
+                meaning = DURATION if timed else self._meanings[-outcome.value - 1]
+                if one.follow(meaning):
+                    ends[lane] = one.end
+                    self._put(lane, one, meaning == LEFT)  # else what it has crossed must not count again
+                elif following := self._next(lane, waiting, ends):
                     flying[lane] = following
+                else:
+                    del flying[lane]
 
-    def _next(self, lane: int, waiting: Iterator[Flying], ends: Array) -> Flying | None:
-        """Put the next flight on a lane; an empty lane stays where it is."""
+    def _next(self, lane: int, waiting: Iterator[_Occupant], ends: Array) -> _Occupant | None:
+        """Put the next one on a lane; an empty lane stays where it is."""
         following = next(waiting, None)
         ends[lane] = following.end if following else self._integrator.time[lane]
         if following is None:
             return None
         whole, rest = (part.copy() for part in self._integrator.dtime)
-        whole[lane], rest[lane] = following.time, 0.0
+        whole[lane], rest[lane] = following.time
         self._integrator.set_dtime(whole, rest)
-        return self._put(lane, following)
+        self._put(lane, following)
+        return following
 
-    def _put(self, lane: int, flying: Flying) -> Flying:
-        """Give a lane the state and the ball of its flight."""
-        self._integrator.state[:, lane] = flying.state
-        self._integrator.pars[:, lane] = flying.values[: len(self._integrator.pars)]
-        self._integrator.reset_cooldowns(lane)
-        return flying
+    def _put(self, lane: int, one: _Occupant, anew: bool = True) -> None:
+        self._integrator.state[:, lane] = one.state
+        self._integrator.pars[:, lane] = one.values[: len(self._integrator.pars)]
+        if anew:
+            self._integrator.reset_cooldowns(lane)
 
-    def _record(self, flying: Mapping[int, Flying], found: Any) -> None:
+    def _record(self, flying: Mapping[int, _Occupant], ends: Array, found: Any) -> None:
         """Keep the samples of the steps just taken."""
-        now = self._integrator.time
-        due = {lane: flight.due(float(now[lane])) for lane, flight in flying.items()}
+        now, due = self._integrator.time, dict[int, Array]()
+        for lane, one in flying.items():
+            if one.recorder:
+                due[lane] = one.recorder.due(one.time[0], float(now[lane]), float(ends[lane]))
         most = max(len(times) for times in due.values())
         if not most:
             return
@@ -201,23 +170,12 @@ class Lanes:
         states = found(grid)
         for lane, times in due.items():
             if len(times):
-                flying[lane].keep(times, states[: len(times), :, lane])
-
-    def _after(self, lane: int, flying: Flying, outcome: hy.taylor_outcome) -> Flying | None:
-        """A flight that goes on in another ball of this kind; none that is over or needs something else."""
-        flying.time, flying.state = float(self._integrator.time[lane]), self._integrator.state[:, lane].copy()
-        if outcome == hy.taylor_outcome.err_nf_state:
-            raise IntegrationError(f"A floater's state became infinite at t = {flying.seconds:.6g} s.")
-        if outcome == hy.taylor_outcome.time_limit:
-            flying.finish(DURATION)
-            return None
-        flying.go_over()
-        return self._put(lane, flying) if flying.values[DEGREE] == self.formula.degree else None
+                flying[lane].record(times, states[: len(times), :, lane])
 
 
 @dataclass(frozen=True, eq=False)
 class Endings:
-    """The ends of n flights.
+    """The ends of n trajectories.
 
     Parameters
     ----------
@@ -263,8 +221,7 @@ def ensemble(
 ) -> Endings:
     """Fly a scene's floater from many starts for `duration` (s) each, or until contact or loss.
 
-    A plate is an obstacle only: its currents are not modelled.  A flight's numbers are the same to the last bit
-    whichever flights fly beside it, in one worker or in many, where BLAS has one thread (the default).
+    A plate is an obstacle only: its currents are not modelled.
 
     Parameters
     ----------
@@ -280,21 +237,37 @@ def ensemble(
     InputError : `duration` is not positive, there is no start, or the floater is no sphere
     IntegrationError : a state became infinite
     """
-    scene.floater.must_be("sphere", where="where many fly side by side", instead="Fly them one by one.")
-    count = len(starts.position)
-    if not duration > 0:
-        raise InputError(f"Input duration must be positive; instead received {duration} s.")
-    if not count:
-        raise InputError("Input starts must have one state at least; instead received none.")
-    pieces = [slice(first, first + together) for first in range(0, count, together)]
+    _check(scene, starts, duration)
+    pieces = [slice(first, first + together) for first in range(0, len(starts.position), together)]
     parts = mapped(partial(_ended, scene, table, duration), [State(*(v[p] for v in starts.vectors)) for p in pieces])
     return Endings.joined(list(parts))
+
+
+def _check(scene: Scene, starts: State, duration: float) -> None:
+    scene.floater.must_be("sphere", where="where many fly side by side", instead="Fly them one by one.")
+    if not duration > 0:
+        raise InputError(f"Input duration must be positive; instead received {duration} s.")
+    if not len(starts.position):
+        raise InputError("Input starts must have one state at least; instead received none.")
+
+
+def _ended(scene: Scene, table: FieldTable, duration: float, starts: State) -> Endings:
+    flight, count = _flight(scene, table, duration), len(starts.position)
+    flown = [_begun(flight, State(*(v[k] for v in starts.vectors)), duration, False) for k in range(count)]
+    _fly(flown)
+    return Endings(
+        np.array([f.ended_by for f in flown]),
+        np.minimum([f.seconds for f in flown], duration),
+        flight.scales.unpack(np.array([f.state[:12] for f in flown])),
+        np.array([f.changes.count for f in flown]),
+        np.zeros(count, bool),
+    )
 
 
 def fly_together(
     scenes: Sequence[Scene], table: FieldTable, starts: Sequence[State], duration: float
 ) -> list[Trajectory | None]:
-    """Flights of scenes whose equations are the same but for runtime parameters, from one start each, with samples.
+    """Trajectories of scenes whose equations are the same but for runtime parameters, from one start each.
 
     Each is what `simulate` gives without a plate's currents, but for round-off; None where the start is in contact.
 
@@ -302,44 +275,194 @@ def fly_together(
     ------
     IntegrationError : a state became infinite
     """
-    known: dict[str, LocalFlight] = {}
-    flights = []
-    began = perf_counter()
+    began, known = perf_counter(), dict[str, Flight]()
+    flown = []
     for scene, start in zip(scenes, starts, strict=True):
         key = startless_text(scene)
         if key not in known:
-            known[key] = _local_flight(scene, table, duration)
-        flights.append(Flying.begun(known[key], start, duration, True))
-    _fly_all(flights)
-    speed = sum(f.seconds for f in flights) / (perf_counter() - began)
-    return [None if f.recorder is None else f.trajectory(speed) for f in flights]
+            known[key] = _flight(scene, table, duration)
+        flown.append(_begun(known[key], start, duration, True))
+    _fly(flown)
+    speed = sum(f.seconds for f in flown) / (perf_counter() - began)
+    return [f.trajectory(speed) if f.recorder else None for f in flown]
 
 
-def _local_flight(scene: Scene, table: FieldTable, duration: float) -> LocalFlight:
-    """What flies in balls, without a plate's currents."""
-    return LocalFlight(scene, table, Parts(scene, table, duration, TOLERANCE, True, None))
+def _flight(scene: Scene, table: FieldTable, duration: float) -> Flight:
+    return Flight(scene, table, duration, compact=True, in_balls=True)
 
 
-def _fly_all(flights: Sequence[Flying]) -> None:
+class _InBalls(Course):
+    """A trajectory on a lane for balls of one kind."""
+
+    over = False
+
+    @property
+    def end(self) -> float:
+        return self.duration / self.flight.scales.time
+
+    def record(self, times: Array, states: Array) -> None:
+        assert self.recorder is not None
+        self.recorder.add(times, self.flight.balanced(self.values, times, states), self.over)
+
+    def follow(self, meaning: str) -> bool:
+        if meaning == DURATION:
+            self.ended_by, self.over = DURATION, True
+            if self.recorder:
+                self.record(np.array([self.time[0]]), self.state[None])
+            return False
+        degree = self.flight.degree(self.values)
+        self.change_ball()
+        return self.flight.degree(self.values) == degree
+
+    def alone(self) -> None:
+        """Fly on to the end outside of lanes."""
+        if self.recorder is None:
+            self.recorder = Recorder(self.state, self.flight.interval(self.duration), MOST_SAMPLES, self.time[0])
+        self.fly()
+        self.time, self.state = (float(self.recorder.times[-1]), 0.0), self.recorder.states[-1]
+        self.over = True
+
+
+def _begun(flight: Flight, start: State, duration: float, recorded: bool) -> _InBalls:
+    """At t = 0; over if it begins in contact."""
+    start = replace(start, moment=start.moment / np.linalg.norm(start.moment))
+    free = clearance(flight.scene, np.zeros(1), start.position[None])[0] >= 0
+    course = flight.begin(start, duration, interval=flight.interval(duration) if recorded and free else None)
+    found = _InBalls(**vars(course))
+    if not free:
+        found.ended_by, found.over = CONTACT, True
+    return found
+
+
+def _fly(courses: Sequence[_InBalls]) -> None:
     """In lanes, in small balls first, then in large ones; at last one by one near bodies, and where it is too fast."""
     for formula in (SMALL, LARGE):
-        here = [f for f in flights if not f.over and f.degree == formula.degree]
+        here = [f for f in courses if not f.over and f.flight.degree(f.values) == formula.degree]
         if here:
-            Lanes(here[0].flight, formula).fly(here)
-    for flight in flights:
-        if not flight.over:
-            flight.alone()
+            equations, events = here[0].flight.equations(formula.degree)
+            Lanes(equations, events, LOOSER * TOLERANCE, True).fly(here)
+    for course in courses:
+        if not course.over:
+            course.alone()
 
 
-def _ended(scene: Scene, table: FieldTable, duration: float, starts: State) -> Endings:
-    flight = _local_flight(scene, table, duration)
-    count = len(starts.position)
-    flights = [Flying.begun(flight, State(*(v[k] for v in starts.vectors)), duration, False) for k in range(count)]
-    _fly_all(flights)
+def launched(
+    scene: Scene,
+    table: FieldFormula,
+    memory: PlateMemory,
+    starts: State,
+    duration: float,
+    step_error: float = STEP_ERROR,
+    currents: Array | None = None,
+) -> Endings:
+    """Fly a scene's floater over its plate from many starts, for `duration` (s) each, or until contact or loss.
+
+    Contact with the rotor is that of `flight_events`; where a step misses an edge, contact is told at the latest where
+    the sphere meets the largest one inside the magnet.  The plate is an obstacle without edges.  The field is the
+    table's own expressions, so that a short one (dipoles, closed forms) is fast.
+
+    Parameters
+    ----------
+    scene : has the plate of `memory`, which may be lowered
+    table : the rotor's field, with effects if it is an `Interaction`
+    memory : the plate's currents
+    starts : states (n, 3) at t = 0, SI units
+    step_error : relative, of a Taylor step
+    currents : (n, k) the plate's states then, √J; if not given, those under a floater long held at rest
+
+    Accuracy: that of the tables; beyond the range of the plate's the currents' field is continued as it is, and
+    `Endings.left_plate_table` says which flights went there.
+
+    Raises
+    ------
+    InputError : `duration` is not positive, there is no start, the plate does not lie flat, or the floater is no sphere
+    """
+    _check(scene, starts, duration)
+    scales, count, legs = Scales.of(scene), len(starts.position), plate_legs(scene.plate, duration)
+    known = parameters(scene, scales)
+    values = np.concatenate([known, plate_numbers(memory, known)])
+    equations = equations_of_motion(with_effects(scene, table), bool(np.any(scene.gravity[:2])), memory)
+    position, depth = equations.variables[:3], plate_depth(memory.plate, np.zeros(1))
+    events = [
+        *flight_events(replace(scene, plate=None), position),
+        *range_events(memory, position),
+        *((obstacle, CONTACT) for obstacle in _obstacles(scene, memory, position)),
+    ]
+    left = ~memory.in_range(starts.position, depth)
+    unit = starts.moment / np.linalg.norm(starts.moment, axis=1)[:, None]
+    states = scales.pack(replace(starts, moment=unit))
+    if currents is None:
+        force, now, silent = PlateForce(memory, known), np.zeros(count), states.copy()
+        silent[:, 6:9] = 0.0
+        own = force(now, states).signals - force(now, silent).signals
+    else:
+        own = (currents - memory.driven(scene.angular_velocity)[0].signals(0.0, float(depth[0]))) * known[
+            Parameter.PLATE_SHARE
+        ]
+    states = np.concatenate([states, own], axis=1)
+    flown = [_Launch(values.copy(), states[k], legs, scales, bool(left[k])) for k in range(count)]
+    free = clearance(scene, np.zeros(count), starts.position) > 0
+    if free.any():
+        lanes = Lanes(equations, events, step_error, False)
+        lanes.fly([one for one, there in zip(flown, free, strict=True) if there])
+    times = np.array([one.time[0] for one in flown]) * scales.time
     return Endings(
-        np.array([f.log.ended_by for f in flights]),
-        np.minimum([f.seconds for f in flights], duration),
-        flight.scales.unpack(np.array([f.state[:12] for f in flights])),
-        np.array([f.log.changes.count for f in flights]),
-        np.zeros(count, bool),
+        np.array([one.ended_by for one in flown], dtype="<U8"),
+        np.minimum(times, legs[-1][0]),
+        scales.unpack(np.array([one.state for one in flown])),
+        np.zeros(count, int),
+        np.array([one.left for one in flown]),
     )
+
+
+class _Launch:
+    """A launch on a lane: each leg of the plate's way is flown for itself."""
+
+    recorder = None
+
+    def __init__(
+        self, values: Array, state: Array, legs: Sequence[tuple[float, float, float]], scales: Scales, left: bool
+    ) -> None:
+        self.values, self.state, self.time, self.steps = values, state, (0.0, 0.0), 0
+        self.ended_by, self.left, self._scales, self._legs = CONTACT, left, scales, iter(legs)
+        self.values[Parameter.LOST_DISTANCE] = lost_distance(scales.unpack(state).position) / scales.length
+        self.end = 0.0
+        self.follow(DURATION)
+
+    def follow(self, meaning: str) -> bool:
+        """Beyond the table it flies on; at the end of a leg the next one begins."""
+        if meaning == BEYOND:
+            self.left = True
+        elif meaning != DURATION or (leg := next(self._legs, None)) is None:
+            self.ended_by = meaning
+            return False
+        else:
+            finish, depth, speed = leg
+            self.end = finish / self._scales.time
+            self.values[Parameter.PLATE_DEPTH] = depth / self._scales.length
+            self.values[Parameter.PLATE_SPEED] = speed * self._scales.time / self._scales.length
+        return True
+
+    def record(self, times: Array, states: Array) -> None:
+        raise NotImplementedError
+
+
+def _obstacles(scene: Scene, memory: PlateMemory, position: Vector) -> list[hy.expression]:
+    """What becomes negative in contact, and is a polynomial of the scaled position, so that no step misses it.
+
+    Raises
+    ------
+    InputError : the plate does not lie flat
+    """
+    box, length = memory.plate.box, hy.par[Parameter.LENGTH]
+    normal = int(np.argmin(box.size))
+    if abs(abs(box.rotation[2, normal]) - 1) > FLAT:
+        raise InputError("Input plate must lie flat under the rotor; instead it is turned. Leave out rotation_deg.")
+    face = float(box.center[2] + box.size[normal] / 2)
+    depth = hy.par[Parameter.PLATE_DEPTH] + hy.par[Parameter.PLATE_SPEED] * hy.time
+    found = [position[2] + depth - face / length - 1.0]
+    for body in scene.turning_bodies:
+        apart = [length * position[i] - float(body.center[i]) for i in range(3)]
+        near = float(np.min(body.size)) / 2 + scene.floater.radius
+        found.append((hy.sum([a * a for a in apart]) - near**2) / (length * length))
+    return found

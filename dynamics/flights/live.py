@@ -11,10 +11,7 @@ from ...geometry.scene.contents import Scene
 from ..equilibria.equilibrium import Equilibrium
 from ..motion.plate import PlateMemory
 from ..motion.state import State, turned_about_z
-from .balls import compile_local_flight
-from .compiled import TOLERANCE
-from .flight import PLATE_TOLERANCE, StartError, begun, check_free, fly_on, in_plate_range, initial_state
-from .pieces import Log
+from .flight import PLATE_TOLERANCE, TOLERANCE, Flight, StartError, check_free, in_plate_range, initial_state
 from .trajectory import DURATION, Recorder
 
 FEWEST, MOST, A_SECOND = 8, 256, 400
@@ -40,7 +37,7 @@ class Piece:
 
 
 class LiveFlight:
-    """A flight of a scene's floater, with the plate's memory if there is one.
+    """A flight of a scene's floater, with the plate's currents if they are modelled.
 
     Parameters
     ----------
@@ -59,19 +56,31 @@ class LiveFlight:
     ) -> None:
         start, currents = initial_state(scene, table, equilibria, memory)
         tolerance = TOLERANCE if memory is None else PLATE_TOLERANCE
-        self.scene, self.memory = scene, memory
-        self.flight = compile_local_flight(scene, table, np.inf, tolerance, True, memory)
-        self.log = Log()
-        self.values = begun(self.flight, start, currents, self.log)
-        self.state = self.flight.part(self.values).whole
-        self.time = 0.0
-        """Since the flight began, s."""
+        self.scene = scene
+        flight = Flight(scene, table, np.inf, tolerance, True, memory)
+        self._course = flight.begin(start, np.inf, currents)
+        flight.part(flight.degree(self._course.values))  # compiled now, so that the first piece is not late
         self._check_range(self.now.position)
+
+    @property
+    def time(self) -> float:
+        """Since the flight began, s."""
+        return self._course.seconds
+
+    @property
+    def state(self) -> Array:
+        """Scaled, rotor's frame, with the plate's and the work."""
+        return self._course.state
+
+    @property
+    def ended_by(self) -> str:
+        """See `Piece`."""
+        return self._course.ended_by
 
     @property
     def now(self) -> State:
         """Motion along the laboratory's axes, SI units."""
-        return self.flight.scales.unpack(self.state).to_lab(self.scene.angular_velocity * self.time)
+        return self._course.flight.scales.unpack(self.state).to_lab(self.scene.angular_velocity * self.time)
 
     def onward(self, seconds: float) -> Piece:
         """Fly on so long (s), or to contact or loss, after which there is nothing to fly.
@@ -83,12 +92,18 @@ class LiveFlight:
         """
         if not seconds > 0:
             raise InputError(f"Input seconds must be positive; instead received {seconds}.")
-        if self.log.ended_by != DURATION:
-            return self._piece(np.array([self.time]), self.state[None])
-        unit, number = self.flight.scales.time, int(np.clip(A_SECOND * seconds, FEWEST, MOST))
-        recorder = _Samples(np.append(self.state[:12], 0.0), self.time / unit, seconds / number / unit)
-        self._go(self.time + seconds, recorder)
-        return self._piece(recorder.times[1:] * unit, recorder.states[1:])
+        course, unit = self._course, self._course.flight.scales.time
+        times, states = np.array([course.time[0]]), course.state[None]
+        if course.ended_by == DURATION:
+            interval = seconds / int(np.clip(A_SECOND * seconds, FEWEST, MOST)) / unit
+            course.recorder = Recorder(np.append(course.state[:12], 0.0), interval, 4 * MOST, course.time[0])
+            course.duration = self.time + seconds
+            course.fly()
+            times, states = course.recorder.times[1:], course.recorder.states[1:]
+            course.time = float(times[-1]), 0.0
+        turned = self.scene.angular_velocity * times * unit
+        lab = course.flight.scales.unpack(states).to_lab(turned)
+        return Piece(times * unit, lab, float(turned[-1]), course.ended_by)
 
     def push(self, velocity: Array) -> None:
         """Add a velocity (3,) m/s, along the laboratory's axes, as a blow does."""
@@ -106,12 +121,12 @@ class LiveFlight:
         place = turned_about_z(position, self.scene.angular_velocity * self.time)
         self._check_range(place)
         turning = np.cross([0.0, 0.0, self.scene.angular_velocity], place)
-        self.log.ended_by = DURATION
+        self._course.ended_by = DURATION
         self._become(replace(self.now, position=place, velocity=turning))
 
     def _check_range(self, place: Array) -> None:
         """Raises StartError where the plate's table does not know the field at a place (3,) m in the laboratory."""
-        if not in_plate_range(self.memory, replace(self.now, position=place), self.time):
+        if not in_plate_range(self._course.flight.memory, replace(self.now, position=place), self.time):
             where = ", ".join(f"{1e3 * c:.4g}" for c in place)
             raise StartError(
                 f"Input position must be where the field of the plate's currents was computed; instead received "
@@ -121,22 +136,5 @@ class LiveFlight:
 
     def _become(self, lab: State) -> None:
         state = lab.to_rotor(self.scene.angular_velocity * self.time)
-        self.state[:12] = self.flight.scales.pack(state)
-        self.flight.enter(state, self.values, self.time / self.flight.scales.time)
-
-    def _go(self, end: float, recorder: Recorder) -> None:
-        unit, log = self.flight.scales.time, self.log
-        fly_on(self.scene, self.flight, self.values, self.time / unit, self.state, end, recorder, log)
-        self.state, self.time = self.flight.part(self.values).whole, float(recorder.times[-1]) * unit
-
-    def _piece(self, times: Array, states: Array) -> Piece:
-        turned = self.scene.angular_velocity * times
-        lab = self.flight.scales.unpack(states).to_lab(turned)
-        return Piece(times, lab, float(turned[-1]), self.log.ended_by)
-
-
-class _Samples(Recorder):
-    """Samples from now on; those before are forgotten."""
-
-    def __init__(self, state: Array, now: float, interval: float) -> None:
-        super().__init__(state, interval, 4 * MOST, now)
+        self._course.state[:12] = self._course.flight.scales.pack(state)
+        self._course.enter_ball()

@@ -79,7 +79,7 @@ DURATION, STOPPED = "duration", "stopped"
 
 @dataclass(frozen=True)
 class FieldChanges:
-    """What changes of the field's representation did in a flight through small balls (`fem.ball_field`).
+    """What changes of the field's representation did in a flight through balls.
 
     Parameters
     ----------
@@ -93,6 +93,10 @@ class FieldChanges:
     energy: float = 0.0
     total: float = 0.0
     error: float = 0.0
+
+    def and_one(self, energy: float, error: float) -> Self:
+        """With one more, of an energy (in the unit of the others), to a ball with an error."""
+        return type(self)(self.count + 1, self.energy + energy, self.total + abs(energy), max(self.error, error))
 
     def relative(self, scale: float) -> Self:
         """With energies in units of `scale`."""

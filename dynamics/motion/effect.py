@@ -96,6 +96,7 @@ class Placeable(Effect, Protocol):
         """The same with numbers from the runtime parameter `first` on."""
 
 
+@runtime_checkable
 class InBall(Effect, Protocol):
     """An effect with numbers of its own among the runtime parameters, which hold in a ball of a flight."""
 

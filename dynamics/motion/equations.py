@@ -14,7 +14,7 @@ along the axis everything is autonomous, and the Jacobi integral
 is conserved: the energy less ω times the angular momentum about the axis.  What drag and a horizontal part of gravity
 do in the rotating frame is integrated along as the last state, `work`, so that J - work never changes.
 Effects (`effect`) add what else acts on the floater: accelerations of position and spin, their energy to J, their
-power to `work`.  A plate adds its currents as further states (`plate_terms`) and their energy to J.  Every number that
+power to `work`.  A plate adds its currents as further states (`memory_terms`) and their energy to J.  Every number that
 a sweep may change is a runtime parameter; only the tables' own geometry is compiled in.
 """
 
@@ -28,7 +28,7 @@ from ...fem.rotor.table import FieldFormula
 from ...geometry.common import MU_0, Array
 from ...geometry.scene.contents import Scene
 from .effect import Motion, interaction_of
-from .plate import PlateFormula, memory_terms
+from .plate import PlateMemory, memory_terms
 from .state import Parameter, Scales, Vector, cross, dot, subtract, turned
 
 FORCE_ALONE = "spinlev.floater_force gives force and torque on it; for a motion take a cylinder or a sphere."
@@ -86,7 +86,8 @@ def parameters(scene: Scene, scales: Scales, frozen_spin: bool = False) -> Array
 def equations_of_motion(
     table: FieldFormula,
     tilted_gravity: bool = False,
-    plate: PlateFormula | None = None,
+    memory: PlateMemory | None = None,
+    first: int = len(Parameter),
 ) -> Equations:
     """Rates of the scaled state in the field of a table.
 
@@ -94,7 +95,7 @@ def equations_of_motion(
     ----------
     table : the rotor's field, with effects if it is an `Interaction`
     tilted_gravity : whether gravity has a part across the axis; it turns in this frame, so that time enters
-    plate : the fields of the plate's currents, if they are modelled
+    memory, first : the plate's currents, if they are modelled, and the first of their runtime parameters
     """
     variables = hy.make_vars(*NAMES)
     position, velocity, moment, spin = (variables[i : i + 3] for i in (0, 3, 6, 9))
@@ -131,9 +132,9 @@ def equations_of_motion(
     turn = [a + b for a, b in zip(cross(moment, turning), turn, strict=True)]
     states: list[hy.expression] = []
     state_rates: Vector = []
-    if plate is not None:
-        states = [hy.expression(f"plate_{i}") for i in range(len(plate.weights))]
-        terms = memory_terms(plate, position, moment, states)
+    if memory is not None:
+        states = [hy.expression(f"plate_{i}") for i in range(len(memory.table.rates))]
+        terms = memory_terms(memory, first, position, moment, states)
         force = [a + b for a, b in zip(force, terms.force, strict=True)]
         turn = [a + b for a, b in zip(turn, terms.torque, strict=True)]
         state_rates = terms.rates

@@ -14,36 +14,35 @@ from ...geometry.overlap import body_overlap
 from ...geometry.scene.contents import Plate, Scene
 from ...geometry.shapes import Box
 from ...geometry.solids import Solid
-from .plate import PlateFormula, seen_by_plate
+from .plate import PlateMemory, seen_by_plate
 from .state import Parameter, Vector, turned_about_z
 
 CONTACT, LOST, BEYOND = "contact", "lost", "beyond"
 """The last: where the range of a plate's table ends, beyond which nobody knows its currents' field."""
 
 
-def flight_events(scene: Scene, position: Vector) -> tuple[list[hy.t_event], list[str]]:
-    """Terminal events of the scaled motion, and what each of them means."""
+Events = list[tuple[hy.expression, str]]
+"""What ends a stretch of motion where it becomes negative, and the meaning of that."""
+
+
+def flight_events(scene: Scene, position: Vector) -> Events:
+    """Contact with the bodies of a scene and loss, at a scaled position."""
     length = hy.par[Parameter.LENGTH]
     metres = [length * p for p in position]
     gaps = [_excess(body, metres) for body in scene.turning_bodies]
     if scene.plate is not None:
         gaps.append(_excess(scene.plate.box, _plate_view(metres)))
-    falling = hy.event_direction.negative
     within = (scene.floater.inner_radius / scene.floater.radius) ** 2  # its own contact is found at the samples
-    events = [hy.t_event(gap / (length * length) - within, direction=falling) for gap in gaps]
     reach = hy.par[Parameter.LOST_DISTANCE] ** 2.0 - hy.sum([p * p for p in position])
-    return [*events, hy.t_event(reach, direction=falling)], [CONTACT] * len(gaps) + [LOST]
+    return [*((gap / (length * length) - within, CONTACT) for gap in gaps), (reach, LOST)]
 
 
-def range_events(formula: PlateFormula, position: Vector) -> tuple[list[hy.t_event], list[str]]:
-    """Terminal events where a scaled position leaves the range of a plate's table, and what each of them means."""
-    region = formula.memory.table.region
-    away = [x - float(c) for x, c in zip(seen_by_plate(formula, position), region.center, strict=True)]
+def range_events(memory: PlateMemory, position: Vector) -> Events:
+    """Where a scaled position leaves the range of a plate's table."""
+    region = memory.table.region
+    away = [x - float(c) for x, c in zip(seen_by_plate(memory, position), region.center, strict=True)]
     half = (region.upper - region.lower) / 2
-    falling = hy.event_direction.negative
-    return [hy.t_event(1.0 - (a * a) / float(h) ** 2, direction=falling) for a, h in zip(away, half, strict=True)], [
-        BEYOND
-    ] * 3
+    return [(1.0 - (a * a) / float(h) ** 2, BEYOND) for a, h in zip(away, half, strict=True)]
 
 
 def _excess(body: Solid, position: Vector) -> hy.expression:
@@ -130,13 +129,3 @@ def plate_legs(plate: Plate | None, duration: float) -> list[tuple[float, float,
         (duration, lowering.distance, 0.0),
     ]
     return [(min(end, duration), depth, speed) for end, depth, speed in legs]
-
-
-def plate_places(scene: Scene, values: Array, times: Array) -> Array:
-    """Runtime parameters (n, p) at scaled times (n,): where the plate is, as if it stood there."""
-    places = np.repeat(values[:, None], len(times), axis=1).T  # so in memory as compiled functions want it
-    places[:, Parameter.PLATE_SPEED] = 0.0
-    if scene.plate is not None:
-        places[:, Parameter.PLATE_DEPTH] = plate_depth(scene.plate, times * values[Parameter.TIME])
-        places[:, Parameter.PLATE_DEPTH] /= values[Parameter.LENGTH]
-    return places

@@ -20,113 +20,17 @@ from outside, and ½ Σ y_f², y_f = y - y_r, as what the floater has stored; to
 Whatever depends on the rotor's rate is a runtime parameter.
 """
 
-from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Protocol
 
 import heyoka as hy
 import numpy as np
+from numpy.typing import NDArray
 
-from ...fem.closed_forms.eddy_sphere import ComplexArray
+from ...fem.harmonics.expansion import UPPER
 from ...fem.plate.table import PlateTable, RotorShare
 from ...geometry.common import Array
 from ...geometry.scene.contents import Plate
 from .state import Parameter, Vector, cross, dot, dotted, turned, turned_about_z
-
-
-@dataclass(frozen=True, eq=False)
-class RotorCurrents:
-    """The rotor's share of a plate's signals, and what it leaves.
-
-    Parameters
-    ----------
-    share : r
-    rates : (states,) λ, 1/s
-    angular_velocity : ω of the rotor, rad/s
-    """
-
-    share: RotorShare
-    rates: Array
-    angular_velocity: float
-
-    @property
-    def left(self) -> RotorShare:
-        """The states q."""
-        return self.share.filtered(self.rates / self._impedance)
-
-    @property
-    def currents(self) -> RotorShare:
-        """The currents q - r."""
-        return self.share.filtered(self.rates / self._impedance - 1.0)
-
-    @property
-    def _impedance(self) -> ComplexArray:
-        """λ + ihω, (H+1, states)."""
-        turns = np.arange(len(self.share.series) // 2 + 1)
-        return np.asarray(self.rates + 1j * self.angular_velocity * turns[:, None])
-
-    def numbers(self, weights: Array, reach: Sequence[int], unit: float, lowered: bool) -> Array:
-        """Runtime parameters for `rotor_terms`, from the weights W (states, k) and the scaled unit of √energy."""
-        strengths = np.einsum("nim,ik->nmk", self.currents.series[1:], weights).reshape(len(reach), -1)
-        left = self.left.series.swapaxes(1, 2).ravel() if lowered else np.zeros(0)
-        return unit * np.concatenate([*(row[:count] for row, count in zip(strengths, reach, strict=True)), left])
-
-
-@dataclass(frozen=True, eq=False)
-class RotorTerms:
-    """What the rotor's currents add to the equations of motion, in scaled units.
-
-    Parameters
-    ----------
-    strengths : Σ W_ik (q_i - r_i) of every function
-    lowering : -u ∂q/∂d of each state; none of a plate that stays
-    stored : the floater's energy in their field
-    spent : its change by the field's own, and Σ u y_f ∂q/∂d
-    """
-
-    strengths: Vector
-    lowering: Vector
-    stored: hy.expression
-    spent: hy.expression
-
-
-def rotor_terms(
-    share: RotorShare, reach: Sequence[int], first: int, lowered: bool, heard: Vector, own: Vector
-) -> RotorTerms:
-    """The rotor's part, by time.
-
-    Parameters
-    ----------
-    share : of the rotor; only its shape counts, the numbers are runtime parameters from number `first` on
-    reach : how many of the functions k have the terms of the share, those without h = 0 in their order
-    lowered : whether the plate may go down
-    heard : of each function k of the plate's fields what the floater's moment gives it
-    own : y_f of each state, scaled
-    """
-    angle, depth = names = hy.make_vars("rotor_angle", "plate_depth")
-    speed = hy.par[Parameter.LENGTH] * hy.par[Parameter.PLATE_SPEED]
-    below = hy.par[Parameter.LENGTH] * hy.par[Parameter.PLATE_DEPTH] + speed * hy.time
-    now = {"rotor_angle": hy.par[Parameter.RATE] * hy.time, "plate_depth": below}
-    constant, *turning = share.basis(*names)
-    functions = [f for row in turning for f in row]
-    here = hy.subs(functions, now) if functions else []
-    sinking = [speed * hy.subs(hy.diff(f, depth), now) for f in [*constant, *functions]] if lowered else []
-    changing = [hy.par[Parameter.RATE] * hy.subs(hy.diff(f, angle), now) for f in functions]
-    if lowered:
-        changing = [a + b for a, b in zip(changing, sinking[len(constant) :], strict=True)]
-    starts = [first + sum(reach[:n]) for n in range(len(reach) + 1)]
-    rows = [[hy.par[start + k] for k in range(count)] for start, count in zip(starts[:-1], reach, strict=True)]
-    sums = [dotted(row, heard[: len(row)]) for row in rows]
-    lowering, start = list[hy.expression](), starts[-1]
-    spent = dotted(changing, sums)
-    if lowered:
-        numbers = [[hy.par[start + n * len(own) + i] for n in range(len(sinking))] for i in range(len(own))]
-        lowering = [-dotted(row, sinking) for row in numbers]
-        spent = spent - dotted(own, lowering)
-    strengths = [
-        hy.sum([row[k] * f for row, f in zip(rows, here, strict=True) if k < len(row)]) for k in range(len(heard))
-    ]
-    return RotorTerms(strengths, lowering, -dotted(here, sums), spent)
 
 
 @dataclass(frozen=True, eq=False)
@@ -153,9 +57,15 @@ class PlateMemory:
         """Estimated relative error of what the plate does."""
         return max(self.table.errors.total, self.share.error) + self.neglected
 
-    def driven(self, angular_velocity: float) -> RotorCurrents:
-        """What a rotor turning so fast (rad/s) leaves in the plate."""
-        return RotorCurrents(self.share, self.table.rates, angular_velocity)
+    def driven(self, angular_velocity: float) -> tuple[RotorShare, RotorShare]:
+        """States q and currents q - r that a rotor turning so fast (rad/s) alone leaves in the plate."""
+        turns = np.arange(len(self.share.series) // 2 + 1)[:, None]
+        followed = np.asarray(1 / (1 + 1j * angular_velocity * turns / self.table.rates), complex)
+        return self.share.filtered(followed), self.share.filtered(np.asarray(followed - 1.0))
+
+    def in_range(self, lab: Array, depth: Array) -> NDArray[np.bool_]:
+        """Which places (n, 3) m along the laboratory's axes the table knows, the plate at depths (n,) m."""
+        return self.table.in_range(self.plate.box.to_body(lab + depth[:, None] * [0.0, 0.0, 1.0]))
 
     def __repr__(self) -> str:
         harmonics = len(self.share.series) // 2
@@ -182,82 +92,50 @@ class MemoryTerms:
     spent: hy.expression
 
 
-Felt = Callable[[Vector], tuple[Vector, Vector]]
-"""Field (T/√E) and ∇(source·field) along the plate's axes, of the functions with given strengths."""
+def plate_numbers(memory: PlateMemory, values: Array) -> Array:
+    """Runtime parameters of a plate, from those of `parameters`.
+
+    They are -λT of each state, then for each harmonic of the rotor's share what its currents q - r are in each
+    multipole, and, of a plate that goes down, the harmonics of q of each state.
+    """
+    table, velocity = memory.table, float(values[Parameter.RATE]) / float(values[Parameter.TIME])
+    left, currents = memory.driven(velocity)
+    strengths = np.einsum("nim,ik->nmk", currents.series[1:], table.weights).ravel()
+    sinking = left.series.swapaxes(1, 2).ravel() if memory.plate.lowering else np.zeros(0)
+    unit = float(values[Parameter.PLATE_SHARE])
+    return np.concatenate([-table.rates * float(values[Parameter.TIME]), unit * np.concatenate([strengths, sinking])])
 
 
-class PlateFormula(Protocol):
-    """How the fields of a plate's states are written."""
+def memory_terms(memory: PlateMemory, first: int, position: Vector, moment: Vector, states: Vector) -> MemoryTerms:
+    """The plate's part of the equations of motion.
 
-    @property
-    def memory(self) -> PlateMemory:
-        """The plate."""
-
-    @property
-    def share(self) -> RotorShare:
-        """Of the rotor: with as many terms as count."""
-
-    @property
-    def reach(self) -> list[int]:
-        """How many of the functions have each term of the share, see `rotor_terms`."""
-
-    @property
-    def first(self) -> int:
-        """Number of the first of the runtime parameters, which `numbers` are for."""
-
-    @property
-    def lowered(self) -> bool:
-        """Whether the plate may be on its way."""
-
-    @property
-    def weights(self) -> list[list[hy.expression | None]]:
-        """W of each state (rows) and function; None for zero."""
-
-    @property
-    def further(self) -> int:
-        """Number of the runtime parameters that it has itself, before those of `rotor_numbers`."""
-
-    def seen(self, place: Vector, source: Vector) -> tuple[Vector, Felt]:
-        """What each function hears of a moment at a place (m), both along the plate's axes, and what it does there."""
-
-
-def pushed(slope: dict[tuple[int, int], hy.expression], source: Vector) -> Vector:
-    """∇(source·B) from the upper entries of the gradient of B, which is symmetric and without trace."""
-    slope[2, 2] = -slope[0, 0] - slope[1, 1]
-    return [hy.sum([source[i] * slope[min(i, j), max(i, j)] for i in range(3)]) for j in range(3)]
-
-
-def decay_numbers(rates: Array, values: Array) -> Array:
-    """Runtime parameters of the decay of states with rates (n,) 1/s, from those of `parameters`: -λT."""
-    return -rates * float(values[Parameter.TIME])
-
-
-def rotor_numbers(formula: PlateFormula, weights: Array, values: Array) -> Array:
-    """Runtime parameters of the rotor's currents for weights W (states, k), from those of `parameters`."""
-    velocity = float(values[Parameter.RATE]) / float(values[Parameter.TIME])
-    rotor = RotorCurrents(formula.share, formula.memory.table.rates, velocity)
-    return rotor.numbers(weights, formula.reach, float(values[Parameter.PLATE_SHARE]), formula.lowered)
-
-
-def memory_terms(formula: PlateFormula, position: Vector, moment: Vector, states: Vector) -> MemoryTerms:
-    """The plate's part of the equations, from the floater's scaled position and moment and the plate's states p - q."""
-    plate, start = formula.memory.plate, formula.first + formula.further
+    Parameters
+    ----------
+    memory, first : the plate, whose numbers are the runtime parameters from number `first` on
+    position, moment : of the floater, scaled
+    states : p - q of the plate
+    """
+    plate, table, lowered = memory.plate, memory.table, memory.plate.lowering is not None
     strength, length = hy.par[Parameter.PLATE_MOMENT], hy.par[Parameter.LENGTH]
-    place, pointing = seen_by_plate(formula, position), _product(plate.box.rotation.T, _turn(moment, 1.0))
+    place, pointing = seen_by_plate(memory, position), _product(plate.box.rotation.T, _turn(moment, 1.0))
     source = [strength * m for m in pointing]
-    heard, felt = formula.seen(place, source)
-    weights = formula.weights
-    own = [p - _picked(row, heard) for p, row in zip(states, weights, strict=True)]
-    rotor = rotor_terms(formula.share, formula.reach, start + len(own), formula.lowered, heard, own)
-    strengths = [_picked(column, own) for column in zip(*weights, strict=True)]
-    field, push = felt([a + b for a, b in zip(strengths, rotor.strengths, strict=True)])
+    multipoles = table.multipoles.expressions(place)
+    signals = [dot(source, field) for field, _ in multipoles]  # of the floater in each multipole
+    own = [p - _weighted(row, signals) for p, row in zip(states, table.weights, strict=True)]
+    rotor = _rotor_terms(memory, first + len(own), signals, own)
+    strengths = [_weighted(column, own) + r for column, r in zip(table.weights.T, rotor.strengths, strict=True)]
+    pairs = list(zip(strengths, multipoles, strict=True))
+    field = [hy.sum([w * b[i] for w, (b, _) in pairs]) for i in range(3)]
+    slope = {(i, j): hy.sum([w * g[i][j] for w, (_, g) in pairs]) for i, j in UPPER}
+    slope[2, 2] = -slope[0, 0] - slope[1, 1]
+    push = [hy.sum([source[i] * slope[min(i, j), max(i, j)] for i in range(3)]) for j in range(3)]
     force = [length * f for f in _seen_by_rotor(plate, push)]
     turn = [strength * t for t in cross(moment, _seen_by_rotor(plate, field))]
-    decay = [hy.par[start + i] * y for i, y in enumerate(own)]
-    speed = hy.par[Parameter.PLATE_SPEED] if formula.lowered else hy.expression(0.0)
+    decay = [hy.par[first + i] * y for i, y in enumerate(own)]
+    speed = hy.par[Parameter.PLATE_SPEED] if lowered else hy.expression(0.0)
     drive = dot(force, [*turned(position)[:2], speed]) + hy.par[Parameter.RATE] * turn[2]
     return MemoryTerms(
-        rates=[a + b for a, b in zip(decay, rotor.lowering, strict=True)] if rotor.lowering else decay,
+        rates=[a + b for a, b in zip(decay, rotor.lowering, strict=True)] if lowered else decay,
         force=force,
         torque=[t / hy.par[Parameter.INERTIA] for t in turn],
         stored=0.5 * hy.sum([y * y for y in own]) + rotor.stored,
@@ -265,21 +143,62 @@ def memory_terms(formula: PlateFormula, position: Vector, moment: Vector, states
     )
 
 
-def _picked(weights: Sequence[hy.expression | None], terms: Vector) -> hy.expression:
-    """Σ weight · term."""
-    return hy.sum([w * t for w, t in zip(weights, terms, strict=True) if w is not None])
+@dataclass(frozen=True, eq=False)
+class _RotorTerms:
+    """The part of the rotor's currents, scaled.
+
+    Parameters
+    ----------
+    strengths : Σ W_ik (q_i - r_i) of every multipole
+    lowering : -u ∂q/∂d of each state; none of a plate that stays
+    stored : the floater's energy in their field
+    spent : its change by the field's own, and Σ u y_f ∂q/∂d
+    """
+
+    strengths: Vector
+    lowering: Vector
+    stored: hy.expression
+    spent: hy.expression
 
 
-def seen_by_plate(formula: PlateFormula, position: Vector) -> Vector:
+def _rotor_terms(memory: PlateMemory, first: int, signals: Vector, own: Vector) -> _RotorTerms:
+    """As `memory_terms`, from the floater's signals in each multipole and y_f of each state."""
+    angle, depth = names = hy.make_vars("rotor_angle", "plate_depth")
+    speed = hy.par[Parameter.LENGTH] * hy.par[Parameter.PLATE_SPEED]
+    below = hy.par[Parameter.LENGTH] * hy.par[Parameter.PLATE_DEPTH] + speed * hy.time
+    now = {"rotor_angle": hy.par[Parameter.RATE] * hy.time, "plate_depth": below}
+    constant, *turning = memory.share.basis(*names)
+    functions = [f for row in turning for f in row]
+    here = hy.subs(functions, now) if functions else []
+    lowered = memory.plate.lowering is not None
+    sinking = [speed * hy.subs(hy.diff(f, depth), now) for f in [*constant, *functions]] if lowered else []
+    changing = [hy.par[Parameter.RATE] * hy.subs(hy.diff(f, angle), now) for f in functions]
+    if lowered:
+        changing = [a + b for a, b in zip(changing, sinking[len(constant) :], strict=True)]
+    count = len(signals)
+    rows = [[hy.par[first + n * count + k] for k in range(count)] for n in range(len(functions))]
+    sums = [dotted(row, signals) for row in rows]
+    lowering, start = list[hy.expression](), first + len(functions) * count
+    spent = dotted(changing, sums)
+    if lowered:
+        numbers = [[hy.par[start + n * len(own) + i] for n in range(len(sinking))] for i in range(len(own))]
+        lowering = [-dotted(row, sinking) for row in numbers]
+        spent = spent - dotted(own, lowering)
+    strengths = [hy.sum([row[k] * f for row, f in zip(rows, here, strict=True)]) for k in range(count)]
+    return _RotorTerms(strengths, lowering, -dotted(here, sums), spent)
+
+
+def _weighted(weights: Array, terms: Vector) -> hy.expression:
+    return hy.sum([float(w) * t for w, t in zip(weights, terms, strict=True) if w])
+
+
+def seen_by_plate(memory: PlateMemory, position: Vector) -> Vector:
     """A scaled position in the rotor's frame along the plate's axes, m, from its centre."""
-    plate, depth = formula.memory.plate, hy.par[Parameter.PLATE_DEPTH]
-    if formula.lowered:
-        depth = depth + hy.par[Parameter.PLATE_SPEED] * hy.time
+    plate, depth = memory.plate, hy.par[Parameter.PLATE_DEPTH] + hy.par[Parameter.PLATE_SPEED] * hy.time
     lab = [hy.par[Parameter.LENGTH] * x for x in _turn(position, 1.0)]
     if plate.lowering:
         lab[2] = lab[2] + hy.par[Parameter.LENGTH] * depth
-    shifted = [lab[i] - float(plate.box.center[i]) for i in range(3)]
-    return _product(plate.box.rotation.T, shifted)
+    return _product(plate.box.rotation.T, [lab[i] - float(plate.box.center[i]) for i in range(3)])
 
 
 def _seen_by_rotor(plate: Plate, vector: Vector) -> Vector:
@@ -299,7 +218,7 @@ def _product(matrix: np.ndarray, vector: Vector) -> list[hy.expression]:
 
 
 @dataclass(frozen=True, eq=False)
-class Heard:
+class PlateCoupling:
     """Plate and floater at n instants, scaled, along the rotor's axes.
 
     Parameters
@@ -334,8 +253,8 @@ class PlateForce:
         """(states,) decay of the currents, scaled."""
         return np.asarray(self.memory.table.rates * self.values[Parameter.TIME])
 
-    def __call__(self, times: Array, states: Array) -> Heard:
-        """What plate and floater hear of each other at scaled times (n,) in scaled states (n, 12)."""
+    def __call__(self, times: Array, states: Array) -> PlateCoupling:
+        """How plate and floater act on each other at scaled times (n,) in scaled states (n, 12)."""
         strength, inertia, length = (
             self.values[p] for p in (Parameter.PLATE_MOMENT, Parameter.INERTIA, Parameter.LENGTH)
         )
@@ -353,7 +272,7 @@ class PlateForce:
         pull[..., 6:9, 3:] = strength / inertia * np.cross(np.eye(3), b[:, :, None])
         weights = self.memory.table.weights
         own = strength * np.einsum("na,nka->nk", moment, b)
-        return Heard(
+        return PlateCoupling(
             own @ weights.T + self._shares(times),
             np.einsum("ik,nkx->nix", weights, by_state),
             np.einsum("ik,nkx->nix", weights, np.concatenate([by_state[..., :3], across], axis=2)),

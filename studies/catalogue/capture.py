@@ -16,8 +16,7 @@ from numpy.typing import NDArray
 
 from ...dynamics.continuation.frequencies import StableRange, at_frequency, reference_state, stable_range
 from ...dynamics.equilibria.equilibrium import EquilibriumError
-from ...dynamics.flights.batch import Endings
-from ...dynamics.flights.over_plate import launched
+from ...dynamics.flights.batch import Endings, launched
 from ...dynamics.flights.trajectory import DURATION
 from ...dynamics.motion.events import CONTACT
 from ...dynamics.motion.plate import PlateMemory

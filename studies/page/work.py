@@ -386,7 +386,7 @@ def wish(what: str, vector: list[float]) -> Frame:
 def _still() -> Piece:
     flight = _flights[0]
     lab = type(flight.now)(*(vector[None] for vector in flight.now.vectors))
-    return Piece(np.array([flight.time]), lab, flight.scene.angular_velocity * flight.time, flight.log.ended_by)
+    return Piece(np.array([flight.time]), lab, flight.scene.angular_velocity * flight.time, flight.ended_by)
 
 
 def _frame(piece: Piece) -> Frame:

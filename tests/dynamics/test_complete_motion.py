@@ -10,8 +10,7 @@ from ngsolve import SetNumThreads
 from spinlev.dynamics.equilibria.equilibrium import Survey
 from spinlev.dynamics.equilibria.orbits import floquet_modes, periodic_orbit
 from spinlev.dynamics.equilibria.search import survey, with_plate
-from spinlev.dynamics.flights.compiled import compile_flight
-from spinlev.dynamics.flights.flight import simulate
+from spinlev.dynamics.flights.flight import Flight, simulate
 from spinlev.dynamics.motion.air_and_shape import REAL_AIR
 from spinlev.dynamics.motion.effect import Interaction
 from spinlev.dynamics.motion.effects import with_effects
@@ -73,7 +72,7 @@ def test_multipliers_with_currents_in_the_rotor_are_the_growth_of_a_kicked_fligh
     force = PlateForce(memory, values)
     orbit = periodic_orbit(rates, values, 0.0, force, SCALES.pack(shaken.state))
     modes = floquet_modes(orbit)
-    flight = compile_flight(SCENE, braked, 0.2, compact=True, memory=memory)
+    flight = Flight(SCENE, braked, 0.2, compact=True, memory=memory)
     integrator = flight.integrator
     middle = flight.state(SCALES.unpack(orbit.states[0]), orbit.plate[0] / values[Parameter.PLATE_SHARE])
 

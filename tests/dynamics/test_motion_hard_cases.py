@@ -12,8 +12,7 @@ from article import FLOATER, NO_DRAG, RADIUS
 from spinlev.dynamics.continuation.branch import Family, follow_branch, frequencies
 from spinlev.dynamics.equilibria.equilibrium import FOLD, EquilibriumError, Survey
 from spinlev.dynamics.equilibria.search import find_equilibria, with_plate
-from spinlev.dynamics.flights.compiled import compile_flight
-from spinlev.dynamics.flights.flight import integrate, simulate
+from spinlev.dynamics.flights.flight import Flight, integrate, simulate
 from spinlev.dynamics.motion.plate import PlateMemory
 from spinlev.dynamics.motion.rates import Rates
 from spinlev.dynamics.motion.state import Scales
@@ -36,7 +35,7 @@ def rates():
 
 
 def flown(scene, start, duration, table=TABLE, **options):
-    return integrate(scene, compile_flight(scene, table, duration, compact=True, **options), start, duration)
+    return integrate(Flight(scene, table, duration, compact=True, **options), start, duration)
 
 
 def thrown(position, moment=(0.0, 0.0, 1.0), spin=(0.0, 0.0, 0.0), **changes):
@@ -201,8 +200,8 @@ def test_plate_one_millimetre_below(rates):
     assert found.stable
     assert found.growth_per_s < -10
     assert 5e-4 < found.position[2] - face - RADIUS < 1e-3
-    flight = compile_flight(scene, TABLE, 0.1, compact=True, memory=memory)
-    motion = integrate(scene, flight, found.start, 0.1, currents=found.currents[0])
+    flight = Flight(scene, TABLE, 0.1, compact=True, memory=memory)
+    motion = integrate(flight, found.start, 0.1, currents=found.currents[0])
     assert motion.ended_by == "duration"
     assert np.abs(motion.rotor.position - found.start.position).max() < 1e-10  # an infinite plate shakes nothing
     hangs = 1e3 * (fixed.position[2] - found.position[2])

@@ -13,8 +13,7 @@ from spinlev.dynamics.equilibria.equilibrium import Survey
 from spinlev.dynamics.equilibria.orbits import differentiation, floquet_modes, periodic_orbit, resampled
 from spinlev.dynamics.equilibria.perturbed import plate_action
 from spinlev.dynamics.equilibria.search import find_equilibria, survey, with_plate
-from spinlev.dynamics.flights.compiled import compile_flight
-from spinlev.dynamics.flights.flight import integrate, simulate
+from spinlev.dynamics.flights.flight import Flight, integrate, simulate
 from spinlev.dynamics.motion.equations import parameters
 from spinlev.dynamics.motion.plate import PlateForce, PlateMemory
 from spinlev.dynamics.motion.rates import Rates
@@ -102,9 +101,9 @@ def test_equilibrium_with_a_plate_is_a_periodic_motion(shaken, memory):
     """Flown for twenty turns it comes back to itself after each, to round-off, and the ledger closes."""
     assert shaken.currents is not None
     scene = replace(SCENE, plate=replace(PLATE, lowering=None))
-    flight = compile_flight(scene, CUBOID, 0.2, compact=True, memory=memory)
+    flight = Flight(scene, CUBOID, 0.2, compact=True, memory=memory)
     flight.values[:] = VALUES
-    flown = integrate(scene, flight, shaken.start, 20 / scene.frequency, currents=shaken.currents[0])
+    flown = integrate(flight, shaken.start, 20 / scene.frequency, currents=shaken.currents[0])
     turns = np.isclose(flown.time * scene.frequency, np.round(flown.time * scene.frequency), atol=1e-7)
     assert turns.sum() == 21
     assert np.abs(flown.rotor.position[turns] - shaken.start.position).max() < 1e-11
@@ -115,8 +114,8 @@ def test_equilibrium_with_a_plate_is_a_periodic_motion(shaken, memory):
 def test_ledger_closes_while_the_plate_goes_down(shaken, memory):
     """Work = change of energy + loss in the plate, in free motion after a kick, with the plate lowered meanwhile."""
     start = replace(shaken.start, velocity=shaken.start.velocity + np.array([0.01, 0.02, 0.0]))
-    flight = compile_flight(SCENE, CUBOID, 0.3, compact=True, memory=memory)
-    flown = integrate(SCENE, flight, start, 0.3, currents=shaken.currents[0])
+    flight = Flight(SCENE, CUBOID, 0.3, compact=True, memory=memory)
+    flown = integrate(flight, start, 0.3, currents=shaken.currents[0])
     assert flown.ended_by == "duration"
     assert flown.energy_error < 1e-10
 
@@ -145,8 +144,8 @@ def test_flight_over_a_sinking_plate_equals_another_integrator(shaken, memory, r
     currents, duration = shaken.currents[0], 2 / scene.frequency
     first = np.concatenate([scales.pack(start), currents * values[Parameter.PLATE_SHARE]])
     end = solve_ivp(slope, (0, duration / scales.time), first, "DOP853", rtol=1e-11, atol=1e-12).y[:, -1]
-    flight = compile_flight(scene, CUBOID, duration, compact=True, memory=replace(memory, plate=plate))
-    flown = integrate(scene, flight, start, duration, currents=currents)
+    flight = Flight(scene, CUBOID, duration, compact=True, memory=replace(memory, plate=plate))
+    flown = integrate(flight, start, duration, currents=currents)
     assert n > 5
     assert np.abs(flown.rotor.position[-1] - scales.unpack(end[:12]).position).max() < 1e-11
 
@@ -156,7 +155,7 @@ def test_multipliers_are_the_growth_of_a_kicked_flight(shaken, memory, rates):
     scene, scales = replace(SCENE, plate=replace(PLATE, lowering=None)), Scales.of(SCENE)
     orbit = periodic_orbit(rates, VALUES, 0.0, PlateForce(memory, VALUES), scales.pack(shaken.state))
     modes = floquet_modes(orbit)
-    flight = compile_flight(scene, CUBOID, 0.2, compact=True, memory=memory)
+    flight = Flight(scene, CUBOID, 0.2, compact=True, memory=memory)
     integrator, currents = flight.integrator, orbit.plate[0] / VALUES[Parameter.PLATE_SHARE]
     middle = flight.state(scales.unpack(orbit.states[0]), currents)
 
@@ -250,8 +249,8 @@ def test_gravity_across_the_axis_makes_the_motion_periodic(rates):
     found = find_equilibria(scene, CUBOID, rates=rates)[0]
     assert found.stable
     assert found.turn is not None
-    flight = compile_flight(scene, CUBOID, 0.2, compact=True)
-    flown = integrate(scene, flight, found.start, 10 / scene.frequency)
+    flight = Flight(scene, CUBOID, 0.2, compact=True)
+    flown = integrate(flight, found.start, 10 / scene.frequency)
     turns = np.isclose(flown.time * scene.frequency, np.round(flown.time * scene.frequency), atol=1e-7)
     assert np.abs(flown.rotor.position[turns] - found.start.position).max() < 1e-10
     lab = flown.lab.position.mean(axis=0)

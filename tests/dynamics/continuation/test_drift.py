@@ -8,8 +8,7 @@ from scipy.special import spherical_kn
 
 from spinlev.dynamics.continuation.slow_drift import SlowTorque, drift
 from spinlev.dynamics.equilibria.search import find_equilibria
-from spinlev.dynamics.flights.compiled import compile_flight
-from spinlev.dynamics.flights.flight import integrate
+from spinlev.dynamics.flights.flight import Flight, integrate
 from spinlev.dynamics.motion.air_and_shape import reynolds, spinning, swinging
 from spinlev.dynamics.motion.effects import with_effects
 from spinlev.dynamics.motion.rates import Rates
@@ -41,7 +40,7 @@ def faster(scene, times):
 
 
 def flown(scene, table, start, duration):
-    flight = integrate(scene, compile_flight(scene, table, duration), start.state, duration)
+    flight = integrate(Flight(scene, table, duration), start.state, duration)
     distance = np.linalg.norm(flight.lab.position, axis=1)
     spin = np.einsum("na,na->n", flight.lab.spin, flight.lab.moment) / scene.angular_velocity
     return flight, distance, spin
@@ -121,7 +120,7 @@ def test_whatever_happens_at_the_release_leaves_the_spin():
     spin, moment = np.zeros(3), np.array([0.3, 0.1, 1.0])
     scene = replace(VERTICAL, drag=Drag(0.0, 0.0), floater=replace(FLOATER, conductivity=None))
     start = State(np.array([1e-3, 0.0, -25e-3]), np.zeros(3), moment / np.linalg.norm(moment), spin)
-    flight = integrate(scene, compile_flight(scene, VERTICAL_TABLE, 1.0, compact=True), start, 1.0)
+    flight = integrate(Flight(scene, VERTICAL_TABLE, 1.0, compact=True), start, 1.0)
     found = np.einsum("na,na->n", flight.lab.spin, flight.lab.moment)
     across = np.linalg.norm(flight.lab.spin, axis=1)
     assert across.max() > 0.1 * scene.angular_velocity

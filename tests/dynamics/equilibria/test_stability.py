@@ -8,8 +8,7 @@ from article import MAGNETS, SCENE
 
 from spinlev.dynamics.equilibria.modes import left_eigenvectors, modes
 from spinlev.dynamics.equilibria.search import find_equilibria
-from spinlev.dynamics.flights.compiled import compile_flight
-from spinlev.dynamics.flights.flight import integrate
+from spinlev.dynamics.flights.flight import Flight, integrate
 from spinlev.dynamics.motion.equations import parameters
 from spinlev.dynamics.motion.rates import Rates
 from spinlev.dynamics.motion.state import Scales
@@ -38,7 +37,7 @@ def kicked(scene, equilibrium, kick, duration):
     scales = Scales.of(scene)
     start = scales.unpack(scales.pack(equilibrium.state) + kick)
     start = replace(start, moment=start.moment / np.linalg.norm(start.moment))
-    flight = integrate(scene, compile_flight(scene, CUBOID, duration, compact=True), start, duration)
+    flight = integrate(Flight(scene, CUBOID, duration, compact=True), start, duration)
     assert flight.ended_by == "duration"
     return flight.time, flight.rotor.position - equilibrium.position
 

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 from article import FLOATER, MAGNETS
 
-from spinlev.dynamics.flights.flight import simulate
-from spinlev.dynamics.flights.pieces import Checkpoint
+from spinlev.dynamics.flights.flight import Checkpoint, simulate
 from spinlev.dynamics.flights.trajectory import FlightStopped
 from spinlev.fem.harmonics.expansion import uniform_moments
 from spinlev.fem.rotor.table import RotorTable
@@ -46,7 +45,7 @@ def test_a_stopped_flight_goes_on_to_the_last_bit(checkpoint, seconds):
     first = begun(0.3, checkpoint)
     assert first.ended_by == "stopped"
     assert 0 < first.levitated_s < 2
-    assert len(checkpoint.read().times) == len(first.time)
+    assert len(checkpoint.read()["times"]) == len(first.time)
     second = simulate(SCENE, DIPOLE, 4.0, compact=True, checkpoint=checkpoint)
     checkpoint.remove()
     assert not checkpoint.path.exists()
@@ -74,7 +73,7 @@ def test_a_damaged_checkpoint_is_reported(checkpoint, damage):
 def test_a_flipped_bit_is_reported_or_harmless(checkpoint):
     """Also where it makes an archive look encrypted or packed in another way."""
     begun(0.1, checkpoint)
-    whole, kept = checkpoint.path.read_bytes(), vars(checkpoint.read())
+    whole, kept = checkpoint.path.read_bytes(), checkpoint.read()
     chance, refused = np.random.default_rng(0), 0
     directory = whole.rindex(b"steps.npy") - 400  # most of the file is samples: half of the bits near its end
     for k in range(400):
@@ -82,7 +81,7 @@ def test_a_flipped_bit_is_reported_or_harmless(checkpoint):
         bit = 1 << chance.integers(8)
         checkpoint.path.write_bytes(whole[:place] + bytes([whole[place] ^ bit]) + whole[place + 1 :])
         try:
-            found = vars(checkpoint.read())
+            found = checkpoint.read()
         except InputError:
             refused += 1
         else:

@@ -7,8 +7,7 @@ import pytest
 from article import FLOATER, RADIUS
 
 from spinlev.dynamics.equilibria.search import find_equilibria
-from spinlev.dynamics.flights.compiled import compile_flight
-from spinlev.dynamics.flights.flight import integrate
+from spinlev.dynamics.flights.flight import Flight, integrate
 from spinlev.dynamics.flights.trajectory import (
     DRIFTING,
     GROWING,
@@ -82,5 +81,5 @@ def test_one_real_flight_of_each_kind(frequency, conductivity, duration, kind):
     table = rotor_table(scene.rotor, "dipole")
     start = min(find_equilibria(scene, table), key=lambda e: e.growth_per_s).state
     start = replace(start, position=start.position + np.array([0.0, 0.0, 1e-6]))
-    flight = integrate(scene, compile_flight(scene, table, duration, compact=True), start, duration)
+    flight = integrate(Flight(scene, table, duration, compact=True), start, duration)
     assert flight_kind(flight) == kind

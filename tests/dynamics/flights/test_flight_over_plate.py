@@ -1,4 +1,4 @@
-"""Flights over a plate in local harmonics: as in the whole tables, before, while and after the plate goes down."""
+"""A flight over a plate that goes down, stopped and taken up again."""
 
 from dataclasses import replace
 
@@ -6,11 +6,7 @@ import numpy as np
 import pytest
 from article import FLOATER, MAGNETS
 
-from spinlev.dynamics.flights.balls import compile_local_flight
-from spinlev.dynamics.flights.compiled import compile_flight
-from spinlev.dynamics.flights.flight import PLATE_TOLERANCE, initial_state, integrate
-from spinlev.dynamics.flights.pieces import Checkpoint
-from spinlev.dynamics.flights.plate_balls import SHARE
+from spinlev.dynamics.flights.flight import PLATE_TOLERANCE, Checkpoint, Flight, initial_state, integrate
 from spinlev.dynamics.flights.trajectory import FlightStopped
 from spinlev.dynamics.motion.plate import PlateMemory
 from spinlev.fem.plate.region import Region
@@ -33,7 +29,7 @@ def memory():
 
 @pytest.fixture(scope="module")
 def local(memory):
-    return compile_local_flight(SCENE, TABLE, DURATION, PLATE_TOLERANCE, True, memory)
+    return Flight(SCENE, TABLE, DURATION, PLATE_TOLERANCE, True, memory)
 
 
 @pytest.fixture(scope="module")
@@ -45,25 +41,9 @@ def still(memory):
     return np.zeros(len(memory.table.rates))
 
 
-def test_it_flies_as_in_the_whole_tables(local, memory, start):
-    """To a tenth of the table's error in what the plate does; the ledger tells of each change and closes as there."""
-    near = integrate(SCENE, local, start, DURATION, currents=still(memory))
-    flight = compile_flight(SCENE, TABLE, DURATION, PLATE_TOLERANCE, True, memory)
-    whole = integrate(SCENE, flight, start, DURATION, currents=still(memory))
-    alone = integrate(SCENE, compile_flight(SCENE, TABLE, DURATION, PLATE_TOLERANCE, True), start, DURATION)
-    kinds = [kind for _, kind in local.parts._known]
-    assert None in kinds  # while the plate moves
-    assert len([kind for kind in kinds if kind]) >= 1
-    assert near.field_changes.count >= 2
-    plate = np.abs(alone.lab.position - whole.lab.position).max()
-    assert plate > 1e-5
-    assert np.abs(near.lab.position - whole.lab.position).max() < SHARE * memory.table.errors.total * plate
-    assert near.energy_error < max(1e-9, 3 * whole.energy_error)
-
-
 def test_a_stopped_flight_goes_on_to_the_last_bit(local, memory, start, tmp_path):
     """Stopped after the plate has begun to move, and taken up by the same code."""
-    whole = integrate(SCENE, local, start, DURATION, currents=still(memory))
+    whole = integrate(local, start, DURATION, currents=still(memory))
     checkpoint = Checkpoint(tmp_path / "checkpoint.npz", "this flight", 0.0)
 
     def stop(done):
@@ -71,8 +51,8 @@ def test_a_stopped_flight_goes_on_to_the_last_bit(local, memory, start, tmp_path
             raise KeyboardInterrupt
 
     with pytest.raises(FlightStopped):
-        integrate(SCENE, local, start, DURATION, stop, still(memory), checkpoint)
-    second = integrate(SCENE, local, start, DURATION, None, still(memory), checkpoint)
+        integrate(local, start, DURATION, stop, still(memory), checkpoint)
+    second = integrate(local, start, DURATION, None, still(memory), checkpoint)
     for found, exact in zip(second.lab.vectors, whole.lab.vectors, strict=True):
         np.testing.assert_array_equal(found, exact)
     assert second.field_changes == whole.field_changes

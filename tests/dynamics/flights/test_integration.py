@@ -9,8 +9,15 @@ from article import MAGNETS, RADIUS, SCENE
 
 from spinlev.dynamics.equilibria.equilibrium import EquilibriumError
 from spinlev.dynamics.equilibria.search import find_equilibria
-from spinlev.dynamics.flights.compiled import SHORT_TURNS, STRAIGHT_TURNS, compile_flight
-from spinlev.dynamics.flights.flight import StartError, initial_state, integrate, simulate
+from spinlev.dynamics.flights.flight import (
+    SHORT_TURNS,
+    STRAIGHT_TURNS,
+    Flight,
+    StartError,
+    initial_state,
+    integrate,
+    simulate,
+)
 from spinlev.dynamics.flights.trajectory import FlightStopped
 from spinlev.dynamics.motion.events import clearance
 from spinlev.fem.harmonics.expansion import uniform_moments
@@ -151,9 +158,10 @@ def test_code_is_as_optimised_as_the_flight_is_long():
     start, _ = initial_state(SCENE, DIPOLE)
     flown, kinds = [], []
     for turns in (0.9 * SHORT_TURNS, 1.1 * SHORT_TURNS, 2 * STRAIGHT_TURNS):
-        flight = compile_flight(SCENE, DIPOLE, turns / SCENE.frequency)
-        kinds.append((flight.integrator.llvm_state.opt_level, flight.integrator.compact_mode))
-        flown.append(integrate(SCENE, flight, start, 0.2).lab.position)
+        flight = Flight(SCENE, DIPOLE, turns / SCENE.frequency)
+        integrator = flight.part(0).integrator
+        kinds.append((integrator.llvm_state.opt_level, integrator.compact_mode))
+        flown.append(integrate(flight, start, 0.2).lab.position)
     assert kinds == [(0, True), (1, True), (1, False)]
     for other in flown[1:]:
         np.testing.assert_allclose(other, flown[0], atol=1e-13)

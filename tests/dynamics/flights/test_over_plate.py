@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 from article import FLOATER
 
-from spinlev.dynamics.flights.compiled import compile_flight
-from spinlev.dynamics.flights.flight import PLATE_TOLERANCE, initial_state, integrate
-from spinlev.dynamics.flights.over_plate import launched
+from spinlev.dynamics.flights.batch import launched
+from spinlev.dynamics.flights.flight import PLATE_TOLERANCE, Flight, initial_state, integrate
 from spinlev.dynamics.motion.plate import PlateMemory
 from spinlev.dynamics.motion.state import State
 from spinlev.fem.plate.region import Region
@@ -84,8 +83,8 @@ def test_the_company_does_not_matter(memory, starts, flown):
 
 def alone_from(scene, memory, duration, currents):
     """The flight of one floater by the integrator for one, in the tables' own fields."""
-    flight = compile_flight(scene, TABLE, duration, PLATE_TOLERANCE, True, memory)
-    return integrate(scene, flight, initial_state(scene, TABLE, [], memory)[0], duration, currents=currents)
+    flight = Flight(scene, TABLE, duration, PLATE_TOLERANCE, True, memory)
+    return integrate(flight, initial_state(scene, TABLE, [], memory)[0], duration, currents=currents)
 
 
 def test_a_launch_is_what_one_flight_is(memory, starts):

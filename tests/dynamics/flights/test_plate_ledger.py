@@ -9,8 +9,7 @@ from second_opinions.phasor import mean_force, mean_loss, mean_torque
 
 from spinlev.dynamics.equilibria.equilibrium import Survey
 from spinlev.dynamics.equilibria.search import find_equilibria, with_plate
-from spinlev.dynamics.flights.compiled import compile_flight
-from spinlev.dynamics.flights.flight import initial_state, integrate, starting_point
+from spinlev.dynamics.flights.flight import Flight, initial_state, integrate, starting_point
 from spinlev.dynamics.motion.effects import with_effects
 from spinlev.dynamics.motion.plate import PlateMemory
 from spinlev.dynamics.motion.rates import Rates
@@ -42,8 +41,8 @@ def test_what_a_steady_turn_loses_is_that_of_the_frequency_domain():
     moment, turning = np.array([np.sin(tilt), 0.0, np.cos(tilt)]), np.array([0.0, 0.0, scene.angular_velocity])
     start = State(place, np.zeros(3), moment, turning)
     state, currents = initial_state(replace(scene, start=AbsoluteStart(*start.vectors)), table, memory=memory)
-    compiled = compile_flight(scene, table, 1.0, compact=True, memory=memory)
-    flight = integrate(scene, compiled, state, 1.0, currents=currents)
+    compiled = Flight(scene, table, 1.0, compact=True, memory=memory)
+    flight = integrate(compiled, state, 1.0, currents=currents)
     first, last = np.searchsorted(flight.time, [0.5 - 1e-9, 1.0 - 1e-9])
     seconds = flight.time[last] - flight.time[first]
     assert seconds == pytest.approx(0.5, rel=1e-9)
@@ -74,8 +73,8 @@ def test_ledger_of_ten_seconds():
     fixed = starting_point(find_equilibria(scene, table, rates=rates))
     found = with_plate(scene, table, Survey((fixed,), ()), memory, rates).equilibria[0]
     kicked = replace(found.start, velocity=found.start.velocity + np.array([0.03, 0.02, 0.05]))
-    flight = compile_flight(scene, table, 10.0, memory=memory)
-    motion = integrate(scene, flight, kicked, 10.0, currents=found.currents[0])
+    flight = Flight(scene, table, 10.0, memory=memory)
+    motion = integrate(flight, kicked, 10.0, currents=found.currents[0])
     print(f"\n10 s over a slab, {len(memory.table.rates)} states: ledger {motion.energy_error:.1e}")
     assert motion.ended_by == "duration"
     assert np.ptp(motion.lab.position[:, 2]) > 3e-4

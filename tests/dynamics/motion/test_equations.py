@@ -9,8 +9,7 @@ import pytest
 from article import FLOATER
 from scipy.integrate import solve_ivp
 
-from spinlev.dynamics.flights.compiled import compile_flight
-from spinlev.dynamics.flights.flight import integrate
+from spinlev.dynamics.flights.flight import Flight, integrate
 from spinlev.dynamics.motion.equations import equations_of_motion, parameters
 from spinlev.dynamics.motion.rates import Rates
 from spinlev.dynamics.motion.state import Scales, State, turned_about_z
@@ -88,7 +87,7 @@ def test_flight_equals_dop853_in_the_laboratory_frame(frequency):
     """Tilted gravity, drag and the turning of the frame included."""
     scene = Scene(frequency, MAGNETS, FLOATER, Drag(3e-3, 2e-7), gravity=np.array([1.5, -0.7, -9.81]))
     start = random_state(replace(scene, frequency=110.0), np.random.default_rng(2))
-    flight = integrate(scene, compile_flight(scene, TABLES["cuboid"], 0.02, compact=True), start, 0.02)
+    flight = integrate(Flight(scene, TABLES["cuboid"], 0.02, compact=True), start, 0.02)
     source, initial = magpylib_rotor("cuboid"), np.concatenate(start.vectors)
     scale = np.repeat([1e-2, 1.0, 1.0, 1e3], 3)
     solution = solve_ivp(

@@ -8,11 +8,11 @@ import pytest
 from article import PERMEABLE
 
 from spinlev.dynamics.equilibria.search import find_equilibria
-from spinlev.dynamics.flights.balls import LARGE, SMALL, Balls, ball_equations, compile_local_flight
+from spinlev.dynamics.flights.balls import LARGE, SMALL, Balls, in_ball
 from spinlev.dynamics.flights.batch import fly_together
-from spinlev.dynamics.flights.flight import integrate
+from spinlev.dynamics.flights.flight import Flight, integrate
 from spinlev.dynamics.motion.effect import Interaction
-from spinlev.dynamics.motion.equations import parameters
+from spinlev.dynamics.motion.equations import equations_of_motion, parameters
 from spinlev.dynamics.motion.mutual import Mutual
 from spinlev.dynamics.motion.rates import Rates
 from spinlev.dynamics.motion.state import Parameter, Scales
@@ -87,13 +87,11 @@ def test_rough_rates_leave_out_all_answers_but_the_uniform_one(mutual, start):
 @pytest.mark.parametrize("formula", [SMALL, LARGE])
 def test_in_a_ball_force_and_torque_come_from_one_energy(mutual, start, formula):
     """∇J · rates = 0 at any state in the ball, and the rates are those of the table."""
-    from spinlev.dynamics.flights.balls import fitted
-
-    equations, _ = ball_equations(SCENE, mutual, formula)
+    equations = equations_of_motion(in_ball(mutual, formula))
     slopes = [hy.diff(hy.sum(list(equations.jacobi)), v) for v in equations.variables]
     terms = [a * b for a, b in zip(slopes, equations.rates, strict=True)]
     function = hy.cfunc([*terms, *equations.rates], list(equations.variables), compact_mode=True, opt_level=0)
-    numbers, error = Balls(SCENE, mutual.evaluate, formula, 0.1, fitted(mutual, formula)).at(start.position)
+    numbers, error = Balls(SCENE, mutual).at(formula, 0.1, start.position)
     values = np.concatenate([parameters(SCENE, SCALES), [0.0], numbers])
     states = np.tile(SCALES.pack(start.state), (6, 1))
     generator = np.random.default_rng(2)
@@ -111,7 +109,7 @@ def test_in_a_ball_force_and_torque_come_from_one_energy(mutual, start, formula)
 
 def test_a_kicked_floater_keeps_the_jacobi_integral(mutual, start):
     kicked = replace(start.state, velocity=start.state.velocity + np.array([5e-3, 3e-3, 12e-3]))
-    flight = integrate(SCENE, compile_local_flight(SCENE, mutual, 1.0, compact=True), kicked, 1.0)
+    flight = integrate(Flight(SCENE, mutual, 1.0, compact=True), kicked, 1.0)
     assert flight.ended_by == "duration"
     assert flight.energy_error < 1e-12
     assert np.ptp(flight.lab.position[:, 2]) > 1e-4
@@ -119,7 +117,7 @@ def test_a_kicked_floater_keeps_the_jacobi_integral(mutual, start):
 
 def test_a_floater_at_its_equilibrium_stays_there(mutual, start):
     """The search and the flight have the energy in two forms; they part by the error of the ball."""
-    flight = integrate(SCENE, compile_local_flight(SCENE, mutual, 0.5, compact=True), start.state, 0.5)
+    flight = integrate(Flight(SCENE, mutual, 0.5, compact=True), start.state, 0.5)
     assert np.ptp(flight.lab.position[:, 2]) < 2e-7
 
 
@@ -129,7 +127,7 @@ def test_flights_in_lanes_of_which_some_stay_empty_are_those_alone(mutual, start
     begun = replace(start.state, position=start.state.position + np.array([0.0, 0.0, 1e-4]))
     flown = fly_together(scenes, mutual, [begun] * 3, 0.1)
     for scene, found in zip(scenes, flown, strict=True):
-        alone = integrate(scene, compile_local_flight(scene, mutual, 0.1, compact=True), begun, 0.1)
+        alone = integrate(Flight(scene, mutual, 0.1, compact=True), begun, 0.1)
         assert np.abs(found.lab.position - alone.lab.position).max() < 1e-10 * 0.02
         assert found.energy_error < 1e-12
 

@@ -9,11 +9,11 @@ from article import PERMEABLE
 
 from spinlev.dynamics.equilibria.modes import modes
 from spinlev.dynamics.equilibria.search import find_equilibria
-from spinlev.dynamics.flights.balls import LARGE, SMALL, Balls, ball_equations, fitted
+from spinlev.dynamics.flights.balls import LARGE, SMALL, Balls, in_ball
 from spinlev.dynamics.flights.flight import simulate
 from spinlev.dynamics.motion.effect import Interaction
 from spinlev.dynamics.motion.effects import with_effects
-from spinlev.dynamics.motion.equations import parameters
+from spinlev.dynamics.motion.equations import equations_of_motion, parameters
 from spinlev.dynamics.motion.rates import Rates
 from spinlev.dynamics.motion.rotor_losses import RotorCurrents
 from spinlev.dynamics.motion.state import Scales
@@ -41,13 +41,12 @@ def equilibrium():
 @pytest.mark.parametrize("formula", [SMALL, LARGE])
 def test_the_brake_is_that_of_the_table(equilibrium, formula):
     """At any place, moment and motion in the ball, to what is allowed; and its power is the work that it does."""
-    equations, _ = ball_equations(SCENE, TABLE, formula)
-    bare, _ = ball_equations(SCENE, FIELD, formula)
+    equations, bare = (equations_of_motion(in_ball(whole, formula)) for whole in (TABLE, Interaction(FIELD)))
     added = [a - b for a, b in zip(equations.rates, bare.rates, strict=True)]
     outputs = [*added, equations.power]
     function = hy.cfunc(outputs, list(equations.variables), compact_mode=True, opt_level=0)
     center = equilibrium.position
-    found = Balls(SCENE, FIELD.evaluate, formula, 0.1, fitted(TABLE, formula)).at(center)
+    found = Balls(SCENE, TABLE).at(formula, 0.1, center)
     numbers, error = found
     assert error <= 1e-6
     known = parameters(SCENE, SCALES)

@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 from scipy.stats import binomtest, norm
 
-from spinlev.dynamics.flights.batch import ensemble
-from spinlev.dynamics.flights.over_plate import launched
+from spinlev.dynamics.flights.batch import ensemble, launched
 from spinlev.dynamics.flights.trajectory import DURATION
 from spinlev.studies.catalogue.capture import (
     FARTHER,
