@@ -12,7 +12,7 @@ from .air_and_shape import FLOATER_SHAPE, FloaterShape, RealAir
 from .effect import Effect, Interaction, interaction_of
 from .equations import FORCE_ALONE
 from .floater_currents import FloaterCurrents, check_floater_metal
-from .mutual import rough_force
+from .mutual import STEP, rough_force
 from .rotor_losses import ROTOR_CURRENTS, RotorCurrents
 
 NOTHING_ANSWERS = "neither rotor nor floater is permeable"
@@ -64,7 +64,10 @@ def rough_part(scene: Scene, table: FieldTable) -> float:
     """Roughly, what the answers add to the force near the rotor, relative to the rigid dipole's."""
     magnets, floater = scene.rotor, scene.floater
     lowest = min((float(corner[2]) for magnet in magnets for corner in magnet.box.corners), default=0.0)
-    place, direction = np.array([0.0, 0.0, lowest - NEAR * floater.radius]), np.array([0.0, 0.0, 1.0])
+    direction = np.array([0.0, 0.0, 1.0])
+    deep = lowest - NEAR * floater.radius * 2.0 ** np.arange(10)
+    known = table.in_range((deep[:, None] + STEP * floater.radius) * direction)  # not near, of a tiny floater
+    place = deep[int(np.argmax(known))] * direction
     force = rough_force(magnets, floater, table, place, direction)
     return float(np.linalg.norm(force) / (floater.moment * np.linalg.norm(table.evaluate(place[None])[1][0])))
 

@@ -1,15 +1,15 @@
-"""Currents in the rotor in a ball of a flight: the matrix of their losses with runtime parameters as weights.
+"""Brake by currents in metal that turns with the rotor, in the table's own form, about a pose and in a ball.
 
 A rate u_k = d/dt m·c_k is linear in eight numbers, the five of the traceless symmetric part of m ⊗ (drift) and the
 three of the rate of m, by the five of ∇c_k and the three of c_k.  So the power is quadratic in them, with a matrix S of
-place alone, S_ab = Σ_k w_ka w_kb, whatever the moment is: q⁻³ times polynomials of degree 1 (`ball_polynomials`).
-The work that force and torque do is that power exactly.
+place alone, S_ab = Σ_k w_ka w_kb, whatever the moment is.  About one pose S is a constant: where the floater is in step
+the rates vanish, so that derivatives are right as well.  In a ball S is q⁻³ times polynomials of degree 1
+(`local_polynomials`).  The work that force and torque do is that power exactly.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Protocol
 
 import heyoka as hy
@@ -23,9 +23,10 @@ from ...fem.rotor_metal import RotorLosses
 from ...geometry.common import Array
 from ...geometry.scene.contents import Scene
 from .effect import Added, Motion, dissipative
-from .mutual import count, fallen, falling, fitting, nodes, polynomials, weighted_sum
-from .state import Parameter, Scales, State, Vector, cross, dot
+from .local_polynomials import COUNT, falling, fitting, monomials, nodes, polynomial
+from .state import Parameter, Scales, State, Vector, cross, dotted
 
+ROTOR_CURRENTS = "currents in the rotor"
 NUMBERS = 8
 UPPER = ((0, 0), (1, 1), (0, 1), (0, 2), (1, 2))
 """Entries of the gradient that tell it."""
@@ -38,52 +39,78 @@ ALLOWED = 5e-3
 
 
 @dataclass(frozen=True, eq=False)
-class RotorCurrentsInBall:
-    """The brake in a ball.
+class RotorCurrents:
+    """The brake of a table.
 
     Parameters
     ----------
     table : of the losses
+    first : number of the first of its runtime parameters about a pose or in a ball; None: as the table writes it
     ball : whose centre and radius are among the runtime parameters
-    first : number of the first of the weights: of q (10), and of the 36 entries of S (4 each)
-    name : in results
     """
 
     table: RotorLosses
-    ball: BallField
-    first: int
-    name: str
+    name: str = ROTOR_CURRENTS
+    first: int | None = None
+    ball: BallField | None = None
+
+    def placed(self, first: int) -> RotorCurrents:
+        """About one pose; its numbers are the entries of S."""
+        return replace(self, first=first)
+
+    def in_ball(self, ball: BallField, first: int) -> RotorCurrents:
+        """In a ball; its numbers are the weights of q and of the entries of S."""
+        return replace(self, ball=ball, first=first)
 
     @property
     def count(self) -> int:
-        """Of the weights."""
-        return count(2) + len(ENTRIES) * count(1)
+        """Of its numbers."""
+        return len(ENTRIES) if self.ball is None else COUNT[2] + len(ENTRIES) * COUNT[1]
 
     def added(self, motion: Motion) -> Added:
         """Force and torque are minus half the derivatives of the power by drift and turning."""
         length, moment, drift = hy.par[Parameter.LENGTH], motion.moment, motion.drift
-        offset = self.ball.offset([length * x for x in motion.position])
-        linear, start = polynomials(1, offset), self.first + count(2)
-        known = {pair: weighted_sum(start + k * count(1), linear) for k, pair in enumerate(ENTRIES)}
-        inverse = 1.0 / weighted_sum(self.first, polynomials(2, offset))
         last = moment[2] * drift[2]
         pairs = [moment[0] * drift[0] - last, moment[1] * drift[1] - last]
         pairs += [moment[i] * drift[j] + moment[j] * drift[i] for i, j in UPPER[2:]]
         rates = [*(length * p for p in pairs), *cross(motion.lag, moment)]
         strength = hy.par[Parameter.PLATE_MOMENT] * hy.par[Parameter.PLATE_MOMENT] / hy.par[Parameter.TIME]
-        scale = -strength * fallen(inverse)
-        sums = [hy.sum([known[min(a, b), max(a, b)] * r for b, r in enumerate(rates)]) for a in range(NUMBERS)]
-        xx, yy, xy, xz, yz, *field = (scale * s for s in sums)
+        xx, yy, xy, xz, yz, *field = (-strength * s for s in self._response(motion, rates))
         slopes = [[xx, xy, xz], [xy, yy, yz], [xz, yz, -xx - yy]]
-        force = [length * hy.sum([m * s for m, s in zip(moment, row, strict=True)]) for row in slopes]
-        return braked(force, field, motion)
+        force = [length * dotted(moment, row) for row in slopes]
+        torque = [t / hy.par[Parameter.INERTIA] for t in cross(moment, field)]
+        return dissipative(force, torque, motion)
+
+    def _response(self, motion: Motion, rates: Vector) -> Vector:
+        """S · rates."""
+        metres = [hy.par[Parameter.LENGTH] * x for x in motion.position]
+        if self.first is None:
+            parts = self.table.multipoles.expressions(metres)
+            rows = [[*(slope[i][j] for i, j in UPPER), *field] for field, slope in parts]
+            signals, weights = [dotted(row, rates) for row in rows], self.table.weights
+            induced = [_weighted(w, signals) for w in weights]
+            strengths = [_weighted(w, induced) for w in weights.T]
+            return [dotted(strengths, column) for column in zip(*rows, strict=True)]
+        if self.ball is None:
+            entries = [hy.par[self.first + k] for k in range(len(ENTRIES))]
+        else:
+            basis, start = monomials(2, self.ball.offset(metres), hy.expression(1.0)), self.first
+            inverse = 1.0 / polynomial([hy.par[start + k] for k in range(COUNT[2])], basis)
+            rates = [inverse * inverse * inverse * r for r in rates]
+            start, size = start + COUNT[2], COUNT[1]
+            entries = [
+                polynomial([hy.par[start + n * size + k] for k in range(size)], basis) for n in range(len(ENTRIES))
+            ]
+        known = dict(zip(ENTRIES, entries, strict=True))
+        return [dotted([known[min(a, b), max(a, b)] for b in range(NUMBERS)], rates) for a in range(NUMBERS)]
+
+    def numbers(self, field: FieldTable, position: Array, moment: Array, values: Array) -> Array:
+        """See `Placed`."""
+        return self._entries(position * values[:, Parameter.LENGTH, None]).T
 
     def fit(self, ball: Ball, gradient: Array) -> tuple[Array, float]:
         """See `InBall`."""
-        fields, slopes = self.table.fields(ball.center + ball.radius * nodes())
-        upper = np.stack([slopes[..., i, j] for i, j in UPPER], axis=2)
-        rows = np.concatenate([upper, fields], axis=2)
-        parts = np.array([np.einsum("nk,nk->n", rows[..., a], rows[..., b]) for a, b in ENTRIES])
+        parts = self._entries(ball.center + ball.radius * nodes())
         lengths = np.repeat([UNIT, 1.0], (5, 3))
         units = np.array([lengths[a] * lengths[b] for a, b in ENTRIES])
         solve, basis = fitting(1)
@@ -93,92 +120,14 @@ class RotorCurrentsInBall:
         error = float(missed.max() / (units * np.abs(parts).max(axis=1)).max())
         return np.concatenate([quadratic, weights.ravel()]), error / ALLOWED
 
-
-def braked(force: Vector, field: Vector, motion: Motion) -> Added:
-    """An effect by its force and by the field (scaled) that turns the moment."""
-    torque = [t / hy.par[Parameter.INERTIA] for t in cross(motion.moment, field)]
-    return dissipative(force, torque, motion)
-
-
-ROTOR_CURRENTS = "currents in the rotor"
-UPPER_ = [(a, b) for a in range(6) for b in range(a, 6)]
+    def _entries(self, places: Array) -> Array:
+        """(36, n) of S at places (n, 3) m."""
+        fields, slopes = self.table.fields(places)
+        rows = np.concatenate([np.stack([slopes[..., i, j] for i, j in UPPER], axis=2), fields], axis=2)
+        return np.array([np.einsum("nk,nk->n", rows[..., a], rows[..., b]) for a, b in ENTRIES])
 
 
-@dataclass(frozen=True, eq=False)
-class RotorCurrents:
-    """The brake of a table."""
-
-    table: RotorLosses
-    name: str = ROTOR_CURRENTS
-
-    def added(self, motion: Motion) -> Added:
-        """Its accelerations of place and spin."""
-        length, weights = hy.par[Parameter.LENGTH], self.table.weights
-        strength = hy.par[Parameter.PLATE_MOMENT] * hy.par[Parameter.TIME] ** -0.5  # m/√E per √T
-        multipoles = self.table.multipoles.expressions([length * x for x in motion.position])
-        moment, drift, turning = motion.moment, motion.drift, cross(motion.lag, motion.moment)
-        heard = []
-        for field, slope in multipoles:
-            carried = [dot(moment, [slope[i][j] for i in range(3)]) for j in range(3)]
-            heard.append(length * dot(carried, drift) + dot(field, turning))
-        rates = [strength * _sum(row, heard) for row in weights]
-        answers = [-strength * _sum(column, rates) for column in weights.T]
-        field = [hy.sum([s * b[i] for s, (b, _) in zip(answers, multipoles, strict=True)]) for i in range(3)]
-        slopes = [
-            [hy.sum([s * g[i][j] for s, (_, g) in zip(answers, multipoles, strict=True)]) for j in range(3)]
-            for i in range(3)
-        ]
-        force = [length * dot(moment, [slopes[i][j] for i in range(3)]) for j in range(3)]
-        return braked(force, field, motion)
-
-    def placed(self, first: int) -> RotorCurrentsAtPlace:
-        """The same about one pose."""
-        return RotorCurrentsAtPlace(self.table, first)
-
-    def in_ball(self, ball: BallField, first: int) -> RotorCurrentsInBall:
-        """The same in a ball."""
-        return RotorCurrentsInBall(self.table, ball, first, self.name)
-
-
-@dataclass(frozen=True, eq=False)
-class RotorCurrentsAtPlace:
-    """The same with the matrix D of one pose: right there, and its derivatives where the floater is in step.
-
-    Parameters
-    ----------
-    table : of the losses
-    first : number of the first of its runtime parameters: D (21) by drift and by the rate of m̂, scaled
-    """
-
-    table: RotorLosses
-    first: int
-    name: str = ROTOR_CURRENTS
-
-    @property
-    def count(self) -> int:
-        """Of the runtime parameters."""
-        return len(UPPER_)
-
-    def added(self, motion: Motion) -> Added:
-        """Force and torque are -D of drift and turning."""
-        known = {pair: hy.par[self.first + k] for k, pair in enumerate(UPPER_)}
-        rates = [*motion.drift, *cross(motion.lag, motion.moment)]
-        force = [-hy.sum([known[min(a, b), max(a, b)] * r for b, r in enumerate(rates)]) for a in range(6)]
-        return braked(force[:3], force[3:], motion)
-
-    def numbers(self, field: FieldTable, position: Array, moment: Array, values: Array) -> Array:
-        """(n, count) for scaled positions and moments (n, 3), and runtime parameters (n, p)."""
-        length, strength, time = (
-            values[:, p, None, None] for p in (Parameter.LENGTH, Parameter.PLATE_MOMENT, Parameter.TIME)
-        )
-        fields, slopes = self.table.fields(position * length[:, 0])
-        rates = np.concatenate([length * np.einsum("ni,nkia->nka", moment, slopes), fields], axis=2)
-        scaled = rates * strength / np.sqrt(time)
-        matrix = np.einsum("nka,nkb->nab", scaled, scaled)
-        return np.array([matrix[:, a, b] for a, b in UPPER_]).T
-
-
-def _sum(weights: Array, terms: Sequence[hy.expression]) -> hy.expression:
+def _weighted(weights: Array, terms: Vector) -> hy.expression:
     return hy.sum([float(w) * t for w, t in zip(weights, terms, strict=True) if w])
 
 

@@ -8,8 +8,7 @@ from article import FLOATER
 
 from spinlev.dynamics.equilibria.equilibrium import Survey
 from spinlev.dynamics.equilibria.search import find_equilibria, survey, with_plate
-from spinlev.dynamics.flights.compiled import compile_flight
-from spinlev.dynamics.flights.flight import integrate
+from spinlev.dynamics.flights.flight import Flight, integrate
 from spinlev.dynamics.motion.plate import PlateMemory
 from spinlev.dynamics.motion.rates import Rates
 from spinlev.dynamics.motion.state import Scales
@@ -72,8 +71,8 @@ def measured_growth(scene, table, memory, equilibrium):
     start = scales.pack(equilibrium.start)
     kick = (1e-6 if equilibrium.stable else 1e-8) * np.random.default_rng(4).normal(size=12)
     kick[6:] = 0.0
-    flight = compile_flight(scene, table, duration, compact=True, memory=memory)
-    flown = integrate(scene, flight, scales.unpack(start + kick), duration, currents=equilibrium.currents[0])
+    flight = Flight(scene, table, duration, compact=True, memory=memory)
+    flown = integrate(flight, scales.unpack(start + kick), duration, currents=equilibrium.currents[0])
     turns = np.isclose(flown.time * scene.frequency, np.round(flown.time * scene.frequency), atol=1e-7)
     away = (scales.pack(flown.rotor)[turns] - start)[20:]
     if not equilibrium.stable:

@@ -12,13 +12,14 @@ from spinlev.dynamics.flights.balls import LARGE, SMALL, Balls, in_ball
 from spinlev.dynamics.flights.batch import fly_together
 from spinlev.dynamics.flights.flight import Flight, integrate
 from spinlev.dynamics.motion.effect import Interaction
+from spinlev.dynamics.motion.effects import mutual_choice
 from spinlev.dynamics.motion.equations import equations_of_motion, parameters
 from spinlev.dynamics.motion.mutual import Mutual
 from spinlev.dynamics.motion.rates import Rates
 from spinlev.dynamics.motion.state import Parameter, Scales
 from spinlev.fem.mutual.making import cached_mutual_table
 from spinlev.fem.mutual.response import rotor_ladder, two_body
-from spinlev.fem.rotor.choice import cached_rotor_table
+from spinlev.fem.rotor.choice import cached_rotor_table, rotor_table
 from spinlev.geometry.rotor import horizontal, tilt, vertical
 from spinlev.geometry.scene.contents import Drag, Scene
 
@@ -82,6 +83,27 @@ def test_rough_rates_leave_out_all_answers_but_the_uniform_one(mutual, start):
     ):
         np.testing.assert_allclose(part, known, rtol=1e-12, atol=1e-12)
     assert np.abs(rough[0] - rates(state, values)[0]).max() > 1e-4
+
+
+def test_a_tiny_floater_is_compared_where_the_table_reaches():
+    """Two of its radii below a large magnet a table of finite elements does not know the field."""
+    cube = horizontal(0.0, 10e-3, 1.2, 1.05)
+    table, reach = rotor_table(cube, "cuboid"), 5e-3 + 2.9e-3
+
+    class Far:
+        model = "fem"
+
+        def in_range(self, points):
+            return np.asarray(points)[:, 2] < -reach
+
+        def evaluate(self, points):
+            assert self.in_range(points).all()
+            return table.evaluate(points)
+
+    tiny = replace(SCENE, rotor=cube, floater=replace(PERMEABLE, radius=0.5e-3))
+    included, why = mutual_choice(tiny, Far(), "auto", 1e-6)
+    assert included
+    assert "of the force near the rotor" in why
 
 
 @pytest.mark.parametrize("formula", [SMALL, LARGE])
