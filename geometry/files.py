@@ -18,15 +18,24 @@ from typing import Any, BinaryIO, ParamSpec, TypeVar
 from .common import ComputationError, InputError, printable, shown
 
 MEGA = 1_000_000
-KINDS = (
-    (stat.S_ISDIR, "a folder"),
-    (stat.S_ISFIFO, "a pipe"),
-    (stat.S_ISSOCK, "a socket"),
-    (stat.S_ISCHR, "a device"),
-    (stat.S_ISBLK, "a device"),
-)
+KINDS = {
+    stat.S_IFDIR: "a folder",
+    stat.S_IFIFO: "a pipe",
+    stat.S_IFSOCK: "a socket",
+    stat.S_IFCHR: "a device",
+    stat.S_IFBLK: "a device",
+}
+"""What is no file of a disk."""
 LONGEST = 300
 """Characters of a file's name in a message."""
+MEMORY = 2_000_000_000
+"""Bytes of address space of another process; the libraries alone take a third of it."""
+SLOWER = 4.0
+"""How much longer by the clock than by the processor a call may take: the machine has others to serve."""
+LAUNCH = "from spinlev.geometry.files import _serve; _serve()"
+
+Given = ParamSpec("Given")
+Answer = TypeVar("Answer")
 
 
 def regular_file(path: str | Path, most_bytes: int, name: str, kind: str) -> BinaryIO:
@@ -34,24 +43,18 @@ def regular_file(path: str | Path, most_bytes: int, name: str, kind: str) -> Bin
 
     Parameters
     ----------
-    path : str or Path
-        The file.
-    most_bytes : int
-        Its size may be so large.
-    name : str
-        What messages call the input, such as `points`.
-    kind : str
-        What it must be, with its article, such as `a CSV file`.
+    path : the file
+    most_bytes : its size may be so large
+    name : what messages call the input, such as `points`
+    kind : what it must be, with its article, such as `a CSV file`
 
     Returns
     -------
-    BinaryIO
-        To be closed; a library that opens the path by itself needs no more than that it was given.
+    The file, to be closed; a library that opens the path by itself needs no more than that it was given.
 
     Raises
     ------
-    InputError
-        There is none, it cannot be opened, is a folder, pipe, device or socket, or is larger.
+    InputError : there is none, it cannot be opened, is a folder, pipe, device or socket, or is larger
     """
     found = _opened(path)
     if isinstance(found, str):
@@ -76,37 +79,28 @@ def file_content(path: str | Path, most_bytes: int, name: str, kind: str) -> byt
 
 
 def _opened(path: str | Path) -> BinaryIO | str:
-    """A regular file of a disk, opened; or why it is none.
+    """A regular file of a disk, opened; or why it is none, as the end of a sentence.
 
     Looked at before, as opening a device may do something, and after, when no other can have taken its place.
     """
     if not isinstance(path, str | Path):  # a number would be taken for a file that is open already
         return f"received {shown(path)}"
     try:
-        if kind := _other(os.stat(path)):
+        if kind := KINDS.get(stat.S_IFMT(os.stat(path).st_mode)):
             return f"{_named(path)} is {kind}"
         handle = os.open(path, os.O_RDONLY | os.O_CLOEXEC | os.O_NONBLOCK | os.O_NOCTTY)
         found = os.fstat(handle)
-        kind = _other(found) or ("no file of a disk, but of the system" if _endless(handle, found) else None)
     except (OSError, ValueError) as error:
         return _fault(path, error)
-    if not kind:
+    kind = KINDS.get(stat.S_IFMT(found.st_mode))
+    try:  # files of /proc that say that they are empty may have no end, or wait for something
+        endless = not kind and found.st_size == 0 and os.pread(handle, 1, 0) != b""
+    except OSError:
+        endless = True
+    if not kind and not endless:
         return os.fdopen(handle, "rb")
     os.close(handle)
-    return f"{_named(path)} is {kind}"
-
-
-def _endless(handle: int, found: os.stat_result) -> bool:
-    """Whether a file that says that it is empty is not: those of /proc may have no end, or wait for something."""
-    try:
-        return found.st_size == 0 and stat.S_ISREG(found.st_mode) and os.pread(handle, 1, 0) != b""
-    except OSError:
-        return True
-
-
-def _other(found: os.stat_result) -> str | None:
-    """What it is, if it is no regular file."""
-    return next((words for test, words in KINDS if test(found.st_mode)), None)
+    return f"{_named(path)} is {kind or 'no file of a disk, but of the system'}"
 
 
 def _fault(path: str | Path, error: OSError | ValueError) -> str:
@@ -125,16 +119,6 @@ def _named(path: str | Path) -> str:
     """The file's name on one line of a message: the end of a long one."""
     text = printable(str(path)).replace("\n", "\\n")
     return text if len(text) <= LONGEST else f"…{text[-LONGEST:]}"
-
-
-MEMORY = 2_000_000_000
-"""Bytes of address space; the libraries alone take a third of it."""
-SLOWER = 4.0
-"""How much longer by the clock than by the processor a call may take: the machine has others to serve."""
-LAUNCH = "from spinlev.geometry.files import _serve; _serve()"
-
-Given = ParamSpec("Given")
-Answer = TypeVar("Answer")
 
 
 class LostError(ComputationError):

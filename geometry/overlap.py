@@ -1,6 +1,6 @@
 """Overlap of bodies in any pose, exact for convex ones, and gaps that are too narrow for elements."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from itertools import combinations
 
@@ -40,16 +40,15 @@ def separation(first: Solid, second: Solid) -> tuple[float, Array]:
 
 
 def _box_separation(first: Box, second: Box) -> tuple[float, Array]:
-    """Separating-axis theorem (S. Gottschalk et al., SIGGRAPH 1996).
+    """By the axes of both and the nine products of their edges, one of which parts boxes that are apart.
 
-    Two boxes are apart exactly if one of the three axes of either or one of the nine products of their edges parts
-    them.
+    That is the separating-axis theorem (S. Gottschalk et al., SIGGRAPH 1996).
     """
     a, b = first.rotation.T, second.rotation.T
     crossed = np.cross(a[:, None, :], b[None, :, :]).reshape(9, 3)
     length = np.linalg.norm(crossed, axis=1)
     axes = np.vstack([a, b, crossed[length > 1e-9] / length[length > 1e-9, None]])
-    reach = np.abs(axes @ first.rotation) @ first.half_edges + np.abs(axes @ second.rotation) @ second.half_edges
+    reach = first.reach(axes) + second.reach(axes)
     along = axes @ (second.center - first.center)
     best = int(np.argmax(np.abs(along) - reach))
     return float(np.abs(along[best]) - reach[best]), axes[best] * np.sign(along[best])
@@ -97,23 +96,28 @@ def _gap_in_hole(ring: Ring, body: Solid) -> tuple[float, Array, bool]:
     x, y, _ = ring.rotation.T
     offset = body.center - ring.center
 
-    def stands_off(angle: Array) -> Array:
-        ways = np.multiply.outer(np.cos(angle), x) + np.multiply.outer(np.sin(angle), y)
-        return np.asarray(ring.inner_radius - ways @ offset - body.support(ways))
+    def ways(angles: Array) -> Array:
+        return np.asarray(np.multiply.outer(np.cos(angles), x) + np.multiply.outer(np.sin(angles), y))
 
-    angles = np.linspace(0.0, 2 * np.pi, 361)
-    best = angles[int(np.argmin(stands_off(angles)))]
-    step = angles[1]
+    def stands_off(angles: Array) -> Array:
+        return np.asarray(ring.inner_radius - ways(angles) @ offset - body.support(ways(angles)))
+
+    angle, gap = _least_in_a_turn(lambda angle: float(stands_off(np.array([angle]))[0]), stands_off, 361)
+    fits = body.reach(ways(np.linspace(0.0, 2 * np.pi, 361))).max() <= ring.inner_radius + TOUCHING
+    return gap, -ways(np.array([angle]))[0], bool(fits)
+
+
+def _least_in_a_turn(
+    one: Callable[[float], float], many: Callable[[Array], ArrayLike], number: int
+) -> tuple[float, float]:
+    """Angle (rad) and value of the least of a function: of many angles at once, then of one about the best of them."""
+    angles = np.linspace(0.0, 2 * np.pi, number)
+    values = np.asarray(many(angles), float)
+    best, step = float(angles[np.argmin(values)]), float(angles[1])
     found = scipy.optimize.minimize_scalar(
-        lambda angle: float(stands_off(np.array([angle]))[0]),
-        bounds=(best - step, best + step),
-        method="bounded",
-        options={"xatol": 1e-12},
+        one, bounds=(best - step, best + step), method="bounded", options={"xatol": 1e-12}
     )
-    angle = found.x if found.fun < stands_off(np.array([best]))[0] else best
-    ways = np.multiply.outer(np.cos(angles), x) + np.multiply.outer(np.sin(angles), y)
-    fits = bool(body.reach(ways).max() <= ring.inner_radius + TOUCHING)
-    return float(stands_off(np.array([angle]))[0]), -(np.cos(angle) * x + np.sin(angle) * y), fits
+    return min((best, float(values.min())), (float(found.x), float(found.fun)), key=lambda pair: pair[1])
 
 
 def apart(first: Solid, second: Solid) -> bool:
@@ -138,40 +142,23 @@ def sphere_overlap(center: ArrayLike, radius: float, body: Solid) -> float:
     return radius - float(body.distance(center))
 
 
-def turned(body: Solid, angle: float) -> Solid:
-    """The body after the rotor has turned by `angle` (rad) about z."""
-    turn = rotation_matrix((0.0, 0.0, np.degrees(angle)))
-    return moved(body, turn @ body.center, turn @ body.rotation)
-
-
 def deepest_overlap_in_a_turn(rotating: Solid, fixed: Box) -> float:
     """Largest penetration depth of a body that turns about z into a fixed box, m; negative if always apart.
 
     At angles where the sphere about the body stays clear of the box, its gap is the sphere's.
     """
-    apart = float(fixed.distance(np.zeros(3))) - _farthest(rotating)
-    if apart > 0:  # it never leaves a sphere that does not reach the fixed one
-        return -apart
+    origin = np.zeros(3)
+    clear = float(fixed.distance(origin)) - rotating.farthest(origin)
+    if clear > 0:  # it never leaves a sphere that does not reach the fixed one
+        return -clear
 
     def gap(angle: float) -> float:
-        body = turned(rotating, angle)
+        turn = rotation_matrix((0.0, 0.0, np.degrees(angle)))
+        body = moved(rotating, turn @ rotating.center, turn @ rotating.rotation)
         spheres = float(fixed.distance(body.center)) - body.circumradius
         return spheres if spheres > 0 else -body_overlap(body, fixed)
 
-    angles = np.linspace(0.0, 2 * np.pi, 73)
-    best = angles[int(np.argmin([gap(angle) for angle in angles]))]
-    step = angles[1]
-    refined = scipy.optimize.minimize_scalar(
-        gap, bounds=(best - step, best + step), method="bounded", options={"xatol": 1e-9}
-    )
-    return -min(gap(best), float(refined.fun))
-
-
-def _farthest(body: Solid) -> float:
-    """Distance from the origin that no point of the body exceeds, m."""
-    if isinstance(body, Box):
-        return float(np.linalg.norm(body.corners, axis=1).max())
-    return float(np.linalg.norm(body.center)) + body.circumradius
+    return -_least_in_a_turn(gap, lambda angles: [gap(angle) for angle in angles], 73)[1]
 
 
 def overlapping_magnets(magnets: Sequence[Magnet]) -> list[tuple[int, int, float]]:

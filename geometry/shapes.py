@@ -120,6 +120,10 @@ class Body:
         signs = np.stack(np.meshgrid(*[(-1.0, 1.0)] * 3, indexing="ij"), -1).reshape(8, 3)
         return self.center + (signs * self.half_edges) @ self.rotation.T
 
+    def farthest(self, point: Array) -> float:
+        """Distance from a point (3,) that no point of the body exceeds, m; exact for a cuboid."""
+        return float(np.linalg.norm(self.center - point)) + self.circumradius
+
     def to_body(self, points: ArrayLike) -> Array:
         """Coordinates of `points` (..., 3) along the body axes, from the centre, m."""
         return (np.asarray(points, float) - self.center) @ self.rotation
@@ -157,6 +161,9 @@ class Box(Body):
     @cached_property
     def circumradius(self) -> float:
         return float(np.linalg.norm(self.half_edges))
+
+    def farthest(self, point: Array) -> float:
+        return float(np.linalg.norm(self.corners - point, axis=1).max())
 
     @property
     def volume(self) -> float:

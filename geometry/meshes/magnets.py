@@ -133,7 +133,7 @@ def mesh_magnets(
     reach = np.array([magnet.body.reach(np.eye(3)) for magnet in magnets])
     places = np.array([magnet.body.center for magnet in magnets])
     center = ((places - reach).min(axis=0) + (places + reach).max(axis=0)) / 2
-    unit = max(_farthest(magnet.body, center) for magnet in magnets)
+    unit = max(magnet.body.farthest(center) for magnet in magnets)
     bodies = [magnet.body for magnet in magnets] if edges_of is None else list(edges_of)
     given = magnets, bodies, center, unit, settings, planes
     if any(isinstance(body, Part) for body in bodies):  # on whose shape the mesher may crash
@@ -153,74 +153,45 @@ def _files(bodies: Sequence[Solid]) -> str:
 
 def _meshed(
     magnets: Sequence[Magnet],
-    bodies: Sequence[Solid],
+    edges_of: Sequence[Solid],
     center: Array,
     unit: float,
     settings: MeshSettings,
     planes: tuple[int, ...],
 ) -> Any:
-    """The mesh of `mesh_magnets`, in `unit` from `center`; at the edges of `bodies` elements are small."""
-    kept = _kept_side(planes)
-    solids = []
+    """The mesh of `mesh_magnets`, in `unit` from `center`; at the edges of `edges_of` elements are small."""
+    lower = [0.0 if axis in planes else -LARGE for axis in range(3)]
+    kept = occ.Box(occ.Pnt(*lower), occ.Pnt(LARGE, LARGE, LARGE))
+    air = occ.Sphere(occ.Pnt(0, 0, 0), settings.ball_radius)
+    air.faces.name = "outer"
+    air, solids = air * kept, []
     for k, magnet in enumerate(magnets):
         solid = occ_solid(magnet.body, center, unit) * kept
         solid.mat(f"magnet{k}")
         solid.maxh = _size(magnet.body, settings) / unit
         if solid.solids:
+            solid.faces.name = "faces"
             solids.append(solid)
-    return _generate(solids, kept, planes, [moved(body, body.center - center) for body in bodies], unit, settings)
-
-
-def _size(body: Solid, settings: MeshSettings) -> float:
-    """Largest element in a magnet, m."""
-    thinnest, cube = float(body.size.min()), body.volume ** (1 / 3)
-    return float(settings.magnet_size * (min(thinnest, cube) * cube) ** 0.5)
-
-
-def _farthest(body: Solid, center: Array) -> float:
-    """Radius of a sphere about a centre that holds a body, m; the smallest one for a cuboid."""
-    if isinstance(body, Box):
-        return float(np.linalg.norm(body.corners - center, axis=1).max())
-    return float(np.linalg.norm(body.center - center)) + body.circumradius
-
-
-def _kept_side(planes: tuple[int, ...]) -> Any:
-    """A box, larger than any ball, on the positive side of the planes."""
-    lower = [0.0 if axis in planes else -LARGE for axis in range(3)]
-    return occ.Box(occ.Pnt(*lower), occ.Pnt(LARGE, LARGE, LARGE))
-
-
-def _generate(
-    solids: list[Any], kept: Any, planes: tuple[int, ...], bodies: Sequence[Solid], unit: float, settings: MeshSettings
-) -> Any:
-    air = occ.Sphere(occ.Pnt(0, 0, 0), settings.ball_radius)
-    air.faces.name = "outer"
-    air = air * kept
-    for solid in solids:
-        solid.faces.name = "faces"
-        air = air - solid
+            air = air - solid
     air.mat("air")
     shape = occ.Glue([*solids, air])
     for face in shape.faces:
         for axis in planes:
             if abs(face.center[axis]) < TINY:
                 face.name = f"plane{axis}"
+    bodies = [moved(body, body.center - center) for body in edges_of]
     parts = [body for body in bodies if isinstance(body, Part)]
     layered = settings.hp_layers and len(parts) < len(bodies)
     if layered:
         _mark_singular(shape, bodies, unit)
     for edge in shape.edges if parts else ():
-        edge.maxh = min(
-            [
-                edge.maxh,
-                *(_size(b, settings) * GRADED**settings.hp_layers / unit for b in parts if _sharp(edge, b, unit)),
-            ]
-        )
+        graded = [_size(b, settings) * GRADED**settings.hp_layers / unit for b in parts if _sharp(edge, b, unit)]
+        edge.maxh = min([edge.maxh, *graded])
     smallest = min((settings.smallest * body.volume ** (1 / 3) / unit for body in parts), default=0.0)
     sizes = {"maxh": settings.air_size, "minh": smallest, "grading": settings.grading}
-    sizes["curvaturesafety"] = settings.curvature
     try:
-        mesh = ng.Mesh(occ.OCCGeometry(shape).GenerateMesh(**sizes, parallel_meshing=False))
+        geometry = occ.OCCGeometry(shape)
+        mesh = ng.Mesh(geometry.GenerateMesh(**sizes, curvaturesafety=settings.curvature, parallel_meshing=False))
     except Exception as error:  # netgen raises several kinds
         if not parts:
             raise
@@ -231,6 +202,12 @@ def _generate(
     return mesh
 
 
+def _size(body: Solid, settings: MeshSettings) -> float:
+    """Largest element in a magnet, m."""
+    thinnest, cube = float(body.size.min()), body.volume ** (1 / 3)
+    return float(settings.magnet_size * (min(thinnest, cube) * cube) ** 0.5)
+
+
 def _sharp(edge: Any, body: Part, unit: float) -> bool:
     """Whether an edge of the mesh's geometry is one at which faces of a part meet at an angle."""
     return edge.mass > TINY and float(body.edge_distance(_middle(edge)[None] * unit)[0]) < ON_EDGE * body.circumradius
@@ -239,9 +216,8 @@ def _sharp(edge: Any, body: Part, unit: float) -> bool:
 def _mark_singular(shape: Any, bodies: Sequence[Solid], unit: float) -> None:
     """Mark the edges of bodies, and the points where edges of different directions meet, for hp-refinement."""
     for edge in shape.edges:
-        if edge.mass > TINY and _edge_directions(
-            _middle(edge), bodies, unit
-        ):  # a sphere's poles are edges of no length
+        # a sphere's poles are edges of no length
+        if edge.mass > TINY and _edge_directions(_middle(edge), bodies, unit):
             edge.hpref = 1
     for vertex in shape.vertices:
         directions = _edge_directions(np.array([vertex.p.x, vertex.p.y, vertex.p.z]), bodies, unit)

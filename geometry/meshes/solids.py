@@ -1,4 +1,4 @@
-"""Bodies as solids of OpenCASCADE."""
+"""Bodies as solids of OpenCASCADE: for meshes, rules of integration and STEP files."""
 
 from __future__ import annotations
 
@@ -14,7 +14,6 @@ from typing import Any
 import netgen.occ as occ
 import ngsolve as ng
 import numpy as np
-import scipy
 from scipy.spatial.transform import Rotation
 
 from ..common import Array, ComputationError, InputError, MeshError
@@ -33,6 +32,12 @@ FEW, SMALL = 8, 1.5
 """Degree of the rule in small elements, and their edge times the degree of the polynomial, by the part's, at most."""
 LONGEST = 60.0
 """Seconds of processor time for a mesh of a part."""
+SAME = 1e-7
+"""Distance of corners of facets that are one, in sizes of the solid."""
+WITHIN = 1e-9
+"""Relative difference of volumes by which a cavity that lies within a body is told from one that does not."""
+OWN_WORDS = re.compile(r"'\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d'|(?<=translator )[\d. ]+(?=')")
+"""The time, and a count of the files that the process has written: the rest is the same for the same solid."""
 SIMPLER = "Leave out small features of the part, or export it again."
 
 
@@ -47,9 +52,9 @@ def occ_solid(body: Solid, center: Array, unit: float) -> Any:
     if isinstance(body, Box):
         half = body.half_edges / unit
         corner = foot - body.rotation[:, :2] @ half[:2]
-        axes = occ.Axes(tuple(map(float, corner)), n=_direction(z), h=_direction(x))
+        axes = occ.Axes(tuple(map(float, corner)), n=_vector(z), h=_vector(x))
         return occ.WorkPlane(axes).Rectangle(2 * half[0], 2 * half[1]).Face().Extrude(float(2 * half[2]))
-    axes = occ.Axes(tuple(map(float, foot)), n=_direction(z), h=_direction(x))
+    axes = occ.Axes(tuple(map(float, foot)), n=_vector(z), h=_vector(x))
     filled = occ.Cylinder(axes, body.radius / unit, body.height / unit)
     if isinstance(body, Ring):
         return filled - occ.Cylinder(axes, body.inner_radius / unit, body.height / unit)
@@ -66,14 +71,15 @@ def read_brep(brep: str) -> Any:
 
 
 def _part(body: Part, center: Array, unit: float) -> Any:
-    solid = read_brep(body.brep)
-    solid = solid.Move(_direction(body.origin / MILLIMETRE))
-    turn = scipy.spatial.transform.Rotation.from_matrix(body.rotation).as_rotvec(degrees=True)
+    solid = _turned(read_brep(body.brep).Move(_vector(body.origin / MILLIMETRE)), body.rotation)
+    return solid.Scale(occ.Pnt(0, 0, 0), MILLIMETRE / unit).Move(_vector((body.center - center) / unit))
+
+
+def _turned(shape: Any, rotation: Array) -> Any:
+    """A shape turned about the origin by a matrix (3, 3)."""
+    turn = Rotation.from_matrix(rotation).as_rotvec(degrees=True)
     angle = float(np.linalg.norm(turn))
-    if angle > 0:
-        axis = occ.Axis(occ.Pnt(0, 0, 0), occ.gp_Dir(*map(float, turn / angle)))
-        solid = solid.Rotate(axis, angle)
-    return solid.Scale(occ.Pnt(0, 0, 0), MILLIMETRE / unit).Move(_direction((body.center - center) / unit))
+    return shape.Rotate(occ.Axis(occ.Pnt(0, 0, 0), occ.gp_Dir(*map(float, turn / angle))), angle) if angle else shape
 
 
 def part_rule(body: Part, order: int) -> tuple[Array, Array]:
@@ -94,11 +100,11 @@ def part_rule(body: Part, order: int) -> tuple[Array, Array]:
 
 @lru_cache(maxsize=8)
 def _rule(brep: str, order: int) -> tuple[Array, Array]:
-    *first, last = OTHERWISE
-    for share in first:
+    *first, last = (share * SMALLEST for share in OTHERWISE)
+    for smallest in first:
         with contextlib.suppress(CrashError, MeshError):
-            return call_apart(LONGEST, rule_in_solid, brep, order, share * SMALLEST)
-    return call_apart(LONGEST, rule_in_solid, brep, order, last * SMALLEST)
+            return call_apart(LONGEST, rule_in_solid, brep, order, smallest)
+    return call_apart(LONGEST, rule_in_solid, brep, order, last)
 
 
 def unmeshed(error: LostError, name: str) -> ComputationError:
@@ -117,19 +123,19 @@ def rule_in_solid(brep: str, order: int, smallest: float = SMALLEST) -> tuple[Ar
     except Exception as error:  # netgen raises several kinds
         raise MeshError(f"The part cannot be meshed: {error}. {SIMPLER}") from None
     mesh.Curve(CURVED)
-    few, all_of_it = ng.IntegrationRule(ng.TET, FEW), ng.IntegrationRule(ng.TET, max(order, FEW))
+    few, whole = ng.IntegrationRule(ng.TET, FEW), ng.IntegrationRule(ng.TET, max(order, FEW))
     corners = np.array([vertex.point for vertex in mesh.vertices])
     extent = float(np.ptp(corners, axis=0).max())
     tets = np.array([[vertex.nr for vertex in element.vertices] for element in mesh.Elements(ng.VOL)])
     large = np.ptp(corners[tets], axis=1).max(axis=1) * order > SMALL * extent
     points, weights = _mapped(few, mesh.MapToAllElements(few, ng.VOL), len(tets))
-    found = [(points[~large].reshape(-1, 3), weights[~large].ravel())]
+    found = [(points[~large], weights[~large])]
     for number in np.flatnonzero(large):
-        places = mesh.GetTrafo(ng.ElementId(ng.VOL, int(number)))(all_of_it)
-        points, weights = _mapped(all_of_it, places, 1)
-        found.append((points[0], weights[0]))
-    points, weights = (np.concatenate(column) for column in zip(*found, strict=True))
-    return points, weights
+        found.append(_mapped(whole, mesh.GetTrafo(ng.ElementId(ng.VOL, int(number)))(whole), 1))
+    return (
+        np.concatenate([points.reshape(-1, 3) for points, _ in found]),
+        np.concatenate([weights.ravel() for _, weights in found]),
+    )
 
 
 def _mapped(rule: Any, places: Any, elements: int) -> tuple[Array, Array]:
@@ -140,17 +146,8 @@ def _mapped(rule: Any, places: Any, elements: int) -> tuple[Array, Array]:
     return points, np.array(rule.weights) * stretch
 
 
-def _direction(vector: Array) -> Any:
+def _vector(vector: Array) -> Any:
     return occ.gp_Vec(*map(float, vector))
-
-
-ORIGIN = np.zeros(3)
-SAME = 1e-7
-"""Distance of corners of facets that are one, in sizes of the solid."""
-WITHIN = 1e-9
-"""Relative difference of volumes by which a cavity that lies within a body is told from one that does not."""
-OWN_WORDS = re.compile(r"'\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d'|(?<=translator )[\d. ]+(?=')")
-"""The time, and a count of the files that the process has written: the rest is the same for the same solid."""
 
 
 @dataclass(frozen=True)
@@ -232,24 +229,18 @@ def _shape(body: Body) -> Any:
     if isinstance(body, Facets):
         return _faceted(body.triangles / MILLIMETRE)
     if isinstance(body, Segment):
-        inner, width, height = (
-            value / MILLIMETRE for value in (body.inner_radius, body.radius - body.inner_radius, body.height)
-        )
-        section = occ.Axes((inner, 0.0, -height / 2), n=occ.gp_Dir(0, -1, 0), h=occ.X)
+        inner, outer, height = (length / MILLIMETRE for length in (body.inner_radius, body.radius, body.height))
+        section = occ.WorkPlane(occ.Axes((inner, 0.0, -height / 2), n=occ.gp_Dir(0, -1, 0), h=occ.X))
         axis = occ.Axis(occ.Pnt(0, 0, 0), occ.Z)
-        half = occ.WorkPlane(section).Rectangle(width, height).Face().Revolve(axis, body.end - body.start)
-        return half.Rotate(axis, body.start)
-    return occ_solid(moved(body, ORIGIN, np.eye(3)), ORIGIN, MILLIMETRE)
+        solid = section.Rectangle(outer - inner, height).Face().Revolve(axis, body.end - body.start)
+        return solid.Rotate(axis, body.start)
+    return occ_solid(moved(body, np.zeros(3), np.eye(3)), np.zeros(3), MILLIMETRE)
 
 
 def _placed(body: Body, frame: Body) -> Any:
     """A body as OpenCASCADE has it, mm, in the axes of another."""
-    turn = Rotation.from_matrix(frame.rotation.T @ body.rotation).as_rotvec(degrees=True)
-    angle, shape = float(np.linalg.norm(turn)), _shape(body)
-    if angle > 0:
-        shape = shape.Rotate(occ.Axis(occ.Pnt(0, 0, 0), occ.gp_Dir(*map(float, turn / angle))), angle)
-    offset = frame.rotation.T @ (body.center - frame.center) / MILLIMETRE
-    return shape.Move(occ.gp_Vec(*map(float, offset)))
+    shape = _turned(_shape(body), frame.rotation.T @ body.rotation)
+    return shape.Move(_vector(frame.rotation.T @ (body.center - frame.center) / MILLIMETRE))
 
 
 def _faceted(triangles: Array) -> Any:

@@ -41,24 +41,22 @@ class Floater:
     @property
     def shape(self) -> str:
         """ "sphere", "cuboid" or "cylinder"."""
-        if self.body is None:
-            return "sphere"
-        return "cuboid" if isinstance(self.body, Box) else "cylinder"
+        return "cuboid" if isinstance(self.body, Box) else type(self.solid).__name__.lower()
 
-    @property
+    @cached_property
     def solid(self) -> Box | Cylinder | Sphere:
         """Its body about the origin."""
         return self.body or Sphere(self.radius)
 
-    @cached_property
+    @property
     def inner_radius(self) -> float:
         """Radius of the largest sphere about its centre that it holds, m."""
-        return self.radius if self.body is None else float(self.body.half_edges.min())
+        return float(self.solid.half_edges.min())
 
     @property
     def volume(self) -> float:
         """Volume, m³."""
-        return 4 / 3 * np.pi * self.radius**3 if self.body is None else self.body.volume
+        return self.solid.volume
 
     @property
     def mass(self) -> float:
@@ -67,21 +65,20 @@ class Floater:
 
     @property
     def principal_inertia(self) -> Array:
-        """(3,) moments of inertia about its axes, kg m²; about every axis 2/5 M R² of a sphere."""
-        if self.body is None:
-            return np.full(3, 0.4 * self.mass * self.radius**2)
-        square = self.body.size**2 / np.where([isinstance(self.body, Box)] * 3, 12.0, [16.0, 16.0, 12.0])
+        """(3,) moments of inertia about its axes, kg m²."""
+        divisor = {"sphere": [20, 20, 20], "cuboid": [12, 12, 12], "cylinder": [16, 16, 12]}[self.shape]
+        square = self.solid.size**2 / np.array(divisor)
         return np.asarray(self.mass * (square.sum() - square))
 
     @property
     def inertia(self) -> float:
         """Moment of inertia about an axis across the magnetic moment, kg m²."""
-        return 0.4 * self.mass * self.radius**2 if self.body is None else float(self.principal_inertia[0])
+        return float(self.principal_inertia[0])
 
     @property
     def spin_ratio(self) -> float:
         """Moment of inertia about the magnetic moment over that across it."""
-        return 1.0 if self.body is None else float(self.principal_inertia[2]) / self.inertia
+        return float(self.principal_inertia[2]) / self.inertia
 
     @property
     def moment(self) -> float:

@@ -157,12 +157,9 @@ def check_files(scene: Scene, source: str = "scene") -> None:
 
 def _replaced(path: str, digest: str, source: str) -> SceneError:
     instead = "its content is another one" if digest else "it cannot be read any more"
+    way_out = "Begin again, and what needs the file is computed anew."
     return SceneError(
-        source,
-        [
-            f"Input {path} must stay as it was when the scene was read; instead {instead}. Begin again, and what needs "
-            "the file is computed anew."
-        ],
+        source, [f"Input {path} must stay as it was when the scene was read; instead {instead}. {way_out}"]
     )
 
 

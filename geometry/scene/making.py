@@ -27,7 +27,6 @@ from .schema import (
     ExplicitRotor,
     FloaterTable,
     MagnetTable,
-    PlateTable,
     SceneTable,
     StartTable,
     TiltRotor,
@@ -138,8 +137,8 @@ def _named_files(rotor: AnyRotor, folder: Path, known: Scene | None) -> dict[int
 
 
 def _scene(table: SceneTable, paths: Mapping[int | None, Path], parts: Mapping[Path, Part]) -> Scene:
-    rotor, floater, drag = table.rotor, _floater(table.floater), table.drag
-    air = Drag.of(floater)
+    rotor, floater, plate, drag = table.rotor, _floater(table.floater), table.plate, table.drag
+    down, air = plate.lowering if plate else None, Drag.of(floater)
     if drag and drag.linear_N_s_m is not None and drag.angular_N_m_s is not None:
         air = Drag(drag.linear_N_s_m, drag.angular_N_m_s)
     if isinstance(rotor, ExplicitRotor):
@@ -147,12 +146,13 @@ def _scene(table: SceneTable, paths: Mapping[int | None, Path], parts: Mapping[P
         magnets = tuple(_magnet(*pair, rotor) for pair in zip(rotor.magnets, bodies, strict=True))
     else:
         magnets = _article_magnets(rotor)
+    lowering = Lowering(down.start_s, down.speed_mm_s * MILLI, down.distance_mm * MILLI) if down else None
     return Scene(
         frequency=table.frequency_hz,
         gravity=np.array(table.gravity_m_s2),
         rotor=magnets,
         floater=floater,
-        plate=_plate(table.plate) if table.plate else None,
+        plate=Plate(_solid(plate).box, plate.conductivity_S_m, lowering) if plate else None,
         drag=replace(air, air=True) if drag and drag.model == "air" else air,
         start=_start(table.start or StartTable()),
         field_map=paths.get(None),
@@ -163,10 +163,8 @@ def _scene(table: SceneTable, paths: Mapping[int | None, Path], parts: Mapping[P
 
 def _solid(table: Any) -> Solid:
     """The body of a table's shape, in its place if the table has one."""
-    pose = (
-        MILLI * np.array(getattr(table, "center_mm", ORIGIN)),
-        rotation_matrix(getattr(table, "rotation_deg", ORIGIN)),
-    )
+    center, angles = (getattr(table, key, ORIGIN) for key in ("center_mm", "rotation_deg"))
+    pose = MILLI * np.array(center), rotation_matrix(angles)
     shape, radius = getattr(table, "shape", "cuboid"), (getattr(table, "diameter_mm", None) or 0.0) * MILLI / 2
     if shape == "sphere":
         return Sphere(radius, *pose)
@@ -209,13 +207,6 @@ def _floater(table: FloaterTable) -> Floater:
     return Floater(body.circumradius, *material, body if isinstance(body, Box | Cylinder) else None)
 
 
-def _plate(table: PlateTable) -> Plate:
-    down, box = table.lowering, _solid(table)
-    assert isinstance(box, Box)
-    lowering = Lowering(down.start_s, down.speed_mm_s * MILLI, down.distance_mm * MILLI) if down else None
-    return Plate(box, table.conductivity_S_m, lowering)
-
-
 def _start(start: StartTable) -> OffsetStart | AbsoluteStart:
     if start.position_mm is None:
         return OffsetStart() if start.offset_mm is None else OffsetStart(MILLI * np.array(start.offset_mm))
@@ -235,7 +226,7 @@ Table = Mapping[str, Any]
 
 
 def horizontal(*, displacement_mm: float, remanence_T: float, edge_mm: float | None = None, **more: Any) -> Table:
-    """One cube magnetised along +x and displaced along it from the axis.
+    """The table `[rotor]` of one cube magnetised along +x and displaced along it from the axis.
 
     Parameters
     ----------
@@ -244,71 +235,45 @@ def horizontal(*, displacement_mm: float, remanence_T: float, edge_mm: float | N
     remanence_T : float
         Remanence, T.
     edge_mm : float, optional
-        Edge of the cubes, mm; left out where `shape` is "sphere" (with diameter_mm) or "cylinder" (and height_mm).
+        Edge of the cube, mm; left out where `shape` is "sphere" (with diameter_mm) or "cylinder" (and height_mm).
     **more : float or list
         Further keys, as for `magnets`.
-
-    Returns
-    -------
-    dict
-        The table `[rotor]` of a scene file.
     """
-    material = _article_material(remanence_T, edge_mm)
-    return {"configuration": "horizontal", "displacement_mm": displacement_mm, **material, **more}
+    return {"configuration": "horizontal", "displacement_mm": displacement_mm, **_cube(remanence_T, edge_mm), **more}
 
 
 def vertical(*, displacement_mm: float, remanence_T: float, edge_mm: float | None = None, **more: Any) -> Table:
-    """A cube magnetised along +x and one above it along +z.
+    """The table `[rotor]` of a cube magnetised along +x and one above it along +z.
 
     Parameters
     ----------
     displacement_mm : float
         From centre to centre, mm.
-    remanence_T : float
-        Remanence, T.
-    edge_mm : float, optional
-        Edge of the cubes, mm; left out where `shape` is "sphere" (with diameter_mm) or "cylinder" (and height_mm).
-    **more : float or list
-        Further keys, as for `magnets`.
-
-    Returns
-    -------
-    dict
-        The table `[rotor]` of a scene file.
+    remanence_T, edge_mm, **more
+        As for `horizontal`, of both cubes.
     """
-    material = _article_material(remanence_T, edge_mm)
-    return {"configuration": "vertical", "displacement_mm": displacement_mm, **material, **more}
+    return {"configuration": "vertical", "displacement_mm": displacement_mm, **_cube(remanence_T, edge_mm), **more}
 
 
 def tilt(*, angle_deg: float, remanence_T: float, edge_mm: float | None = None, **more: Any) -> Table:
-    """One cube, turned with its magnetisation about y.
+    """The table `[rotor]` of one cube, turned with its magnetisation about y.
 
     Parameters
     ----------
     angle_deg : float
         The magnetisation is along (cos angle, 0, sin angle), degrees.
-    remanence_T : float
-        Remanence, T.
-    edge_mm : float, optional
-        Edge of the cubes, mm; left out where `shape` is "sphere" (with diameter_mm) or "cylinder" (and height_mm).
-    **more : float or list
-        Further keys, as for `magnets`.
-
-    Returns
-    -------
-    dict
-        The table `[rotor]` of a scene file.
+    remanence_T, edge_mm, **more
+        As for `horizontal`.
     """
-    material = _article_material(remanence_T, edge_mm)
-    return {"configuration": "tilt", "angle_deg": angle_deg, **material, **more}
+    return {"configuration": "tilt", "angle_deg": angle_deg, **_cube(remanence_T, edge_mm), **more}
 
 
-def _article_material(remanence_T: float, edge_mm: float | None) -> Table:
+def _cube(remanence_T: float, edge_mm: float | None) -> Table:
     return {"remanence_T": remanence_T} | ({} if edge_mm is None else {"edge_mm": edge_mm})
 
 
 def magnets(*bodies: Table, **more: Any) -> Table:
-    """Any set of magnets.
+    """The table `[rotor]` of any set of magnets.
 
     Parameters
     ----------
@@ -322,17 +287,12 @@ def magnets(*bodies: Table, **more: Any) -> Table:
         currents, else left out), coercivity_kA_m (the knee of their demagnetisation curves), field_map, and
         conductors, a list of tables with shape ("cuboid" or "cylinder"), size_mm or diameter_mm and height_mm,
         center_mm, rotation_deg and conductivity_S_m: metal that turns with the rotor.
-
-    Returns
-    -------
-    dict
-        The table `[rotor]` of a scene file.
     """
     return {"magnets": list(bodies), **more}
 
 
 def sphere(*, diameter_mm: float, remanence_T: float, density_kg_m3: float, **more: Any) -> Table:
-    """The floating sphere.
+    """The table `[floater]` of a sphere.
 
     Parameters
     ----------
@@ -344,17 +304,12 @@ def sphere(*, diameter_mm: float, remanence_T: float, density_kg_m3: float, **mo
         Density, kg/m³.
     **more : float
         Further keys: recoil_permeability (1.05), conductivity_S_m (its eddy currents, else left out).
-
-    Returns
-    -------
-    dict
-        The table `[floater]` of a scene file.
     """
     return {"diameter_mm": diameter_mm, "remanence_T": remanence_T, "density_kg_m3": density_kg_m3, **more}
 
 
 def plate(*, size_mm: Sequence[float], center_mm: Sequence[float], conductivity_S_m: float, **more: Any) -> Table:
-    """A conducting plate.
+    """The table `[plate]` of a conducting plate.
 
     Parameters
     ----------
@@ -366,10 +321,5 @@ def plate(*, size_mm: Sequence[float], center_mm: Sequence[float], conductivity_
         Conductivity, S/m.
     **more : list or dict
         Further keys: rotation_deg about x, y, z, and lowering = {start_s, speed_mm_s, distance_mm}.
-
-    Returns
-    -------
-    dict
-        The table `[plate]` of a scene file.
     """
     return {"size_mm": size_mm, "center_mm": center_mm, "conductivity_S_m": conductivity_S_m, **more}
