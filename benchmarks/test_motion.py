@@ -109,7 +109,7 @@ def test_flights_side_by_side(benchmark, start):
 def test_flight_with_plate(benchmark, start, model, plate_model, rtol):
     """A floater that hangs over the plate's currents, at the tolerance and in the fields that `simulate` uses."""
     table = rotor_table(SCENE.rotor, model, nearest=SCENE.floater.radius)
-    memory, _ = plate_memory(SCENE, SCENE.plate, plate_model, table, start.position, rtol)
+    memory = plate_memory(SCENE, SCENE.plate, plate_model, table, start.position, rtol)
     table = rotor_nearby(table, SCENE.rotor, start.position, SCENE.floater.radius, 3e-6)
     equilibria = with_plate(SCENE, table, survey(SCENE, table), memory, Rates(table)).equilibria
     begun, currents = initial_state(SCENE, table, equilibria, memory)

@@ -61,7 +61,7 @@ def test_states(benchmark, rtol):
     """A flight over a plate whose network has more and more states."""
     table = rotor_table(SCENE.rotor, "cuboid", nearest=SCENE.floater.radius)
     start, _ = initial_state(FREE, table)
-    memory, _ = plate_memory(SCENE, SCENE.plate, "slab", table, start.position, rtol)
+    memory = plate_memory(SCENE, SCENE.plate, "slab", table, start.position, rtol)
     flight = Flight(SCENE, table, LONG, PLATE_TOLERANCE, True, memory)
     still = np.zeros(len(memory.table.rates))
     flown = benchmark.pedantic(lambda: integrate(flight, start, 0.2, currents=still), rounds=10, warmup_rounds=1)

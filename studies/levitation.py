@@ -1,13 +1,13 @@
-"""The plate of a scene for its motion, as the console tells it, and whether it leaves the floater room."""
+"""One scene, led along: rotor's table, equilibria, plate around the place, equilibria with it, flight."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
 from time import perf_counter
-from typing import Any, cast
+from typing import Any, TypeVar, cast
 
 import numpy as np
 
@@ -17,29 +17,82 @@ from ..dynamics.flights.flight import Checkpoint, initial_state, most_like_levit
 from ..dynamics.flights.live import LiveFlight
 from ..dynamics.flights.trajectory import FlightStopped, Trajectory
 from ..dynamics.motion.effect import Interaction, interaction_of
-from ..dynamics.motion.effects import BESIDE_METAL, WITHOUT_METAL, mutual_choice, with_effects
+from ..dynamics.motion.effects import BESIDE_METAL, WITHOUT_METAL, with_effects
 from ..dynamics.motion.equations import FORCE_ALONE
 from ..dynamics.motion.events import plate_depth
 from ..dynamics.motion.mutual import Mutual
 from ..dynamics.motion.plate import PlateMemory
 from ..dynamics.motion.rates import Rates
 from ..dynamics.motion.rotor_losses import RotorCurrents
-from ..fem.maps_of_B.table import GriddedTable
+from ..fem.maps_of_B.table import GriddedTable, map_table
+from ..fem.mutual.making import cached_mutual_table, mutual_key
 from ..fem.mutual.table import MutualTable
-from ..fem.plate.choice import PlateAround, plate_around, resolve_plate_model, rotor_nearby, wider_region
+from ..fem.plate.choice import plate_around, rotor_nearby, wider_region
 from ..fem.plate.region import Region
 from ..fem.plate.slab import cached_edge_error, edge_error
 from ..fem.plate.table import PlateTable, RotorShare
+from ..fem.rotor.choice import cached_rotor_table, rotor_table
 from ..fem.rotor.models import AccuracyError
 from ..fem.rotor.table import FieldTable, RotorTable
-from ..fem.rotor_metal import RotorLosses, check_slow_enough, pieces_of
-from ..geometry.common import Array, InputError, SpinlevError, Watch, millimetre_size, shown, unwatched
-from ..geometry.overlap import TOUCHING, sphere_overlap
+from ..fem.rotor_metal import RotorLosses, cached_rotor_losses, check_slow_enough, losses_key, pieces_of
+from ..geometry.common import Array, InputError, SpinlevError, Watch, shown, unwatched
 from ..geometry.scene.contents import AbsoluteStart, Plate, Scene
-from ..geometry.scene.files import load_scene
+from ..geometry.scene.files import check_files, load_scene
 from .cli.console import detail, note, progress, stages
 from .cli.options import FieldModel, Models, finite, positive
-from .rotor import RotorField, RotorTables, equations_key
+from .plan import (
+    RotorField,
+    check_room,
+    check_way,
+    equations_key,
+    far_plan,
+    field_key,
+    field_plan,
+    looser,
+    mutual_plan,
+    nearest_faces,
+    plate_plan,
+)
+
+AHEAD = 1.0
+"""Of a flight, s, that is looked at beforehand."""
+PLACES = 50
+"""On a flight's way, at which the error by a slab's missing edges is looked at."""
+UP = np.array([0.0, 0.0, 1.0])
+Made = TypeVar("Made")
+SceneLike = Scene | str | Path
+"""A scene, or the path of its file."""
+
+
+class SharedTables:
+    """Tables and equations for any number of scenes to share; a scene finds those that were made for what it needs."""
+
+    def __init__(self) -> None:
+        self.from_cache: list[str] = []
+        """Names of the tables that were found in the user's cache."""
+        self._known: dict[str, Any] = {}
+
+    def once(self, key: str, make: Callable[[], Made]) -> Made:
+        """What was made under this key for any of the scenes, or else made now."""
+        if key not in self._known:
+            self._known[key] = make()
+        made: Made = self._known[key]
+        return made
+
+    def table(self, key: str, name: str, title: str, make: Callable[[Watch], tuple[Made, bool]]) -> Made:
+        """The same of a table from the cache, told with its title; `make` also says whether it was there."""
+
+        def told() -> Made:
+            note(f"{title} ...")
+            begun = perf_counter()
+            with stages(title) as watch:
+                made, found = make(watch)
+            note("  from the cache." if found else f"  done in {perf_counter() - begun:.1f} s.")
+            if found and name not in self.from_cache:
+                self.from_cache.append(name)
+            return made
+
+        return self.once(key, told)
 
 
 def plate_memory(
@@ -50,76 +103,26 @@ def plate_memory(
     place: Array,
     rtol: float,
     edges: float = 0.0,
-    tables: RotorTables | None = None,
+    tables: SharedTables | None = None,
     region: Region | None = None,
-) -> tuple[PlateMemory, bool]:
-    """The plate's currents for a floater about `place` (3,) m that turns with the rotor; whether they were cached.
+) -> PlateMemory:
+    """The plate's currents for a floater about a place that turns with the rotor.
 
-    `edges`: relative error by edges that the model leaves out. `tables` are shared with other scenes. `region`: where
-    the floater may be, if not near the place, in the frame of the plate. Errors are those of `plate_around` and of its
-    model.
+    Parameters
+    ----------
+    model, table, place, rtol, region : as of `plate_around`, whose errors and those of the model are raised
+    edges : relative error by edges that the model leaves out
+    tables : shared with other scenes
     """
     asked = plate_around(plate, model, table, place, scene.floater.radius, scene.frequency, rtol, region)
-    made, share, found = (tables or RotorTables()).once(asked.key, lambda: _told(asked))
-    return PlateMemory(asked.plate, made, share, model, edges), found
 
-
-def _told(asked: PlateAround) -> tuple[PlateTable, RotorShare, bool]:
-    note("Plate's currents ...")
-    begun = perf_counter()
-    with stages("Plate's currents") as watch:
+    def make(watch: Watch) -> tuple[tuple[PlateTable, RotorShare], bool]:
         made, share, found = asked.made(note, watch)
-    note("  from the cache." if found else f"  done in {perf_counter() - begun:.1f} s.")
-    detail(f"  {len(made.rates)} states, estimated relative error {made.errors.total:.1e}.")
-    return made, share, found
+        detail(f"  {len(made.rates)} states, estimated relative error {made.errors.total:.1e}.")
+        return (made, share), found
 
-
-def check_way(scene: Scene, place: Array) -> None:
-    """A conductor of the rotor where the floater, at `place` (3,) m, would levitate is a wrong scene.
-
-    Raises
-    ------
-    InputError : it overlaps the floater
-    """
-    for k, conductor in enumerate(scene.conductors):
-        depth = sphere_overlap(place, scene.floater.radius, conductor.body)
-        if depth > TOUCHING:
-            raise InputError(
-                f"Input rotor.conductors[{k}] must leave the floater's way free; instead it overlaps the floater by "
-                f"{depth * 1e3:.4g} mm where it levitates, at {np.round(place * 1e3, 3).tolist()} mm; make it smaller "
-                "or move it away."
-            )
-
-
-def check_room(scene: Scene, place: Array) -> None:
-    """A plate that leaves a floater at `place` (3,) m no room is a wrong scene.
-
-    Raises
-    ------
-    InputError : it overlaps the floater
-    """
-    depth = sphere_overlap(place, scene.floater.inner_radius, scene.plate.box) if scene.plate else 0.0
-    if scene.plate and depth > TOUCHING:
-        center, levitates = (np.round(c * 1e3, 3).tolist() for c in (scene.plate.box.center, place))
-        raise InputError(
-            f"Input plate.center_mm must leave room for the floater; instead received {center}: the plate overlaps it "
-            f"by {depth * 1e3:.4g} mm where it levitates, at {levitates} mm; move the plate away."
-        )
-
-
-PLATE_WORDS = {
-    "none": "only an obstacle, without eddy currents",
-    "slab": "taken as an infinite slab, {thickness:.4g} mm thick",
-    "reduced": "finite, {size}",
-}
-
-
-AHEAD = 1.0
-"""Of a flight, s, that is looked at beforehand."""
-LOOSER, ROUGHEST = 4.0, 0.1
-"""How much more error a plate's table may have for a large region, and the most; it is said with the result."""
-PLACES = 50
-"""On a flight's way, at which the error by a slab's missing edges is looked at."""
+    made, share = (tables or SharedTables()).table(asked.key, "plate", "Plate's currents", make)
+    return PlateMemory(asked.plate, made, share, model, edges)
 
 
 class Levitation:
@@ -130,7 +133,7 @@ class Levitation:
 
     Parameters
     ----------
-    scene : a scene, or the path of a scene file
+    scene : a scene file's path, or a scene
     models : of the field and of the plate, with their tolerances
     spin : body spin S = Ω·m̂/ω of the equilibria
 
@@ -140,62 +143,21 @@ class Levitation:
     InputError : a model that does not exist, or a tolerance out of range
     """
 
-    def __init__(self, scene: Scene | str | Path, models: Models = Models(), spin: float = 0.0) -> None:
+    def __init__(self, scene: SceneLike, models: Models = Models(), spin: float = 0.0) -> None:
         self.scene = given_scene(scene)
         self.models = models.checked()
         self.spin = finite("spin", spin)
         self.searched = True
         """Whether the equilibria were searched for; else they were carried here from scenes nearby."""
-        self._tables = RotorTables()
-        self._plate_cached = False
-        self._flown: dict[float, Trajectory] = {}
-        self._wider: PlateMemory | None = None
-        self._nearest: Array | None = None
-        self._ahead = 0.0
         self.no_wider = ""
         """Why the plate's table could not be made for where a flight went, if so."""
+        self._tables = SharedTables()
+        self._flown: dict[float, Trajectory] = {}
+        self._wider: PlateMemory | None = None  # the plate's currents for all of a flight's way
+        self._nearest: Array | None = None  # to the plate, of a flight that had begun without its currents
+        self._ahead = 0.0  # duration of the flight that is asked for, s
 
-    @cached_property
-    def interaction(self) -> Interaction:
-        """The rotor's field with what else acts on the floater.
-
-        Raises
-        ------
-        InputError : mutual magnetisation is asked for where it cannot be known, or the floater is a cuboid
-        """
-        self.scene.floater.must_be("sphere", "cylinder", where="where it moves", instead=FORCE_ALONE)
-        return self._with_effects(self.table)
-
-    @cached_property
-    def answers(self) -> tuple[MutualTable | None, str]:
-        """What rotor and floater do to each other's magnetisation, or None; and why."""
-        scene, asked = self.scene, self.models.interaction
-        known, why = mutual_choice(scene, self.table, asked, self.models.rtol)
-        if not known:
-            return None, why
-        return self._tables.answers(scene), why
-
-    def _with_effects(self, table: RotorField) -> Interaction:
-        answers, effects = self.answers[0], interaction_of(table)
-        if answers is not None:
-            effects = effects.joined(Mutual(answers, self.scene.floater.moment))
-        if self.losses is not None:
-            effects = effects.joined(RotorCurrents(self.losses))
-        return with_effects(self.scene, effects)
-
-    @cached_property
-    def losses(self) -> RotorLosses | None:
-        """The losses in the rotor's metal, or None where none has a conductivity.
-
-        Raises
-        ------
-        InputError : the rotor turns too fast for its metal, or the floater is no sphere
-        """
-        pieces = pieces_of(self.scene.rotor, self.scene.conductors)
-        if pieces:
-            self.scene.floater.must_be("sphere", where=BESIDE_METAL, instead=WITHOUT_METAL)
-        check_slow_enough(pieces, self.scene.frequency)
-        return self._tables.losses(self.scene) if pieces else None
+    # Sharing with other scenes
 
     def elsewhere(self, models: Models | None = None, **changes: Any) -> Levitation:
         """Another scene, which shares the tables that fit it; `changes` are fields of `Scene`, SI units."""
@@ -215,10 +177,109 @@ class Levitation:
         """Take over a flight of this duration (s) that was flown together with others."""
         self._flown[duration] = flown
 
+    # The rotor's field and what else acts
+
     @cached_property
     def table(self) -> RotorField:
         """The rotor's field by the model that was asked for; `auto` chooses and says why."""
         return self.field(self.models.model)
+
+    def field(self, model: str) -> RotorField:
+        """The rotor's field by any model, accurate wherever the floater can be: from its radius off the magnets on.
+
+        Raises
+        ------
+        InputError : the map cannot be used
+        """
+        scene, rtol, nearest = self.scene, self.models.rtol, nearest_faces(self.scene.floater)
+        key = partial(field_key, scene, rtol=rtol)
+        name, reason = self._tables.once(f"model {key(model)}", lambda: field_plan(scene, model, rtol))
+        if model == "auto":
+            detail(f"Field model: {name} ({reason})")
+        if name == "fem":
+            make = partial(cached_rotor_table, scene.rotor, name, rtol, note, nearest)
+            return self._tables.table(key(name), name, "Rotor's field by finite elements", make)
+        if name == "map":
+            return self._tables.once(key(name), lambda: _map(scene))
+        return self._tables.once(key(name), lambda: rotor_table(scene.rotor, name, rtol, nearest))
+
+    @cached_property
+    def answers(self) -> tuple[MutualTable | None, str]:
+        """What rotor and floater do to each other's magnetisation, or None; and why."""
+        scene = self.scene
+        known, why = mutual_plan(scene, self.table, self.models)
+        if not known:
+            return None, why
+        title, make = (
+            "Mutual magnetisation of rotor and floater",
+            partial(cached_mutual_table, scene.rotor, scene.floater),
+        )
+        return self._tables.table(mutual_key(scene.rotor, scene.floater), "mutual", title, partial(make, note)), why
+
+    @cached_property
+    def losses(self) -> RotorLosses | None:
+        """The losses in the rotor's metal, or None where none has a conductivity.
+
+        Raises
+        ------
+        InputError : the rotor turns too fast for its metal, or the floater is no sphere
+        """
+        scene, pieces = self.scene, pieces_of(self.scene.rotor, self.scene.conductors)
+        if not pieces:
+            return None
+        scene.floater.must_be("sphere", where=BESIDE_METAL, instead=WITHOUT_METAL)
+        check_slow_enough(pieces, scene.frequency)
+        make = partial(cached_rotor_losses, scene, note)
+        return self._tables.table(losses_key(scene), "rotor losses", "Currents in the rotor's metal", make)
+
+    @cached_property
+    def interaction(self) -> Interaction:
+        """The rotor's field with what else acts on the floater.
+
+        Raises
+        ------
+        InputError : mutual magnetisation is asked for where it cannot be known, or the floater is a cuboid
+        """
+        self.scene.floater.must_be("sphere", "cylinder", where="where it moves", instead=FORCE_ALONE)
+        return self._with_effects(self.table)
+
+    def _with_effects(self, table: RotorField) -> Interaction:
+        answers, effects = self.answers[0], interaction_of(table)
+        if answers is not None:
+            effects = effects.joined(Mutual(answers, self.scene.floater.moment))
+        if self.losses is not None:
+            effects = effects.joined(RotorCurrents(self.losses))
+        return with_effects(self.scene, effects)
+
+    @cached_property
+    def equations_key(self) -> str:
+        """All that decides tables and equations; scenes where it is the same differ in parameters of the motion."""
+        return equations_key(self.scene, self.models)
+
+    @property
+    def rates(self) -> Rates:
+        """The equations of motion in the rotor's field, compiled."""
+        return self._tables.once(f"rates {self.equations_key}", lambda: Rates(self.interaction))
+
+    # What a result says of its models
+
+    @property
+    def from_cache(self) -> list[str]:
+        """Names of the tables that were found in the user's cache."""
+        return list(self._tables.from_cache)
+
+    @property
+    def interaction_model(self) -> str:
+        """ "mutual" where rotor and floater magnetise each other, else "rigid"."""
+        return "rigid" if self.answers[0] is None else "mutual"
+
+    @property
+    def labels(self) -> dict[str, str]:
+        """What a result says of its models."""
+        plate = self.plate.model if self.plate else "none"
+        return {"model": self.table.model, "plate_model": plate, "interaction": self.interaction_model}
+
+    # Equilibria
 
     @cached_property
     def without_plate(self) -> Survey:
@@ -259,78 +320,6 @@ class Levitation:
         return survey(self.scene, table, self.spin, rates=rates, remembered=remembered, watch=watch)
 
     @cached_property
-    def plate(self) -> PlateMemory | None:
-        """The plate's currents around the place where the floater levitates; None where none are modelled.
-
-        Raises
-        ------
-        InputError : the plate leaves the floater no room, or the model does not fit it
-        """
-        scene = self.scene
-        alone = self.absolute or scene.plate is None or not scene.frequency
-        place = self._place(() if alone else self.without_plate.equilibria)
-        if place is not None:
-            check_room(scene, place)
-        nearest = place if self._nearest is None else self._nearest
-        choice = resolve_plate_model(scene, self.models.plate_model, nearest, self.models.plate_rtol, note)
-        if scene.plate is not None:
-            size = scene.plate.box.size
-            said = PLATE_WORDS[choice.model].format(size=millimetre_size(size), thickness=1e3 * min(size))
-            note(f"Plate: {said}")
-            detail(f"Plate model: {choice.model} ({choice.reason})")
-        if choice.model == "none" or scene.plate is None or place is None:
-            return None
-        scene.floater.must_be("sphere", where="over a plate with eddy currents", instead="Choose --plate-model none.")
-        rtol, far = self.models.plate_rtol, self._foreseen() if choice.model == "reduced" else None
-        if far is not None and self.models.plate_model == "auto":
-            edges = f"edges change an infinite slab's response by {far.neglected:.2g} of itself at most"
-            if far.neglected <= ROUGHEST:
-                note(
-                    f"The floater goes so far that finite elements take long; {edges}, which is what is computed. "
-                    "Choose --plate-model fem for the edges."
-                )
-                return far
-            rtol = self._looser
-            note(f"The floater goes so far that finite elements take long, and {edges}: {rtol:.2g} is asked for.")
-        memory, found = plate_memory(
-            scene,
-            scene.plate,
-            choice.model,
-            sources(self.table),
-            place,
-            rtol,
-            choice.edges,
-            self._tables,
-            far.table.region if far else None,
-        )
-        self._plate_cached = found
-        return memory
-
-    def _foreseen(self) -> PlateMemory | None:
-        """An infinite slab for where a flight goes at first, if that is far, and what it misses without edges.
-
-        Its tables take seconds, the finite elements' minutes.
-        """
-        if not self.absolute or not self._ahead:
-            return None
-        note("Where the floater goes, by an infinite slab ...")
-        slab = self.elsewhere(replace(self.models, plate_model="slab"))
-        try:
-            flown = slab.flight(min(self._ahead, AHEAD))
-        except FlightStopped:
-            raise KeyboardInterrupt from None  # it is not the flight that was asked for
-        except SpinlevError:
-            return None  # the plate is no slab for it
-        found = slab._wider
-        if found is None:
-            return None
-        way = _way(found, flown)
-        worst = way[int(np.argmax([edge_error(found.plate, place) for place in way]))]
-        rotor = np.mean([magnet.box.center for magnet in self.scene.rotor], axis=0)
-        edges = cached_edge_error(found.plate, np.array([worst, rotor]), self.scene.frequency, note)
-        return replace(found, neglected=min(1.0, edges))
-
-    @cached_property
     def survey(self) -> Survey:
         """All equilibria free of the bodies, the stable ones first, with the plate where its currents are modelled."""
         found = self.without_plate
@@ -357,6 +346,81 @@ class Levitation:
             raise EquilibriumError(f"At {self.scene.frequency:g} Hz the floater has no equilibrium {with_spin}.")
         return chosen
 
+    # The plate's currents
+
+    @cached_property
+    def plate(self) -> PlateMemory | None:
+        """The plate's currents around the place where the floater levitates; None where none are modelled.
+
+        Raises
+        ------
+        InputError : the plate leaves the floater no room, or the model does not fit it
+        """
+        scene = self.scene
+        alone = self.absolute or scene.plate is None or not scene.frequency
+        place = self._place(() if alone else self.without_plate.equilibria)
+        if place is not None:
+            check_room(scene, place)
+        plan = plate_plan(scene, self.models, place if self._nearest is None else self._nearest)
+        if plan.model == "none" or scene.plate is None or place is None:
+            return None
+        scene.floater.must_be("sphere", where="over a plate with eddy currents", instead="Choose --plate-model none.")
+        far = self._foreseen() if plan.model == "reduced" else None
+        if far is not None:
+            plan = far_plan(plan, self.models, far)
+            if plan.model == "slab":
+                return far
+        return self._plate_memory(place, plan.model, plan.rtol, plan.edges, plan.region)
+
+    def _plate_memory(self, place: Array, model: str, rtol: float, edges: float, region: Region | None) -> PlateMemory:
+        assert self.scene.plate is not None
+        table = sources(self.table)
+        return plate_memory(self.scene, self.scene.plate, model, table, place, rtol, edges, self._tables, region)
+
+    def _foreseen(self) -> PlateMemory | None:
+        """An infinite slab for where a flight goes at first, if that is far, and what it misses without edges.
+
+        Its tables take seconds, the finite elements' minutes.
+        """
+        if not self.absolute or not self._ahead:
+            return None
+        note("Where the floater goes, by an infinite slab ...")
+        slab = self.elsewhere(replace(self.models, plate_model="slab"))
+        try:
+            flown = slab.flight(min(self._ahead, AHEAD))
+        except FlightStopped:
+            raise KeyboardInterrupt from None  # it is not the flight that was asked for
+        except SpinlevError:
+            return None  # the plate is no slab for it
+        found = slab._wider
+        if found is None:
+            return None
+        way = _seen(found.plate, flown)[:: _stride(flown)]
+        worst = way[int(np.argmax([edge_error(found.plate, place) for place in way]))]
+        rotor = np.mean([magnet.box.center for magnet in self.scene.rotor], axis=0)
+        edges = cached_edge_error(found.plate, np.array([worst, rotor]), self.scene.frequency, note)
+        return replace(found, neglected=min(1.0, edges))
+
+    # The flight, which the plate's table follows
+
+    @property
+    def absolute(self) -> bool:
+        """Whether a flight begins where the scene says, and needs no equilibrium."""
+        return isinstance(self.scene.start, AbsoluteStart)
+
+    def _place(self, known: Sequence[Equilibrium]) -> Array | None:
+        """Where the floater levitates, (3,) m: rotor's frame, or the laboratory's if it does not turn with it."""
+        if isinstance(self.scene.start, AbsoluteStart):
+            return self.scene.start.position
+        chosen = _first(known)
+        if chosen is None:
+            return None
+        return chosen.laboratory_position if np.any(self.scene.gravity[:2]) else chosen.position
+
+    @property
+    def _flight_place(self) -> Array | None:
+        return self._place(() if self.absolute else self.equilibria)
+
     @property
     def flight_plate(self) -> PlateMemory | None:
         """The plate's currents as a flight has them: by a table for all of its way, where that about its place ends."""
@@ -368,10 +432,19 @@ class Levitation:
         table = self.table
         if self._wider or self.plate is None or not isinstance(table, RotorTable):
             return table
-        place = self._place(() if self.absolute else self.equilibria)
-        if place is None:
-            return table
-        return rotor_nearby(table, self.scene.rotor, place, self.scene.floater.radius, self.models.rtol)
+        place, scene = self._flight_place, self.scene
+        return (
+            table if place is None else rotor_nearby(table, scene.rotor, place, scene.floater.radius, self.models.rtol)
+        )
+
+    @property
+    def _known_for_flight(self) -> Sequence[Equilibrium]:
+        """The equilibria at which a flight may begin, with the currents of its own table."""
+        if self.absolute:
+            return ()
+        if self._wider is None:
+            return self.equilibria
+        return with_plate(self.scene, self.interaction, self.without_plate, self._wider, self.rates).equilibria
 
     def flight(self, duration: float, checkpoint: Checkpoint | None = None) -> Trajectory:
         """The motion for `duration` (s) from where the scene says, kept in `checkpoint` while it lasts.
@@ -394,90 +467,23 @@ class Levitation:
         if kept is not None and self.plate is not None:
             bounds = self.plate.table.region
             if not np.array_equal(kept["region"], [bounds.lower, bounds.upper]):
-                self._plate_for(Region(*kept["region"]))
+                self._widen(Region(*kept["region"]))
         while True:
-            flown = self._simulated(duration, checkpoint)
+            table, plate, known = self._with_effects(self.flight_table), self.flight_plate, self._known_for_flight
+            note("Motion ...")
+            with progress("Motion") as bar:
+                flown = simulate(self.scene, table, duration, known, progress=bar, memory=plate, checkpoint=checkpoint)
             if flown.left_plate_table:
                 again = self._followed(flown.lab.position[-1], flown.levitated_s)
             else:
                 again = self._plate_matters(flown)
             if not again:
-                return self._with_edges(flown)
+                break
             if checkpoint:
                 checkpoint.remove()
-
-    def _simulated(self, duration: float, checkpoint: Checkpoint | None) -> Trajectory:
-        table, plate, known = self._with_effects(self.flight_table), self.flight_plate, self._known_for_flight
-        note("Motion ...")
-        with progress("Motion") as advance:
-            return simulate(self.scene, table, duration, known, progress=advance, memory=plate, checkpoint=checkpoint)
-
-    @property
-    def _known_for_flight(self) -> Sequence[Equilibrium]:
-        """The equilibria at which a flight may begin, with the currents of its own table."""
-        if self.absolute:
-            return ()
-        if self._wider is None:
-            return self.equilibria
-        return with_plate(self.scene, self.interaction, self.without_plate, self._wider, self.rates).equilibria
-
-    def _followed(self, place: Array, time: float) -> bool:
-        """Whether there is now a plate's table for a floater that left the last one at a place (3,) m at a time, s."""
-        memory, radius = self.flight_plate, self.scene.floater.radius
-        assert memory is not None
-        seen = place + plate_depth(memory.plate, np.array([time])) * [0.0, 0.0, 1.0]
-        body = memory.plate.box.to_body(seen)
-        try:
-            region = wider_region(memory.plate, memory.table.region, radius, body)
-            note(
-                f"After {time:.4g} s the floater leaves the range of the plate's table: again from the start, with a "
-                "larger one."
-            )
-            self._plate_for(region)
-        except SpinlevError as error:
-            self.no_wider = str(error)
-            return False
-        return True
-
-    def _plate_matters(self, flown: Trajectory) -> bool:
-        """Whether a plate that was left out where the flight began can be felt where it went; then it is there now."""
-        plate = self.scene.plate
-        if plate is None or self.plate is not None or self.models.plate_model != "auto" or self._nearest is not None:
-            return False
-        way = flown.lab.position + plate_depth(plate, flown.time)[:, None] * [0.0, 0.0, 1.0]
-        self._nearest = way[int(np.argmin(plate.box.distance(way)))]
-        if resolve_plate_model(self.scene, "auto", self._nearest, self.models.plate_rtol, note).model == "none":
-            return False
-        note("The floater comes so near to the plate that its currents count; it begins anew with them.")
-        del self.plate
-        return True
-
-    def _plate_for(self, region: Region) -> None:
-        """Have the plate's table for a region, plate's frame, with more error than asked for where it must be."""
-        try:
-            self._wider = self._plate_memory(region, self.models.plate_rtol)
-        except AccuracyError:
-            self._wider = self._plate_memory(region, self._looser)
-
-    @property
-    def _looser(self) -> float:
-        return max(self.models.plate_rtol, min(LOOSER * self.models.plate_rtol, ROUGHEST))
-
-    def _plate_memory(self, region: Region, rtol: float) -> PlateMemory:
-        scene, known, place = self.scene, self.plate, self._place(() if self.absolute else self.equilibria)
-        assert scene.plate is not None
-        assert known is not None
-        assert place is not None
-        table = sources(self.table)
-        return plate_memory(scene, scene.plate, known.model, table, place, rtol, known.neglected, self._tables, region)[
-            0
-        ]
-
-    def _with_edges(self, flown: Trajectory) -> Trajectory:
-        """The flight, and the error by a slab's missing edges for where it went."""
-        memory, place = self._wider, self._place(() if self.absolute else self.equilibria)
-        if memory is not None and place is not None and memory.neglected:
-            there = max(edge_error(memory.plate, seen) for seen in _way(memory, flown))
+        memory, place = self._wider, self._flight_place
+        if memory is not None and place is not None and memory.neglected:  # a slab's missing edges, for where it went
+            there = max(edge_error(memory.plate, seen) for seen in _seen(memory.plate, flown)[:: _stride(flown)])
             there /= edge_error(memory.plate, place)
             self._wider = replace(memory, neglected=min(1.0, memory.neglected * max(1.0, there)))
         return flown
@@ -491,57 +497,48 @@ class Levitation:
                 self._followed(begins, 0.0)
         return LiveFlight(self.scene, self._with_effects(self.flight_table), self._known_for_flight, self.flight_plate)
 
-    def field(self, model: str) -> RotorField:
-        """The rotor's field by any model, accurate wherever the floater can be: from its radius off the magnets on."""
-        if model == "map":
-            return self._tables.field(self.scene, model, self.models.rtol)
-        name, reason = self._tables.model(self.scene, model, self.models.rtol)
-        if model == "auto":
-            detail(f"Field model: {name} ({reason})")
-        return self._tables.field(self.scene, name, self.models.rtol)
+    def _followed(self, place: Array, time: float) -> bool:
+        """Whether there is now a plate's table for a floater that left the last one at a place (3,) m at a time, s."""
+        memory = self.flight_plate
+        assert memory is not None
+        body = memory.plate.box.to_body(place + plate_depth(memory.plate, np.array([time])) * UP)
+        try:
+            region = wider_region(memory.plate, memory.table.region, self.scene.floater.radius, body)
+            note(
+                f"After {time:.4g} s the floater leaves the range of the plate's table: again from the start, with a "
+                "larger one."
+            )
+            self._widen(region)
+        except SpinlevError as error:
+            self.no_wider = str(error)
+            return False
+        return True
 
-    @property
-    def from_cache(self) -> list[str]:
-        """Names of the tables that were found in the user's cache."""
-        return [*self._tables.from_cache, *(["plate"] if self._plate_cached else [])]
+    def _plate_matters(self, flown: Trajectory) -> bool:
+        """Whether a plate that was left out where the flight began can be felt where it went; then it is there now."""
+        plate = self.scene.plate
+        if plate is None or self.plate is not None or self.models.plate_model != "auto" or self._nearest is not None:
+            return False
+        way = _seen(plate, flown)
+        self._nearest = way[int(np.argmin(plate.box.distance(way)))]
+        if plate_plan(self.scene, self.models, self._nearest).model == "none":
+            return False
+        note("The floater comes so near to the plate that its currents count; it begins anew with them.")
+        del self.plate
+        return True
 
-    @property
-    def labels(self) -> dict[str, str]:
-        """What a result says of its models."""
-        plate = self.plate.model if self.plate else "none"
-        return {"model": self.table.model, "plate_model": plate, "interaction": self.interaction_model}
-
-    @property
-    def interaction_model(self) -> str:
-        """ "mutual" where rotor and floater magnetise each other, else "rigid"."""
-        return "rigid" if self.answers[0] is None else "mutual"
-
-    @property
-    def rates(self) -> Rates:
-        """The equations of motion in the rotor's field, compiled."""
-        return self._tables.rates(self.equations_key, self.interaction)
-
-    @cached_property
-    def equations_key(self) -> str:
-        """All that decides tables and equations; scenes where it is the same differ in parameters of the motion."""
-        return equations_key(self.scene, self.models)
-
-    @property
-    def absolute(self) -> bool:
-        """Whether a flight begins where the scene says, and needs no equilibrium."""
-        return isinstance(self.scene.start, AbsoluteStart)
-
-    def _place(self, known: Sequence[Equilibrium]) -> Array | None:
-        """Where the floater levitates, (3,) m: rotor's frame, or the laboratory's if it does not turn with it."""
-        if isinstance(self.scene.start, AbsoluteStart):
-            return self.scene.start.position
-        chosen = _first(known)
-        if chosen is None:
-            return None
-        return chosen.laboratory_position if np.any(self.scene.gravity[:2]) else chosen.position
+    def _widen(self, region: Region) -> None:
+        """Have the plate's table for a region, plate's frame, with more error than asked for where it must be."""
+        known, place, rtol = self.plate, self._flight_place, self.models.plate_rtol
+        assert known is not None
+        assert place is not None
+        try:
+            self._wider = self._plate_memory(place, known.model, rtol, known.neglected, region)
+        except AccuracyError:
+            self._wider = self._plate_memory(place, known.model, looser(rtol), known.neglected, region)
 
 
-def given_scene(scene: Scene | str | Path) -> Scene:
+def given_scene(scene: SceneLike) -> Scene:
     """A scene as it is, or from the path of its file. Raises SceneError, and InputError for anything else."""
     if isinstance(scene, Scene):
         return scene
@@ -550,17 +547,27 @@ def given_scene(scene: Scene | str | Path) -> Scene:
     raise InputError(f"Input scene must be a Scene or the path of a scene file; instead received {shown(scene)}.")
 
 
-def _way(memory: PlateMemory, flown: Trajectory) -> Array:
-    """Some places (n, 3) m of a flight as the plate at its start would see them."""
-    depths = plate_depth(memory.plate, flown.time)[:, None] * [0.0, 0.0, 1.0]
-    return np.asarray((flown.lab.position + depths)[:: max(1, len(depths) // PLACES)])
+def sources(table: RotorField) -> RotorTable:
+    """The closed forms and expansions that make a table's field."""
+    return table.expansions if isinstance(table, GriddedTable) else table
+
+
+def _map(scene: Scene) -> GriddedTable:
+    note("Rotor's field from its map ...")
+    table = map_table(scene.field_map, scene.rotor, scene.map_reading)
+    check_files(scene)  # the map may have been replaced since the scene was read
+    return table
+
+
+def _seen(plate: Plate, flown: Trajectory) -> Array:
+    """Places (n, 3) m of a flight as the plate at its start would see them: it may be lowered."""
+    return np.asarray(flown.lab.position + plate_depth(plate, flown.time)[:, None] * UP)
+
+
+def _stride(flown: Trajectory) -> int:
+    return max(1, len(flown.time) // PLACES)
 
 
 def _first(known: Sequence[Equilibrium]) -> Equilibrium | None:
     """The equilibrium at which a flight begins, or else the nearest."""
     return starting_point(known) or next(iter(known), None)
-
-
-def sources(table: RotorField) -> RotorTable:
-    """The closed forms and expansions that make a table's field."""
-    return table.expansions if isinstance(table, GriddedTable) else table

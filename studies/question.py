@@ -25,8 +25,8 @@ from ..geometry.scene.contents import Scene
 from ..geometry.scene.files import changed, scene_digest, scene_keys, scene_text, startless_text
 from .cli.options import Models, Quantity, positive
 from .levitation import Levitation
+from .plan import equations_key, nearest_faces
 from .result import AXIS, found_dataset, variable
-from .rotor import equations_key, nearest_faces
 from .study import Point
 from .words import kind_of_flight
 

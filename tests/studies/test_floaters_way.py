@@ -9,7 +9,7 @@ from article import BALL
 import spinlev as sl
 from spinlev.dynamics.flights.flight import most_like_levitation
 from spinlev.geometry.common import InputError
-from spinlev.studies.levitation import check_way
+from spinlev.studies.plan import check_way
 
 BLOCK = {"size_mm": [4.0, 4.0, 4.0], "center_mm": [0.0, 0.0, -8.0], "conductivity_S_m": 1.4e6}
 

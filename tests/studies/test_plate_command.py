@@ -14,7 +14,7 @@ from spinlev.geometry.scene.contents import Plate
 from spinlev.geometry.scene.files import load_scene
 from spinlev.geometry.shapes import Box, rotation_matrix
 from spinlev.studies.cli.main import app
-from spinlev.studies.levitation import check_room
+from spinlev.studies.plan import check_room
 from spinlev.studies.reaction import MODELS
 
 SetNumThreads(1)

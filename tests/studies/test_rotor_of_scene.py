@@ -6,7 +6,9 @@ import numpy as np
 from places import SCENES
 
 from spinlev.geometry.scene.files import load_scene
-from spinlev.studies.rotor import RotorTables, nearest_faces
+from spinlev.studies.cli.options import Models
+from spinlev.studies.levitation import Levitation
+from spinlev.studies.plan import nearest_faces
 
 SCENE = load_scene(SCENES / "horizontal.toml")
 
@@ -26,7 +28,9 @@ def test_a_table_is_made_for_the_radius_or_up_to_a_twelfth_less():
 
 
 def test_floaters_of_about_one_size_have_one_table():
-    tables = RotorTables()
-    near, same, other = (tables.field(of_radius(radius), "cuboid", 3e-6) for radius in (6.0e-3, 6.3e-3, 6.4e-3))
+    first, *more = (Levitation(of_radius(radius), Models("cuboid")) for radius in (6.0e-3, 6.3e-3, 6.4e-3))
+    for one in more:
+        one.share(first)
+    near, same, other = (one.table for one in (first, *more))
     assert near is same
     assert near is not other

@@ -1,0 +1,160 @@
+"""Which models a scene's motion is computed by, each with its reason, and what decides the tables that it needs.
+
+The rotor's field is the cheapest that meets the tolerance (`resolve_model`); rotor and floater magnetise each other
+where that matters at this tolerance (`mutual_choice`); the plate is an obstacle, an infinite slab or the network of the
+finite elements (`resolve_plate_model`), for the neighbourhood of the place where the floater levitates or, thrown from
+far off, for all of its way.
+"""
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..dynamics.motion.effects import mutual_choice
+from ..dynamics.motion.plate import PlateMemory
+from ..fem.maps_of_B.table import GriddedTable
+from ..fem.mutual.making import mutual_key
+from ..fem.plate.choice import resolve_plate_model
+from ..fem.plate.region import Region
+from ..fem.rotor.choice import resolve_model, rotor_key
+from ..fem.rotor.table import RotorTable
+from ..fem.rotor_metal import losses_key, pieces_of
+from ..geometry.common import Array, InputError, millimetre_size
+from ..geometry.overlap import TOUCHING, sphere_overlap
+from ..geometry.scene.contents import Floater, Scene
+from ..geometry.scene.files import map_digest
+from .cli.console import detail, note
+from .cli.options import Models
+
+RotorField = RotorTable | GriddedTable
+"""A rotor's table: computed, or from a map."""
+ARTICLE_RADIUS, STEP = 6.35e-3, 2 ** (1 / 8)
+"""Radii for which tables are made: that of the article's floater, m, and so many times the one before."""
+LOOSER, ROUGHEST = 4.0, 0.1
+"""How much more error a plate's table may have for a large region, and the most; it is said with the result."""
+PLATE_WORDS = {
+    "none": "only an obstacle, without eddy currents",
+    "slab": "taken as an infinite slab, {thickness:.4g} mm thick",
+    "reduced": "finite, {size}",
+}
+
+
+def field_plan(scene: Scene, asked: str, rtol: float) -> tuple[str, str]:
+    """The model of the rotor's field, and why it is taken: the measured map if that is asked for."""
+    return (
+        ("map", "as asked") if asked == "map" else resolve_model(scene.rotor, asked, rtol, nearest_faces(scene.floater))
+    )
+
+
+def mutual_plan(scene: Scene, table: RotorField, models: Models) -> tuple[bool, str]:
+    """Whether rotor and floater magnetise each other in the motion, and why. Raises InputError as `mutual_choice`."""
+    return mutual_choice(scene, table, models.interaction, models.rtol)
+
+
+@dataclass(frozen=True, eq=False)
+class PlatePlan:
+    """A plate's model in the motion and what is asked of its table.
+
+    Parameters
+    ----------
+    model : "none", "slab" or "reduced"
+    edges : relative error by edges that the model leaves out
+    rtol : relative accuracy of the table
+    region : where the floater may be, in the frame of the plate; None: near the place where it levitates
+    """
+
+    model: str
+    edges: float
+    rtol: float
+    region: Region | None = None
+
+
+def plate_plan(scene: Scene, models: Models, place: Array | None) -> PlatePlan:
+    """The plate's model for a floater that comes to a place (3,) m, told with its reason."""
+    choice = resolve_plate_model(scene, models.plate_model, place, models.plate_rtol, note)
+    if scene.plate is not None:
+        size = scene.plate.box.size
+        said = PLATE_WORDS[choice.model].format(size=millimetre_size(size), thickness=1e3 * min(size))
+        note(f"Plate: {said}")
+        detail(f"Plate model: {choice.model} ({choice.reason})")
+    return PlatePlan(choice.model, choice.edges, models.plate_rtol)
+
+
+def far_plan(plan: PlatePlan, models: Models, slab: PlateMemory) -> PlatePlan:
+    """The plan for all of a way that an infinite slab has foreseen, whose error by edges is `slab.neglected`.
+
+    For so large a region the finite elements take minutes: the slab does where its edges matter little, else they are
+    asked for less accuracy.
+    """
+    region = slab.table.region
+    if models.plate_model != "auto":
+        return replace(plan, region=region)
+    edges = f"edges change an infinite slab's response by {slab.neglected:.2g} of itself at most"
+    if slab.neglected <= ROUGHEST:
+        note(
+            f"The floater goes so far that finite elements take long; {edges}, which is what is computed. "
+            "Choose --plate-model fem for the edges."
+        )
+        return PlatePlan("slab", slab.neglected, models.plate_rtol, region)
+    rtol = looser(models.plate_rtol)
+    note(f"The floater goes so far that finite elements take long, and {edges}: {rtol:.2g} is asked for.")
+    return PlatePlan(plan.model, plan.edges, rtol, region)
+
+
+def looser(rtol: float) -> float:
+    """The accuracy asked of a plate's table for a region in which `rtol` takes too long."""
+    return max(rtol, min(LOOSER * rtol, ROUGHEST))
+
+
+def nearest_faces(floater: Floater) -> float:
+    """Distance from the magnets' faces from which on a table is to be accurate, m.
+
+    The floater's radius or up to a twelfth less, so that floaters between the same two steps share the rotor's table.
+    """
+    steps = math.floor(math.log(floater.radius / ARTICLE_RADIUS) / math.log(STEP) + 1e-9)
+    return ARTICLE_RADIUS * STEP**steps
+
+
+def field_key(scene: Scene, model: str, rtol: float) -> str:
+    """All that decides the rotor's field: also the content of its map, and how that is read."""
+    known = rotor_key(scene.rotor, model, rtol, nearest_faces(scene.floater))
+    return f"{known} {map_digest(scene)} {scene.map_reading}"
+
+
+def equations_key(scene: Scene, models: Models) -> str:
+    """All that decides a scene's tables and equations of motion without plate; what it leaves out are parameters."""
+    floater, body = scene.floater, scene.floater.body
+    shape = "" if body is None else f"{floater.shape} {body.shape_numbers.tolist()} {floater.recoil_permeability!r}"
+    return " ".join(
+        (
+            field_key(scene, models.model, models.rtol),
+            f"{bool(floater.conductivity)} {scene.drag.air} {models.interaction}",
+            "" if models.interaction == "rigid" else mutual_key(scene.rotor, floater),
+            losses_key(scene) if pieces_of(scene.rotor, scene.conductors) else "",
+            shape,
+        )
+    )
+
+
+def check_way(scene: Scene, place: Array) -> None:
+    """A conductor of the rotor where the floater, at `place` (3,) m, would levitate is a wrong scene: InputError."""
+    for k, conductor in enumerate(scene.conductors):
+        depth = sphere_overlap(place, scene.floater.radius, conductor.body)
+        if depth > TOUCHING:
+            raise InputError(
+                f"Input rotor.conductors[{k}] must leave the floater's way free; instead it overlaps the floater by "
+                f"{depth * 1e3:.4g} mm where it levitates, at {np.round(place * 1e3, 3).tolist()} mm; make it smaller "
+                "or move it away."
+            )
+
+
+def check_room(scene: Scene, place: Array) -> None:
+    """A plate that leaves a floater at `place` (3,) m no room is a wrong scene: InputError."""
+    depth = sphere_overlap(place, scene.floater.inner_radius, scene.plate.box) if scene.plate else 0.0
+    if scene.plate and depth > TOUCHING:
+        center, levitates = (np.round(c * 1e3, 3).tolist() for c in (scene.plate.box.center, place))
+        raise InputError(
+            f"Input plate.center_mm must leave room for the floater; instead received {center}: the plate overlaps it "
+            f"by {depth * 1e3:.4g} mm where it levitates, at {levitates} mm; move the plate away."
+        )
