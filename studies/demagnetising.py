@@ -1,27 +1,50 @@
 """Whether a scene's magnets demagnetise: the field along their easy axes, with the floater where it levitates."""
 
 from collections.abc import Mapping
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import xarray as xr
 
-from ..dynamics.equilibria.equilibrium import Equilibrium, EquilibriumError
+from ..dynamics.equilibria.equilibrium import EquilibriumError
 from ..dynamics.flights.flight import most_like_levitation
 from ..fem.files import write_whole
-from ..fem.rotor.working_point import EasyField, WorkingPoint, easy_axis, working_points
+from ..fem.rotor.working_point import EasyField, easy_axis, working_points
 from ..geometry.common import InputError
-from ..geometry.magnets import Magnet
-from ..geometry.scene.contents import Floater
 from .cli.console import note, to_json
 from .figures.run import working_point_figure
 from .figures.style import save_figures
 from .levitation import Levitation
-from .result import AXIS, variable, write_dataset
+from .result import AXIS, Columns, columns, write_dataset
 
 STEPS, LEVELS = 101, 201
 """Points across a section; levels of the field that are kept of a magnet."""
+OF_A_POINT: Columns = {
+    "lowest": (("magnet",), "T", "lowest μ0 H along the easy axis"),
+    "place": (("magnet", "axis"), "m", "where it is lowest"),
+    "error": (("magnet",), "T", "estimated error of the lowest"),
+    "lowest_turning": (("magnet",), "T", "lowest, the rotor turning past the floater"),
+    "clear": (("magnet",), "m", "distance from edges that the lowest keeps"),
+    "knee": (("magnet",), "T", "knee of the demagnetisation curve"),
+    "share_below": (("magnet",), "1", "share of the volume below the knee"),
+    "share_error": (("magnet",), "1", "estimated error of the share"),
+}
+OF_A_SECTION: Columns = {
+    "section": (("magnet", "v", "u"), "T", "μ0 H along the easy axis"),
+    "along": (("magnet", "u"), "m", "along the easy axis, from the centre"),
+    "across": (("magnet", "v"), "m", "across the easy axis"),
+    "across_axis": (("magnet", "axis"), "1", "unit vector of `across`"),
+}
+COLUMNS: Columns = {
+    **OF_A_POINT,
+    **OF_A_SECTION,
+    "levels": (("magnet", "level"), "T", "μ0 H along the easy axis"),
+    "easy_axis": (("magnet", "axis"), "1", "easy axis"),
+    "center": (("magnet", "axis"), "m", "centre"),
+    "floater": (("axis",), "m", "place of the floater"),
+}
 
 
 def working_point_dataset(levitation: Levitation) -> xr.Dataset:
@@ -37,69 +60,40 @@ def working_point_dataset(levitation: Levitation) -> xr.Dataset:
         raise InputError(
             "Input rotor must have a magnet with a polarisation, whose working point is asked for; instead none has."
         )
-    place = _floating(levitation)
+    floating = None
+    if scene.floater.shape == "cuboid":
+        note("The magnets alone: where a cuboid floats is not known.")
+    else:
+        with suppress(EquilibriumError):  # without one the magnets are alone
+            floating = most_like_levitation(levitation.without_plate.equilibria)
     note("Field in the magnets ...")
-    field = EasyField(scene.rotor, None if place is None else _ball(scene.floater, place))
+    start = None if floating is None else floating.start
+    field = EasyField(scene.rotor, None if start is None else scene.floater.magnet(start.position, start.moment))
     known = working_points(field)
     found = [(k, point) for k in numbers if (point := known[k]) is not None]
     sections = [field.section(k, point.place, STEPS) for k, point in found]
+    shares = np.linspace(0, 1, LEVELS)
+    values = {
+        **{name: [_or_nan(getattr(point, name)) for _, point in found] for name in OF_A_POINT},
+        "levels": [np.quantile(point.levels, shares) for _, point in found],
+        **{name: [section[n] for section in sections] for n, name in enumerate(OF_A_SECTION)},
+        "easy_axis": [easy_axis(scene.rotor[k]) for k in numbers],
+        "center": [scene.rotor[k].body.center for k in numbers],
+        "floater": np.full(3, np.nan) if start is None else start.position,
+    }
     return xr.Dataset(
-        _values([point for _, point in found])
-        | {
-            "section": variable(("magnet", "v", "u"), [s[0] for s in sections], "T", "μ0 H along the easy axis"),
-            "along": variable(("magnet", "u"), [s[1] for s in sections], "m", "along the easy axis, from the centre"),
-            "across": variable(("magnet", "v"), [s[2] for s in sections], "m", "across the easy axis"),
-            "across_axis": variable(("magnet", "axis"), [s[3] for s in sections], "1", "unit vector of `across`"),
-            "easy_axis": variable(("magnet", "axis"), [easy_axis(scene.rotor[k]) for k in numbers], "1", "easy axis"),
-            "center": variable(("magnet", "axis"), [scene.rotor[k].body.center for k in numbers], "m", "centre"),
-            "floater": variable(
-                ("axis",), np.full(3, np.nan) if place is None else place.start.position, "m", "place of the floater"
-            ),
-        },
+        columns(COLUMNS, values),
         {
             "magnet": ("magnet", np.array(numbers) + 1),
             "axis": list(AXIS),
-            "share": ("level", np.linspace(0, 1, LEVELS), {"units": "1", "long_name": "share of the volume"}),
+            "share": ("level", shares, {"units": "1", "long_name": "share of the volume"}),
         },
         {"title": "Field along the easy axes of the rotor's magnets, rotor's frame"},
     )
 
 
-def _values(points: list[WorkingPoint]) -> dict[str, xr.Variable]:
-    shares = np.linspace(0, 1, LEVELS)
-
-    def each(name: str, units: str, label: str) -> xr.Variable:
-        values = [np.nan if getattr(p, name) is None else getattr(p, name) for p in points]
-        return variable(("magnet", "axis")[: 1 + np.ndim(values[0])], values, units, label)
-
-    return {
-        "lowest": each("lowest", "T", "lowest μ0 H along the easy axis"),
-        "place": each("place", "m", "where it is lowest"),
-        "error": each("error", "T", "estimated error of the lowest"),
-        "lowest_turning": each("lowest_turning", "T", "lowest, the rotor turning past the floater"),
-        "clear": each("clear", "m", "distance from edges that the lowest keeps"),
-        "knee": each("knee", "T", "knee of the demagnetisation curve"),
-        "share_below": each("share_below", "1", "share of the volume below the knee"),
-        "share_error": each("share_error", "1", "estimated error of the share"),
-        "levels": variable(
-            ("magnet", "level"), [np.quantile(p.levels, shares) for p in points], "T", "μ0 H along the easy axis"
-        ),
-    }
-
-
-def _floating(levitation: Levitation) -> Equilibrium | None:
-    """Where the floater levitates, or nearly does; None where it has no equilibrium, and for a cuboid."""
-    if levitation.scene.floater.shape == "cuboid":
-        note("The magnets alone: where a cuboid floats is not known.")
-        return None
-    try:
-        return most_like_levitation(levitation.without_plate.equilibria)
-    except EquilibriumError:
-        return None
-
-
-def _ball(floater: Floater, place: Equilibrium) -> Magnet:
-    return floater.magnet(place.start.position, place.start.moment)
+def _or_nan(value: Any) -> Any:
+    return np.nan if value is None else value
 
 
 def working_point_answer(found: xr.Dataset) -> dict[str, Any]:

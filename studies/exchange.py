@@ -1,4 +1,4 @@
-"""The figure of a map of the field on a plane."""
+"""Fields for other programs: B, H, M and J about the bodies as VTU, and maps of the field on a plane."""
 
 from __future__ import annotations
 
@@ -19,7 +19,6 @@ from ..fem.rotor.choice import rotor_table
 from ..fem.rotor.near_field import near_field
 from ..geometry.common import MU_0, Array, InputError
 from ..geometry.scene.contents import AbsoluteStart, Scene
-from ..geometry.shapes import Box
 from .cli.console import note
 from .cli.options import Models
 from .figures.pictures import plate_currents
@@ -99,24 +98,37 @@ def export_job(scene: Scene, asked: Models, path: Path) -> tuple[Mapping[str, An
         raise InputError(f"Input OUT must end in .vtu; instead received {path}.")
     levitation = Levitation(scene, asked)
     state = _floater_state(levitation)
-    about, cells = _grid(*_bounds(scene, state), STEPS)
+    corners = [magnet.box.corners for magnet in scene.rotor]
+    if state is not None:
+        corners += [state.position[None] + s * scene.floater.radius for s in (-1, 1)]
+    together = np.concatenate(corners)
+    lower, upper = together.min(axis=0) - MARGIN, together.max(axis=0) + MARGIN
+    counts = np.maximum(2, np.round(STEPS * (upper - lower) / (upper - lower).max()).astype(int))
+    about, cells = _lattice([np.linspace(lower[k], upper[k], counts[k]) for k in range(3)])
     parts = [(about, cells, _fields(levitation, state, about))]
     if scene.plate is not None and scene.frequency and state is not None:
         note("Currents in the plate ...")
-        inside, cells = _plate_grid(scene.plate.box)
+        box = scene.plate.box
+        # A little inside the faces, where the current is known from within.
+        edges = [np.linspace(-0.499, 0.499, n) * size for n, size in zip(PLATE_STEPS, box.size, strict=True)]
+        body, cells = _lattice(edges)
+        inside = box.center + body @ box.rotation.T
         current = plate_currents(scene, scene.plate, sources(levitation.table), state, inside)
         data = _fields(levitation, state, inside)
         parts.append((inside, cells, {**data, "J": current, "body": np.full(len(inside), PLATE)}))
-    _write(path, parts)
-    count = sum(len(points) for points, _, _ in parts)
+    points = np.concatenate([points for points, _, _ in parts])
+    starts = np.cumsum([0, *(len(points) for points, _, _ in parts)])
+    joined = np.concatenate([part + start for start, (_, part, _) in zip(starts, parts, strict=False)])
+    data = {name: np.concatenate([part[name] for _, _, part in parts]) for name in parts[0][2]}
+    _write_grid(path, meshio.Mesh(points, [("hexahedron", joined)], point_data=data))
     values = {
         "model": levitation.table.model,
         "error_estimate": closed_form_error(scene.rotor),
         "file": str(path),
-        "points": count,
+        "points": len(points),
         "floater": state is not None,
     }
-    return values, [f"B, H, M and J at {count} points in {path}"]
+    return values, [f"B, H, M and J at {len(points)} points in {path}"]
 
 
 def _floater_state(levitation: Levitation) -> State | None:
@@ -131,34 +143,13 @@ def _floater_state(levitation: Levitation) -> State | None:
     return known.equilibria[0].start
 
 
-def _bounds(scene: Scene, state: State | None) -> tuple[Array, Array]:
-    corners = [magnet.box.corners for magnet in scene.rotor]
-    if state is not None:
-        corners += [state.position[None] + s * scene.floater.radius for s in (-1, 1)]
-    together = np.concatenate(corners)
-    return together.min(axis=0) - MARGIN, together.max(axis=0) + MARGIN
-
-
-def _grid(lower: Array, upper: Array, steps: int) -> tuple[Array, Array]:
-    """Points (n, 3) m of a grid with cubic cells, and the cells."""
-    counts = np.maximum(2, np.round(steps * (upper - lower) / (upper - lower).max()).astype(int))
-    return _lattice([np.linspace(lower[k], upper[k], counts[k]) for k in range(3)])
-
-
-def _plate_grid(box: Box) -> tuple[Array, Array]:
-    """Points a little inside the plate's faces, where the current is known from within."""
-    body, cells = _lattice(
-        [np.linspace(-0.499, 0.499, n) * size for n, size in zip(PLATE_STEPS, box.size, strict=True)]
-    )
-    return box.center + body @ box.rotation.T, cells
-
-
 def _lattice(axes: list[Array]) -> tuple[Array, Array]:
-    shape = tuple(len(axis) for axis in axes)
-    points = np.stack(np.meshgrid(*axes, indexing="ij"), -1).reshape(-1, 3)
+    """Points (n, d) of a grid, the last coordinate fastest, and its cells: the corners of quadrangles or hexahedra."""
+    shape, d = tuple(len(axis) for axis in axes), len(axes)
+    points = np.stack(np.meshgrid(*axes, indexing="ij"), -1).reshape(-1, d)
     numbers = np.arange(len(points)).reshape(shape)
-    corner = [tuple(slice(c, n - 1 + c) for c, n in zip(place, shape, strict=True)) for place in CORNERS]
-    return points, np.stack([numbers[part].ravel() for part in corner], axis=1)
+    ends = [tuple(slice(c, n - 1 + c) for c, n in zip(corner, shape, strict=False)) for corner in CORNERS[: 2**d]]
+    return points, np.stack([numbers[part].ravel() for part in ends], axis=1)
 
 
 def _fields(levitation: Levitation, state: State | None, points: Array) -> dict[str, Array]:
@@ -181,16 +172,7 @@ def _fields(levitation: Levitation, state: State | None, points: Array) -> dict[
     return {"B": MU_0 * (h + magnetization), "H": h, "M": magnetization, "J": np.zeros_like(points), "body": body}
 
 
-def _write(path: Path, parts: list[tuple[Array, Array, dict[str, Array]]]) -> None:
-    """One file of all grids."""
-    starts = np.cumsum([0, *(len(points) for points, _, _ in parts)])
-    cells = np.concatenate([part + start for start, (_, part, _) in zip(starts, parts, strict=False)])
-    data = {name: np.concatenate([part[name] for _, _, part in parts]) for name in parts[0][2]}
-    mesh = meshio.Mesh(np.concatenate([points for points, _, _ in parts]), [("hexahedron", cells)], point_data=data)
-    write_grids(path, mesh)
-
-
-def write_grids(path: Path, mesh: meshio.Mesh) -> None:
+def _write_grid(path: Path, mesh: meshio.Mesh) -> None:
     """Write a mesh as VTU; the file is whole or absent."""
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "fields.vtu"
@@ -236,7 +218,11 @@ def field_map_job(
 def field_map(scene: Scene, plane: str, extent: Array | None, offset: float, steps: int) -> xr.Dataset:
     """The field of every model on a plane, as `field_map_job` writes it."""
     along, up, across = PLANES[plane]
-    left, right, lower, upper = _around(scene, along, up) if extent is None else extent
+    if extent is None:  # a square about the rotor, twice its size
+        corners = np.concatenate([magnet.body.corners for magnet in scene.rotor])[:, [along, up]]
+        middle, half = (corners.max(axis=0) + corners.min(axis=0)) / 2, np.ptp(corners, axis=0).max()
+        extent = np.array([middle[0] - half, middle[0] + half, middle[1] - half, middle[1] + half])
+    left, right, lower, upper = extent
     size = max(right - left, upper - lower) / (steps - 1)
     u = np.linspace(left, right, max(2, round((right - left) / size) + 1))
     v = np.linspace(lower, upper, max(2, round((upper - lower) / size) + 1))
@@ -277,13 +263,6 @@ def field_map(scene: Scene, plane: str, extent: Array | None, offset: float, ste
     )
 
 
-def _around(scene: Scene, along: int, up: int) -> Array:
-    """A square (4,) m about the rotor, twice its size."""
-    corners = np.concatenate([magnet.body.corners for magnet in scene.rotor])[:, [along, up]]
-    middle, half = (corners.max(axis=0) + corners.min(axis=0)) / 2, np.ptp(corners, axis=0).max()
-    return np.array([middle[0] - half, middle[0] + half, middle[1] - half, middle[1] + half])
-
-
 def _dipoles(scene: Scene, places: Array) -> Array:
     """B (n, 3) T of the magnets' dipoles, also where the magnets are; NaN at the dipoles themselves."""
     dipoles = rotor_table(scene.rotor, "dipole").expansions
@@ -294,16 +273,13 @@ def _dipoles(scene: Scene, places: Array) -> Array:
 
 
 def _write_vtu(found: xr.Dataset, path: Path, plane: str, offset: float) -> None:
-    along, up, across = PLANES[plane]
-    u, v = found["u"].values, found["v"].values
-    points = np.zeros((len(v) * len(u), 3))
-    points[:, along], points[:, up], points[:, across] = np.tile(u, len(v)), np.repeat(v, len(u)), offset
-    number = np.arange(len(points)).reshape(len(v), len(u))
-    corners = (number[:-1, :-1], number[:-1, 1:], number[1:, 1:], number[1:, :-1])
-    cells = np.stack([corner.ravel() for corner in corners], axis=1)
+    along, up, _ = PLANES[plane]
+    places, cells = _lattice([found["v"].values, found["u"].values])
+    points = np.full((len(places), 3), offset)
+    points[:, up], points[:, along] = places.T
     data: dict[str, Array] = {"error": found["error"].values.ravel(), "magnet": found["magnet"].values.ravel()}
     for model in MODELS:
         chosen = found.sel(model=model)
         data |= {f"{name}_{model}": chosen[name].values.reshape(-1, 3) for name in "BHM"}
         data[f"difference_{model}"] = chosen["difference"].values.ravel()
-    write_grids(path, meshio.Mesh(points, [("quad", cells)], point_data=data))
+    _write_grid(path, meshio.Mesh(points, [("quad", cells)], point_data=data))

@@ -74,17 +74,18 @@ def from_magpylib(
     sources = list(_sources(collection))
     if not sources:
         raise InputError("Input collection must hold at least one magnet; instead it is empty.")
-    found = _joined([_magnet(source) for source in sources])
     parts = Path(folder) if folder else cache_folder() / "parts"
-    cavities = _cavities(found)
-    return dict(
-        magnets(
-            *(
-                {**_keys(magnet, inside, parts), "recoil_permeability": float(recoil_permeability)}
-                for magnet, inside in cavities
-            )
-        )
-    )
+    tables = [
+        {
+            **_shape(magnet, cavities, parts),
+            "center_mm": _listed(1e3 * magnet.body.center),
+            "rotation_deg": _listed(rotation_angles(magnet.body.rotation)),
+            "polarization_T": _listed(magnet.polarization),
+            "recoil_permeability": float(recoil_permeability),
+        }
+        for magnet, cavities in _cavities(_joined([_magnet(source) for source in sources]))
+    ]
+    return dict(magnets(*tables))
 
 
 @dataclass(frozen=True)
@@ -174,14 +175,11 @@ def _joined(found: Sequence[_Magnet]) -> list[_Magnet]:
         if isinstance(first.body, Segment):
             others = [other for other in left if _same_ring(first, other)]
             turns = sorted(_angles(first.body, one.body) for one in (first, *others))  # type: ignore[arg-type]
-            ends = [end % 360 for _, end in turns]
-            begins = [start % 360 for start, _ in turns[1:] + turns[:1]]
-            meet = all(
-                abs((end - begin + 180) % 360 - 180) < SAME_ANGLE for end, begin in zip(ends, begins, strict=True)
-            )
-            if others and meet and abs(sum(end - start for start, end in turns) - 360) < SAME_ANGLE:
-                whole = replace(first.body, start=0.0, end=360.0)
-                first = replace(first, body=_ring(whole))
+            ends, begins = np.array([end for _, end in turns]), np.roll([start for start, _ in turns], -1)
+            gaps = (ends - begins + 180) % 360 - 180
+            whole = abs(sum(end - start for start, end in turns) - 360) < SAME_ANGLE
+            if others and whole and np.abs(gaps).max() < SAME_ANGLE:
+                first = replace(first, body=_ring(replace(first.body, start=0.0, end=360.0)))
                 left = [other for other in left if not any(other is one for one in others)]
         joined.append(first)
     return joined
@@ -204,8 +202,8 @@ def _angles(frame: Segment, segment: Segment) -> tuple[float, float]:
     """Where a segment of the same axis begins and ends about that of a frame, degrees; it begins within a turn."""
     turn = frame.rotation.T @ segment.rotation
     start = segment.start + float(np.degrees(np.arctan2(turn[1, 0], turn[0, 0])))
-    start_within = round(start % 360, 9) % 360
-    return start_within, start_within + segment.end - segment.start
+    start = round(start % 360, 9) % 360
+    return start, start + segment.end - segment.start
 
 
 def _alike(one: Array, other: Array) -> bool:
@@ -248,17 +246,6 @@ def _bored(outer: Body, inner: Body) -> Ring | None:
     return Ring(outer.radius, inner.radius, outer.height, outer.center, outer.rotation)
 
 
-def _keys(magnet: _Magnet, cavities: Sequence[Body], folder: Path) -> dict[str, Any]:
-    """A table `[[rotor.magnets]]`, but for its permeability."""
-    body = magnet.body
-    return {
-        **(_file(magnet, cavities, folder) if cavities or isinstance(body, Segment | Facets) else _shape(body)),
-        "center_mm": _listed(1e3 * body.center),
-        "rotation_deg": _listed(rotation_angles(body.rotation)),
-        "polarization_T": _listed(magnet.polarization),
-    }
-
-
 def _file(magnet: _Magnet, cavities: Sequence[Body], folder: Path) -> dict[str, Any]:
     """The file of a magnet, written if it is not there; its name tells its content."""
     try:
@@ -274,8 +261,11 @@ def _file(magnet: _Magnet, cavities: Sequence[Body], folder: Path) -> dict[str, 
     return {"file": str(path)}
 
 
-def _shape(body: Solid) -> dict[str, Any]:
-    """The keys of a shape, mm."""
+def _shape(magnet: _Magnet, cavities: Sequence[Body], folder: Path) -> dict[str, Any]:
+    """The keys of a shape, mm; of what has no keys, or a cavity, the file in a folder."""
+    body = magnet.body
+    if cavities or isinstance(body, Segment | Facets):
+        return _file(magnet, cavities, folder)
     if isinstance(body, Sphere):
         return {"shape": "sphere", "diameter_mm": 2e3 * body.radius}
     if isinstance(body, Box):
@@ -310,10 +300,19 @@ def to_magpylib(table: RotorTable) -> Any:
         turn = Rotation.from_matrix(magnet.body.rotation)
         pose = {"position": magnet.body.center, "orientation": turn, "polarization": magnet.polarization}
         sources.append(_source(magnet.body, pose))
-    if table.expansions:
-        rest = RotorTable(table.model, table.magnets, (), table.expansions)
-        sources.append(magpylib.misc.CustomSource(field_func=_Field(rest)))
-    return magpylib.Collection(*sources)
+    if not table.expansions:
+        return magpylib.Collection(*sources)
+    rest = RotorTable(table.model, table.magnets, (), table.expansions)
+
+    def field(field: str, observers: Array) -> Array | None:
+        if field not in ("B", "H"):  # magpylib may also ask for J and M
+            return None
+        points = np.asarray(observers, float).reshape(-1, 3)
+        found, known = np.full(points.shape, np.nan), rest.in_range(points)
+        found[known] = rest.evaluate(points[known])[0]
+        return found if field == "B" else found / MU_0
+
+    return magpylib.Collection(*sources, magpylib.misc.CustomSource(field_func=field))
 
 
 def _source(body: Solid, pose: dict[str, Any]) -> Any:
@@ -326,19 +325,3 @@ def _source(body: Solid, pose: dict[str, Any]) -> Any:
     if isinstance(body, Cylinder):
         return magpylib.magnet.Cylinder(dimension=(2 * body.radius, body.height), **pose)
     return magpylib.magnet.Cuboid(dimension=body.size, **pose)
-
-
-class _Field:
-    """A table's B (T) and H (A/m) outside the magnets, as magpylib asks for them."""
-
-    def __init__(self, table: RotorTable) -> None:
-        self.table = table
-
-    def __call__(self, field: str, observers: Array) -> Array | None:
-        """(n, 3) at `observers` (n, 3) m; None for what magpylib may also ask of a source, J and M."""
-        if field not in ("B", "H"):
-            return None
-        points = np.asarray(observers, float).reshape(-1, 3)
-        found, known = np.full(points.shape, np.nan), self.table.in_range(points)
-        found[known] = self.table.evaluate(points[known])[0]
-        return found if field == "B" else found / MU_0

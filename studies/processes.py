@@ -52,20 +52,6 @@ class NoProcessError(ComputationError):
     """The system lets no process begin; the message says why."""
 
 
-@dataclass(frozen=True)
-class _Ready:
-    program: str
-
-
-@dataclass(frozen=True)
-class _Raised:
-    text: str
-
-
-class _Done:
-    """A job has no more results."""
-
-
 def program() -> str:
     """What tells this version of the program from any other."""
     return program_digest()
@@ -94,41 +80,45 @@ def results(number: int, jobs: deque[Job]) -> Generator[tuple[Job, Any], None, N
                 except OSError as error:  # too many open files or processes, too little memory
                     number = _fewer(len(busy), str(error))
                     break
-                job = jobs.popleft()
-                process.send(job)
+                process.send(job := jobs.popleft())
                 busy[process.connection] = process, job
             for connection in wait(list(busy)):
-                assert isinstance(connection, Connection)
-                process, job = busy[connection]
-                message = process.receive()
-                if isinstance(message, _Ready):
+                process, job = busy[connection]  # type: ignore[index]
+                kind, content = process.receive()
+                if kind in ("death", "done"):
+                    del busy[process.connection]
+                if kind == "ready":
                     process.ready = True
-                    if message.program != program():
+                    if content != program():
                         raise ComputationError(
                             "The program was changed while it computed: what is finished is kept; begin again."
                         )
-                    continue
-                if isinstance(message, _Raised):
-                    raise ComputationError(f"A process of this sweep failed: {message.text}.")
-                if isinstance(message, Death) and not process.ready:
-                    del busy[connection]
-                    process.stop()
-                    jobs.appendleft(job)
-                    number = _fewer(len(busy), f"it {message}")
-                    continue
-                if isinstance(message, Death):
-                    del busy[connection]
-                    process.stop()
-                if isinstance(message, _Done):
-                    del busy[connection]
+                elif kind == "raised":
+                    raise ComputationError(f"A process of this sweep failed: {content}.")
+                elif kind == "done":
                     free.append(process)
+                elif kind == "result":
+                    yield job, content
                 else:
-                    yield job, message
+                    process.stop()
+                    if process.ready:
+                        yield job, content
+                    else:  # no death of its job, which it had not begun
+                        jobs.appendleft(job)
+                        number = _fewer(len(busy), f"it {content}")
     finally:
-        for process in [*free, *(process for process, _ in busy.values())]:
-            process.end()
-        for process in [*free, *(process for process, _ in busy.values())]:
+        left = [*free, *(process for process, _ in busy.values())]
+        for process in left:  # all are asked before the first is waited for
+            process.terminate()
+        for process in left:
             process.stop()
+
+
+def _fewer(left: int, why: str) -> int:
+    """So many processes as there are, if there are any."""
+    if not left:
+        raise NoProcessError(f"No process can begin: {why}.")
+    return left
 
 
 def mapped(number: int) -> Callable[[Callable[[Any], Any], Iterable[Any]], Iterator[Any]]:
@@ -167,13 +157,6 @@ def _one(function: Callable[[Any], Any], number: int, item: Any) -> list[tuple[i
     return [(number, function(item))]
 
 
-def _fewer(left: int, why: str) -> int:
-    """So many processes as there are, if there are any."""
-    if not left:
-        raise NoProcessError(f"No process can begin: {why}.")
-    return left
-
-
 class _Process:
     def __init__(self) -> None:
         self.ready = False
@@ -201,18 +184,18 @@ class _Process:
         with suppress(OSError):  # it has ended, which `receive` finds out
             self.connection.send_bytes(content)
 
-    def receive(self) -> Any:
+    def receive(self) -> tuple[str, Any]:
+        """What kind of message it sent, and its content."""
         try:
-            return pickle.loads(self.connection.recv_bytes())
+            kind, content = pickle.loads(self.connection.recv_bytes())
         except (EOFError, OSError):
-            return Death(self._process.wait())
+            return "death", Death(self._process.wait())
+        return kind, content
 
-    def end(self) -> None:
-        """Ask it to end at once."""
+    def terminate(self) -> None:
         self._process.terminate()
 
     def stop(self) -> None:
-        """End it."""
         self.connection.close()
         self._process.terminate()
         try:
@@ -226,16 +209,20 @@ def serve(connection: Connection) -> None:
     """The life of such a process: jobs come, results go, until the other end is closed."""
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(1))  # unfinished files are removed on the way out
     threading.Thread(target=_end_with, args=(connection.fileno(),), daemon=True).start()
+
+    def say(kind: str, content: Any = None) -> None:
+        connection.send_bytes(cloudpickle.dumps((kind, content)))
+
     try:
-        connection.send_bytes(pickle.dumps(_Ready(program())))
+        say("ready", program())
         while True:
             function, *arguments = pickle.loads(connection.recv_bytes())
             try:
                 for result in function(*arguments):
-                    connection.send_bytes(cloudpickle.dumps(result))
-                connection.send_bytes(pickle.dumps(_Done()))
+                    say("result", result)
+                say("done")
             except Exception as error:
-                connection.send_bytes(pickle.dumps(_Raised(f"{type(error).__name__}: {error}")))
+                say("raised", f"{type(error).__name__}: {error}")
     except (EOFError, ConnectionError):  # it is over
         return
 

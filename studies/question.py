@@ -77,7 +77,10 @@ def _find_together(alike: Sequence[Levitation], places: Indices) -> None:
     same: dict[str, list[Levitation]] = {}
     first_places = []
     for levitation, place in zip(alike, places, strict=True):
-        if levitation.scene.frequency and _allowed(levitation):
+        if not levitation.scene.frequency:
+            continue
+        with suppress(SpinlevError):
+            levitation.interaction  # noqa: B018  # equations are shared, the limits of what acts in each scene are not
             key = f"{startless_text(levitation.scene)} {levitation.spin!r}"
             if key not in same:
                 first_places.append(place)
@@ -94,13 +97,6 @@ def _find_together(alike: Sequence[Levitation], places: Indices) -> None:
     for some, (survey, searched) in zip(same.values(), found, strict=True):
         for levitation in some:
             levitation.adopt(survey, searched)
-
-
-def _allowed(levitation: Levitation) -> bool:
-    """Whether a scene alone is not refused for what acts in it: equations are shared, their limits are not."""
-    with suppress(SpinlevError):
-        return levitation.interaction is not None
-    return False
 
 
 def _of_family(alike: Sequence[Levitation], different: Mapping[str, Levitation]) -> tuple[Rates, Array]:
@@ -132,21 +128,19 @@ def fly(levitations: Sequence[Levitation], duration: float) -> None:
                 key = levitation.equations_key, levitation.interaction_model, tilted
                 groups.setdefault(key, []).append(levitation)
     for alike in groups.values():
-        if len(alike) > 1:
-            _fly_together(alike, duration)
-
-
-def _fly_together(alike: Sequence[Levitation], duration: float) -> None:
-    ready = []
-    for levitation in alike:
+        if len(alike) < 2:
+            continue
+        ready = []
+        for one in alike:
+            with suppress(SpinlevError):
+                known = () if one.absolute else one.equilibria
+                ready.append((one, initial_state(one.scene, one.interaction, known)[0]))
         with suppress(SpinlevError):
-            known = () if levitation.absolute else levitation.equilibria
-            ready.append((levitation, initial_state(levitation.scene, levitation.interaction, known)[0]))
-    with suppress(SpinlevError):
-        flown = fly_together([one.scene for one, _ in ready], alike[0].interaction, [s for _, s in ready], duration)
-        for (levitation, _), flight in zip(ready, flown, strict=True):
-            if flight is not None:
-                levitation.adopt_flight(duration, flight)
+            starts = [start for _, start in ready]
+            flown = fly_together([one.scene for one, _ in ready], alike[0].interaction, starts, duration)
+            for (one, _), flight in zip(ready, flown, strict=True):
+                if flight is not None:
+                    one.adopt_flight(duration, flight)
 
 
 CHOICES = ("model", "plate_model", "interaction", "spin")

@@ -1,6 +1,6 @@
-"""The commands about one scene: run, field, equilibria, simulate, plate.
+"""The commands; their docstrings are the help.
 
-The numeric libraries are imported once the input has been found good: a wrong scene is answered at once.
+The numeric libraries are imported in them, once the input has been found good: a wrong scene is answered at once.
 """
 
 import html
@@ -8,7 +8,7 @@ import tempfile
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
-from cyclopts import App, Parameter
+from cyclopts import Parameter
 
 from ...geometry.common import InputError
 from .console import note
@@ -34,12 +34,6 @@ if TYPE_CHECKING:
 
 ReactionModel = Literal["slab", "fem", "reduced", "auto"]
 Plane = Literal["xy", "xz", "yz"]
-
-
-def add_scene_commands(app: App) -> None:
-    """Let the command line know these commands."""
-    for command in (run, field, plate, equilibria, simulate):
-        app.command(command)
 
 
 def _loaded(scene: Path) -> "Scene":
@@ -228,12 +222,6 @@ def plate(
     return Answer(*plate_job(loaded, place * 1e-3, frequency_hz, model, rtol, output.out), output.json)
 
 
-def add_result_commands(app: App) -> None:
-    """Let the command line know these commands."""
-    for command in (study, figure, show, report, cite):
-        app.command(command)
-
-
 def study(
     name: str | None = None,
     *,
@@ -273,7 +261,16 @@ def study(
         Duration of the flights asked for, s.
     """
     if vary:
-        return _own_question(name, vary, (ask, at, spin, duration_s), asked, engine, output)
+        if name is None:
+            raise InputError("Input name must be a scene file where --vary is given; instead it is missing.")
+        values, place = parse_vary(vary), three_numbers("--at", at)
+        positive("--duration-s", duration_s)
+        loaded = _loaded(Path(name))
+        from ..catalogue.runner import question_job
+        from ..question import Question
+
+        question = Question(loaded, name, ask, asked.checked(), spin, duration_s, tuple(1e-3 * place))
+        return Answer(*question_job(question, values, engine.checked(), output.out), output.json)
     from ..catalogue.entries import CATALOGUE
 
     if list:
@@ -285,28 +282,6 @@ def study(
     from ..catalogue.runner import study_job
 
     return Answer(*study_job(name, quick, engine.checked(), output.out), output.json)
-
-
-def _own_question(
-    scene: str | None,
-    vary: tuple[str, ...],
-    what: tuple[Quantity, str, float, float],
-    asked: Models,
-    engine: Workers,
-    output: Output,
-) -> Answer:
-    if scene is None:
-        raise InputError("Input name must be a scene file where --vary is given; instead it is missing.")
-    values, place = parse_vary(vary), three_numbers("--at", what[1])
-    positive("--duration-s", what[3])
-    from ...geometry.scene.files import load_scene
-
-    loaded = load_scene(scene)
-    from ..catalogue.runner import question_job
-    from ..question import Question
-
-    question = Question(loaded, scene, what[0], asked.checked(), what[2], what[3], tuple(1e-3 * place))
-    return Answer(*question_job(question, values, engine.checked(), output.out), output.json)
 
 
 def figure(result: Path, *, output: Beside = Beside()) -> Answer:
@@ -367,12 +342,6 @@ def cite(result: Path, *, output: Output = Output()) -> Answer:
     return Answer({"references": references}, references, output.json)
 
 
-def add_file_commands(app: App) -> None:
-    """Let the command line know these commands."""
-    for command in (new, export):
-        app.command(command)
-
-
 def new(name: str, file: Path, *, output: Output = Output()) -> Answer:
     """A commented scene file to start from.
 
@@ -384,8 +353,7 @@ def new(name: str, file: Path, *, output: Output = Output()) -> Answer:
         Where to write it; an existing file is left alone.
     """
     path = new_scene(name, file)
-    said = f"Written: {path}. Next: spinlev run {path}"
-    return Answer({"file": str(path)}, [said], output.json)
+    return Answer({"file": str(path)}, [f"Written: {path}. Next: spinlev run {path}"], output.json)
 
 
 def export(scene: Path, file: Path, *, asked: Models = Models(), output: Output = Output()) -> Answer:
@@ -398,9 +366,7 @@ def export(scene: Path, file: Path, *, asked: Models = Models(), output: Output 
     file
         File to write, OUT.vtu.
     """
-    from ...geometry.scene.files import load_scene
-
-    loaded = load_scene(scene)
+    loaded = _loaded(scene)
     from ..exchange import export_job
 
     return Answer(*export_job(loaded, asked.checked(), file), output.json)
@@ -410,11 +376,6 @@ LEADING = """<!DOCTYPE html><meta charset="utf-8"><title>spinlev</title><meta na
 <meta http-equiv="refresh" content="0; url={address}"><a href="{address}">spinlev</a>
 """
 """A page that leads to another."""
-
-
-def add_page_command(app: App) -> None:
-    """Let the command line know this command."""
-    app.command(explore)
 
 
 def explore(
@@ -443,10 +404,8 @@ def explore(
     """
     if not 0 <= port <= 65535:
         raise InputError(f"Input --port must be between 0 and 65535; instead received {port}.")
-    from ...geometry.scene.files import load_scene
-
     source = scene or default_scene()
-    loaded = load_scene(source)
+    loaded = _loaded(source)
     from ..interface import page_server
 
     pages = page_server()(loaded, str(source), host, port)

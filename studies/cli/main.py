@@ -17,7 +17,7 @@ from cyclopts import App, CycloptsError
 from rich.console import Console
 
 from ...geometry.common import SpinlevError, printable
-from .commands import add_file_commands, add_page_command, add_result_commands, add_scene_commands
+from . import commands
 from .console import FORTRAN, answers_only, heard, is_missing_library, note, to_json, way_out
 from .options import Answer
 from .start import STOPPED, TOO_MANY_FILES
@@ -32,10 +32,11 @@ app = App(
     help_format="markdown",
     suppress_keyboard_interrupt=False,
 )
-add_scene_commands(app)
-add_result_commands(app)
-add_file_commands(app)
-add_page_command(app)
+for command in (
+    *(commands.run, commands.field, commands.plate, commands.equilibria, commands.simulate, commands.study),
+    *(commands.figure, commands.show, commands.report, commands.cite, commands.new, commands.export, commands.explore),
+):
+    app.command(command)
 app.register_install_completion_command()
 
 
@@ -48,36 +49,27 @@ def run(arguments: list[str], stop: threading.Event) -> int:
 def _status(arguments: list[str], out: Any, stop: threading.Event | None = None) -> int:
     """The exit status; `stop` tells that the user has stopped the program, whatever a library made of that."""
     with heard(verbose="--verbose" in arguments):
-        return _answered(arguments, out, stop)
-
-
-def _answered(arguments: list[str], out: Any, stop: threading.Event | None) -> int:
-    try:
-        _answer(arguments, out)
-    except CycloptsError as error:
-        note(f"{_told(error)}\nTry: spinlev --help")
-        return 2
-    except SpinlevError as error:
-        note(_told(error))
-        return error.exit_status
-    except OSError as error:
-        if error.errno == errno.EMFILE:
-            note(f"spinlev: {TOO_MANY_FILES}")
+        try:
+            _answer(arguments, out)
+        except CycloptsError as error:
+            note(f"{_told(error)}\nTry: spinlev --help")
+            return 2
+        except SpinlevError as error:
+            note(_told(error))
+            return error.exit_status
+        except OSError as error:
+            where = error.filename or "standard output"
+            what = f"the computation failed to write or read {where}: {error.strerror or error}; see --out."
+            note(f"spinlev: {TOO_MANY_FILES if error.errno == errno.EMFILE else what}")
             return 1
-        where = error.filename or "standard output"
-        note(f"spinlev: the computation failed to write or read {where}: {error.strerror or error}; see --out.")
-        return 1
-    except KeyboardInterrupt:
-        note(STOPPED)
-        return 1
-    except Exception as error:  # the last resort: say what and where, without a traceback
-        if stop and stop.is_set():
-            note(STOPPED)
+        except (KeyboardInterrupt, Exception) as error:
+            if isinstance(error, KeyboardInterrupt) or (stop and stop.is_set()):
+                note(STOPPED)
+                return 1
+            if "SPINLEV_TRACEBACK" in os.environ:
+                raise
+            note(f"spinlev: {_unforeseen(error)}")  # the last resort: what and where, without a traceback
             return 1
-        if "SPINLEV_TRACEBACK" in os.environ:
-            raise
-        note(f"spinlev: {_unforeseen(error)}")
-        return 1
     return 0
 
 

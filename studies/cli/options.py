@@ -1,4 +1,4 @@
-"""Numbers given on the command line, and points to evaluate a field at, from a CSV file."""
+"""What is given on the command line and from Python, checked: numbers, points of a file, models, values to vary."""
 
 from __future__ import annotations
 
@@ -28,13 +28,26 @@ FARTHEST = 1e9
 """Largest coordinate, mm: beyond, powers of it overflow."""
 
 
+def _floats(text: str, separator: str = ",") -> list[float]:
+    """The numbers of a text; none where one is no finite number."""
+    try:
+        numbers = [float(part) for part in text.split(separator)]
+    except ValueError:
+        return []
+    return numbers if all(map(math.isfinite, numbers)) else []
+
+
+def _in_array(numbers: list[Any]) -> Array:
+    """As an array; NumPy is loaded when the first number is read, not with the command line."""
+    import numpy as np
+
+    return np.array(numbers)
+
+
 def three_numbers(name: str, text: str) -> Array:
     """(3,) from X,Y,Z. Raises InputError where they are not three finite numbers."""
-    try:
-        numbers = [float(part) for part in text.split(",")]
-    except ValueError:
-        numbers = []
-    if len(numbers) != 3 or not all(abs(number) <= FARTHEST for number in numbers):
+    numbers = _floats(text)
+    if len(numbers) != 3 or max(map(abs, numbers)) > FARTHEST:
         raise InputError(
             f"Input {name} must be three numbers X,Y,Z of at most {FARTHEST:g} mm; instead received {shown(text)}."
         )
@@ -43,14 +56,10 @@ def three_numbers(name: str, text: str) -> Array:
 
 def map_extent(text: str) -> Array:
     """(4,) m left, right, lower and upper end of a map, from HALF or the four in mm. Raises InputError."""
-    try:
-        numbers = [float(part) for part in text.split(",")]
-    except ValueError:
-        numbers = []
+    numbers = _floats(text)
     if len(numbers) == 1:
         numbers = [-numbers[0], numbers[0]] * 2
-    sound = len(numbers) == 4 and all(map(math.isfinite, numbers))
-    if not (sound and numbers[0] < numbers[1] and numbers[2] < numbers[3]):
+    if not (len(numbers) == 4 and numbers[0] < numbers[1] and numbers[2] < numbers[3]):
         raise InputError(
             "Input --extent-mm must be one positive number, or LEFT,RIGHT,LOWER,UPPER in rising order; instead "
             f"received {shown(text)}."
@@ -109,20 +118,11 @@ def read_points(path: Path) -> Array:
     return _in_array(found) * 1e-3
 
 
-def _in_array(numbers: list[Any]) -> Array:
-    """As an array; NumPy is loaded when the first number is read, not with the command line."""
-    import numpy as np
-
-    return np.array(numbers)
-
-
 def _number(path: Path, line: int, row: list[str], column: int) -> float:
     text = row[column].strip() if column < len(row) else ""
-    try:
-        value = float(text)
-    except ValueError:
-        value = math.nan
-    if not math.isfinite(value):
+    numbers = _floats(text)
+    value = numbers[0] if len(numbers) == 1 else math.nan
+    if math.isnan(value):
         raise InputError(f"{path}: Input line {line} must have three finite numbers; instead received {shown(text)}.")
     if abs(value) > FARTHEST:
         raise InputError(
@@ -181,9 +181,9 @@ class Models:
         ------
         InputError : a model that does not exist, or a tolerance out of range
         """
-        choices = (("model", FieldModel), ("plate_model", PlateModel), ("interaction", InteractionModel))
-        for name, known in ((name, get_args(kind)) for name, kind in choices):
-            value = getattr(self, name)
+        choices = {"model": FieldModel, "plate_model": PlateModel, "interaction": InteractionModel}
+        for name, kind in choices.items():
+            value, known = getattr(self, name), get_args(kind)
             if not isinstance(value, str) or value not in known:
                 raise InputError(f"Input {name} must be one of {', '.join(known)}; instead received {shown(value)}.")
         if not is_number(self.rtol) or not 1e-13 <= self.rtol < 1:
@@ -338,13 +338,8 @@ def combinations(values: Mapping[str, Sequence[Any]]) -> list[dict[str, Any]]:
 
 def _values(text: str, values: str) -> list[float]:
     separator = ":" if ":" in values else ","
-    try:
-        numbers = [float(part) for part in values.split(separator)]
-    except ValueError:
-        raise _wrong(text) from None
-    if not all(map(math.isfinite, numbers)):
-        raise _wrong(text)
-    if separator == ",":
+    numbers = _floats(values, separator)
+    if numbers and separator == ",":
         return numbers
     if len(numbers) != 3 or numbers[2] == 0 or (numbers[1] - numbers[0]) / numbers[2] < 0:
         raise _wrong(text)
