@@ -11,32 +11,30 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from time import perf_counter
-from typing import Any, Protocol
+from typing import Any
 
 import heyoka as hy
 import numpy as np
 from numpy.typing import NDArray
 
 from ...fem.compiled_code import compiled
-from ...fem.rotor.table import FieldFormula, FieldTable
+from ...fem.rotor.table import FieldTable
 from ...geometry.common import Array, InputError
 from ...geometry.scene.contents import Scene
 from ...geometry.scene.files import startless_text
-from ..motion.effects import with_effects
-from ..motion.equations import Equations, equations_of_motion, parameters
+from ..motion.equations import Equations
 from ..motion.events import (
     BEYOND,
     CONTACT,
     Events,
     clearance,
     flight_events,
-    lost_distance,
     plate_depth,
     plate_legs,
     range_events,
 )
-from ..motion.plate import PlateForce, PlateMemory, plate_numbers
-from ..motion.state import Parameter, Scales, State, Vector
+from ..motion.plate import PlateForce, PlateMemory
+from ..motion.state import Parameter, State, Vector
 from .balls import LARGE, SMALL
 from .flight import LEFT, LOOSER, MOST_SAMPLES, TOLERANCE, Course, Flight, IntegrationError
 from .trajectory import DURATION, Recorder, Trajectory
@@ -51,25 +49,65 @@ FLAT = 1e-9
 """Sine of the angle to the horizontal that a plate may have."""
 
 
-class _Occupant(Protocol):
-    """What flies on a lane: its state is put there when it begins and after each of its events."""
+class _Passenger(Course):
+    """A trajectory on a lane for balls of one kind."""
 
-    values: Array
-    state: Array
-    time: tuple[float, float]
-    steps: int
+    over = False
+    left = False
+    """Whether it was ever beyond the range of the plate's table."""
 
     @property
     def end(self) -> float:
-        """Scaled time at which the meaning of the next event is "duration"."""
+        """Scaled time at which "duration" interrupts it."""
+        return self.duration / self.flight.scales.time
 
-    @property
-    def recorder(self) -> Recorder | None: ...
-
-    def record(self, times: Array, states: Array) -> None: ...
+    def record(self, times: Array, states: Array) -> None:
+        assert self.recorder is not None
+        self.recorder.add(times, self.flight.balanced(self.values, times, states), self.over)
 
     def follow(self, meaning: str) -> bool:
-        """After an event, with time and state as they are then: whether it goes on here."""
+        """After what interrupted it, with time and state as they are then: whether it goes on on its lane."""
+        if meaning == DURATION:
+            self.ended_by, self.over = DURATION, True
+            if self.recorder:
+                self.record(np.array([self.time[0]]), self.state[None])
+            return False
+        degree = self.flight.degree(self.values)
+        self.change_ball()
+        return self.flight.degree(self.values) == degree
+
+    def alone(self) -> None:
+        """Fly on to the end outside of lanes."""
+        if self.recorder is None:
+            self.recorder = Recorder(self.state, self.flight.interval(self.duration), MOST_SAMPLES, self.time[0])
+        self.fly()
+        self.time, self.state = (float(self.recorder.times[-1]), 0.0), self.recorder.states[-1]
+        self.over = True
+
+
+class _Launch(_Passenger):
+    """A launch over a plate's currents; each leg of the plate's way is flown for itself."""
+
+    def __init__(self, course: Course, left: bool) -> None:
+        super().__init__(**vars(course))
+        self.ended_by, self.left, self._end = CONTACT, left, 0.0
+        self._legs = iter(plate_legs(self.flight.scene.plate, self.duration))
+        self.follow(DURATION)
+
+    @property
+    def end(self) -> float:
+        return self._end
+
+    def follow(self, meaning: str) -> bool:
+        """Beyond the table it flies on; at the end of a leg the next one begins."""
+        if meaning == BEYOND:
+            self.left = True
+        elif meaning != DURATION or (leg := next(self._legs, None)) is None:
+            self.ended_by = meaning
+            return False
+        else:
+            self._end = self.set_leg(*leg)
+        return True
 
 
 class Lanes:
@@ -84,6 +122,7 @@ class Lanes:
 
     def __init__(self, equations: Equations, events: Events, tolerance: float, with_work: bool) -> None:
         system = list(zip(equations.variables, equations.rates, strict=True))
+        self._count = len(system) + with_work
         if with_work:
             system.append((hy.expression("work"), equations.power))
         self._meanings = [meaning for _, meaning in events]
@@ -97,17 +136,17 @@ class Lanes:
             t_events=[hy.t_event_batch(each, direction=hy.event_direction.negative) for each, _ in events],
         )
 
-    def fly(self, occupants: Sequence[_Occupant]) -> None:
+    def fly(self, passengers: Sequence[_Passenger]) -> None:
         """Fly each until it does not go on here.
 
         Raises
         ------
         IntegrationError : a state became infinite
         """
-        integrator, waiting, ends = self._integrator, iter(occupants), np.zeros(LANES)
+        integrator, waiting, ends = self._integrator, iter(passengers), np.zeros(LANES)
         integrator.set_time(ends)
         for lane in range(LANES):  # one that stays empty must be finite too: the equations are not, where all is zero
-            self._put(lane, occupants[0])
+            self._put(lane, passengers[0])
         flying = {lane: first for lane in range(LANES) if (first := self._next(lane, waiting, ends))}
         while flying:
             recorded = any(one.recorder for one in flying.values())
@@ -119,7 +158,8 @@ class Lanes:
                     continue
                 one = flying[lane]
                 one.steps += int(steps)
-                one.time, one.state = (float(integrator.time[lane]), 0.0), integrator.state[:, lane].copy()
+                one.time, one.state = (float(integrator.time[lane]), 0.0), one.state.copy()
+                one.state[: self._count] = integrator.state[:, lane]
                 if outcome in (hy.taylor_outcome.success, hy.taylor_outcome.step_limit):
                     continue
                 if outcome == hy.taylor_outcome.err_nf_state:
@@ -137,7 +177,7 @@ class Lanes:
                 else:
                     del flying[lane]
 
-    def _next(self, lane: int, waiting: Iterator[_Occupant], ends: Array) -> _Occupant | None:
+    def _next(self, lane: int, waiting: Iterator[_Passenger], ends: Array) -> _Passenger | None:
         """Put the next one on a lane; an empty lane stays where it is."""
         following = next(waiting, None)
         ends[lane] = following.end if following else self._integrator.time[lane]
@@ -149,13 +189,13 @@ class Lanes:
         self._put(lane, following)
         return following
 
-    def _put(self, lane: int, one: _Occupant, anew: bool = True) -> None:
-        self._integrator.state[:, lane] = one.state
+    def _put(self, lane: int, one: _Passenger, anew: bool = True) -> None:
+        self._integrator.state[:, lane] = one.state[: self._count]
         self._integrator.pars[:, lane] = one.values[: len(self._integrator.pars)]
         if anew:
             self._integrator.reset_cooldowns(lane)
 
-    def _record(self, flying: Mapping[int, _Occupant], ends: Array, found: Any) -> None:
+    def _record(self, flying: Mapping[int, _Passenger], ends: Array, found: Any) -> None:
         """Keep the samples of the steps just taken."""
         now, due = self._integrator.time, dict[int, Array]()
         for lane, one in flying.items():
@@ -255,12 +295,17 @@ def _ended(scene: Scene, table: FieldTable, duration: float, starts: State) -> E
     flight, count = _flight(scene, table, duration), len(starts.position)
     flown = [_begun(flight, State(*(v[k] for v in starts.vectors)), duration, False) for k in range(count)]
     _fly(flown)
+    return _endings(flown)
+
+
+def _endings(flown: Sequence[_Passenger]) -> Endings:
+    flight = flown[0].flight
     return Endings(
-        np.array([f.ended_by for f in flown]),
-        np.minimum([f.seconds for f in flown], duration),
+        np.array([f.ended_by for f in flown], dtype="<U8"),
+        np.minimum([f.seconds for f in flown], flown[0].duration),
         flight.scales.unpack(np.array([f.state[:12] for f in flown])),
         np.array([f.changes.count for f in flown]),
-        np.zeros(count, bool),
+        np.array([f.left for f in flown]),
     )
 
 
@@ -291,50 +336,18 @@ def _flight(scene: Scene, table: FieldTable, duration: float) -> Flight:
     return Flight(scene, table, duration, compact=True, in_balls=True)
 
 
-class _InBalls(Course):
-    """A trajectory on a lane for balls of one kind."""
-
-    over = False
-
-    @property
-    def end(self) -> float:
-        return self.duration / self.flight.scales.time
-
-    def record(self, times: Array, states: Array) -> None:
-        assert self.recorder is not None
-        self.recorder.add(times, self.flight.balanced(self.values, times, states), self.over)
-
-    def follow(self, meaning: str) -> bool:
-        if meaning == DURATION:
-            self.ended_by, self.over = DURATION, True
-            if self.recorder:
-                self.record(np.array([self.time[0]]), self.state[None])
-            return False
-        degree = self.flight.degree(self.values)
-        self.change_ball()
-        return self.flight.degree(self.values) == degree
-
-    def alone(self) -> None:
-        """Fly on to the end outside of lanes."""
-        if self.recorder is None:
-            self.recorder = Recorder(self.state, self.flight.interval(self.duration), MOST_SAMPLES, self.time[0])
-        self.fly()
-        self.time, self.state = (float(self.recorder.times[-1]), 0.0), self.recorder.states[-1]
-        self.over = True
-
-
-def _begun(flight: Flight, start: State, duration: float, recorded: bool) -> _InBalls:
+def _begun(flight: Flight, start: State, duration: float, recorded: bool) -> _Passenger:
     """At t = 0; over if it begins in contact."""
     start = replace(start, moment=start.moment / np.linalg.norm(start.moment))
     free = clearance(flight.scene, np.zeros(1), start.position[None])[0] >= 0
     course = flight.begin(start, duration, interval=flight.interval(duration) if recorded and free else None)
-    found = _InBalls(**vars(course))
+    found = _Passenger(**vars(course))
     if not free:
         found.ended_by, found.over = CONTACT, True
     return found
 
 
-def _fly(courses: Sequence[_InBalls]) -> None:
+def _fly(courses: Sequence[_Passenger]) -> None:
     """In lanes, in small balls first, then in large ones; at last one by one near bodies, and where it is too fast."""
     for formula in (SMALL, LARGE):
         here = [f for f in courses if not f.over and f.flight.degree(f.values) == formula.degree]
@@ -348,7 +361,7 @@ def _fly(courses: Sequence[_InBalls]) -> None:
 
 def launched(
     scene: Scene,
-    table: FieldFormula,
+    table: FieldTable,
     memory: PlateMemory,
     starts: State,
     duration: float,
@@ -378,73 +391,32 @@ def launched(
     InputError : `duration` is not positive, there is no start, the plate does not lie flat, or the floater is no sphere
     """
     _check(scene, starts, duration)
-    scales, count, legs = Scales.of(scene), len(starts.position), plate_legs(scene.plate, duration)
-    known = parameters(scene, scales)
-    values = np.concatenate([known, plate_numbers(memory, known)])
-    equations = equations_of_motion(with_effects(scene, table), bool(np.any(scene.gravity[:2])), memory)
-    position, depth = equations.variables[:3], plate_depth(memory.plate, np.zeros(1))
+    flight, count = Flight(scene, table, duration, memory=memory, in_balls=False), len(starts.position)
+    equations, (scales, values) = flight.equations(0)[0], (flight.scales, flight.values)
+    position = equations.variables[:3]
     events = [
         *flight_events(replace(scene, plate=None), position),
         *range_events(memory, position),
         *((obstacle, CONTACT) for obstacle in _obstacles(scene, memory, position)),
     ]
-    left = ~memory.in_range(starts.position, depth)
     unit = starts.moment / np.linalg.norm(starts.moment, axis=1)[:, None]
-    states = scales.pack(replace(starts, moment=unit))
-    if currents is None:
-        force, now, silent = PlateForce(memory, known), np.zeros(count), states.copy()
-        silent[:, 6:9] = 0.0
+    starts = replace(starts, moment=unit)
+    if currents is None:  # what the floater's moment alone leaves in the plate; the rotor's part is not integrated
+        force, now, states = PlateForce(memory, values), np.zeros(count), scales.pack(starts)
+        silent = np.where(np.isin(np.arange(12), (6, 7, 8)), 0.0, states)
         own = force(now, states).signals - force(now, silent).signals
-    else:
-        own = (currents - memory.driven(scene.angular_velocity)[0].signals(0.0, float(depth[0]))) * known[
-            Parameter.PLATE_SHARE
-        ]
-    states = np.concatenate([states, own], axis=1)
-    flown = [_Launch(values.copy(), states[k], legs, scales, bool(left[k])) for k in range(count)]
+    outside = ~memory.in_range(starts.position, np.repeat(plate_depth(memory.plate, np.zeros(1)), count))
+    flown = []
+    for k in range(count):
+        start = State(*(v[k] for v in starts.vectors))
+        course = flight.begin(start, duration, None if currents is None else currents[k])
+        if currents is None:
+            course.state[12:-1] = own[k]
+        flown.append(_Launch(course, bool(outside[k])))
     free = clearance(scene, np.zeros(count), starts.position) > 0
     if free.any():
-        lanes = Lanes(equations, events, step_error, False)
-        lanes.fly([one for one, there in zip(flown, free, strict=True) if there])
-    times = np.array([one.time[0] for one in flown]) * scales.time
-    return Endings(
-        np.array([one.ended_by for one in flown], dtype="<U8"),
-        np.minimum(times, legs[-1][0]),
-        scales.unpack(np.array([one.state for one in flown])),
-        np.zeros(count, int),
-        np.array([one.left for one in flown]),
-    )
-
-
-class _Launch:
-    """A launch on a lane: each leg of the plate's way is flown for itself."""
-
-    recorder = None
-
-    def __init__(
-        self, values: Array, state: Array, legs: Sequence[tuple[float, float, float]], scales: Scales, left: bool
-    ) -> None:
-        self.values, self.state, self.time, self.steps = values, state, (0.0, 0.0), 0
-        self.ended_by, self.left, self._scales, self._legs = CONTACT, left, scales, iter(legs)
-        self.values[Parameter.LOST_DISTANCE] = lost_distance(scales.unpack(state).position) / scales.length
-        self.end = 0.0
-        self.follow(DURATION)
-
-    def follow(self, meaning: str) -> bool:
-        """Beyond the table it flies on; at the end of a leg the next one begins."""
-        if meaning == BEYOND:
-            self.left = True
-        elif meaning != DURATION or (leg := next(self._legs, None)) is None:
-            self.ended_by = meaning
-            return False
-        else:
-            finish, depth, speed = leg
-            self.end = finish / self._scales.time
-            self.values[Parameter.PLATE_DEPTH] = depth / self._scales.length
-            self.values[Parameter.PLATE_SPEED] = speed * self._scales.time / self._scales.length
-        return True
-
-    def record(self, times: Array, states: Array) -> None:
-        raise NotImplementedError
+        Lanes(equations, events, step_error, False).fly([f for f, there in zip(flown, free, strict=True) if there])
+    return _endings(flown)
 
 
 def _obstacles(scene: Scene, memory: PlateMemory, position: Vector) -> list[hy.expression]:

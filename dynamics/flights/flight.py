@@ -281,12 +281,10 @@ class Course:
         """Propagate in pieces until something ends the trajectory."""
         flight, scales, kept = self.flight, self.flight.scales, perf_counter()
         assert self.recorder is not None
-        for finish, depth, speed in plate_legs(flight.scene.plate, self.duration):
-            end = finish / scales.time
-            if self.time[0] >= end:
+        for leg in plate_legs(flight.scene.plate, self.duration):
+            if self.time[0] >= leg[0] / scales.time:
                 continue
-            self.values[Parameter.PLATE_DEPTH] = depth / scales.length
-            self.values[Parameter.PLATE_SPEED] = speed * scales.time / scales.length
+            end = self.set_leg(*leg)
             while self.time[0] < end:
                 self.change_ball()
                 times, states = self._piece(end, self.recorder)
@@ -300,6 +298,13 @@ class Course:
                 if checkpoint and perf_counter() - kept > checkpoint.every:
                     checkpoint.write(self)
                     kept = perf_counter()
+
+    def set_leg(self, end: float, depth: float, speed: float) -> float:
+        """Let the plate move as on a leg of its way, see `plate_legs`; scaled time of its end."""
+        scales = self.flight.scales
+        self.values[Parameter.PLATE_DEPTH] = depth / scales.length
+        self.values[Parameter.PLATE_SPEED] = speed * scales.time / scales.length
+        return end / scales.time
 
     def _piece(self, end: float, recorder: Recorder) -> tuple[Array, Array]:
         """Go on to the end of a piece or to an event: scaled times, and states with J - work."""

@@ -122,8 +122,9 @@ def memory_terms(memory: PlateMemory, first: int, position: Vector, moment: Vect
     multipoles = table.multipoles.expressions(place)
     signals = [dot(source, field) for field, _ in multipoles]  # of the floater in each multipole
     own = [p - _weighted(row, signals) for p, row in zip(states, table.weights, strict=True)]
-    rotor = _rotor_terms(memory, first + len(own), signals, own)
-    strengths = [_weighted(column, own) + r for column, r in zip(table.weights.T, rotor.strengths, strict=True)]
+    by_rotor, sinking, stored, spent = _rotor_terms(memory, first + len(own), signals, own)
+    # of all states together, so that the fields of 20 to 40 multipoles are summed instead of those of 40 to 90 states
+    strengths = [_weighted(column, own) + r for column, r in zip(table.weights.T, by_rotor, strict=True)]
     pairs = list(zip(strengths, multipoles, strict=True))
     field = [hy.sum([w * b[i] for w, (b, _) in pairs]) for i in range(3)]
     slope = {(i, j): hy.sum([w * g[i][j] for w, (_, g) in pairs]) for i, j in UPPER}
@@ -135,34 +136,22 @@ def memory_terms(memory: PlateMemory, first: int, position: Vector, moment: Vect
     speed = hy.par[Parameter.PLATE_SPEED] if lowered else hy.expression(0.0)
     drive = dot(force, [*turned(position)[:2], speed]) + hy.par[Parameter.RATE] * turn[2]
     return MemoryTerms(
-        rates=[a + b for a, b in zip(decay, rotor.lowering, strict=True)] if lowered else decay,
+        rates=[a + b for a, b in zip(decay, sinking, strict=True)] if lowered else decay,
         force=force,
         torque=[t / hy.par[Parameter.INERTIA] for t in turn],
-        stored=0.5 * hy.sum([y * y for y in own]) + rotor.stored,
-        spent=rotor.spent + drive - dotted(own, decay),
+        stored=0.5 * hy.sum([y * y for y in own]) + stored,
+        spent=spent + drive - dotted(own, decay),
     )
 
 
-@dataclass(frozen=True, eq=False)
-class _RotorTerms:
-    """The part of the rotor's currents, scaled.
+def _rotor_terms(
+    memory: PlateMemory, first: int, signals: Vector, own: Vector
+) -> tuple[Vector, Vector, hy.expression, hy.expression]:
+    """The part of the rotor's currents, from the floater's signals in each multipole and y_f of each state.
 
-    Parameters
-    ----------
-    strengths : Σ W_ik (q_i - r_i) of every multipole
-    lowering : -u ∂q/∂d of each state; none of a plate that stays
-    stored : the floater's energy in their field
-    spent : its change by the field's own, and Σ u y_f ∂q/∂d
+    They are Σ W_ik (q_i - r_i) of every multipole; -u ∂q/∂d of each state, if the plate goes down; the floater's energy
+    in their field; and its change by the field's own, with Σ u y_f ∂q/∂d.
     """
-
-    strengths: Vector
-    lowering: Vector
-    stored: hy.expression
-    spent: hy.expression
-
-
-def _rotor_terms(memory: PlateMemory, first: int, signals: Vector, own: Vector) -> _RotorTerms:
-    """As `memory_terms`, from the floater's signals in each multipole and y_f of each state."""
     angle, depth = names = hy.make_vars("rotor_angle", "plate_depth")
     speed = hy.par[Parameter.LENGTH] * hy.par[Parameter.PLATE_SPEED]
     below = hy.par[Parameter.LENGTH] * hy.par[Parameter.PLATE_DEPTH] + speed * hy.time
@@ -185,7 +174,7 @@ def _rotor_terms(memory: PlateMemory, first: int, signals: Vector, own: Vector) 
         lowering = [-dotted(row, sinking) for row in numbers]
         spent = spent - dotted(own, lowering)
     strengths = [hy.sum([row[k] * f for row, f in zip(rows, here, strict=True)]) for k in range(count)]
-    return _RotorTerms(strengths, lowering, -dotted(here, sums), spent)
+    return strengths, lowering, -dotted(here, sums), spent
 
 
 def _weighted(weights: Array, terms: Vector) -> hy.expression:
