@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from peers import PLATE, SLAB, scipy_slab
 
-from spinlev.fem.plate.driven import plate_table
 from spinlev.fem.plate.reaction import plate_reaction
-from spinlev.fem.plate.region import Region
 from spinlev.fem.plate.slab import reaction_tensor
+from spinlev.fem.plate.table import Region
+from spinlev.fem.plate.tables import plate_table
 
 HEIGHTS = np.linspace(0.008, 0.06, 50)
 REGION = Region.over_face(PLATE.box.size, (0.01, 0.04), 0.005)

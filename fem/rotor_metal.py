@@ -27,7 +27,7 @@ from ..geometry.solids import Solid, places_off
 from .cache import TableKind
 from .harmonics.solid import factorials, norm
 from .metal_currents import CurrentPatterns, Metal, current_patterns, metal_of, of_motion
-from .plate.field_functions import Multipoles, fit_multipoles
+from .plate.multipoles import Multipoles, fit_multipoles
 
 
 @dataclass(frozen=True, eq=False)

@@ -28,9 +28,8 @@ from ..fem.maps_of_B.table import GriddedTable, map_table
 from ..fem.mutual.making import cached_mutual_table, mutual_key
 from ..fem.mutual.table import MutualTable
 from ..fem.plate.choice import plate_around, rotor_nearby, wider_region
-from ..fem.plate.region import Region
 from ..fem.plate.slab import cached_edge_error, edge_error
-from ..fem.plate.table import PlateTable, RotorShare
+from ..fem.plate.table import PlateTable, Region, RotorShare
 from ..fem.rotor.choice import cached_rotor_table, rotor_table
 from ..fem.rotor.models import AccuracyError
 from ..fem.rotor.table import FieldTable, RotorTable

@@ -8,10 +8,10 @@ import numpy as np
 
 from ..fem.closed_forms.eddy_sphere import ComplexArray
 from ..fem.files import write_whole
-from ..fem.plate.driven import cached_plate_table
 from ..fem.plate.reaction import plate_reaction
-from ..fem.plate.region import Region
 from ..fem.plate.slab import Slab, edge_error, reaction_tensor
+from ..fem.plate.table import Region
+from ..fem.plate.tables import cached_plate_table
 from ..geometry.common import Array, InputError
 from ..geometry.scene.contents import Plate, Scene
 from .cli.console import note, to_json

@@ -19,8 +19,8 @@ from problems import (
 )
 from said import measure, say
 
-from spinlev.fem.plate.driven import plate_table
-from spinlev.fem.plate.region import Region
+from spinlev.fem.plate.table import Region
+from spinlev.fem.plate.tables import plate_table
 from spinlev.geometry import Box, Plate
 
 rtol, top = float(sys.argv[2]), PLATE_SIZE[2] / 2

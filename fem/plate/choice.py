@@ -9,22 +9,40 @@ from functools import cached_property, partial
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from ...geometry.common import MU_0, Array, Watch, unwatched
+from ...geometry.common import MU_0, Array, InputError, Watch, unwatched
 from ...geometry.magnets import Magnet
 from ...geometry.scene.contents import Plate, Scene
-from ..cache import TableKind
 from ..rotor.models import Accuracy, AccuracyError, shortened_table
 from ..rotor.table import RotorTable
-from .driven import DRIVEN, cached_driven_plate, deciding, reachable_region
-from .region import Region
+from .rotor_share import DOWN
 from .slab import cached_edge_error, edge_error
-from .slab_network import slab_and_rotor_table
-from .table import PlateTable, RotorShare
+from .table import PlateTable, Region, RotorShare
+from .tables import DRIVEN, SLAB, cached_driven_plate, deciding, slab_and_rotor_table
 
-SLAB = TableKind("slab", tuple[PlateTable, RotorShare], "Eddy currents of an infinite slab, with the rotor's share")
 NEGLIGIBLE = 1e-6
 """Part of the floater's weight below which the largest conceivable force of the plate is left out."""
+REACH = 0.003
+"""The floater may move so far from where it begins, along each axis, m."""
+RASTER = 0.001
+"""Bounds of regions are multiples of this, m, so that scenes that differ little share a table."""
+LOWEST, HIGHEST, HARMONICS = 0.5, 250.0, 2.0
+"""Frequencies of a table, Hz, at least; and the multiple of the rotor's that it must hold."""
+COARSE = 50.0
+"""The highest frequency is a multiple of this, Hz, for the same reason."""
+FACING, BESIDE = 2.0, 0.5
+"""How far a bound that a floater has left is moved out, in widths of the region: across the plate's face, and along it,
+where terms grow with the square of the width."""
+WIDEST = 3.0
+"""Half the width of a wider region along the face, in distances from it: at 2.3 a slab takes 230 states, at 4.6 it
+takes minutes."""
+AT = 1e-6
+"""Distance from a bound, in widths of the region, at which it counts as crossed: that is where the event is."""
+SKIN = 0.9
+"""Nearest that a region comes to the plate, in radii of the floater, which touches it at one."""
+PLUMB = 1e-9
+"""Cosine of the angle between a slab's normal and the vertical below which it stands upright."""
 
 
 class PlateChoice(NamedTuple):
@@ -73,28 +91,6 @@ def resolve_plate_model(
             "reduced", f"measured, edges take {error:.1e} of an infinite slab's reaction, {rtol:.1e} is allowed"
         )
     return PlateChoice("reduced", "the floater is beside the plate's edge")
-
-
-REACH = 0.003
-"""The floater may move so far from where it begins, along each axis, m."""
-RASTER = 0.001
-"""Bounds of regions are multiples of this, m, so that scenes that differ little share a table."""
-LOWEST, HIGHEST, HARMONICS = 0.5, 250.0, 2.0
-"""Frequencies of a table, Hz, at least; and the multiple of the rotor's that it must hold."""
-COARSE = 50.0
-"""The highest frequency is a multiple of this, Hz, for the same reason."""
-FACING, BESIDE = 2.0, 0.5
-"""How far a bound that a floater has left is moved out, in widths of the region: across the plate's face, and along it,
-where terms grow with the square of the width."""
-WIDEST = 3.0
-"""Half the width of a wider region along the face, in distances from it: at 2.3 a slab takes 230 states, at 4.6 it
-takes minutes."""
-AT = 1e-6
-"""Distance from a bound, in widths of the region, at which it counts as crossed: that is where the event is."""
-SKIN = 0.9
-"""Nearest that a region comes to the plate, in radii of the floater, which touches it at one."""
-PLUMB = 1e-9
-"""Cosine of the angle between a slab's normal and the vertical below which it stands upright."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -167,6 +163,43 @@ def plate_around(
         region = _off_the_face(_rastered(region), plate, radius)
     highest = max(HIGHEST, COARSE * math.ceil(HARMONICS * frequency / COARSE - 1e-9))
     return PlateAround(plate, model, table, region, (LOWEST, highest), rtol)
+
+
+def reachable_region(plate: Plate, center: ArrayLike, half_edges: ArrayLike, radius: float = 0.0) -> Region:
+    """Where a floater can come to in the plate's frame, during all of its lowering.
+
+    The box about `center` and its image under the lowering are united; what is nearer to the plate than the floater's
+    radius is cut off.
+
+    Parameters
+    ----------
+    center, half_edges : (3,) m, box along the laboratory's axes, where the floater may be
+    radius : of the floater, m
+
+    Raises
+    ------
+    InputError : the centre is not farther than the radius from the plate's face, all the way
+    """
+    center, half = np.asarray(center, float), plate.box.half_edges
+    way = plate.lowering.distance if plate.lowering else 0.0
+    ends = plate.box.to_body(np.array([center, center - way * DOWN]))
+    beyond = np.min(np.abs(ends) - half, axis=0)
+    axis = int(np.argmax(beyond))
+    if beyond[axis] <= radius or ends[0, axis] * ends[1, axis] < 0:
+        raise InputError(
+            f"Input center_mm must be farther than {radius * 1e3:.4g} mm from the plate's faces on all of its way; "
+            f"instead received {np.round(center * 1e3, 6).tolist()}, {max(beyond[axis], 0) * 1e3:.4g} mm from them. "
+            "Move the plate away."
+        )
+    signs = np.stack(np.meshgrid(*[(-1.0, 1.0)] * 3, indexing="ij"), -1).reshape(8, 3)
+    corners = center + np.asarray(half_edges, float) * signs
+    body = plate.box.to_body(np.concatenate([corners, corners - way * DOWN]))
+    lower, upper = body.min(axis=0), body.max(axis=0)
+    if ends[0, axis] > 0:
+        lower[axis] = max(lower[axis], half[axis] + radius)
+    else:
+        upper[axis] = min(upper[axis], -half[axis] - radius)
+    return Region(lower, upper)
 
 
 def wider_region(plate: Plate, region: Region, radius: float, seen: Array) -> Region:

@@ -1,28 +1,65 @@
-"""A plate's currents as a network of many states, from which the few of a table are taken.
+"""A plate's currents as many states, from which the few of a table are taken.
 
-By parity class, it holds fields e_i with ∫ σ e_i·e_j dV = δ_ij and the inductance L_ij between their currents.  A
-source with couplings b_i = ∫ σ e_i·A_s dV drives them as (1 + iωL) c = b, and couples with another one by -iω b'·c.
+Fields at the quadrature points are rows of numbers whose plain products are ∫ σ e·e' dV over the whole plate.  By
+parity class, there are fields e_i with ∫ σ e_i·e_j dV = δ_ij and the inductance L_ij between their currents.  A source
+with couplings b_i = ∫ σ e_i·A_s dV drives them as (1 + iωL) c = b, and couples with another one by -iω b'·c.
+
+With T, the map of a current to its potential, the field e of a source A_s solves (1 + iωT) e = A_s; the fields are
+solved for at one real shift, and the residual A_s - (1 + iωT) e of any combination is known at every frequency without
+solving again.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
-from functools import partial
 from itertools import chain
 
+import ngsolve
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike
 
-from ...geometry.common import Array, Watch, spread_points, unwatched, watched
+from ...geometry.common import MU_0, Array, Watch, spread_points, unwatched, watched
+from ...geometry.meshes.metal import PLANES
 from ..closed_forms.eddy_sphere import ComplexArray
 from ..elements.spaces import Parity
 from .eddy import ClassFactor, EddySpace, ShiftedSystem, Source
-from .eddy_fields import FieldRows, dipole_images
-from .region import Region
+from .table import Region
 
 CHUNK = 16
 """Sources handled at a time: bounds the memory."""
+CROSS = ((0, 1, 2, 1.0), (0, 2, 1, -1.0), (1, 0, 2, -1.0), (1, 2, 0, 1.0), (2, 0, 1, 1.0), (2, 1, 0, -1.0))
+"""Component, moment's axis j, component of K and sign of what is not zero in e_j × K."""
+PROBES = 6
+"""Dipoles at places off the grid, beside those at the region's corners."""
+MOST_PLACES, FEWEST_PLACES, PER_GAP = 6, 3, 1.5
+"""Places of the grid along an edge: at most, at least, and more for each distance to the plate that it is long."""
+MODE_SHARE, NEXT_SHARE = 0.2, 0.3
+"""Shares of what residuals may be: for sources left out of the modes, and for residuals that no solve starts from."""
+DEPENDENT = 1e-9
+"""Squared part of a field that the others must leave for it to be taken."""
+MOST_ROUNDS = 12
+SHIFT = 0.25
+"""The real shift in units of the highest angular frequency; a second one gave the same states for more work."""
+FREQUENCIES = 6
+"""At so many, in equal ratios, residuals are looked at."""
+
+
+@dataclass(frozen=True, eq=False)
+class OtherSources:
+    """What drives the plate beside a dipole in the region: the rotor.
+
+    Parameters
+    ----------
+    training : sources in the plate's frame whose currents the network shall hold
+    probes : others of the kind; the field of their currents is asked for in the region
+    places : (n, 3) m, where they are: the mesh must do for dipoles there
+    """
+
+    training: Sequence[Source] = ()
+    probes: Sequence[Source] = ()
+    places: Array = field(default_factory=lambda: np.zeros((0, 3)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,8 +91,7 @@ class CurrentSpace:
     def dipole_couplings(self, places: ArrayLike) -> list[Array]:
         """b (3 × places, states) of each parity class, of unit moments along x, y and z at places (m, 3), m."""
         places = np.asarray(places, float).reshape(-1, 3)
-        images = dipole_images(self.parity, self.points, places)
-        return self.image_couplings(part.reshape(len(part), -1, *part.shape[3:]) for part in images)
+        return self.image_couplings(dipole_images(self.parity, self.points, places))
 
     def image_couplings(self, images: Iterable[Array]) -> list[Array]:
         """b (sources, states) of each parity class, of parts of potentials as `source_images` makes them."""
@@ -67,15 +103,6 @@ class CurrentSpace:
         return [np.concatenate(rows) for rows in found]
 
 
-def source_images(parity: Parity, points: Array, sources: Sequence[Source]) -> Iterable[Array]:
-    """(classes, some sources, n, 3) parity parts of the sources' potentials at `points` (n, 3), T m."""
-    flips = parity.flips
-    mirrored = (points * flips[:, None]).reshape(-1, 3)
-    for start in range(0, len(sources), CHUNK):
-        some = [s.vector_potential(mirrored).reshape(len(flips), -1, 3) for s in sources[start : start + CHUNK]]
-        yield parity.project(np.stack(some, axis=1) * flips[:, None, None])
-
-
 def space_couplings(b: Sequence[Array], inductances: Sequence[Array], shift: complex) -> ComplexArray:
     """(sources, sources) -s b (1 + sL)⁻¹ bᵀ, summed over the parity classes; s is iω or a real shift, rad/s."""
     parts = [
@@ -85,59 +112,41 @@ def space_couplings(b: Sequence[Array], inductances: Sequence[Array], shift: com
     return np.asarray(-shift * sum(parts))
 
 
-PROBES = 6
-"""Dipoles at places off the grid, beside those at the region's corners."""
-MOST_PLACES, FEWEST_PLACES, PER_GAP = 6, 3, 1.5
-"""Places of the grid along an edge: at most, at least, and more for each distance to the plate that it is long."""
+def source_images(parity: Parity, points: Array, sources: Sequence[Source]) -> Iterator[Array]:
+    """(classes, some sources, n, 3) parity parts of the sources' potentials at `points` (n, 3), T m."""
+    flips = parity.flips
+    mirrored = (points * flips[:, None]).reshape(-1, 3)
+    for start in range(0, len(sources), CHUNK):
+        some = [s.vector_potential(mirrored).reshape(len(flips), -1, 3) for s in sources[start : start + CHUNK]]
+        yield parity.project(np.stack(some, axis=1) * flips[:, None, None])
 
 
-@dataclass(frozen=True, eq=False)
-class OtherSources:
-    """What drives the plate beside a dipole in the region: the rotor.
+def dipole_images(parity: Parity, points: Array, places: Array) -> Iterator[Array]:
+    """The same of unit moments along x, y and z at each of `places` (m, 3) m.
 
-    Parameters
-    ----------
-    training : sources in the plate's frame whose currents the network shall hold
-    probes : others of the kind; the field of their currents is asked for in the region
-    places : (n, 3) m, where they are: the mesh must do for dipoles there
+    A mirrored potential e_j × K is that of the mirrored kernel K = μ0/4π r/r³ but for a sign that depends on component
+    and moment, so that one kernel's parity parts serve all three moments of a place.
     """
-
-    training: Sequence[Source] = ()
-    probes: Sequence[Source] = ()
-    places: Array = field(default_factory=lambda: np.zeros((0, 3)))
-
-
-@dataclass(frozen=True, eq=False)
-class SourceSet:
-    """Unit dipoles along x, y and z at `places` (n, 3) m, and after them other sources."""
-
-    places: Array
-    others: Sequence[Source] = ()
-
-    def __len__(self) -> int:
-        return 3 * len(self.places) + len(self.others)
-
-    def rows(self, space: EddySpace, root: Array) -> Array:
-        """(classes, sources, width) weighted potentials by parity class."""
-        found = np.empty((len(space.parity.classes), len(self), root.size))
-        images = chain(
-            dipole_images(space.parity, space.points, self.places),
-            source_images(space.parity, space.points, self.others),
-        )
-        start = 0
-        for part in images:
-            rows = part.reshape(len(found), -1, root.size)
-            found[:, start : start + rows.shape[1]] = rows
-            start += rows.shape[1]
-        found *= root
-        return found
+    flips, characters = parity.flips, parity.characters
+    # By component: the class whose character is that of each class times the component's own sign.
+    partner = [
+        [int(np.flatnonzero((characters == row).all(axis=1))[0]) for row in characters * flip] for flip in flips.T
+    ]
+    for start in range(0, len(places), CHUNK):
+        some = places[start : start + CHUNK]
+        offset = (points * flips[:, None])[:, None] - some[:, None]
+        square = np.einsum("fmna,fmna->fmn", offset, offset)
+        offset *= (MU_0 / (4 * np.pi) / (square * np.sqrt(square)))[..., None]  # a power would take five times as long
+        parts = parity.project(offset)
+        images = np.zeros((len(flips), len(some), 3, len(points), 3))
+        for component, moment, kernel, sign in CROSS:
+            images[:, :, moment, :, component] = sign * parts[partner[component], :, :, kernel]
+        yield images.reshape(len(flips), -1, len(points), 3)
 
 
 def grid_counts(region: Region, half_edges: Array) -> tuple[int, int, int]:
     """Places along each edge of a region: more where it is long against its distance from the plate."""
-    of_region, of_plate = region.nearest(half_edges)
-    gap = float(np.linalg.norm(of_region - of_plate))
-    wanted = np.ceil(2 + PER_GAP * (region.upper - region.lower) / gap)
+    wanted = np.ceil(2 + PER_GAP * (region.upper - region.lower) / region.gap(half_edges))
     x, y, z = np.clip(wanted, FEWEST_PLACES, MOST_PLACES).astype(int)
     return int(x), int(y), int(z)
 
@@ -148,13 +157,58 @@ def probe_places(region: Region, fold: bool = False) -> Array:
     return np.concatenate([region.surface((2, 2, 2), fold), inside])
 
 
-Solve = Callable[[Array], tuple[Array, Array]]
-"""Fields e and their potentials T e for rows r."""
-MODE_SHARE, NEXT_SHARE = 0.2, 0.3
-"""Shares of what residuals may be: for sources left out of the modes, and for residuals that no solve starts from."""
-DEPENDENT = 1e-9
-"""Squared part of a field that the others must leave for it to be taken."""
-MOST_ROUNDS = 12
+def unit_power(power: Array, others: int) -> Array:
+    """Factors (sources,) that give each place of three dipoles, and each of the last `others` sources, unit power."""
+    dipoles = len(power) - others
+    place = np.repeat(power[:dipoles].reshape(-1, 3).sum(axis=1), 3)
+    return np.asarray(1 / np.sqrt(np.concatenate([place, power[dipoles:]])))
+
+
+class FieldRows:
+    """Rows of one finite-element space."""
+
+    def __init__(self, space: EddySpace) -> None:
+        self.space = space
+        weights = scipy.sparse.diags(space.root)
+        self._values = weights @ space.value_matrix(space.real, space.real.TrialFunction())
+        self._scalars = ngsolve.H1(space.conductors.mesh, order=space.order + 1, definedon=space.region)
+        slopes = space.value_matrix(self._scalars, ngsolve.grad(self._scalars.TrialFunction()))
+        self._gradients = (weights @ slopes).tocsc()
+        self._products = (self._gradients.T @ self._gradients).tocsc()
+
+    def loads(self, rows: Array) -> Array:
+        """∫ σ A·v dV (sources, unknowns) over the meshed part, S m³ T."""
+        return np.asarray((self._values.T @ rows.T).T) / self.space.conductors.images
+
+    def values(self, solutions: Array) -> Array:
+        """Rows of solutions (n, unknowns)."""
+        return np.asarray((self._values @ solutions.T).T)
+
+    def without_gradients(self, rows: Array, parity_class: Sequence[int]) -> Array:
+        """Rows of one parity class without their gradients: charges cancel these, so that they drive no current."""
+        kept = self._products.diagonal() > 0
+        mirrors, mesh = self.space.parity.mirrors, self.space.conductors.mesh
+        if odd := [PLANES[a] for a, sign in zip(mirrors, parity_class, strict=True) if sign < 0]:
+            kept &= ~np.array(list(self._scalars.GetDofs(mesh.Boundaries("|".join(odd)))), bool)
+        else:
+            kept[np.flatnonzero(kept)[0]] = False  # a constant has no gradient
+        free = np.flatnonzero(kept)
+        gradients = self._gradients[:, free]
+        factor = scipy.sparse.linalg.splu(
+            self._products[free][:, free], permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True}
+        )
+        return np.asarray(rows - (gradients @ factor.solve(np.ascontiguousarray(gradients.T @ rows.T))).T)
+
+    def of_sources(self, places: Array, others: Sequence[Source]) -> Array:
+        """(classes, sources, 3n) parts by parity class of dipoles at `places` (m, 3) m and of other sources."""
+        parity, points = self.space.parity, self.space.points
+        found = np.empty((len(parity.classes), 3 * len(places) + len(others), self.space.root.size))
+        start = 0
+        for part in chain(dipole_images(parity, points, places), source_images(parity, points, others)):
+            found[:, start : start + part.shape[1]] = part.reshape(len(found), -1, self.space.root.size)
+            start += part.shape[1]
+        found *= self.space.root
+        return found
 
 
 @dataclass(frozen=True, eq=False)
@@ -165,14 +219,9 @@ class ClassBasis:
     potentials: Array
     inductance: Array
 
-    @classmethod
-    def empty(cls, width: int) -> ClassBasis:
-        """No fields."""
-        return cls(np.zeros((0, width)), np.zeros((0, width)), np.zeros((0, 0)))
-
     def extended(self, fields: Array, potentials: Array) -> ClassBasis:
         """The basis and what is new in more fields."""
-        for _ in range(2):
+        for _ in range(2):  # Gram-Schmidt once leaves what cancellation spoils
             known = fields @ self.fields.T
             fields, potentials = fields - known @ self.fields, potentials - known @ self.potentials
             energies, vectors = np.linalg.eigh(fields @ fields.T)
@@ -189,85 +238,69 @@ class ClassBasis:
         return np.asarray(np.linalg.solve(matrix, couplings.T.astype(complex)).T)
 
 
-@dataclass(frozen=True, eq=False)
 class Residuals:
-    """What a basis leaves of sources (m, width), by products of all rows involved.
+    """What a basis leaves of gradient-free sources (m, width), by products of all rows involved.
 
-    Parameters
+    Attributes
     ----------
-    rows : the sources' above the fields' above the potentials'
-    products : of all of them with each other
     couplings : (m, n) of the sources
-    basis : the fields
     """
 
-    rows: Array
-    products: Array
-    couplings: Array
-    basis: ClassBasis
+    def __init__(self, sources: Array, basis: ClassBasis) -> None:
+        self.basis, self._rows = basis, np.concatenate([sources, basis.fields, basis.potentials])
+        self._products = self._rows @ self._rows.T
+        self.couplings = self._products[: len(sources), len(sources) : len(sources) + len(basis.fields)]
 
-    @classmethod
-    def of(cls, sources: Array, basis: ClassBasis) -> Residuals:
-        """The residuals of gradient-free sources (m, width)."""
-        rows = np.concatenate([sources, basis.fields, basis.potentials])
-        products = rows @ rows.T
-        m, n = len(sources), len(basis.fields)
-        return cls(rows, products, products[:m, m : m + n], basis)
-
-    def combinations(self, angular_frequency: float) -> ComplexArray:
+    def _combinations(self, angular_frequency: float) -> ComplexArray:
         """(m, rows) factors that make the residuals out of the rows."""
         amplitudes = self.basis.response(self.couplings, angular_frequency)
         return np.concatenate([np.eye(len(amplitudes)), -amplitudes, -1j * angular_frequency * amplitudes], axis=1)
 
     def gram(self, angular_frequency: float) -> ComplexArray:
         """(m, m) products of the residuals."""
-        factors = self.combinations(angular_frequency)
-        return np.asarray(factors @ self.products @ factors.conj().T)
+        factors = self._combinations(angular_frequency)
+        return np.asarray(factors @ self._products @ factors.conj().T)
 
     def driven(self, angular_frequency: float) -> Array:
         """Re ∫ σ A_s·e dV of every source: what its coupling with itself is made of."""
         return np.asarray(np.sum(self.couplings * self.basis.response(self.couplings, angular_frequency).real, axis=1))
 
-    def largest(self, angular_frequencies: Iterable[float], scales: Array, allowed: float) -> Array:
+    def largest(self, angular_frequencies: Array, scales: Array, allowed: float) -> Array:
         """Rows (k, width): principal components of all residuals times `scales` (frequencies, m), but for a tail."""
-        parts = [s[:, None] * self.combinations(w) for w, s in zip(angular_frequencies, scales, strict=True)]
+        parts = [s[:, None] * self._combinations(w) for w, s in zip(angular_frequencies, scales, strict=True)]
         factors = np.concatenate([half for part in parts for half in (part.real, part.imag)])
-        energies, vectors = np.linalg.eigh(factors @ self.products @ factors.T)
+        energies, vectors = np.linalg.eigh(factors @ self._products @ factors.T)
         kept = (np.cumsum(np.maximum(energies, 0.0)) > allowed) & (energies > DEPENDENT**1.5 * energies[-1])
-        return np.asarray((vectors[:, kept] / np.sqrt(energies[kept])).T @ factors @ self.rows)
+        return np.asarray((vectors[:, kept] / np.sqrt(energies[kept])).T @ factors @ self._rows)
 
 
-def class_basis(sources: Array, solve: Solve, angular_frequencies: Array, allowed: float) -> ClassBasis:
+def class_basis(
+    sources: Array, solve: Callable[[Array], tuple[Array, Array]], angular_frequencies: Array, allowed: float
+) -> ClassBasis:
     """A basis in which no source's residual is larger than `allowed`, relative to what the source drives.
 
     Parameters
     ----------
     sources : (m, width) without gradients, of about unit power each
-    solve : at the shift
+    solve : fields e and their potentials T e for rows, at the shift
     """
     energies, vectors = np.linalg.eigh(sources @ sources.T)
     kept = np.cumsum(np.maximum(energies, 0.0)) > MODE_SHARE * allowed
     modes = (vectors[:, kept] / np.sqrt(energies[kept])).T @ sources
     strengths, mixture = np.sqrt(energies[kept]), sources @ modes.T
-    basis = ClassBasis.empty(sources.shape[1])
+    basis = ClassBasis(*(np.zeros((0, sources.shape[1])),) * 2, np.zeros((0, 0)))
     starts = modes
     for _ in range(MOST_ROUNDS):
         if not len(starts):
             break
         basis = basis.extended(*solve(starts))
-        left = Residuals.of(modes, basis)
+        left = Residuals(modes, basis)
         shares = np.array([left.driven(w) @ strengths**2 for w in angular_frequencies]) / np.sum(strengths**2)
         grams = [left.gram(w).real / share for w, share in zip(angular_frequencies, shares, strict=True)]
         if max(float(np.max(np.sum(mixture @ gram * mixture, axis=1))) for gram in grams) <= allowed:
             break
         starts = left.largest(angular_frequencies, strengths / np.sqrt(shares)[:, None], NEXT_SHARE * allowed)
     return basis
-
-
-SHIFT = 0.25
-"""The real shift in units of the highest angular frequency; a second one gave the same states for more work."""
-FREQUENCIES = 6
-"""At so many, in equal ratios, residuals are looked at."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -302,16 +335,19 @@ class Missing:
 
 def train(
     space: EddySpace,
-    training: SourceSet,
-    probes: SourceSet,
+    grid: Array,
+    probes: Array,
+    others: OtherSources,
     frequencies: tuple[float, float],
     allowed: float,
     watch: Watch = unwatched,
 ) -> tuple[CurrentSpace, Missing]:
-    """Currents of the `training` sources at all frequencies (Hz) between the two, and what is missing of the `probes`.
+    """Currents of the sources at all frequencies (Hz) between the two, and what is missing of the probes.
 
     Parameters
     ----------
+    grid, probes : (n, 3) m, places of the dipoles that are trained and of those that are not
+    others : more sources of both kinds
     allowed : |ρ|² of a source relative to what it drives, and thus relative error of its coupling with itself
     watch : hears of the progress
     """
@@ -319,40 +355,32 @@ def train(
     rows = FieldRows(space)
     omegas = 2 * np.pi * np.geomspace(*frequencies, FREQUENCIES)
     system = ShiftedSystem(space, SHIFT * omegas[-1])
-    sources, tests = (part.rows(space, rows.root) for part in (training, probes))
+    sources, tests = rows.of_sources(grid, others.training), rows.of_sources(probes, others.probes)
     for done, (part, other, parity_class) in enumerate(zip(sources, tests, space.parity.classes, strict=True)):
         watch("potentials of sources", 0.3 + 0.7 * done / len(sources))
-        both = rows.without_gradients(np.concatenate([part, other]), parity_class)
+        both = rows.without_gradients(np.concatenate([part, other]), parity_class)  # with one factor for all
         part[:], other[:] = both[: len(part)], both[len(part) :]
-    scale = unit_power(np.einsum("csw,csw->s", sources, sources), len(training.others))
+    scale = unit_power(np.einsum("csw,csw->s", sources, sources), len(others.training))
     fields, inductances = [], []
     couplings = np.zeros((len(omegas), *[tests.shape[1]] * 2), complex)
     residuals = np.zeros_like(couplings)
     classes = zip(space.parity.classes, sources, tests, strict=True)
     for parity_class, driving, testing in watched(classes, watch, f"currents at order {space.order}"):
-        solve = partial(_solved, rows, system.factor(parity_class))
+        factor = system.factor(parity_class)
+
+        def solve(starts: Array, factor: ClassFactor = factor) -> tuple[Array, Array]:
+            reaction = rows.values(factor.solve(rows.loads(starts)))
+            return starts + reaction, -reaction / float(np.real(factor.shift))
+
         basis = class_basis(driving * scale[:, None], solve, omegas, allowed / len(sources))
-        left = Residuals.of(testing, basis)
+        left = Residuals(testing, basis)
         for k, omega in enumerate(omegas):
             residuals[k] += left.gram(omega)
             couplings[k] -= 1j * omega * left.couplings @ basis.response(left.couplings, omega).T
         fields.append(basis.fields)
         inductances.append(basis.inductance)
     made = CurrentSpace(
-        space.parity, space.points, rows.root, tuple(fields), tuple(inductances),
+        space.parity, space.points, space.root, tuple(fields), tuple(inductances),
         space.order, int(space.conductors.mesh.ne),
     )  # fmt: skip
-    return made, Missing(omegas, residuals, couplings, len(probes.places))
-
-
-def unit_power(power: Array, others: int) -> Array:
-    """Factors (sources,) that give each place of three dipoles, and each of the last `others` sources, unit power."""
-    dipoles = len(power) - others
-    place = np.repeat(power[:dipoles].reshape(-1, 3).sum(axis=1), 3)
-    return np.asarray(1 / np.sqrt(np.concatenate([place, power[dipoles:]])))
-
-
-def _solved(rows: FieldRows, factor: ClassFactor, starts: Array) -> tuple[Array, Array]:
-    """Fields and potentials (n, width) that `starts` (n, width) drive at a real shift."""
-    reaction = rows.values(factor.solve(rows.loads(starts)))
-    return starts + reaction, -reaction / float(np.real(factor.shift))
+    return made, Missing(omegas, residuals, couplings, len(probes))

@@ -1,7 +1,10 @@
-"""Finite-element space of the eddy-current problem and the loads of its sources.
+"""Eddy currents by finite elements: the reaction potential A of sources with potentials A_s, phasors e^{+iωt},
 
-Nédélec elements of the second kind, full order.  Gradients are kept in the conductors only.  Sources enter by
-their vector potential at the quadrature points of the conductors, so that any function of position will do.
+    curl curl A + iωμ0σ A = -iωμ0σ A_s.
+
+Nédélec elements of the second kind, full order; gradients are kept in the conductors only.  Sources enter by their
+vector potential at the quadrature points of the conductors, so that any function of position will do.  Mirror planes
+are used: one factorisation for each parity class that the sources touch.
 
 S. Zaglmayr, High order finite element methods for electromagnetic field computation, thesis, Linz 2006 (the space).
 """
@@ -15,13 +18,19 @@ from typing import Any, Protocol
 import ngsolve
 import numpy as np
 import scipy
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from ...geometry.common import MU_0, Array
 from ...geometry.meshes.metal import MILLIMETRE, PLANES, ConductorMesh
 from ..closed_forms.eddy_sphere import ComplexArray
 from ..elements.condensed import require_memory, solve_condensed
 from ..elements.spaces import Parity, edge_vertices, region_edges, tree_edges, value_matrix
+
+RESISTIVE = 1e-2
+"""ωμ0σL² below which the response is resistive: A = a0 + iω a1, with a0 (charges) and a1 (currents) real and constant.
+The slowest current of a plate decays in less than μ0σL²/100, so that this is exact to RESISTIVE²/1e4 = 1e-8."""
+SILENT = 1e-9
+"""Parity parts smaller than this share of the whole source are not solved for."""
 
 
 class Source(Protocol):
@@ -43,6 +52,7 @@ class EddySpace:
     ----------
     points : (n, 3) quadrature points in the conductors, m
     weights : (n,) σ times quadrature weights, S m²
+    root : (3n,) factors that make ∫ σ e·e' dV over the whole plate, with its mirror images, a plain product of rows
     """
 
     def __init__(self, conductors: ConductorMesh, order: int) -> None:
@@ -53,7 +63,7 @@ class EddySpace:
         mesh = conductors.mesh
         self.region = mesh.Materials(conductors.pattern)
         self.sigma = mesh.MaterialCF(dict(conductors.conductivity), default=0.0)
-        self.real = self._space(complex_valued=False)
+        self.real = self.elements(complex_valued=False)
         scalar = ngsolve.comp.IntegrationRuleSpace(mesh, order=order + 2, definedon=self.region)
         self._rules = scalar.GetIntegrationRules()
         self._carrier = ngsolve.GridFunction(scalar**3)
@@ -63,10 +73,12 @@ class EddySpace:
         weight += self.sigma * scalar.TestFunction() * ngsolve.dx(definedon=self.region, intrules=self._rules)
         weight.Assemble()
         self.weights = np.array(weight.vec.FV().NumPy()) * MILLIMETRE**3
+        self.root = np.repeat(np.sqrt(self.weights * conductors.images), 3)
         self._edges = edge_vertices(mesh)
         self._conducting = region_edges(mesh, self.region)
 
-    def _space(self, complex_valued: bool) -> ngsolve.FESpace:
+    def elements(self, complex_valued: bool) -> ngsolve.FESpace:
+        """The finite elements; real and complex ones have the same numbering."""
         mesh = self.conductors.mesh
         inside = [int(name in self.conductors.conductivity) for name in mesh.GetMaterials()]
         return ngsolve.HCurl(
@@ -77,10 +89,6 @@ class EddySpace:
             gradientboundaries=[0] * len(mesh.GetBoundaries()),
             dirichlet="far",
         )
-
-    def complex_space(self) -> ngsolve.FESpace:
-        """The same space with complex coefficients and the same numbering."""
-        return self._space(complex_valued=True)
 
     def class_images(self, sources: Sequence[Source]) -> NDArray[np.float64]:
         """(classes, sources, n, 3) parity parts of the sources' potentials at the quadrature points, T m."""
@@ -100,11 +108,6 @@ class EddySpace:
             form.Assemble()
             row[:] = form.vec.FV().NumPy() * MILLIMETRE**3
         return found
-
-    def point_values(self, function: ngsolve.GridFunction) -> Array:
-        """(n, 3) values of a real function of this space at the quadrature points."""
-        self._carrier.Interpolate(function, definedon=self.region)
-        return np.stack([c.vec.FV().NumPy() for c in self._carrier.components], axis=1)
 
     def value_matrix(self, space: ngsolve.FESpace, basis: ngsolve.CoefficientFunction) -> scipy.sparse.csr_matrix:
         """(3n, unknowns) values of a space's `basis` at the quadrature points, the components of one point together."""
@@ -142,7 +145,7 @@ class ShiftedSystem:
 
     def __init__(self, space: EddySpace, shift: complex) -> None:
         self.space, self.shift = space, shift
-        self.fes = space.complex_space() if np.iscomplexobj(shift) else space.real
+        self.fes = space.elements(complex_valued=True) if np.iscomplexobj(shift) else space.real
         require_memory(
             self.fes,
             self.fes.FreeDofs(True),
@@ -156,7 +159,6 @@ class ShiftedSystem:
         self.form = form
 
     def factor(self, parity_class: Sequence[int]) -> ClassFactor:
-        """The factor of one parity class."""
         free = self.space.free_unknowns(parity_class, self.fes)
         inverse = self.form.mat.Inverse(free, inverse="sparsecholesky")
         return ClassFactor(self.form, inverse, self.shift, sum(free))
@@ -174,13 +176,6 @@ class ClassFactor:
     def solve(self, loads: Array) -> NDArray[Any]:
         """Reactions A = -s (curl curl + s μ0 σ)⁻¹ μ0 ∫ σ A_s·v (sources, unknowns), T m; complex as the shift is."""
         return solve_condensed(self.form, self.inverse, -self.shift * MU_0 / MILLIMETRE * loads)
-
-
-RESISTIVE = 1e-2
-"""ωμ0σL² below which the response is resistive: A = a0 + iω a1, with a0 (charges) and a1 (currents) real and constant.
-The slowest current of a plate decays in less than μ0σL²/100, so that this is exact to RESISTIVE²/1e4 = 1e-8."""
-SILENT = 1e-9
-"""Parity parts smaller than this share of the whole source are not solved for."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -210,11 +205,6 @@ class EddyResponse:
     coupling_unknowns: int
 
     @property
-    def frequency(self) -> float:
-        """Hz, of phasors e^{+iωt}."""
-        return float(np.imag(self.shift)) / (2 * np.pi)
-
-    @property
     def couplings(self) -> ComplexArray:
         """(sources, sources) ∫ J_j · A_i dV, J; for dipoles of 1 A m² it is B_i, T. Symmetric to round-off."""
         return self._sum({number: (c.potentials, c.loads) for number, c in self.classes.items()})
@@ -225,24 +215,21 @@ class EddyResponse:
         return self._sum({number: (images[number], self.space.loads(images[number])) for number in self.classes})
 
     def _sum(self, tests: dict[int, tuple[Array, Array]]) -> ComplexArray:
-        factor = -self.shift * self.space.conductors.images
-        total: ComplexArray = np.zeros((0, 0), complex)
+        parts = []
         for number, (potentials, loads) in tests.items():
             c = self.classes[number]
             direct = np.einsum("q,iqa,jqa->ij", self.space.weights, potentials, c.potentials, optimize=True)
-            part = factor * (direct + loads @ c.solutions.T)
-            total = part if total.size == 0 else total + part
-        return total
+            parts.append(direct + loads @ c.solutions.T)
+        return np.asarray(-self.shift * self.space.conductors.images * sum(parts))
 
 
 def solve_eddy(
     conductors: ConductorMesh, order: int, frequency: float, sources: Sequence[Source], space: EddySpace | None = None
 ) -> EddyResponse:
-    """Eddy currents of all `sources` at `frequency` (Hz), with one factorisation for each parity class that they touch.
+    """Eddy currents of all `sources` at `frequency` (Hz).
 
     Any frequency from 0 up is safe: the gauge needs no parameter, and below ωμ0σL² = 1e-2 the resistive limit
-    is used, exact to 1e-8.  At high frequency the mesh must resolve the skin depth; `plate_currents` estimates whether
-    it does.
+    is used, exact to 1e-8.  At high frequency the mesh must resolve the skin depth: `plate_reaction` sees to it.
 
     Raises
     ------
@@ -254,7 +241,8 @@ def solve_eddy(
     if not sources:
         raise ValueError("Input sources must hold at least one source; instead received none.")
     space = space or EddySpace(conductors, order)
-    solved = max(frequency, _resistive_frequency(space))
+    extent, conductivity = 2 * float(np.abs(space.points).max()), max(space.conductors.conductivity.values())
+    solved = max(frequency, RESISTIVE / (2 * np.pi * MU_0 * conductivity * extent**2))
     response = solve_shifted(space, 2j * np.pi * solved, sources)
     scaled = {
         number: replace(part, solutions=part.solutions.real + 1j * part.solutions.imag * (frequency / solved))
@@ -264,7 +252,7 @@ def solve_eddy(
 
 
 def solve_shifted(space: EddySpace, shift: complex, sources: Sequence[Source]) -> EddyResponse:
-    """The answers of all `sources` where iω is `shift`, rad/s: a real one is that of fields that grow as e^{st}.
+    """Eddy currents of all `sources` where iω is `shift`, rad/s: a real one is that of fields that grow as e^{st}.
 
     Raises
     ------
@@ -284,7 +272,34 @@ def solve_shifted(space: EddySpace, shift: complex, sources: Sequence[Source]) -
     return EddyResponse(space, shift, classes, coupling)
 
 
-def _resistive_frequency(space: EddySpace) -> float:
-    extent = 2 * float(np.abs(space.points).max())
-    conductivity = max(space.conductors.conductivity.values())
-    return RESISTIVE / (2 * np.pi * MU_0 * conductivity * extent**2)
+def current_density(
+    response: EddyResponse, applied: ComplexArray, amplitudes: ArrayLike, points: ArrayLike
+) -> ComplexArray:
+    """J = -iωσ(A_s + A) (n, 3), A/m², at points (n, 3), m; zero in air.
+
+    Parameters
+    ----------
+    applied : (n, 3) T m, potential A_s of the sources with their amplitudes at the same points
+    amplitudes : of the sources that `response` was solved for
+
+    Raises
+    ------
+    ValueError : a point outside the mesh
+    """
+    points, space = np.asarray(points, float).reshape(-1, 3), response.space
+    mirrors = list(space.parity.mirrors)
+    flip = np.ones((len(points), 3))
+    flip[:, mirrors] = np.where(points[:, mirrors] < 0, -1.0, 1.0)
+    places = space.conductors.mesh(*(points * flip / MILLIMETRE).T)
+    outside = places["nr"] < 0
+    if outside.any():
+        raise ValueError(f"Input points_m must lie in the meshed box; instead received {points[outside][0].tolist()}.")
+    function = ngsolve.GridFunction(space.elements(complex_valued=True))
+    total = np.array(applied, complex)
+    for number, c in response.classes.items():
+        function.vec.FV().NumPy()[:] = np.asarray(amplitudes, complex) @ c.solutions
+        # In the octants that are not meshed a class has its sign about each plane that lies between.
+        signs = np.prod(np.where(flip[:, mirrors] < 0, np.array(space.parity.classes[number]), 1.0), axis=1)
+        total += signs[:, None] * flip * np.asarray(function(places), complex).reshape(-1, 3)
+    sigma = np.asarray(space.sigma(places), float).reshape(-1, 1)
+    return np.asarray(-response.shift * sigma * total)

@@ -1,41 +1,89 @@
-"""A passive resistor-inductor network from snapshots of the currents: proper orthogonal decomposition, then Galerkin.
+"""Passive networks of few states from snapshots of the currents: proper orthogonal decomposition, then Galerkin.
 
-In the span of real fields e_i, whose currents σe_i have the potentials a_i, the eddy currents answer a source A_s by
+In the span of real fields e_i, whose currents σe_i have the potentials a_i, the eddy currents of a source A_s are
 
     (R + iωL) c = -iω b,    R_ij = ∫ σ e_i·e_j,    L_ij = ∫ σ e_i·a_j,    b_i = ∫ σ e_i·A_s,
 
 and their coupling to another source is b'·c.  R and L are Gram matrices of power and of energy, hence positive: the
-network is passive whatever is left out.  A source whose own field lies in the span is answered exactly, and the error
-of a coupling is the product of two projection errors.  The basis is reduced first and diagonalised afterwards:
+network is passive whatever is left out.  The currents of a source whose own field lies in the span are exact, and the
+error of a coupling is the product of two projection errors.  The basis is reduced first and diagonalised afterwards:
 R w = λ L w with wᵀ L w = 1 (eigenmodes of the plate itself converge far more slowly).
 M. Clemens, T. Weiland, IEEE Trans. Magn. 35 (1999) 1163 (discrete eddy-current operators).
 """
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import NoReturn
+from functools import partial
+from importlib.metadata import version
+from itertools import product
 
 import numpy as np
 import scipy
-from numpy.typing import ArrayLike
 
-from ...geometry.common import Array
-from ...geometry.meshes.plate import MeshRule
+from ...geometry.common import Array, Watch
 from ...geometry.scene.contents import Plate
 from ..closed_forms.eddy_sphere import ComplexArray
-from ..elements.spaces import Parity
-from ..rotor.models import AccuracyError
-from .currents import CurrentSpace, OtherSources, grid_counts, probe_places, space_couplings, unit_power
+from .currents import OtherSources, grid_counts, probe_places, space_couplings, unit_power
 from .eddy import Source
-from .reaction import OPTION
-from .region import Region
-from .solution import STRICT, PlateSolution, solve_currents
+from .multipoles import Multipoles, fit_multipoles
+from .solution import STRICT, PlateSolution
+from .table import ENOUGH, Region, refuse
 
 NEGLIGIBLE = 1e-12
 """Snapshot energies below this share of the largest are round-off."""
+FREQUENCIES = 7
+"""Errors are looked at at so many, in equal ratios."""
+NETWORK_SHARE, STRICT_SHARE = 0.9, 0.8
+"""Share of the tolerance for the finite elements and the states left out together; the rest is the field functions',
+and that is more of a strict tolerance."""
+FUNCTION_SHARE = 0.1
+"""Share of the tolerance for the field functions; what the other errors leave of it comes on top."""
+CONDUCTOR = "this plate and this place of the floater"
+"""In words, of which tolerances are refused."""
+DEGREE, STRICT_DEGREE = 4, 7
+"""Highest degree of the multipoles, and for strict tolerances: in a region half as wide as it is far from the plate,
+degree 4 ends near 8e-5 of the field of the plate's currents, degree 5 near 2e-5."""
+DEPTHS = (0.0, 0.3, 0.6, 1.0, 1.6, 2.5, 4.0, 6.0, 10.0, 18.0)
+"""Depths of their centres behind the surface, in units of the distance between region and plate: near ones for what is
+close to the surface, far ones for the rest."""
+SPACING = 2.5
+"""Lateral distance of the lines of centres, in the same unit."""
+
+
+@dataclass(frozen=True, eq=False)
+class PassiveNetwork:
+    """Currents in a plate as states: dp_i/dt = -λ_i (p_i - s_i), with y_i = p_i - s_i the current of field e_i.
+
+    Parameters
+    ----------
+    plate : the conductor; fields and region are in its own frame
+    region : where the floater may be
+    frequencies : lowest and highest, Hz
+    rates : (states,) λ_i, 1/s
+    couplings : s_i = ∫ σ e_i·A_s dV (sources, states), √J, of sources in the plate's frame
+    field_functions : for a tolerance of reaction tensors the multipoles, their weights (states, k), 1/√J, and the error
+        that they leave, which may be more
+    mesh_error, state_error : estimated relative errors of reaction tensors
+    provenance : how it was made; texts and numbers
+    seconds : time spent on that
+    """
+
+    plate: Plate
+    region: Region
+    frequencies: tuple[float, float]
+    rates: Array
+    couplings: Callable[[Sequence[Source]], Array]
+    field_functions: Callable[[float, Watch], tuple[Multipoles, Array, float]]
+    mesh_error: float
+    state_error: float
+    provenance: Mapping[str, str | float]
+    seconds: float
+
+
+Reduction = Callable[[float], PassiveNetwork]
+"""The network of fewest states that meets a tolerance, by what its field functions are expected to miss."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,7 +93,7 @@ class OrderedBasis:
     Parameters
     ----------
     energies : (n,) of the snapshots along each field, decreasing
-    fields : (n, width) weighted rows e_i
+    fields : (n, width) rows e_i
     resistance, inductance : (n, n)
     """
 
@@ -67,328 +115,73 @@ class OrderedBasis:
         return rates, vectors.T @ self.fields
 
     def couplings(self, rows: Array, angular_frequency: float) -> ComplexArray:
-        """(sources, sources) -iω b (R + iωL)⁻¹ bᵀ of sources with weighted potentials `rows` (sources, width)."""
+        """(sources, sources) -iω b (R + iωL)⁻¹ bᵀ of sources with potentials `rows` (sources, width)."""
         b = rows @ self.fields.T
         impedance = self.resistance + 1j * angular_frequency * self.inductance
         return np.asarray(-1j * angular_frequency * b @ np.linalg.solve(impedance, b.T))
 
 
-def ordered_basis(
-    sources: Array, reactions: Sequence[ComplexArray], angular_frequencies: Sequence[float], scales: Sequence[Array]
-) -> OrderedBasis:
-    """Basis from the answers to `sources` (n, width) at several frequencies.
+def ordered_basis(fields: Array, potentials: Array, reference: float) -> OrderedBasis:
+    """Basis from snapshots of fields and of their potentials (n, width).
 
-    Parameters
-    ----------
-    reactions : A (n, width) for each angular frequency (rad/s), weighted as the sources
-    scales : (n,) for each frequency, how much a snapshot counts
+    At the angular frequency `reference` (rad/s) energy and power count alike.
     """
-    fields, potentials = [], []
-    for reaction, omega, scale in zip(reactions, angular_frequencies, scales, strict=True):
-        weight = scale[:, None]
-        fields += [weight * (sources + reaction.real), weight * reaction.imag]
-        potentials += [-weight / omega * reaction.imag, weight / omega * reaction.real]
-    e, a = np.concatenate(fields), np.concatenate(potentials)
-    resistance, inductance = e @ e.T, a @ e.T
+    resistance, inductance = fields @ fields.T, potentials @ fields.T
     inductance = (inductance + inductance.T) / 2
-    reference = float(np.sqrt(max(angular_frequencies) * min(angular_frequencies)))
     energies, vectors = np.linalg.eigh(resistance + reference * inductance)
     kept = np.flatnonzero(energies > NEGLIGIBLE * energies.max(initial=0.0))[::-1]
     mixed = vectors[:, kept] / np.sqrt(energies[kept])
-    return OrderedBasis(energies[kept], mixed.T @ e, mixed.T @ resistance @ mixed, mixed.T @ inductance @ mixed)
+    return OrderedBasis(energies[kept], mixed.T @ fields, mixed.T @ resistance @ mixed, mixed.T @ inductance @ mixed)
 
 
-def leading_fields(snapshots: Array, inductance: Array, reference: float) -> OrderedBasis:
-    """Basis from snapshots (m, n) in coordinates in which the resistance is 1.
+def fewest_states(
+    basis: Sequence[OrderedBasis],
+    probes: Sequence[tuple[int, Array]],
+    truth: Mapping[float, ComplexArray],
+    places: int,
+    tolerance: float,
+) -> tuple[list[OrderedBasis], float]:
+    """The fewest leading fields of all bases whose worst error meets the tolerance, and that error.
 
     Parameters
     ----------
-    inductance : (n, n) in these coordinates
-    reference : angular frequency (rad/s) at which energy and power count alike
+    probes : numbers of bases with potentials (sources, width) of all probes in them, whose couplings add up
+    truth : (sources, sources) couplings of the probes by angular frequency, rad/s
+    places : of the probes: three dipoles at each come first, then other sources
     """
-    root = np.linalg.cholesky(np.eye(len(inductance)) + reference * inductance)
-    energies, vectors = np.linalg.eigh(root.T @ (snapshots.T @ snapshots) @ root)
-    kept = np.flatnonzero(energies > NEGLIGIBLE * energies.max(initial=0.0))[::-1]
-    fields = scipy.linalg.solve_triangular(root, vectors[:, kept], lower=True, trans="T").T
-    return OrderedBasis(energies[kept], fields, fields @ fields.T, fields @ inductance @ fields.T)
 
+    def worst(chosen: Sequence[OrderedBasis]) -> float:
+        errors = []
+        for omega, exact in truth.items():
+            found = sum(chosen[number].couplings(rows, omega) for number, rows in probes)
+            errors.append(coupling_error(np.asarray(found), exact, places))
+        return max(errors)
 
-LARGEST = 0.1
-"""Tolerance that may be asked at most."""
-ENOUGH = 2.0
-"""A tolerance that is met with certainty, in units of the errors of a table that was to meet a smaller one."""
-
-
-def coupling_error(found: ComplexArray, truth: ComplexArray, places: int) -> float:
-    """Largest relative error of own tensors and of other sources' fields, in couplings (sources, sources).
-
-    Three dipoles at each of some places come first, then the others.
-    """
-    pairs = zip(_seen(found, places), _seen(truth, places), strict=True)
-    return max(float(_relative(f, t).max(initial=0.0)) for f, t in pairs)
-
-
-def _seen(couplings: ComplexArray, places: int) -> tuple[ComplexArray, ComplexArray]:
-    """Own tensors (places, 9), and fields (other sources, components at all places)."""
-    n = places
-    blocks = couplings[: 3 * n, : 3 * n].reshape(n, 3, n, 3)
-    return np.einsum("iaib->iab", blocks).reshape(n, 9), couplings[3 * n :, : 3 * n]
-
-
-def _relative(found: ComplexArray, truth: ComplexArray) -> Array:
-    return np.asarray(np.linalg.norm(found - truth, axis=1) / np.linalg.norm(truth, axis=1))
-
-
-def fewest_fields(
-    worst: Callable[[Sequence[OrderedBasis]], float], basis: Sequence[OrderedBasis], tolerance: float
-) -> tuple[list[OrderedBasis], float]:
-    """The fewest leading fields whose `worst` error meets the tolerance, and that error."""
     levels = np.sort(np.concatenate([part.energies for part in basis]))[::-1]
     low, high = 0, len(levels) - 1
     while low < high:
         middle = (low + high) // 2
-        error = worst([part.leading(levels[middle]) for part in basis])
-        low, high = (low, middle) if error <= tolerance else (middle + 1, high)
+        met = worst([part.leading(levels[middle]) for part in basis]) <= tolerance
+        low, high = (low, middle) if met else (middle + 1, high)
     chosen = [part.leading(levels[low]) for part in basis]
     return chosen, worst(chosen)
 
 
-def refuse(rtol: float, enough: float, conductor: str) -> NoReturn:
-    """Refuse a tolerance that a table of a conductor, in words, misses, where `enough` can be met.
-
-    Raises
-    ------
-    AccuracyError : always
-    """
-    unit = 10.0 ** math.floor(math.log10(enough))
-    enough = math.ceil(enough / unit - 1e-9) * unit
-    if enough > LARGEST:
-        raise AccuracyError(
-            f"Input {OPTION} must be at least {enough:.2g} for {conductor}, more than the {LARGEST:g} that is allowed; "
-            f"instead received {rtol:g}. Move the plate away from the floater, or choose another model of it."
-        )
-    raise AccuracyError(f"Input {OPTION} must be at least {enough:.2g} for {conductor}; instead received {rtol:g}.")
+def coupling_error(found: ComplexArray, truth: ComplexArray, places: int) -> float:
+    """Largest relative error of dipoles' own tensors and of other sources' fields at their places."""
+    n, errors = places, [0.0]
+    own, exact = (np.einsum("iaib->iab", c[: 3 * n, : 3 * n].reshape(n, 3, n, 3)) for c in (found, truth))
+    fields = (c[3 * n :, : 3 * n] for c in (found - truth, truth))
+    for missed, whole in (((own - exact).reshape(n, 9), exact.reshape(n, 9)), tuple(fields)):
+        errors += (np.linalg.norm(missed, axis=1) / np.linalg.norm(whole, axis=1)).tolist()
+    return max(errors)
 
 
-FREQUENCIES = 7
-"""Errors are looked at at so many, in equal ratios."""
-
-
-@dataclass(frozen=True)
-class Group:
-    """Parity classes that the region mixes, by their numbers among the classes of the mesh."""
-
-    classes: tuple[int, ...]
-
-
-def parity_groups(parity: Parity, mirrors: Sequence[int]) -> list[Group]:
-    """Classes of the mesh sorted by their parity about those of its planes that also mirror the region."""
-    common = [k for k, axis in enumerate(parity.mirrors) if axis in mirrors]
-    sorted_classes: dict[tuple[int, ...], list[int]] = {}
-    for number, signs in enumerate(parity.classes):
-        sorted_classes.setdefault(tuple(signs[k] for k in common), []).append(number)
-    return [Group(tuple(numbers)) for numbers in sorted_classes.values()]
-
-
-def joined(parts: Sequence[Array], groups: Sequence[Group]) -> list[Array]:
-    """Couplings (sources, states) of the classes of each group side by side."""
-    return [np.concatenate([parts[number] for number in group.classes], axis=1) for group in groups]
-
-
-@dataclass(frozen=True, eq=False)
-class Training:
-    """Sources of one region in a current space.
-
-    Parameters
-    ----------
-    groups : of parity classes
-    inductances : of each group
-    driving : couplings of the training sources by group
-    scale : how much each counts
-    testing : couplings of the probes by group: three dipoles at each place, then other sources
-    places : of the probes
-    frequencies : lowest and highest, Hz
-    """
-
-    groups: Sequence[Group]
-    inductances: Sequence[Array]
-    driving: Sequence[Array]
-    scale: Array
-    testing: Sequence[Array]
-    places: int
-    frequencies: tuple[float, float]
-
-    def basis(self) -> list[OrderedBasis]:
-        """Bases of all groups; snapshots count by the reaction at their frequency, to which errors are relative."""
-        low, high = self.frequencies
-        omegas = [2 * np.pi * f for f in (low, low**0.25 * high**0.75, high)]
-        sizes = [np.linalg.norm(np.diagonal(self.truth(w))[: 3 * self.places]) / w for w in omegas]
-        found = []
-        for b, inductance in zip(self.driving, self.inductances, strict=True):
-            answers = [
-                self.scale[:, None]
-                / np.sqrt(size)
-                * np.linalg.solve(np.eye(len(inductance)) + 1j * omega * inductance, b.T).T
-                for omega, size in zip(omegas, sizes, strict=True)
-            ]
-            snapshots = np.concatenate([part for answer in answers for part in (answer.real, answer.imag)])
-            found.append(leading_fields(snapshots, inductance, float(np.sqrt(omegas[0] * omegas[-1]))))
-        return found
-
-    def truth(self, omega: float) -> ComplexArray:
-        """(probes, probes) couplings of the whole space."""
-        return space_couplings(self.testing, self.inductances, 1j * omega)
-
-    def worst(self, basis: Sequence[OrderedBasis]) -> float:
-        """Largest relative error of the dipoles' own tensors and, at their places, of the other sources' fields."""
-        return max(self._error(basis, 2 * np.pi * f) for f in np.geomspace(*self.frequencies, FREQUENCIES))
-
-    def _error(self, basis: Sequence[OrderedBasis], omega: float) -> float:
-        parts = [part.couplings(b, omega) for part, b in zip(basis, self.testing, strict=True)]
-        return coupling_error(np.asarray(sum(parts)), self.truth(omega), self.places)
-
-
-def prepare_training(
-    space: CurrentSpace,
-    region: Region,
-    counts: tuple[int, int, int],
-    frequencies: tuple[float, float],
-    others: OtherSources,
-) -> Training:
-    """Dipoles on a grid in `region` and `others`, with probes, in the coordinates of a current space."""
-    groups = parity_groups(space.parity, region.mirrors)
-    probes = probe_places(region, fold=True)
-    driving, testing = (
-        [np.concatenate(pair) for pair in zip(space.dipole_couplings(places), space.couplings(more), strict=True)]
-        for places, more in ((region.grid(counts, fold=True), others.training), (probes, others.probes))
-    )
-    power = np.sum([np.sum(part**2, axis=1) for part in driving], axis=0)
-    return Training(
-        groups,
-        [scipy.linalg.block_diag(*(space.inductances[number] for number in group.classes)) for group in groups],
-        joined(driving, groups),
-        unit_power(power, len(others.training)),
-        joined(testing, groups),
-        len(probes),
-        frequencies,
-    )
-
-
-NETWORK_SHARE, STRICT_SHARE = 0.9, 0.8
-"""Share of the tolerance for the finite elements and the states left out together; the rest is the field functions',
-and that is more of a strict tolerance."""
-
-
-@dataclass(frozen=True, eq=False)
-class PlateNetwork:
-    """Currents in a plate as states: dp_i/dt = -λ_i (p_i - s_i), with y_i = p_i - s_i the current of field e_i.
-
-    Parameters
-    ----------
-    plate : the conductor; fields and region are in its own frame
-    region : where the floater may be
-    frequencies : lowest and highest, Hz
-    space : of the currents, with the fields e_i (of unit inductance) and the inductances of each parity class's part
-    groups : parity groups
-    rates : (states,) λ_i, 1/s, for each group
-    mesh_error, state_error : estimated relative errors of reaction tensors
-    seconds : time spent on the finite elements
-    """
-
-    plate: Plate
-    region: Region
-    frequencies: tuple[float, float]
-    space: CurrentSpace
-    groups: tuple[Group, ...]
-    rates: tuple[Array, ...]
-    mesh_error: float
-    state_error: float
-    seconds: float
-
-    def couplings(self, sources: Sequence[Source]) -> list[Array]:
-        """s_i = ∫ σ e_i·A_s dV, √J, of sources in the plate's frame: (sources, states) for each group."""
-        return self._by_group(self.space.couplings(sources))
-
-    def dipole_couplings(self, places: ArrayLike) -> list[Array]:
-        """The same of unit moments along x, y and z at `places` (n, 3), m."""
-        return self._by_group(self.space.dipole_couplings(places))
-
-    def _by_group(self, parts: Sequence[Array]) -> list[Array]:
-        return [np.sum([parts[number] for number in group.classes], axis=0) for group in self.groups]
-
-
-def reduce_plate(
-    plate: Plate,
-    region: Region,
-    frequencies: tuple[float, float] = (0.5, 250.0),
-    rtol: float = 1e-3,
-    rule: MeshRule | None = None,
-    others: OtherSources | None = None,
-) -> PlateNetwork:
-    """The network of a plate for dipoles in `region` and all frequencies between the two (Hz).
-
-    Parameters
-    ----------
-    rtol : relative accuracy of reaction tensors (Frobenius norm); the network's share of it is used here
-    rule : mesh (default by `rtol`)
-    others : more sources whose currents the network shall hold: the rotor's
-
-    Raises
-    ------
-    ValueError : region in the plate, frequencies not 0 < lowest < highest, or rtol not between 0 and 1
-    AccuracyError : the mesh is too coarse for `rtol`, or the frequencies do not suffice
-    """
-    checked_ranges(frequencies, rtol)
-    others = others or OtherSources()
-    solution = solve_currents(plate, [region], frequencies, rtol, rule, others)
-    return reduce_currents(plate, solution, region, frequencies, rtol, others, solution.space_error)
-
-
-def reduce_currents(
-    plate: Plate,
-    solution: PlateSolution,
-    region: Region,
-    frequencies: tuple[float, float],
-    rtol: float,
-    others: OtherSources,
-    space_error: float,
-    functions_error: float = 0.0,
-) -> PlateNetwork:
-    """The network for a region within the boxes and frequencies within those of a `solution`.
-
-    Parameters
-    ----------
-    space_error : what the solution's states miss of reaction tensors and of the others' fields, relative
-    functions_error : what field functions will miss, where that is more than the share left to them
-
-    Raises
-    ------
-    AccuracyError : all of the solution's states do not suffice
-    """
-    share = NETWORK_SHARE if rtol >= STRICT else STRICT_SHARE
-    allowed = min(share * rtol, rtol - functions_error) - solution.mesh_error - space_error
-    counts = grid_counts(region, plate.box.half_edges)
-    training = prepare_training(solution.space, region, counts, frequencies, others)
-    chosen, state_error = fewest_fields(training.worst, training.basis(), allowed)
-    if state_error > allowed:
-        missed = state_error + functions_error + solution.mesh_error + space_error
-        refuse(rtol, ENOUGH * max(missed, rtol), "this plate and this place of the floater")
-    rates, fields = zip(*[part.diagonalised() for part in chosen], strict=True)
-    return PlateNetwork(
-        plate, region, frequencies, part_of_space(solution.space, training.groups, fields), tuple(training.groups),
-        rates, solution.mesh_error, state_error + space_error, solution.seconds,
-    )  # fmt: skip
-
-
-def part_of_space(space: CurrentSpace, groups: Sequence[Group], fields: Sequence[Array]) -> CurrentSpace:
-    """The space that holds, in each class, the part there of `fields` (states, coordinates) of each group."""
-    rows, inductances = list(space.fields), list(space.inductances)
-    for group, states in zip(groups, fields, strict=True):
-        ends = np.cumsum([len(space.inductances[number]) for number in group.classes])
-        for number, part in zip(group.classes, np.split(states, ends[:-1], axis=1), strict=True):
-            rows[number] = part @ space.fields[number]
-            inductances[number] = part @ space.inductances[number] @ part.T
-    return replace(space, fields=tuple(rows), inductances=tuple(inductances))
+def tensor_error(values: Array, error: Array, rates: Array, omega: float) -> float:
+    """Largest relative error of reaction tensors from errors of the field functions (states, n, 3)."""
+    weight = 1 / (rates + 1j * omega)
+    exact, found = (np.einsum("ina,i,inb->nab", b, weight, b, optimize=True) for b in (values, values - error))
+    return float(np.max(np.linalg.norm(found - exact, axis=(1, 2)) / np.linalg.norm(exact, axis=(1, 2))))
 
 
 def checked_ranges(frequencies: tuple[float, float], rtol: float) -> tuple[float, float]:
@@ -404,3 +197,149 @@ def checked_ranges(frequencies: tuple[float, float], rtol: float) -> tuple[float
     if not 0 < rtol < 1:
         raise ValueError(f"Input rtol must be between 0 and 1; instead received {rtol}.")
     return low, high
+
+
+def from_elements(
+    plate: Plate,
+    solution: PlateSolution,
+    region: Region,
+    frequencies: tuple[float, float],
+    rtol: float,
+    others: OtherSources,
+    space_error: float,
+) -> Reduction:
+    """Networks for a region within the boxes and frequencies (Hz) within those of a `solution`.
+
+    Parameters
+    ----------
+    rtol : relative accuracy of reaction tensors (Frobenius norm) and of the fields of `others`
+    others : more sources whose currents the networks shall hold: the rotor's
+    space_error : what the solution's states miss of these, relative
+
+    Raises
+    ------
+    AccuracyError : (the reduction) all of the solution's states do not suffice
+    """
+    space, (low, high) = solution.space, frequencies
+    # Classes of the plate's mirrors that do not mirror the region are mixed by every source: they share their states.
+    common = [k for k, axis in enumerate(space.parity.mirrors) if axis in region.mirrors]
+    by_signs: dict[tuple[int, ...], list[int]] = {}
+    for number, signs in enumerate(space.parity.classes):
+        by_signs.setdefault(tuple(signs[k] for k in common), []).append(number)
+    groups = list(by_signs.values())
+
+    def joined(parts: Sequence[Array]) -> list[Array]:
+        return [np.concatenate([parts[number] for number in group], axis=1) for group in groups]
+
+    probes = probe_places(region, fold=True)
+    grid = region.grid(grid_counts(region, plate.box.half_edges), fold=True)
+    driving, testing = (
+        [np.concatenate(pair) for pair in zip(space.dipole_couplings(places), space.couplings(more), strict=True)]
+        for places, more in ((grid, others.training), (probes, others.probes))
+    )
+    scale = unit_power(np.sum([np.sum(part**2, axis=1) for part in driving], axis=0), len(others.training))
+    truth = partial(space_couplings, testing, space.inductances)
+    omegas = [2 * np.pi * f for f in (low, low**0.25 * high**0.75, high)]
+    # Snapshots count by the reaction at their frequency, to which errors are relative.
+    sizes = [np.linalg.norm(np.diagonal(truth(1j * w))[: 3 * len(probes)]) / w for w in omegas]
+    basis = []
+    for group, b in zip(groups, joined(driving), strict=True):
+        inductance = scipy.linalg.block_diag(*(space.inductances[number] for number in group))
+        snapshots = []
+        for omega, size in zip(omegas, sizes, strict=True):
+            amplitudes = np.linalg.solve(np.eye(len(inductance)) + 1j * omega * inductance, b.T).T
+            amplitudes = scale[:, None] / np.sqrt(size) * amplitudes
+            snapshots += [amplitudes.real, amplitudes.imag]
+        # The many snapshots have the Gram matrix of their triangle, which is small.
+        fields = np.asarray(np.linalg.qr(np.concatenate(snapshots), mode="r"))
+        basis.append(ordered_basis(fields, fields @ inductance, float(np.sqrt(omegas[0] * omegas[-1]))))
+    truths = {w: truth(1j * w) for w in (2 * np.pi * np.geomspace(low, high, FREQUENCIES)).tolist()}
+
+    def reduced(functions_error: float) -> PassiveNetwork:
+        share = NETWORK_SHARE if rtol >= STRICT else STRICT_SHARE
+        known = solution.mesh_error + space_error
+        allowed = min(share * rtol, rtol - functions_error) - known
+        chosen, state_error = fewest_states(basis, list(enumerate(joined(testing))), truths, len(probes), allowed)
+        if state_error > allowed:
+            refuse(rtol, ENOUGH * max(state_error + functions_error + known, rtol), CONDUCTOR)
+        rates, fields = zip(*[part.diagonalised() for part in chosen], strict=True)
+        rows = list(space.fields)
+        for group, states in zip(groups, fields, strict=True):
+            ends = np.cumsum([len(space.inductances[number]) for number in group])
+            for number, part in zip(group, np.split(states, ends[:-1], axis=1), strict=True):
+                rows[number] = part @ space.fields[number]
+        held = replace(space, fields=tuple(rows))
+
+        def by_state(parts: Sequence[Array]) -> Array:
+            return np.concatenate([np.sum([parts[number] for number in group], axis=0) for group in groups], axis=1)
+
+        every = np.concatenate(rates)
+        return PassiveNetwork(
+            plate, region, frequencies, every, lambda sources: by_state(held.couplings(sources)),
+            partial(_functions, plate, region, frequencies, every, lambda at: by_state(held.dipole_couplings(at))),
+            solution.mesh_error, state_error + space_error,
+            {"ngsolve": version("ngsolve"), "order": float(space.order), "cells": float(space.cells)}, solution.seconds,
+        )  # fmt: skip
+
+    return reduced
+
+
+def _functions(
+    plate: Plate,
+    region: Region,
+    frequencies: tuple[float, float],
+    rates: Array,
+    dipole_couplings: Callable[[Array], Array],
+    rtol: float,
+    watch: Watch,
+) -> tuple[Multipoles, Array, float]:
+    """`PassiveNetwork.field_functions` from the fields on the region's surface, which determine those within."""
+    extent = region.upper - region.lower
+    x, y, z = np.clip(np.ceil(13 * np.sqrt(extent / extent.max())), 6, 13).astype(int)  # more along the longer edges
+    points = region.surface((int(x), int(y), int(z)))
+    values = dipole_couplings(points).T.reshape(len(rates), -1, 3)
+    low, high = (2 * np.pi * f for f in frequencies)
+    middle = np.sqrt(low * high)
+    state_scale = 1 / np.sqrt(rates + middle)
+    point_scale = 1 / np.sqrt(np.sum((values * state_scale[:, None, None]) ** 2, axis=(0, 2)))
+
+    def worst(error: Array) -> float:
+        return max(tensor_error(values, error, rates, omega) for omega in (low, middle, high))
+
+    choice = candidates(region, plate.box.half_edges, DEGREE if rtol >= STRICT else STRICT_DEGREE)
+    fit = fit_multipoles(
+        choice, points, values, state_scale, point_scale, rtol,
+        lambda error: worst(error) <= FUNCTION_SHARE * rtol, watch=watch,
+    )  # fmt: skip
+    return fit.multipoles, fit.weights, worst(fit.error)
+
+
+def candidates(region: Region, half_edges: Array, degree: int = DEGREE) -> Multipoles:
+    """Multipoles to choose from for a region beside a plate with these half edges (m), both about the plate's centre.
+
+    They lie behind the plate's surface, on lines away from the region.
+
+    Raises
+    ------
+    ValueError : the region touches the plate
+    """
+    of_region, of_plate = region.nearest(half_edges)
+    gap = region.gap(half_edges)
+    if gap < 1e-9:
+        raise ValueError(
+            f"Input region must be apart from the plate; instead received {region.lower.tolist()} to "
+            f"{region.upper.tolist()} m for half edges {half_edges.tolist()} m."
+        )
+    away = (of_plate - of_region) / gap
+    axis = int(np.argmax(np.abs(away)))
+    lines = []
+    for a in range(3):
+        reach = (region.upper - region.lower)[a] / 2 - gap
+        count = 1 if a == axis else 2 * int(np.ceil(max(reach, 0.0) / (SPACING * gap))) + 1
+        lines.append(region.center[a] + max(reach, 0.0) * np.linspace(-1, 1, count) * (count > 1))
+    lines[axis] = of_plate[[axis]]
+    starts = np.array(list(product(*lines)))
+    centers = np.concatenate([starts + depth * gap * away for depth in DEPTHS])
+    kinds = [(l, m, part) for l in range(degree + 1) for m in range(l + 1) for part in (0, 1)[: 1 + (m > 0)]]
+    pairs = list(product(centers, kinds))
+    return Multipoles(np.array([p[0] for p in pairs]), np.array([p[1] for p in pairs], float), gap)

@@ -1,4 +1,4 @@
-"""How large a plate's finite-element problem may be, and what is said of one that is larger."""
+"""Orders of the finite elements until a tolerance is met, and the reaction of a plate at single places so found."""
 
 from __future__ import annotations
 
@@ -13,13 +13,22 @@ from ...geometry.scene.contents import Plate
 from ..closed_forms.eddy_sphere import ComplexArray
 from ..closed_forms.potentials import HomogeneousField, unit_dipoles
 from ..rotor.models import AccuracyError
-from .eddy import EddyResponse, EddySpace, solve_eddy, solve_shifted
+from .eddy import EddySpace, solve_eddy, solve_shifted
+from .table import OPTION
 
-OPTION = "--plate-rtol (plate_rtol in Python, --rtol of the command plate)"
-"""What messages call the tolerance of a plate."""
 HIGHEST_ORDER = 5
 MOST_UNKNOWNS = 80_000
 """Coupling unknowns that are solved at most: beyond, one frequency takes many minutes and several GB."""
+LEAST_REDUCTION = 0.2
+"""The smallest error reduction from one order to the next that is believed without having seen the next."""
+BEST_REDUCTION = 0.03
+"""More than an order ever gains: where even this for all orders left does not do, none of them is solved."""
+STALLED = 0.6
+"""A weaker reduction than this says that the mesh is too coarse for its order."""
+MESH_SHARE = 0.6
+"""Share of a table's tolerance for the finite elements."""
+MODULUS = 2.0
+"""Most that |s/(1 + sτ)|² can grow from s = ω to s = iω, whatever the time constant τ."""
 
 
 class MeshTooLargeError(AccuracyError):
@@ -42,54 +51,126 @@ def highest_order(cells: int) -> int:
     return found[-1]
 
 
-def refusal(plate: Plate, frequency: float, rtol: float, best: float) -> str:
-    """What to say where `best` is the smallest relative error reached; infinite if nothing was solved."""
-    depth = 1e3 * skin_depth(plate.conductivity, frequency)
-    if best < 1:
-        return (
-            f"Input rtol of the plate must be at least {best:.1e} at {frequency:g} Hz (skin depth {depth:.2g} mm); "
-            f"instead received {rtol:.1e}."
-        )
-    return (
-        f"Input frequency_hz must be lower for finite elements with {MOST_UNKNOWNS} unknowns: a skin depth of "
-        f"{depth:.2g} mm is too small for this plate; instead received {frequency:g}. The infinite slab (model slab) "
-        "has no such limit."
-    )
+class Ladder:
+    """Orders of the finite elements on one mesh, one after the other, and the estimated error of each.
 
+    What an order leaves is at most its change of a tensor times the reduction of that change against the order before;
+    the truncation of the air comes on top.
 
-LEAST_REDUCTION = 0.2
-"""The smallest error reduction from one order to the next that is believed without having seen the next."""
-BEST_REDUCTION = 0.03
-"""More than an order ever gains: where even this for all orders left does not do, none of them is solved."""
-STALLED = 0.6
-"""A weaker reduction than this says that the mesh is too coarse for its order."""
+    Parameters
+    ----------
+    places : (n, 3) m, of the dipoles whose own tensors are compared, plate's frame
+    frequency : Hz
+    allowed : relative error
+    growing : compare fields that grow as e^{ωt} instead of phasors: half the memory, a quarter of the work
+    watch : hears of the progress
+
+    Raises
+    ------
+    MeshTooLargeError : not even order 3 is within `MOST_UNKNOWNS`
+    """
+
+    def __init__(
+        self,
+        plate: Plate,
+        places: Array,
+        frequency: float,
+        rule: MeshRule,
+        allowed: float,
+        growing: bool = False,
+        watch: Watch = unwatched,
+    ) -> None:
+        self.mesh = plate_mesh(plate.box.size, plate.conductivity, places, frequency, rule)
+        self.highest = highest_order(self.mesh.mesh.ne)
+        self.places, self.frequency, self.allowed, self.growing, self.watch = places, frequency, allowed, growing, watch
+        self.reach = rule.reach * float(plate.box.size.max())
+        self.order, self.unknowns, self.errors = 0, 0, np.full(len(places), np.inf)
+        self.change = self.last = self.size = np.ones(len(places))
+        self.truncation = np.zeros(len(places))
+        self.tensors: ComplexArray = np.zeros((len(places), 3, 3), complex)
+        self.climb()
+
+    @property
+    def error(self) -> float:
+        """The largest of the estimates."""
+        return float(self.errors.max())
+
+    def next_space(self) -> EddySpace:
+        return EddySpace(self.mesh, self.order + 1)
+
+    def climb(self) -> None:
+        """Solve for the dipoles at the next order."""
+        self.watch(f"error at order {self.order + 1}", 0.0)
+        space, dipoles = self.next_space(), unit_dipoles(self.places)
+        if self.growing:
+            response = solve_shifted(space, 2 * np.pi * self.frequency, dipoles)
+        else:
+            response = solve_eddy(self.mesh, space.order, self.frequency, dipoles, space)
+        induced = response.couplings_to([HomogeneousField(axis) for axis in np.eye(3)])
+        moment = np.linalg.norm(induced.reshape(3, -1, 3), axis=(0, 2))
+        # The induced moment against its image in the box of half edge `reach`.
+        bound = MU_0 / (2 * np.pi * self.reach**3) * moment**2
+        self.truncation = np.asarray((MODULUS if self.growing else 1.0) * bound)
+        self.unknowns = response.coupling_unknowns
+        self.take(response.couplings)
+
+    def take(self, couplings: ComplexArray) -> None:
+        """Take the dipoles' couplings at the next order, which need not come from `climb`."""
+        previous, n = self.tensors, len(self.places)
+        self.tensors = np.asarray(np.einsum("iaib->iab", couplings.reshape(n, 3, n, 3)))
+        self.order += 1
+        if self.order > 1:
+            self.size = np.linalg.norm(self.tensors, axis=(1, 2))
+            self.last, self.change = self.change, np.linalg.norm(self.tensors - previous, axis=(1, 2)) / self.size
+            self.errors = self._left(self.change, self.change / self.last)
+
+    def expected(self) -> float:
+        """Error of the next order, if it helps as the last did; nothing is expected of the first two."""
+        if self.order < 2 or self.error <= self.allowed:
+            return np.inf if self.order < 2 else 0.0
+        reduction = self.change / self.last
+        return float(np.max(self._left(self.change * reduction, reduction)))
+
+    def _left(self, change: Array, reduction: Array) -> Array:
+        return np.asarray(change * np.clip(reduction, LEAST_REDUCTION, 1.0) + self.truncation / self.size)
+
+    @property
+    def hopeless(self) -> bool:
+        """Whether higher orders on this mesh will not do."""
+        out_of_reach = self.error * BEST_REDUCTION ** (self.highest - self.order) > self.allowed
+        stalled = self.order > 2 and float(np.max(self.change / self.last)) > STALLED
+        return self.order > 1 and self.error > self.allowed and (out_of_reach or stalled)
+
+    def refuse(self) -> None:
+        """Go on only where that can help.
+
+        Raises
+        ------
+        AccuracyError : the mesh is too coarse
+        """
+        if self.hopeless:
+            raise AccuracyError(
+                f"Input {OPTION} must be at least {self.error / MESH_SHARE:.2g} for the finite elements of this plate; "
+                f"instead received {self.allowed / MESH_SHARE:g}. Ask for less, or take another model of it."
+            )
 
 
 @dataclass(frozen=True, eq=False)
 class PlateReaction:
-    """The plate's answer to dipoles at several places.
+    """Reaction tensors of a plate, for dipoles at several places.
 
     Parameters
     ----------
-    frequency : Hz
-    positions : (n, 3) m, laboratory frame
-    mutual : (n, 3, n, 3) T/(A m²): B at place i along a, from a moment at place j along b; laboratory frame
-    error_estimate : (n,) estimated relative error of each own tensor (Frobenius norm), truncation included
+    tensors : (n, 3, 3) T/(A m²): B = G m at the dipole's own place; laboratory frame
+    error_estimate : (n,) estimated relative error of each (Frobenius norm), truncation included
     order, cells, coupling_unknowns : of the solution
     """
 
-    frequency: float
-    positions: Array
-    mutual: ComplexArray
+    tensors: ComplexArray
     error_estimate: Array
-    order: int
-    cells: int
-    coupling_unknowns: int
-
-    @property
-    def tensors(self) -> ComplexArray:
-        """G (n, 3, 3), T/(A m²): B = G m at the dipole's own place."""
-        return np.asarray(np.einsum("iaib->iab", self.mutual))
+    order: int = 0
+    cells: int = 0
+    coupling_unknowns: int = 0
 
 
 def plate_reaction(
@@ -116,147 +197,29 @@ def plate_reaction(
     AccuracyError : `rtol` not reached after all refinements of the mesh, or with `MOST_UNKNOWNS`
     """
     places = np.asarray(positions, float).reshape(-1, 3)
-    body = plate.box.to_body(places)
-    rule = rule or MeshRule()
     if frequency == 0:
-        silent = np.zeros((len(places), 3, len(places), 3), complex)
-        return PlateReaction(0.0, places, silent, np.zeros(len(places)), 0, 0, 0)
-    best = np.inf
+        return PlateReaction(np.zeros((len(places), 3, 3), complex), np.zeros(len(places)))
+    body, rule, turn, best = plate.box.to_body(places), rule or MeshRule(), plate.box.rotation, np.inf
     for _ in range(refinements + 1):
         try:
-            response, error = raise_order(plate, body, frequency, rtol, rule)
+            ladder = Ladder(plate, body, frequency, rule, rtol)
         except MeshTooLargeError:
             break
-        best = min(best, float(error.max()))
+        while ladder.error > rtol and not ladder.hopeless:
+            ladder.climb()
+        best = min(best, ladder.error)
         if best <= rtol:
-            mutual = _to_laboratory(response.couplings, plate.box.rotation)
-            cells = response.space.conductors.mesh.ne
-            return PlateReaction(
-                frequency, places, mutual, error, response.space.order, cells, response.coupling_unknowns
-            )
+            cells = int(ladder.mesh.mesh.ne)
+            return PlateReaction(turn @ ladder.tensors @ turn.T, ladder.errors, ladder.order, cells, ladder.unknowns)
         rule = rule.finer()
-    raise AccuracyError(refusal(plate, frequency, rtol, best))
-
-
-def raise_order(plate: Plate, body: Array, frequency: float, rtol: float, rule: MeshRule) -> tuple[EddyResponse, Array]:
-    """The response of the lowest order that meets `rtol` on one mesh, or of the last that helped, and its errors.
-
-    Raises
-    ------
-    MeshTooLargeError : not even order 3 is within `MOST_UNKNOWNS`
-    """
-    mesh = plate_mesh(plate.box.size, plate.conductivity, body, frequency, rule)
-    highest = highest_order(mesh.mesh.ne)
-    sources = unit_dipoles(body)
-    response = solve_eddy(mesh, 1, frequency, sources)
-    tensors, change = own_tensors(response.couplings), np.ones(len(body))
-    error = change
-    for order in range(2, highest + 1):
-        response = solve_eddy(mesh, order, frequency, sources)
-        previous, tensors = tensors, own_tensors(response.couplings)
-        size = np.linalg.norm(tensors, axis=(1, 2))
-        last, change = change, np.linalg.norm(tensors - previous, axis=(1, 2)) / size
-        error = order_error(change, last) + truncation_error(response, rule.reach * plate.box.size.max()) / size
-        hopeless = error.max() * BEST_REDUCTION ** (highest - order) > rtol
-        if error.max() <= rtol or hopeless or (order > 2 and np.max(change / last) > STALLED):
-            break
-    return response, error
-
-
-def order_error(change: Array, last: Array) -> Array:
-    """Error left by an order, from its change of the tensors and that of the order before."""
-    return np.asarray(change * np.clip(change / last, LEAST_REDUCTION, 1.0))
-
-
-def own_tensors(couplings: ComplexArray) -> ComplexArray:
-    """G (n, 3, 3), T/(A m²), from the couplings of `unit_dipoles`, each at its own place."""
-    n = len(couplings) // 3
-    return np.asarray(np.einsum("iaib->iab", couplings.reshape(n, 3, n, 3)))
-
-
-def truncation_error(response: EddyResponse, reach: float) -> Array:
-    """Error bound (n,) of the own tensors, T/(A m²): induced moment against the box of half edge `reach`, m."""
-    induced = response.couplings_to([HomogeneousField(axis) for axis in np.eye(3)])
-    moment = np.linalg.norm(induced.reshape(3, -1, 3), axis=(0, 2))
-    return np.asarray(MU_0 / (2 * np.pi * reach**3) * moment**2)
-
-
-def _to_laboratory(couplings: ComplexArray, rotation: Array) -> ComplexArray:
-    n = len(couplings) // 3
-    blocks = couplings.reshape(n, 3, n, 3)
-    return np.asarray(np.einsum("ca,iajb,db->icjd", rotation, blocks, rotation, optimize=True))
-
-
-MESH_SHARE = 0.6
-"""Share of the tolerance for the finite elements."""
-MODULUS = 2.0
-"""Most that |s/(1 + sτ)|² can grow from s = ω to s = iω, whatever the time constant τ."""
-
-
-class Ladder:
-    """Orders of the finite elements on one mesh, one after the other, and the error of each.
-
-    Parameters
-    ----------
-    corners : (n, 3) m, places of the dipoles whose tensors are compared, plate's frame
-    frequency : Hz
-    allowed : relative error
-    watch : hears of the progress
-    """
-
-    def __init__(
-        self, plate: Plate, corners: Array, frequency: float, rule: MeshRule, allowed: float, watch: Watch = unwatched
-    ) -> None:
-        self.mesh = plate_mesh(plate.box.size, plate.conductivity, corners, frequency, rule)
-        self.highest = highest_order(self.mesh.mesh.ne)
-        self.corners, self.shift, self.allowed = corners, 2 * np.pi * frequency, allowed
-        self.watch = watch
-        self.reach = rule.reach * float(plate.box.size.max())
-        self.order, self.error, self.change, self.truncation = 0, np.inf, np.ones(len(corners)), np.zeros(len(corners))
-        self.last = self.change
-        self.tensors: ComplexArray = np.zeros((len(corners), 3, 3), complex)
-        self.take(self.solved())
-
-    def next_space(self) -> EddySpace:
-        """Of the next order."""
-        return EddySpace(self.mesh, self.order + 1)
-
-    def solved(self) -> ComplexArray:
-        """Couplings of the corners' dipoles at the next order and the shift s."""
-        self.watch(f"error at order {self.order + 1}", 0.0)
-        response = solve_shifted(self.next_space(), self.shift, unit_dipoles(self.corners))
-        self.truncation = MODULUS * truncation_error(response, self.reach)
-        return response.couplings
-
-    def take(self, couplings: ComplexArray) -> None:
-        """Take the next order's couplings."""
-        tensors = own_tensors(couplings)
-        self.order += 1
-        if self.order > 1:
-            size = np.linalg.norm(tensors, axis=(1, 2))
-            self.last, self.change = self.change, np.linalg.norm(tensors - self.tensors, axis=(1, 2)) / size
-            self.error = float(np.max(order_error(self.change, self.last) + self.truncation / size))
-        self.tensors = tensors
-
-    def expected(self) -> float:
-        """Error of the next order, if it helps as the last did; nothing is expected of the first two."""
-        if self.order < 2 or self.error <= self.allowed:
-            return np.inf if self.order < 2 else 0.0
-        reduction = self.change / self.last
-        size = np.linalg.norm(self.tensors, axis=(1, 2))
-        return float(np.max(order_error(self.change * reduction, self.change) + self.truncation / size))
-
-    def refuse(self) -> None:
-        """Go on only where that can help.
-
-        Raises
-        ------
-        AccuracyError : the mesh is too coarse
-        """
-        hopeless = self.error * BEST_REDUCTION ** (self.highest - self.order) > self.allowed
-        stalled = self.order > 2 and float(np.max(self.change / self.last)) > STALLED
-        if self.order > 1 and (hopeless or stalled) and self.error > self.allowed:
-            raise AccuracyError(
-                f"Input {OPTION} must be at least {self.error / MESH_SHARE:.2g} for the finite elements of this plate; "
-                f"instead received {self.allowed / MESH_SHARE:g}. Ask for less, or take another model of it."
-            )
+    depth = 1e3 * skin_depth(plate.conductivity, frequency)
+    if best < 1:
+        raise AccuracyError(
+            f"Input rtol of the plate must be at least {best:.1e} at {frequency:g} Hz (skin depth {depth:.2g} mm); "
+            f"instead received {rtol:.1e}."
+        )
+    raise AccuracyError(
+        f"Input frequency_hz must be lower for finite elements with {MOST_UNKNOWNS} unknowns: a skin depth of "
+        f"{depth:.2g} mm is too small for this plate; instead received {frequency:g}. The infinite slab (model slab) "
+        "has no such limit."
+    )

@@ -1,22 +1,24 @@
-"""The rotor as a source of eddy currents in the plate: the vector potential of its field table.
+"""The rotor as a source of eddy currents in the plate, and its share of their signals along a turn and a descent.
+
+The source is the vector potential of the rotor's field table, so that all moments are there, and what recoil
+permeability and mutual demagnetisation add.
 
 Closed forms have a potential of their own.  A multipole part Ψ_l of degree l, with r from its centre, is homogeneous
 of degree -(l+1), so that curl (r × ∇Ψ_l) = l ∇Ψ_l, and B = -∇Ψ is the curl of
 
     A = Σ_l r × B_l / l.
 
-What the table knows of recoil permeability and mutual demagnetisation thus reaches the plate with all its moments.
+The share's series in angle and depth interpolate at equidistant angles and at Chebyshev points: they converge
+geometrically.
 """
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Protocol
 
 import numpy as np
 
 from ...geometry.common import MU_0, Array, InputError, Watch, unwatched, watched
-from ...geometry.magnets import Magnet
 from ...geometry.scene.contents import Plate
 from ...geometry.shapes import Box, rotation_matrix
 from ..closed_forms.moments import uniform_cells
@@ -25,14 +27,34 @@ from ..harmonics.expansion import MultipoleExpansion
 from ..harmonics.solid import Coefficients, derivative, field_spectrum, outer_sums
 from ..rotor.models import AccuracyError
 from ..rotor.table import RotorTable
+from .currents import OtherSources
 from .eddy import Source
-from .table import PlateTable, RotorShare, turn_harmonics
+from .network import PassiveNetwork
+from .table import PlateTable, Region, RotorShare, turn_harmonics
 
 DOWN = np.array([0.0, 0.0, -1.0])
 CLOSEST = 0.1
 """Clearance of the plate, in radii of a round magnet, for which its moments are made at least."""
-INAUDIBLE = 1e-7
+LEFT_OUT = 1e-7
 """Share of the rotor's field at the plate that is left out where no tolerance says another."""
+SHARE_PART = 0.1
+"""Share of a table's tolerance for the series of the rotor's signals."""
+UNNOTICED = 1e-2
+"""Share of the series' tolerance for degrees of the rotor's multipoles that are left out."""
+MOST_TERMS = 15
+"""Highest number of harmonics, and of points along the way."""
+TOGETHER = 12
+"""Places whose signals are computed at once."""
+NOISE = 1e-10
+"""Amplitudes below this share of the largest signal are what symmetry forbids."""
+MISSED = 0.2
+"""Share of a table's tolerance for the harmonics left out."""
+POINTS, DEPTHS = (3, 3, 3), 7
+"""Places in the region, and depths of a plate that is lowered, where the field of the rotor's currents is looked at."""
+TRAINED_ANGLES, TRAINED_DEPTHS = 8, 5
+"""Networks are trained with the rotor at so many angles of a turn and depths of the plate; probes lie between them."""
+INNER = 0.25
+"""Part of a magnet's edges about its centre in which dipoles stand for it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,12 +99,12 @@ class RotorSource:
         return np.asarray(total @ self.turn.T)
 
 
-def rotor_parts(table: RotorTable, plate: Plate, inaudible: float = INAUDIBLE) -> list[Source]:
-    """The parts of a rotor's table that the plate hears, in the rotor's frame.
+def rotor_parts(table: RotorTable, plate: Plate, left_out: float = LEFT_OUT) -> list[Source]:
+    """The parts of a rotor's table that reach the plate, in the rotor's frame.
 
     Parameters
     ----------
-    inaudible : degrees whose field at the plate is below this share of the rotor's are left out
+    left_out : degrees whose field at the plate is below this share of the rotor's are dropped
 
     Raises
     ------
@@ -92,7 +114,11 @@ def rotor_parts(table: RotorTable, plate: Plate, inaudible: float = INAUDIBLE) -
         PolarizedCuboid.of_magnet(magnet) for magnet in table.uniform if isinstance(magnet.body, Box)
     ]
     round_ones = [magnet for magnet in table.uniform if not isinstance(magnet.body, Box)]
-    moments = [part for magnet in round_ones for part in uniform_cells(magnet, _clearance(magnet, plate))]
+    moments = []
+    for magnet in round_ones:
+        radius = magnet.body.circumradius
+        clearance = max(_nearest(magnet.body.center, plate) - radius, CLOSEST * radius)  # that the plate keeps
+        moments += uniform_cells(magnet, clearance)
     for expansion in (*table.expansions, *moments):
         nearest = _nearest(expansion.center, plate)
         if nearest <= 1.001 * expansion.nearest:
@@ -103,9 +129,9 @@ def rotor_parts(table: RotorTable, plate: Plate, inaudible: float = INAUDIBLE) -
         degrees = np.arange(expansion.degree + 1)
         sizes = field_spectrum(expansion.coefficients) * (expansion.radius / nearest) ** (degrees + 2)
         whole = MU_0 / (4 * np.pi) * np.linalg.norm(table.moment) / nearest**3
-        heard = np.flatnonzero(sizes > inaudible * whole)
-        if len(heard):
-            end = heard[-1] + 1
+        felt = np.flatnonzero(sizes > left_out * whole)
+        if len(felt):
+            end = felt[-1] + 1
             parts.append(ExpansionSource(replace(expansion, coefficients=expansion.coefficients[:end, :end])))
     return parts
 
@@ -116,44 +142,51 @@ def posed_rotor(parts: Sequence[Source], plate: Plate, angle: float, depth: floa
     return RotorSource(parts, plate.box.rotation.T @ back.T, back @ (plate.box.center + depth * DOWN))
 
 
-def _clearance(magnet: Magnet, plate: Plate) -> float:
-    """A distance (m) from the surface of a turning magnet that the plate keeps, at least."""
-    body = magnet.body
-    return max(_nearest(body.center, plate) - body.circumradius, CLOSEST * body.circumradius)
-
-
 def _nearest(place: Array, plate: Plate) -> float:
     """Smallest distance (m) of a turning place (3,) m of the rotor from the plate on its way."""
     angles = np.linspace(0.0, 2 * np.pi, 73)
     radius, height = np.hypot(place[0], place[1]), np.full(len(angles), place[2])
     circle = np.stack([radius * np.cos(angles), radius * np.sin(angles), height], axis=1)
-    distance = plate.lowering.distance if plate.lowering else 0.0
-    return min(float(plate.box.distance(circle - depth * DOWN).min()) for depth in np.linspace(0.0, distance, 25))
+    return min(float(plate.box.distance(circle - depth * DOWN).min()) for depth in np.linspace(0.0, _way(plate), 25))
 
 
-MOST_TERMS = 15
-"""Highest number of harmonics, and of points along the way."""
-UNHEARD = 1e-2
-"""Share of the tolerance for degrees of the rotor's multipoles that the plate does not hear."""
-TOGETHER = 12
-"""Places whose signals are asked for at once."""
-NOISE = 1e-10
-"""Amplitudes below this share of the largest signal are what symmetry forbids."""
+def _way(plate: Plate) -> float:
+    """How far the plate goes down, m."""
+    return plate.lowering.distance if plate.lowering else 0.0
 
 
-class Network(Protocol):
-    """Currents as states that listen to sources."""
+def turning_rotor(plate: Plate, rotor: RotorTable) -> OtherSources:
+    """The rotor at some angles and depths of the plate, to train and to probe a network with."""
+    parts = rotor_parts(rotor, plate)
+    way = _way(plate)
+    depths = way * (1 - np.cos(np.pi * np.arange(TRAINED_DEPTHS) / (TRAINED_DEPTHS - 1))) / 2 if way else np.zeros(1)
+    angles = 2 * np.pi * np.arange(TRAINED_ANGLES) / TRAINED_ANGLES
+    training = [posed_rotor(parts, plate, angle, depth) for depth in depths for angle in angles]
+    between = (depths[1:] + depths[:-1]) / 2 if way else depths
+    probes = [posed_rotor(parts, plate, angle + angles[1] / 2, depth) for depth in between for angle in angles[:3]]
+    centers = np.array([magnet.box.center for magnet in rotor.magnets])
+    if not parts:  # a rotor without a field
+        training, probes = [], []
+    return OtherSources(training, probes, plate.box.to_body(centers))
 
-    def couplings(self, sources: Sequence[Source]) -> list[Array]:
-        """s_i, √J, of sources in the plate's frame: (sources, states) for each group of states."""
+
+def rotor_box(plate: Plate, rotor: RotorTable) -> Region:
+    """Where the inner parts of the turning magnets are, in the plate's frame, on all of its way."""
+    boxes = [magnet.box for magnet in rotor.magnets]
+    inner = [INNER * float(box.size.max()) for box in boxes]
+    radius = max(float(np.hypot(*box.center[:2])) + r for box, r in zip(boxes, inner, strict=True))
+    low = min(float(box.center[2]) - r for box, r in zip(boxes, inner, strict=True))
+    high = max(float(box.center[2]) + r for box, r in zip(boxes, inner, strict=True))
+    corners = np.stack(np.meshgrid((-radius, radius), (-radius, radius), (low, high + _way(plate))), -1).reshape(8, 3)
+    body = plate.box.to_body(corners)
+    return Region(body.min(axis=0), body.max(axis=0))
 
 
 def rotor_share(
-    network: Network,
+    network: PassiveNetwork,
     plate: Plate,
     rotor: RotorTable,
-    tolerance: float = 1e-4,
-    most: int = MOST_TERMS,
+    tolerance: float,
     watch: Watch = unwatched,
 ) -> RotorShare:
     """Signals of a rotor for the pose and the way of `plate`.
@@ -162,32 +195,36 @@ def rotor_share(
     ----------
     network : of a plate of the same size and conductivity, or of what stands for it
     tolerance : for the estimated error; harmonics and depths are added until it is met
-    most : highest number of either
     watch : hears of the progress
 
     Raises
     ------
     AccuracyError : the tolerance is not met with the most terms
     """
-    listen = _listener(network, plate, rotor_parts(rotor, plate, UNHEARD * tolerance), watch)
-    distance = plate.lowering.distance if plate.lowering else 0.0
+    signals = _signals(network, plate, rotor_parts(rotor, plate, UNNOTICED * tolerance), watch)
+    distance = _way(plate)
     angles, depths = 12, 4 if distance else 1
     while True:
-        series, samples = _sampled(listen, distance, angles, depths)
+        nodes = np.cos(np.pi * (np.arange(depths) + 0.5) / depths)
+        turns = 2 * np.pi * np.arange(angles) / angles
+        samples = signals(distance * (1 + nodes) / 2, turns).reshape(depths, angles, -1)
+        fourier = np.linalg.pinv(turn_harmonics(turns, angles - 1))
+        chebyshev = np.linalg.inv(np.polynomial.chebyshev.chebvander(nodes, depths - 1))
+        series = np.einsum("ha,kn,nas->hsk", fourier, chebyshev, samples, optimize=True)
         size = np.abs(samples).max()
         if not size:  # a rotor without a field
             return RotorShare(distance, series[:3, :, :1] * 0.0, 0.0)
-        turns = float(np.abs(series[-4:]).max() / size)  # of two harmonics: symmetry may forbid one
-        ways = float(np.abs(series[..., -1]).max() / size) if distance else 0.0
-        if max(turns, ways) <= tolerance / 2:
-            return _trimmed(distance, series, turns + ways, tolerance / 2, float(size))
-        if max(angles // 2, depths) > most:
+        by_angle = float(np.abs(series[-4:]).max() / size)  # of two harmonics: symmetry may forbid one
+        by_depth = float(np.abs(series[..., -1]).max() / size) if distance else 0.0
+        if max(by_angle, by_depth) <= tolerance / 2:
+            return _trimmed(distance, series, by_angle + by_depth, tolerance / 2, float(size))
+        if max(angles // 2, depths) > MOST_TERMS:
             raise AccuracyError(
-                f"Input tolerance must be at least {turns + ways:.1e} for this rotor and this way; instead received "
-                f"{tolerance:.1e}."
+                f"Input tolerance must be at least {by_angle + by_depth:.1e} for this rotor and this way; instead "
+                f"received {tolerance:.1e}."
             )
-        angles *= 1 + (turns > tolerance / 2)  # so that none is asked for twice
-        depths += 2 * (ways > tolerance / 2)
+        angles *= 1 + (by_angle > tolerance / 2)  # so that none is computed twice
+        depths += 2 * (by_depth > tolerance / 2)
 
 
 def _trimmed(distance: float, series: Array, error: float, tolerance: float, size: float) -> RotorShare:
@@ -199,38 +236,22 @@ def _trimmed(distance: float, series: Array, error: float, tolerance: float, siz
     return RotorShare(distance, np.where(small, 0.0, part), error + float(np.append(tails, [0.0, 0.0])[kept]))
 
 
-def _listener(network: Network, plate: Plate, parts: Sequence[Source], watch: Watch) -> Callable[[Array, Array], Array]:
-    """Signals (depths × angles, states) of the rotor at ways (m) and angles (rad); each place is asked for once."""
-    known: dict[tuple[float, float], Array] = {}
+def _signals(
+    network: PassiveNetwork, plate: Plate, parts: Sequence[Source], watch: Watch
+) -> Callable[[Array, Array], Array]:
+    """Signals (depths × angles, states) of the rotor at depths (m) and angles (rad); each is computed once."""
+    cached: dict[tuple[float, float], Array] = {}
 
-    def listen(ways: Array, angles: Array) -> Array:
-        places = [(float(way), float(angle)) for way in ways for angle in angles]
-        new = [place for place in places if place not in known]
+    def signals(depths: Array, angles: Array) -> Array:
+        places = [(float(depth), float(angle)) for depth in depths for angle in angles]
+        new = [place for place in places if place not in cached]
         groups = [new[first : first + TOGETHER] for first in range(0, len(new), TOGETHER)]
         for some in watched(groups, watch, f"signals of the rotor at {len(new)} places"):
-            sources = [posed_rotor(parts, plate, angle, way) for way, angle in some]
-            known.update(zip(some, np.concatenate(network.couplings(sources), axis=1), strict=True))
-        return np.array([known[place] for place in places])
+            sources = [posed_rotor(parts, plate, angle, depth) for depth, angle in some]
+            cached.update(zip(some, network.couplings(sources), strict=True))
+        return np.array([cached[place] for place in places])
 
-    return listen
-
-
-def _sampled(listen: Callable[[Array, Array], Array], distance: float, turns: int, depths: int) -> tuple[Array, Array]:
-    """Series (2H+1, states, depths) through samples (depths, turns, states) at equidistant angles, Chebyshev depths."""
-    nodes = np.cos(np.pi * (np.arange(depths) + 0.5) / depths)
-    angles = 2 * np.pi * np.arange(turns) / turns
-    samples = listen(distance * (1 + nodes) / 2, angles).reshape(depths, turns, -1)
-    fourier = np.linalg.pinv(np.array([turn_harmonics(angle, turns - 1) for angle in angles]))
-    chebyshev = np.linalg.inv(np.polynomial.chebyshev.chebvander(nodes, depths - 1))
-    return np.einsum("ha,kn,nas->hsk", fourier, chebyshev, samples, optimize=True), samples
-
-
-POINTS = (3, 3, 3)
-"""Places in the region where the field of the rotor's currents is looked at."""
-DEPTHS = 7
-"""Depths of a plate that is lowered."""
-MISSED = 0.2
-"""Share of a table's tolerance for the harmonics left out."""
+    return signals
 
 
 def without_high_harmonics(share: RotorShare, table: PlateTable, allowed: float) -> RotorShare:

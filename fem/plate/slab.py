@@ -34,8 +34,8 @@ from ..closed_forms.eddy_sphere import ComplexArray
 from ..closed_forms.potentials import unit_dipoles
 from ..rotor.table import RotorTable
 from .eddy import EddySpace, solve_shifted
-from .region import Region
 from .rotor_share import DOWN
+from .table import Region
 
 LOWEST, HIGHEST = -37.0, 3.5
 """Range of ln(k (z+z')/2): the integrand goes as k or faster below, and as e^{-66} above."""

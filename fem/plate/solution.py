@@ -1,8 +1,4 @@
-"""The currents of a plate for dipoles in some boxes, by finite elements to a wanted accuracy: the expensive part.
-
-The order is raised as in `plate`; an order that is expected to do is not solved for the sake of its error alone, but
-the currents are trained on it at once, and its error follows from their network.
-"""
+"""The currents of a plate for dipoles in some boxes, by finite elements to a wanted accuracy: the expensive part."""
 
 from __future__ import annotations
 
@@ -21,7 +17,7 @@ from ..closed_forms.eddy_sphere import ComplexArray
 from .currents import (
     CurrentSpace,
     OtherSources,
-    SourceSet,
+    dipole_images,
     grid_counts,
     probe_places,
     source_images,
@@ -29,9 +25,8 @@ from .currents import (
     train,
 )
 from .eddy import Source
-from .eddy_fields import dipole_images
 from .reaction import MESH_SHARE, Ladder
-from .region import Region
+from .table import Region
 
 SPACE_SHARE = 0.1
 """Share of the tolerance for what the current space misses of the finite elements' currents."""
@@ -41,6 +36,13 @@ part of them."""
 HOPEFUL, KEPT = 1.5, 1.1
 """An order whose expected error is at most so many times what is allowed is trained at once; once trained it is kept
 with an error of the second times that: the next takes three times as long, and a few more states make up for it."""
+INDEPENDENT = 1e-9
+"""Combinations of dipoles with less than this share of the largest squared potential are left out."""
+STEPS = 5.0
+"""The raster of boxes is the largest power of two, in metres, of which so many fit between box and plate."""
+FREQUENCY_STEP = 125.0
+"""Highest frequencies are multiples of this, Hz."""
+ROUND_OFF = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,6 +74,22 @@ class PlateSolution:
     seconds: float = field(metadata={"units": "s"})
 
 
+def outer_box(box: Region, half_edges: Array) -> Region:
+    """The box with its bounds moved outwards to the raster; at least 0.65 of its distance from the plate is left."""
+    gap = box.gap(half_edges)
+    if gap <= 0:
+        return box
+    step = 2.0 ** np.floor(np.log2(gap / STEPS))
+    lower, upper = np.floor(box.lower / step + ROUND_OFF), np.ceil(box.upper / step - ROUND_OFF)
+    return Region(lower * step, upper * step)
+
+
+def outer_frequencies(frequencies: tuple[float, float]) -> tuple[float, float]:
+    """Lowest and highest, Hz, with the highest rounded up."""
+    low, high = frequencies
+    return low, float(np.ceil(high / FREQUENCY_STEP - ROUND_OFF)) * FREQUENCY_STEP
+
+
 def solve_currents(
     plate: Plate,
     boxes: Sequence[Region],
@@ -83,6 +101,17 @@ def solve_currents(
 ) -> PlateSolution:
     """Currents for dipoles in `boxes` and for `others`, at all frequencies between the two (Hz).
 
+    An order that is expected to do is not solved for the sake of its error alone: the currents are trained on it at
+    once, and its error follows from their network.
+
+    Parameters
+    ----------
+    boxes : in the plate's frame
+    rtol : relative accuracy of reaction tensors that a table shall have
+    rule : mesh; left out, the one that has been found to need the least work for `rtol`
+    others : more sources whose currents are held
+    watch : hears of the progress
+
     Raises
     ------
     ValueError : a box touches the plate
@@ -90,85 +119,65 @@ def solve_currents(
     """
     start = time.perf_counter()
     others = others or OtherSources()
-    rule = rule or mesh_rule(rtol)
-    half = plate.box.half_edges
+    if rule is None:
+        loose = MeshRule(1.2, 3.0, 2.5, 4.0) if rtol >= LOOSE else MeshRule()
+        rule = MeshRule(1.0, 1.6, 1.4) if rtol < STRICT else loose
     corners = np.concatenate([*(box.grid((2, 2, 2), fold=True) for box in boxes), others.places])
-    ladder = Ladder(plate, corners, frequencies[1], rule, MESH_SHARE * rtol, watch)
-    training = SourceSet(
-        np.concatenate([box.grid(grid_counts(box, half), fold=True) for box in boxes]), others.training
-    )
-    probes = SourceSet(np.concatenate([probe_places(box, fold=True) for box in boxes]), others.probes)
-    allowed = SPACE_SHARE * rtol
+    ladder = Ladder(plate, corners, frequencies[1], rule, MESH_SHARE * rtol, growing=True, watch=watch)
+    grid = np.concatenate([box.grid(grid_counts(box, plate.box.half_edges), fold=True) for box in boxes])
+    probes = np.concatenate([probe_places(box, fold=True) for box in boxes])
     while True:
         if ladder.expected() <= HOPEFUL * ladder.allowed or ladder.order + 1 == ladder.highest:
-            space, missing = train(ladder.next_space(), training, probes, frequencies, allowed, watch)
-            couplings = space_couplings(space.dipole_couplings(corners), space.inductances, ladder.shift)
+            space, missing = train(ladder.next_space(), grid, probes, others, frequencies, SPACE_SHARE * rtol, watch)
+            couplings = space_couplings(space.dipole_couplings(corners), space.inductances, 2 * np.pi * frequencies[1])
             ladder.take(couplings)
             if ladder.error <= KEPT * ladder.allowed:
                 break
         else:
-            ladder.take(ladder.solved())
+            ladder.climb()
         ladder.refuse()
     return PlateSolution(
-        tuple(boxes), frequencies, space, ladder.error, missing.worst, probes.places, missing.angular_frequencies,
-        missing.residuals[:, : 3 * len(probes.places), : 3 * len(probes.places)], time.perf_counter() - start,
+        tuple(boxes), frequencies, space, ladder.error, missing.worst, probes, missing.angular_frequencies,
+        missing.residuals[:, : 3 * len(probes), : 3 * len(probes)], time.perf_counter() - start,
     )  # fmt: skip
-
-
-def mesh_rule(rtol: float) -> MeshRule:
-    """Mesh that has been found to need the least work for a tolerance."""
-    if rtol < STRICT:
-        return MeshRule(1.0, 1.6, 1.4)
-    return MeshRule(1.2, 3.0, 2.5, 4.0) if rtol >= LOOSE else MeshRule()
-
-
-INDEPENDENT = 1e-9
-"""Combinations of dipoles with less than this share of the largest squared potential are left out."""
 
 
 def error_of(solution: PlateSolution, sources: Sequence[Source]) -> float:
     """Bound of the largest relative error of the sources' fields at the probes in the first box.
 
-    Parameters
-    ----------
-    sources : in the plate's frame; dipoles in the second box stand for them
+    Dipoles in the second box stand for the sources (plate's frame); what is left of these counts in full.
     """
+    space = solution.space
     inside = solution.boxes[0].contains(solution.probes)
     standing = solution.boxes[1].contains(solution.probes)
-    images = np.concatenate(list(source_images(solution.space.parity, solution.space.points, sources)), axis=1)
-    amplitudes, rest = _fitted(solution.space, solution.probes[standing], images)
-    stands, hears = np.repeat(standing, 3), np.repeat(inside, 3)
-    driving = solution.space.image_couplings([images])
-    testing = solution.space.dipole_couplings(solution.probes[inside])
+    images = np.concatenate(list(source_images(space.parity, space.points, sources)), axis=1)
+    amplitudes, rest = _fitted(space, solution.probes[standing], images)
+    stands, tested = np.repeat(standing, 3), np.repeat(inside, 3)
+    driving, testing = space.image_couplings([images]), space.dipole_couplings(solution.probes[inside])
     worst = 0.0
     for omega, residuals in zip(solution.angular_frequencies, solution.residuals, strict=True):
         left = np.sqrt(np.sum(amplitudes @ residuals[np.ix_(stands, stands)].real * amplitudes, axis=1)) + rest
         fields = sum(
             d @ np.linalg.solve(np.eye(len(induct)) + 1j * omega * induct, t.T)
-            for d, t, induct in zip(driving, testing, solution.space.inductances, strict=True)
+            for d, t, induct in zip(driving, testing, space.inductances, strict=True)
         )
-        errors = (
-            left * np.sqrt(np.trace(residuals[np.ix_(hears, hears)]).real) / np.linalg.norm(np.asarray(fields), axis=1)
-        )
-        worst = max(worst, float(errors.max()))
+        power = np.trace(residuals[np.ix_(tested, tested)]).real
+        worst = max(worst, float(np.max(left * np.sqrt(power) / np.linalg.norm(np.asarray(fields), axis=1))))
     return worst
 
 
 def _fitted(space: CurrentSpace, places: Array, images: Array) -> tuple[Array, Array]:
     """Amplitudes (sources, 3 × places) of dipoles that stand for the sources, and norms (sources,) of the rest."""
     wanted = images.reshape(*images.shape[:2], -1)
-    standing = np.concatenate(
-        [p.reshape(len(p), -1, space.root.size) for p in dipole_images(space.parity, space.points, places)], axis=1
-    )
+    standing = np.concatenate(list(dipole_images(space.parity, space.points, places)), axis=1)
+    standing = standing.reshape(*standing.shape[:2], -1)
     squares = space.root**2
     products = sum((part * squares) @ part.T for part in standing)
     overlaps = sum((part * squares) @ other.T for part, other in zip(standing, wanted, strict=True))
     energies, vectors = np.linalg.eigh(np.asarray(products))
     kept = energies > INDEPENDENT * energies[-1]
     amplitudes = (vectors[:, kept] / energies[kept] @ vectors[:, kept].T @ np.asarray(overlaps)).T
-    powers = np.zeros(images.shape[1])
-    for part, other in zip(standing, wanted, strict=True):
-        powers += ((other - amplitudes @ part) ** 2) @ squares
+    powers = sum(((other - amplitudes @ part) ** 2) @ squares for part, other in zip(standing, wanted, strict=True))
     return amplitudes, np.sqrt(powers)
 
 

@@ -1,24 +1,18 @@
-"""The rotor's share of a plate's states: what its turning field adds to the signals s_i.
+"""Tables of a plate's response: a passive network of currents with harmonic field functions, in the plate's frame.
 
-The rotor turns by the angle φ = ωt about the laboratory's z axis while the plate stands d below its first place:
-
-    s_i(φ, d) = Σ_h [C_hi(d) cos hφ + S_hi(d) sin hφ],
-
-with amplitudes that are Chebyshev series in d.  The rotor is its field table, so that all moments are there, and what
-recoil permeability and mutual demagnetisation add.  Both sums are interpolations at equidistant angles and at Chebyshev
-points: they converge geometrically.
-
-Energy.  With the floater's share, s_i = b_i·m + r_i(φ, d), the energy ½ Σ y_i² of the currents changes by
-Σ y_i dp_i/dt - Σ y_i ds_i/dt: the first is minus the loss Σ λ_i y_i², the second is minus the work of the currents on
-whatever makes s_i change.  On the floater they do Σ y_i d(b_i·m)/dt, on the rotor Σ y_i ∂r_i/∂φ per radian, a torque
-that the motor must balance, and Σ y_i ∂r_i/∂d per metre of lowering.  Magnetisation is constant, hence no other work.
-The static interaction of rotor and floater is not in these sums.
+With currents y_i and the signals s_i that drive them, the energy ½ Σ y_i² changes by Σ y_i dp_i/dt - Σ y_i ds_i/dt: the
+first is minus the loss Σ λ_i y_i², the second minus the work of the currents on whatever makes s_i change.  On the
+floater they do Σ y_i d(b_i·m)/dt, on the rotor Σ y_i ∂r_i/∂φ per radian, a torque that the motor must balance, and
+Σ y_i ∂r_i/∂d per metre of lowering.  Magnetisation is constant, hence no other work.  The static interaction of rotor
+and floater is not in these sums.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from typing import NoReturn
 
 import heyoka as hy
 import numpy as np
@@ -26,22 +20,108 @@ from numpy.typing import ArrayLike, NDArray
 
 from ...geometry.common import Array, frozen_array, millimetres
 from ..closed_forms.eddy_sphere import ComplexArray
+from ..rotor.models import AccuracyError
 from ..rotor.table import RangeError
-from .field_functions import Multipoles
-from .network import ENOUGH, refuse
-from .region import Region
+from .multipoles import Multipoles
+
+OPTION = "--plate-rtol (plate_rtol in Python, --rtol of the command plate)"
+"""What messages call the tolerance of a plate."""
+LARGEST = 0.1
+"""Tolerance that may be asked at most."""
+ENOUGH = 2.0
+"""A tolerance that is met with certainty, in units of the errors of a table that was to meet a smaller one."""
+SYMMETRIC = 1e-9
+"""Relative difference of two bounds that still counts as a mirror symmetry."""
+
+
+@dataclass(frozen=True, eq=False)
+class Region:
+    """Where the floater may be: a box in the frame of the plate, whose centre is the origin.
+
+    Parameters
+    ----------
+    lower, upper : (3,) bounds, m
+
+    Raises
+    ------
+    ValueError : an upper bound is not above the lower one
+    """
+
+    lower: Array = field(metadata={"units": "m"})
+    upper: Array = field(metadata={"units": "m"})
+
+    def __post_init__(self) -> None:
+        for name in ("lower", "upper"):
+            object.__setattr__(self, name, frozen_array(getattr(self, name), (3,)))
+        if not np.all(self.upper > self.lower):
+            bounds = f"{self.lower.tolist()} and {self.upper.tolist()}"
+            raise ValueError(f"Input region upper bounds must exceed the lower ones; instead received {bounds}.")
+
+    @classmethod
+    def over_face(cls, size: ArrayLike, heights: tuple[float, float], lateral: ArrayLike) -> Region:
+        """Heights (m) over the face +z of a plate with edges `size`, and ± `lateral` (m) about its axis."""
+        face = float(np.asarray(size, float)[2]) / 2
+        reach = np.broadcast_to(np.asarray(lateral, float), (2,))
+        return cls(np.array([*-reach, face + heights[0]]), np.array([*reach, face + heights[1]]))
+
+    @property
+    def center(self) -> Array:
+        return np.asarray((self.lower + self.upper) / 2)
+
+    @property
+    def mirrors(self) -> tuple[int, ...]:
+        """Axes whose plane through the plate's centre mirrors the region."""
+        extent = self.upper - self.lower
+        return tuple(int(a) for a in np.flatnonzero(np.abs(self.lower + self.upper) <= SYMMETRIC * extent))
+
+    def nearest(self, half_edges: Array) -> tuple[Array, Array]:
+        """Nearest points (3,) of the region and of a plate with these half edges, m; equal if they touch."""
+        of_plate = np.clip(self.center, -half_edges, half_edges)
+        for _ in range(100):  # alternating projections onto two convex boxes converge to a nearest pair
+            of_region = np.clip(of_plate, self.lower, self.upper)
+            of_plate = np.clip(of_region, -half_edges, half_edges)
+        return of_region, of_plate
+
+    def gap(self, half_edges: Array) -> float:
+        """Distance (m) from a plate with these half edges."""
+        return float(np.linalg.norm(np.subtract(*self.nearest(half_edges))))
+
+    def contains(self, points: ArrayLike) -> NDArray[np.bool_]:
+        """Which of `points` (n, 3) lie in the region, bounds included: (n,)."""
+        points = np.asarray(points, float).reshape(-1, 3)
+        slack = SYMMETRIC * (self.upper - self.lower)
+        return np.asarray(np.all((points >= self.lower - slack) & (points <= self.upper + slack), axis=1))
+
+    def grid(self, counts: tuple[int, int, int], fold: bool = False) -> Array:
+        """Chebyshev-Lobatto grid (n, 3), m, bounds included; folded, only the non-negative half of mirrored axes."""
+        axes = []
+        for axis, count in enumerate(counts):
+            nodes = -np.cos(np.pi * np.arange(count) / (count - 1)) if count > 1 else np.zeros(1)
+            line = self.center[axis] + (self.upper - self.lower)[axis] / 2 * nodes
+            keep = line >= -SYMMETRIC * self.upper[axis] if fold and axis in self.mirrors else np.full(count, True)
+            axes.append(line[keep])
+        return np.stack(np.meshgrid(*axes, indexing="ij"), -1).reshape(-1, 3)
+
+    def surface(self, counts: tuple[int, int, int], fold: bool = False) -> Array:
+        """The points of `grid` that lie on the region's surface."""
+        points = self.grid(counts, fold)
+        on_face = (points <= self.lower + 1e-12) | (points >= self.upper - 1e-12)
+        return points[on_face.any(axis=1)]
 
 
 @dataclass(frozen=True, eq=False)
 class RotorShare:
-    """Fourier amplitudes of the rotor's signals along the way of a plate.
+    """Rotor's signals along the way of a plate: r_i(φ, d) = Σ_h [C_hi(d) cos hφ + S_hi(d) sin hφ].
+
+    The angle is φ = ωt about the laboratory's z axis, and d how far the plate has gone down; the amplitudes are
+    Chebyshev series in d.
 
     Parameters
     ----------
     distance : how far the plate goes down, m
     series : (2H+1, states, k) Chebyshev coefficients over 0…distance, √J: constant, cos φ, sin φ, cos 2φ, …
     error : estimated largest error of a signal, relative to the largest signal; in it, of harmonics that were left out
-        because the floater does not feel them (`shorter_share`), what they miss of the field of the rotor's currents
+        because the floater does not feel them (`without_high_harmonics`), what they miss of the rotor's currents' field
     """
 
     distance: float = field(metadata={"units": "m"})
@@ -102,7 +182,6 @@ class PlateErrors:
 
     @property
     def total(self) -> float:
-        """Their sum."""
         return self.mesh + self.states + self.functions
 
     def check(self, rtol: float, conductor: str) -> None:
@@ -117,6 +196,23 @@ class PlateErrors:
         """
         if self.total > rtol:
             refuse(rtol, ENOUGH * self.total, conductor)
+
+
+def refuse(rtol: float, enough: float, conductor: str) -> NoReturn:
+    """Refuse a tolerance that a table of a conductor, in words, misses, where `enough` can be met.
+
+    Raises
+    ------
+    AccuracyError : always
+    """
+    unit = 10.0 ** math.floor(math.log10(enough))
+    enough = math.ceil(enough / unit - 1e-9) * unit
+    if enough > LARGEST:
+        raise AccuracyError(
+            f"Input {OPTION} must be at least {enough:.2g} for {conductor}, more than the {LARGEST:g} that is allowed; "
+            f"instead received {rtol:g}. Move the plate away from the floater, or choose another model of it."
+        )
+    raise AccuracyError(f"Input {OPTION} must be at least {enough:.2g} for {conductor}; instead received {rtol:g}.")
 
 
 @dataclass(frozen=True, eq=False)

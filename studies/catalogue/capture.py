@@ -21,8 +21,8 @@ from ...dynamics.flights.trajectory import DURATION
 from ...dynamics.motion.events import CONTACT
 from ...dynamics.motion.plate import PlateMemory
 from ...dynamics.motion.state import State
-from ...fem.plate.driven import reachable_region
-from ...fem.plate.slab_network import slab_and_rotor_table
+from ...fem.plate.choice import reachable_region
+from ...fem.plate.tables import slab_and_rotor_table
 from ...fem.rotor.table import FieldTable
 from ...geometry.common import Array
 from ...geometry.scene.contents import Lowering, Plate, Scene

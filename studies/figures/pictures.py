@@ -9,8 +9,7 @@ import numpy as np
 
 from ...dynamics.motion.state import State
 from ...fem.closed_forms.potentials import unit_dipoles
-from ...fem.plate.eddy import Source, solve_eddy
-from ...fem.plate.eddy_fields import current_density
+from ...fem.plate.eddy import Source, current_density, solve_eddy
 from ...fem.plate.rotor_share import posed_rotor, rotor_parts
 from ...fem.rotor.choice import rotor_table
 from ...fem.rotor.table import FieldTable, RotorTable

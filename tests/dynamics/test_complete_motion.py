@@ -22,8 +22,8 @@ from spinlev.dynamics.motion.rates import Rates
 from spinlev.dynamics.motion.rotor_losses import ROTOR_CURRENTS, RotorCurrents
 from spinlev.dynamics.motion.state import Parameter, Scales
 from spinlev.fem.mutual.making import cached_mutual_table
-from spinlev.fem.plate.driven import plate_and_rotor_table
-from spinlev.fem.plate.region import Region
+from spinlev.fem.plate.table import Region
+from spinlev.fem.plate.tables import plate_and_rotor_table
 from spinlev.fem.rotor.choice import rotor_table
 from spinlev.fem.rotor_metal import ball_losses, pieces_of
 from spinlev.geometry.meshes.plate import MeshRule

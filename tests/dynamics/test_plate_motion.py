@@ -18,10 +18,8 @@ from spinlev.dynamics.motion.equations import parameters
 from spinlev.dynamics.motion.plate import PlateForce, PlateMemory
 from spinlev.dynamics.motion.rates import Rates
 from spinlev.dynamics.motion.state import Parameter, Scales
-from spinlev.fem.plate.driven import plate_and_rotor_table
-from spinlev.fem.plate.region import Region
-from spinlev.fem.plate.slab_network import slab_and_rotor_table
-from spinlev.fem.plate.table import RotorShare
+from spinlev.fem.plate.table import Region, RotorShare
+from spinlev.fem.plate.tables import plate_and_rotor_table, slab_and_rotor_table
 from spinlev.fem.rotor.table import RotorTable
 from spinlev.geometry.meshes.plate import MeshRule
 from spinlev.geometry.scene.contents import Drag, Lowering, OffsetStart, Plate, Scene

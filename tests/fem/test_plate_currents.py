@@ -7,13 +7,14 @@ import pytest
 from ngsolve import SetNumThreads
 
 from spinlev.fem.closed_forms.potentials import unit_dipoles
-from spinlev.fem.plate.currents import SourceSet, source_images, space_couplings, train
-from spinlev.fem.plate.driven import plate_and_rotor_table, reachable_region, rotor_box, turning_rotor
+from spinlev.fem.plate.choice import reachable_region
+from spinlev.fem.plate.currents import OtherSources, dipole_images, source_images, space_couplings, train
 from spinlev.fem.plate.eddy import EddySpace, solve_eddy
-from spinlev.fem.plate.eddy_fields import dipole_images
 from spinlev.fem.plate.reaction import MESH_SHARE, Ladder
-from spinlev.fem.plate.region import Region, outer_box, outer_frequencies
-from spinlev.fem.plate.solution import CURRENTS, error_of, solve_currents
+from spinlev.fem.plate.rotor_share import rotor_box, turning_rotor
+from spinlev.fem.plate.solution import CURRENTS, error_of, outer_box, outer_frequencies, solve_currents
+from spinlev.fem.plate.table import Region
+from spinlev.fem.plate.tables import plate_and_rotor_table
 from spinlev.fem.rotor.choice import rotor_table
 from spinlev.fem.rotor.models import AccuracyError
 from spinlev.geometry.meshes.plate import MeshRule, plate_mesh
@@ -60,9 +61,8 @@ def test_what_residuals_bound_is_no_larger(space, frequency):
     probes = REGION.lower + (REGION.upper - REGION.lower) * np.random.default_rng(1).random((3, 3))
     exact = solve_eddy(space.conductors, 2, frequency, unit_dipoles(probes), space).couplings
     for allowed in (1e-2, 1e-4):
-        made, missing = train(
-            space, SourceSet(REGION.grid((3, 3, 3), fold=True)), SourceSet(probes), FREQUENCIES, allowed
-        )
+        grid = REGION.grid((3, 3, 3), fold=True)
+        made, missing = train(space, grid, probes, OtherSources(), FREQUENCIES, allowed)
         found = space_couplings(made.dipole_couplings(probes), made.inductances, 2j * np.pi * frequency)
         blocks = [np.einsum("iaib->iab", c.reshape(3, 3, 3, 3)) for c in (found, exact)]
         error = np.max(np.linalg.norm(blocks[0] - blocks[1], axis=(1, 2)) / np.linalg.norm(blocks[1], axis=(1, 2)))
@@ -158,8 +158,8 @@ def test_a_solution_survives_the_disk(solution, tmp_path):
 
 def test_a_tolerance_that_a_mesh_misses_is_named_as_the_user_gave_it():
     """`--plate-rtol` is what was given, not `rtol`, and a mesh rule says nothing to whom did not choose one."""
-    ladder = Ladder(PLATE, REGION.grid((2, 2, 2), fold=True), FREQUENCIES[1], RULE, MESH_SHARE * 1e-5)
-    ladder.order, ladder.error = ladder.highest, 6e-3
+    ladder = Ladder(PLATE, REGION.grid((2, 2, 2), fold=True), FREQUENCIES[1], RULE, MESH_SHARE * 1e-5, growing=True)
+    ladder.order, ladder.errors = ladder.highest, np.array([6e-3])
     with pytest.raises(AccuracyError) as refused:
         ladder.refuse()
     said = str(refused.value)

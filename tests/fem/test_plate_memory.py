@@ -15,11 +15,12 @@ from second_opinions.phasor import mean_force, mean_loss, mean_torque
 from second_opinions.time_stepping import TimeStepper, work_on
 
 from spinlev.fem.closed_forms.potentials import Dipole, unit_dipoles
-from spinlev.fem.plate.driven import tabulate
+from spinlev.fem.plate.currents import OtherSources
 from spinlev.fem.plate.eddy import EddySpace
-from spinlev.fem.plate.network import reduce_plate
-from spinlev.fem.plate.region import Region
-from spinlev.fem.plate.slab_network import slab_and_rotor_table
+from spinlev.fem.plate.network import from_elements
+from spinlev.fem.plate.solution import solve_currents
+from spinlev.fem.plate.table import Region
+from spinlev.fem.plate.tables import slab_and_rotor_table, tabulate
 from spinlev.fem.rotor.choice import rotor_table
 from spinlev.geometry.meshes.plate import MeshRule, plate_mesh
 from spinlev.geometry.rotor import horizontal
@@ -120,7 +121,9 @@ def test_finite_elements_step_by_step_have_the_same_memory():
     Both begin from rest.  The same finite-element space, so that states and field functions alone are compared; 60
     steps a turn leave some (2π/60)²/10 ~ 1e-3.
     """
-    network = reduce_plate(PLATE, REGION, (2.0, 250.0), 2e-3)
+    solution = solve_currents(PLATE, [REGION], (2.0, 250.0), 2e-3)
+    missed = solution.space_error
+    network = from_elements(PLATE, solution, REGION, (2.0, 250.0), 2e-3, OtherSources(), missed)(0.0)
     table = tabulate(network, 2e-3)
     omega, bounce, turns = 2 * np.pi * 100, 2 * np.pi * 15, 5
     step = 2 * np.pi / omega / 60
@@ -134,7 +137,7 @@ def test_finite_elements_step_by_step_have_the_same_memory():
 
     _, dense = flight(table, place, speed, moment, lambda t: np.array([0, 0, omega]), turns / 100)
     mesh = plate_mesh(PLATE.box.size, PLATE.conductivity, REGION.grid((2, 2, 2), fold=True), 250.0, MeshRule())
-    space = EddySpace(mesh, network.space.order)
+    space = EddySpace(mesh, solution.space.order)
     stepper = TimeStepper(space, step)
 
     def source(t):

@@ -12,8 +12,8 @@ from spinlev.dynamics.flights.flight import Flight, integrate
 from spinlev.dynamics.motion.plate import PlateMemory
 from spinlev.dynamics.motion.rates import Rates
 from spinlev.dynamics.motion.state import Scales
-from spinlev.fem.plate.region import Region
-from spinlev.fem.plate.slab_network import slab_and_rotor_table
+from spinlev.fem.plate.table import Region
+from spinlev.fem.plate.tables import slab_and_rotor_table
 from spinlev.fem.rotor.choice import rotor_table
 from spinlev.geometry import rotor
 from spinlev.geometry.scene.contents import Drag, Plate, Scene

@@ -9,8 +9,8 @@ from article import FLOATER, MAGNETS
 from spinlev.dynamics.flights.flight import PLATE_TOLERANCE, Checkpoint, Flight, initial_state, integrate
 from spinlev.dynamics.flights.trajectory import FlightStopped
 from spinlev.dynamics.motion.plate import PlateMemory
-from spinlev.fem.plate.region import Region
-from spinlev.fem.plate.slab_network import slab_and_rotor_table
+from spinlev.fem.plate.table import Region
+from spinlev.fem.plate.tables import slab_and_rotor_table
 from spinlev.fem.rotor.choice import rotor_table
 from spinlev.geometry.scene.contents import Drag, Lowering, Plate, Scene
 from spinlev.geometry.shapes import Box

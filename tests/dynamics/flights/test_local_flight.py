@@ -14,8 +14,8 @@ from spinlev.dynamics.motion.plate import PlateMemory
 from spinlev.fem.harmonics.expansion import uniform_moments
 from spinlev.fem.harmonics.interior import Ball
 from spinlev.fem.harmonics.local import BallField
-from spinlev.fem.plate.region import Region
-from spinlev.fem.plate.slab_network import slab_and_rotor_table
+from spinlev.fem.plate.table import Region
+from spinlev.fem.plate.tables import slab_and_rotor_table
 from spinlev.fem.rotor.table import RotorTable
 from spinlev.geometry.scene.contents import AbsoluteStart, Lowering, Plate
 from spinlev.geometry.shapes import Box

@@ -10,8 +10,8 @@ from spinlev.dynamics.flights.batch import launched
 from spinlev.dynamics.flights.flight import PLATE_TOLERANCE, Flight, initial_state, integrate
 from spinlev.dynamics.motion.plate import PlateMemory
 from spinlev.dynamics.motion.state import State
-from spinlev.fem.plate.region import Region
-from spinlev.fem.plate.slab_network import slab_and_rotor_table
+from spinlev.fem.plate.table import Region
+from spinlev.fem.plate.tables import slab_and_rotor_table
 from spinlev.fem.rotor.choice import rotor_table
 from spinlev.geometry import rotor
 from spinlev.geometry.common import InputError

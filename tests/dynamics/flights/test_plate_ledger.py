@@ -14,8 +14,8 @@ from spinlev.dynamics.motion.effects import with_effects
 from spinlev.dynamics.motion.plate import PlateMemory
 from spinlev.dynamics.motion.rates import Rates
 from spinlev.dynamics.motion.state import State
-from spinlev.fem.plate.region import Region
-from spinlev.fem.plate.slab_network import slab_and_rotor_table
+from spinlev.fem.plate.table import Region
+from spinlev.fem.plate.tables import slab_and_rotor_table
 from spinlev.fem.rotor.choice import rotor_table
 from spinlev.geometry import rotor
 from spinlev.geometry.scene.contents import AbsoluteStart, Drag, Plate, Scene

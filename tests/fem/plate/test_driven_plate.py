@@ -10,15 +10,15 @@ from article import RADIUS
 from ngsolve import SetNumThreads
 
 from spinlev.fem.closed_forms.potentials import unit_dipoles
-from spinlev.fem.plate.driven import (
+from spinlev.fem.plate.choice import reachable_region
+from spinlev.fem.plate.eddy import solve_eddy
+from spinlev.fem.plate.rotor_share import posed_rotor, rotor_parts
+from spinlev.fem.plate.tables import (
     DRIVEN,
     cached_driven_plate,
     deciding,
     plate_and_rotor_table,
-    reachable_region,
 )
-from spinlev.fem.plate.eddy import solve_eddy
-from spinlev.fem.plate.rotor_share import posed_rotor, rotor_parts
 from spinlev.fem.rotor.choice import rotor_table
 from spinlev.geometry.common import InputError
 from spinlev.geometry.meshes.plate import MeshRule, plate_mesh

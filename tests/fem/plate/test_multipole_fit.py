@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from spinlev.fem.plate.field_functions import Multipoles, candidates, fit_multipoles
-from spinlev.fem.plate.region import Region
+from spinlev.fem.plate.multipoles import Multipoles, fit_multipoles
+from spinlev.fem.plate.network import candidates
+from spinlev.fem.plate.table import Region
 
 REGION = Region.over_face((0.1, 0.1, 0.02), (0.015, 0.025), 0.004)
 CHOICE = candidates(REGION, np.array([0.05, 0.05, 0.01]))

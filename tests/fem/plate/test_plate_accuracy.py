@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from ngsolve import SetNumThreads
 
-from spinlev.fem.plate.driven import plate_table
 from spinlev.fem.plate.reaction import plate_reaction
-from spinlev.fem.plate.region import Region
+from spinlev.fem.plate.table import Region
+from spinlev.fem.plate.tables import plate_table
 from spinlev.geometry.meshes.plate import MeshRule
 from spinlev.geometry.scene.contents import Plate
 from spinlev.geometry.shapes import Box

@@ -8,15 +8,18 @@ import pytest
 from ngsolve import SetNumThreads
 
 from spinlev.fem.cache import TableFileError
-from spinlev.fem.plate.driven import (
+from spinlev.fem.closed_forms.potentials import unit_dipoles
+from spinlev.fem.plate.currents import OtherSources
+from spinlev.fem.plate.network import from_elements
+from spinlev.fem.plate.rotor_share import posed_rotor, rotor_parts, rotor_share, without_high_harmonics
+from spinlev.fem.plate.solution import solve_currents
+from spinlev.fem.plate.table import Region
+from spinlev.fem.plate.tables import (
     PLATE as PLATES,
     cached_plate_table,
-    field_values,
+    plate_table,
     tabulate,
 )
-from spinlev.fem.plate.network import reduce_plate
-from spinlev.fem.plate.region import Region
-from spinlev.fem.plate.rotor_share import posed_rotor, rotor_parts, rotor_share, without_high_harmonics
 from spinlev.fem.rotor.choice import rotor_table
 from spinlev.fem.rotor.table import RangeError
 from spinlev.geometry.meshes.plate import MeshRule
@@ -32,7 +35,9 @@ RTOL = 0.1
 
 @pytest.fixture(scope="module")
 def network():
-    return reduce_plate(PLATE, REGION, (5.0, 250.0), RTOL, MeshRule(2.0, 3.0, 3.0))
+    frequencies, rule = (5.0, 250.0), MeshRule(2.0, 3.0, 3.0)
+    solution = solve_currents(PLATE, [REGION], frequencies, RTOL, rule)
+    return from_elements(PLATE, solution, REGION, frequencies, RTOL, OtherSources(), solution.space_error)(0.0)
 
 
 @pytest.fixture(scope="module")
@@ -47,7 +52,7 @@ def places(count, seed=0):
 def test_field_functions_are_those_of_the_currents(network, table):
     """Multipoles against the finite elements' own coupling inside the region: the tolerance of the fit."""
     points = places(10)
-    exact = field_values(network, points).swapaxes(0, 1)
+    exact = network.couplings(unit_dipoles(points)).reshape(len(points), 3, -1).swapaxes(1, 2)
     found, _ = table.field_functions(points)
     scale = np.sqrt(table.rates)[:, None]
     difference = np.linalg.norm((found - exact) / scale, axis=(1, 2)) / np.linalg.norm(exact / scale, axis=(1, 2))
@@ -109,7 +114,7 @@ def test_rotor_share_follows_the_turning_rotor(network):
     assert share.error < 1e-3
     angle, depth = 0.7, 0.0123
     source = posed_rotor(rotor_parts(rotor, PLATE), PLATE, angle, depth)
-    exact = np.concatenate(network.couplings([source]), axis=1)[0]
+    exact = network.couplings([source])[0]
     assert abs(share.signals(angle, depth) - exact).max() < 2 * share.error * abs(exact).max()
     variables = hy.make_vars("angle", "depth")
     expressed = hy.cfunc(share.expressions(share.basis(*variables)), variables, compact_mode=True, opt_level=0)(
@@ -167,8 +172,8 @@ def test_bad_input_is_named(table):
     with pytest.raises(RangeError, match="Input frequency_hz must be between 0 and 250"):
         table.reaction_tensor(REGION.center, -1.0)
     with pytest.raises(ValueError, match="Input frequencies_hz must be positive and increasing"):
-        reduce_plate(PLATE, REGION, (0.0, 250.0))
+        plate_table(PLATE, REGION, (0.0, 250.0))
     with pytest.raises(ValueError, match="Input region upper bounds"):
         Region(np.zeros(3), np.zeros(3))
     with pytest.raises(ValueError, match="must lie outside the plate"):
-        reduce_plate(PLATE, Region(np.full(3, -0.01), np.full(3, 0.01)))
+        plate_table(PLATE, Region(np.full(3, -0.01), np.full(3, 0.01)))

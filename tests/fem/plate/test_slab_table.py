@@ -11,11 +11,11 @@ from scipy.special import jv
 
 from spinlev.fem.closed_forms.potentials import Dipole, HomogeneousField, PolarizedCuboid
 from spinlev.fem.harmonics.expansion import uniform_moments
-from spinlev.fem.plate.region import Region
 from spinlev.fem.plate.rotor_share import DOWN, ExpansionSource, posed_rotor, rotor_parts
 from spinlev.fem.plate.slab import Slab, modes_needed, mutual_tensor, reaction_tensor, slab_modes
-from spinlev.fem.plate.slab_network import cylinder_moments, slab_and_rotor_table
-from spinlev.fem.plate.table import PlateErrors
+from spinlev.fem.plate.table import PlateErrors, Region
+from spinlev.fem.plate.tables import slab_and_rotor_table
+from spinlev.fem.plate.waves import cylinder_moments
 from spinlev.fem.rotor.choice import rotor_table
 from spinlev.fem.rotor.models import AccuracyError
 from spinlev.geometry.common import InputError

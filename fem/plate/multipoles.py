@@ -1,8 +1,6 @@
-"""Functions of position that are harmonic where the floater is: multipoles at points beyond the region.
+"""Fields that are harmonic where the floater is, as sums over the same few multipoles at points beyond.
 
-Every field function of the plate is a sum over the same few multipoles, B = -∇ Σ c_k Θ_k, each free of divergence
-and curl by construction.  Their centres lie behind the plate's surface, on lines away from the region: near ones
-for what is close to the surface, far ones for the rest.
+B = -∇ Σ c_k Θ_k: each multipole is free of divergence and curl by construction.
 """
 
 from __future__ import annotations
@@ -14,29 +12,31 @@ from itertools import combinations_with_replacement, product
 
 import heyoka as hy
 import numpy as np
+from numpy.typing import NDArray
 
 from ...geometry.common import Array, Watch, frozen_array, unwatched
 from ..compiled_code import compiled
 from ..harmonics.expansion import MultipoleExpansion
 from ..harmonics.expressions import FieldExpressions
 from ..harmonics.solid import derivative, outer_sums
-from .region import Region
 
-DEPTHS = (0.0, 0.3, 0.6, 1.0, 1.6, 2.5, 4.0, 6.0, 10.0, 18.0)
-"""Depths of the centres behind the surface, in units of the distance between region and plate."""
-SPACING = 2.5
-"""Lateral distance of the lines, in the same unit."""
-HIGHEST_DEGREE = 4
-UNFOLDED = np.array([[3, 4, 5], [4, 6, 7], [5, 7, 8]])
-"""Where the entries of the symmetric gradient lie among the nine outputs of a function."""
-_TRIPLES = list(combinations_with_replacement(range(3), 3))
-UNFOLDED_THRICE = np.array(
-    [
-        [[_TRIPLES.index((min(i, j, k), sorted((i, j, k))[1], max(i, j, k))) for k in range(3)] for j in range(3)]
-        for i in range(3)
-    ]
-)
-"""The same for the second derivatives, which are symmetric in all three indices."""
+INDEPENDENT = 1e-10
+"""Squared part of a multipole that the chosen ones must leave for it to be taken."""
+NOISE = 1e-11
+"""Weights below this share of the largest are what symmetry forbids."""
+STEP, PATIENCE, STALLED = 2, 6, 0.95
+"""Multipoles at a time, unless told; the fit ends where so many steps leave more than this share of the error."""
+
+
+def _unfolded(rank: int) -> NDArray[np.int_]:
+    """Where the entries of a symmetric tensor (3, …, 3) lie among those with indices in order."""
+    distinct = list(combinations_with_replacement(range(3), rank))
+    places = [distinct.index(tuple(sorted(indices))) for indices in product(range(3), repeat=rank)]
+    return np.array(places).reshape((3,) * rank)
+
+
+TWICE, THRICE = _unfolded(2), _unfolded(3)
+"""For the gradient of a curl-free field, and for its second derivatives."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,7 +59,6 @@ class Multipoles:
             object.__setattr__(self, name, frozen_array(getattr(self, name), (len(self.kinds), 3)))
 
     def subset(self, numbers: Sequence[int]) -> Multipoles:
-        """Some of them."""
         return Multipoles(self.centers[list(numbers)], self.kinds[list(numbers)], self.scale)
 
     @cached_property
@@ -97,7 +96,7 @@ class Multipoles:
     def curvature(self, points: Array) -> Array:
         """∂²B_i/∂x_j∂x_k (n, k, 3, 3, 3) T/m² at points (n, 3) m."""
         values = self._compiled_curvature(np.ascontiguousarray(points.T)).reshape(len(self.kinds), 10, -1)
-        return np.moveaxis(values[:, UNFOLDED_THRICE], -1, 0)
+        return np.moveaxis(values[:, THRICE], -1, 0)
 
     def fields(self, points: Array) -> Array:
         """B (n, k, 3) T at points (n, 3) m, without compilation."""
@@ -116,47 +115,7 @@ class Multipoles:
     def evaluate(self, points: Array) -> tuple[Array, Array]:
         """B (n, k, 3) T and ∂B_i/∂x_j (n, k, 3, 3) T/m at points (n, 3) m."""
         values = self._compiled(np.ascontiguousarray(points.T)).reshape(len(self.kinds), 9, -1)
-        return np.moveaxis(values[:, :3], -1, 0), np.moveaxis(values[:, UNFOLDED], -1, 0)
-
-
-def candidates(region: Region, half_edges: Array, degree: int = HIGHEST_DEGREE) -> Multipoles:
-    """Multipoles to choose from for a region beside a plate with these half edges (m), both about the plate's centre.
-
-    The highest `degree` sets how well they can do: in a region half as wide as it is far from the plate, degree 4 ends
-    near 8e-5 of the field of the plate's currents, degree 5 near 2e-5.
-
-    Raises
-    ------
-    ValueError : the region touches the plate
-    """
-    of_region, of_plate = region.nearest(half_edges)
-    gap = float(np.linalg.norm(of_region - of_plate))
-    if gap < 1e-9:
-        raise ValueError(
-            f"Input region must be apart from the plate; instead received {region.lower.tolist()} to "
-            f"{region.upper.tolist()} m for half edges {half_edges.tolist()} m."
-        )
-    away = (of_plate - of_region) / gap
-    axis = int(np.argmax(np.abs(away)))
-    lines = []
-    for a in range(3):
-        reach = (region.upper - region.lower)[a] / 2 - gap
-        count = 1 if a == axis else 2 * int(np.ceil(max(reach, 0.0) / (SPACING * gap))) + 1
-        lines.append(region.center[a] + max(reach, 0.0) * np.linspace(-1, 1, count) * (count > 1))
-    lines[axis] = of_plate[[axis]]
-    starts = np.array(list(product(*lines)))
-    centers = np.concatenate([starts + depth * gap * away for depth in DEPTHS])
-    kinds = [(l, m, part) for l in range(degree + 1) for m in range(l + 1) for part in (0, 1)[: 1 + (m > 0)]]
-    pairs = list(product(centers, kinds))
-    return Multipoles(np.array([p[0] for p in pairs]), np.array([p[1] for p in pairs], float), gap)
-
-
-INDEPENDENT = 1e-10
-"""Squared part of a multipole that the chosen ones must leave for it to be taken."""
-NOISE = 1e-11
-"""Weights below this share of the largest are what symmetry forbids."""
-STEP, PATIENCE, STALLED = 2, 6, 0.95
-"""Multipoles at a time, unless told; the fit ends where so many steps leave more than this share of the error."""
+        return np.moveaxis(values[:, :3], -1, 0), np.moveaxis(values[:, 3:][:, TWICE], -1, 0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -195,7 +154,7 @@ def fit_multipoles(
     tolerance : for the norm of the scaled error over functions and components, at every point
     enough : whether errors (functions, n, 3) are small enough
     step : multipoles between two looks at the error
-    watch : hears of the progress, told by the orders of magnitude between the first error and the tolerance
+    watch : hears of the progress
     """
     columns = choice.fields(points) * point_scale[:, None, None]
     columns = columns.swapaxes(1, 2).reshape(-1, len(choice.kinds))
@@ -205,7 +164,9 @@ def fit_multipoles(
     chosen: list[int] = []
     left = [_worst(rest)]
     while True:
-        watch("field functions", _share(left, tolerance))
+        least = max(tolerance, np.finfo(float).eps * left[0])  # progress goes by the orders of magnitude to it
+        gone = 1.0 if left[-1] <= least else float(np.log(left[0] / left[-1]) / np.log(left[0] / least))
+        watch("field functions", gone)
         error = rest.T.reshape(values.shape) / state_scale[:, None, None] / point_scale[:, None]
         stalled = len(left) > PATIENCE and left[-1] > STALLED * left[-1 - PATIENCE]
         if stalled or (left[-1] <= tolerance and enough(error)):
@@ -225,12 +186,6 @@ def fit_multipoles(
     weights = (scaled / size[chosen][:, None]).T
     small = np.abs(scaled.T) < NOISE * np.abs(scaled).max(initial=0.0)
     return Fit(choice.subset(chosen), np.where(small, 0.0, weights / state_scale[:, None]), error)
-
-
-def _share(left: Sequence[float], tolerance: float) -> float:
-    """How far the errors have come to the tolerance, or to round-off, by orders of magnitude."""
-    least = max(tolerance, np.finfo(float).eps * left[0])
-    return 1.0 if left[-1] <= least else float(np.log(left[0] / left[-1]) / np.log(left[0] / least))
 
 
 def _worst(rest: Array) -> float:

@@ -1,0 +1,205 @@
+"""Tables of a plate: finite elements or an infinite slab, the network of its currents, then its field functions."""
+
+import time
+from collections.abc import Callable
+from dataclasses import replace
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from ...geometry.common import Watch, unwatched
+from ...geometry.meshes.plate import MeshRule
+from ...geometry.scene.contents import Plate
+from ..cache import TableKind
+from ..rotor.table import RotorTable
+from .currents import OtherSources
+from .network import CONDUCTOR, NETWORK_SHARE, PassiveNetwork, Reduction, checked_ranges, from_elements
+from .rotor_share import MISSED, SHARE_PART, rotor_box, rotor_share, turning_rotor, without_high_harmonics
+from .slab import rotor_reach, slab_frame
+from .solution import PlateSolution, cached_solver, error_of, outer_box, outer_frequencies, solve_currents
+from .table import PlateErrors, PlateTable, Region, RotorShare
+from .waves import from_slab
+
+TITLE = "Eddy currents of a plate: passive network with harmonic field functions, in the plate's frame"
+PLATE = TableKind("plate", PlateTable, TITLE)
+DRIVEN = TableKind("driven-plate", tuple[PlateTable, RotorShare], f"{TITLE}, and the rotor's share of their signals")
+SLAB = TableKind("slab", tuple[PlateTable, RotorShare], "Eddy currents of an infinite slab, with the rotor's share")
+OTHERS_SHARE = 0.65
+"""Share of what the finite elements leave of the tolerance for what dipoles around the rotor miss of it; the rest is
+the left-out states'.  Above, the rotor itself is solved for, which takes as long again: a few more states cost less."""
+ENDLESS = 1e6
+"""Edges of a plate without edges, m."""
+
+
+def plate_table(
+    plate: Plate,
+    region: Region,
+    frequencies: tuple[float, float] = (0.5, 250.0),
+    rtol: float = 1e-3,
+    rule: MeshRule | None = None,
+) -> PlateTable:
+    """Table of `plate` for dipoles in `region` (plate's frame) and frequencies (Hz).
+
+    Parameters
+    ----------
+    rtol : relative accuracy asked of reaction tensors G, Frobenius norm
+    rule : mesh (default by `rtol`)
+
+    Raises
+    ------
+    ValueError : region in the plate, or a parameter out of range
+    AccuracyError : `rtol` not reached
+    """
+    checked_ranges(frequencies, rtol)
+    solution = solve_currents(plate, [region], frequencies, rtol, rule)
+    reduced = from_elements(plate, solution, region, frequencies, rtol, OtherSources(), solution.space_error)
+    return _reduced_table(reduced, rtol, CONDUCTOR, unwatched)[1]
+
+
+def plate_and_rotor_table(
+    plate: Plate,
+    rotor: RotorTable,
+    region: Region,
+    frequencies: tuple[float, float] = (0.5, 250.0),
+    rtol: float = 1e-3,
+    rule: MeshRule | None = None,
+    solve: Callable[..., PlateSolution] = solve_currents,
+    watch: Watch = unwatched,
+) -> tuple[PlateTable, RotorShare]:
+    """Table of `plate` and the rotor's share of its signals, of one network.
+
+    Parameters
+    ----------
+    plate : with its pose at the start and its lowering
+    rotor : field table; whatever it knows drives the plate
+    region : where the floater may be, in the plate's frame, during all of its way: see `reachable_region`
+    frequencies : lowest and highest, Hz, of currents in the plate.  The field of a turning rotor has all multiples of
+        its frequency.  Of a cube on the axis all but the first are below 3e-4; of one 2 mm off it, the second is 3 to
+        6 per cent and the third below 4e-3: then the highest should be twice the rotor's
+    rtol : relative accuracy of reaction tensors in the region, and there of the field of the rotor's currents
+    rule : mesh (default by `rtol`)
+    solve : finite elements; `cached_solver` has them from the cache
+    watch : hears of the progress
+
+    The finite elements are solved for dipoles in boxes around the region and around the rotor, on a coarse raster, so
+    that neighbours of the scene and other models of the rotor need the same ones.  A rotor that these dipoles do not
+    stand for gets its own.
+
+    Raises
+    ------
+    InputError : the plate is too near to the rotor
+    ValueError : region in the plate, or a parameter out of range
+    AccuracyError : `rtol` not reached
+    """
+    others = turning_rotor(plate, rotor)
+    half = plate.box.half_edges
+    boxes = [outer_box(region, half), outer_box(rotor_box(plate, rotor), half)]
+    outer = outer_frequencies(frequencies)
+    solution = solve(plate, boxes, outer, rtol, rule)
+    watch("network of the scene", 0.0)
+    error = error_of(solution, others.probes)
+    if error > OTHERS_SHARE * (NETWORK_SHARE * rtol - solution.mesh_error):
+        solution = solve(plate, boxes, outer, rtol, rule, others)
+        error = solution.space_error
+    watch("network of the scene", 0.5)
+    missed = max(error, solution.space_error)
+    reduced = from_elements(plate, solution, region, frequencies, rtol, others, missed)
+    return _with_share(reduced, plate, rotor, rtol, CONDUCTOR, watch)
+
+
+def slab_and_rotor_table(
+    plate: Plate,
+    rotor: RotorTable,
+    region: Region,
+    frequencies: tuple[float, float] = (0.5, 250.0),
+    rtol: float = 1e-3,
+) -> tuple[PlateTable, RotorShare]:
+    """As `plate_and_rotor_table`, but for a plate that is infinite along its two longer edges.
+
+    The errors do not tell how far the plate is from infinite.
+
+    Raises
+    ------
+    InputError : the region is not over one of the plate's two largest faces, or the rotor not on its side of the slab
+    ValueError : a parameter out of range
+    AccuracyError : `rtol` not reached
+    """
+    far = rotor_reach(plate, rotor, slab_frame(plate, region))
+    size = np.where(np.arange(3) == np.argmin(plate.box.size), plate.box.size, ENDLESS)
+    endless = replace(plate, box=replace(plate.box, size=size))
+    reduced = from_slab(plate, region, frequencies, rtol, turning_rotor(endless, rotor), far)
+    conductor = "this plate, taken as an infinite slab, and this place of the floater"
+    return _with_share(reduced, endless, rotor, rtol, conductor, unwatched)
+
+
+def _with_share(
+    reduced: Reduction, plate: Plate, rotor: RotorTable, rtol: float, conductor: str, watch: Watch
+) -> tuple[PlateTable, RotorShare]:
+    network, table = _reduced_table(reduced, rtol, conductor, watch)
+    share = rotor_share(network, plate, rotor, SHARE_PART * rtol, watch)
+    return table, without_high_harmonics(share, table, MISSED * rtol)
+
+
+def _reduced_table(reduced: Reduction, rtol: float, conductor: str, watch: Watch) -> tuple[PassiveNetwork, PlateTable]:
+    """The network that a table needs, and the table.
+
+    Raises
+    ------
+    AccuracyError : its errors add up to more than `rtol`
+    """
+    network = reduced(0.0)
+    table = tabulate(network, rtol, watch)
+    if table.errors.total > rtol:  # more states leave room for what the field functions miss
+        network = reduced(table.errors.functions)
+        table = tabulate(network, rtol, watch)
+        table.errors.check(rtol, conductor)
+    return network, table
+
+
+def tabulate(network: PassiveNetwork, rtol: float, watch: Watch = unwatched) -> PlateTable:
+    """Field functions of a network as multipoles, whose errors may add up to more than `rtol`: see `PlateErrors.check`.
+
+    `watch` hears of the progress.
+    """
+    start = time.perf_counter()
+    watch("field functions", 0.0)
+    multipoles, weights, error = network.field_functions(rtol, watch)
+    seconds = network.seconds + time.perf_counter() - start
+    return PlateTable(
+        network.plate.box.size, network.plate.conductivity, network.region, network.frequencies, network.rates,
+        multipoles, weights, PlateErrors(network.mesh_error, network.state_error, error),
+        {**network.provenance, "rtol": rtol, "seconds": seconds},
+    )  # fmt: skip
+
+
+def cached_plate_table(
+    plate: Plate, region: Region, frequencies: tuple[float, float], rtol: float, report: Callable[[str], None]
+) -> tuple[PlateTable, bool]:
+    """A plate table, from the cache if it is there, and whether it was; it is the same for every pose of the plate."""
+    inputs = plate.box.size, plate.conductivity, region, frequencies, rtol
+    return PLATE.cached(inputs, lambda: plate_table(plate, region, frequencies, rtol), report)
+
+
+def deciding(
+    plate: Plate, rotor: RotorTable, region: Region, frequencies: tuple[float, float], rtol: float
+) -> tuple[Any, ...]:
+    """What decides a plate's table and the rotor's share: the way of a lowering does, but not when and how fast."""
+    way = plate.lowering.distance if plate.lowering else 0.0
+    return plate.box, plate.conductivity, way, rotor.uniform, rotor.expansions, region, frequencies, rtol
+
+
+def cached_driven_plate(
+    plate: Plate,
+    rotor: RotorTable,
+    region: Region,
+    frequencies: tuple[float, float],
+    rtol: float,
+    report: Callable[[str], None],
+    watch: Watch = unwatched,
+) -> tuple[PlateTable, RotorShare, bool]:
+    """`plate_and_rotor_table` from the cache if it is there, and whether it was."""
+    asked, solve = (plate, rotor, region, frequencies, rtol), cached_solver(report, watch)
+    make = partial(plate_and_rotor_table, *asked, solve=solve, watch=watch)
+    (table, share), found = DRIVEN.cached(deciding(*asked), make, report)
+    return table, share, found
