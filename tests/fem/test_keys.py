@@ -12,8 +12,8 @@ import pytest
 from spinlev.fem.cache import FORMATS, LIBRARIES, key_of, libraries, program_digest, program_version
 from spinlev.fem.harmonics.expansion import MultipoleExpansion
 from spinlev.fem.plate.currents import OtherSources
-from spinlev.fem.plate.table import Region
 from spinlev.fem.plate.rotor_share import posed_rotor, rotor_parts
+from spinlev.fem.plate.table import Region
 from spinlev.fem.rotor.choice import rotor_key, rotor_table
 from spinlev.geometry.magnets import Magnet
 from spinlev.geometry.meshes.plate import MeshRule
