@@ -16,7 +16,7 @@ from ..dynamics.motion.plate import PlateMemory
 from ..fem.maps_of_B.table import GriddedTable
 from ..fem.mutual.making import mutual_key
 from ..fem.plate.choice import resolve_plate_model
-from ..fem.plate.region import Region
+from ..fem.plate.table import Region
 from ..fem.rotor.choice import resolve_model, rotor_key
 from ..fem.rotor.table import RotorTable
 from ..fem.rotor_metal import losses_key, pieces_of
