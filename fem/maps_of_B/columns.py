@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -144,6 +144,11 @@ class Column:
     unit: str | None
 
     @property
+    def parts(self) -> tuple[str, ...]:
+        """What it holds: of a vector the three components."""
+        return {"B": COMPONENTS, "B_err": ERRORS}.get(self.name, (self.name,))
+
+    @property
     def is_field(self) -> bool:
         """Whether it holds B or a component of it."""
         return self.name in (*COMPONENTS, "B")
@@ -236,7 +241,15 @@ def chosen(titles: Sequence[str], reading: MapReading, vectors: bool = False) ->
             )
         names = {c.name for c in told.values()}
         known = {k: c for k, c in known.items() if k in told or not (c.is_field or c.name in names)}
-    _require_single(known.values())
+    seen: dict[str, Column] = {}
+    for column in known.values():
+        for name in column.parts:
+            if name in seen:
+                one, other = seen[name].title, column.title
+                raise FieldMapError(
+                    f"Input columns must hold {name} once; instead received {one!r} and {other!r}.{_choice(one, other)}"
+                )
+            seen[name] = column
     return known
 
 
@@ -248,18 +261,6 @@ def _without(title: str, text: str) -> str | None:
     if found is None:
         return None
     return re.sub(r"[ _.:-]+(?=[ _]?[\[({]|$)", "", (title[: found.start()] + title[found.end() :]).strip(" _.:-"))
-
-
-def _require_single(columns: Iterable[Column]) -> None:
-    seen: dict[str, Column] = {}
-    for column in columns:
-        for name in COMPONENTS if column.name == "B" else (column.name,):
-            if name in seen:
-                one, other = seen[name].title, column.title
-                raise FieldMapError(
-                    f"Input columns must hold {name} once; instead received {one!r} and {other!r}.{_choice(one, other)}"
-                )
-            seen[name] = column
 
 
 def _choice(one: str, other: str) -> str:

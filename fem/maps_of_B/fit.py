@@ -55,7 +55,11 @@ class HarmonicBasis:
         result = np.empty((self.count(self.degree), 3, len(points)))
         scaled = ((points - self.centers[0]) / self.extent).T
         harmonics = regular_values(self.background_degree, *scaled)
-        sizes = regular_field_sizes(self.background_degree)
+        degrees = np.arange(self.background_degree + 1.0)[:, None]
+        irregular = field_sizes(self.background_degree)
+        inverse = np.divide(1.0, irregular, out=np.zeros_like(irregular), where=irregular > 0)
+        # The mean of |Υ_lm|² is 1/((l-m)!(l+m)!(2l+1)), that of |grad f|² is l(2l+1) times that of f².
+        sizes = np.where(degrees.T == 0, 1.0, 2.0) * np.sqrt(degrees * (degrees + 1)) * inverse
         for row, l, m in _terms(0, self.background_degree, 1):
             _fill(result, row, m, regular_gradient(harmonics, l, m), sizes[l, m])
         sizes = _sizes(self.degree)
@@ -86,14 +90,6 @@ class HarmonicBasis:
 def _sizes(degree: int) -> Array:
     """Unknown that belongs to a coefficient c_lm of 1, [l, m]."""
     return field_sizes(degree) * ((2 * np.arange(degree + 1) + 1) / 3)[:, None]
-
-
-def regular_field_sizes(degree: int) -> Array:
-    """As `field_sizes`, for Υ_lm: the mean of |Υ_lm|² is 1/((l-m)!(l+m)!(2l+1)), that of |grad f|² l(2l+1) times f²."""
-    l = np.arange(degree + 1.0)[:, None]
-    with np.errstate(divide="ignore"):
-        inverse = np.where(field_sizes(degree) > 0, 1 / field_sizes(degree), 0.0)
-    return np.where(np.arange(degree + 1) == 0, 1.0, 2.0) * np.sqrt(l * (l + 1)) * inverse
 
 
 def _terms(start: int, degree: int, centers: int, k: int = 0) -> Iterator[tuple[int, int, int]]:
@@ -203,7 +199,9 @@ def fit_harmonics(
     groups = generator.permutation(len(points)) % GROUPS
     parts = np.array([_normal_matrix(basis, points, field, errors, groups == k) for k in range(GROUPS)])
     whole = parts.sum(axis=0)
-    expected = _expected_size(whole, basis)
+    count = basis.count(1)
+    dipoles = np.linalg.lstsq(whole[:count, :count], whole[:count, -2], rcond=1e-10)[0]
+    expected = float(np.abs(dipoles[basis.background_count :]).max()) or 1.0  # field (T) of the largest unknown
     nothing = _misfit([whole], [np.zeros(0)])
     misfits = [nothing]
     for degree in range(1, basis.degree + 1):
@@ -217,15 +215,11 @@ def fit_harmonics(
     more = basis.count(min(degree + MARGIN, basis.degree))
     held_out = np.array([_solve(whole, more, ridge, part) for part in parts])
     undecided = misfits[degree] * ridge * generator.normal(size=(more, GROUPS))
-    likely = _likely(held_out) + _inverse_times(whole[:more, :more], ridge, undecided).T
+    # Their spread is the jackknife's: √(GROUPS-1) times the change by each group.
+    likely = held_out + (np.sqrt(GROUPS - 1) - 1) * (held_out - held_out.mean(axis=0))
+    likely = likely + _inverse_times(whole[:more, :more], ridge, undecided).T
     deviations = likely - np.pad(kept, (0, more - len(kept)))
     return HarmonicFit(degree, kept, np.array(misfits), groups, held_out, deviations)
-
-
-def _likely(held_out: Array) -> Array:
-    """Solutions whose spread is the jackknife's: their mean, and √(GROUPS-1) times the change by each group."""
-    mean = held_out.mean(axis=0)
-    return np.asarray(mean + np.sqrt(GROUPS - 1) * (held_out - mean))
 
 
 def _normal_matrix(
@@ -246,13 +240,6 @@ def _normal_matrix(
         product[:-1, :-1] += columns @ columns.T
         product[-1, -1] += columns.shape[1]
     return product
-
-
-def _expected_size(normal: Array, basis: HarmonicBasis) -> float:
-    """Field (T) of the largest unknown of a fit by dipoles alone."""
-    count = basis.count(1)
-    dipole = np.linalg.lstsq(normal[:count, :count], normal[:count, -2], rcond=1e-10)[0]
-    return float(np.abs(dipole[basis.background_count :]).max()) or 1.0
 
 
 def _solve(normal: Array, count: int, ridge: float, left_out: Array | None = None) -> Array:

@@ -9,9 +9,10 @@ import csv
 import io
 import re
 from array import array
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import redirect_stderr, redirect_stdout
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
 import meshio
@@ -81,10 +82,8 @@ class _Table:
         return _cells(lines, self.separator)
 
 
-def text_columns(path: Path, reading: MapReading) -> tuple[dict[str, Array], dict[str, str]]:
-    """Columns x, y, z, Bx, By, Bz, Bx_err, By_err, Bz_err in SI units, as far as they are there, and VTK's masks.
-
-    The second are the units in which the file has them.
+def _text(path: Path, reading: MapReading) -> FieldMap:
+    """A map from a table as text.
 
     Raises
     ------
@@ -101,8 +100,10 @@ def text_columns(path: Path, reading: MapReading) -> tuple[dict[str, Array], dic
         raise FieldMapError(f"Input columns must hold {NEEDED}; instead received {received}. {VALID}")
     faults = []
     for table in tables:
+        below = _units_below(table, reading)
+        source = _Source(table.titles, below, table.usual, partial(_numbers, table, skipped=1 if below else 0))
         try:
-            return _columns(table, reading)
+            return _field_map(source, reading, vectors=False)
         except FieldMapError as error:
             faults.append(error)
     raise faults[0]
@@ -147,7 +148,8 @@ def _table(lines: list[str], separator: str | None, reading: MapReading) -> _Tab
         if in_comment and (said := LENGTH_UNIT.search(bare)):
             length = said[1]
         titles = _titles(bare, separator, lines[number:])
-        if _is_complete(known_columns(titles, reading).values()):
+        names = {column.name for column in known_columns(titles, reading).values()}
+        if names.issuperset(AXES) and not names.isdisjoint(COMPONENTS):
             usual = (length or "m", "T") if line.lstrip().startswith("%") else (length, None)
             found = _Table(separator, titles, lines[number:], usual)
         elif found and not in_comment and not RULE.fullmatch(line):
@@ -162,11 +164,6 @@ def _titles(line: str, separator: str | None, below: list[str]) -> list[str]:
     cells = len(next(_Table(None, [], below[:HEADER_LINES]).rows(), []))
     ways = (re.split(r"\s{2,}|\t", line.strip()), TITLE.findall(line))
     return next((titles for titles in ways if len(titles) == cells), line.split())
-
-
-def _is_complete(columns: Iterable[Column]) -> bool:
-    names = {column.name for column in columns}
-    return names.issuperset(AXES) and not names.isdisjoint(COMPONENTS)
 
 
 def _nearest_titles(lines: list[str], separators: Sequence[str | None], reading: MapReading) -> str:
@@ -209,30 +206,15 @@ def _grid_unit(table: _Table, corner: Sequence[str]) -> str:
     )
 
 
-def _columns(table: _Table, reading: MapReading) -> tuple[dict[str, Array], dict[str, str]]:
-    columns = chosen(table.titles, reading)
-    if below := _units_below(table, columns):
-        columns = {k: replace(column, unit=column.unit or below.get(k)) for k, column in columns.items()}
-    length, field = table.usual
-    units = {
-        k: column.known_unit(reading, length if column.name in AXES else field)
-        for k, column in columns.items()
-        if column.name not in (MASK, GHOSTS)
-    }
-    values = _numbers(table, columns, skipped=1 if below else 0)
-    found = {c.name: UNITS.get(units.get(k, ""), 1.0) * np.frombuffer(values[k]) for k, c in columns.items()}
-    return found, {columns[k].name: unit for k, unit in units.items()}
-
-
-def _units_below(table: _Table, columns: dict[int, Column]) -> dict[int, str]:
+def _units_below(table: _Table, reading: MapReading) -> dict[int, str]:
     """Units of the columns in a line of their own below the titles."""
     row = next(table.rows(), [])
-    units = {k: row[k].strip(" ()[]{}<>\"'") for k in columns if k < len(row)}
+    units = {k: row[k].strip(" ()[]{}<>\"'") for k in known_columns(table.titles, reading) if k < len(row)}
     said = {k: unit for k, unit in units.items() if unit}
     return said if said and all(map(unit_named, said.values())) else {}
 
 
-def _numbers(table: _Table, columns: dict[int, Column], skipped: int) -> dict[int, "array[float]"]:
+def _numbers(table: _Table, columns: Mapping[int, Column], skipped: int) -> dict[str, Array]:
     values = {k: array("d") for k in columns}
     comma, is_decimal = _has_decimal_comma(table, columns), False
     for number, row in enumerate(table.rows(), 1 - skipped):
@@ -250,10 +232,10 @@ def _numbers(table: _Table, columns: dict[int, Column], skipped: int) -> dict[in
         )
     if not all(values.values()):
         raise FieldMapError("Input map must have numbers below its titles; instead it has none.")
-    return values
+    return {column.name: np.frombuffer(values[k]) for k, column in columns.items()}
 
 
-def _has_decimal_comma(table: _Table, columns: dict[int, Column]) -> bool:
+def _has_decimal_comma(table: _Table, columns: Mapping[int, Column]) -> bool:
     """Whether the first number with a mark of decimals has a comma for it."""
     cells = (row[k] for row in table.rows() for k in columns if k < len(row))
     return next((mark == "," for cell in cells for mark in cell if mark in ",."), False)
@@ -288,8 +270,24 @@ MESHES = {*meshio.extension_to_filetypes} - {".dat"}
 TECPLOT = re.compile(rb"\s*(?:TITLE|VARIABLES|ZONE)\b", re.IGNORECASE)
 OTHER_VTK = {".vti", ".vtr", ".vts", ".vtp", ".vtm", ".pvtu", ".pvti", ".pvts", ".pvtr", ".pvd"}
 LARGEST_FILE = 1_000_000_000
-Read = tuple[dict[str, Array], dict[str, str]]
-"""Columns in SI units by name, and the units in which the file has them."""
+
+
+@dataclass(frozen=True)
+class _Source:
+    """What every kind of file has.
+
+    Parameters
+    ----------
+    titles : of all columns
+    said : units by number, whatever the titles say
+    usual : units of length and of B of titles without one, if files of the kind have them
+    numbers : values (n,) of some columns by what they hold, as they are in the file
+    """
+
+    titles: Sequence[str]
+    said: Mapping[int, str]
+    usual: tuple[str | None, str | None]
+    numbers: Callable[[Mapping[int, Column]], Mapping[str, Array]]
 
 
 def read_field_map(path: str | Path, reading: MapReading | None = None) -> FieldMap:
@@ -299,7 +297,7 @@ def read_field_map(path: str | Path, reading: MapReading | None = None) -> Field
       coordinates x, y, z, each with its `units`; grids and lists of points alike.
     - all that meshio reads (`.vtu`, `.vtk`, `.msh`, `.xdmf`): point data B (n, 3), or Bx, By, Bz, in m and T where
       neither their names nor `reading` tell others. Points that VTK marks as hidden or without a value are left out.
-    - any other file: a table as text, `text_columns`.
+    - any other file: a table as text, with columns x, y, z, Bx, By, Bz, Bx_err, By_err, Bz_err, not all of them needed.
 
     Raises
     ------
@@ -318,110 +316,99 @@ def read_field_map(path: str | Path, reading: MapReading | None = None) -> Field
                 f"Input map must be a mesh that meshio reads; instead received {suffix}. Save it as .vtu."
             )
         if suffix in (".nc", ".nc4"):
-            columns, units = _netcdf_columns(path, reading)
-        elif suffix in MESHES or (suffix == ".dat" and TECPLOT.match(beginning)):
-            columns, units = _mesh_columns(path, reading)
-        else:
-            columns, units = text_columns(path, reading)
-        return _assemble(columns, units)
+            return _field_map(_netcdf(path), reading)
+        if suffix in MESHES or (suffix == ".dat" and TECPLOT.match(beginning)):
+            return _field_map(_mesh(path, reading), reading)
+        return _text(path, reading)
     except InputError as error:
         raise FieldMapError(f"{path}: {error}") from None
 
 
-def _assemble(columns: Mapping[str, Array], units: Mapping[str, str]) -> FieldMap:
-    """A map from SI columns x, y, z, Bx, By, Bz, Bx_err, By_err, Bz_err, not all of which must be there, and masks."""
-    missing = [axis for axis in AXES if axis not in columns]
-    if missing or not any(component in columns for component in COMPONENTS):
-        received = ", ".join(columns) or "none that is known"
-        raise FieldMapError(f"Input columns must hold {NEEDED}; instead received {received}.")
-    points = np.stack([columns[axis] for axis in AXES], axis=-1)
-    nothing = np.full(len(points), np.nan)
-    field, errors = (
-        np.stack([columns.get(name, nothing) for name in names], axis=-1) for names in (COMPONENTS, ERRORS)
+def _field_map(source: _Source, reading: MapReading, vectors: bool = True) -> FieldMap:
+    columns = {k: replace(c, unit=source.said.get(k) or c.unit)
+               for k, c in chosen(source.titles, reading, vectors).items()}  # fmt: skip
+    units = {
+        name: column.known_unit(reading, source.usual[0 if name in AXES else 1])
+        for column in columns.values()
+        for name in column.parts
+        if name not in (MASK, GHOSTS)
+    }
+    found = {name: UNITS.get(units.get(name, ""), 1.0) * part for name, part in source.numbers(columns).items()}
+    if not found.keys() >= {*AXES} or found.keys().isdisjoint(COMPONENTS):
+        raise FieldMapError(f"Input columns must hold {NEEDED}; instead received {', '.join(units) or 'none of them'}.")
+    nothing = np.full(len(found["x"]), np.nan)
+    points, field, errors = (
+        np.stack([found.get(name, nothing) for name in names], axis=-1) for names in (AXES, COMPONENTS, ERRORS)
     )
-    is_known = np.ones(len(points), bool)
-    if MASK in columns:
-        is_known &= columns[MASK] != 0
-    if GHOSTS in columns:
-        is_known &= columns[GHOSTS].astype(int) & HIDDEN == 0
+    is_known = (found.get(MASK, nothing) != 0) & (np.nan_to_num(found.get(GHOSTS, nothing)).astype(int) & HIDDEN == 0)
     if not is_known.any():
         raise FieldMapError(f"Input map must have points with a value; instead all {len(points)} are masked.")
-    given = not columns.keys().isdisjoint(ERRORS)
-    read_as = units["x"], next(units[name] for name in COMPONENTS if name in columns)
+    read_as = units["x"], next(units[name] for name in COMPONENTS if name in units)
+    given = not found.keys().isdisjoint(ERRORS)
     return FieldMap(points[is_known], field[is_known], errors[is_known] if given else None, read_as)
 
 
-def _netcdf_columns(path: Path, reading: MapReading) -> Read:
+def _netcdf(path: Path) -> _Source:
     try:
         dataset = read_checked(path)
     except TableFileError as error:
         raise FieldMapError(str(error)) from error
-    names = [str(name) for name in dataset.variables]
-    found, units = dict[str, xr.DataArray](), dict[str, str]()
-    for k, column in chosen(names, reading, vectors=True).items():
-        variable = dataset[names[k]]
-        is_vector = column.name in ("B", "B_err")
-        parts = _components(variable, column.name) if is_vector else {column.name: variable}
-        unit = replace(column, unit=variable.attrs.get("units", column.unit)).known_unit(reading)
-        found |= parts
-        units |= dict.fromkeys(parts, unit)
-    found = {axis: found[axis] for axis in AXES if axis in found} | found
-    whole = xr.broadcast(*found.values())
-    return {n: UNITS[units[n]] * w.values.ravel() for n, w in zip(found, whole, strict=True)}, units
+    titles = [str(name) for name in dataset.variables]
+    said = {k: dataset[name].attrs["units"] for k, name in enumerate(titles) if "units" in dataset[name].attrs}
+
+    def numbers(columns: Mapping[int, Column]) -> dict[str, Array]:
+        found: dict[str, xr.DataArray] = {}
+        for k, column in sorted(columns.items(), key=lambda entry: entry[1].name not in AXES):
+            whole = dataset[titles[k]]
+            found |= _components(whole, column) if len(column.parts) == 3 else {column.name: whole}
+        return {n: part.values.ravel() for n, part in zip(found, xr.broadcast(*found.values()), strict=True)}
+
+    return _Source(titles, said, (None, None), numbers)
 
 
-def _components(vector: xr.DataArray, name: str) -> dict[str, xr.DataArray]:
-    """Bx, By, Bz of a variable that has a dimension of length 3 that is not one of space."""
+def _components(vector: xr.DataArray, column: Column) -> dict[str, xr.DataArray]:
+    """The parts of a variable that has a dimension of length 3 that is not one of space."""
     axes = [d for d in vector.dims if d not in AXES and vector.sizes[d] == 3]
     if len(axes) != 1:
-        raise FieldMapError(f"Input {name} must have one dimension of three components; instead it has {vector.sizes}.")
-    suffix = name.removeprefix("B")
-    return {f"B{axis}{suffix}": vector.isel({axes[0]: k}, drop=True) for k, axis in enumerate(AXES)}
+        raise FieldMapError(
+            f"Input {column.name} must have one dimension of three components; instead it has {vector.sizes}."
+        )
+    return {name: vector.isel({axes[0]: k}, drop=True) for k, name in enumerate(column.parts)}
 
 
-def _mesh_columns(path: Path, reading: MapReading) -> Read:
+def _mesh(path: Path, reading: MapReading) -> _Source:
     for part in (path, path.with_suffix(".h5")):  # where XDMF has its numbers
         if is_hdf5(part) and (fault := hdf5_fault(part)):
             raise FieldMapError(f"Input map must be a readable HDF5 file; instead: {fault}.")
-    said = io.StringIO()
+    printed = io.StringIO()
     try:
-        with redirect_stdout(said), redirect_stderr(said):
+        with redirect_stdout(printed), redirect_stderr(printed):
             mesh = meshio.read(path)
     except (Exception, SystemExit) as error:  # where no reader takes the file meshio prints why, and leaves the program
-        reason = " ".join(said.getvalue().split()) or error
+        reason = " ".join(printed.getvalue().split()) or error
         raise FieldMapError(f"Input map must be a mesh that meshio reads; instead: {reason}.") from None
-    places = enumerate(AXES[: mesh.points.shape[1]])
-    units = dict.fromkeys(AXES, Column("x", "x", "m").known_unit(reading))
-    columns = {axis: UNITS[units["x"]] * mesh.points[:, k] for k, axis in places}
-    columns[GHOSTS] = np.where(_hidden_by_cells(mesh), HIDDEN, 0)
     data = {name: np.squeeze(np.asarray(values, float)) for name, values in mesh.point_data.items()}
     known = known_columns(list(data), reading, vectors=True)
-    names = [title for k, title in enumerate(data) if k in known and _fits(known[k], data[title])]
-    for k, column in chosen(names, reading, vectors=True).items():
-        values = data[names[k]]
-        if column.name in (MASK, GHOSTS):
-            columns[column.name] = np.maximum(columns.get(column.name, values), values)
-            continue
-        is_vector = column.name in ("B", "B_err")
-        parts = (
-            dict(zip(COMPONENTS if column.name == "B" else ERRORS, values.T, strict=True))
-            if is_vector
-            else {column.name: values}
-        )
-        units |= dict.fromkeys(parts, column.known_unit(reading, "T"))
-        columns |= {name: UNITS[units[name]] * part for name, part in parts.items()}
+    # Point data that have the shape that goes with their name: `B` may be a length as well.
+    fitting = [name for k, name in enumerate(data) if k in known and known[k].name not in AXES
+               and data[name].shape[1:] == ((3,) if len(known[k].parts) == 3 else ())]  # fmt: skip
     in_cells = [name for name in mesh.cell_data if (c := column_of(name)) and c.is_field]
-    if in_cells and columns.keys().isdisjoint(COMPONENTS):
+    if in_cells and not any(c.is_field for c in known_columns(fitting, reading, vectors=True).values()):
         raise FieldMapError(
             f"Input map must have B as point data; instead {in_cells[0]!r} is cell data. Write its values at the "
             "points, as ParaView's filter Cell Data to Point Data does."
         )
-    return columns, units
+    places = dict(zip(AXES, mesh.points.T, strict=False))
+    titles = [*places, *fitting]
 
+    def numbers(columns: Mapping[int, Column]) -> dict[str, Array]:
+        found: dict[str, Array] = {}
+        for k, column in columns.items():
+            found |= zip(column.parts, np.atleast_2d((places | data)[titles[k]].T), strict=True)
+        found[GHOSTS] = np.maximum(found.get(GHOSTS, 0), np.where(_hidden_by_cells(mesh), HIDDEN, 0))
+        return found
 
-def _fits(column: Column, values: Array) -> bool:
-    """Whether point data have the shape that goes with their name."""
-    return column.name not in AXES and values.shape[1:] == ((3,) if column.name in ("B", "B_err") else ())
+    return _Source(titles, {}, ("m", "T"), numbers)
 
 
 def _hidden_by_cells(mesh: meshio.Mesh) -> NDArray[np.bool_]:

@@ -172,7 +172,10 @@ def fit_field_map(
     distances = np.linalg.norm(field_map.points[:, None] - middle, axis=2)
     radii = _radii(distances, radius)
     basis = _basis(field_map, middle, radii, max_degree, background_degree)
-    errors = _default_errors(field_map, distances.min(axis=1)) if field_map.errors is None else field_map.errors
+    errors = field_map.errors
+    if errors is None:  # the typical size of a component, T, that falls as a dipole's
+        fall = distances.min(axis=1)[:, None] ** 3
+        errors = np.repeat((float(np.sqrt(np.nanmean((field_map.field * fall) ** 2))) or 1.0) / fall, 3, axis=1)
     fit = fit_harmonics(basis, field_map.points, field_map.field, errors, np.random.default_rng(seed))
     wide = min(fit.degree + MARGIN, basis.degree)
     deviations = np.array([basis.coefficients(member, wide) for member in fit.deviations])
@@ -208,12 +211,6 @@ def _basis(field_map: FieldMap, centers: Array, radii: Array, max_degree: int, b
     return HarmonicBasis(centers, radii, max(fitting), background_degree, extent)
 
 
-def _default_errors(field_map: FieldMap, distances: Array) -> Array:
-    """Typical size (n, 3) of a component, T, that falls as a dipole's."""
-    size = float(np.sqrt(np.nanmean((field_map.field * distances[:, None] ** 3) ** 2))) or 1.0
-    return np.repeat(size / distances[:, None] ** 3, 3, axis=1)
-
-
 def _left_out(
     basis: HarmonicBasis,
     fit: HarmonicFit,
@@ -228,36 +225,29 @@ def _left_out(
     """
     if fit.degree < basis.degree:
         return ()
-    tails = [replace(e, coefficients=_zonal(_tail(field_spectrum(e.coefficients)))) for e in expansions]
+    tails = [replace(e, coefficients=_tail(field_spectrum(e.coefficients))) for e in expansions]
     near = np.nonzero((distances <= EDGE * distances.min(axis=0)).any(axis=1))[0]
     near = near[:: 1 + len(near) // EDGE_POINTS]
     predicted = RotorTable("map", (), doubts={"tail": tuple(tails)}).absolute_error(field_map.points[near])[0]
-    residuals = field_map.field[near] - _held_out_field(basis, fit, field_map.points, near)
+    unseen = fit.held_out[fit.groups[near]]  # of the fits that did not see these points
+    columns = basis.columns(field_map.points[near])[: unseen.shape[1]]
+    residuals = field_map.field[near] - np.einsum("nu,uin->ni", unseen, columns)
     sizes = np.sqrt(np.nansum(residuals**2, axis=1))
     scale = EDGE_SAFETY * float(np.max(sizes / (predicted + np.finfo(float).tiny)))
     return tuple(replace(tail, coefficients=scale * tail.coefficients) for tail in tails)
 
 
-def _zonal(spectrum: Array) -> Coefficients:
-    """Coefficients of a field with a given root mean square (T) in every degree; which one does not matter."""
-    coefficients = np.zeros((len(spectrum), len(spectrum)), complex)
-    coefficients[:, 0] = spectrum / field_sizes(len(spectrum) - 1)[:, 0]
-    return coefficients
+def _tail(spectrum: Array) -> Coefficients:
+    """Coefficients (T) that continue a spectrum to degree `TAIL`, nothing in its own degrees; which order is no matter.
 
-
-def _held_out_field(basis: HarmonicBasis, fit: HarmonicFit, points: Array, chosen: NDArray[np.intp]) -> Array:
-    """Field (chosen, 3) T at chosen points of the fits that did not see them."""
-    unknowns = fit.held_out[fit.groups[chosen]]
-    columns = basis.columns(points[chosen])[: unknowns.shape[1]]
-    return np.asarray(np.einsum("nu,uin->ni", unknowns, columns))
-
-
-def _tail(spectrum: Array) -> Array:
-    """Continuation (T) of a spectrum to degree `TAIL`, nothing in its own degrees."""
+    Of the last eight degrees the field falls in the mean by a ratio each, or is level.
+    """
     last, before = spectrum[-4:].max(), spectrum[-8:-4].max(initial=0.0)
     ratio = min((last / before) ** 0.25, 1.0) if before > 0 else 1.0
-    beyond = last * ratio ** np.arange(1, TAIL + 2 - len(spectrum))
-    return np.concatenate([np.zeros(len(spectrum)), beyond])
+    coefficients = np.zeros((TAIL + 1, TAIL + 1), complex)
+    sizes = field_sizes(TAIL)[len(spectrum) :, 0]
+    coefficients[len(spectrum) :, 0] = last * ratio ** np.arange(1, TAIL + 2 - len(spectrum)) / sizes
+    return coefficients
 
 
 def _region(field_map: FieldMap, centers: Array, radii: Array) -> Array:
