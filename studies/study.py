@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from operator import itemgetter
 from typing import TYPE_CHECKING, Any
 
@@ -45,6 +46,16 @@ def cases_with(result: xr.Dataset, **labels: object) -> xr.Dataset:
     return result.isel(case=np.flatnonzero(found))
 
 
+def case_with(result: xr.Dataset, **labels: object) -> xr.Dataset:
+    """The first case with the given labels."""
+    return cases_with(result, **labels).isel(case=0)
+
+
+def each_case(result: xr.Dataset) -> list[xr.Dataset]:
+    """The cases of a joined result one by one."""
+    return [result.isel(case=k) for k in range(result.sizes["case"])]
+
+
 @dataclass(frozen=True)
 class Study:
     """One question to the program.
@@ -55,9 +66,9 @@ class Study:
     summary : what it gives, in a line
     points : takes `quick` and returns the points
     compute : takes a point and returns its labelled result, the same whoever computes it
-    gather : joins the results of the points into one
     figures : by the name of its files, what draws each figure from the joined result alone; one message a figure
     report : what it says, in lines, from the joined result alone
+    gather : joins the results of the points into one
     prepared : how to compute each of several points that help each other; None where they do not
     batches : which of the numbered points are computed together, with `prepared`
     timed : whether it measures times, for which its points must have the machine for themselves
@@ -70,9 +81,9 @@ class Study:
     summary: str
     points: Callable[[bool], Sequence[Point]]
     compute: Callable[[Point], xr.Dataset]
-    gather: Callable[[Sequence[xr.Dataset]], xr.Dataset]
     figures: Mapping[str, Callable[[xr.Dataset], Figure]]
     report: Callable[[xr.Dataset], list[str]]
+    gather: Callable[[Sequence[xr.Dataset]], xr.Dataset] = by_case
     prepared: Callable[[Sequence[Point]], Sequence[Callable[[], xr.Dataset]]] | None = None
     batches: Callable[[Mapping[int, Point]], Sequence[Sequence[int]]] | None = None
     timed: bool = False
@@ -83,18 +94,12 @@ class Study:
 
 def study_of_one(compute: Callable[[bool], xr.Dataset], **more: Any) -> Study:
     """A study that is computed as a whole: its only point says whether it is quick; `more` as of a `Study`."""
-    return Study(points=_settings, compute=_Whole(compute), gather=itemgetter(0), **more)
+    return Study(points=_settings, compute=partial(_whole, compute), gather=itemgetter(0), **more)
 
 
 def _settings(quick: bool) -> list[Point]:
     return [{"quick": quick}]
 
 
-@dataclass(frozen=True)
-class _Whole:
-    """Can be sent to a worker, unlike a function that is made here."""
-
-    compute: Callable[[bool], xr.Dataset]
-
-    def __call__(self, point: Point) -> xr.Dataset:
-        return self.compute(point["quick"])
+def _whole(compute: Callable[[bool], xr.Dataset], point: Point) -> xr.Dataset:
+    return compute(point["quick"])

@@ -3,16 +3,11 @@
 J. M. Hermansen, F. L. Durhuus and R. Bjørk, Appl. Phys. Lett. 127 (2025) 012402.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Any
 
-import matplotlib as mpl
 import numpy as np
 import scipy
-import xarray as xr
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 from numpy.typing import ArrayLike, NDArray
 
 from ...geometry.common import MAGNET_CONDUCTIVITY, MU_0, Array
@@ -20,9 +15,8 @@ from ...geometry.magnets import Magnet
 from ...geometry.rotor import horizontal, tilt, vertical
 from ...geometry.scene.contents import Drag, Floater, Scene
 from ..cli.options import FieldModel, InteractionModel, Models
-from ..figures.style import PAGE, panels
 from ..levitation import Levitation
-from ..study import Point, cases_with
+from ..study import Point
 
 EDGE, REMANENCE, PERMEABILITY = 10e-3, 1.305, 1.05
 """Of the rotor's cubes: m; T, the middle of 1.29 to 1.32; recoil permeability usual for NdFeB, which is not given."""
@@ -39,6 +33,10 @@ FLIGHT = 250.0
 """The longest flight of the experiment, s."""
 RTOL = 1e-4
 """Relative accuracy of B asked of the finite elements, from contact on: it moves the equilibria by less than 1 µm."""
+INTERACTION = 1e-7 * FLOATER.moment * REMANENCE * EDGE**3 / MU_0
+"""G = μ0 m_f m_r / 4π, N m⁴."""
+NEAREST, FARTHEST = CONTACT, 0.12
+"""Distances between which roots of the force are looked for, m; nearer, the side mode's radius has no bound."""
 MODELS = ("dipole", "fem")
 
 
@@ -79,6 +77,7 @@ CONFIGURATIONS = {
 }
 QUICK = {"horizontal": (1.0,), "vertical": (14.0,), "tilt": (10.0,)}
 """One rotor of each configuration, for the quick settings of studies."""
+QUICK_ROTORS = (("horizontal", 2.0), ("vertical", 14.0), ("tilt", 10.0))
 
 
 def levitated_rotors(quick: bool) -> list[Point]:
@@ -134,18 +133,10 @@ def rotor_label(configuration: str, value: float) -> str:
     return f"{kind.symbol} = {value:g}{'' if kind.unit == '°' else ' '}{kind.unit}"
 
 
-def axis_label(configuration: str) -> str:
+def label_of(configuration: str) -> str:
     """A configuration's parameter with its unit, for an axis."""
     kind = CONFIGURATIONS[configuration]
     return f"{kind.symbol} ({kind.unit})"
-
-
-def by_configuration(result: xr.Dataset) -> Iterator[tuple[str, xr.Dataset]]:
-    """Each configuration that a joined result has, with its rotors by ascending displacement or tilt."""
-    for configuration in CONFIGURATIONS:
-        part = cases_with(result, configuration=configuration).sortby("measure")
-        if part.sizes["case"]:
-            yield configuration, part
 
 
 def stable_in_flight(growth: ArrayLike) -> NDArray[np.bool_]:
@@ -153,10 +144,9 @@ def stable_in_flight(growth: ArrayLike) -> NDArray[np.bool_]:
     return np.asarray(np.asarray(growth) <= 1 / FLIGHT)
 
 
-INTERACTION = 1e-7 * FLOATER.moment * REMANENCE * EDGE**3 / MU_0
-"""G = μ0 m_f m_r / 4π, N m⁴."""
-NEAREST, FARTHEST = CONTACT, 0.12
-"""Distances between which roots of the force are looked for, m; nearer, the side mode's radius has no bound."""
+def polar_angle(moments: Array) -> Array:
+    """Angle (...) to the axis, rad, of moments (..., 3)."""
+    return np.asarray(np.arctan2(np.hypot(moments[..., 0], moments[..., 1]), moments[..., 2]))
 
 
 @dataclass(frozen=True)
@@ -270,51 +260,3 @@ def analytic_distance(configuration: str, value: float, frequency: ArrayLike) ->
         half = angular / (8 * parameter)
         return np.asarray(np.sqrt(half + np.sqrt(half**2 + 3 * linear / parameter)))
     return np.asarray(np.cbrt(angular / (2 * parameter))) if configuration == "tilt" else np.full(rate.shape, np.nan)
-
-
-TITLES = {
-    "horizontal": "Cube displaced by δx",
-    "vertical": "Two cubes, δz apart",
-    "tilt": "Cube tilted by δθ",
-}
-
-
-def one_panel_each(height: float, **shared: Any) -> tuple[Figure, Any]:
-    """A panel (3,) side by side for each configuration, `height` inches high; `shared` are options of `panels`."""
-    figure, (axes,) = panels(1, len(CONFIGURATIONS), (PAGE, height), **shared)
-    for panel, configuration in zip(axes, CONFIGURATIONS, strict=True):
-        panel.set_title(TITLES[configuration])
-    return figure, axes
-
-
-def rotor_panels(result: xr.Dataset, height: float, **shared: Any) -> tuple[Figure, Any]:
-    """A panel (3,) for each configuration of a joined result, with a numbered place for each of its rotors."""
-    figure, (axes,) = panels(1, len(CONFIGURATIONS), (PAGE, height), **shared)
-    for panel, (configuration, part) in zip(axes, by_configuration(result), strict=False):
-        panel.set_xticks(range(part.sizes["case"]), [f"{m:g}" for m in part["measure"].values])
-        panel.set(xlabel=axis_label(configuration), xlim=(-0.6, part.sizes["case"] - 0.4), title=TITLES[configuration])
-    return figure, axes
-
-
-def rotor_color(configuration: str, value: float) -> tuple[float, ...]:
-    """Colour of a rotor: dark to bright along viridis, which all kinds of colour vision tell apart."""
-    tested = CONFIGURATIONS[configuration].tested
-    place = (value - tested[0]) / (tested[-1] - tested[0])
-    return tuple(mpl.colormaps["viridis"](0.92 * float(np.clip(place, 0, 1))))
-
-
-def legend_name(configuration: str, value: float) -> str:
-    """A rotor in a legend; with a star if it levitated in the experiment."""
-    return rotor_label(configuration, value) + ("*" if value in CONFIGURATIONS[configuration].levitated else "")
-
-
-def values_of(result: xr.Dataset, configuration: str) -> list[float]:
-    """The values of a configuration's parameter that a result holds, ascending."""
-    return sorted(set(result["value"].values[result["configuration"].values == configuration].tolist()))
-
-
-def plot_branch(axes: Axes, x: Array, y: Array, solid: NDArray[np.bool_], **style: Any) -> None:
-    """A curve, solid where `solid`, else dashed, without a gap between."""
-    inside = solid & np.append(solid[1:], True) & np.append(True, solid[:-1])
-    axes.plot(x, np.where(inside, np.nan, y), "--", **{**style, "label": None})
-    axes.plot(x, np.where(solid, y, np.nan), "-", **style)

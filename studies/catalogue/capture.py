@@ -1,14 +1,15 @@
-"""How a floater is brought in: a rotor over its plate, and launches drawn at random."""
+"""Which floaters are captured: launches drawn at random over the plate of every rotor that was tried."""
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cache, cached_property
-from itertools import pairwise, product
+from itertools import product
 from typing import Any
 from zlib import crc32
 
 import numpy as np
+import scipy
 import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -29,18 +30,20 @@ from ...geometry.scene.contents import Lowering, Plate, Scene
 from ...geometry.shapes import Box
 from ..figures.style import PAGE, PALETTE, legend_below, panels, styled
 from ..levitation import sources
-from ..result import variable
-from ..study import Point, Study, by_case, cases_with, one_case
+from ..result import Columns, columns
+from ..study import Point, Study, cases_with, one_case
 from .article import (
     CONFIGURATIONS,
     PLATE_CONDUCTIVITY,
     PLATE_SIZE,
+    QUICK_ROTORS,
     article_scene,
-    axis_label,
     conducting,
+    label_of,
     levitation_of,
     rotor_label,
 )
+from .drawing import by_configuration, configuration_panels, text_table
 
 NEARER, FARTHER, SIDEWAYS = 4e-3, 8e-3, 6e-3
 """From where it would levitate without a plate: so much nearer to the rotor, farther from it, and to the side, m."""
@@ -156,8 +159,10 @@ def launches(place: Place, count: int, seed: list[int]) -> Launches:
     sideways, spin = SIDEWAYS * np.sqrt(area), SPIN * (2 * along - 1)
     cosine = 1 - (1 - np.cos(LEAN)) * cap
     sine = np.sqrt(1 - cosine**2)
-    position = _stacked(sideways * np.cos(place_angle), sideways * np.sin(place_angle), -place.distance - farther)
-    moment = _stacked(sine * np.cos(moment_angle), sine * np.sin(moment_angle), cosine)
+    position = np.stack(
+        [sideways * np.cos(place_angle), sideways * np.sin(place_angle), -place.distance - farther], axis=-1
+    )
+    moment = np.stack([sine * np.cos(moment_angle), sine * np.sin(moment_angle), cosine], axis=-1)
     turning = (spin * place.scene.angular_velocity)[:, None] * moment
     return Launches(farther, sideways, np.arccos(cosine), spin, State(position, velocity, moment, turning))
 
@@ -165,10 +170,6 @@ def launches(place: Place, count: int, seed: list[int]) -> Launches:
 def seed_of(configuration: str, measure: float, part: float, batch: int) -> list[int]:
     """A seed of its own for each batch of launches."""
     return [crc32(f"{configuration} {measure:g} {part:.6f}".encode()), batch]
-
-
-def _stacked(*columns: Array) -> Array:
-    return np.stack(columns, axis=-1)
 
 
 HELD, PLATE, ROTOR, LOST, NO_EQUILIBRIUM = range(5)
@@ -209,7 +210,7 @@ class Share:
 
 
 @dataclass(frozen=True, eq=False)
-class Caught:
+class Captured:
     """One rotor at one frequency: all of its launches.
 
     Parameters
@@ -229,43 +230,55 @@ class Caught:
     stayed: int
 
     @property
-    def held(self) -> Share:
-        """Share of launches that are held."""
-        outcome = self.flights["outcome"].values
-        return Share(int(np.sum(outcome == HELD)), len(outcome))
+    def captured(self) -> NDArray[np.bool_]:
+        """Which launches are captured."""
+        return np.asarray(self.flights["outcome"].values == HELD)
 
-    def share(self, outcome: int) -> float:
-        """Share of launches that ended so."""
-        return float(np.mean(self.flights["outcome"].values == outcome))
+    @property
+    def probability(self) -> Share:
+        """Share of launches that are captured."""
+        return Share(int(self.captured.sum()), self.captured.size)
+
+    @property
+    def beyond(self) -> NDArray[np.bool_]:
+        """Which launches left the range of the plate's table."""
+        return np.asarray(self.flights["left_plate_table"].values == 1)
+
+    @property
+    def others(self) -> dict[str, float]:
+        """Shares of launches that ended otherwise, by name."""
+        return {word: float(np.mean(self.flights["outcome"].values == k)) for k, word in enumerate(WORDS) if k != HELD}
+
+    @property
+    def levitated(self) -> bool:
+        """Whether the article's experiment levitated with this rotor."""
+        return self.measure in CONFIGURATIONS[self.configuration].levitated
 
 
-def rotors_of(result: xr.Dataset) -> Iterator[tuple[str, float, list[Caught]]]:
-    """Each rotor of a joined result with its frequencies, their batches put together."""
-    for configuration in CONFIGURATIONS:
-        some = cases_with(result, configuration=configuration)
-        for measure in np.unique(some["measure"].values):
-            here = cases_with(some, measure=measure)
-            parts = [cases_with(here, part=part) for part in np.unique(here["part"].values)]
-            yield configuration, float(measure), [_caught(part) for part in parts]
+def captured(result: xr.Dataset) -> list[Captured]:
+    """Each rotor and frequency of a joined result, its batches put together."""
+    found = []
+    for _, some in by_configuration(result):
+        for measure, part in sorted({(float(m), float(p)) for m, p in zip(some["measure"], some["part"], strict=True)}):
+            found.append(_together(cases_with(some, measure=measure, part=part)))
+    return found
 
 
-def _caught(part: xr.Dataset) -> Caught:
-    names = ("outcome", "farther", "sideways", "lean", "spin", "levitated", "left_plate_table")
-    whole = part[list(names)].drop_vars(["configuration", "measure"], errors="ignore")
+def _together(part: xr.Dataset) -> Captured:
+    names = ["outcome", "farther", "sideways", "lean", "spin", "levitated", "left_plate_table"]
+    whole = part[names].drop_vars(["configuration", "measure"], errors="ignore")
     flights = whole.stack(every=("case", "flight"), create_index=False).rename(every="flight")
     flights = flights.isel(flight=np.flatnonzero(np.isfinite(flights["outcome"].values)))
     first = part.isel(case=0)
-    return Caught(
-        str(first["configuration"].values), float(first["measure"]), float(first["part"]),
-        float(first["rotor_frequency"]), flights, int(part["settled"].sum()), int(part["stayed"].sum()),
-    )  # fmt: skip
+    rotor = str(first["configuration"].values), float(first["measure"]), float(first["part"])
+    counts = int(part["settled"].sum()), int(part["stayed"].sum())
+    return Captured(*rotor, float(first["rotor_frequency"]), flights, *counts)
 
 
 PARTS = (1 / 6, 1 / 2, 5 / 6)
 """Places in the range of stable frequencies."""
 TOGETHER, BATCHES = 2000, 5
 """Flights of a point, and points for each rotor and frequency: ten thousand flights."""
-QUICK = (("horizontal", 2.0), ("vertical", 14.0), ("tilt", 10.0))
 CHECKED = 8
 """Launches of each rotor and frequency that are flown on while the plate goes down."""
 FEW = 24
@@ -275,7 +288,7 @@ FEW = 24
 def capture_points(quick: bool) -> list[Point]:
     """All rotors and frequencies again and again, a batch of launches each time, so that a stop leaves equal shares."""
     if quick:
-        return [_point(*rotor, 0.5, 0, FEW, 0) for rotor in QUICK]
+        return [_point(*rotor, 0.5, 0, FEW, 0) for rotor in QUICK_ROTORS]
     rotors = [(name, value) for name, kind in CONFIGURATIONS.items() for value in kind.tested]
     return [
         _point(*rotor, part, batch, TOGETHER, CHECKED if batch == 0 else 0)
@@ -291,22 +304,45 @@ def _point(configuration: str, measure: float, part: float, batch: int, flights:
 
 
 def capture(point: Point) -> xr.Dataset:
-    """One batch of launches below one rotor.
-
-    Returns
-    -------
-    Dataset over `flight`: how each was let go, how it ended (see `outcomes`) and when; how many of those that were
-    flown on while the plate went down were held first, and to the end.
-    """
+    """One batch of launches below one rotor, see `COLUMNS`; the outcomes are numbers of `WORDS`."""
     rotor = point["configuration"], point["measure"], point["part"]
+    found: dict[str, Any] = {"part": point["part"], "batch": point["batch"], "settled": 0, "stayed": 0}
+    empty = np.full(point["flights"], np.nan)
     try:
         place = place_of(*rotor)
     except EquilibriumError:
-        return _row(point, None, None, np.full(point["flights"], NO_EQUILIBRIUM), None, (0, 0))
-    begun = launches(place, point["flights"], seed_of(*rotor, point["batch"]))
-    ended = launched(place.scene, field_of(place), plate_under(place, place.scene), begun.states, SETTLED)
-    outcome = outcomes(place, ended)
-    return _row(point, place, begun, outcome, ended, _flown_on(place, begun, point["checked"]))
+        found |= {name: np.nan for name, (dims, *_) in COLUMNS.items() if not dims and name not in found}
+        found["outcome"] = np.full(point["flights"], float(NO_EQUILIBRIUM))
+    else:
+        begun = launches(place, point["flights"], seed_of(*rotor, point["batch"]))
+        ended = launched(place.scene, field_of(place), plate_under(place, place.scene), begun.states, SETTLED)
+        found |= {"rotor_frequency": place.scene.frequency, "distance": place.distance, "low": place.low}
+        found |= {"high": place.high, "levitated": ended.levitated_s, "outcome": outcomes(place, ended).astype(float)}
+        found |= {name: getattr(begun, name) for name in ("farther", "sideways", "lean", "spin")}
+        found["left_plate_table"] = ended.left_plate_table.astype(float)
+        found["settled"], found["stayed"] = _flown_on(place, begun, point["checked"])
+    found = {name: found.get(name, empty) for name in COLUMNS}
+    return one_case(point, xr.Dataset(columns(COLUMNS, {name: np.asarray(value) for name, value in found.items()})))
+
+
+FLIGHTS = ("flight",)
+COLUMNS: Columns = {
+    "rotor_frequency": ((), "Hz", "frequency of the rotor"),
+    "distance": ((), "m", "distance of levitation without a plate"),
+    "low": ((), "Hz", "lowest stable frequency without a plate"),
+    "high": ((), "Hz", "highest stable frequency without a plate"),
+    "part": ((), "1", "place in the range of stable frequencies"),
+    "batch": ((), "1", "number of the batch"),
+    "settled": ((), "1", "flights that were up when the plate began to go down"),
+    "stayed": ((), "1", "those of them that were up after it had gone down"),
+    "farther": (FLIGHTS, "m", "farther from the rotor than where it levitates"),
+    "sideways": (FLIGHTS, "m", "lateral offset"),
+    "lean": (FLIGHTS, "rad", "angle of the moment to the axis"),
+    "spin": (FLIGHTS, "1", "spin about the moment over the rotor's"),
+    "levitated": (FLIGHTS, "s", "time until it touched something or was lost"),
+    "outcome": (FLIGHTS, "1", "how it ended"),
+    "left_plate_table": (FLIGHTS, "1", "whether it went where the plate's field is a continuation of its table"),
+}
 
 
 def outcomes(place: Place, ended: Endings) -> NDArray[np.int_]:
@@ -329,184 +365,120 @@ def _flown_on(place: Place, begun: Launches, count: int) -> tuple[int, int]:
     return int(np.sum(ended.levitated_s >= SETTLED)), int(np.sum(ended.ended_by == DURATION))
 
 
-def _row(
-    point: Point,
-    place: Place | None,
-    begun: Launches | None,
-    outcome: NDArray[np.int_],
-    ended: Endings | None,
-    flown_on: tuple[int, int],
-) -> xr.Dataset:
-    empty = np.full(point["flights"], np.nan)
-    numbers: Mapping[str, tuple[float, str, str]] = {
-        "rotor_frequency": (place.scene.frequency if place else np.nan, "Hz", "frequency of the rotor"),
-        "distance": (place.distance if place else np.nan, "m", "distance of levitation without a plate"),
-        "low": (place.low if place else np.nan, "Hz", "lowest stable frequency without a plate"),
-        "high": (place.high if place else np.nan, "Hz", "highest stable frequency without a plate"),
-        "part": (point["part"], "1", "place in the range of stable frequencies"),
-        "batch": (point["batch"], "1", "number of the batch"),
-        "settled": (flown_on[0], "1", "flights that were up when the plate began to go down"),
-        "stayed": (flown_on[1], "1", "those of them that were up after it had gone down"),
-    }
-    columns: Mapping[str, tuple[Array, str, str]] = {
-        "farther": (begun.farther if begun else empty, "m", "farther from the rotor than where it levitates"),
-        "sideways": (begun.sideways if begun else empty, "m", "beside the axis"),
-        "lean": (begun.lean if begun else empty, "rad", "angle of the moment to the axis"),
-        "spin": (begun.spin if begun else empty, "1", "spin about the moment over the rotor's"),
-        "levitated": (ended.levitated_s if ended else empty, "s", "time until it touched something or was lost"),
-        "outcome": (outcome.astype(float), "1", "how it ended"),
-        "left_plate_table": (
-            ended.left_plate_table.astype(float) if ended else empty,
-            "1",
-            "whether it went beyond the range of the plate's table, where the plate's field is a continuation",
-        ),
-    }
-    single = {name: variable((), np.array(value), unit, text) for name, (value, unit, text) in numbers.items()}
-    flights = {name: variable(("flight",), values, unit, text) for name, (values, unit, text) in columns.items()}
-    return one_case(point, xr.Dataset({**single, **flights}))
-
-
 SHOWN = (("horizontal", 2.0), ("vertical", 14.0), ("vertical", 18.0), ("tilt", 10.0))
-"""Rotors of which it is drawn from where they catch."""
-BINS = 12
+"""Rotors of which it is drawn from where they capture."""
+BINS = 6
 
 
 @styled
 def share_figure(result: xr.Dataset) -> Figure:
-    """The share that is held against each configuration's displacement or tilt, at each part of its frequencies."""
-    known = list(rotors_of(result))
-    names = [name for name in CONFIGURATIONS if any(name == configuration for configuration, _, _ in known)]
-    figure, (axes,) = panels(1, len(names), (PAGE, 2.7), sharey=True)
-    for panel, name in zip(axes, names, strict=True):
-        rows = [(measure, parts) for configuration, measure, parts in known if configuration == name]
-        for k in range(max(len(parts) for _, parts in rows)):
-            there = [(measure, parts[k].held) for measure, parts in rows if k < len(parts)]
-            values = np.array([share.value for _, share in there])
-            around = np.array([share.bounds for _, share in there])
-            bars = np.maximum(np.stack([values - around[:, 0], around[:, 1] - values]), 0)
-            label = f"{rows[0][1][k].part:.0%} of the stable range"
-            panel.errorbar([m for m, _ in there], 100 * values, 100 * bars, fmt="o-", color=PALETTE[k], label=label)
+    """The capture probability against each configuration's displacement or tilt, at each part of its frequencies."""
+    found = captured(result)
+    figure, rows = configuration_panels(result, 2.7, ylabel="capture probability (%)", sharey=True)
+    for axes, name, _ in rows:
+        own = [one for one in found if one.configuration == name]
+        for part, color in zip(sorted({one.part for one in own}), PALETTE, strict=False):
+            some = [one for one in own if one.part == part]
+            label = f"{part:.0%} of the stable range"
+            _shares(axes, [one.measure for one in some], [one.probability for one in some], color, label)
         for measure in CONFIGURATIONS[name].levitated:
-            panel.axvline(measure, color="0.85", lw=4, zorder=0)
-        panel.set(xlabel=axis_label(name), ylim=(-2, 102))
-    axes[0].set_ylabel("launches that are held (%)")
-    legend_below(figure, axes[0])
+            axes.axvline(measure, color="0.85", lw=4, zorder=0, label="levitated in the article")
+        axes.set(xlabel=label_of(name), ylim=(-2, 102))
+    legend_below(figure, rows[0][0])
     return figure
+
+
+def _shares(axes: Axes, x: Sequence[float], shares: Sequence[Share], color: str, label: str) -> None:
+    """Shares in per cent with Wilson's intervals."""
+    values, around = np.array([s.value for s in shares]), np.array([s.bounds for s in shares])
+    bars = np.maximum(np.stack([values - around[:, 0], around[:, 1] - values]), 0)
+    axes.errorbar(x, 100 * values, 100 * bars, fmt="o-", ms=4, capsize=2, color=color, label=label)
 
 
 @styled
 def place_figure(result: xr.Dataset) -> Figure:
-    """From where floaters are caught: the share over height and distance from the axis, and over the moment's angle."""
-    found = {(c, m): parts for c, m, parts in rotors_of(result)}
-    chosen = [parts[len(parts) // 2] for key in SHOWN if (parts := found.get(key))]
+    """From where floaters are captured: over height and lateral offset, and over the moment's angle to the axis."""
+    found = [[one for one in captured(result) if (one.configuration, one.measure) == rotor] for rotor in SHOWN]
+    chosen = [some[len(some) // 2] for some in found if some]
     figure, (maps, leans) = panels(2, len(chosen), (PAGE, 4.6), sharey="row")
-    for top, bottom, caught in zip(maps, leans, chosen, strict=True):
-        _map(top, caught)
-        _lean(bottom, caught)
-        top.set_title(f"{rotor_label(caught.configuration, caught.measure)}, {caught.frequency:.0f} Hz")
+    side, height = np.linspace(0, SIDEWAYS, 5), np.linspace(-NEARER, FARTHER, 9)
+    edges = np.degrees(np.linspace(0, LEAN, BINS + 1))
+    for top, bottom, one in zip(maps, leans, chosen, strict=True):
+        at = one.flights["sideways"].values, one.flights["farther"].values
+        hits = one.captured.astype(float)
+        share = 100 * scipy.stats.binned_statistic_2d(*at, hits, bins=(side, height)).statistic
+        drawn = top.pcolormesh(1e3 * side, 1e3 * height, share.T, vmin=0, vmax=100, cmap="viridis")
+        top.grid(False)
+        top.set(title=f"{rotor_label(one.configuration, one.measure)}, {one.frequency:.0f} Hz")
+        top.set_xlabel("lateral offset (mm)")
+        lean = np.digitize(np.degrees(one.flights["lean"].values), edges) - 1
+        shares = [Share(int(one.captured[lean == k].sum()), int((lean == k).sum())) for k in range(BINS)]
+        _shares(bottom, ((edges[1:] + edges[:-1]) / 2).tolist(), shares, PALETTE[0], "")
+        bottom.set(xlabel="moment to the axis (°)", ylim=(-2, 102))
     maps[0].set_ylabel("farther from the rotor (mm)")
     maps[0].invert_yaxis()  # shared by all
-    leans[0].set_ylabel("held (%)")
+    leans[0].set_ylabel("capture probability (%)")
+    figure.colorbar(drawn, ax=maps, label="captured (%)")
     return figure
 
 
-FIGURES = {"capture": share_figure, "capture-from-where": place_figure}
-
-
-def _map(axes: Axes, caught: Caught) -> None:
-    """Held (blue) and not held (red) launches; of each place the mean over all directions of the moment."""
-    side, height = np.linspace(0, SIDEWAYS, 5), np.linspace(-NEARER, FARTHER, 9)
-    at = caught.flights["sideways"].values, caught.flights["farther"].values
-    held = caught.flights["outcome"].values == HELD
-    every = np.histogram2d(*at, bins=(side, height))[0]
-    some = np.histogram2d(at[0][held], at[1][held], bins=(side, height))[0]
-    share = np.divide(100 * some, every, out=np.full_like(every, np.nan), where=every > 0)
-    drawn = axes.pcolormesh(1e3 * side, 1e3 * height, share.T, vmin=0, vmax=100, cmap="RdYlBu")
-    axes.set_xlabel("beside the axis (mm)")
-    axes.figure.colorbar(drawn, ax=axes, label="held (%)")
-
-
-def _lean(axes: Axes, caught: Caught) -> None:
-    """The share against the moment's angle to the axis."""
-    edges = np.degrees(np.linspace(0, LEAN, BINS // 2 + 1))
-    angle, held = np.degrees(caught.flights["lean"].values), caught.flights["outcome"].values == HELD
-    inside = [(angle >= a) & (angle < b) for a, b in pairwise(edges)]
-    shares = [Share(int(held[k].sum()), int(k.sum())) for k in inside]
-    values, bars = [100 * s.value for s in shares], [100 * s.error for s in shares]
-    axes.errorbar((edges[1:] + edges[:-1]) / 2, values, bars, fmt="o-", color=PALETTE[0])
-    axes.set(xlabel="moment to the axis (°)", ylim=(-2, 102))
-
-
 def capture_lines(result: xr.Dataset) -> list[str]:
-    """The share that is held of each rotor and frequency, and what became of the others."""
-    lines, every = [], []
-    for configuration, measure, parts in rotors_of(result):
-        levitated = measure in CONFIGURATIONS[configuration].levitated
-        told = "levitated in the article" if levitated else "did NOT levitate in the article"
-        for caught in parts:
-            lines.append(f"{rotor_label(configuration, measure)} ({told}), {_line(caught)}")
-        every += parts
-    flown = sum(int(np.isfinite(c.flights["left_plate_table"]).sum()) for c in every)
-    beyond = [sum(int(_beyond(c)[_held(c) == held].sum()) for c in every) for held in (True, False)]
-    if sum(beyond):
+    """The capture probability of each rotor and frequency, and what became of the others."""
+    found, rows = captured(result), []
+    for one in found:
+        rest = sorted(((share, word) for word, share in one.others.items() if share > 0), reverse=True)
+        after = f"{one.stayed} of {one.settled}" if one.settled else ""
+        seen = "levitated" if one.levitated else "did not levitate"
+        name = f"{rotor_label(one.configuration, one.measure)}, {one.frequency:.1f} Hz"
+        ends = ", ".join(f"{100 * share:.0f} % {word}" for share, word in rest)
+        rows.append((name, f"{one.probability}", str(one.probability.trials), seen, after, ends))
+    head = ("rotor", "captured", "launches", "article", "stay, plate lowered", "others")
+    lines = text_table(head, rows)
+    flown = sum(int(np.isfinite(one.flights["left_plate_table"]).sum()) for one in found)
+    beyond = sum(int(one.beyond.sum()) for one in found)
+    if beyond:
+        inside = sum(int((one.beyond & one.captured).sum()) for one in found)
         lines.append(
-            f"{sum(beyond)} of {flown} flights, {beyond[0]} of them held, were for a while beyond the range of the "
+            f"{beyond} of {flown} trajectories, {inside} of them captured, were for a while beyond the range of the "
             "plate's table, where the field of its currents is a continuation of unknown error."
         )
-    settled, stayed = sum(c.settled for c in every), sum(c.stayed for c in every)
+    settled, stayed = sum(one.settled for one in found), sum(one.stayed for one in found)
     if settled:
-        gone = Share(settled - stayed, settled)
         lines.append(
-            f"Of {settled} flights that were up when the plate began to go down (10 mm/s over 55 mm), {stayed} were "
-            f"still up at the end: {gone} of what is called held is lost after all."
+            f"Of {settled} captured floaters {stayed} still levitate after the plate was lowered (10 mm/s over 55 mm): "
+            f"{Share(settled - stayed, settled)} are lost."
         )
     return lines
 
 
-def _beyond(caught: Caught) -> Array:
-    return np.asarray(caught.flights["left_plate_table"].values == 1)
-
-
-def _held(caught: Caught) -> Array:
-    return np.asarray(caught.flights["outcome"].values == HELD)
-
-
-def _line(caught: Caught) -> str:
-    if caught.share(NO_EQUILIBRIUM) == 1:
-        return "no stable frequency is found: none can be held."
-    others = [(caught.share(k), k) for k in range(len(WORDS)) if k != HELD]
-    rest = ", ".join(f"{100 * share:.0f} % {WORDS[k]}" for share, k in sorted(others, reverse=True) if share > 0)
-    after = f"; the plate lowered: {caught.stayed} of {caught.settled} stay" if caught.settled else ""
-    return f"{caught.frequency:.1f} Hz: {caught.held} of {caught.held.trials} launches are held; {rest}{after}."
-
-
 def capture_numbers(result: xr.Dataset) -> dict[str, Any]:
     """The shares as numbers: `shares`, one entry for each rotor and frequency; and what the plate's lowering loses."""
-    rows, settled, stayed = [], 0, 0
-    for configuration, measure, parts in rotors_of(result):
-        for caught in parts:
-            settled, stayed = settled + caught.settled, stayed + caught.stayed
-            rows.append({
-                "configuration": configuration,
-                "value": measure,
-                "levitated_in_article": measure in CONFIGURATIONS[configuration].levitated,
-                "frequency_hz": None if np.isnan(caught.frequency) else caught.frequency,
-                "flights": caught.held.trials,
-                "held": caught.held.value,
-                "held_error": caught.held.error,
-                "left_plate_table": float(np.mean(_beyond(caught))),
-                **{WORDS[k].replace(" ", "_"): caught.share(k) for k in range(1, len(WORDS))},
-            })  # fmt: skip
-    return {"shares": rows, "flown_on": settled, "stayed_up": stayed}
+    found = captured(result)
+    rows = [
+        {
+            "configuration": one.configuration,
+            "value": one.measure,
+            "levitated_in_article": one.levitated,
+            "frequency_hz": None if np.isnan(one.frequency) else one.frequency,
+            "flights": one.probability.trials,
+            "held": one.probability.value,
+            "held_error": one.probability.error,
+            "left_plate_table": float(np.mean(one.beyond)),
+            **{word.replace(" ", "_"): share for word, share in one.others.items()},
+        }
+        for one in found
+    ]
+    return {
+        "shares": rows, "flown_on": sum(one.settled for one in found), "stayed_up": sum(one.stayed for one in found),
+    }  # fmt: skip
 
 
 STUDY = Study(
     name="capture",
-    summary="who is caught: floaters let go over the plate in many ways, for every rotor that was tried",
+    summary="capture probability: floaters let go over the plate in many ways, for every rotor that was tried",
     points=capture_points,
     compute=capture,
-    gather=by_case,
-    figures=FIGURES,
+    figures={"capture": share_figure, "capture-from-where": place_figure},
     report=capture_lines,
     numbers=capture_numbers,
 )

@@ -4,7 +4,6 @@ from dataclasses import dataclass
 
 import numpy as np
 import xarray as xr
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import PercentFormatter
 
@@ -19,10 +18,11 @@ from ...dynamics.motion.state import Scales
 from ...geometry.common import MU_0, Array
 from ...geometry.scene.contents import Scene
 from ..cli.console import note
-from ..figures.style import PAGE, PALETTE, panels, styled
-from ..result import variable
-from ..study import Point, Study, by_case, cases_with, one_case
-from .article import CONFIGURATIONS, FLOATER, REMANENCE, article_scene, axis_label, levitation_of
+from ..figures.style import PALETTE, legend_below, styled
+from ..result import Columns, columns, variable
+from ..study import Point, Study, cases_with, each_case, one_case
+from .article import CONFIGURATIONS, FLOATER, REMANENCE, article_scene, levitation_of, polar_angle
+from .drawing import TITLES, small_multiples, text_table, uncertain
 
 
 @dataclass(frozen=True, eq=False)
@@ -174,20 +174,23 @@ def checked_by_elements(
     raise EquilibriumError("The correction of the measure for the true field did not settle.")
 
 
-NAMES = {
-    "measure": ("mm or °", "displacement or tilt"),
-    "margin": ("1", "smallest relative change of frequency that ends stable levitation; 0 where unstable"),
-    "lowest": ("Hz", "lower end of stability"),
-    "highest": ("Hz", "upper end of stability"),
-    "growth": ("1/s", "largest growth rate"),
-    "polar_angle": ("°", "polar angle of the moment"),
+NAMES: Columns = {
+    "measure": (("edge",), "mm or °", "displacement or tilt"),
+    "margin": (("edge",), "1", "smallest relative change of frequency that ends stable levitation; 0 where unstable"),
+    "lowest": (("edge",), "Hz", "lower end of stability"),
+    "highest": (("edge",), "Hz", "upper end of stability"),
+    "growth": (("edge",), "1/s", "largest growth rate"),
+    "polar_angle": (("edge",), "°", "polar angle of the moment"),
 }
-CHECKED = {
-    "true_measure": ("mm or °", "measure corrected for the true field"),
-    "true_distance": ("m", "distance that a forward search in the true field gives"),
-    "true_distance_error": ("m", "its estimated error"),
-    "true_stable": ("1", "whether it is stable"),
-    "true_growth": ("1/s", "largest growth rate in the true field"),
+CHECKED: Columns = {
+    "true_measure": ((), "mm or °", "measure corrected for the field of the finite magnets"),
+    "true_distance": ((), "m", "distance that a forward search in that field gives"),
+    "true_distance_error": ((), "m", "its estimated error"),
+    "true_stable": ((), "1", "whether it is stable"),
+    "true_growth": ((), "1/s", "largest growth rate in that field"),
+    "wanted_distance": ((), "m", "wanted distance"),
+    "wanted_frequency": ((), "Hz", "wanted frequency"),
+    "best": ((), "1", "which edge has the largest margin; -1 if none"),
 }
 
 
@@ -197,20 +200,17 @@ def compute(point: Point, rtol: float = RTOL, close: float = CLOSE_ENOUGH) -> xr
     rows = np.array([_row(name, 1e-3 * edge, distance, frequency) for edge in point["edges_mm"]])
     margin = rows[:, list(NAMES).index("margin")]
     best = int(np.nanargmax(margin)) if np.isfinite(margin).any() else -1
-    true = np.full(len(CHECKED), np.nan)
+    true = np.full(5, np.nan)
     if best >= 0 and margin[best] > 0:
         try:
             edge = 1e-3 * point["edges_mm"][best]
             true = checked_by_elements(name, edge, distance, frequency, rows[best, 0], rtol, close)
         except EquilibriumError as error:
             note(str(error))
-    data = {k: variable(("edge",), column, *words) for (k, words), column in zip(NAMES.items(), rows.T, strict=True)}
-    data |= {k: variable((), value, *words) for (k, words), value in zip(CHECKED.items(), true, strict=True)}
-    data["wanted_distance"] = variable((), distance, "m", "wanted distance")
-    data["wanted_frequency"] = variable((), frequency, "Hz", "wanted frequency")
-    data["best"] = variable((), best, "1", "which edge has the largest margin; -1 if none")
-    edge = variable(("edge",), 1e-3 * np.array(point["edges_mm"]), "m", "edge of the cubes")
-    return one_case(point, xr.Dataset(data, {"edge": edge}))
+    data = columns(NAMES, dict(zip(NAMES, rows.T, strict=True)))
+    data |= columns(CHECKED, dict(zip(CHECKED, (*true, distance, frequency, best), strict=True)))
+    edges = variable(("edge",), 1e-3 * np.array(point["edges_mm"]), "m", "edge of the cubes")
+    return one_case(point, xr.Dataset(data, {"edge": edges}))
 
 
 def _row(configuration: str, edge: float, distance: float, frequency: float) -> list[float]:
@@ -218,86 +218,61 @@ def _row(configuration: str, edge: float, distance: float, frequency: float) -> 
         found = designed(configuration, edge, distance, frequency)
     except EquilibriumError:
         return [np.nan] * len(NAMES)
-    moment = found.here.state[6:9]
-    angle = float(np.degrees(np.arctan2(np.hypot(moment[0], moment[1]), moment[2])))
+    angle = float(np.degrees(polar_angle(found.here.state[6:9])))
     ends = found.low.parameter, found.high.parameter
     return [found.measure, found.margin, *ends, found.here.growth_per_s, angle]
 
 
-def wanted(result: xr.Dataset) -> list[tuple[float, float]]:
-    """The pairs of distance (m) and frequency (Hz) that were asked for."""
+def wishes(result: xr.Dataset) -> list[tuple[float, float, xr.Dataset]]:
+    """The pairs of distance (m) and frequency (Hz) that were asked for, each with what the configurations answer."""
     pairs = zip(result["wanted_distance"].values, result["wanted_frequency"].values, strict=True)
-    return sorted({(float(d), float(f)) for d, f in pairs})
-
-
-def _wish(result: xr.Dataset, distance: float, frequency: float) -> list[xr.Dataset]:
-    """What each configuration answers to one of them."""
-    found = cases_with(result, wanted_distance=distance, wanted_frequency=frequency)
-    return [found.isel(case=k) for k in range(found.sizes["case"])]
+    return [
+        (d, f, cases_with(result, wanted_distance=d, wanted_frequency=f))
+        for d, f in sorted({(float(d), float(f)) for d, f in pairs})
+    ]
 
 
 @styled
 def design_figure(result: xr.Dataset) -> Figure:
-    """Stability margin against the cubes' edge for every configuration and wish, with the measure that it takes."""
-    wishes = wanted(result)
-    columns = len({f for _, f in wishes})
-    figure, axes = panels(len(wishes) // columns, columns, (PAGE, 2.3 * len(wishes) / columns + 0.2))
-    for place, (distance, frequency) in zip(axes.flat, wishes, strict=True):
-        for one in _wish(result, distance, frequency):
-            _margins(place, one)
-        place.set_title(f"{1e3 * distance:g} mm at {frequency:g} Hz")
-        place.yaxis.set_major_formatter(PercentFormatter(1.0))
-        place.margins(y=0.15)
-        place.set(ylim=(-0.02, None))
-        place.legend(loc="upper left")
-    for place in axes[-1]:
-        place.set_xlabel("edge of the cubes (mm)")
-    for place in axes[:, 0]:
-        place.set_ylabel("margin in frequency")
+    """Stability margin against the cubes' edge for every configuration and wish."""
+    asked = wishes(result)
+    titles = [f"{1e3 * distance:g} mm at {frequency:g} Hz" for distance, frequency, _ in asked]
+    across = len({frequency for _, frequency, _ in asked})
+    words = "edge of the cubes (mm)", "margin in frequency"
+    figure, axes = small_multiples(titles, 2.3, across, *words, sharex=True)
+    for panel, (_, _, answers) in zip(axes, asked, strict=True):
+        for one in each_case(answers):
+            configuration = str(one["configuration"].values)
+            color = PALETTE[list(CONFIGURATIONS).index(configuration)]
+            panel.plot(1e3 * one["edge"], one["margin"], "o-", ms=3, color=color, label=TITLES[configuration])
+        panel.yaxis.set_major_formatter(PercentFormatter(1.0))
+        panel.margins(y=0.15)
+        panel.set_ylim(-0.02, None)
+    legend_below(figure, *axes)
     return figure
 
 
-FIGURES = {"design": design_figure}
-
-
-def _margins(place: Axes, one: xr.Dataset) -> None:
-    kind = str(one["configuration"].values)
-    color = PALETTE[list(CONFIGURATIONS).index(kind)]
-    edges, margin, measure = 1e3 * one["edge"].values, one["margin"].values, one["measure"].values
-    place.plot(edges, margin, "o-", ms=3, color=color, label=f"{kind}, {axis_label(kind)}")
-    for edge, height, value in zip(edges, margin, measure, strict=True):
-        if np.isfinite(height) and height > 0:
-            place.annotate(
-                f"{value:.2g}", (edge, height), xytext=(0, 3), textcoords="offset points", ha="center",
-                fontsize=6, color=color,
-            )  # fmt: skip
-
-
 def design_lines(result: xr.Dataset) -> list[str]:
-    """The best rotor for each wish, checked by a forward search in the true field."""
-    lines = []
-    for distance, frequency in wanted(result):
-        lines.append(f"{1e3 * distance:g} mm at {frequency:g} Hz:")
-        lines += [f"  {_best(one)}" for one in _wish(result, distance, frequency)]
-    return lines
-
-
-def _best(one: xr.Dataset) -> str:
-    kind, best = str(one["configuration"].values), int(one["best"])
-    if best < 0 or not float(one["margin"][best]) > 0:
-        return f"{kind}: no edge gives stable levitation there."
-    at = one.isel(edge=best)
-    symbol, unit = CONFIGURATIONS[kind].symbol, CONFIGURATIONS[kind].unit
-    found = (
-        f"{kind}: edge {1e3 * float(at['edge']):g} mm, {symbol} = {float(at['measure']):.3f} {unit} (closed "
-        f"form), margin {100 * float(at['margin']):.1f} % ({float(at['lowest']):.1f} to {float(at['highest']):.1f} Hz)"
-    )
-    if not np.isfinite(float(one["true_distance"])):
-        return f"{found}; the true field was not met."
-    state = "stable" if float(one["true_stable"]) else f"UNSTABLE, {float(one['true_growth']):.2g} /s"
-    return (
-        f"{found}; true field: {symbol} = {float(one['true_measure']):.3f} {unit} gives "
-        f"{1e3 * float(one['true_distance']):.4f} ± {1e3 * float(one['true_distance_error']):.1g} mm, {state}."
+    """The best rotor for each wish, checked by a forward search in the field of the finite magnets."""
+    rows = []
+    for distance, frequency, answers in wishes(result):
+        for one in each_case(answers):
+            name, best = str(one["configuration"].values), int(one["best"])
+            head = f"{1e3 * distance:g} mm at {frequency:g} Hz, {name}"
+            if best < 0 or not float(one["margin"][best]) > 0:
+                rows.append((head, "none is stable", *[""] * 6))
+                continue
+            at, kind = one.isel(edge=best), CONFIGURATIONS[name]
+            found = [f"{kind.symbol} = {float(at[key]):.3f} {kind.unit}" for key in ("measure", "true_measure")]
+            ends = f"{float(at['lowest']):.1f} to {float(at['highest']):.1f}"
+            cells = [f"{1e3 * float(at['edge']):g} mm", found[0], f"{100 * float(at['margin']):.1f} %", ends]
+            if np.isfinite(one["true_distance"]):
+                met = uncertain(*(1e3 * float(one[key]) for key in ("true_distance", "true_distance_error")))
+                state = "stable" if float(one["true_stable"]) else f"grows at {float(one['true_growth']):.2g} 1/s"
+                cells += [found[1], met, state]
+            rows.append((head, *cells, *["not met"] * (7 - len(cells))))
+    return text_table(
+        ("wanted, by", "edge", "closed form", "margin", "stable (Hz)", "finite magnets", "distance (mm)", ""), rows
     )
 
 
@@ -306,7 +281,6 @@ STUDY = Study(
     summary="which displacement, tilt and magnet size give a wanted distance and frequency with the largest margin",
     points=points,
     compute=compute,
-    gather=by_case,
-    figures=FIGURES,
+    figures={"design": design_figure},
     report=design_lines,
 )

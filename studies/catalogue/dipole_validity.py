@@ -1,4 +1,4 @@
-"""Where the point dipole, and what lies between it and the true field, can be trusted.
+"""Where the point dipole, and models between it and the field of the finite magnets, can be trusted.
 
 Region: distance below the lower magnet's centre × lateral offset, worst azimuth, for the article's three rotors.
 Truth: the finite-element table, whose own error is stored beside.
@@ -17,11 +17,12 @@ from ...fem.rotor.table import RotorTable
 from ...geometry.common import Array
 from ...geometry.magnets import Magnet
 from ...geometry.rotor import horizontal, tilt, vertical
-from ..figures.style import PAGE, panels, styled
+from ..figures.style import PALETTE, legend_below, styled
 from ..result import variable
 from ..study import study_of_one
+from .article import EDGE, PERMEABILITY, REMANENCE
+from .drawing import explain, last_crossing, small_multiples, text_table
 
-EDGE, REMANENCE, PERMEABILITY = 0.01, 1.305, 1.05
 ROTORS = {
     "horizontal, δx = 2 mm": horizontal(0.002, EDGE, REMANENCE, PERMEABILITY),
     "vertical, δz = 14 mm": vertical(0.014, EDGE, REMANENCE, PERMEABILITY),
@@ -95,60 +96,45 @@ LEVELS = (1e-1, 1e-2, 1e-3, 1e-4)
 
 def validity_lines(result: xr.Dataset) -> list[str]:
     """From which distance on each model is good to 10, 1, 0.1 and 0.01 % on the axis, by rotor."""
-    lines = ["Distance (mm) below the lower magnet from which on B on the axis is good to 10 / 1 / 0.1 / 0.01 %:"]
+    distance, rows = 1e3 * result["distance"].values, []
     for rotor in result["rotor"].values:
         for model in result["model"].values:
             error = result["field_error"].sel(rotor=rotor, model=model).isel(offset=0).values
-            entries = [_reach(1e3 * result["distance"].values, error, level) for level in LEVELS]
-            lines.append(f"  {rotor:22} {model:27} {' '.join(entries)}")
-    return lines
+            rows.append((f"{rotor}, {model}", *(_reach(distance, error, level) for level in LEVELS)))
+    words = "Distance (mm) below the lower magnet from which on B on the axis is good to each error:"
+    return [words, *text_table(("rotor, model", *(f"{100 * level:g} %" for level in LEVELS)), rows)]
 
 
 def _reach(distance: Array, error: Array, level: float) -> str:
-    """The distance beyond which the error stays below a level, interpolated; '>' if it never does."""
-    above = np.flatnonzero(error > level)
-    if not len(above):
-        return f"  <{distance[0]:4.1f}"
-    last = int(above[-1])
-    if last == len(distance) - 1:
-        return f"  >{distance[-1]:4.1f}"
-    share = np.log(error[last] / level) / np.log(error[last] / error[last + 1])
-    return f"   {distance[last] + share * (distance[last + 1] - distance[last]):4.1f}"
+    """The distance beyond which the error stays below a level, with a sign where that is not in the range."""
+    found = last_crossing(distance, error, level)
+    if np.isnan(found):
+        return f">{distance[-1]:.1f}"
+    return f"<{found:.1f}" if found == distance[0] else f"{found:.1f}"
 
 
 @styled
 def validity_figure(result: xr.Dataset) -> Figure:
-    """Regions in which each model is good to 10, 1, 0.1 and 0.01 %, rotor by rotor."""
-    rotors, names = result["rotor"].values, result["model"].values
-    figure, axes = panels(len(rotors), len(names), (PAGE, 1.5 * len(rotors) + 0.3), sharex=True, sharey=True)
-    colors = ["#2c7bb6", "#92c5de", "#ffffbf", "#fdae61", "#d7191c"]
-    bounds = [1e-9, *LEVELS[::-1], 1e3]
-    for row, rotor in zip(axes, rotors, strict=True):
-        for panel, model in zip(row, names, strict=True):
+    """Error of each model against the distance, on the axis and at the largest lateral offset, rotor by rotor."""
+    names, distance = result["rotor"].values.tolist(), 1e3 * result["distance"].values
+    figure, axes = small_multiples(names, 3.0, xlabel="distance (mm)", ylabel="relative error of B", sharey=True)
+    for panel, rotor in zip(axes, names, strict=True):
+        for model, color in zip(result["model"].values, PALETTE, strict=False):
             error = result["field_error"].sel(rotor=rotor, model=model)
-            shown = panel.contourf(
-                1e3 * result["offset"], 1e3 * result["distance"], np.clip(error, 1e-8, 1e2), bounds, colors=colors
-            )
-            panel.grid(visible=False)
-            if rotor == rotors[0]:
-                panel.set_title(model.replace(", ", ",\n"), fontsize="small")
-            if rotor == rotors[-1]:
-                panel.set_xlabel("offset (mm)")
-            if model == names[0]:
-                panel.set_ylabel(f"{rotor}\ndistance (mm)", fontsize="small")
-    axes[0, 0].invert_yaxis()
-    bar = figure.colorbar(shown, ax=axes, shrink=0.7, ticks=LEVELS, label="relative error of B")
-    bar.ax.set_yticklabels([f"{100 * level:g} %" for level in LEVELS])
+            panel.semilogy(distance, error.isel(offset=0), color=color, label=str(model))
+            panel.semilogy(distance, error.isel(offset=-1), ":", color=color)
+        own = result["truth_error"].sel(rotor=rotor)
+        panel.semilogy(distance, own.max("offset"), color="0.6", lw=2.5, label="error of the finite elements")
+    widest = 1e3 * float(result["offset"][-1])
+    explain(axes[0], {"on the axis": "-", f"{widest:g} mm off the axis, worst azimuth": ":"})
+    legend_below(figure, axes[0], columns=3)
     return figure
-
-
-FIGURES = {"dipole-validity": validity_figure}
 
 
 STUDY = study_of_one(
     name="dipole-validity",
     summary="where the dipole and each further model are good to 10, 1, 0.1 and 0.01 %",
     compute=dipole_validity,
-    figures=FIGURES,
+    figures={"dipole-validity": validity_figure},
     report=validity_lines,
 )

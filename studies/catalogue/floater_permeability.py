@@ -1,11 +1,10 @@
-"""When is the floater a rigid dipole? Force and torque with and without the answers of both bodies."""
+"""When is the floater a rigid dipole? Force and torque with and without mutual magnetisation."""
 
 from collections.abc import Sequence
 from functools import partial
 
 import numpy as np
 import xarray as xr
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from ...dynamics.equilibria.equilibrium import Equilibrium
@@ -15,10 +14,11 @@ from ...geometry.common import Array
 from ...geometry.scene.contents import Floater, Scene
 from ...geometry.scene.files import load_scene
 from ..cli.options import Models, shipped_scene
-from ..figures.style import PAGE, PALETTE, panels, styled
+from ..figures.style import PAGE, PALETTE, legend_below, panels, styled
 from ..levitation import Levitation
 from ..result import AXIS, variable
 from ..study import study_of_one
+from .drawing import last_crossing, text_table
 
 LEVELS = (0.1, 0.01, 1e-3, 1e-4)
 FARTHEST = 0.05
@@ -51,7 +51,7 @@ def floater_permeability(scene: Scene, distances: Sequence[float] | None = None,
     dataset = missed(rotors, scene.floater, places, balance.directions(places, start, guess))
     weight = scene.floater.mass * float(np.linalg.norm(scene.gravity))
     dataset = dataset.merge(sufficient(dataset)).assign_attrs(weight_N=weight)
-    return dataset.merge(levitation(rotors, scene.floater, balance, stable)) if stable else dataset
+    return dataset.merge(shifted(rotors, scene.floater, balance, stable)) if stable else dataset
 
 
 def missed(rotors: Sequence[RotorResponse], floater: Floater, places: Array, directions: Array) -> xr.Dataset:
@@ -84,12 +84,12 @@ def sufficient(dataset: xr.Dataset) -> xr.Dataset:
     rows = []
     for quantity in ("force", "torque"):
         missed = (dataset[f"{quantity}_missed"] + dataset[f"{quantity}_missed_error"]).values[order]
-        rows.append([_last_crossing(distance, missed, level) for level in LEVELS])
+        rows.append([last_crossing(distance, missed, level) for level in LEVELS])
     values = variable(("quantity", "level"), rows, "m", "distance from which on the rigid dipole suffices")
     return xr.Dataset({"sufficient_from": values}, {"quantity": ["force", "torque"], "level": list(LEVELS)})
 
 
-def levitation(
+def shifted(
     rotors: Sequence[RotorResponse], floater: Floater, balance: PerturbedBalance, stable: Equilibrium
 ) -> xr.Dataset:
     """What the rigid dipole misses at the stable equilibrium, and where the equilibrium really is."""
@@ -125,25 +125,14 @@ def _depths(scene: Scene, number: int) -> Array:
     return np.geomspace(nearest, FARTHEST, number)
 
 
-def _last_crossing(distance: Array, values: Array, level: float) -> float:
-    above = np.nonzero(values > level)[0]
-    if not len(above):
-        return float(distance[0])
-    k = int(above[-1])
-    if k + 1 == len(distance):
-        return float("nan")
-    share = np.log(values[k] / level) / np.log(values[k] / values[k + 1])
-    return float(distance[k] * (distance[k + 1] / distance[k]) ** share)
-
-
 def in_the_horizontal_scene(quick: bool) -> xr.Dataset:
     """What the rigid dipole misses in the scene `horizontal`."""
     return floater_permeability(load_scene(shipped_scene("horizontal")), quick=quick)
 
 
 LABELS = {
-    "floater_answer": "floater answers to the rotor",
-    "rotor_answer": "rotor answers to the floater",
+    "floater_answer": "floater magnetised by the rotor",
+    "rotor_answer": "rotor magnetised by the floater",
     "total": "both",
 }
 
@@ -151,56 +140,41 @@ LABELS = {
 @styled
 def floater_figure(result: xr.Dataset) -> Figure:
     """What the rigid dipole misses against distance: share of force and torque; axial force by its two causes."""
-    figure, ((left, right),) = panels(1, 2, (PAGE, 2.9))
-    _shares(left, result)
-    _axial(right, result)
-    if "rigid_position" in result:
-        place = -1e3 * float(result["rigid_position"].sel(axis="z"))
-        for axes in (left, right):
-            axes.axvline(place, color="0.3", lw=0.8, ls=":", label="stable equilibrium")
-    left.legend(loc="upper center", bbox_to_anchor=(0.5, -0.17))
-    right.legend(loc="upper right")
-    return figure
-
-
-FIGURES = {"floater-permeability": floater_figure}
-
-
-def _shares(axes: Axes, result: xr.Dataset) -> None:
-    distance = 1e3 * result["distance"].values
+    figure, ((left, right),) = panels(1, 2, (PAGE, 3.3))
+    distance, weight = 1e3 * result["distance"].values, float(result.attrs["weight_N"])
     for quantity, color in zip(("force", "torque"), PALETTE, strict=False):
         share, error = (result[f"{quantity}_{name}"].values for name in ("missed", "missed_error"))
-        axes.semilogy(distance, share, "o-", ms=3, color=color, label=f"{quantity}, |Δ| / |total|")
-        axes.fill_between(distance, np.maximum(share - error, share / 100), share + error, color=color, alpha=0.25)
-    for level in result["level"].values:
-        axes.axhline(level, color="0.6", lw=0.6)
-        axes.annotate(f"{100 * level:g} %", (distance[-1], level), ha="right", va="bottom", fontsize=7)
-    axes.set(xlabel="distance below the rotor (mm)", ylabel="missed share", title="What a rigid dipole misses")
-
-
-def _axial(axes: Axes, result: xr.Dataset) -> None:
-    distance, force = 1e3 * result["distance"].values, result["force"].sel(axis="z")
-    weight = float(result.attrs["weight_N"])
+        left.semilogy(distance, share, "o-", ms=3, color=color, label=f"{quantity}, |Δ| / |total|")
+        left.fill_between(distance, np.maximum(share - error, share / 100), share + error, color=color, alpha=0.25)
+    force = result["force"].sel(axis="z")
     for (part, label), color in zip(LABELS.items(), PALETTE[2:], strict=False):
-        values = force.sel(part=part) - (force.sel(part="rigid") if part == "total" else 0.0)
-        axes.semilogy(distance, np.abs(values) / weight, "o-", ms=3, color=color, label=label)
-    axes.set(xlabel="distance below the rotor (mm)", ylabel="|missed axial force| / weight", title="Missed lift")
+        missed = 100 * (force.sel(part=part) - (force.sel(part="rigid") if part == "total" else 0.0)).values / weight
+        right.semilogy(distance, np.abs(missed), color=color, label=f"axial force, {label}")
+        right.semilogy(distance, missed.clip(0), "o", ms=3, color=color)
+        right.semilogy(distance, (-missed).clip(0), "o", ms=3, mfc="white", color=color)
+    for axes in (left, right):
+        axes.set_xlabel("distance below the rotor (mm)")
+        if "rigid_position" in result:
+            place = -1e3 * float(result["rigid_position"].sel(axis="z"))
+            axes.axvline(place, color="0.3", lw=0.8, ls=":", label="stable equilibrium")
+    left.set(ylabel="missed share", title="What a rigid dipole misses")
+    right.set(ylabel="missed axial force (% of the weight)", title="Missed lift (open: downwards)")
+    legend_below(figure, left, right, columns=3)
+    return figure
 
 
 def floater_lines(result: xr.Dataset) -> list[str]:
     """From where on the rigid dipole suffices, and what it misses at the stable equilibrium."""
-    lines = ["The rigid dipole suffices for the force / the torque on the floater:"]
-    for level in result["level"].values:
-        reach = [1e3 * float(result["sufficient_from"].sel(quantity=q, level=level)) for q in ("force", "torque")]
-        words = ["beyond the range" if np.isnan(r) else f"from {r:.1f} mm on" for r in reach]
-        lines.append(f"  to {100 * float(level):g} %: {words[0]} / {words[1]}")
+    reach = 1e3 * result["sufficient_from"]
+    rows = [(f"{100 * float(k):g} %", *reach.sel(level=k, quantity=["force", "torque"]).values) for k in reach["level"]]
+    lines = text_table(("rigid dipole good to", "force, from (mm)", "torque, from (mm)"), rows)
     if "shift" in result:
         force, error = (float(result[name].sel(axis="z")) for name in ("missed_force", "missed_force_error"))
         shift, doubt = (1e3 * float(result[name].sel(axis="z")) for name in ("shift", "shift_error"))
         share = 100 * abs(force) / result.attrs["weight_N"]
         lines.append(
-            f"At the stable equilibrium it misses {1e3 * force:+.4f} ± {1e3 * error:.1g} mN, {share:.1f} % of the "
-            f"weight: the floater hangs {shift:+.4f} ± {doubt:.1g} mm higher."
+            f"Mutual magnetisation adds {1e3 * force:+.4f} ± {1e3 * error:.1g} mN ({share:.1f} % of the weight) at the "
+            f"rigid dipole's equilibrium, and moves the equilibrium by {shift:+.4f} ± {doubt:.1g} mm, up positive."
         )
     return lines
 
@@ -209,6 +183,6 @@ STUDY = study_of_one(
     name="floater-permeability",
     summary="what the rigid dipole misses once rotor and floater magnetise each other, in the scene horizontal",
     compute=in_the_horizontal_scene,
-    figures=FIGURES,
+    figures={"floater-permeability": floater_figure},
     report=floater_lines,
 )

@@ -10,7 +10,6 @@ from textwrap import fill
 import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
-from matplotlib.ticker import LogLocator
 
 from ...fem.closed_forms.moments import added_by_closed_form, carrier, oblique_contact
 from ...fem.elements.ladder import Refinement, solve_rotor
@@ -24,13 +23,14 @@ from ...geometry.meshes.magnets import MeshSettings
 from ...geometry.rotor import horizontal, tilt, vertical
 from ...geometry.shapes import Box, Cylinder, Ring, rotation_matrix
 from ..cli.console import progress
-from ..figures.style import PAGE, PALETTE, panels, styled
-from ..result import variable
+from ..figures.style import PALETTE, legend_below, styled
+from ..result import Columns, columns
 from ..study import study_of_one
+from .article import EDGE, FLOATER, PERMEABILITY, REMANENCE
+from .drawing import small_multiples, text_table
 
-CUBE = (0.01, 0.01, 0.01)
-REMANENCE, PERMEABILITY = 1.305, 1.05
-CONTACT = 0.00635
+CUBE = (EDGE, EDGE, EDGE)
+CONTACT = FLOATER.radius
 """The floater's radius (m): it touches a face of the cube when their centres are 11.35 mm apart."""
 OTHER_MESH = MeshSettings(ball_radius=1.2, magnet_size=0.6, hp_layers=2, hp_factor=0.2, curve_order=8)
 MORE_LAYERS = replace(OTHER_MESH, hp_layers=4, hp_factor=0.15, magnet_size=0.4)
@@ -66,12 +66,15 @@ class HardCase:
         return Accuracy(nearest=self.nearest).clearance(self.magnets)
 
 
-def _box(size: Sequence[float], center: Sequence[float] = (0.0, 0.0, 0.0), rotation: Array | None = None) -> Box:
-    return Box(np.array(size, float), np.array(center, float), np.eye(3) if rotation is None else rotation)
-
-
-def _magnet(box: Box, polarization: Sequence[float], along: float, across: float | None = None) -> Magnet:
-    return Magnet(box, np.array(polarization, float), along, across)
+def _magnet(
+    size: Sequence[float],
+    polarization: Sequence[float],
+    center: Sequence[float] = (0.0, 0.0, 0.0),
+    angles: tuple[float, float, float] = (0.0, 0.0, 0.0),
+    across: float | None = None,
+) -> Magnet:
+    box = Box(np.array(size, float), np.array(center, float), rotation_matrix(angles))
+    return Magnet(box, np.array(polarization, float), PERMEABILITY, across)
 
 
 def _round(body: Cylinder | Ring, polarization: tuple[float, float, float]) -> tuple[Magnet, ...]:
@@ -79,32 +82,29 @@ def _round(body: Cylinder | Ring, polarization: tuple[float, float, float]) -> t
 
 
 def _cube(permeability: float) -> tuple[Magnet, ...]:
-    return horizontal(0.002, 0.01, REMANENCE, permeability)
+    return horizontal(0.002, EDGE, REMANENCE, permeability)
 
 
 def _pair(distance: float) -> tuple[Magnet, ...]:
-    return vertical(distance, 0.01, REMANENCE, PERMEABILITY)
-
-
-def _plate(polarization: tuple[float, float, float]) -> tuple[Magnet, ...]:
-    return (_magnet(_box((0.02, 0.02, 0.0005)), polarization, PERMEABILITY),)
+    return vertical(distance, EDGE, REMANENCE, PERMEABILITY)
 
 
 EDGE_WITHIN_A_FACE = (
-    _magnet(_box(CUBE), (1, 0, 0), PERMEABILITY),
-    _magnet(_box((0.006,) * 3, (0.001, 0.0015, 0.008), rotation_matrix((0, 0, 30))), (0, 0.5, 1), PERMEABILITY),
+    _magnet(CUBE, (1, 0, 0)),
+    _magnet((0.006,) * 3, (0, 0.5, 1), (0.001, 0.0015, 0.008), (0, 0, 30)),
 )
 EIGHT = tuple(
     _magnet(
-        _box((0.006,) * 3, (0.012 * np.cos(a), 0.012 * np.sin(a), 0.001 * k), rotation_matrix((10 * k, 20, 30))),
+        (0.006,) * 3,
         (1.2 + 0.01 * k, 0.1 * k, 0),
-        PERMEABILITY,
+        (0.012 * np.cos(a), 0.012 * np.sin(a), 0.001 * k),
+        (10 * k, 20, 30),
     )
     for k, a in enumerate(np.arange(8) * np.pi / 4)
 )
-OBLIQUE = (_magnet(_box(CUBE, rotation=rotation_matrix((15, 40, 70))), (1, 0, 0), 1.05, 1.15),)
+OBLIQUE = (_magnet(CUBE, (1, 0, 0), angles=(15, 40, 70), across=1.15),)
+FLAT, LONG = (0.02, 0.02, 0.0005), (0.005, 0.005, 0.04)
 DISC, THIN_RING = Cylinder(10e-3, 1e-3), Ring(10e-3, 9e-3, 5e-3)
-LONG = (_magnet(_box((0.005, 0.005, 0.04)), (1.3, 0, 0), PERMEABILITY),)
 CASES = {
     "contact distance": HardCase(_cube(PERMEABILITY), CONTACT, quick=True),
     "extensions of edges and faces": HardCase(_cube(PERMEABILITY), extensions=True),
@@ -112,20 +112,20 @@ CASES = {
     "μr = 1 + 1e-9": HardCase(_cube(1 + 1e-9)),
     "μr = 5": HardCase(_cube(5.0), order=8, mesh=MORE_LAYERS),
     "μr = 1000": HardCase(_cube(1000.0), order=8, mesh=MORE_LAYERS),
-    "flat, across": HardCase(_plate((0, 0, 1.3)), CONTACT, order=4),
-    "flat, along": HardCase(_plate((1.3, 0, 0)), CONTACT, order=4),
-    "long": HardCase(LONG, CONTACT),
+    "flat, across": HardCase((_magnet(FLAT, (0, 0, 1.3)),), CONTACT, order=4),
+    "flat, along": HardCase((_magnet(FLAT, (1.3, 0, 0)),), CONTACT, order=4),
+    "long": HardCase((_magnet(LONG, (1.3, 0, 0)),), CONTACT),
     "disc of 20 : 1, across": HardCase(_round(DISC, (0, 0, 1.3)), CONTACT, order=4),
     "disc of 20 : 1, along": HardCase(_round(DISC, (1.3, 0, 0)), CONTACT, order=4),
     "thin ring": HardCase(_round(THIN_RING, (1.3, 0, 0)), CONTACT, order=4),
     "touching": HardCase(_pair(0.01)),
     "gap of 1 µm": HardCase(_pair(0.010001)),
     "gap of 50 µm": HardCase(_pair(0.01005), order=4),
-    "any angle": HardCase(tilt(0.3, 0.01, REMANENCE, PERMEABILITY), quick=True),
+    "any angle": HardCase(tilt(0.3, EDGE, REMANENCE, PERMEABILITY), quick=True),
     "anisotropic, any angle": HardCase(OBLIQUE),
     "an edge within a face": HardCase(EDGE_WITHIN_A_FACE, order=4),
     "eight magnets": HardCase(EIGHT, order=4, mesh=BESIDE_EACH_OTHER),
-    "no polarisation": HardCase((_magnet(_box(CUBE), (0, 0, 0), PERMEABILITY),), quick=True),
+    "no polarisation": HardCase((_magnet(CUBE, (0, 0, 0)),), quick=True),
 }
 """By name, in the order of the figure."""
 
@@ -143,6 +143,17 @@ FINER_CELLS = 0.8
 PLACES = 12
 """Distances from the faces, from the case's own nearest one to `FARTHEST`."""
 ROUND_OFF = 1e-13
+ERRORS = ("true_error", "stated_error", "reference_step", "shortfall")
+COLUMNS: Columns = {
+    "distance": (("place",), "m", "distance from the magnets' faces"),
+    "true_error": (("place",), "1", "largest difference of B from the reference"),
+    "stated_error": (("place",), "1", "largest error of B that the table states"),
+    "reference_step": (("place",), "1", "largest last step in order of the reference"),
+    "shortfall": (("place",), "1", "largest ratio of the difference to stated error and reference's step"),
+    "order": ((), "1", "order of the table's elements"),
+    "unknowns": ((), "1", "unknowns of the table's elements"),
+    "seconds": ((), "s", "processor time of the table"),
+}
 
 
 def field_hard_cases(quick: bool, cases: Mapping[str, HardCase] = CASES, places: int = PLACES) -> xr.Dataset:
@@ -162,32 +173,19 @@ def case_errors(case: HardCase, places: int) -> xr.Dataset:
     start = time.process_time()
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", AccuracyWarning)
-        table = fem_table(case.magnets, Accuracy(RTOL, case.nearest))
+        field = fem_table(case.magnets, Accuracy(RTOL, case.nearest))
     seconds = time.process_time() - start
     distance = np.geomspace(case.clearance, FARTHEST, places)
     points = [extensions(case, d) if case.extensions else points_around(case.magnets, d) for d in distance]
     before, truth = reference(case, np.concatenate(points))
     ends = np.cumsum([len(p) for p in points])[:-1]
     rows = [
-        _errors(table, case, *parts)
+        _errors(field, case, *parts)
         for parts in zip(points, np.split(before, ends), np.split(truth, ends), strict=True)
     ]
-    true, stated, own, cover = np.array(rows).T
-    names = {
-        "true_error": (true, "largest difference of B from the reference"),
-        "stated_error": (stated, "largest error of B that the table states"),
-        "reference_step": (own, "largest last step in order of the reference"),
-        "shortfall": (cover, "largest ratio of the difference to stated error and reference's step"),
-    }
-    return xr.Dataset(
-        {
-            "distance": variable(("place",), distance, "m", "distance from the magnets' faces"),
-            **{key: variable(("place",), values, "1", text) for key, (values, text) in names.items()},
-            "order": variable((), float(table.provenance["order"]), "1", "order of the table's elements"),
-            "unknowns": variable((), float(table.provenance["unknowns"]), "1", "unknowns of the table's elements"),
-            "seconds": variable((), seconds, "s", "processor time of the table"),
-        }
-    )
+    found = {key: field.provenance[key] for key in ("order", "unknowns")}
+    found |= dict(zip(ERRORS, np.array(rows).T, strict=True)) | {"distance": distance, "seconds": seconds}
+    return xr.Dataset(columns(COLUMNS, {key: np.asarray(value, float) for key, value in found.items()}))
 
 
 def extensions(case: HardCase, distance: float) -> Array:
@@ -231,13 +229,10 @@ def _errors(table: RotorTable, case: HardCase, points: Array, before: Array, tru
     return float(true.max()), float(stated.max()), float(own.max()), float((true / (stated + own)).max())
 
 
-COLUMNS = 4
-SMALL = 1e-11
-"""Panels with errors below it show round-off too."""
 LINES = {
-    "stated_error": ("stated by the table", "--", PALETTE[1], "s"),
-    "true_error": ("difference from the reference", "-", PALETTE[0], "o"),
-    "reference_step": ("last step of the reference", ":", "0.45", ""),
+    "stated_error": ("stated by the table", "s--", PALETTE[1]),
+    "true_error": ("difference from the reference", "o-", PALETTE[0]),
+    "reference_step": ("last step of the reference", ":", "0.45"),
 }
 
 
@@ -245,55 +240,41 @@ LINES = {
 def hard_case_figure(result: xr.Dataset) -> Figure:
     """True and stated error over the distance, a panel for each case with a field."""
     names = [name for name in result["case"].values if float(result["true_error"].sel(case=name).max()) > 0]
-    rows = -(-len(names) // COLUMNS)
-    figure, axes = panels(rows, COLUMNS, (PAGE, 1.5 * rows + 0.7))
-    for panel, name in zip(axes.flat, names, strict=False):
+    words = "distance (mm)", "error of B"
+    figure, axes = small_multiples([fill(name, 24) for name in names], 1.5, 4, *words, sharex=True)
+    for panel, name in zip(axes, names, strict=True):
         row = result.sel(case=name)
-        for key, (label, dash, color, marker) in LINES.items():
+        for key, (label, style, color) in LINES.items():
             values = np.where(row[key] > 0, np.maximum(row[key], 1e-17), np.nan)
-            panel.loglog(1e3 * row["distance"], values, dash, color=color, marker=marker, ms=3, label=label)
-        panel.axhline(1e-5, color="0.2", lw=0.7, label="tolerance asked for")
-        panel.set_title(fill(name, 22))
-        small = float(row["true_error"].min()) < SMALL
-        panel.set(xlim=(4, 1300), ylim=(3e-17 if small else 1e-10, 1e-4))
-        panel.yaxis.set_major_locator(LogLocator(numticks=6))
-    for panel in axes.flat[len(names) :]:
-        panel.set_visible(False)
-    figure.supxlabel("distance from the magnets' faces (mm)", fontsize="medium")
-    figure.supylabel("largest relative error of B", fontsize="medium")
-    figure.legend(*axes.flat[0].get_legend_handles_labels(), loc="outside upper center", ncols=4)
+            panel.loglog(1e3 * row["distance"], values, style, color=color, ms=3, label=label)
+        panel.axhline(RTOL, color="0.2", lw=0.7, label="tolerance asked for")
+        small = float(row["true_error"].min()) < 1e-11  # such panels show round-off too
+        panel.set(ylim=(3e-17 if small else 1e-10, 1e-4))
+    legend_below(figure, axes[0])
     return figure
-
-
-FIGURES = {"field-hard-cases": hard_case_figure}
 
 
 def hard_case_lines(result: xr.Dataset) -> list[str]:
     """The study's table."""
-    ends = f"{'at the nearest distance':27}  {'10 cm and farther':27}"
-    lines = [
-        "Largest relative error of B: true / stated / last step of the reference",
-        f"{'case':30} {'mm':>6}  {ends} {'cover':>6} {'order':>5} {'CPU s':>6}",
-    ]
+    keys, rows = tuple(LINES)[1::-1] + tuple(LINES)[2:], []
     for name in result["case"].values:
         row = result.sel(case=name)
         near, far = row.isel(place=0), row.where(row["distance"] >= 0.1).max()
-        lines.append(
-            f"{name:30} {1e3 * float(near['distance']):6.2f}  {_three(near)}  {_three(far)} "
-            f"{float(row['shortfall'].max()):6.2f} {int(row['order']):5d} {float(row['seconds']):6.1f}"
-        )
-    return [*lines, "cover: true error over stated error and reference's step; above 1 the table states too little."]
-
-
-def _three(row: xr.Dataset) -> str:
-    return " / ".join(f"{float(row[key]):7.1e}" for key in ("true_error", "stated_error", "reference_step"))
+        errors = [" / ".join(f"{float(at[key]):.1e}" for key in keys) for at in (near, far)]
+        cover, order, seconds = float(row["shortfall"].max()), int(row["order"]), float(row["seconds"])
+        rows.append((name, f"{1e3 * float(near['distance']):.2f}", *errors, f"{cover:.2f}", order, f"{seconds:.1f}"))
+    head = ("case", "nearest (mm)", "errors there", "10 cm and farther", "cover", "order", "CPU (s)")
+    return [
+        "Largest relative error of B: true / stated / last step of the reference",
+        *text_table(head, rows),
+        "cover: true error over stated error and reference's step; above 1 the table states too little.",
+    ]
 
 
 STUDY = study_of_one(
     name="field-hard-cases",
-    summary="true and stated error of the rotor's table in hard cases: contact,"
-    " extensions, flat, touching, strong, many",
+    summary="true and stated error of the rotor's table in hard cases: contact, extensions, flat, touching, many",
     compute=field_hard_cases,
-    figures=FIGURES,
+    figures={"field-hard-cases": hard_case_figure},
     report=hard_case_lines,
 )

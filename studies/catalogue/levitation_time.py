@@ -1,4 +1,4 @@
-"""The rotors whose drift is studied, and what is not known of the experiment."""
+"""Levitation time against frequency by the slow drift of the spin, with what is not known of the experiment."""
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -20,12 +20,13 @@ from ...fem.rotor.table import FieldTable
 from ...geometry.common import MAGNET_CONDUCTIVITY, Array
 from ...geometry.magnets import Magnet
 from ...geometry.rotor import horizontal, tilt, vertical
-from ...geometry.scene.contents import Drag, Floater, Scene
+from ...geometry.scene.contents import Drag, Scene
 from ..cli.options import FieldModel
-from ..figures.style import PAGE, PALETTE, panels, styled
-from ..result import variable
+from ..figures.style import PALETTE, legend_below, styled
+from ..result import Columns, columns, variable
 from ..study import Point, Study
-from .article import levitation_of
+from .article import EDGE, FLOATER, PERMEABILITY, REMANENCE, levitation_of
+from .drawing import explain, small_multiples, span, text_table
 
 
 @dataclass(frozen=True)
@@ -78,7 +79,7 @@ class Variant:
     """
 
     spin: float = 0.0
-    remanence: float = 1.305
+    remanence: float = REMANENCE
     conductivity: float = MAGNET_CONDUCTIVITY
     stokes: bool = False
     e_folds: float = E_FOLDS
@@ -107,9 +108,9 @@ QUICK_VARIANTS = ("nominal", "spin -0.1", "spin +0.1", "displacement smaller", "
 
 def scene_of(case: DriftCase, variant: Variant) -> Scene:
     """The scene of a case at its reference frequency."""
-    floater = Floater(6.35e-3, variant.remanence, 1.05, 7500.0, variant.conductivity)
-    permeability, metal = 1.0 if variant.rotor == "rigid" else 1.05, variant.rotor == "conducting"
-    magnets = case.make(case.size + variant.misplaced * case.tolerance, 10e-3, variant.remanence, permeability)
+    floater = replace(FLOATER, remanence=variant.remanence, conductivity=variant.conductivity)
+    permeability, metal = 1.0 if variant.rotor == "rigid" else PERMEABILITY, variant.rotor == "conducting"
+    magnets = case.make(case.size + variant.misplaced * case.tolerance, EDGE, variant.remanence, permeability)
     magnets = tuple(replace(magnet, conductivity=MAGNET_CONDUCTIVITY if metal else None) for magnet in magnets)
     return Scene(case.reference, magnets, floater, Drag.stokes(floater.radius))
 
@@ -117,16 +118,19 @@ def scene_of(case: DriftCase, variant: Variant) -> Scene:
 CAP, SHORTEST = 250.0, 3.0
 """The article stopped a flight after 250 s, and did not count one of less than 3 s."""
 SAMPLES = 60
-QUANTITIES = {
-    "levitation_time": ("s", f"time until the loss, at most {CAP:g} s"),
-    "outcome": ("1", "how it ended: " + ", ".join(f"{k} {name}" for k, name in enumerate(OUTCOMES))),
-    "distance_start": ("m", "distance from the rotor at the start"),
-    "distance_end": ("m", "distance at the end or the cap"),
-    "spin_end": ("1", "body spin at the end or the cap"),
-    "fall_rate": ("m/s", "mean rate of fall over the first nine tenths of the flight"),
-    "fall_ratio": ("1", "rate of fall from 0.6 to 0.9 of the flight over that from 0 to 0.3"),
-    "balance_spin": ("1", "body spin at which drag and eddy currents balance"),
-    "growth": ("1/s", "largest growth of small motions during the flight"),
+STEP = ("case", "variant", "step")
+COLUMNS: Columns = {
+    "levitation_time": (STEP, "s", f"time until the loss, at most {CAP:g} s"),
+    "outcome": (STEP, "1", "how it ended: " + ", ".join(f"{k} {name}" for k, name in enumerate(OUTCOMES))),
+    "distance_start": (STEP, "m", "distance from the rotor at the start"),
+    "distance_end": (STEP, "m", "distance at the end or the cap"),
+    "spin_end": (STEP, "1", "body spin at the end or the cap"),
+    "fall_rate": (STEP, "m/s", "mean rate of fall over the first nine tenths of the flight"),
+    "fall_ratio": (STEP, "1", "rate of fall from 0.6 to 0.9 of the flight over that from 0 to 0.3"),
+    "balance_spin": (STEP, "1", "body spin at which drag and eddy currents balance"),
+    "growth": (STEP, "1/s", "largest growth rate of a mode during the flight"),
+    "flight_time": ((*STEP, "sample"), "s", "time"),
+    "flight_distance": ((*STEP, "sample"), "m", "distance from the rotor"),
 }
 
 
@@ -147,16 +151,12 @@ def levitation_times(point: Point) -> xr.Dataset:
     grid = np.linspace(case.lowest, case.highest, point["steps"])
     scene = scene_of(case, variant)
     flights = dict(_flights(scene, *_compiled(scene, point["model"]), variant, grid))
-    rows = np.array([_row(flights.get(f)) for f in grid])
-    courses = np.array([_course(flights.get(f)) for f in grid])
-    dims = ("case", "variant", "step")
-    data = {name: variable(dims, rows[None, None, :, k], *label) for k, (name, label) in enumerate(QUANTITIES.items())}
-    course = (*dims, "sample")
-    data["flight_time"] = variable(course, courses[None, None, :, 0], "s", "time")
-    data["flight_distance"] = variable(course, courses[None, None, :, 1], "m", "distance from the rotor")
+    rows = [_row(flights.get(f)) for f in grid]
+    found = {name: np.array([row[name] for row in rows])[None, None] for name in COLUMNS}
     frequency = variable(("case", "step"), grid[None], "Hz", "frequency of the rotor")
     coordinates = {"case": [point["case"]], "variant": [point["variant"]], "frequency": frequency}
-    return xr.Dataset(data, coordinates, {"model": point["model"], "cap_s": CAP, "shortest_s": SHORTEST})
+    attributes = {"model": point["model"], "cap_s": CAP, "shortest_s": SHORTEST}
+    return xr.Dataset(columns(COLUMNS, found), coordinates, attributes)
 
 
 def gather_times(parts: Sequence[xr.Dataset]) -> xr.Dataset:
@@ -179,14 +179,6 @@ def _compiled(scene: Scene, model: FieldModel) -> tuple[FieldTable, Rates, Array
     family = Family(levitation.rates, frequencies(scene), 50.0)
     there = follow_branch(family, state, frequency, scene.frequency, LONG_STEPS, tolerated=np.inf)[-1]
     return levitation.table, levitation.rates, there.state
-
-
-def _course(flight: Drift | None) -> Array:
-    """Time and distance (2, sample) of a flight."""
-    if flight is None:
-        return np.full((2, SAMPLES), np.nan)
-    times = np.linspace(0.0, flight.time[-1], SAMPLES)
-    return np.array([times, np.interp(times, flight.time, flight.distance)])
 
 
 def _flights(
@@ -212,26 +204,31 @@ def _flights(
             yield frequency, drift(there, table, variant.spin, CAP, rates, at_rest, variant.stokes, variant.e_folds)
 
 
-def _row(flight: Drift | None) -> list[float]:
+def _row(flight: Drift | None) -> dict[str, Any]:
     if flight is None:
-        return [0.0, NO_EQUILIBRIUM, *[np.nan] * 7]
+        course = {name: np.full(SAMPLES, np.nan) for name in ("flight_time", "flight_distance")}
+        return dict.fromkeys(COLUMNS, np.nan) | {"levitation_time": 0.0, "outcome": NO_EQUILIBRIUM} | course
     kept = flight.ended_by in ("duration", "balance")
-    outcome = LEVITATES if kept else OUTCOMES.index(flight.ended_by)
-    rates = [flight.fall_rate(*part) for part in ((0.0, 0.9), (0.6, 0.9), (0.0, 0.3))]
-    return [
-        CAP if kept else min(flight.levitated_s, CAP), outcome, flight.distance[0], flight.distance[-1],
-        flight.spin[-1], rates[0], rates[1] / rates[2], flight.balance_spin, flight.growth_per_s.max(),
-    ]  # fmt: skip
+    whole, late, early = (flight.fall_rate(*part) for part in ((0.0, 0.9), (0.6, 0.9), (0.0, 0.3)))
+    times = np.linspace(0.0, flight.time[-1], SAMPLES)
+    return {
+        "levitation_time": CAP if kept else min(flight.levitated_s, CAP),
+        "outcome": LEVITATES if kept else OUTCOMES.index(flight.ended_by),
+        "distance_start": flight.distance[0],
+        "distance_end": flight.distance[-1],
+        "spin_end": flight.spin[-1],
+        "fall_rate": whole,
+        "fall_ratio": late / early,
+        "balance_spin": flight.balance_spin,
+        "growth": flight.growth_per_s.max(),
+        "flight_time": times,
+        "flight_distance": np.interp(times, flight.time, flight.distance),
+    }
 
 
 MARKS = dict(zip(OUTCOMES, ("v", "o", "X", "^", "|"), strict=True))
-MEANINGS = {
-    "contact": "touches the rotor",
-    "fold": "sinks until it is lost (fold)",
-    "instability": "oscillates until it is lost",
-    "levitates": "still up after 250 s",
-    "no equilibrium": "no equilibrium",
-}
+MEANINGS = ("touches the rotor", "falls (fold)", "lost in oscillations", "levitates for 250 s", "no equilibrium")
+"""Of the outcomes, in a legend."""
 BANDS = {
     "displacement": "displacement ±0.2 mm, ±0.5 mm or ±0.5°",
     "spin": "spin at release ±0.1",
@@ -239,63 +236,64 @@ BANDS = {
     "remanence": "remanence 1.29 … 1.32 T",
 }
 LINES = {
-    "complete": ("-", "complete: mutual magnetisation, currents in the rotor too"),
+    "complete": ("-", "mutual magnetisation, currents in the rotor too"),
     "rough release": ("--", "oscillation from 0.1 mm, not 3 µm"),
     "Stokes drag": (":", "air after Stokes"),
 }
-FLOWN = {
+REPORTED = {
     "horizontal 1 mm": {115: "linear fall", 140: "stable", 150: "oscillating loss"},
     "horizontal 1.5 mm": {115: "linear fall", 140: "stable", 150: "oscillating loss"},
     "vertical 14 mm": {60: "24 hours"},
     "vertical 12.6 mm": {60: "24 hours"},
 }
 """What the article saw (δx = 1 mm and δz = 14 mm there), by frequency in Hz."""
+ENDS = {"linear fall": ":", "stable": "-", "oscillating loss": "--", "24 hours": "-."}
 
 
 @styled
 def times_figure(result: xr.Dataset) -> Figure:
     """Levitation time of each rotor against frequency, with the bands of what is not known well."""
-    figure, axes = _one_panel_each(result)
-    for panel, case in zip(axes.flat, result["case"].values.tolist(), strict=False):
-        _times(panel, result.sel(case=case), FLOWN.get(case, {}))
-    for row in axes:
-        row[0].set_ylabel("levitation time (s)")
-    handles, labels = axes[0, 0].get_legend_handles_labels()
-    for name in OUTCOMES:
-        handles += axes[0, 0].plot([], [], MARKS[name], color=PALETTE[0], ms=5)
-        labels.append(MEANINGS[name])
-    figure.legend(handles, labels, loc="outside lower center", ncols=3)
+    figure, rows = _rotors(result, "frequency (Hz)", "levitation time (s)")
+    for panel, case, rotor in rows:
+        _times(panel, rotor)
+        for frequency, end in REPORTED.get(case, {}).items():
+            panel.axvline(frequency, ls=ENDS[end], color=PALETTE[3], lw=1.0, label=f"article: {end}")
+    first = rows[0][0]
+    explain(first, {words: MARKS[name] for name, words in zip(OUTCOMES, MEANINGS, strict=True)}, color=PALETTE[0], ms=4)
+    legend_below(figure, *(panel for panel, _, _ in rows), columns=4)
     return figure
 
 
 @styled
 def flights_figure(result: xr.Dataset) -> Figure:
-    """Distance against time in some nominal flights of each rotor."""
-    figure, axes = _one_panel_each(result)
-    for panel, case in zip(axes.flat, result["case"].values.tolist(), strict=False):
-        _flights_figure(panel, result.sel(case=case))
-    for row in axes:
-        row[0].set_ylabel("distance (mm)")
+    """Distance against time in some nominal flights of each rotor, their frequencies by colour."""
+    figure, rows = _rotors(result, "time (s)", "distance (mm)")
+    for panel, _, rotor in rows:
+        nominal, frequency = rotor.sel(variant="nominal"), rotor["frequency"].values
+        flown = np.flatnonzero(nominal["levitation_time"].values >= float(result.attrs["shortest_s"]))
+        shown = flown[np.unique(np.linspace(0, max(len(flown) - 1, 0), 6).astype(int))] if len(flown) else []
+        for k, color in zip(shown, PALETTE, strict=False):
+            time, distance = nominal["flight_time"][k], 1e3 * nominal["flight_distance"][k]
+            panel.plot(time, distance, color=color, label=f"{frequency[k]:.3g} Hz")
+            panel.plot(time[-1], distance[-1], MARKS[OUTCOMES[int(nominal["outcome"][k])]], color=color, ms=4)
+        if len(shown):
+            panel.legend(ncols=2)
+        low, high = panel.get_ylim()
+        panel.set_ylim(low, high + 0.6 * (high - low))  # room for the legend
     return figure
 
 
 FIGURES = {"levitation-time": times_figure, "levitation-time-flights": flights_figure}
 
 
-def _one_panel_each(result: xr.Dataset) -> tuple[Figure, Any]:
-    """A panel for each rotor, three in a row."""
-    cases = result["case"].values.tolist()
-    columns = min(3, len(cases))
-    rows = -(-len(cases) // columns)
-    figure, axes = panels(rows, columns, (PAGE, 2.2 * rows + 0.7))
-    for panel, case in zip(axes.flat, cases, strict=False):
-        panel.set_title(case.replace(" deg", "°"))
-    for unused in axes.flat[len(cases) :]:
-        unused.remove()
-    return figure, axes
+def _rotors(result: xr.Dataset, xlabel: str, ylabel: str) -> tuple[Figure, list[tuple[Axes, str, xr.Dataset]]]:
+    """A panel for each rotor, in the order of the cases, with its name and its part of the result."""
+    cases = sorted(result["case"].values.tolist(), key=list(CASES).index)
+    figure, axes = small_multiples([case.replace(" deg", "°") for case in cases], 2.2, 3, xlabel, ylabel)
+    return figure, [(panel, case, result.sel(case=case)) for panel, case in zip(axes, cases, strict=True)]
 
 
-def _times(axes: Axes, result: xr.Dataset, flown: dict[int, str]) -> None:
+def _times(axes: Axes, result: xr.Dataset) -> None:
     frequency, time = result["frequency"].values, result["levitation_time"]
     variants = result["variant"].values.tolist()
     for (start, label), color in zip(BANDS.items(), ("0.6", *PALETTE[1:]), strict=False):
@@ -307,76 +305,32 @@ def _times(axes: Axes, result: xr.Dataset, flown: dict[int, str]) -> None:
     for name, (dashes, label) in LINES.items():
         if name in variants:
             axes.plot(frequency, time.sel(variant=name), dashes, color="0.25", lw=1, label=label)
-    nominal = time.sel(variant="nominal").values
+    nominal, outcome = (result[name].sel(variant="nominal").values for name in ("levitation_time", "outcome"))
     axes.plot(frequency, nominal, color=PALETTE[0], lw=1.6, label="nominal")
-    outcome = result["outcome"].sel(variant="nominal").values
     for number, name in enumerate(OUTCOMES):
         here = outcome == number
         axes.plot(frequency[here], nominal[here], MARKS[name], color=PALETTE[0], ms=3.5)
-    for seen, word in flown.items():
-        axes.axvline(seen, color=PALETTE[3], lw=0.8)
-        words = axes.text(seen, 245, f"{seen} Hz {word}", rotation=90, ha="center", va="top", color=PALETTE[3], size=7)
-        words.set_bbox({"facecolor": "white", "edgecolor": "none", "pad": 0.8, "alpha": 0.85})
-    axes.set(xlabel="frequency (Hz)", ylim=(-8, 262), xlim=(frequency[0], frequency[-1]))
-
-
-def _flights_figure(axes: Axes, result: xr.Dataset) -> None:
-    nominal = result.sel(variant="nominal")
-    frequency = result["frequency"].values
-    flown = np.flatnonzero(nominal["levitation_time"].values >= float(result.attrs["shortest_s"]))
-    falls = flown[nominal["outcome"].values[flown] != LEVITATES]
-    lasts = flown[nominal["outcome"].values[flown] == LEVITATES]
-    shown = np.unique([*falls[:: max(1, -(-len(falls) // 4))], *lasts[:: max(1, -(-len(lasts) // 3))]]).astype(int)
-    for number, k in enumerate(shown):
-        color = PALETTE[number % len(PALETTE)]
-        time, distance = nominal["flight_time"][k].values, 1e3 * nominal["flight_distance"][k].values
-        axes.plot(time, distance, color=color)
-        fold = OUTCOMES[int(nominal["outcome"][k])] == "fold"
-        way = {"rotation": 60, "rotation_mode": "anchor"} if fold else {"va": "center"}
-        axes.annotate(f" {frequency[k]:.3g} Hz", (time[-1], distance[-1]), color=color, size=7, ha="left", **way)
-    low, high = axes.get_ylim()
-    axes.set(xlabel="time (s)", xlim=(0, 330), ylim=(low, high + 0.25 * (high - low)))  # room for words above folds
+    axes.set(ylim=(-8, 262), xlim=(frequency[0], frequency[-1]))
 
 
 def time_lines(result: xr.Dataset) -> list[str]:
     """For each rotor: where flights end in the fold, where they last and where they are unstable."""
-    lines = []
+    rows = []
     for case in result["case"].values.tolist():
         for variant in ("nominal", "permeable", "complete"):
             if variant not in result["variant"]:
                 continue
             chosen = result.sel(case=case, variant=variant)
-            lines.append(f"{case}{'' if variant == 'nominal' else f', {variant}'}:")
-            lines += [line for number in range(len(OUTCOMES)) if (line := _line(chosen, number))]
-    return lines
-
-
-def _line(nominal: xr.Dataset, number: int) -> str:
-    """What is to be said of all flights of one outcome; nothing if there is none."""
-    here = (nominal["outcome"] == number).values
-    if not here.any():
-        return ""
-    chosen, name = nominal.isel(step=here), OUTCOMES[number]
-    span = f"{_span(chosen['frequency'])} Hz"
-    if name == "no equilibrium":
-        return f"  none at {span}"
-    words = f"  {name} at {span}: {_span(chosen['levitation_time'])} s, "
-    words += f"from {_span(1e3 * chosen['distance_start'])} to {_span(1e3 * chosen['distance_end'])} mm"
-    if name == "fold":
-        words += f", falling {_span(1e3 * chosen['fall_rate'])} mm/s, late over early {_span(chosen['fall_ratio'])}"
-    if number == LEVITATES:
-        endless = np.isfinite(chosen["balance_spin"].values)
-        words += f"; with a balance ahead: {endless.sum()} of {len(endless)}, s* {_span(chosen['balance_spin'])}"
-        words += f"; largest growth {_span(chosen['growth'])} /s"
-    return words
-
-
-def _span(values: xr.DataArray) -> str:
-    known = values.values[np.isfinite(values.values)]
-    if not len(known):
-        return "unknown"
-    low, high = (f"{value:.3g}" for value in (known.min(), known.max()))
-    return low if low == high else f"{low}–{high}"
+            for number, name in enumerate(OUTCOMES):
+                one = chosen.isel(step=(chosen["outcome"] == number).values)
+                if not one.sizes["step"]:
+                    continue
+                scaled = [1e3 * one[key] for key in ("distance_start", "distance_end", "fall_rate")]
+                values = (one["frequency"], one["levitation_time"], *scaled, one["fall_ratio"], one["balance_spin"])
+                cells = [span(value) if number != NO_EQUILIBRIUM or not k else "" for k, value in enumerate(values)]
+                rows.append((f"{case}, {variant}: {name}", *cells))
+    head = ("flights", "at (Hz)", "time (s)", "from (mm)", "to (mm)", "fall (mm/s)", "late/early", "balance at spin")
+    return text_table(head, rows)
 
 
 STUDY = Study(

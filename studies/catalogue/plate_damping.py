@@ -1,15 +1,14 @@
-"""The plates and rotors of the study of the plate's damping, and where the floater levitates without a plate."""
+"""What a plate does to each mode of the floater, against its place, conductivity, thickness, and the rotor."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, replace
-from functools import cache
+from functools import cache, partial
 from typing import Any
 
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import NullLocator
 from numpy.typing import ArrayLike
 
 from ...dynamics.continuation.frequencies import StableRange, at_frequency, reference_state, stable_range
@@ -22,7 +21,7 @@ from ..cli.options import PlateModel
 from ..figures.style import PAGE, PALETTE, legend_below, panels, styled
 from ..levitation import Levitation
 from ..result import AXIS, MODES, Columns, columns, variable
-from ..study import Point, Study, cases_with
+from ..study import Point, Study, cases_with, each_case
 from .article import (
     CONFIGURATIONS,
     PLATE_CONDUCTIVITY,
@@ -32,7 +31,7 @@ from .article import (
     levitation_of,
     rotor_label,
 )
-from .dipole_vs_fem import range_text
+from .drawing import explain, plain_log, range_text, small_multiples, text_table, uncertain
 
 DISTANCE = 0.018
 """Face below or beside the floater's centre in the sweeps over all else, m."""
@@ -119,20 +118,20 @@ def _stable_range(configuration: str, measure: float, complete: bool) -> StableR
     return stable_range(levitation.scene, levitation.rates, *reference_state(levitation.scene))
 
 
-def without_plate(case: PlateCase) -> tuple[Levitation, Equilibrium]:
-    """A case's scene without plate, and its equilibrium that is stable but for the currents in rotor and floater.
+@cache
+def without_plate(
+    configuration: str, measure: float, part: float | None, complete: bool
+) -> tuple[Levitation, Equilibrium]:
+    """A rotor's scene without plate, and its equilibrium that is stable but for the currents in rotor and floater.
+
+    Parameters
+    ----------
+    configuration, measure, part, complete : as of a `PlateCase`
 
     Raises
     ------
     EquilibriumError : nothing levitates there
     """
-    return _without_plate(case.configuration, case.measure, case.part, case.complete)
-
-
-@cache
-def _without_plate(
-    configuration: str, measure: float, part: float | None, complete: bool
-) -> tuple[Levitation, Equilibrium]:
     alone, frequency = _in_field(configuration, measure, complete), FREQUENCY
     if part is not None:
         stable = _stable_range(configuration, measure, complete)
@@ -173,7 +172,7 @@ def plate_damping(point: Point) -> xr.Dataset:
     EquilibriumError : nothing levitates even without the plate
     """
     case = PlateCase(**point)
-    alone, start = without_plate(case)
+    alone, start = without_plate(case.configuration, case.measure, case.part, case.complete)
     models = replace(alone.models, plate_model=case.model, plate_rtol=RTOL)
     beside = alone.elsewhere(models, plate=case.plate(start.position))
     beside.adopt(Survey((start,), ()))
@@ -197,9 +196,9 @@ def gather_damping(parts: Sequence[xr.Dataset]) -> xr.Dataset:
 
 
 COLUMNS: Columns = {
-    "growth": (("mode",), "1/s", "growth rate of a small motion"),
+    "growth": (("mode",), "1/s", "growth rate of a mode"),
     "growth_without": (("mode",), "1/s", "growth rate without a plate"),
-    "frequency": (("mode",), "Hz", "frequency of a small motion, rotor's frame"),
+    "frequency": (("mode",), "Hz", "frequency of a mode, rotor's frame"),
     "shift": (("axis",), "m", "displacement of the equilibrium by the plate"),
     "force": (("axis",), "N", "mean force of the plate on the floater"),
     "torque": (("axis",), "N m", "mean torque of the plate on the floater"),
@@ -224,106 +223,112 @@ def _row(levitation: Levitation, start: Equilibrium) -> dict[str, ArrayLike]:
 
 
 SWEEPS = {
-    "below": ("Plate below", "distance of the face from the floater's centre (mm)", 1e3),
-    "beside": ("Plate standing beside", "distance of the face from the floater's centre (mm)", 1e3),
+    "below": ("Plate below", "distance of the face (mm)", 1e3),
+    "beside": ("Plate standing beside", "distance of the face (mm)", 1e3),
     "frequency": ("Frequency", "frequency of the rotor (Hz)", 1.0),
     "conductivity": ("Conductivity", "conductivity (MS/m)", 1e-6),
     "thickness": ("Thickness", "thickness (mm)", 1e3),
 }
 DISTANCES = (10, 15, 20, 30, 40, 60)
-LIMITS = (8.0, 66.0)
-"""Of the axis of distances, mm."""
-MODELS = {"": ("infinite slab", "o-", 3.0), ", real plate": ("real plate", "s", 6.0)}
-"""By the ending of a sweep's name: what the plate is, its marks and their size."""
-LINEAR = 0.1
-"""Growth rates below this are drawn on a linear scale, 1/s."""
-MEANS = (
-    ("Equilibrium moved by", "displacement (mm)"),
-    ("Mean force, up", "of the weight (%)"),
-    ("Braking torque on the floater", "torque (µN m)"),
-    ("Loss in the plate", "loss (mW)"),
-)
+PLACES, REAL_PLATE = ("below", "beside"), ", real plate"
+ENDINGS = {"": ("infinite slab", "o-", None), REAL_PLATE: ("real plate", "s", "none")}
+"""By the ending of a sweep's name: what the plate is, its marks and their face."""
+MEANS = {
+    "moved": ("Equilibrium moved by", "displacement (mm)"),
+    "lift": ("Mean force, up", "of the weight (%)"),
+    "torque": ("Braking torque on the floater", "torque (µN m)"),
+    "loss": ("Loss in the plate", "loss (mW)"),
+}
 """Titles and labels of what `means` gives."""
-LIFT = 1
-"""Which of them has both signs."""
 
 
-def means(part: xr.Dataset) -> tuple[Array, Array, Array, Array]:
+def means(part: xr.Dataset) -> dict[str, xr.DataArray]:
     """What a plate does on average: displacement (mm), force up (% of the weight), braking torque (µN m), loss (mW)."""
-    moved = 1e3 * np.linalg.norm(part["shift"].values, axis=-1)
-    lift = 100 * part["force"].sel(axis="z").values / float(part.attrs["weight_N"])
-    return np.asarray(moved), lift, -1e6 * part["torque"].sel(axis="z").values, 1e3 * part["loss"].values
+    return {
+        "moved": 1e3 * (part["shift"] ** 2).sum("axis", skipna=False) ** 0.5,
+        "lift": 100 * part["force"].sel(axis="z") / float(part.attrs["weight_N"]),
+        "torque": -1e6 * part["torque"].sel(axis="z"),
+        "loss": 1e3 * part["loss"],
+    }
 
 
 @styled
-def places_figure(result: xr.Dataset) -> Figure:
-    """Growth of each small motion against the plate's distance, below the floater and beside it."""
-    figure, axes = _growths(result, ("below", "beside"))
-    for ending, (name, style, size) in MODELS.items():
-        if part_of(result, f"below{ending}").sizes["case"]:
-            axes[0].plot([], [], style, ms=size, mfc="none" if ending else "0.3", color="0.3", label=name)
-    legend_below(figure, axes[0], columns=7)
-    _mark_distances(axes)
-    return figure
-
-
-@styled
-def materials_figure(result: xr.Dataset) -> Figure:
-    """Growth of each small motion against frequency, conductivity and thickness, plate 18 mm below the floater."""
-    figure, axes = _growths(result, ("frequency", "conductivity", "thickness"))
+def growth_figure(result: xr.Dataset, sweeps: Sequence[str]) -> Figure:
+    """Damping rate of each mode in some sweeps, a panel each; open: it grows instead."""
+    titles, ylabel = [SWEEPS[sweep][0] for sweep in sweeps], "damping rate (1/s)"
+    figure, axes = small_multiples(titles, 3.0, 3, "", ylabel, sharey=True)
+    for panel, sweep in zip(axes, sweeps, strict=True):
+        for ending, (_, style, fill) in ENDINGS.items():
+            part = part_of(result, sweep + ending)
+            varied = part["rotor_frequency"] if sweep == "frequency" else part["value"] * SWEEPS[sweep][2]
+            for mode, color in zip(result["mode"].values, PALETTE, strict=False):
+                growth = part["growth"].sel(mode=mode)
+                _damped(panel, varied, growth, part["error"], style, color, fill or color)
+                if not ending:
+                    explain(panel, {str(mode): "-"}, color=color)
+        panel.set_xlabel(SWEEPS[sweep][1])
+        if sweep in PLACES:
+            plain_log(panel, DISTANCES)
+        elif sweep != "frequency":
+            panel.set_xscale("log")
+        for words, style, fill in ENDINGS.values():
+            explain(panel, {words: style}, mfc=fill, ms=4)
+        explain(panel, {"growth rate (unstable)": "x"}, ms=4)
     legend_below(figure, axes[0])
     return figure
 
 
+def _damped(
+    axes: Axes, x: ArrayLike, growth: xr.DataArray, error: ArrayLike, style: str, color: str, fill: str
+) -> None:
+    """Damping rates with their errors, and as crosses the growth rates of what is not damped, on one log axis."""
+    style_of: Any = {"fmt": style, "color": color, "mfc": fill, "ms": 4}
+    axes.errorbar(x, -growth.where(growth < 0), yerr=np.abs(growth) * error, **style_of)
+    axes.plot(x, growth.where(growth >= 0), "x", color=color, ms=5)
+    axes.set_yscale("log")
+
+
 @styled
 def rotors_figure(result: xr.Dataset) -> Figure:
-    """Growth of the least damped motion of every rotor of the article, plate below and beside."""
-    figure, ((axes,),) = panels(1, 1, (0.7 * PAGE, 3.0))
-    _rotors(axes, result)
+    """Damping rate of the least stable mode of every rotor of the article, plate below and beside."""
+    figure, ((axes,),) = panels(1, 1, (PAGE, 3.4))
+    for sweep, marker, color in zip(ROTORS, "os", PALETTE, strict=False):
+        part = part_of(result, sweep)
+        worst, places = part["growth"].max("mode"), np.arange(part.sizes["case"])
+        _damped(axes, places, worst, part["error"], marker, color, color)
+        explain(axes, {f"plate {sweep.split(', ')[1]}": marker}, color=color, ms=4)
+        rotors = zip(part["configuration"].values, part["value"].values, strict=True)
+        axes.set_xticks(places, [rotor_label(str(name), float(value)) for name, value in rotors], rotation=90)
+    explain(axes, {"growth rate (unstable)": "x"}, ms=5)
+    axes.set(title="Rotors of the article, plate at 18 mm", ylabel="damping rate of the\nleast stable mode (1/s)")
+    legend_below(figure, axes)
     return figure
 
 
 @styled
 def means_figure(result: xr.Dataset) -> Figure:
     """What the plate does on average: it moves the floater, pushes it, brakes it and is warmed."""
-    figure, axes = panels(2, 2, (0.8 * PAGE, 4.4), sharex=True)
-    for number, (panel, (title, words)) in enumerate(zip(axes.flat, MEANS, strict=True)):
-        _mean(panel, result, number)
-        panel.set(title=title, ylabel=words, yscale="linear" if number == LIFT else "log")
-    _mark_distances(axes.ravel())
-    for panel in axes[1]:
-        panel.set_xlabel("distance of the face (mm)")
-    legend_below(figure, axes[0, 0])
+    titles = [title for title, _ in MEANS.values()]
+    figure, axes = small_multiples(titles, 2.2, 2, "distance of the face (mm)", sharex=True)
+    for panel, name in zip(axes, MEANS, strict=True):
+        for place, line, color in zip(PLACES, ("-", "--"), PALETTE, strict=False):
+            for ending, (words, style, fill) in ENDINGS.items():
+                part = part_of(result, place + ending)
+                values, marks = means(part)[name], style[0] if ending else f"{style[0]}{line}"
+                more: Any = {"ms": 4, "color": color, "mfc": fill or color, "label": f"{place}, {words}"}
+                panel.errorbar(1e3 * part["value"], values, np.abs(values) * part["error"], fmt=marks, **more)
+        panel.set(ylabel=MEANS[name][1], yscale="linear" if name == "lift" else "log")
+        plain_log(panel, DISTANCES)
+    legend_below(figure, axes[0])
     return figure
 
 
-FIGURES = {
-    "plate-damping-distance": places_figure,
-    "plate-damping-material": materials_figure,
+FIGURES: dict[str, Callable[[xr.Dataset], Figure]] = {
+    "plate-damping-distance": partial(growth_figure, sweeps=PLACES),
+    "plate-damping-material": partial(growth_figure, sweeps=("frequency", "conductivity", "thickness")),
     "plate-damping-rotors": rotors_figure,
     "plate-damping-means": means_figure,
 }
-
-
-def _growths(result: xr.Dataset, sweeps: Sequence[str]) -> tuple[Figure, Any]:
-    """A panel for each sweep."""
-    figure, (axes,) = panels(1, len(sweeps), (PAGE, 3.2), sharey=True)
-    for panel, sweep in zip(axes, sweeps, strict=True):
-        title, words, scale = SWEEPS[sweep]
-        _growth(panel, result, sweep, scale)
-        panel.set(title=title, xlabel=words)
-    axes[0].set_ylabel("growth rate (1/s)")
-    return figure, axes
-
-
-def _mark_distances(panels: Iterable[Axes]) -> None:
-    """The same marks on each, whatever was drawn: first none may choose limits by itself."""
-    for axes in panels:
-        axes.autoscale(enable=False, axis="x")
-    for axes in panels:
-        axes.set(xlim=LIMITS, xscale="log")
-        axes.set_xticks(DISTANCES, [f"{d:g}" for d in DISTANCES])
-        axes.xaxis.set_minor_locator(NullLocator())
 
 
 def part_of(result: xr.Dataset, sweep: str) -> xr.Dataset:
@@ -332,100 +337,34 @@ def part_of(result: xr.Dataset, sweep: str) -> xr.Dataset:
     return part if sweep in ROTORS else part.sortby("value")
 
 
-def _growth(axes: Axes, result: xr.Dataset, sweep: str, scale: float) -> None:
-    for ending, (_, style, size) in MODELS.items():
-        part = part_of(result, sweep + ending)
-        varied = part["rotor_frequency" if sweep == "frequency" else "value"].values * scale
-        for mode, color in zip(result["mode"].values, PALETTE, strict=False):
-            growth, error = part["growth"].sel(mode=mode).values, part["error"].values
-            axes.errorbar(
-                varied, growth, yerr=np.abs(growth) * error, fmt=style, ms=size,
-                mfc="none" if ending else color, color=color, label=None if ending else str(mode),
-            )  # fmt: skip
-    axes.set_xscale("linear" if sweep == "frequency" else "log")
-    axes.set_yscale("symlog", linthresh=LINEAR)
-    axes.margins(y=0.12)
-    axes.axhline(0.0, color="0.3", lw=0.8)
-
-
-def _rotors(axes: Axes, result: xr.Dataset) -> None:
-    """Growth of the least damped motion of each rotor, plate below and beside."""
-    for sweep, marker, color in zip(ROTORS, "os", PALETTE, strict=False):
-        part = part_of(result, sweep)
-        worst, error = part["growth"].max("mode").values, part["error"].values
-        places = np.arange(part.sizes["case"])
-        axes.errorbar(places, worst, np.abs(worst) * error, fmt=marker, ms=4, color=color, label=sweep.split(", ")[1])
-        gone = places[np.isnan(worst)]
-        axes.plot(gone, 0 * gone, "x", color=color, label="no equilibrium is left" if len(gone) else None)
-        rotors = zip(part["configuration"].values, part["value"].values, strict=True)
-        names = [rotor_label(str(configuration), float(value)) for configuration, value in rotors]
-        axes.set_xticks(places, names, rotation=90, fontsize=7)
-    axes.set_yscale("symlog", linthresh=LINEAR)
-    axes.axhline(0.0, color="0.3", lw=0.8)
-    axes.set(title="Rotors of the article, plate at 18 mm", ylabel="growth of the least\ndamped motion (1/s)")
-    axes.margins(x=0.08, y=0.12)
-    axes.legend()
-
-
-def _mean(axes: Axes, result: xr.Dataset, number: int) -> None:
-    for sweep, style, color in (("below", "o-", PALETTE[0]), ("beside", "s--", PALETTE[1])):
-        for ending, fill, line in (("", color, style), (", real plate", "none", style[0])):
-            part = part_of(result, sweep + ending)
-            if part.sizes["case"]:
-                values, error = means(part)[number], part["error"].values
-                axes.errorbar(
-                    part["value"].values * 1e3, values, np.abs(values) * error, fmt=line, ms=6 if ending else 3,
-                    color=color, mfc=fill, label=f"{sweep}{ending}",
-                )  # fmt: skip
-
-
-PLACES = ("below", "beside")
-REAL_ = ", real plate"
-
-
 def damping_lines(result: xr.Dataset) -> list[str]:
-    """What the plate does at each place, frequency and rotor; what the infinite slab misses; and the sentence."""
-    lines = []
-    for sweep in (*PLACES, *(place + REAL_ for place in PLACES), "frequency", *ROTORS):
-        part = part_of(result, sweep)
-        lines += [_line(part.isel(case=k), sweep) for k in range(part.sizes["case"])]
-    return [*lines, *_edges(result), sentence(result)]
-
-
-def _line(one: xr.Dataset, sweep: str) -> str:
-    value, configuration = float(one["value"]), str(one["configuration"].values)
-    if sweep in ROTORS:
-        where = f"{rotor_label(configuration, value)}, plate {sweep.split(', ')[1]}"
-    elif sweep == "frequency":
-        where = "Plate 18 mm below"
-    else:
-        where = f"Plate {sweep}, face at {value * SWEEPS['below'][2]:.1f} mm"
-    where += f", {float(one['rotor_frequency']):.1f} Hz: "
-    worst = float(one["growth"].max("mode"))
-    if np.isnan(worst):
-        return f"{where}no equilibrium is left."
-    mode = str(one["mode"].values[int(one["growth"].argmax("mode"))])
-    moved, lift, torque, loss = means(one)
-    return (
-        f"{where}{'stable' if worst < 0 else 'UNSTABLE'}, least damped motion {mode} {worst:+.3g} ± "
-        f"{abs(worst) * float(one['error']):.1g} /s (without the plate {float(one['growth_without'].max()):+.1g} /s); "
-        f"moved {moved:.3f} mm; mean force up {lift:+.3g} % of the weight; braking torque {torque:.3g} µN m; "
-        f"loss {loss:.3g} mW."
+    """What the plate does at each place, frequency and rotor; and the sentence."""
+    rows = []
+    for sweep in (*PLACES, *(place + REAL_PLATE for place in PLACES), "frequency", *ROTORS):
+        for one in each_case(part_of(result, sweep)):
+            value, configuration = float(one["value"]), str(one["configuration"].values)
+            where = f"plate {sweep}, face at {1e3 * value:.1f} mm"
+            if sweep in ROTORS:
+                where = f"{rotor_label(configuration, value)}, plate {sweep.split(', ')[1]}"
+            elif sweep == "frequency":
+                where = f"plate {1e3 * DISTANCE:g} mm below"
+            frequency, before = f"{float(one['rotor_frequency']):.1f}", f"{float(one['growth_without'].max()):+.1g}"
+            worst = float(one["growth"].max("mode"))
+            if np.isnan(worst):
+                rows.append((where, frequency, "no equilibrium", "", before, *[""] * len(MEANS)))
+                continue
+            mode = str(one["mode"].values[int(one["growth"].argmax("mode"))])
+            rate = uncertain(worst, abs(worst) * float(one["error"]))
+            rows.append((where, frequency, mode, rate, before, *(f"{float(v):.3g}" for v in means(one).values())))
+    head = (
+        "where",
+        "rotor (Hz)",
+        "least stable mode",
+        "growth (1/s)",
+        "without plate",
+        *(w for _, w in MEANS.values()),
     )
-
-
-def _edges(result: xr.Dataset) -> list[str]:
-    """What the infinite slab misses where the real plate was computed at the same place."""
-    lines = []
-    for place in PLACES:
-        real, slab = part_of(result, place + REAL_), part_of(result, place)
-        for value in real["value"].values:
-            pair = [float(p["growth"].sel(case=p["value"] == value).max()) for p in (real, slab)]
-            lines.append(
-                f"Real plate {place}, face at {value * 1e3:.1f} mm: least damped motion {pair[0]:+.4g} /s; as an "
-                f"infinite slab {pair[1]:+.4g} /s ({100 * (pair[1] / pair[0] - 1):+.2g} %)."
-            )
-    return lines
+    return [*text_table(head, rows), sentence(result)]
 
 
 def sentence(result: xr.Dataset) -> str:
@@ -434,28 +373,22 @@ def sentence(result: xr.Dataset) -> str:
     for sweep, place in zip(ROTORS, ("below the floater", "standing beside it"), strict=True):
         part = part_of(result, sweep)
         error, worst = part["error"], part["growth"].max("mode")
-        moved = (part["shift"] ** 2).sum("axis", skipna=False) ** 0.5
-        lift = 100 * part["force"].sel(axis="z") / float(result.attrs["weight_N"])
-        torque = -1e6 * part["torque"].sel(axis="z")
         kept, gone = int((worst < 0).sum()), int(worst.isnull().sum())
         lost = f", {gone} without an equilibrium" if gone else ""
         words.append(
-            f"{place} to {range_text(worst, abs(worst) * error)} /s ({kept} of {part.sizes['case']} stable{lost}), "
-            f"moving it by {range_text(moved, moved * error, 1e3)} mm, with a mean force up of "
-            f"{range_text(lift, abs(lift) * error)} % of its weight and a braking torque of "
-            f"{range_text(torque, abs(torque) * error)} µN m"
+            f"{place} to {range_text(worst, abs(worst) * error)} /s ({kept} of {part.sizes['case']} stable{lost})"
         )
-    before = part_of(result, next(iter(ROTORS)))["growth_without"].max("mode").values
+    before = part_of(result, ROTORS[0])["growth_without"].max("mode").values
     return (
         f"The plate (infinite slab of 30 mm aluminium, face {DISTANCE * 1e3:g} mm from the floater's centre) changes "
-        f"the growth of the least damped small motion of the article's rotors, in the middle of their stable "
-        f"frequencies, from {before.min():+.1g} to {before.max():+.1g} /s: {'; '.join(words)}."
+        f"the growth rate of the least stable mode of the article's rotors, amid their stable frequencies, from "
+        f"{before.min():+.1g} to {before.max():+.1g} /s: {'; '.join(words)}."
     )
 
 
 STUDY = Study(
     name="plate-damping",
-    summary="what a plate does to each small motion, against its place, conductivity and thickness",
+    summary="what a plate does to each mode, against its place, conductivity and thickness",
     points=damping_points,
     compute=plate_damping,
     gather=gather_damping,

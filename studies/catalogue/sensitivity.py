@@ -1,12 +1,12 @@
-"""What is not known exactly of a rotor and its floater, and what they do with other values of it."""
+"""Which parameter matters: derivatives by each, and what realistic tolerances of all make of a rotor."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from typing import Any
 
 import numpy as np
 import xarray as xr
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 from scipy.special import ndtri
@@ -26,18 +26,18 @@ from ...dynamics.equilibria.equilibrium import EquilibriumError
 from ...geometry.common import Array
 from ...geometry.scene.contents import Floater, Scene
 from ..cli.options import FieldModel
-from ..figures.style import PAGE, PALETTE, panels, styled
-from ..result import variable
-from ..study import Point, Study, by_case, one_case
-from .article import (
-    CONFIGURATIONS,
-    TITLES,
-    article_scene,
+from ..figures.style import PALETTE, legend_below, styled
+from ..result import Columns, columns, variable
+from ..study import Point, Study, case_with, each_case, one_case
+from .article import CONFIGURATIONS, article_scene, levitated_rotors, levitation_of, rotor_label
+from .drawing import (
     by_configuration,
-    levitated_rotors,
-    levitation_of,
-    rotor_label,
-    rotor_panels,
+    configuration_panels,
+    explain,
+    rotor_colors,
+    rotor_places,
+    text_table,
+    uncertain,
 )
 
 MODEL: FieldModel = "cuboid"
@@ -74,6 +74,19 @@ TILTS = (1.0, 2.0)
 """Of the axis from the vertical, degrees."""
 QUANTITIES = ("lowest", "highest", *(f"distance at {f:.0%}" for f in FRACTIONS))
 PLACE = "frequency"
+STEP = 1e-3
+"""Relative step of the central differences; twice that for their error."""
+SEED = 20250706
+COLUMNS: Columns = {
+    "nominal": (("quantity",), "Hz or m", "as it should be"),
+    "derivative": (("parameter", "quantity"), "of the quantity by SI, mm or °", "derivative"),
+    "derivative_error": (("parameter", "quantity"), "as the derivative", "estimated error"),
+    "sample": (("draw", "quantity"), "Hz or m", "with a draw of the tolerances"),
+    "drawn": (("draw", "parameter"), "SI, mm or °", "deviation of the parameter"),
+    "frequency": (("fraction",), "Hz", "frequency at which the distance is asked for"),
+    "leaning_distance": (("lean",), "m", "mean distance with the axis tilted from the vertical"),
+    "leaning_growth": (("lean",), "1/s", "largest growth rate with the axis tilted"),
+}
 
 
 @dataclass(frozen=True, eq=False)
@@ -142,11 +155,6 @@ def levitation(base: Nominal, values: dict[str, float], shift: float = 0.0) -> A
         if row[0] < frequency < row[1]:
             row[k] = at_frequency(scene, rates, middle, float(frequency), LONG_STEPS).distance
     return row
-
-
-STEP = 1e-3
-"""Relative step of the central differences; twice that for their error."""
-SEED = 20250706
 
 
 def points(quick: bool) -> list[Point]:
@@ -221,19 +229,11 @@ def compute(point: Point) -> xr.Dataset:
     slopes, errors = derivatives(base, point["steps"])
     samples, draws = drawn(base, point["samples"])
     distance, growth = leaning(base)
-    data = {
-        "nominal": (("quantity",), levitation(base, base.values), "Hz or m", "as it should be"),
-        "derivative": (("parameter", "quantity"), slopes, "of the quantity by SI, mm or °", "derivative"),
-        "derivative_error": (("parameter", "quantity"), errors, "as the derivative", "estimated error"),
-        "sample": (("draw", "quantity"), samples, "Hz or m", "with a draw of the tolerances"),
-        "drawn": (("draw", "parameter"), draws, "SI, mm or °", "deviation of the parameter"),
-        "frequency": (("fraction",), base.grid, "Hz", "frequency at which the distance is asked for"),
-        "leaning_distance": (("lean",), distance, "m", "mean distance with the axis tilted from the vertical"),
-        "leaning_growth": (("lean",), growth, "1/s", "largest growth rate with the axis tilted"),
-    }
+    found = (levitation(base, base.values), slopes, errors, samples, draws, base.grid, distance, growth)
+    data = columns(COLUMNS, dict(zip(COLUMNS, found, strict=True)))
     lean = variable(("lean",), np.array([0.0, *TILTS]), "°", "tilt of the axis from the vertical")
     axes = {"parameter": list(PARAMETERS), "quantity": list(QUANTITIES), "fraction": list(FRACTIONS), "lean": lean}
-    return one_case(point, xr.Dataset({name: variable(*column) for name, column in data.items()}, axes))
+    return one_case(point, xr.Dataset(data, axes))
 
 
 WORDS = {
@@ -247,147 +247,103 @@ WORDS = {
     "frequency": "frequency",
 }
 MIDDLE = QUANTITIES[3]
+SCALES = {"lowest": (1.0, "Hz"), "highest": (1.0, "Hz"), MIDDLE: (1e3, "mm")}
+"""Quantities of the report, with scale and unit."""
 PERCENTILES = (5, 95)
+BANDS = f"{PERCENTILES[0]} to {PERCENTILES[1]} % of the rotors"
 
 
-def spreads(one: xr.Dataset) -> Array:
+def spreads(one: xr.Dataset) -> xr.DataArray:
     """Standard deviation of each parameter by its tolerance (SI, mm or °), for one rotor."""
-    known = list(PARAMETERS.values())
-    result = np.array([k.spread if k.normal else k.spread / np.sqrt(3) for k in known])
+    found = {name: known.spread / (1 if known.normal else np.sqrt(3)) for name, known in PARAMETERS.items()}
     if str(one["configuration"].values) == "tilt":
-        result[list(PARAMETERS).index("measure")] = TILT_SPREAD
-    return np.asarray(result)
+        found["measure"] = TILT_SPREAD
+    return xr.DataArray(list(found.values()), {"parameter": list(found)}, "parameter")
 
 
 @styled
-def contributions_figure(result: xr.Dataset, quantity: str, scale: float, words: str) -> Figure:
+def contributions_figure(result: xr.Dataset, quantity: str, words: str) -> Figure:
     """What one standard deviation of each parameter does to distance or lowest frequency."""
-    figure, (axes,) = panels(1, 3, (PAGE, 3.4), sharey=True)
-    for panel, (configuration, part) in zip(axes, by_configuration(result), strict=False):
-        panel.set(title=TITLES[configuration], xlabel=words)
-        _contributions(panel, part, quantity, scale)
-    axes[0].invert_yaxis()
+    figure, rows = configuration_panels(result, 3.6, words, sharey=True)
+    names = [name for name in PARAMETERS if name != "gravity"]
+    places = np.arange(len(names))
+    for axes, configuration, part in rows:
+        width = 0.8 / part.sizes["case"]
+        for k, (measure, color) in enumerate(rotor_colors(figure, axes, configuration, part["measure"]).items()):
+            one = case_with(part, measure=measure).sel(quantity=quantity)
+            value, error = (
+                abs(SCALES[quantity][0] * one[name] * spreads(one)).sel(parameter=names)
+                for name in ("derivative", "derivative_error")
+            )
+            axes.barh(places + (k + 0.5) * width - 0.4, value, width, xerr=error, color=color, error_kw={"lw": 0.7})
+        axes.xaxis.set_major_locator(MaxNLocator(4))
+    rows[0][0].set_yticks(places, [WORDS[name] for name in names])
+    rows[0][0].invert_yaxis()
     return figure
 
 
 @styled
-def frequency_bands_figure(result: xr.Dataset) -> Figure:
-    """Lowest and highest stable frequency of the rotors within all tolerances together."""
-    figure, axes = rotor_panels(result, 2.5)
-    for panel, (_, part) in zip(axes, by_configuration(result), strict=False):
-        places = np.arange(part.sizes["case"], dtype=float)
-        for name, color in (("lowest", PALETTE[0]), ("highest", PALETTE[1])):
-            _box(panel, part, name, places, color, 1.0, f"{name} frequency")
-    axes[0].set_ylabel(f"stable frequencies (Hz),\n{PERCENTILES[0]} to {PERCENTILES[1]} % of the rotors")
-    axes[0].legend()
-    return figure
-
-
-@styled
-def distance_bands_figure(result: xr.Dataset) -> Figure:
-    """Distance in mid-range of the rotors within all tolerances together."""
-    figure, axes = rotor_panels(result, 2.5)
-    for panel, (_, part) in zip(axes, by_configuration(result), strict=False):
-        _box(panel, part, MIDDLE, np.arange(part.sizes["case"], dtype=float), PALETTE[2], 1e3, "distance")
-    axes[0].set_ylabel(f"distance in mid-range (mm),\n{PERCENTILES[0]} to {PERCENTILES[1]} % of the rotors")
+def bands_figure(result: xr.Dataset, quantities: Sequence[str], words: str) -> Figure:
+    """Quantities of the rotors within all tolerances together."""
+    figure, rows = configuration_panels(result, 2.6, ylabel=words, sharey=True)
+    for axes, configuration, part in rows:
+        for name, color in zip(quantities, PALETTE, strict=False):
+            middle, low, high = SCALES[name][0] * band(part, name)
+            style: Any = {"fmt": "s", "ms": 4, "capsize": 3, "color": color, "label": name}
+            axes.errorbar(rotor_places(axes, configuration, part), middle, [middle - low, high - middle], **style)
+    explain(rows[0][0], {f"median, and {BANDS}": "s"}, ms=4)
+    legend_below(figure, rows[0][0])
     return figure
 
 
 FIGURES: dict[str, Callable[[xr.Dataset], Figure]] = {
     "sensitivity-distance": partial(
-        contributions_figure, quantity=MIDDLE, scale=1e3, words="change of the distance (mm)"
+        contributions_figure, quantity=MIDDLE, words="change of the distance (mm)\nby one standard deviation"
     ),
     "sensitivity-frequency": partial(
-        contributions_figure, quantity="lowest", scale=1.0, words="change of the lowest\nstable frequency (Hz)"
+        contributions_figure, quantity="lowest", words="change of the lowest frequency\n(Hz) by one standard deviation"
     ),
-    "sensitivity-distance-band": distance_bands_figure,
-    "sensitivity-frequency-band": frequency_bands_figure,
+    "sensitivity-distance-band": partial(bands_figure, quantities=[MIDDLE], words="distance in mid-range (mm)"),
+    "sensitivity-frequency-band": partial(
+        bands_figure, quantities=["lowest", "highest"], words="stable frequencies (Hz)"
+    ),
 }
 
 
-def _contributions(axes: Axes, part: xr.Dataset, quantity: str, scale: float) -> None:
-    names = [name for name in PARAMETERS if name != "gravity"]
-    places, count = np.arange(len(names)), part.sizes["case"]
-    for k in range(count):
-        one = part.isel(case=k)
-        sizes = xr.DataArray(scale * spreads(one), dims="parameter", coords={"parameter": one["parameter"]})
-        value, error = (
-            np.abs((one[name].sel(quantity=quantity) * sizes).sel(parameter=names).values)
-            for name in ("derivative", "derivative_error")
-        )
-        kind = str(one["configuration"].values)
-        axes.barh(
-            places + (k - (count - 1) / 2) * 0.8 / count, value, 0.8 / count, xerr=error, color=PALETTE[k],
-            label=rotor_label(kind, float(one["measure"])), error_kw={"lw": 0.7},
-        )  # fmt: skip
-    axes.set_yticks(places, [WORDS[name] for name in names])
-    axes.xaxis.set_major_locator(MaxNLocator(4))
-    axes.legend(ncols=2, loc="upper center", bbox_to_anchor=(0.5, -0.2), columnspacing=1.0)
-
-
-def _box(axes: Axes, part: xr.Dataset, quantity: str, places: Array, color: str, scale: float, label: str) -> None:
-    middle, low, high = scale * band(part, quantity)
-    axes.errorbar(places, middle, [middle - low, high - middle], fmt="s", ms=4, capsize=3, color=color, label=label)
-
-
 def band(part: xr.Dataset, quantity: str) -> Array:
-    """Median and the two percentiles (3, case) of what the tolerances give."""
+    """Median and the two percentiles (3, ...) of what the tolerances give."""
     values = part["sample"].sel(quantity=quantity).values
-    return np.asarray(np.nanpercentile(values, [50, *PERCENTILES], axis=1))
+    return np.asarray(np.nanpercentile(values, [50, *PERCENTILES], axis=-1))
 
 
 def sensitivity_lines(result: xr.Dataset) -> list[str]:
-    """Derivatives by the measure, what sub-millimetre precision buys, and the bands."""
-    lines = []
+    """Derivatives by the measure, the bands, the leading tolerances and what a tilted axis does, for each rotor."""
+    slopes, bands, leading, leans = [], [], [], []
     for configuration, part in by_configuration(result):
-        for k in range(part.sizes["case"]):
-            one = part.isel(case=k)
-            unit, head = CONFIGURATIONS[configuration].unit, rotor_label(configuration, float(one["measure"]))
-            lines += [f"{head}: {line}" for line in (_by_measure(one, unit), _all(one), _leading(one), _lean(one))]
-    return lines
-
-
-def _by_measure(one: xr.Dataset, unit: str) -> str:
-    slope = one["derivative"].sel(parameter="measure")
-    doubt = one["derivative_error"].sel(parameter="measure")
-    words = [
-        f"{name} {float(slope.sel(quantity=name)):+.3g}{_doubt(float(doubt.sel(quantity=name)))} Hz/{unit}"
-        for name in ("lowest", "highest")
+        for one in each_case(part):
+            head = rotor_label(configuration, float(one["measure"]))
+            slope, doubt = (one[name].sel(parameter="measure") for name in ("derivative", "derivative_error"))
+            ends = [uncertain(slope.sel(quantity=q), doubt.sel(quantity=q)) for q in QUANTITIES[:2]]
+            slopes.append((f"{head}, per {CONFIGURATIONS[configuration].unit}", *ends, *(1e3 * slope.values[2:])))
+            ranges = [scale * band(one, name) for name, (scale, _) in SCALES.items()]
+            bands.append((head, *(f"{middle:.2f} ({low:.2f} to {high:.2f})" for middle, low, high in ranges)))
+            leading.append((head, *(_leading(one, quantity) for quantity in SCALES)))
+            distance, growth = 1e3 * one["leaning_distance"].values, one["leaning_growth"].values
+            leans.append((head, *(f"{d:+.4f}" for d in distance[1:] - distance[0]), *(f"{g:.1e}" for g in growth[1:])))
+    names = [f"{quantity} ({unit})" for quantity, (_, unit) in SCALES.items()]
+    leaning = [f"{words}, {tilt:g}°" for words in ("distance (mm)", "growth (1/s)") for tilt in TILTS]
+    return [
+        *text_table(("derivative", "lowest (Hz)", "highest (Hz)", *(f"{q} (mm)" for q in QUANTITIES[2:])), slopes),
+        *text_table((f"within tolerance: median, {BANDS}", *names), bands),
+        *text_table(("leading tolerances, one standard deviation", *names), leading),
+        *text_table(("change with the axis tilted from the vertical", *leaning), leans),
     ]
-    along = [1e3 * float(slope.sel(quantity=name)) for name in QUANTITIES[2:]]
-    words += [f"distance {a:+.2f} mm/{unit} at {f:.0%} of the range" for a, f in zip(along, FRACTIONS, strict=True)]
-    steepest = np.nanmax(np.abs(along))
-    return "; ".join(words) + f"; 1 mm of distance is {1 / steepest:.2g} {unit}"
 
 
-def _doubt(error: float) -> str:
-    return f" ± {error:.1g}" if np.isfinite(error) else ""
-
-
-def _all(one: xr.Dataset) -> str:
-    expanded = one.expand_dims("case")
-    words = []
-    for name, scale, unit in (("lowest", 1.0, "Hz"), ("highest", 1.0, "Hz"), (MIDDLE, 1e3, "mm")):
-        middle, low, high = (scale * float(v[0]) for v in band(expanded, name))
-        words.append(f"{name} {middle:.2f} {unit} ({low:.2f} to {high:.2f})")
-    return "within tolerance " + "; ".join(words)
-
-
-def _leading(one: xr.Dataset) -> str:
-    words = []
-    for quantity, scale, unit in ((MIDDLE, 1e3, "mm"), ("lowest", 1.0, "Hz"), ("highest", 1.0, "Hz")):
-        parts = np.abs(one["derivative"].sel(quantity=quantity).values) * spreads(one) * scale
-        order = np.argsort(-np.nan_to_num(parts))[:3]
-        words.append(f"{quantity}: " + ", ".join(f"{WORDS[list(PARAMETERS)[k]]} {parts[k]:.2g} {unit}" for k in order))
-    return "leading tolerances (one standard deviation), " + "; ".join(words)
-
-
-def _lean(one: xr.Dataset) -> str:
-    distance, growth = 1e3 * one["leaning_distance"].values, one["leaning_growth"].values
-    return "axis tilted from the vertical: " + ", ".join(
-        f"by {t:g}° {d - distance[0]:+.4f} mm, growth {g:.1e} /s"
-        for t, d, g in zip(TILTS, distance[1:], growth[1:], strict=True)
-    )
+def _leading(one: xr.Dataset, quantity: str) -> str:
+    """The three parameters whose tolerances matter most."""
+    parts = np.nan_to_num(np.abs(one["derivative"].sel(quantity=quantity) * spreads(one)) * SCALES[quantity][0])
+    return ", ".join(f"{WORDS[list(PARAMETERS)[k]]} {parts[k]:.2g}" for k in np.argsort(-parts)[:3])
 
 
 STUDY = Study(
@@ -395,7 +351,6 @@ STUDY = Study(
     summary="which parameter matters: derivatives of distance and limits, and bands of realistic tolerances",
     points=points,
     compute=compute,
-    gather=by_case,
     figures=FIGURES,
     report=sensitivity_lines,
 )

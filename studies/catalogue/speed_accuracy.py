@@ -1,4 +1,4 @@
-"""Every way to compute the rotor's field, by name, for the study of speed against error."""
+"""Every way to compute the rotor's field: its error against what it costs."""
 
 import os
 import tempfile
@@ -33,10 +33,12 @@ from ...geometry.magnets import Magnet
 from ...geometry.meshes.magnets import MeshSettings, mesh_magnets
 from ...geometry.rotor import horizontal
 from ..cli.console import note
-from ..figures.style import PAGE, PALETTE, panels, styled
+from ..figures.style import PALETTE, legend_below, styled
 from ..processes import safe_path
-from ..result import variable
+from ..result import Columns, columns, variable
 from ..study import study_of_one
+from .article import EDGE, REMANENCE
+from .drawing import explain, small_multiples, text_table
 
 Magnets = tuple[Magnet, ...]
 INNER_SPHERE = 0.0087
@@ -152,25 +154,33 @@ class Measured:
     ----------
     field, gradient : (d, n, 3) T and (d, n, 3, 3) T/m
     stated : (d,) largest error of B that the table states
-    unknowns : degrees of freedom
-    seconds : from nothing to the field at the points, and `cpu_seconds` of the processor
-    memory : what the process grew by, bytes
-    per_point : seconds per point of an evaluation of B and its gradient at many
+    costs : by name, see `COSTS`
     """
 
     field: Array
     gradient: Array
     stated: Array
-    unknowns: int
-    seconds: float
-    cpu_seconds: float
-    memory: float
-    per_point: float
+    costs: dict[str, float]
+
+
+COSTS: Columns = {
+    "unknowns": (("approach",), "1", "degrees of freedom"),
+    "seconds": (("approach",), "s", "time from nothing"),
+    "cpu_seconds": (("approach",), "s", "processor time from nothing"),
+    "memory": (("approach",), "B", "memory that it took"),
+    "per_point": (("approach",), "s", "time of B and its gradient per point"),
+}
+ERRORS: Columns = {
+    "field_error": (("approach", "distance"), "1", "largest relative error of B"),
+    "gradient_error": (("approach", "distance"), "1", "largest relative error of grad B"),
+    "stated_error": (("approach", "distance"), "1", "error of B that is stated"),
+    "truth_error": (("approach", "distance"), "1", "error of the reference itself"),
+}
 
 
 def cube(problem: str) -> tuple[Magnet, ...]:
     """The article's cube at the origin."""
-    return horizontal(0.0, 0.01, 1.305, PERMEABILITIES[problem])
+    return horizontal(0.0, EDGE, REMANENCE, PERMEABILITIES[problem])
 
 
 def sphere_points(number: int = 200) -> Array:
@@ -181,29 +191,34 @@ def sphere_points(number: int = 200) -> Array:
 
 def measure(name: str, quick: bool, timed_points: int = TIMED_POINTS) -> Measured:
     """Run one method of the catalogue, and its table at `timed_points`; meant for a fresh process."""
-    catalogue = methods(quick)
-    method = catalogue[name]
-    magnets, points = cube(method.problem), sphere_points()
+    method = methods(quick)[name]
+    magnets = cube(method.problem)
     compiled(hy.cfunc, [hy.expression("x")], [hy.expression("x")])  # the compiler's own start is nobody's cost
     memory = _memory("VmRSS")
     Path("/proc/self/clear_refs").write_text("5")  # the peak counts from here (Linux)
     began, processor = time.perf_counter(), time.process_time()
     table, unknowns = method.build(magnets)
-    b, g = table.evaluate(points.reshape(-1, 3))
+    field, gradient = _at_points(table)
     seconds, cpu_seconds = time.perf_counter() - began, time.process_time() - processor
     grown = _memory("VmHWM") - memory
-    stated = table.relative_error(points.reshape(-1, 3))[0].reshape(points.shape[:2]).max(axis=1)
-    shape = points.shape
-    return Measured(
-        b.reshape(shape),
-        g.reshape(*shape, 3),
-        stated,
-        unknowns,
-        seconds,
-        cpu_seconds,
-        grown,
-        _pace(table, timed_points),
-    )
+    many = _many(timed_points)
+    table.evaluate(many)
+    pace = _fastest(lambda: table.evaluate(many)) / timed_points
+    costs = dict(zip(COSTS, (unknowns, seconds, cpu_seconds, grown, pace), strict=True))
+    return Measured(field, gradient, _stated(table), costs)
+
+
+def _at_points(table: FieldTable) -> tuple[Array, Array]:
+    """B (d, n, 3) and its gradient (d, n, 3, 3) at `sphere_points`."""
+    points = sphere_points()
+    b, g = table.evaluate(points.reshape(-1, 3))
+    return b.reshape(points.shape), g.reshape(*points.shape, 3)
+
+
+def _stated(table: FieldTable) -> Array:
+    """Largest relative error (d,) of B that a table states of these."""
+    points = sphere_points()
+    return np.asarray(table.relative_error(points.reshape(-1, 3))[0].reshape(points.shape[:2]).max(axis=1))
 
 
 def _memory(entry: str) -> float:
@@ -212,18 +227,11 @@ def _memory(entry: str) -> float:
     return 1024.0 * next(float(line.split()[1]) for line in lines if line.startswith(entry))
 
 
-def _pace(table: FieldTable, number: int) -> float:
-    """Seconds per point of the fastest of five evaluations."""
-    points = _many(number)
-    table.evaluate(points)
-    return _fastest(lambda: table.evaluate(points)) / number
-
-
 def _fastest(work: Callable[[], object]) -> float:
     return min(timeit.repeat(work, timer=time.process_time, number=1))
 
 
-def _many(number: int = TIMED_POINTS) -> Array:
+def _many(number: int) -> Array:
     """Where a floater may be: all around, 13 to 40 mm from the cube's centre."""
     rng = np.random.default_rng(0)
     way = rng.normal(size=(number, 3))
@@ -233,7 +241,7 @@ def _many(number: int = TIMED_POINTS) -> Array:
 def peer_pace() -> float:
     """Seconds per point of magpylib's B alone for the same cube."""
     peer = magpylib.magnet.Cuboid(polarization=(1.305, 0, 0), dimension=(0.01,) * 3)
-    points = _many()
+    points = _many(TIMED_POINTS)
     peer.getB(points[:10])
     return _fastest(lambda: peer.getB(points)) / TIMED_POINTS
 
@@ -253,6 +261,8 @@ def _measured_with(cache: str, name: str, quick: bool) -> Measured:
 
 TRUTH_TOLERANCE, QUICK_TRUTH = 1e-9, 1e-8
 """Asked of the reference, in 24 and in 4 s of processor time."""
+ROUND_OFF = 1e-13
+"""What is stated of a model that has no error but that."""
 
 
 def speed_accuracy(quick: bool, names: Sequence[str] | None = None, truth: float | None = None) -> xr.Dataset:
@@ -265,31 +275,20 @@ def speed_accuracy(quick: bool, names: Sequence[str] | None = None, truth: float
     """
     catalogue = {name: method for name, method in methods(quick).items() if names is None or name in names}
     asked = truth or (QUICK_TRUTH if quick else TRUTH_TOLERANCE)
-    truths = {problem: _truth(problem, asked) for problem in PERMEABILITIES}
-    rows = []
-    for name in catalogue:
+    truths = {}
+    for problem in PERMEABILITIES:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", AccuracyWarning)  # its own error is stored, whatever it is
+            table = rotor_table(cube(problem), "auto", asked)
+        truths[problem] = *_at_points(table), _stated(table)
+    errors, costs = [], []
+    for name, method in catalogue.items():
         note(f"  {name} ...")
-        rows.append(apart(name, quick))
-    exact = [truths[method.problem] for method in catalogue.values()]
-    errors = [
-        (_largest(row.field, b, 1), _largest(row.gradient, g, 2)) for row, (b, g, _) in zip(rows, exact, strict=True)
-    ]
-    dims = ("approach", "distance")
-    data = {
-        "field_error": variable(dims, np.array([e for e, _ in errors]), "1", "largest relative error of B"),
-        "gradient_error": variable(dims, np.array([e for _, e in errors]), "1", "largest relative error of grad B"),
-        "stated_error": variable(dims, np.array([row.stated for row in rows]), "1", "error of B that is stated"),
-        "truth_error": variable(dims, np.array([own for _, _, own in exact]), "1", "error of the reference itself"),
-    }
-    costs = {
-        "unknowns": ("1", "degrees of freedom"),
-        "seconds": ("s", "time from nothing"),
-        "cpu_seconds": ("s", "processor time from nothing"),
-        "memory": ("B", "memory that it took"),
-        "per_point": ("s", "time of B and its gradient per point"),
-    }
-    for key, (units, label) in costs.items():
-        data[key] = variable(("approach",), np.array([float(getattr(row, key)) for row in rows]), units, label)
+        row, (b, g, own) = apart(name, quick), truths[method.problem]
+        errors.append([_largest(row.field, b, 1), _largest(row.gradient, g, 2), row.stated, own])
+        costs.append(list(row.costs.values()))
+    data = columns(ERRORS, dict(zip(ERRORS, np.array(errors).swapaxes(0, 1), strict=True)))
+    data |= columns(COSTS, dict(zip(COSTS, np.array(costs, float).T, strict=True)))
     coords = {
         "approach": list(catalogue),
         "family": (("approach",), [method.family for method in catalogue.values()]),
@@ -299,86 +298,60 @@ def speed_accuracy(quick: bool, names: Sequence[str] | None = None, truth: float
     return xr.Dataset(data, coords, {"magpylib_seconds_per_point": peer_pace()})
 
 
-def _truth(problem: str, rtol: float) -> tuple[Array, Array, Array]:
-    """B, its gradient and the stated relative error (d,) of B at the points."""
-    points = sphere_points()
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", AccuracyWarning)  # its own error is stored, whatever it is
-        table = rotor_table(cube(problem), "auto", rtol)
-    b, g = table.evaluate(points.reshape(-1, 3))
-    own = table.relative_error(points.reshape(-1, 3))[0].reshape(points.shape[:2]).max(axis=1)
-    return b.reshape(points.shape), g.reshape(*points.shape, 3), own
-
-
 def _largest(values: Array, truth: Array, rank: int) -> Array:
     """Largest relative error (d,) over the points of each distance."""
     axes = tuple(range(2, 2 + rank))
     return np.asarray((np.linalg.norm(values - truth, axis=axes) / np.linalg.norm(truth, axis=axes)).max(axis=1))
 
 
-ROUND_OFF = 1e-13
-"""What is stated of a model that has no error but that."""
-
-
 def speed_lines(result: xr.Dataset) -> list[str]:
     """The table of the study."""
-    head = " ".join(f"{1e3 * d:4.0f} mm" + " " * 8 for d in result["distance"].values)
-    lines = [
-        "Largest relative error of B / of its gradient, and what it costs from nothing",
-        f"{'method':26} {'s':>7} {'CPU s':>7} {'unknowns':>9} {'MB':>6} {'ns/pt':>6}  {head}",
-    ]
+    rows = []
     for name in result["approach"].values:
         row = result.sel(approach=name)
         pairs = zip(row["field_error"].values, row["gradient_error"].values, strict=True)
-        lines.append(
-            f"{name:26} {float(row['seconds']):7.2f} {float(row['cpu_seconds']):7.2f} {int(row['unknowns']):9d} "
-            f"{float(row['memory']) / 1e6:6.0f} {1e9 * float(row['per_point']):6.0f}  "
-            + "  ".join(f"{b:.0e} / {g:.0e}" for b, g in pairs)
-        )
-    pace = 1e9 * result.attrs["magpylib_seconds_per_point"]
-    lines.append(f"magpylib, B alone: {pace:.0f} ns per point")
-    own = result["truth_error"].where(result["problem"] == "permeable").max()
-    return [*lines, f"The reference for μr = 1.05 states an error of at most {float(own):.1e}; for μr = 1 it is exact."]
+        costs = [float(row[key]) * scale for key, scale in (("memory", 1e-6), ("per_point", 1e9))]
+        times = [f"{float(row[key]):.2f}" for key in ("seconds", "cpu_seconds")]
+        errors = [f"{b:.0e} / {g:.0e}" for b, g in pairs]
+        rows.append((name, *times, str(int(row["unknowns"])), *(f"{cost:.0f}" for cost in costs), *errors))
+    distances = [f"{1e3 * distance:g} mm" for distance in result["distance"].values]
+    own = float(result["truth_error"].where(result["problem"] == "permeable").max())
+    return [
+        "Largest relative error of B / of its gradient, and what it costs from nothing",
+        *text_table(("method", "s", "CPU s", "unknowns", "MB", "ns/point", *distances), rows),
+        f"magpylib, B alone: {1e9 * result.attrs['magpylib_seconds_per_point']:.0f} ns per point",
+        f"The reference for μr = 1.05 states an error of at most {own:.1e}; for μr = 1 it is exact.",
+    ]
 
 
 @styled
 def speed_figure(result: xr.Dataset) -> Figure:
-    """Error of B at 20 mm (full) and 13 mm (faint) against the time from nothing, for both problems.
-
-    Where a table estimates its own error, a bar reaches from the true error up to the stated one.
-    """
-    figure, (axes,) = panels(1, 2, (PAGE, 3.4), sharey=True)
+    """Error of B at 20 mm against the time from nothing, for both problems; open: the error that is stated."""
     titles = {"exact": "μr = 1 (closed form known)", "permeable": "μr = 1.05"}
-    families = list(dict.fromkeys(result["family"].values.tolist()))
-    for panel, (problem, title) in zip(axes, titles.items(), strict=True):
+    words = "processor time from nothing (s)", "relative error of B at 20 mm"
+    figure, axes = small_multiples(list(titles.values()), 3.4, 2, *words, sharey=True)
+    at = result.sel(distance=0.02)
+    families = dict.fromkeys(result["family"].values.tolist())
+    for panel, problem in zip(axes, titles, strict=True):
         for family, color in zip(families, [*PALETTE, "0.4"], strict=False):
-            rows = result.isel(approach=np.flatnonzero((result["family"] == family) & (result["problem"] == problem)))
-            if not rows.sizes["approach"]:
-                continue
-            for distance, alpha, label in ((0.02, 1.0, family), (0.013, 0.35, None)):
-                at = rows.sel(distance=distance)
-                error = np.maximum(at["field_error"], 1e-16)
-                stated = np.where(at["stated_error"] > ROUND_OFF, np.maximum(at["stated_error"] - error, 0.0), 0.0)
-                bars = [np.zeros_like(stated), stated] if stated.any() else None
-                style = {"ms": 4, "capsize": 2.5, "elinewidth": 1, "color": color, "alpha": alpha, "label": label}
-                panel.errorbar(rows["cpu_seconds"], error, bars, fmt="o-", **style)
-        panel.set(xscale="log", yscale="log")
-        own = float(result["truth_error"].where(result["problem"] == problem).sel(distance=0.02).max())
+            rows = at.isel(approach=np.flatnonzero((at["family"] == family) & (at["problem"] == problem)))
+            panel.loglog(rows["cpu_seconds"], np.maximum(rows["field_error"], 1e-16), "o-", ms=4, color=color)
+            stated = rows["stated_error"].where(rows["stated_error"] > ROUND_OFF)
+            panel.loglog(rows["cpu_seconds"], stated, "o", mfc="none", ms=4, color=color)
+            explain(panel, {family: "o-"}, color=color, ms=4)
+        own = float(at["truth_error"].where(at["problem"] == problem).max())
         panel.axhspan(1e-17, max(own, 1e-16), facecolor="0.9", edgecolor="0.6", label="error of the reference")
-        panel.set(xlabel="processor time from nothing (s)", title=title, ylim=(1e-16, None))
-        panel.legend(frameon=True)
-    axes[0].set_ylabel("relative error of B")
+        panel.set_ylim(1e-16, None)
+    explain(axes[0], {"error that the table states": "o"}, mfc="none", ms=4)
+    legend_below(figure, axes[0], columns=4)
     return figure
-
-
-FIGURES = {"speed-accuracy": speed_figure}
 
 
 STUDY = study_of_one(
     name="speed-accuracy",
     summary="error of B and of its gradient against time, unknowns and memory, for every way to the rotor's field",
     compute=speed_accuracy,
-    figures=FIGURES,
+    figures={"speed-accuracy": speed_figure},
     report=speed_lines,
     timed=True,
 )

@@ -19,23 +19,24 @@ from ...geometry.common import Array
 from ...geometry.scene.contents import Drag, Plate
 from ...geometry.shapes import Box
 from ..cli.console import note
-from ..figures.style import COLORS, NAMES, PAGE, PALETTE, panels, styled
+from ..figures.style import COLORS, NAMES, PALETTE, legend_below, styled
 from ..levitation import Levitation
-from ..result import variable
-from ..study import Point, Study, by_case, cases_with, one_case
+from ..result import Columns, columns
+from ..study import Point, Study, cases_with, each_case, one_case
 from .article import (
     CONFIGURATIONS,
     FLIGHT,
+    MODELS,
     PLATE_CONDUCTIVITY,
     PLATE_SIZE,
-    TITLES,
+    QUICK_ROTORS,
     article_scene,
-    axis_label,
-    by_configuration,
     conducting,
+    label_of,
     levitation_of,
     rotor_label,
 )
+from .drawing import by_configuration, configuration_panels, explain, text_table
 
 MEASURES = {
     "horizontal": (0.5, 1.0, 1.5, 2.0, 2.5, 3.0, 3.5, 4.0, 5.0, 6.0, 7.0, 8.0),
@@ -50,12 +51,36 @@ BEYOND = 1.15
 """How far above the last stable frequency the plate is tried."""
 
 
+FACE = -0.045
+"""Height of the plate's upper face below the rotor's origin, m: no floater that levitates touches it."""
+METAL = {"insulating": False, "conducting": True}
+"""The rotor's magnets: whether they have eddy currents."""
+LASTING: Columns = {
+    "low": (("metal",), "Hz", "lowest frequency at which flights last"),
+    "high": (("metal",), "Hz", "highest frequency up to which flights last"),
+    "growth_per_s": (("metal",), "1/s", "largest growth rate of a mode in the flight there"),
+}
+INTERVAL: Columns = {
+    "lowest": (("interval",), "Hz", "lower end of an interval of stability"),
+    "highest": (("interval",), "Hz", "upper end of an interval of stability"),
+    "distance_lowest": (("interval",), "m", "distance at the lower end"),
+    "distance_highest": (("interval",), "m", "distance at the upper end"),
+    "leading_highest": (("interval",), "Hz", "frequency of the mode that becomes unstable at the upper end"),
+}
+PLATE: Columns = {
+    "plate_frequency": (("tried",), "Hz", "frequency at which a plate below is tried"),
+    "plate_growth": (("tried",), "1/s", "largest growth rate with a plate below"),
+    "plate_distance": (("tried",), "m", "distance with a plate below"),
+    "plate_error": (("tried",), "1", "estimated relative error of the plate's table"),
+}
+
+
 def points(quick: bool) -> list[Point]:
     """All rotors with both models; with the plate, and flights, the rotors that levitated in the article.
 
     `quick` leaves out the mutual magnetisation and the flights.
     """
-    rotors = {"horizontal": (2.0,), "vertical": (14.0,), "tilt": (10.0,)} if quick else MEASURES
+    rotors = {name: (value,) for name, value in QUICK_ROTORS} if quick else MEASURES
     return [
         {
             "configuration": c, "measure": m, "model": model, "with_plate": (2 if quick else 5) if known else 0,
@@ -81,45 +106,19 @@ def compute(point: Point, rtol: float = RTOL) -> xr.Dataset:
         rows[:, k] = [*(e.parameter for e in ends), *(e.distance for e in ends), run.high.leading_hz]
         kinds[:, k] = [e.kind for e in ends]
     plate = _with_plate(levitation, found[0] if found else None, point["with_plate"])
-    data = {
-        name: variable(("interval",), row, *words) for (name, words), row in zip(INTERVAL.items(), rows, strict=True)
-    }
-    data |= {name: variable(("tried",), row, *words) for (name, words), row in zip(PLATE.items(), plate.T, strict=True)}
+    data = columns(INTERVAL, dict(zip(INTERVAL, rows, strict=True))) | columns(
+        PLATE, dict(zip(PLATE, plate.T, strict=True))
+    )
     if "flights" in point:
         data |= _flights(levitation, found[0] if found and point["flights"] else None)
     data |= {name: xr.Variable(("interval",), row) for name, row in zip(("low_kind", "high_kind"), kinds, strict=True)}
     return one_case(point, xr.Dataset(data))
 
 
-METAL = {"insulating": False, "conducting": True}
-"""The rotor's magnets: whether they have eddy currents."""
-LASTING = {
-    "low": ("Hz", "lowest frequency at which flights last"),
-    "high": ("Hz", "highest frequency up to which flights last"),
-    "growth_per_s": ("1/s", "largest growth rate of a small motion in the flight there"),
-}
-INTERVAL = {
-    "lowest": ("Hz", "lower end of an interval of stability"),
-    "highest": ("Hz", "upper end of an interval of stability"),
-    "distance_lowest": ("m", "distance at the lower end"),
-    "distance_highest": ("m", "distance at the upper end"),
-    "leading_highest": ("Hz", "frequency of the motion that becomes unstable at the upper end"),
-}
-PLATE = {
-    "plate_frequency": ("Hz", "frequency at which a plate below is tried"),
-    "plate_growth": ("1/s", "largest growth rate with a plate below"),
-    "plate_distance": ("m", "distance with a plate below"),
-    "plate_error": ("1", "estimated relative error of the plate's table"),
-}
-
-
 def _flights(alone: Levitation, stable: StableRange | None) -> dict[str, xr.Variable]:
     """Where flights last, without and with currents in the rotor's magnets."""
     found = [_lasting(alone, stable, metal) if stable else Lasting() for metal in METAL]
-    data = {
-        name: variable(("metal",), np.array([getattr(one, name) for one in found]), *words)
-        for name, words in LASTING.items()
-    }
+    data = columns(LASTING, {name: np.array([getattr(one, name) for one in found]) for name in LASTING})
     data["ended_by"] = xr.Variable(("metal",), np.array([one.ended_by for one in found], "U12"))
     return {**data, "metal": xr.Variable(("metal",), list(METAL))}
 
@@ -160,118 +159,97 @@ def _with_plate(alone: Levitation, stable: StableRange | None, number: int) -> A
     return rows
 
 
-MODELS = ("dipole", "fem")
-FACE = -0.045
-"""Height of the plate's upper face below the rotor's origin, m: no floater that levitates touches it."""
-MARKERS = {"fold": "^", "oscillatory": "o", "real": "D", "contact": "v", "border": "_"}
-MARKS = {"insulating": ("<", "flights of 250 s last up to here"), "conducting": ("*", "… with currents in the rotor")}
-"""Marks of where averaged flights last, without and with eddy currents in the rotor's magnets."""
-MEANINGS = {
-    "fold": "fold: no equilibrium beyond",
-    "oscillatory": "growing oscillation (Hopf)",
-    "real": "growing without oscillation",
-    "contact": "contact with the rotor",
-    "border": "end of the search",
+MARKERS = {
+    "fold": ("^", "fold: no equilibrium beyond"),
+    "oscillatory": ("o", "growing oscillation (Hopf)"),
+    "real": ("D", "growing without oscillation"),
+    "contact": ("v", "contact with the rotor"),
+    "border": ("_", "end of the search"),
+}
+VERDICTS = (
+    ("P", PALETTE[4], "plate: stable"),
+    ("x", PALETTE[3], "plate: unstable"),
+    ("1", "0.2", "plate: no equilibrium"),
+)
+MARKS = {
+    "insulating": ("<", f"trajectories last {FLIGHT:g} s up to here"),
+    "conducting": ("*", "… with currents in the rotor"),
 }
 
 
 @styled
 def map_figure(result: xr.Dataset) -> Figure:
     """Regions of stable levitation by dipole and by finite elements, kinds of boundary, and the plate's verdict."""
-    figure, axes = panels(1, 3, (PAGE, 3.9), sharey=True)
-    for place, (configuration, rotors) in zip(axes[0], by_configuration(result), strict=False):
+    figure, rows = configuration_panels(result, 3.9, ylabel="frequency of the rotor (Hz)", sharey=True)
+    for axes, configuration, rotors in rows:
         for model in MODELS:
-            _region(place, cases_with(rotors, model=model), model)
-        _plate(place, cases_with(rotors, model=MODELS[-1]))
-        _lasting_figure(place, cases_with(rotors, model=MODELS[-1]))
-        place.set(
-            xlabel=axis_label(configuration), title=TITLES[configuration], ylim=(20, 410),
-        )  # fmt: skip
-    handles = [
-        *(axes[0, 0].plot([], [], "s", color=COLORS[m], alpha=0.5, label=f"stable: {NAMES[m]}")[0] for m in MODELS),
-        *(axes[0, 0].plot([], [], k, color="0.3", mfc="white", label=MEANINGS[n])[0] for n, k in MARKERS.items()),
-        axes[0, 0].plot([], [], "P", color=PALETTE[4], label=f"stable with a plate {-1e3 * FACE:g} mm below")[0],
-        axes[0, 0].plot([], [], "x", color=PALETTE[3], label="unstable with it")[0],
-        axes[0, 0].plot([], [], "1", color="0.2", label="no equilibrium is left with it")[0],
-    ]
+            _region(axes, cases_with(rotors, model=model), COLORS[model])
+        true = cases_with(rotors, model="fem")
+        growth, frequency = true["plate_growth"].values, true["plate_frequency"].values
+        measure = np.broadcast_to(true["measure"].values[:, None], growth.shape)
+        found = (growth < 0, growth >= 0, np.isnan(growth) & np.isfinite(frequency))
+        for here, (marker, color, _) in zip(found, VERDICTS, strict=True):
+            axes.plot(measure[here], frequency[here], marker, color=color, ms=4, mew=0.8)
+        for metal, (marker, _) in MARKS.items() if "high" in true else ():
+            axes.plot(true["measure"], true["high"].sel(metal=metal), marker, color="k", ms=5)
+        axes.set(xlabel=label_of(configuration), ylim=(20, 410))
+        axes.margins(x=0.08)
+    first = rows[0][0]
+    for model in MODELS:
+        explain(first, {f"stable: {NAMES[model]}": "s"}, color=COLORS[model], alpha=0.5)
+    explain(first, {words: marker for marker, words in MARKERS.values()}, mfc="white")
+    for marker, color, words in VERDICTS:
+        explain(first, {f"{words}, face {-1e3 * FACE:g} mm below": marker}, color=color)
     if "high" in result:
-        handles += [axes[0, 0].plot([], [], mark, color="k", label=words)[0] for mark, words in MARKS.values()]
-    for place in axes[0]:
-        place.margins(x=0.08)
-    axes[0, 0].set_ylabel("frequency of the rotor (Hz)")
-    figure.legend(handles=handles, loc="outside lower center", ncols=3)
+        explain(first, {words: marker for marker, words in MARKS.values()}, color="k")
+    legend_below(figure, first, columns=3)
     return figure
 
 
-FIGURES = {"stability-map": map_figure}
-
-
-def _region(axes: Axes, part: xr.Dataset, model: str) -> None:
+def _region(axes: Axes, part: xr.Dataset, color: str) -> None:
     measure = part["measure"].values
-    low, high = part["lowest"].values, part["highest"].values
     wide = measure if len(measure) > 1 else measure * np.array([0.99, 1.01])  # one rotor alone is a bar
     for k in range(part.sizes["interval"]):
-        bottom, top = (np.broadcast_to(values[:, k], wide.shape) for values in (low, high))
-        axes.fill_between(wide, bottom, top, color=COLORS[model], alpha=0.2, lw=0)
-        for ends, kinds in ((low, part["low_kind"].values), (high, part["high_kind"].values)):
-            axes.plot(measure, ends[:, k], color=COLORS[model], lw=0.8)
-            for kind, marker in MARKERS.items():
-                here = kinds[:, k] == kind
-                axes.plot(measure[here], ends[here, k], marker, color=COLORS[model], mfc="white", ms=4)
-
-
-def _plate(axes: Axes, part: xr.Dataset) -> None:
-    growth, frequency = part["plate_growth"].values, part["plate_frequency"].values
-    measure = np.broadcast_to(part["measure"].values[:, None], growth.shape)
-    gone = np.isnan(growth) & np.isfinite(frequency)
-    for here, style, color in ((growth < 0, "P", PALETTE[4]), (growth >= 0, "x", PALETTE[3]), (gone, "1", "0.2")):
-        axes.plot(measure[here], frequency[here], style, color=color, ms=4, mew=0.8)
-
-
-def _lasting_figure(axes: Axes, part: xr.Dataset) -> None:
-    for metal, (mark, _) in MARKS.items() if "high" in part else ():
-        axes.plot(part["measure"], part["high"].sel(metal=metal), mark, color="k", ms=5)
+        ends = [part[name].values[:, k] for name in ("lowest", "highest")]
+        low, high = (np.broadcast_to(end, wide.shape) for end in ends)
+        axes.fill_between(wide, low, high, color=color, alpha=0.2, lw=0)
+        for values, name in zip(ends, ("low_kind", "high_kind"), strict=True):
+            axes.plot(measure, values, color=color, lw=0.8)
+            for kind, (marker, _) in MARKERS.items():
+                here = part[name].values[:, k] == kind
+                axes.plot(measure[here], values[here], marker, color=color, mfc="white", ms=4)
 
 
 def map_lines(result: xr.Dataset) -> list[str]:
     """Every rotor's intervals by both models, where the plate below keeps or undoes stability, where flights last."""
-    lines = []
-    for configuration, rotors in by_configuration(result):
-        for measure in np.unique(rotors["measure"].values):
-            rows = cases_with(rotors, measure=measure)
-            found = {str(m): rows.isel(case=k) for k, m in enumerate(rows["model"].values)}
-            words = [f"{model} {_intervals(one)}" for model, one in found.items()]
-            verdicts = "".join(_verdicts(one) for one in found.values())
-            flights = "".join(_flights_figure(one) for one in found.values())
-            lines.append(f"{rotor_label(configuration, measure)}: {'; '.join(words)}{verdicts}{flights}")
-    return lines
+    rows = []
+    for configuration, part in by_configuration(result):
+        for one in each_case(part):
+            name = f"{rotor_label(configuration, float(one['measure']))}, {one['model'].item()}"
+            rows.append((name, _intervals(one), _verdicts(one), _lasts(one)))
+    flights = f"trajectories last {FLIGHT:g} s"
+    return text_table(("rotor, model", "stable", "growth with the plate (1/s)", flights), rows)
 
 
 def _intervals(one: xr.Dataset) -> str:
-    rows = zip(
-        one["lowest"].values, one["low_kind"].values, one["highest"].values, one["high_kind"].values, strict=True
-    )
-    words = [f"{low:.1f} ({a}) to {high:.1f} Hz ({b})" for low, a, high, b in rows if np.isfinite(low)]
-    return " and ".join(words) or "never stable"
+    ends = zip(*(one[name].values for name in ("lowest", "low_kind", "highest", "high_kind")), strict=True)
+    words = [f"{low:.1f} ({a}) to {high:.1f} Hz ({b})" for low, a, high, b in ends if np.isfinite(low)]
+    return " and ".join(words) or "never"
 
 
 def _verdicts(one: xr.Dataset) -> str:
     pairs = zip(one["plate_frequency"].values, one["plate_growth"].values, strict=True)
-    words = [f"{f:.0f} Hz {f'{g:+.2g}' if np.isfinite(g) else 'no equilibrium'}" for f, g in pairs if np.isfinite(f)]
-    return f"; growth with the plate (1/s): {', '.join(words)}" if words else ""
+    tried = [f"{f:.0f} Hz {f'{g:+.2g}' if np.isfinite(g) else 'no equilibrium'}" for f, g in pairs if np.isfinite(f)]
+    return ", ".join(tried)
 
 
-def _flights_figure(one: xr.Dataset) -> str:
+def _lasts(one: xr.Dataset) -> str:
     if "high" not in one:
         return ""
-    words = [
-        f"{low:.1f} to {high:.1f} Hz ({metal} rotor; then {end})"
-        for metal, low, high, end in zip(
-            one["metal"].values, one["low"], one["high"], one["ended_by"].values, strict=True
-        )
-        if end
-    ]
-    return f"; flights of 250 s last from {' and '.join(words)}" if words else ""
+    found = zip(*(one[name].values for name in ("metal", "low", "high", "ended_by")), strict=True)
+    return " and ".join(
+        f"{low:.1f} to {high:.1f} Hz ({metal} rotor; then {end})" for metal, low, high, end in found if end
+    )
 
 
 STUDY = Study(
@@ -279,7 +257,6 @@ STUDY = Study(
     summary="regions of stable levitation in frequency and displacement, their boundaries, with and without a plate",
     points=points,
     compute=compute,
-    gather=by_case,
-    figures=FIGURES,
+    figures={"stability-map": map_figure},
     report=map_lines,
 )

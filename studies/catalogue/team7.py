@@ -19,9 +19,10 @@ from ...fem.plate.eddy import solve_eddy
 from ...geometry.common import Array
 from ...geometry.meshes.metal import ConductorMesh
 from ...geometry.meshes.plate import Block, graded_partition, hex_mesh, skin_depth
-from ..figures.style import PAGE, PALETTE, panels, styled
+from ..figures.style import PAGE, PALETTE, legend_below, panels, styled
 from ..result import variable
 from ..study import study_of_one
+from .drawing import explain
 
 CONDUCTIVITY = 3.526e7
 COIL = Racetrack(np.array([0.194, 0.100, 0.099]), (0.2, 0.2), 0.1, 0.025, 0.05, 2742.0)
@@ -71,7 +72,7 @@ def compute_line(frequency: float, x: Array, mesh: ConductorMesh, order: int = 3
 
 
 def team7(order: int = 3) -> xr.Dataset:
-    """Both frequencies against the measurement."""
+    """Measured and computed B_z on the line, in T, and their deviation in units of the line's peak."""
     x, measured = measured_line()
     return compared(x, measured, np.hstack([compute_line(f, x, team7_mesh(f), order) for f in FREQUENCIES]))
 
@@ -89,7 +90,7 @@ def compared(x: Array, measured: Array, computed: Array) -> xr.Dataset:
 
 
 def team7_study(quick: bool) -> xr.Dataset:
-    """Measured and computed B_z on the line, in T, and their deviation in units of the line's peak."""
+    """`team7` by elements of second or third order."""
     return team7(order=2 if quick else 3)
 
 
@@ -129,23 +130,18 @@ def team7_figure(result: xr.Dataset) -> Figure:
         left.plot(x, 1e3 * here["computed"], color=color, label=curve)
         left.plot(x, 1e3 * here["measured"], "o", ms=3.5, color=color)
         right.plot(x, 100 * here["deviation"], "o-", ms=3, color=color, label=curve)
-    left.plot([], [], "-", color="0.3", label="computed (same places)")
-    left.plot([], [], "o", ms=3.5, color="0.3", label="measured (COMPEL 1990)")
+    explain(left, {"computed, at the same places": "-", "measured (COMPEL 1990)": "o"}, ms=3.5)
     right.axhspan(-5, 5, color="0.93", zorder=0)
-    left.set(xlabel="x (mm)", ylabel="$B_z$ (mT)", title="TEAM problem 7: line y = 72 mm, z = 34 mm", ylim=(-3, 12.5))
-    right.set(xlabel="x (mm)", ylabel="computed - measured (% of the line's peak)", title="Deviation", ylim=(-6, 8))
-    left.legend(loc="upper left", ncols=2)
-    right.legend(loc="upper left", ncols=2)
+    left.set(xlabel="x (mm)", ylabel="$B_z$ (mT)", title="Line y = 72 mm, z = 34 mm")
+    right.set(xlabel="x (mm)", ylabel="computed less measured (% of the peak)", title="Deviation")
+    legend_below(figure, left, columns=3)
     return figure
-
-
-FIGURES = {"team7": team7_figure}
 
 
 STUDY = study_of_one(
     name="team7",
     summary="eddy currents against the measurement of TEAM workshop problem 7",
     compute=team7_study,
-    figures=FIGURES,
+    figures={"team7": team7_figure},
     report=team7_lines,
 )

@@ -6,7 +6,6 @@ magnets do, and for displaced cubes one that also has the steel with which the a
 Closed form of μr = 1, rigid floater with its own currents, real air.
 """
 
-from collections.abc import Iterator
 from dataclasses import replace
 from typing import Any
 
@@ -20,16 +19,27 @@ from ...dynamics.motion.state import Scales
 from ...geometry.rotor import Conductor
 from ...geometry.scene.contents import Scene
 from ...geometry.shapes import Box
-from ..figures.style import PAGE, PALETTE, legend_below, panels, styled
-from ..result import variable
-from ..study import Point, Study, by_case, cases_with, one_case
+from ..figures.style import PALETTE, legend_below, styled
+from ..result import Columns, columns
+from ..study import Point, Study, cases_with, each_case, one_case
 from .article import EDGE, FLIGHT, article_scene, conducting, levitated_rotors, levitation_of, rotor_label
+from .drawing import by_configuration, small_multiples, text_table
 
 VARIANTS = ("does not conduct", "magnets conduct", "magnets and spacers conduct")
 STEEL_CONDUCTIVITY, STEEL_DENSITY, MAGNET_DENSITY = 1.4e6, 7900.0, 7500.0
 """Of non-magnetic steel (AISI 304), S/m and kg/m³; of NdFeB."""
 STEPS, LONGEST = 16, 3600.0
 """Frequencies of flights; how long they are followed, s."""
+COLUMNS: Columns = {
+    "low": ((), "Hz", "lowest stable frequency without losses"),
+    "high": ((), "Hz", "highest stable frequency without losses"),
+    "lasts_from": ((), "Hz", "lowest frequency at which flights last"),
+    "lasts_to": ((), "Hz", "highest frequency at which flights last"),
+    "rotor_frequency": (("step",), "Hz", "frequency of the rotor"),
+    "levitated": (("step",), "s", "time until the loss"),
+    "growth": (("step",), "1/s", "largest growth rate of a mode in the flight"),
+}
+ENDS = tuple(COLUMNS)[:4]
 
 
 def limit_points(quick: bool) -> list[Point]:
@@ -63,13 +73,7 @@ def scene_of(point: Point) -> Scene:
 
 
 def upper_limit(point: Point) -> xr.Dataset:
-    """How long flights last at each frequency, and between which they last for the article's 250 s.
-
-    Returns
-    -------
-    Dataset over `case` and `step`: frequency and time until the loss (at most `LONGEST`), ends of lasting flights, and
-    of the frequencies that are stable without losses.
-    """
+    """How long flights last at each frequency (`step`), and between which they last for the article's 250 s."""
     scene = scene_of(point)
     bare = article_scene(point["configuration"], point["measure"], permeability=1.0, drag=False)
     alone, whole = levitation_of(bare, "cuboid"), levitation_of(scene, "cuboid")
@@ -85,112 +89,81 @@ def upper_limit(point: Point) -> xr.Dataset:
         start = Scales.of(there).unpack(point_there.state)
         flight = drift(there, whole.interaction, 0.0, LONGEST, whole.rates, start)
         flights.append((min(flight.levitated_s, LONGEST), flight.growth_per_s.max(), flight.ended_by))
-    times, growth = (np.array([flight[k] for flight in flights]) for k in range(2))
-    numbers = {
-        "low": (low, "lowest stable frequency without losses"),
-        "high": (high, "highest stable frequency without losses"),
-        "lasts_from": (lasts.low, "lowest frequency at which flights last"),
-        "lasts_to": (lasts.high, "highest frequency at which flights last"),
-    }
-    single = {name: variable((), np.array(value), "Hz", text) for name, (value, text) in numbers.items()}
-    rows = {
-        "rotor_frequency": variable(("step",), frequencies, "Hz", "frequency of the rotor"),
-        "levitated": variable(("step",), times, "s", "time until the loss"),
-        "growth": variable(("step",), growth, "1/s", "largest growth of a small motion in the flight"),
-    }
-    rows["end"] = (("step",), [ended for _, _, ended in flights])  # type: ignore[assignment]
-    labels = {"variant": xr.Variable((), point["variant"]), "ended_by": xr.Variable((), lasts.ended_by)}
-    return one_case(point, xr.Dataset({**single, **rows, **labels}))
+    times, growth, ends = zip(*flights, strict=True)
+    found = dict(zip(COLUMNS, (low, high, lasts.low, lasts.high, frequencies, times, growth), strict=True))
+    data = columns(COLUMNS, {name: np.asarray(value) for name, value in found.items()})
+    labels = {"variant": ((), point["variant"]), "ended_by": ((), lasts.ended_by), "end": (("step",), list(ends))}
+    return one_case(point, xr.Dataset({**data, **labels}))
 
 
-COLUMNS = 4
-
-
-def _rotors(result: xr.Dataset) -> Iterator[tuple[str, xr.Dataset]]:
-    """Each rotor with its variants."""
-    pairs = zip(result["configuration"].values, result["measure"].values, strict=True)
-    for configuration, measure in dict.fromkeys((str(c), float(m)) for c, m in pairs):
-        yield rotor_label(configuration, measure), cases_with(result, configuration=configuration, measure=measure)
+def rotors_of(result: xr.Dataset) -> list[tuple[str, xr.Dataset]]:
+    """Each rotor's label with its variants."""
+    return [
+        (rotor_label(name, measure), cases_with(part, measure=measure))
+        for name, part in by_configuration(result)
+        for measure in np.unique(part["measure"].values)
+    ]
 
 
 @styled
 def limit_figure(result: xr.Dataset) -> Figure:
     """Levitation time against frequency of each rotor, one line for each variant."""
-    rotors = list(_rotors(result))
-    columns = min(COLUMNS, len(rotors))
-    rows = -(-len(rotors) // columns)
-    figure, axes = panels(rows, columns, (PAGE, 0.9 + 1.9 * rows), sharey=True)
-    for panel, (label, rotor) in zip(axes.ravel(), rotors, strict=False):
-        for k in range(rotor.sizes["case"]):
-            one = rotor.isel(case=k)
-            panel.plot(
-                one["rotor_frequency"], one["levitated"], ".-", color=PALETTE[k], label=str(one["variant"].values)
+    rotors = rotors_of(result)
+    words = "frequency (Hz)", "levitation time (s)"
+    figure, axes = small_multiples([label for label, _ in rotors], 1.9, 4, *words, sharey=True)
+    for panel, (_, rotor) in zip(axes, rotors, strict=True):
+        for one, style, color in zip(each_case(rotor), ("o-", "s--", "^:"), PALETTE, strict=False):
+            panel.semilogy(
+                one["rotor_frequency"], one["levitated"], style, ms=3, color=color, label=one["variant"].item()
             )
-        panel.axhline(FLIGHT, color="0.8", lw=0.8, zorder=0)
-        panel.set(yscale="log", xlabel="frequency (Hz)")
-        panel.set_title(label)
-    for row in axes:
-        row[0].set_ylabel("levitation time (s)")
-    legend_below(figure, axes[0][0])
+        panel.axhline(FLIGHT, color="0.6", lw=0.8, zorder=0, label=f"longest of the experiment, {FLIGHT:g} s")
+        panel.axhline(LONGEST, color="0.6", lw=0.8, ls=":", zorder=0, label=f"followed no longer, {LONGEST:g} s")
+    legend_below(figure, *axes, columns=3)
     return figure
-
-
-FIGURES = {"upper-limit": limit_figure}
 
 
 def limit_lines(result: xr.Dataset) -> list[str]:
     """Where flights last by variant, and what a rotor that does not conduct would change."""
-    lines = []
-    for label, rotor in _rotors(result):
-        for k in range(rotor.sizes["case"]):
-            one = rotor.isel(case=k)
-            lines.append(f"{label}, {one['variant'].values}: {_span(one)}")
-        change = _change(rotor)
-        if change:
-            lines.append(f"{label}: {change}")
-    return lines
-
-
-def _span(one: xr.Dataset) -> str:
-    low, high = float(one["lasts_from"]), float(one["lasts_to"])
-    stable = f"stable without losses from {float(one['low']):.1f} to {float(one['high']):.1f} Hz"
-    if np.isnan(high):
-        return f"no flight lasts for {FLIGHT:g} s; {stable}."
-    ended = one["ended_by"].values
-    return f"flights last for {FLIGHT:g} s from {low:.1f} to {high:.1f} ± 0.5 Hz (then {ended}); {stable}."
+    rows, lines = [], []
+    for label, rotor in rotors_of(result):
+        for one in each_case(rotor):
+            ends = [f"{float(one[name]):.1f}" for name in ("low", "high", "lasts_from", "lasts_to")]
+            lasts = "none" if np.isnan(one["lasts_to"]) else f"{ends[2]} to {ends[3]} ± 0.5"
+            rows.append((f"{label}, {one['variant'].item()}", f"{ends[0]} to {ends[1]}", lasts, one["ended_by"].item()))
+        lines.append(f"{label}: {_change(rotor)}")
+    head = ("rotor", "stable without losses (Hz)", f"trajectories last {FLIGHT:g} s (Hz)", "then")
+    return [*text_table(head, rows), *lines]
 
 
 def _change(rotor: xr.Dataset) -> str:
     """What conduction changes where it changes the most: the end in Hz, and a flight in s."""
-    first, second = (rotor.isel(case=k) for k in (0, 1))
+    first, second = each_case(rotor)[:2]
     less = max(0.0, float(first["lasts_to"] - second["lasts_to"]))
     ratio = first["levitated"].values / second["levitated"].values
     lost = second["end"].values == "instability"
     if not lost.any():
-        return f"the magnets' currents lower the end by {less:.1f} Hz and shorten no flight."
+        return f"the magnets' currents lower the end by {less:.1f} Hz and shorten no trajectory."
     k = int(np.argmax(np.where(lost, ratio, 0.0)))
     times = [float(f"{float(one['levitated'][k]):.3g}") for one in (first, second)]
     return (
-        f"a rotor that does not conduct holds up to {less:.1f} Hz more; at "
+        f"a rotor that does not conduct levitates up to {less:.1f} Hz more; at "
         f"{float(first['rotor_frequency'][k]):.1f} Hz its floater stays for {times[0]:g} instead of {times[1]:g} s."
     )
 
 
 def limit_numbers(result: xr.Dataset) -> dict[str, Any]:
     """Ends of lasting flights by rotor and variant as numbers: `limits`."""
-    rows = []
-    for k in range(result.sizes["case"]):
-        one = result.isel(case=k)
-        ends = {f"{name}_hz": _number(one[name]) for name in ("low", "high", "lasts_from", "lasts_to")}
-        rows.append({
-            "configuration": str(one["configuration"].values), "value": float(one["measure"]),
-            "variant": str(one["variant"].values), **ends,
-        })  # fmt: skip
-    return {"limits": rows}
-
-
-def _number(value: xr.DataArray) -> float | None:
-    return None if bool(np.isnan(value)) else float(value)
+    return {
+        "limits": [
+            {
+                "configuration": str(one["configuration"].values),
+                "value": float(one["measure"]),
+                "variant": str(one["variant"].values),
+                **{f"{name}_hz": None if np.isnan(one[name]) else float(one[name]) for name in ENDS},
+            }
+            for one in each_case(result)
+        ]
+    }
 
 
 STUDY = Study(
@@ -198,8 +171,7 @@ STUDY = Study(
     summary="until which frequency flights last, below rotors that do and do not conduct",
     points=limit_points,
     compute=upper_limit,
-    gather=by_case,
-    figures=FIGURES,
+    figures={"upper-limit": limit_figure},
     report=limit_lines,
     numbers=limit_numbers,
 )

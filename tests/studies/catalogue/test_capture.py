@@ -103,7 +103,7 @@ def test_a_small_point_is_computed_drawn_and_told():
     assert numbers[0]["flights"] == 24
     assert numbers[0]["held"] == pytest.approx(held.mean())
     assert numbers[0]["held"] + sum(numbers[0][word.replace(" ", "_")] for word in WORDS[1:]) == pytest.approx(1)
-    assert f"{row['rotor_frequency'].item():.1f} Hz" in CAPTURE.report(result)[0]
+    assert f"{row['rotor_frequency'].item():.1f} Hz" in CAPTURE.report(result)[1]
     beyond = int(sum(result["left_plate_table"].values.ravel() == 1))
     assert any(line.startswith(f"{beyond} of ") and "plate's table" in line for line in CAPTURE.report(result))
     for draw in CAPTURE.figures.values():
@@ -113,7 +113,7 @@ def test_a_small_point_is_computed_drawn_and_told():
 def test_a_rotor_without_a_stable_frequency_is_said_not_left_out():
     row = CAPTURE.compute({**POINT, "configuration": "tilt", "measure": 45.0})
     assert (row["outcome"] == NO_EQUILIBRIUM).all()
-    assert "no stable frequency" in CAPTURE.report(CAPTURE.gather([row]))[0]
+    assert "100 % no stable frequency" in CAPTURE.report(CAPTURE.gather([row]))[1]
     assert CAPTURE.numbers(CAPTURE.gather([row]))["shares"][0]["frequency_hz"] is None
 
 

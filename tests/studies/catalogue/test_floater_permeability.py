@@ -67,7 +67,7 @@ def test_level_is_met_where_the_law_says():
 
 def test_figure_is_drawn_from_the_dataset(dataset, tmp_path):
     figure = floater_figure(dataset.merge(sufficient(dataset)).assign_attrs(weight_N=0.079))
-    assert [axes.get_ylabel() for axes in figure.axes] == ["missed share", "|missed axial force| / weight"]
+    assert [axes.get_ylabel() for axes in figure.axes] == ["missed share", "missed axial force (% of the weight)"]
     figure.savefig(tmp_path / "figure.png")
 
 

@@ -1,0 +1,170 @@
+"""What figures and reports of several studies share: panels, legends, colours of rotors, tables and numbers as text."""
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from typing import Any, SupportsFloat
+
+import matplotlib as mpl
+import numpy as np
+import xarray as xr
+from matplotlib.axes import Axes
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import BoundaryNorm, ListedColormap
+from matplotlib.figure import Figure
+from matplotlib.ticker import NullLocator
+from numpy.typing import ArrayLike, NDArray
+
+from ...geometry.common import Array
+from ..figures.style import PAGE, PALETTE, panels
+from ..study import cases_with
+from .article import CONFIGURATIONS, label_of, rotor_label
+
+TITLES = {
+    "horizontal": "Cube displaced by δx",
+    "vertical": "Two cubes, δz apart",
+    "tilt": "Cube tilted by δθ",
+}
+
+
+def small_multiples(
+    titles: Sequence[str], height: float, columns: int = 3, xlabel: str = "", ylabel: str = "", **shared: Any
+) -> tuple[Figure, list[Axes]]:
+    """A panel for each title.
+
+    Parameters
+    ----------
+    titles : of the panels
+    height : of a row, inches
+    columns : panels side by side, at most
+    xlabel, ylabel : of the lowest panel of each column, and of the first of each row
+    shared : as of `Figure.subplots`
+    """
+    columns = min(columns, len(titles))
+    rows = -(-len(titles) // columns)
+    figure, grid = panels(rows, columns, (PAGE, height * rows + 0.5), **shared)
+    for unused in grid.flat[len(titles) :]:
+        unused.remove()
+    for k, (panel, title) in enumerate(zip(grid.flat, titles, strict=False)):
+        panel.set_title(title)
+        if k % columns == 0:
+            panel.set_ylabel(ylabel)
+        if k + columns >= len(titles):
+            panel.set_xlabel(xlabel)
+            panel.tick_params(labelbottom=True)  # the last in its column, though another row may follow
+    return figure, list(grid.flat[: len(titles)])
+
+
+def by_configuration(result: xr.Dataset) -> Iterator[tuple[str, xr.Dataset]]:
+    """Each configuration that a joined result has, with its rotors by ascending displacement or tilt."""
+    for configuration in CONFIGURATIONS:
+        part = cases_with(result, configuration=configuration)
+        if part.sizes["case"]:
+            yield configuration, part.sortby("measure" if "measure" in part else "value")
+
+
+def configuration_panels(
+    result: xr.Dataset, height: float, xlabel: str = "", ylabel: str = "", **shared: Any
+) -> tuple[Figure, list[tuple[Axes, str, xr.Dataset]]]:
+    """A panel for each configuration of a joined result, with its name and its cases; options of `small_multiples`."""
+    parts = list(by_configuration(result))
+    figure, axes = small_multiples([TITLES[name] for name, _ in parts], height, 3, xlabel, ylabel, **shared)
+    return figure, [(panel, *part) for panel, part in zip(axes, parts, strict=True)]
+
+
+def rotor_places(axes: Axes, configuration: str, part: xr.Dataset) -> Array:
+    """Numbered places (case,) for the rotors of one configuration along x, labelled by their displacement or tilt."""
+    count = part.sizes["case"]
+    axes.set_xticks(range(count), [f"{m:g}" for m in part["measure"].values])
+    axes.set(xlabel=label_of(configuration), xlim=(-0.6, count - 0.4))
+    return np.arange(count, dtype=float)
+
+
+def rotor_colors(figure: Figure, axes: Axes, configuration: str, values: ArrayLike) -> dict[float, Any]:
+    """A colour for each displacement or tilt, dark to bright along viridis, with a bar below the panel."""
+    known = sorted(set(np.ravel(values).tolist()))
+    if len(known) == 1:
+        axes.set_title(rotor_label(configuration, known[0]))
+        return {known[0]: PALETTE[0]}
+    colors = mpl.colormaps["viridis"](np.linspace(0, 0.88, len(known)))
+    norm = BoundaryNorm(np.arange(len(known) + 1) - 0.5, len(known))
+    bar = figure.colorbar(
+        ScalarMappable(norm, ListedColormap(colors)), ax=axes, location="bottom", ticks=range(len(known)), aspect=25
+    )
+    bar.ax.set_xticklabels([f"{value:g}" for value in known])
+    bar.set_label(label_of(configuration))
+    return dict(zip(known, colors, strict=True))
+
+
+def explain(axes: Axes, formats: Mapping[str, str], **style: Any) -> None:
+    """Entries of a legend that no curve has by itself: a format of `Axes.plot` by its meaning."""
+    for words, shape in formats.items():
+        axes.plot([], [], shape, **{"color": "0.3", "label": words, **style})
+
+
+def plain_log(axes: Axes, ticks: Sequence[float]) -> None:
+    """A logarithmic x axis of less than a decade, its ticks as plain numbers."""
+    axes.set_xscale("log")
+    axes.set_xticks(ticks, [f"{tick:g}" for tick in ticks])
+    axes.xaxis.set_minor_locator(NullLocator())
+
+
+def plot_branch(axes: Axes, x: Array, y: Array, solid: NDArray[np.bool_], **style: Any) -> None:
+    """A curve, solid where `solid`, else dashed, without a gap between."""
+    inside = solid & np.append(solid[1:], True) & np.append(True, solid[:-1])
+    axes.plot(x, np.where(inside, np.nan, y), "--", **{**style, "label": None})
+    axes.plot(x, np.where(solid, y, np.nan), "-", **style)
+
+
+def text_table(head: Sequence[str], rows: Iterable[Sequence[object]]) -> list[str]:
+    """Lines with aligned columns below their heads; numbers with four significant digits, NaN as a dash."""
+    cells = [tuple(head), *(tuple(map(_cell, row)) for row in rows)]
+    widths = [max(map(len, column)) for column in zip(*cells, strict=True)]
+    sides = ["<"] + [">"] * (len(widths) - 1)
+    return ["  ".join(f"{c:{s}{w}}" for c, s, w in zip(row, sides, widths, strict=True)).rstrip() for row in cells]
+
+
+def _cell(value: object) -> str:
+    if isinstance(value, str):
+        return value
+    number = float(value)  # type: ignore[arg-type]
+    return f"{number:.4g}" if np.isfinite(number) else "–"
+
+
+def span(values: ArrayLike, digits: str = ".3g") -> str:
+    """The smallest and the largest of the known values; a dash if there is none."""
+    known = np.ravel(np.asarray(values, float))
+    known = known[np.isfinite(known)]
+    if not known.size:
+        return "–"
+    low, high = (f"{value:{digits}}" for value in (known.min(), known.max()))
+    return low if low == high else f"{low} to {high}"
+
+
+def uncertain(value: SupportsFloat, error: SupportsFloat) -> str:
+    """A number with its error, which has one digit; without it where it is not known."""
+    number, doubt = float(value), float(error)
+    if not np.isfinite(doubt) or doubt <= 0:
+        return f"{number:.4g}"
+    return f"{number:.{int(np.clip(-np.floor(np.log10(doubt)), 0, 6))}f} ± {doubt:.1g}"
+
+
+def range_text(value: xr.DataArray, error: xr.DataArray, scale: float = 1.0) -> str:
+    """A range of values with signs, and the largest error."""
+    known: Array = scale * value.values[np.isfinite(value.values)]
+    if not known.size:
+        return "–"
+    worst = scale * float(np.nanmax(error.values))
+    digits = int(np.clip(1 - np.floor(np.log10(max(worst, 1e-6))), 1, 4))
+    low, high = (f"{value:+.{digits}f}" for value in (known.min(), known.max()))
+    return f"{low if low == high else f'{low} to {high}'} (± {worst:.1g})"
+
+
+def last_crossing(distance: Array, values: Array, level: float) -> float:
+    """The distance from which on values stay below a level, NaN if beyond the last; logarithms are interpolated."""
+    above = np.flatnonzero(values > level)
+    if not len(above):
+        return float(distance[0])
+    k = int(above[-1])
+    if k + 1 == len(distance):
+        return float("nan")
+    share = np.log(values[k] / level) / np.log(values[k] / values[k + 1])
+    return float(distance[k] * (distance[k + 1] / distance[k]) ** share)
