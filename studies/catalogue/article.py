@@ -21,20 +21,15 @@ from ..study import Point
 EDGE, REMANENCE, PERMEABILITY = 10e-3, 1.305, 1.05
 """Of the rotor's cubes: m; T, the middle of 1.29 to 1.32; recoil permeability usual for NdFeB, which is not given."""
 FLOATER = Floater(6.35e-3, REMANENCE, PERMEABILITY, 7500.0)
-WEIGHT = FLOATER.mass * 9.81
-"""Of the floater, N."""
-PLATE_SIZE, PLATE_CONDUCTIVITY = (0.1, 0.24, 0.03), 3.5e7
-"""Of the aluminium plate: edges, m; S/m."""
-CONTACT = EDGE / 2 + FLOATER.radius
-"""Distance on the axis at which floater and a cube that is not tilted touch, m."""
+WEIGHT = FLOATER.mass * 9.81  # Of the floater, N
+PLATE_SIZE, PLATE_CONDUCTIVITY = (0.1, 0.24, 0.03), 3.5e7  # Of the aluminium plate: edges, m; S/m
+CONTACT = EDGE / 2 + FLOATER.radius  # Distance on the axis at which floater and a cube that is not tilted touch, m
 LOWEST, HIGHEST = 40.0, 250.0
 """Frequencies that are looked at, Hz: the article flew from below 50 Hz to what its motor gave."""
-FLIGHT = 250.0
-"""The longest flight of the experiment, s."""
+FLIGHT = 250.0  # The longest flight of the experiment, s
 RTOL = 1e-4
 """Relative accuracy of B asked of the finite elements, from contact on: it moves the equilibria by less than 1 µm."""
-INTERACTION = 1e-7 * FLOATER.moment * REMANENCE * EDGE**3 / MU_0
-"""G = μ0 m_f m_r / 4π, N m⁴."""
+INTERACTION = 1e-7 * FLOATER.moment * REMANENCE * EDGE**3 / MU_0  # G = μ0 m_f m_r / 4π, N m⁴
 NEAREST, FARTHEST = CONTACT, 0.12
 """Distances between which roots of the force are looked for, m; nearer, the side mode's radius has no bound."""
 MODELS = ("dipole", "fem")
@@ -42,22 +37,14 @@ MODELS = ("dipole", "fem")
 
 @dataclass(frozen=True)
 class Configuration:
-    """One of the article's three rotors.
+    """One of the article's three rotors."""
 
-    Parameters
-    ----------
-    make : maker of its magnets, from the parameter in SI units
-    symbol, unit, scale : of the parameter, its unit, and that in SI
-    tested : values of the parameter that the article tried, in its unit
-    levitated : those of them that levitated in the experiment
-    """
-
-    make: Callable[..., tuple[Magnet, ...]]
-    symbol: str
+    make: Callable[..., tuple[Magnet, ...]]  # maker of its magnets, from the parameter in SI units
+    symbol: str  # of the parameter, its unit, and that in SI
     unit: str
     scale: float
-    tested: tuple[float, ...]
-    levitated: tuple[float, ...]
+    tested: tuple[float, ...]  # values of the parameter that the article tried, in its unit
+    levitated: tuple[float, ...]  # those of them that levitated in the experiment
 
     def si(self, value: float) -> float:
         """The parameter in SI units."""
@@ -151,20 +138,12 @@ def polar_angle(moments: Array) -> Array:
 
 @dataclass(frozen=True)
 class AxialForce:
-    """Parts of the magnetic force along the axis, each like the distances: N, attraction upwards positive.
+    """Parts of the magnetic force along the axis, each like the distances: N, attraction upwards positive."""
 
-    Parameters
-    ----------
-    attracting : by the on-axis field, the terms with cos θ
-    repelling : by the rotating field, the terms with sin θ
-    polar_angle : θ of the floater, rad; NaN where the formula has no solution
-    side : radius a of the side mode, m
-    """
-
-    attracting: Array
-    repelling: Array
-    polar_angle: Array
-    side: Array
+    attracting: Array  # by the on-axis field, the terms with cos θ
+    repelling: Array  # by the rotating field, the terms with sin θ
+    polar_angle: Array  # θ of the floater, rad; NaN where the formula has no solution
+    side: Array  # radius a of the side mode, m
 
     @property
     def total(self) -> Array:

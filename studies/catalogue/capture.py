@@ -47,34 +47,23 @@ from .drawing import by_configuration, configuration_panels, text_table
 
 NEARER, FARTHER, SIDEWAYS = 4e-3, 8e-3, 6e-3
 """From where it would levitate without a plate: so much nearer to the rotor, farther from it, and to the side, m."""
-LEAN = np.radians(60.0)
-"""Largest angle of the moment to the axis."""
-SPIN = 0.2
-"""Largest spin about its own moment, over the rotor's."""
-SPEED = 0.02
-"""Standard deviation of each component of the velocity with which a hand lets go, m/s."""
+LEAN = np.radians(60.0)  # Largest angle of the moment to the axis
+SPIN = 0.2  # Largest spin about its own moment, over the rotor's
+SPEED = 0.02  # Standard deviation of each component of the velocity with which a hand lets go, m/s
 BELOW = 0.018
 """Face of the plate below where the floater levitates without it, m: 35 mm below the rotor is 10 to 20 of these."""
 SETTLED, LOWERED, LOWERING_SPEED, AFTER = 1.0, 0.055, 0.01, 1.0
 """The plate goes down after (s), by (m), at (m/s: the article's), and the flight goes on for (s)."""
-PLATE_RTOL = 1e-2
-"""Of the plate's tables: capture is decided by the field's attraction, the plate only brakes."""
+PLATE_RTOL = 1e-2  # Of the plate's tables: capture is decided by the field's attraction, the plate only brakes
 
 
 @dataclass(frozen=True, eq=False)
 class Place:
-    """A rotor at one frequency, and where the floater would levitate without a plate.
+    """A rotor at one frequency, and where the floater would levitate without a plate."""
 
-    Parameters
-    ----------
-    scene : with the plate, which stays
-    distance : of the floater from the rotor's origin, m
-    low, high : ends of the stable frequencies without a plate, Hz
-    """
-
-    scene: Scene
-    distance: float
-    low: float
+    scene: Scene  # with the plate, which stays
+    distance: float  # of the floater from the rotor's origin, m
+    low: float  # ends of the stable frequencies without a plate, Hz
     high: float
 
     @cached_property
@@ -128,22 +117,13 @@ def field_of(place: Place, model: str = "cuboid") -> FieldTable:
 
 @dataclass(frozen=True, eq=False)
 class Launches:
-    """How n floaters are let go.
+    """How n floaters are let go."""
 
-    Parameters
-    ----------
-    farther : (n,) from the rotor than where it levitates, m
-    sideways : (n,) m
-    lean : (n,) angle of the moment to the axis, rad
-    spin : (n,) about the moment, over the rotor's
-    states : (n, 3) at t = 0, along the rotor's axes
-    """
-
-    farther: Array
-    sideways: Array
-    lean: Array
-    spin: Array
-    states: State
+    farther: Array  # (n,) from the rotor than where it levitates, m
+    sideways: Array  # (n,) m
+    lean: Array  # (n,) angle of the moment to the axis, rad
+    spin: Array  # (n,) about the moment, over the rotor's
+    states: State  # (n, 3) at t = 0, along the rotor's axes
 
 
 def launches(place: Place, count: int, seed: list[int]) -> Launches:
@@ -211,22 +191,14 @@ class Share:
 
 @dataclass(frozen=True, eq=False)
 class Captured:
-    """One rotor at one frequency: all of its launches.
+    """One rotor at one frequency: all of its launches."""
 
-    Parameters
-    ----------
-    configuration, measure, part : of the rotor and of its range of stable frequencies
-    frequency : Hz, NaN where none is stable
-    flights : outcome and how each was let go, over `flight`
-    settled, stayed : of those flown on while the plate went down: up before, and after
-    """
-
-    configuration: str
+    configuration: str  # of the rotor and of its range of stable frequencies
     measure: float
     part: float
-    frequency: float
-    flights: xr.Dataset
-    settled: int
+    frequency: float  # Hz, NaN where none is stable
+    flights: xr.Dataset  # outcome and how each was let go, over `flight`
+    settled: int  # of those flown on while the plate went down: up before, and after
     stayed: int
 
     @property
@@ -275,14 +247,10 @@ def _together(part: xr.Dataset) -> Captured:
     return Captured(*rotor, float(first["rotor_frequency"]), flights, *counts)
 
 
-PARTS = (1 / 6, 1 / 2, 5 / 6)
-"""Places in the range of stable frequencies."""
-TOGETHER, BATCHES = 2000, 5
-"""Flights of a point, and points for each rotor and frequency: ten thousand flights."""
-CHECKED = 8
-"""Launches of each rotor and frequency that are flown on while the plate goes down."""
-FEW = 24
-"""Launches of a point in the quick setting."""
+PARTS = (1 / 6, 1 / 2, 5 / 6)  # Places in the range of stable frequencies
+TOGETHER, BATCHES = 2000, 5  # Flights of a point, and points for each rotor and frequency: ten thousand flights
+CHECKED = 8  # Launches of each rotor and frequency that are flown on while the plate goes down
+FEW = 24  # Launches of a point in the quick setting
 
 
 def capture_points(quick: bool) -> list[Point]:

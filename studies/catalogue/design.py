@@ -27,18 +27,11 @@ from .drawing import TITLES, small_multiples, text_table, uncertain
 
 @dataclass(frozen=True, eq=False)
 class Design:
-    """A rotor that holds the floater where it is wanted.
+    """A rotor that holds the floater where it is wanted."""
 
-    Parameters
-    ----------
-    measure : displacement, mm, or tilt, °
-    here : the equilibrium
-    low, high : where its stability ends below and above the wanted frequency; `here` where it is not stable
-    """
-
-    measure: float
-    here: BranchPoint
-    low: BranchPoint
+    measure: float  # displacement, mm, or tilt, °
+    here: BranchPoint  # the equilibrium
+    low: BranchPoint  # where its stability ends below and above the wanted frequency; `here` where it is not stable
     high: BranchPoint
 
     @property
@@ -123,11 +116,9 @@ def _judged(scene: Scene, rates: Rates, measure: float, place: Array, moment: Ar
     return Design(measure, here, low, high)
 
 
-EDGES = (6.0, 8.0, 10.0, 12.7, 16.0)
-"""Edges of the cubes that are tried, mm."""
+EDGES = (6.0, 8.0, 10.0, 12.7, 16.0)  # Edges of the cubes that are tried, mm
 RTOL = 1e-4
-CLOSE_ENOUGH = 1e-6
-"""To which the true field shall meet the wanted distance, m."""
+CLOSE_ENOUGH = 1e-6  # To which the true field shall meet the wanted distance, m
 
 
 def points(quick: bool) -> list[Point]:

@@ -42,8 +42,7 @@ MODES = ("bounce", "side, backward", "side, forward", "precession", "nutation")
 SIDES = ("low", "high")
 RTOL, COARSE = 1e-5, 1e-4
 """Accuracy of the finite elements, and of those whose distance from them is the error estimate."""
-ROUND_OFF = 1e-10
-"""Relative error of what needs no finite elements."""
+ROUND_OFF = 1e-10  # Relative error of what needs no finite elements
 
 
 def points(quick: bool) -> list[Point]:

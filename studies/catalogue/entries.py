@@ -26,5 +26,4 @@ LISTED = (
     *(SIDE_MODE, TRAJECTORIES, FLOATER_PERMEABILITY, LEVITATION_TIME, DIPOLE_VS_FEM),
     *(SENSITIVITY, DESIGN, STABILITY_MAP, PLATE_DAMPING, TEAM7, CAPTURE, UPPER_LIMIT, EXPERIMENT),
 )
-CATALOGUE: dict[str, Study] = {study.name: study for study in LISTED}
-"""By name."""
+CATALOGUE: dict[str, Study] = {study.name: study for study in LISTED}  # By name

@@ -10,14 +10,14 @@ from typing import Any
 import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
 from ...geometry.common import Array
-from ..figures.style import PAGE, PALETTE, panels, styled
+from ..figures.style import PAGE, PALETTE, legend_below, panels, styled
 from ..result import variable
 from ..study import Point, Study
+from .drawing import text_table, uncertain
 from .experiment_design import cached_row
-from .experiment_facts import FACTS, NAMES, QUICK_FACTS, UNKNOWNS, Fact, Models
+from .experiment_facts import FACTS, NAMES, QUICK_FACTS, UNKNOWNS, Fact, Models, Unknown
 from .experiment_fit import SYNTHETIC, TRUTH, Evidences, Posterior, evidences, posterior, synthetic_facts
 from .experiment_surrogate import FITTED, Surrogate, corrected, fitted
 
@@ -168,112 +168,11 @@ def gather_experiment(parts: Sequence[xr.Dataset]) -> xr.Dataset:
     return joined.assign(design_rotors=rotors, says=(("fact",), texts), **labels)
 
 
-SHOWN = ("displacement", "tilt", "stack_tilt", "magnets", "steel", "motion", "spin")
-"""Unknowns of the corner."""
-
-
-@styled
-def corner_figure(result: xr.Dataset) -> Figure:
-    """The posterior of some unknowns, alone and in pairs; grey: the middle 68 % of the prior."""
-    one = result.isel(variant=0)
-    units = np.where(result["unit"].values == "S/m", 1e-6, 1.0)
-    before = prior_quantiles(result) * units[:, None]
-    names = list(result["unknown"].values)
-    chosen = [names.index(name) for name in SHOWN]
-    draws = one["posterior"].values * units
-    draws = draws[np.isfinite(draws).all(axis=1)]
-    figure, axes = panels(len(chosen), len(chosen), (PAGE, PAGE))
-    for row, i in enumerate(chosen):
-        for column, j in enumerate(chosen):
-            panel = axes[row][column]
-            if column > row:
-                panel.set_axis_off()
-                continue
-            panel.axvspan(before[j, 0], before[j, 2], color="0.92", zorder=0)
-            if row == column:
-                panel.hist(draws[:, j], bins=30, color=PALETTE[0], histtype="stepfilled")
-                panel.set_yticks([])
-            else:
-                panel.axhspan(before[i, 0], before[i, 2], color="0.92", zorder=0)
-                panel.plot(draws[:, j], draws[:, i], ".", ms=1, alpha=0.3, color=PALETTE[0], rasterized=True)
-                panel.set_ylim(*np.quantile(draws[:, i], (0.003, 0.997)))
-            panel.set_xlim(*np.quantile(draws[:, j], (0.003, 0.997)))
-            panel.tick_params(labelbottom=row == len(chosen) - 1, labelleft=column == 0 and row > 0, labelsize=5)
-            if row == len(chosen) - 1:
-                panel.set_xlabel(_label(result, j), fontsize=6)
-            if not column and row:
-                panel.set_ylabel(_label(result, i), fontsize=6)
-    return figure
-
-
-@styled
-def unknowns_figure(result: xr.Dataset) -> Figure:
-    """The middle 68 % of each unknown's posterior in deviations of its prior, for each variant fitted to the facts."""
-    before = prior_quantiles(result)
-    middle, half = before[:, 1], (before[:, 2] - before[:, 0]) / 2
-    told = [k for k in range(result.sizes["variant"]) if not np.isfinite(result["truth"].values[k]).any()]
-    symbols = {unknown.name: unknown.symbol for unknown in UNKNOWNS}
-    figure, ((panel,),) = panels(1, 1, (PAGE, 1.2 + 0.22 * len(middle)))
-    places = np.arange(len(middle))[::-1]
-    panel.axvspan(-1, 1, color="0.92", zorder=0)
-    for n, k in enumerate(told):
-        found = (quantiles(result.isel(variant=k)) - middle[:, None]) / half[:, None]
-        bars = np.abs(found[:, [0, 2]] - found[:, [1]]).T
-        name = str(result["variant"].values[k])
-        panel.errorbar(
-            found[:, 1], places - 0.12 * n, xerr=bars, fmt="o", ms=3, color=PALETTE[n % len(PALETTE)], label=name
-        )
-    panel.set_yticks(places, [symbols.get(str(name), str(name)) for name in result["unknown"].values])
-    panel.set_xlabel("middle 68 %, in deviations of the prior")
-    panel.legend(fontsize=6, loc="lower right")
-    return figure
-
-
-@styled
-def facts_figure(result: xr.Dataset) -> Figure:
-    """Each fact's probability beforehand, given the others, and in the fit; and which facts go together."""
-    one = result.isel(variant=0)
-    known = facts_known(one)
-    names = [str(one["fact"].values[k]) for k in known]
-    figure, ((left, right),) = panels(1, 2, (PAGE, 1.6 + 0.28 * len(names)))
-    places = np.arange(len(names))[::-1]
-    alone = np.exp(one["log_evidence_single"].values[known])
-    given = np.exp(float(one["log_evidence_drawn"]) - one["log_evidence_others"].values[known])
-    fitted = np.nanmean(np.exp(one["fact_log_likelihood"].values[:, known]), axis=0)
-    for values, mark, label in (
-        (alone, "o", "beforehand"),
-        (given, "s", "given all others"),
-        (fitted, "^", "in the fit"),
-    ):
-        left.plot(values, places, mark, ms=4, label=label)
-    left.set(xscale="log", xlim=(3e-3, 1.3), xlabel="probability of the fact")
-    left.set_yticks(places, names)
-    left.legend(fontsize=6)
-    ratio = support(one)[np.ix_(known, known)]
-    np.fill_diagonal(ratio, np.nan)
-    drawn = right.imshow(ratio, cmap="RdBu", vmin=-3, vmax=3)
-    right.set_xticks(np.arange(len(names)), names, rotation=90, fontsize=6)
-    right.set_yticks(np.arange(len(names)), names, fontsize=6)
-    right.grid(False)
-    figure.colorbar(drawn, ax=right, shrink=0.6, label="gain of two facts (logarithm)")
-    return figure
-
-
-FIGURES = {"experiment": unknowns_figure, "experiment-corner": corner_figure, "experiment-facts": facts_figure}
-
-
-def _label(result: xr.Dataset, k: int) -> str:
-    name, unit = str(result["unknown"].values[k]).replace("_", " "), str(result["unit"].values[k])
-    return name if unit == "1" else f"{name} ({'MS/m' if unit == 'S/m' else unit})"
-
-
-SHARES = (0.16, 0.5, 0.84)
-PINNED = 0.7
-"""A posterior that is narrower than this part of the prior, or off its middle by as much, is worth a line."""
-PINS, TOLD = 3, 0.25
-"""How many unknowns are named with a fact, and from which change on."""
-CONTRADICTS = 1.0
-"""Logarithm of the ratio of evidences below minus which two facts contradict each other."""
+SHOWN = ("displacement", "tilt", "stack_tilt", "magnets", "steel", "motion", "spin")  # Unknowns of the corner
+SHARES = np.array([0.16, 0.5, 0.84])  # Ends of the middle 68 %, and the middle
+LEARNED = 0.7  # Worth a mark: a posterior narrower than this part of the prior, or off its middle by as many deviations
+NAMED, ASKED = 3, 0.25  # How many unknowns are named with a fact, and from which change on
+CONTRADICTS = 1.0  # Logarithm of the ratio of evidences below minus which two facts contradict each other
 
 
 def quantiles(one: xr.Dataset) -> Array:
@@ -284,131 +183,185 @@ def quantiles(one: xr.Dataset) -> Array:
 
 def prior_quantiles(result: xr.Dataset) -> Array:
     """The same of the prior."""
-    rows = []
-    for kind, (first, second) in zip(result["prior"].values, result["prior_numbers"].values, strict=True):
-        if kind == "even":
-            rows.append([first + share * (second - first) for share in SHARES])
-        elif kind == "normal":
-            rows.append([first - second, first, first + second])
+    priors = zip(result["prior"].values, result["prior_numbers"].values, strict=True)
+    return np.array([Unknown("", "", "", kind, first, second, "").at(SHARES) for kind, (first, second) in priors])
+
+
+def facts_weighed(one: xr.Dataset) -> tuple[xr.Dataset, Array]:
+    """Of the facts that a variant is fitted to: probabilities, and the logarithm of the gain (fact, fact) of each two.
+
+    Probabilities are beforehand, given all others and in the fit; a gain is the evidence of two facts together over
+    that of each by itself.
+    """
+    known = np.flatnonzero(np.isfinite(one["log_evidence_single"].values))
+    some = one.isel(fact=known, other_fact=known)
+    single = some["log_evidence_single"]
+    weighed = xr.Dataset({
+        "probability": np.exp(single),
+        "given_others": np.exp(some["log_evidence_drawn"] - some["log_evidence_others"]),
+        "in_fit": xr.apply_ufunc(np.exp, some["fact_log_likelihood"]).mean("draw"),
+        "shift": some["fact_shift"],
+        "width": some["fact_width"],
+    })  # fmt: skip
+    return weighed, some["log_evidence_pair"].values - single.values[:, None] - single.values
+
+
+def _labels(result: xr.Dataset) -> dict[str, str]:
+    """Symbol and unit of each unknown."""
+    symbols = {unknown.name: unknown.symbol for unknown in UNKNOWNS}
+    units = {"1": "", "S/m": " (MS/m)", "deg": " (°)", "um": " (µm)", "kg/m3": " (kg/m³)"}
+    pairs = zip(result["unknown"].values.tolist(), result["unit"].values.tolist(), strict=True)
+    return {name: symbols.get(name, name) + units.get(unit, f" ({unit})") for name, unit in pairs}
+
+
+@styled
+def corner_figure(result: xr.Dataset) -> Figure:
+    """The posterior of some unknowns, alone and in pairs; grey: the middle 68 % of the prior."""
+    labels, names = _labels(result), result["unknown"].values.tolist()
+    scale = np.where(result["unit"].values == "S/m", 1e-6, 1.0)
+    before, draws = prior_quantiles(result) * scale[:, None], result["posterior"].values[0] * scale
+    draws = draws[np.isfinite(draws).all(axis=1)]
+    limits = np.quantile(draws, (0.003, 0.997), axis=0).T
+    chosen = [names.index(name) for name in SHOWN]
+    figure, axes = panels(len(chosen), len(chosen), (PAGE, PAGE), sharex="col")
+    for row, column in np.ndindex(axes.shape):
+        panel, i, j = axes[row, column], chosen[row], chosen[column]
+        if column > row:
+            panel.set_axis_off()
+            continue
+        panel.axvspan(before[j, 0], before[j, 2], color="0.92", zorder=0)
+        panel.set_xlim(*limits[j])
+        if row == column:
+            panel.hist(draws[:, j], bins=30, color=PALETTE[0], histtype="stepfilled")
+            panel.set_yticks([])
         else:
-            rows.append([first * np.exp(-second), first, first * np.exp(second)])
-    return np.array(rows)
+            panel.axhspan(before[i, 0], before[i, 2], color="0.92", zorder=0)
+            panel.plot(draws[:, j], draws[:, i], ".", ms=1, alpha=0.3, color=PALETTE[0], rasterized=True)
+            panel.set_ylim(*limits[i])
+            panel.tick_params(labelleft=column == 0)
+        panel.locator_params(nbins=2)
+        if row == len(chosen) - 1:
+            panel.set_xlabel(labels[names[j]].replace(" (", "\n("))
+        if row and not column:
+            panel.set_ylabel(labels[names[i]].replace(" (", "\n("))
+    return figure
 
 
-def facts_known(one: xr.Dataset) -> NDArray[np.intp]:
-    """Numbers of the facts that a variant is fitted to."""
-    return np.flatnonzero(np.isfinite(one["log_evidence_single"].values))
+@styled
+def unknowns_figure(result: xr.Dataset) -> Figure:
+    """The middle 68 % of each unknown's posterior in deviations of its prior, for each variant fitted to the facts."""
+    before = prior_quantiles(result)
+    middle, half = before[:, [1]], (before[:, [2]] - before[:, [0]]) / 2
+    figure, ((panel,),) = panels(1, 1, (PAGE, 1.4 + 0.24 * len(middle)))
+    places = np.arange(len(middle))[::-1]
+    panel.axvspan(-1, 1, color="0.92", zorder=0, label="prior")
+    fitted_to_facts = [name for name in result["variant"].values.tolist() if name != SYNTHETIC]
+    for n, name in enumerate(fitted_to_facts):
+        found = (quantiles(result.sel(variant=name)) - middle) / half
+        bars = np.abs(found[:, [0, 2]] - found[:, [1]]).T
+        style: Any = {"fmt": "o", "ms": 3, "color": PALETTE[n % len(PALETTE)], "label": name}
+        panel.errorbar(found[:, 1], places - 0.12 * n, xerr=bars, **style)
+    panel.set_yticks(places, _labels(result).values())
+    panel.set_xlabel("middle 68 %, in deviations of the prior")
+    legend_below(figure, panel, columns=3)
+    return figure
 
 
-def support(one: xr.Dataset) -> Array:
-    """Logarithm of the ratio (fact, fact) of the evidence of two facts together to that of each by itself."""
-    single = one["log_evidence_single"].values
-    return np.asarray(one["log_evidence_pair"].values - single[:, None] - single[None, :])
+@styled
+def facts_figure(result: xr.Dataset) -> Figure:
+    """Each fact's probability beforehand, given the others, and in the fit; and which facts go together."""
+    weighed, gain = facts_weighed(result.isel(variant=0))
+    names, places = weighed["fact"].values.tolist(), np.arange(weighed.sizes["fact"])
+    figure, ((left, right),) = panels(1, 2, (PAGE, 1.8 + 0.28 * len(names)), sharey=True)
+    marks = {
+        "probability": ("o", "beforehand"),
+        "given_others": ("s", "given all others"),
+        "in_fit": ("^", "in the fit"),
+    }
+    for key, (mark, label) in marks.items():
+        left.plot(weighed[key], places, mark, ms=4, label=label)
+    left.set(xscale="log", xlim=(3e-3, 1.3), xlabel="probability of the fact")
+    left.set_yticks(places, names)
+    left.invert_yaxis()
+    np.fill_diagonal(gain, np.nan)
+    drawn = right.imshow(gain, cmap="RdBu", vmin=-3, vmax=3, aspect="auto")
+    right.set_xticks(places, names, rotation=90)
+    right.grid(False)
+    figure.colorbar(drawn, ax=right, shrink=0.6, label="logarithm of the gain")
+    legend_below(figure, left)
+    return figure
 
 
 def experiment_lines(result: xr.Dataset) -> list[str]:
     """The posterior, what each fact is worth, what contradicts what, and the evidence of each variant."""
     if "variant" not in result.dims:
         return [f"{int(result['design_rotors'])} rotors of the designs, and no posterior."]
-    lines = []
-    for k, name in enumerate(result["variant"].values):
-        one = result.isel(variant=k)
-        if name == SYNTHETIC:
-            lines += _recovered(result, one)
-        elif not k:
-            lines += [*_errors(one), *_posterior(result, one), *_facts(one), *_pairs(one)]
+    one = result.isel(variant=0)
+    lines = [*_errors(one), *_posterior(result, one), *_facts(one)]
+    if SYNTHETIC in result["variant"]:
+        made = result.sel(variant=SYNTHETIC)
+        truth, found = made["truth"].values, quantiles(made)
+        inside = np.sum((truth >= found[:, 0]) & (truth <= found[:, 2]))
+        lines.append(
+            f"Made-up facts of known rotors: {inside} of {len(truth)} unknowns lie in the middle 68 % of their "
+            f"posterior (on average it is {0.68 * len(truth):.0f})."
+        )
     return [*lines, *_evidences(result)]
 
 
 def _errors(one: xr.Dataset) -> list[str]:
-    lines = []
+    rows = []
     for kind in one["rotor_kind"].values:
         row = one.sel(rotor_kind=kind)
-        errors = {name: float(row["surrogate_error"].sel(fitted=name)) for name in ("frequency", "eddy")}
-        lines.append(
-            f"Surrogate of the {kind} cube's rotors from {int(row['surrogate_rotors'])}: of rotors left out the "
-            f"frequency is missed by {100 * errors['frequency']:.2f} %, the drift by {100 * errors['eddy']:.2f} %."
-        ) if kind == "single" else lines.append(
-            f"Surrogate of the {kind}'s rotors from {int(row['surrogate_rotors'])}: {100 * errors['frequency']:.2f} % "
-            f"and {100 * errors['eddy']:.2f} %."
-        )
-    return lines
+        missed = [f"{100 * float(row['surrogate_error'].sel(fitted=name)):.2f} %" for name in ("frequency", "eddy")]
+        rows.append((str(kind), str(int(row["surrogate_rotors"])), *missed))
+    return text_table(("surrogate", "rotors", "frequency missed by", "drift missed by"), rows)
 
 
 def _posterior(result: xr.Dataset, one: xr.Dataset) -> list[str]:
-    lines = []
-    for name, unit, now, before in zip(
-        result["unknown"].values, result["unit"].values, quantiles(one), prior_quantiles(result), strict=True
-    ):
+    rows = []
+    known = zip(result["unknown"].values, result["unit"].values, quantiles(one), prior_quantiles(result), strict=True)
+    for name, unit, now, before in known:
         width = (now[2] - now[0]) / (before[2] - before[0])
         away = 2 * (now[1] - before[1]) / (before[2] - before[0])
-        mark = f", {width:.2f} of the prior's width, {away:+.1f} deviations off" if _learned(width, away) else ""
-        lines.append(
-            f"{name}: {now[1]:.4g} ({now[0]:.4g} to {now[2]:.4g}) {'' if unit == '1' else unit}".rstrip() + mark
-        )
-    return lines
-
-
-def _learned(width: float, away: float) -> bool:
-    return bool(width < PINNED or abs(away) > PINNED)
+        learned = width < LEARNED or abs(away) > LEARNED
+        rows.append((f"{name} ({unit})", *now, f"{width:.2f}", f"{away:+.1f}", "learned" if learned else ""))
+    return text_table(("unknown", "16 %", "middle", "84 %", "over prior's width", "deviations off", ""), rows)
 
 
 def _facts(one: xr.Dataset) -> list[str]:
-    lines = []
-    for k in facts_known(one):
-        kept = np.exp(one["fact_log_likelihood"].values[:, k])
-        alone = float(np.exp(one["log_evidence_single"][k]))
-        given = float(one["log_evidence_drawn"] - one["log_evidence_others"][k])
-        lines.append(
-            f"{one['fact'].values[k]}: probability {alone:.2g} beforehand, {np.exp(given):.2g} given all others, "
-            f"{np.nanmean(kept):.2g} in the fit{_pinned(one, k)}."
-        )
-    return lines
-
-
-def _pinned(one: xr.Dataset, k: int) -> str:
-    """The unknowns that one fact alone moves or narrows most, in deviations of their priors."""
-    shift, width = one["fact_shift"].values[k], one["fact_width"].values[k]
-    moved = np.maximum(np.abs(shift), 1 - width)
-    names = [j for j in np.argsort(-moved)[:PINS] if moved[j] > TOLD]
-    told = ", ".join(f"{one['unknown'].values[j]} {shift[j]:+.1f} ± {width[j]:.1f}" for j in names)
-    return f"; alone it asks for {told}" if told else ""
-
-
-def _pairs(one: xr.Dataset) -> list[str]:
-    ratio, names = support(one), one["fact"].values
-    pairs = [(float(ratio[i, j]), names[i], names[j]) for i in facts_known(one) for j in facts_known(one) if i < j]
-    against = sorted(pair for pair in pairs if pair[0] < -CONTRADICTS)
-    lines = [
-        f"Contradict each other: '{a}' and '{b}', less probable together by a factor {np.exp(-r):.3g}."
-        for r, a, b in against
+    """What each fact is worth, which unknowns it alone moves or narrows most, and which facts contradict each other."""
+    weighed, gain = facts_weighed(one)
+    rows = []
+    for name in weighed["fact"].values:
+        fact = weighed.sel(fact=name)
+        shift, width = fact["shift"].values, fact["width"].values
+        moved = np.maximum(np.abs(shift), 1 - width)
+        best = [j for j in np.argsort(-moved)[:NAMED] if moved[j] > ASKED]
+        asks = ", ".join(f"{one['unknown'].values[j]} {shift[j]:+.1f} ± {width[j]:.1f}" for j in best)
+        chances = [f"{float(fact[key]):.2g}" for key in ("probability", "given_others", "in_fit")]
+        rows.append((str(name), *chances, asks))
+    lines = text_table(("probability of", "beforehand", "given the others", "in the fit", "alone it asks for"), rows)
+    names = weighed["fact"].values
+    against = sorted((gain[i, j], names[i], names[j]) for i, j in zip(*np.triu_indices(len(names), 1), strict=True))
+    clash = [
+        f"Contradict each other: '{a}' and '{b}', less probable together by a factor {np.exp(-value):.3g}."
+        for value, a, b in against
+        if value < -CONTRADICTS
     ]
-    return lines or [f"No two facts contradict each other by more than a factor {np.exp(CONTRADICTS):.2g}."]
-
-
-def _recovered(result: xr.Dataset, one: xr.Dataset) -> list[str]:
-    truth, found = one["truth"].values, quantiles(one)
-    inside = np.sum((truth >= found[:, 0]) & (truth <= found[:, 2]))
-    return [
-        f"Made-up facts of known rotors: {inside} of {len(truth)} unknowns lie in the middle 68 % of their posterior "
-        f"(on average it is {0.68 * len(truth):.0f})."
-    ]
+    none = f"No two facts contradict each other by more than a factor {np.exp(CONTRADICTS):.2g}."
+    return [*lines, *(clash or [none])]
 
 
 def _evidences(result: xr.Dataset) -> list[str]:
-    lines, first = [], result.isel(variant=0)
-    for k, name in enumerate(result["variant"].values):
+    rows, first = [], float(result["log_evidence"][0])
+    for k, name in enumerate(result["variant"].values.tolist()):
         one = result.isel(variant=k)
-        value, error = float(one["log_evidence"]), float(one["log_evidence_error"])
-        drawn = f"{float(one['log_evidence_drawn']):.2f} ± {float(one['log_evidence_drawn_error']):.2f} by draws"
-        told = f"{name}: logarithm of the evidence {value:.2f} ± {error:.2f} ({drawn} of the prior)"
-        if k and name != SYNTHETIC:
-            ratio = float(first["log_evidence"]) - value
-            told += (
-                f"; {first['variant'].item()} is {'more' if ratio > 0 else 'less'} probable by {np.exp(abs(ratio)):.3g}"
-            )
-        lines.append(f"{told}.")
-    return lines
+        both = [uncertain(one[key], one[f"{key}_error"]) for key in ("log_evidence", "log_evidence_drawn")]
+        less = "" if name == SYNTHETIC else f"{np.exp(first - float(one['log_evidence'])):.3g}"
+        rows.append((name, *both, less))
+    head = ("variant", "nested sampling", "draws of the prior", "less probable than the first by")
+    return [*text_table(head, rows), "Each by the natural logarithm of the evidence."]
 
 
 def experiment_numbers(result: xr.Dataset) -> dict[str, Any]:
@@ -416,29 +369,25 @@ def experiment_numbers(result: xr.Dataset) -> dict[str, Any]:
     if "variant" not in result.dims:
         return {"unknowns": [], "facts": [], "evidences": []}
     one = result.isel(variant=0)
-    unknowns = [
-        {"name": str(n), "unit": str(u), "low": float(low), "middle": float(middle), "high": float(high)}
-        for n, u, (low, middle, high) in zip(
-            result["unknown"].values, result["unit"].values, quantiles(one), strict=True
-        )
-    ]
-    facts = [
-        {
-            "fact": str(one["fact"].values[k]), "probability": float(np.exp(one["log_evidence_single"][k])),
-            "given_others": float(np.exp(one["log_evidence_drawn"] - one["log_evidence_others"][k])),
-            "in_fit": float(np.nanmean(np.exp(one["fact_log_likelihood"].values[:, k]))),
-        }
-        for k in facts_known(one)
-    ]  # fmt: skip
-    evidences = [
-        {
-            "variant": str(name), "log_evidence": float(result["log_evidence"][k]),
-            "error": float(result["log_evidence_error"][k]), "by_draws": float(result["log_evidence_drawn"][k]),
-            "by_draws_error": float(result["log_evidence_drawn_error"][k]),
-        }
-        for k, name in enumerate(result["variant"].values)
-    ]  # fmt: skip
-    return {"unknowns": unknowns, "facts": facts, "evidences": evidences}
+    weighed, _ = facts_weighed(one)
+    known = zip(result["unknown"].values, result["unit"].values, quantiles(one).tolist(), strict=True)
+    chances = weighed[["probability", "given_others", "in_fit"]]
+    keys = {"log_evidence": "log_evidence", "error": "log_evidence_error"}
+    keys |= {"by_draws": "log_evidence_drawn", "by_draws_error": "log_evidence_drawn_error"}
+    return {
+        "unknowns": [
+            {"name": str(n), "unit": str(u), "low": low, "middle": middle, "high": high}
+            for n, u, (low, middle, high) in known
+        ],
+        "facts": [
+            {"fact": str(name), **{key: float(value) for key, value in chances.sel(fact=name).items()}}
+            for name in chances["fact"].values
+        ],
+        "evidences": [
+            {"variant": str(name), **{key: float(result[of][k]) for key, of in keys.items()}}
+            for k, name in enumerate(result["variant"].values)
+        ],
+    }
 
 
 STUDY = Study(
@@ -447,7 +396,7 @@ STUDY = Study(
     points=experiment_points,
     compute=experiment,
     gather=gather_experiment,
-    figures=FIGURES,
+    figures={"experiment": unknowns_figure, "experiment-corner": corner_figure, "experiment-facts": facts_figure},
     report=experiment_lines,
     numbers=experiment_numbers,
 )

@@ -42,24 +42,19 @@ from .article import EDGE, FLOATER, REMANENCE, levitation_of
 from .upper_limit import spacer
 
 GRAVITY = 9.81
-PER_MILLIMETRE = 5.0
-"""Tilt, in degrees, that does about what a millimetre of displacement does."""
-SPACER = spacer(1e-3)
-"""The block of steel that balances a cube displaced by 1 mm."""
+PER_MILLIMETRE = 5.0  # Tilt, in degrees, that does about what a millimetre of displacement does
+SPACER = spacer(1e-3)  # The block of steel that balances a cube displaced by 1 mm
 
 
 @dataclass(frozen=True)
 class Kind:
-    """One kind of rotor.
+    """One kind of rotor."""
 
-    Parameters
-    ----------
-    box : ends of each input, by name: `on_axis` (°, tilt and displacement of the cube together), `displacement` (mm),
-        `stack` (mm, of the second cube), `radius` (of the floater, over the article's), `weight` (gravity over 9.81)
-    near, far : part of the way from contact to where the attraction alone carries the weight, ends of what is looked at
-    """
-
+    # ends of each input, by name: `on_axis` (°, tilt and displacement of the cube together), `displacement`
+    # (mm), `stack` (mm, of the second cube), `radius` (of the floater, over the article's), `weight` (gravity
+    # over 9.81)
     box: Mapping[str, tuple[float, float]]
+    # part of the way from contact to where the attraction alone carries the weight, ends of what is looked at
     near: float
     far: float
 
@@ -121,10 +116,8 @@ QUANTITIES = (
 """Of a node: frequency of the rotor, Hz; ds/dt by the floater's currents and by air, 1/s; distance from the axis, m;
 frequency of the bounce, Hz; growth without losses, 1/s; of two motions the frequency, Hz, and growth by each effect."""
 ITERATIONS, CLOSE = 40, 1e-10
-UNIT = 50.0
-"""Hz over which the equilibrium moves by about a radius of the floater."""
-REACH = (11.5e-3, 0.15)
-"""Distances between which the attraction is looked at, m."""
+UNIT = 50.0  # Hz over which the equilibrium moves by about a radius of the floater
+REACH = (11.5e-3, 0.15)  # Distances between which the attraction is looked at, m
 Losses = tuple[Dissipation | None, Dissipation | None]
 OFF = [Parameter.LINEAR_DRAG, Parameter.TILT_DRAG, Parameter.SPIN_DRAG, Parameter.TILT_EDDY, Parameter.SPIN_EDDY]
 AIR, EDDY = OFF[:3], OFF[3:]
@@ -132,19 +125,13 @@ AIR, EDDY = OFF[:3], OFF[3:]
 
 @dataclass(frozen=True, eq=False)
 class Levitating:
-    """The floater of a scene whose frequency is open.
+    """The floater of a scene whose frequency is open."""
 
-    Parameters
-    ----------
-    scene : without losses
-    table : the rotor's field
-    losses : gives those in the magnets and in the steel, None where they are not asked for; called when something
-        levitates, so that one process compiles while another computes the losses that both need
-    """
-
-    scene: Scene
-    table: FieldTable
+    scene: Scene  # without losses
+    table: FieldTable  # the rotor's field
     rates: Rates
+    # gives those in the magnets and in the steel, None where they are not asked for; called when something
+    # levitates, so that one process compiles while another computes the losses that both need
     losses: Callable[[], Losses]
 
     @classmethod
@@ -277,8 +264,7 @@ def _without(values: Array, off: Sequence[int]) -> Array:
     return found
 
 
-SPINS = (-0.12, 0.6)
-"""Ends of the body spins."""
+SPINS = (-0.12, 0.6)  # Ends of the body spins
 SEED, LONGEST_DESIGN = 20250701, 256
 CONTACT = 11.35e-3
 """Distance from which parts of the way are counted, m: that on the axis at which floater and cube touch."""
@@ -289,16 +275,10 @@ NODES = TableKind("experiment", tuple[Array, float], "Nodes of one rotor in the 
 
 @dataclass(frozen=True, eq=False)
 class CarriedLosses:
-    """The losses of magnets that keep their own currents wherever they are: tables of each at home, carried along.
+    """The losses of magnets that keep their own currents wherever they are: tables of each at home, carried along."""
 
-    Parameters
-    ----------
-    table : of a cube about the origin, its axes along the frame's
-    magnets : the cubes as they are
-    """
-
-    table: RotorLosses
-    magnets: tuple[Magnet, ...]
+    table: RotorLosses  # of a cube about the origin, its axes along the frame's
+    magnets: tuple[Magnet, ...]  # the cubes as they are
 
     def dissipation(self, positions: ArrayLike, moments: ArrayLike) -> Array:
         """D (n, 6, 6) of dipoles (n, 3) A m² at (n, 3) m, summed over the magnets."""

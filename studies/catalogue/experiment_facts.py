@@ -18,18 +18,13 @@ from ...geometry.common import Array
 from .experiment_design import PER_MILLIMETRE
 from .experiment_surrogate import FITTED, LONGEST, Conditions, Course, Surrogate, flown
 
-UNFORESEEN = 0.02
-"""Probability that a flight's end has a reason outside of the model."""
-LARGE = 3e-3
-"""Motion with which a floater is lost, m."""
-SCATTER = 0.7
-"""Of the logarithm of the residual motion from flight to flight."""
-TIMES = 0.1
-"""Of the logarithm of computed times."""
-SOFT = 0.003
-"""Of the logarithm of frequencies, which are told in whole Hz."""
-DAY, SHORTEST = 86400.0, 3.0
-"""Longest flight of the experiment, and the shortest that counts, s."""
+UNFORESEEN = 0.02  # Probability that a flight's end has a reason outside of the model
+LARGE = 3e-3  # Motion with which a floater is lost, m
+SCATTER = 0.7  # Of the logarithm of the residual motion from flight to flight
+TIMES = 0.1  # Of the logarithm of computed times
+SOFT = 0.003  # Of the logarithm of frequencies, which are told in whole Hz
+TOLD = 0.1  # Of the logarithm of a made-up time
+DAY, SHORTEST = 86400.0, 3.0  # Longest flight of the experiment, and the shortest that counts, s
 NOT_CAUGHT = 0.05
 """Probability that all launches fail below a rotor that can hold a floater: some half of them are held (`capture`)."""
 Values = Mapping[str, Array]
@@ -131,25 +126,18 @@ def courses(models: Models, values: Values, flights: Sequence[Flight]) -> dict[F
     return found
 
 
-Flight = tuple[str, float, float, float]
-"""Kind of rotor, its δx or δz (mm), frequency (Hz) and longest time (s)."""
+Flight = tuple[str, float, float, float]  # Kind of rotor, its δx or δz (mm), frequency (Hz) and longest time (s)
 Known = Mapping[Flight, Course]
+Likelihood = Callable[[Models, Mapping[str, Array], Known], Array]
 
 
 @dataclass(frozen=True)
 class Fact:
-    """One reported fact.
+    """One reported fact."""
 
-    Parameters
-    ----------
-    says : what is reported
-    flights : that it is about
-    likelihood : its probability (n,) from the surrogates, the unknowns (n,) and these flights
-    """
-
-    says: str
-    flights: tuple[Flight, ...]
-    likelihood: Callable[[Models, Values, Known], Array]
+    says: str  # what is reported
+    flights: tuple[Flight, ...]  # that it is about
+    likelihood: Likelihood  # its probability (n,) from the surrogates, the unknowns (n,) and these flights
 
 
 LOW, MIDDLE, HIGH, BEYOND = (("single", 1.0, frequency, LONGEST) for frequency in (115.0, 140.0, 150.0, 165.0))
@@ -163,22 +151,23 @@ def robust(probability: Array, ways: int = 4) -> Array:
     return (1 - UNFORESEEN) * probability + UNFORESEEN / ways
 
 
+def ended(flight: Flight, way: str, lasted: float | None = None) -> Likelihood:
+    """That a flight ended in one of the ways of `Ends`, and for a fall after which time (s), if it is known."""
+
+    def likelihood(models: Models, values: Values, known: Known) -> Array:
+        found = getattr(ends(models, flight[0], known[flight], values, flight[3]), way)
+        if lasted is None:
+            return robust(found)
+        distance = np.log(np.clip(known[flight].fall, 1e-3, 1e9) / lasted)
+        return robust(found * np.exp(-0.5 * (distance / TOLD) ** 2))
+
+    return likelihood
+
+
 def _falls(models: Models, values: Values, known: Known) -> Array:
     error = np.hypot(TIMES, models.error("single", "eddy"))
     long_enough = ndtr((np.log(np.clip(known[LOW].fall, 1e-3, 1e9)) - np.log(SHORTEST)) / error)
     return robust(ends(models, "single", known[LOW], values).falls * long_enough)
-
-
-def _stays(models: Models, values: Values, known: Known) -> Array:
-    return robust(ends(models, "single", known[MIDDLE], values).stays)
-
-
-def _oscillates(models: Models, values: Values, known: Known) -> Array:
-    return robust(ends(models, "single", known[HIGH], values).oscillates)
-
-
-def _endless(models: Models, values: Values, known: Known) -> Array:
-    return robust(ends(models, "stack", known[ENDLESS], values, DAY).stays)
 
 
 def _lowest(models: Models, values: Values, known: Known) -> Array:
@@ -202,7 +191,7 @@ def _peak(models: Models, values: Values, known: Known) -> Array:
     return robust(ndtr((times[0] - times[1]) / 0.3))
 
 
-def _never(distance: float) -> Callable[[Models, Values, Known], Array]:
+def _never(distance: float) -> Likelihood:
     def likelihood(models: Models, values: Values, known: Known) -> Array:
         nothing = ends(models, "stack", known[NEVER[distance]], values).nothing
         return robust(nothing + (1 - nothing) * NOT_CAUGHT)
@@ -212,9 +201,9 @@ def _never(distance: float) -> Callable[[Models, Values, Known], Array]:
 
 FACTS = {
     "falls at 115 Hz": Fact("δx = 1 mm falls linearly at 115 Hz, after more than 3 s", (LOW,), _falls),
-    "stays at 140 Hz": Fact("δx = 1 mm stays at 140 Hz for 250 s", (MIDDLE,), _stays),
-    "oscillates at 150 Hz": Fact("δx = 1 mm is lost in oscillations at 150 Hz", (HIGH,), _oscillates),
-    "24 h at 60 Hz": Fact("δz = 14 mm flew for 24 hours at 60 Hz", (ENDLESS,), _endless),
+    "stays at 140 Hz": Fact("δx = 1 mm stays at 140 Hz for 250 s", (MIDDLE,), ended(MIDDLE, "stays")),
+    "oscillates at 150 Hz": Fact("δx = 1 mm is lost in oscillations at 150 Hz", (HIGH,), ended(HIGH, "oscillates")),
+    "24 h at 60 Hz": Fact("δz = 14 mm flew for 24 hours at 60 Hz", (ENDLESS,), ended(ENDLESS, "stays")),
     "below 50 Hz": Fact("levitation below 50 Hz (δz = 10 mm)", (LOWEST,), _lowest),
     "a third": Fact(
         "the lowest frequency is lowered by a factor of 3 (δz = 10 mm against δx = 1 mm)", (LOW, LOWEST), _third
@@ -235,23 +224,15 @@ EVEN, NORMAL, POSITIVE = "even", "normal", "positive"
 
 @dataclass(frozen=True)
 class Unknown:
-    """One number that is not known.
+    """One number that is not known."""
 
-    Parameters
-    ----------
-    name, unit, symbol : its name in results, its unit, and what figures call it
-    prior : kind
-    first, second : ends; mean and deviation; or median and deviation of the logarithm
-    why : where the range comes from
-    """
-
-    name: str
+    name: str  # its name in results, its unit, and what figures call it
     unit: str
     symbol: str
-    prior: str
-    first: float
+    prior: str  # kind
+    first: float  # ends; mean and deviation; or median and deviation of the logarithm
     second: float
-    why: str
+    why: str  # where the range comes from
 
     def at(self, share: Array) -> Array:
         """The value below which a share (n,) of the prior lies."""
@@ -266,7 +247,7 @@ class Unknown:
 UNKNOWNS = (
     Unknown("displacement", "mm", "δx", NORMAL, 1.0, 0.3, "1 mm stated; 'sub-millimeter precision is required'"),
     Unknown("tilt", "deg", "tilt of δx", NORMAL, 0.0, 2.0, "printed holder, glue, and magnetisation against the cube"),
-    Unknown("direction", "deg", "direction", NORMAL, 0.0, 10.0, "of the displacement against the magnetisation"),
+    Unknown("direction", "deg", "direction of δx", NORMAL, 0.0, 10.0, "of the displacement against the magnetisation"),
     Unknown("stack", "mm", "δz", NORMAL, 14.0, 0.3, "14 mm stated, as δx"),
     Unknown("stack_displacement", "mm", "δx of δz", NORMAL, 0.0, 0.3, "of the lower cube, as δx"),
     Unknown("stack_tilt", "deg", "tilt of δz", NORMAL, 0.0, 2.0, "of the lower cube, as that of δx"),
@@ -277,17 +258,33 @@ UNKNOWNS = (
     Unknown("diameter", "mm", "diameter", NORMAL, 12.7, 0.05, "makers: 0.1 mm"),
     Unknown("magnets", "S/m", "σ magnets", POSITIVE, 6.7e5, 0.15, "makers: 6.2e5 to 9e5"),
     Unknown(
-        "floater", "1", "plating", POSITIVE, 1.2, 0.15, "of the floater's currents: copper and nickel add up to a half"
+        "floater",
+        "1",
+        "floater's σ (plating)",
+        POSITIVE,
+        1.2,
+        0.15,
+        "of the floater's currents: copper and nickel add up to a half",
     ),
-    Unknown("steel", "1", "steel", POSITIVE, 1.0, 1.0, "its losses over those of the balancing block: amount unknown"),
-    Unknown("motion", "um", "motion", POSITIVE, 5.0, 1.2, "left of the launch when the plate is down: 1 to 100 µm"),
-    Unknown("spin", "1", "spin", NORMAL, 0.02, 0.05, "at release: 0 to 0.05 in settling over the plate"),
+    Unknown(
+        "steel",
+        "1",
+        "steel over block",
+        POSITIVE,
+        1.0,
+        1.0,
+        "its losses over those of the balancing block: amount unknown",
+    ),
+    Unknown(
+        "motion", "um", "residual motion", POSITIVE, 5.0, 1.2, "left of the launch when the plate is down: 1 to 100 µm"
+    ),
+    Unknown("spin", "1", "spin at release", NORMAL, 0.02, 0.05, "at release: 0 to 0.05 in settling over the plate"),
     Unknown(
         "tilt_10", "deg", "tilt at 10 mm", NORMAL, 0.0, 2.5, "of the stack of 10 mm, displacement and tilt together"
     ),
     Unknown("tilt_18", "deg", "tilt at 18 mm", NORMAL, 0.0, 2.5, "of that of 18 mm"),
     Unknown("tilt_20", "deg", "tilt at 20 mm", NORMAL, 0.0, 2.5, "of that of 20 mm"),
-    Unknown("lean", "deg", "lean", NORMAL, 0.0, 3.0, "of the shaft"),
+    Unknown("lean", "deg", "tilt of the shaft", NORMAL, 0.0, 3.0, "of the shaft"),
 )
 NAMES = tuple(unknown.name for unknown in UNKNOWNS)
 

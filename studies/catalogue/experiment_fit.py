@@ -19,42 +19,29 @@ from .experiment_facts import (
     UNKNOWNS,
     Fact,
     Flight,
-    Known,
     Models,
-    Values,
     courses,
     drawn,
+    ended,
     ends,
     log_likelihoods,
-    robust,
 )
 from .experiment_surrogate import LONGEST
 
-KEPT = 1000
-"""Draws of the posterior that are kept."""
-TOGETHER = 500
-"""Draws that are evaluated in one call."""
-DONE = 0.1
-"""What the evidence that remains may add to its logarithm."""
+KEPT = 1000  # Draws of the posterior that are kept
+TOGETHER = 500  # Draws that are evaluated in one call
+DONE = 0.1  # What the evidence that remains may add to its logarithm
 
 
 @dataclass(frozen=True, eq=False)
 class Posterior:
-    """What facts say of the unknowns.
+    """What facts say of the unknowns."""
 
-    Parameters
-    ----------
-    values : (draw, unknown) equally weighted
-    likelihoods : (draw, fact) logarithms
-    evidence, error : logarithm of the evidence and its standard deviation
-    calls : how often the likelihood was asked for
-    """
-
-    values: Array
-    likelihoods: Array
-    evidence: float
+    values: Array  # (draw, unknown) equally weighted
+    likelihoods: Array  # (draw, fact) logarithms
+    evidence: float  # logarithm of the evidence and its standard deviation
     error: float
-    calls: int
+    calls: int  # how often the likelihood was asked for
 
 
 def posterior(models: Models, facts: Mapping[str, Fact], live: int, walks: int, seed: int) -> Posterior:
@@ -89,23 +76,14 @@ def _same(shares: Array) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class Evidences:
-    """Evidences by drawing from the prior.
+    """Evidences by drawing from the prior."""
 
-    Parameters
-    ----------
-    single : (fact,) logarithm of the evidence of each fact alone
-    pair : (fact, fact) of each two
-    without : (fact,) of all others together
-    every, error : of all together, and its standard deviation
-    shift, width : (fact, unknown) mean and deviation of each unknown given one fact, in deviations of the prior
-    """
-
-    single: Array
-    pair: Array
-    without: Array
-    every: float
+    single: Array  # (fact,) logarithm of the evidence of each fact alone
+    pair: Array  # (fact, fact) of each two
+    without: Array  # (fact,) of all others together
+    every: float  # of all together, and its standard deviation
     error: float
-    shift: Array
+    shift: Array  # (fact, unknown) mean and deviation of each unknown given one fact, in deviations of the prior
     width: Array
 
 
@@ -148,8 +126,6 @@ FLIGHTS: tuple[Flight, ...] = (
     *(("stack", 14.0, frequency, LONGEST) for frequency in np.arange(52.0, 68.0, 3.0)),
 )
 WAYS = ("nothing", "falls", "stays", "oscillates")
-TOLD = 0.1
-"""Of the logarithm of a made-up time."""
 
 
 def synthetic_facts(models: Models) -> dict[str, Fact]:
@@ -160,20 +136,8 @@ def synthetic_facts(models: Models) -> dict[str, Fact]:
         course = courses(models, values, [flight])[flight]
         found = ends(models, flight[0], course, values, flight[3])
         way = max(WAYS, key=lambda name: float(getattr(found, name)[0]))
-        fact = flight_fact(flight, way, float(course.fall[0]) if way == "falls" else None)
-        facts[fact.says] = fact
+        lasted = float(course.fall[0]) if way == "falls" else None
+        when = "" if lasted is None else f" after {lasted:.3g} s"
+        says = f"{flight[0]} of {flight[1]:g} mm, {flight[2]:g} Hz: {way}{when}"
+        facts[says] = Fact(says, (flight,), ended(flight, way, lasted))
     return facts
-
-
-def flight_fact(flight: Flight, way: str, lasted: float | None = None) -> Fact:
-    """That a flight ended in one of `WAYS`, and for a fall after which time (s), if it is known."""
-
-    def likelihood(models: Models, values: Values, known: Known) -> Array:
-        found = getattr(ends(models, flight[0], known[flight], values, flight[3]), way)
-        if lasted is None:
-            return robust(found)
-        distance = np.log(np.clip(known[flight].fall, 1e-3, 1e9) / lasted)
-        return robust(found * np.exp(-0.5 * (distance / TOLD) ** 2))
-
-    when = "" if lasted is None else f" after {lasted:.3g} s"
-    return Fact(f"{flight[0]} of {flight[1]:g} mm, {flight[2]:g} Hz: {way}{when}", (flight,), likelihood)

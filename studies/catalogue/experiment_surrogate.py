@@ -25,14 +25,10 @@ FITTED = (
     *(f"{motion} {name}" for motion in MOTIONS for name in EFFECTS),
 )
 """What is fitted, see `targets`."""
-STRENGTHS = {"single": (4.0, 13.0), "stack": (2.0, 28.0)}
-"""Ends of what `strength` may be."""
-WITH_STRENGTH = -0.78
-"""The frequency goes about as this power of it."""
-FASTEST = 300.0
-"""Nodes of faster rotors are left out, Hz: no fact asks for more than 200."""
-STABLE = 0.02
-"""Growth without losses that is taken as none, 1/s."""
+STRENGTHS = {"single": (4.0, 13.0), "stack": (2.0, 28.0)}  # Ends of what `strength` may be
+WITH_STRENGTH = -0.78  # The frequency goes about as this power of it
+FASTEST = 300.0  # Nodes of faster rotors are left out, Hz: no fact asks for more than 200
+STABLE = 0.02  # Growth without losses that is taken as none, 1/s
 APART = 0.03, 0.004
 """Squared distances of bounce and side motion from precession, over the frequency, from which on growth is its own."""
 
@@ -114,22 +110,13 @@ def exponents(kind: Kind, degree: int) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class Surrogate:
-    """Polynomials for one kind of rotor.
+    """Polynomials for one kind of rotor."""
 
-    Parameters
-    ----------
-    name : of the kind
-    terms : (term, input + 2) degrees
-    weights : (term, fitted)
-    errors : (fitted,) root mean square of what rotors left out are missed by
-    rotors : how many it is fitted to
-    """
-
-    name: str
-    terms: Array
-    weights: Array
-    errors: Array
-    rotors: int
+    name: str  # of the kind
+    terms: Array  # (term, input + 2) degrees
+    weights: Array  # (term, fitted)
+    errors: Array  # (fitted,) root mean square of what rotors left out are missed by
+    rotors: int  # how many it is fitted to
 
     @property
     def kind(self) -> Kind:
@@ -215,10 +202,8 @@ def _scaled(values: Array, ends: tuple[float, float]) -> Array:
 
 STEPS = 40
 LONGEST = 250.0
-SLOWEST = 1e-7
-"""Drift slower than this, 1/s, is a balance."""
-TURNS = 4
-"""Corrections of the spin at a height, of which each leaves a tenth of its error or less."""
+SLOWEST = 1e-7  # Drift slower than this, 1/s, is a balance
+TURNS = 4  # Corrections of the spin at a height, of which each leaves a tenth of its error or less
 WINDOW, DWELL = 0.2, 10.0
 """A floater is lost where twice the bounce is so near to precession (Hz) for so long (s), see docs/learned.md."""
 NARROWEST = 1e-4
@@ -228,22 +213,13 @@ PLACE = {name: k for k, name in enumerate(FITTED)}
 
 @dataclass(frozen=True, eq=False)
 class Conditions:
-    """Of n flights, in the units of the surrogate's scenes.
+    """Of n flights, in the units of the surrogate's scenes."""
 
-    Parameters
-    ----------
-    inputs : (n, input) of the rotor
-    frequency : (n,) Hz
-    spin : (n,) at release
-    strengths : (n, 4) of the floater's currents, the magnets', the steel's and air, over the surrogate's
-    longest : (n,) how long they are followed, s
-    """
-
-    inputs: Array
-    frequency: Array
-    spin: Array
-    strengths: Array
-    longest: Array
+    inputs: Array  # (n, input) of the rotor
+    frequency: Array  # (n,) Hz
+    spin: Array  # (n,) at release
+    strengths: Array  # (n, 4) of the floater's currents, the magnets', the steel's and air, over the surrogate's
+    longest: Array  # (n,) how long they are followed, s
 
     @classmethod
     def joined(cls, parts: Sequence[Self]) -> Self:
@@ -254,25 +230,18 @@ class Conditions:
 
 @dataclass(frozen=True, eq=False)
 class Course:
-    """What becomes of n flights.
+    """What becomes of n flights."""
 
-    Parameters
-    ----------
-    margin : (n,) logarithm of the frequency over the lowest at which there is an equilibrium with the spin at release
-    fall : (n,) time until the fold, s; infinite where a balance comes before
-    growth, doubt : (n,) e-folds of small motions until the fold or the longest time, and their error by the surrogate's
-    shaken : (n,) time until bounce and precession meet, or two bounces take as long as a precession for long enough, s
-    circle : (n,) distance from the axis at release, m
-    clock, folds : (n, k) times on the way, s, and e-folds up to them
-    """
-
+    # (n,) logarithm of the frequency over the lowest at which there is an equilibrium with the spin at release
     margin: Array
-    fall: Array
+    fall: Array  # (n,) time until the fold, s; infinite where a balance comes before
+    # (n,) e-folds of small motions until the fold or the longest time, and their error by the surrogate's
     growth: Array
     doubt: Array
+    # (n,) time until bounce and precession meet, or two bounces take as long as a precession for long enough, s
     shaken: Array
-    circle: Array
-    clock: Array
+    circle: Array  # (n,) distance from the axis at release, m
+    clock: Array  # (n, k) times on the way, s, and e-folds up to them
     folds: Array
 
     def parted(self, count: int) -> list[Self]:

@@ -21,8 +21,7 @@ from ..study import study_of_one
 from .drawing import last_crossing, text_table
 
 LEVELS = (0.1, 0.01, 1e-3, 1e-4)
-FARTHEST = 0.05
-"""Depth that the study reaches below the rotor's origin, m."""
+FARTHEST = 0.05  # Depth that the study reaches below the rotor's origin, m
 PARTS = ("rigid", "floater_answer", "rotor_answer", "total")
 
 

@@ -17,8 +17,7 @@ from ..study import Point, Study, case_with, one_case
 from .article import CONTACT, FLOATER, WEIGHT, article_scene, force, levitation_of, polar_angle
 from .drawing import explain, text_table
 
-CONFIGURATION, VALUE = "horizontal", 1.0
-"""The rotor of the article's figure; its text does not give the frequency."""
+CONFIGURATION, VALUE = "horizontal", 1.0  # The rotor of the article's figure; its text does not give the frequency
 FREQUENCIES = (165.0, 170.0, 185.0, 200.0)
 MODELS = ("semi-analytic", "small angles", "dipole", "fem")
 TOLD_ANGLE, TOLD_DISTANCE = 9.0, 0.04

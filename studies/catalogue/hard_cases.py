@@ -41,24 +41,14 @@ BESIDE_EACH_OTHER = replace(OTHER_MESH, magnet_size=0.8, air_size=0.4)
 
 @dataclass(frozen=True)
 class HardCase:
-    """A rotor, and the reference that judges its table.
+    """A rotor, and the reference that judges its table."""
 
-    Parameters
-    ----------
-    magnets : of the rotor
-    nearest : distance from the faces from which on the tolerance holds, m; None: `Accuracy`'s own
-    order : of the reference's elements; 0: Coulomb's law in 80-bit numbers (all permeabilities are 1)
-    mesh : of the reference
-    extensions : look along the extensions of edges and faces instead of all around
-    quick : short enough for a quick run
-    """
-
-    magnets: tuple[Magnet, ...]
-    nearest: float | None = None
-    order: int = 5
-    mesh: MeshSettings = OTHER_MESH
-    extensions: bool = False
-    quick: bool = False
+    magnets: tuple[Magnet, ...]  # of the rotor
+    nearest: float | None = None  # distance from the faces from which on the tolerance holds, m; None: `Accuracy`'s own
+    order: int = 5  # of the reference's elements; 0: Coulomb's law in 80-bit numbers (all permeabilities are 1)
+    mesh: MeshSettings = OTHER_MESH  # of the reference
+    extensions: bool = False  # look along the extensions of edges and faces instead of all around
+    quick: bool = False  # short enough for a quick run
 
     @property
     def clearance(self) -> float:
@@ -132,16 +122,12 @@ CASES = {
 
 RTOL = 1e-5
 FARTHEST = 1.0
-DEGREE = 33
-"""Of the reference's expansions."""
+DEGREE = 33  # Of the reference's expansions
 BOUNDARY_DEGREE = 20
 """Of the reference's open boundary: a ball of 1.2 radii leaves (1/1.2)^(2 · 20 + 1), 6e-4 of what degree 20 adds."""
-OBLIQUE_NODES = 192
-"""Of the reference's rules for boxes that touch without being parallel."""
-FINER_CELLS = 0.8
-"""Of the reference's expansions of round magnets: they converge from nearer on than the table's."""
-PLACES = 12
-"""Distances from the faces, from the case's own nearest one to `FARTHEST`."""
+OBLIQUE_NODES = 192  # Of the reference's rules for boxes that touch without being parallel
+FINER_CELLS = 0.8  # Of the reference's expansions of round magnets: they converge from nearer on than the table's
+PLACES = 12  # Distances from the faces, from the case's own nearest one to `FARTHEST`
 ROUND_OFF = 1e-13
 ERRORS = ("true_error", "stated_error", "reference_step", "shortfall")
 COLUMNS: Columns = {

@@ -36,8 +36,7 @@ from .drawing import by_configuration, configuration_panels, explain, plot_branc
 
 SIDES = ("near", "far")
 FORMULAS, FIELDS = ("semi-analytic", "analytic"), ("dipole", "fem")
-FLOWN = "dipole"
-"""The field of the simulated flights, which are spread over a rotor's stable frequencies."""
+FLOWN = "dipole"  # The field of the simulated flights, which are spread over a rotor's stable frequencies
 KICK, SECONDS = 0.01, 1.0
 """Speed with which a simulated floater leaves its equilibrium upwards, m/s, and duration of the flight."""
 BOTH: tuple[str, ...] = ("frequency", "side")

@@ -56,34 +56,22 @@ CASES = {
 }
 """Rotors of the article, and two whose displacement is chosen so that they fly where the article's did."""
 QUICK = ("horizontal 1 mm", "vertical 14 mm")
-OUTCOMES = ("contact", "fold", "instability", "levitates", "no equilibrium")
-"""How a flight may end."""
-LEVITATES, NO_EQUILIBRIUM = 3, 4
-"""Numbers of two of these."""
+OUTCOMES = ("contact", "fold", "instability", "levitates", "no equilibrium")  # How a flight may end
+LEVITATES, NO_EQUILIBRIUM = 3, 4  # Numbers of two of these
 
 
 @dataclass(frozen=True)
 class Variant:
-    """What is not known of the experiment.
+    """What is not known of the experiment."""
 
-    Parameters
-    ----------
-    spin : at release
-    remanence : of all magnets, T
-    conductivity : of the floater, S/m
-    stokes : whether the air's drag is Stokes's
-    e_folds : growth of an oscillation that ends the flight
-    misplaced : error of the rotor's displacement, in units of its tolerance
-    rotor : "rigid": closed form of μr = 1, and no answers; "permeable": by finite elements with μr = 1.05, rotor and
-        floater magnetise each other; "conducting": and there are eddy currents in the rotor's magnets
-    """
-
-    spin: float = 0.0
-    remanence: float = REMANENCE
-    conductivity: float = MAGNET_CONDUCTIVITY
-    stokes: bool = False
-    e_folds: float = E_FOLDS
-    misplaced: float = 0.0
+    spin: float = 0.0  # at release
+    remanence: float = REMANENCE  # of all magnets, T
+    conductivity: float = MAGNET_CONDUCTIVITY  # of the floater, S/m
+    stokes: bool = False  # whether the air's drag is Stokes's
+    e_folds: float = E_FOLDS  # growth of an oscillation that ends the flight
+    misplaced: float = 0.0  # error of the rotor's displacement, in units of its tolerance
+    # "rigid": closed form of μr = 1, and no answers; "permeable": by finite elements with μr = 1.05, rotor and
+    # floater magnetise each other; "conducting": and there are eddy currents in the rotor's magnets
     rotor: str = "rigid"
 
 
@@ -115,8 +103,7 @@ def scene_of(case: DriftCase, variant: Variant) -> Scene:
     return Scene(case.reference, magnets, floater, Drag.stokes(floater.radius))
 
 
-CAP, SHORTEST = 250.0, 3.0
-"""The article stopped a flight after 250 s, and did not count one of less than 3 s."""
+CAP, SHORTEST = 250.0, 3.0  # The article stopped a flight after 250 s, and did not count one of less than 3 s
 SAMPLES = 60
 STEP = ("case", "variant", "step")
 COLUMNS: Columns = {

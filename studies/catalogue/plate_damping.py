@@ -33,46 +33,32 @@ from .article import (
 )
 from .drawing import explain, plain_log, range_text, small_multiples, text_table, uncertain
 
-DISTANCE = 0.018
-"""Face below or beside the floater's centre in the sweeps over all else, m."""
+DISTANCE = 0.018  # Face below or beside the floater's centre in the sweeps over all else, m
 CONFIGURATION, MEASURE, FREQUENCY = "tilt", 10.0, 130.0
 """The rotor of the sweeps over plates, that of the scene `tilt-over-plate`: tilt in degrees, Hz."""
 REAL = (DISTANCE,)
 """Distances of the face at which the real plate, with its edges, is computed beside the infinite slab, m."""
 FIELD_RTOL = 1e-4
 MIDDLE = 0.5
-ROTORS = ("rotors, below", "rotors, beside")
-"""Sweeps over the article's rotors."""
+ROTORS = ("rotors, below", "rotors, beside")  # Sweeps over the article's rotors
 
 
 @dataclass(frozen=True)
 class PlateCase:
-    """One plate and rotor.
+    """One plate and rotor."""
 
-    Parameters
-    ----------
-    sweep : what is varied
-    value : of that, SI; of a rotor its displacement (mm) or tilt (degrees)
-    model : slab or reduced
-    upright : beside the floater instead of below it
-    distance : of the face from the floater's centre, m
-    thickness : m
-    conductivity : S/m
-    configuration, measure : of the rotor
-    part : place of the rotor's frequency in its range of stable frequencies, 0 to 1; None: `FREQUENCY`
-    complete : rotor and floater magnetise each other and have eddy currents, in real air; else Stokes drag alone
-    """
-
-    sweep: str
-    value: float
-    model: PlateModel = "slab"
-    upright: bool = False
-    distance: float = DISTANCE
-    thickness: float = PLATE_SIZE[2]
-    conductivity: float = PLATE_CONDUCTIVITY
-    configuration: str = CONFIGURATION
+    sweep: str  # what is varied
+    value: float  # of that, SI; of a rotor its displacement (mm) or tilt (degrees)
+    model: PlateModel = "slab"  # slab or reduced
+    upright: bool = False  # beside the floater instead of below it
+    distance: float = DISTANCE  # of the face from the floater's centre, m
+    thickness: float = PLATE_SIZE[2]  # m
+    conductivity: float = PLATE_CONDUCTIVITY  # S/m
+    configuration: str = CONFIGURATION  # of the rotor
     measure: float = MEASURE
+    # place of the rotor's frequency in its range of stable frequencies, 0 to 1; None: `FREQUENCY`
     part: float | None = None
+    # rotor and floater magnetise each other and have eddy currents, in real air; else Stokes drag alone
     complete: bool = False
 
     def plate(self, place: Array) -> Plate:

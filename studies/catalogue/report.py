@@ -74,12 +74,9 @@ SUMMARIES = {
     QUESTION: "A quantity of a scene over some of its parameters.",
 }
 PLACE = b"the scene comes here"
-LONGEST = 400
-"""Characters of a value that are shown."""
-MOST = 100_000_000
-"""Bytes of a file beside a result."""
-LARGEST = 2_500_000
-"""Bytes of pictures on a page; what comes later is named, not shown."""
+LONGEST = 400  # Characters of a value that are shown
+MOST = 100_000_000  # Bytes of a file beside a result
+LARGEST = 2_500_000  # Bytes of pictures on a page; what comes later is named, not shown
 CAPTIONS = {
     "field": "Field on the axis below the rotor by each model, and how far the models are apart.",
     "force": "Axial force on the floater where all else is balanced. It floats where the curve meets its weight.",

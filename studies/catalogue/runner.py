@@ -40,8 +40,7 @@ from ..study import Point, Study
 from ..sweep import forget, swept
 from .entries import CATALOGUE
 
-QUESTION = "question"
-"""What the result of one's own question is called."""
+QUESTION = "question"  # What the result of one's own question is called
 DRAWN = {
     "axis_field": ("field", field_figure),
     "curve_force": ("force", force_figure),

@@ -41,8 +41,7 @@ from .drawing import (
 )
 
 MODEL: FieldModel = "cuboid"
-FRACTIONS = (0.1, 0.5, 0.9)
-"""Places in the range of stable frequencies at which the distance is asked for."""
+FRACTIONS = (0.1, 0.5, 0.9)  # Places in the range of stable frequencies at which the distance is asked for
 
 
 @dataclass(frozen=True)
@@ -70,12 +69,10 @@ PARAMETERS = {
 }
 """Remanence: the article's 1.29 to 1.32 T. Size: what makers of magnets give. Place of the cube: 0.1 mm, tilt 0.5°."""
 TILT_SPREAD = 0.5
-TILTS = (1.0, 2.0)
-"""Of the axis from the vertical, degrees."""
+TILTS = (1.0, 2.0)  # Of the axis from the vertical, degrees
 QUANTITIES = ("lowest", "highest", *(f"distance at {f:.0%}" for f in FRACTIONS))
 PLACE = "frequency"
-STEP = 1e-3
-"""Relative step of the central differences; twice that for their error."""
+STEP = 1e-3  # Relative step of the central differences; twice that for their error
 SEED = 20250706
 COLUMNS: Columns = {
     "nominal": (("quantity",), "Hz or m", "as it should be"),
@@ -91,21 +88,13 @@ COLUMNS: Columns = {
 
 @dataclass(frozen=True, eq=False)
 class Nominal:
-    """What one rotor does with all parameters as they should be.
+    """What one rotor does with all parameters as they should be."""
 
-    Parameters
-    ----------
-    configuration, measure : of the rotor
-    model : of its field
-    values : of the parameters
-    range : its stable frequencies
-    """
-
-    configuration: str
+    configuration: str  # of the rotor
     measure: float
-    model: FieldModel
-    values: dict[str, float]
-    range: StableRange
+    model: FieldModel  # of its field
+    values: dict[str, float]  # of the parameters
+    range: StableRange  # its stable frequencies
 
     @property
     def grid(self) -> Array:

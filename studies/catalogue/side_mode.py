@@ -31,8 +31,7 @@ KICK, SECONDS, SAMPLES = 0.01, 2.0, 400
 FLOWN_HZ, TURNS = 170.0, 3
 """Of the flight in the article's figure, for δx = 1 mm: Hz, and how many of its last turns are shown."""
 FLOWN = {"configuration": "horizontal", "value": 1.0}
-TYPICAL = (0.1, 0.3)
-"""Radii that the article calls typical, mm."""
+TYPICAL = (0.1, 0.3)  # Radii that the article calls typical, mm
 COLUMNS: Columns = {
     "radius": (("frequency",), "m", "radius of the floater's circle"),
     "distance": (("frequency",), "m", "levitation distance"),

@@ -41,23 +41,16 @@ from .article import EDGE, REMANENCE
 from .drawing import explain, small_multiples, text_table
 
 Magnets = tuple[Magnet, ...]
-INNER_SPHERE = 0.0087
-"""Holds all sources of the article's cube, m."""
+INNER_SPHERE = 0.0087  # Holds all sources of the article's cube, m
 
 
 @dataclass(frozen=True)
 class Method:
-    """One way to the field.
+    """One way to the field."""
 
-    Parameters
-    ----------
-    family : methods that differ only in one number, joined by a line in the figure
-    problem : "exact" (μr = 1) or "permeable" (μr = 1.05)
-    build : takes the magnets and returns the table and its number of unknowns
-    """
-
-    family: str
-    problem: str
+    family: str  # methods that differ only in one number, joined by a line in the figure
+    problem: str  # "exact" (μr = 1) or "permeable" (μr = 1.05)
+    # takes the magnets and returns the table and its number of unknowns
     build: Callable[[Magnets], tuple[FieldTable, int]]
 
 
@@ -148,19 +141,12 @@ TIMED_POINTS = 100_000
 
 @dataclass(frozen=True, eq=False)
 class Measured:
-    """One method: field and gradient at the points, and what they cost.
+    """One method: field and gradient at the points, and what they cost."""
 
-    Parameters
-    ----------
-    field, gradient : (d, n, 3) T and (d, n, 3, 3) T/m
-    stated : (d,) largest error of B that the table states
-    costs : by name, see `COSTS`
-    """
-
-    field: Array
+    field: Array  # (d, n, 3) T and (d, n, 3, 3) T/m
     gradient: Array
-    stated: Array
-    costs: dict[str, float]
+    stated: Array  # (d,) largest error of B that the table states
+    costs: dict[str, float]  # by name, see `COSTS`
 
 
 COSTS: Columns = {
@@ -259,10 +245,8 @@ def _measured_with(cache: str, name: str, quick: bool) -> Measured:
     return measure(name, quick)
 
 
-TRUTH_TOLERANCE, QUICK_TRUTH = 1e-9, 1e-8
-"""Asked of the reference, in 24 and in 4 s of processor time."""
-ROUND_OFF = 1e-13
-"""What is stated of a model that has no error but that."""
+TRUTH_TOLERANCE, QUICK_TRUTH = 1e-9, 1e-8  # Asked of the reference, in 24 and in 4 s of processor time
+ROUND_OFF = 1e-13  # What is stated of a model that has no error but that
 
 
 def speed_accuracy(quick: bool, names: Sequence[str] | None = None, truth: float | None = None) -> xr.Dataset:

@@ -45,16 +45,12 @@ MEASURES = {
 }
 """Displacements (mm) and tilts (degrees): the article's tested ones and some between."""
 RTOL, PLATE_RTOL = 1e-4, 1e-2
-MOST = 4
-"""Intervals of stability that are kept of one rotor."""
-BEYOND = 1.15
-"""How far above the last stable frequency the plate is tried."""
+MOST = 4  # Intervals of stability that are kept of one rotor
+BEYOND = 1.15  # How far above the last stable frequency the plate is tried
 
 
-FACE = -0.045
-"""Height of the plate's upper face below the rotor's origin, m: no floater that levitates touches it."""
-METAL = {"insulating": False, "conducting": True}
-"""The rotor's magnets: whether they have eddy currents."""
+FACE = -0.045  # Height of the plate's upper face below the rotor's origin, m: no floater that levitates touches it
+METAL = {"insulating": False, "conducting": True}  # The rotor's magnets: whether they have eddy currents
 LASTING: Columns = {
     "low": (("metal",), "Hz", "lowest frequency at which flights last"),
     "high": (("metal",), "Hz", "highest frequency up to which flights last"),

@@ -30,8 +30,7 @@ FREQUENCIES = (50.0, 200.0)
 CURVES = ("50 Hz, ωt = 0", "50 Hz, ωt = 90°", "200 Hz, ωt = 0", "200 Hz, ωt = 90°")
 FACES = (np.array([0.0, 18.0, 126.0, 294.0]), np.array([0.0, 18.0, 126.0, 294.0]), np.array([0.0, 19.0]))
 """Faces of plate and hole across each axis, mm."""
-REACH = 1500.0
-"""Distance from the plate to the outer boundary, mm."""
+REACH = 1500.0  # Distance from the plate to the outer boundary, mm
 GAUSS = 1e-4
 
 

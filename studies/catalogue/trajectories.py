@@ -33,15 +33,12 @@ from .drawing import explain, small_multiples, text_table
 FREQUENCIES = (115.0, 140.0, 150.0, 160.0, 170.0, 200.0)
 DISPLACEMENTS = (1.0, 1.5, 2.0)
 """δx in mm: as in the experiment, what gives its fall at 115 Hz, and what is lost in oscillations within these."""
-KICK = 1e-3
-"""Speed with which a flight begins upwards, m/s."""
+KICK = 1e-3  # Speed with which a flight begins upwards, m/s
 PARTS, SAMPLES = 400, 100
-SHORTEST = 3.0
-"""What stays up for less, the article does not call levitation, s."""
+SHORTEST = 3.0  # What stays up for less, the article does not call levitation, s
 REPORTED = {115.0: "linear fall", 140.0: "stable", 150.0: "oscillating loss"}
 """The article's three flights, by frequency in Hz."""
-NONE, SHORT = "no equilibrium", "lost within 3 s"
-"""Of a flight that is none."""
+NONE, SHORT = "no equilibrium", "lost within 3 s"  # Of a flight that is none
 COLUMNS: Columns = {
     "levitated": (("frequency",), "s", "time until the loss in the simulated flight, or its duration"),
     "averaged_levitated": (("frequency",), "s", "the same in the averaged flight; infinite for a balance"),

@@ -28,8 +28,7 @@ from .drawing import by_configuration, small_multiples, text_table
 VARIANTS = ("does not conduct", "magnets conduct", "magnets and spacers conduct")
 STEEL_CONDUCTIVITY, STEEL_DENSITY, MAGNET_DENSITY = 1.4e6, 7900.0, 7500.0
 """Of non-magnetic steel (AISI 304), S/m and kg/m³; of NdFeB."""
-STEPS, LONGEST = 16, 3600.0
-"""Frequencies of flights; how long they are followed, s."""
+STEPS, LONGEST = 16, 3600.0  # Frequencies of flights; how long they are followed, s
 COLUMNS: Columns = {
     "low": ((), "Hz", "lowest stable frequency without losses"),
     "high": ((), "Hz", "highest stable frequency without losses"),
