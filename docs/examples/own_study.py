@@ -5,8 +5,8 @@ A study of your own
 How the bounce depends on the floater's density.
 
 A study is a pure function of a point, the points at which it is asked, and what is drawn and said of the joined
-result. One object joins them, and it is resumable and runs on any number of workers; put into ``STUDIES`` of a room of
-``studies``, the command line knows it too.
+result. One object joins them, and it is resumable and runs on any number of workers; put into
+``studies/catalogue/entries.py``, the command line knows it too.
 """
 
 import tempfile
@@ -19,7 +19,7 @@ from spinlev import draw, load_scene, parse_scene, run_study, stability
 from spinlev.studies.catalogue.entries import CATALOGUE
 from spinlev.studies.figures.style import panels, styled
 from spinlev.studies.result import variable
-from spinlev.studies.study import Study, by_case
+from spinlev.studies.study import Study
 
 TEXT = load_scene(files("spinlev.scenes") / "horizontal.toml").text
 
@@ -61,7 +61,6 @@ STUDY = Study(
     summary="bounce against the floater's density",
     points=points,
     compute=compute,
-    gather=by_case,
     figures={"bounce": picture},
     report=report,
 )
