@@ -107,12 +107,12 @@ Item = TypeVar("Item")
 
 
 def unwatched(stage: str, share: float) -> None:
-    """Nobody wants to know."""
+    """Ignore progress."""
 
 
 def watched(items: Iterable[Item], watch: Watch, stage: str) -> Iterator[Item]:
     """The items one after the other, of which a stage of the work takes each."""
-    listed = list(items)
-    for done, item in enumerate(listed):
-        watch(stage, done / len(listed))
+    known = list(items)
+    for done, item in enumerate(known):
+        watch(stage, done / len(known))
         yield item

@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +15,9 @@ CONVERGENCE = 1.3
 """Least distance of a point from a piece's centre, in circumradii of the piece."""
 MOST = 300
 """Pieces of a body."""
+SAMPLES = 12
+"""Places along each edge of a cell at which it is looked at."""
+MARGIN = 1.0 + 1e-6
 
 
 def cut_magnets(
@@ -32,23 +34,25 @@ def cut_magnets(
     ------
     InputError : a magnet would need more than `MOST` pieces
     """
-    return tuple(
-        tuple(_pieces(magnet, _counts(magnet.box, nearest, whole))) if isinstance(magnet.body, Box) else (magnet,)
-        for magnet in magnets
-    )
+    return tuple(_pieces(m, nearest, whole) if isinstance(m.body, Box) else (m,) for m in magnets)
 
 
-def _counts(box: Box, nearest: float, whole: float) -> tuple[int, ...]:
-    """Number of pieces along each axis: the longest side of the pieces is cut until they are compact enough."""
-    counts = np.ones(3, dtype=int)
+def _pieces(magnet: Magnet, nearest: float, whole: float) -> tuple[Magnet, ...]:
+    """The longest side of the pieces is cut until they are compact enough."""
+    box, counts = magnet.box, np.ones(3, dtype=int)
     while True:
-        half = box.size / counts / 2
+        half = box.half_edges / counts
         if nearest + half.min() >= (CONVERGENCE if counts.max() > 1 else whole) * np.linalg.norm(half):
-            return tuple(int(n) for n in counts)
-        cut_further(counts, half, box, nearest)
+            break
+        _cut_further(counts, half, box, nearest)
+    if counts.max() == 1:
+        return (magnet,)
+    material = magnet.polarization, magnet.recoil_permeability, magnet.transverse_permeability
+    shifts = [2 * half * (np.array(place) + 0.5) - box.half_edges for place in np.ndindex(*counts)]
+    return tuple(Magnet(Box(2 * half, box.center + box.rotation @ s, box.rotation), *material) for s in shifts)
 
 
-def cut_further(counts: Array, half: Array, body: Solid, nearest: float) -> None:
+def _cut_further(counts: Array, half: Array, body: Solid, nearest: float) -> None:
     """One more piece along the axis on which pieces are longest. Raises InputError where there are too many."""
     counts[np.argmax(half)] += 1
     if counts.prod() > MOST:
@@ -56,26 +60,6 @@ def cut_further(counts: Array, half: Array, body: Solid, nearest: float) -> None
             f"Input bodies must be such that {MOST} compact pieces make one up; instead a {body.described_size} "
             f"needs more for its field to be known {nearest * 1e3:.3g} mm from its faces. Give it as several bodies."
         )
-
-
-def _pieces(magnet: Magnet, counts: tuple[int, ...]) -> list[Magnet]:
-    if counts == (1, 1, 1):
-        return [magnet]
-    box, size = magnet.box, magnet.box.size / counts
-    return [
-        Magnet(
-            Box(size, box.center + box.rotation @ (size * (np.array(place) + 0.5) - box.half_edges), box.rotation),
-            magnet.polarization,
-            magnet.recoil_permeability,
-            magnet.transverse_permeability,
-        )
-        for place in product(*(range(n) for n in counts))
-    ]
-
-
-SAMPLES = 12
-"""Places along each edge of a cell at which it is looked at."""
-MARGIN = 1.0 + 1e-6
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,7 +103,7 @@ def cells_of(body: Solid, nearest: float) -> Cells:
         depth = -body.distance(cells.centers)
         if isinstance(body, Box) or np.all(nearest + depth >= CONVERGENCE * cells.radii):
             return cells
-        cut_further(counts, body.half_edges / counts, body, nearest)
+        _cut_further(counts, body.half_edges / counts, body, nearest)
 
 
 def _cells(body: Solid, counts: tuple[int, int, int]) -> Cells:
@@ -131,7 +115,7 @@ def _cells(body: Solid, counts: tuple[int, int, int]) -> Cells:
     step = float(np.linalg.norm(size)) / SAMPLES
     centers, radii = list[Array](), list[float]()
     numbers = np.full(counts, -1)
-    for place in product(*(range(n) for n in counts)):
+    for place in np.ndindex(*counts):
         ends = [line[k * SAMPLES : (k + 1) * SAMPLES + 1] for line, k in zip(lines, place, strict=True)]
         grid = np.stack(np.meshgrid(*ends, indexing="ij"), -1).reshape(-1, 3)
         within = body.distance(body.center + grid @ body.rotation.T) <= step / 2

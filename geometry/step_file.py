@@ -5,7 +5,6 @@ OpenCASCADE crashes on some damaged files and does not return from others.
 
 import re
 import tempfile
-from collections.abc import Sequence
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -133,23 +132,23 @@ def _roots(text: str) -> list[str]:
 
     A root is a shape's definition whose product is not a component of another.
     """
-    names: dict[str, dict[str, list[str]]] = {}
+    found: dict[str, dict[str, list[str]]] = {}
     spans = {}
-    for found in ENTITY.finditer(text):
-        number, name, given = found.groups()
-        names.setdefault(name, {})[number] = re.findall(r"#(\d+)", re.sub(r"'[^']*'", "", given))
-        spans[number] = found.span()
-    products = {number: refs[-1] for number, refs in names.get("PRODUCT_DEFINITION_SHAPE", {}).items() if refs}
-    components = {refs[1] for refs in names.get("NEXT_ASSEMBLY_USAGE_OCCURRENCE", {}).values() if len(refs) > 1}
-    shapes = names.get("SHAPE_DEFINITION_REPRESENTATION", {})
+    for entity in ENTITY.finditer(text):
+        number, name, given = entity.groups()
+        found.setdefault(name, {})[number] = re.findall(r"#(\d+)", re.sub(r"'[^']*'", "", given))
+        spans[number] = entity.span()
+    products = {number: refs[-1] for number, refs in found.get("PRODUCT_DEFINITION_SHAPE", {}).items() if refs}
+    components = {refs[1] for refs in found.get("NEXT_ASSEMBLY_USAGE_OCCURRENCE", {}).values() if len(refs) > 1}
+    shapes = found.get("SHAPE_DEFINITION_REPRESENTATION", {})
     roots = [n for n, refs in shapes.items() if refs and products.get(refs[0]) not in components]
-    return [_without(text, [spans[other] for other in roots if other != kept]) for kept in roots] or [text]
-
-
-def _without(text: str, spans: Sequence[tuple[int, int]]) -> str:
-    for start, end in sorted(spans, reverse=True):
-        text = text[:start] + text[end:]
-    return text
+    texts = []
+    for kept in roots:
+        alone = text
+        for start, end in sorted((spans[other] for other in roots if other != kept), reverse=True):
+            alone = alone[:start] + alone[end:]
+        texts.append(alone)
+    return texts or [text]
 
 
 def _brep(solid: Any) -> str:

@@ -11,7 +11,6 @@ import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import combinations
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import netgen.occ as occ
@@ -259,7 +258,8 @@ MESHIO_SHAPES = {
 def to_meshio(mesh: MagnetMesh) -> meshio.Mesh:
     """The mesh with straight edges, coordinates in m, and the region of every cell as cell data.
 
-    Region k + 1 is `magnet{k}`, the last one is `air`; the names are in `field_data`, as Gmsh has them.
+    Region k + 1 is `magnet{k}`, the last one is `air`; the names are in `field_data`, as Gmsh has them (its format
+    of version 4 would lose them).
     """
     import meshio
 
@@ -278,11 +278,3 @@ def to_meshio(mesh: MagnetMesh) -> meshio.Mesh:
         cell_data={"gmsh:physical": ids, "gmsh:geometrical": ids},
         field_data={name: np.array([number, 3]) for name, number in regions.items()},
     )
-
-
-def write_mesh(mesh: MagnetMesh, path: str | Path) -> None:
-    """Write the mesh in the format of the file's suffix (.vtu, .msh, .xdmf, …), see `to_meshio`."""
-    import meshio
-
-    gmsh = Path(path).suffix == ".msh"  # version 4 of that format would lose the regions
-    meshio.write(path, to_meshio(mesh), file_format="gmsh22" if gmsh else None)

@@ -65,7 +65,10 @@ def hex_mesh(lines: Sequence[Array], blocks: Sequence[Block], mirrors: tuple[int
     materials = ["air", *dict.fromkeys(block.material for block in blocks if block.material != "air")]
     mesh = netgen.Mesh()
     mesh.dim = 3
-    points = _add_points(mesh, lines)
+    points = np.empty([len(a) for a in lines], dtype=object)
+    for index in np.ndindex(*points.shape):
+        position = (float(a[i]) for a, i in zip(lines, index, strict=True))
+        points[index] = mesh.Add(netgen.MeshPoint(netgen.Pnt(*position)))
     for number in range(1, 5):
         mesh.Add(netgen.FaceDescriptor(surfnr=number, domin=1, bc=number))
     centers = np.stack(np.meshgrid(*[(a[1:] + a[:-1]) / 2 for a in map(np.asarray, lines)], indexing="ij"), -1)
@@ -76,29 +79,16 @@ def hex_mesh(lines: Sequence[Array], blocks: Sequence[Block], mirrors: tuple[int
     for cell, number in np.ndenumerate(number_of):
         corners = [points[tuple(np.add(cell, corner))] for corner in HEXAHEDRON]
         mesh.Add(netgen.Element3D(int(number), corners))
-    _add_boundary(mesh, points, mirrors)
+    for axis, end in itertools.product(range(3), (0, -1)):
+        number = axis + 1 if end == 0 and axis in mirrors else 4
+        layer = np.take(points, end, axis=axis)
+        for i, j in np.ndindex(layer.shape[0] - 1, layer.shape[1] - 1):
+            mesh.Add(netgen.Element2D(number, [layer[i + a, j + b] for a, b in SQUARE]))
     for number, name in enumerate(materials, start=1):
         mesh.SetMaterial(number, name)
     for number, name in enumerate([*PLANES, "far"]):
         mesh.SetBCName(number, name)
     return ngsolve.Mesh(mesh)
-
-
-def _add_points(mesh: netgen.Mesh, lines: Sequence[Array]) -> np.ndarray:
-    points = np.empty([len(a) for a in lines], dtype=object)
-    for index in np.ndindex(*points.shape):
-        position = (float(a[i]) for a, i in zip(lines, index, strict=True))
-        points[index] = mesh.Add(netgen.MeshPoint(netgen.Pnt(*position)))
-    return points
-
-
-def _add_boundary(mesh: netgen.Mesh, points: np.ndarray, mirrors: tuple[int, ...]) -> None:
-    for axis in range(3):
-        for end in (0, -1):
-            number = axis + 1 if end == 0 and axis in mirrors else 4
-            layer = np.take(points, end, axis=axis)
-            for i, j in np.ndindex(layer.shape[0] - 1, layer.shape[1] - 1):
-                mesh.Add(netgen.Element2D(number, [layer[i + a, j + b] for a, b in SQUARE]))
 
 
 @dataclass(frozen=True)

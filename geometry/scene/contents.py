@@ -255,11 +255,9 @@ class Scene:
     def __repr__(self) -> str:
         air = f"drag {self.drag.linear:.3g} N s/m, {self.drag.angular:.3g} N m s{' and more' if self.drag.air else ''}"
         lines = [f"Scene at {self.frequency:g} Hz, gravity ({listed(self.gravity)}) m/s², {air}"]
-        lines += [f"  {magnet!r}" for magnet in self.rotor]
-        lines += [f"  {conductor!r}" for conductor in self.conductors]
+        lines += [f"  {body!r}" for body in (*self.rotor, *self.conductors)]
         lines += [f"  Field from {self.field_map}"] if self.field_map else []
-        lines += [f"  {self.floater!r}"]
-        lines += [f"  {self.plate!r}"] if self.plate else []
+        lines += [f"  {body!r}" for body in (self.floater, self.plate) if body]
         return "\n".join(lines)
 
     def _repr_html_(self) -> str:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from spinlev.geometry.magnets import Magnet
-from spinlev.geometry.meshes.magnets import MeshSettings, mesh_magnets, to_meshio, write_mesh
+from spinlev.geometry.meshes.magnets import MeshSettings, mesh_magnets, to_meshio
 from spinlev.geometry.rotor import horizontal, vertical
 from spinlev.geometry.shapes import Box, rotation_matrix
 
@@ -35,7 +35,7 @@ def _volumes(cells, points):
 @pytest.mark.parametrize("suffix", ["vtu", "msh"])
 def test_mesh_survives_exchange(tmp_path, suffix):
     mesh = mesh_magnets(vertical(0.01, 0.01, 1.3, 1.05))
-    write_mesh(mesh, tmp_path / f"m.{suffix}")
+    to_meshio(mesh).write(tmp_path / f"m.{suffix}", {"msh": "gmsh22"}.get(suffix))
     read = meshio.read(tmp_path / f"m.{suffix}")
     assert sum(len(cells.data) for cells in read.cells) == mesh.elements
     assert {number for part in read.cell_data["gmsh:physical"] for number in part} == {1, 2, 3}
