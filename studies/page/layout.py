@@ -15,13 +15,8 @@ from ...geometry.common import Array
 from ...geometry.scene.contents import Scene
 from ..figures.view import SQUARES, Surface, arrow, near_plate, triangles
 from .state import Control, PageState
-from .work import Regions, Shown
+from .work import MODEL_WORDS, Regions, Shown
 
-FIELDS = [
-    ("dipole", "Field: point dipole"),
-    ("cuboid", "Field: closed form (μr = 1)"),
-    ("fem", "Field: finite elements"),
-]
 PLATES = [
     ("none", "Plate: only an obstacle"),
     ("slab", "Plate: infinite slab"),
@@ -122,9 +117,9 @@ class Layout:
     def show_controls(self, state: PageState, sliders: Sequence[bk.Slider]) -> None:
         """The sliders and models of a scene."""
         self.sliders.children = list(sliders)
-        more = [("map", "Field: its map")] if state.scene.field_map else []
-        more += [("auto", "Field: chosen by accuracy")] if state.model == "auto" else []
-        self.model.options = [*FIELDS, *more]
+        names = ["dipole", "cuboid", "fem", *(["map"] if state.scene.field_map else [])]
+        names += [state.model] if state.model not in names else []
+        self.model.options = [(name, f"Field: {MODEL_WORDS.get(name, 'chosen by accuracy')}") for name in names]
         self.model.value, self.plate_model.value = state.model, state.plate_model
         self.plate_model.visible = state.scene.plate is not None
 
@@ -149,8 +144,8 @@ class Layout:
 
     def map_axes(self, frequency: Control, measure: Control) -> None:
         """Take over what the sliders reach."""
-        self.map.x_range.update(start=frequency.low, end=frequency.high)
-        self.map.y_range.update(start=measure.low, end=measure.high)
+        self.map.x_range.update(start=frequency.start, end=frequency.end)
+        self.map.y_range.update(start=measure.start, end=measure.end)
         self.map.yaxis.axis_label = measure.title
 
     def place(self, x: float, z: float, radius: float) -> None:

@@ -96,17 +96,8 @@ class Page:
         self._changed()
 
     def _slider(self, control: Control) -> Slider:
-        made = Slider(
-            start=control.low,
-            end=control.high,
-            step=control.step,
-            value=control.value,
-            title=control.title,
-            name=control.key,
-            format="0[.]00",
-            sizing_mode="stretch_width",
-        )
-        made.on_change("value", lambda _, old, new: self._become("changed", control.key, round(float(new), 9)))
+        made = Slider(**vars(control), format="0[.]00", sizing_mode="stretch_width")
+        made.on_change("value", lambda _, old, new: self._become("changed", control.name, round(float(new), 9)))
         return made
 
     def _choose(self, name: str, value: str) -> None:
@@ -173,7 +164,7 @@ class Page:
         elif (key := work.map_key(self.state)) != self.mapped:
             self._forget_map("Map: being computed ...")
             self.mapped = key
-            (x, y), state = ((control.low, control.high) for control in controls(self.state)[:2]), self.state
+            (x, y), state = ((control.start, control.end) for control in controls(self.state)[:2]), self.state
             for model in ("dipole", "cuboid") if state.model == "cuboid" else ("dipole",):
                 for points in POINTS:
                     call = (work.regions, state, (x, y), model, points)

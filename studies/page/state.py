@@ -176,21 +176,13 @@ def _put(keys: Any, path: list[str], text: str) -> None:
 
 @dataclass(frozen=True)
 class Control:
-    """A number that a slider moves.
+    """A number that a slider moves, as Bokeh's sliders take it; `name` is its key in the scene file, or `spin`."""
 
-    Parameters
-    ----------
-    key : of the scene file, with dots, or `spin`
-    title : with the unit
-    value : now
-    low, high, step : the slider's
-    """
-
-    key: str
+    name: str
     title: str
     value: float
-    low: float
-    high: float
+    start: float
+    end: float
     step: float
 
 

@@ -77,17 +77,17 @@ def test_other_input_that_cannot_be(asked, says):
 
 def test_sliders_have_room_for_their_values_and_move_the_plate_towards_the_floater():
     state = first_state(load_scene(OVER_PLATE)).changed("frequency_hz", 500.0)
-    found = {control.key: control for control in controls(state)}
+    found = {control.name: control for control in controls(state)}
     assert list(found) == [
         *("frequency_hz", "rotor.angle_deg", "rotor.edge_mm", "floater.diameter_mm", "spin", "plate.center_mm.2")
     ]
-    assert all(control.low <= control.value <= control.high for control in found.values())
-    assert [c.key for c in controls(OTHER)][-1] == "plate.center_mm.0"  # which stands beside the floater
-    assert controls(first_state(load_scene(SCENES / "explicit-magnets.toml")))[1].key == "floater.diameter_mm"
+    assert all(control.start <= control.value <= control.end for control in found.values())
+    assert [c.name for c in controls(OTHER)][-1] == "plate.center_mm.0"  # which stands beside the floater
+    assert controls(first_state(load_scene(SCENES / "explicit-magnets.toml")))[1].name == "floater.diameter_mm"
 
 
 def test_cubes_one_over_the_other_cannot_be_moved_into_each_other():
     state = first_state(load_scene(SCENES / "vertical-24h.toml"))
     measure = controls(state)[1]
-    assert measure.low >= state.keys["rotor"]["edge_mm"]
-    state.changed(measure.key, measure.low)
+    assert measure.start >= state.keys["rotor"]["edge_mm"]
+    state.changed(measure.name, measure.start)
