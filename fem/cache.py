@@ -116,12 +116,13 @@ def _count(value: Any, update: Callable[[bytes], None]) -> None:
         for item in value:
             _count(item, update)
     elif isinstance(value, Mapping):
-        _count(("mapping", *sorted(value.items())), update)
+        update(b"mapping ")
+        _count(sorted(value.items()), update)
     elif isinstance(value, Path):
         with regular_file(value, MOST, "file", "a file") as stream:
-            _count(("file", hashlib.sha256(stream.read()).hexdigest()), update)
-    elif value is None or isinstance(value, bool | int | str):
-        said = str(value).encode()
+            update(b"file " + hashlib.sha256(stream.read()).digest())
+    elif value is None or isinstance(value, bool | int | str | bytes):
+        said = value if isinstance(value, bytes) else str(value).encode()
         update(f"{type(value).__name__} {len(said)} ".encode() + said)
     elif isinstance(value, float):
         update(f"float {(float(value) + 0.0).hex()} ".encode())

@@ -11,6 +11,7 @@ import json
 import re
 from collections.abc import Mapping
 from dataclasses import fields, is_dataclass
+from functools import cache
 from pathlib import Path
 from typing import Any, TypeVar, get_args, get_type_hints
 
@@ -127,6 +128,7 @@ def _classes(form: Any, found: dict[str, type]) -> dict[str, type]:
     return found
 
 
+@cache
 def _documentation(form: type) -> dict[str, str]:
     """Sentences of a class's documentation about its parameters, by name."""
     lines = re.findall(r"^(\w+(?:, \w+)*) : (.*(?:\n {4,}.*)*)", inspect.getdoc(form) or "", re.MULTILINE)

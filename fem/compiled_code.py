@@ -130,8 +130,8 @@ def _say(reason: str) -> None:
     LOG.info("Compiled code is neither read nor kept, which costs seconds: %s.", reason)
 
 
-def _content(asked: object) -> str:
-    """What is asked for as a text, all its expressions as one: what they share is written once, not in each."""
+def _content(asked: object) -> bytes:
+    """What is asked for, all its expressions as one: what they share is written once, not in each."""
     import heyoka as hy
 
     expressions: list[Any] = []
@@ -145,7 +145,7 @@ def _content(asked: object) -> str:
             return len(expressions)
 
     Writer(stream := io.BytesIO()).dump(asked)
-    return (stream.getvalue() + pickle.dumps(hy.dfun("asked", expressions))).hex()
+    return stream.getvalue() + pickle.dumps(hy.dfun("asked", expressions))
 
 
 @cache

@@ -117,7 +117,8 @@ def test_inputs_that_look_alike_have_other_keys():
         tuple(numbers.tolist()), (numbers[:3], numbers[3:]), (numbers[:2], numbers[2:]), (numbers.tobytes().hex(),),
         (1,), (1.0,), ("1",), (True,), (None,), ("None",), ("",), (), ((),), ((1,),), ("a", "b"), ("ab", ""), ("ab",),
         (Cylinder(1.0, 2.0),), (Sphere(1.0),), (BOX,), (np.zeros((0, 3)),), (np.zeros((3, 0)),),
-        ({"a": 1},), (("a", 1),), ((("a", 1),),), (Plate(BOX.size, BOX.center, BOX.rotation),),
+        ({"a": 1},), (("mapping", ("a", 1)),), (b"1",), (("a", 1),), ((("a", 1),),),
+        (Plate(BOX.size, BOX.center, BOX.rotation),),
     ]  # fmt: skip
     assert len({key(*inputs) for inputs in alike}) == len(alike)
 
