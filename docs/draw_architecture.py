@@ -128,7 +128,7 @@ def _arrow(
 def members() -> dict[str, set[str]]:
     """What each public member of `Levitation` asks of the others."""
     tree = ast.parse((ROOT / "studies" / "levitation.py").read_text())
-    (body,) = (node for node in tree.body if isinstance(node, ast.ClassDef))
+    (body,) = (node for node in tree.body if isinstance(node, ast.ClassDef) and node.name == "Levitation")
     functions = {node.name: node for node in body.body if isinstance(node, ast.FunctionDef)}
     uses = {
         name: {n.attr for n in ast.walk(node) if isinstance(n, ast.Attribute) and ast.unparse(n.value) == "self"}

@@ -14,12 +14,12 @@ from .geometry.scene.making import (
 )
 from .geometry.scene.messages import SceneError as SceneError
 from .studies.cli.options import Models as Models
+from .studies.explore import explore as explore
+from .studies.floater_force import floater_force as floater_force
 from .studies.interface import (
     draw as draw,
     ensemble as ensemble,
     equilibria as equilibria,
-    explore as explore,
-    floater_force as floater_force,
     plate_table as plate_table,
     rotor_table as rotor_table,
     run_study as run_study,

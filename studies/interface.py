@@ -2,34 +2,24 @@
 
 from __future__ import annotations
 
-import asyncio
-import html
 import os
-import threading
-from collections.abc import Callable, Mapping, Sequence
-from concurrent.futures import Future
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypedDict, Unpack
+from typing import Any, TypedDict, Unpack
 
-import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
-from numpy.typing import ArrayLike
 
 from ..dynamics.flights.batch import ensemble as flown
 from ..dynamics.motion.plate import PlateMemory
 from ..fem.cache import owned
-from ..fem.rotor.floater import FloaterSources, floater_sources, force_and_torque
 from ..fem.rotor.near_field import NEAR_RTOL, complete
-from ..fem.rotor.table import FieldTable, RangeError, RotorTable
-from ..geometry.common import Array, ComputationError, InputError, SpinlevError
-from ..geometry.overlap import body_overlap
-from ..geometry.scene.contents import Scene
+from ..fem.rotor.table import FieldTable, RotorTable
+from ..geometry.common import InputError
 from ..geometry.scene.files import scene_text
-from ..geometry.solids import moved
 from .catalogue.entries import CATALOGUE
 from .catalogue.runner import QUESTION, figures_of, question_study
-from .cli.console import heard, note
+from .cli.console import heard
 from .cli.options import (
     FieldModel,
     InteractionModel,
@@ -43,31 +33,16 @@ from .cli.options import (
     positive,
 )
 from .demagnetising import working_point_dataset
-from .levitation import Levitation, given_scene
+from .levitation import Levitation, SceneLike, given_scene
 from .processes import mapped
 from .question import Question
-from .result import AXIS, Result, found_dataset, variable
+from .result import AXIS, Result, found_dataset, state_columns, variable
 from .starts import drawn_starts, given_starts
 from .study import Study
 from .sweep import forget, swept
 
-if TYPE_CHECKING:
-    from .page.server import Pages
-
-SceneLike = Scene | str | Path
-"""A scene, or the path of its file."""
-COARSE = 12
-"""Degree of the rule whose difference from the full one is told as an error."""
 TOGETHER = 512
 """Flights that a worker gets at once, at most."""
-COLUMNS = {
-    "position": ("m", "position, laboratory frame,"),
-    "velocity": ("m/s", "velocity, laboratory frame,"),
-    "moment": ("1", "direction of the moment, laboratory frame,"),
-    "spin": ("rad/s", "angular velocity, laboratory frame,"),
-}
-HEIGHT = 900
-"""Of the page in a notebook, pixels."""
 
 
 class Asked(TypedDict, total=False):
@@ -241,130 +216,6 @@ def working_point(
         return working_point_dataset(levitation).assign_attrs(study="working-point", scene=scene_text(levitation.scene))
 
 
-def floater_force(
-    scene: SceneLike,
-    position: ArrayLike,
-    moment: ArrayLike,
-    body_x: ArrayLike | None = None,
-    model: FieldModel = "auto",
-    rtol: float = Models.rtol,
-    progress: bool = False,
-) -> xr.Dataset:
-    """Force and torque of the rotor's field on the floater held in any pose: a sphere, a cuboid or a cylinder.
-
-    The floater's own multipoles in the rotor's field, those of its permeability as well; what rotor and floater induce
-    in each other is left out. Gravity, plate and motion do not enter.
-
-    Parameters
-    ----------
-    scene : a scene, or the path of its file
-    position : (n, 3) or (3,) of the floater's centre, m, rotor's frame
-    moment : (n, 3) or (3,) directions of its moment, the body's z
-    body_x : (n, 3) or (3,) directions near which the body's x lies; left out, the rotor's x; it matters to a cuboid
-    model, rtol : of the rotor's field, see `Models`
-    progress : whether messages go to standard error
-
-    Returns
-    -------
-    xarray.Dataset
-        Over `pose` and `axis`, SI units: `force`, `torque` about the centre, their errors `force_error` and
-        `torque_error` (the field's all over the body, and of the sums over it), and the `position` and `body_axes`.
-
-    Raises
-    ------
-    InputError : a pose in which the floater overlaps the rotor, or that is none
-
-    Examples
-    --------
-    >>> import spinlev as sl
-    >>> cube = sl.tilt(angle_deg=10.0, edge_mm=10.0, remanence_T=1.305)
-    >>> disc = {"shape": "cylinder", "diameter_mm": 12.0, "height_mm": 6.0}
-    >>> disc |= {"remanence_T": 1.305, "recoil_permeability": 1.0, "density_kg_m3": 7500.0}
-    >>> scene = sl.scene(frequency_hz=130.0, rotor=cube, floater=disc)
-    >>> found = sl.floater_force(scene, [0.0, 0.0, -0.02], [-1.0, 0.0, 0.0], model="cuboid")
-    >>> print(f"{found.force.values[0, 2]:.3f} N")
-    1.466 N
-    """
-    with heard(progress):
-        levitation = Levitation(scene, Models(model, rtol=rtol))
-        floater, table = levitation.scene.floater, levitation.table
-        places, pointing = np.broadcast_arrays(_vectors("position", position), _directions("moment", moment))
-        axes = np.array([floater.axes(m) for m in pointing])
-        if body_x is not None:
-            axes = _turned(axes, np.broadcast_to(_directions("body_x", body_x), places.shape))
-        _check_free(levitation.scene, places, axes)
-        fine, coarse = floater_sources(floater, note), floater_sources(floater, note, COARSE)
-        force, torque = _acting(fine, table, places, axes)
-        rough = _acting(coarse, table, places, axes)
-        unsure = fine.unsure(table, places, axes)
-    errors = [
-        doubt + np.linalg.norm(one - other, axis=1)
-        for doubt, one, other in zip(unsure, (force, torque), rough, strict=True)
-    ]
-    return xr.Dataset(
-        {
-            "position": variable(("pose", "axis"), places, "m", "position, rotor's frame"),
-            "body_axes": variable(("pose", "axis", "body_axis"), axes, "1", "axes of the body as columns"),
-            "force": variable(("pose", "axis"), force, "N", "magnetic force"),
-            "torque": variable(("pose", "axis"), torque, "N m", "magnetic torque about the centre"),
-            "force_error": variable(("pose",), errors[0], "N", "estimated error of the force"),
-            "torque_error": variable(("pose",), errors[1], "N m", "estimated error of the torque"),
-        },
-        coords={"axis": list(AXIS)},
-        attrs={"study": "floater-force", "model": table.model, "scene": scene_text(levitation.scene)},
-    )
-
-
-def _vectors(name: str, value: ArrayLike) -> Array:
-    try:
-        found = np.atleast_2d(np.asarray(value, float))
-    except (TypeError, ValueError):
-        found = np.zeros((0, 0))
-    if found.ndim != 2 or found.shape[1] != 3 or not np.isfinite(found).all():
-        raise InputError(f"Input {name} must be three numbers or a list of such; instead received {value!r}.")
-    return found
-
-
-def _directions(name: str, value: ArrayLike) -> Array:
-    found = _vectors(name, value)
-    length = np.linalg.norm(found, axis=1, keepdims=True)
-    if not length.all():
-        raise InputError(f"Input {name} must be a direction, not zero; instead received {value!r}.")
-    return np.asarray(found / length)
-
-
-def _turned(axes: Array, near: Array) -> Array:
-    """Body axes (n, 3, 3) turned about their z so that x is as near as can be to unit vectors (n, 3)."""
-    z = axes[:, :, 2]
-    x = near - np.sum(near * z, axis=1, keepdims=True) * z
-    length = np.linalg.norm(x, axis=1, keepdims=True)
-    if not (length > 1e-9).all():
-        raise InputError("Input body_x must not be along the moment; instead it is.")
-    return np.stack([x / length, np.cross(z, x / length), z], axis=2)
-
-
-def _check_free(scene: Scene, places: Array, axes: Array) -> None:
-    for place, turn in zip(places, axes, strict=True):
-        body = moved(scene.floater.solid, place, turn)
-        depth = max((body_overlap(other, body) for other in scene.turning_bodies), default=-1.0)
-        if depth > 0:
-            where = ", ".join(f"{1e3 * c:.6g}" for c in place)
-            raise InputError(
-                f"Input position must leave the floater free of the rotor; instead received ({where}) mm, where it "
-                f"overlaps it by {1e3 * depth:.3g} mm. Move it away by as much."
-            )
-
-
-def _acting(sources: FloaterSources, table: FieldTable, places: Array, axes: Array) -> tuple[Array, Array]:
-    try:
-        return force_and_torque(sources, table, places, axes)
-    except RangeError as error:
-        raise InputError(
-            f"Input position must be where the field of the rotor is known all over the floater; instead {error} "
-            'Move it away, or take model="cuboid".'
-        ) from None
-
-
 def ensemble(
     scene: SceneLike,
     starts: Mapping[Any, Any] | None = None,
@@ -430,19 +281,17 @@ def ensemble(
         together = min(TOGETHER, -(-len(begun.position) // number))
         asked = levitation.scene, levitation.interaction, begun, duration
         found = flown(*asked, map if number == 1 else mapped(number), together)
-    dims = ("flight", "axis")
-    where = variable(dims, found.last.position, "m", "position, rotor's frame, at the end")
-    states: dict[str, Any] = {"position_rotor_frame": where}
-    # In the laboratory, whose axes are the rotor's at t = 0.
     last = found.last.to_lab(levitation.scene.angular_velocity * found.levitated_s)
-    for prefix, when, state in (("", " at the end", last), ("start_", " at t = 0", begun)):
-        for (name, (unit, label)), values in zip(COLUMNS.items(), state.vectors, strict=True):
-            states[prefix + name] = variable(dims, values, unit, label + when)
-    ends = {
+    data = {
         "levitated": variable(("flight",), found.levitated_s, "s", "levitation time"),
         "ended_by": (("flight",), found.ended_by),
+        "position_rotor_frame": variable(
+            ("flight", "axis"), found.last.position, "m", "position, rotor's frame, at the end"
+        ),
+        **state_columns(last, "flight", ", at the end"),
+        **state_columns(begun, "flight", ", at t = 0", "start_"),  # where the rotor's axes are the laboratory's
     }
-    return xr.Dataset({**ends, **states}, {"axis": list(AXIS)}).assign_attrs(
+    return xr.Dataset(data, {"axis": list(AXIS)}).assign_attrs(
         study="ensemble", scene=scene_text(levitation.scene), duration_s=duration, **levitation.labels, **drawn
     )
 
@@ -543,68 +392,3 @@ def draw(result: xr.Dataset) -> Mapping[str, Figure]:
     Raises InputError where the result has no figure.
     """
     return figures_of(result)
-
-
-class LivePage:
-    """A page that is served in the background; in a notebook it shows itself."""
-
-    def __init__(self, pages: Pages, thread: threading.Thread, loop: asyncio.AbstractEventLoop) -> None:
-        self._pages, self._thread, self._loop = pages, thread, loop
-
-    @property
-    def address(self) -> str:
-        """For a browser on this machine."""
-        return self._pages.address
-
-    def stop(self) -> None:
-        """Close the page and end its work."""
-        if self._thread.is_alive():
-            self._loop.call_soon_threadsafe(self._loop.stop)
-            self._thread.join()
-
-    def __repr__(self) -> str:
-        return f"LivePage at {self.address}"
-
-    def _repr_html_(self) -> str:
-        return f'<iframe src="{html.escape(self.address)}" width="100%" height="{HEIGHT}" style="border:0"></iframe>'
-
-
-def explore(scene: SceneLike, port: int = 0) -> LivePage:
-    """A page in the browser to play with a scene: sliders, equilibria at once, where it levitates, a live flight.
-
-    `port` is on 127.0.0.1; 0 takes one that is free. The page shows itself in a notebook; has an `address` for a
-    browser, and `stop`. Raises SceneError, or ComputationError where libraries are missing or the port is taken.
-    """
-    loaded, serve = given_scene(scene), page_server()
-    source = "scene" if isinstance(scene, Scene) else str(scene)
-    begun: Future[tuple[Pages, asyncio.AbstractEventLoop]] = Future()
-
-    def work() -> None:
-        loop = asyncio.new_event_loop()
-        asyncio.set_event_loop(loop)
-        try:
-            pages = serve(loaded, source, port=port, framed=True)
-        except SpinlevError as error:
-            begun.set_exception(error)
-        else:
-            begun.set_result((pages, loop))
-            pages.run()
-        loop.close()
-
-    thread = threading.Thread(target=work, name="spinlev explore", daemon=True)
-    thread.start()
-    pages, loop = begun.result()
-    return LivePage(pages, thread, loop)
-
-
-def page_server() -> Callable[..., Pages]:
-    """The function that serves pages. Raises ComputationError where its libraries are missing."""
-    try:
-        from .page.server import serve
-    except ModuleNotFoundError as error:
-        if (error.name or "").partition(".")[0] not in ("bokeh", "plotly", "tornado"):
-            raise
-        raise ComputationError(
-            f"The page needs {error.name}, which is not installed. Write pip install 'spinlev[explore]' and try again."
-        ) from None
-    return serve

@@ -19,6 +19,7 @@ from ..dynamics.equilibria.equilibrium import Equilibrium, ForceCurve, LeftOut, 
 from ..dynamics.equilibria.modes import SIDE, TILT
 from ..dynamics.flights.trajectory import Trajectory
 from ..dynamics.motion.plate import PlateMemory
+from ..dynamics.motion.state import State
 from ..fem.cache import write_checked
 from ..fem.rotor.table import FieldTable
 from ..geometry.common import Array, millimetres
@@ -53,6 +54,12 @@ QUANTITIES: tuple[tuple[str, str, str, tuple[str, ...]], ...] = (
 """Of an equilibrium: name in labelled data, SI unit, label, dimensions."""
 IN_JSON = {"m": ("_mm", 1e-3), "deg": ("_deg", 1.0), "1/s": ("_per_s", 1.0), "1": ("", 1.0)}
 """How a name ends there, for its unit, and what the number is divided by."""
+OF_A_STATE = (
+    ("position", "m", "position"),
+    ("velocity", "m/s", "velocity"),
+    ("moment", "1", "direction of the moment"),
+    ("spin", "rad/s", "angular velocity"),
+)
 PLACES = 500
 """Of a flight, at which the field's error is looked at."""
 Columns = Mapping[str, tuple[tuple[str, ...], str, str]]
@@ -285,6 +292,14 @@ def found_dataset(rows: Sequence[Equilibrium]) -> xr.Dataset:
     return xr.Dataset(data, {"equilibrium": np.arange(len(rows)), **{dim: list(names) for dim, names in SIZES.items()}})
 
 
+def state_columns(state: State, over: str, when: str = "", prefix: str = "") -> dict[str, xr.Variable]:
+    """States (n, 3) along the laboratory's axes over a dimension; `when` ends the labels, `prefix` begins the names."""
+    return {
+        f"{prefix}{name}": variable((over, "axis"), values, unit, f"{label}, laboratory frame{when}")
+        for (name, unit, label), values in zip(OF_A_STATE, state.vectors, strict=True)
+    }
+
+
 def trajectory_dataset(flight: Trajectory, memory: PlateMemory | None = None) -> xr.Dataset:
     """A flight in the laboratory frame, with its position in the rotor's frame as well.
 
@@ -297,10 +312,7 @@ def trajectory_dataset(flight: Trajectory, memory: PlateMemory | None = None) ->
     tilt = np.degrees(np.arctan2(np.hypot(lab.moment[:, 0], lab.moment[:, 1]), lab.moment[:, 2]))
     found = xr.Dataset(
         {
-            "position": variable(dims, lab.position, "m", "position, laboratory frame"),
-            "velocity": variable(dims, lab.velocity, "m/s", "velocity, laboratory frame"),
-            "moment": variable(dims, lab.moment, "1", "direction of the moment, laboratory frame"),
-            "spin": variable(dims, lab.spin, "rad/s", "angular velocity, laboratory frame"),
+            **state_columns(lab, "time"),
             "position_rotor_frame": variable(dims, rotor.position, "m", "position, rotor's frame"),
             "distance": variable(("time",), far, "m", "distance from the rotor's origin"),
             "polar_angle": variable(("time",), tilt, "deg", "polar angle of the moment"),

@@ -8,7 +8,7 @@ import logging
 import os
 import shutil
 import sys
-from collections import deque
+from collections import Counter, deque
 from collections.abc import Callable, Generator, Iterator, Mapping, Sequence, Set
 from contextlib import closing, contextmanager, suppress
 from dataclasses import dataclass
@@ -35,6 +35,8 @@ TRIES = 3
 """How often a point is begun whose process dies."""
 Compute = Callable[[Point], xr.Dataset]
 Prepared = Callable[[Sequence[Point]], Sequence[Callable[[], xr.Dataset]]] | None
+Batch = Mapping[int, Point]
+"""Numbered points that are computed together."""
 
 
 @dataclass(frozen=True)
@@ -57,11 +59,9 @@ def computed(
     Raises InputError if the scheduler does not answer, ComputationError if it is lost.
     """
     grouped = study.batches(points) if study.batches else [[k] for k in points]
-    batches: list[Mapping[int, Point]] = [
-        {k: points[k] for k in batch} for batch in grouped if not missing.isdisjoint(batch)
-    ]
+    batches: list[Batch] = [{k: points[k] for k in batch} for batch in grouped if not missing.isdisjoint(batch)]
     if batches and by.scheduler is not None:
-        yield from on_scheduler(by.scheduler, study, batches, missing)
+        yield from _on_scheduler(by.scheduler, study, batches, missing)
         return
     number = min(by.workers or os.cpu_count() or 1, len(batches))
     if number > 1:
@@ -70,7 +70,7 @@ def computed(
         yield from attempts(study.compute, study.prepared, batch, missing)
 
 
-def attempts(compute: Compute, prepared: Prepared, points: Mapping[int, Point], missing: Set[int]) -> Iterator[Attempt]:
+def attempts(compute: Compute, prepared: Prepared, points: Batch, missing: Set[int]) -> Iterator[Attempt]:
     """The results of the missing ones of points that are computed together, or why there is none."""
     asked = list(points.values())
     jobs: Sequence[Callable[[], xr.Dataset]] = [partial(compute, point) for point in asked]
@@ -88,22 +88,20 @@ def attempts(compute: Compute, prepared: Prepared, points: Mapping[int, Point], 
             yield k, Failure(f"{type(error).__name__}: {error}")
 
 
-def silent_attempts(
-    compute: Compute, prepared: Prepared, points: Mapping[int, Point], missing: Set[int]
-) -> Iterator[Attempt]:
+def silent_attempts(*asked: Any) -> Iterator[Attempt]:
     """Attempts in a worker, whose messages would come in between those of the others."""
     with silence():
-        yield from attempts(compute, prepared, points, missing)
+        yield from attempts(*asked)
 
 
 def _in_processes(
-    number: int, study: Study, batches: Sequence[Mapping[int, Point]], missing: Set[int]
-) -> Generator[Attempt, None, list[Mapping[int, Point]]]:
+    number: int, study: Study, batches: Sequence[Batch], missing: Set[int]
+) -> Generator[Attempt, None, list[Batch]]:
     """The attempts of processes of this machine; returns the batches that are left where none can begin."""
     finished: set[int] = set()
-    deaths: dict[int, int] = {}
+    deaths: Counter[int] = Counter()
 
-    def job(batch: Mapping[int, Point]) -> Job:
+    def job(batch: Batch) -> Job:
         return silent_attempts, study.compute, study.prepared, batch, missing
 
     jobs = deque(map(job, batches))
@@ -115,15 +113,12 @@ def _in_processes(
                     yield answer
                     continue
                 left = [k for k in batch if k in missing and k not in finished]
-                if len(left) > 1:  # one of them killed the process: which?
-                    jobs.extend(job({k: batch[k]}) for k in left)
-                    continue
-                for k in left:
-                    deaths[k] = deaths.get(k, 0) + 1
-                    if deaths[k] < TRIES:
-                        jobs.append(job({k: batch[k]}))
-                    else:
-                        yield k, Failure(f"its process {answer}, {TRIES} times")
+                if len(left) == 1:
+                    deaths[left[0]] += 1
+                    if deaths[left[0]] == TRIES:
+                        yield left[0], Failure(f"its process {answer}, {TRIES} times")
+                        continue
+                jobs.extend(job({k: batch[k]}) for k in left)  # one of them killed the process: which?
     except NoProcessError as error:
         note(f"{error} The points are computed in this process, one after the other, as with --workers 1.")
         return [batch for *_, batch, _ in jobs]
@@ -135,9 +130,7 @@ LONGEST = 10.0
 WAY_OUT = "install the same version of spinlev and of its libraries there, or choose --workers"
 
 
-def on_scheduler(
-    address: str, study: Study, batches: Sequence[Mapping[int, Point]], missing: Set[int]
-) -> Iterator[Attempt]:
+def _on_scheduler(address: str, study: Study, batches: Sequence[Batch], missing: Set[int]) -> Iterator[Attempt]:
     """The attempts of the scheduler's workers; those of another version of the program are not used.
 
     Raises
@@ -155,7 +148,7 @@ def on_scheduler(
 
 
 def _answers(
-    client: Client, address: str, study: Study, batches: Sequence[Mapping[int, Point]], missing: Set[int]
+    client: Client, address: str, study: Study, batches: Sequence[Batch], missing: Set[int]
 ) -> Iterator[Attempt]:
     from concurrent.futures import CancelledError
 
@@ -164,14 +157,14 @@ def _answers(
 
     of_us = _workers_of_us(client, address)
 
-    def begin(batch: Mapping[int, Point]) -> Future[Any]:
+    def begin(batch: Batch) -> Future[Any]:
         asked = (program(), study.compute, study.prepared, batch, missing)
         return client.submit(answered, *asked, pure=False, workers=of_us or None)
 
     futures = {begin(batch): batch for batch in batches}
     running = as_completed(list(futures), loop=client.loop)
     for future in running:
-        batch, again = futures.pop(future), list[Mapping[int, Point]]()
+        batch, again = futures.pop(future), list[Batch]()
         try:
             found: list[Attempt] | None = future.result()
         except KilledWorker as error:
@@ -367,19 +360,21 @@ def swept(name: str, study: Study, points: Mapping[int, Point], engine: Workers,
     failed: dict[int, str] = {}
     missing = frozenset(points) - frozenset(finished)
     engine = Workers(workers=1) if study.timed else engine
-    with progress(f"{name}: {len(points)} points") as advance:
+    with (
+        progress(f"{name}: {len(points)} points") as advance,
+        closing(computed(engine, study, points, missing)) as attempts,
+    ):
         advance(len(finished) / len(points))
-        with closing(computed(engine, study, points, missing)) as attempts:
-            for k, result in attempts:
-                if isinstance(result, Failure):
-                    if study.check is not None:  # else each point to come fails for the same reason
-                        study.check()
-                    failed[k] = result.reason
-                    note(f"Point {to_json(points[k])} failed: {result.reason}")
-                else:
-                    journal.keep(k, result)
-                    finished[k] = result
-                advance((len(finished) + len(failed)) / len(points))
+        for k, result in attempts:
+            if isinstance(result, Failure):
+                if study.check is not None:  # else each point to come fails for the same reason
+                    study.check()
+                failed[k] = result.reason
+                note(f"Point {to_json(points[k])} failed: {result.reason}")
+            else:
+                journal.keep(k, result)
+                finished[k] = result
+            advance((len(finished) + len(failed)) / len(points))
     if not finished:
         raise SweepError(f"All {len(points)} points failed; the first: {failed[min(failed)]}")
     reasons = [{"point": points[k], "reason": failed[k]} for k in sorted(failed)]

@@ -14,7 +14,6 @@ from ...geometry.common import InputError
 from .console import note
 from .options import (
     Answer,
-    Beside,
     FieldModel,
     Models,
     Output,
@@ -74,8 +73,8 @@ def run(
     from ...fem.cache import owned
     from ..run import main_job
 
-    with owned(output.out):
-        return Answer(*main_job(loaded, asked.checked(), spin, duration_s, output.out), output.json)
+    with owned(output.folder):
+        return Answer(*main_job(loaded, asked.checked(), spin, duration_s, output.folder), output.json)
 
 
 def field(
@@ -126,19 +125,20 @@ def field(
         from ..demagnetising import working_point_job
         from ..levitation import Levitation
 
-        return Answer(*working_point_job(Levitation(_loaded(scene), asked), output.out), output.json)
+        return Answer(*working_point_job(Levitation(_loaded(scene), asked), output.folder), output.json)
     if plane is not None:
         extent = None if extent_mm is None else map_extent(extent_mm)
         if not 5 <= steps <= 1001:
             raise InputError(f"Input --steps must be between 5 and 1001; instead received {steps}.")
         from ..exchange import field_map_job
 
-        return Answer(*field_map_job(_loaded(scene), plane, extent, offset_mm * 1e-3, steps, output.out), output.json)
+        made = field_map_job(_loaded(scene), plane, extent, offset_mm * 1e-3, steps, output.folder)
+        return Answer(*made, output.json)
     assert points is not None
     loaded, places = _loaded(scene), read_points(points)
     from ..run import field_job
 
-    return Answer(*field_job(loaded, places, asked, output.out), output.json)
+    return Answer(*field_job(loaded, places, asked, output.folder), output.json)
 
 
 def equilibria(
@@ -161,7 +161,7 @@ def equilibria(
     loaded = _loaded(scene)
     from ..run import equilibria_job
 
-    return Answer(*equilibria_job(loaded, asked.checked(), spin, output.out), output.json)
+    return Answer(*equilibria_job(loaded, asked.checked(), spin, output.folder), output.json)
 
 
 def simulate(
@@ -187,7 +187,7 @@ def simulate(
     loaded = _loaded(scene)
     from ..run import simulate_job
 
-    return Answer(*simulate_job(loaded, asked.checked(), duration_s, output.out, resume), output.json)
+    return Answer(*simulate_job(loaded, asked.checked(), duration_s, output.folder, resume), output.json)
 
 
 def plate(
@@ -219,7 +219,7 @@ def plate(
     loaded = _loaded(scene)
     from ..reaction import plate_job
 
-    return Answer(*plate_job(loaded, place * 1e-3, frequency_hz, model, rtol, output.out), output.json)
+    return Answer(*plate_job(loaded, place * 1e-3, frequency_hz, model, rtol, output.folder), output.json)
 
 
 def study(
@@ -270,7 +270,7 @@ def study(
         from ..question import Question
 
         question = Question(loaded, name, ask, asked.checked(), spin, duration_s, tuple(1e-3 * place))
-        return Answer(*question_job(question, values, engine.checked(), output.out), output.json)
+        return Answer(*question_job(question, values, engine.checked(), output.folder), output.json)
     from ..catalogue.entries import CATALOGUE
 
     if list:
@@ -281,10 +281,10 @@ def study(
         raise InputError(f"Input name must be one of {', '.join(CATALOGUE)}; instead received {name}.{scene}")
     from ..catalogue.runner import study_job
 
-    return Answer(*study_job(name, quick, engine.checked(), output.out), output.json)
+    return Answer(*study_job(name, quick, engine.checked(), output.folder), output.json)
 
 
-def figure(result: Path, *, output: Beside = Beside()) -> Answer:
+def figure(result: Path, *, output: Output = Output()) -> Answer:
     """The figures of a result as PNG and PDF, from its file alone; beside it, unless --out is given.
 
     Parameters
@@ -298,7 +298,7 @@ def figure(result: Path, *, output: Beside = Beside()) -> Answer:
     return Answer({"figures": files}, [f"Figure in {file}" for file in files], output.json)
 
 
-def show(result: Path, *, html: Annotated[bool, Parameter(negative="")] = False, output: Beside = Beside()) -> Answer:
+def show(result: Path, *, html: Annotated[bool, Parameter(negative="")] = False, output: Output = Output()) -> Answer:
     """Three-dimensional pictures of a flight, beside its file: scene and currents in the plate, animation, page.
 
     Parameters
@@ -314,7 +314,7 @@ def show(result: Path, *, html: Annotated[bool, Parameter(negative="")] = False,
     return Answer({"pictures": files}, [f"Picture in {file}" for file in files], output.json)
 
 
-def report(folder: Path, *, output: Beside = Beside()) -> Answer:
+def report(folder: Path, *, output: Output = Output()) -> Answer:
     """One page, report.html, about all results in a folder: figures, numbers, errors and where they come from.
 
     Parameters
@@ -406,7 +406,7 @@ def explore(
         raise InputError(f"Input --port must be between 0 and 65535; instead received {port}.")
     source = scene or default_scene()
     loaded = _loaded(source)
-    from ..interface import page_server
+    from ..explore import page_server
 
     pages = page_server()(loaded, str(source), host, port)
     if not pages.local:

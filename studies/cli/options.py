@@ -11,15 +11,13 @@ from importlib.resources import files
 from itertools import product
 from numbers import Real
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal, Self, get_args
+from typing import Annotated, Any, Literal, Self, get_args
 
+import numpy as np
 from cyclopts import Parameter
 
-from ...geometry.common import InputError, shown
+from ...geometry.common import Array, InputError, shown
 from ...geometry.files import file_content
-
-if TYPE_CHECKING:
-    from ...geometry.common import Array
 
 COLUMNS = ("x_mm", "y_mm", "z_mm")
 MOST = 50_000_000
@@ -37,13 +35,6 @@ def _floats(text: str, separator: str = ",") -> list[float]:
     return numbers if all(map(math.isfinite, numbers)) else []
 
 
-def _in_array(numbers: list[Any]) -> Array:
-    """As an array; NumPy is loaded when the first number is read, not with the command line."""
-    import numpy as np
-
-    return np.array(numbers)
-
-
 def three_numbers(name: str, text: str) -> Array:
     """(3,) from X,Y,Z. Raises InputError where they are not three finite numbers."""
     numbers = _floats(text)
@@ -51,7 +42,7 @@ def three_numbers(name: str, text: str) -> Array:
         raise InputError(
             f"Input {name} must be three numbers X,Y,Z of at most {FARTHEST:g} mm; instead received {shown(text)}."
         )
-    return _in_array(numbers)
+    return np.array(numbers)
 
 
 def map_extent(text: str) -> Array:
@@ -64,7 +55,7 @@ def map_extent(text: str) -> Array:
             "Input --extent-mm must be one positive number, or LEFT,RIGHT,LOWER,UPPER in rising order; instead "
             f"received {shown(text)}."
         )
-    return _in_array(numbers) * 1e-3
+    return np.array(numbers) * 1e-3
 
 
 def is_number(value: Any) -> bool:
@@ -115,7 +106,7 @@ def read_points(path: Path) -> Array:
         raise InputError(f"{path}: Input points must be a readable CSV text; instead: {error}.") from None
     if not found:
         raise InputError(f"{path}: Input points must be at least one line below the header; instead received none.")
-    return _in_array(found) * 1e-3
+    return np.array(found) * 1e-3
 
 
 def _number(path: Path, line: int, row: list[str], column: int) -> float:
@@ -207,34 +198,18 @@ class Output:
     json
         Print one JSON object and nothing else on standard output.
     out
-        Folder for the files.
+        Folder for the files; left out: `out`, or beside a result that is asked about.
     verbose
         Say why each model was chosen, how large it is and how exactly the ledgers close.
     """
 
     json: Annotated[bool, Parameter(negative="")] = False
-    out: Path = Path("out")
-    verbose: Annotated[bool, Parameter(negative="")] = False
-
-
-@Parameter(name="*")
-@dataclass(frozen=True)
-class Beside:
-    """Where answers about a file go.
-
-    Parameters
-    ----------
-    json
-        Print one JSON object and nothing else on standard output.
-    out
-        Folder for the files; left out: beside the input.
-    verbose
-        Say more.
-    """
-
-    json: Annotated[bool, Parameter(negative="")] = False
     out: Path | None = None
     verbose: Annotated[bool, Parameter(negative="")] = False
+
+    @property
+    def folder(self) -> Path:
+        return self.out or Path("out")
 
 
 @dataclass(frozen=True)

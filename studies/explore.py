@@ -1,0 +1,85 @@
+"""The live page from Python, also below a notebook's cell."""
+
+from __future__ import annotations
+
+import asyncio
+import html
+import threading
+from collections.abc import Callable
+from concurrent.futures import Future
+from typing import TYPE_CHECKING
+
+from ..geometry.common import ComputationError, SpinlevError
+from ..geometry.scene.contents import Scene
+from .levitation import SceneLike, given_scene
+
+if TYPE_CHECKING:
+    from .page.server import Pages
+
+HEIGHT = 900
+"""Of the page in a notebook, pixels."""
+
+
+class LivePage:
+    """A page that is served in the background; in a notebook it shows itself."""
+
+    def __init__(self, pages: Pages, thread: threading.Thread, loop: asyncio.AbstractEventLoop) -> None:
+        self._pages, self._thread, self._loop = pages, thread, loop
+
+    @property
+    def address(self) -> str:
+        """For a browser on this machine."""
+        return self._pages.address
+
+    def stop(self) -> None:
+        """Close the page and end its work."""
+        if self._thread.is_alive():
+            self._loop.call_soon_threadsafe(self._loop.stop)
+            self._thread.join()
+
+    def __repr__(self) -> str:
+        return f"LivePage at {self.address}"
+
+    def _repr_html_(self) -> str:
+        return f'<iframe src="{html.escape(self.address)}" width="100%" height="{HEIGHT}" style="border:0"></iframe>'
+
+
+def explore(scene: SceneLike, port: int = 0) -> LivePage:
+    """A page in the browser to play with a scene: sliders, equilibria at once, where it levitates, a live flight.
+
+    `port` is on 127.0.0.1; 0 takes one that is free. The page shows itself in a notebook; has an `address` for a
+    browser, and `stop`. Raises SceneError, or ComputationError where libraries are missing or the port is taken.
+    """
+    loaded, serve = given_scene(scene), page_server()
+    source = "scene" if isinstance(scene, Scene) else str(scene)
+    begun: Future[tuple[Pages, asyncio.AbstractEventLoop]] = Future()
+
+    def work() -> None:
+        loop = asyncio.new_event_loop()
+        asyncio.set_event_loop(loop)
+        try:
+            pages = serve(loaded, source, port=port, framed=True)
+        except SpinlevError as error:
+            begun.set_exception(error)
+        else:
+            begun.set_result((pages, loop))
+            pages.run()
+        loop.close()
+
+    thread = threading.Thread(target=work, name="spinlev explore", daemon=True)
+    thread.start()
+    pages, loop = begun.result()
+    return LivePage(pages, thread, loop)
+
+
+def page_server() -> Callable[..., Pages]:
+    """The function that serves pages. Raises ComputationError where its libraries are missing."""
+    try:
+        from .page.server import serve
+    except ModuleNotFoundError as error:
+        if (error.name or "").partition(".")[0] not in ("bokeh", "plotly", "tornado"):
+            raise
+        raise ComputationError(
+            f"The page needs {error.name}, which is not installed. Write pip install 'spinlev[explore]' and try again."
+        ) from None
+    return serve

@@ -1,0 +1,144 @@
+"""Force and torque of the rotor's field on a floater that is held: a sphere, a cuboid or a cylinder in any pose."""
+
+import numpy as np
+import xarray as xr
+from numpy.typing import ArrayLike
+
+from ..fem.rotor.floater import FloaterSources, floater_sources, force_and_torque
+from ..fem.rotor.table import FieldTable, RangeError
+from ..geometry.common import Array, InputError
+from ..geometry.overlap import body_overlap
+from ..geometry.scene.contents import Scene
+from ..geometry.scene.files import scene_text
+from ..geometry.solids import moved
+from .cli.console import heard, note
+from .cli.options import FieldModel, Models
+from .levitation import Levitation, SceneLike
+from .result import AXIS, variable
+
+COARSE = 12
+"""Degree of the rule whose difference from the full one is told as an error."""
+
+
+def floater_force(
+    scene: SceneLike,
+    position: ArrayLike,
+    moment: ArrayLike,
+    body_x: ArrayLike | None = None,
+    model: FieldModel = "auto",
+    rtol: float = Models.rtol,
+    progress: bool = False,
+) -> xr.Dataset:
+    """Force and torque of the rotor's field on the floater held in any pose: a sphere, a cuboid or a cylinder.
+
+    The floater's own multipoles in the rotor's field, those of its permeability as well; what rotor and floater induce
+    in each other is left out. Gravity, plate and motion do not enter.
+
+    Parameters
+    ----------
+    scene : a scene, or the path of its file
+    position : (n, 3) or (3,) of the floater's centre, m, rotor's frame
+    moment : (n, 3) or (3,) directions of its moment, the body's z
+    body_x : (n, 3) or (3,) directions near which the body's x lies; left out, the rotor's x; it matters to a cuboid
+    model, rtol : of the rotor's field, see `Models`
+    progress : whether messages go to standard error
+
+    Returns
+    -------
+    xarray.Dataset
+        Over `pose` and `axis`, SI units: `force`, `torque` about the centre, their errors `force_error` and
+        `torque_error` (the field's all over the body, and of the sums over it), and the `position` and `body_axes`.
+
+    Raises
+    ------
+    InputError : a pose in which the floater overlaps the rotor, or that is none
+
+    Examples
+    --------
+    >>> import spinlev as sl
+    >>> cube = sl.tilt(angle_deg=10.0, edge_mm=10.0, remanence_T=1.305)
+    >>> disc = {"shape": "cylinder", "diameter_mm": 12.0, "height_mm": 6.0}
+    >>> disc |= {"remanence_T": 1.305, "recoil_permeability": 1.0, "density_kg_m3": 7500.0}
+    >>> scene = sl.scene(frequency_hz=130.0, rotor=cube, floater=disc)
+    >>> found = sl.floater_force(scene, [0.0, 0.0, -0.02], [-1.0, 0.0, 0.0], model="cuboid")
+    >>> print(f"{found.force.values[0, 2]:.3f} N")
+    1.466 N
+    """
+    with heard(progress):
+        levitation = Levitation(scene, Models(model, rtol=rtol))
+        floater, table = levitation.scene.floater, levitation.table
+        places, pointing = np.broadcast_arrays(_vectors("position", position), _directions("moment", moment))
+        axes = np.array([floater.axes(m) for m in pointing])
+        if body_x is not None:
+            axes = _turned(axes, np.broadcast_to(_directions("body_x", body_x), places.shape))
+        _check_free(levitation.scene, places, axes)
+        fine, coarse = floater_sources(floater, note), floater_sources(floater, note, COARSE)
+        force, torque = _acting(fine, table, places, axes)
+        rough = _acting(coarse, table, places, axes)
+        unsure = fine.unsure(table, places, axes)
+    errors = [
+        doubt + np.linalg.norm(one - other, axis=1)
+        for doubt, one, other in zip(unsure, (force, torque), rough, strict=True)
+    ]
+    return xr.Dataset(
+        {
+            "position": variable(("pose", "axis"), places, "m", "position, rotor's frame"),
+            "body_axes": variable(("pose", "axis", "body_axis"), axes, "1", "axes of the body as columns"),
+            "force": variable(("pose", "axis"), force, "N", "magnetic force"),
+            "torque": variable(("pose", "axis"), torque, "N m", "magnetic torque about the centre"),
+            "force_error": variable(("pose",), errors[0], "N", "estimated error of the force"),
+            "torque_error": variable(("pose",), errors[1], "N m", "estimated error of the torque"),
+        },
+        coords={"axis": list(AXIS)},
+        attrs={"study": "floater-force", "model": table.model, "scene": scene_text(levitation.scene)},
+    )
+
+
+def _vectors(name: str, value: ArrayLike) -> Array:
+    try:
+        found = np.atleast_2d(np.asarray(value, float))
+    except (TypeError, ValueError):
+        found = np.zeros((0, 0))
+    if found.ndim != 2 or found.shape[1] != 3 or not np.isfinite(found).all():
+        raise InputError(f"Input {name} must be three numbers or a list of such; instead received {value!r}.")
+    return found
+
+
+def _directions(name: str, value: ArrayLike) -> Array:
+    found = _vectors(name, value)
+    length = np.linalg.norm(found, axis=1, keepdims=True)
+    if not length.all():
+        raise InputError(f"Input {name} must be a direction, not zero; instead received {value!r}.")
+    return np.asarray(found / length)
+
+
+def _turned(axes: Array, near: Array) -> Array:
+    """Body axes (n, 3, 3) turned about their z so that x is as near as can be to unit vectors (n, 3)."""
+    z = axes[:, :, 2]
+    x = near - np.sum(near * z, axis=1, keepdims=True) * z
+    length = np.linalg.norm(x, axis=1, keepdims=True)
+    if not (length > 1e-9).all():
+        raise InputError("Input body_x must not be along the moment; instead it is.")
+    return np.stack([x / length, np.cross(z, x / length), z], axis=2)
+
+
+def _check_free(scene: Scene, places: Array, axes: Array) -> None:
+    for place, turn in zip(places, axes, strict=True):
+        body = moved(scene.floater.solid, place, turn)
+        depth = max((body_overlap(other, body) for other in scene.turning_bodies), default=-1.0)
+        if depth > 0:
+            where = ", ".join(f"{1e3 * c:.6g}" for c in place)
+            raise InputError(
+                f"Input position must leave the floater free of the rotor; instead received ({where}) mm, where it "
+                f"overlaps it by {1e3 * depth:.3g} mm. Move it away by as much."
+            )
+
+
+def _acting(sources: FloaterSources, table: FieldTable, places: Array, axes: Array) -> tuple[Array, Array]:
+    try:
+        return force_and_torque(sources, table, places, axes)
+    except RangeError as error:
+        raise InputError(
+            f"Input position must be where the field of the rotor is known all over the floater; instead {error} "
+            'Move it away, or take model="cuboid".'
+        ) from None
