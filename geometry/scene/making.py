@@ -76,9 +76,10 @@ def assemble(keys: Mapping[str, Any], source: str, folder: Path | None = None, k
         raise SceneError(source, faults)
     own = copy.deepcopy(dict(keys))
     for number, path in paths.items():
-        (own["rotor"] if number is None else own["rotor"]["magnets"][number])[
-            "field_map" if number is None else "file"
-        ] = str(path)
+        if number is None:
+            own["rotor"]["field_map"] = str(path)
+        else:
+            own["rotor"]["magnets"][number]["file"] = str(path)
     scene = replace(scene, files=tuple(files.items()), parts=tuple(parts.values()))
     return replace(scene, keys=(own, scene))
 

@@ -2,6 +2,7 @@
 
 from typing import Annotated, Any, Literal, TypeVar
 
+import numpy as np
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Discriminator, Field, Tag
 from pydantic_core import PydanticCustomError
 
@@ -234,11 +235,16 @@ def key_faults(table: SceneTable) -> list[str]:
             for key, there in given.items()
             if there == bool(drag.model)
         ]
+    magnets: dict[str, Any] = {"rotor": rotor}
     if isinstance(rotor, ExplicitRotor):
-        for k, magnet in enumerate(rotor.magnets):
-            faults += _shape_faults(f"rotor.magnets[{k}]", magnet)
-    else:
-        faults += _shape_faults("rotor", rotor)
+        magnets = {f"rotor.magnets[{k}]": magnet for k, magnet in enumerate(rotor.magnets)}
+    for place, magnet in magnets.items():
+        faults += _shape_faults(place, magnet)
+        key, (along, across) = "remanence_T" if magnet is rotor else "polarization_T", magnet.recoil_permeability
+        if along != across and not np.any(getattr(magnet, key)):
+            faults.append(
+                f"Input {place}.{key} must not be zero where recoil_permeability has an easy axis; instead it is zero."
+            )
     for k, conductor in enumerate(rotor.conductors):
         faults += _shape_faults(f"rotor.conductors[{k}]", conductor)
     faults += _shape_faults("floater", floater)

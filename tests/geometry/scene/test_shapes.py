@@ -75,6 +75,14 @@ def test_an_article_rotor_of_spheres_turns_only_their_polarisation():
             "magnet 1 and magnet 2 overlap by 1 mm",
         ),
         (
+            magnets(PLACED | DISC | {"polarization_T": [0.0] * 3, "recoil_permeability": [1.05, 1.1]}),
+            "magnets[0].polarization_T must not be zero where recoil_permeability has an easy axis",
+        ),
+        (
+            tilt(angle_deg=5.0, edge_mm=10.0, remanence_T=0.0, recoil_permeability=[1.05, 1.1]),
+            "rotor.remanence_T must not be zero",
+        ),
+        (
             tilt(angle_deg=5.0, remanence_T=1.2),
             "rotor must have edge_mm, as the shape is 'cube'; instead received no size",
         ),
