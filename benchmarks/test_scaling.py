@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from peers import PLATE, SCENE, around
 
-from spinlev.dynamics.flights.flight import PLATE_TOLERANCE, Flight, initial_state, integrate
+from spinlev.dynamics.flights.flight import PLATE_TOLERANCE, Flight, integrate
+from spinlev.dynamics.flights.start import initial_state
 from spinlev.dynamics.maps.family import rotor_family
 from spinlev.dynamics.maps.map import equilibrium_map
 from spinlev.fem.closed_forms.moments import carrier

@@ -13,8 +13,10 @@ import numpy as np
 
 from ..dynamics.equilibria.equilibrium import Equilibrium, EquilibriumError, Survey
 from ..dynamics.equilibria.search import Found, cached_found, free_of_bodies, own_spin, survey, with_plate
-from ..dynamics.flights.flight import Checkpoint, initial_state, most_like_levitation, simulate, starting_point
+from ..dynamics.flights.checkpoint import Checkpoint
+from ..dynamics.flights.flight import simulate
 from ..dynamics.flights.live import LiveFlight
+from ..dynamics.flights.start import initial_state, most_like_levitation, starting_point
 from ..dynamics.flights.trajectory import FlightStopped, Trajectory
 from ..dynamics.motion.effect import Interaction, interaction_of
 from ..dynamics.motion.effects import BESIDE_METAL, WITHOUT_METAL, with_effects

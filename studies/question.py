@@ -15,7 +15,7 @@ import xarray as xr
 from ..dynamics.equilibria.balance import Indices
 from ..dynamics.flights.balls import is_long
 from ..dynamics.flights.batch import fly_together
-from ..dynamics.flights.flight import initial_state
+from ..dynamics.flights.start import initial_state
 from ..dynamics.maps.family import article_measure, rotor_family
 from ..dynamics.maps.map import surveys
 from ..dynamics.motion.rates import Rates

@@ -13,7 +13,8 @@ import xarray as xr
 
 from ..dynamics.equilibria.equilibrium import EquilibriumError, Survey
 from ..dynamics.equilibria.search import free_of_bodies
-from ..dynamics.flights.flight import Checkpoint, starting_point
+from ..dynamics.flights.checkpoint import Checkpoint
+from ..dynamics.flights.start import starting_point
 from ..dynamics.flights.trajectory import FlightStopped, Trajectory
 from ..fem.cache import owned, program_digest
 from ..fem.files import write_whole

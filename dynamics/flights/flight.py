@@ -3,20 +3,14 @@
 A. Jorba and M. Zou, Exp. Math. 14 (2005) 99; heyoka: F. Biscani and D. Izzo, MNRAS 504 (2021) 2614.
 
 A `Flight` is a scene's motion in machine code, one part for each kind of ball and one for the table's own field.  A
-`Course` is how far one trajectory is: all that decides the rest of it, so that a file of it (`Checkpoint`) goes on to
-the last bit.
+`Course` is how far one trajectory is: all that decides the rest of it, so that it goes on from a checkpoint to the last
+bit.
 """
 
 from __future__ import annotations
 
-import hashlib
-import io
-import os
-import zipfile
-import zlib
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import astuple, dataclass, field
-from pathlib import Path
 from time import perf_counter
 from typing import Any
 
@@ -24,15 +18,11 @@ import heyoka as hy
 import numpy as np
 
 from ...fem.compiled_code import compiled
-from ...fem.files import write_whole
 from ...fem.harmonics.local import BallField
 from ...fem.rotor.table import FieldTable
-from ...geometry.common import Array, ComputationError, InputError
-from ...geometry.files import regular_file
-from ...geometry.scene.contents import AbsoluteStart, Scene
-from ..continuation.frequencies import way_out
-from ..equilibria.equilibrium import Equilibrium, EquilibriumError
-from ..equilibria.search import find_equilibria
+from ...geometry.common import Array, ComputationError
+from ...geometry.scene.contents import Scene
+from ..equilibria.equilibrium import Equilibrium
 from ..motion.effects import with_effects
 from ..motion.equations import Equations, equations_of_motion, parameters
 from ..motion.events import (
@@ -47,9 +37,11 @@ from ..motion.events import (
     plate_legs,
     range_events,
 )
-from ..motion.plate import PlateForce, PlateMemory, plate_numbers
+from ..motion.plate import PlateMemory, plate_numbers
 from ..motion.state import Parameter, Scales, State
 from .balls import DEGREE, LARGE, SMALL, Balls, in_ball, is_long, within
+from .checkpoint import Checkpoint
+from .start import StartError, in_plate_range, initial_state
 from .trajectory import DURATION, STOPPED, FieldChanges, FlightStopped, Recorder, Trajectory
 
 LEFT = "left"
@@ -78,21 +70,10 @@ PIECE_TURNS, PIECE_SAMPLES = 256, 256
 A step ends where a piece does, so that pieces must not depend on how fast the machine is.
 """
 MOST_SAMPLES, SAMPLES_PER_TURN = 20000, 32
-SLOWLY = 1 / 3
-"""Growth (1/s) with which a flight may still begin: an e-fold in the shortest flight that counts, 3 s."""
-MOST = 2_000_000_000
-"""Bytes of a checkpoint."""
-KEPT = ("key", "time", "state", "values", "times", "states", "interval", "steps", "changes", "region")
-BROKEN = (OSError, ValueError, KeyError, TypeError, EOFError, RuntimeError, MemoryError, zipfile.BadZipFile, zlib.error)
-"""What damage to a file of arrays is told by; its header may say any size."""
 
 
 class IntegrationError(ComputationError):
     """The motion could not be integrated."""
-
-
-class StartError(InputError):
-    """The flight cannot begin where it was asked to."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -296,7 +277,7 @@ class Course:
                 if over:
                     return
                 if checkpoint and perf_counter() - kept > checkpoint.every:
-                    checkpoint.write(self)
+                    checkpoint.write(self.content())
                     kept = perf_counter()
 
     def set_leg(self, end: float, depth: float, speed: float) -> float:
@@ -335,6 +316,32 @@ class Course:
                 times, states = times[: touching[0] + 1], states[: touching[0] + 1]
         return times, self.flight.balanced(self.values, times, states)
 
+    def content(self) -> dict[str, Any]:
+        """All that decides the rest, for a checkpoint, and the region (2, 3) m of the plate's table; zeros: none."""
+        memory, recorder = self.flight.memory, self.recorder
+        assert recorder is not None
+        return {
+            "time": self.time,
+            "state": self.state,
+            "values": self.values,
+            "times": recorder.times,
+            "states": recorder.states,
+            "interval": recorder.interval,
+            "steps": self.steps,
+            "changes": astuple(self.changes),
+            "region": np.zeros((2, 3)) if memory is None else [memory.table.region.lower, memory.table.region.upper],
+        }
+
+    def restore(self, content: Mapping[str, Any]) -> None:
+        """Go back to where it was."""
+        assert self.recorder is not None
+        high, low = content["time"].tolist()
+        self.time, self.state, self.values = (high, low), content["state"], content["values"]
+        count, *rest = content["changes"].tolist()
+        self.steps, self.changes = int(content["steps"]), FieldChanges(int(count), *rest)
+        self.recorder.put(content["times"], content["states"])
+        self.recorder.interval = float(content["interval"])
+
     def trajectory(self, speed: float) -> Trajectory:
         """The samples, at so many simulated seconds per second."""
         assert self.recorder is not None
@@ -357,77 +364,6 @@ class Course:
             left_plate_table=self.ended_by == BEYOND,
             field_changes=self.changes.relative(self.scale),
         )
-
-
-@dataclass(frozen=True)
-class Checkpoint:
-    """The file in which a course is kept while it lasts.
-
-    Parameters
-    ----------
-    path : where it is
-    identity : everything that the flight depends on, as text; another flight's checkpoint is refused
-    every : seconds between two writings
-    """
-
-    path: Path
-    identity: str
-    every: float = 5.0
-
-    @property
-    def _key(self) -> str:
-        return hashlib.sha256(self.identity.encode()).hexdigest()
-
-    def write(self, course: Course) -> None:
-        """Keep how far a course is; the file is whole or as it was."""
-        memory, recorder, stream = course.flight.memory, course.recorder, io.BytesIO()
-        assert recorder is not None
-        region = np.zeros((2, 3)) if memory is None else [memory.table.region.lower, memory.table.region.upper]
-        np.savez(
-            stream, allow_pickle=False, key=np.array(self._key), time=course.time, state=course.state,
-            values=course.values, times=recorder.times, states=recorder.states, interval=recorder.interval,
-            steps=course.steps, changes=astuple(course.changes), region=region,
-        )  # fmt: skip
-        write_whole(self.path, stream.getvalue())
-
-    def read(self) -> dict[str, Any] | None:
-        """Arrays by name, with the `region` (2, 3) m of the plate's table (zeros: none), or None without a file.
-
-        Raises
-        ------
-        InputError : the file is damaged, or belongs to another flight
-        """
-        if not os.path.lexists(self.path):
-            return None
-        try:
-            with regular_file(self.path, MOST, "checkpoint", "a regular file") as stream, np.load(stream) as data:
-                content = {name: data[name] for name in KEPT}
-            key = str(content.pop("key"))
-        except InputError:
-            raise
-        except BROKEN as error:
-            raise InputError(f"Input {self.path} must be a checkpoint; instead it is damaged: delete it.") from error
-        if key != self._key:
-            raise InputError(
-                f"Input {self.path} must be a checkpoint of this flight; instead it was kept by another scene, model, "
-                "duration or version: delete it, choose another --out, or leave out --resume."
-            )
-        return content
-
-    def restore(self, course: Course) -> bool:
-        """Put a course back to where it was; whether there was something."""
-        known, recorder = self.read(), course.recorder
-        if known is None or recorder is None:
-            return False
-        course.time, course.state, course.values = tuple(known["time"].tolist()), known["state"], known["values"]
-        course.steps, (count, *rest) = int(known["steps"]), known["changes"].tolist()
-        course.changes = FieldChanges(int(count), *rest)
-        recorder.put(known["times"], known["states"])
-        recorder.interval = float(known["interval"])
-        return True
-
-    def remove(self) -> None:
-        self.path.unlink(missing_ok=True)
 
 
 def integrate(
@@ -458,10 +394,11 @@ def integrate(
     """
     began, known = perf_counter(), flight.compile_seconds
     course = flight.begin(start, duration, currents, flight.interval(duration))
-    began_at, moved = 0.0, False
-    if checkpoint and checkpoint.restore(course):
-        began_at, moved = course.seconds, True
-    if not moved and not in_plate_range(flight.memory, start):
+    kept = checkpoint.read() if checkpoint else None
+    if kept is not None:
+        course.restore(kept)
+    began_at = course.seconds
+    if kept is None and not in_plate_range(flight.memory, start):
         course.ended_by = BEYOND  # no event tells of a range in which it never was
         return course.trajectory(0.0)
     try:
@@ -469,18 +406,13 @@ def integrate(
     except KeyboardInterrupt:
         course.ended_by = STOPPED
         if checkpoint and course.steps and course.sound:
-            checkpoint.write(course)
+            checkpoint.write(course.content())
     assert course.recorder is not None
     seconds = perf_counter() - began - (flight.compile_seconds - known)
     found = course.trajectory((float(course.recorder.times[-1]) * flight.scales.time - began_at) / seconds)
     if course.ended_by == STOPPED:
         raise FlightStopped(found)
     return found
-
-
-def in_plate_range(memory: PlateMemory | None, lab: State, time: float = 0.0) -> bool:
-    """Whether a plate's table, if there is one, knows the field at a place along the laboratory's axes at a time, s."""
-    return memory is None or bool(memory.in_range(lab.position, plate_depth(memory.plate, np.array([time])))[0])
 
 
 def simulate(
@@ -517,77 +449,3 @@ def simulate(
         tolerance = max(tolerance, PLATE_TOLERANCE)
     flight = Flight(scene, table, duration, tolerance, compact, memory)
     return integrate(flight, start, duration, progress, currents, checkpoint)
-
-
-def initial_state(
-    scene: Scene,
-    table: FieldTable,
-    equilibria: Sequence[Equilibrium] | None = None,
-    memory: PlateMemory | None = None,
-) -> tuple[State, Array]:
-    """State at t = 0, when the rotor's frame is the laboratory's, and the plate's states (k,), √J.
-
-    An `OffsetStart` displaces the stable equilibrium in the rotor's frame and keeps the floater at rest in it; among
-    several it takes the nearest; where there is none, what `starting_point` says.  An absolute start finds the plate as
-    if the floater had long turned with the rotor there.  `equilibria` are found if they are not given.
-
-    Raises
-    ------
-    EquilibriumError : no equilibrium to start from; it says why and which frequency has one
-    StartError : the floater would overlap a magnet or the plate
-    """
-    currents = np.zeros(0)
-    if isinstance(scene.start, AbsoluteStart):
-        start = scene.start
-        state = State(start.position, start.velocity, start.moment / np.linalg.norm(start.moment), start.spin)
-        if memory is not None:
-            scales = Scales.of(scene)
-            plate = PlateForce(memory, parameters(scene, scales))
-            currents = plate.settled(scales.pack(state)) / plate.values[Parameter.PLATE_SHARE]
-    else:
-        known = find_equilibria(scene, table, memory=memory) if equilibria is None else equilibria
-        chosen = starting_point(known)
-        if chosen is None:
-            raise EquilibriumError(way_out(scene, table, known, memory=memory))
-        state = displaced(chosen.start, scene.start.offset, scene.angular_velocity)
-        currents = currents if chosen.currents is None else chosen.currents[0]
-    check_free("start", scene, state.position, moment=state.moment)
-    return state, currents
-
-
-def check_free(name: str, scene: Scene, position: Array, time: float = 0.0, moment: Array | None = None) -> None:
-    """Raises StartError where a floater at a position (3,) m, rotor's frame, would overlap a body at a time (s)."""
-    pointing = None if moment is None else moment[None]
-    gap = float(clearance(scene, np.array([time]), position[None], pointing)[0])
-    if gap < 0:
-        where = ", ".join(f"{1e3 * c:.6g}" for c in position)
-        raise StartError(
-            f"Input {name} must leave the floater free of the magnets and the plate; instead it begins at ({where}) "
-            f"mm, {-1e3 * gap:.3g} mm inside one of them. Move the plate or the {name}."
-        )
-
-
-def starting_point(equilibria: Sequence[Equilibrium]) -> Equilibrium | None:
-    """The nearest stable equilibrium, or else the nearest that only the plate, or only slowly something, undoes.
-
-    The floater's own eddy currents do so slowly, in minutes.
-    """
-    stable = [e for e in equilibria if e.stable]
-    without = [e for e in equilibria if e.without and e.without.stable]
-    slowly = [e for e in equilibria if e.growth_per_s < SLOWLY]
-    return next(iter([*stable, *without, *slowly]), None)
-
-
-def most_like_levitation(equilibria: Sequence[Equilibrium]) -> Equilibrium | None:
-    """Where a flight begins, or, where none may, the equilibrium whose small motions grow least; None without any.
-
-    A brake undoes those near the rotor the most.
-    """
-    return starting_point(equilibria) or min(equilibria, key=lambda e: e.growth_per_s, default=None)
-
-
-def displaced(start: State, offset: Array, angular_velocity: float) -> State:
-    """A state moved by one or more offsets (..., 3) m, as much at rest in the frame that turns (rad/s) as it was."""
-    turning = np.cross([0.0, 0.0, angular_velocity], offset)
-    moment, spin = (np.broadcast_to(v, offset.shape) for v in (start.moment, start.spin))
-    return State(start.position + offset, start.velocity + turning, moment, spin)
