@@ -1,6 +1,6 @@
 """Levitations of many points at once: scenes with one rotor share its table, compiled equations and equilibria.
 
-Flights that begin in one field go side by side in a processor's lanes (`dynamics.ensembles`).
+Flights that begin in one field go side by side in a processor's lanes (`dynamics/flights/batch.py`).
 """
 
 from collections.abc import Callable, Mapping, Sequence

@@ -119,7 +119,8 @@ class Flight:
         self.parts: dict[int, Part] = {}
         """By the degree of the ball, 0: in none."""
         self.compile_seconds, self._tolerance, self._turns = 0.0, tolerance, scene.frequency * duration
-        self._straight = self._turns > STRAIGHT_TURNS if compact is None else not compact
+        long = memory is None and self._turns > STRAIGHT_TURNS  # straight code of a plate takes minutes to compile
+        self._straight = long if compact is None else not compact
 
     def degree(self, values: Array) -> int:
         """Of the ball in runtime parameters; 0: none."""
@@ -128,6 +129,7 @@ class Flight:
     def part(self, degree: int) -> Part:
         """The compiled motion in balls of a degree, or, 0, in the table's own field."""
         if degree not in self.parts:
+            # in small balls most of a long flight is spent: straight code is for them, or where there are none
             began = perf_counter()
             equations, events = self.equations(degree)
             falling = hy.event_direction.negative
@@ -136,7 +138,7 @@ class Flight:
                 [*zip(equations.variables, equations.rates, strict=True), (hy.expression("work"), equations.power)],
                 np.zeros(len(equations.variables) + 1),
                 tol=self._tolerance * (LOOSER if degree else 1),
-                compact_mode=not self._straight or (self.balls is not None and not degree),
+                compact_mode=not self._straight or (self.balls is not None and degree != SMALL.degree),
                 opt_level=OPTIMISATION if self._turns > SHORT_TURNS else 0,
                 t_events=[hy.t_event(each, direction=falling) for each, _ in events],
             )

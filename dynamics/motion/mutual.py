@@ -76,6 +76,7 @@ class Mutual:
             hy.par[p] for p in (Parameter.LENGTH, Parameter.PLATE_MOMENT, Parameter.PLATE_SHARE, Parameter.INDUCED)
         )
         flux = [share * b for b in motion.field]
+        # in the unit of √energy, so that the unit of energy enters nowhere else
         away = [strength * m + induced * b for m, b in zip(motion.moment, motion.field, strict=True)]
         if self.ball is None:
             centre = [hy.par[self.first + k] for k in range(6)]

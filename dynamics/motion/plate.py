@@ -165,6 +165,7 @@ def _rotor_terms(
     if lowered:
         changing = [a + b for a, b in zip(changing, sinking[len(constant) :], strict=True)]
     count = len(signals)
+    # r and q are Σ number · basis: the basis is written once, its derivatives by angle and depth are heyoka's
     rows = [[hy.par[first + n * count + k] for k in range(count)] for n in range(len(functions))]
     sums = [dotted(row, signals) for row in rows]
     lowering, start = list[hy.expression](), first + len(functions) * count
