@@ -2,6 +2,7 @@
 
 import copy
 import operator
+import pickle
 from collections.abc import Iterator
 from dataclasses import replace
 from functools import reduce
@@ -16,7 +17,7 @@ from spinlev.dynamics.motion.equations import parameters
 from spinlev.dynamics.motion.state import Scales
 from spinlev.geometry.common import MU_0
 from spinlev.geometry.scene.contents import AbsoluteStart, Drag, OffsetStart
-from spinlev.geometry.scene.files import load_scene, parse_scene, scene, scene_text
+from spinlev.geometry.scene.files import load_scene, parse_scene, scene, scene_keys, scene_text
 from spinlev.geometry.scene.making import sphere, tilt
 from spinlev.geometry.scene.messages import SceneError
 
@@ -261,6 +262,22 @@ def test_air_survives_writing():
     assert stokes.drag == Drag.stokes(stokes.floater.radius)
     assert air.drag == replace(stokes.drag, air=True)
     assert parse_scene(scene_text(replace(air, frequency=99.0)), "again").drag == air.drag
+
+
+def test_what_was_not_replaced_is_written_as_the_user_wrote_it():
+    """Also on its way to another process; what has no keys of its own, as its magnets."""
+    read = pickle.loads(pickle.dumps(parse_scene(GOOD, "s.toml")))
+    assert scene_text(read) == GOOD
+    slower = replace(read, frequency=99.0, plate=None)
+    keys = scene_keys(read)
+    del keys["plate"]
+    assert scene_keys(slower) == keys | {"frequency_hz": 99.0}
+    assert "magnets" in scene_keys(replace(read, rotor=load_scene(SCENES / "vertical-24h.toml").rotor))["rotor"]
+    bare = replace(read, keys=None)
+    assert "configuration" not in scene_text(bare)
+    assert repr(parse_scene(scene_text(bare))) == repr(read)
+    larger = replace(parse_scene(with_drag('model = "stokes"')), floater=replace(read.floater, radius=7e-3))
+    assert parse_scene(scene_text(larger)).drag == larger.drag != Drag.stokes(7e-3)
 
 
 def with_drag(text):
