@@ -16,7 +16,7 @@ import unicodedata
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import Any, Protocol, TextIO
+from typing import Any, TextIO
 
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
@@ -105,7 +105,6 @@ def lend_quadmath() -> Path | None:
 
 
 def _folder(package: str) -> Path | None:
-    """Where a package is installed, without importing it."""
     found = importlib.util.find_spec(package)
     return Path(found.origin).parent if found and found.origin else None
 
@@ -143,8 +142,8 @@ class Heartbeat(threading.Thread):
         super().__init__(name="heartbeat", daemon=True)
         self._say, self._pause, self._over = say, pause, threading.Event()
         self._began: float | None = None
-        self._said = time.monotonic()
-        self._stage, self._stage_began, self._fraction, self._advanced = "", self._said, 0.0, self._said
+        self._said = self._stage_began = self._advanced = time.monotonic()
+        self._stage, self._fraction = "", 0.0
 
     def said(self, text: str = "") -> None:
         """Something was shown; a text that ends in " ..." begins a step, any other ends it."""
@@ -169,7 +168,6 @@ class Heartbeat(threading.Thread):
             self.join()
 
     def run(self) -> None:
-        """The thread's work."""
         while not self._over.wait(self._pause / 5):
             now, began = time.monotonic(), self._began
             if began is not None and now - self._said > max(self._pause, SHARE * (now - began)):
@@ -177,11 +175,12 @@ class Heartbeat(threading.Thread):
                 self._say(f"  {self._progress(now, began)}")
 
     def _progress(self, now: float, began: float) -> str:
+        stage = self._stage and f"{self._stage}, "
         if not TELLING <= self._fraction < ALL:
-            return f"{self._stage}{self._stage and ', '}{_rounded(now - began)} so far"
+            return f"{stage}{_rounded(now - began)} so far"
         left = (self._advanced - self._stage_began) * (1 / self._fraction - 1) - (now - self._advanced)
         told = f", {_rounded(left)} left" if left > 0 else ""  # a part that takes longer than its share tells no time
-        return f"{self._stage}{self._stage and ', '}{self._fraction:.0%}{told}"
+        return f"{stage}{self._fraction:.0%}{told}"
 
 
 def _rounded(seconds: float) -> str:
@@ -192,13 +191,6 @@ def _rounded(seconds: float) -> str:
 
 LOG = logging.getLogger("spinlev")
 ERRORS = Console(stderr=True, highlight=False, soft_wrap=True)
-
-
-class Progressed(Protocol):
-    """Moves a progress bar."""
-
-    def __call__(self, fraction: float, text: str = ...) -> None:
-        """To the finished fraction, with another label if one is given."""
 
 
 def note(text: str) -> None:
@@ -256,7 +248,7 @@ def silence() -> Iterator[None]:
 
 
 @contextmanager
-def progress(label: str) -> Iterator[Progressed]:
+def progress(label: str) -> Iterator[Callable[..., None]]:
     """A progress bar where messages are heard; gives a function that takes the finished fraction and a new label."""
     columns = (TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(), TimeRemainingColumn())
     shown = LOG.handlers and (ERRORS.is_interactive or ERRORS.is_jupyter)
