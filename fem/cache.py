@@ -308,17 +308,15 @@ def others_may_write(folder: Path) -> str | None:
     he puts there is his own, and is known by that. Raises OSError.
     """
     above, found = folder.parent.stat(), folder.lstat()
-    if not above.st_mode & stat.S_ISVTX:
-        if not ours(above):
-            return f"{folder.parent} belongs to another user; set SPINLEV_CACHE to a folder of your own"
-        if not closed(above):
-            mends = f"chmod go-w {folder.parent} mends it (chmod +t where several users share it)"
-            return f"others may write in {folder.parent}; {mends}"
-    if not stat.S_ISDIR(found.st_mode):
-        return f"{folder} is a link or no folder; remove it"
-    if not ours(found):
-        return f"{folder} belongs to another user; set SPINLEV_CACHE to a folder of your own"
-    return None if closed(found) else f"others may write in {folder}; chmod go-w {folder} mends it"
+    places = [(folder.parent, above, " (chmod +t where several users share it)"), (folder, found, "")]
+    for path, one, hint in places[1:] if above.st_mode & stat.S_ISVTX else places:
+        if not stat.S_ISDIR(one.st_mode):
+            return f"{path} is a link or no folder; remove it"
+        if not ours(one):
+            return f"{path} belongs to another user; set SPINLEV_CACHE to a folder of your own"
+        if not closed(one):
+            return f"others may write in {path}; chmod go-w {path} mends it{hint}"
+    return None
 
 
 def cache_limit() -> int:

@@ -70,10 +70,15 @@ def compiled_later(
         if found is None:
             with _alone():
                 found = compiler(*write(), **options)
-            content = _written(found, name)
+            state, _ = cast(Any, found).__getstate__()
+            content = zlib.compress(f"{name}\n{type(found).__name__}\n".encode() + state, 1)
             size = len(content)
-            if folder:
-                _keep(content, folder / name)
+            try:
+                if folder:
+                    write_whole(folder / name, seal(content))
+                    make_room(folder, min(LIMIT, cache_limit()))
+            except OSError as error:  # costs time only
+                LOG.debug("Compiled code could not be kept: %s", error)
         taken = EACH + TIMES * size
     if compiler.__name__ == "cfunc":
         _functions[path] = found, taken
@@ -158,11 +163,6 @@ def _target() -> str:
         return f"{hy.__version__} {hy.cfunc([x], [x]).llvm_states}"
 
 
-def _written(made: Any, name: str) -> bytes:
-    state, _ = made.__getstate__()
-    return zlib.compress(f"{name}\n{type(made).__name__}\n".encode() + state, 1)
-
-
 def _read(path: Path) -> tuple[Any, int]:
     """What was kept, and its size; None where there is none to be trusted."""
     import heyoka as hy
@@ -182,14 +182,6 @@ def _read(path: Path) -> tuple[Any, int]:
         return made, len(content)
     except Exception:  # missing, or of a heyoka that was built otherwise: it raises what it likes
         return None, 0
-
-
-def _keep(content: bytes, path: Path) -> None:
-    try:
-        write_whole(path, seal(content))
-        make_room(path.parent, min(LIMIT, cache_limit()))
-    except OSError as error:  # costs time only
-        LOG.debug("Compiled code could not be kept: %s", error)
 
 
 PLAIN = (0.0, 1.0, -1.0)
