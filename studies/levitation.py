@@ -12,7 +12,7 @@ from typing import Any, TypeVar, cast
 import numpy as np
 
 from ..dynamics.equilibria.equilibrium import Equilibrium, EquilibriumError, Survey
-from ..dynamics.equilibria.search import Found, cached_found, free_of_bodies, own_spin, survey, with_plate
+from ..dynamics.equilibria.search import FixedPoints, cached_points, free_of_bodies, survey, with_plate
 from ..dynamics.flights.checkpoint import Checkpoint
 from ..dynamics.flights.flight import simulate
 from ..dynamics.flights.live import LiveFlight
@@ -310,10 +310,10 @@ class Levitation:
     def _searched(self, table: FieldTable, equations: str, watch: Watch, rates: Rates | None = None) -> Survey:
         """All equilibria in a table, from the cache if they were searched for before."""
 
-        def remembered(search: Callable[[], Found]) -> Found:
+        def remembered(search: Callable[[], FixedPoints]) -> FixedPoints:
             if self.scene.field_map:  # the file can have another content than it had
                 return search()
-            found, known = cached_found(self.scene, equations, self.spin, own_spin(self.scene), search, note)
+            found, known = cached_points(self.scene, equations, self.spin, search, note)
             if known:
                 detail("  from the cache.")
             return found

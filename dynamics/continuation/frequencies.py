@@ -5,7 +5,7 @@ at one far distance, an unstable equilibrium.  From there the branch goes down i
 equilibrium meets the near one, and up again along the near one until floater and rotor touch.
 """
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import groupby
@@ -17,11 +17,10 @@ from ...fem.rotor.choice import rotor_table
 from ...fem.rotor.table import FieldTable
 from ...geometry.common import Array
 from ...geometry.scene.contents import AbsoluteStart, Scene
-from ..equilibria.balance import CONVERGED_STEP, EVERY, solve
-from ..equilibria.curves import SearchRange, scattered
 from ..equilibria.equilibrium import FOLD, Equilibrium, EquilibriumError
 from ..equilibria.path import Steps
 from ..equilibria.search import find_equilibria
+from ..maps.map import surveys
 from ..motion.effects import with_effects
 from ..motion.equations import parameters
 from ..motion.events import rotor_gap
@@ -31,15 +30,26 @@ from ..motion.rates import Rates
 from ..motion.state import Parameter, Scales
 from .branch import BranchPoint, Family, follow_branch, frequencies
 
-UP = np.array([0.0, 0.0, 1.0])
 UNIT = 50.0
 """Hz over which the equilibrium moves by about a radius of the floater."""
 SLOWEST = 10.0
 """Branches are followed down to this frequency, Hz: all of the article's rotors have their fold above it."""
 REACH = (8e-3, 0.15)
 """Distances on the axis between which the attraction is looked at, m."""
-SAME = 0.05
-"""Farther than this (radii) from its neighbours on the branch, Newton's method has found another equilibrium."""
+LOWEST, HIGHEST = 25.0, 400.0
+"""Frequencies between which is looked for ranges of stability, Hz."""
+CONTACT, BORDER = "contact", "border"
+"""Ends of a range beside those that `follow_branch` marks: the floater touches the rotor; nobody looked beyond."""
+TOLERATED = 0.02
+"""Growth that counts as stable, 1/s: more than what the error of finite elements makes of undamped motion."""
+STEPS, LONG_STEPS = Steps(longest=0.1, turn=0.15), Steps(longest=0.4, turn=0.3)
+"""Along a branch, and along one that is known from one that is near."""
+WIDEST = 2.0
+"""Ratio of frequencies, up and down, within which one that works is looked for."""
+FREQUENCIES = 81
+"""That are looked at there, 1.7 % apart."""
+INSIDE = 0.05
+"""How far inside a window of frequencies the one that is named lies, as a part of the window."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,11 +58,12 @@ class Branch:
 
     Parameters
     ----------
-    family : the problem
+    scene, rates : of which the frequency is left open
     far, near : its points, by growing frequency; both begin at the fold
     """
 
-    family: Family
+    scene: Scene
+    rates: Rates
     far: tuple[BranchPoint, ...]
     near: tuple[BranchPoint, ...]
 
@@ -62,23 +73,15 @@ class Branch:
         return self.near[0]
 
     def side(self, name: str, grid: Array) -> list[BranchPoint | None]:
-        """The equilibrium on a side ("near", "far") at each frequency of `grid` to round-off; None beyond its end."""
+        """The equilibrium on a side ("near", "far") at each frequency of `grid`, to round-off; None beyond its end."""
         points = {"near": self.near, "far": self.far}[name]
-        return [self._at(points, float(frequency)) for frequency in grid]
-
-    def _at(self, points: tuple[BranchPoint, ...], frequency: float) -> BranchPoint | None:
-        known = np.array([point.parameter for point in points])
-        if not known[0] <= frequency <= known[-1]:
-            return None
-        # Near the fold places go with the root of the distance to it.
-        ahead = np.sqrt(np.maximum(known - known[0], 0.0))
-        states = np.array([point.state for point in points])
-        guess = np.array([np.interp(np.sqrt(frequency - known[0]), ahead, column) for column in states.T])
-        moment = guess[6:9] / np.linalg.norm(guess[6:9])
-        position, moments, size = solve(self.family.balance(frequency), guess[None, :3], moment[None], EVERY)
-        if not size[0] < CONVERGED_STEP or np.linalg.norm(position[0] - guess[:3]) > SAME:
-            return None
-        return self.family.point(position[0], moments[0], frequency)
+        ordinary = [point for point in points if point.kind != FOLD]  # a fold has no way towards other frequencies
+        found: list[BranchPoint | None] = []
+        for frequency in map(float, grid):
+            near = min(ordinary, key=lambda point: abs(point.parameter - frequency))
+            known = points[0].parameter <= frequency <= points[-1].parameter
+            found.append(at_frequency(self.scene, self.rates, near, frequency, LONG_STEPS) if known else None)
+        return found
 
 
 def by_frequency(scene: Scene, rates: Rates) -> Family:
@@ -104,20 +107,20 @@ def levitating_branch(scene: Scene, table: FieldTable, rates: Rates, highest: fl
     if not folds:
         raise EquilibriumError(f"The levitating branch has no fold between {SLOWEST:g} and {highest:g} Hz.")
     end = folds[1] + 1 if len(folds) > 1 else len(points)
-    return Branch(family, tuple(points[folds[0] :: -1]), tuple(points[folds[0] : end]))
+    return Branch(scene, rates, tuple(points[folds[0] :: -1]), tuple(points[folds[0] : end]))
 
 
 def kicked(scene: Scene, point: BranchPoint, speed: float) -> Scene:
     """The scene at the frequency of an equilibrium, beginning there with `speed` (m/s) upwards."""
     there = replace(scene, frequency=point.parameter)
     state = Scales.of(there).unpack(point.state)
-    start = AbsoluteStart(state.position, state.velocity + speed * UP, state.moment, state.spin)
+    start = AbsoluteStart(state.position, state.velocity + speed * np.eye(3)[2], state.moment, state.spin)
     return replace(there, start=start)
 
 
 def _hanging(scene: Scene, table: FieldTable, family: Family) -> Array:
     """Scaled state (12,) near the far equilibrium: on the axis, upright, where attraction carries the weight."""
-    scales, upright = Scales.of(scene), UP[None]
+    scales, upright = Scales.of(scene), np.eye(3)[2:]
     weight = scene.floater.mass * abs(float(scene.gravity[2]))
 
     def excess(distance: float) -> float:
@@ -148,16 +151,6 @@ def distance_error(scene: Scene, table: FieldTable, family: Family, point: Branc
     slope = family.balance(point.parameter)(point.state[None, :3], point.state[None, 6:9])[1][0]
     shares = np.abs(np.linalg.inv(slope)[2])
     return float(shares @ np.array([force] * 3 + [torque] * 2)) * scales.length
-
-
-LOWEST, HIGHEST = 25.0, 400.0
-"""Frequencies between which is looked, Hz."""
-CONTACT, BORDER = "contact", "border"
-"""Ends beside those of `branch`: the floater touches the rotor; the end of what was looked at."""
-TOLERATED = 0.02
-"""Growth that counts as stable, 1/s: more than what the error of finite elements makes of undamped motion."""
-STEPS, LONG_STEPS = Steps(longest=0.1, turn=0.15), Steps(longest=0.4, turn=0.3)
-"""Along a branch, and along one that is known from one that is near."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -198,7 +191,7 @@ def reference_state(scene: Scene) -> tuple[Array, float]:
 def levitating_ranges(scene: Scene, table: FieldTable, rates: Rates) -> list[StableRange]:
     """All intervals of stability on the branch that levitates below the rotor, by ascending frequency.
 
-    The branch is found without a search, see `levitation_branch`.  Raises EquilibriumError where there is no branch.
+    The branch is found without a search, see `levitating_branch`.  Raises EquilibriumError where there is no branch.
     """
     bare = replace(scene, plate=None)
     near = levitating_branch(bare, table, rates, HIGHEST).near
@@ -219,7 +212,12 @@ def stable_ranges(scene: Scene, rates: Rates, start: Array, frequency: float) ->
         runs[-1].append(point)
         if point.kind:
             runs.append([point])
-    return [StableRange(run[0], run[-1], tuple(run)) for run in runs if _holds(run)]
+    inner = [[point for point in run if not point.kind] for run in runs]
+    return [
+        StableRange(run[0], run[-1], tuple(run))
+        for run, points in zip(runs, inner, strict=True)
+        if points and all(levitates(point) for point in points)
+    ]
 
 
 def stable_range(scene: Scene, rates: Rates, start: Array, frequency: float) -> StableRange:
@@ -230,15 +228,31 @@ def stable_range(scene: Scene, rates: Rates, start: Array, frequency: float) -> 
     return min(found, key=lambda run: max(run.low.parameter - frequency, frequency - run.high.parameter))
 
 
-def at_frequency(scene: Scene, rates: Rates, near: BranchPoint, frequency: float, steps: Steps = STEPS) -> BranchPoint:
-    """The equilibrium at one frequency (Hz) on the branch through another.
+def at_frequency(
+    scene: Scene,
+    rates: Rates,
+    near: BranchPoint,
+    frequency: float,
+    steps: Steps = STEPS,
+    tolerated: float = TOLERATED,
+) -> BranchPoint:
+    """The equilibrium at one frequency on the branch through another.
 
-    Raises EquilibriumError where the branch does not reach it.
+    Parameters
+    ----------
+    scene, rates : of which the frequency is left open
+    near : the other equilibrium
+    frequency : Hz
+    steps, tolerated : see `follow_branch`
+
+    Raises
+    ------
+    EquilibriumError : the branch does not reach it
     """
     family = by_frequency(scene, rates)
     if frequency == near.parameter:
         return family.point(near.state[:3], near.state[6:9], frequency)
-    last = follow_branch(family, near.state, near.parameter, frequency, steps, tolerated=TOLERATED)[-1]
+    last = follow_branch(family, near.state, near.parameter, frequency, steps, tolerated=tolerated)[-1]
     if last.parameter != frequency:
         raise EquilibriumError(f"The branch of equilibria ends before {frequency:g} Hz.")
     return last
@@ -256,11 +270,6 @@ def levitates(point: BranchPoint) -> bool:
     return point.growth_per_s <= max(TOLERATED, point.doubt_per_s)
 
 
-def _holds(run: Sequence[BranchPoint]) -> bool:
-    inner = [point for point in run if not point.kind]
-    return bool(inner) and all(levitates(point) for point in inner)
-
-
 def _side(
     scene: Scene, family: Family, start: Array, frequency: float, end: float, steps: Steps = STEPS
 ) -> list[BranchPoint]:
@@ -274,30 +283,15 @@ def _side(
         if point.kind == FOLD:
             return points[: k + 1]
         if k and rotor_gap(scene, point.position) < 0:
-            return [*points[:k], replace(_touching(scene, family, points[k - 1], point), kind=CONTACT)]
+            before = points[k - 1]
+
+            def there(f: float, before: BranchPoint = before) -> BranchPoint:
+                return follow_branch(family, before.state, before.parameter, f, STEPS, tolerated=TOLERATED)[-1]
+
+            ends = before.parameter + 1e-9 * (point.parameter - before.parameter), point.parameter
+            touching = scipy.optimize.brentq(lambda f: rotor_gap(scene, there(f).position), *ends, xtol=1e-6)
+            return [*points[:k], replace(there(float(touching)), kind=CONTACT)]
     return [*points[:-1], replace(points[-1], kind=points[-1].kind or BORDER)]
-
-
-def _touching(scene: Scene, family: Family, before: BranchPoint, after: BranchPoint) -> BranchPoint:
-    def there(frequency: float) -> BranchPoint:
-        return follow_branch(family, before.state, before.parameter, frequency, STEPS, tolerated=TOLERATED)[-1]
-
-    ends = before.parameter, after.parameter
-    inside = ends[0] + 1e-9 * (ends[1] - ends[0])
-    return there(
-        float(scipy.optimize.brentq(lambda f: rotor_gap(scene, there(f).position), inside, ends[1], xtol=1e-6))
-    )
-
-
-WIDEST = 2.0
-"""Ratio of frequencies, up and down, within which one that works is looked for."""
-INSIDE = 0.05
-"""How far inside a window of frequencies the one that is named lies, as a part of the window."""
-FARTHEST = 0.1
-"""Of the equilibria that count, m."""
-ADVICE_STEPS = Steps(longest=0.4, turn=0.3)
-SAME_STATE = 1e-4
-"""Equilibria nearer to each other than this, in radii and rad together, are one."""
 
 
 def way_out(
@@ -309,39 +303,39 @@ def way_out(
 ) -> str:
     """What is wrong with a scene of which these are all equilibria, and what would help.
 
-    Without the plate branches are followed in frequency from these equilibria, and from those of one search at each
-    end of what is looked at, up to `widest` times the scene's frequency and down to as small a part of it: of the
-    frequencies between which one of them is stable the nearest ones count.  Where there is a plate, or gravity across
-    the axis, a search with these has to find the equilibrium too before its frequency is named.
+    Without the plate, and with gravity along the axis, equilibria are found at frequencies up to `widest` times the
+    scene's and down to as small a part of it.  Of those between which there is a stable one the nearest count; with the
+    plate and the whole gravity a search has to find it too before its frequency is named.
 
     Parameters
     ----------
+    scene, table : with the rotor's field and what acts beside it
+    equilibria : all that the scene has
+    widest : ratio of frequencies
     memory : the plate's currents, if they are modelled
     """
     kinds = dict.fromkeys(f"{1e3 * e.distance:.2f} mm (grows e-fold in {1 / e.growth_per_s:.2g} s)" for e in equilibria)
     found = f"only unstable ones at {', '.join(kinds)}" if kinds else "nor any unstable one below the rotor"
-    other = _levitating_frequency(scene, table, equilibria, widest, memory)
+    other = _levitating_frequency(scene, table, widest, memory)
     advice = f"About {other:.4g} Hz has one; or" if other else f"None was found within a factor of {widest:g};"
     return f"At {scene.frequency:g} Hz the floater has no stable equilibrium, {found}. {advice} give start.position_mm."
 
 
-def _levitating_frequency(
-    scene: Scene, table: FieldTable, equilibria: Sequence[Equilibrium], widest: float, memory: PlateMemory | None
-) -> float | None:
-    """A frequency (Hz) in the nearest window in which a branch is stable; not one that holds the scene's own."""
-    rates, own = Rates(with_effects(scene, table)), scene.frequency
-    where = SearchRange(scene, FARTHEST)
-
-    def counts(point: BranchPoint) -> bool:
-        return point.motion.stable and point.state[:3] in where and bool(table.in_range(point.position)[0])
-
-    known = [Scales.of(scene).pack((e.without or e).state) for e in equilibria]
-    branches = _branches(scene, Family(rates, frequencies(scene), own / 2), known, where, widest)
-    windows = [window for branch in branches for window in _windows(branch, counts)]
-    for low, high in sorted(windows, key=lambda window: abs(np.log(np.clip(own, *window) / own))):
-        if low <= own <= high:  # there the floater is held, were it not for the plate or gravity across the axis
-            continue
-        near, far = (low, high) if low > own else (high, low)
+def _levitating_frequency(scene: Scene, table: FieldTable, widest: float, memory: PlateMemory | None) -> float | None:
+    """A frequency (Hz) in the nearest window with a stable equilibrium; not in one that holds the scene's own."""
+    own, rates = scene.frequency, Rates(with_effects(scene, table))
+    upright = replace(scene, plate=None, gravity=np.array([0.0, 0.0, scene.gravity[2]]))
+    tried = [replace(upright, frequency=float(f)) for f in own * widest ** np.linspace(-1, 1, FREQUENCIES)]
+    places = np.arange(FREQUENCIES)[:, None]
+    found = surveys(tried, [table] * FREQUENCIES, np.zeros(FREQUENCIES), places, rates)
+    holding = [any(e.stable for e in survey.equilibria) for survey, _ in found]
+    windows = []
+    for stable, run in groupby(range(FREQUENCIES), lambda k: holding[k]):
+        values = [tried[k].frequency for k in run]
+        if stable and not values[0] <= own <= values[-1]:  # in one that does, the plate or tilted gravity is to blame
+            windows.append(values if values[0] > own else values[::-1])
+    for window in sorted(windows, key=lambda window: abs(np.log(window[0] / own))):
+        near, far = window[0], window[-1]
         there = replace(scene, frequency=float(near + INSIDE * (far - near)))
         if _levitates(there, table, rates, memory):
             return there.frequency
@@ -349,7 +343,7 @@ def _levitating_frequency(
 
 
 def _levitates(scene: Scene, table: FieldTable, rates: Rates, memory: PlateMemory | None) -> bool:
-    """Whether a scene on a stable branch has a stable equilibrium too with its plate and its whole gravity."""
+    """Whether a scene with a stable equilibrium without plate, in upright gravity, has one too with all that acts."""
     if too_slow(scene):
         return False
     if scene.plate is None and not np.any(scene.gravity[:2]):
@@ -358,39 +352,3 @@ def _levitates(scene: Scene, table: FieldTable, rates: Rates, memory: PlateMemor
         return False
     found = find_equilibria(scene, table, rates=rates, memory=memory)
     return any(e.stable and (memory is None or e.currents is not None) for e in found)
-
-
-def _branches(
-    scene: Scene, family: Family, known: Sequence[Array], where: SearchRange, widest: float
-) -> Iterator[list[BranchPoint]]:
-    """Branches through known states (12,) both ways, and those through what is found at either end, each once."""
-    own, ends = scene.frequency, (scene.frequency * widest, scene.frequency / widest)
-    seen: list[tuple[bool, BranchPoint]] = []
-    for begin, end in ((own, ends[0]), (own, ends[1]), ends, ends[::-1]):
-        balance = family.balance(begin)
-        for start in known if begin == own else balance.states(*scattered(balance, where)):
-            if any(
-                up == (end > begin) and begin == p.parameter and _apart(p.state, start) < SAME_STATE for up, p in seen
-            ):
-                continue
-            try:
-                branch = follow_branch(family, start, begin, end, ADVICE_STEPS)
-            except EquilibriumError:
-                continue
-            seen.append((branch[-1].parameter < (begin + end) / 2, branch[-1]))
-            yield branch
-
-
-def _apart(a: Array, b: Array) -> float:
-    return float(np.linalg.norm((a - b)[[0, 1, 2, 6, 7, 8]]))
-
-
-def _windows(branch: Sequence[BranchPoint], counts: Callable[[BranchPoint], bool]) -> list[tuple[float, float]]:
-    """Frequencies between which the points of a branch count, up to where stability is lost."""
-    found = list[tuple[float, float]]()
-    for good, run in groupby(branch, lambda point: bool(point.kind) or counts(point)):
-        points = list(run)
-        if good and any(not point.kind for point in points):
-            values = [point.parameter for point in points]
-            found.append((min(values), max(values)))
-    return found

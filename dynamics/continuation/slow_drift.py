@@ -4,7 +4,8 @@ That of air goes beyond Stokes' range (`effects.air`): 8πηR³Ω times f for a 
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
+from functools import cache
 from typing import Self
 
 import numpy as np
@@ -14,7 +15,7 @@ from scipy.interpolate import CubicHermiteSpline, CubicSpline, PchipInterpolator
 from ...fem.rotor.table import FieldTable
 from ...geometry.common import Array
 from ...geometry.scene.contents import Scene
-from ..equilibria.equilibrium import FOLD, Equilibrium, EquilibriumError
+from ..equilibria.equilibrium import FOLD, EquilibriumError
 from ..equilibria.path import Steps
 from ..equilibria.search import find_equilibria
 from ..motion.air_and_shape import reynolds, spinning, swinging
@@ -24,7 +25,18 @@ from ..motion.events import rotor_gap
 from ..motion.rates import Rates
 from ..motion.state import Parameter, Scales, State
 from .branch import BranchPoint, Family, follow_branch, spins
-from .frequencies import HIGHEST, LONG_STEPS, LOWEST, by_frequency
+from .frequencies import BORDER, HIGHEST, LONG_STEPS, LOWEST, at_frequency, by_frequency
+
+BALANCE, DURATION, INSTABILITY, CONTACT = "balance", "duration", "instability", "contact"
+SETTLED = 1e-3
+"""A balance is reached where ds/dt has fallen to this part of what it was at the start."""
+E_FOLDS = 7.0
+"""Growth after which a disturbance has ended the flight, unless it is given: from 3 µm to 3 mm."""
+SAMPLES = 400
+ESCAPE = 3.40922
+"""Where the solution of y'' = t + y² that comes from y = -√(-t) becomes infinite; found numerically."""
+POINTS = 16
+"""Frequencies along the branch at which flights are tried first: what lasts only between two of them is missed."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,16 +100,6 @@ class SlowTorque:
         return more_steady * steady + more_swing * float(spin @ moment - steady)
 
 
-BALANCE, DURATION, INSTABILITY, CONTACT = "balance", "duration", "instability", "contact"
-SETTLED = 1e-3
-"""A balance is reached where ds/dt has fallen to this part of what it was at the start."""
-E_FOLDS = 7.0
-"""Growth after which a disturbance has ended the flight, unless it is given: from 3 µm to 3 mm."""
-SAMPLES = 400
-ESCAPE = 3.40922
-"""Where the solution of y'' = t + y² that comes from y = -√(-t) becomes infinite; found numerically."""
-
-
 @dataclass(frozen=True, eq=False)
 class Drift:
     """An averaged flight.
@@ -133,7 +135,7 @@ class Drift:
         return float((ends[1] - ends[0]) / (times[1] - times[0]))
 
 
-def steady(start: BranchPoint, duration: float, e_folds: float = E_FOLDS) -> Drift:
+def _steady(start: BranchPoint, duration: float, e_folds: float) -> Drift:
     """A flight on which nothing moves the spin."""
     growth = max(0.0, start.growth_per_s - start.doubt_per_s)
     ended = INSTABILITY if growth * duration > e_folds else DURATION
@@ -142,7 +144,7 @@ def steady(start: BranchPoint, duration: float, e_folds: float = E_FOLDS) -> Dri
     return Drift(time, spin, distance, rate, ended, np.nan)
 
 
-def flown(torque: SlowTorque, points: list[BranchPoint], duration: float, end: str, e_folds: float = E_FOLDS) -> Drift:
+def _averaged(torque: SlowTorque, points: list[BranchPoint], duration: float, end: str, e_folds: float) -> Drift:
     """The flight along the points of a branch, to its `end` or to what comes first."""
     arc, course = _course(points)
     pace = CubicSpline(arc, [torque(p.state) for p in points])
@@ -232,9 +234,14 @@ def drift(
     rates = rates or Rates(with_effects(scene, table))
     torque = SlowTorque.of(scene, rates, stokes)
     family = Family(rates, spins(scene))
-    state = Scales.of(scene).pack(start or _start(scene, table, spin, rates).state)
+    if start is None:
+        known = find_equilibria(scene, table, spin, rates=rates)
+        if not known:
+            raise EquilibriumError(f"At {scene.frequency:g} Hz the floater has no equilibrium with body spin {spin:g}.")
+        start = min(known, key=lambda equilibrium: equilibrium.growth_per_s).state
+    state = Scales.of(scene).pack(start)
     if torque.absent:
-        return steady(family.point(state[:3], state[6:9], spin), duration, e_folds)
+        return _steady(family.point(state[:3], state[6:9], spin), duration, e_folds)
     towards = spin + np.copysign(3.0, torque(state))
 
     def over(point: BranchPoint) -> bool:
@@ -243,22 +250,9 @@ def drift(
     points = follow_branch(family, state, spin, towards, Steps(longest=0.03, turn=0.05), over)
     fold = next((k for k, point in enumerate(points) if point.kind == FOLD), None)
     if fold is not None:
-        return flown(torque, points[: fold + 1], duration, FOLD, e_folds)
-    return flown(torque, points, duration, CONTACT if rotor_gap(scene, points[-1].position) < 0 else BALANCE, e_folds)
-
-
-def _start(scene: Scene, table: FieldTable, spin: float, rates: Rates) -> Equilibrium:
-    """The equilibrium at which small motions grow the slowest."""
-    known = find_equilibria(scene, table, spin, rates=rates)
-    if not known:
-        raise EquilibriumError(f"At {scene.frequency:g} Hz the floater has no equilibrium with body spin {spin:g}.")
-    return min(known, key=lambda equilibrium: equilibrium.growth_per_s)
-
-
-BORDER = "border"
-"""The end of what was looked at, where flights still last."""
-POINTS = 16
-"""Frequencies along the branch at which flights are tried first: what lasts only between two of them is missed."""
+        return _averaged(torque, points[: fold + 1], duration, FOLD, e_folds)
+    end = CONTACT if rotor_gap(scene, points[-1].position) < 0 else BALANCE
+    return _averaged(torque, points, duration, end, e_folds)
 
 
 @dataclass(frozen=True)
@@ -268,7 +262,7 @@ class Lasting:
     Parameters
     ----------
     low, high : Hz; NaN where none lasts
-    ended_by : what ends flights above `high`, see `averaged.Drift`; or "border" of what was looked at; "" without one
+    ended_by : what ends flights above `high`, see `Drift`; or "border" of what was looked at; "" without one
     growth_per_s : largest growth of a small motion during the flight at `high`
     """
 
@@ -291,70 +285,53 @@ def lasting_frequencies(
     """Where a floater that is let go with body spin 0 stays up, by its averaged flights along a branch of equilibria.
 
     A flight is over where a small motion has grown by `e_folds`: seven are 3 µm, what is left of a launch over a plate,
-    to 3 mm.  Growth is added up along the drift of the body spin, see `averaged`.
+    to 3 mm.  Growth is added up along the drift of the body spin.
 
     Parameters
     ----------
+    scene : its drag and the floater's conductivity; its frequency is left open
     table, rates : of all effects that shall take part
     start : scaled state (12,) of an equilibrium of the branch at `frequency` (Hz)
     duration : s
+    e_folds : see `drift`
     resolution : of the two ends, Hz
     """
-    flights = _Flights(scene, table, rates, duration, e_folds, _branch(scene, rates, start, frequency))
-    ends = flights.known[0].parameter, flights.known[-1].parameter
-    grid = [float(at) for at in np.linspace(*ends, POINTS + 2)[1:-1]]
-    first = next((at for at in grid if not flights.ended(at)[0]), None)
-    if first is None:
-        return Lasting()
-    low = flights.edge(first, max((at for at in grid if at < first), default=ends[0]), resolution)[0]
-    gone = next((at for at in grid if at > first and flights.ended(at)[0]), None)
-    last = max(at for at in grid if gone is None or at < gone)
-    if gone is None:
-        return Lasting(low, ends[1], BORDER, flights.ended(last)[1])
-    high, lost = flights.edge(last, gone, resolution)
-    return Lasting(low, high, flights.ended(lost)[0], flights.ended(high)[1])
-
-
-@dataclass(frozen=True, eq=False)
-class _Flights:
-    """Averaged flights from the equilibria of a branch, of which some are `known`, by ascending frequency."""
-
-    scene: Scene
-    table: FieldTable
-    rates: Rates
-    duration: float
-    e_folds: float
-    known: list[BranchPoint]
-    flown: dict[float, tuple[str, float]] = field(default_factory=dict)
-
-    def ended(self, frequency: float) -> tuple[str, float]:
-        """What ends the flight at a frequency (Hz), "" if it lasts; and the largest growth in it, 1/s."""
-        if frequency not in self.flown:
-            near = min(self.known, key=lambda point: abs(point.parameter - frequency))
-            family, there = by_frequency(self.scene, self.rates), replace(self.scene, frequency=frequency)
-            point = follow_branch(family, near.state, near.parameter, frequency, LONG_STEPS, tolerated=np.inf)[-1]
-            state = Scales.of(there).unpack(point.state)
-            flight = drift(there, self.table, 0.0, self.duration, self.rates, state, False, self.e_folds)
-            lasts = flight.ended_by in (BALANCE, DURATION) or flight.levitated_s >= self.duration
-            self.flown[frequency] = "" if lasts else flight.ended_by, float(flight.growth_per_s.max())
-        return self.flown[frequency]
-
-    def edge(self, kept: float, gone: float, resolution: float) -> tuple[float, float]:
-        """Between a frequency at which the flight lasts and one at which it does not: the two, nearer to each other."""
-        while abs(gone - kept) > resolution:
-            middle = (kept + gone) / 2
-            kept, gone = (kept, middle) if self.ended(middle)[0] else (middle, gone)
-        return kept, gone
-
-
-def _branch(scene: Scene, rates: Rates, start: Array, frequency: float) -> list[BranchPoint]:
-    """The branch of equilibria by ascending frequency, to its fold or contact, or the border of what is looked at."""
+    family = by_frequency(scene, rates)
 
     def over(point: BranchPoint) -> bool:
         return point.kind == FOLD or rotor_gap(scene, point.position) < 0
 
-    family, sides = by_frequency(scene, rates), []
+    sides = []
     for border in (LOWEST, HIGHEST):
-        points = follow_branch(family, start, frequency, border, LONG_STEPS, over, np.inf)
-        sides.append(points[: next((k for k, point in enumerate(points) if over(point)), len(points))])
-    return [*sides[0][:0:-1], *sides[1]]
+        side = follow_branch(family, start, frequency, border, LONG_STEPS, over, np.inf)
+        sides.append(side[: next((k for k, point in enumerate(side) if over(point)), len(side))])
+    branch = [*sides[0][:0:-1], *sides[1]]
+
+    @cache
+    def ended(at: float) -> tuple[str, float]:
+        """What ends the flight at a frequency (Hz), "" if it lasts; and the largest growth in it, 1/s."""
+        near = min(branch, key=lambda point: abs(point.parameter - at))
+        point, there = at_frequency(scene, rates, near, at, LONG_STEPS, np.inf), replace(scene, frequency=at)
+        flight = drift(there, table, 0.0, duration, rates, Scales.of(there).unpack(point.state), False, e_folds)
+        lasts = flight.ended_by in (BALANCE, DURATION) or flight.levitated_s >= duration
+        return "" if lasts else flight.ended_by, float(flight.growth_per_s.max())
+
+    def edge(kept: float, gone: float) -> tuple[float, float]:
+        """The same two frequencies, at which the flight lasts and does not, nearer to each other."""
+        while abs(gone - kept) > resolution:
+            middle = (kept + gone) / 2
+            kept, gone = (kept, middle) if ended(middle)[0] else (middle, gone)
+        return kept, gone
+
+    ends = branch[0].parameter, branch[-1].parameter
+    grid = [float(at) for at in np.linspace(*ends, POINTS + 2)[1:-1]]
+    first = next((at for at in grid if not ended(at)[0]), None)
+    if first is None:
+        return Lasting()
+    low = edge(first, max((at for at in grid if at < first), default=ends[0]))[0]
+    gone = next((at for at in grid if at > first and ended(at)[0]), None)
+    last = max(at for at in grid if gone is None or at < gone)
+    if gone is None:
+        return Lasting(low, ends[1], BORDER, ended(last)[1])
+    high, lost = edge(last, gone)
+    return Lasting(low, high, ended(lost)[0], ended(high)[1])

@@ -43,11 +43,6 @@ class Balance:
     spin: float | Array
     top: float = 0.0
 
-    @property
-    def rate(self) -> Array:
-        """The rotor's rate, (1,) or (n, 1)."""
-        return np.asarray(self.values[..., [Parameter.RATE]])
-
     def at(self, rows: NDArray[Any]) -> Self:
         """The balance of some of the points only."""
         if self.values.ndim == 1:
@@ -62,7 +57,7 @@ class Balance:
 
     def states(self, position: Array, moment: Array) -> Array:
         """States (n, 12) at rest in the rotor's frame at positions and moments (n, 3)."""
-        rate = self.rate
+        rate = np.asarray(self.values[..., [Parameter.RATE]])
         velocity = rate * np.stack([-position[:, 1], position[:, 0], 0 * position[:, 0]], axis=1)
         spin = rate * ((np.asarray(self.spin)[..., None] - moment[:, 2:]) * moment + np.array([0.0, 0.0, 1.0]))
         spin = spin + self.top * moment
@@ -93,7 +88,7 @@ def tangent_basis(moment: Array) -> Array:
 def moved_pose(position: Array, moment: Array, step: Array) -> tuple[Array, Array]:
     """Positions and moments (n, 3) after a step (n, 5) of the unknowns; the moments stay unit vectors."""
     moment = moment + np.einsum("nk,nka->na", step[:, 3:], tangent_basis(moment))
-    return position + step[:, :3], moment / _lengths(moment)[:, None]
+    return position + step[:, :3], moment / np.linalg.norm(moment, axis=1, keepdims=True)
 
 
 def solve(
@@ -132,11 +127,10 @@ def solve(
         value, slope = known(position[active], moment[active])
         step = np.zeros((len(active), 5))
         good = np.isfinite(slope).all(axis=(1, 2))
-        if len(free) < len(EVERY):  # to choose takes almost as long as to solve
-            value, slope = value[:, free], slope[:, free[:, None], free]
+        value, slope = value[:, free], slope[:, free[:, None], free]
         step[np.ix_(good, free)] = -_divided(slope[good], value[good])
-        shift, tilt = _lengths(step[:, :3]), _lengths(step[:, 3:])
-        scale = np.maximum(1.0, _lengths(position[active]) / far)
+        shift, tilt = np.linalg.norm(step[:, :3], axis=1), np.linalg.norm(step[:, 3:], axis=1)
+        scale = np.maximum(1.0, np.linalg.norm(position[active], axis=1) / far)
         step *= (reach / np.maximum(np.maximum(shift / scale, tilt), reach))[:, None]
         size = np.maximum(shift, tilt)
         position[active], moment[active] = moved_pose(position[active], moment[active], step)
@@ -153,8 +147,3 @@ def _divided(matrix: Array, vector: Array) -> Array:
         return np.asarray(np.linalg.solve(matrix, vector[..., None])[..., 0])
     except np.linalg.LinAlgError:  # one of them is singular to the last bit
         return np.asarray((np.linalg.pinv(matrix) @ vector[..., None])[..., 0])
-
-
-def _lengths(vectors: Array) -> Array:
-    """Of vectors (n, k): (n,), in a third of the time of `numpy.linalg.norm`."""
-    return np.asarray(np.sqrt(np.einsum("nk,nk->n", vectors, vectors)))

@@ -1,6 +1,8 @@
-"""Where equilibria are looked for, from what starts, and Newton's method from all of these at once."""
+"""The fixed points below a rotor: Newton's method from thousands of starts, and the curves of lateral balance.
 
-from __future__ import annotations
+Along a curve all but the axial force is balanced; equilibria are the zeros of that force.  What no curve of those that
+were met passes through, Newton's method in all unknowns finds from some of the same starts.
+"""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -8,8 +10,8 @@ from functools import cached_property
 from itertools import product
 
 import numpy as np
-import scipy
 from numpy.typing import NDArray
+from scipy.interpolate import CubicHermiteSpline
 
 from ...geometry.common import Array, Watch, unwatched
 from ...geometry.scene.contents import Scene
@@ -18,12 +20,19 @@ from .path import AtRest, Steps, whole_curves
 
 THINNED = 8
 """One of so many starts is tried in the whole balance too where there is a rough one."""
+SPARE = 3
+"""One of so many starts is tried for what lies on none of the curves: a test of 90 scenes finds no such equilibrium."""
 ITERATIONS = 30
 """Of Newton's method from the starts; none of those that have not met by then was seen to meet in twice as many."""
 STEPS_TOGETHER, CELL, COARSER, AWAY = 3, 0.1, 1.3, 1.0
 """Steps after which the starts are thinned: within a cell of such an edge (radii, and of the moment), which grows by
 that factor each time, one is kept, and those that are as far outside the range, in radii, are left out; a test compares
 what is found with what all find."""
+STEPS = Steps(longest=0.1, shortest=1e-6, turn=0.15, most=5000, first=1 / 4, far=3.0)
+FARTHEST = 0.1
+"""Largest depth at which equilibria are looked for, and distance from the axis, m."""
+TOGETHER = 8
+"""Curves that are followed at once."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,16 +46,12 @@ class SearchRange:
     """
 
     scene: Scene
-    farthest: float
+    farthest: float = FARTHEST
 
     @property
     def bound(self) -> float:
         """Largest depth, and distance from the axis, in floater radii."""
         return self.farthest / self.scene.floater.radius
-
-    def __contains__(self, position: Array) -> bool:
-        """Whether a scaled position (3,) belongs to the range."""
-        return bool(self.holds(position[None])[0])
 
     def holds(self, position: Array, margin: float = 0.0) -> NDArray[np.bool_]:
         """Which of the scaled positions (n, 3) belong to the range, or lie at most a margin (radii) outside: (n,)."""
@@ -57,8 +62,8 @@ class SearchRange:
             inside &= magnet.body.distance(position * radius) > inner - margin * radius
         return np.asarray(inside)
 
-    def starts(self) -> tuple[Array, Array]:
-        """Scaled positions and moments (n, 3) below the rotor and beside it, in fourteen directions each."""
+    def starts(self) -> Array:
+        """Scaled positions and moments (n, 6) below the rotor and beside it, in fourteen directions each."""
         corners = [magnet.box.corners / self.scene.floater.radius for magnet in self.scene.rotor]
         nearest = 1.0 + max((-c[:, 2].min() for c in corners), default=0.0)
         beside = 1.0 + np.array([1.0, 1.1, 1.3, 2.0]) * max((np.abs(c[:, :2]).max() for c in corners), default=0.0)
@@ -68,7 +73,7 @@ class SearchRange:
         )
         moment = np.array([v for v in product((-1.0, 0.0, 1.0), repeat=3) if sum(map(abs, v)) in (1.0, 3.0)])
         moment /= np.linalg.norm(moment, axis=1, keepdims=True)
-        return np.repeat(places, len(moment), axis=0), np.tile(moment, (len(places), 1))
+        return np.column_stack([np.repeat(places, len(moment), axis=0), np.tile(moment, (len(places), 1))])
 
 
 def _rings(heights: Array, radii: Array, number: int) -> Array:
@@ -79,116 +84,106 @@ def _rings(heights: Array, radii: Array, number: int) -> Array:
     return np.asarray(points[(r > 0) | (a == 0)])  # a ring of no radius is one point
 
 
-@dataclass(frozen=True, eq=False)
-class Search:
-    """Newton's method from many starts, in one problem or in several side by side.
+def newton_search(
+    balance: Callable[[Indices], Balance],
+    holds: Callable[[Indices, Array, float], NDArray[np.bool_]],
+    problem: Indices,
+    points: Array,
+    free: Indices = EVERY,
+    margin: float = 0.0,
+    reach: float = 0.3,
+    far: float = np.inf,
+    watch: Watch = unwatched,
+) -> tuple[Indices, Array]:
+    """What starts lead to by Newton's method, in one problem or in several side by side, each solution once.
 
     Parameters
     ----------
     balance : of problems (n,), one for each point
     holds : which of the scaled positions (n, 3) lie in the ranges of problems (n,), or at most a margin (radii) outside
-    free : which balances shall vanish and which unknowns move, see `steady.solve`
+    problem : (n,) of each start
+    points : (n, 6) the starts: scaled positions and moments
+    free : which balances shall vanish and which unknowns move, see `balance.solve`
     margin : so far outside the range (radii) solutions are kept
-    reach, far : longest steps, see `steady.solve`
+    reach, far : longest steps, see `balance.solve`
     watch : is told the stage of the search and its share that is done
+
+    Returns
+    -------
+    Problems (k,) in order, and positions with moments (k, 6), of each problem the lowest first.
     """
 
-    balance: Callable[[Indices], Balance]
-    holds: Callable[[Indices, Array, float], NDArray[np.bool_]]
-    free: Indices
-    margin: float = 0.0
-    reach: float = 0.3
-    far: float = np.inf
-    watch: Watch = unwatched
-
-    def solutions(self, problem: Indices, position: Array, moment: Array) -> tuple[Indices, Array]:
-        """What the starts (n, 3), (n, 3) of problems (n,) lead to, each solution once.
-
-        Returns
-        -------
-        Problems (k,) in order, and positions with moments (k, 6), of each problem the lowest first.
-        """
-        points = np.concatenate([position, moment], axis=1)
-        if self.balance(problem).rates.has_rough:
-            near = self._newton(problem, points, rough=True)
-            problem, points = _together(near, (problem[::THINNED], points[::THINNED]))
-        return self._newton(problem, points)
-
-    def _newton(self, problem: Indices, points: Array, rough: bool = False) -> tuple[Indices, Array]:
-        """Every few steps those that ran away are given up, and of those that have come together one goes on."""
+    def solved(problem: Indices, points: Array, rough: bool) -> tuple[Indices, Array]:
         found = [(problem[:0], points[:0])]
         for turn in range(ITERATIONS // STEPS_TOGETHER):
-            self.watch("Newton's method from many starts", turn / (ITERATIONS // STEPS_TOGETHER))
-            balance = self.balance(problem)
-            if rough:
-                balance = replace(balance, rates=balance.rates.rough)
+            watch("Newton's method from many starts", turn / (ITERATIONS // STEPS_TOGETHER))
+            here = balance(problem)
+            here = replace(here, rates=here.rates.rough) if rough else here
             with np.errstate(all="ignore"):
-                position, moment, step = solve(
-                    balance, points[:, :3], points[:, 3:], self.free, STEPS_TOGETHER, self.reach, self.far
-                )
+                position, moment, step = solve(here, points[:, :3], points[:, 3:], free, STEPS_TOGETHER, reach, far)
             points, met = np.concatenate([position, moment], axis=1), step < CONVERGED_STEP
-            kept = met & self.holds(problem, position, self.margin)
+            kept = met & holds(problem, position, margin)
             found.append((problem[kept], points[kept]))
-            going = ~met & np.isfinite(step) & self.holds(problem, position, AWAY)
-            problem, points = problem[going], points[going]
-            first = _first_in_cells(problem, points, CELL * COARSER**turn)
-            problem, points = problem[first], points[first]
+            # Those that ran away are given up, and of those that have come together one goes on.
+            going = ~met & np.isfinite(step) & holds(problem, position, AWAY)
+            problem, points = _thinned(problem[going], points[going], CELL * COARSER**turn)
             if not len(points):
                 break
-        problem, points = _together(*found)
-        first = _first_in_cells(problem, points, DUPLICATE_DISTANCE)
-        problem, points = problem[first], points[first]
-        order = np.lexsort([points[:, 2], problem])
-        return problem[order], points[order]
+        problem, points = (np.concatenate(part) for part in zip(*found, strict=True))
+        return _thinned(problem, points, DUPLICATE_DISTANCE)
+
+    if balance(problem).rates.has_rough:
+        near = solved(problem, points, True)
+        problem, points = np.append(near[0], problem[::THINNED]), np.append(near[1], points[::THINNED], axis=0)
+    problem, points = solved(problem, points, False)
+    order = np.lexsort([points[:, 2], problem])
+    return problem[order], points[order]
 
 
-def _together(*found: tuple[Indices, Array]) -> tuple[Indices, Array]:
-    """Problems and points, (n,) and (n, 6), of several sets of them."""
-    problem, points = (np.concatenate(part) for part in zip(*found, strict=True))
-    return problem, points
-
-
-def _first_in_cells(problem: Indices, points: Array, edge: float) -> Indices:
-    """Numbers (k,) of the first of those points (n, 6) of a problem that round to the same multiples of an edge."""
+def _thinned(problem: Indices, points: Array, edge: float) -> tuple[Indices, Array]:
+    """The first of those points (n, 6) of a problem that round to the same multiples of an edge."""
     keys = np.column_stack([problem, np.round(points / edge)])
     order = np.lexsort(keys.T[::-1])
     new = np.ones(len(keys), bool)
     new[1:] = (np.diff(keys[order], axis=0) != 0).any(axis=1)
-    return order[new]
+    return problem[order[new]], points[order[new]]
 
 
-def from_starts(balance: Balance, where: SearchRange, free: Indices, every: int = 1, watch: Watch = unwatched) -> Array:
-    """Distinct points (n, 6) in the range, lowest first, at which the balances of `free` vanish, see `fixed_points`.
+def from_starts(
+    balance: Balance, where: SearchRange, free: Indices = EVERY, every: int = 1, watch: Watch = unwatched
+) -> Array:
+    """Distinct points (n, 6) in the range, lowest first, at which the balances of `free` vanish.
 
-    One of so many starts is taken.
+    Parameters
+    ----------
+    balance, where : of one problem
+    free, watch : see `newton_search`
+    every : one of so many starts is taken
     """
-    position, moment = (part[::every] for part in where.starts())
-    search = Search(lambda _: balance, lambda _, position, margin: where.holds(position, margin), free, watch=watch)
-    return search.solutions(np.zeros(len(position), int), position, moment)[1]
+    points = where.starts()[::every]
 
+    def holds(_: Indices, position: Array, margin: float) -> NDArray[np.bool_]:
+        return where.holds(position, margin)
 
-STEPS = Steps(longest=0.1, shortest=1e-6, turn=0.15, most=5000, first=1 / 4, far=3.0)
-TOGETHER = 8
-"""Curves that are followed at once."""
+    return newton_search(lambda _: balance, holds, np.zeros(len(points), int), points, free, watch=watch)[1]
 
 
 @dataclass(frozen=True, eq=False)
 class Curve:
-    """Points of one curve, in scaled units.
+    """Points of one curve of lateral balance, in scaled units.
 
     Parameters
     ----------
     arc : (n,) length along the curve
-    position, moment : (n, 3)
-    tangent : (n, 6) unit direction of the curve: position and moment
+    points : (n, 6) positions and moments
+    tangents : (n, 6) unit directions of the curve
     force : (n,) axial force that is left over, gravity included
     slope : (n,) its derivative along the curve
     """
 
     arc: Array
-    position: Array
-    moment: Array
-    tangent: Array
+    points: Array
+    tangents: Array
     force: Array
     slope: Array
 
@@ -198,54 +193,53 @@ class Curve:
         apart = self._spline(crossings[np.isfinite(crossings)]) - point
         return bool(np.min(np.linalg.norm(apart, axis=1), initial=np.inf) < 1e-3)
 
-    def balanced(self) -> tuple[Array, Array]:
-        """Estimates (k, 3) of positions and moments where the axial force vanishes as well."""
-        crossings = scipy.interpolate.CubicHermiteSpline(self.arc, self.force, self.slope).roots(extrapolate=False)
-        points = self._spline(crossings[np.isfinite(crossings)])
-        moment = points[:, 3:]
-        return points[:, :3], moment / np.linalg.norm(moment, axis=1, keepdims=True)
+    def balanced(self) -> Array:
+        """Estimates (k, 6) of positions and moments where the axial force vanishes as well."""
+        crossings = CubicHermiteSpline(self.arc, self.force, self.slope).roots(extrapolate=False)
+        return AtRest().onto(self._spline(crossings[np.isfinite(crossings)]))
 
     @cached_property
-    def _spline(self) -> scipy.interpolate.CubicHermiteSpline:
-        return scipy.interpolate.CubicHermiteSpline(
-            self.arc, np.concatenate([self.position, self.moment], axis=1), self.tangent
-        )
+    def _spline(self) -> CubicHermiteSpline:
+        return CubicHermiteSpline(self.arc, self.points, self.tangents)
 
     @cached_property
-    def _height(self) -> scipy.interpolate.CubicHermiteSpline:
-        return scipy.interpolate.CubicHermiteSpline(self.arc, self.position[:, 2], self.tangent[:, 2])
+    def _height(self) -> CubicHermiteSpline:
+        return CubicHermiteSpline(self.arc, self.points[:, 2], self.tangents[:, 2])
 
 
 @dataclass(frozen=True, eq=False)
-class Lateral(AtRest):
-    """Everything but the axial force, as equations of a curve."""
+class _Lateral(AtRest):
+    """Everything but the axial force, as equations of a curve: unknown are position and moment."""
 
     balance: Balance
 
     def linear(self, points: Array, which: Indices) -> tuple[Array, Array]:
-        """Four balances and |m̂| = 1 (n, 5) at positions and moments (n, 6), and their derivatives (n, 5, 6)."""
         value, slope = self.balance(points[:, :3], points[:, 3:])
         return self.extended(value[:, LATERAL], slope[:, LATERAL], points[:, 3:])
 
 
-def curves_through(balance: Balance, points: Array, where: SearchRange) -> list[Curve | None]:
-    """The curves through points (n, 6), both ways, until they leave the range or close.
+def fixed_points(balance: Balance, where: SearchRange, watch: Watch = unwatched) -> tuple[list[Curve], Array]:
+    """Curves of lateral balance in the range, and scaled positions and moments (k, 6) of the equilibria.
 
-    None where four balances do not fix a curve (a field of revolution about the axis).
+    Parameters
+    ----------
+    balance, where : of one problem
+    watch : is told the stage of the search and its share that is done
     """
-    found = whole_curves(Lateral(balance), points, STEPS, lambda points: where.holds(points[:, :3]))
-    return [None if one is None or len(one[0]) < 2 else _curve(balance, *one) for one in found]
+    curves = _all_curves(balance, where, watch)
+    guesses = [*(curve.balanced() for curve in curves), from_starts(balance, where, EVERY, SPARE, watch)]
+    points = np.concatenate(guesses)
+    if not len(points):
+        return curves, points
+    position, moment, step = solve(balance, points[:, :3], points[:, 3:], EVERY)
+    found: list[Array] = []
+    for point in np.concatenate([position, moment], axis=1)[(step < CONVERGED_STEP) & where.holds(position)]:
+        if all(np.linalg.norm(point - known) > DUPLICATE_DISTANCE for known in found):
+            found.append(point)
+    return curves, np.reshape(found, (-1, 6))
 
 
-def _curve(balance: Balance, points: Array, tangents: Array) -> Curve:
-    value, slope = balance(points[:, :3], points[:, 3:])
-    slope = AtRest.extended(value, slope, points[:, 3:])[1][:, AXIAL]
-    chords = np.linalg.norm(np.diff(points, axis=0), axis=1)
-    arc, along = np.append(0.0, np.cumsum(chords)), np.sum(slope * tangents, axis=1)
-    return Curve(arc, points[:, :3], points[:, 3:], tangents, value[:, AXIAL], along)
-
-
-def all_curves(balance: Balance, where: SearchRange, watch: Watch = unwatched) -> list[Curve]:
+def _all_curves(balance: Balance, where: SearchRange, watch: Watch) -> list[Curve]:
     """Every curve that is met in the range, from its starts at their own heights."""
     seeds = from_starts(balance, where, LATERAL, watch=watch)
     curves: list[Curve] = []
@@ -256,42 +250,18 @@ def all_curves(balance: Balance, where: SearchRange, watch: Watch = unwatched) -
         heights, number = np.unique(np.round(seeds[:, 2], 6), return_counts=True)
         chosen = np.abs(seeds[:, 2] - heights[np.argmax(number)]) < 1e-5
         chosen &= np.cumsum(chosen) <= TOGETHER
-        for seed, curve in zip(seeds[chosen], curves_through(balance, seeds[chosen], where), strict=True):
+        # Four balances do not fix a curve in a field of revolution about the axis.
+        traced = whole_curves(_Lateral(balance), seeds[chosen], STEPS, lambda points: where.holds(points[:, :3]))
+        for seed, one in zip(seeds[chosen], traced, strict=True):
+            curve = None if one is None or len(one[0]) < 2 else _curve(balance, *one)
             if curve is not None and not any(known.passes(seed) for known in curves):
                 curves.append(curve)
         seeds = np.array([seed for seed in seeds[~chosen] if not any(curve.passes(seed) for curve in curves)])
     return curves
 
 
-SPARE = 3
-"""One of so many starts is tried for what lies on none of the curves: a test of 90 scenes finds no such equilibrium."""
-
-
-def fixed_points(
-    balance: Balance, where: SearchRange, watch: Watch = unwatched
-) -> tuple[list[Curve], list[tuple[Array, Array]]]:
-    """Curves of lateral balance in the range, and the scaled positions and moments of the equilibria on them."""
-    curves = all_curves(balance, where, watch)
-    guesses = [*(curve.balanced() for curve in curves), scattered(balance, where, SPARE, watch)]
-    position, moment = (np.concatenate(part) for part in zip(*guesses, strict=True))
-    return curves, [(r, m) for r, m in _polished(balance, position, moment) if r in where]
-
-
-def scattered(balance: Balance, where: SearchRange, every: int = 1, watch: Watch = unwatched) -> tuple[Array, Array]:
-    """What Newton's method in all unknowns finds from one of so many starts: short curves may pass between them."""
-    points = from_starts(balance, where, EVERY, every, watch)
-    return points[:, :3], points[:, 3:]
-
-
-def _polished(balance: Balance, position: Array, moment: Array) -> list[tuple[Array, Array]]:
-    """Distinct zeros of all five balances near the guesses (n, 3), to round-off."""
-    if not len(position):
-        return []
-    position, moment, step = solve(balance, position, moment, EVERY)
-    points: list[tuple[Array, Array]] = []
-    for r, m, size in zip(position, moment, step, strict=True):
-        if size < CONVERGED_STEP and not any(
-            np.linalg.norm(r - q) + np.linalg.norm(m - n) < DUPLICATE_DISTANCE for q, n in points
-        ):
-            points.append((r, m))
-    return points
+def _curve(balance: Balance, points: Array, tangents: Array) -> Curve:
+    value, slope = balance(points[:, :3], points[:, 3:])
+    slope = AtRest.extended(value, slope, points[:, 3:])[1][:, AXIAL]
+    arc = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1)))
+    return Curve(arc, points, tangents, value[:, AXIAL], np.sum(slope * tangents, axis=1))

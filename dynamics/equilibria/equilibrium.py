@@ -94,51 +94,54 @@ class Equilibrium:
         """(3,) mean over a turn along the laboratory's axes, m: on the axis for a steady motion."""
         return np.asarray(self.laboratory_turn.position.mean(axis=0))
 
+    @cached_property
+    def _distances(self) -> Array:
+        return np.asarray(np.linalg.norm(self._turn.position, axis=1))
+
+    @cached_property
+    def _offsets(self) -> Array:
+        return np.asarray(np.hypot(*self._turn.position[:, :2].T))
+
+    @cached_property
+    def _angles(self) -> Array:
+        x, y, z = self._turn.moment.T
+        return np.asarray(np.degrees(np.arctan2(np.hypot(x, y), z)))
+
     @property
     def distance(self) -> float:
         """Distance from the rotor's origin, mean over a turn, m."""
-        return float(np.linalg.norm(self.position)) if self.turn is None else float(self._distances.mean())
-
-    @property
-    def distance_swing(self) -> Array:
-        """(2,) smallest and largest distance from the rotor's origin in a turn, m."""
-        return self._swing(self._distances)
+        return float(self._distances.mean())
 
     @property
     def lateral_offset(self) -> float:
         """Distance from the axis of rotation, mean over a turn, m."""
-        return float(np.hypot(*self.position[:2])) if self.turn is None else float(self._offsets.mean())
-
-    @property
-    def lateral_offset_swing(self) -> Array:
-        """(2,) smallest and largest distance from the axis of rotation in a turn, m."""
-        return self._swing(self._offsets)
+        return float(self._offsets.mean())
 
     @property
     def polar_angle_deg(self) -> float:
         """Angle between the moment and +z, mean over a turn."""
-        return float(self._angles[0]) if self.turn is None else float(self._angles.mean())
+        return float(self._angles.mean())
+
+    @property
+    def distance_swing(self) -> Array:
+        """(2,) smallest and largest distance in a turn, m."""
+        return _extremes(self._distances)
+
+    @property
+    def lateral_offset_swing(self) -> Array:
+        """(2,) smallest and largest offset in a turn, m."""
+        return _extremes(self._offsets)
 
     @property
     def polar_angle_swing_deg(self) -> Array:
-        """(2,) smallest and largest angle between the moment and +z in a turn."""
-        return self._swing(self._angles)
+        """(2,) smallest and largest angle in a turn."""
+        return _extremes(self._angles)
 
     @property
-    def _distances(self) -> Array:
-        return np.asarray(np.linalg.norm(self.laboratory_turn.position, axis=1))
-
-    @property
-    def _offsets(self) -> Array:
-        return np.asarray(np.hypot(*self.laboratory_turn.position[:, :2].T))
-
-    @property
-    def _angles(self) -> Array:
-        x, y, z = (self.state if self.turn is None else self.laboratory_turn).moment.reshape(-1, 3).T
-        return np.asarray(np.degrees(np.arctan2(np.hypot(x, y), z)))
-
-    def _swing(self, values: Array) -> Array:
-        return np.array([values.min(), values.max()])
+    def _turn(self) -> State:
+        if self.turn is not None:
+            return self.laboratory_turn
+        return State(*(vector[None] for vector in self.state.vectors))
 
     @property
     def lag_deg(self) -> float:
@@ -171,6 +174,10 @@ class Equilibrium:
             "small motions": ", ".join(f"{mode.name} {mode.frequency_hz:.4g} Hz" for mode in self.modes),
         }
         return html_table(f"Equilibrium, {'stable' if self.stable else 'unstable'}", rows)
+
+
+def _extremes(values: Array) -> Array:
+    return np.array([values.min(), values.max()])
 
 
 @dataclass(frozen=True, eq=False)

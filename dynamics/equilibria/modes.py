@@ -1,4 +1,4 @@
-"""Linear stability of a synchronous equilibrium, and the names of its small motions, told from their shapes."""
+"""Linear stability of a synchronous equilibrium: its modes, and their names by their shapes."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -15,7 +15,7 @@ SIDE, TILT = ("side, backward", "side, forward"), ("precession", "nutation")
 
 @dataclass(frozen=True, eq=False)
 class Modes:
-    """Small motions about an equilibrium, in scaled time.
+    """Modes of an equilibrium, in scaled time.
 
     Parameters
     ----------
@@ -43,6 +43,16 @@ class Modes:
         """The distinct positive imaginary parts, ascending."""
         positive = np.sort(self.eigenvalues.imag[self.eigenvalues.imag > self.errors])
         return positive[np.diff(positive, prepend=-np.inf) > 1e-9]
+
+    def in_seconds(self, time: float) -> dict[str, Any]:
+        """What an `Equilibrium` says of them, in SI units; `time` is the unit of the eigenvalues', s."""
+        return {
+            "stable": self.stable,
+            "growth_per_s": self.growth / time,
+            "growth_error_per_s": float(self.errors.max()) / time,
+            "frequencies_hz": self.angular_frequencies / (2 * np.pi * time),
+            "modes": named_modes(self, time),
+        }
 
 
 def is_stable(eigenvalues: NDArray[Any], errors: Array) -> NDArray[np.bool_]:
@@ -104,7 +114,7 @@ def tangent_spaces(states: Array) -> tuple[Array, Array]:
 
 @dataclass(frozen=True)
 class Mode:
-    """One small motion.
+    """One mode.
 
     Parameters
     ----------
@@ -120,10 +130,11 @@ class Mode:
 
 
 def named_modes(modes: Modes, time: float) -> tuple[Mode, ...]:
-    """The five motions of the floater, bounce first; of a pair that does not oscillate the one that grows more.
+    """The floater's five modes, bounce first; of a pair that does not oscillate the one that grows more.
 
     Parameters
     ----------
+    modes : ten eigenvalues and their shapes
     time : unit of time of the eigenvalues, s
     """
     values, shapes = modes.eigenvalues, np.abs(modes.shapes)
@@ -131,18 +142,12 @@ def named_modes(modes: Modes, time: float) -> tuple[Mode, ...]:
     while len(chosen) > 5:  # drop what decays most of those that do not oscillate
         still = [k for k in chosen if abs(values[k].imag) <= modes.errors[k]]
         chosen.remove((still or chosen)[-1])
-    bounce = max(chosen, key=lambda k: _axial(shapes[:, k]))
-    others = sorted((k for k in chosen if k != bounce), key=lambda k: -_moving(shapes[:, k]))
+    size = np.linalg.norm(shapes[[0, 1, 2, 6, 7, 8]], axis=0)  # of place and moment alone
+    axial, moving = shapes[2] / size, np.linalg.norm(shapes[:2], axis=0) / size
+    bounce = max(chosen, key=lambda k: axial[k])
+    others = sorted((k for k in chosen if k != bounce), key=lambda k: -moving[k])
     side, tilt = (sorted(part, key=lambda k: values[k].imag) for part in (others[:2], others[2:]))
     pairs = [("bounce", bounce), *zip(SIDE, side, strict=False), *zip(TILT, tilt, strict=False)]
     return tuple(
         Mode(name, float(values[k].real) / time, float(values[k].imag) / (2 * np.pi * time)) for name, k in pairs
     )
-
-
-def _axial(shape: Array) -> float:
-    return float(shape[2] / np.linalg.norm(shape[[0, 1, 2, 6, 7, 8]]))
-
-
-def _moving(shape: Array) -> float:
-    return float(np.linalg.norm(shape[:2]) / np.linalg.norm(shape[[0, 1, 2, 6, 7, 8]]))

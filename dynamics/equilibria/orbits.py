@@ -62,18 +62,19 @@ def periodic_orbit(rates: Rates, values: Array, spin: float, plate: PlateForce |
     values : their parameters, with the drag along the moment left out; gravity may have any direction
     spin : body spin s
     plate : its currents, if they are modelled
+    guess : scaled state or turn, an odd number n of instants
     """
     count = FEWEST
     states = np.broadcast_to(guess, (count, 12)) if guess.ndim == 1 else resampled(guess, count)
     while True:
-        found = orbit_near(rates, values, spin, plate, states)
+        found = _orbit_near(rates, values, spin, plate, states)
         if found is None or _tail(found.states) < TAIL or count >= MOST:
             return found
         count = 2 * count - 1
         states = resampled(found.states, count)
 
 
-def orbit_near(rates: Rates, values: Array, spin: float, plate: PlateForce | None, states: Array) -> Orbit | None:
+def _orbit_near(rates: Rates, values: Array, spin: float, plate: PlateForce | None, states: Array) -> Orbit | None:
     """The orbit near a turn (n, 12) of states, at as many instants; see `periodic_orbit`."""
     problem = OrbitProblem(rates, values, plate, len(states))
     states, size = states.copy(), np.inf

@@ -13,7 +13,6 @@ from ..motion.rates import Rates
 from ..motion.state import Parameter, Scales, State
 from .balance import Indices
 from .equilibrium import FOLD, IN_PLATE, IN_ROTOR, NOT_CONVERGED, PAST_TABLE, Equilibrium, LeftOut
-from .modes import named_modes
 from .orbits import Orbit, OrbitProblem, conserved, floquet_modes, periodic_orbit, resampled
 from .path import DIFFERENCE, END, ON, Steps, directions, follow
 
@@ -76,7 +75,7 @@ class OrbitCurve:
 
 
 @dataclass(frozen=True, eq=False)
-class Shaken:
+class ForcedMotion:
     """A scene in which something makes the motion periodic.
 
     Parameters
@@ -111,11 +110,7 @@ class Shaken:
             spin=fixed.spin,
             residual=orbit.error,
             position_error=self._position_error(orbit, known, scales),
-            stable=motion.stable,
-            growth_per_s=motion.growth / scales.time,
-            growth_error_per_s=float(motion.errors.max()) / scales.time,
-            frequencies_hz=motion.angular_frequencies / (2 * np.pi * scales.time),
-            modes=named_modes(motion, scales.time),
+            **motion.in_seconds(scales.time),
             turn=turn,
             currents=orbit.plate / self.values[Parameter.PLATE_SHARE] if self.memory else None,
             without=fixed,
@@ -142,19 +137,16 @@ class Shaken:
             return periodic_orbit(self.rates, values, spin, plate, states)
 
         found, done, step, states = None, 0.0, 1.0, start
-        while done < 1.0:
+        while done < 1.0 and step >= SMALLEST_STEP:
             ahead = orbit(min(1.0, done + step), states)
             if ahead is None or (step > SMALLEST_STEP and _moved(states, ahead.states) > JUMP):
                 step /= 2
-                if step < SMALLEST_STEP:
-                    break
-                continue
-            found, done, states = ahead, min(1.0, done + step), ahead.states
+            else:
+                found, done, states = ahead, min(1.0, done + step), ahead.states
         if done == 1.0 or found is None:
             return found, NOT_CONVERGED, done
         arrived, why, part = _turned(OrbitCurve(self.rates, problem, spin), states, done)
-        found = None if arrived is None else orbit(1.0, arrived)
-        return found, why, part
+        return None if arrived is None else orbit(1.0, arrived), why, part
 
     def _position_error(self, orbit: Orbit, known: Equilibrium, scales: Scales) -> float:
         """The one's own without the plate, m, and the part of what the plate moves that its table may be wrong by."""

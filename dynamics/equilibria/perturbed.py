@@ -2,7 +2,6 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Self
 
 import numpy as np
 
@@ -14,7 +13,6 @@ from ...fem.rotor_metal import RotorLosses
 from ...geometry.common import Array
 from ...geometry.scene.contents import Scene
 from ..motion.effect import Interaction
-from ..motion.effects import with_effects
 from ..motion.equations import parameters
 from ..motion.floater_currents import FloaterCurrents
 from ..motion.mutual import Mutual, rough_force
@@ -48,78 +46,66 @@ class Shift:
     moment: Array
 
 
-@dataclass(frozen=True, eq=False)
-class PerturbedBalance:
-    """Balance of a floater at rest in the rotor's frame with additional forces."""
+def balanced_directions(scene: Scene, balance: Balance, places: Array, start: float, guess: Array) -> Array:
+    """Moment directions (n, 3) whose torque is balanced, followed downwards and upwards from `start` (m) below.
 
-    balance: Balance
-    scales: Scales
-    scene: Scene
+    Parameters
+    ----------
+    scene, balance : a scene's
+    places : (n, 3) m
+    start : distance below the rotor's origin, m
+    guess : (3,) for the first ones; each other begins at its neighbour's, which stays where no balance is near
+    """
+    result, depths = np.zeros_like(places), -places[:, 2]
+    downwards = [k for k in np.argsort(depths) if depths[k] >= start]
+    upwards = [k for k in np.argsort(-depths) if depths[k] < start]
+    for chain in (downwards, upwards):
+        direction = guess
+        for k in chain:
+            _, moment, step = solve(balance, places[None, k] / scene.floater.radius, direction[None], TILTS)
+            direction = result[k] = moment[0] if step[0] < CONVERGED_STEP else direction
+    return result
 
-    @classmethod
-    def of(cls, scene: Scene, table: FieldTable, spin: float = 0.0) -> Self:
-        """The balance in a table's field, for body spin s."""
-        scales = Scales.of(scene)
-        return cls(
-            Balance(Rates(with_effects(scene, table)), parameters(scene, scales, frozen_spin=True), spin), scales, scene
-        )
 
-    def direction(self, position: Array, guess: Array) -> Array:
-        """Moment direction (3,) whose torque is balanced at a place (3,) m; `guess` itself if none is near."""
-        place = position[None] / self.scales.length
-        _, moment, step = solve(self.balance, place, guess[None], TILTS)
-        return np.asarray(moment[0] if step[0] < CONVERGED_STEP else guess)
+def shifted_equilibrium(
+    scene: Scene, balance: Balance, position: Array, moment: Array, extra: Extra, tolerance: float = 1e-7
+) -> Shift:
+    """Follow an equilibrium to where additional forces put it.
 
-    def directions(self, places: Array, start: float, guess: Array) -> Array:
-        """Balanced moment directions (n, 3) at places (n, 3) m, followed downwards and upwards from `start` (m) below.
+    Quasi-Newton from the table's own Jacobian (C. G. Broyden, Math. Comp. 19 (1965) 577).
 
-        Each begins at its neighbour's, the first ones at `guess`.
-        """
-        result = np.zeros_like(places)
-        depths = -places[:, 2]
-        downwards = [k for k in np.argsort(depths) if depths[k] >= start]
-        upwards = [k for k in np.argsort(-depths) if depths[k] < start]
-        for chain in (downwards, upwards):
-            direction = guess
-            for k in chain:
-                direction = result[k] = self.direction(places[k], direction)
-        return result
+    Parameters
+    ----------
+    scene, balance : a scene's, without the additional forces
+    position, moment : (3,) m and direction of the equilibrium
+    extra : the additional forces
+    tolerance : of the place, in radii of the floater
+    """
+    scales, floater = Scales.of(scene), scene.floater
 
-    def shift(self, position: Array, moment: Array, extra: Extra, tolerance: float = 1e-7) -> Shift:
-        """Follow an equilibrium, position (3,) m and moment direction (3,), to where the additional forces put it.
-
-        Quasi-Newton from the table's own Jacobian (C. G. Broyden, Math. Comp. 19 (1965) 577), to `tolerance` of the
-        floater's radius.
-        """
-        position = position / self.scales.length
-        inverse = np.linalg.inv(self.balance(position[None], moment[None])[1][0])
-        residual = self._residual(position, moment, extra)
-        step = -inverse @ residual
-        linear = step[:3] * self.scales.length
-        for _ in range(MOST):
-            places, moments = moved_pose(position[None], moment[None], step[None])
-            position, moment = places[0], moments[0]
-            if np.linalg.norm(step) < tolerance:
-                return Shift(linear, position * self.scales.length, moment)
-            if np.linalg.norm(step) > 1.0 or not self._free(position):
-                break
-            new = self._residual(position, moment, extra)
-            change = inverse @ (new - residual)
-            inverse = inverse + np.outer(step - change, step @ inverse) / (step @ change)
-            residual, step = new, -inverse @ new
-        return Shift(linear, np.full(3, np.nan), np.full(3, np.nan))
-
-    def _free(self, position: Array) -> bool:
-        place = position * self.scales.length
-        return all(body.distance(place) > self.scene.floater.radius for body in self.scene.turning_bodies)
-
-    def _residual(self, position: Array, moment: Array, extra: Extra) -> Array:
-        value = self.balance(position[None], moment[None])[0][0]
-        force, torque = extra(position * self.scales.length, moment)
-        floater, square = self.scene.floater, self.scales.time**2
-        value[:3] += force * square / (floater.mass * self.scales.length)
-        value[3:] += tangent_basis(moment[None])[0] @ torque * square / floater.inertia
+    def residual(position: Array, moment: Array) -> Array:
+        value = balance(position[None], moment[None])[0][0]
+        force, torque = extra(position * scales.length, moment)
+        value[:3] += force * scales.time**2 / (floater.mass * scales.length)
+        value[3:] += tangent_basis(moment[None])[0] @ torque * scales.time**2 / floater.inertia
         return np.asarray(value)
+
+    position = position / scales.length
+    inverse, left = np.linalg.inv(balance(position[None], moment[None])[1][0]), residual(position, moment)
+    step = -inverse @ left
+    linear = step[:3] * scales.length
+    for _ in range(MOST):
+        (position,), (moment,) = moved_pose(position[None], moment[None], step[None])
+        place = position * scales.length
+        if np.linalg.norm(step) < tolerance:
+            return Shift(linear, place, moment)
+        if np.linalg.norm(step) > 1.0 or any(body.distance(place) <= floater.radius for body in scene.turning_bodies):
+            break
+        new = residual(position, moment)
+        change = inverse @ (new - left)
+        inverse = inverse + np.outer(step - change, step @ inverse) / (step @ change)
+        left, step = new, -inverse @ new
+    return Shift(linear, np.full(3, np.nan), np.full(3, np.nan))
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,4 +1,4 @@
-"""What a full search finds, and its file: the same search is not done again."""
+"""All synchronous equilibria of a scene, with their stability; a search is not done twice."""
 
 from collections.abc import Callable, Sequence
 from contextlib import suppress
@@ -21,14 +21,23 @@ from ..motion.plate import PlateMemory
 from ..motion.rates import Rates
 from ..motion.state import Parameter, Scales
 from .balance import Balance, tangent_basis
-from .curves import Curve, SearchRange, fixed_points
+from .curves import FARTHEST, SearchRange, fixed_points
 from .equilibrium import Equilibrium, EquilibriumError, ForceCurve, LeftOut, Survey
-from .modes import modes, named_modes
-from .periodic import Shaken, overlap
+from .modes import modes
+from .periodic import ForcedMotion, overlap
+
+SECOND_ORDER = 0.25
+"""Part of what a model leaves out that is wrong of its effect to first order, by all causes together and by each.
+
+Below three vertical and four tilted rotors of permeable cubes the place by finite elements differed by 0.59 to 0.79 of
+the error so stated for dipoles and cuboids (72 equilibria), below five horizontal ones by 0.1 to 1 of it.
+"""
+BEYOND = 0.1
+"""Part of a floater's weight that its multipoles may leave out; beyond, they do not tell an equilibrium."""
 
 
 @dataclass(frozen=True, eq=False)
-class Found:
+class FixedPoints:
     """Fixed points of a scene without plate, what the equations of motion are like there, and the curves they lie on.
 
     Parameters
@@ -59,45 +68,46 @@ class Found:
         return cls(points, doubts, *near(position, moment), jacobians, curves)
 
 
-FOUND = TableKind("equilibria", Found, "Fixed points of a scene without plate", most=2**26)
+FIXED_POINTS = TableKind("equilibria", FixedPoints, "Fixed points of a scene without plate", most=2**26)
 """In a folder of their own, of some thousand scenes."""
 
 
-def cached_found(
-    scene: Scene, equations: str, spin: float, top: float, make: Callable[[], Found], report: Callable[[str], None]
-) -> tuple[Found, bool]:
+def cached_points(
+    scene: Scene, equations: str, spin: float, make: Callable[[], FixedPoints], report: Callable[[str], None]
+) -> tuple[FixedPoints, bool]:
     """What a search finds, from the cache if it is there, and whether it was.
 
     Parameters
     ----------
-    scene : its plate and its start decide nothing
+    scene : its plate decides nothing
     equations : tells the rotor's table and the equations of motion from all others
     spin : body spin
-    top : spin about the moment beside a rotor at rest, rad/s
+    make : the search
+    report : hears what is wrong with the cache
     """
-    inputs = equations, spin, top, parameters(scene, Scales.of(scene), frozen_spin=True)
-    return FOUND.cached(inputs, make, report)
-
-
-SECOND_ORDER = 0.25
-"""Part of what a model leaves out that is wrong of its effect to first order, by all causes together and by each.
-
-Below three vertical and four tilted rotors of permeable cubes the place by finite elements differed by 0.59 to 0.79 of
-the error so stated for dipoles and cuboids (72 equilibria), below five horizontal ones by 0.1 to 1 of it.
-"""
-BEYOND = 0.1
-"""Part of a floater's weight that its multipoles may leave out; beyond, they do not tell an equilibrium."""
+    inputs = equations, spin, _own_spin(scene), parameters(scene, Scales.of(scene), frozen_spin=True)
+    return FIXED_POINTS.cached(inputs, make, report)
 
 
 def find_equilibria(
     scene: Scene,
     table: FieldTable,
     spin: float = 0.0,
-    farthest: float = 0.1,
+    farthest: float = FARTHEST,
     rates: Rates | None = None,
     memory: PlateMemory | None = None,
 ) -> list[Equilibrium]:
-    """All synchronous equilibria free of the bodies, the stable ones first, then by distance; see `survey`."""
+    """All synchronous equilibria free of the bodies, the stable ones first, then by distance.
+
+    Parameters
+    ----------
+    scene, table, spin, farthest, rates : see `survey`
+    memory : the plate's currents; None leaves them out
+
+    Raises
+    ------
+    EquilibriumError : the rotor is at rest and the floater does not spin
+    """
     rates = rates or Rates(with_effects(scene, table))
     found = survey(scene, table, spin, farthest, rates)
     found = free_of_bodies(scene, found) if memory is None else with_plate(scene, table, found, memory, rates)
@@ -108,9 +118,9 @@ def survey(
     scene: Scene,
     table: FieldTable,
     spin: float = 0.0,
-    farthest: float = 0.1,
+    farthest: float = FARTHEST,
     rates: Rates | None = None,
-    remembered: Callable[[Callable[[], Found]], Found] = lambda search: search(),
+    remembered: Callable[[Callable[[], FixedPoints]], FixedPoints] = lambda search: search(),
     watch: Watch = unwatched,
 ) -> Survey:
     """All synchronous equilibria with z < 0 between contact with the rotor and `farthest`, with their stability.
@@ -123,7 +133,7 @@ def survey(
         how fast the floater spins about its moment, of which stability depends, as of a spinning top
     farthest : largest depth, and distance from the axis, m
     rates : `Rates` of the same table, to compile them once for many scenes
-    remembered : gets the search and gives what it finds, perhaps from before, see `cached_found`
+    remembered : gets the search and gives what it finds, perhaps from an earlier one, see `cached_points`
     watch : is told the stage of the search and its share that is done
 
     With gravity across the axis equilibria are periodic motions, followed from the fixed points without it.
@@ -138,24 +148,26 @@ def survey(
     ------
     EquilibriumError : the rotor is at rest and the floater does not spin
     """
-    turning(scene)
+    check_turning(scene)
     scales = Scales.of(scene)
     equations = rates or Rates(with_effects(scene, table))
-    top = own_spin(scene) * scales.time * scales.spin_ratio
+    top = _own_spin(scene) * scales.time * scales.spin_ratio
     balance = Balance(equations, parameters(scene, scales, frozen_spin=True), spin * scales.spin_ratio, top)
     found = remembered(lambda: _search(scene, table, balance, farthest, watch))
-    return told(scene, balance, found)
+    return survey_of(scene, balance, found)
 
 
-def _search(scene: Scene, table: FieldTable, balance: Balance, farthest: float, watch: Watch) -> Found:
+def _search(scene: Scene, table: FieldTable, balance: Balance, farthest: float, watch: Watch) -> FixedPoints:
     scales = Scales.of(scene)
     balance.rates.compile()
-    curves, points = fixed_points(balance, SearchRange(scene, farthest), watch)
-    where = np.reshape([np.concatenate(point) for point in points], (-1, 6))
+    curves, where = fixed_points(balance, SearchRange(scene, farthest), watch)
     known, doubts = field_doubts(table, where[:, :3] * scales.length)
     if scene.floater.body is not None:
         known, doubts = _of_shape(scene, table, known, doubts, where)
-    return Found.at(balance, where[known], doubts, tuple(_force_curve(scene, scales, curve) for curve in curves))
+    weight = scene.floater.mass * float(scene.gravity[2])
+    unit = scene.floater.mass * scales.length / scales.time**2
+    forces = [ForceCurve(c.points[:, :3] * scales.length, c.points[:, 3:], c.force * unit - weight) for c in curves]
+    return FixedPoints.at(balance, where[known], doubts, tuple(forces))
 
 
 def _of_shape(
@@ -180,20 +192,19 @@ def _of_shape(
     return kept, np.reshape(more, (-1, doubts.shape[1]))
 
 
-def told(scene: Scene, balance: Balance, known: Found) -> Survey:
+def survey_of(scene: Scene, balance: Balance, known: FixedPoints) -> Survey:
     """The survey of a scene of which all fixed points are known."""
     rows = zip(known.points, known.doubts, known.residuals, known.slopes, known.jacobians, strict=True)
-    found, left_out = [_equilibrium(Scales.of(scene), balance, *row) for row in rows], list[LeftOut]()
-    if np.any(scene.gravity[:2]):
-        found, left_out = _shaken(Shaken(replace(scene, plate=None), balance.rates, balance.values, None), found)
-    return Survey(_in_order(found), known.curves, tuple(left_out))
+    found = _survey([_equilibrium(Scales.of(scene), balance, *row) for row in rows], known.curves)
+    if not np.any(scene.gravity[:2]):
+        return found
+    return _forced(ForcedMotion(replace(scene, plate=None), balance.rates, balance.values, None), found)
 
 
 def free_of_bodies(scene: Scene, known: Survey) -> Survey:
     """A survey without the plate's currents, of whose equilibria those that would overlap a body are left out."""
-    over = {id(e): overlap(scene, e) for e in known.equilibria}
-    left_out = [LeftOut(e, over[id(e)]) for e in known.equilibria if over[id(e)]]
-    return Survey(tuple(e for e in known.equilibria if not over[id(e)]), known.curves, (*known.left_out, *left_out))
+    found = [LeftOut(e, why) if (why := overlap(scene, e)) else e for e in known.equilibria]
+    return _survey(found, known.curves, known.left_out)
 
 
 def field_doubts(table: FieldTable, places: Array) -> tuple[NDArray[np.bool_], Array]:
@@ -228,28 +239,35 @@ def with_plate(
     """
     known = free_of_bodies(scene, known)
     values = parameters(scene, Scales.of(scene), frozen_spin=True)
-    problem = Shaken(scene, rates or Rates(with_effects(scene, table)), values, memory)
-    found, left_out = _shaken(problem, known.equilibria)
-    return Survey(_in_order(found), known.curves, (*known.left_out, *left_out))
+    return _forced(ForcedMotion(scene, rates or Rates(with_effects(scene, table)), values, memory), known)
 
 
-def _in_order(found: list[Equilibrium]) -> tuple[Equilibrium, ...]:
-    return tuple(sorted(found, key=lambda equilibrium: (not equilibrium.stable, equilibrium.distance)))
+def _forced(problem: ForcedMotion, known: Survey) -> Survey:
+    """The same equilibria with the plate's currents and the whole gravity; those that are none are left out."""
+    found = [problem.equilibrium(e) if problem.reaches(e) else e for e in known.equilibria]
+    return _survey(found, known.curves, known.left_out)
 
 
-def own_spin(scene: Scene) -> float:
+def _survey(
+    found: Sequence[Equilibrium | LeftOut], curves: tuple[ForceCurve, ...], left_out: tuple[LeftOut, ...] = ()
+) -> Survey:
+    equilibria = sorted((e for e in found if isinstance(e, Equilibrium)), key=lambda e: (not e.stable, e.distance))
+    return Survey(tuple(equilibria), curves, (*left_out, *(e for e in found if isinstance(e, LeftOut))))
+
+
+def _own_spin(scene: Scene) -> float:
     """Spin about its own moment with which a floater begins beside a rotor at rest, rad/s; else 0."""
     if scene.frequency or not isinstance(scene.start, AbsoluteStart):
         return 0.0
     return float(scene.start.spin @ scene.start.moment / np.linalg.norm(scene.start.moment))
 
 
-def turning(scene: Scene) -> None:
+def check_turning(scene: Scene) -> None:
     """Raises EquilibriumError beside a rotor at rest, but for a floater that spins and gravity along the axis.
 
     So it does where rotor or floater is not magnetised.
     """
-    if not scene.frequency and not own_spin(scene):
+    if not scene.frequency and not _own_spin(scene):
         raise EquilibriumError(
             "Beside a rotor at rest a magnet without spin has no stable equilibrium (S. Earnshaw, 1842). "
             "Give the rotor a frequency, or let the floater spin about its moment, which can make it stable: "
@@ -269,12 +287,6 @@ def turning(scene: Scene) -> None:
         )
 
 
-def _shaken(problem: Shaken, known: Sequence[Equilibrium]) -> tuple[list[Equilibrium], list[LeftOut]]:
-    """The same equilibria with the plate's currents and the whole gravity, and those that are none."""
-    moved = [problem.equilibrium(e) if problem.reaches(e) else e for e in known]
-    return [e for e in moved if isinstance(e, Equilibrium)], [e for e in moved if isinstance(e, LeftOut)]
-
-
 def _equilibrium(
     scales: Scales, balance: Balance, point: Array, doubt: Array, residual: Array, slope: Array, jacobian: Array
 ) -> Equilibrium:
@@ -289,9 +301,9 @@ def _equilibrium(
     left_out, moment = doubt[2:].reshape(-1, 4, 3), point[3:]
     forces = inertia * length * (left_out[:, 1:] @ moment)
     torques = np.cross(moment, left_out[:, 0]) @ tangent_basis(moment[None])[0].T
-    moved = np.linalg.norm((torque * np.concatenate([forces, torques], axis=1) @ inverse.T)[:, :3], axis=1)
-    together = np.linalg.norm((torque * np.concatenate([forces, torques], axis=1).sum(axis=0) @ inverse.T)[:3])
-    error += float((1 + SECOND_ORDER) * together + SECOND_ORDER * moved.sum())
+    moved = (torque * np.concatenate([forces, torques], axis=1) @ inverse.T)[:, :3]
+    together, each = np.linalg.norm(moved.sum(axis=0)), np.linalg.norm(moved, axis=1)
+    error += float((1 + SECOND_ORDER) * together + SECOND_ORDER * each.sum())
     gravity = abs(float(values[Parameter.GRAVITY_Z]))
     return Equilibrium(
         state=scales.unpack(state),
@@ -299,17 +311,7 @@ def _equilibrium(
         steady_frame=not values[Parameter.RATE],
         residual=float(np.abs(residual).max() / (gravity or 1.0)),
         position_error=error * scales.length,
-        stable=motion.stable,
-        growth_per_s=motion.growth / scales.time,
-        growth_error_per_s=float(motion.errors.max()) / scales.time,
-        frequencies_hz=motion.angular_frequencies / (2 * np.pi * scales.time),
-        modes=named_modes(motion, scales.time),
+        **motion.in_seconds(scales.time),
         slope=slope,
         jacobian=jacobian,
     )
-
-
-def _force_curve(scene: Scene, scales: Scales, curve: Curve) -> ForceCurve:
-    weight = scene.floater.mass * float(scene.gravity[2])
-    unit = scene.floater.mass * scales.length / scales.time**2
-    return ForceCurve(curve.position * scales.length, curve.moment, curve.force * unit - weight)

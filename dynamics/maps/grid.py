@@ -1,6 +1,6 @@
 """The points of a map or a sweep, the balances there, and the equilibria that are known."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -9,9 +9,25 @@ from numpy.typing import NDArray
 
 from ...geometry.common import Array
 from ..equilibria.balance import DUPLICATE_DISTANCE, EVERY, Balance, Indices
-from ..equilibria.curves import Search, SearchRange
+from ..equilibria.curves import SearchRange, newton_search
 from ..equilibria.path import carried
 from ..motion.rates import Rates
+
+FAR_APART = 1.5
+"""Equilibria are followed up to so many times the farthest distance of the ranges."""
+SPACING = 5
+"""Points of the map between two searches."""
+WHOLE, PART = 64, 8
+"""One of so many searches has all starts, the others an eighth of them, which misses less than one in a hundred of a
+point's equilibria: a sheet is lost only if every search that meets it does."""
+REACH, FAR = 0.8, 1.0
+"""Longest steps of the searches, rad of the moment and radii of the position, and beyond that distance (radii) as a
+part of it, as the field changes: with 0.3 rad and radii they are more than twice as many, and an eighth of the starts
+misses several times as much."""
+TOGETHER = 8
+"""Searches that are made side by side: enough that NumPy's calls cost less than what they compute."""
+MARGIN = 0.3
+"""Sheets are followed so far beyond the range (radii): what its border cuts into pieces is whole there."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,7 +63,6 @@ class Grid:
         return Balance(self.rates, self.values[point], float(self.spin[point]))
 
     def range(self, point: int) -> SearchRange:
-        """Where equilibria of one point are looked for."""
         return self.ranges[int(self.region[point])]
 
     def holds(self, point: Indices, position: Array, margin: float = 0.0) -> NDArray[np.bool_]:
@@ -136,46 +151,26 @@ class Atlas:
         return point[inside], found[inside, :3], found[inside, 3:]
 
 
-FAR_APART = 1.5
-"""Equilibria are followed up to so many times the farthest distance of the ranges."""
-SPACING = 5
-"""Points of the map between two searches."""
-WHOLE, PART = 64, 8
-"""One of so many searches has all starts, the others an eighth of them, which misses less than one in a hundred of a
-point's equilibria: a sheet is lost only if every search that meets it does."""
-REACH, FAR = 0.8, 1.0
-"""Longest steps of the searches, rad of the moment and radii of the position, and beyond that distance (radii) as a
-part of it, as the field changes: with 0.3 rad and radii they are more than twice as many, and an eighth of the starts
-misses several times as much."""
-TOGETHER = 8
-"""Searches that are made side by side: enough that NumPy's calls cost less than what they compute."""
-MARGIN = 0.3
-"""Sheets are followed so far beyond the range (radii): what its border cuts into pieces is whole there."""
-
-
-def filled(grid: Grid, nodes: Indices, progress: Callable[[float], None] | None = None) -> Atlas:
+def filled(grid: Grid, nodes: Indices) -> Atlas:
     """What is found from searches at `nodes`; an equilibrium that is carried is good to round-off like any other."""
-    search = Search(grid.balance, grid.holds, EVERY, MARGIN, REACH, FAR)
     random, seeds = np.random.default_rng(0), []
     for first in range(0, len(nodes), TOGETHER):
         some = range(first, min(first + TOGETHER, len(nodes)))
         starts = [_starts(grid, int(nodes[k]), None if k % WHOLE == 0 else random) for k in some]
-        seeds.append(search.solutions(*(np.concatenate(part) for part in zip(*starts, strict=True))))
-        if progress is not None:
-            progress(0.9 * (some[-1] + 1) / len(nodes))
+        problem, points = (np.concatenate(part) for part in zip(*starts, strict=True))
+        seeds.append(newton_search(grid.balance, grid.holds, problem, points, EVERY, MARGIN, REACH, FAR))
     point, places = (np.concatenate(part) for part in zip(*seeds, strict=True))
     atlas = Atlas(len(grid))
     _spread(grid, atlas, point, places[:, :3], places[:, 3:])
     return atlas
 
 
-def _starts(grid: Grid, point: int, random: np.random.Generator | None) -> tuple[Indices, Array, Array]:
-    """All starts at a point, or some: the point and scaled positions and moments, (n,), (n, 3) and (n, 3)."""
-    position, moment = grid.range(point).starts()
+def _starts(grid: Grid, point: int, random: np.random.Generator | None) -> tuple[Indices, Array]:
+    """All starts at a point, or some: the point (n,) and scaled positions and moments (n, 6)."""
+    points = grid.range(point).starts()
     if random is not None:
-        chosen = random.choice(len(position), len(position) // PART, replace=False)
-        position, moment = position[chosen], moment[chosen]
-    return np.full(len(position), point), position, moment
+        points = points[random.choice(len(points), len(points) // PART, replace=False)]
+    return np.full(len(points), point), points
 
 
 def _spread(grid: Grid, atlas: Atlas, point: Indices, position: Array, moment: Array) -> None:

@@ -1,6 +1,6 @@
 """Equilibria of a map with the stability of each."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,12 +13,12 @@ from ..equilibria.balance import Indices
 from ..equilibria.curves import SearchRange
 from ..equilibria.equilibrium import EquilibriumError, Survey
 from ..equilibria.modes import is_stable, spectra
-from ..equilibria.search import Found, field_doubts, told, turning
+from ..equilibria.search import FixedPoints, check_turning, field_doubts, survey_of
 from ..motion.equations import parameters
 from ..motion.rates import Rates
 from ..motion.state import Parameter, Scales
 from .family import RotorFamily
-from .grid import SPACING, Atlas, Grid, filled
+from .grid import SPACING, Grid, filled
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,9 +61,35 @@ class EquilibriumMap:
         return every.reshape(shape), stable.reshape(shape)
 
 
-def judged(grid: Grid, atlas: Atlas, axes: tuple[Array, Array], searches: int) -> EquilibriumMap:
-    """What an atlas knows within the range, all spectra in one call."""
-    point, position, moment = atlas.within(grid)
+def equilibrium_map(
+    family: RotorFamily,
+    frequencies: ArrayLike,
+    measures: ArrayLike,
+    spin: float = 0.0,
+    spacing: int = SPACING,
+) -> EquilibriumMap:
+    """All synchronous equilibria with z < 0 over a grid, with their stability; gravity along the axis, no plate.
+
+    Parameters
+    ----------
+    family : the scenes; nothing is compiled again within a family
+    frequencies, measures : axes, Hz and m or rad
+    spin : body spin s
+    spacing : steps of the grid between two searches; a sheet between them is missed if it meets no other in a fold
+
+    Raises
+    ------
+    EquilibriumError : a frequency is zero, or gravity has a part across the axis
+    """
+    axes = np.atleast_1d(np.asarray(frequencies, float)), np.atleast_1d(np.asarray(measures, float))
+    if not axes[0].all() or np.any(family.scene.gravity[:2]):
+        raise EquilibriumError(
+            "Equilibria are fixed points only where the rotor turns and gravity is along its axis. Elsewhere use "
+            "find_equilibria."
+        )
+    grid = family_grid(family, *axes, spin)
+    nodes = grid.coarse(spacing)
+    point, position, moment = filled(grid, nodes).within(grid)
     row, column = grid.places[point].T
     balance = grid.balance(point)
     time, length = balance.values[:, [Parameter.TIME]], balance.values[:, [Parameter.LENGTH]]
@@ -81,53 +107,18 @@ def judged(grid: Grid, atlas: Atlas, axes: tuple[Array, Array], searches: int) -
         eigenvalues=np.asarray(values / time, complex),
         errors=errors.max(axis=1, initial=0.0) / time[:, 0],
         stable=is_stable(values, errors),
-        searches=searches,
+        searches=len(nodes),
     )
 
 
-def equilibrium_map(
-    family: RotorFamily,
-    frequencies: ArrayLike,
-    measures: ArrayLike,
-    spin: float = 0.0,
-    farthest: float = 0.1,
-    spacing: int = SPACING,
-    progress: Callable[[float], None] | None = None,
-) -> EquilibriumMap:
-    """All synchronous equilibria with z < 0 over a grid, with their stability; gravity along the axis, no plate.
-
-    Parameters
-    ----------
-    family : the scenes; nothing is compiled again within a family
-    frequencies, measures : axes, Hz and m or rad
-    spin : body spin s
-    farthest : largest depth, and distance from the axis, m
-    spacing : steps of the grid between two searches; a sheet between them is missed if it meets no other in a fold
-    progress : called with the finished part, 0 to 1
-
-    Raises
-    ------
-    EquilibriumError : a frequency is zero, or gravity has a part across the axis
-    """
-    axes = np.atleast_1d(np.asarray(frequencies, float)), np.atleast_1d(np.asarray(measures, float))
-    if not axes[0].all() or np.any(family.scene.gravity[:2]):
-        raise EquilibriumError(
-            "Equilibria are fixed points only where the rotor turns and gravity is along its axis. Elsewhere use "
-            "find_equilibria."
-        )
-    grid = family_grid(family, *axes, spin, farthest)
-    nodes = grid.coarse(spacing)
-    return judged(grid, filled(grid, nodes, progress), axes, len(nodes))
-
-
-def family_grid(family: RotorFamily, frequencies: Array, measures: Array, spin: float, farthest: float) -> Grid:
-    """The points of a map, numbered row by row."""
+def family_grid(family: RotorFamily, frequencies: Array, measures: Array, spin: float) -> Grid:
+    """The points of a map, numbered row by row: `frequencies` (Hz), `measures` of a `family`, body `spin`."""
     row, column = (part.ravel() for part in np.indices((len(frequencies), len(measures))))
     return Grid(
         rates=family.rates,
         values=family.values(frequencies[row], measures[column]),
         spin=np.full(len(row), spin),
-        ranges=[SearchRange(family.at(frequencies[0], measure), farthest) for measure in measures],
+        ranges=[SearchRange(family.at(frequencies[0], measure)) for measure in measures],
         region=column,
         places=np.column_stack([row, column]),
     )
@@ -140,8 +131,6 @@ def surveys(
     places: Indices,
     rates: Rates,
     measures: ArrayLike = 0.0,
-    farthest: float = 0.1,
-    spacing: int | None = None,
 ) -> list[tuple[Survey, bool]]:
     """What `equilibria.survey` finds for each scene, without its curves; neighbours help each other as in a map.
 
@@ -153,32 +142,23 @@ def surveys(
     spin : (n,) body spin s
     places : (n, axes) whole-numbered coordinates by which scenes are neighbours
     measures : (n,) of the rotors in their family, see `RotorFamily`
-    farthest : largest depth, and distance from the axis, m
-    spacing : steps between two searches, None for 5, and 10 along a single axis; a sheet between them is missed if it
-        meets no other in a fold
 
     Returns
     -------
     (n,) the surveys, and whether the scene's own point was searched. Raises EquilibriumError for a rotor at rest.
     """
     for scene in scenes:
-        turning(scene)
+        check_turning(scene)
     values = np.array([parameters(scene, Scales.of(scene), frozen_spin=True) for scene in scenes])
     values[:, Parameter.MEASURE] = measures
-    ranges = [SearchRange(scene, farthest) for scene in scenes]
+    ranges = [SearchRange(scene) for scene in scenes]
     grid = Grid(rates, values, spin, ranges, np.arange(len(scenes)), places)
-    nodes = grid.coarse(spacing or (SPACING if places.shape[1] > 1 else 2 * SPACING))
+    nodes = grid.coarse(SPACING if places.shape[1] > 1 else 2 * SPACING)
     point, position, moment = filled(grid, nodes).within(grid)
-    points = np.concatenate([position, moment], axis=1)
-    known, parts = np.zeros(len(points), bool), list[tuple[Indices, Array]]()
-    for table in {id(table): table for table in tables}.values():
-        (mine,) = np.nonzero(np.isin(point, [k for k, other in enumerate(tables) if other is table]))
-        there, unsure = field_doubts(table, points[mine, :3] * values[point[mine], Parameter.LENGTH, None])
-        known[mine] = there
-        parts.append((mine[there], unsure))
-    doubts = np.zeros((len(points), max(part.shape[1] for _, part in parts)))
-    for which, part in parts:
-        doubts[which, : part.shape[1]] = part
-    point, points, doubts = point[known], points[known], doubts[known]
-    found = [Found.at(grid.alone(k), points[point == k], doubts[point == k]) for k in range(len(scenes))]
-    return [(told(scene, grid.alone(k), found[k]), k in nodes) for k, scene in enumerate(scenes)]
+    poses, found = np.concatenate([position, moment], axis=1), []
+    for k, (scene, table) in enumerate(zip(scenes, tables, strict=True)):
+        here = poses[point == k]
+        known, doubts = field_doubts(table, here[:, :3] * scene.floater.radius)
+        fixed = FixedPoints.at(grid.alone(k), here[known], doubts)
+        found.append((survey_of(scene, grid.alone(k), fixed), k in nodes))
+    return found

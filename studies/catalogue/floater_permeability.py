@@ -7,8 +7,13 @@ import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
 
+from ...dynamics.equilibria.balance import Balance
 from ...dynamics.equilibria.equilibrium import Equilibrium
-from ...dynamics.equilibria.perturbed import PerturbedBalance
+from ...dynamics.equilibria.perturbed import balanced_directions, shifted_equilibrium
+from ...dynamics.motion.effects import with_effects
+from ...dynamics.motion.equations import parameters
+from ...dynamics.motion.rates import Rates
+from ...dynamics.motion.state import Scales
 from ...fem.mutual.response import RotorResponse, rotor_ladder, two_body, two_body_ladder
 from ...geometry.common import Array
 from ...geometry.scene.contents import Floater, Scene
@@ -44,13 +49,14 @@ def floater_permeability(scene: Scene, distances: Sequence[float] | None = None,
     alone = Levitation(scene, Models("auto", "none", 1e-4 if quick else 1e-6, interaction="rigid"))
     depths = np.array(distances if distances is not None else _depths(scene, 8 if quick else 24))
     stable = next((e for e in alone.equilibria if e.stable), None)
-    balance = PerturbedBalance.of(scene, alone.table)
+    values = parameters(scene, Scales.of(scene), frozen_spin=True)
+    balance = Balance(Rates(with_effects(scene, alone.table)), values, 0.0)
     places = np.stack([0 * depths, 0 * depths, -depths], axis=1)
     start, guess = (stable.distance, stable.state.moment) if stable else (FARTHEST, np.array([-1.0, 0.0, 0.0]))
-    dataset = missed(rotors, scene.floater, places, balance.directions(places, start, guess))
+    dataset = missed(rotors, scene.floater, places, balanced_directions(scene, balance, places, start, guess))
     weight = scene.floater.mass * float(np.linalg.norm(scene.gravity))
     dataset = dataset.merge(sufficient(dataset)).assign_attrs(weight_N=weight)
-    return dataset.merge(shifted(rotors, scene.floater, balance, stable)) if stable else dataset
+    return dataset.merge(shifted(rotors, scene, balance, stable)) if stable else dataset
 
 
 def missed(rotors: Sequence[RotorResponse], floater: Floater, places: Array, directions: Array) -> xr.Dataset:
@@ -88,19 +94,17 @@ def sufficient(dataset: xr.Dataset) -> xr.Dataset:
     return xr.Dataset({"sufficient_from": values}, {"quantity": ["force", "torque"], "level": list(LEVELS)})
 
 
-def shifted(
-    rotors: Sequence[RotorResponse], floater: Floater, balance: PerturbedBalance, stable: Equilibrium
-) -> xr.Dataset:
+def shifted(rotors: Sequence[RotorResponse], scene: Scene, balance: Balance, stable: Equilibrium) -> xr.Dataset:
     """What the rigid dipole misses at the stable equilibrium, and where the equilibrium really is."""
 
     def added(rotor: RotorResponse, position: Array, moment: Array) -> tuple[Array, Array]:
-        both = two_body(rotor, floater, position, moment)
+        both = two_body(rotor, scene.floater, position, moment)
         extra = both.total - both.rigid
         return extra.force, extra.torque
 
-    both, error = two_body_ladder(rotors, floater, stable.position, stable.state.moment)
+    both, error = two_body_ladder(rotors, scene.floater, stable.position, stable.state.moment)
     place, moment, extra = stable.position, stable.state.moment, both.total - both.rigid
-    coarse, fine = (balance.shift(place, moment, partial(added, rotor)) for rotor in rotors[-2:])
+    coarse, fine = (shifted_equilibrium(scene, balance, place, moment, partial(added, rotor)) for rotor in rotors[-2:])
     doubt = np.abs(fine.position - coarse.position) + stable.position_error
     rows = {
         "rigid_position": (place, "m", "stable equilibrium of the rigid dipole"),

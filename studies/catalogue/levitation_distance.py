@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from ...dynamics.continuation.branch import BranchPoint, Family
-from ...dynamics.continuation.frequencies import distance_error, kicked, levitating_branch
+from ...dynamics.continuation.frequencies import by_frequency, distance_error, kicked, levitating_branch
 from ...dynamics.flights.flight import simulate
 from ...fem.rotor.table import FieldTable
 from ...geometry.common import Array
@@ -89,7 +89,8 @@ def _in_field(point: Point, grid: Array) -> dict[str, Array]:
     field = levitation.interaction
     branch = levitating_branch(scene, field, levitation.rates, HIGHEST)
     found = [branch.side(side, grid) for side in SIDES]
-    rows = np.array([[_row(scene, field, branch.family, p) for p in side] for side in found])
+    family = by_frequency(scene, levitation.rates)
+    rows = np.array([[_row(scene, field, family, p) for p in side] for side in found])
     fold = branch.fold
     flown = found[0] if point["model"] == FLOWN else []
     known = [p for p in flown if p is not None and stable_in_flight(p.growth_per_s)]

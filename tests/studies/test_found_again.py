@@ -8,7 +8,7 @@ from places import SCENES
 
 from spinlev.dynamics.equilibria import search as full_search
 from spinlev.dynamics.equilibria.balance import Balance
-from spinlev.dynamics.equilibria.search import FOUND, Found, survey
+from spinlev.dynamics.equilibria.search import FIXED_POINTS, FixedPoints, survey
 from spinlev.dynamics.motion.rates import Rates
 from spinlev.geometry.scene.contents import AbsoluteStart
 from spinlev.geometry.scene.files import changed, load_scene
@@ -111,7 +111,7 @@ def test_a_damaged_file_is_reported_and_made_anew(cache, caplog):
     again = Levitation(SCENE, DIPOLE).without_plate
     assert "damaged" in caplog.text
     assert repr(again.equilibria) == repr(first.equilibria)
-    assert FOUND.load(file).points.shape == (len(first.equilibria), 6)
+    assert FIXED_POINTS.load(file).points.shape == (len(first.equilibria), 6)
 
 
 def test_what_is_known_needs_no_compiled_equations(cache, monkeypatch):
@@ -125,15 +125,15 @@ def test_what_was_not_used_for_long_makes_room(cache, monkeypatch):
     for frequency in (108.0, 109.0, 110.0):
         Levitation(replace(SCENE, frequency=frequency), DIPOLE).without_plate  # noqa: B018
         kept = sorted(cache.glob("equilibria/*.nc"), key=lambda path: path.stat().st_mtime_ns)
-        small = replace(FOUND, most=int(1.5 * kept[-1].stat().st_size))
-        monkeypatch.setattr("spinlev.dynamics.equilibria.search.FOUND", small)
+        small = replace(FIXED_POINTS, most=int(1.5 * kept[-1].stat().st_size))
+        monkeypatch.setattr("spinlev.dynamics.equilibria.search.FIXED_POINTS", small)
     assert len(kept) == 1
 
 
 def test_nothing_found_is_kept_as_well(tmp_path):
     balance = Balance(None, np.zeros(0), 0.0)  # of which nothing is asked
-    FOUND.save(Found.at(balance, np.zeros((0, 6)), np.zeros((0, 2))), tmp_path / "none.nc")
-    found = FOUND.load(tmp_path / "none.nc")
+    FIXED_POINTS.save(FixedPoints.at(balance, np.zeros((0, 6)), np.zeros((0, 2))), tmp_path / "none.nc")
+    found = FIXED_POINTS.load(tmp_path / "none.nc")
     assert found.points.shape == (0, 6)
     assert found.doubts.shape == (0, 2)
     assert found.jacobians.shape == (0, 12, 12)

@@ -7,7 +7,7 @@ import pytest
 
 from spinlev.dynamics.continuation.frequencies import at_frequency, levitating_ranges, reference_state, stable_range
 from spinlev.dynamics.equilibria.balance import Balance
-from spinlev.dynamics.equilibria.perturbed import PerturbedBalance
+from spinlev.dynamics.equilibria.perturbed import shifted_equilibrium
 from spinlev.dynamics.equilibria.search import find_equilibria
 from spinlev.dynamics.motion.effect import Interaction
 from spinlev.dynamics.motion.equations import parameters
@@ -128,7 +128,7 @@ def test_mutual_magnetisation_moves_the_floater_as_the_perturbed_balance_says(ti
         added = both.total - both.rigid
         return added.force, added.torque
 
-    shift = PerturbedBalance(balance, scales, there).shift(rigid.position, rigid.state[6:9], extra)
+    shift = shifted_equilibrium(there, balance, rigid.position, rigid.state[6:9], extra)
     assert np.linalg.norm(shift.position - rigid.position) > 2e-5
     np.testing.assert_allclose(together.position, shift.position, atol=1e-7)
 

@@ -10,13 +10,14 @@ from second_opinions.solids import Conductor, occ_mesh
 
 from spinlev.dynamics.continuation.frequencies import way_out
 from spinlev.dynamics.continuation.slow_drift import drift
-from spinlev.dynamics.equilibria.balance import EVERY, solve
+from spinlev.dynamics.equilibria.balance import EVERY, Balance, solve
 from spinlev.dynamics.equilibria.equilibrium import EquilibriumError
-from spinlev.dynamics.equilibria.perturbed import TILTS, PerturbedBalance
+from spinlev.dynamics.equilibria.perturbed import TILTS, balanced_directions, shifted_equilibrium
 from spinlev.dynamics.equilibria.search import find_equilibria
 from spinlev.dynamics.maps.family import rotor_family
+from spinlev.dynamics.motion.equations import parameters
 from spinlev.dynamics.motion.rates import Rates
-from spinlev.dynamics.motion.state import Parameter
+from spinlev.dynamics.motion.state import Parameter, Scales
 from spinlev.fem.closed_forms.potentials import Racetrack
 from spinlev.fem.rotor.choice import rotor_table
 from spinlev.geometry import rotor
@@ -80,20 +81,25 @@ def test_no_frequency_helps_a_floater_without_strength():
         drift(WEAK, TABLE, spin=0.25)
 
 
-def test_the_balanced_direction_feels_no_torque(rates):
-    """At any place near the axis; a guess that leads nowhere is given back."""
-    balance = PerturbedBalance.of(SCENE, TABLE)
-    place = np.array([1e-3, 2e-3, -0.025])
-    found = balance.direction(place, np.array([0.2, 0.0, np.sqrt(0.96)]))
-    scaled = (place / balance.scales.length)[None]
-    assert np.abs(balance.balance(scaled, found[None])[0][0, TILTS]).max() < 1e-9
+@pytest.fixture(scope="module")
+def balance(rates):
+    return Balance(rates, parameters(SCENE, Scales.of(SCENE), frozen_spin=True), 0.0)
+
+
+def test_the_balanced_direction_feels_no_torque(balance):
+    """At any place near the axis."""
+    place = np.array([[1e-3, 2e-3, -0.025]])
+    found = balanced_directions(SCENE, balance, place, 0.0, np.array([0.2, 0.0, np.sqrt(0.96)]))
+    assert np.abs(balance(place / FLOATER.radius, found)[0][0, TILTS]).max() < 1e-9
     assert np.linalg.norm(found) == pytest.approx(1.0)
 
 
-def test_an_additional_force_that_throws_the_floater_out_leaves_no_place(stable):
+def test_an_additional_force_that_throws_the_floater_out_leaves_no_place(stable, balance):
     """Ten times the weight upwards; a linear estimate there is, but no equilibrium."""
-    balance, lift = PerturbedBalance.of(SCENE, TABLE), -10 * FLOATER.mass * SCENE.gravity
-    found = balance.shift(stable.position, stable.state.moment, lambda place, moment: (lift, np.zeros(3)))
+    lift = -10 * FLOATER.mass * SCENE.gravity
+    found = shifted_equilibrium(
+        SCENE, balance, stable.position, stable.state.moment, lambda place, moment: (lift, np.zeros(3))
+    )
     assert np.isnan(found.position).all()
     assert np.isfinite(found.linear).all()
 

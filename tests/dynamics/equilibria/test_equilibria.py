@@ -114,7 +114,7 @@ def test_none_is_missed_that_brute_force_finds(name, frequency, spin):
     moment /= np.linalg.norm(moment, axis=1, keepdims=True)
     with np.errstate(all="ignore"):  # many of these starts run away
         position, _, step = solve(balance, position, moment, EVERY)
-    brute = [r * scales.length for r in position[step < 1e-10] if r in where]
+    brute = [r * scales.length for r in position[(step < 1e-10) & where.holds(position)]]
     found = np.array([e.position for e in find_equilibria(scene, table, spin)])
     assert brute
     for r in brute:

@@ -4,7 +4,7 @@ import heyoka as hy
 import numpy as np
 import pytest
 
-from spinlev.dynamics.maps.family import Translation, blend_tables, chebyshev_points
+from spinlev.dynamics.maps.family import Move, blend_tables, chebyshev_points
 from spinlev.dynamics.motion.state import Parameter
 from spinlev.fem.harmonics.expansion import MultipoleExpansion
 
@@ -35,8 +35,8 @@ def test_nodes_are_chebyshevs():
 @pytest.mark.parametrize("measure", [10e-3, 12.3e-3, MEASURES[1], 20e-3])
 def test_four_tables_give_a_cubic_exactly(measure):
     """Field and gradient to round-off: Lagrange's polynomials of four nodes hold cubics."""
-    ((blend, move),) = blend_tables(tables(), MEASURES, [(CENTER, None)])
-    assert move is None
+    ((blend, move),) = blend_tables(tables(), MEASURES, [(CENTER, Move())])
+    assert move == Move()
     variables = hy.make_vars("x", "y", "z")
     b, gradient = blend.expressions(variables)
     function = hy.cfunc([*b, *(g for row in gradient for g in row)], variables, compact_mode=True)
@@ -51,12 +51,12 @@ def test_four_tables_give_a_cubic_exactly(measure):
 
 
 def test_a_magnet_that_moves_takes_its_expansion_along():
-    move = Translation(np.array([0.0, 0.0, 1.0]))
-    ((blend, moved),) = blend_tables(tables(lambda m: CENTER + move.way_of(float(m))), MEASURES, [(CENTER, move)])
+    move = Move((0.0, 0.0, 1.0))
+    ((blend, moved),) = blend_tables(tables(lambda m: CENTER + np.array([0.0, 0.0, m])), MEASURES, [(CENTER, move)])
     assert moved is move
-    assert all(np.array_equal(expansion.center, CENTER) for expansion in blend.expansions)
+    assert all(np.array_equal(expansion.center, CENTER) for expansion in blend.sources)
 
 
 def test_magnets_cut_into_pieces_are_refused():
     with pytest.raises(ValueError, match=r"one expansion about each magnet's centre; instead it has 1 for 2 magnets"):
-        blend_tables(tables(), MEASURES, [(CENTER, None), (CENTER, None)])
+        blend_tables(tables(), MEASURES, [(CENTER, Move()), (CENTER, Move())])

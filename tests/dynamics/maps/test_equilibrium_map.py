@@ -67,13 +67,13 @@ def test_map_equals_searches_at_random_points(name, model):
 def test_map_misses_nothing_that_a_search_finds(name, model):
     """At thirty random points; sheets that leave the range, such as z > 0, and come back are followed outside it."""
     family, measures = rotor_family(scene_of(name), name, model, 1e-4), ROTORS[name][1]
-    grid = family_grid(family, FREQUENCIES, measures, 0.0, 0.1)
+    grid = family_grid(family, FREQUENCIES, measures, 0.0)
     found = equilibrium_map(family, FREQUENCIES, measures, spacing=3)
     places = np.concatenate([found.position / PERMEABLE.radius, found.moment], axis=1)
     for point in np.random.default_rng(5).choice(len(grid), 30, replace=False):
         here = places[found.row * len(measures) + found.column == point]
-        for position, moment in fixed_points(grid.alone(int(point)), grid.range(int(point)))[1]:
-            assert np.linalg.norm(here - np.concatenate([position, moment]), axis=1).min() < 1e-6
+        for place in fixed_points(grid.alone(int(point)), grid.range(int(point)))[1]:
+            assert np.linalg.norm(here - place, axis=1).min() < 1e-6
 
 
 @pytest.mark.parametrize("name", ROTORS)

@@ -5,7 +5,7 @@ import pytest
 from article import PERMEABLE
 
 from spinlev.dynamics.equilibria.balance import EVERY
-from spinlev.dynamics.equilibria.curves import Search
+from spinlev.dynamics.equilibria.curves import newton_search
 from spinlev.dynamics.maps import grid as filling
 from spinlev.dynamics.maps.family import rotor_family
 from spinlev.dynamics.maps.map import equilibrium_map, family_grid
@@ -34,14 +34,14 @@ def map_of(name, side, model="dipole"):
 
 def grid_of(name, side, model="dipole"):
     """Its points."""
-    return family_grid(*map_of(name, side, model), 0.0, 0.1)
+    return family_grid(*map_of(name, side, model), 0.0)
 
 
 def found_by(grid, points, random=None, reach=filling.REACH, far=filling.FAR):
     """Points (k,) and places (k, 6) that one call finds at several points of a grid."""
-    search = Search(grid.balance, grid.holds, EVERY, filling.MARGIN, reach, far)
     starts = [filling._starts(grid, point, random) for point in points]
-    return search.solutions(*(np.concatenate(part) for part in zip(*starts, strict=True)))
+    starts = (np.concatenate(part) for part in zip(*starts, strict=True))
+    return newton_search(grid.balance, grid.holds, *starts, EVERY, filling.MARGIN, reach, far)
 
 
 def missed(expected, found):

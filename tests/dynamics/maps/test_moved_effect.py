@@ -7,7 +7,7 @@ import pytest
 from article import PERMEABLE
 
 from spinlev.dynamics.equilibria.search import find_equilibria
-from spinlev.dynamics.maps.family import MovedEffect, Rotation, Translation, rotor_family
+from spinlev.dynamics.maps.family import Move, MovedEffect, rotor_family
 from spinlev.dynamics.maps.map import equilibrium_map
 from spinlev.dynamics.motion.effect import Interaction
 from spinlev.dynamics.motion.equations import equations_of_motion, parameters
@@ -23,7 +23,7 @@ from spinlev.geometry.rotor import Conductor, horizontal, tilt, vertical
 from spinlev.geometry.scene.contents import Drag, Scene
 
 SHAPE = (10e-3, 1.305, 1.05)
-MOVES = [(horizontal, 2e-3, Translation((1.0, 0.0, 0.0))), (tilt, np.radians(12.0), Rotation())]
+MOVES = [(horizontal, 2e-3, Move((1.0, 0.0, 0.0))), (tilt, np.radians(12.0), Move(turning=True))]
 
 
 def scene_of(rotor):

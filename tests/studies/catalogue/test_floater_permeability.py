@@ -5,8 +5,11 @@ import pytest
 import xarray as xr
 from places import SCENES
 
-from spinlev.dynamics.equilibria.balance import EVERY, solve
-from spinlev.dynamics.equilibria.perturbed import PerturbedBalance
+from spinlev.dynamics.equilibria.balance import EVERY, Balance, solve
+from spinlev.dynamics.equilibria.perturbed import shifted_equilibrium
+from spinlev.dynamics.motion.equations import parameters
+from spinlev.dynamics.motion.rates import Rates
+from spinlev.dynamics.motion.state import Scales
 from spinlev.fem.mutual.response import rotor_ladder
 from spinlev.fem.rotor.choice import rotor_table
 from spinlev.geometry.scene.contents import Drag, Floater, Scene
@@ -77,13 +80,19 @@ def test_additional_weight_moves_the_equilibrium_like_gravity(scene):
     table = rotor_table(scene.rotor, "dipole")
     light = Scene(110.0, scene.rotor, floater, drag)
     heavy = Scene(110.0, scene.rotor, floater, drag, 1.1 * light.gravity)
-    balances = [PerturbedBalance.of(s, table) for s in (light, heavy)]
+    rates = Rates(table)
+    balances = [Balance(rates, parameters(s, Scales.of(s), frozen_spin=True), 0.0) for s in (light, heavy)]
     start = np.array([[0.0005, 0.0, -0.0196]]) / floater.radius
     guess = np.array([[0.24, 0.0, np.sqrt(1 - 0.24**2)]])
-    found = [solve(b.balance, start, guess, EVERY) for b in balances]
+    found = [solve(b, start, guess, EVERY) for b in balances]
     places = [position[0] * floater.radius for position, _, _ in found]
-    shift = balances[0].shift(
-        places[0], found[0][1][0], lambda r, m: (0.1 * floater.mass * light.gravity, np.zeros(3)), tolerance=1e-10
+    shift = shifted_equilibrium(
+        light,
+        balances[0],
+        places[0],
+        found[0][1][0],
+        lambda r, m: (0.1 * floater.mass * light.gravity, np.zeros(3)),
+        tolerance=1e-10,
     )
     assert max(step[0] for _, _, step in found) < 1e-8
     np.testing.assert_allclose(shift.position, places[1], rtol=0, atol=1e-11)
