@@ -7,6 +7,7 @@ can be repeated.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import heyoka as hy
 import numpy as np
@@ -90,7 +91,7 @@ class Balls:
     whole: Interaction
     _known: dict[tuple[float, ...], tuple[Array, float] | None] = field(default_factory=dict)
 
-    @property
+    @cached_property
     def end(self) -> int:
         """Number of the first runtime parameter that is not a ball's."""
         return FIRST + sum(effect.count for effect in _fitted(self.whole, LARGE))

@@ -164,8 +164,8 @@ class Lanes:
                     continue
                 if outcome == hy.taylor_outcome.err_nf_state:
                     raise IntegrationError(
-                        f"A floater's state became infinite at scaled time {one.time[0]:.6g}: it began in a magnet, or "
-                        "the plate's table is too small for this start."
+                        f"A floater's state became infinite at t = {one.seconds:.6g} s: it began in a magnet, or the "
+                        "plate's table is too small for this start."
                     )
                 timed = outcome == hy.taylor_outcome.time_limit
                 meaning = DURATION if timed else self._meanings[-outcome.value - 1]
