@@ -51,7 +51,7 @@ class Page:
         self.builder = Worker(document, "Reading this scene", READING, self._failed)
         self.quick = Worker(document, "The preview", 60.0, self._failed)
         self.slow = Worker(document, "The answer by the chosen models", 600.0, self._failed, work.PATIENCE)
-        self.mapper = Worker(document, "The map", 600.0, lambda why: self._map_says(f"No map: {why}"), work.PATIENCE)
+        self.mapper = Worker(document, "The map", 600.0, self._no_map, work.PATIENCE)
         self.porter = Worker(document, "The file", 600.0, self._failed, work.PATIENCE)
         self.flight = Flight(self)
         self.number, self.answered = 0, 0
@@ -205,6 +205,10 @@ class Page:
         self.mapped, self.regions = "", None
         self.layout.regions.data = NO_IMAGE
         self._map_says(why)
+
+    def _no_map(self, why: str) -> None:
+        self.mapper.stop()
+        self._map_says(f"No map: {why}")
 
     def _map_says(self, text: str) -> None:
         self.layout.map_says.text = html.escape(text)

@@ -10,6 +10,7 @@ import tempfile
 import threading
 from collections.abc import Callable, Hashable
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import cache, partial
 from multiprocessing import forkserver, resource_tracker
@@ -144,26 +145,27 @@ class Worker:
             self._begin()
         call, self._hear = self._waiting.pop(next(iter(self._waiting)))
         self._limit = self._loop.call_later(self.seconds, self._say, self.process, self._cut_off)
-        self._connection.send(call())
+        with suppress(BrokenPipeError, ConnectionResetError):  # it has ended, as `_listen` will find
+            self._connection.send(call())
 
     def _begin(self) -> None:
         self._loop = IOLoop.current()
         self._connection, other = context().Pipe()
-        self.process = context().Process(target=_serve, args=(other, self.patience), daemon=True)
+        process = context().Process(target=_serve, args=(other, self.patience), daemon=True)
         # A signal stops the main thread anywhere; a process that begins and is not told its task says so at length.
         with ThreadPoolExecutor(1) as beside:
-            beside.submit(self.process.start).result()
+            beside.submit(process.start).result()
         other.close()
-        listen = partial(self._listen, self.process)
-        self._loop.add_handler(self._connection.fileno(), listen, IOLoop.READ)
+        self.process = process
+        self._loop.add_handler(self._connection.fileno(), partial(self._listen, process), IOLoop.READ)
 
     def _listen(self, process: ForkServerProcess, *_: object) -> None:
         try:
             answer, problem = self._connection.recv()
         except (EOFError, ConnectionError):
             self.stop()
-            answer, problem = None, "A computation was ended from outside; memory may be short."
-            self.document.add_next_tick_callback(lambda: self.failed(problem))
+            why = "A computation was ended from outside; memory may be short."
+            self.document.add_next_tick_callback(lambda: self.failed(why))
             return
         self._say(process, lambda: self._answered(answer, problem))
 
