@@ -175,8 +175,12 @@ class LivePage:
         """Send a message of Bokeh's protocol."""
         self.number += 1
         header = {"msgid": str(self.number), "msgtype": kind}
-        for part in (header, {}, content):
-            self.line.write_message(json.dumps(part))
+
+        async def sent():
+            for part in (header, {}, content):
+                await self.line.write_message(json.dumps(part))
+
+        self.loop.run_until_complete(sent())
 
     def set(self, name: str, value: object, attribute: str = "value") -> None:
         """Move a slider, choose, or put a file in."""
@@ -237,6 +241,9 @@ class LivePage:
         """Leave."""
         if self.loop.is_closed():
             return
-        self.line.close()
-        self.loop.run_until_complete(asyncio.sleep(0))
+
+        async def left():
+            self.line.close()
+
+        self.loop.run_until_complete(left())
         self.loop.close()
