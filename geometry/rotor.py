@@ -85,12 +85,10 @@ def separate_pieces(conductors: Sequence[Conductor]) -> list[tuple[Conductor, ..
     """
     groups: list[list[Conductor]] = []
     for new in conductors:
-        joined = [group for group in groups if any(_one_piece(new, known) for known in group)]
-        groups = [group for group in groups if group not in joined]
-        groups.append([new, *(known for group in joined for known in group)])
+        joined, others = [new], list[list[Conductor]]()
+        for group in groups:
+            metal = [known for known in group if known.conductivity == new.conductivity]
+            touch = any(body_overlap(new.body, known.body) > -TOUCHING for known in metal)
+            joined, others = (joined + group, others) if touch else (joined, [*others, group])
+        groups = [*others, joined]
     return [tuple(group) for group in groups]
-
-
-def _one_piece(first: Conductor, second: Conductor) -> bool:
-    same = first.conductivity == second.conductivity
-    return same and body_overlap(first.body, second.body) > -TOUCHING

@@ -87,26 +87,22 @@ def _same_body(body: Solid, other: Solid, flip: Array) -> bool:
 
 def mirror_images(magnets: Sequence[Magnet], axis: int) -> list[int] | None:
     """Number of the body that is the mirror image of each, at the plane across a coordinate axis; None if one lacks."""
-    images = []
+    images, flip = [], mirror(axis)
     for magnet in magnets:
-        image = next((k for k, other in enumerate(magnets) if _mirrored(magnet, other, axis)), None)
-        if image is None:
+        seen = magnet.permeability_in_rotor * flip[:, None] * flip
+        for k, other in enumerate(magnets):
+            alike = np.allclose(seen, other.permeability_in_rotor, rtol=0, atol=1e-12)
+            if alike and _same_body(magnet.body, other.body, flip):
+                images.append(k)
+                break
+        else:
             return None
-        images.append(image)
     return images
 
 
 def mirror(axis: int) -> Array:
     """(3,) factors that mirror a vector at the plane across a coordinate axis."""
     return np.where(np.arange(3) == axis, -1.0, 1.0)
-
-
-def _mirrored(magnet: Magnet, other: Magnet, axis: int) -> bool:
-    flip = mirror(axis)
-    if not _same_body(magnet.body, other.body, flip):
-        return False
-    permeability = magnet.permeability_in_rotor * flip[:, None] * flip
-    return bool(np.allclose(permeability, other.permeability_in_rotor, rtol=0, atol=1e-12))
 
 
 def parity_parts(
