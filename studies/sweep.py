@@ -384,7 +384,9 @@ def swept(name: str, study: Study, points: Mapping[int, Point], engine: Workers,
 
 def _program(study: Study) -> str:
     """What computes a study's points: this program's solvers, and the text of a user's own file."""
-    function = getattr(study.compute, "compute", study.compute)  # of a study that is computed as a whole
+    function = study.compute
+    if isinstance(function, partial):  # of a study that is computed as a whole
+        (function,) = function.args
     module = sys.modules.get(function.__module__)
     path = Path(getattr(module, "__file__", None) or "")
     is_own = not function.__module__.startswith("spinlev.") and path.is_file()

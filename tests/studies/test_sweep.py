@@ -23,10 +23,10 @@ from spinlev.studies import processes
 from spinlev.studies.cli.options import Workers
 from spinlev.studies.processes import safe_path
 from spinlev.studies.result import write_dataset
-from spinlev.studies.study import Study, by_case
+from spinlev.studies.study import Study
 from spinlev.studies.sweep import Journal, SweepError, answered, forget, swept
 
-STUDY = Study("roots", "square roots", lambda quick: [], root, by_case, lambda result: Figure(), lambda result: [])
+STUDY = Study("roots", "square roots", lambda quick: [], root, {"roots": lambda result: Figure()}, lambda result: [])
 
 
 def points(*values, **more):
