@@ -13,12 +13,12 @@ from matplotlib.figure import Figure
 
 from ...geometry.common import Array
 from ..figures.style import PAGE, PALETTE, legend_below, panels, styled
-from ..result import variable
+from ..result import Columns, columns, variable
 from ..study import Point, Study
 from .drawing import text_table, uncertain
 from .experiment_design import cached_row
 from .experiment_facts import FACTS, NAMES, QUICK_FACTS, UNKNOWNS, Fact, Models, Unknown
-from .experiment_fit import SYNTHETIC, TRUTH, Evidences, Posterior, evidences, posterior, synthetic_facts
+from .experiment_fit import EVIDENCES, POSTERIOR, SYNTHETIC, TRUTH, evidences, posterior, synthetic_facts
 from .experiment_surrogate import FITTED, Surrogate, corrected, fitted
 
 EVERYTHING = ("floater", "rotor", "air", "mutual")
@@ -43,6 +43,11 @@ SETTINGS: Mapping[bool, Point] = {
 }  # fmt: skip
 """Nodes of a rotor, whether there is steel, rotors of designs, degrees of surrogates, live points, walks, draws."""
 SEED = 42
+SURROGATES: Columns = {
+    "surrogate_error": (("rotor_kind", "fitted"), "1", "error for rotors left out"),
+    "surrogate_rotors": (("rotor_kind",), "1", "rotors that it is fitted to"),
+    "truth": (("unknown",), "see unit", "unknowns of which the facts were made up"),
+}
 
 
 def experiment_points(quick: bool) -> list[Point]:
@@ -85,8 +90,16 @@ def experiment(point: Point) -> xr.Dataset:
     models = Models(surrogates_of(settings, effects), effects)
     facts = facts_of(point["variant"], point["quick"], models)
     found = posterior(models, facts, settings["live"], settings["walks"], SEED)
-    drawn = evidences(models, facts, settings["draws"], SEED)
-    return _row(point["variant"], facts, models, found, drawn)
+    found |= evidences(models, facts, settings["draws"], SEED)
+    surrogates, name = models.surrogates.values(), point["variant"]
+    found["surrogate_error"] = [surrogate.errors for surrogate in surrogates]
+    found["surrogate_rotors"] = [surrogate.rotors for surrogate in surrogates]
+    found["truth"] = [TRUTH[unknown] if name == SYNTHETIC else np.nan for unknown in NAMES]
+    data = columns({**POSTERIOR, **EVIDENCES, **SURROGATES}, {key: np.asarray(value) for key, value in found.items()})
+    says = ("fact", [fact.says for fact in facts.values()])
+    labels = {"fact": list(facts), "other_fact": list(facts), "unknown": list(NAMES)}
+    labels |= {"rotor_kind": list(models.surrogates), "fitted": list(FITTED)}
+    return xr.Dataset(data, labels).assign(says=says).expand_dims(variant=[name])
 
 
 def facts_of(variant: str, quick: bool, models: Models) -> Mapping[str, Fact]:
@@ -120,32 +133,6 @@ def surrogates_of(settings: Point, effects: Sequence[str]) -> dict[str, Surrogat
             found["single"] = corrected(found["single"], before, better, settings["better_degree"])
             before = better
     return found
-
-
-def _row(name: str, facts: Mapping[str, Fact], models: Models, found: Posterior, drawn: Evidences) -> xr.Dataset:
-    kinds, each = list(models.surrogates), tuple(models.surrogates.values())
-    truth = [TRUTH[unknown] if name == SYNTHETIC else np.nan for unknown in NAMES]
-    data = {
-        "posterior": (("draw", "unknown"), found.values, "see unit", "draw of the posterior"),
-        "fact_log_likelihood": (("draw", "fact"), found.likelihoods, "1", "logarithm of the likelihood of a fact"),
-        "log_evidence": ((), found.evidence, "1", "logarithm of the evidence by nested sampling"),
-        "log_evidence_error": ((), found.error, "1", "its standard deviation"),
-        "calls": ((), found.calls, "1", "evaluations of the likelihood"),
-        "log_evidence_drawn": ((), drawn.every, "1", "logarithm of the evidence by draws of the prior"),
-        "log_evidence_drawn_error": ((), drawn.error, "1", "its standard deviation"),
-        "log_evidence_single": (("fact",), drawn.single, "1", "logarithm of the evidence of one fact"),
-        "log_evidence_pair": (("fact", "other_fact"), drawn.pair, "1", "logarithm of the evidence of two facts"),
-        "log_evidence_others": (("fact",), drawn.without, "1", "logarithm of the evidence of all other facts"),
-        "fact_shift": (("fact", "unknown"), drawn.shift, "1", "mean given one fact, in deviations of the prior"),
-        "fact_width": (("fact", "unknown"), drawn.width, "1", "deviation given one fact, in deviations of the prior"),
-        "surrogate_error": (("rotor_kind", "fitted"), [s.errors for s in each], "1", "error for rotors left out"),
-        "surrogate_rotors": (("rotor_kind",), [s.rotors for s in each], "1", "rotors that it is fitted to"),
-        "truth": (("unknown",), truth, "see unit", "unknowns of which the facts were made up"),
-    }
-    row = xr.Dataset({key: variable(dims, np.asarray(values), *label) for key, (dims, values, *label) in data.items()})
-    row = row.assign(says=(("fact",), [fact.says for fact in facts.values()]))
-    row = row.assign_coords(fact=list(facts), other_fact=list(facts), rotor_kind=kinds, fitted=list(FITTED))
-    return row.assign_coords(unknown=list(NAMES)).expand_dims(variant=[name])
 
 
 def gather_experiment(parts: Sequence[xr.Dataset]) -> xr.Dataset:

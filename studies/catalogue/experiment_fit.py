@@ -6,13 +6,14 @@ the evidence of every single fact, of every pair and of all again, independently
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from scipy.special import logsumexp, ndtri
 from scipy.stats import qmc
 
 from ...geometry.common import Array
+from ..result import Columns
 from .experiment_facts import (
     EVEN,
     NAMES,
@@ -33,21 +34,32 @@ TOGETHER = 500  # Draws that are evaluated in one call
 DONE = 0.1  # What the evidence that remains may add to its logarithm
 
 
-@dataclass(frozen=True, eq=False)
-class Posterior:
-    """What facts say of the unknowns."""
+POSTERIOR: Columns = {
+    "posterior": (("draw", "unknown"), "see unit", "draw of the posterior"),
+    "fact_log_likelihood": (("draw", "fact"), "1", "logarithm of the likelihood of a fact"),
+    "log_evidence": ((), "1", "logarithm of the evidence by nested sampling"),
+    "log_evidence_error": ((), "1", "its standard deviation"),
+    "calls": ((), "1", "evaluations of the likelihood"),
+}
+EVIDENCES: Columns = {
+    "log_evidence_drawn": ((), "1", "logarithm of the evidence by draws of the prior"),
+    "log_evidence_drawn_error": ((), "1", "its standard deviation"),
+    "log_evidence_single": (("fact",), "1", "logarithm of the evidence of one fact"),
+    "log_evidence_pair": (("fact", "other_fact"), "1", "logarithm of the evidence of two facts"),
+    "log_evidence_others": (("fact",), "1", "logarithm of the evidence of all other facts"),
+    "fact_shift": (("fact", "unknown"), "1", "mean given one fact, in deviations of the prior"),
+    "fact_width": (("fact", "unknown"), "1", "deviation given one fact, in deviations of the prior"),
+}
 
-    values: Array  # (draw, unknown) equally weighted
-    likelihoods: Array  # (draw, fact) logarithms
-    evidence: float  # logarithm of the evidence and its standard deviation
-    error: float
-    calls: int  # how often the likelihood was asked for
 
+def posterior(models: Models, facts: Mapping[str, Fact], live: int, walks: int, seed: int) -> dict[str, Any]:
+    """Draws of the posterior and the evidence, by the names of `POSTERIOR`; the same seed gives the same draws.
 
-def posterior(models: Models, facts: Mapping[str, Fact], live: int, walks: int, seed: int) -> Posterior:
-    """Sampled with so many `live` points, each new one found by a walk of so many steps.
-
-    The same seed gives the same draws to the last bit.
+    Parameters
+    ----------
+    models, facts : whose likelihood is asked for
+    live, walks : points of nested sampling, and steps of the walk by which each new one is found
+    seed : of all random numbers
     """
     from dynesty import NestedSampler
 
@@ -66,7 +78,8 @@ def posterior(models: Models, facts: Mapping[str, Fact], live: int, walks: int, 
     each = log_likelihoods(models, drawn(shares), facts)
     values = np.stack([drawn(shares)[name] for name in NAMES], axis=1)
     likelihoods = np.stack([each[name] for name in facts], axis=1)
-    return Posterior(values, likelihoods, float(found.logz[-1]), float(found.logzerr[-1]), int(np.sum(found.ncall)))
+    numbers = (values, likelihoods, found.logz[-1], found.logzerr[-1], np.sum(found.ncall))
+    return dict(zip(POSTERIOR, numbers, strict=True))
 
 
 def _same(shares: Array) -> Array:
@@ -74,21 +87,8 @@ def _same(shares: Array) -> Array:
     return shares
 
 
-@dataclass(frozen=True, eq=False)
-class Evidences:
-    """Evidences by drawing from the prior."""
-
-    single: Array  # (fact,) logarithm of the evidence of each fact alone
-    pair: Array  # (fact, fact) of each two
-    without: Array  # (fact,) of all others together
-    every: float  # of all together, and its standard deviation
-    error: float
-    shift: Array  # (fact, unknown) mean and deviation of each unknown given one fact, in deviations of the prior
-    width: Array
-
-
-def evidences(models: Models, facts: Mapping[str, Fact], draws: int, seed: int) -> Evidences:
-    """By so many `draws`, a power of two, of the prior (Sobol's sequence)."""
+def evidences(models: Models, facts: Mapping[str, Fact], draws: int, seed: int) -> dict[str, Any]:
+    """By so many `draws`, a power of two, of the prior (Sobol's sequence); by the names of `EVIDENCES`."""
     shares = qmc.Sobol(len(UNKNOWNS), seed=seed).random(draws)
     shares = np.clip(shares, 1e-12, 1 - 1e-12)
     parts = [log_likelihoods(models, drawn(part), facts) for part in np.array_split(shares, max(1, draws // TOGETHER))]
@@ -106,7 +106,8 @@ def evidences(models: Models, facts: Mapping[str, Fact], draws: int, seed: int) 
     shift = weights @ deviates
     width = np.sqrt(np.maximum(weights @ deviates**2 - shift**2, 0.0))
     error = float(spread.std() / np.sqrt(draws))
-    return Evidences(mean(known), pair, mean(every[:, None] - known), whole, error, shift, width)
+    numbers = (whole, error, mean(known), pair, mean(every[:, None] - known), shift, width)
+    return dict(zip(EVIDENCES, numbers, strict=True))
 
 
 SYNTHETIC = "made-up facts"

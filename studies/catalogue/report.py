@@ -4,6 +4,7 @@ import base64
 import gzip
 import json
 import os
+from collections.abc import Callable
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
@@ -115,8 +116,11 @@ def _part(path: Path) -> dict[str, Any]:
     result = read_result(path)
     kind = str(result.attrs["study"])
     study = CATALOGUE.get(kind)
-    drawn = figures_of(result).items()
-    pictures = [(_caption(name), _embedded(figure_bytes(figure, "png"), "png")) for name, figure in drawn]
+    captions = {name: _described(draw) for name, draw in study.figures.items()} if study else {}
+    pictures = [
+        (captions.get(name, _caption(name)), _embedded(figure_bytes(figure, "png"), "png"))
+        for name, figure in figures_of(result).items()
+    ]
     beside = [path.parent / "scene.png"] if kind == "run" else []
     beside += [path.parent / f"{path.stem}-{name}" for name in ("scene.png", "flight.gif")]
     pictures += [
@@ -158,6 +162,11 @@ def _viewer(parts: list[dict[str, Any]]) -> dict[str, str]:
         return {}
     packed = gzip.compress(turnable_page(PLACE))
     return {"viewer": base64.b64encode(packed).decode(), "place": base64.b64encode(PLACE).decode()}
+
+
+def _described(draw: Callable[..., Any]) -> str:
+    """The first line of what a study says of a figure."""
+    return (getattr(draw, "func", draw).__doc__ or "").split("\n")[0]
 
 
 def _embedded(content: bytes, kind: str) -> str:
