@@ -47,8 +47,24 @@ class LivePage:
 def explore(scene: SceneLike, port: int = 0) -> LivePage:
     """A page in the browser to play with a scene: sliders, equilibria at once, where it levitates, a live flight.
 
-    `port` is on 127.0.0.1; 0 takes one that is free. The page shows itself in a notebook; has an `address` for a
-    browser, and `stop`. Raises SceneError, or ComputationError where libraries are missing or the port is taken.
+    Parameters
+    ----------
+    scene : Scene, str or Path
+        Where the page begins, or the path of its file.
+    port : int
+        Port on 127.0.0.1; 0 takes one that is free.
+
+    Returns
+    -------
+    LivePage
+        Shows itself in a notebook; has an `address` for a browser, and `stop`.
+
+    Raises
+    ------
+    SceneError
+        The scene cannot be used.
+    ComputationError
+        The libraries of the page are missing, or the port is taken.
     """
     loaded, serve = given_scene(scene), page_server()
     source = "scene" if isinstance(scene, Scene) else str(scene)

@@ -36,12 +36,20 @@ def floater_force(
 
     Parameters
     ----------
-    scene : a scene, or the path of its file
-    position : (n, 3) or (3,) of the floater's centre, m, rotor's frame
-    moment : (n, 3) or (3,) directions of its moment, the body's z
-    body_x : (n, 3) or (3,) directions near which the body's x lies; left out, the rotor's x; it matters to a cuboid
-    model, rtol : of the rotor's field, see `Models`
-    progress : whether messages go to standard error
+    scene : Scene, str or Path
+        The scene, or the path of its file.
+    position : array_like
+        (n, 3) or (3,) of the floater's centre, m, rotor's frame.
+    moment : array_like
+        (n, 3) or (3,) directions of its moment, the body's z.
+    body_x : array_like, optional
+        (n, 3) or (3,) directions near which the body's x lies; left out, near the rotor's x. It matters to a cuboid.
+    model : {"auto", "dipole", "cuboid", "fem", "map"}
+        Model of the rotor's field.
+    rtol : float
+        Relative accuracy asked of that field.
+    progress : bool
+        Whether messages go to standard error.
 
     Returns
     -------
@@ -51,7 +59,8 @@ def floater_force(
 
     Raises
     ------
-    InputError : a pose in which the floater overlaps the rotor, or that is none
+    InputError
+        A pose in which the floater overlaps the rotor, or that is none.
 
     Examples
     --------

@@ -65,11 +65,19 @@ def equilibria(
 
     Parameters
     ----------
-    scene : a scene, or the path of its file
-    model, plate_model : of the rotor's field and of the plate, see `Models`
-    spin : body spin S = Ω·m̂/ω of the floater about its own moment
-    progress : whether messages go to standard error
-    asked : `rtol`, `plate_rtol` and `interaction` of `Models`
+    scene : Scene, str or Path
+        The scene, or the path of its file.
+    model : {"auto", "dipole", "cuboid", "fem", "map"}
+        Model of the rotor's field.
+    plate_model : {"auto", "none", "slab", "reduced", "fem"}
+        Model of the plate.
+    spin : float
+        Body spin S = Ω·m̂/ω of the floater about its own moment.
+    progress : bool
+        Whether messages go to standard error.
+    **asked
+        `rtol` and `plate_rtol`, the relative accuracy asked of the field and of the plate's reaction; `interaction`
+        ("auto", "rigid", "mutual"), whether rotor and floater magnetise each other.
 
     Returns
     -------
@@ -79,8 +87,10 @@ def equilibria(
 
     Raises
     ------
-    EquilibriumError : the rotor is at rest and the floater does not spin about its moment
-    InputError : a model, a tolerance or a file that cannot be used
+    EquilibriumError
+        The rotor is at rest and the floater does not spin about its moment.
+    InputError
+        A model, a tolerance or a file that cannot be used.
     """
     with heard(progress):
         levitation = Levitation(scene, Models(model, plate_model, **asked), spin)
@@ -98,7 +108,21 @@ def stability(
 ) -> xr.Dataset:
     """The five small motions about the equilibrium at which a flight begins, the nearest stable one if there is one.
 
-    Parameters are those of `equilibria`.
+    Parameters
+    ----------
+    scene : Scene, str or Path
+        The scene, or the path of its file.
+    model : {"auto", "dipole", "cuboid", "fem", "map"}
+        Model of the rotor's field.
+    plate_model : {"auto", "none", "slab", "reduced", "fem"}
+        Model of the plate.
+    spin : float
+        Body spin S = Ω·m̂/ω of the floater about its own moment.
+    progress : bool
+        Whether messages go to standard error.
+    **asked
+        `rtol` and `plate_rtol`, the relative accuracy asked of the field and of the plate's reaction; `interaction`
+        ("auto", "rigid", "mutual"), whether rotor and floater magnetise each other.
 
     Returns
     -------
@@ -108,8 +132,10 @@ def stability(
 
     Raises
     ------
-    EquilibriumError : there is no equilibrium to begin at
-    InputError : a model, a tolerance or a file that cannot be used
+    EquilibriumError
+        There is no equilibrium to begin at.
+    InputError
+        A model, a tolerance or a file that cannot be used.
     """
     with heard(progress):
         levitation = Levitation(scene, Models(model, plate_model, **asked), spin)
@@ -125,17 +151,35 @@ def simulate(
     progress: bool = False,
     **asked: Unpack[Asked],
 ) -> xr.Dataset:
-    """The floater's motion for `duration` (s) from where the scene says; other parameters are those of `equilibria`.
+    """The floater's motion from where the scene says.
+
+    Parameters
+    ----------
+    scene : Scene, str or Path
+        The scene, or the path of its file.
+    duration : float
+        Simulated time, s.
+    model : {"auto", "dipole", "cuboid", "fem", "map"}
+        Model of the rotor's field.
+    plate_model : {"auto", "none", "slab", "reduced", "fem"}
+        Model of the plate.
+    progress : bool
+        Whether messages go to standard error.
+    **asked
+        `rtol` and `plate_rtol`, the relative accuracy asked of the field and of the plate's reaction; `interaction`
+        ("auto", "rigid", "mutual"), whether rotor and floater magnetise each other.
 
     Returns
     -------
     xarray.Dataset
-        Over `time`, SI units; how it ended and the violation of the energy ledger are attributes.
+        Over `time`, SI units; how it ended and the violation of the energy balance are attributes.
 
     Raises
     ------
-    EquilibriumError : the scene starts from an equilibrium and has none
-    InputError : a model, a tolerance or a file that cannot be used
+    EquilibriumError
+        The scene starts from an equilibrium and has none.
+    InputError
+        A model, a tolerance or a file that cannot be used.
     """
     with heard(progress):
         levitation = Levitation(scene, Models(model, plate_model, **asked))
@@ -146,7 +190,18 @@ def simulate(
 def rotor_table(
     scene: SceneLike, model: FieldModel = "auto", rtol: float = Models.rtol, progress: bool = False
 ) -> FieldTable:
-    """The rotor's field as a table, accurate to `rtol` wherever the floater can be; `model` as of `Models`.
+    """The rotor's field as a table, accurate to `rtol` wherever the floater can be.
+
+    Parameters
+    ----------
+    scene : Scene, str or Path
+        The scene, or the path of its file.
+    model : {"auto", "dipole", "cuboid", "fem", "map"}
+        Model of the rotor's field.
+    rtol : float
+        Relative accuracy asked of the field.
+    progress : bool
+        Whether messages go to standard error.
 
     Returns
     -------
@@ -157,8 +212,10 @@ def rotor_table(
 
     Raises
     ------
-    InputError : a model, a tolerance or a file that cannot be used; of `evaluate`, a point on an edge of a magnet
-    AccuracyError : the accuracy cannot be reached
+    InputError
+        A model, a tolerance or a file that cannot be used; of `evaluate`, a point on an edge of a magnet.
+    AccuracyError
+        The accuracy cannot be reached.
     """
     with heard(progress):
         table = Levitation(scene, Models(model, rtol=rtol)).table
@@ -172,10 +229,32 @@ def plate_table(
     progress: bool = False,
     **asked: Unpack[Asked],
 ) -> PlateMemory | None:
-    """The plate's currents around the place where the floater levitates; None where no currents are modelled.
+    """The plate's currents around the place where the floater levitates.
 
-    Parameters are those of `equilibria`. Of what is returned, `table` holds the network, `share` what the rotor drives,
-    `error` the estimated relative error. Raises InputError for a model, a tolerance or a file that cannot be used.
+    Parameters
+    ----------
+    scene : Scene, str or Path
+        The scene, or the path of its file.
+    model : {"auto", "dipole", "cuboid", "fem", "map"}
+        Model of the rotor's field.
+    plate_model : {"auto", "none", "slab", "reduced", "fem"}
+        Model of the plate.
+    progress : bool
+        Whether messages go to standard error.
+    **asked
+        `rtol` and `plate_rtol`, the relative accuracy asked of the field and of the plate's reaction; `interaction`
+        ("auto", "rigid", "mutual"), whether rotor and floater magnetise each other.
+
+    Returns
+    -------
+    PlateMemory or None
+        Its `table` holds the network, `share` what the rotor drives, `error` the estimated relative error; None where
+        no currents are modelled.
+
+    Raises
+    ------
+    InputError
+        A model, a tolerance or a file that cannot be used.
     """
     with heard(progress):
         return Levitation(scene, Models(model, plate_model, **asked)).plate
@@ -196,10 +275,16 @@ def working_point(
 
     Parameters
     ----------
-    scene : a scene, or the path of its file
-    model, rtol, interaction : with which the floater is placed, see `Models`; in the magnets the field is always of
-        finite elements, and rotor and floater magnetise each other
-    progress : whether messages go to standard error
+    scene : Scene, str or Path
+        The scene, or the path of its file.
+    model : {"auto", "dipole", "cuboid", "fem", "map"}
+        Model of the rotor's field that places the floater; in the magnets the field is always of finite elements.
+    rtol : float
+        Relative accuracy asked of that field.
+    interaction : {"auto", "rigid", "mutual"}
+        Whether rotor and floater magnetise each other where the floater is placed; in the magnets they always do.
+    progress : bool
+        Whether messages go to standard error.
 
     Returns
     -------
@@ -209,7 +294,8 @@ def working_point(
 
     Raises
     ------
-    InputError : no magnet has a polarisation, or a model, a tolerance or a file that cannot be used
+    InputError
+        No magnet has a polarisation, or a model, a tolerance or a file that cannot be used.
     """
     with heard(progress):
         levitation = Levitation(scene, Models(model, rtol=rtol, interaction=interaction))
@@ -233,17 +319,30 @@ def ensemble(
 
     Parameters
     ----------
-    scene : a scene, or the path of its file
-    starts : dict or Dataset by key of the scene file's `[start]`, three numbers for each flight (n, 3), or three for
-        all: "offset_mm" from the stable equilibrium, or "position_mm" with "velocity_mm_s", "moment" and "spin_hz"
-    duration : of each flight, s
-    n : instead of `starts`: so many flights from about where the scene begins
-    seed : of the random numbers; the same gives the same flights, to the last bit, with any number of workers
-    spread : standard deviations of "offset_mm" (at rest in the turning frame), "velocity_mm_s", "moment_deg" and
-        "spin_hz", each one number or three
-    model, rtol, interaction : see `Models`
-    workers : processes, None for one a core
-    progress : whether messages go to standard error
+    scene : Scene, str or Path
+        The scene, or the path of its file.
+    starts : dict or xarray.Dataset, optional
+        By key of the scene file's `[start]`, three numbers for each flight (n, 3), or three for all: "offset_mm" from
+        the stable equilibrium, or "position_mm" with "velocity_mm_s", "moment" and "spin_hz".
+    duration : float
+        Of each flight, s.
+    n : int, optional
+        Instead of `starts`: so many flights from about where the scene begins.
+    seed : int
+        Of the random numbers; the same gives the same flights, to the last bit, with any number of workers.
+    spread : dict, optional
+        Standard deviations of "offset_mm" (at rest in the turning frame), "velocity_mm_s", "moment_deg" and "spin_hz",
+        each one number or three.
+    model : {"auto", "dipole", "cuboid", "fem", "map"}
+        Model of the rotor's field.
+    rtol : float
+        Relative accuracy asked of the field.
+    interaction : {"auto", "rigid", "mutual"}
+        Whether rotor and floater magnetise each other.
+    workers : int or None
+        Processes, None for one a core.
+    progress : bool
+        Whether messages go to standard error.
 
     Returns
     -------
@@ -255,8 +354,10 @@ def ensemble(
 
     Raises
     ------
-    InputError : starts that are not allowed, with what is
-    EquilibriumError : a flight shall begin near an equilibrium, and there is none
+    InputError
+        Starts that are not allowed, with what is.
+    EquilibriumError
+        A flight shall begin near an equilibrium, and there is none.
 
     Examples
     --------
@@ -315,18 +416,32 @@ def sweep(
 
     Parameters
     ----------
-    scene : a scene, or the path of its file
-    values : by key, numbers for keys of the scene file (`frequency_hz`, `rotor.angle_deg`, `plate.center_mm.2`) and for
-        `spin`, names for `model`, `plate_model` and `interaction`
-    ask : "equilibria", "flight" or "field": what is computed at each point
-    model, plate_model, spin : of `equilibria`, at all points unless they are varied
-    duration : simulated time of a flight, s
-    place : (3,) where the field is asked for, m, rotor's frame
-    workers : processes here, None for one a core
-    scheduler : address of a dask scheduler that computes instead
-    out : folder in which finished points are kept until all are done; the same sweep goes on there
-    progress : whether messages and a progress bar go to standard error
-    asked : `rtol`, `plate_rtol` and `interaction` of `Models`
+    scene : Scene, str or Path
+        The scene, or the path of its file.
+    values : dict of str to list
+        By key, numbers for keys of the scene file (`frequency_hz`, `rotor.angle_deg`, `plate.center_mm.2`) and for
+        `spin`, names for `model`, `plate_model` and `interaction`.
+    ask : {"equilibria", "flight", "field"}
+        What is computed at each point.
+    model, plate_model : str
+        Models of the rotor's field and of the plate at all points, unless they are varied.
+    spin : float
+        Body spin S = Ω·m̂/ω, likewise.
+    duration : float
+        Simulated time of a flight, s.
+    place : sequence of 3 floats
+        Where the field is asked for, m, rotor's frame.
+    workers : int or None
+        Processes here, None for one a core.
+    scheduler : str or None
+        Address of a dask scheduler that computes instead.
+    out : str or Path
+        Folder in which finished points are kept until all are done; the same sweep goes on there.
+    progress : bool
+        Whether messages and a progress bar go to standard error.
+    **asked
+        `rtol` and `plate_rtol`, the relative accuracy asked of the field and of the plate's reaction; `interaction`
+        ("auto", "rigid", "mutual"), whether rotor and floater magnetise each other.
 
     Returns
     -------
@@ -335,8 +450,10 @@ def sweep(
 
     Raises
     ------
-    InputError : a key, a value or a model that is not allowed
-    SweepError : no point could be computed
+    InputError
+        A key, a value or a model that is not allowed.
+    SweepError
+        No point could be computed.
     """
     loaded = given_scene(scene)
     models = Models(model, plate_model, **asked).checked()
@@ -357,18 +474,34 @@ def run_study(
     out: str | Path = "out",
     progress: bool = False,
 ) -> xr.Dataset:
-    """The result of a study of the catalogue, SI units; points finished before an interruption are kept.
+    """The result of a study of the catalogue; points finished before an interruption are kept.
 
     Parameters
     ----------
-    name : of the study, as `spinlev study --list` has it
-    quick : coarser, in less than a minute
-    workers, scheduler, out, progress : as of `sweep`
+    name : str
+        Name of the study, as `spinlev study --list` has it.
+    quick : bool
+        Coarser, in less than a minute.
+    workers : int or None
+        Processes here, None for one a core.
+    scheduler : str or None
+        Address of a dask scheduler that computes instead.
+    out : str or Path
+        Folder in which finished points are kept until all are done.
+    progress : bool
+        Whether messages and a progress bar go to standard error.
+
+    Returns
+    -------
+    xarray.Dataset
+        The study's result, SI units.
 
     Raises
     ------
-    InputError : the name is unknown
-    SweepError : no point could be computed
+    InputError
+        The name is unknown.
+    SweepError
+        No point could be computed.
     """
     if name not in CATALOGUE:
         raise InputError(f"Input name must be one of {', '.join(CATALOGUE)}; instead received {name}.")
@@ -387,8 +520,21 @@ def _computed(
 
 
 def draw(result: xr.Dataset) -> Mapping[str, Figure]:
-    """The figures, by name, of a result of any function here or read from a file; a notebook shows them.
+    """The figures of a result; a notebook shows them.
 
-    Raises InputError where the result has no figure.
+    Parameters
+    ----------
+    result : xarray.Dataset
+        Of `equilibria`, `stability`, `simulate`, `sweep`, `run_study`, or read from a file.
+
+    Returns
+    -------
+    dict of str to matplotlib.figure.Figure
+        By name.
+
+    Raises
+    ------
+    InputError
+        The result has no figure.
     """
     return figures_of(result)
