@@ -26,8 +26,36 @@ from ..geometry.shapes import Box, Ring
 from ..geometry.solids import Solid, places_off
 from .cache import TableKind
 from .harmonics.solid import factorials, norm
-from .metal_currents import CurrentPatterns, Metal, current_patterns, metal_of, of_motion
-from .plate.multipoles import Multipoles, fit_multipoles
+from .metal_currents import Metal, current_patterns, metal_of, of_motion
+from .plate.multipoles import Multipoles, fit_multipoles, real_kinds
+
+BALL_DEGREE = 3
+CUBE = 0.6092
+"""Radius of the ball with the losses of a cube in a uniform field, over the cube's edge."""
+ORDER = 5
+"""Degree of the elements."""
+LEFT_OUT = 1e-2
+"""Part of the dissipation that may be left out where the floater touches; far less elsewhere."""
+FIT = 1e-2
+"""Relative error of the fields c_k there."""
+DEGREE = 10
+"""Of the multipoles."""
+NOISE = 3e-3
+"""Entries of unit columns below this come from elements that are not as symmetric as the bodies."""
+SHELLS = (1.0, 1.5, 2.5, 5.0)
+"""Distances from the rotor at which fields are fitted, over that in contact."""
+CHECKED = (1.0, 1.5, 2.0, 3.0, 5.0)
+"""The same for the errors that are stated; between them errors are interpolated."""
+DIRECTIONS = 18
+"""In which places are looked for from each body, in an octant: with their mirror images, as most rotors have them."""
+POSES = 8
+"""At each of these distances."""
+Pieces = list[tuple[tuple[Solid, ...], float]]
+"""Bodies that are one piece of metal, and its conductivity in S/m."""
+ALLOWED = 0.02
+"""Relative error of the losses by currents that have memory."""
+ROUNDED = 0.995
+"""What is named as the most that would do is less by so much, so that its three digits will do."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,9 +102,7 @@ class RotorLosses:
         return f"RotorLosses: {size}, error {self.errors[0]:.1e} in contact, {self.errors[-1]:.1e} far off"
 
 
-BALL_DEGREE = 3
-CUBE = 0.6092
-"""Radius of the ball with the losses of a cube in a uniform field, over the cube's edge."""
+LOSSES = TableKind("rotor-losses", RotorLosses, "Dissipation in a rotor's metal: power Σ (d/dt m·c)²")
 
 
 def ball_losses(pieces: Sequence[tuple[Sequence[Solid], float]], degree: int = BALL_DEGREE) -> RotorLosses:
@@ -88,7 +114,7 @@ def ball_losses(pieces: Sequence[tuple[Sequence[Solid], float]], degree: int = B
     for bodies, conductivity in pieces:
         for body in bodies:
             radius = CUBE * body.volume ** (1 / 3)
-            parts = [(l, m, part) for l in range(1, degree + 1) for m in range(l + 1) for part in (0, 1)[: 1 + (m > 0)]]
+            parts = real_kinds(1, degree)
             centers += [body.center] * len(parts)
             kinds += parts
             weights += [_weight(l, m, radius, conductivity) for l, m, _ in parts]
@@ -97,33 +123,11 @@ def ball_losses(pieces: Sequence[tuple[Sequence[Solid], float]], degree: int = B
 
 
 def _weight(l: int, m: int, radius: float, conductivity: float) -> float:
-    """√W s/(A m²) of the field of one harmonic Θ_lm with lengths in metres."""
+    """Strength of the field of one harmonic Θ_lm with lengths in metres, √W s/(A m²)."""
     loss = conductivity * l / ((l + 1) * (2 * l + 3)) * radius ** (2 * l + 3)
     harmonic = norm(l, m) / factorials(l)[l, m]
     both_signs = 1.0 if m == 0 else 2.0  # of m stand in one multipole
     return float(np.sqrt(loss) * MU_0 / (2 * l + 1) * harmonic / both_signs)
-
-
-ORDER = 5
-"""Degree of the elements."""
-LEFT_OUT = 1e-2
-"""Part of the dissipation that may be left out where the floater touches; far less elsewhere."""
-FIT = 1e-2
-"""Relative error of the fields c_k there."""
-DEGREE = 10
-"""Of the multipoles."""
-NOISE = 3e-3
-"""Entries of unit columns below this come from elements that are not as symmetric as the bodies."""
-SHELLS = (1.0, 1.5, 2.5, 5.0)
-"""Distances from the rotor at which fields are fitted, over that in contact."""
-CHECKED = (1.0, 1.5, 2.0, 3.0, 5.0)
-"""The same for the errors that are stated; between them errors are interpolated."""
-DIRECTIONS = 18
-"""In which places are looked for from each body, in an octant: with their mirror images, as most rotors have them."""
-POSES = 8
-"""At each of these distances."""
-Pieces = list[tuple[tuple[Solid, ...], float]]
-"""Bodies that are one piece of metal, and its conductivity in S/m."""
 
 
 def pieces_of(rotor: Sequence[Magnet], conductors: Sequence[Conductor]) -> Pieces:
@@ -157,8 +161,7 @@ def rotor_losses(
     start, pieces = time.perf_counter(), pieces_of(rotor, conductors)
     if not pieces:
         raise ValueError("Input rotor must have a conductivity; instead neither magnets nor conductors have one.")
-    for group, _ in pieces:
-        _refuse_wide_holes(group, nearest)
+    refuse_wide_holes(pieces, nearest)
     bodies: list[Solid] = [magnet.body for magnet in rotor] + [conductor.body for conductor in conductors]
     around = partial(places_around, bodies, directions=directions)
     metals = [metal_of(group, conductivity, ORDER) for group, conductivity in pieces]
@@ -172,18 +175,13 @@ def rotor_losses(
     table = RotorLosses(fit.multipoles, sparse(fit.weights), nearest * np.array(CHECKED), np.zeros(len(CHECKED)))
     distances = watched(table.distances, watch, "errors")
     errors = [_error(table, finer, around(distance, seed=1)) for distance in distances]
-    return replace(table, errors=np.array(errors), provenance=_made(found, start))
-
-
-def _refuse_wide_holes(bodies: Sequence[Solid], nearest: float) -> None:
-    """Refuse rings that the floater fits into: the multipoles lie in their holes, where their fields have no end."""
-    for body in bodies:
-        if isinstance(body, Ring) and body.inner_radius > nearest:
-            raise InputError(
-                f"Input conductivity_S_m must be left out of a ring into whose hole the floater fits; instead received "
-                f"a {body.described_size} beside a floater of {2e3 * nearest:.4g} mm. Leave it out, or make the ring "
-                "of cuboids."
-            )
+    made: dict[str, str | float] = {
+        "elements": sum(int(metal.mesh.mesh.ne) for metal in metals),
+        "order": ORDER,
+        "unknowns": sum(int(metal.space.ndof) for metal in metals),
+        "seconds": time.perf_counter() - start,
+    }
+    return replace(table, errors=np.array(errors), provenance=made)
 
 
 def sparse(weights: Array) -> Array:
@@ -212,9 +210,7 @@ def _candidates(bodies: Sequence[Solid], nearest: float) -> Multipoles:
     """Multipoles about the middles of parts of the bodies so compact that their expansions converge."""
     boxes = [Magnet(Box(body.size, body.center, body.rotation), np.zeros(3)) for body in bodies]
     centers = [part.box.center for parts in cut_magnets(boxes, nearest) for part in parts]
-    kinds = [(l, m, part) for l in range(1, DEGREE + 1) for m in range(l + 1) for part in (0, 1)[: 1 + (m > 0)]]
-    pairs = list(product(centers, kinds))
-    return Multipoles(np.array([p[0] for p in pairs]), np.array([p[1] for p in pairs], float), nearest)
+    return Multipoles.at(centers, real_kinds(1, DEGREE), nearest)
 
 
 def _error(table: RotorLosses, metals: Sequence[Metal], places: Array) -> float:
@@ -230,39 +226,39 @@ def _error(table: RotorLosses, metals: Sequence[Metal], places: Array) -> float:
     return worst
 
 
-def _made(patterns: CurrentPatterns, start: float) -> dict[str, str | float]:
-    return {
-        "elements": sum(int(metal.mesh.mesh.ne) for metal in patterns.metals),
-        "order": ORDER,
-        "unknowns": sum(int(metal.space.ndof) for metal in patterns.metals),
-        "seconds": time.perf_counter() - start,
-    }
+def check_metal(pieces: Pieces, frequency: float, nearest: float) -> None:
+    """Refuse pieces of metal whose losses a table cannot hold: of currents with memory, or around the floater.
 
-
-ALLOWED = 0.02
-"""Relative error of the losses."""
-ROUNDED = 0.995
-"""What is named as the most that would do is less by so much, so that its three digits will do."""
-
-
-def check_slow_enough(pieces: Pieces, frequency: float) -> None:
-    """Refuse pieces of metal in which a rotor's frequency (Hz) is too high for losses without memory.
+    Parameters
+    ----------
+    frequency : of the rotor, Hz
+    nearest : how near the floater's centre comes to a face, m
 
     Raises
     ------
     InputError : with the skin depth, and the conductivity or frequency up to which it would do
     """
+    refuse_wide_holes(pieces, nearest)
     for bodies, conductivity in pieces:
-        radius = _radius(bodies)
         if (error := slow_error([(bodies, conductivity)], frequency)) > ALLOWED:
             most = ROUNDED * np.sqrt(ALLOWED / error)
             place = ", ".join(f"{c * 1e3:.4g}" for c in np.mean([body.center for body in bodies], axis=0))
-            depth, thickness = skin_depth(conductivity, 2 * frequency), 2 * radius
+            depth, thickness = skin_depth(conductivity, 2 * frequency), 2 * _radius(bodies)
             raise InputError(
                 f"Input conductivity_S_m of the rotor's metal at ({place}) mm must leave its skin depth large against "
                 f"it; instead received {conductivity:.3g} S/m: {depth * 1e3:.3g} mm at {2 * frequency:.4g} Hz, twice "
                 f"the rotor's frequency, in {thickness * 1e3:.3g} mm of metal. Take at most "
                 f"{most * conductivity:.3g} S/m or {most * frequency:.3g} Hz, or leave this piece out."
+            )
+
+
+def refuse_wide_holes(pieces: Pieces, nearest: float) -> None:
+    """Refuse rings that the floater fits into: the multipoles lie in their holes, where their fields have no end."""
+    for body in (body for bodies, _ in pieces for body in bodies):
+        if isinstance(body, Ring) and body.inner_radius > nearest:
+            raise InputError(
+                f"Input conductivity_S_m must be left out of a ring into whose hole the floater fits; instead received "
+                f"a {body.described_size} beside a floater of {2e3 * nearest:.4g} mm. Leave it out."
             )
 
 
@@ -273,10 +269,8 @@ def slow_error(pieces: Pieces, frequency: float) -> float:
 
 
 def _radius(bodies: Sequence[Solid]) -> float:
+    """Of the ball of the same volume, m."""
     return float((3 * sum(body.volume for body in bodies) / (4 * np.pi)) ** (1 / 3))
-
-
-LOSSES = TableKind("rotor-losses", RotorLosses, "Dissipation in a rotor's metal: power Σ (d/dt m·c)²")
 
 
 def _deciding(scene: Scene) -> tuple[Any, ...]:
@@ -294,7 +288,7 @@ def cached_rotor_losses(
 ) -> tuple[RotorLosses, bool]:
     """The losses in a scene's rotor, from the cache if they are there, and whether they were.
 
-    `watch` hears of the progress.  At which frequencies they hold, `check_slow_enough` says.
+    `watch` hears of the progress.  At which frequencies they hold, `check_metal` says.
     """
     make = partial(rotor_losses, scene.rotor, scene.conductors, scene.floater.radius, watch=watch)
     return LOSSES.cached(_deciding(scene), make, report)

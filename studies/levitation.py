@@ -35,7 +35,7 @@ from ..fem.plate.table import PlateTable, Region, RotorShare
 from ..fem.rotor.choice import cached_rotor_table, rotor_table
 from ..fem.rotor.models import AccuracyError
 from ..fem.rotor.table import FieldTable, RotorTable
-from ..fem.rotor_metal import RotorLosses, cached_rotor_losses, check_slow_enough, losses_key, pieces_of
+from ..fem.rotor_metal import Pieces, RotorLosses, cached_rotor_losses, check_metal, losses_key, pieces_of
 from ..geometry.common import Array, InputError, SpinlevError, Watch, shown, unwatched
 from ..geometry.scene.contents import AbsoluteStart, Plate, Scene
 from ..geometry.scene.files import check_files, load_scene
@@ -217,6 +217,14 @@ class Levitation:
         )
         return self._tables.table(mutual_key(scene.rotor, scene.floater), "mutual", title, partial(make, note)), why
 
+    def _metal(self) -> Pieces:
+        """The rotor's pieces of metal, once they and the floater are found fit for a table of losses."""
+        scene, pieces = self.scene, pieces_of(self.scene.rotor, self.scene.conductors)
+        if pieces:
+            scene.floater.must_be("sphere", where=BESIDE_METAL, instead=WITHOUT_METAL)
+            check_metal(pieces, scene.frequency, scene.floater.radius)
+        return pieces
+
     @cached_property
     def losses(self) -> RotorLosses | None:
         """The losses in the rotor's metal, or None where none has a conductivity.
@@ -225,11 +233,9 @@ class Levitation:
         ------
         InputError : the rotor turns too fast for its metal, or the floater is no sphere
         """
-        scene, pieces = self.scene, pieces_of(self.scene.rotor, self.scene.conductors)
-        if not pieces:
+        scene = self.scene
+        if not self._metal():
             return None
-        scene.floater.must_be("sphere", where=BESIDE_METAL, instead=WITHOUT_METAL)
-        check_slow_enough(pieces, scene.frequency)
         make = partial(cached_rotor_losses, scene, note)
         return self._tables.table(losses_key(scene), "rotor losses", "Currents in the rotor's metal", make)
 
@@ -242,6 +248,7 @@ class Levitation:
         InputError : mutual magnetisation is asked for where it cannot be known, or the floater is a cuboid
         """
         self.scene.floater.must_be("sphere", "cylinder", where="where it moves", instead=FORCE_ALONE)
+        self._metal()  # refused before the field's table is made, which takes minutes
         return self._with_effects(self.table)
 
     def _with_effects(self, table: RotorField) -> Interaction:

@@ -19,7 +19,7 @@ from ...fem.harmonics.expressions import FieldExpressions
 from ...fem.mutual.making import cached_mutual_table
 from ...fem.rotor.choice import cached_rotor_table, rotor_table
 from ...fem.rotor.table import FieldFormula, FieldTable, RotorTable
-from ...fem.rotor_metal import cached_rotor_losses, check_slow_enough, pieces_of
+from ...fem.rotor_metal import cached_rotor_losses, check_metal, pieces_of
 from ...geometry.common import Array, InputError
 from ...geometry.magnets import Magnet
 from ...geometry.scene.contents import Scene
@@ -250,7 +250,7 @@ class RotorFamily:
         frequency, measure = np.broadcast_arrays(np.atleast_1d(frequency), np.atleast_1d(measure))
         different, which = np.unique(frequency, return_inverse=True)
         scenes = [replace(self.scene, frequency=float(f)) for f in different]
-        check_slow_enough(pieces_of(self.rotor, ()), scenes[-1].frequency)
+        check_metal(pieces_of(self.rotor, ()), scenes[-1].frequency, self.scene.floater.radius)
         check_floater_metal(scenes[-1])
         values = np.array([parameters(scene, Scales.of(scene), frozen_spin=True) for scene in scenes])[which]
         values[:, Parameter.MEASURE] = measure
@@ -361,7 +361,7 @@ def _currents(scene: Scene, parts: Sequence[Part]) -> list[Effect]:
     found: list[Effect] = []
     for k, (magnet, move, alone) in enumerate(parts, 1):
         if magnet.conductivity:
-            check_slow_enough(pieces_of((magnet,), ()), scene.frequency)
+            check_metal(pieces_of((magnet,), ()), scene.frequency, scene.floater.radius)
             table, _ = cached_rotor_losses(replace(scene, rotor=(magnet,)), lambda _: None)
             name = ROTOR_CURRENTS if len(parts) == 1 else f"{ROTOR_CURRENTS}, magnet {k}"
             found.append(MovedEffect(RotorCurrents(table), move, alone, name))

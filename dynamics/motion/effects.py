@@ -5,7 +5,7 @@ import numpy as np
 from ...fem.mutual.making import unanswered
 from ...fem.rotor.floater import floater_sources
 from ...fem.rotor.table import FieldFormula, FieldTable
-from ...fem.rotor_metal import cached_rotor_losses, check_slow_enough, pieces_of
+from ...fem.rotor_metal import cached_rotor_losses, check_metal, pieces_of
 from ...geometry.common import InputError
 from ...geometry.scene.contents import Scene
 from .air_and_shape import FLOATER_SHAPE, FloaterShape, RealAir
@@ -93,9 +93,9 @@ def with_effects(scene: Scene, table: FieldFormula) -> Interaction:
     if scene.drag.air:
         effects.append(RealAir())
     pieces = pieces_of(scene.rotor, scene.conductors)
-    check_slow_enough(pieces, scene.frequency)
     if pieces:
         scene.floater.must_be("sphere", where=BESIDE_METAL, instead=WITHOUT_METAL)
+        check_metal(pieces, scene.frequency, scene.floater.radius)
     if pieces and ROTOR_CURRENTS not in {effect.name for effect in whole.effects}:
         effects.append(RotorCurrents(cached_rotor_losses(scene, lambda _: None)[0]))
     return whole.joined(*effects)

@@ -14,12 +14,14 @@ from numpy.typing import ArrayLike
 from ...geometry.common import MU_0, Array, InputError, Watch, unwatched
 from ...geometry.magnets import Magnet
 from ...geometry.scene.contents import Plate, Scene
+from ..cache import TableKind
 from ..rotor.models import Accuracy, AccuracyError, shortened_table
 from ..rotor.table import RotorTable
 from .rotor_share import DOWN
 from .slab import cached_edge_error, edge_error
+from .solution import cached_solver
 from .table import PlateTable, Region, RotorShare
-from .tables import DRIVEN, SLAB, cached_driven_plate, deciding, slab_and_rotor_table
+from .tables import DRIVEN, SLAB, deciding, plate_and_rotor_table, slab_and_rotor_table
 
 NEGLIGIBLE = 1e-6
 """Part of the floater's weight below which the largest conceivable force of the plate is left out."""
@@ -115,16 +117,20 @@ class PlateAround:
     @cached_property
     def key(self) -> str:
         """The same for scenes that share the table."""
-        kind = SLAB if self.model == "slab" else DRIVEN
-        return kind.key(*deciding(*self._asked))
+        return self._kind.key(*deciding(*self._asked))
 
     def made(self, report: Callable[[str], None], watch: Watch = unwatched) -> tuple[PlateTable, RotorShare, bool]:
         """The table, the rotor's share in it, and whether they were cached. Raises what the models raise."""
-        if self.model != "slab":
-            return cached_driven_plate(*self._asked, report, watch)
         make = partial(slab_and_rotor_table, *self._asked)
-        (table, share), found = SLAB.cached(deciding(*self._asked), make, report)
-        return table, share, found
+        if self.model != "slab":
+            solve = cached_solver(report, watch)
+            make = partial(plate_and_rotor_table, *self._asked, solve=solve, watch=watch)
+        (table, share), cached = self._kind.cached(deciding(*self._asked), make, report)
+        return table, share, cached
+
+    @property
+    def _kind(self) -> TableKind[tuple[PlateTable, RotorShare]]:
+        return SLAB if self.model == "slab" else DRIVEN
 
     @property
     def _asked(self) -> tuple[Plate, RotorTable, Region, tuple[float, float], float]:

@@ -5,7 +5,7 @@ B = -∇ Σ c_k Θ_k: each multipole is free of divergence and curl by construct
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import combinations_with_replacement, product
@@ -35,6 +35,11 @@ def _unfolded(rank: int) -> NDArray[np.int_]:
     return np.array(places).reshape((3,) * rank)
 
 
+def real_kinds(lowest: int, highest: int) -> list[tuple[int, int, int]]:
+    """Degree, order and part of all multipoles with degrees from the lowest to the highest."""
+    return [(l, m, i) for l in range(lowest, highest + 1) for m in range(l + 1) for i in (0, 1)[: 1 + (m > 0)]]
+
+
 TWICE, THRICE = _unfolded(2), _unfolded(3)
 """For the gradient of a curl-free field, and for its second derivatives."""
 
@@ -57,6 +62,12 @@ class Multipoles:
     def __post_init__(self) -> None:
         for name in ("centers", "kinds"):
             object.__setattr__(self, name, frozen_array(getattr(self, name), (len(self.kinds), 3)))
+
+    @classmethod
+    def at(cls, centers: Iterable[Array], kinds: Sequence[tuple[int, int, int]], scale: float) -> Multipoles:
+        """All of these kinds at each of these centres."""
+        pairs = list(product(centers, kinds))
+        return cls(np.array([p[0] for p in pairs]), np.array([p[1] for p in pairs], float), scale)
 
     def subset(self, numbers: Sequence[int]) -> Multipoles:
         return Multipoles(self.centers[list(numbers)], self.kinds[list(numbers)], self.scale)

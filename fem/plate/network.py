@@ -27,7 +27,7 @@ from ...geometry.scene.contents import Plate
 from ..closed_forms.eddy_sphere import ComplexArray
 from .currents import OtherSources, grid_counts, probe_places, space_couplings, unit_power
 from .eddy import Source
-from .multipoles import Multipoles, fit_multipoles
+from .multipoles import Multipoles, fit_multipoles, real_kinds
 from .solution import STRICT, PlateSolution
 from .table import ENOUGH, Region, refuse
 
@@ -340,6 +340,4 @@ def candidates(region: Region, half_edges: Array, degree: int = DEGREE) -> Multi
     lines[axis] = of_plate[[axis]]
     starts = np.array(list(product(*lines)))
     centers = np.concatenate([starts + depth * gap * away for depth in DEPTHS])
-    kinds = [(l, m, part) for l in range(degree + 1) for m in range(l + 1) for part in (0, 1)[: 1 + (m > 0)]]
-    pairs = list(product(centers, kinds))
-    return Multipoles(np.array([p[0] for p in pairs]), np.array([p[1] for p in pairs], float), gap)
+    return Multipoles.at(centers, real_kinds(0, degree), gap)

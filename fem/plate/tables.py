@@ -3,7 +3,6 @@
 import time
 from collections.abc import Callable
 from dataclasses import replace
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -17,7 +16,7 @@ from .currents import OtherSources
 from .network import CONDUCTOR, NETWORK_SHARE, PassiveNetwork, Reduction, checked_ranges, from_elements
 from .rotor_share import MISSED, SHARE_PART, rotor_box, rotor_share, turning_rotor, without_high_harmonics
 from .slab import rotor_reach, slab_frame
-from .solution import PlateSolution, cached_solver, error_of, outer_box, outer_frequencies, solve_currents
+from .solution import PlateSolution, error_of, outer_box, outer_frequencies, solve_currents
 from .table import PlateErrors, PlateTable, Region, RotorShare
 from .waves import from_slab
 
@@ -187,19 +186,3 @@ def deciding(
     """What decides a plate's table and the rotor's share: the way of a lowering does, but not when and how fast."""
     way = plate.lowering.distance if plate.lowering else 0.0
     return plate.box, plate.conductivity, way, rotor.uniform, rotor.expansions, region, frequencies, rtol
-
-
-def cached_driven_plate(
-    plate: Plate,
-    rotor: RotorTable,
-    region: Region,
-    frequencies: tuple[float, float],
-    rtol: float,
-    report: Callable[[str], None],
-    watch: Watch = unwatched,
-) -> tuple[PlateTable, RotorShare, bool]:
-    """`plate_and_rotor_table` from the cache if it is there, and whether it was."""
-    asked, solve = (plate, rotor, region, frequencies, rtol), cached_solver(report, watch)
-    make = partial(plate_and_rotor_table, *asked, solve=solve, watch=watch)
-    (table, share), found = DRIVEN.cached(deciding(*asked), make, report)
-    return table, share, found

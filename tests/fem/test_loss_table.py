@@ -9,7 +9,7 @@ import pytest
 from spinlev.fem import rotor_metal as tabulate
 from spinlev.fem.cache import TableFileError
 from spinlev.fem.metal_currents import metal_of, of_motion
-from spinlev.fem.rotor_metal import LOSSES, check_slow_enough, pieces_of, rotor_losses
+from spinlev.fem.rotor_metal import LOSSES, check_metal, pieces_of, rotor_losses
 from spinlev.geometry.common import InputError
 from spinlev.geometry.rotor import Conductor, horizontal
 from spinlev.geometry.shapes import Box, Cylinder
@@ -91,11 +91,11 @@ def test_what_thinning_leaves_out_is_below_the_noise():
 
 def test_a_rotor_too_fast_for_its_metal_is_refused_with_the_way_out():
     holder = (Conductor(Cylinder(20e-3, 10e-3, (0.0, 0.0, 12e-3)), 3.5e7),)
-    check_slow_enough(pieces_of(CUBE, SPACER), 250.0)
+    check_metal(pieces_of(CUBE, SPACER), 250.0, 6.35e-3)
     with pytest.raises(InputError, match=re.escape("instead received 3.5e+07 S/m: 4.91 mm at 300 Hz")) as caught:
-        check_slow_enough(pieces_of(CUBE, holder), 150.0)
+        check_metal(pieces_of(CUBE, holder), 150.0, 6.35e-3)
     allowed = float(re.search(r"Take at most (\S+) S/m", str(caught.value))[1])
-    check_slow_enough(pieces_of((), (replace(holder[0], conductivity=allowed),)), 150.0)
+    check_metal(pieces_of((), (replace(holder[0], conductivity=allowed),)), 150.0, 6.35e-3)
 
 
 def test_nothing_that_conducts_has_no_table():

@@ -108,6 +108,6 @@ def test_a_conducting_ring_that_the_floater_fits_into_is_refused():
     """In a hole of 30 mm the table was wrong by up to 6e10 times the true dissipation."""
     ring = Conductor(Ring(20e-3, 15e-3, 5e-3), 1.4e6)
     with pytest.raises(
-        InputError, match=r"into whose hole the floater fits; instead received a .* of 12\.7 mm\. Leave"
+        InputError, match=r"into whose hole the floater fits; instead received a .* of 12\.7 mm\. Leave it out\.$"
     ):
         rotor_losses((), (ring,), 6.35e-3)

@@ -10,12 +10,11 @@ from article import RADIUS
 from ngsolve import SetNumThreads
 
 from spinlev.fem.closed_forms.potentials import unit_dipoles
-from spinlev.fem.plate.choice import reachable_region
+from spinlev.fem.plate.choice import PlateAround, reachable_region
 from spinlev.fem.plate.eddy import solve_eddy
 from spinlev.fem.plate.rotor_share import posed_rotor, rotor_parts
 from spinlev.fem.plate.tables import (
     DRIVEN,
-    cached_driven_plate,
     deciding,
     plate_and_rotor_table,
 )
@@ -99,7 +98,7 @@ def test_one_file_holds_table_and_share(made, rotor, region, tmp_path, monkeypat
     arguments = (PLATE, rotor, region, FREQUENCIES, RTOL)
     key = DRIVEN.key(*deciding(*arguments))
     DRIVEN.save((table, share), tmp_path / f"driven-plate-{key}.nc", key)
-    read, read_share, found = cached_driven_plate(*arguments, report=pytest.fail)
+    read, read_share, found = PlateAround(PLATE, "reduced", rotor, region, FREQUENCIES, RTOL).made(pytest.fail)
     assert found
     assert np.array_equal(read.weights, table.weights)
     assert np.array_equal(read_share.series, share.series)
