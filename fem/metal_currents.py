@@ -7,7 +7,7 @@ A vector potential that changes at the rate Ȧ drives E = -(Ȧ + ∇φ), free of
 The error of the dissipation is the square of that of ∇φ, and the gauge of A does not matter.
 """
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -23,8 +23,8 @@ from .elements.spaces import IntegrationPoints, volume_points
 
 Potentials = Callable[[Array], Array]
 """Points (n, 3) m -> A (n, 3, k) of k sources."""
-BLOCK = 4000
-"""Points at a time."""
+BLOCK, TOGETHER = 4000, 40
+"""Points, and places of dipoles, at a time."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,23 +57,18 @@ class Metal:
         return np.asarray(self.conductivity * self.mesh.unit**3 * self.points.weights)
 
     def dissipation(self, sources: Potentials, loads: Array | None = None) -> Array:
-        """σ ∫ E_a·E_b dV (k, k) of the rates of k sources; of many, whose fields are large, with their `loads`."""
-        if loads is None:
-            fields = sources(self.places)
-            loads, blocks = self._integrals(fields), iter([(fields, self.weights)])
-        else:
-            blocks = self._blocks(sources)
-        potentials = self.solutions(loads)
-        whole = np.sum([flat(a).T @ flat(w[:, None, None] * a) for a, w in blocks], axis=0)
-        return np.asarray(whole - self.conductivity * self.mesh.unit**3 * loads @ potentials.T)
+        """σ ∫ E_a·E_b dV (k, k) of the rates of k sources, whose `loads` may be known."""
+        loads = self.loads(sources) if loads is None else loads
+        whole = np.zeros((len(loads), len(loads)))
+        for start in range(0, len(self.places), BLOCK):
+            fields, weights = sources(self.places[start : start + BLOCK]), self.weights[start : start + BLOCK]
+            whole += flat(fields).T @ flat(weights[:, None, None] * fields)
+        # E is A without its gradient part, which is orthogonal to it.
+        return np.asarray(whole - self.conductivity * self.mesh.unit**3 * loads @ self.solutions(loads).T)
 
     def loads(self, sources: Potentials) -> Array:
         """∫ A·∇v (k, unknowns), in units of the mesh."""
-        return self._integrals(sources(self.places))
-
-    def _integrals(self, fields: Array) -> Array:
-        """∫ A·∇v (k, unknowns) of A (n, 3, k) at the points."""
-        test, found = self.space.TestFunction(), []
+        fields, test, found = sources(self.places), self.space.TestFunction(), []
         for k in range(fields.shape[2]):
             form = ng.LinearForm(self.space)
             along = ng.CF(tuple(self.points.function(fields[:, axis, k]) for axis in range(3)))
@@ -100,10 +95,6 @@ class Metal:
             slope = ng.grad(function)
             found.append(self.points.sample(*(slope[axis] for axis in range(3))))
         return np.moveaxis(np.array(found), 0, 2)
-
-    def _blocks(self, sources: Potentials) -> Iterator[tuple[Array, Array]]:
-        for start in range(0, len(self.places), BLOCK):
-            yield sources(self.places[start : start + BLOCK]), self.weights[start : start + BLOCK]
 
 
 def flat(values: Array) -> Array:
@@ -168,10 +159,6 @@ def of_motion(position: Array, moment: Array) -> Potentials:
     return potentials
 
 
-TOGETHER = 40
-"""Places at a time."""
-
-
 @dataclass(frozen=True, eq=False)
 class CurrentPatterns:
     """Patterns of current in several pieces of metal.
@@ -191,7 +178,7 @@ class CurrentPatterns:
         return int(self.patterns[0].shape[2])
 
     def fields(self, positions: Array, watch: Watch = unwatched) -> Array:
-        """c_k (k, n, 3) at positions (n, 3) m, √W s/(A m²); `watch` hears of the progress."""
+        """c_k (k, n, 3) at positions (n, 3) m, √W s/(A m²); `watch` is a progress callback."""
         found = []
         for start in watched(range(0, len(positions), TOGETHER), watch, "their fields"):
             sources = of_places(positions[start : start + TOGETHER])
@@ -208,7 +195,7 @@ def current_patterns(
 ) -> CurrentPatterns:
     """Patterns that dipoles at `positions` (n, 3) m drive, but for a part `left_out` of the loss at any place.
 
-    `watch` hears of the progress.
+    `watch` is a progress callback.
     """
     grams, loads, blocks = [], [], range(0, len(positions), TOGETHER)
     for metal in metals:

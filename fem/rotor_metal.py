@@ -53,7 +53,7 @@ POSES = 8
 Pieces = list[tuple[tuple[Solid, ...], float]]
 """Bodies that are one piece of metal, and its conductivity in S/m."""
 ALLOWED = 0.02
-"""Relative error of the losses by currents that have memory."""
+"""Relative error of losses that are taken as instantaneous."""
 ROUNDED = 0.995
 """What is named as the most that would do is less by so much, so that its three digits will do."""
 
@@ -150,7 +150,7 @@ def rotor_losses(
 ) -> RotorLosses:
     """Table of the dissipation for a floater whose centre is at least `nearest` (m) from every face.
 
-    It is fitted in so many `directions` of each octant; `watch` hears of the progress.
+    It is fitted in so many `directions` of each octant; `watch` is a progress callback.
 
     Raises
     ------
@@ -227,7 +227,7 @@ def _error(table: RotorLosses, metals: Sequence[Metal], places: Array) -> float:
 
 
 def check_metal(pieces: Pieces, frequency: float, nearest: float) -> None:
-    """Refuse pieces of metal whose losses a table cannot hold: of currents with memory, or around the floater.
+    """Refuse pieces of metal whose losses a table cannot hold: too fast ones, and those around the floater.
 
     Parameters
     ----------
@@ -263,7 +263,7 @@ def refuse_wide_holes(pieces: Pieces, nearest: float) -> None:
 
 
 def slow_error(pieces: Pieces, frequency: float) -> float:
-    """Largest relative error of the losses of pieces of metal without memory at a rotor's frequency, Hz."""
+    """Largest relative error of the losses of pieces of metal, taken as instantaneous, at a rotor's frequency, Hz."""
     reactions = [4 * np.pi * frequency * MU_0 * sigma * _radius(bodies) ** 2 for bodies, sigma in pieces]
     return float(max(reactions, default=0.0) ** 2 / 105)
 
@@ -288,7 +288,7 @@ def cached_rotor_losses(
 ) -> tuple[RotorLosses, bool]:
     """The losses in a scene's rotor, from the cache if they are there, and whether they were.
 
-    `watch` hears of the progress.  At which frequencies they hold, `check_metal` says.
+    `watch` is a progress callback.  At which frequencies they hold, `check_metal` says.
     """
     make = partial(rotor_losses, scene.rotor, scene.conductors, scene.floater.radius, watch=watch)
     return LOSSES.cached(_deciding(scene), make, report)

@@ -19,7 +19,7 @@ from ..rotor.models import Accuracy, AccuracyError, shortened_table
 from ..rotor.table import RotorTable
 from .rotor_share import DOWN
 from .slab import cached_edge_error, edge_error
-from .solution import cached_solver
+from .solution import cached_currents
 from .table import PlateTable, Region, RotorShare
 from .tables import DRIVEN, SLAB, deciding, plate_and_rotor_table, slab_and_rotor_table
 
@@ -60,7 +60,7 @@ def resolve_plate_model(
 ) -> PlateChoice:
     """The plate's model in the motion.
 
-    `auto` is none where even a perfect conductor's image would not be felt, the infinite slab where a bound or else a
+    `auto` is none where even a perfect conductor's image would not matter, the infinite slab where a bound or else a
     coarse solution says that the edges are too far to matter, and otherwise the reduced network of the finite elements.
     """
     plate = scene.plate
@@ -123,7 +123,7 @@ class PlateAround:
         """The table, the rotor's share in it, and whether they were cached. Raises what the models raise."""
         make = partial(slab_and_rotor_table, *self._asked)
         if self.model != "slab":
-            solve = cached_solver(report, watch)
+            solve = partial(cached_currents, report=report, watch=watch)
             make = partial(plate_and_rotor_table, *self._asked, solve=solve, watch=watch)
         (table, share), cached = self._kind.cached(deciding(*self._asked), make, report)
         return table, share, cached

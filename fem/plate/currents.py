@@ -24,7 +24,7 @@ from ...geometry.common import MU_0, Array, Watch, spread_points, unwatched, wat
 from ...geometry.meshes.metal import PLANES
 from ..closed_forms.eddy_sphere import ComplexArray
 from ..elements.spaces import Parity
-from .eddy import ClassFactor, EddySpace, ShiftedSystem, Source
+from .eddy import EddySpace, ShiftedSystem, Source
 from .table import Region
 
 CHUNK = 16
@@ -349,7 +349,7 @@ def train(
     grid, probes : (n, 3) m, places of the dipoles that are trained and of those that are not
     others : more sources of both kinds
     allowed : |ρ|² of a source relative to what it drives, and thus relative error of its coupling with itself
-    watch : hears of the progress
+    watch : progress callback
     """
     watch("potentials of sources", 0.0)
     rows = FieldRows(space)
@@ -366,13 +366,13 @@ def train(
     residuals = np.zeros_like(couplings)
     classes = zip(space.parity.classes, sources, tests, strict=True)
     for parity_class, driving, testing in watched(classes, watch, f"currents at order {space.order}"):
-        factor = system.factor(parity_class)
+        solve, _ = system.solver(parity_class)
 
-        def solve(starts: Array, factor: ClassFactor = factor) -> tuple[Array, Array]:
-            reaction = rows.values(factor.solve(rows.loads(starts)))
-            return starts + reaction, -reaction / float(np.real(factor.shift))
+        def fields_of(starts: Array, solve: Callable[[Array], Array] = solve) -> tuple[Array, Array]:
+            reaction = rows.values(solve(rows.loads(starts)))
+            return starts + reaction, -reaction / float(np.real(system.shift))
 
-        basis = class_basis(driving * scale[:, None], solve, omegas, allowed / len(sources))
+        basis = class_basis(driving * scale[:, None], fields_of, omegas, allowed / len(sources))
         left = Residuals(testing, basis)
         for k, omega in enumerate(omegas):
             residuals[k] += left.gram(omega)

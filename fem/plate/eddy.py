@@ -11,7 +11,7 @@ S. Zaglmayr, High order finite element methods for electromagnetic field computa
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Protocol
 
@@ -158,24 +158,14 @@ class ShiftedSystem:
         form.Assemble()
         self.form = form
 
-    def factor(self, parity_class: Sequence[int]) -> ClassFactor:
+    def solver(self, parity_class: Sequence[int]) -> tuple[Callable[[Array], NDArray[Any]], int]:
+        """A factor of one parity class, which turns loads into reactions (sources, unknowns), and its unknowns.
+
+        Reactions A = -s (curl curl + s μ0 σ)⁻¹ μ0 ∫ σ A_s·v, T m, are complex as the shift is.
+        """
         free = self.space.free_unknowns(parity_class, self.fes)
         inverse = self.form.mat.Inverse(free, inverse="sparsecholesky")
-        return ClassFactor(self.form, inverse, self.shift, sum(free))
-
-
-@dataclass(frozen=True, eq=False)
-class ClassFactor:
-    """Factorised matrix of one shift and parity class, with the number of its coupling unknowns."""
-
-    form: ngsolve.BilinearForm
-    inverse: ngsolve.BaseMatrix
-    shift: complex
-    unknowns: int
-
-    def solve(self, loads: Array) -> NDArray[Any]:
-        """Reactions A = -s (curl curl + s μ0 σ)⁻¹ μ0 ∫ σ A_s·v (sources, unknowns), T m; complex as the shift is."""
-        return solve_condensed(self.form, self.inverse, -self.shift * MU_0 / MILLIMETRE * loads)
+        return lambda loads: solve_condensed(self.form, inverse, -self.shift * MU_0 / MILLIMETRE * loads), sum(free)
 
 
 @dataclass(frozen=True, eq=False)
@@ -266,9 +256,9 @@ def solve_shifted(space: EddySpace, shift: complex, sources: Sequence[Source]) -
         if np.all(size[number] <= SILENT * np.linalg.norm(size, axis=0)):
             continue
         loads = space.loads(images[number])
-        factor = system.factor(parity_class)
-        classes[number] = ClassResponse(images[number], loads, factor.solve(loads))
-        coupling = max(coupling, factor.unknowns)
+        solve, unknowns = system.solver(parity_class)
+        classes[number] = ClassResponse(images[number], loads, solve(loads))
+        coupling = max(coupling, unknowns)
     return EddyResponse(space, shift, classes, coupling)
 
 

@@ -25,7 +25,7 @@ INDEPENDENT = 1e-10
 NOISE = 1e-11
 """Weights below this share of the largest are what symmetry forbids."""
 STEP, PATIENCE, STALLED = 2, 6, 0.95
-"""Multipoles at a time, unless told; the fit ends where so many steps leave more than this share of the error."""
+"""Multipoles at a time, by default; the fit ends where so many steps leave more than this share of the error."""
 
 
 def _unfolded(rank: int) -> NDArray[np.int_]:
@@ -165,7 +165,7 @@ def fit_multipoles(
     tolerance : for the norm of the scaled error over functions and components, at every point
     enough : whether errors (functions, n, 3) are small enough
     step : multipoles between two looks at the error
-    watch : hears of the progress
+    watch : progress callback
     """
     columns = choice.fields(points) * point_scale[:, None, None]
     columns = columns.swapaxes(1, 2).reshape(-1, len(choice.kinds))

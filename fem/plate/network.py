@@ -268,7 +268,7 @@ def from_elements(
             ends = np.cumsum([len(space.inductances[number]) for number in group])
             for number, part in zip(group, np.split(states, ends[:-1], axis=1), strict=True):
                 rows[number] = part @ space.fields[number]
-        held = replace(space, fields=tuple(rows))
+        held = replace(space, fields=tuple(rows))  # for couplings only: these inductances are 1
 
         def by_state(parts: Sequence[Array]) -> Array:
             return np.concatenate([np.sum([parts[number] for number in group], axis=0) for group in groups], axis=1)

@@ -63,7 +63,7 @@ class Ladder:
     frequency : Hz
     allowed : relative error
     growing : compare fields that grow as e^{ωt} instead of phasors: half the memory, a quarter of the work
-    watch : hears of the progress
+    watch : progress callback
 
     Raises
     ------

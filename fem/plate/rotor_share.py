@@ -129,9 +129,9 @@ def rotor_parts(table: RotorTable, plate: Plate, left_out: float = LEFT_OUT) -> 
         degrees = np.arange(expansion.degree + 1)
         sizes = field_spectrum(expansion.coefficients) * (expansion.radius / nearest) ** (degrees + 2)
         whole = MU_0 / (4 * np.pi) * np.linalg.norm(table.moment) / nearest**3
-        felt = np.flatnonzero(sizes > left_out * whole)
-        if len(felt):
-            end = felt[-1] + 1
+        kept = np.flatnonzero(sizes > left_out * whole)
+        if len(kept):
+            end = kept[-1] + 1
             parts.append(ExpansionSource(replace(expansion, coefficients=expansion.coefficients[:end, :end])))
     return parts
 
@@ -195,7 +195,7 @@ def rotor_share(
     ----------
     network : of a plate of the same size and conductivity, or of what stands for it
     tolerance : for the estimated error; harmonics and depths are added until it is met
-    watch : hears of the progress
+    watch : progress callback
 
     Raises
     ------

@@ -41,6 +41,22 @@ LOWEST, HIGHEST = -37.0, 3.5
 """Range of ln(k (z+z')/2): the integrand goes as k or faster below, and as e^{-66} above."""
 DIGITS = 33.0
 """Natural logarithm of the precision aimed at."""
+PARALLEL = 1e-9
+"""Sine of an angle that still counts as none."""
+ANGLES = 72
+"""Angles of a turn at which the rotor's reach is looked at."""
+NEWTON_STEPS = 60
+"""More than enough: from the left, Newton's method doubles the smallest roots and then converges quadratically."""
+EDGES = 5.0
+"""Change of an infinite slab's reaction by the edges, in units of the source's share beyond them: in 82 comparisons
+with finite elements at most 1.4 at 100 Hz, 1.9 at 5 Hz and, where resistance alone rules in thin plates, 4.5 at 0.5 Hz.
+"""
+ORDER, RULE = 2, MeshRule(reach=4.0)
+LOW = 10.0
+"""Hz, of the floater's slow motions: edges count more there than at the rotor's frequency."""
+DOUBT = 1.5
+"""Against converged elements at iω, changes were 0.75 and 0.81 times the truth at 10 Hz, 1.14 to 1.34 at 110 Hz."""
+EDGE_ERROR = TableKind("edges", float, "Change of an infinite slab's reaction by a plate's edges")
 
 
 @dataclass(frozen=True)
@@ -115,12 +131,6 @@ def reaction_tensor(slab: Slab, height: ArrayLike, frequency: ArrayLike) -> Comp
     h, f = checked(height, frequency)
     normal = -MU_0 / (4 * np.pi) * power_integral(slab, h, f, 2)
     return normal[..., None, None] * np.diag([0.5, 0.5, 1.0])
-
-
-PARALLEL = 1e-9
-"""Sine of an angle that still counts as none."""
-ANGLES = 72
-"""Angles of a turn at which the rotor's reach is looked at."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -199,10 +209,6 @@ def rotor_reach(plate: Plate, rotor: RotorTable, frame: SlabFrame) -> Array:
     return found
 
 
-NEWTON_STEPS = 60
-"""More than enough: from the left, Newton's method doubles the smallest roots and then converges quadratically."""
-
-
 @dataclass(frozen=True, eq=False)
 class SlabModes:
     """The first modes of each wave number.
@@ -217,11 +223,6 @@ class SlabModes:
     wave_numbers: Array
     rates: Array
     strengths: Array
-
-    def reflection(self, frequency: float) -> ComplexArray:
-        """Γ (n,) of these modes at a frequency, Hz."""
-        rate = 2j * np.pi * frequency
-        return np.asarray(2 * rate * self.wave_numbers / MU_0 * np.sum(self.strengths**2 / (self.rates + rate), axis=1))
 
 
 def slab_modes(slab: Slab, wave_numbers: Array, count: int) -> SlabModes:
@@ -283,18 +284,6 @@ def _angular(even: ComplexArray, first: ComplexArray, second: ComplexArray, offs
     return result
 
 
-EDGES = 5.0
-"""Change of an infinite slab's reaction by the edges, in units of the source's share beyond them: in 82 comparisons
-with finite elements at most 1.4 at 100 Hz, 1.9 at 5 Hz and, where resistance alone rules in thin plates, 4.5 at 0.5 Hz.
-"""
-ORDER, RULE = 2, MeshRule(reach=4.0)
-LOW = 10.0
-"""Hz, of the floater's slow motions: edges count more there than at the rotor's frequency."""
-DOUBT = 1.5
-"""Against converged elements at iω, changes were 0.75 and 0.81 times the truth at 10 Hz, 1.14 to 1.34 at 110 Hz."""
-EDGE_ERROR = TableKind("edges", float, "Change of an infinite slab's reaction by a plate's edges")
-
-
 def edge_error(plate: Plate, place: Array) -> float:
     """Estimated relative error of an infinite slab's reaction for a plate with edges, at most 1.
 
@@ -320,24 +309,20 @@ def measured_edge_error(plate: Plate, places: Array, frequency: float) -> float:
     field there of dipoles at the others.
     """
     body = plate.box.to_body(places)
-    changes = [_change(plate, body[:1], LOW)]
-    if frequency:
-        changes.append(_change(plate, body, frequency))
+    changes = []
+    for seen, shift in ((body[:1], LOW), *([(body, frequency)] if frequency else [])):
+        with_edges, endless = (
+            solve_shifted(
+                EddySpace(plate_mesh(plate.box.size, plate.conductivity, seen, shift, RULE, without), ORDER),
+                2 * np.pi * shift,
+                unit_dipoles(seen),
+            ).couplings[:3]
+            for without in (False, True)
+        )
+        parts = [part.reshape(3, -1, 3) for part in (with_edges - endless, endless)]
+        missed, sizes = (np.linalg.norm(part, axis=(0, 2)) for part in parts)
+        changes.append(float(np.max(missed / sizes)))
     return DOUBT * max(changes)
-
-
-def _change(plate: Plate, body: Array, frequency: float) -> float:
-    with_edges, endless = (
-        solve_shifted(
-            EddySpace(plate_mesh(plate.box.size, plate.conductivity, body, frequency, RULE, without), ORDER),
-            2 * np.pi * frequency,
-            unit_dipoles(body),
-        ).couplings[:3]
-        for without in (False, True)
-    )
-    parts = [part.reshape(3, -1, 3) for part in (with_edges - endless, endless)]
-    changes, sizes = (np.linalg.norm(part, axis=(0, 2)) for part in parts)
-    return float(np.max(changes / sizes))
 
 
 def cached_edge_error(plate: Plate, places: Array, frequency: float, report: Callable[[str], None]) -> float:

@@ -110,7 +110,7 @@ def solve_currents(
     rtol : relative accuracy of reaction tensors that a table shall have
     rule : mesh; left out, the one that has been found to need the least work for `rtol`
     others : more sources whose currents are held
-    watch : hears of the progress
+    watch : progress callback
 
     Raises
     ------
@@ -184,19 +184,18 @@ def _fitted(space: CurrentSpace, places: Array, images: Array) -> tuple[Array, A
 CURRENTS = TableKind("plate-currents", PlateSolution, "Currents of a plate by finite elements")
 
 
-def cached_solver(report: Callable[[str], None], watch: Watch = unwatched) -> Callable[..., PlateSolution]:
-    """`solve_currents` that looks into the cache first."""
-
-    def solve(
-        plate: Plate,
-        boxes: Sequence[Region],
-        frequencies: tuple[float, float],
-        rtol: float,
-        rule: MeshRule | None = None,
-        others: OtherSources | None = None,
-    ) -> PlateSolution:
-        inputs = plate.box.size, plate.conductivity, tuple(boxes), frequencies, rtol, rule, others
-        make = partial(solve_currents, plate, boxes, frequencies, rtol, rule, others, watch)
-        return CURRENTS.cached(inputs, make, report)[0]
-
-    return solve
+def cached_currents(
+    plate: Plate,
+    boxes: Sequence[Region],
+    frequencies: tuple[float, float],
+    rtol: float,
+    rule: MeshRule | None = None,
+    others: OtherSources | None = None,
+    *,
+    report: Callable[[str], None],
+    watch: Watch = unwatched,
+) -> PlateSolution:
+    """`solve_currents` from the cache if it is there, with callbacks for messages and progress."""
+    inputs = plate.box.size, plate.conductivity, tuple(boxes), frequencies, rtol, rule, others
+    make = partial(solve_currents, plate, boxes, frequencies, rtol, rule, others, watch)
+    return CURRENTS.cached(inputs, make, report)[0]

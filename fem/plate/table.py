@@ -263,7 +263,7 @@ class PlateTable:
         slowest, fastest = 1e3 / self.rates.min(), 1e3 / self.rates.max()
         return "\n".join([
             f"PlateTable of {millimetres(self.size)}, {self.conductivity:.3g} S/m: {len(self.rates)} currents",
-            f"  memory from {fastest:.2g} to {slowest:.3g} ms; {len(self.multipoles.kinds)} multipoles",
+            f"  relaxation in {fastest:.2g} to {slowest:.3g} ms; {len(self.multipoles.kinds)} multipoles",
             f"  relative error {self.errors.total:.1e} up to {self.frequencies[1]:g} Hz",
             f"  from {lower} to {upper} from the plate's centre",
         ])  # fmt: skip

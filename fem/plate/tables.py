@@ -78,8 +78,8 @@ def plate_and_rotor_table(
         6 per cent and the third below 4e-3: then the highest should be twice the rotor's
     rtol : relative accuracy of reaction tensors in the region, and there of the field of the rotor's currents
     rule : mesh (default by `rtol`)
-    solve : finite elements; `cached_solver` has them from the cache
-    watch : hears of the progress
+    solve : finite elements; `cached_currents` has them from the cache
+    watch : progress callback
 
     The finite elements are solved for dipoles in boxes around the region and around the rotor, on a coarse raster, so
     that neighbours of the scene and other models of the rotor need the same ones.  A rotor that these dipoles do not
@@ -159,7 +159,7 @@ def _reduced_table(reduced: Reduction, rtol: float, conductor: str, watch: Watch
 def tabulate(network: PassiveNetwork, rtol: float, watch: Watch = unwatched) -> PlateTable:
     """Field functions of a network as multipoles, whose errors may add up to more than `rtol`: see `PlateErrors.check`.
 
-    `watch` hears of the progress.
+    `watch` is a progress callback.
     """
     start = time.perf_counter()
     watch("field functions", 0.0)
