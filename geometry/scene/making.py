@@ -227,7 +227,7 @@ Table = Mapping[str, Any]
 
 
 def horizontal(*, displacement_mm: float, remanence_T: float, edge_mm: float | None = None, **more: Any) -> Table:
-    """The table `[rotor]` of one cube magnetised along +x and displaced along it from the axis.
+    """One cube magnetised along +x and displaced along it from the axis.
 
     Parameters
     ----------
@@ -236,35 +236,58 @@ def horizontal(*, displacement_mm: float, remanence_T: float, edge_mm: float | N
     remanence_T : float
         Remanence, T.
     edge_mm : float, optional
-        Edge of the cube, mm; left out where `shape` is "sphere" (with diameter_mm) or "cylinder" (and height_mm).
+        Edge of the cubes, mm; left out where `shape` is "sphere" (with diameter_mm) or "cylinder" (and height_mm).
     **more : float or list
         Further keys, as for `magnets`.
+
+    Returns
+    -------
+    dict
+        The table `[rotor]` of a scene file.
     """
     return {"configuration": "horizontal", "displacement_mm": displacement_mm, **_cube(remanence_T, edge_mm), **more}
 
 
 def vertical(*, displacement_mm: float, remanence_T: float, edge_mm: float | None = None, **more: Any) -> Table:
-    """The table `[rotor]` of a cube magnetised along +x and one above it along +z.
+    """A cube magnetised along +x and one above it along +z.
 
     Parameters
     ----------
     displacement_mm : float
         From centre to centre, mm.
-    remanence_T, edge_mm, **more
-        As for `horizontal`, of both cubes.
+    remanence_T : float
+        Remanence, T.
+    edge_mm : float, optional
+        Edge of the cubes, mm; left out where `shape` is "sphere" (with diameter_mm) or "cylinder" (and height_mm).
+    **more : float or list
+        Further keys, as for `magnets`.
+
+    Returns
+    -------
+    dict
+        The table `[rotor]` of a scene file.
     """
     return {"configuration": "vertical", "displacement_mm": displacement_mm, **_cube(remanence_T, edge_mm), **more}
 
 
 def tilt(*, angle_deg: float, remanence_T: float, edge_mm: float | None = None, **more: Any) -> Table:
-    """The table `[rotor]` of one cube, turned with its magnetisation about y.
+    """One cube, turned with its magnetisation about y.
 
     Parameters
     ----------
     angle_deg : float
         The magnetisation is along (cos angle, 0, sin angle), degrees.
-    remanence_T, edge_mm, **more
-        As for `horizontal`.
+    remanence_T : float
+        Remanence, T.
+    edge_mm : float, optional
+        Edge of the cubes, mm; left out where `shape` is "sphere" (with diameter_mm) or "cylinder" (and height_mm).
+    **more : float or list
+        Further keys, as for `magnets`.
+
+    Returns
+    -------
+    dict
+        The table `[rotor]` of a scene file.
     """
     return {"configuration": "tilt", "angle_deg": angle_deg, **_cube(remanence_T, edge_mm), **more}
 
@@ -274,7 +297,7 @@ def _cube(remanence_T: float, edge_mm: float | None) -> Table:
 
 
 def magnets(*bodies: Table, **more: Any) -> Table:
-    """The table `[rotor]` of any set of magnets.
+    """Any set of magnets.
 
     Parameters
     ----------
@@ -288,12 +311,17 @@ def magnets(*bodies: Table, **more: Any) -> Table:
         currents, else left out), coercivity_kA_m (the knee of their demagnetisation curves), field_map, and
         conductors, a list of tables with shape ("cuboid" or "cylinder"), size_mm or diameter_mm and height_mm,
         center_mm, rotation_deg and conductivity_S_m: metal that turns with the rotor.
+
+    Returns
+    -------
+    dict
+        The table `[rotor]` of a scene file.
     """
     return {"magnets": list(bodies), **more}
 
 
 def sphere(*, diameter_mm: float, remanence_T: float, density_kg_m3: float, **more: Any) -> Table:
-    """The table `[floater]` of a sphere.
+    """The floating sphere.
 
     Parameters
     ----------
@@ -305,12 +333,17 @@ def sphere(*, diameter_mm: float, remanence_T: float, density_kg_m3: float, **mo
         Density, kg/m³.
     **more : float
         Further keys: recoil_permeability (1.05), conductivity_S_m (its eddy currents, else left out).
+
+    Returns
+    -------
+    dict
+        The table `[floater]` of a scene file.
     """
     return {"diameter_mm": diameter_mm, "remanence_T": remanence_T, "density_kg_m3": density_kg_m3, **more}
 
 
 def plate(*, size_mm: Sequence[float], center_mm: Sequence[float], conductivity_S_m: float, **more: Any) -> Table:
-    """The table `[plate]` of a conducting plate.
+    """A conducting plate.
 
     Parameters
     ----------
@@ -322,5 +355,10 @@ def plate(*, size_mm: Sequence[float], center_mm: Sequence[float], conductivity_
         Conductivity, S/m.
     **more : list or dict
         Further keys: rotation_deg about x, y, z, and lowering = {start_s, speed_mm_s, distance_mm}.
+
+    Returns
+    -------
+    dict
+        The table `[plate]` of a scene file.
     """
     return {"size_mm": size_mm, "center_mm": center_mm, "conductivity_S_m": conductivity_S_m, **more}
