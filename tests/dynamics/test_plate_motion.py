@@ -100,7 +100,7 @@ def test_equilibrium_with_a_plate_is_a_periodic_motion(shaken, memory):
     assert shaken.currents is not None
     scene = replace(SCENE, plate=replace(PLATE, lowering=None))
     flight = Flight(scene, CUBOID, 0.2, compact=True, memory=memory)
-    flight.values[:] = VALUES
+    flight.values[: len(VALUES)] = VALUES
     flown = integrate(flight, shaken.start, 20 / scene.frequency, currents=shaken.currents[0])
     turns = np.isclose(flown.time * scene.frequency, np.round(flown.time * scene.frequency), atol=1e-7)
     assert turns.sum() == 21
@@ -154,12 +154,12 @@ def test_multipliers_are_the_growth_of_a_kicked_flight(shaken, memory, rates):
     orbit = periodic_orbit(rates, VALUES, 0.0, PlateForce(memory, VALUES), scales.pack(shaken.state))
     modes = floquet_modes(orbit)
     flight = Flight(scene, CUBOID, 0.2, compact=True, memory=memory)
-    integrator, currents = flight.integrator, orbit.plate[0] / VALUES[Parameter.PLATE_SHARE]
-    middle = flight.state(scales.unpack(orbit.states[0]), currents)
+    integrator, currents = flight.part(0).integrator, orbit.plate[0] / VALUES[Parameter.PLATE_SHARE]
+    middle = flight.begin(scales.unpack(orbit.states[0]), 0.2, currents).state
 
     def after_one_turn(state):
         integrator.time, integrator.state[:] = 0.0, state
-        integrator.pars[:] = flight.given(VALUES[None], len(integrator.pars))[:, 0]
+        integrator.pars[:] = flight.values[: len(integrator.pars)]
         integrator.propagate_until(2 * np.pi)
         return integrator.state.copy()
 
