@@ -595,7 +595,7 @@ class Explored:
         taken = 0
         for one in [mine, *mine.children(recursive=True)]:
             with contextlib.suppress(psutil.Error):
-                taken += one.memory_info().rss - one.memory_info().shared
+                taken += one.memory_full_info().pss  # copies of one process share what they do not change
         self.peak = max(self.peak, taken)
         assert taken < self.most, f"{taken / 1e9:.2f} GB"
         assert b"Traceback" not in self.log.read_bytes(), self.log.read_text(errors="replace")[-2000:]
@@ -609,7 +609,7 @@ class Explored:
             self.watched()
             print(f"explore: peak {self.peak / 1e9:.2f} GB, log {self.log.stat().st_size} bytes", file=sys.__stderr__)
             self.process.terminate()
-            assert self.process.wait(30) == 0
+            assert self.process.wait(30) == 0, self.log.read_text(errors="replace")[-1000:]
         finally:
             self.process.kill()
             self.process.wait()

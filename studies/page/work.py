@@ -180,6 +180,8 @@ class Worker:
         elif hear is not None:
             hear(answer)
         self._go_on()
+        if self.patience and not self.busy:  # gives its memory back; another one begins in hundredths of a second
+            self.stop()
 
     def _rest(self) -> Callable[[Any], None] | None:
         if self._limit is not None:
