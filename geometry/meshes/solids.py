@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import logging
 import re
 import tempfile
 from collections.abc import Sequence
@@ -100,6 +101,7 @@ def part_rule(body: Part, order: int) -> tuple[Array, Array]:
 
 @lru_cache(maxsize=8)
 def _rule(brep: str, order: int) -> tuple[Array, Array]:
+    logging.getLogger("spinlev").info("Mesh of a part from a STEP file ...")  # a damaged one takes its whole minute
     *first, last = (share * SMALLEST for share in OTHERWISE)
     for smallest in first:
         with contextlib.suppress(CrashError, MeshError):
