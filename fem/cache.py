@@ -49,6 +49,7 @@ FORMATS = {
 another shape of its file, has the next number, and nothing of the old one is read any more."""
 LIBRARIES = ("heyoka", "netgen-mesher", "ngsolve", "numpy", "scipy")
 """That decide the digits of a table; the others read, write and show."""
+ROOT = Path(__file__).resolve().parents[1]
 FLOORS = ("geometry", "fem", "dynamics", "studies")
 TEXTS = (".py", ".csv")
 OWNER = "in-use.lock"
@@ -68,19 +69,21 @@ def libraries() -> str:
     return " ".join(f"{name} {version(name)}" for name in LIBRARIES)
 
 
-def program_version() -> str:
-    """What tells the numbers of this program from those of any other: its version, its solvers' and its libraries'."""
-    return f"spinlev {version('spinlev')} {FORMATS} {libraries()}"
-
-
 @cache
-def program_digest() -> str:
-    """SHA-256 of this program's text and its libraries' versions: processes that compute together have one."""
-    root = Path(__file__).resolve().parents[1]
+def program_digest(*without: str, root: Path = ROOT) -> str:
+    """SHA-256 of this program's text and its libraries' versions: processes that compute together have one.
+
+    Parameters
+    ----------
+    without : rooms that are left out, as "studies/figures"
+    root : where the floors lie
+    """
     digest = hashlib.sha256(libraries().encode())
     for path in sorted(path for floor in FLOORS for path in (root / floor).rglob("*") if path.suffix in TEXTS):
-        content = path.read_bytes()
-        digest.update(f"{path.relative_to(root).as_posix()} {len(content)}\n".encode() + content)
+        name = path.relative_to(root)
+        if name.parent.as_posix() not in without:
+            content = path.read_bytes()
+            digest.update(f"{name.as_posix()} {len(content)}\n".encode() + content)
     return digest.hexdigest()
 
 

@@ -318,7 +318,7 @@ class Levitation:
         """All equilibria in a table, from the cache if they were searched for before."""
 
         def remembered(search: Callable[[], FixedPoints]) -> FixedPoints:
-            if self.scene.field_map:  # the file can have another content than it had
+            if self.scene.field_map:  # no number in a key stands for how a map is fitted
                 return search()
             found, known = cached_points(self.scene, equations, self.spin, search, note)
             if known:

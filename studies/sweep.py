@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import xarray as xr
 
-from ..fem.cache import program_version
+from ..fem.cache import program_digest
 from ..fem.files import seal, unsealed, write_whole
 from ..geometry.common import ComputationError, InputError
 from .cli.console import note, progress, silence, to_json
@@ -31,6 +31,8 @@ from .study import Point, Study
 if TYPE_CHECKING:
     from distributed import Client, Future
 
+SHOWING = ("studies/catalogue", "studies/cli", "studies/figures", "studies/page")
+"""Rooms whose text does not change a point, but for the file of its own study."""
 TRIES = 3
 """How often a point is begun whose process dies."""
 Compute = Callable[[Point], xr.Dataset]
@@ -383,14 +385,13 @@ def swept(name: str, study: Study, points: Mapping[int, Point], engine: Workers,
 
 
 def _program(study: Study) -> str:
-    """What computes a study's points: this program's solvers, and the text of a user's own file."""
+    """What computes a study's points: the program without the rooms that draw and say, and the study's own file."""
     function = study.compute
     if isinstance(function, partial):  # of a study that is computed as a whole
         (function,) = function.args
     module = sys.modules.get(function.__module__)
     path = Path(getattr(module, "__file__", None) or "")
-    is_own = not function.__module__.startswith("spinlev.") and path.is_file()
-    return f"{program_version()} {hashlib.sha256(path.read_bytes()).hexdigest() if is_own else ''}"
+    return f"{program_digest(*SHOWING)} {hashlib.sha256(path.read_bytes()).hexdigest() if path.is_file() else ''}"
 
 
 def forget(name: str, out: Path) -> None:

@@ -40,7 +40,7 @@ def memory_given_back():
 
 @pytest.fixture
 def memory_given_back_at_once():
-    """After the test: where one test does what is else done by a process of its own."""
+    """After the test: a whole command leaves as much behind as a file of other tests."""
     yield
     give_memory_back()
 

@@ -78,7 +78,7 @@ def check_floater_metal(scene: Scene) -> None:
 def slow_error(scene: Scene) -> float:
     """Relative error, at most 1, of what a conducting floater's currents do to motions: they are taken as slow.
 
-    As for the rotor's metal (`fem.rotor_losses`) the fastest are at twice the rotor's frequency.
+    As for the rotor's metal (`fem.rotor_metal`) the fastest are at twice the rotor's frequency.
     """
     floater = scene.floater
     return min(1.0, (2 * skin_number(floater.radius, floater.conductivity or 0.0, scene.frequency)) ** 2 / 105)

@@ -130,13 +130,14 @@ class Worker:
         """End the process, whatever it is doing, and forget all questions."""
         self._waiting.clear()
         self._rest()
-        if self.process is not None:
+        # First of all: a signal may come in between, and who stops everything then must not find half of it.
+        process, self.process = self.process, None
+        if process is not None:
             self._loop.remove_handler(self._connection.fileno())
             self._connection.close()
-            self.process.kill()
-            self.process.join()
-            self.process.close()
-            self.process = None
+            process.kill()
+            process.join()
+            process.close()
 
     def _go_on(self) -> None:
         if self.busy or not self._waiting:

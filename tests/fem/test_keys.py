@@ -1,5 +1,6 @@
 """Keys: everything that decides a table changes its key, and equal inputs have equal ones in every process."""
 
+import shutil
 import subprocess
 import sys
 from dataclasses import dataclass, field, fields, is_dataclass, replace
@@ -9,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from spinlev.fem.cache import FORMATS, LIBRARIES, key_of, libraries, program_digest, program_version
+from spinlev.fem.cache import FLOORS, FORMATS, LIBRARIES, ROOT, key_of, libraries, program_digest
 from spinlev.fem.harmonics.expansion import MultipoleExpansion
 from spinlev.fem.plate.currents import OtherSources
 from spinlev.fem.plate.rotor_share import posed_rotor, rotor_parts
@@ -164,11 +165,21 @@ def test_the_solvers_number_and_the_libraries_are_in_the_key(monkeypatch):
     assert len({before, other, rotor_key(rotor, "fem", 1e-5)}) == 3
 
 
-def test_points_are_kept_over_a_typo_and_not_over_another_solver(monkeypatch):
-    """What processes compare is the whole text; what finished points are of are the numbers of the solvers."""
-    before = program_version()
-    assert before == program_version()
-    assert libraries() in before
-    assert len(program_digest()) == 64
-    monkeypatch.setitem(FORMATS, "rotor", FORMATS["rotor"] + 1)
-    assert program_version() != before
+def test_a_program_is_its_text_but_for_the_rooms_left_out(tmp_path):
+    """What processes compare is all of it; finished points are of what computes, and outlive a label's typo."""
+    for floor in FLOORS:
+        ignored = shutil.ignore_patterns("__pycache__")
+        shutil.copytree(ROOT / floor, tmp_path / floor, ignore=ignored)
+    figures, motion = tmp_path / "studies/figures/style.py", tmp_path / "dynamics/motion/equations.py"
+
+    def digests():
+        program_digest.cache_clear()
+        return program_digest(root=tmp_path), program_digest("studies/figures", root=tmp_path)
+
+    whole, computing = digests()
+    assert (whole, whole != computing) == (program_digest(), True)
+    figures.write_text(figures.read_text() + "# a typo\n")
+    assert digests()[0] != whole
+    assert digests()[1] == computing
+    motion.write_text(motion.read_text() + "# other physics\n")
+    assert digests()[1] != computing

@@ -1,5 +1,7 @@
 """Broken inputs: no traceback, no hang, no partial file; thousands of them in `make fuzz`."""
 
+import ast
+import re
 import subprocess
 import sys
 
@@ -16,6 +18,9 @@ def test_broken_inputs(kind):
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stdout + done.stderr
     assert done.stdout.rstrip().endswith("0 faults")
+    counts = ast.literal_eval(re.search(r"\{.*?\}", done.stdout)[0])
+    assert sum(counts.values()) == number
+    assert counts[2] > number // 6
 
 
 @pytest.mark.parametrize(

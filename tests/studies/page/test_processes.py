@@ -7,6 +7,8 @@ import subprocess
 import sys
 import time
 
+import pytest
+
 from spinlev.studies.page.work import Worker
 
 
@@ -51,6 +53,45 @@ def test_a_task_that_fails_is_said_and_the_process_goes_on():
     assert said.startswith("The computation failed: TypeError: must be real number")
     assert worker.process.is_alive()
     worker.process.kill()
+
+
+def test_a_stop_that_is_interrupted_may_be_repeated():
+    """As by SIGTERM while an idle process is ended: the server then ends all of them, this one too."""
+
+    async def listen():
+        worker = Worker(Turns(), "The work", 60.0, print)
+        worker.ask("", lambda: (math.sqrt, 4), print)
+        close = worker._connection.close  # where the signal comes
+
+        def struck():
+            close()
+            raise KeyboardInterrupt
+
+        worker._connection.close = struck
+        process = worker.process
+        with pytest.raises(KeyboardInterrupt):
+            worker.stop()
+        worker.stop()
+        return process
+
+    process = asyncio.run(listen())
+    process.kill()
+    process.join()
+
+
+def test_idle_processes_of_work_that_is_not_in_a_hurry_end():
+    async def listen():
+        said = []
+        workers = [Worker(Turns(), "The work", 60.0, said.append, patience) for patience in (0, 10)]
+        for worker in workers:
+            worker.ask("", lambda: (math.sqrt, 4), said.append)
+        while len(said) < 2 or any(worker.busy for worker in workers):
+            await asyncio.sleep(0.01)
+        kept = [worker.process is not None for worker in workers]
+        workers[0].stop()
+        return kept
+
+    assert asyncio.run(asyncio.wait_for(listen(), 60)) == [True, False]
 
 
 def test_a_process_that_is_ended_from_outside_is_said():
