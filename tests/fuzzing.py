@@ -53,7 +53,7 @@ from spinlev.studies.page.state import first_state
 
 SCENES = sorted(places.SCENES.glob("*.toml"))
 LONGEST = 60
-"""Seconds after which an input counts as a hang; of a scene, seconds of silence."""
+"""Seconds of silence after which an input counts as a hang."""
 MOST = 2_000_000_000
 """Bytes of memory that a scene may take."""
 TOLD = 100
@@ -286,9 +286,17 @@ def unusual(path: Path, content: bytes, chance: random.Random) -> None:
         )
 
 
+class Heard(io.StringIO):
+    """What a command says; whoever says something has another minute."""
+
+    def write(self, text: str) -> int:
+        signal.alarm(LONGEST)
+        return super().write(text)
+
+
 def answered(arguments: list[str]) -> int:
     """The exit status of the command line, in this process; a traceback or a silent failure is an error here."""
-    said, answer = io.StringIO(), io.StringIO()
+    said, answer = Heard(), io.StringIO()
     with contextlib.redirect_stderr(said):
         status = cli._status(arguments, answer)
     assert status in (0, 1, 2), status
