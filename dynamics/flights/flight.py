@@ -47,7 +47,7 @@ from .trajectory import DURATION, STOPPED, FieldChanges, FlightStopped, Recorder
 LEFT = "left"
 TOLERANCE = 1e-16
 """Of a Taylor step. Measured over 1300 turns: J drifts by 3e-13 at 1e-15, by 1e-14 at 1e-16 with 1 % more steps."""
-PLATE_TOLERANCE = 1e-13
+PLATE_TOLERANCE = 1e-12
 """Of a Taylor step with a plate, whose table is known to 1e-4 at best."""
 LOOSER = 300
 """A step's error is relative to the largest of states and events: 250 and more by the event of loss, 3 in a ball.
@@ -139,7 +139,7 @@ class Flight:
                 np.zeros(len(equations.variables) + 1),
                 tol=self._tolerance * (LOOSER if degree else 1),
                 compact_mode=not self._straight or (self.balls is not None and degree != SMALL.degree),
-                opt_level=OPTIMISATION if self._turns > SHORT_TURNS else 0,
+                opt_level=OPTIMISATION if self.memory or self._turns > SHORT_TURNS else 0,
                 t_events=[hy.t_event(each, direction=falling) for each, _ in events],
             )
             terms, given = list(equations.jacobi), list(equations.variables)

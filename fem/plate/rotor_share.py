@@ -47,7 +47,7 @@ TOGETHER = 12
 """Places whose signals are computed at once."""
 NOISE = 1e-10
 """Amplitudes below this share of the largest signal are what symmetry forbids."""
-MISSED = 0.2
+MISSED = 0.3
 """Share of a table's tolerance for the harmonics left out."""
 POINTS, DEPTHS = (3, 3, 3), 7
 """Places in the region, and depths of a plate that is lowered, where the field of the rotor's currents is looked at."""

@@ -18,7 +18,6 @@ PALETTE = ["#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9"]
 STYLE: Any = {
     "font.size": 8,
     "axes.titlesize": 8.5,
-    "axes.titleweight": "bold",
     "axes.titlelocation": "left",
     "axes.spines.top": False,
     "axes.spines.right": False,
@@ -90,10 +89,13 @@ def legend_below(figure: Figure, *labelled: Any, columns: int = 6) -> None:
 
 def save_figures(figures: Mapping[str, Figure], out: Path) -> list[str]:
     """Write each figure as PNG and PDF; returns the files."""
-    files = [out / f"{name}.{kind}" for name in figures for kind in ("png", "pdf")]
-    for file in files:
-        save_figure(figures[file.stem], file)
-    return [str(file) for file in files]
+    files = []
+    for name, figure in figures.items():
+        for kind in ("png", "pdf"):
+            save_figure(figure, out / f"{name}.{kind}")
+            figure.set_layout_engine("none")  # the places found for the first format are those of the second
+            files.append(str(out / f"{name}.{kind}"))
+    return files
 
 
 def save_figure(figure: Figure, path: Path) -> None:
