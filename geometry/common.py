@@ -11,10 +11,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 Array = NDArray[np.float64]
-MU_0 = 4e-7 * math.pi
-"""Vacuum permeability, T m/A (the value before 2019; the relative difference is 5e-10)."""
-MAGNET_CONDUCTIVITY = 6.7e5
-"""Electrical conductivity of sintered NdFeB, S/m; makers give 6.2e5 to 9e5."""
+MU_0 = 4e-7 * math.pi  # Vacuum permeability, T m/A (the value before 2019; the relative difference is 5e-10)
+MAGNET_CONDUCTIVITY = 6.7e5  # Electrical conductivity of sintered NdFeB, S/m; makers give 6.2e5 to 9e5
 
 
 def frozen_array(values: ArrayLike, shape: tuple[int, ...]) -> Array:
@@ -101,8 +99,7 @@ def html_table(title: str, rows: Mapping[str, str]) -> str:
     return f"<table><caption>{escape(title)}</caption>{lines}</table>"
 
 
-Watch = Callable[[str, float], None]
-"""Takes the name of a stage and the share of it that is done."""
+Watch = Callable[[str, float], None]  # Takes the name of a stage and the share of it that is done
 Item = TypeVar("Item")
 
 

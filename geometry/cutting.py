@@ -11,12 +11,9 @@ from .magnets import Magnet
 from .shapes import Box
 from .solids import Solid
 
-CONVERGENCE = 1.3
-"""Least distance of a point from a piece's centre, in circumradii of the piece."""
-MOST = 300
-"""Pieces of a body."""
-SAMPLES = 12
-"""Places along each edge of a cell at which it is looked at."""
+CONVERGENCE = 1.3  # Least distance of a point from a piece's centre, in circumradii of the piece
+MOST = 300  # Pieces of a body
+SAMPLES = 12  # Places along each edge of a cell at which it is looked at
 MARGIN = 1.0 + 1e-6
 
 
@@ -64,21 +61,14 @@ def _cut_further(counts: Array, half: Array, body: Solid, nearest: float) -> Non
 
 @dataclass(frozen=True, eq=False)
 class Cells:
-    """Parts of a body by which of the equal boxes within the box about it they lie in.
+    """Parts of a body by which of the equal boxes within the box about it they lie in."""
 
-    Parameters
-    ----------
-    body : the body
-    counts : number of boxes along each body axis
-    centers, radii : (n, 3) m and (n,) m of spheres that hold the parts, rotor's frame
-    numbers : (counts) which part lies in a box; -1: none
-    """
-
-    body: Solid
-    counts: tuple[int, int, int]
+    body: Solid  # the body
+    counts: tuple[int, int, int]  # number of boxes along each body axis
+    # centers, radii: (n, 3) m and (n,) m of spheres that hold the parts, rotor's frame
     centers: Array
     radii: Array
-    numbers: NDArray[np.intp]
+    numbers: NDArray[np.intp]  # (counts) which part lies in a box; -1: none
 
     def which(self, points: Array) -> NDArray[np.intp]:
         """Number of the part (n,) to which points (n, 3) m of the body belong, the nearest where there is none."""

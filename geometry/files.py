@@ -18,6 +18,7 @@ from typing import Any, BinaryIO, ParamSpec, TypeVar
 from .common import ComputationError, InputError, printable, shown
 
 MEGA = 1_000_000
+# What is no file of a disk.
 KINDS = {
     stat.S_IFDIR: "a folder",
     stat.S_IFIFO: "a pipe",
@@ -25,13 +26,9 @@ KINDS = {
     stat.S_IFCHR: "a device",
     stat.S_IFBLK: "a device",
 }
-"""What is no file of a disk."""
-LONGEST = 300
-"""Characters of a file's name in a message."""
-MEMORY = 2_000_000_000
-"""Bytes of address space of another process; the libraries alone take a third of it."""
-SLOWER = 4.0
-"""How much longer by the clock than by the processor a call may take: the machine has others to serve."""
+LONGEST = 300  # Characters of a file's name in a message
+MEMORY = 2_000_000_000  # Bytes of address space of another process; the libraries alone take a third of it
+SLOWER = 4.0  # How much longer by the clock than by the processor a call may take: the machine has others to serve
 LAUNCH = "from spinlev.geometry.files import _serve; _serve()"
 
 Given = ParamSpec("Given")

@@ -13,12 +13,10 @@ from .magnets import Magnet
 from .shapes import Box, Ring, Sphere, rotation_matrix
 from .solids import Part, Solid, moved
 
+# Bodies that overlap by less than this (m) only touch: it is far above round-off and far below any tolerance.
 TOUCHING = 1e-9
-"""Bodies that overlap by less than this (m) only touch: it is far above round-off and far below any tolerance."""
-ROUNDS = 5
-"""Of searches for the widest gap."""
-NARROW = 2e-3
-"""Gaps below this part of the smallest edge are closed for the mesh."""
+ROUNDS = 5  # Of searches for the widest gap
+NARROW = 2e-3  # Gaps below this part of the smallest edge are closed for the mesh
 
 
 def separation(first: Solid, second: Solid) -> tuple[float, Array]:

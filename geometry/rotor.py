@@ -61,16 +61,10 @@ def tilt(
 
 @dataclass(frozen=True, eq=False)
 class Conductor:
-    """A non-magnetic piece of metal that turns with the rotor.
+    """A non-magnetic piece of metal that turns with the rotor."""
 
-    Parameters
-    ----------
-    body : shape and pose in the rotor's frame
-    conductivity : S/m
-    """
-
-    body: Solid
-    conductivity: float
+    body: Solid  # shape and pose in the rotor's frame
+    conductivity: float  # S/m
 
     def __repr__(self) -> str:
         place = f"{self.body.described_size} at {millimetres(self.body.center)}"

@@ -10,10 +10,8 @@ from numpy.typing import ArrayLike
 
 from .common import Array, frozen_array, millimetres
 
-ROUND_OFF = 4e-16
-"""Of the entries of a rotation."""
-INSIDE = 1 - 1e-9
-"""Just inside of a surface, in radii."""
+ROUND_OFF = 4e-16  # Of the entries of a rotation
+INSIDE = 1 - 1e-9  # Just inside of a surface, in radii
 
 
 def rotation_matrix(degrees_xyz: ArrayLike) -> Array:

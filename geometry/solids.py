@@ -13,21 +13,17 @@ from numpy.typing import ArrayLike
 from .common import Array, frozen_array, millimetres
 from .shapes import Body, Box, Cylinder, Ring, Sphere
 
-CHUNK = 100_000
-"""Points times triangles at once."""
+CHUNK = 100_000  # Points times triangles at once
+# Cosine between the normals of triangles from which on their common side is no edge.
 SMOOTH = float(np.cos(np.radians(30.0)))
-"""Cosine between the normals of triangles from which on their common side is no edge."""
-SAME, EDGES = 1e-7, 64
-"""Of the size: distance of corners that are one; edges at once."""
-FACES = 100
-"""Normals of so many faces are enough to find the one along which another body touches it."""
-HALVINGS, ENOUGH = 50, 1e-13
-"""Steps to a place off a body at most, and how exactly by its distance it is found."""
+SAME, EDGES = 1e-7, 64  # Of the size: distance of corners that are one; edges at once
+FACES = 100  # Normals of so many faces are enough to find the one along which another body touches it
+HALVINGS, ENOUGH = 50, 1e-13  # Steps to a place off a body at most, and how exactly by its distance it is found
+# Distance of corners from the surface in sizes of the part, and relative difference of volumes and areas.
 SAME_SHAPE = 1e-9
-"""Distance of corners from the surface in sizes of the part, and relative difference of volumes and areas."""
+# Sine of an angle between directions that are one; entries of axes that are round-off of a file; flat faces that may be
+# the end of a cylinder.
 ALONG, STRAIGHT, KNOWN_FACES = 1e-6, 1e-9, 40
-"""Sine of an angle between directions that are one; entries of axes that are round-off of a file; flat faces that may
-be the end of a cylinder."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -182,8 +178,7 @@ def _plane(a: Array, b: Array, c: Array) -> Array:
     return np.where(over, np.abs(height), np.inf)
 
 
-Solid = Box | Cylinder | Part | Ring | Sphere
-"""A body's shape and pose."""
+Solid = Box | Cylinder | Part | Ring | Sphere  # A body's shape and pose
 
 
 def places_off(body: Solid, directions: Array, distance: float) -> Array:

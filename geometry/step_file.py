@@ -16,24 +16,19 @@ from .files import LostError, call_apart, file_content
 from .solids import Part
 
 MILLI = 1e-3
-MOST = 50_000_000
-"""Bytes of a STEP file."""
+MOST = 50_000_000  # Bytes of a STEP file
+# Seconds of processor time for a small file, which takes a fraction of one; bytes for each second more.
 LONGEST, PACE = 8.0, 1e6
-"""Seconds of processor time for a small file, which takes a fraction of one; bytes for each second more."""
-SMALLEST, LARGEST = 1e-3, 1e5
-"""Edges of the box about a solid, mm."""
-FLAT = 1e-12
-"""Area of a triangle, in the largest one's, below which it has none."""
+SMALLEST, LARGEST = 1e-3, 1e5  # Edges of the box about a solid, mm
+FLAT = 1e-12  # Area of a triangle, in the largest one's, below which it has none
+# What a closed surface may miss of being one, in its area; triangles in it of its volume, on thin walls.
 CLOSED, NEARLY_ROUND = 1e-3, 0.1
-"""What a closed surface may miss of being one, in its area; triangles in it of its volume, on thin walls."""
-ALONG_EDGES = 20_000
-"""Places on the edges of a solid at which its box is looked for."""
-POINT = 1e-6
-"""Length of an edge below which it is a point, mm."""
+ALONG_EDGES = 20_000  # Places on the edges of a solid at which its box is looked for
+POINT = 1e-6  # Length of an edge below which it is a point, mm
+# Of its size: what OpenCASCADE's box may exceed those places by; on splines it is that of their control points.
 LOOSE = 1e-3
-"""Of its size: what OpenCASCADE's box may exceed those places by; on splines it is that of their control points."""
+# Elements in a radius of curvature, their degree, places along their sides: together 1e-4 of the radius.
 FINE, CURVED, ACROSS = 1.0, 6, 32
-"""Elements in a radius of curvature, their degree, places along their sides: together 1e-4 of the radius."""
 ENTITY = re.compile(
     r"#(\d+)\s*=\s*(SHAPE_DEFINITION_REPRESENTATION|PRODUCT_DEFINITION_SHAPE|NEXT_ASSEMBLY_USAGE_OCCURRENCE)"
     r"\s*\(((?:'[^']*'|[^';])*)\)\s*;"

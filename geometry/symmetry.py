@@ -15,27 +15,19 @@ from .magnets import Magnet
 from .shapes import Box, Sphere
 from .solids import Part, Solid, moved
 
-SAME_PLACE = 1e-9
-"""Positions that differ by less than this part of the bodies' size are the same."""
+SAME_PLACE = 1e-9  # Positions that differ by less than this part of the bodies' size are the same
+# A plane in a gap is left out if corners lie nearer to it than this part of the shortest edge: elements at the plane
+# would be larger than their distance from the edges, whose singularity is resolved only where elements touch them.
 NARROW_SIDE = 0.04
-"""A plane in a gap is left out if corners lie nearer to it than this part of the shortest edge: elements at the plane
-would be larger than their distance from the edges, whose singularity is resolved only where elements touch them."""
 
 
 @dataclass(frozen=True, eq=False)
 class Symmetry:
-    """Mirror planes through one centre.
+    """Mirror planes through one centre."""
 
-    Parameters
-    ----------
-    center : (3,) m
-    axes : (3, 3) matrix whose columns are the axes of the mirrors' frame
-    planes : which of the planes across those axes mirror the bodies onto themselves
-    """
-
-    center: Array
-    axes: Array
-    planes: tuple[int, ...]
+    center: Array  # (3,) m
+    axes: Array  # (3, 3) matrix whose columns are the axes of the mirrors' frame
+    planes: tuple[int, ...]  # which of the planes across those axes mirror the bodies onto themselves
 
     def to_frame(self, magnet: Magnet) -> Magnet:
         """The magnet as seen in the mirrors' frame: planes are coordinate planes through the origin."""

@@ -16,10 +16,10 @@ from ..motion.equations import parameters
 from ..motion.rates import Rates
 from ..motion.state import Parameter, Scales
 
+# Parameter -> values of the runtime parameters, with the drag along the moment left out, and body spin s.
 Problem = Callable[[float], tuple[Array, float]]
-"""Parameter -> values of the runtime parameters, with the drag along the moment left out, and body spin s."""
+# Kinds of marked points beside `FOLD`; `REAL` is a real eigenvalue through zero away from a fold: branches cross.
 OSCILLATORY, REAL = "oscillatory", "real"
-"""Kinds of marked points beside `FOLD`; `REAL` is a real eigenvalue through zero away from a fold: branches cross."""
 
 
 def scenes(make: Callable[[float], Scene], spin: float = 0.0) -> Problem:

@@ -30,40 +30,29 @@ from ..motion.rates import Rates
 from ..motion.state import Parameter, Scales
 from .branch import BranchPoint, Family, follow_branch, frequencies
 
-UNIT = 50.0
-"""Hz over which the equilibrium moves by about a radius of the floater."""
-SLOWEST = 10.0
-"""Branches are followed down to this frequency, Hz: all of the article's rotors have their fold above it."""
-REACH = (8e-3, 0.15)
-"""Distances on the axis between which the attraction is looked at, m."""
-LOWEST, HIGHEST = 25.0, 400.0
-"""Frequencies between which is looked for ranges of stability, Hz."""
+UNIT = 50.0  # Hz over which the equilibrium moves by about a radius of the floater
+SLOWEST = 10.0  # Branches are followed down to this frequency, Hz: all of the article's rotors have their fold above it
+REACH = (8e-3, 0.15)  # Distances on the axis between which the attraction is looked at, m
+LOWEST, HIGHEST = 25.0, 400.0  # Frequencies between which is looked for ranges of stability, Hz
+# Ends of a range beside those that `follow_branch` marks: the floater touches the rotor; nobody looked beyond.
 CONTACT, BORDER = "contact", "border"
-"""Ends of a range beside those that `follow_branch` marks: the floater touches the rotor; nobody looked beyond."""
+# Growth that counts as stable, 1/s: more than what the error of finite elements makes of undamped motion.
 TOLERATED = 0.02
-"""Growth that counts as stable, 1/s: more than what the error of finite elements makes of undamped motion."""
+# Along a branch, and along one that is known from one that is near.
 STEPS, LONG_STEPS = Steps(longest=0.1, turn=0.15), Steps(longest=0.4, turn=0.3)
-"""Along a branch, and along one that is known from one that is near."""
-WIDEST = 2.0
-"""Ratio of frequencies, up and down, within which one that works is looked for."""
-FREQUENCIES = 81
-"""That are looked at there, 1.7 % apart."""
-INSIDE = 0.05
-"""How far inside a window of frequencies the one that is named lies, as a part of the window."""
+WIDEST = 2.0  # Ratio of frequencies, up and down, within which one that works is looked for
+FREQUENCIES = 81  # That are looked at there, 1.7 % apart
+INSIDE = 0.05  # How far inside a window of frequencies the one that is named lies, as a part of the window
 
 
 @dataclass(frozen=True, eq=False)
 class Branch:
-    """The two sides of a rotor's levitating branch.
+    """The two sides of a rotor's levitating branch."""
 
-    Parameters
-    ----------
-    scene, rates : of which the frequency is left open
-    far, near : its points, by growing frequency; both begin at the fold
-    """
-
+    # scene, rates: of which the frequency is left open
     scene: Scene
     rates: Rates
+    # far, near: its points, by growing frequency; both begin at the fold
     far: tuple[BranchPoint, ...]
     near: tuple[BranchPoint, ...]
 
@@ -155,17 +144,12 @@ def distance_error(scene: Scene, table: FieldTable, family: Family, point: Branc
 
 @dataclass(frozen=True, eq=False)
 class StableRange:
-    """An interval of frequencies in which an equilibrium is stable.
+    """An interval of frequencies in which an equilibrium is stable."""
 
-    Parameters
-    ----------
-    low, high : the equilibria at its ends; `kind` says what is there
-    points : the equilibria between them, by ascending frequency
-    """
-
+    # low, high: the equilibria at its ends; `kind` says what is there
     low: BranchPoint
     high: BranchPoint
-    points: tuple[BranchPoint, ...]
+    points: tuple[BranchPoint, ...]  # the equilibria between them, by ascending frequency
 
     def near(self, frequency: float) -> BranchPoint:
         """The point that is nearest in frequency."""

@@ -28,15 +28,12 @@ from .branch import BranchPoint, Family, follow_branch, spins
 from .frequencies import BORDER, HIGHEST, LONG_STEPS, LOWEST, at_frequency, by_frequency
 
 BALANCE, DURATION, INSTABILITY, CONTACT = "balance", "duration", "instability", "contact"
-SETTLED = 1e-3
-"""A balance is reached where ds/dt has fallen to this part of what it was at the start."""
-E_FOLDS = 7.0
-"""Growth after which a disturbance has ended the flight, unless it is given: from 3 µm to 3 mm."""
+SETTLED = 1e-3  # A balance is reached where ds/dt has fallen to this part of what it was at the start
+E_FOLDS = 7.0  # Growth after which a disturbance has ended the flight, unless it is given: from 3 µm to 3 mm
 SAMPLES = 400
-ESCAPE = 3.40922
-"""Where the solution of y'' = t + y² that comes from y = -√(-t) becomes infinite; found numerically."""
+ESCAPE = 3.40922  # Where the solution of y'' = t + y² that comes from y = -√(-t) becomes infinite; found numerically
+# Frequencies along the branch at which flights are tried first: what lasts only between two of them is missed.
 POINTS = 16
-"""Frequencies along the branch at which flights are tried first: what lasts only between two of them is missed."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,19 +54,12 @@ class SlowTorque:
     The field's gradient adds to κ as in `effects.floater_currents`, which is compiled and evaluated here: that of a
     dipole at distance d, which turns across its way, (12/7) (R/d)² of it on a small θ, 8 % at 30 mm.  A plating of
     copper and nickel, t thick, adds 5 σ't/(σR) to 1: a half for 5 µm of each of Ni, Cu and Ni.
-
-    Parameters
-    ----------
-    rates : compiled equations
-    values : their parameters, all slow torques included
-    radius : of the floater, m
-    beyond_stokes : whether drag goes beyond Stokes' here, as it does not in the compiled equations
     """
 
-    rates: Rates
-    values: Array
-    radius: float
-    beyond_stokes: bool
+    rates: Rates  # compiled equations
+    values: Array  # their parameters, all slow torques included
+    radius: float  # of the floater, m
+    beyond_stokes: bool  # whether drag goes beyond Stokes' here, as it does not in the compiled equations
 
     @classmethod
     def of(cls, scene: Scene, rates: Rates, stokes: bool = False) -> Self:
@@ -257,19 +247,13 @@ def drift(
 
 @dataclass(frozen=True)
 class Lasting:
-    """The lowest interval of frequencies in which averaged flights last.
+    """The lowest interval of frequencies in which averaged flights last."""
 
-    Parameters
-    ----------
-    low, high : Hz; NaN where none lasts
-    ended_by : what ends flights above `high`, see `Drift`; or "border" of what was looked at; "" without one
-    growth_per_s : largest growth of a small motion during the flight at `high`
-    """
-
+    # low, high: Hz; NaN where none lasts
     low: float = np.nan
     high: float = np.nan
-    ended_by: str = ""
-    growth_per_s: float = np.nan
+    ended_by: str = ""  # what ends flights above `high`, see `Drift`; or "border" of what was looked at; "" without one
+    growth_per_s: float = np.nan  # largest growth of a small motion during the flight at `high`
 
 
 def lasting_frequencies(

@@ -17,8 +17,7 @@ from ..motion.rates import Rates
 from ..motion.state import Parameter
 
 Indices = NDArray[np.intp]
-LATERAL: Indices = np.array([0, 1, 3, 4])
-"""The four balances but the axial force, and the four unknowns but the height."""
+LATERAL: Indices = np.array([0, 1, 3, 4])  # The four balances but the axial force, and the four unknowns but the height
 EVERY: Indices = np.arange(5)
 AXIAL = 2
 CONVERGED_STEP = 1e-8  # of Newton's method, in floater radii or rad: squared, it leaves round-off
@@ -28,20 +27,13 @@ CLOSE = 1e-6  # steps from which on effects are known well enough from where the
 
 @dataclass(frozen=True, eq=False)
 class Balance:
-    """Five balances as functions of five unknowns, all in scaled units, at many points in one call.
+    """Five balances as functions of five unknowns, all in scaled units, at many points in one call."""
 
-    Parameters
-    ----------
-    rates : compiled rates and their derivatives
-    values : their parameters, with the drag along the moment left out: (p,), or (n, p) where every point has its own
-    spin : body spin s = Ω·m̂/ω, of all points or (n,)
-    top : beside a rotor at rest, where s means nothing, the spin about the moment itself
-    """
-
-    rates: Rates
+    rates: Rates  # compiled rates and their derivatives
+    # their parameters, with the drag along the moment left out: (p,), or (n, p) where every point has its own
     values: Array
-    spin: float | Array
-    top: float = 0.0
+    spin: float | Array  # body spin s = Ω·m̂/ω, of all points or (n,)
+    top: float = 0.0  # beside a rotor at rest, where s means nothing, the spin about the moment itself
 
     def at(self, rows: NDArray[Any]) -> Self:
         """The balance of some of the points only."""

@@ -18,35 +18,26 @@ from ...geometry.scene.contents import Scene
 from .balance import AXIAL, CONVERGED_STEP, DUPLICATE_DISTANCE, EVERY, LATERAL, Balance, Indices, solve
 from .path import AtRest, Steps, whole_curves
 
-THINNED = 8
-"""One of so many starts is tried in the whole balance too where there is a rough one."""
+THINNED = 8  # One of so many starts is tried in the whole balance too where there is a rough one
+# One of so many starts is tried for what lies on none of the curves: a test of 90 scenes finds no such equilibrium.
 SPARE = 3
-"""One of so many starts is tried for what lies on none of the curves: a test of 90 scenes finds no such equilibrium."""
+# Of Newton's method from the starts; none of those that have not met by then was seen to meet in twice as many.
 ITERATIONS = 30
-"""Of Newton's method from the starts; none of those that have not met by then was seen to meet in twice as many."""
+# Steps after which the starts are thinned: within a cell of such an edge (radii, and of the moment), which grows by
+# that factor each time, one is kept, and those that are as far outside the range, in radii, are left out; a test
+# compares what is found with what all find.
 STEPS_TOGETHER, CELL, COARSER, AWAY = 3, 0.1, 1.3, 1.0
-"""Steps after which the starts are thinned: within a cell of such an edge (radii, and of the moment), which grows by
-that factor each time, one is kept, and those that are as far outside the range, in radii, are left out; a test compares
-what is found with what all find."""
 STEPS = Steps(longest=0.1, shortest=1e-6, turn=0.15, most=5000, first=1 / 4, far=3.0)
-FARTHEST = 0.1
-"""Largest depth at which equilibria are looked for, and distance from the axis, m."""
-TOGETHER = 8
-"""Curves that are followed at once."""
+FARTHEST = 0.1  # Largest depth at which equilibria are looked for, and distance from the axis, m
+TOGETHER = 8  # Curves that are followed at once
 
 
 @dataclass(frozen=True, eq=False)
 class SearchRange:
-    """Positions below the rotor, from contact with it to `farthest`, in floater radii.
+    """Positions below the rotor, from contact with it to `farthest`, in floater radii."""
 
-    Parameters
-    ----------
-    scene : its rotor and floater
-    farthest : largest depth, and distance from the axis, m
-    """
-
-    scene: Scene
-    farthest: float = FARTHEST
+    scene: Scene  # its rotor and floater
+    farthest: float = FARTHEST  # largest depth, and distance from the axis, m
 
     @property
     def bound(self) -> float:
@@ -170,22 +161,13 @@ def from_starts(
 
 @dataclass(frozen=True, eq=False)
 class Curve:
-    """Points of one curve of lateral balance, in scaled units.
+    """Points of one curve of lateral balance, in scaled units."""
 
-    Parameters
-    ----------
-    arc : (n,) length along the curve
-    points : (n, 6) positions and moments
-    tangents : (n, 6) unit directions of the curve
-    force : (n,) axial force that is left over, gravity included
-    slope : (n,) its derivative along the curve
-    """
-
-    arc: Array
-    points: Array
-    tangents: Array
-    force: Array
-    slope: Array
+    arc: Array  # (n,) length along the curve
+    points: Array  # (n, 6) positions and moments
+    tangents: Array  # (n, 6) unit directions of the curve
+    force: Array  # (n,) axial force that is left over, gravity included
+    slope: Array  # (n,) its derivative along the curve
 
     def passes(self, point: Array) -> bool:
         """Whether the curve goes through a point (6,), judged by cubic interpolation at the point's own height."""

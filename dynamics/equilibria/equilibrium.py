@@ -12,14 +12,12 @@ from ..motion.state import State
 from .modes import Mode
 from .orbits import resampled
 
-INSTANTS = 129
-"""Of a turn, at which quantities in the laboratory are looked at; odd."""
-UPRIGHT = 1e-9
-"""Part of the moment across the axis that is round-off."""
+INSTANTS = 129  # Of a turn, at which quantities in the laboratory are looked at; odd
+UPRIGHT = 1e-9  # Part of the moment across the axis that is round-off
 IN_PLATE, IN_ROTOR = "in the plate", "in the rotor"
+# Why a solution is no equilibrium of a scene: the floater would overlap a body; with growing response of the plate it
+# meets another and both cease to be; it could not be computed; the plate's field functions are not known there.
 FOLD, NOT_CONVERGED, PAST_TABLE = "fold", "not converged", "past the plate's table"
-"""Why a solution is no equilibrium of a scene: the floater would overlap a body; with growing response of the plate it
-meets another and both cease to be; it could not be computed; the plate's field functions are not known there."""
 
 
 class EquilibriumError(ComputationError):
@@ -198,18 +196,11 @@ class ForceCurve:
 
 @dataclass(frozen=True, eq=False)
 class LeftOut:
-    """A solution that is no equilibrium of the scene, or is not known to be one.
+    """A solution that is no equilibrium of the scene, or is not known to be one."""
 
-    Parameters
-    ----------
-    known : the solution, or what it would be without the plate
-    why : `IN_PLATE`, `IN_ROTOR`, `FOLD`, `NOT_CONVERGED` or `PAST_TABLE`
-    part : of the plate's response, and of gravity across the axis, up to which it was followed
-    """
-
-    known: Equilibrium
-    why: str
-    part: float = 1.0
+    known: Equilibrium  # the solution, or what it would be without the plate
+    why: str  # `IN_PLATE`, `IN_ROTOR`, `FOLD`, `NOT_CONVERGED` or `PAST_TABLE`
+    part: float = 1.0  # of the plate's response, and of gravity across the axis, up to which it was followed
 
 
 @dataclass(frozen=True, eq=False)

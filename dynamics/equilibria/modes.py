@@ -9,24 +9,17 @@ from numpy.typing import NDArray
 from ...geometry.common import Array
 from .balance import tangent_basis
 
+# The slower and the faster of each kind, in the rotor's frame.
 SIDE, TILT = ("side, backward", "side, forward"), ("precession", "nutation")
-"""The slower and the faster of each kind, in the rotor's frame."""
 
 
 @dataclass(frozen=True, eq=False)
 class Modes:
-    """Modes of an equilibrium, in scaled time.
+    """Modes of an equilibrium, in scaled time."""
 
-    Parameters
-    ----------
-    eigenvalues : (10,) complex, those of the motion that keeps |m̂| = 1 and the body spin
-    errors : (10,) bounds of what round-off does to them
-    shapes : (12, 10) complex, changes of the state, one mode a column
-    """
-
-    eigenvalues: Array
-    errors: Array
-    shapes: Array
+    eigenvalues: Array  # (10,) complex, those of the motion that keeps |m̂| = 1 and the body spin
+    errors: Array  # (10,) bounds of what round-off does to them
+    shapes: Array  # (12, 10) complex, changes of the state, one mode a column
 
     @property
     def growth(self) -> float:
@@ -114,19 +107,13 @@ def tangent_spaces(states: Array) -> tuple[Array, Array]:
 
 @dataclass(frozen=True)
 class Mode:
-    """One mode.
+    """One mode."""
 
-    Parameters
-    ----------
-    name : bounce (along the axis), side (across it; forward or backward of the rotor), precession or nutation (slower
-        and faster turning of the moment)
-    growth_per_s : 1/s; negative where it dies out
-    frequency_hz : in the rotor's frame; 0 where it does not oscillate
-    """
-
+    # bounce (along the axis), side (across it; forward or backward of the rotor), precession or nutation (slower and
+    # faster turning of the moment)
     name: str
-    growth_per_s: float
-    frequency_hz: float
+    growth_per_s: float  # 1/s; negative where it dies out
+    frequency_hz: float  # in the rotor's frame; 0 where it does not oscillate
 
 
 def named_modes(modes: Modes, time: float) -> tuple[Mode, ...]:

@@ -19,31 +19,21 @@ from ..motion.rates import Rates
 from ..motion.state import Parameter, turned_about_z
 from .modes import Modes, left_eigenvectors, tangent_spaces
 
-FEWEST, MOST = 9, 65
-"""Instants in a turn, odd."""
-TAIL = 1e-10
-"""Size of the highest harmonics, in floater radii and rad, below which there are enough instants."""
+FEWEST, MOST = 9, 65  # Instants in a turn, odd
+TAIL = 1e-10  # Size of the highest harmonics, in floater radii and rad, below which there are enough instants
 CONVERGED, LONGEST_STEP = 1e-11, 0.3
+# Steps of Newton's method that are shorter than this, in floater radii and rad, and no longer shrink are round-off.
 ROUNDED = 1e-7
-"""Steps of Newton's method that are shorter than this, in floater radii and rad, and no longer shrink are round-off."""
 
 
 @dataclass(frozen=True, eq=False)
 class Orbit:
-    """One turn of a periodic motion, scaled, along the rotor's axes.
+    """One turn of a periodic motion, scaled, along the rotor's axes."""
 
-    Parameters
-    ----------
-    states : (n, 12) of the floater at n equidistant instants, the first at t = 0
-    plate : (n, k) states of the plate
-    derivatives : (n, 12 + k, 12 + k) of all rates by all states
-    error : estimate, from the highest harmonics and the last step of Newton's method
-    """
-
-    states: Array
-    plate: Array
-    derivatives: Array
-    error: float
+    states: Array  # (n, 12) of the floater at n equidistant instants, the first at t = 0
+    plate: Array  # (n, k) states of the plate
+    derivatives: Array  # (n, 12 + k, 12 + k) of all rates by all states
+    error: float  # estimate, from the highest harmonics and the last step of Newton's method
 
     @property
     def mean(self) -> Array:
@@ -166,8 +156,7 @@ class OrbitProblem:
         return rates, slopes
 
 
-ACCELERATED = np.array([3, 4, 5, 9, 10, 11])
-"""Places of velocity and spin in the state."""
+ACCELERATED = np.array([3, 4, 5, 9, 10, 11])  # Places of velocity and spin in the state
 
 
 def differentiation(count: int) -> Array:
@@ -186,12 +175,10 @@ def resampled(samples: Array, count: int) -> Array:
     return np.fft.irfft(spectrum, count, axis=0)
 
 
+# Steps in a turn, doubled once for the error, and again until it is small: so often at most.
 STEPS, MOST_STEPS = 24, 384
-"""Steps in a turn, doubled once for the error, and again until it is small: so often at most."""
-ENOUGH = 1e-8
-"""Error of the multipliers that is small: 1e-6 /s of growth at 100 Hz."""
-SHARE = 0.1
-"""Of the change by the last doubling, as the error: of a method of order six it is a 63rd."""
+ENOUGH = 1e-8  # Error of the multipliers that is small: 1e-6 /s of growth at 100 Hz
+SHARE = 0.1  # Of the change by the last doubling, as the error: of a method of order six it is a 63rd
 NODES = np.array([0.5 - np.sqrt(15) / 10, 0.5, 0.5 + np.sqrt(15) / 10])
 COLLOCATION = np.array(
     [
@@ -200,8 +187,8 @@ COLLOCATION = np.array(
         [5 / 36 + np.sqrt(15) / 30, 2 / 9 + np.sqrt(15) / 15, 5 / 36],
     ]
 )
+# Gauss's method of order six (E. Hairer and G. Wanner, Solving Ordinary Differential Equations II, 1996, ch. IV.5).
 WEIGHTS = np.array([5, 8, 5]) / 18
-"""Gauss's method of order six (E. Hairer and G. Wanner, Solving Ordinary Differential Equations II, 1996, ch. IV.5)."""
 
 
 def floquet_modes(orbit: Orbit) -> Modes:

@@ -20,17 +20,13 @@ from ...geometry.common import Array
 from .balance import CONVERGED_STEP, EVERY, Balance, Indices, solve, tangent_basis
 
 Truth = NDArray[np.bool_]
-ON, SHORTER, END = 0, 1, 2
-"""What may be said of a step: go on from it, try a shorter one instead, or it is the last."""
-GROWTH = 1.4
-"""Ratio of a step to the one before that succeeded."""
+ON, SHORTER, END = 0, 1, 2  # What may be said of a step: go on from it, try a shorter one instead, or it is the last
+GROWTH = 1.4  # Ratio of a step to the one before that succeeded
 CLOSE = 1e-10  # a correction by which a point is on its curve, in the curve's units
 CORRECTIONS = 8
 ROUNDED = 1e-7  # a correction below which one that has not halved since the one before is round-off
-DIFFERENCE = 1e-5
-"""Step of the central difference by a parameter of a curve, in its units."""
-ONE: Indices = np.zeros(1, int)
-"""The number of a curve that is followed alone."""
+DIFFERENCE = 1e-5  # Step of the central difference by a parameter of a curve, in its units
+ONE: Indices = np.zeros(1, int)  # The number of a curve that is followed alone
 
 
 class Equations(Protocol):
@@ -116,9 +112,9 @@ class Steps:
         return np.asarray(self.longest * np.maximum(1.0, np.linalg.norm(points[:, :3], axis=1) / self.far))
 
 
+# Told which curves (n,) have come to what points (n, k + 1) with what tangents (n, k + 1) by steps (n,), all of which
+# came out well; says of them `ON`, `SHORTER` or `END`: one answer, or one of each.
 Watch = Callable[[Indices, Array, Array, Array], int | NDArray[np.int_]]
-"""Told which curves (n,) have come to what points (n, k + 1) with what tangents (n, k + 1) by steps (n,), all of which
-came out well; says of them `ON`, `SHORTER` or `END`: one answer, or one of each."""
 
 
 def follow(equations: Equations, points: Array, tangents: Array, steps: Steps, watch: Watch) -> None:
@@ -207,8 +203,7 @@ def _solved(slope: Array, row: Array, value: Array, last: float) -> Array:
     return np.asarray(found[..., 0])
 
 
-Traced = tuple[Array, Array]
-"""Points and tangents (n, k + 1) of a curve."""
+Traced = tuple[Array, Array]  # Points and tangents (n, k + 1) of a curve
 
 
 def whole_curves(
@@ -259,10 +254,9 @@ def _joined(ahead: list[Traced], behind: list[Traced]) -> Traced:
     return points, tangents
 
 
-NEWTON_STEPS = 12
-"""Of Newton's method from a problem's equilibrium to that of one nearby."""
+NEWTON_STEPS = 12  # Of Newton's method from a problem's equilibrium to that of one nearby
+# What it finds farther away than this (radii and rad) may be another branch's: then the branch itself is followed.
 NEAR = 0.15
-"""What it finds farther away than this (radii and rad) may be another branch's: then the branch itself is followed."""
 WAY_STEPS = Steps(longest=0.1, shortest=1e-5, turn=0.2, most=300)
 
 

@@ -16,31 +16,22 @@ from .equilibrium import FOLD, IN_PLATE, IN_ROTOR, NOT_CONVERGED, PAST_TABLE, Eq
 from .orbits import Orbit, OrbitProblem, conserved, floquet_modes, periodic_orbit, resampled
 from .path import DIFFERENCE, END, ON, Steps, directions, follow
 
-SMALLEST_STEP = 1 / 64
-"""Of the way from no plate and gravity along the axis to the whole plate and the true gravity."""
-JUMP = 0.5
-"""An orbit that moves farther in one longer step of that way, in floater radii, may be another one."""
+SMALLEST_STEP = 1 / 64  # Of the way from no plate and gravity along the axis to the whole plate and the true gravity
+JUMP = 0.5  # An orbit that moves farther in one longer step of that way, in floater radii, may be another one
+# Along the curve of orbits, where a step of the way fails.
 TURNING = Steps(longest=0.1, shortest=1e-5, turn=0.2, most=400)
-"""Along the curve of orbits, where a step of the way fails."""
 SHAKING = [Parameter.GRAVITY_X, Parameter.GRAVITY_Y]
-INSTANTS = 16
-"""Of a turn, at which a steady motion is looked at in the laboratory."""
+INSTANTS = 16  # Of a turn, at which a steady motion is looked at in the laboratory
 
 
 @dataclass(frozen=True, eq=False)
 class OrbitCurve:
-    """A periodic motion as a function of one parameter, as equations of a curve: states divided by √n, parameter.
+    """A periodic motion as a function of one parameter, as equations of a curve: states divided by √n, parameter."""
 
-    Parameters
-    ----------
-    rates : compiled equations of the rotor's field
-    problem : parameter -> values of the runtime parameters, drag along the moment left out, and the plate's forces
-    spin : body spin s
-    """
-
-    rates: Rates
+    rates: Rates  # compiled equations of the rotor's field
+    # parameter -> values of the runtime parameters, drag along the moment left out, and the plate's forces
     problem: Callable[[float], tuple[Array, PlateForce | None]]
-    spin: float
+    spin: float  # body spin s
 
     def linear(self, points: Array, which: Indices) -> tuple[Array, Array]:
         """What shall vanish (1, 12 n) at one point (1, 12 n + 1), and its derivatives (1, 12 n, 12 n + 1).
@@ -76,20 +67,12 @@ class OrbitCurve:
 
 @dataclass(frozen=True, eq=False)
 class ForcedMotion:
-    """A scene in which something makes the motion periodic.
+    """A scene in which something makes the motion periodic."""
 
-    Parameters
-    ----------
-    scene : gravity may have any direction
-    rates : compiled equations in the rotor's field
-    values : their parameters, with the drag along the moment left out
-    memory : the plate's currents, if they are modelled
-    """
-
-    scene: Scene
-    rates: Rates
-    values: Array
-    memory: PlateMemory | None
+    scene: Scene  # gravity may have any direction
+    rates: Rates  # compiled equations in the rotor's field
+    values: Array  # their parameters, with the drag along the moment left out
+    memory: PlateMemory | None  # the plate's currents, if they are modelled
 
     def reaches(self, known: Equilibrium) -> bool:
         """Whether the plate's table knows the places of an equilibrium through a whole turn."""

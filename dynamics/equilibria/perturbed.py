@@ -24,24 +24,18 @@ from .balance import CONVERGED_STEP, Balance, moved_pose, solve, tangent_basis
 from .equilibrium import Equilibrium
 from .modes import left_eigenvectors, tangent_spaces
 
+# Position (3,) m and moment direction (3,) -> additional force (3,) N and torque (3,) N m, rotor's frame.
 Extra = Callable[[Array, Array], tuple[Array, Array]]
-"""Position (3,) m and moment direction (3,) -> additional force (3,) N and torque (3,) N m, rotor's frame."""
 TILTS = np.array([3, 4])
-MOST = 20
-"""Steps of the quasi-Newton method."""
+MOST = 20  # Steps of the quasi-Newton method
 
 
 @dataclass(frozen=True, eq=False)
 class Shift:
-    """How an equilibrium moves.
+    """How an equilibrium moves."""
 
-    Parameters
-    ----------
-    linear : (3,) m, by the additional force and torque at the old place and the rigidity of the old balance
-    position, moment : (3,) m and (3,) the new equilibrium; NaN if none was reached
-    """
-
-    linear: Array
+    linear: Array  # (3,) m, by the additional force and torque at the old place and the rigidity of the old balance
+    # position, moment: (3,) m and (3,) the new equilibrium; NaN if none was reached
     position: Array
     moment: Array
 
@@ -110,18 +104,11 @@ def shifted_equilibrium(
 
 @dataclass(frozen=True, eq=False)
 class PlateAction:
-    """Means over a turn, along the laboratory's axes.
+    """Means over a turn, along the laboratory's axes."""
 
-    Parameters
-    ----------
-    force : (3,) N
-    torque : (3,) N m
-    loss : heat in the plate, W
-    """
-
-    force: Array
-    torque: Array
-    loss: float
+    force: Array  # (3,) N
+    torque: Array  # (3,) N m
+    loss: float  # heat in the plate, W
 
 
 def plate_action(scene: Scene, memory: PlateMemory, equilibrium: Equilibrium) -> PlateAction:
@@ -147,10 +134,8 @@ def plate_action(scene: Scene, memory: PlateMemory, equilibrium: Equilibrium) ->
     return PlateAction(lab.position.mean(axis=0), lab.moment.mean(axis=0), float(loss))
 
 
-EXACT_SLOPES = 4
-"""Degree of a potential that has all derivatives which the slopes of the floater's currents ask for."""
-AROUND = 1 / 32
-"""Radius of the ball of that expansion, in radii of the floater."""
+EXACT_SLOPES = 4  # Degree of a potential that has all derivatives which the slopes of the floater's currents ask for
+AROUND = 1 / 32  # Radius of the ball of that expansion, in radii of the floater
 
 
 def shift_by_answers(scene: Scene, table: FieldTable, equilibrium: Equilibrium, answers: MutualTable | None) -> float:

@@ -26,36 +26,23 @@ from .equilibrium import Equilibrium, EquilibriumError, ForceCurve, LeftOut, Sur
 from .modes import modes
 from .periodic import ForcedMotion, overlap
 
+# Part of what a model leaves out that is wrong of its effect to first order, by all causes together and by each. Below
+# three vertical and four tilted rotors of permeable cubes the place by finite elements differed by 0.59 to 0.79 of the
+# error so stated for dipoles and cuboids (72 equilibria), below five horizontal ones by 0.1 to 1 of it.
 SECOND_ORDER = 0.25
-"""Part of what a model leaves out that is wrong of its effect to first order, by all causes together and by each.
-
-Below three vertical and four tilted rotors of permeable cubes the place by finite elements differed by 0.59 to 0.79 of
-the error so stated for dipoles and cuboids (72 equilibria), below five horizontal ones by 0.1 to 1 of it.
-"""
-BEYOND = 0.1
-"""Part of a floater's weight that its multipoles may leave out; beyond, they do not tell an equilibrium."""
+BEYOND = 0.1  # Part of a floater's weight that its multipoles may leave out; beyond, they do not tell an equilibrium
 
 
 @dataclass(frozen=True, eq=False)
 class FixedPoints:
-    """Fixed points of a scene without plate, what the equations of motion are like there, and the curves they lie on.
+    """Fixed points of a scene without plate, and what the equations of motion are like there."""
 
-    Parameters
-    ----------
-    points : (n, 6) scaled positions and moments, good to round-off
-    doubts : (n, 2 + 12 c) of the field there, see `field_doubts`
-    residuals : (n, 5) what is left of the balances
-    slopes : (n, 5, 5) their derivatives
-    jacobians : (n, 12, 12) of the scaled state's rates by the state
-    curves : along which everything but the axial force is balanced
-    """
-
-    points: Array
-    doubts: Array = field(metadata={"units": "T or T/m"})
-    residuals: Array
-    slopes: Array
-    jacobians: Array
-    curves: tuple[ForceCurve, ...] = ()
+    points: Array  # (n, 6) scaled positions and moments, good to round-off
+    doubts: Array = field(metadata={"units": "T or T/m"})  # (n, 2 + 12 c) of the field there, see `field_doubts`
+    residuals: Array  # (n, 5) what is left of the balances
+    slopes: Array  # (n, 5, 5) their derivatives
+    jacobians: Array  # (n, 12, 12) of the scaled state's rates by the state
+    curves: tuple[ForceCurve, ...] = ()  # along which everything but the axial force is balanced
 
     @classmethod
     def at(cls, balance: Balance, points: Array, doubts: Array, curves: tuple[ForceCurve, ...] = ()) -> Self:
@@ -68,8 +55,8 @@ class FixedPoints:
         return cls(points, doubts, *near(position, moment), jacobians, curves)
 
 
+# In a folder of their own, of some thousand scenes.
 FIXED_POINTS = TableKind("equilibria", FixedPoints, "Fixed points of a scene without plate", most=2**26)
-"""In a folder of their own, of some thousand scenes."""
 
 
 def cached_points(

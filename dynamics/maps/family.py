@@ -34,24 +34,16 @@ from ..motion.rates import Rates
 from ..motion.rotor_losses import ROTOR_CURRENTS, RotorCurrents
 from ..motion.state import Parameter, Scales
 
-Numbers = Sequence[Any]
-"""A vector of heyoka expressions, or of arrays (n,)."""
-NODES = 7
-"""Tables between which changing moments are interpolated."""
+Numbers = Sequence[Any]  # A vector of heyoka expressions, or of arrays (n,)
+NODES = 7  # Tables between which changing moments are interpolated
 
 
 @dataclass(frozen=True)
 class Move:
-    """How a part of the rotor moves with the measure.
+    """How a part of the rotor moves with the measure."""
 
-    Parameters
-    ----------
-    way : it moves by the measure (m) along this vector
-    turning : it turns by the measure (rad) about the rotor's y, so that +x comes towards +z
-    """
-
-    way: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    turning: bool = False
+    way: tuple[float, float, float] = (0.0, 0.0, 0.0)  # it moves by the measure (m) along this vector
+    turning: bool = False  # it turns by the measure (rad) about the rotor's y, so that +x comes towards +z
 
     def moved(self, magnet: Magnet, measure: float) -> Magnet:
         """The magnet, from where it is at measure zero."""
@@ -83,24 +75,19 @@ class Move:
         return [list(row) for row in zip(*columns, strict=True)]
 
 
+# How each magnet of the article's rotors moves with displacement (m) or tilt (rad).
 MOVES: dict[str, tuple[Move, ...]] = {
     "horizontal": (Move((1.0, 0.0, 0.0)),),
     "vertical": (Move(), Move((0.0, 0.0, 1.0))),
     "tilt": (Move(turning=True),),
 }
-"""How each magnet of the article's rotors moves with displacement (m) or tilt (rad)."""
 
 
 @dataclass(frozen=True, eq=False)
 class MovableField:
-    """The sum of fields of which each moves in its own way.
+    """The sum of fields of which each moves in its own way."""
 
-    Parameters
-    ----------
-    parts : fields as they are at measure zero, and how each moves
-    """
-
-    parts: tuple[tuple[FieldFormula, Move], ...]
+    parts: tuple[tuple[FieldFormula, Move], ...]  # fields as they are at measure zero, and how each moves
 
     def expressions(self, position: Sequence[hy.expression]) -> FieldExpressions:
         """B and its gradient as expressions of a position (m, rotor's frame) and of `Parameter.MEASURE`."""
@@ -116,16 +103,10 @@ class MovableField:
 
 @dataclass(frozen=True, eq=False)
 class Blend:
-    """Fields as a polynomial of the measure.
+    """Fields as a polynomial of the measure."""
 
-    Parameters
-    ----------
-    measures : (k,) at which they are known
-    sources : (k,) the fields there
-    """
-
-    measures: Array
-    sources: tuple[FieldFormula, ...]
+    measures: Array  # (k,) at which they are known
+    sources: tuple[FieldFormula, ...]  # (k,) the fields there
 
     def expressions(self, position: Sequence[hy.expression]) -> FieldExpressions:
         """B and its gradient as expressions of a position (m) and of `Parameter.MEASURE`."""
@@ -175,20 +156,12 @@ def blend_tables(
 
 @dataclass(frozen=True, eq=False)
 class MovedEffect:
-    """An effect that `Rates` has as a `Placed` one.
+    """An effect that `Rates` has as a `Placed` one."""
 
-    Parameters
-    ----------
-    effect : of the part where it is at measure zero
-    move : how the part moves
-    alone : field of the part at measure zero
-    name : in results
-    """
-
-    effect: Effect
-    move: Move
-    alone: FieldTable
-    name: str
+    effect: Effect  # of the part where it is at measure zero
+    move: Move  # how the part moves
+    alone: FieldTable  # field of the part at measure zero
+    name: str  # in results
 
     def added(self, motion: Motion) -> Added:
         """Its accelerations of place and spin."""
@@ -330,8 +303,8 @@ def rotor_family(
     return RotorFamily(scene, rotor, moves, MovableField(tuple(sources)), effects)
 
 
+# A magnet as it is at measure zero, how it moves, and its field there if it is alone.
 Part = tuple[Magnet, Move, RotorTable]
-"""A magnet as it is at measure zero, how it moves, and its field there if it is alone."""
 
 
 def _mutual_magnetisation(scene: Scene, parts: Sequence[Part], interaction: str, rtol: float) -> list[Effect]:

@@ -13,43 +13,29 @@ from ..equilibria.curves import SearchRange, newton_search
 from ..equilibria.path import carried
 from ..motion.rates import Rates
 
-FAR_APART = 1.5
-"""Equilibria are followed up to so many times the farthest distance of the ranges."""
-SPACING = 5
-"""Points of the map between two searches."""
+FAR_APART = 1.5  # Equilibria are followed up to so many times the farthest distance of the ranges
+SPACING = 5  # Points of the map between two searches
+# One of so many searches has all starts, the others an eighth of them, which misses less than one in a hundred of a
+# point's equilibria: a sheet is lost only if every search that meets it does.
 WHOLE, PART = 64, 8
-"""One of so many searches has all starts, the others an eighth of them, which misses less than one in a hundred of a
-point's equilibria: a sheet is lost only if every search that meets it does."""
+# Longest steps of the searches, rad of the moment and radii of the position, and beyond that distance (radii) as a part
+# of it, as the field changes: with 0.3 rad and radii they are more than twice as many, and an eighth of the starts
+# misses several times as much.
 REACH, FAR = 0.8, 1.0
-"""Longest steps of the searches, rad of the moment and radii of the position, and beyond that distance (radii) as a
-part of it, as the field changes: with 0.3 rad and radii they are more than twice as many, and an eighth of the starts
-misses several times as much."""
-TOGETHER = 8
-"""Searches that are made side by side: enough that NumPy's calls cost less than what they compute."""
-MARGIN = 0.3
-"""Sheets are followed so far beyond the range (radii): what its border cuts into pieces is whole there."""
+TOGETHER = 8  # Searches that are made side by side: enough that NumPy's calls cost less than what they compute
+MARGIN = 0.3  # Sheets are followed so far beyond the range (radii): what its border cuts into pieces is whole there
 
 
 @dataclass(frozen=True, eq=False)
 class Grid:
-    """Problems at points with whole-numbered coordinates, all in one rotor's field.
+    """Problems at points with whole-numbered coordinates, all in one rotor's field."""
 
-    Parameters
-    ----------
-    rates : compiled for that field
-    values : (n, p) runtime parameters of the points
-    spin : (n,) body spin s
-    ranges : in which equilibria are looked for
-    region : (n,) which of them is the point's
-    places : (n, axes) coordinates; not every place of the grid need have a point
-    """
-
-    rates: Rates
-    values: Array
-    spin: Array
-    ranges: Sequence[SearchRange]
-    region: Indices
-    places: Indices
+    rates: Rates  # compiled for that field
+    values: Array  # (n, p) runtime parameters of the points
+    spin: Array  # (n,) body spin s
+    ranges: Sequence[SearchRange]  # in which equilibria are looked for
+    region: Indices  # (n,) which of them is the point's
+    places: Indices  # (n, axes) coordinates; not every place of the grid need have a point
 
     def __len__(self) -> int:
         return len(self.values)

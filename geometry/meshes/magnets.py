@@ -29,41 +29,26 @@ if TYPE_CHECKING:
     import meshio
 
 LARGE = 100.0
-TINY = 1e-7
-"""Lengths in units of the mesh; a gap of a micrometre between centimetres is 1e-4."""
+TINY = 1e-7  # Lengths in units of the mesh; a gap of a micrometre between centimetres is 1e-4
+# Size of the elements at the edges of a part, for each layer that others have there: netgen's layers know no corner of
+# more than three edges, and crash.
 GRADED = 0.5
-"""Size of the elements at the edges of a part, for each layer that others have there: netgen's layers know no corner of
-more than three edges, and crash."""
-ON_EDGE = 5e-3
-"""How near to the edges of a part's triangles its own lie, in circumradii."""
+ON_EDGE = 5e-3  # How near to the edges of a part's triangles its own lie, in circumradii
 
 
 @dataclass(frozen=True)
 class MeshSettings:
-    """How fine the mesh is.
+    """How fine the mesh is."""
 
-    Parameters
-    ----------
-    ball_radius : of the ball of air, in radii of the smallest ball about all magnets
-    magnet_size : largest element in a magnet, in cube roots of its volume
-    air_size : largest element in the air, in units of the mesh
-    grading : how fast sizes may grow (0 slow … 1 fast)
-    hp_layers : layers of elements that shrink towards the magnets' edges and corners
-    hp_factor : ratio of the sizes of two such layers
-    curve_order : polynomial degree of the curved elements at the sphere and at round magnets
-    curvature : elements in a radius of curvature
-    smallest : least element that a radius of curvature asks for, in cube roots of a part's volume
-    """
-
-    ball_radius: float = 1.3
-    magnet_size: float = 1.0
-    air_size: float = 1.0
-    grading: float = 0.5
-    hp_layers: int = 1
-    hp_factor: float = 0.15
-    curve_order: int = 6
-    curvature: float = 2.0
-    smallest: float = SMALLEST
+    ball_radius: float = 1.3  # of the ball of air, in radii of the smallest ball about all magnets
+    magnet_size: float = 1.0  # largest element in a magnet, in cube roots of its volume
+    air_size: float = 1.0  # largest element in the air, in units of the mesh
+    grading: float = 0.5  # how fast sizes may grow (0 slow … 1 fast)
+    hp_layers: int = 1  # layers of elements that shrink towards the magnets' edges and corners
+    hp_factor: float = 0.15  # ratio of the sizes of two such layers
+    curve_order: int = 6  # polynomial degree of the curved elements at the sphere and at round magnets
+    curvature: float = 2.0  # elements in a radius of curvature
+    smallest: float = SMALLEST  # least element that a radius of curvature asks for, in cube roots of a part's volume
 
     def __post_init__(self) -> None:
         if self.ball_radius <= 1:
@@ -74,23 +59,14 @@ class MeshSettings:
 
 @dataclass(frozen=True, eq=False)
 class MagnetMesh:
-    """A mesh of magnets in a ball of air.
+    """A mesh of magnets in a ball of air."""
 
-    Parameters
-    ----------
-    mesh : the `ngsolve.Mesh`
-    magnets : the bodies; the region of number k is called `magnet{k}`
-    center : (3,) centre of the ball and origin of the mesh's coordinates, m
-    unit : length of one unit of the mesh, m: radius of the ball about all magnets
-    ball_radius : radius of the ball of air, in units
-    planes : coordinate planes through the centre that cut the ball; only the positive side is meshed
-    """
-
-    mesh: Any
-    magnets: tuple[Magnet, ...]
-    center: Array
-    unit: float
-    ball_radius: float
+    mesh: Any  # the `ngsolve.Mesh`
+    magnets: tuple[Magnet, ...]  # the bodies; the region of number k is called `magnet{k}`
+    center: Array  # (3,) centre of the ball and origin of the mesh's coordinates, m
+    unit: float  # length of one unit of the mesh, m: radius of the ball about all magnets
+    ball_radius: float  # radius of the ball of air, in units
+    # coordinate planes through the centre that cut the ball; only the positive side is meshed
     planes: tuple[int, ...] = ()
 
     @property
@@ -246,13 +222,13 @@ def _edge_directions(point: Array, bodies: Sequence[Solid], unit: float) -> list
     return found
 
 
+# Names and vertex order of NGSolve's element shapes in meshio, where volumes are positive.
 MESHIO_SHAPES = {
     "TET": ("tetra", [0, 2, 1, 3]),
     "PRISM": ("wedge", [0, 2, 1, 3, 5, 4]),
     "PYRAMID": ("pyramid", [0, 3, 2, 1, 4]),
     "HEX": ("hexahedron", [0, 3, 2, 1, 4, 7, 6, 5]),
 }
-"""Names and vertex order of NGSolve's element shapes in meshio, where volumes are positive."""
 
 
 def to_meshio(mesh: MagnetMesh) -> meshio.Mesh:

@@ -15,26 +15,17 @@ from ..common import Array, frozen_array
 from ..solids import Solid
 from .solids import occ_solid
 
-CURVED = 5
-"""Polynomial degree of the elements at a mantle; they leave 1e-4 of its volume and place."""
-ROUND = 1.0
-"""Elements in a radius of curvature."""
+CURVED = 5  # Polynomial degree of the elements at a mantle; they leave 1e-4 of its volume and place
+ROUND = 1.0  # Elements in a radius of curvature
 
 
 @dataclass(frozen=True, eq=False)
 class MetalMesh:
-    """Mesh of a piece of metal.
+    """Mesh of a piece of metal."""
 
-    Parameters
-    ----------
-    mesh : the `ngsolve.Mesh`
-    center : (3,) origin of the mesh's coordinates, m
-    unit : length of one unit of the mesh, m
-    """
-
-    mesh: Any
-    center: Array
-    unit: float
+    mesh: Any  # the `ngsolve.Mesh`
+    center: Array  # (3,) origin of the mesh's coordinates, m
+    unit: float  # length of one unit of the mesh, m
 
     def to_meter(self, points: Array) -> Array:
         """Positions (n, 3) in m of `points` (n, 3) in the mesh's coordinates."""
@@ -54,26 +45,18 @@ def mesh_metal(bodies: Sequence[Solid], largest: float = 0.7) -> MetalMesh:
     return MetalMesh(mesh, frozen_array(center, (3,)), unit)
 
 
-MILLIMETRE = 1e-3
-"""Length unit of all meshes, m."""
-PLANES = ("x0", "y0", "z0")
-"""Boundary names of the mirror planes."""
+MILLIMETRE = 1e-3  # Length unit of all meshes, m
+PLANES = ("x0", "y0", "z0")  # Boundary names of the mirror planes
 
 
 @dataclass(frozen=True, eq=False)
 class ConductorMesh:
-    """A volume mesh in millimetres with the boundary "far" all around.
+    """A volume mesh in millimetres with the boundary "far" all around."""
 
-    Parameters
-    ----------
-    mesh : NGSolve mesh; where there are mirrors, it holds only the part with non-negative coordinates
-    conductivity : S/m by material name; every other material is air
-    mirrors : axes (0, 1, 2) whose plane through the origin mirrors the conductors; those boundaries are named
-        "x0", "y0", "z0".  Sources and fields need no symmetry: they are split into parity classes
-    """
-
-    mesh: ngsolve.Mesh
-    conductivity: Mapping[str, float]
+    mesh: ngsolve.Mesh  # NGSolve mesh; where there are mirrors, it holds only the part with non-negative coordinates
+    conductivity: Mapping[str, float]  # S/m by material name; every other material is air
+    # axes (0, 1, 2) whose plane through the origin mirrors the conductors; those boundaries are named "x0", "y0", "z0".
+    # Sources and fields need no symmetry: they are split into parity classes
     mirrors: tuple[int, ...] = ()
 
     def __post_init__(self) -> None:

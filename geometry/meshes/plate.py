@@ -93,20 +93,13 @@ def hex_mesh(lines: Sequence[Array], blocks: Sequence[Block], mirrors: tuple[int
 
 @dataclass(frozen=True)
 class MeshRule:
-    """How fine the mesh is; the defaults suit orders 3 to 5, for which few large cells cost least.
+    """How fine the mesh is; the defaults suit orders 3 to 5, for which few large cells cost least."""
 
-    Parameters
-    ----------
-    distance_share : cell size in the plate, in units of the distance to the nearest dipole
-    skin_share : cell size at the faces, in units of the skin depth
-    growth : by how much a cell grows per length away from a face
-    reach : half edge of the air box in units of the plate's largest edge; the error of the truncation goes as its
-        inverse cube
-    """
-
-    distance_share: float = 1.2
-    skin_share: float = 2.0
-    growth: float = 1.6
+    distance_share: float = 1.2  # cell size in the plate, in units of the distance to the nearest dipole
+    skin_share: float = 2.0  # cell size at the faces, in units of the skin depth
+    growth: float = 1.6  # by how much a cell grows per length away from a face
+    # half edge of the air box in units of the plate's largest edge; the error of the truncation goes as its inverse
+    # cube
     reach: float = 12.0
 
     def finer(self) -> MeshRule:

@@ -23,22 +23,18 @@ from ..shapes import Box, Ring, Sphere
 from ..solids import Part, Solid, moved
 
 MILLIMETRE = 1e-3
-CURVED, ROUND = 6, 2.0
-"""Degree of the elements at round surfaces, and how many of them in a radius of curvature."""
+CURVED, ROUND = 6, 2.0  # Degree of the elements at round surfaces, and how many of them in a radius of curvature
+# Least element that a radius of curvature asks for, in cube roots of a part's volume: one spans a small fillet.
 SMALLEST = 0.06
-"""Least element that a radius of curvature asks for, in cube roots of a part's volume: one spans a small fillet."""
+# Of that, where the mesher fails: its luck with the same part is another with elements of other sizes.
 OTHERWISE = (1.0, 0.5, 0.0)
-"""Of that, where the mesher fails: its luck with the same part is another with elements of other sizes."""
+# Degree of the rule in small elements, and their edge times the degree of the polynomial, by the part's, at most.
 FEW, SMALL = 8, 1.5
-"""Degree of the rule in small elements, and their edge times the degree of the polynomial, by the part's, at most."""
-LONGEST = 60.0
-"""Seconds of processor time for a mesh of a part."""
-SAME = 1e-7
-"""Distance of corners of facets that are one, in sizes of the solid."""
-WITHIN = 1e-9
-"""Relative difference of volumes by which a cavity that lies within a body is told from one that does not."""
+LONGEST = 60.0  # Seconds of processor time for a mesh of a part
+SAME = 1e-7  # Distance of corners of facets that are one, in sizes of the solid
+WITHIN = 1e-9  # Relative difference of volumes by which a cavity that lies within a body is told from one that does not
+# The time, and a count of the files that the process has written: the rest is the same for the same solid.
 OWN_WORDS = re.compile(r"'\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d'|(?<=translator )[\d. ]+(?=')")
-"""The time, and a count of the files that the process has written: the rest is the same for the same solid."""
 SIMPLER = "Leave out small features of the part, or export it again."
 
 
@@ -154,20 +150,16 @@ def _vector(vector: Array) -> Any:
 
 @dataclass(frozen=True)
 class Segment:
-    """A part of a ring, from an angle to another about the body's z axis.
+    """A part of a ring, from an angle to another about the body's z axis."""
 
-    Parameters
-    ----------
-    inner_radius, radius, height : m; the first may be 0
-    start, end : degrees, at most 360 apart
-    center, rotation : (3,) m and (3, 3), as of every body
-    """
-
+    # inner_radius, radius, height: m; the first may be 0
     inner_radius: float
     radius: float
     height: float
+    # start, end: degrees, at most 360 apart
     start: float
     end: float
+    # center, rotation: (3,) m and (3, 3), as of every body
     center: Array = field(default_factory=lambda: np.zeros(3))
     rotation: Array = field(default_factory=lambda: np.eye(3))
 
@@ -179,15 +171,10 @@ class Segment:
 
 @dataclass(frozen=True)
 class Facets:
-    """A solid within triangles.
+    """A solid within triangles."""
 
-    Parameters
-    ----------
-    triangles : (n, 3, 3) m, corners, in any order, along the body axes from the centre
-    center, rotation : (3,) m and (3, 3), as of every body
-    """
-
-    triangles: Array
+    triangles: Array  # (n, 3, 3) m, corners, in any order, along the body axes from the centre
+    # center, rotation: (3,) m and (3, 3), as of every body
     center: Array = field(default_factory=lambda: np.zeros(3))
     rotation: Array = field(default_factory=lambda: np.eye(3))
 

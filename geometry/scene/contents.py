@@ -120,8 +120,7 @@ class Floater:
         return text if self.conductivity is None else f"{text}, {self.conductivity:.3g} S/m"
 
 
-AIR_VISCOSITY = 1.83e-5
-"""Dynamic viscosity of air at 20-25 °C, Pa s."""
+AIR_VISCOSITY = 1.83e-5  # Dynamic viscosity of air at 20-25 °C, Pa s
 
 
 @dataclass(frozen=True)
@@ -191,16 +190,12 @@ class OffsetStart:
 
 @dataclass(frozen=True)
 class MapReading:
-    """How a map of the field is to be read where its file does not tell.
+    """How a map of the field is to be read where its file does not tell."""
 
-    Parameters
-    ----------
-    length_unit, field_unit : of the coordinates and of B, whatever the file says; None: as it says
-    columns : what the titles of the columns to take have and others have not, as of one of several solutions; or None
-    """
-
+    # length_unit, field_unit: of the coordinates and of B, whatever the file says; None: as it says
     length_unit: str | None = None
     field_unit: str | None = None
+    # what the titles of the columns to take have and others have not, as of one of several solutions; or None
     columns: str | None = None
 
 

@@ -23,19 +23,14 @@ from .making import Table, assemble, content_digest
 from .messages import SceneError
 from .schema import SceneTable
 
-SAME = 1e-12
-"""Entry of a vector, in its largest, below which it is round-off."""
-MOST = 5_000_000
-"""Bytes of a scene file; one with a thousand magnets has 200 000."""
-MOST_OF_MAP = 1_000_000_000
-"""Bytes of a map of the field."""
+SAME = 1e-12  # Entry of a vector, in its largest, below which it is round-off
+MOST = 5_000_000  # Bytes of a scene file; one with a thousand magnets has 200 000
+MOST_OF_MAP = 1_000_000_000  # Bytes of a map of the field
+# A dotted key of so many parts: reading it takes time and memory that grow with their square.
 LONGEST_KEY = re.compile(r"""(?<![\w-])(?:(?:[\w-]+|"(?:[^"\\\n]|\\.)*"|'[^'\n]*')[ \t]*\.[ \t]*){20}""")
-"""A dotted key of so many parts: reading it takes time and memory that grow with their square."""
 DECIMAL_COMMA = re.compile(r"(?m)^[^#\n\[]*=\s*[-+]?\d+,\s*\d")
-DEEPEST = 10
-"""Tables and lists in each other; a scene has five."""
-LARGEST = 2**1000
-"""Integers below it are floats."""
+DEEPEST = 10  # Tables and lists in each other; a scene has five
+LARGEST = 2**1000  # Integers below it are floats
 
 
 def load_scene(path: str | Path) -> Scene:
@@ -407,6 +402,7 @@ def _all_rounded(values: Array) -> list[float]:
     return [_rounded(value) if abs(value) > scale else 0.0 for value in values]
 
 
+# What of a scene each key or table of its file decides, and how that is written from the object.
 FIELDS: dict[str, tuple[tuple[str, ...], Callable[[Scene], Any]]] = {
     "frequency_hz": (("frequency",), lambda scene: float(scene.frequency)),
     "gravity_m_s2": (("gravity",), lambda scene: scene.gravity.tolist()),
@@ -416,7 +412,6 @@ FIELDS: dict[str, tuple[tuple[str, ...], Callable[[Scene], Any]]] = {
     "drag": (("drag", "floater"), _drag),
     "start": (("start",), _start),
 }
-"""What of a scene each key or table of its file decides, and how that is written from the object."""
 
 
 def _toml(keys: Mapping[str, Any], table: str = "") -> str:

@@ -34,10 +34,8 @@ from .schema import (
 )
 
 MILLI = 1e-3
-LARGEST = 2**30
-"""Bytes of a file that a scene may name."""
-MOST_BODIES = 64
-"""Magnets and conductors of a scene beside a known one, unless that has more."""
+LARGEST = 2**30  # Bytes of a file that a scene may name
+MOST_BODIES = 64  # Magnets and conductors of a scene beside a known one, unless that has more
 ORIGIN = (0.0, 0.0, 0.0)
 
 
@@ -222,8 +220,7 @@ def _start(start: StartTable) -> OffsetStart | AbsoluteStart:
     )
 
 
-Table = Mapping[str, Any]
-"""A table of the scene file."""
+Table = Mapping[str, Any]  # A table of the scene file
 
 
 def horizontal(*, displacement_mm: float, remanence_T: float, edge_mm: float | None = None, **more: Any) -> Table:

@@ -13,12 +13,10 @@ from ..overlap import TOUCHING, apart, body_overlap, deepest_overlap_in_a_turn
 from .contents import AbsoluteStart, Scene
 from .schema import TABLES, ExplicitRotor
 
-LONGEST = 60
-"""Characters of a key in a message."""
-LONGEST_SOURCE = 300
-"""Characters of a file's name in a message."""
-MOST = 20
-"""Faults of a scene that are told; the rest are counted."""
+LONGEST = 60  # Characters of a key in a message
+LONGEST_SOURCE = 300  # Characters of a file's name in a message
+MOST = 20  # Faults of a scene that are told; the rest are counted
+# The kinds of error of pydantic.
 RULES = {
     "greater_than": "greater than {gt:g}",
     "greater_than_equal": "at least {ge:g}",
@@ -32,7 +30,6 @@ RULES = {
     "model_type": "a table",
     "model_attributes_type": "a table",
 }
-"""The kinds of error of pydantic."""
 
 
 class SceneError(InputError):

@@ -36,14 +36,14 @@ Metal = Annotated[Number, Field(ge=1e-3, le=1e9)]
 Coercivity = Annotated[Positive, Field(ge=1e-6, le=1e5)]
 Brake = Annotated[NotNegative, Field(le=1e6), _zero_or(1e-30)]
 Speed = Annotated[Number, Field(ge=-1e9, le=1e9)]
-RECOIL_PERMEABILITY = 1.05
-"""Default: sintered NdFeB."""
+RECOIL_PERMEABILITY = 1.05  # Default: sintered NdFeB
+# Along the easy axis, and across it; a single number for both.
 MagnetPermeability = Annotated[
     list[Permeability],
     Field(min_length=2, max_length=2),
     BeforeValidator(lambda value: value if isinstance(value, list) else [value] * 2, json_schema_input_type=float),
 ]
-"""Along the easy axis, and across it; a single number for both."""
+# The keys of every shape; its axis, where it has one, is along the body's z.
 SIZES: dict[str, tuple[str, ...]] = {
     "cube": ("edge_mm",),
     "cuboid": ("size_mm",),
@@ -51,7 +51,6 @@ SIZES: dict[str, tuple[str, ...]] = {
     "ring": ("diameter_mm", "inner_diameter_mm", "height_mm"),
     "sphere": ("diameter_mm",),
 }
-"""The keys of every shape; its axis, where it has one, is along the body's z."""
 SIZE_KEYS = ("size_mm", "edge_mm", "diameter_mm", "inner_diameter_mm", "height_mm")
 
 
@@ -207,6 +206,7 @@ class SceneTable(Table):
     start: StartTable | None = None
 
 
+# By their keys; rotors by their configuration, but for that of `rotor.magnets`.
 TABLES: dict[str, type[Table]] = {
     "": SceneTable,
     "horizontal": DisplacedRotor,
@@ -220,7 +220,6 @@ TABLES: dict[str, type[Table]] = {
     "drag": DragTable,
     "start": StartTable,
 }
-"""By their keys; rotors by their configuration, but for that of `rotor.magnets`."""
 
 
 def key_faults(table: SceneTable) -> list[str]:
