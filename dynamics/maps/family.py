@@ -13,8 +13,6 @@ import heyoka as hy
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...fem.closed_forms.moments import carrier
-from ...fem.harmonics.expansion import MultipoleExpansion
 from ...fem.harmonics.expressions import FieldExpressions
 from ...fem.mutual.making import cached_mutual_table
 from ...fem.rotor.choice import cached_rotor_table, rotor_table
@@ -35,7 +33,6 @@ from ..motion.rotor_losses import ROTOR_CURRENTS, RotorCurrents
 from ..motion.state import Parameter, Scales
 
 Numbers = Sequence[Any]  # A vector of heyoka expressions, or of arrays (n,)
-NODES = 7  # Tables between which changing moments are interpolated
 
 
 @dataclass(frozen=True)
@@ -99,59 +96,6 @@ class MovableField:
             [hy.sum([b[i] for b, _ in found]) for i in range(3)],
             [[hy.sum([g[i][j] for _, g in found]) for j in range(3)] for i in range(3)],
         )
-
-
-@dataclass(frozen=True, eq=False)
-class Blend:
-    """Fields as a polynomial of the measure."""
-
-    measures: Array  # (k,) at which they are known
-    sources: tuple[FieldFormula, ...]  # (k,) the fields there
-
-    def expressions(self, position: Sequence[hy.expression]) -> FieldExpressions:
-        """B and its gradient as expressions of a position (m) and of `Parameter.MEASURE`."""
-        # Lagrange's polynomials of the measure
-        steps = [hy.par[Parameter.MEASURE] - float(node) for node in self.measures]
-        parts = []
-        for k, source in enumerate(self.sources):
-            share = hy.expression(1.0 / float(np.prod(self.measures[k] - np.delete(self.measures, k))))
-            for step in [*steps[:k], *steps[k + 1 :]]:
-                share = share * step
-            field, slope = source.expressions(position)
-            parts.append([share * value for value in (*field, *(g for row in slope for g in row))])
-        sums = [hy.sum(list(same)) for same in zip(*parts, strict=True)]
-        return sums[:3], [sums[3:6], sums[6:9], sums[9:]]
-
-
-def blend_tables(
-    tables: Sequence[tuple[MultipoleExpansion, ...]], measures: Array, magnets: Sequence[tuple[Array, Move]]
-) -> list[tuple[Blend, Move]]:
-    """The expansions of several tables (k,), known at `measures` (k,), as blends, one for each magnet.
-
-    Parameters
-    ----------
-    tables : of the whole rotor
-    measures : (k,) m
-    magnets : centre (3,) m at measure zero of each, and how it moves along its way
-
-    Raises
-    ------
-    ValueError : a table has expansions about other places than its magnets' centres
-    """
-    found = []
-    for center, move in magnets:
-        series = []
-        for measure, table in zip(measures, tables, strict=True):
-            place = center + measure * np.array(move.way)
-            here = [e for e in table if np.linalg.norm(e.center - place) < 1e-9]
-            if len(here) != 1 or len(table) != len(magnets):
-                raise ValueError(
-                    f"Input rotor must have one expansion about each magnet's centre; instead it has {len(table)} for "
-                    f"{len(magnets)} magnets, which were cut into pieces. Make them cubes."
-                )
-            series.append(MultipoleExpansion(center, here[0].radius, here[0].coefficients))
-        found.append((Blend(measures, tuple(series)), move))
-    return found
 
 
 @dataclass(frozen=True, eq=False)
@@ -244,8 +188,6 @@ def rotor_family(
     model: str,
     rtol: float = 3e-6,
     nearest: float | None = None,
-    measures: tuple[float, float] | None = None,
-    tables: int = NODES,
     interaction: str = "auto",
 ) -> RotorFamily:
     """The family of one of the article's rotors, with the magnets of `scene`.
@@ -256,23 +198,27 @@ def rotor_family(
     configuration : "horizontal" (measure: displacement of the cube along +x, m), "vertical" (of the second cube along
         +z, m) or "tilt" (of the cube, rad)
     model, rtol, nearest : of the field, see `fem.rotor_table`
-    measures : between which "vertical" with "fem" shall hold: how the cubes magnetise each other changes with their
-        distance and is interpolated
-    tables : between which it is, about two seconds each
     interaction : "rigid", "mutual" or "auto", see `effects.mutual_choice`; "vertical" is rigid
 
     A rotor that moves as a whole keeps its tables, whatever the model: the family is as good as its scenes' tables.
 
     Raises
     ------
-    InputError : mutual magnetisation is asked for where magnets move against each other, or conductors do not move
-    ValueError : unknown configuration or one of other magnets, or no `measures` where they are needed
+    InputError : mutual magnetisation, or finite elements, are asked for where magnets move against each other, or
+        conductors do not move
+    ValueError : unknown configuration or one of other magnets
     """
     moves = MOVES.get(configuration, ())
     if not moves or len(moves) != len(scene.rotor):
         raise ValueError(
             f"Input configuration must be one of {', '.join(MOVES)} and have the scene's number of magnets, "
             f"{len(scene.rotor)}; instead received {configuration!r}."
+        )
+    if len(moves) > 1 and model == "fem":
+        raise InputError(
+            "Input model must be dipole or cuboid for a family of rotors whose magnets move against each other, as how "
+            "they magnetise each other changes with their distance; instead received fem. Take one scene a "
+            "distance (spinlev.sweep over rotor.displacement_mm), which makes a table for each."
         )
     rotor = tuple(
         magnet if move == Move() else replace(magnet, body=moved(magnet.body, np.zeros(3), np.eye(3)))
@@ -286,24 +232,9 @@ def rotor_family(
     ]
     parts = list(zip(rotor, moves, alone, strict=True))
     effects = (*_mutual_magnetisation(scene, parts, interaction, rtol), *_currents(scene, parts))
-    sources: list[tuple[FieldFormula, Move]] = [(table, move) for _, move, table in parts]
-    if len(rotor) > 1 and model == "fem":
-        if measures is None:
-            raise ValueError(
-                "Input measures must be given for magnets that magnetise each other and move against each other, such "
-                "as (0.010, 0.020) m; instead received None."
-            )
-        # Closed forms move as they are; what the cubes add to each other's magnetisation changes on the way.
-        nodes = chebyshev_points(*measures, tables)
-        rotors = [tuple(move.moved(m, float(d)) for m, move in zip(rotor, moves, strict=True)) for d in nodes]
-        expansions = [rotor_table(there, "fem", rtol, nearest).expansions for there in rotors]
-        closed = [(RotorTable("cuboid", (c,), (c,)), move) for c, move in zip(map(carrier, rotor), moves, strict=True)]
-        places = [(magnet.box.center, move) for magnet, move in zip(rotor, moves, strict=True)]
-        sources = [*closed, *blend_tables(expansions, nodes, places)]
-    return RotorFamily(scene, rotor, moves, MovableField(tuple(sources)), effects)
+    return RotorFamily(scene, rotor, moves, MovableField(tuple((table, move) for _, move, table in parts)), effects)
 
 
-# A magnet as it is at measure zero, how it moves, and its field there if it is alone.
 Part = tuple[Magnet, Move, RotorTable]
 
 
@@ -339,11 +270,6 @@ def _currents(scene: Scene, parts: Sequence[Part]) -> list[Effect]:
             name = ROTOR_CURRENTS if len(parts) == 1 else f"{ROTOR_CURRENTS}, magnet {k}"
             found.append(MovedEffect(RotorCurrents(table), move, alone, name))
     return found
-
-
-def chebyshev_points(lowest: float, highest: float, count: int) -> Array:
-    """Chebyshev points of an interval, in ascending order."""
-    return (lowest + highest) / 2 - (highest - lowest) / 2 * np.cos(np.pi * (np.arange(count) + 0.5) / count)
 
 
 def article_measure(rotor: Mapping[str, Any]) -> tuple[str, float] | None:

@@ -2,7 +2,6 @@
 
 from dataclasses import replace
 
-import heyoka as hy
 import numpy as np
 import pytest
 from article import FLOATER, SCENE
@@ -14,13 +13,11 @@ from spinlev.dynamics.equilibria.balance import EVERY, Balance, solve
 from spinlev.dynamics.equilibria.equilibrium import EquilibriumError
 from spinlev.dynamics.equilibria.perturbed import TILTS, balanced_directions, shifted_equilibrium
 from spinlev.dynamics.equilibria.search import find_equilibria
-from spinlev.dynamics.maps.family import rotor_family
 from spinlev.dynamics.motion.equations import parameters
 from spinlev.dynamics.motion.rates import Rates
-from spinlev.dynamics.motion.state import Parameter, Scales
+from spinlev.dynamics.motion.state import Scales
 from spinlev.fem.closed_forms.potentials import Racetrack
 from spinlev.fem.rotor.choice import rotor_table
-from spinlev.geometry import rotor
 from spinlev.geometry.common import MU_0
 from spinlev.geometry.cutting import CONVERGENCE, cut_magnets
 from spinlev.geometry.magnets import Magnet
@@ -102,22 +99,6 @@ def test_an_additional_force_that_throws_the_floater_out_leaves_no_place(stable,
     )
     assert np.isnan(found.position).all()
     assert np.isfinite(found.linear).all()
-
-
-@pytest.mark.slow
-def test_tables_of_magnets_that_magnetise_each_other_are_met_at_the_nodes():
-    """Two coarse tables; at the displacement of one of them the family's field is that of the table."""
-    shape = (10e-3, 1.305, 1.05)
-    scene = replace(SCENE, rotor=rotor.vertical(14e-3, *shape))
-    family = rotor_family(scene, "vertical", "fem", 1e-3, FLOATER.radius, (12e-3, 16e-3), tables=2)
-    x, y, z = variables = hy.make_vars("x", "y", "z")
-    field = hy.cfunc(family.field.expressions([x, y, z])[0], variables, compact_mode=True, opt_level=0)
-    points, measure = np.array([[0.0, 0.0, -0.02], [2e-3, 1e-3, -0.03]]), 14e-3 + 2e-3 * np.cos(np.pi / 4)  # Chebyshev
-    pars = np.zeros((Parameter.MEASURE + 1, 2))
-    pars[Parameter.MEASURE] = measure
-    found = field(np.ascontiguousarray(points.T), pars=pars).T
-    expected = rotor_table(rotor.vertical(measure, *shape), "fem", 1e-3, FLOATER.radius).evaluate(points)[0]
-    np.testing.assert_allclose(found, expected, atol=1e-9 * np.abs(expected).max())
 
 
 def test_a_flat_magnet_is_cut_into_pieces_that_converge():

@@ -1,6 +1,5 @@
 """Maps of equilibria against searches that know nothing of their neighbours."""
 
-import heyoka as hy
 import numpy as np
 import pytest
 from article import PERMEABLE
@@ -14,6 +13,7 @@ from spinlev.dynamics.motion.rates import Rates
 from spinlev.dynamics.motion.state import Parameter
 from spinlev.fem.rotor.choice import rotor_table
 from spinlev.geometry import rotor
+from spinlev.geometry.common import InputError
 from spinlev.geometry.scene.contents import Drag, Scene
 
 SHAPE = (10e-3, 1.305, 1.05)
@@ -108,21 +108,5 @@ def test_what_has_no_map_says_so():
         equilibrium_map(family, [0.0, 10.0], [1e-3])
     with pytest.raises(ValueError, match="configuration must be one of"):
         rotor_family(scene_of("horizontal"), "vertical", "dipole")
-    with pytest.raises(ValueError, match="measures must be given"):
+    with pytest.raises(InputError, match="model must be dipole or cuboid for a family of rotors whose magnets move"):
         rotor_family(scene_of("vertical"), "vertical", "fem")
-
-
-@pytest.mark.slow
-def test_mutual_magnetisation_is_interpolated():
-    """Between the seven tables the field is that of a table of its own, twice the accuracy asked of each: 2e-4."""
-    family = rotor_family(scene_of("vertical"), "vertical", "fem", 1e-4, PERMEABLE.radius, (10e-3, 20e-3))
-    x, y, z = variables = hy.make_vars("x", "y", "z")
-    field = hy.cfunc(family.field.expressions([x, y, z])[0], variables, compact_mode=True, opt_level=0)
-    rng = np.random.default_rng(0)
-    points = np.stack([*rng.uniform(-4e-3, 4e-3, (2, 100)), -rng.uniform(11.4e-3, 35e-3, 100)])
-    for measure in (10e-3, 11.3e-3, 19.9e-3):
-        table = rotor_table(rotor.vertical(measure, *SHAPE), "fem", 1e-5, nearest=PERMEABLE.radius)
-        expected, pars = table.evaluate(points.T)[0], np.zeros((Parameter.MEASURE + 1, 100))
-        pars[Parameter.MEASURE] = measure
-        apart = np.linalg.norm(field(points, pars=pars).T - expected, axis=1)
-        assert np.all(apart <= 2e-4 * np.linalg.norm(expected, axis=1))
