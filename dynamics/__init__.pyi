@@ -1,4 +1,6 @@
 from .continuation.branch import BranchPoint as BranchPoint, Family as Family, follow_branch as follow_branch
+from .continuation.map import EquilibriumMap as EquilibriumMap, equilibrium_map as equilibrium_map
+from .continuation.rotor_family import RotorFamily as RotorFamily, rotor_family as rotor_family
 from .continuation.slow_drift import Drift as Drift, drift as drift
 from .equilibria.equilibrium import (
     Equilibrium as Equilibrium,
@@ -12,7 +14,5 @@ from .flights.checkpoint import Checkpoint as Checkpoint
 from .flights.flight import simulate as simulate
 from .flights.start import StartError as StartError, initial_state as initial_state, starting_point as starting_point
 from .flights.trajectory import FlightStopped as FlightStopped, Trajectory as Trajectory, flight_kind as flight_kind
-from .maps.family import RotorFamily as RotorFamily, rotor_family as rotor_family
-from .maps.map import EquilibriumMap as EquilibriumMap, equilibrium_map as equilibrium_map
 from .motion.plate import PlateMemory as PlateMemory
 from .motion.rates import Rates as Rates

@@ -12,12 +12,12 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from ..dynamics.continuation.map import surveys
+from ..dynamics.continuation.rotor_family import article_measure, rotor_family
 from ..dynamics.equilibria.balance import Indices
 from ..dynamics.flights.balls import is_long
 from ..dynamics.flights.batch import fly_together
 from ..dynamics.flights.start import initial_state
-from ..dynamics.maps.family import article_measure, rotor_family
-from ..dynamics.maps.map import surveys
 from ..dynamics.motion.rates import Rates
 from ..fem.rotor.pose import at_home
 from ..geometry.common import Array, InputError, SpinlevError

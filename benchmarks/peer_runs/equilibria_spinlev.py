@@ -8,9 +8,9 @@ from equilibria_scene import SCENE, rows
 from problems import MAP_DISPLACEMENTS, MAP_FREQUENCIES
 from said import measure, say
 
+from spinlev.dynamics.continuation.map import equilibrium_map
+from spinlev.dynamics.continuation.rotor_family import rotor_family
 from spinlev.dynamics.equilibria.search import find_equilibria
-from spinlev.dynamics.maps.family import rotor_family
-from spinlev.dynamics.maps.map import equilibrium_map
 from spinlev.fem.rotor.choice import rotor_table
 
 case = sys.argv[1]

@@ -1,1 +1,1 @@
-"""Equilibria followed in a parameter: folds, limits of stability, and the slow drift of the spin."""
+"""Equilibria followed in parameters: branches, limits of stability, maps, and the slow drift of the spin."""

@@ -20,7 +20,6 @@ from ...geometry.scene.contents import AbsoluteStart, Scene
 from ..equilibria.equilibrium import FOLD, Equilibrium, EquilibriumError
 from ..equilibria.path import Steps
 from ..equilibria.search import find_equilibria
-from ..maps.map import surveys
 from ..motion.effects import with_effects
 from ..motion.equations import parameters
 from ..motion.events import rotor_gap
@@ -29,6 +28,7 @@ from ..motion.plate import PlateMemory
 from ..motion.rates import Rates
 from ..motion.state import Parameter, Scales
 from .branch import BranchPoint, Family, follow_branch, frequencies
+from .map import surveys
 
 UNIT = 50.0  # Hz over which the equilibrium moves by about a radius of the floater
 SLOWEST = 10.0  # Branches are followed down to this frequency, Hz: all of the article's rotors have their fold above it

@@ -22,10 +22,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from tornado.ioloop import IOLoop
 
+from ...dynamics.continuation.map import equilibrium_map
+from ...dynamics.continuation.rotor_family import rotor_family
 from ...dynamics.equilibria.search import survey
 from ...dynamics.flights.live import LiveFlight, Piece
-from ...dynamics.maps.family import rotor_family
-from ...dynamics.maps.map import equilibrium_map
 from ...geometry.common import Array, ComputationError, SpinlevError
 from ...geometry.scene.files import canonical_keys, scene_text
 from ..cli.console import to_json

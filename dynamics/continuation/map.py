@@ -17,8 +17,8 @@ from ..equilibria.search import FixedPoints, check_turning, field_doubts, survey
 from ..motion.equations import parameters
 from ..motion.rates import Rates
 from ..motion.state import Parameter, Scales
-from .family import RotorFamily
 from .grid import SPACING, Grid, filled
+from .rotor_family import RotorFamily
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from article import PERMEABLE
 
+from spinlev.dynamics.continuation.map import equilibrium_map
+from spinlev.dynamics.continuation.rotor_family import Move, MovedEffect, rotor_family
 from spinlev.dynamics.equilibria.search import find_equilibria
-from spinlev.dynamics.maps.family import Move, MovedEffect, rotor_family
-from spinlev.dynamics.maps.map import equilibrium_map
 from spinlev.dynamics.motion.effect import Interaction
 from spinlev.dynamics.motion.equations import equations_of_motion, parameters
 from spinlev.dynamics.motion.mutual import Mutual

@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 from article import PERMEABLE
 
+from spinlev.dynamics.continuation.map import equilibrium_map, family_grid
+from spinlev.dynamics.continuation.rotor_family import rotor_family
 from spinlev.dynamics.equilibria.curves import fixed_points
 from spinlev.dynamics.equilibria.equilibrium import EquilibriumError
 from spinlev.dynamics.equilibria.search import find_equilibria
-from spinlev.dynamics.maps.family import rotor_family
-from spinlev.dynamics.maps.map import equilibrium_map, family_grid
 from spinlev.dynamics.motion.rates import Rates
 from spinlev.dynamics.motion.state import Parameter
 from spinlev.fem.rotor.choice import rotor_table

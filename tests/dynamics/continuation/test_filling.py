@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 from article import PERMEABLE
 
+from spinlev.dynamics.continuation import grid as filling
+from spinlev.dynamics.continuation.map import equilibrium_map, family_grid
+from spinlev.dynamics.continuation.rotor_family import rotor_family
 from spinlev.dynamics.equilibria.balance import EVERY
 from spinlev.dynamics.equilibria.curves import newton_search
-from spinlev.dynamics.maps import grid as filling
-from spinlev.dynamics.maps.family import rotor_family
-from spinlev.dynamics.maps.map import equilibrium_map, family_grid
 from spinlev.geometry import rotor
 from spinlev.geometry.scene.contents import Drag, Scene
 

@@ -1,1 +1,0 @@
-"""Equilibria over grids of frequencies and rotors."""
