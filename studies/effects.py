@@ -6,21 +6,33 @@ from typing import Any
 
 import numpy as np
 
+from ..dynamics.equilibria.balance import tangent_basis
 from ..dynamics.equilibria.equilibrium import Equilibrium
-from ..dynamics.equilibria.perturbed import growth_by_floater, growth_by_rotor, shift_by_answers
+from ..dynamics.equilibria.modes import left_eigenvectors, tangent_spaces
 from ..dynamics.motion.air_and_shape import REAL_AIR, reynolds, swinging
+from ..dynamics.motion.effect import Interaction
 from ..dynamics.motion.effects import NOTHING_ANSWERS
-from ..dynamics.motion.floater_currents import FLOATER_CURRENTS, SLOW_ENOUGH, slow_error
-from ..dynamics.motion.mutual import MUTUAL
-from ..dynamics.motion.rotor_losses import ROTOR_CURRENTS
-from ..fem.rotor_metal import ball_losses, pieces_of, slow_error as metal_error
-from ..geometry.common import MAGNET_CONDUCTIVITY
+from ..dynamics.motion.equations import parameters
+from ..dynamics.motion.floater_currents import FLOATER_CURRENTS, SLOW_ENOUGH, FloaterCurrents, slow_error
+from ..dynamics.motion.mutual import MUTUAL, Mutual, rough_force
+from ..dynamics.motion.rates import Rates
+from ..dynamics.motion.rotor_losses import ROTOR_CURRENTS, brake_slope
+from ..dynamics.motion.state import Parameter, Scales
+from ..fem.harmonics.interior import Ball
+from ..fem.harmonics.local import BallField
+from ..fem.mutual.table import MutualTable
+from ..fem.rotor.table import FieldTable
+from ..fem.rotor_metal import RotorLosses, ball_losses, pieces_of, slow_error as metal_error
+from ..geometry.common import MAGNET_CONDUCTIVITY, Array
+from ..geometry.scene.contents import Scene
 from .levitation import Levitation
 
 PLATE_NOT_MODELLED = "The plate's eddy currents are left out: the plate is only an obstacle."
 
 UNKNOWN_NEAR = "the floater is so near to the magnets that their size is not known"
 OF_SPHERES = "known for spherical floaters alone"
+EXACT_SLOPES = 4  # degree of a potential that has all derivatives which the slopes of the floater's currents ask for
+AROUND = 1 / 32  # radius of the ball of that expansion, in radii of the floater
 
 
 @dataclass(frozen=True)
@@ -117,3 +129,60 @@ def _air(levitation: Levitation, first: Equilibrium | None) -> ListedEffect:
     h = float(swinging(reynolds(scene.floater.radius, scene.angular_velocity)))
     why = f'drag.model is not "air"; it would make the torque on a swing {h:.2g} times Stokes\''
     return ListedEffect(REAL_AIR, False, 0.0, None, why)
+
+
+def shift_by_answers(scene: Scene, table: FieldTable, equilibrium: Equilibrium, answers: MutualTable | None) -> float:
+    """How far mutual magnetisation moves an equilibrium, m.
+
+    To first order by `answers` in the field `table` of the `scene`; without them to a factor of two.
+    """
+    fixed = equilibrium.without or equilibrium
+    place, moment, scales = fixed.position[None], fixed.state.moment[None], Scales.of(scene)
+    if answers is None:
+        force, torque = rough_force(scene.rotor, scene.floater, table, place[0], moment[0]), np.zeros(3)
+    else:
+        effect = Mutual(answers, scene.floater.moment)
+        force, torque = (part[0] for part in effect.wrench(place, moment, *table.evaluate(place)))
+    units = scales.time**2 / np.array([scene.floater.mass * scales.length, scene.floater.inertia])
+    pushed = np.concatenate([force * units[0], tangent_basis(moment)[0] @ torque * units[1]])
+    return float(np.linalg.norm(np.linalg.solve(fixed.slope, pushed)[:3]) * scales.length)
+
+
+def growth_by_floater(scene: Scene, table: FieldTable, equilibrium: Equilibrium, included: bool) -> float:
+    """What the floater's own currents add to the growth of the mode that grows fastest with them, 1/s.
+
+    `included`: whether the motion of the `equilibrium`, in the field `table` of the `scene`, had them.
+    """
+    fixed = equilibrium.without or equilibrium
+    # In the field's expansion about the place, whose derivatives there are the field's, code is compiled in a tenth of
+    # the time that the table's own expressions take.
+    formula, scales = BallField(len(Parameter), EXACT_SLOPES), Scales.of(scene)
+    numbers, _ = formula.fit(table.evaluate, Ball(fixed.state.position, AROUND * scene.floater.radius))
+    values = np.concatenate([parameters(scene, scales, frozen_spin=True), numbers])
+    still = values.copy()
+    still[Parameter.TILT_EDDY] = 0.0
+    rates = Rates(Interaction(formula, (FloaterCurrents(),)))
+    slopes = [rates(scales.pack(fixed.state)[None], each)[1][0] for each in (values, still)]
+    return _growth(scene, fixed, slopes[0] - slopes[1], included)
+
+
+def growth_by_rotor(scene: Scene, equilibrium: Equilibrium, losses: RotorLosses, included: bool) -> float:
+    """What losses in the rotor add to the growth of the mode that grows fastest with them, 1/s.
+
+    `included`: whether the motion of the `equilibrium` of the `scene` had these `losses`.
+    """
+    fixed = equilibrium.without or equilibrium
+    return _growth(scene, fixed, brake_slope(losses, scene, fixed.state), included)
+
+
+def _growth(scene: Scene, fixed: Equilibrium, brake: Array, included: bool) -> float:
+    """What a part (12, 12) of the Jacobian, which it has or has not, adds to the growth, 1/s."""
+    # To first order, of the mode that grows fastest with it: the fastest one without it may be another mode, and the
+    # difference of their growth rates is no effect.
+    scales = Scales.of(scene)
+    tangents, projections = (found[0] for found in tangent_spaces(scales.pack(fixed.state)[None]))
+    whole = fixed.jacobian if included else fixed.jacobian + brake
+    values, right = np.linalg.eig(projections @ whole @ tangents)
+    leading = int(np.argmax(values.real))
+    added = left_eigenvectors(right)[leading] @ (projections @ brake @ tangents) @ right[:, leading]
+    return float(added.real) / scales.time

@@ -11,7 +11,6 @@ from second_opinions.phasor import mean_force, mean_torque
 
 from spinlev.dynamics.equilibria.equilibrium import Survey
 from spinlev.dynamics.equilibria.orbits import differentiation, floquet_modes, periodic_orbit, resampled
-from spinlev.dynamics.equilibria.perturbed import plate_action
 from spinlev.dynamics.equilibria.search import find_equilibria, survey, with_plate
 from spinlev.dynamics.flights.flight import Flight, integrate, simulate
 from spinlev.dynamics.motion.equations import parameters
@@ -24,6 +23,7 @@ from spinlev.fem.rotor.table import RotorTable
 from spinlev.geometry.meshes.plate import MeshRule
 from spinlev.geometry.scene.contents import Drag, Lowering, OffsetStart, Plate, Scene
 from spinlev.geometry.shapes import Box
+from spinlev.studies.catalogue.plate_damping import plate_action
 
 SetNumThreads(1)
 CUBOID = RotorTable("cuboid", MAGNETS, MAGNETS)
@@ -233,9 +233,9 @@ def test_what_the_plate_burns_comes_from_the_turn(known, rates):
     currents = found.currents[0] * VALUES[Parameter.PLATE_SHARE] - heard.signals[0]
     push = heard.fields[0].T @ currents * FLOATER.mass * scales.length / scales.time**2
     orbit = np.cross(found.position, push[:3])[2]  # the force drags the floater's orbit as well
-    assert action.torque[2] < 0
-    assert action.force[2] > 0
-    assert action.loss == pytest.approx(-SCENE.angular_velocity * (action.torque[2] + orbit), rel=1e-9)
+    assert action["torque"][2] < 0
+    assert action["force"][2] > 0
+    assert action["loss"] == pytest.approx(-SCENE.angular_velocity * (action["torque"][2] + orbit), rel=1e-9)
     with pytest.raises(ValueError, match="found with the plate"):
         plate_action(SCENE, alone, known.equilibria[0])
 
