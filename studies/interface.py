@@ -18,7 +18,7 @@ from ..fem.rotor.table import FieldTable, RotorTable
 from ..geometry.common import InputError
 from ..geometry.scene.files import scene_text
 from .catalogue.entries import CATALOGUE
-from .catalogue.runner import QUESTION, figures_of, question_study
+from .catalogue.runner import figures_of, question_study
 from .cli.console import heard
 from .cli.options import (
     FieldModel,
@@ -38,7 +38,7 @@ from .processes import mapped
 from .question import Question
 from .result import AXIS, Result, found_dataset, state_columns, variable
 from .starts import drawn_starts, given_starts
-from .study import Study
+from .study import Point, Study
 from .sweep import forget, swept
 
 TOGETHER = 512
@@ -463,7 +463,7 @@ def sweep(
     question = Question(loaded, "scene", ask, models, finite("spin", spin), finite("duration", duration), where)
     grid = checked_values(values)
     with heard(progress):
-        return _computed(QUESTION, question_study(question, grid), combinations(grid), (workers, scheduler), out)
+        return _computed(question_study(question, grid), combinations(grid), Workers(workers, scheduler), Path(out))
 
 
 def run_study(
@@ -507,15 +507,13 @@ def run_study(
         raise InputError(f"Input name must be one of {', '.join(CATALOGUE)}; instead received {name}.")
     study = CATALOGUE[name]
     with heard(progress):
-        return _computed(name, study, study.points(quick), (workers, scheduler), out)
+        return _computed(study, study.points(quick), Workers(workers, scheduler), Path(out))
 
 
-def _computed(
-    name: str, study: Study, points: Sequence[Mapping[str, object]], by: tuple[int | None, str | None], out: str | Path
-) -> xr.Dataset:
-    with owned(Path(out)):
-        result = swept(name, study, dict(enumerate(points)), Workers(*by).checked(), Path(out))
-        forget(name, Path(out))
+def _computed(study: Study, points: Sequence[Point], engine: Workers, out: Path) -> xr.Dataset:
+    with owned(out):
+        result = swept(study, points, engine.checked(), out)
+        forget(study, points, out)
     return result
 
 

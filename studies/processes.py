@@ -31,21 +31,15 @@ PATIENCE = 5.0
 THREADS = ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS")
 BEGIN = "import sys, pickle; from multiprocessing.connection import Connection; c = Connection(int(sys.argv[1])); \
 sys.path[:] = pickle.loads(c.recv_bytes()); from {module} import serve; serve(c)"
-Job = tuple[Any, ...]
-"""A function that gives an iterable, and its arguments."""
+Function = Callable[[Any], Iterable[Any]]
 
 
 @dataclass(frozen=True)
 class Death:
-    """How the process of a job ended before the job was done."""
+    """How a process ended before its work was done, as the end of a sentence, and how often."""
 
-    status: int
-
-    def __str__(self) -> str:
-        if self.status == -signal.SIGKILL:
-            return "was killed (out of memory?)"
-        how = signal.strsignal(-self.status) if self.status < 0 else f"exit status {self.status}"
-        return f"died ({how})"
+    how: str
+    times: int = 1
 
 
 class NoProcessError(ComputationError):
@@ -57,33 +51,34 @@ def program() -> str:
     return program_digest()
 
 
-def results(number: int, jobs: deque[Job]) -> Generator[tuple[Job, Any], None, None]:
-    """What jobs give, as it comes, each result with its job; a `Death` in place of what is missing.
+def results(number: int, function: Function, items: deque[Any]) -> Generator[tuple[Any, Any], None, None]:
+    """What a function gives for each item, as it comes, with its item; a `Death` in place of what is missing.
 
     Parameters
     ----------
     number : of processes, at most
-    jobs : who iterates may append others
+    function : gives an iterable
+    items : who iterates may append others
 
     Raises
     ------
-    NoProcessError : not one process can begin; `jobs` still has all that was not begun
-    ComputationError : a job raised, or the program was changed since this process began
+    NoProcessError : not one process can begin; `items` still has all that was not begun
+    ComputationError : the function raised, or the program was changed since this process began
     """
-    busy: dict[Connection, tuple[_Process, Job]] = {}
+    busy: dict[Connection, tuple[_Process, Any]] = {}
     free: list[_Process] = []
     try:
-        while jobs or busy:
-            while jobs and (free or len(busy) < number):
+        while items or busy:
+            while items and (free or len(busy) < number):
                 try:
-                    process = free.pop() if free else _Process()
+                    process = free.pop() if free else _Process(function)
                 except OSError as error:  # too many open files or processes, too little memory
                     number = _fewer(len(busy), str(error))
                     break
-                process.send(job := jobs.popleft())
-                busy[process.connection] = process, job
+                process.send(item := items.popleft())
+                busy[process.connection] = process, item
             for connection in wait(list(busy)):
-                process, job = busy[connection]  # type: ignore[index]
+                process, item = busy[connection]  # type: ignore[index]
                 kind, content = process.receive()
                 if kind in ("death", "done"):
                     del busy[process.connection]
@@ -98,14 +93,14 @@ def results(number: int, jobs: deque[Job]) -> Generator[tuple[Job, Any], None, N
                 elif kind == "done":
                     free.append(process)
                 elif kind == "result":
-                    yield job, content
+                    yield item, content
                 else:
                     process.stop()
                     if process.ready:
-                        yield job, content
-                    else:  # no death of its job, which it had not begun
-                        jobs.appendleft(job)
-                        number = _fewer(len(busy), f"it {content}")
+                        yield item, content
+                    else:  # no death of its item, which it had not begun
+                        items.appendleft(item)
+                        number = _fewer(len(busy), f"it {content.how}")
     finally:
         left = [*free, *(process for process, _ in busy.values())]
         for process in left:  # all are asked before the first is waited for
@@ -128,12 +123,11 @@ def mapped(number: int) -> Callable[[Callable[[Any], Any], Iterable[Any]], Itera
     """
 
     def map_in_processes(function: Callable[[Any], Any], items: Iterable[Any]) -> Iterator[Any]:
-        jobs: deque[Job] = deque((_one, function, k, item) for k, item in enumerate(items))
         found: dict[int, Any] = {}
-        for _, answer in results(number, jobs):
+        for (k, _), answer in results(number, lambda item: [function(item[1])], deque(enumerate(items))):
             if isinstance(answer, Death):
-                raise ComputationError(f"A process {answer}: choose fewer workers, or a machine with more memory.")
-            found[answer[0]] = answer[1]
+                raise ComputationError(f"A process {answer.how}: choose fewer workers, or a machine with more memory.")
+            found[k] = answer
         return (found[k] for k in sorted(found))
 
     return map_in_processes
@@ -153,12 +147,8 @@ def safe_path() -> Iterator[None]:
             os.environ["PYTHONSAFEPATH"] = before
 
 
-def _one(function: Callable[[Any], Any], number: int, item: Any) -> list[tuple[int, Any]]:
-    return [(number, function(item))]
-
-
 class _Process:
-    def __init__(self) -> None:
+    def __init__(self, function: Function) -> None:
         self.ready = False
         self.connection, other = Pipe()
         one_thread = dict.fromkeys(THREADS, "1") | {"MALLOC_TRIM_THRESHOLD_": "65536"}
@@ -175,21 +165,19 @@ class _Process:
             self.connection.close()
             raise
         here = [os.getcwd()] if "" in sys.path else []
-        self._put(pickle.dumps([place for place in sys.path if place] + here))
+        self.send([place for place in sys.path if place] + here)
+        self.send(function)
 
-    def send(self, job: Job) -> None:
-        self._put(cloudpickle.dumps(job))  # functions of a notebook as well
-
-    def _put(self, content: bytes) -> None:
+    def send(self, what: Any) -> None:
         with suppress(OSError):  # it has ended, which `receive` finds out
-            self.connection.send_bytes(content)
+            self.connection.send_bytes(cloudpickle.dumps(what))  # functions of a notebook as well
 
     def receive(self) -> tuple[str, Any]:
         """What kind of message it sent, and its content."""
         try:
             kind, content = pickle.loads(self.connection.recv_bytes())
         except (EOFError, OSError):
-            return "death", Death(self._process.wait())
+            return "death", Death(_way_to_end(self._process.wait()))
         return kind, content
 
     def terminate(self) -> None:
@@ -205,8 +193,14 @@ class _Process:
             self._process.wait()
 
 
+def _way_to_end(status: int) -> str:
+    if status == -signal.SIGKILL:
+        return "was killed (out of memory?)"
+    return f"died ({signal.strsignal(-status) if status < 0 else f'exit status {status}'})"
+
+
 def serve(connection: Connection) -> None:
-    """The life of such a process: jobs come, results go, until the other end is closed."""
+    """The life of such a process: items come, results go, until the other end is closed."""
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(1))  # unfinished files are removed on the way out
     threading.Thread(target=_end_with, args=(connection.fileno(),), daemon=True).start()
 
@@ -215,10 +209,12 @@ def serve(connection: Connection) -> None:
 
     try:
         say("ready", program())
+        content, function = connection.recv_bytes(), None
         while True:
-            function, *arguments = pickle.loads(connection.recv_bytes())
+            item = pickle.loads(connection.recv_bytes())
             try:
-                for result in function(*arguments):
+                function = function or pickle.loads(content)
+                for result in function(item):
                     say("result", result)
                 say("done")
             except Exception as error:

@@ -16,6 +16,10 @@ if TYPE_CHECKING:
 
 Point = Mapping[str, Any]
 """What tells one point of a study from the others, in types that JSON knows."""
+Batch = Mapping[int, Point]
+"""Numbered points that are computed together."""
+Prepared = Callable[[Sequence[Point]], Sequence[Callable[[], xr.Dataset]]]
+"""How to compute each of several points that help each other."""
 
 
 def by_case(parts: Sequence[xr.Dataset]) -> xr.Dataset:
@@ -84,8 +88,8 @@ class Study:
     figures: Mapping[str, Callable[[xr.Dataset], Figure]]
     report: Callable[[xr.Dataset], list[str]]
     gather: Callable[[Sequence[xr.Dataset]], xr.Dataset] = by_case
-    prepared: Callable[[Sequence[Point]], Sequence[Callable[[], xr.Dataset]]] | None = None
-    batches: Callable[[Mapping[int, Point]], Sequence[Sequence[int]]] | None = None
+    prepared: Prepared | None = None
+    batches: Callable[[Batch], Sequence[Sequence[int]]] | None = None
     timed: bool = False
     settings: Point = field(default_factory=dict)
     numbers: Callable[[xr.Dataset], Mapping[str, Any]] | None = None

@@ -127,9 +127,9 @@ def _studied(study: Study, points: Sequence[Point], engine: Workers, out: Path) 
     name = study.name
     path = out / f"{name}.nc"
     with owned(out):
-        result = swept(name, study, dict(enumerate(points)), engine, out)
+        result = swept(study, points, engine, out)
         write_dataset(result, path)
-        forget(name, out)
+        forget(study, points, out)
         figures = save_figures(figures_of(result), out)
     lines = [*study.report(result), *failure_lines(result)]
     values = {

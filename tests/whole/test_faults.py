@@ -482,7 +482,7 @@ def test_a_stopped_flight_is_no_point_of_a_sweep(spinlev, monkeypatch):
     with monkeypatch.context() as patch:
         patch.setattr("spinlev.studies.levitation.progress", progress)
         assert spinlev(*arguments)[0] == 1
-    assert [path.name for path in Path("out/question.points").glob("0*.json")] == ["000000.json"]
+    assert [path.name[:7] for path in Path("out/question.points").iterdir()] == ["000000-"]
     status, _, said = spinlev(*arguments)
     assert status == 0
     assert "1 of 2 points are there" in said

@@ -34,9 +34,9 @@ PHASES = {
     "run: table": (RUN, "finite elements ...", 0.2),
     "run: equilibria": (RUN, "Equilibria ...", 0.3),
     "run: files": (RUN, "Files and figures ...", 0.5),
-    "sweep in one process": ((*SWEEP, "--workers", "1"), "000000.json", 0.1),
-    "sweep: its cluster starts": ((*SWEEP, "--workers", "2"), "identity.json", 0.8),
-    "sweep on a cluster": ((*SWEEP, "--workers", "2"), "000000.json", 0.1),
+    "sweep in one process": ((*SWEEP, "--workers", "1"), "000000-*.json", 0.1),
+    "sweep: its cluster starts": ((*SWEEP, "--workers", "2"), "0*.json", 0.8),
+    "sweep on a cluster": ((*SWEEP, "--workers", "2"), "000000-*.json", 0.1),
 }
 RESULTS = ("field.csv", "trajectory.nc", "result.nc", "question.nc")
 

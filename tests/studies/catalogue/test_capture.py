@@ -130,7 +130,7 @@ def test_without_the_plates_currents_nothing_is_held(place):
 
 @pytest.mark.slow
 def test_the_number_of_workers_does_not_matter(tmp_path):
-    points = {k: {**POINT, "batch": k, "flights": 10, "checked": 1 - k} for k in range(2)}
-    one, two = (swept("capture", CAPTURE, points, Workers(workers=n), tmp_path / str(n)) for n in (1, 2))
+    points = [{**POINT, "batch": k, "flights": 10, "checked": 1 - k} for k in range(2)]
+    one, two = (swept(CAPTURE, points, Workers(workers=n), tmp_path / str(n)) for n in (1, 2))
     for name in one.data_vars:
         np.testing.assert_array_equal(one[name].values, two[name].values)

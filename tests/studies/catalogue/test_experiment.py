@@ -284,8 +284,8 @@ def test_a_variant_without_an_effect_has_none_of_it(models):
 @pytest.mark.slow
 def test_the_number_of_workers_does_not_matter(tmp_path):
     """The quick study with one and two workers, and a rotor that is computed anew against the one that was kept."""
-    points = dict(enumerate(EXPERIMENT.points(True)))
-    one, two = (swept("experiment", EXPERIMENT, points, Workers(workers=n), tmp_path / str(n)) for n in (1, 2))
+    points = EXPERIMENT.points(True)
+    one, two = (swept(EXPERIMENT, points, Workers(workers=n), tmp_path / str(n)) for n in (1, 2))
     for name in one.data_vars:
         np.testing.assert_array_equal(one[name].values, two[name].values)
     for k in (0, SETTINGS[True]["single"]):
