@@ -31,6 +31,8 @@ from ..geometry.files import regular_file
 from .codec import CodecError, from_dataset, to_dataset
 from .files import MOST, closed, hdf5_fault, ours, seal, sealed, user, write_whole
 
+# Number of each solver whose answers are kept, or of what writes the formulas that are compiled: another answer, or
+# another shape of its file, has the next number, and nothing of the old one is read any more.
 FORMATS = {
     "rotor": 6,
     "mutual": 4,
@@ -45,16 +47,13 @@ FORMATS = {
     "experiment": 2,
     "code": 1,
 }
-"""Number of each solver whose answers are kept, or of what writes the formulas that are compiled: another answer, or
-another shape of its file, has the next number, and nothing of the old one is read any more."""
+# That decide the digits of a table; the others read, write and show.
 LIBRARIES = ("heyoka", "netgen-mesher", "ngsolve", "numpy", "scipy")
-"""That decide the digits of a table; the others read, write and show."""
 ROOT = Path(__file__).resolve().parents[1]
 FLOORS = ("geometry", "fem", "dynamics", "studies")
 TEXTS = (".py", ".csv")
 OWNER = "in-use.lock"
-LIMIT = 2.0
-"""Size of all tables that are kept, GB, if SPINLEV_CACHE_GB names no other."""
+LIMIT = 2.0  # Size of all tables that are kept, GB, if SPINLEV_CACHE_GB names no other
 NO_LOCKS = (ENOLCK, ENOSYS, EOPNOTSUPP)
 Table = TypeVar("Table")
 
@@ -135,19 +134,12 @@ def _count(value: Any, update: Callable[[bytes], None]) -> None:
 
 @dataclass(frozen=True)
 class TableKind(Generic[Table]):
-    """One kind of tables, and their files.
+    """One kind of tables, and their files."""
 
-    Parameters
-    ----------
-    name : its entry in `FORMATS`; names of files begin with it
-    form : type of a table: a dataclass, or `tuple[...]`
-    title : of the files, for people
-    most : size of all of them, bytes, which are in a folder of their own then; None: with the others in the cache
-    """
-
-    name: str
-    form: type[Table]
-    title: str = ""
+    name: str  # its entry in `FORMATS`; names of files begin with it
+    form: type[Table]  # type of a table: a dataclass, or `tuple[...]`
+    title: str = ""  # of the files, for people
+    # size of all of them, bytes, which are in a folder of their own then; None: with the others in the cache
     most: int | None = None
 
     @property

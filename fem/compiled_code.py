@@ -23,15 +23,13 @@ from typing import Any, TypeVar, cast
 from .cache import cache_folder, cache_limit, key_of, make_room, others_may_write, own_folder
 from .files import seal, unsealed, write_whole
 
-LIMIT = 2**29
-"""Size of all that is kept, bytes; what was not used for the longest time makes room."""
+LIMIT = 2**29  # Size of all that is kept, bytes; what was not used for the longest time makes room
+# Memory of functions that this process keeps at hand, bytes; those in use are not lost by it, and integrators, which
+# have a state, are read anew each time.
 SHARED = 2**26
-"""Memory of functions that this process keeps at hand, bytes; those in use are not lost by it, and integrators, which
-have a state, are read anew each time."""
+# What a function takes of it: so many bytes where it was compiled here, and so many times its file.
 EACH, TIMES = 3_000_000, 20
-"""What a function takes of it: so many bytes where it was compiled here, and so many times its file."""
-KINDS = ("cfunc_dbl", "taylor_adaptive_dbl", "taylor_adaptive_batch_dbl")
-"""What is kept, by its name in heyoka."""
+KINDS = ("cfunc_dbl", "taylor_adaptive_dbl", "taylor_adaptive_batch_dbl")  # What is kept, by its name in heyoka
 LOG = logging.getLogger("spinlev")
 Compiled = TypeVar("Compiled")
 _functions: OrderedDict[Path, tuple[Any, int]] = OrderedDict()
@@ -184,8 +182,7 @@ def _read(path: Path) -> tuple[Any, int]:
         return None, 0
 
 
-PLAIN = (0.0, 1.0, -1.0)
-"""Numbers that symmetry makes so: they stay what they are, and make the code shorter."""
+PLAIN = (0.0, 1.0, -1.0)  # Numbers that symmetry makes so: they stay what they are, and make the code shorter
 
 
 class RuntimeNumbers:

@@ -19,8 +19,7 @@ from ..geometry.files import LostError, call_apart, file_content, regular_file
 
 MARK = b"\nspinlev sha256 "
 LENGTH = len(MARK) + 64
-MOST = 1_000_000_000
-"""Bytes of a file that is read."""
+MOST = 1_000_000_000  # Bytes of a file that is read
 
 
 def write_whole(path: str | Path, content: bytes) -> None:
@@ -114,12 +113,9 @@ def closed(found: os.stat_result) -> bool:
 
 
 SIGNATURE = b"\x89HDF\r\n\x1a\n"
-LONGEST = 20.0
-"""Seconds to look through a small file, which takes a fraction of one."""
-LARGEST = 1_000_000_000
-"""Bytes of numbers that a file may unfold to: a few of it can stand for any number of zeros."""
-PACE = 10e6
-"""Bytes for each second more; disks and HDF5's filters are ten times as fast."""
+LONGEST = 20.0  # Seconds to look through a small file, which takes a fraction of one
+LARGEST = 1_000_000_000  # Bytes of numbers that a file may unfold to: a few of it can stand for any number of zeros
+PACE = 10e6  # Bytes for each second more; disks and HDF5's filters are ten times as fast
 
 
 def is_hdf5(path: Path) -> bool:

@@ -21,30 +21,19 @@ from ..geometry.solids import Solid
 from .elements.condensed import require_memory
 from .elements.spaces import IntegrationPoints, volume_points
 
-Potentials = Callable[[Array], Array]
-"""Points (n, 3) m -> A (n, 3, k) of k sources."""
-BLOCK, TOGETHER = 4000, 40
-"""Points, and places of dipoles, at a time."""
+Potentials = Callable[[Array], Array]  # Points (n, 3) m -> A (n, 3, k) of k sources
+BLOCK, TOGETHER = 4000, 40  # Points, and places of dipoles, at a time
 
 
 @dataclass(frozen=True, eq=False)
 class Metal:
-    """A piece of metal on a mesh; made by `metal_of`.
+    """A piece of metal on a mesh; made by `metal_of`."""
 
-    Parameters
-    ----------
-    mesh : of the piece alone
-    conductivity : S/m
-    space : H1
-    inverse : of the Laplacian, one unknown held at zero
-    points : integration points
-    """
-
-    mesh: MetalMesh
-    conductivity: float
-    space: Any
-    inverse: Any
-    points: IntegrationPoints
+    mesh: MetalMesh  # of the piece alone
+    conductivity: float  # S/m
+    space: Any  # H1
+    inverse: Any  # of the Laplacian, one unknown held at zero
+    points: IntegrationPoints  # integration points
 
     @cached_property
     def places(self) -> Array:
@@ -161,16 +150,10 @@ def of_motion(position: Array, moment: Array) -> Potentials:
 
 @dataclass(frozen=True, eq=False)
 class CurrentPatterns:
-    """Patterns of current in several pieces of metal.
+    """Patterns of current in several pieces of metal."""
 
-    Parameters
-    ----------
-    metals : the pieces
-    patterns : (points, 3, k) of w_k σ dV at the integration points of each
-    """
-
-    metals: tuple[Metal, ...]
-    patterns: tuple[Array, ...]
+    metals: tuple[Metal, ...]  # the pieces
+    patterns: tuple[Array, ...]  # (points, 3, k) of w_k σ dV at the integration points of each
 
     @property
     def count(self) -> int:

@@ -30,32 +30,20 @@ from .metal_currents import Metal, current_patterns, metal_of, of_motion
 from .plate.multipoles import Multipoles, fit_multipoles, real_kinds
 
 BALL_DEGREE = 3
-CUBE = 0.6092
-"""Radius of the ball with the losses of a cube in a uniform field, over the cube's edge."""
-ORDER = 5
-"""Degree of the elements."""
-LEFT_OUT = 1e-2
-"""Part of the dissipation that may be left out where the floater touches; far less elsewhere."""
-FIT = 1e-2
-"""Relative error of the fields c_k there."""
-DEGREE = 10
-"""Of the multipoles."""
-NOISE = 3e-3
-"""Entries of unit columns below this come from elements that are not as symmetric as the bodies."""
-SHELLS = (1.0, 1.5, 2.5, 5.0)
-"""Distances from the rotor at which fields are fitted, over that in contact."""
-CHECKED = (1.0, 1.5, 2.0, 3.0, 5.0)
-"""The same for the errors that are stated; between them errors are interpolated."""
+CUBE = 0.6092  # Radius of the ball with the losses of a cube in a uniform field, over the cube's edge
+ORDER = 5  # Degree of the elements
+LEFT_OUT = 1e-2  # Part of the dissipation that may be left out where the floater touches; far less elsewhere
+FIT = 1e-2  # Relative error of the fields c_k there
+DEGREE = 10  # Of the multipoles
+NOISE = 3e-3  # Entries of unit columns below this come from elements that are not as symmetric as the bodies
+SHELLS = (1.0, 1.5, 2.5, 5.0)  # Distances from the rotor at which fields are fitted, over that in contact
+CHECKED = (1.0, 1.5, 2.0, 3.0, 5.0)  # The same for the errors that are stated; between them errors are interpolated
+# In which places are looked for from each body, in an octant: with their mirror images, as most rotors have them.
 DIRECTIONS = 18
-"""In which places are looked for from each body, in an octant: with their mirror images, as most rotors have them."""
-POSES = 8
-"""At each of these distances."""
-Pieces = list[tuple[tuple[Solid, ...], float]]
-"""Bodies that are one piece of metal, and its conductivity in S/m."""
-ALLOWED = 0.02
-"""Relative error of losses that are taken as instantaneous."""
-ROUNDED = 0.995
-"""What is named as the most that would do is less by so much, so that its three digits will do."""
+POSES = 8  # At each of these distances
+Pieces = list[tuple[tuple[Solid, ...], float]]  # Bodies that are one piece of metal, and its conductivity in S/m
+ALLOWED = 0.02  # Relative error of losses that are taken as instantaneous
+ROUNDED = 0.995  # What is named as the most that would do is less by so much, so that its three digits will do
 
 
 @dataclass(frozen=True, eq=False)

@@ -21,34 +21,25 @@ from ..motion.effect import Effect, Fittable, InBall, Interaction, interaction_o
 from ..motion.events import clearance, rotor_gap
 from ..motion.state import Parameter, Vector, turned_about_z
 
-DEGREE = len(Parameter)
-"""Number of the runtime parameter that says of which degree the ball is: 0 where there is none."""
+DEGREE = len(Parameter)  # Number of the runtime parameter that says of which degree the ball is: 0 where there is none
+# The second kind, twice as wide and half again as slow, is for a floater that has left a small ball.
 SMALL, LARGE = BallField(DEGREE + 1, 7), BallField(DEGREE + 1, 9)
-"""The second kind, twice as wide and half again as slow, is for a floater that has left a small ball."""
-FIRST = DEGREE + 1 + LARGE.count
-"""Number of the first runtime parameter of the effects in a ball."""
+FIRST = DEGREE + 1 + LARGE.count  # Number of the first runtime parameter of the effects in a ball
+# Length of a field's expressions, written out, from which on balls are faster. A dipole has 6e3, a cuboid's closed form
+# 2e4, two of them 4e4, moments up to degree 9 4e6 (as fast as a ball), a cube's table by finite elements 9e6 from 3 mm
+# off contact on and 1e8 from contact on.
 WORTH = 5e6
-"""Length of a field's expressions, written out, from which on balls are faster.
-
-A dipole has 6e3, a cuboid's closed form 2e4, two of them 4e4, moments up to degree 9 4e6 (as fast as a ball), a cube's
-table by finite elements 9e6 from 3 mm off contact on and 1e8 from contact on.
-"""
+# Of a ball's field and its gradient, relative; the gradient of a table by finite elements is known to 4e-5.
 ERROR = 1e-6
-"""Of a ball's field and its gradient, relative; the gradient of a table by finite elements is known to 4e-5."""
-SPACING = 1 / 32
-"""Of the lattice, in radii of the floater."""
-LEAST = 1.5
-"""Smallest radius of a ball in spacings: a floater that enters it is at most 0.87 of them from the centre."""
+SPACING = 1 / 32  # Of the lattice, in radii of the floater
+LEAST = 1.5  # Smallest radius of a ball in spacings: a floater that enters it is at most 0.87 of them from the centre
 TRIALS = 5
 ANGLES, DEPTHS = 72, 400
-MOST = 4096
-"""Balls that are remembered, 2.6 kB each."""
-INSIDE = 1 - 1e-9
-"""Square of the distance from a ball's centre, in radii, from which on the floater has left it."""
+MOST = 4096  # Balls that are remembered, 2.6 kB each
+INSIDE = 1 - 1e-9  # Square of the distance from a ball's centre, in radii, from which on the floater has left it
+# A ball is worth its making if the floater needs so many radians of the rotor's turn for its radius, up or down.
 STAY = 4.0
-"""A ball is worth its making if the floater needs so many radians of the rotor's turn for its radius, up or down."""
-SNUG = 0.97
-"""Largest part of a ball's radius to which the circle may reach on which the rotor sees the floater."""
+SNUG = 0.97  # Largest part of a ball's radius to which the circle may reach on which the rotor sees the floater
 
 
 def is_long(table: FieldTable) -> bool:
@@ -79,16 +70,10 @@ def within(formula: BallField, position: Vector) -> hy.expression:
 
 @dataclass(frozen=True, eq=False)
 class Balls:
-    """The balls of a scene.
+    """The balls of a scene."""
 
-    Parameters
-    ----------
-    scene : whose bodies the floater must not touch while it is in a ball
-    whole : the rotor's table with its effects
-    """
-
-    scene: Scene
-    whole: Interaction
+    scene: Scene  # whose bodies the floater must not touch while it is in a ball
+    whole: Interaction  # the rotor's table with its effects
     _known: dict[tuple[float, ...], tuple[Array, float] | None] = field(default_factory=dict)
 
     @cached_property

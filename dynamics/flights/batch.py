@@ -39,22 +39,17 @@ from .balls import LARGE, SMALL
 from .flight import LEFT, LOOSER, MOST_SAMPLES, TOLERANCE, Course, Flight, IntegrationError
 from .trajectory import DURATION, Recorder, Trajectory
 
-LANES = 8
-"""Measured: a flight in eight lanes takes a quarter of the time of one alone, in four a half, in 16 a third."""
-TOGETHER = 200
-"""Steps between two looks for lanes whose flights have ended; a hundred are about 16 turns."""
-STEP_ERROR = 1e-9
-"""Of a launch, which is chaotic: single flights depend on the error of a step, but not their shares."""
-FLAT = 1e-9
-"""Sine of the angle to the horizontal that a plate may have."""
+LANES = 8  # Measured: a flight in eight lanes takes a quarter of the time of one alone, in four a half, in 16 a third
+TOGETHER = 200  # Steps between two looks for lanes whose flights have ended; a hundred are about 16 turns
+STEP_ERROR = 1e-9  # Of a launch, which is chaotic: single flights depend on the error of a step, but not their shares
+FLAT = 1e-9  # Sine of the angle to the horizontal that a plate may have
 
 
 class _Passenger(Course):
     """A trajectory on a lane for balls of one kind."""
 
     over = False
-    left = False
-    """Whether it was ever beyond the range of the plate's table."""
+    left = False  # Whether it was ever beyond the range of the plate's table
 
     @property
     def end(self) -> float:
@@ -215,21 +210,13 @@ class Lanes:
 
 @dataclass(frozen=True, eq=False)
 class Endings:
-    """The ends of n trajectories.
+    """The ends of n trajectories."""
 
-    Parameters
-    ----------
-    ended_by : (n,) "duration", "contact" or "lost"
-    levitated_s : (n,) when, s
-    last : states (n, 3) then, along the rotor's axes, SI units
-    changes : (n,) how often a floater went from one ball to another
-    left_plate_table : (n,) whether it was ever beyond the range of the plate's table, where its field is a continuation
-    """
-
-    ended_by: NDArray[np.str_]
-    levitated_s: Array
-    last: State
-    changes: NDArray[np.int_]
+    ended_by: NDArray[np.str_]  # (n,) "duration", "contact" or "lost"
+    levitated_s: Array  # (n,) when, s
+    last: State  # states (n, 3) then, along the rotor's axes, SI units
+    changes: NDArray[np.int_]  # (n,) how often a floater went from one ball to another
+    # (n,) whether it was ever beyond the range of the plate's table, where its field is a continuation
     left_plate_table: NDArray[np.bool_]
 
     @classmethod

@@ -17,26 +17,18 @@ from ...geometry.common import InputError
 from ...geometry.files import regular_file
 
 KEPT = ("time", "state", "values", "times", "states", "interval", "steps", "changes", "region")
-MOST = 2_000_000_000
-"""Bytes of a checkpoint."""
+MOST = 2_000_000_000  # Bytes of a checkpoint
+# What damage to a file of arrays is noticed by; its header may say any size.
 BROKEN = (OSError, ValueError, KeyError, TypeError, EOFError, RuntimeError, MemoryError, zipfile.BadZipFile, zlib.error)
-"""What damage to a file of arrays is noticed by; its header may say any size."""
 
 
 @dataclass(frozen=True)
 class Checkpoint:
-    """The file in which a `Course` is kept while it lasts.
+    """The file in which a `Course` is kept while it lasts."""
 
-    Parameters
-    ----------
-    path : where it is
-    identity : everything that the flight depends on, as text; another flight's checkpoint is refused
-    every : seconds between two writings
-    """
-
-    path: Path
-    identity: str
-    every: float = 5.0
+    path: Path  # where it is
+    identity: str  # everything that the flight depends on, as text; another flight's checkpoint is refused
+    every: float = 5.0  # seconds between two writings
 
     @property
     def _key(self) -> str:

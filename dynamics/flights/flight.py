@@ -45,30 +45,22 @@ from .start import StartError, in_plate_range, initial_state
 from .trajectory import DURATION, STOPPED, FieldChanges, FlightStopped, Recorder, Trajectory
 
 LEFT = "left"
+# Of a Taylor step. Measured over 1300 turns: J drifts by 3e-13 at 1e-15, by 1e-14 at 1e-16 with 1 % more steps.
 TOLERANCE = 1e-16
-"""Of a Taylor step. Measured over 1300 turns: J drifts by 3e-13 at 1e-15, by 1e-14 at 1e-16 with 1 % more steps."""
-PLATE_TOLERANCE = 1e-12
-"""Of a Taylor step with a plate, whose table is known to 1e-4 at best."""
+PLATE_TOLERANCE = 1e-12  # Of a Taylor step with a plate, whose table is known to 1e-4 at best
+# A step's error is relative to the largest of states and events: 250 and more by the event of loss, 3 in a ball.
+# Measured: in a ball J drifts by 3e-14 in 1100 turns at 3e-14, and by 2e-14 in the table's field at 1e-16.
 LOOSER = 300
-"""A step's error is relative to the largest of states and events: 250 and more by the event of loss, 3 in a ball.
-
-Measured: in a ball J drifts by 3e-14 in 1100 turns at 3e-14, and by 2e-14 in the table's field at 1e-16.
-"""
+# Of the compiler. Measured: more takes twice as long to compile, and the code is not faster, but often slower.
 OPTIMISATION = 1
-"""Of the compiler. Measured: more takes twice as long to compile, and the code is not faster, but often slower."""
+# Turns up to which code that is not optimised at all is done sooner. Measured for a dipole, for closed forms and in a
+# ball: loops are compiled in 0.05 to 0.1 s instead of 0.4 to 0.7 s, and a turn takes 0.3 to 0.5 ms longer.
 SHORT_TURNS = 1000.0
-"""Turns up to which code that is not optimised at all is done sooner.
-
-Measured for a dipole, for closed forms and in a ball: loops are compiled in 0.05 to 0.1 s instead of 0.4 to 0.7 s, and
-a turn takes 0.3 to 0.5 ms longer.
-"""
+# Turns from which on straight code saves more time (in a ball 21 of 47 µs a step) than its compilation takes.
 STRAIGHT_TURNS = 2e5
-"""Turns from which on straight code saves more time (in a ball 21 of 47 µs a step) than its compilation takes."""
+# The most turns and samples between two looks at the motion. A step ends where a piece does, so that pieces must not
+# depend on how fast the machine is.
 PIECE_TURNS, PIECE_SAMPLES = 256, 256
-"""The most turns and samples between two looks at the motion.
-
-A step ends where a piece does, so that pieces must not depend on how fast the machine is.
-"""
 MOST_SAMPLES, SAMPLES_PER_TURN = 20000, 32
 
 
@@ -209,32 +201,20 @@ class Flight:
 
 @dataclass(eq=False)
 class Course:
-    """How far a trajectory is.
+    """How far a trajectory is."""
 
-    Parameters
-    ----------
-    flight, duration : the problem, and when it ends (s) if nothing ends it before
-    values : runtime parameters, with those of the ball that the floater is in
-    state : scaled (s,), with the plate's and the work
-    time : scaled, the sum of two numbers, so that it loses nothing over millions of turns
-    ended_by : what has ended the last piece
-    steps : of Taylor's method so far
-    changes : from ball to ball, so far; energies scaled
-    recorder, scale : samples with J - work, and the size of J; none where only the end is asked for
-    sound : whether samples and state belong together: not where an interrupt comes between them
-    """
-
-    flight: Flight
+    flight: Flight  # the problem, and when it ends (s) if nothing ends it before
     duration: float
-    values: Array
-    state: Array
+    values: Array  # runtime parameters, with those of the ball that the floater is in
+    state: Array  # scaled (s,), with the plate's and the work
+    # scaled, the sum of two numbers, so that it loses nothing over millions of turns
     time: tuple[float, float] = (0.0, 0.0)
-    ended_by: str = DURATION
-    steps: int = 0
-    changes: FieldChanges = field(default_factory=FieldChanges)
-    recorder: Recorder | None = None
+    ended_by: str = DURATION  # what has ended the last piece
+    steps: int = 0  # of Taylor's method so far
+    changes: FieldChanges = field(default_factory=FieldChanges)  # from ball to ball, so far; energies scaled
+    recorder: Recorder | None = None  # samples with J - work, and the size of J; none where only the end is asked for
     scale: float = 1.0
-    sound: bool = True
+    sound: bool = True  # whether samples and state belong together: not where an interrupt comes between them
 
     @property
     def seconds(self) -> float:

@@ -15,25 +15,17 @@ from .flight import PLATE_TOLERANCE, TOLERANCE, Flight
 from .start import StartError, check_free, in_plate_range, initial_state
 from .trajectory import DURATION, Recorder
 
-FEWEST, MOST, A_SECOND = 8, 256, 400
-"""Samples of a piece at least and at most, and between that so many a second."""
+FEWEST, MOST, A_SECOND = 8, 256, 400  # Samples of a piece at least and at most, and between that so many a second
 
 
 @dataclass(frozen=True, eq=False)
 class Piece:
-    """Samples of a piece of a flight.
+    """Samples of a piece of a flight."""
 
-    Parameters
-    ----------
-    time : (n,) s
-    lab : motion (n, 3) along the laboratory's axes, SI units
-    angle : of the rotor at the last sample, rad
-    ended_by : "duration" where the flight can go on, else "contact", "lost", or "beyond" the range of the plate's table
-    """
-
-    time: Array
-    lab: State
-    angle: float
+    time: Array  # (n,) s
+    lab: State  # motion (n, 3) along the laboratory's axes, SI units
+    angle: float  # of the rotor at the last sample, rad
+    # "duration" where the flight can go on, else "contact", "lost", or "beyond" the range of the plate's table
     ended_by: str
 
 

@@ -15,8 +15,7 @@ from ..motion.events import clearance, plate_depth
 from ..motion.plate import PlateForce, PlateMemory
 from ..motion.state import Parameter, Scales, State
 
-SLOWLY = 1 / 3
-"""Growth (1/s) with which a flight may still begin: an e-fold in the shortest flight that counts, 3 s."""
+SLOWLY = 1 / 3  # Growth (1/s) with which a flight may still begin: an e-fold in the shortest flight that counts, 3 s
 
 
 class StartError(InputError):

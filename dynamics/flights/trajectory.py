@@ -79,20 +79,12 @@ DURATION, STOPPED = "duration", "stopped"
 
 @dataclass(frozen=True)
 class FieldChanges:
-    """What changes of the field's representation did in a flight through balls.
+    """What changes of the field's representation did in a flight through balls."""
 
-    Parameters
-    ----------
-    count : of the changes
-    energy : their sum U_new - U_old, each at the place of the change; relative, as the ledger's error
-    total : sum of |U_new - U_old|, relative
-    error : largest error of a ball's field or gradient against the table, relative
-    """
-
-    count: int = 0
-    energy: float = 0.0
-    total: float = 0.0
-    error: float = 0.0
+    count: int = 0  # of the changes
+    energy: float = 0.0  # their sum U_new - U_old, each at the place of the change; relative, as the ledger's error
+    total: float = 0.0  # sum of |U_new - U_old|, relative
+    error: float = 0.0  # largest error of a ball's field or gradient against the table, relative
 
     def and_one(self, energy: float, error: float) -> Self:
         """With one more, of an energy (in the unit of the others), to a ball with an error."""
@@ -105,34 +97,21 @@ class FieldChanges:
 
 @dataclass(frozen=True, eq=False)
 class Trajectory:
-    """Samples of a flight and how it ended.
+    """Samples of a flight and how it ended."""
 
-    Parameters
-    ----------
-    time : (n,) s, at equal intervals but for the last
-    lab : motion (n, 3) along the laboratory's axes, SI units
-    angular_velocity : of the rotor, rad/s
-    ended_by : "duration", "contact" or "lost"; "stopped" by the user
-    energy_error : largest relative violation of the energy ledger or of |m̂| = 1
-    realtime_factor : simulated seconds per second of integration, compilation left out
-    steps : number of Taylor steps
-    compile_seconds : time spent on compilation (little where heyoka's cache knows the system)
-    beyond_plate_table : part of the samples at which the floater was out of the range of the plate's table
-    left_plate_table : whether it ended, as "lost", where that range does: the plate's field is not known farther on
-    field_changes : from one representation of the rotor's field to another; the ledger is that of the motion between
-        them
-    """
-
-    time: Array
-    lab: State
-    angular_velocity: float
-    ended_by: str
-    energy_error: float
-    realtime_factor: float
-    steps: int
-    compile_seconds: float
+    time: Array  # (n,) s, at equal intervals but for the last
+    lab: State  # motion (n, 3) along the laboratory's axes, SI units
+    angular_velocity: float  # of the rotor, rad/s
+    ended_by: str  # "duration", "contact" or "lost"; "stopped" by the user
+    energy_error: float  # largest relative violation of the energy ledger or of |m̂| = 1
+    realtime_factor: float  # simulated seconds per second of integration, compilation left out
+    steps: int  # number of Taylor steps
+    compile_seconds: float  # time spent on compilation (little where heyoka's cache knows the system)
+    # part of the samples at which the floater was out of the range of the plate's table
     beyond_plate_table: float = 0.0
+    # whether it ended, as "lost", where that range does: the plate's field is not known farther on
     left_plate_table: bool = False
+    # from one representation of the rotor's field to another; the ledger is that of the motion between them
     field_changes: FieldChanges = field(default_factory=FieldChanges)
 
     def __repr__(self) -> str:
@@ -173,16 +152,13 @@ class FlightStopped(KeyboardInterrupt):
 
 STABLE, LINEAR_FALL, OSCILLATING_LOSS = "stable", "linear fall", "oscillating loss"
 DRIFTING, GROWING, NOT_HELD = "drifting", "growing oscillation", "not held"
-NOT_FOLLOWED = "not followed"
-"""To its end: it left the range of the plate's table."""
+NOT_FOLLOWED = "not followed"  # To its end: it left the range of the plate's table
+# Parts into which a flight is divided; the last one, in which the floater may already fall freely, is left out.
 WINDOWS = 20
-"""Parts into which a flight is divided; the last one, in which the floater may already fall freely, is left out."""
-FEWEST = 4
-"""Samples in a part: a trend takes three."""
-VISIBLE = 2e-5
-"""Smallest drift or oscillation that counts while the floater is still up, m."""
+FEWEST = 4  # Samples in a part: a trend takes three
+VISIBLE = 2e-5  # Smallest drift or oscillation that counts while the floater is still up, m
+# A loss before this time, s, is no flight: the floater had no time for a few bounces; nor is a trend seen in less.
 HELD = 0.5
-"""A loss before this time, s, is no flight: the floater had no time for a few bounces; nor is a trend seen in less."""
 
 
 def flight_kind(flight: Trajectory) -> str:

@@ -40,13 +40,12 @@ from .effect import Added, Motion, dissipative
 from .state import Parameter, cross, dot
 
 REAL_AIR = "air beyond Stokes"
-AIR_DENSITY = 1.19
-"""kg/m³ at 20-25 °C."""
+AIR_DENSITY = 1.19  # kg/m³ at 20-25 °C
 BOUNDARY_LAYER, REST = 6.45, 32.1
+# Reynolds number at which a steady spin begins to feel more than Stokes' torque.
 STOKES_UP_TO = ((16 * np.pi - REST) / BOUNDARY_LAYER) ** 2
-"""Reynolds number at which a steady spin begins to feel more than Stokes' torque."""
+# Reynolds number that is added in square to that of translation, so that its power is smooth at rest: 3 % there.
 SLOW = 0.1
-"""Reynolds number that is added in square to that of translation, so that its power is smooth at rest: 3 % there."""
 Value = TypeVar("Value", Array, hy.expression)
 
 
@@ -105,26 +104,17 @@ def _separated(square: Value) -> Value:
 
 
 FLOATER_SHAPE = "the floater's shape"
-HEIGHTS = np.array([0.3, 0.6, 0.9])
-"""Of the dipoles off the centre, in half heights of the floater."""
+HEIGHTS = np.array([0.3, 0.6, 0.9])  # Of the dipoles off the centre, in half heights of the floater
 
 
 @dataclass(frozen=True, eq=False)
 class FloaterShape:
-    """What the shape of a cylinder polarised along its axis adds to the dipole at its centre.
+    """What the shape of a cylinder polarised along its axis adds to the dipole at its centre."""
 
-    Parameters
-    ----------
-    field : the rotor's
-    heights : (k,) m along the moment; the first is zero
-    dipoles : (k,) by the moment of the equations
-    floater, sources : whose shape it is
-    """
-
-    field: FieldFormula
-    heights: Array
-    dipoles: Array
-    floater: Floater
+    field: FieldFormula  # the rotor's
+    heights: Array  # (k,) m along the moment; the first is zero
+    dipoles: Array  # (k,) by the moment of the equations
+    floater: Floater  # whose shape it is
     sources: FloaterSources
     name: str = FLOATER_SHAPE
 

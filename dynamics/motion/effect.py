@@ -26,44 +26,28 @@ NOTHING = (ZERO, ZERO, ZERO)
 
 @dataclass(frozen=True, eq=False)
 class Motion:
-    """The floater's motion, as expressions (3,) that effects are written with.
+    """The floater's motion, as expressions (3,) that effects are written with."""
 
-    Parameters
-    ----------
-    position, velocity, moment, spin : the scaled state; moment is a unit vector
-    drift, lag : velocity and spin as seen from the rotor
-    field, gradient : the rotor's B (3) T and ∂B_i/∂x_j (3, 3) T/m at the floater's centre
-    """
-
-    position: Vector
+    position: Vector  # the scaled state; moment is a unit vector
     velocity: Vector
     moment: Vector
     spin: Vector
-    drift: Vector
+    drift: Vector  # velocity and spin as seen from the rotor
     lag: Vector
-    field: Vector
+    field: Vector  # the rotor's B (3) T and ∂B_i/∂x_j (3, 3) T/m at the floater's centre
     gradient: list[list[hy.expression]]
 
 
 @dataclass(frozen=True, eq=False)
 class Added:
-    """What an effect adds to the equations of motion.
+    """What an effect adds to the equations of motion."""
 
-    Parameters
-    ----------
-    force, torque : (3,) scaled accelerations of place and of spin
-    pulled : (3,) a moment on which the rotor's gradient acts: scaled force by a gradient of 1 T/m
-    turning : (3,) a field that turns the floater's moment: scaled torque by a unit moment across it
-    energy : term of the Jacobi integral
-    power : rate of change of the Jacobi integral by this effect
-    """
-
-    force: Vector = NOTHING
+    force: Vector = NOTHING  # (3,) scaled accelerations of place and of spin
     torque: Vector = NOTHING
-    pulled: Vector = NOTHING
-    turning: Vector = NOTHING
-    energy: hy.expression = ZERO
-    power: hy.expression = ZERO
+    pulled: Vector = NOTHING  # (3,) a moment on which the rotor's gradient acts: scaled force by a gradient of 1 T/m
+    turning: Vector = NOTHING  # (3,) a field that turns the floater's moment: scaled torque by a unit moment across it
+    energy: hy.expression = ZERO  # term of the Jacobi integral
+    power: hy.expression = ZERO  # rate of change of the Jacobi integral by this effect
 
 
 class Effect(Protocol):
@@ -152,16 +136,10 @@ def conservative(energy: Callable[[Vector, Vector, Vector], hy.expression], moti
 
 @dataclass(frozen=True, eq=False)
 class Interaction:
-    """A field table that also knows effects.
+    """A field table that also knows effects."""
 
-    Parameters
-    ----------
-    field : the rotor's field; a table where more than its expressions are asked for
-    effects : what else acts on the floater
-    """
-
-    field: FieldFormula
-    effects: tuple[Effect, ...] = ()
+    field: FieldFormula  # the rotor's field; a table where more than its expressions are asked for
+    effects: tuple[Effect, ...] = ()  # what else acts on the floater
 
     def expressions(self, position: Sequence[hy.expression]) -> FieldExpressions:
         """B and its gradient as heyoka expressions of a position (m, rotor's frame)."""

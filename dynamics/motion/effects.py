@@ -16,8 +16,7 @@ from .mutual import STEP, rough_force
 from .rotor_losses import ROTOR_CURRENTS, RotorCurrents
 
 NOTHING_ANSWERS = "neither rotor nor floater is permeable"
-NEAR = 2.0
-"""Distance from the rotor, in floater radii, at which the answers are compared with the accuracy asked for."""
+NEAR = 2.0  # Distance from the rotor, in floater radii, at which the answers are compared with the accuracy asked for
 
 
 def mutual_choice(scene: Scene, table: FieldTable, asked: str, rtol: float) -> tuple[bool, str]:

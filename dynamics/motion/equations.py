@@ -37,20 +37,13 @@ NAMES = tuple(f"{vector}_{axis}" for vector in ("position", "velocity", "moment"
 
 @dataclass(frozen=True, eq=False)
 class Equations:
-    """The equations of motion as heyoka expressions.
+    """The equations of motion as heyoka expressions."""
 
-    Parameters
-    ----------
-    variables : the twelve of the floater, then the plate's
-    rates : their derivatives with respect to scaled time
-    jacobi : the terms of the Jacobi integral: motion, turning, magnet, weight, swirl, effects, and the plate's energy
-    power : its rate of change, by drag, by gravity across the axis, by effects and by the plate
-    """
-
-    variables: Vector
-    rates: Vector
+    variables: Vector  # the twelve of the floater, then the plate's
+    rates: Vector  # their derivatives with respect to scaled time
+    # the terms of the Jacobi integral: motion, turning, magnet, weight, swirl, effects, and the plate's energy
     jacobi: Vector
-    power: hy.expression
+    power: hy.expression  # its rate of change, by drag, by gravity across the axis, by effects and by the plate
 
 
 def parameters(scene: Scene, scales: Scales, frozen_spin: bool = False) -> Array:
@@ -165,8 +158,8 @@ def _angular_drag(moment: Vector, spin: Vector) -> Vector:
     return [excess * moment[i] - tilt * spin[i] for i in range(3)]
 
 
+# Position, moment, its two tangents, and body spin s: what balances are functions of.
 GIVEN = ("x", "y", "z", "m_x", "m_y", "m_z", "t_x", "t_y", "t_z", "u_x", "u_y", "u_z", "body_spin")
-"""Position, moment, its two tangents, and body spin s: what balances are functions of."""
 TILTS = ("tilt_t", "tilt_u")
 
 

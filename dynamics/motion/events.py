@@ -17,12 +17,12 @@ from ...geometry.solids import Solid
 from .plate import PlateMemory, seen_by_plate
 from .state import Parameter, Vector, turned_about_z
 
+# The last: where the range of a plate's table ends, beyond which nobody knows its currents' field.
 CONTACT, LOST, BEYOND = "contact", "lost", "beyond"
-"""The last: where the range of a plate's table ends, beyond which nobody knows its currents' field."""
 
 
+# What ends a stretch of motion where it becomes negative, and the meaning of that.
 Events = list[tuple[hy.expression, str]]
-"""What ends a stretch of motion where it becomes negative, and the meaning of that."""
 
 
 def flight_events(scene: Scene, position: Vector) -> Events:

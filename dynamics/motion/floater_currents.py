@@ -29,22 +29,19 @@ from .effect import Added, Motion, dissipative
 from .state import Parameter, Vector, cross, dot
 
 Matrix = list[list[hy.expression]]
-GRADIENT = 2 / 21
-"""Share of a unit gradient in the loss, lengths in radii; κ is that of a unit field."""
+GRADIENT = 2 / 21  # Share of a unit gradient in the loss, lengths in radii; κ is that of a unit field
+# The first of j0 and of j1; all others together are as fast as the field.
 ZEROS = (
     tuple(float(n * np.pi) for n in range(1, 9)),
     (4.493409457909064, 7.725251836937707, 10.904121659428899, 14.066193912831473, 17.22075527193077),
 )
-"""The first of j0 and of j1; all others together are as fast as the field."""
-SUMS = ((1 / 90, 1 / 945), (1 / 350, 1 / 7875))
-"""Σ 1/z⁴ and Σ 1/z⁶ over all zeros (Rayleigh)."""
+SUMS = ((1 / 90, 1 / 945), (1 / 350, 1 / 7875))  # Σ 1/z⁴ and Σ 1/z⁶ over all zeros (Rayleigh)
+# Largest ωμ0σR², 2 R² over the skin depth's square: there the other modes are missed by 2 % of the torque.
 THINNEST = 300.0
-"""Largest ωμ0σR², 2 R² over the skin depth's square: there the other modes are missed by 2 % of the torque."""
 
+# Largest `slow_error` beside a remanence, which makes motions fast: there it would be a growth rate's error.
 SLOW_ENOUGH = 0.25
-"""Largest `slow_error` beside a remanence, which makes motions fast: there it would be a growth rate's error."""
-ROUNDED = 0.995
-"""What is named as the most that would do is less by so much, so that its three digits will do."""
+ROUNDED = 0.995  # What is named as the most that would do is less by so much, so that its three digits will do
 
 FLOATER_CURRENTS = "currents in the floater"
 

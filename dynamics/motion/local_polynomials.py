@@ -15,12 +15,9 @@ import numpy as np
 from ...geometry.common import Array, even_directions
 
 NORMALS, RADII = 32, (0.35, 0.7, 1.0)
-FALL = 3
-"""Minus the power of q."""
-COUNT = (1, 4, 10)
-"""Of the monomials up to a degree."""
-PAIRS = [(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)]
-"""Of the coordinates in the monomials of degree 2."""
+FALL = 3  # Minus the power of q
+COUNT = (1, 4, 10)  # Of the monomials up to a degree
+PAIRS = [(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)]  # Of the coordinates in the monomials of degree 2
 
 
 def monomials(degree: int, offset: Sequence[Any], one: Any) -> list[Any]:

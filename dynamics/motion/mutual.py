@@ -27,33 +27,24 @@ from .local_polynomials import COUNT, FALL, PAIRS, falling, fitting, monomials, 
 from .state import Parameter, Vector, dot, subtract
 
 MUTUAL = "mutual magnetisation"
+# Degrees of u, the three of V, and xx, xy, xz, yy, yz, zz of H in a ball; V is small.
 IN_BALL = (2, *(1, 1, 1), *(2, 2, 2, 2, 2, 2))
-"""Degrees of u, the three of V, and xx, xy, xz, yy, yz, zz of H in a ball; V is small."""
 AT_POSE = (2, *(1, 1, 1), *(0, 0, 0, 0, 0, 0))
-ALLOWED = 1e-5
-"""Error of the force by that of the rigid dipole."""
+ALLOWED = 1e-5  # Error of the force by that of the rigid dipole
 WHICH = [Parameter.LENGTH, Parameter.PLATE_MOMENT, Parameter.PLATE_SHARE]
-STEP = 0.02
-"""Of the differences of `rough_force`, in floater radii."""
+STEP = 0.02  # Of the differences of `rough_force`, in floater radii
 
 
 @dataclass(frozen=True, eq=False)
 class Mutual:
-    """Rotor and floater magnetise each other.
+    """Rotor and floater magnetise each other."""
 
-    Parameters
-    ----------
-    table : of their answers
-    moment : of the floater, A m²
-    first : number of the first of its runtime parameters about a pose or in a ball; None: as the table writes it
-    ball : whose centre and radius are among the runtime parameters
-    """
-
-    table: MutualTable
-    moment: float
+    table: MutualTable  # of their answers
+    moment: float  # of the floater, A m²
     name: str = MUTUAL
+    # number of the first of its runtime parameters about a pose or in a ball; None: as the table writes it
     first: int | None = None
-    ball: BallField | None = None
+    ball: BallField | None = None  # whose centre and radius are among the runtime parameters
 
     def placed(self, first: int) -> Mutual:
         """About one pose, whose numbers are: place (3) and M (3), scaled, then the weights."""

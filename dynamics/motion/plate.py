@@ -35,22 +35,13 @@ from .state import Parameter, Vector, cross, dot, dotted, turned, turned_about_z
 
 @dataclass(frozen=True, eq=False)
 class PlateMemory:
-    """A plate in the motion.
+    """A plate in the motion."""
 
-    Parameters
-    ----------
-    plate : pose and way in the laboratory
-    table : its currents and their fields, in its own frame
-    share : what the turning rotor adds to the signals
-    model : name of the plate's model
-    neglected : estimated relative error of the model itself: of a slab, what its edges would change
-    """
-
-    plate: Plate
-    table: PlateTable
-    share: RotorShare
-    model: str = "reduced"
-    neglected: float = 0.0
+    plate: Plate  # pose and way in the laboratory
+    table: PlateTable  # its currents and their fields, in its own frame
+    share: RotorShare  # what the turning rotor adds to the signals
+    model: str = "reduced"  # name of the plate's model
+    neglected: float = 0.0  # estimated relative error of the model itself: of a slab, what its edges would change
 
     @property
     def error(self) -> float:
@@ -75,21 +66,13 @@ class PlateMemory:
 
 @dataclass(frozen=True, eq=False)
 class MemoryTerms:
-    """What a plate adds to the equations of motion, in scaled units.
+    """What a plate adds to the equations of motion, in scaled units."""
 
-    Parameters
-    ----------
-    rates : of its states
-    force, torque : accelerations of the floater's position and spin
-    stored : energy of the floater's currents, and of the floater in the field of the rotor's
-    spent : what both lose to heat, to what turns the rotor and to what lowers the plate
-    """
-
-    rates: Vector
-    force: Vector
+    rates: Vector  # of its states
+    force: Vector  # accelerations of the floater's position and spin
     torque: Vector
-    stored: hy.expression
-    spent: hy.expression
+    stored: hy.expression  # energy of the floater's currents, and of the floater in the field of the rotor's
+    spent: hy.expression  # what both lose to heat, to what turns the rotor and to what lowers the plate
 
 
 def plate_numbers(memory: PlateMemory, values: Array) -> Array:
@@ -209,34 +192,20 @@ def _product(matrix: np.ndarray, vector: Vector) -> list[hy.expression]:
 
 @dataclass(frozen=True, eq=False)
 class PlateCoupling:
-    """Plate and floater at n instants, scaled, along the rotor's axes.
+    """Plate and floater at n instants, scaled, along the rotor's axes."""
 
-    Parameters
-    ----------
-    signals : (n, states) s̃, the rotor's share included
-    by_state : (n, states, 12) their derivatives by the floater's state
-    fields : (n, states, 6) acceleration of position and of spin by a unit current of each state
-    pull : (n, k, 12, 6) derivative of the multipoles' accelerations by the floater's state
-    """
-
-    signals: Array
-    by_state: Array
-    fields: Array
-    pull: Array
+    signals: Array  # (n, states) s̃, the rotor's share included
+    by_state: Array  # (n, states, 12) their derivatives by the floater's state
+    fields: Array  # (n, states, 6) acceleration of position and of spin by a unit current of each state
+    pull: Array  # (n, k, 12, 6) derivative of the multipoles' accelerations by the floater's state
 
 
 @dataclass(frozen=True, eq=False)
 class PlateForce:
-    """The plate of a scene, seen from the frame that turns with the rotor.
+    """The plate of a scene, seen from the frame that turns with the rotor."""
 
-    Parameters
-    ----------
-    memory : plate, table and the rotor's share
-    values : runtime parameters of the equations of motion
-    """
-
-    memory: PlateMemory
-    values: Array
+    memory: PlateMemory  # plate, table and the rotor's share
+    values: Array  # runtime parameters of the equations of motion
 
     @property
     def rates(self) -> Array:

@@ -28,31 +28,22 @@ from .state import Parameter, Scales, State, Vector, cross, dotted
 
 ROTOR_CURRENTS = "currents in the rotor"
 NUMBERS = 8
-UPPER = ((0, 0), (1, 1), (0, 1), (0, 2), (1, 2))
-"""Entries of the gradient that tell it."""
+UPPER = ((0, 0), (1, 1), (0, 1), (0, 2), (1, 2))  # Entries of the gradient that tell it
 ENTRIES = [(a, b) for a in range(NUMBERS) for b in range(a, NUMBERS)]
 DIAGONAL = [ENTRIES.index((a, a)) for a in range(NUMBERS)]
-UNIT = 1e-2
-"""Length by which gradients count beside fields, m: about a place's distance from the currents."""
-ALLOWED = 5e-3
-"""Error of S by its largest entry; the table has 1e-2 in contact and 1e-3 farther off."""
+UNIT = 1e-2  # Length by which gradients count beside fields, m: about a place's distance from the currents
+ALLOWED = 5e-3  # Error of S by its largest entry; the table has 1e-2 in contact and 1e-3 farther off
 
 
 @dataclass(frozen=True, eq=False)
 class RotorCurrents:
-    """The brake of a table.
+    """The brake of a table."""
 
-    Parameters
-    ----------
-    table : of the losses
-    first : number of the first of its runtime parameters about a pose or in a ball; None: as the table writes it
-    ball : whose centre and radius are among the runtime parameters
-    """
-
-    table: RotorLosses
+    table: RotorLosses  # of the losses
     name: str = ROTOR_CURRENTS
+    # number of the first of its runtime parameters about a pose or in a ball; None: as the table writes it
     first: int | None = None
-    ball: BallField | None = None
+    ball: BallField | None = None  # whose centre and radius are among the runtime parameters
 
     def placed(self, first: int) -> RotorCurrents:
         """About one pose; its numbers are the entries of S."""

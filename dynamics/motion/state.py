@@ -74,8 +74,7 @@ def subtract(a: Vector, b: Vector) -> list[hy.expression]:
     return [a[i] - b[i] for i in range(3)]
 
 
-WEIGHTLESS = 1e-9
-"""Gravity, m/s², that sets no unit of time."""
+WEIGHTLESS = 1e-9  # Gravity, m/s², that sets no unit of time
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,19 +83,12 @@ class State:
 
     Velocity and spin are those seen from the laboratory; only their components are taken along the axes of the
     laboratory or of the frame that turns with the rotor.
-
-    Parameters
-    ----------
-    position : of the centre from the rotor's origin, m
-    velocity : m/s
-    moment : direction of the magnetic moment, a unit vector fixed in the body
-    spin : angular velocity of the body, rad/s
     """
 
-    position: Array
-    velocity: Array
-    moment: Array
-    spin: Array
+    position: Array  # of the centre from the rotor's origin, m
+    velocity: Array  # m/s
+    moment: Array  # direction of the magnetic moment, a unit vector fixed in the body
+    spin: Array  # angular velocity of the body, rad/s
 
     def to_rotor(self, angle: ArrayLike) -> State:
         """Components along the rotor's axes, from those along the laboratory's; `angle` of the rotor in rad."""
@@ -122,18 +114,13 @@ def turned_about_z(vectors: ArrayLike, angle: ArrayLike) -> Array:
 
 @dataclass(frozen=True)
 class Scales:
-    """Units of the integrated state, chosen so that all its components are of order one.
+    """Units of the integrated state, chosen so that all its components are of order one."""
 
-    Parameters
-    ----------
-    length : radius of the floater, m
-    time : 1/ω of the rotor, s; of a rotor at rest the time of a fall through `length`, or one second without gravity
-    spin_ratio : moment of inertia about the magnetic moment over that across it; the integrated spin is L/I, which has
-        so much of the true one along the moment
-    """
-
-    length: float
+    length: float  # radius of the floater, m
+    # 1/ω of the rotor, s; of a rotor at rest the time of a fall through `length`, or one second without gravity
     time: float
+    # moment of inertia about the magnetic moment over that across it; the integrated spin is L/I, which has so much of
+    # the true one along the moment
     spin_ratio: float = 1.0
 
     @classmethod

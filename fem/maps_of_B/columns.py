@@ -21,22 +21,16 @@ class FieldMapError(InputError):
 class FieldMap:
     """Observed field components at points in any order.
 
-    Parameters
-    ----------
-    points : (n, 3) m, rotor's frame
-    field : (n, 3) T; NaN where a component was not observed
-    errors : (n, 3) standard errors of `field`, T, or what broadcasts to it; None if they are not known
-    read_as : units of length and of B that the file was taken to have
-
     Raises
     ------
     FieldMapError : wrong shapes, a point or field that is infinite, a point that is NaN, an error that is not positive
     """
 
-    points: Array
-    field: Array
+    points: Array  # (n, 3) m, rotor's frame
+    field: Array  # (n, 3) T; NaN where a component was not observed
+    # (n, 3) standard errors of `field`, T, or what broadcasts to it; None if they are not known
     errors: Array | None = None
-    read_as: tuple[str, str] = ("m", "T")
+    read_as: tuple[str, str] = ("m", "T")  # units of length and of B that the file was taken to have
 
     def __post_init__(self) -> None:
         points, field = np.asarray(self.points, float), np.asarray(self.field, float)
@@ -87,8 +81,8 @@ def _require(good: np.ndarray, values: Array, name: str, rule: str) -> None:
 AXES = ("x", "y", "z")
 COMPONENTS = tuple(f"B{axis}" for axis in AXES)
 ERRORS = tuple(f"{component}_err" for component in COMPONENTS)
+# VTK's names in small letters: 0 where a point has no value; flags, one of which says that it is hidden.
 MASK, GHOSTS = "vtkvalidpointmask", "vtkghosttype"
-"""VTK's names in small letters: 0 where a point has no value; flags, one of which says that it is hidden."""
 HIDDEN, HIDDEN_CELL = 2, 32
 NEEDED = "x, y, z and at least one of Bx, By, Bz"
 VALID = "Valid: x_mm,y_mm,z_mm,Bx_mT,By_mT,Bz_mT."
@@ -109,8 +103,8 @@ OTHER_NAMES = {
     "mG": "mgs milligauss",
     "kG": "kgs kilogauss",
 }
+# By every name in small letters: instruments print MT for mT, and none means a megatesla.
 UNIT_OF = {name: unit for unit, names in OTHER_NAMES.items() for name in (unit.casefold(), *names.split())}
-"""By every name in small letters: instruments print MT for mT, and none means a megatesla."""
 SPELLINGS = str.maketrans({"μ": "µ", "²": "2", "^": None, "·": None, "*": None, " ": None, "\u00a0": None})
 
 _AXIS = (
@@ -120,28 +114,21 @@ _COMPONENT = r"(?:B[ _.-]?(?P<b>[xyz])|magnetic[ _]flux[ _]density,?[ _](?P<long
 _ENTRY = r"(?P<what>B|points|coordinates)(?:[:_](?P<n>[0-2])|\[(?P<k>[0-2])\])"
 _VECTOR = r"(?P<vector>B|magnetic[ _]flux[ _]density)(?P<vector_err>_err)?"
 _UNIT = r"[ _]?[\[({<](?P<bracket>[^\])}>]*)[\])}>]|(?:[ _]in[ _]|[_/]|,? )(?P<bare>[^\W\d_]+(?:/m\^?[2²])?)"
+# `x_mm`, `Bx [mT]`, `mf.Bx (T) @ freq=50`, `Points:0`; a number at the end is that of a repeated title.
 TITLE = re.compile(
     rf"(?:{_ENTRY}|{_AXIS}|(?:\w+[.:])*(?:{_COMPONENT}(?P<err>[ _](?:err|error))?|{_VECTOR}))(?:{_UNIT})?"
     r"(?:[ ._#]\d+)?(?:[ _]?@.*)?",
     re.IGNORECASE,
 )
-"""`x_mm`, `Bx [mT]`, `mf.Bx (T) @ freq=50`, `Points:0`; a number at the end is that of a repeated title."""
 
 
 @dataclass(frozen=True)
 class Column:
-    """What a title says.
+    """What a title says."""
 
-    Parameters
-    ----------
-    title : as it stands in the file
-    name : one of `AXES`, `COMPONENTS`, `ERRORS`, "B" or "B_err" of a vector, `MASK` or `GHOSTS`
-    unit : as it is written, or None
-    """
-
-    title: str
-    name: str
-    unit: str | None
+    title: str  # as it stands in the file
+    name: str  # one of `AXES`, `COMPONENTS`, `ERRORS`, "B" or "B_err" of a vector, `MASK` or `GHOSTS`
+    unit: str | None  # as it is written, or None
 
     @property
     def parts(self) -> tuple[str, ...]:

@@ -26,20 +26,13 @@ class HarmonicBasis:
     The root mean square of a column on its sphere is 3/(2l+1), that of a background's 1. Unknowns (T) are fields there
     then, and of a like size for every degree: in a magnet with corners each part of degree l falls as l^-3/2.
     Order: the background, then degree by degree all centres; the first `count(L)` columns are the basis of degree L.
-
-    Parameters
-    ----------
-    centers, radii : (k, 3) and (k,) m, spheres that hold the sources
-    degree : highest degree about the centres
-    background_degree : highest degree of the background: 0 none, 1 uniform, 2 with uniform gradients
-    extent : radius of the background's sphere about the first centre, m
     """
 
-    centers: Array
+    centers: Array  # (k, 3) and (k,) m, spheres that hold the sources
     radii: Array
-    degree: int
-    background_degree: int = 0
-    extent: float = 1.0
+    degree: int  # highest degree about the centres
+    background_degree: int = 0  # highest degree of the background: 0 none, 1 uniform, 2 with uniform gradients
+    extent: float = 1.0  # radius of the background's sphere about the first centre, m
 
     @property
     def background_count(self) -> int:
@@ -109,10 +102,9 @@ def _fill(result: Array, row: int, m: int, gradient: list[Array], size: float) -
             result[row + 1, axis] = -factor * gradient[axis].imag
 
 
-SUBSET = 2000
-"""Map points that are enough to find a centre."""
+SUBSET = 2000  # Map points that are enough to find a centre
+# A dipole that leaves more than this part of the field's root mean square does not tell where its sources are.
 EXPLAINED = 0.7
-"""A dipole that leaves more than this part of the field's root mean square does not tell where its sources are."""
 
 
 def find_center(field_map: FieldMap) -> Array:
@@ -138,39 +130,27 @@ def find_center(field_map: FieldMap) -> Array:
     return np.asarray(found.x * scale).reshape(1, 3)
 
 
+# Groups of points, each of which is held out once: they choose the degree, and the fits without them differ.
 GROUPS = 12
-"""Groups of points, each of which is held out once: they choose the degree, and the fits without them differ."""
-MARGIN = 4
-"""Degrees beyond the chosen one that the error bar takes into account."""
+MARGIN = 4  # Degrees beyond the chosen one that the error bar takes into account
+# Unknowns are left out that change the fit by less than so many standard errors: symmetry makes most of them zero.
 NEGLIGIBLE = 0.1
-"""Unknowns are left out that change the fit by less than so many standard errors: symmetry makes most of them zero."""
-FLOOR = 1e-8
-"""Smallest misfit that normal equations in double precision can tell, relative to the observations."""
+FLOOR = 1e-8  # Smallest misfit that normal equations in double precision can tell, relative to the observations
 ROUND_OFF = 16 * np.finfo(float).eps
-CHUNK = 2000
-"""Points whose columns are held in memory at once."""
+CHUNK = 2000  # Points whose columns are held in memory at once
 
 
 @dataclass(frozen=True, eq=False)
 class HarmonicFit:
-    """What a fit found.
+    """What a fit found."""
 
-    Parameters
-    ----------
-    degree : the degree chosen
-    unknowns : (count,) T
-    misfits : root mean square of held-out residuals over the errors given, by degree; that of 0 is the field itself
-    groups : (n,) number of the group that each point is in
-    held_out : (GROUPS, more) T, fits without each group, `MARGIN` degrees higher (as far as the basis goes)
-    deviations : (GROUPS, more) T, differences to `unknowns` of solutions as likely as the data leave them
-    """
-
-    degree: int
-    unknowns: Array
+    degree: int  # the degree chosen
+    unknowns: Array  # (count,) T
+    # root mean square of held-out residuals over the errors given, by degree; that of 0 is the field itself
     misfits: Array
-    groups: NDArray[np.intp]
-    held_out: Array
-    deviations: Array
+    groups: NDArray[np.intp]  # (n,) number of the group that each point is in
+    held_out: Array  # (GROUPS, more) T, fits without each group, `MARGIN` degrees higher (as far as the basis goes)
+    deviations: Array  # (GROUPS, more) T, differences to `unknowns` of solutions as likely as the data leave them
 
     @property
     def misfit(self) -> float:

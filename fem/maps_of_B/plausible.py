@@ -16,16 +16,14 @@ from ...geometry.solids import Part
 from ..closed_forms.uniform import remanent_field
 from .columns import METERS, TESLAS, UNITS, FieldMap, FieldMapError
 
-SUBSET = 400
-"""Map points that are enough to compare."""
+SUBSET = 400  # Map points that are enough to compare
+# Largest ratio of B of the map to that of the magnets, or the other way round; least mean cosine between both.
 FACTOR, ALIGNED = 2.0, 0.5
-"""Largest ratio of B of the map to that of the magnets, or the other way round; least mean cosine between both."""
-ENOUGH = 0.1
-"""Least share of the points that lies outside the magnets where the units are right."""
+ENOUGH = 0.1  # Least share of the points that lies outside the magnets where the units are right
+# Units explain a map as well as the best ones up to so many times their deviation, or a deviation of so much.
 AS_GOOD, GOOD = 3.0, 0.02
-"""Units explain a map as well as the best ones up to so many times their deviation, or a deviation of so much."""
+# A zero is no reading where the magnets' field is so many times the smallest that was read, and so much of |B|.
 STEPS, COMPONENT = 30.0, 0.1
-"""A zero is no reading where the magnets' field is so many times the smallest that was read, and so much of |B|."""
 
 
 @dataclass(frozen=True)

@@ -47,24 +47,19 @@ from .columns import (
 )
 
 MOST_BYTES = 250_000_000
-HEADER_LINES = 300
-"""Lines in which the titles must be."""
+HEADER_LINES = 300  # Lines in which the titles must be
 COMMENT = re.compile(r"\s*(?:%+|#+|//+|!+|\*+)\s?")
-RULE = re.compile(r"[\s=_+|-]*")
-"""An empty line, or one that is drawn."""
-LENGTH_UNIT = re.compile(r"length unit\W+(\w+)", re.IGNORECASE)
-"""COMSOL's unit of the coordinates, in a comment."""
-SEP = re.compile(r"\"?sep=(.)\"?", re.IGNORECASE)
-"""A spreadsheet's first line."""
+RULE = re.compile(r"[\s=_+|-]*")  # An empty line, or one that is drawn
+LENGTH_UNIT = re.compile(r"length unit\W+(\w+)", re.IGNORECASE)  # COMSOL's unit of the coordinates, in a comment
+SEP = re.compile(r"\"?sep=(.)\"?", re.IGNORECASE)  # A spreadsheet's first line
 GRID = re.compile(r"Grid Output Min:\s*\[(\S+) (\S+) (\S+)\]", re.IGNORECASE)
+# Maxwell's titles: coordinates and B are in m and T.
 VECTOR_DATA = re.compile(r"\s*X,\s*Y,\s*Z,\s*Vector data\s*\"(.*)\"\s*", re.IGNORECASE)
-"""Maxwell's titles: coordinates and B are in m and T."""
+# One of titles that only spaces part, such as `mf.Bx (T) @ freq=50`.
 TITLE = re.compile(r"\"[^\"]*\"|\S+(?:[ ]?(?:\[[^\]]*\]|\([^)]*\)))?(?:[ ]@[ ][^\s=]+=\S+(?:(?<=,)[ ][^\s=]+=\S+)*)?")
-"""One of titles that only spaces part, such as `mf.Bx (T) @ freq=50`."""
 MISSING = {"", "na", "n/a", "#n/a", "null", "none", "-", "--", "nan(ind)", "-nan(ind)", "1.#qnan", "-1.#ind"}
 FORTRAN = str.maketrans("dD−", "eE-")
-GROUPED = re.compile(r"[+-]?[1-9]\d{0,2}(?:,\d{3})+")
-"""Where a comma may part thousands."""
+GROUPED = re.compile(r"[+-]?[1-9]\d{0,2}(?:,\d{3})+")  # Where a comma may part thousands
 
 
 @dataclass(frozen=True)
@@ -265,8 +260,8 @@ def _number(cell: str, comma: bool, title: str, line: int) -> float:
         ) from None
 
 
+# Endings of the names of meshes; a `.dat` is one if it is Tecplot's.
 MESHES = {*meshio.extension_to_filetypes} - {".dat"}
-"""Endings of the names of meshes; a `.dat` is one if it is Tecplot's."""
 TECPLOT = re.compile(rb"\s*(?:TITLE|VARIABLES|ZONE)\b", re.IGNORECASE)
 OTHER_VTK = {".vti", ".vtr", ".vts", ".vtp", ".vtm", ".pvtu", ".pvti", ".pvts", ".pvtr", ".pvd"}
 LARGEST_FILE = 1_000_000_000
@@ -274,19 +269,13 @@ LARGEST_FILE = 1_000_000_000
 
 @dataclass(frozen=True)
 class _Source:
-    """What every kind of file has.
+    """What every kind of file has."""
 
-    Parameters
-    ----------
-    titles : of all columns
-    said : units by number, whatever the titles say
-    usual : units of length and of B of titles without one, if files of the kind have them
-    numbers : values (n,) of some columns by what they hold, as they are in the file
-    """
-
-    titles: Sequence[str]
-    said: Mapping[int, str]
+    titles: Sequence[str]  # of all columns
+    said: Mapping[int, str]  # units by number, whatever the titles say
+    # units of length and of B of titles without one, if files of the kind have them
     usual: tuple[str | None, str | None]
+    # values (n,) of some columns by what they hold, as they are in the file
     numbers: Callable[[Mapping[int, Column]], Mapping[str, Array]]
 
 

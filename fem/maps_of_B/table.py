@@ -24,11 +24,10 @@ from .fit import FLOOR, MARGIN, HarmonicBasis, HarmonicFit, find_center, fit_har
 from .plausible import require_plausible
 from .read import read_field_map
 
-PAIRS = [(i, j) for i in range(3) for j in range(i, 3)]
-"""Entries of a symmetric matrix."""
+PAIRS = [(i, j) for i in range(3) for j in range(i, 3)]  # Entries of a symmetric matrix
 TWICE = [1.0 if i == j else 2.0 for i, j in PAIRS]
+# The error bar in standard deviations: with a spread of a dozen members, once in 500 the error is beyond it.
 COVERAGE = 4.0
-"""The error bar in standard deviations: with a spread of a dozen members, once in 500 the error is beyond it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -129,12 +128,9 @@ class GriddedTable:
         return known
 
 
-TAIL = 45
-"""Degree to which the part left out is continued."""
-EDGE = 1.1
-"""Points nearer than so many times the nearest one's distance tell how large the part left out is."""
-EDGE_POINTS = 2000
-"""At most so many of them."""
+TAIL = 45  # Degree to which the part left out is continued
+EDGE = 1.1  # Points nearer than so many times the nearest one's distance tell how large the part left out is
+EDGE_POINTS = 2000  # At most so many of them
 EDGE_SAFETY = 2.0
 
 

@@ -23,28 +23,21 @@ from .solution import cached_currents
 from .table import PlateTable, Region, RotorShare
 from .tables import DRIVEN, SLAB, deciding, plate_and_rotor_table, slab_and_rotor_table
 
-NEGLIGIBLE = 1e-6
-"""Part of the floater's weight below which the largest conceivable force of the plate is left out."""
-REACH = 0.003
-"""The floater may move so far from where it begins, along each axis, m."""
-RASTER = 0.001
-"""Bounds of regions are multiples of this, m, so that scenes that differ little share a table."""
+NEGLIGIBLE = 1e-6  # Part of the floater's weight below which the largest conceivable force of the plate is left out
+REACH = 0.003  # The floater may move so far from where it begins, along each axis, m
+RASTER = 0.001  # Bounds of regions are multiples of this, m, so that scenes that differ little share a table
+# Frequencies of a table, Hz, at least; and the multiple of the rotor's that it must hold.
 LOWEST, HIGHEST, HARMONICS = 0.5, 250.0, 2.0
-"""Frequencies of a table, Hz, at least; and the multiple of the rotor's that it must hold."""
-COARSE = 50.0
-"""The highest frequency is a multiple of this, Hz, for the same reason."""
+COARSE = 50.0  # The highest frequency is a multiple of this, Hz, for the same reason
+# How far a bound that a floater has left is moved out, in widths of the region: across the plate's face, and along it,
+# where terms grow with the square of the width.
 FACING, BESIDE = 2.0, 0.5
-"""How far a bound that a floater has left is moved out, in widths of the region: across the plate's face, and along it,
-where terms grow with the square of the width."""
+# Half the width of a wider region along the face, in distances from it: at 2.3 a slab takes 230 states, at 4.6 it takes
+# minutes.
 WIDEST = 3.0
-"""Half the width of a wider region along the face, in distances from it: at 2.3 a slab takes 230 states, at 4.6 it
-takes minutes."""
-AT = 1e-6
-"""Distance from a bound, in widths of the region, at which it counts as crossed: that is where the event is."""
-SKIN = 0.9
-"""Nearest that a region comes to the plate, in radii of the floater, which touches it at one."""
-PLUMB = 1e-9
-"""Cosine of the angle between a slab's normal and the vertical below which it stands upright."""
+AT = 1e-6  # Distance from a bound, in widths of the region, at which it counts as crossed: that is where the event is
+SKIN = 0.9  # Nearest that a region comes to the plate, in radii of the floater, which touches it at one
+PLUMB = 1e-9  # Cosine of the angle between a slab's normal and the vertical below which it stands upright
 
 
 class PlateChoice(NamedTuple):
@@ -97,20 +90,12 @@ def resolve_plate_model(
 
 @dataclass(frozen=True, eq=False)
 class PlateAround:
-    """What a plate's table for a floater about a place is made from.
+    """What a plate's table for a floater about a place is made from."""
 
-    Parameters
-    ----------
-    plate : as the model sees it
-    model : "slab", or "reduced" for the network of the finite elements
-    rotor : its field
-    region, frequencies, rtol : as of `plate_and_rotor_table`
-    """
-
-    plate: Plate
-    model: str
-    rotor: RotorTable
-    region: Region
+    plate: Plate  # as the model sees it
+    model: str  # "slab", or "reduced" for the network of the finite elements
+    rotor: RotorTable  # its field
+    region: Region  # as of `plate_and_rotor_table`
     frequencies: tuple[float, float]
     rtol: float
 

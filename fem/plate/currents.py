@@ -27,38 +27,28 @@ from ..elements.spaces import Parity
 from .eddy import EddySpace, ShiftedSystem, Source
 from .table import Region
 
-CHUNK = 16
-"""Sources handled at a time: bounds the memory."""
+CHUNK = 16  # Sources handled at a time: bounds the memory
+# Component, moment's axis j, component of K and sign of what is not zero in e_j × K.
 CROSS = ((0, 1, 2, 1.0), (0, 2, 1, -1.0), (1, 0, 2, -1.0), (1, 2, 0, 1.0), (2, 0, 1, 1.0), (2, 1, 0, -1.0))
-"""Component, moment's axis j, component of K and sign of what is not zero in e_j × K."""
-PROBES = 6
-"""Dipoles at places off the grid, beside those at the region's corners."""
+PROBES = 6  # Dipoles at places off the grid, beside those at the region's corners
+# Places of the grid along an edge: at most, at least, and more for each distance to the plate that it is long.
 MOST_PLACES, FEWEST_PLACES, PER_GAP = 6, 3, 1.5
-"""Places of the grid along an edge: at most, at least, and more for each distance to the plate that it is long."""
+# Shares of what residuals may be: for sources left out of the modes, and for residuals that no solve starts from.
 MODE_SHARE, NEXT_SHARE = 0.2, 0.3
-"""Shares of what residuals may be: for sources left out of the modes, and for residuals that no solve starts from."""
-DEPENDENT = 1e-9
-"""Squared part of a field that the others must leave for it to be taken."""
+DEPENDENT = 1e-9  # Squared part of a field that the others must leave for it to be taken
 MOST_ROUNDS = 12
+# The real shift in units of the highest angular frequency; a second one gave the same states for more work.
 SHIFT = 0.25
-"""The real shift in units of the highest angular frequency; a second one gave the same states for more work."""
-FREQUENCIES = 6
-"""At so many, in equal ratios, residuals are looked at."""
+FREQUENCIES = 6  # At so many, in equal ratios, residuals are looked at
 
 
 @dataclass(frozen=True, eq=False)
 class OtherSources:
-    """What drives the plate beside a dipole in the region: the rotor.
+    """What drives the plate beside a dipole in the region: the rotor."""
 
-    Parameters
-    ----------
-    training : sources in the plate's frame whose currents the network shall hold
-    probes : others of the kind; the field of their currents is asked for in the region
-    places : (n, 3) m, where they are: the mesh must do for dipoles there
-    """
-
-    training: Sequence[Source] = ()
-    probes: Sequence[Source] = ()
+    training: Sequence[Source] = ()  # sources in the plate's frame whose currents the network shall hold
+    probes: Sequence[Source] = ()  # others of the kind; the field of their currents is asked for in the region
+    # (n, 3) m, where they are: the mesh must do for dipoles there
     places: Array = field(default_factory=lambda: np.zeros((0, 3)))
 
 
@@ -305,20 +295,13 @@ def class_basis(
 
 @dataclass(frozen=True, eq=False)
 class Missing:
-    """What a space misses of some sources, at angular frequencies (rad/s).
+    """What a space misses of some sources, at angular frequencies (rad/s)."""
 
-    Parameters
-    ----------
-    angular_frequencies : (k,)
-    residuals : (k, sources, sources) products of the residuals ρ, whose norms are bounds of the errors of fields
-    couplings : (k, sources, sources)
-    places : of the dipoles among the sources; they come first
-    """
-
-    angular_frequencies: Array
+    angular_frequencies: Array  # (k,)
+    # (k, sources, sources) products of the residuals ρ, whose norms are bounds of the errors of fields
     residuals: ComplexArray
-    couplings: ComplexArray
-    places: int
+    couplings: ComplexArray  # (k, sources, sources)
+    places: int  # of the dipoles among the sources; they come first
 
     @property
     def worst(self) -> float:

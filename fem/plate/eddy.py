@@ -26,11 +26,10 @@ from ..closed_forms.eddy_sphere import ComplexArray
 from ..elements.condensed import require_memory, solve_condensed
 from ..elements.spaces import Parity, edge_vertices, region_edges, tree_edges, value_matrix
 
+# ωμ0σL² below which the response is resistive: A = a0 + iω a1, with a0 (charges) and a1 (currents) real and constant.
+# The slowest current of a plate decays in less than μ0σL²/100, so that this is exact to RESISTIVE²/1e4 = 1e-8.
 RESISTIVE = 1e-2
-"""ωμ0σL² below which the response is resistive: A = a0 + iω a1, with a0 (charges) and a1 (currents) real and constant.
-The slowest current of a plate decays in less than μ0σL²/100, so that this is exact to RESISTIVE²/1e4 = 1e-8."""
-SILENT = 1e-9
-"""Parity parts smaller than this share of the whole source are not solved for."""
+SILENT = 1e-9  # Parity parts smaller than this share of the whole source are not solved for
 
 
 class Source(Protocol):
@@ -179,20 +178,12 @@ class ClassResponse:
 
 @dataclass(frozen=True, eq=False)
 class EddyResponse:
-    """Eddy currents of several sources at one shift.
+    """Eddy currents of several sources at one shift."""
 
-    Parameters
-    ----------
-    space : the finite-element space
-    shift : s, rad/s: iω at a frequency
-    classes : responses by number of the parity class; silent ones are missing
-    coupling_unknowns : size of the factorised matrix, of the largest class
-    """
-
-    space: EddySpace
-    shift: complex
-    classes: dict[int, ClassResponse]
-    coupling_unknowns: int
+    space: EddySpace  # the finite-element space
+    shift: complex  # s, rad/s: iω at a frequency
+    classes: dict[int, ClassResponse]  # responses by number of the parity class; silent ones are missing
+    coupling_unknowns: int  # size of the factorised matrix, of the largest class
 
     @property
     def couplings(self) -> ComplexArray:

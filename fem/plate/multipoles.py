@@ -20,12 +20,10 @@ from ..harmonics.expansion import MultipoleExpansion
 from ..harmonics.expressions import FieldExpressions
 from ..harmonics.solid import derivative, outer_sums
 
-INDEPENDENT = 1e-10
-"""Squared part of a multipole that the chosen ones must leave for it to be taken."""
-NOISE = 1e-11
-"""Weights below this share of the largest are what symmetry forbids."""
+INDEPENDENT = 1e-10  # Squared part of a multipole that the chosen ones must leave for it to be taken
+NOISE = 1e-11  # Weights below this share of the largest are what symmetry forbids
+# Multipoles at a time, by default; the fit ends where so many steps leave more than this share of the error.
 STEP, PATIENCE, STALLED = 2, 6, 0.95
-"""Multipoles at a time, by default; the fit ends where so many steps leave more than this share of the error."""
 
 
 def _unfolded(rank: int) -> NDArray[np.int_]:
@@ -40,8 +38,7 @@ def real_kinds(lowest: int, highest: int) -> list[tuple[int, int, int]]:
     return [(l, m, i) for l in range(lowest, highest + 1) for m in range(l + 1) for i in (0, 1)[: 1 + (m > 0)]]
 
 
-TWICE, THRICE = _unfolded(2), _unfolded(3)
-"""For the gradient of a curl-free field, and for its second derivatives."""
+TWICE, THRICE = _unfolded(2), _unfolded(3)  # For the gradient of a curl-free field, and for its second derivatives
 
 
 @dataclass(frozen=True, eq=False)
@@ -131,18 +128,11 @@ class Multipoles:
 
 @dataclass(frozen=True, eq=False)
 class Fit:
-    """Field functions as sums of multipoles.
+    """Field functions as sums of multipoles."""
 
-    Parameters
-    ----------
-    multipoles : the k chosen
-    weights : (functions, k) c_k
-    error : (functions, n, 3) what is left at the points of the fit
-    """
-
-    multipoles: Multipoles
-    weights: Array
-    error: Array
+    multipoles: Multipoles  # the k chosen
+    weights: Array  # (functions, k) c_k
+    error: Array  # (functions, n, 3) what is left at the points of the fit
 
 
 def fit_multipoles(

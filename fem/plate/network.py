@@ -31,75 +31,52 @@ from .multipoles import Multipoles, fit_multipoles, real_kinds
 from .solution import STRICT, PlateSolution
 from .table import ENOUGH, Region, refuse
 
-NEGLIGIBLE = 1e-12
-"""Snapshot energies below this share of the largest are round-off."""
-FREQUENCIES = 7
-"""Errors are looked at at so many, in equal ratios."""
+NEGLIGIBLE = 1e-12  # Snapshot energies below this share of the largest are round-off
+FREQUENCIES = 7  # Errors are looked at at so many, in equal ratios
+# Share of the tolerance for the finite elements and the states left out together; the rest is the field functions', and
+# that is more of a strict tolerance.
 NETWORK_SHARE, STRICT_SHARE = 0.9, 0.8
-"""Share of the tolerance for the finite elements and the states left out together; the rest is the field functions',
-and that is more of a strict tolerance."""
-FUNCTION_SHARE = 0.1
-"""Share of the tolerance for the field functions; what the other errors leave of it comes on top."""
-CONDUCTOR = "this plate and this place of the floater"
-"""In words, of which tolerances are refused."""
+FUNCTION_SHARE = 0.1  # Share of the tolerance for the field functions; what the other errors leave of it comes on top
+CONDUCTOR = "this plate and this place of the floater"  # In words, of which tolerances are refused
+# Highest degree of the multipoles, and for strict tolerances: in a region half as wide as it is far from the plate,
+# degree 4 ends near 8e-5 of the field of the plate's currents, degree 5 near 2e-5.
 DEGREE, STRICT_DEGREE = 4, 7
-"""Highest degree of the multipoles, and for strict tolerances: in a region half as wide as it is far from the plate,
-degree 4 ends near 8e-5 of the field of the plate's currents, degree 5 near 2e-5."""
+# Depths of their centres behind the surface, in units of the distance between region and plate: near ones for what is
+# close to the surface, far ones for the rest.
 DEPTHS = (0.0, 0.3, 0.6, 1.0, 1.6, 2.5, 4.0, 6.0, 10.0, 18.0)
-"""Depths of their centres behind the surface, in units of the distance between region and plate: near ones for what is
-close to the surface, far ones for the rest."""
-SPACING = 2.5
-"""Lateral distance of the lines of centres, in the same unit."""
+SPACING = 2.5  # Lateral distance of the lines of centres, in the same unit
 
 
 @dataclass(frozen=True, eq=False)
 class PassiveNetwork:
-    """Currents in a plate as states: dp_i/dt = -λ_i (p_i - s_i), with y_i = p_i - s_i the current of field e_i.
+    """Currents in a plate as states: dp_i/dt = -λ_i (p_i - s_i), with y_i = p_i - s_i the current of field e_i."""
 
-    Parameters
-    ----------
-    plate : the conductor; fields and region are in its own frame
-    region : where the floater may be
-    frequencies : lowest and highest, Hz
-    rates : (states,) λ_i, 1/s
-    couplings : s_i = ∫ σ e_i·A_s dV (sources, states), √J, of sources in the plate's frame
-    field_functions : for a tolerance of reaction tensors the multipoles, their weights (states, k), 1/√J, and the error
-        that they leave, which may be more
-    mesh_error, state_error : estimated relative errors of reaction tensors
-    provenance : how it was made; texts and numbers
-    seconds : time spent on that
-    """
-
-    plate: Plate
-    region: Region
-    frequencies: tuple[float, float]
-    rates: Array
+    plate: Plate  # the conductor; fields and region are in its own frame
+    region: Region  # where the floater may be
+    frequencies: tuple[float, float]  # lowest and highest, Hz
+    rates: Array  # (states,) λ_i, 1/s
+    # s_i = ∫ σ e_i·A_s dV (sources, states), √J, of sources in the plate's frame
     couplings: Callable[[Sequence[Source]], Array]
+    # for a tolerance of reaction tensors the multipoles, their weights (states, k), 1/√J, and the error that they
+    # leave, which may be more
     field_functions: Callable[[float, Watch], tuple[Multipoles, Array, float]]
-    mesh_error: float
+    mesh_error: float  # estimated relative errors of reaction tensors
     state_error: float
-    provenance: Mapping[str, str | float]
-    seconds: float
+    provenance: Mapping[str, str | float]  # how it was made; texts and numbers
+    seconds: float  # time spent on that
 
 
+# The network of fewest states that meets a tolerance, by what its field functions are expected to miss.
 Reduction = Callable[[float], PassiveNetwork]
-"""The network of fewest states that meets a tolerance, by what its field functions are expected to miss."""
 
 
 @dataclass(frozen=True, eq=False)
 class OrderedBasis:
-    """Fields in the order of their importance, and their network.
+    """Fields in the order of their importance, and their network."""
 
-    Parameters
-    ----------
-    energies : (n,) of the snapshots along each field, decreasing
-    fields : (n, width) rows e_i
-    resistance, inductance : (n, n)
-    """
-
-    energies: Array
-    fields: Array
-    resistance: Array
+    energies: Array  # (n,) of the snapshots along each field, decreasing
+    fields: Array  # (n, width) rows e_i
+    resistance: Array  # (n, n)
     inductance: Array
 
     def leading(self, energy: float) -> OrderedBasis:

@@ -17,18 +17,15 @@ from .eddy import EddySpace, solve_eddy, solve_shifted
 from .table import OPTION
 
 HIGHEST_ORDER = 5
+# Coupling unknowns that are solved at most: beyond, one frequency takes many minutes and several GB.
 MOST_UNKNOWNS = 80_000
-"""Coupling unknowns that are solved at most: beyond, one frequency takes many minutes and several GB."""
+# The smallest error reduction from one order to the next that is believed without having seen the next.
 LEAST_REDUCTION = 0.2
-"""The smallest error reduction from one order to the next that is believed without having seen the next."""
+# More than an order ever gains: where even this for all orders left does not do, none of them is solved.
 BEST_REDUCTION = 0.03
-"""More than an order ever gains: where even this for all orders left does not do, none of them is solved."""
-STALLED = 0.6
-"""A weaker reduction than this says that the mesh is too coarse for its order."""
-MESH_SHARE = 0.6
-"""Share of a table's tolerance for the finite elements."""
-MODULUS = 2.0
-"""Most that |s/(1 + sτ)|² can grow from s = ω to s = iω, whatever the time constant τ."""
+STALLED = 0.6  # A weaker reduction than this says that the mesh is too coarse for its order
+MESH_SHARE = 0.6  # Share of a table's tolerance for the finite elements
+MODULUS = 2.0  # Most that |s/(1 + sτ)|² can grow from s = ω to s = iω, whatever the time constant τ
 
 
 class MeshTooLargeError(AccuracyError):
@@ -157,18 +154,11 @@ class Ladder:
 
 @dataclass(frozen=True, eq=False)
 class PlateReaction:
-    """Reaction tensors of a plate, for dipoles at several places.
+    """Reaction tensors of a plate, for dipoles at several places."""
 
-    Parameters
-    ----------
-    tensors : (n, 3, 3) T/(A m²): B = G m at the dipole's own place; laboratory frame
-    error_estimate : (n,) estimated relative error of each (Frobenius norm), truncation included
-    order, cells, coupling_unknowns : of the solution
-    """
-
-    tensors: ComplexArray
-    error_estimate: Array
-    order: int = 0
+    tensors: ComplexArray  # (n, 3, 3) T/(A m²): B = G m at the dipole's own place; laboratory frame
+    error_estimate: Array  # (n,) estimated relative error of each (Frobenius norm), truncation included
+    order: int = 0  # of the solution
     cells: int = 0
     coupling_unknowns: int = 0
 

@@ -33,28 +33,19 @@ from .network import PassiveNetwork
 from .table import PlateTable, Region, RotorShare, turn_harmonics
 
 DOWN = np.array([0.0, 0.0, -1.0])
-CLOSEST = 0.1
-"""Clearance of the plate, in radii of a round magnet, for which its moments are made at least."""
-LEFT_OUT = 1e-7
-"""Share of the rotor's field at the plate that is left out where no tolerance says another."""
-SHARE_PART = 0.1
-"""Share of a table's tolerance for the series of the rotor's signals."""
-UNNOTICED = 1e-2
-"""Share of the series' tolerance for degrees of the rotor's multipoles that are left out."""
-MOST_TERMS = 15
-"""Highest number of harmonics, and of points along the way."""
-TOGETHER = 12
-"""Places whose signals are computed at once."""
-NOISE = 1e-10
-"""Amplitudes below this share of the largest signal are what symmetry forbids."""
-MISSED = 0.3
-"""Share of a table's tolerance for the harmonics left out."""
+CLOSEST = 0.1  # Clearance of the plate, in radii of a round magnet, for which its moments are made at least
+LEFT_OUT = 1e-7  # Share of the rotor's field at the plate that is left out where no tolerance says another
+SHARE_PART = 0.1  # Share of a table's tolerance for the series of the rotor's signals
+UNNOTICED = 1e-2  # Share of the series' tolerance for degrees of the rotor's multipoles that are left out
+MOST_TERMS = 15  # Highest number of harmonics, and of points along the way
+TOGETHER = 12  # Places whose signals are computed at once
+NOISE = 1e-10  # Amplitudes below this share of the largest signal are what symmetry forbids
+MISSED = 0.3  # Share of a table's tolerance for the harmonics left out
+# Places in the region, and depths of a plate that is lowered, where the field of the rotor's currents is looked at.
 POINTS, DEPTHS = (3, 3, 3), 7
-"""Places in the region, and depths of a plate that is lowered, where the field of the rotor's currents is looked at."""
+# Networks are trained with the rotor at so many angles of a turn and depths of the plate; probes lie between them.
 TRAINED_ANGLES, TRAINED_DEPTHS = 8, 5
-"""Networks are trained with the rotor at so many angles of a turn and depths of the plate; probes lie between them."""
-INNER = 0.25
-"""Part of a magnet's edges about its centre in which dipoles stand for it."""
+INNER = 0.25  # Part of a magnet's edges about its centre in which dipoles stand for it
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,18 +68,11 @@ class ExpansionSource:
 
 @dataclass(frozen=True, eq=False)
 class RotorSource:
-    """The rotor at one angle, seen from a plate.
+    """The rotor at one angle, seen from a plate."""
 
-    Parameters
-    ----------
-    parts : in the rotor's frame
-    turn : (3, 3) from the rotor's frame to the plate's
-    center : (3,) m, of the plate in the rotor's frame
-    """
-
-    parts: Sequence[Source]
-    turn: Array
-    center: Array
+    parts: Sequence[Source]  # in the rotor's frame
+    turn: Array  # (3, 3) from the rotor's frame to the plate's
+    center: Array  # (3,) m, of the plate in the rotor's frame
 
     def vector_potential(self, points: Array) -> Array:
         """A (n, 3), T m, at points (n, 3), m, in the plate's frame."""

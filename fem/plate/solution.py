@@ -28,20 +28,16 @@ from .eddy import Source
 from .reaction import MESH_SHARE, Ladder
 from .table import Region
 
-SPACE_SHARE = 0.1
-"""Share of the tolerance for what the current space misses of the finite elements' currents."""
+SPACE_SHARE = 0.1  # Share of the tolerance for what the current space misses of the finite elements' currents
+# Tolerances below the first have a finer mesh, from the second on a coarser one with less air: its truncation takes a
+# part of them.
 STRICT, LOOSE = 5e-4, 2e-3
-"""Tolerances below the first have a finer mesh, from the second on a coarser one with less air: its truncation takes a
-part of them."""
+# An order whose expected error is at most so many times what is allowed is trained at once; once trained it is kept
+# with an error of the second times that: the next takes three times as long, and a few more states make up for it.
 HOPEFUL, KEPT = 1.5, 1.1
-"""An order whose expected error is at most so many times what is allowed is trained at once; once trained it is kept
-with an error of the second times that: the next takes three times as long, and a few more states make up for it."""
-INDEPENDENT = 1e-9
-"""Combinations of dipoles with less than this share of the largest squared potential are left out."""
-STEPS = 5.0
-"""The raster of boxes is the largest power of two, in metres, of which so many fit between box and plate."""
-FREQUENCY_STEP = 125.0
-"""Highest frequencies are multiples of this, Hz."""
+INDEPENDENT = 1e-9  # Combinations of dipoles with less than this share of the largest squared potential are left out
+STEPS = 5.0  # The raster of boxes is the largest power of two, in metres, of which so many fit between box and plate
+FREQUENCY_STEP = 125.0  # Highest frequencies are multiples of this, Hz
 ROUND_OFF = 1e-6
 
 

@@ -24,14 +24,11 @@ from ..rotor.models import AccuracyError
 from ..rotor.table import RangeError
 from .multipoles import Multipoles
 
+# What messages call the tolerance of a plate.
 OPTION = "--plate-rtol (plate_rtol in Python, --rtol of the command plate)"
-"""What messages call the tolerance of a plate."""
-LARGEST = 0.1
-"""Tolerance that may be asked at most."""
-ENOUGH = 2.0
-"""A tolerance that is met with certainty, in units of the errors of a table that was to meet a smaller one."""
-SYMMETRIC = 1e-9
-"""Relative difference of two bounds that still counts as a mirror symmetry."""
+LARGEST = 0.1  # Tolerance that may be asked at most
+ENOUGH = 2.0  # A tolerance that is met with certainty, in units of the errors of a table that was to meet a smaller one
+SYMMETRIC = 1e-9  # Relative difference of two bounds that still counts as a mirror symmetry
 
 
 @dataclass(frozen=True, eq=False)

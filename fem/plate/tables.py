@@ -24,11 +24,10 @@ TITLE = "Eddy currents of a plate: passive network with harmonic field functions
 PLATE = TableKind("plate", PlateTable, TITLE)
 DRIVEN = TableKind("driven-plate", tuple[PlateTable, RotorShare], f"{TITLE}, and the rotor's share of their signals")
 SLAB = TableKind("slab", tuple[PlateTable, RotorShare], "Eddy currents of an infinite slab, with the rotor's share")
+# Share of what the finite elements leave of the tolerance for what dipoles around the rotor miss of it; the rest is the
+# left-out states'. Above, the rotor itself is solved for, which takes as long again: a few more states cost less.
 OTHERS_SHARE = 0.65
-"""Share of what the finite elements leave of the tolerance for what dipoles around the rotor miss of it; the rest is
-the left-out states'.  Above, the rotor itself is solved for, which takes as long again: a few more states cost less."""
-ENDLESS = 1e6
-"""Edges of a plate without edges, m."""
+ENDLESS = 1e6  # Edges of a plate without edges, m
 
 
 def plate_table(

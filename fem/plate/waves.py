@@ -43,26 +43,19 @@ from .rotor_share import ExpansionSource, RotorSource
 from .slab import SlabFrame, SlabModes, corners, modes_needed, mutual_tensor, reaction_tensor, slab_frame, slab_modes
 from .table import Region
 
+# Squared part of the training sources, in units of the tolerance, below which a combination of them is left out.
 NEGLIGIBLE_MODE = 1e-5
-"""Squared part of the training sources, in units of the tolerance, below which a combination of them is left out."""
-SUMS_SHARE = 0.01
-"""Share of the tolerance for the sums over wave numbers, orders and modes."""
-PER_DECADE = 2
-"""Frequencies of the training."""
-FAVOUR = 0.3
-"""Power of the frequency by which the snapshots' weights grow: found to need the fewest states."""
-SLOW = 100.0
-"""How much slower than the lowest frequency changes may be: a slab without end has no slowest mode."""
-REDUCTION_POINTS = 8
-"""Places of the training along radius and height."""
+SUMS_SHARE = 0.01  # Share of the tolerance for the sums over wave numbers, orders and modes
+PER_DECADE = 2  # Frequencies of the training
+FAVOUR = 0.3  # Power of the frequency by which the snapshots' weights grow: found to need the fewest states
+SLOW = 100.0  # How much slower than the lowest frequency changes may be: a slab without end has no slowest mode
+REDUCTION_POINTS = 8  # Places of the training along radius and height
+# Depths of the multipoles' centres below the face, in units of the distance between region and face.
 DEPTHS = (0.0, 0.25, 0.5, 0.75, 1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0, 12.0, 16.0)
-"""Depths of the multipoles' centres below the face, in units of the distance between region and face."""
-DEGREES = 2
-"""Degrees of the multipoles for each order: m and m + 1."""
-POINTS = 13
-"""Places of the fit along radius and height."""
+DEGREES = 2  # Degrees of the multipoles for each order: m and m + 1
+POINTS = 13  # Places of the fit along radius and height
+# First tolerance of the fits, in units of that for the tensors, and how often it may be halved.
 COARSEST, HALVINGS = 4.0, 8
-"""First tolerance of the fits, in units of that for the tensors, and how often it may be halved."""
 ROUND_OFF = 1e-12
 
 
@@ -133,20 +126,12 @@ def cylinder_moments(
 
 @dataclass(frozen=True, eq=False)
 class SlabWaves:
-    """The full network of a slab: for every order m shapes that go with cos mφ, and those with sin mφ.
+    """The full network of a slab: for every order m shapes that go with cos mφ, and those with sin mφ."""
 
-    Parameters
-    ----------
-    frame : of the cylinder
-    modes : of the slab at each of n wave numbers
-    weights : (n, orders) √(k w_k / a_m), 1/m
-    directions : of waves that make up those of the cylinder
-    """
-
-    frame: SlabFrame
-    modes: SlabModes
-    weights: Array
-    directions: int
+    frame: SlabFrame  # of the cylinder
+    modes: SlabModes  # of the slab at each of n wave numbers
+    weights: Array  # (n, orders) √(k w_k / a_m), 1/m
+    directions: int  # of waves that make up those of the cylinder
 
     def amplitudes(self, sources: Sequence[Source]) -> ComplexArray:
         """Signals but for γ (sources, n, orders): real for the shapes with cos mφ, imaginary for sin mφ."""
