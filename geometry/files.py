@@ -11,9 +11,10 @@ import signal
 import stat
 import subprocess
 import sys
+import time
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, BinaryIO, ParamSpec, TypeVar
+from typing import Any, BinaryIO, TypeVar
 
 from .common import ComputationError, InputError, printable, shown
 
@@ -31,7 +32,6 @@ MEMORY = 2_000_000_000  # Bytes of address space of another process; the librari
 SLOWER = 4.0  # How much longer by the clock than by the processor a call may take: the machine has others to serve
 LAUNCH = "from spinlev.geometry.files import _serve; _serve()"
 
-Given = ParamSpec("Given")
 Answer = TypeVar("Answer")
 
 
@@ -126,14 +126,14 @@ class CrashError(LostError):
     """The process crashed: asked slightly differently, the library may well answer."""
 
 
-def call_apart(seconds: float, function: Callable[Given, Answer], *given: Given.args, **named: Given.kwargs) -> Answer:
+def call_apart(seconds: float, function: Callable[..., Answer], *given: Any) -> Answer:
     """What a function of this package returns, called in another process.
 
     Parameters
     ----------
     seconds : of processor time
     function : at the top of its module
-    *given, **named : its arguments, which like the answer must be such that pickle takes them
+    *given : its arguments, which like the answer must be such that pickle takes them
 
     Raises
     ------
@@ -141,15 +141,14 @@ def call_apart(seconds: float, function: Callable[Given, Answer], *given: Given.
     CrashError : it crashed
     Exception : whatever the function raises
     """
-    task = pickle.dumps((seconds, function, given, named))
-    name = f"{function.__module__}.{function.__qualname__}"
-    command = [sys.executable, "-P", "-c", LAUNCH, name]  # -P: no module of the current folder
+    # -P: no module of the current folder. Processes of multiprocessing would run the user's script once more.
+    command = [sys.executable, "-P", "-c", LAUNCH, f"{function.__module__}.{function.__qualname__}"]
+    task, quiet = pickle.dumps((seconds, function, given)), subprocess.DEVNULL
     alone = os.environ | {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}  # each thread takes address space
     try:
         done = subprocess.run(
-            command, input=task, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL,
-            timeout=SLOWER * seconds, check=False, env=alone,
-        )  # fmt: skip
+            command, input=task, stdout=subprocess.PIPE, stderr=quiet, timeout=SLOWER * seconds, check=False, env=alone
+        )
     except subprocess.TimeoutExpired:
         raise LostError("does not come to an end with it") from None
     return outcome(done.returncode, done.stdout)  # type: ignore[no-any-return]
@@ -171,10 +170,8 @@ def outcome(status: int, sent: bytes) -> Any:
 
 
 def _serve() -> None:
-    """Answer one call from standard input; libraries may print what they like."""
-    answers = os.fdopen(os.dup(sys.stdout.fileno()), "wb")
-    with open(os.devnull, "w") as nowhere:
-        os.dup2(nowhere.fileno(), sys.stdout.fileno())
+    answers = os.fdopen(os.dup(1), "wb")
+    os.dup2(2, 1)  # libraries may print what they like, where nobody listens
     answers.write(sent_answer(sys.stdin.buffer.read()))
     answers.flush()
     os._exit(0)  # what a damaged shape left behind may crash as it is cleared away
@@ -185,13 +182,12 @@ def sent_answer(task: bytes) -> bytes:
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
     with contextlib.suppress(ValueError):  # the limit of this process may be lower already
         resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
-    seconds, function, given, named = pickle.loads(task)
-    used = sum(resource.getrusage(resource.RUSAGE_SELF)[:2])
-    limit = int(used + seconds) + 1
+    seconds, function, given = pickle.loads(task)
+    limit = int(time.process_time() + seconds) + 1
     resource.setrlimit(resource.RLIMIT_CPU, (limit, limit + 1))
     answer: tuple[Any, BaseException | None]
     try:
-        answer = function(*given, **named), None
+        answer = function(*given), None
     except Exception as error:
         answer = None, error
     try:

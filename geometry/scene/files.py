@@ -6,7 +6,7 @@ import json
 import logging
 import re
 import tomllib
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
@@ -108,54 +108,45 @@ def parse_scene(
 
 def _keys(text: str, source: str) -> dict[str, Any]:
     """The tables of a text, of which TOML's parser survives the reading."""
-    if LONGEST_KEY.search(text):
-        raise SceneError(source, ["Input key must have fewer than 20 parts; instead there is one with more."])
     try:
-        return tomllib.loads(text)
+        if not LONGEST_KEY.search(text):
+            return tomllib.loads(text)
+        fault = "Input key must have fewer than 20 parts; instead there is one with more."
     except tomllib.TOMLDecodeError as error:
         point = " Decimals have a point, lists square brackets." if DECIMAL_COMMA.search(text) else ""
-        raise SceneError(source, [f"Input scene must be TOML; instead: {str(error)[:200]}.{point}"]) from None
+        fault = f"Input scene must be TOML; instead: {str(error)[:200]}.{point}"
     except RecursionError:
-        raise SceneError(
-            source, ["Input scene must be TOML with few lists in each other; instead some are nested too deep."]
-        ) from None
+        fault = "Input scene must be TOML with few lists in each other; instead some are nested too deep."
     except ValueError:  # Python's own limit
-        raise SceneError(
-            source, ["Input scene must have numbers of a few digits; instead one has thousands."]
-        ) from None
+        fault = "Input scene must have numbers of a few digits; instead one has thousands."
+    raise SceneError(source, [fault])
 
 
 def changed(scene: Scene, changes: Mapping[str, float], source: str = "scene", known: Scene | None = None) -> Scene:
-    """The scene with numbers replaced by key, as in `parse_scene`.
+    """The `scene` with numbers replaced by key; `changes`, `source` and `known` are as in `parse_scene`.
 
-    Raises
-    ------
-    SceneError : as there, or a file that the scene names has another content than when the scene was read
+    Raises SceneError as that does, and where a file that the scene names has another content than when it was read.
     """
     keys = scene_keys(scene)
     for key, value in changes.items():
         _replace(keys, key, value, source)
     found = assemble(keys, source, Path(), known)
-    before = dict(scene.files)
-    for path, digest in found.files:
-        if before.get(path, digest) != digest:
-            raise _replaced(path, digest, source)
+    _check_same(scene, found.files, source)
     return found
 
 
 def check_files(scene: Scene, source: str = "scene") -> None:
     """Raise SceneError if a file that a scene names has another content than when the scene was read."""
-    for path, digest in scene.files:
-        if (found := content_digest(Path(path))) != digest:
-            raise _replaced(path, found, source)
+    _check_same(scene, [(path, content_digest(Path(path))) for path, _ in scene.files], source)
 
 
-def _replaced(path: str, digest: str, source: str) -> SceneError:
-    instead = "its content is another one" if digest else "it cannot be read any more"
-    way_out = "Begin again, and what needs the file is computed anew."
-    return SceneError(
-        source, [f"Input {path} must stay as it was when the scene was read; instead {instead}. {way_out}"]
-    )
+def _check_same(scene: Scene, files: Iterable[tuple[str, str]], source: str) -> None:
+    before = dict(scene.files)
+    for path, digest in files:
+        if before.get(path, digest) != digest:
+            instead = "its content is another one" if digest else "it cannot be read any more"
+            fault = f"Input {path} must stay as it was when the scene was read; instead {instead}."
+            raise SceneError(source, [f"{fault} Begin again, and what needs the file is computed anew."])
 
 
 def _replace(raw: Any, key: str, value: float, source: str) -> None:
@@ -169,10 +160,8 @@ def _replace(raw: Any, key: str, value: float, source: str) -> None:
         else:
             raw.update({last: value})
     except (ValueError, KeyError, IndexError, TypeError, AttributeError):
-        raise SceneError(
-            source,
-            [f"Input {shown(key)} must be a key inside the tables and lists that the scene has; instead it is not."],
-        ) from None
+        fault = f"Input {shown(key)} must be a key inside the tables and lists that the scene has; instead it is not."
+        raise SceneError(source, [fault]) from None
 
 
 def scene(
@@ -230,11 +219,8 @@ def scene(
 
 
 def _plain(value: Any, depth: int = 0) -> Any:
-    """Tuples and arrays as lists, NumPy's numbers and integers as floats: as a scene file has them.
-
-    What is deeper than any scene, or too large for a float, is left as it is: the schema refuses it.
-    """
-    if depth > DEEPEST:
+    """Tuples and arrays as lists, NumPy's numbers and integers as floats: as a scene file has them."""
+    if depth > DEEPEST:  # as what is too large for a float it is left as it is: the schema refuses it
         return value
     if isinstance(value, Mapping):
         return {str(key): _plain(item, depth + 1) for key, item in value.items()}
@@ -260,8 +246,7 @@ def startless_text(scene: Scene) -> str:
 def scene_keys(scene: Scene) -> dict[str, Any]:
     """The keys of a scene file that describe a scene, as tables within tables, files named from the folder at hand.
 
-    They are those that it was made of; those of what was replaced since, or never had any, are written from the object:
-    a rotor then as its magnets.
+    What was replaced since the scene was made of keys, or never had any, is written from the object.
     """
     own = scene.keys[0] if scene.keys else {}
     found = {
@@ -298,11 +283,10 @@ def map_digest(scene: Scene) -> str:
 
 def _as_written(scene: Scene, name: str) -> bool:
     """Whether all that a key or table of the scene file decides is still what that made."""
-    made = scene.keys[1] if scene.keys else None
-    pairs = [(getattr(scene, field), getattr(made, field, None)) for field in FIELDS[name][0]]
-    return made is not None and all(
-        now is then or (not isinstance(now, np.ndarray) and now == then) for now, then in pairs
-    )
+    if not scene.keys:
+        return False
+    pairs = [(getattr(scene, field), getattr(scene.keys[1], field)) for field in FIELDS[name][0]]
+    return all(now is then or (not isinstance(now, np.ndarray) and now == then) for now, then in pairs)
 
 
 def _rotor(scene: Scene) -> dict[str, Any]:

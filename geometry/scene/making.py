@@ -9,34 +9,17 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 from pydantic import ValidationError
 
 from ..common import InputError, shown
 from ..files import regular_file
-from ..magnets import Magnet
-from ..rotor import Conductor, horizontal as horizontal_rotor, tilt as tilted_rotor, vertical as vertical_rotor
-from ..shapes import Box, Cylinder, Ring, Sphere, rotation_matrix
-from ..solids import Part, Solid, known_shape
 from ..step_file import read_part
-from .contents import AbsoluteStart, Drag, Floater, Lowering, MapReading, OffsetStart, Plate, Scene
+from .contents import Scene
 from .messages import SceneError, described_faults, overlap_faults
-from .schema import (
-    AnyRotor,
-    DisplacedRotor,
-    ExplicitRotor,
-    FloaterTable,
-    MagnetTable,
-    SceneTable,
-    StartTable,
-    TiltRotor,
-    key_faults,
-)
+from .schema import AnyRotor, ExplicitRotor, SceneTable, key_faults
 
-MILLI = 1e-3
 LARGEST = 2**30  # Bytes of a file that a scene may name
 MOST_BODIES = 64  # Magnets and conductors of a scene beside a known one, unless that has more
-ORIGIN = (0.0, 0.0, 0.0)
 
 
 def assemble(keys: Mapping[str, Any], source: str, folder: Path | None = None, known: Scene | None = None) -> Scene:
@@ -63,9 +46,10 @@ def assemble(keys: Mapping[str, Any], source: str, folder: Path | None = None, k
         raise SceneError(source, faults)
     try:
         paths = _named_files(table.rotor, Path(source).parent if folder is None else folder, known)
+        field_map, of_magnets = paths.get(-1), {k: path for k, path in paths.items() if k >= 0}
         read = {part.file: part for part in known.parts} if known else {}
-        parts = {path: read.get(path) or read_part(path) for number, path in paths.items() if number is not None}
-        scene = _scene(table, paths, parts)
+        parts = {path: read.get(path) or read_part(path) for path in of_magnets.values()}
+        scene = table.scene({k: parts[path] for k, path in of_magnets.items()}, field_map)
         files = {str(path): content_digest(path) for path in paths.values()} if known is None else dict(known.files)
     except InputError as error:  # a file
         raise SceneError(source, [str(error)]) from None
@@ -73,11 +57,9 @@ def assemble(keys: Mapping[str, Any], source: str, folder: Path | None = None, k
     if faults:
         raise SceneError(source, faults)
     own = copy.deepcopy(dict(keys))
-    for number, path in paths.items():
-        if number is None:
-            own["rotor"]["field_map"] = str(path)
-        else:
-            own["rotor"]["magnets"][number]["file"] = str(path)
+    own["rotor"].update({"field_map": str(field_map)} if field_map else {})
+    for k, path in of_magnets.items():
+        own["rotor"]["magnets"][k]["file"] = str(path)
     scene = replace(scene, files=tuple(files.items()), parts=tuple(parts.values()))
     return replace(scene, keys=(own, scene))
 
@@ -109,118 +91,35 @@ def _too_many(rotor: AnyRotor, known: Scene) -> list[str]:
     return [f"{said} Give the scene to the command line."]
 
 
-def _named_files(rotor: AnyRotor, folder: Path, known: Scene | None) -> dict[int | None, Path]:
-    """The files that a rotor names: those of magnets by their number, that of its map by None.
+def _named_files(rotor: AnyRotor, folder: Path, known: Scene | None) -> dict[int, Path]:
+    """The files that a rotor names: those of magnets by their number, that of its map by -1.
 
     Beside a known scene a name means one of its files, which is `folder / name` or ends so. No disk is asked.
     """
-    names: dict[int | None, str | None] = {None: rotor.field_map}
+    names = {-1: rotor.field_map}
     if isinstance(rotor, ExplicitRotor):
         names |= {k: magnet.file for k, magnet in enumerate(rotor.magnets)}
-    found: dict[int | None, Path] = {}
-    for number, name in names.items():
-        if name and known is None:
-            found[number] = folder / name
-        elif name and known:
-            own = [known.field_map] if number is None else [part.file for part in known.parts]
-            files, end = [file for file in own if file], Path(name).parts
-            alike = [file for file in files if file == folder / name or file.parts[-len(end) :] == end]
-            if not alike:
-                key = "field_map" if number is None else f"magnets[{number}].file"
-                raise InputError(
-                    f"Input rotor.{key} must be a file of the scene that was opened first; instead received "
-                    f"{shown(name)}. Give the scene to the command line."
-                )
-            found[number] = folder / name if folder / name in alike else alike[0]
+    found = {k: folder / name for k, name in names.items() if name}
+    for k, path in found.items() if known else ():
+        assert known is not None
+        name, own = str(names[k]), [known.field_map] if k < 0 else [part.file for part in known.parts]
+        end = Path(name).parts
+        alike = [file for file in own if file and (file == path or file.parts[-len(end) :] == end)]
+        if not alike:
+            key = "field_map" if k < 0 else f"magnets[{k}].file"
+            raise InputError(
+                f"Input rotor.{key} must be a file of the scene that was opened first; instead received "
+                f"{shown(name)}. Give the scene to the command line."
+            )
+        found[k] = path if path in alike else alike[0]
     return found
 
 
-def _scene(table: SceneTable, paths: Mapping[int | None, Path], parts: Mapping[Path, Part]) -> Scene:
-    rotor, floater, plate, drag = table.rotor, _floater(table.floater), table.plate, table.drag
-    down, air = plate.lowering if plate else None, Drag.of(floater)
-    if drag and drag.linear_N_s_m is not None and drag.angular_N_m_s is not None:
-        air = Drag(drag.linear_N_s_m, drag.angular_N_m_s)
-    if isinstance(rotor, ExplicitRotor):
-        bodies = [parts[paths[k]] if magnet.file else None for k, magnet in enumerate(rotor.magnets)]
-        magnets = tuple(_magnet(*pair, rotor) for pair in zip(rotor.magnets, bodies, strict=True))
-    else:
-        magnets = _article_magnets(rotor)
-    lowering = Lowering(down.start_s, down.speed_mm_s * MILLI, down.distance_mm * MILLI) if down else None
-    return Scene(
-        frequency=table.frequency_hz,
-        gravity=np.array(table.gravity_m_s2),
-        rotor=magnets,
-        floater=floater,
-        plate=Plate(_solid(plate).box, plate.conductivity_S_m, lowering) if plate else None,
-        drag=replace(air, air=True) if drag and drag.model == "air" else air,
-        start=_start(table.start or StartTable()),
-        field_map=paths.get(None),
-        map_reading=MapReading(rotor.map_length_unit, rotor.map_field_unit, rotor.map_columns),
-        conductors=tuple(Conductor(_solid(c), c.conductivity_S_m) for c in rotor.conductors),
-    )
-
-
-def _solid(table: Any) -> Solid:
-    """The body of a table's shape, in its place if the table has one."""
-    center, angles = (getattr(table, key, ORIGIN) for key in ("center_mm", "rotation_deg"))
-    pose = MILLI * np.array(center), rotation_matrix(angles)
-    shape, radius = getattr(table, "shape", "cuboid"), (getattr(table, "diameter_mm", None) or 0.0) * MILLI / 2
-    if shape == "sphere":
-        return Sphere(radius, *pose)
-    if shape == "cylinder":
-        return Cylinder(radius, table.height_mm * MILLI, *pose)
-    if shape == "ring":
-        return Ring(radius, table.inner_diameter_mm * MILLI / 2, table.height_mm * MILLI, *pose)
-    return Box(np.array([table.edge_mm] * 3 if shape == "cube" else table.size_mm) * MILLI, *pose)
-
-
-def _magnet(table: MagnetTable, part: Part | None, rotor: AnyRotor) -> Magnet:
-    """One of an explicit rotor, whose conductivity and knee it has where it has none of its own."""
-    conductivity = rotor.conductivity_S_m if table.conductivity_S_m is None else table.conductivity_S_m
-    knee = table.coercivity_kA_m or rotor.coercivity_kA_m
-    along, across = table.recoil_permeability
-    material = along, across, conductivity, 1e3 * knee if knee else None
-    polarization = np.array(table.polarization_T)
-    if part is None:
-        return Magnet(_solid(table), polarization, *material)
-    turn = rotation_matrix(table.rotation_deg)
-    part = replace(part, center=MILLI * np.array(table.center_mm) - turn @ part.origin, rotation=turn)
-    body = known_shape(part) or part
-    return Magnet(body, body.rotation.T @ turn @ polarization if body is not part else polarization, *material)
-
-
-def _article_magnets(rotor: DisplacedRotor | TiltRotor) -> tuple[Magnet, ...]:
-    material = rotor.remanence_T, *rotor.recoil_permeability
-    if isinstance(rotor, TiltRotor):
-        magnets = tilted_rotor(float(np.radians(rotor.angle_deg)), _solid(rotor), *material)
-    else:
-        build = horizontal_rotor if rotor.configuration == "horizontal" else vertical_rotor
-        magnets = build(rotor.displacement_mm * MILLI, _solid(rotor), *material)
-    knee = None if rotor.coercivity_kA_m is None else 1e3 * rotor.coercivity_kA_m
-    return tuple(replace(magnet, conductivity=rotor.conductivity_S_m, coercivity=knee) for magnet in magnets)
-
-
-def _floater(table: FloaterTable) -> Floater:
-    material = (table.remanence_T, table.recoil_permeability, table.density_kg_m3, table.conductivity_S_m)
-    body = _solid(table)
-    return Floater(body.circumradius, *material, body if isinstance(body, Box | Cylinder) else None)
-
-
-def _start(start: StartTable) -> OffsetStart | AbsoluteStart:
-    if start.position_mm is None:
-        return OffsetStart() if start.offset_mm is None else OffsetStart(MILLI * np.array(start.offset_mm))
-    moment = np.array(start.moment or [0.0, 0.0, 1.0])
-    if not 1e-100 < np.abs(moment).max() < 1e100:  # squares of its parts are no numbers
-        moment = moment / np.abs(moment).max()
-    return AbsoluteStart(
-        position=MILLI * np.array(start.position_mm),
-        velocity=MILLI * np.array(start.velocity_mm_s or ORIGIN),
-        moment=moment / np.linalg.norm(moment),
-        spin=2 * np.pi * np.array(start.spin_hz or ORIGIN),
-    )
-
-
 Table = Mapping[str, Any]  # A table of the scene file
+
+
+def _cube(remanence_T: float, edge_mm: float | None) -> Table:
+    return {"remanence_T": remanence_T} | ({} if edge_mm is None else {"edge_mm": edge_mm})
 
 
 def horizontal(*, displacement_mm: float, remanence_T: float, edge_mm: float | None = None, **more: Any) -> Table:
@@ -228,10 +127,8 @@ def horizontal(*, displacement_mm: float, remanence_T: float, edge_mm: float | N
 
     Parameters
     ----------
-    displacement_mm : float
-        Of the cube's centre, mm.
-    remanence_T : float
-        Remanence, T.
+    displacement_mm, remanence_T : float
+        Of the cube's centre, mm, and remanence, T.
     edge_mm : float, optional
         Edge of the cubes, mm; left out where `shape` is "sphere" (with diameter_mm) or "cylinder" (and height_mm).
     **more : float or list
@@ -252,12 +149,8 @@ def vertical(*, displacement_mm: float, remanence_T: float, edge_mm: float | Non
     ----------
     displacement_mm : float
         From centre to centre, mm.
-    remanence_T : float
-        Remanence, T.
-    edge_mm : float, optional
-        Edge of the cubes, mm; left out where `shape` is "sphere" (with diameter_mm) or "cylinder" (and height_mm).
-    **more : float or list
-        Further keys, as for `magnets`.
+    remanence_T, edge_mm, **more : float or list
+        As for `horizontal`.
 
     Returns
     -------
@@ -274,12 +167,8 @@ def tilt(*, angle_deg: float, remanence_T: float, edge_mm: float | None = None, 
     ----------
     angle_deg : float
         The magnetisation is along (cos angle, 0, sin angle), degrees.
-    remanence_T : float
-        Remanence, T.
-    edge_mm : float, optional
-        Edge of the cubes, mm; left out where `shape` is "sphere" (with diameter_mm) or "cylinder" (and height_mm).
-    **more : float or list
-        Further keys, as for `magnets`.
+    remanence_T, edge_mm, **more : float or list
+        As for `horizontal`.
 
     Returns
     -------
@@ -287,10 +176,6 @@ def tilt(*, angle_deg: float, remanence_T: float, edge_mm: float | None = None, 
         The table `[rotor]` of a scene file.
     """
     return {"configuration": "tilt", "angle_deg": angle_deg, **_cube(remanence_T, edge_mm), **more}
-
-
-def _cube(remanence_T: float, edge_mm: float | None) -> Table:
-    return {"remanence_T": remanence_T} | ({} if edge_mm is None else {"edge_mm": edge_mm})
 
 
 def magnets(*bodies: Table, **more: Any) -> Table:
@@ -322,12 +207,8 @@ def sphere(*, diameter_mm: float, remanence_T: float, density_kg_m3: float, **mo
 
     Parameters
     ----------
-    diameter_mm : float
-        Diameter, mm.
-    remanence_T : float
-        Remanence, T.
-    density_kg_m3 : float
-        Density, kg/m³.
+    diameter_mm, remanence_T, density_kg_m3 : float
+        Diameter, mm, remanence, T, and density, kg/m³.
     **more : float
         Further keys: recoil_permeability (1.05), conductivity_S_m (its eddy currents, else left out).
 
@@ -344,12 +225,10 @@ def plate(*, size_mm: Sequence[float], center_mm: Sequence[float], conductivity_
 
     Parameters
     ----------
-    size_mm : sequence of 3 floats
-        Edges, mm.
-    center_mm : sequence of 3 floats
-        Centre in the laboratory frame, mm.
+    size_mm, center_mm : sequence of 3 floats
+        Edges, and centre in the laboratory frame, mm.
     conductivity_S_m : float
-        Conductivity, S/m.
+        S/m.
     **more : list or dict
         Further keys: rotation_deg about x, y, z, and lowering = {start_s, speed_mm_s, distance_mm}.
 

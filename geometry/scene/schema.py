@@ -1,10 +1,22 @@
-"""The scene file's keys, types and ranges, and the rules between keys; every key carries its unit."""
+"""The scene file's keys, types and ranges, the rules between keys, and what they say in SI units."""
 
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
 from typing import Annotated, Any, Literal, TypeVar
 
 import numpy as np
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Discriminator, Field, Tag
 from pydantic_core import PydanticCustomError
+
+from ..magnets import Magnet
+from ..rotor import Conductor, Rotor, horizontal, tilt, vertical
+from ..shapes import Box, Cylinder, Ring, Sphere, rotation_matrix
+from ..solids import Part, Solid, known_shape
+from .contents import AbsoluteStart, Drag, Floater, Lowering, MapReading, OffsetStart, Plate, Scene
+
+MILLI = 1e-3
+ORIGIN = (0.0, 0.0, 0.0)
 
 
 def _zero_or(least: float) -> AfterValidator:
@@ -59,6 +71,19 @@ class Table(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
+    def solid(self) -> Solid:
+        """The body of a table's shape, in its place if the table has one."""
+        given = dict(self)
+        pose = MILLI * np.array(given.get("center_mm", ORIGIN)), rotation_matrix(given.get("rotation_deg", ORIGIN))
+        shape, radius = given.get("shape", "cuboid"), (given.get("diameter_mm") or 0.0) * MILLI / 2
+        if shape == "sphere":
+            return Sphere(radius, *pose)
+        if shape == "cylinder":
+            return Cylinder(radius, given["height_mm"] * MILLI, *pose)
+        if shape == "ring":
+            return Ring(radius, given["inner_diameter_mm"] * MILLI / 2, given["height_mm"] * MILLI, *pose)
+        return Box(np.array([given["edge_mm"]] * 3 if shape == "cube" else given["size_mm"]) * MILLI, *pose)
+
 
 class _Placed(Table):
     """A body in a place, with the keys of its shape."""
@@ -76,6 +101,9 @@ class ConductorTable(_Placed):
     shape: Literal["cuboid", "cylinder"] = "cuboid"
     conductivity_S_m: Metal
 
+    def conductor(self) -> Conductor:
+        return Conductor(self.solid(), self.conductivity_S_m)
+
 
 class MagnetTable(_Placed):
     """One magnet of an explicit rotor; its polarisation is along the body's axes and turns with it."""
@@ -87,6 +115,20 @@ class MagnetTable(_Placed):
     recoil_permeability: MagnetPermeability = [RECOIL_PERMEABILITY, RECOIL_PERMEABILITY]
     conductivity_S_m: Conductivity | None = None
     coercivity_kA_m: Coercivity | None = None
+
+    def magnet(self, part: Part | None, rotor: "AnyRotor") -> Magnet:
+        """The magnet, its body from a file where that is given; what it does not say, its `rotor` says."""
+        conductivity = rotor.conductivity_S_m if self.conductivity_S_m is None else self.conductivity_S_m
+        knee = self.coercivity_kA_m or rotor.coercivity_kA_m
+        along, across = self.recoil_permeability
+        material = along, across, conductivity, 1e3 * knee if knee else None
+        polarization = np.array(self.polarization_T)
+        if part is None:
+            return Magnet(self.solid(), polarization, *material)
+        turn = rotation_matrix(self.rotation_deg)
+        part = replace(part, center=MILLI * np.array(self.center_mm) - turn @ part.origin, rotation=turn)
+        body = known_shape(part) or part
+        return Magnet(body, polarization if body is part else body.rotation.T @ turn @ polarization, *material)
 
 
 class AnyRotor(Table):
@@ -111,12 +153,20 @@ class ArticleRotor(AnyRotor):
     remanence_T: Remanence
     recoil_permeability: MagnetPermeability = [RECOIL_PERMEABILITY, RECOIL_PERMEABILITY]
 
+    def _of(self, magnets: Rotor) -> Rotor:
+        knee = None if self.coercivity_kA_m is None else 1e3 * self.coercivity_kA_m
+        return tuple(replace(magnet, conductivity=self.conductivity_S_m, coercivity=knee) for magnet in magnets)
+
 
 class DisplacedRotor(ArticleRotor):
     """One cube beside the axis, or two, the upper magnetised along the axis."""
 
     configuration: Literal["horizontal", "vertical"]
     displacement_mm: Annotated[NotNegative, Field(le=1e6)]
+
+    def in_si(self, parts: Mapping[int, Part]) -> Rotor:
+        build = horizontal if self.configuration == "horizontal" else vertical
+        return self._of(build(self.displacement_mm * MILLI, self.solid(), self.remanence_T, *self.recoil_permeability))
 
 
 class TiltRotor(ArticleRotor):
@@ -125,11 +175,18 @@ class TiltRotor(ArticleRotor):
     configuration: Literal["tilt"]
     angle_deg: Annotated[Number, Field(ge=-90.0, le=90.0)]
 
+    def in_si(self, parts: Mapping[int, Part]) -> Rotor:
+        angle = float(np.radians(self.angle_deg))
+        return self._of(tilt(angle, self.solid(), self.remanence_T, *self.recoil_permeability))
+
 
 class ExplicitRotor(AnyRotor):
     """Any set of magnets."""
 
     magnets: Annotated[list[MagnetTable], Field(min_length=1)]
+
+    def in_si(self, parts: Mapping[int, Part]) -> Rotor:
+        return tuple(magnet.magnet(parts.get(k), self) for k, magnet in enumerate(self.magnets))
 
 
 def _rotor_kind(rotor: Any) -> str | None:
@@ -151,6 +208,11 @@ class FloaterTable(Table):
     density_kg_m3: Annotated[Positive, Field(ge=1e-3, le=1e6)]
     conductivity_S_m: Conductivity | None = None
 
+    def floater(self) -> Floater:
+        material = self.remanence_T, self.recoil_permeability, self.density_kg_m3, self.conductivity_S_m
+        body = self.solid()
+        return Floater(body.circumradius, *material, body if isinstance(body, Box | Cylinder) else None)
+
 
 class LoweringTable(Table):
     """The plate's way down."""
@@ -169,6 +231,11 @@ class PlateTable(Table):
     conductivity_S_m: Metal
     lowering: LoweringTable | None = None
 
+    def plate(self) -> Plate:
+        down = self.lowering
+        lowering = Lowering(down.start_s, down.speed_mm_s * MILLI, down.distance_mm * MILLI) if down else None
+        return Plate(self.solid().box, self.conductivity_S_m, lowering)
+
 
 class DragTable(Table):
     """Drag on the floater: of air by a model, or numbers."""
@@ -176,6 +243,11 @@ class DragTable(Table):
     model: Literal["stokes", "air"] | None = None
     linear_N_s_m: Brake | None = None
     angular_N_m_s: Brake | None = None
+
+    def drag(self, floater: Floater) -> Drag:
+        if self.linear_N_s_m is not None and self.angular_N_m_s is not None:
+            return Drag(self.linear_N_s_m, self.angular_N_m_s)
+        return replace(Drag.of(floater), air=self.model == "air")
 
 
 class StartTable(Table):
@@ -186,6 +258,19 @@ class StartTable(Table):
     velocity_mm_s: Three[Speed] | None = None
     moment: Three[Number] | None = None
     spin_hz: Three[Coordinate] | None = None
+
+    def start(self) -> OffsetStart | AbsoluteStart:
+        if self.position_mm is None:
+            return OffsetStart() if self.offset_mm is None else OffsetStart(MILLI * np.array(self.offset_mm))
+        moment = np.array(self.moment or [0.0, 0.0, 1.0])
+        if not 1e-100 < np.abs(moment).max() < 1e100:  # squares of its parts are no numbers
+            moment = moment / np.abs(moment).max()
+        return AbsoluteStart(
+            position=MILLI * np.array(self.position_mm),
+            velocity=MILLI * np.array(self.velocity_mm_s or ORIGIN),
+            moment=moment / np.linalg.norm(moment),
+            spin=2 * np.pi * np.array(self.spin_hz or ORIGIN),
+        )
 
 
 class SceneTable(Table):
@@ -204,6 +289,22 @@ class SceneTable(Table):
     plate: PlateTable | None = None
     drag: DragTable | None = None
     start: StartTable | None = None
+
+    def scene(self, parts: Mapping[int, Part], field_map: Path | None) -> Scene:
+        """The scene in SI units, its `parts` by the numbers of their magnets."""
+        rotor, floater = self.rotor, self.floater.floater()
+        return Scene(
+            frequency=self.frequency_hz,
+            gravity=np.array(self.gravity_m_s2),
+            rotor=rotor.in_si(parts),
+            floater=floater,
+            plate=self.plate.plate() if self.plate else None,
+            drag=(self.drag or DragTable()).drag(floater),
+            start=(self.start or StartTable()).start(),
+            field_map=field_map,
+            map_reading=MapReading(rotor.map_length_unit, rotor.map_field_unit, rotor.map_columns),
+            conductors=tuple(conductor.conductor() for conductor in rotor.conductors),
+        )
 
 
 # By their keys; rotors by their configuration, but for that of `rotor.magnets`.
