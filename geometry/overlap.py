@@ -32,52 +32,34 @@ def separation(first: Solid, second: Solid) -> tuple[float, Array]:
             if gap > -TOUCHING:
                 return gap, sign * direction
             through += [(gap, sign * direction)] if fits else []
-    if isinstance(first, Box) and isinstance(second, Box):
-        return _box_separation(first, second)
     return max([_convex_separation(first, second), *through], key=lambda found: found[0])
 
 
-def _box_separation(first: Box, second: Box) -> tuple[float, Array]:
-    """By the axes of both and the nine products of their edges, one of which parts boxes that are apart.
-
-    That is the separating-axis theorem (S. Gottschalk et al., SIGGRAPH 1996).
-    """
-    a, b = first.rotation.T, second.rotation.T
-    crossed = np.cross(a[:, None, :], b[None, :, :]).reshape(9, 3)
-    length = np.linalg.norm(crossed, axis=1)
-    axes = np.vstack([a, b, crossed[length > 1e-9] / length[length > 1e-9, None]])
-    reach = first.reach(axes) + second.reach(axes)
-    along = axes @ (second.center - first.center)
-    best = int(np.argmax(np.abs(along) - reach))
-    return float(np.abs(along[best]) - reach[best]), axes[best] * np.sign(along[best])
-
-
 def _convex_separation(first: Solid, second: Solid) -> tuple[float, Array]:
-    """Some direction shows the widest gap between convex bodies.
-
-    Where faces or mantles meet it is one of those that are tried first, and the gap is exact; elsewhere it is found by
-    a search, which can only tell too small a gap.
-    """
     offset = second.center - first.center
 
     def gap(directions: Array) -> Array:
         ways = directions / np.linalg.norm(directions, axis=1)[:, None]
         return np.asarray(ways @ offset - first.support(ways) - second.support(-ways))
 
+    # Some direction shows the widest gap. Where faces or mantles meet it is one of these, and the gap is exact; for two
+    # boxes it always is (separating-axis theorem, S. Gottschalk et al., SIGGRAPH 1996).
     axes = np.vstack([first.rotation.T, second.rotation.T])
     crossed = np.cross(first.rotation.T[:, None], second.rotation.T).reshape(9, 3)
-    across = np.vstack([offset, *(offset - (offset @ axis) * axis for axis in axes)])
-    faces = [
-        sign * body.face_normals @ body.rotation.T
-        for body, sign in ((first, 1), (second, -1))
-        if isinstance(body, Part)
-    ]
-    tried = np.vstack([axes, -axes, crossed, -crossed, across, *faces, np.random.default_rng(0).normal(size=(200, 3))])
-    tried = tried[np.linalg.norm(tried, axis=1) > 1e-12]
-    tried /= np.linalg.norm(tried, axis=1)[:, None]
-    best = tried[int(np.argmax(gap(tried)))]
+    tried, boxes = [axes, -axes, crossed, -crossed], isinstance(first, Box) and isinstance(second, Box)
+    if not boxes:
+        across = np.vstack([offset, *(offset - (offset @ axis) * axis for axis in axes)])
+        pairs = ((first, 1), (second, -1))
+        faces = [sign * body.face_normals @ body.rotation.T for body, sign in pairs if isinstance(body, Part)]
+        tried += [across, *faces, np.random.default_rng(0).normal(size=(200, 3))]
+    ways = np.vstack(tried)
+    length = np.linalg.norm(ways, axis=1)
+    ways = ways[length > 1e-12] / length[length > 1e-12, None]
+    best = ways[int(np.argmax(gap(ways)))]
     scale = first.circumradius + second.circumradius
-    for _ in range(ROUNDS):  # the simplex may end early on an edge of the gap; from there it goes on
+    # Elsewhere it is found by a search, which can only tell too small a gap. The simplex may end early on an edge of
+    # the gap; from there it goes on.
+    for _ in range(0 if boxes else ROUNDS):
         found = scipy.optimize.minimize(
             lambda n: -gap(n[None])[0] / scale, best, method="Nelder-Mead", options={"xatol": 1e-10, "fatol": 1e-13}
         )
@@ -124,10 +106,7 @@ def apart(first: Solid, second: Solid) -> bool:
 
 
 def body_overlap(first: Solid, second: Solid) -> float:
-    """Penetration depth of two bodies, m: the shortest shift that parts them; negative if they are apart.
-
-    Exact as `separation`, and between a sphere and any body.
-    """
+    """Penetration depth of two bodies, m, negative if apart; exact as `separation`, and of a sphere and any body."""
     if isinstance(second, Sphere):
         return sphere_overlap(second.center, second.radius, first)
     if isinstance(first, Sphere):
@@ -141,10 +120,7 @@ def sphere_overlap(center: ArrayLike, radius: float, body: Solid) -> float:
 
 
 def deepest_overlap_in_a_turn(rotating: Solid, fixed: Box) -> float:
-    """Largest penetration depth of a body that turns about z into a fixed box, m; negative if always apart.
-
-    At angles where the sphere about the body stays clear of the box, its gap is the sphere's.
-    """
+    """Largest penetration depth of a body that turns about z into a fixed box, m; negative if always apart."""
     origin = np.zeros(3)
     clear = float(fixed.distance(origin)) - rotating.farthest(origin)
     if clear > 0:  # it never leaves a sphere that does not reach the fixed one
@@ -153,8 +129,8 @@ def deepest_overlap_in_a_turn(rotating: Solid, fixed: Box) -> float:
     def gap(angle: float) -> float:
         turn = rotation_matrix((0.0, 0.0, np.degrees(angle)))
         body = moved(rotating, turn @ rotating.center, turn @ rotating.rotation)
-        spheres = float(fixed.distance(body.center)) - body.circumradius
-        return spheres if spheres > 0 else -body_overlap(body, fixed)
+        clear = float(fixed.distance(body.center)) - body.circumradius
+        return clear if clear > 0 else -body_overlap(body, fixed)  # where the sphere about the body is clear, its gap
 
     return -_least_in_a_turn(gap, lambda angles: [gap(angle) for angle in angles], 73)[1]
 

@@ -46,19 +46,14 @@ class Body:
     center: Array
     rotation: Array
 
-    if TYPE_CHECKING:  # a field of a cuboid; a property here would be that field's default
+    if TYPE_CHECKING:  # fields of some bodies; properties here would be the fields' defaults
 
         @property
-        def size(self) -> Array:
-            """(3,) edges of the box about it, along the body axes, m."""
-
+        def size(self) -> Array: ...  # (3,) edges of the box about it, along the body axes, m
         @property
-        def volume(self) -> float:
-            """Volume, m³."""
-
+        def volume(self) -> float: ...  # m³
         @property
-        def area(self) -> float:
-            """Area of the surface, m²."""
+        def area(self) -> float: ...  # of the surface, m²
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "center", frozen_array(self.center, (3,)))
@@ -72,10 +67,7 @@ class Body:
     @property
     @abstractmethod
     def shape_numbers(self) -> Array:
-        """Numbers (n,) m that tell it from another of its shape, but for its pose; how many they are tells the shape.
-
-        A cuboid has three, its edges; a sphere one; a cylinder two; a ring four; a part eight, of its file's digest.
-        """
+        """Numbers (n,) m that tell it from another, but for its pose; how many they are tells the shape."""
 
     @property
     @abstractmethod
@@ -200,8 +192,7 @@ class _Turned(Body):
         height: float
 
         @property
-        def inner_radius(self) -> float:
-            """Of the hole, m; zero where there is none."""
+        def inner_radius(self) -> float: ...  # of the hole, m; zero where there is none
 
     @property
     def size(self) -> Array:
@@ -270,9 +261,7 @@ class Cylinder(_Turned):
     center: Array = field(default_factory=lambda: np.zeros(3), metadata={"units": "m"})
     rotation: Array = field(default_factory=lambda: np.eye(3))
 
-    @property
-    def inner_radius(self) -> float:
-        return 0.0
+    inner_radius = 0.0
 
     @property
     def shape_numbers(self) -> Array:
