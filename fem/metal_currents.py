@@ -16,7 +16,7 @@ import ngsolve as ng
 import numpy as np
 
 from ..geometry.common import MU_0, Array, Watch, unwatched, watched
-from ..geometry.meshes.metal import MetalMesh, mesh_metal
+from ..geometry.meshes.solids import SolidMesh, mesh_metal
 from ..geometry.solids import Solid
 from .elements.condensed import require_memory
 from .elements.spaces import IntegrationPoints, volume_points
@@ -29,7 +29,7 @@ BLOCK, TOGETHER = 4000, 40  # Points, and places of dipoles, at a time
 class Metal:
     """A piece of metal on a mesh; made by `metal_of`."""
 
-    mesh: MetalMesh  # of the piece alone
+    mesh: SolidMesh  # of the piece alone
     conductivity: float  # S/m
     space: Any  # H1
     inverse: Any  # of the Laplacian, one unknown held at zero
@@ -101,7 +101,7 @@ def metal_of(bodies: Sequence[Solid], conductivity: float, order: int) -> Metal:
     return metal_on(mesh_metal(bodies), conductivity, order)
 
 
-def metal_on(mesh: MetalMesh, conductivity: float, order: int) -> Metal:
+def metal_on(mesh: SolidMesh, conductivity: float, order: int) -> Metal:
     """The same on a mesh that is there."""
     space = ng.H1(mesh.mesh, order=order)
     free = space.FreeDofs()

@@ -21,7 +21,7 @@ import scipy
 from numpy.typing import ArrayLike
 
 from ...geometry.common import MU_0, Array, Watch, spread_points, unwatched, watched
-from ...geometry.meshes.metal import PLANES
+from ...geometry.meshes.plate import PLANES
 from ..closed_forms.eddy_sphere import ComplexArray
 from ..elements.spaces import Parity
 from .eddy import EddySpace, ShiftedSystem, Source

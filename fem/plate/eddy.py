@@ -21,7 +21,7 @@ import scipy
 from numpy.typing import ArrayLike, NDArray
 
 from ...geometry.common import MU_0, Array
-from ...geometry.meshes.metal import MILLIMETRE, PLANES, ConductorMesh
+from ...geometry.meshes.plate import MILLIMETRE, PLANES, ConductorMesh
 from ..closed_forms.eddy_sphere import ComplexArray
 from ..elements.condensed import require_memory, solve_condensed
 from ..elements.spaces import Parity, edge_vertices, region_edges, tree_edges, value_matrix

@@ -23,7 +23,7 @@ from ..magnets import Magnet
 from ..overlap import overlapping_magnets
 from ..shapes import Box, Cylinder, Ring
 from ..solids import Part, Solid, moved
-from .solids import LONGEST, SIMPLER, SMALLEST, occ_solid, unmeshed
+from .solids import LONGEST, SIMPLER, SMALLEST, SolidMesh, occ_solid, unmeshed
 
 if TYPE_CHECKING:
     import meshio
@@ -58,13 +58,10 @@ class MeshSettings:
 
 
 @dataclass(frozen=True, eq=False)
-class MagnetMesh:
-    """A mesh of magnets in a ball of air."""
+class MagnetMesh(SolidMesh):
+    """A mesh of magnets in a ball of air, whose radius is in units; one unit is the radius of the ball about them."""
 
-    mesh: Any  # the `ngsolve.Mesh`
     magnets: tuple[Magnet, ...]  # the bodies; the region of number k is called `magnet{k}`
-    center: Array  # (3,) centre of the ball and origin of the mesh's coordinates, m
-    unit: float  # length of one unit of the mesh, m: radius of the ball about all magnets
     ball_radius: float  # radius of the ball of air, in units
     # coordinate planes through the centre that cut the ball; only the positive side is meshed
     planes: tuple[int, ...] = ()
@@ -73,10 +70,6 @@ class MagnetMesh:
     def elements(self) -> int:
         """Number of volume elements."""
         return int(self.mesh.ne)
-
-    def to_meter(self, points: Array) -> Array:
-        """Positions (n, 3) in m of `points` (n, 3) in the mesh's coordinates."""
-        return np.asarray(points * self.unit + self.center)
 
 
 def mesh_magnets(
@@ -119,7 +112,7 @@ def mesh_magnets(
             raise unmeshed(error, _files(bodies)) from None
     else:
         mesh = _meshed(*given)
-    return MagnetMesh(mesh, magnets, frozen_array(center, (3,)), unit, settings.ball_radius, planes)
+    return MagnetMesh(mesh, frozen_array(center, (3,)), unit, magnets, settings.ball_radius, planes)
 
 
 def _files(bodies: Sequence[Solid]) -> str:

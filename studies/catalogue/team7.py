@@ -17,8 +17,7 @@ from matplotlib.figure import Figure
 from ...fem.closed_forms.potentials import Dipole, Racetrack
 from ...fem.plate.eddy import solve_eddy
 from ...geometry.common import Array
-from ...geometry.meshes.metal import ConductorMesh
-from ...geometry.meshes.plate import Block, graded_partition, hex_mesh, skin_depth
+from ...geometry.meshes.plate import Block, ConductorMesh, graded_partition, hex_mesh, skin_depth
 from ..figures.style import PAGE, PALETTE, legend_below, panels, styled
 from ..result import variable
 from ..study import study_of_one

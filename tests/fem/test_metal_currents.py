@@ -11,7 +11,7 @@ from spinlev.fem.closed_forms.eddy_sphere import thin_field_torque
 from spinlev.fem.metal_currents import current_patterns, metal_of, metal_on, of_motion, of_places
 from spinlev.fem.rotor_metal import CUBE, ball_losses, places_around, rotor_losses
 from spinlev.geometry.common import InputError
-from spinlev.geometry.meshes.metal import MetalMesh
+from spinlev.geometry.meshes.solids import SolidMesh
 from spinlev.geometry.rotor import Conductor
 from spinlev.geometry.shapes import Box, Cylinder, Ring
 
@@ -28,7 +28,7 @@ def uniform(points):
 def ball():
     mesh = ng.Mesh(occ.OCCGeometry(occ.Sphere((0, 0, 0), 1)).GenerateMesh(maxh=0.7))
     mesh.Curve(5)
-    return metal_on(MetalMesh(mesh, np.zeros(3), 5e-3), SIGMA, 4)
+    return metal_on(SolidMesh(mesh, np.zeros(3), 5e-3), SIGMA, 4)
 
 
 def test_a_ball_in_a_uniform_field(ball):

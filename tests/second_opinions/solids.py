@@ -8,7 +8,7 @@ import ngsolve
 import numpy as np
 from netgen.occ import Box as OccBox, Glue, OCCGeometry, Pnt
 
-from spinlev.geometry.meshes.metal import ConductorMesh
+from spinlev.geometry.meshes.plate import ConductorMesh
 
 
 @dataclass(frozen=True, eq=False)

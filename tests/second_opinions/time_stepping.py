@@ -17,7 +17,7 @@ import numpy as np
 from spinlev.fem.elements.condensed import solve_condensed
 from spinlev.fem.plate.eddy import EddySpace, Source
 from spinlev.geometry.common import MU_0, Array
-from spinlev.geometry.meshes.metal import MILLIMETRE
+from spinlev.geometry.meshes.plate import MILLIMETRE
 
 GAMMA = 1 - np.sqrt(0.5)
 """Diagonal entry of the method, and time of its first stage."""

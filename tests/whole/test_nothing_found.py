@@ -20,8 +20,7 @@ from spinlev.fem.rotor.choice import rotor_table
 from spinlev.geometry.common import MU_0
 from spinlev.geometry.cutting import CONVERGENCE, cut_magnets
 from spinlev.geometry.magnets import Magnet
-from spinlev.geometry.meshes.metal import ConductorMesh
-from spinlev.geometry.meshes.plate import Block, graded_partition, hex_mesh
+from spinlev.geometry.meshes.plate import Block, ConductorMesh, graded_partition, hex_mesh
 from spinlev.geometry.shapes import Box, rotation_matrix
 from spinlev.studies.catalogue.floater_permeability import TILTS, balanced_directions, shifted_equilibrium
 

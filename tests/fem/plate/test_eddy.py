@@ -13,8 +13,7 @@ from spinlev.fem.elements.spaces import Parity, tree_edges
 from spinlev.fem.plate.eddy import solve_eddy
 from spinlev.fem.plate.slab import Slab, mutual_tensor, reaction_tensor
 from spinlev.geometry.common import MU_0
-from spinlev.geometry.meshes.metal import ConductorMesh
-from spinlev.geometry.meshes.plate import Block, MeshRule, hex_mesh, plate_mesh
+from spinlev.geometry.meshes.plate import Block, ConductorMesh, MeshRule, hex_mesh, plate_mesh
 from spinlev.geometry.shapes import Box
 
 SetNumThreads(1)

@@ -4,7 +4,7 @@ import ngsolve as ng
 import numpy as np
 import pytest
 
-from spinlev.geometry.meshes.metal import mesh_metal
+from spinlev.geometry.meshes.solids import mesh_metal
 from spinlev.geometry.shapes import Box, Cylinder, rotation_matrix
 
 TURN = rotation_matrix((20.0, -35.0, 50.0))
