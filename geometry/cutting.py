@@ -20,22 +20,15 @@ MARGIN = 1.0 + 1e-6
 def cut_magnets(
     magnets: Sequence[Magnet], nearest: float, whole: float = CONVERGENCE
 ) -> tuple[tuple[Magnet, ...], ...]:
-    """Pieces of every magnet, equal boxes, for expansions that are used from the distance `nearest` (m) from faces on.
+    """Pieces of all `magnets`, equal boxes, for expansions that are used from the distance `nearest` (m) from faces on.
 
-    Parameters
-    ----------
-    whole : least distance of a point from the centre of a magnet that stays whole, in circumradii; at 1.3 a cube does
-        down to 0.63 of its edge from a face.  Magnets of other shapes stay whole here, see `cells_of`.
-
-    Raises
-    ------
-    InputError : a magnet would need more than `MOST` pieces
+    A magnet stays `whole` for points that far from its centre, in circumradii: at 1.3 a cube does down to 0.63 of its
+    edge from a face; for other shapes see `cells_of`. Raises InputError where a magnet would need more than `MOST`.
     """
     return tuple(_pieces(m, nearest, whole) if isinstance(m.body, Box) else (m,) for m in magnets)
 
 
 def _pieces(magnet: Magnet, nearest: float, whole: float) -> tuple[Magnet, ...]:
-    """The longest side of the pieces is cut until they are compact enough."""
     box, counts = magnet.box, np.ones(3, dtype=int)
     while True:
         half = box.half_edges / counts

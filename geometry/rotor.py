@@ -27,9 +27,12 @@ def horizontal(
     recoil_permeability: float,
     transverse_permeability: float | None = None,
 ) -> Rotor:
-    """One cube magnetised along +x, `displacement` off the axis along +x; its edge, or a body in its place."""
-    material = (recoil_permeability, transverse_permeability)
-    return (Magnet(moved(_solid(body), displacement * X), remanence * X, *material),)
+    """One cube magnetised along +x, `displacement` off the axis along +x; its edge, or a body in its place.
+
+    Its material has a `remanence` (T), a `recoil_permeability` and across the easy axis a `transverse_permeability`.
+    """
+    body = moved(_solid(body), displacement * X)
+    return (Magnet(body, remanence * X, recoil_permeability, transverse_permeability),)
 
 
 def vertical(
@@ -39,7 +42,10 @@ def vertical(
     recoil_permeability: float,
     transverse_permeability: float | None = None,
 ) -> Rotor:
-    """A cube at the origin magnetised along +x and one `displacement` above it along +z; their edge, or a body."""
+    """A cube at the origin magnetised along +x and one `displacement` above it along +z; their edge, or a body.
+
+    Their material has a `remanence` (T), a `recoil_permeability` and across the easy axis a `transverse_permeability`.
+    """
     material = (recoil_permeability, transverse_permeability)
     return (
         Magnet(moved(_solid(body), 0 * X), remanence * X, *material),
@@ -54,7 +60,10 @@ def tilt(
     recoil_permeability: float,
     transverse_permeability: float | None = None,
 ) -> Rotor:
-    """One cube at the origin, body and magnetisation turned to (cos angle, 0, sin angle); its edge, or a body."""
+    """One cube at the origin, body and magnetisation turned to (cos angle, 0, sin angle); its edge, or a body.
+
+    Its material has a `remanence` (T), a `recoil_permeability` and across the easy axis a `transverse_permeability`.
+    """
     turned = moved(_solid(body), 0 * X, rotation_matrix((0.0, -np.degrees(angle), 0.0)))
     return (Magnet(turned, remanence * X, recoil_permeability, transverse_permeability),)
 

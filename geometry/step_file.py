@@ -38,14 +38,8 @@ WAY_OUT = "Export one closed solid a file, and give each magnet its own."
 
 
 def read_part(path: Path) -> Part:
-    """The one closed solid of a STEP file, its middle at the origin.
-
-    Raises
-    ------
-    InputError : no such file, not a STEP file, or anything in it but one closed solid
-    """
-    content = file_content(path, MOST, "file", "a STEP file")
-    return part_of(content.decode("utf-8", errors="replace"), path)
+    """The one closed solid of a STEP file, its middle at the origin. Raises InputError for a file of anything else."""
+    return part_of(file_content(path, MOST, "file", "a STEP file").decode("utf-8", errors="replace"), path)
 
 
 def part_of(text: str, path: Path) -> Part:
@@ -71,9 +65,7 @@ def _measured(text: str) -> tuple[Any, ...]:
 def measured(text: str) -> tuple[str, Array, Array, Array, float, float, Array]:
     """What `Part` knows of the solid of a STEP file's text, from its BREP text on.
 
-    Raises
-    ------
-    InputError : there is not one closed solid; the message is the end of a sentence that begins with the file
+    Raises InputError where there is not one closed solid, with the end of a sentence that begins with the file.
     """
     solids, faces = _solids(text)
     named = max(len(SOLID.findall(text)), len(solids))
@@ -83,7 +75,9 @@ def measured(text: str) -> tuple[str, Array, Array, Array, float, float, Array]:
             f"holds {counted(named, 'solid')}{unread}" if named else f"holds none, and {counted(faces, 'open face')}"
         )
     (solid,) = solids
-    brep = _brep(solid)
+    with tempfile.NamedTemporaryFile("r", suffix=".brep", encoding="utf-8") as copy:
+        solid.WriteBrep(copy.name, withTriangles=False)
+        brep = copy.read()
     volume, area = float(solid.mass), sum(float(face.mass) for face in solid.faces)
     centroid = np.array([solid.center.x, solid.center.y, solid.center.z])
     outer = np.array([[corner.x, corner.y, corner.z] for corner in solid.bounding_box])
@@ -139,17 +133,10 @@ def _roots(text: str) -> list[str]:
     roots = [n for n, refs in shapes.items() if refs and products.get(refs[0]) not in components]
     texts = []
     for kept in roots:
-        alone = text
+        texts.append(text)
         for start, end in sorted((spans[other] for other in roots if other != kept), reverse=True):
-            alone = alone[:start] + alone[end:]
-        texts.append(alone)
+            texts[-1] = texts[-1][:start] + texts[-1][end:]
     return texts or [text]
-
-
-def _brep(solid: Any) -> str:
-    with tempfile.NamedTemporaryFile("r", suffix=".brep", encoding="utf-8") as copy:
-        solid.WriteBrep(copy.name, withTriangles=False)
-        return copy.read()
 
 
 def _triangles(solid: Any) -> Array:

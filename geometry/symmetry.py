@@ -100,15 +100,10 @@ def mirror(axis: int) -> Array:
 def parity_parts(
     magnets: Sequence[Magnet], planes: tuple[int, ...], polarizations: Array | None = None
 ) -> list[tuple[tuple[int, ...], Array]]:
-    """Parts of the polarisation that are even (+1) or odd (-1) at each coordinate plane, those that are zero left out.
+    """Parts of the polarisation that are even (+1) or odd (-1) at each of the `planes`, those that are zero left out.
 
-    Parameters
-    ----------
-    polarizations : (..., n, 3) T, one or several sets; by default those of the magnets
-
-    Returns
-    -------
-    Pairs of the signs, one per plane, and the polarisations (..., n, 3), T. The potential has the same signs.
+    Of `polarizations` (..., n, 3) T, one or several sets, by default those of the `magnets`: pairs of the signs, one a
+    plane, and the polarisations (..., n, 3), T. The potential has the same signs.
     """
     own = np.array([magnet.polarization_in_rotor for magnet in magnets])
     whole = own if polarizations is None else polarizations

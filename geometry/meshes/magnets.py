@@ -82,6 +82,7 @@ def mesh_magnets(
 
     Parameters
     ----------
+    magnets, settings : what is meshed, and how finely
     planes : coordinate planes (0: across x, …) that mirror the magnets; only the positive side is meshed. The faces
         there are the boundaries `plane0`, …
     edges_of : the bodies at whose edges and corners the field is singular; by default the magnets
@@ -89,8 +90,7 @@ def mesh_magnets(
     Raises
     ------
     ValueError : no magnet, or two that overlap
-    MeshError : a part from a file cannot be meshed
-    ComputationError : the mesher takes too long with it, or too much memory
+    MeshError, ComputationError : a part from a file cannot be meshed, takes too long or too much memory
     """
     settings = settings or MeshSettings()
     magnets = tuple(magnets)
@@ -103,20 +103,17 @@ def mesh_magnets(
     center = ((places - reach).min(axis=0) + (places + reach).max(axis=0)) / 2
     unit = max(magnet.body.farthest(center) for magnet in magnets)
     bodies = [magnet.body for magnet in magnets] if edges_of is None else list(edges_of)
+    files = sorted({body.file.name for body in bodies if isinstance(body, Part)})
     given = magnets, bodies, center, unit, settings, planes
-    if any(isinstance(body, Part) for body in bodies):  # on whose shape the mesher may crash
+    if not files:
+        mesh = _meshed(*given)
+    else:  # on the shape of a part the mesher may crash
         sys.modules["ngsolve.comp"] = ng.comp  # where pickle looks for the class of a mesh: else for a file
         try:
             mesh = call_apart(LONGEST, _meshed, *given)
         except LostError as error:
-            raise unmeshed(error, _files(bodies)) from None
-    else:
-        mesh = _meshed(*given)
+            raise unmeshed(error, ", ".join(files)) from None
     return MagnetMesh(mesh, frozen_array(center, (3,)), unit, magnets, settings.ball_radius, planes)
-
-
-def _files(bodies: Sequence[Solid]) -> str:
-    return ", ".join(sorted({body.file.name for body in bodies if isinstance(body, Part)}))
 
 
 def _meshed(
@@ -163,7 +160,8 @@ def _meshed(
     except Exception as error:  # netgen raises several kinds
         if not parts:
             raise
-        raise MeshError(f"The mesher gives up {_files(parts)}: {error}. {SIMPLER}") from None
+        files = ", ".join(sorted({part.file.name for part in parts}))
+        raise MeshError(f"The mesher gives up {files}: {error}. {SIMPLER}") from None
     if layered:
         mesh.RefineHP(settings.hp_layers, settings.hp_factor)
     mesh.Curve(settings.curve_order)
@@ -225,10 +223,9 @@ MESHIO_SHAPES = {
 
 
 def to_meshio(mesh: MagnetMesh) -> meshio.Mesh:
-    """The mesh with straight edges, coordinates in m, and the region of every cell as cell data.
+    """The mesh with straight edges, coordinates in m, and the region of every cell as Gmsh has it in cell data.
 
-    Region k + 1 is `magnet{k}`, the last one is `air`; the names are in `field_data`, as Gmsh has them (its format
-    of version 4 would lose them).
+    Region k + 1 is `magnet{k}`, the last one is `air`; the names are in `field_data`.
     """
     import meshio
 

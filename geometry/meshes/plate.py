@@ -60,10 +60,6 @@ def graded_partition(breakpoints: Sequence[float], size: SizeFunction) -> Array:
     """Increasing grid lines that hold all `breakpoints` and whose spacing follows `size`.
 
     Between neighbouring breakpoints the lines share ∫ dx/size equally, so that no cell is larger than asked for.
-
-    Raises
-    ------
-    ValueError : breakpoints do not increase
     """
     if np.any(np.diff(breakpoints) <= 0):
         raise ValueError(f"Input breakpoints must increase; instead received {list(breakpoints)}.")
@@ -159,6 +155,8 @@ def plate_mesh(
 
     Parameters
     ----------
+    conductivity, frequency : S/m and Hz, of which the skin depth follows
+    rule : how fine the mesh is
     endless : on the same cells, the plate reaches to the end of the air along its two longer edges
 
     Raises

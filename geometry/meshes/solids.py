@@ -109,10 +109,7 @@ def _turned(shape: Any, rotation: Array) -> Any:
 def part_rule(body: Part, order: int) -> tuple[Array, Array]:
     """Points (n, 3) m in a part and weights (n,) m³, on curved tetrahedra, for polynomials up to about `order`.
 
-    Raises
-    ------
-    MeshError : the part cannot be meshed
-    ComputationError : the mesher takes too long, or too much memory
+    Raises MeshError for a part that cannot be meshed, ComputationError where that takes too long or too much memory.
     """
     try:
         points, weights = _rule(body.brep, order)
@@ -139,7 +136,10 @@ def unmeshed(error: LostError, name: str) -> ComputationError:
 
 
 def rule_in_solid(brep: str, order: int, smallest: float = SMALLEST) -> tuple[Array, Array]:
-    """Points (n, 3) mm in the solid of a BREP text and weights (n,) mm³; small elements have few. Raises MeshError."""
+    """Points (n, 3) mm in the solid of a text `brep` and weights (n,) mm³, for polynomials up to about an `order`.
+
+    Small elements have few; the `smallest` is in cube roots of the volume. Raises MeshError.
+    """
     solid = read_brep(brep)
     unit = float(solid.mass) ** (1 / 3)
     sizes = {"maxh": 0.6 * unit, "minh": smallest * unit, "curvaturesafety": ROUND, "grading": 0.6}
@@ -217,11 +217,7 @@ Body = Solid | Segment | Facets
 def step_text(body: Body, cavities: Sequence[Body] = ()) -> str:
     """A STEP file (mm) of a body without its cavities, its centre at the origin and its axes those of the file.
 
-    The text is the same for the same bodies.
-
-    Raises
-    ------
-    InputError : the facets do not close, or cut each other
+    The text is the same for the same bodies. Raises InputError for facets that do not close, or cut each other.
     """
     shape = _shape(body)
     for cavity in cavities:
