@@ -290,21 +290,22 @@ def _as_written(scene: Scene, name: str) -> bool:
 
 
 def _rotor(scene: Scene) -> dict[str, Any]:
-    keys: dict[str, Any] = {"magnets": [_magnet(magnet) for magnet in scene.rotor]}
+    keys: dict[str, Any] = {"magnets": [magnet_keys(magnet) for magnet in scene.rotor]}
     keys |= {"field_map": str(scene.field_map)} if scene.field_map else {}
     keys |= _given({f"map_{name}": value for name, value in asdict(scene.map_reading).items()})
     conductors = [
-        {"shape": "cuboid", **_shape(c.body), **_pose(c.body), "conductivity_S_m": c.conductivity}
+        {"shape": "cuboid", **shape_keys(c.body), **pose_keys(c.body), "conductivity_S_m": c.conductivity}
         for c in scene.conductors
     ]
     return keys | ({"conductors": conductors} if conductors else {})
 
 
-def _magnet(magnet: Magnet) -> dict[str, Any]:
+def magnet_keys(magnet: Magnet) -> dict[str, Any]:
+    """The table of a magnet, among `rotor.magnets`."""
     along, across = magnet.recoil_permeability, magnet.transverse_permeability
     return {
-        **_shape(magnet.body),
-        **_pose(magnet.body),
+        **shape_keys(magnet.body),
+        **pose_keys(magnet.body),
         "polarization_T": magnet.polarization.tolist(),
         "recoil_permeability": along if magnet.isotropic else [along, across],
         **_given({"conductivity_S_m": magnet.conductivity}),
@@ -316,7 +317,7 @@ def _floater(scene: Scene) -> dict[str, Any]:
     floater = scene.floater
     return {
         "shape": floater.shape,
-        **_shape(floater.solid),
+        **shape_keys(floater.solid),
         "remanence_T": floater.remanence,
         "recoil_permeability": floater.recoil_permeability,
         "density_kg_m3": floater.density,
@@ -328,7 +329,7 @@ def _plate(scene: Scene) -> dict[str, Any] | None:
     if scene.plate is None:
         return None
     box, down = scene.plate.box, scene.plate.lowering
-    keys = {**_shape(box), **_pose(box), "conductivity_S_m": scene.plate.conductivity}
+    keys = {**shape_keys(box), **pose_keys(box), "conductivity_S_m": scene.plate.conductivity}
     if down:
         speed, distance = _rounded(1e3 * down.speed), _rounded(1e3 * down.distance)
         keys["lowering"] = {"start_s": down.start, "speed_mm_s": speed, "distance_mm": distance}
@@ -355,8 +356,8 @@ def _start(scene: Scene) -> dict[str, Any] | None:
     }
 
 
-def _shape(body: Solid) -> dict[str, Any]:
-    """The keys of a body's shape, but for its pose."""
+def shape_keys(body: Solid) -> dict[str, Any]:
+    """The keys of a body's shape."""
     if isinstance(body, Part):
         return {"file": str(body.file)}
     if isinstance(body, Box):
@@ -366,8 +367,8 @@ def _shape(body: Solid) -> dict[str, Any]:
     return keys | ({"inner_diameter_mm": _rounded(2e3 * body.inner_radius)} if isinstance(body, Ring) else {})
 
 
-def _pose(body: Solid) -> dict[str, Any]:
-    """Of a part, where the origin of its file lies."""
+def pose_keys(body: Solid) -> dict[str, Any]:
+    """The keys of a body's place and axes; of a part, where the origin of its file lies."""
     center = body.center + body.rotation @ body.origin if isinstance(body, Part) else body.center
     return {"center_mm": _all_rounded(1e3 * center), "rotation_deg": _all_rounded(rotation_angles(body.rotation))}
 
