@@ -28,33 +28,21 @@ ALONG, STRAIGHT, KNOWN_FACES = 1e-6, 1e-9, 40
 
 @dataclass(frozen=True, eq=False)
 class Part(Body):
-    """A solid read from a file, its middle that of the box about it.
+    """A solid read from a file, its middle that of the box about it."""
 
-    Parameters
-    ----------
-    file : where it was read
-    step : the file's text
-    brep : the solid as OpenCASCADE writes it for itself, mm
-    triangles : (n, 3, 3) m, corners of triangles on the surface, outwards, from the middle along the body axes
-    extent : (3,) m, edges of the box about it
-    origin : (3,) m, the file's origin, from the middle along the body axes
-    volume : m³
-    area : m², of the surface
-    centroid : (3,) m, from the middle along the body axes
-    center : (3,) position of the middle, m
-    rotation : (3, 3) matrix whose columns are the body axes (default: none turned)
-    """
-
-    file: Path = field(compare=False)
-    step: str
-    brep: str
+    file: Path  # where it was read
+    step: str  # the file's text
+    brep: str  # the solid as OpenCASCADE writes it for itself, mm
+    # (n, 3, 3) m, corners of triangles on the surface, outwards, from the middle along the body axes
     triangles: Array = field(metadata={"units": "m"})
-    extent: Array = field(metadata={"units": "m"})
-    origin: Array = field(metadata={"units": "m"})
-    volume: float = field(metadata={"units": "m3"})
-    area: float = field(metadata={"units": "m2"})
-    centroid: Array = field(metadata={"units": "m"})
+    extent: Array = field(metadata={"units": "m"})  # (3,) m, edges of the box about it
+    origin: Array = field(metadata={"units": "m"})  # (3,) m, the file's origin, from the middle along the body axes
+    volume: float = field(metadata={"units": "m3"})  # m³
+    area: float = field(metadata={"units": "m2"})  # m², of the surface
+    centroid: Array = field(metadata={"units": "m"})  # (3,) m, from the middle along the body axes
+    # (3,) position of the middle, m
     center: Array = field(default_factory=lambda: np.zeros(3), metadata={"units": "m"})
+    # (3, 3) matrix whose columns are the body axes (default: none turned)
     rotation: Array = field(default_factory=lambda: np.eye(3))
 
     def __post_init__(self) -> None:

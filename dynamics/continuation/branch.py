@@ -45,28 +45,16 @@ def spins(scene: Scene) -> Problem:
 
 @dataclass(frozen=True, eq=False)
 class BranchPoint:
-    """One equilibrium of a branch.
+    """One equilibrium of a branch."""
 
-    Parameters
-    ----------
-    parameter : where on the axis of the parameter
-    spin : body spin s
-    position : (3,) m, rotor's frame
-    state : (12,) scaled
-    tangent : (7,) unit direction of the branch: scaled position, moment, and the parameter by its unit
-    motion : its modes, in scaled time
-    time_unit : s
-    kind : what is marked here: "fold", "oscillatory", "real"; "" at an ordinary point
-    """
-
-    parameter: float
-    spin: float
-    position: Array
-    state: Array
-    tangent: Array
-    motion: Modes
-    time_unit: float
-    kind: str = ""
+    parameter: float  # where on the axis of the parameter
+    spin: float  # body spin s
+    position: Array  # (3,) m, rotor's frame
+    state: Array  # (12,) scaled
+    tangent: Array  # (7,) unit direction of the branch: scaled position, moment, and the parameter by its unit
+    motion: Modes  # its modes, in scaled time
+    time_unit: float  # s
+    kind: str = ""  # what is marked here: "fold", "oscillatory", "real"; "" at an ordinary point
 
     @property
     def distance(self) -> float:

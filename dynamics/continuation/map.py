@@ -23,29 +23,21 @@ from .rotor_family import RotorFamily
 
 @dataclass(frozen=True, eq=False)
 class EquilibriumMap:
-    """Equilibria (k,) of a map, point by point; rotor's frame.
+    """Equilibria (k,) of a map, point by point; rotor's frame."""
 
-    Parameters
-    ----------
-    frequencies, measures : axes of the map, Hz and m or rad
-    row, column : (k,) place of each equilibrium on them
-    position, moment : (k, 3) m and direction
-    eigenvalues : (k, 10) of the small motions, 1/s
-    errors : (k,) what round-off may do to them, 1/s
-    stable : (k,) whether every small motion stays small
-    searches : points of the map at which all was searched for
-    """
-
+    # frequencies, measures: axes of the map, Hz and m or rad
     frequencies: Array
     measures: Array
+    # row, column: (k,) place of each equilibrium on them
     row: Indices
     column: Indices
+    # position, moment: (k, 3) m and direction
     position: Array
     moment: Array
-    eigenvalues: NDArray[np.complex128]
-    errors: Array
-    stable: NDArray[np.bool_]
-    searches: int
+    eigenvalues: NDArray[np.complex128]  # (k, 10) of the small motions, 1/s
+    errors: Array  # (k,) what round-off may do to them, 1/s
+    stable: NDArray[np.bool_]  # (k,) whether every small motion stays small
+    searches: int  # points of the map at which all was searched for
 
     @property
     def growth_per_s(self) -> Array:

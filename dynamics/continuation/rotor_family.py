@@ -140,21 +140,13 @@ class _MovedAtPlace(MovedEffect):
 
 @dataclass(frozen=True, eq=False)
 class RotorFamily:
-    """A scene with frequency and one measure of its rotor left open.
+    """A scene with frequency and one measure of its rotor left open."""
 
-    Parameters
-    ----------
-    scene : all else; its plate is left out
-    rotor : magnets as they are at measure zero
-    moves : how each of them moves
-    field : of the rotor, with `Parameter.MEASURE`
-    effects : mutual magnetisation and currents in the rotor's magnets, with `Parameter.MEASURE`
-    """
-
-    scene: Scene
-    rotor: tuple[Magnet, ...]
-    moves: tuple[Move, ...]
-    field: MovableField
+    scene: Scene  # all else; its plate is left out
+    rotor: tuple[Magnet, ...]  # magnets as they are at measure zero
+    moves: tuple[Move, ...]  # how each of them moves
+    field: MovableField  # of the rotor, with `Parameter.MEASURE`
+    # mutual magnetisation and currents in the rotor's magnets, with `Parameter.MEASURE`
     effects: tuple[Effect, ...] = ()
 
     def at(self, frequency: float, measure: float) -> Scene:

@@ -92,26 +92,15 @@ class SlowTorque:
 
 @dataclass(frozen=True, eq=False)
 class Drift:
-    """An averaged flight.
+    """An averaged flight."""
 
-    Parameters
-    ----------
-    time : (n,) s
-    spin : (n,) body spin s
-    distance : (n,) from the rotor's origin, m
-    growth_per_s : (n,) largest growth of a small motion
-    ended_by : "balance", "fold", "instability", "contact" or "duration"
-    balance_spin : the spin s* at which the slow torques balance, if the branch reaches it, else NaN
-    last_fall_s : time from the fold to the loss, s; 0 unless the flight ended by a fold
-    """
-
-    time: Array
-    spin: Array
-    distance: Array
-    growth_per_s: Array
-    ended_by: str
-    balance_spin: float
-    last_fall_s: float = 0.0
+    time: Array  # (n,) s
+    spin: Array  # (n,) body spin s
+    distance: Array  # (n,) from the rotor's origin, m
+    growth_per_s: Array  # (n,) largest growth of a small motion
+    ended_by: str  # "balance", "fold", "instability", "contact" or "duration"
+    balance_spin: float  # the spin s* at which the slow torques balance, if the branch reaches it, else NaN
+    last_fall_s: float = 0.0  # time from the fold to the loss, s; 0 unless the flight ended by a fold
 
     @property
     def levitated_s(self) -> float:

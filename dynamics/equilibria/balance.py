@@ -101,13 +101,12 @@ def solve(
     free : which unknowns move and which balances count, e.g. `LATERAL` to keep the height
     iterations : at most
     reach : longest step of the position (floater radii) and of the moment (rad)
-    far : where the position is farther than this from the origin, in floater radii, its longest step grows with the
-        distance, as the scale of the field does
+    far : farther than this from the origin, in floater radii, the longest step grows with the distance, as the scale
+        of the field does
 
     Returns
     -------
-    position, moment : (n, 3)
-    step : (n,) length of the last step: an estimate of the error before it was made; infinite where it failed
+    Positions and moments (n, 3), and lengths (n,) of the last steps: the errors before these; infinite where it failed.
     """
     position, moment = position.copy(), moment.copy()
     length = np.full(len(position), np.inf)

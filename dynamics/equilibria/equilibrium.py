@@ -93,53 +93,42 @@ class Equilibrium:
         return np.asarray(self.laboratory_turn.position.mean(axis=0))
 
     @cached_property
-    def _distances(self) -> Array:
-        return np.asarray(np.linalg.norm(self._turn.position, axis=1))
-
-    @cached_property
-    def _offsets(self) -> Array:
-        return np.asarray(np.hypot(*self._turn.position[:, :2].T))
-
-    @cached_property
-    def _angles(self) -> Array:
-        x, y, z = self._turn.moment.T
-        return np.asarray(np.degrees(np.arctan2(np.hypot(x, y), z)))
+    def _course(self) -> tuple[Array, Array, Array]:
+        """Distance and lateral offset, m, and polar angle, °, through a turn; one of each where it is at rest."""
+        at_rest = State(*(vector[None] for vector in self.state.vectors))
+        turn = at_rest if self.turn is None else self.laboratory_turn
+        offset, (x, y, z) = np.hypot(*turn.position[:, :2].T), turn.moment.T
+        return np.linalg.norm(turn.position, axis=1), offset, np.degrees(np.arctan2(np.hypot(x, y), z))
 
     @property
     def distance(self) -> float:
         """Distance from the rotor's origin, mean over a turn, m."""
-        return float(self._distances.mean())
+        return float(self._course[0].mean())
 
     @property
     def lateral_offset(self) -> float:
         """Distance from the axis of rotation, mean over a turn, m."""
-        return float(self._offsets.mean())
+        return float(self._course[1].mean())
 
     @property
     def polar_angle_deg(self) -> float:
         """Angle between the moment and +z, mean over a turn."""
-        return float(self._angles.mean())
+        return float(self._course[2].mean())
 
     @property
     def distance_swing(self) -> Array:
         """(2,) smallest and largest distance in a turn, m."""
-        return _extremes(self._distances)
+        return _extremes(self._course[0])
 
     @property
     def lateral_offset_swing(self) -> Array:
         """(2,) smallest and largest offset in a turn, m."""
-        return _extremes(self._offsets)
+        return _extremes(self._course[1])
 
     @property
     def polar_angle_swing_deg(self) -> Array:
         """(2,) smallest and largest angle in a turn."""
-        return _extremes(self._angles)
-
-    @property
-    def _turn(self) -> State:
-        if self.turn is not None:
-            return self.laboratory_turn
-        return State(*(vector[None] for vector in self.state.vectors))
+        return _extremes(self._course[2])
 
     @property
     def lag_deg(self) -> float:
