@@ -1,24 +1,154 @@
-"""Equilibria of a map with the stability of each."""
+"""Equilibria at the points of a map or a sweep, each with its stability: searched at some, carried to all others."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.spatial import cKDTree
 
 from ...fem.rotor.table import FieldTable
 from ...geometry.common import Array
 from ...geometry.scene.contents import Scene
-from ..equilibria.balance import Indices
-from ..equilibria.curves import SearchRange
+from ..equilibria.balance import DUPLICATE_DISTANCE, EVERY, Balance, Indices
+from ..equilibria.curves import SearchRange, newton_search
 from ..equilibria.equilibrium import EquilibriumError, Survey
 from ..equilibria.modes import is_stable, spectra
+from ..equilibria.path import carried
 from ..equilibria.search import FixedPoints, check_turning, field_doubts, survey_of
 from ..motion.equations import parameters
 from ..motion.rates import Rates
 from ..motion.state import Parameter, Scales
-from .grid import SPACING, Grid, filled
 from .rotor_family import RotorFamily
+
+FAR_APART = 1.5  # Equilibria are followed up to so many times the farthest distance of the ranges
+SPACING = 5  # Points of the map between two searches
+# One of so many searches has all starts, the others an eighth of them, which misses less than one in a hundred of a
+# point's equilibria: a sheet is lost only if every search that meets it does.
+WHOLE, PART = 64, 8
+# Longest steps of the searches, rad of the moment and radii of the position, and beyond that distance (radii) as a part
+# of it, as the field changes: with 0.3 rad and radii they are more than twice as many, and an eighth of the starts
+# misses several times as much.
+REACH, FAR = 0.8, 1.0
+TOGETHER = 8  # Searches that are made side by side: enough that NumPy's calls cost less than what they compute
+MARGIN = 0.3  # Sheets are followed so far beyond the range (radii): what its border cuts into pieces is whole there
+
+
+@dataclass(frozen=True, eq=False)
+class Grid:
+    """Problems at points with whole-numbered coordinates, all in one rotor's field."""
+
+    rates: Rates  # compiled for that field
+    values: Array  # (n, p) runtime parameters of the points
+    spin: Array  # (n,) body spin s
+    ranges: Sequence[SearchRange]  # in which equilibria are looked for
+    region: Indices  # (n,) which of them is the point's
+    places: Indices  # (n, axes) coordinates; not every place of the grid need have a point
+
+    def __len__(self) -> int:
+        return len(self.values)
+
+    def balance(self, point: Indices) -> Balance:
+        """The balance in which every point has its own problem."""
+        return Balance(self.rates, self.values[point], self.spin[point])
+
+    def alone(self, point: int) -> Balance:
+        """The balance of one point, for any number of positions."""
+        return Balance(self.rates, self.values[point], float(self.spin[point]))
+
+    def range(self, point: int) -> SearchRange:
+        return self.ranges[int(self.region[point])]
+
+    def holds(self, point: Indices, position: Array, margin: float = 0.0) -> NDArray[np.bool_]:
+        """Which of the scaled positions (n, 3) lie in the range of their points (n,), or at most a margin outside."""
+        inside = np.zeros(len(point), bool)
+        for k in np.unique(self.region[point]):
+            chosen = self.region[point] == k
+            inside[chosen] = self.ranges[k].holds(position[chosen], margin)
+        return inside
+
+    def neighbours(self, point: Indices) -> tuple[Indices, Indices]:
+        """Pairs of a place in `point` and one of the points beside it, up to two along each axis."""
+        which, beside = [np.zeros(0, int)], [np.zeros(0, int)]
+        for axis in range(self.places.shape[1]):
+            for step in (1, -1):
+                found = self._at(self.places[point] + step * np.eye(self.places.shape[1], dtype=int)[axis])
+                which.append(np.flatnonzero(found >= 0))
+                beside.append(found[found >= 0])
+        return np.concatenate(which), np.concatenate(beside)
+
+    def coarse(self, spacing: int) -> Indices:
+        """Points of a coarse grid with at most `spacing` steps between along each axis, the borders included."""
+        chosen = np.ones(len(self), bool)
+        for column in self.places.T:
+            last = int(column.max())
+            chosen &= np.isin(column, np.linspace(0, last, -(-last // spacing) + 1).round().astype(int))
+        if len(self) < np.prod(self._shape):  # where its points are missing, others stand in for them
+            for point in range(len(self)):
+                apart = np.abs(self.places[chosen] - self.places[point]).max(axis=1, initial=0)
+                chosen[point] |= not len(apart) or apart.min() > spacing
+        return np.flatnonzero(chosen)
+
+    @cached_property
+    def _shape(self) -> tuple[int, ...]:
+        return tuple(self.places.max(axis=0) + 1)
+
+    @cached_property
+    def _numbers(self) -> Indices:
+        numbers = np.full(self._shape, -1)
+        numbers[tuple(self.places.T)] = np.arange(len(self))
+        return numbers
+
+    def _at(self, places: Indices) -> Indices:
+        """Numbers (n,) of the points at places (n, axes); -1 where there is none."""
+        inside = ((places >= 0) & (places < self._shape)).all(axis=1)
+        found = np.full(len(places), -1)
+        found[inside] = self._numbers[tuple(places[inside].T)]
+        return found
+
+
+def filled(grid: Grid, nodes: Indices) -> tuple[Indices, Array, Array]:
+    """Points (k,) in order, positions and moments (k, 3) of all equilibria in a grid's ranges, by searches at `nodes`.
+
+    An equilibrium that is carried from point to point is good to round-off like any other.
+    """
+    random, seeds = np.random.default_rng(0), []
+    for first in range(0, len(nodes), TOGETHER):
+        some = range(first, min(first + TOGETHER, len(nodes)))
+        starts = [_starts(grid, int(nodes[k]), None if k % WHOLE == 0 else random) for k in some]
+        problem, points = (np.concatenate(part) for part in zip(*starts, strict=True))
+        seeds.append(newton_search(grid.balance, grid.holds, problem, points, EVERY, MARGIN, REACH, FAR))
+    point, places = (np.concatenate(part) for part in zip(*seeds, strict=True))
+    bound, known = FAR_APART * max(where.bound for where in grid.ranges), np.zeros((0, 7))
+    while len(point):  # until nothing new is found
+        # Of what is found anew at a point, all but the first within `DUPLICATE_DISTANCE` goes; points are 1 apart.
+        every = np.concatenate([known, np.column_stack([point, places])])
+        again = cKDTree(every).query_pairs(DUPLICATE_DISTANCE, output_type="ndarray")[:, 1]
+        new = np.setdiff1d(np.arange(len(known), len(every)), again)
+        point, places, known = every[new, 0].astype(int), every[new, 1:], np.delete(every, again, axis=0)
+        source, target = grid.neighbours(point)
+        if not len(source):
+            break
+        before, after = grid.balance(point[source]), grid.balance(target)
+        which, arrived, position, moment = carried(before, after, places[source, :3], places[source, 3:], bound)
+        point, places = (
+            np.where(arrived, target[which], point[source[which]]),
+            np.concatenate([position, moment], axis=1),
+        )
+        inside = grid.holds(point, position, MARGIN)
+        point, places = point[inside], places[inside]
+    known = known[np.argsort(known[:, 0], kind="stable")]
+    known = known[grid.holds(known[:, 0].astype(int), known[:, 1:4])]
+    return known[:, 0].astype(int), known[:, 1:4], known[:, 4:]
+
+
+def _starts(grid: Grid, point: int, random: np.random.Generator | None) -> tuple[Indices, Array]:
+    """All starts at a point, or some: the point (n,) and scaled positions and moments (n, 6)."""
+    points = grid.range(point).starts()
+    if random is not None:
+        points = points[random.choice(len(points), len(points) // PART, replace=False)]
+    return np.full(len(points), point), points
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,7 +211,7 @@ def equilibrium_map(
         )
     grid = family_grid(family, *axes, spin)
     nodes = grid.coarse(spacing)
-    point, position, moment = filled(grid, nodes).within(grid)
+    point, position, moment = filled(grid, nodes)
     row, column = grid.places[point].T
     balance = grid.balance(point)
     time, length = balance.values[:, [Parameter.TIME]], balance.values[:, [Parameter.LENGTH]]
@@ -146,7 +276,7 @@ def surveys(
     ranges = [SearchRange(scene) for scene in scenes]
     grid = Grid(rates, values, spin, ranges, np.arange(len(scenes)), places)
     nodes = grid.coarse(SPACING if places.shape[1] > 1 else 2 * SPACING)
-    point, position, moment = filled(grid, nodes).within(grid)
+    point, position, moment = filled(grid, nodes)
     poses, found = np.concatenate([position, moment], axis=1), []
     for k, (scene, table) in enumerate(zip(scenes, tables, strict=True)):
         here = poses[point == k]

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from article import PERMEABLE
 
-from spinlev.dynamics.continuation import grid as filling
+from spinlev.dynamics.continuation import map as filling
 from spinlev.dynamics.continuation.map import equilibrium_map, family_grid
 from spinlev.dynamics.continuation.rotor_family import rotor_family
 from spinlev.dynamics.equilibria.balance import EVERY
