@@ -113,8 +113,14 @@ def equations_of_motion(
     ]
     power = dot(push, drift) + inertia * dot(brake, lag)
     motion = Motion(position, velocity, moment, spin, drift, lag, field, gradient)
-    for effect in interaction_of(table).effects:
-        added = effect.added(motion)
+    parts = [effect.added(motion) for effect in interaction_of(table).effects]
+    states: list[hy.expression] = []
+    state_rates: Vector = []
+    if memory is not None:
+        states = [hy.expression(f"plate_{i}") for i in range(len(memory.table.rates))]
+        by_plate, state_rates = memory_terms(memory, first, position, moment, states)
+        parts.append(by_plate)
+    for added in parts:
         force = [a + b for a, b in zip(force, added.force, strict=True)]
         turn = [a + b for a, b in zip(turn, added.torque, strict=True)]
         pulled = [a + b for a, b in zip(pulled, added.pulled, strict=True)]
@@ -123,16 +129,6 @@ def equations_of_motion(
         power = power + added.power
     force = [dot(pulled, [gradient[i][j] for i in range(3)]) + f for j, f in enumerate(force)]
     turn = [a + b for a, b in zip(cross(moment, turning), turn, strict=True)]
-    states: list[hy.expression] = []
-    state_rates: Vector = []
-    if memory is not None:
-        states = [hy.expression(f"plate_{i}") for i in range(len(memory.table.rates))]
-        terms = memory_terms(memory, first, position, moment, states)
-        force = [a + b for a, b in zip(force, terms.force, strict=True)]
-        turn = [a + b for a, b in zip(turn, terms.torque, strict=True)]
-        state_rates = terms.rates
-        jacobi.append(terms.stored)
-        power = power - terms.spent
     rates = [
         *drift,
         *subtract([force[i] + axial[i] + push[i] for i in range(3)], turned(velocity)),

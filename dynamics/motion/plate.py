@@ -20,16 +20,17 @@ from outside, and ½ Σ y_f², y_f = y - y_r, as what the floater has stored; to
 Whatever depends on the rotor's rate is a runtime parameter.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import heyoka as hy
 import numpy as np
 from numpy.typing import NDArray
 
-from ...fem.harmonics.expansion import UPPER
+from ...fem.plate.multipoles import cartesian, weighted
 from ...fem.plate.table import PlateTable, RotorShare
 from ...geometry.common import Array
 from ...geometry.scene.contents import Plate
+from .effect import Added
 from .state import Parameter, Vector, cross, dot, dotted, turned, turned_about_z
 
 
@@ -48,11 +49,14 @@ class PlateMemory:
         """Estimated relative error of what the plate does."""
         return max(self.table.errors.total, self.share.error) + self.neglected
 
-    def driven(self, angular_velocity: float) -> tuple[RotorShare, RotorShare]:
-        """States q and currents q - r that a rotor turning so fast (rad/s) alone leaves in the plate."""
-        turns = np.arange(len(self.share.series) // 2 + 1)[:, None]
-        followed = np.asarray(1 / (1 + 1j * angular_velocity * turns / self.table.rates), complex)
-        return self.share.filtered(followed), self.share.filtered(np.asarray(followed - 1.0))
+    def left_by_rotor(self, angular_velocity: float) -> RotorShare:
+        """States q that a rotor turning so fast (rad/s) leaves in the plate, in the form of its share r."""
+        series = self.share.series.copy()
+        turns = np.arange(1, len(series) // 2 + 1)[:, None]
+        followed = 1 / (1 + 1j * angular_velocity * turns / self.table.rates)
+        amplitudes = (series[1::2] - 1j * series[2::2]) * followed[:, :, None]
+        series[1::2], series[2::2] = amplitudes.real, -amplitudes.imag
+        return replace(self.share, series=series)
 
     def in_range(self, lab: Array, depth: Array) -> NDArray[np.bool_]:
         """Which places (n, 3) m along the laboratory's axes the table knows, the plate at depths (n,) m."""
@@ -64,17 +68,6 @@ class PlateMemory:
         return f"PlateMemory {self.model!r}: {told}\n{self.table!r}"
 
 
-@dataclass(frozen=True, eq=False)
-class MemoryTerms:
-    """What a plate adds to the equations of motion, in scaled units."""
-
-    rates: Vector  # of its states
-    force: Vector  # accelerations of the floater's position and spin
-    torque: Vector
-    stored: hy.expression  # energy of the floater's currents, and of the floater in the field of the rotor's
-    spent: hy.expression  # what both lose to heat, to what turns the rotor and to what lowers the plate
-
-
 def plate_numbers(memory: PlateMemory, values: Array) -> Array:
     """Runtime parameters of a plate, from those of `parameters`.
 
@@ -82,15 +75,25 @@ def plate_numbers(memory: PlateMemory, values: Array) -> Array:
     multipole, and, of a plate that goes down, the harmonics of q of each state.
     """
     table, velocity = memory.table, float(values[Parameter.RATE]) / float(values[Parameter.TIME])
-    left, currents = memory.driven(velocity)
-    strengths = np.einsum("nim,ik->nmk", currents.series[1:], table.weights).ravel()
-    sinking = left.series.swapaxes(1, 2).ravel() if memory.plate.lowering else np.zeros(0)
+    left = memory.left_by_rotor(velocity).series
+    strengths = np.einsum("nim,ik->nmk", left[1:] - memory.share.series[1:], _signal_weights(table)).ravel()
+    sinking = left.swapaxes(1, 2).ravel() if memory.plate.lowering else np.zeros(0)
     unit = float(values[Parameter.PLATE_SHARE])
     return np.concatenate([-table.rates * float(values[Parameter.TIME]), unit * np.concatenate([strengths, sinking])])
 
 
-def memory_terms(memory: PlateMemory, first: int, position: Vector, moment: Vector, states: Vector) -> MemoryTerms:
-    """The plate's part of the equations of motion.
+def _signal_weights(table: PlateTable) -> Array:
+    """(n, k) of the first derivatives of each multipole, without their factors."""
+    return table.weights * table.multipoles.factors(1)
+
+
+def memory_terms(
+    memory: PlateMemory, first: int, position: Vector, moment: Vector, states: Vector
+) -> tuple[Added, Vector]:
+    """The plate's part of the equations of motion, and the scaled rates of its states.
+
+    Its energy is that of the floater's currents, and of the floater in the field of the rotor's; power is what both
+    gain from heat, from what turns the rotor and from what lowers the plate.
 
     Parameters
     ----------
@@ -102,29 +105,35 @@ def memory_terms(memory: PlateMemory, first: int, position: Vector, moment: Vect
     strength, length = hy.par[Parameter.PLATE_MOMENT], hy.par[Parameter.LENGTH]
     place, pointing = seen_by_plate(memory, position), _product(plate.box.rotation.T, _turn(moment, 1.0))
     source = [strength * m for m in pointing]
-    multipoles = table.multipoles.expressions(place)
-    signals = [dot(source, field) for field, _ in multipoles]  # of the floater in each multipole
-    own = [p - _weighted(row, signals) for p, row in zip(states, table.weights, strict=True)]
+    # x, y and z enter only after the sums over multipoles: every operation counts in Taylor's method
+    flux, slopes = (table.multipoles.derivatives(place, order) for order in (1, 2))
+    along = [weighted(column, source) for column in cartesian(1).T]
+    signals = [dot(along, entry) for entry in flux]  # of the floater in each multipole
+    weights = _signal_weights(table)
+    own = [p - weighted(row, signals) for p, row in zip(states, weights, strict=True)]
     by_rotor, sinking, stored, spent = _rotor_terms(memory, first + len(own), signals, own)
     # of all states together, so that the fields of 20 to 40 multipoles are summed instead of those of 40 to 90 states
-    strengths = [_weighted(column, own) + r for column, r in zip(table.weights.T, by_rotor, strict=True)]
-    pairs = list(zip(strengths, multipoles, strict=True))
-    field = [hy.sum([w * b[i] for w, (b, _) in pairs]) for i in range(3)]
-    slope = {(i, j): hy.sum([w * g[i][j] for w, (_, g) in pairs]) for i, j in UPPER}
-    slope[2, 2] = -slope[0, 0] - slope[1, 1]
-    push = [hy.sum([source[i] * slope[min(i, j), max(i, j)] for i in range(3)]) for j in range(3)]
+    strengths = [weighted(column, own) + r for column, r in zip(weights.T, by_rotor, strict=True)]
+    steeper = table.multipoles.factors(2) / table.multipoles.factors(1) / table.multipoles.scale
+    strong = [float(factor) * each for factor, each in zip(steeper, strengths, strict=True)]
+    field_sums, slope_sums = (
+        [dotted(several, column) for column in zip(*each, strict=True)]
+        for several, each in ((strengths, flux), (strong, slopes))
+    )
+    field = [weighted(row, field_sums) for row in cartesian(1)]
+    push = [dot(source, [weighted(row, slope_sums) for row in rows]) for rows in cartesian(2)]
     force = [length * f for f in _seen_by_rotor(plate, push)]
     turn = [strength * t for t in cross(moment, _seen_by_rotor(plate, field))]
     decay = [hy.par[first + i] * y for i, y in enumerate(own)]
     speed = hy.par[Parameter.PLATE_SPEED] if lowered else hy.expression(0.0)
     drive = dot(force, [*turned(position)[:2], speed]) + hy.par[Parameter.RATE] * turn[2]
-    return MemoryTerms(
-        rates=[a + b for a, b in zip(decay, sinking, strict=True)] if lowered else decay,
+    added = Added(
         force=force,
         torque=[t / hy.par[Parameter.INERTIA] for t in turn],
-        stored=0.5 * hy.sum([y * y for y in own]) + stored,
-        spent=spent + drive - dotted(own, decay),
+        energy=0.5 * hy.sum([y * y for y in own]) + stored,
+        power=dotted(own, decay) - spent - drive,
     )
+    return added, [a + b for a, b in zip(decay, sinking, strict=True)] if lowered else decay
 
 
 def _rotor_terms(
@@ -140,29 +149,21 @@ def _rotor_terms(
     below = hy.par[Parameter.LENGTH] * hy.par[Parameter.PLATE_DEPTH] + speed * hy.time
     now = {"rotor_angle": hy.par[Parameter.RATE] * hy.time, "plate_depth": below}
     constant, *turning = memory.share.basis(*names)
-    functions = [f for row in turning for f in row]
+    functions, count = [f for row in turning for f in row], len(signals)
     here = hy.subs(functions, now) if functions else []
-    lowered = memory.plate.lowering is not None
-    sinking = [speed * hy.subs(hy.diff(f, depth), now) for f in [*constant, *functions]] if lowered else []
-    changing = [hy.par[Parameter.RATE] * hy.subs(hy.diff(f, angle), now) for f in functions]
-    if lowered:
-        changing = [a + b for a, b in zip(changing, sinking[len(constant) :], strict=True)]
-    count = len(signals)
     # r and q are Σ number · basis: the basis is written once, its derivatives by angle and depth are heyoka's
+    changing = [hy.par[Parameter.RATE] * hy.subs(hy.diff(f, angle), now) for f in functions]
     rows = [[hy.par[first + n * count + k] for k in range(count)] for n in range(len(functions))]
-    sums = [dotted(row, signals) for row in rows]
-    lowering, start = list[hy.expression](), first + len(functions) * count
-    spent = dotted(changing, sums)
-    if lowered:
+    sums, lowering, spent = [dotted(row, signals) for row in rows], list[hy.expression](), hy.expression(0.0)
+    if memory.plate.lowering is not None:
+        sinking = [speed * hy.subs(hy.diff(f, depth), now) for f in [*constant, *functions]]
+        changing = [a + b for a, b in zip(changing, sinking[len(constant) :], strict=True)]
+        start = first + len(functions) * count
         numbers = [[hy.par[start + n * len(own) + i] for n in range(len(sinking))] for i in range(len(own))]
         lowering = [-dotted(row, sinking) for row in numbers]
-        spent = spent - dotted(own, lowering)
-    strengths = [hy.sum([row[k] * f for row, f in zip(rows, here, strict=True)]) for k in range(count)]
-    return strengths, lowering, -dotted(here, sums), spent
-
-
-def _weighted(weights: Array, terms: Vector) -> hy.expression:
-    return hy.sum([float(w) * t for w, t in zip(weights, terms, strict=True) if w])
+        spent = -dotted(own, lowering)
+    strengths = [dotted(column, here) for column in zip(*rows, strict=True)] or [hy.expression(0.0)] * count
+    return strengths, lowering, -dotted(here, sums), spent + dotted(changing, sums)
 
 
 def seen_by_plate(memory: PlateMemory, position: Vector) -> Vector:
@@ -187,7 +188,7 @@ def _turn(vector: Vector, sense: float) -> list[hy.expression]:
 
 def _product(matrix: np.ndarray, vector: Vector) -> list[hy.expression]:
     exact = np.where(np.abs(matrix) < 1e-15, 0.0, matrix)  # a quarter turn leaves 6e-17, which would cost operations
-    return [hy.sum([float(row[i]) * vector[i] for i in range(3) if row[i]]) for row in exact]
+    return [weighted(row, vector) for row in exact]
 
 
 @dataclass(frozen=True, eq=False)
@@ -214,25 +215,32 @@ class PlateForce:
 
     def __call__(self, times: Array, states: Array) -> PlateCoupling:
         """How plate and floater act on each other at scaled times (n,) in scaled states (n, 12)."""
-        strength, inertia, length = (
-            self.values[p] for p in (Parameter.PLATE_MOMENT, Parameter.INERTIA, Parameter.LENGTH)
-        )
-        moment = states[:, 6:9]
-        b, g, h = self._multipoles(times, states[:, :3] * length)
-        count = b.shape[1]
-        by_state = np.zeros((len(times), count, 12))
+        multipoles, weights, box = self.memory.table.multipoles, self.memory.table.weights, self.memory.plate.box
+        chosen = Parameter.PLATE_MOMENT, Parameter.INERTIA, Parameter.LENGTH
+        strength, inertia, length = (float(self.values[p]) for p in chosen)
+        turn = turned_about_z(np.eye(3)[None], -(self.values[Parameter.RATE] * times)[:, None])  # rows: lab axes
+        axes = np.einsum("ia,nib->nab", box.rotation, turn)  # rows: the plate's axes, seen from the rotor
+        lab = np.einsum("nib,nb->ni", turn, states[:, :3] * length) + np.array([0.0, 0.0, self._depth])
+        places, moment = box.to_body(lab), states[:, 6:9]
+        pointing = np.einsum("nab,nb->na", axes, moment)
+        b, g = multipoles.evaluate(places)
+        bend = np.einsum("na,nkabc->nkbc", pointing, multipoles.curvature(places))  # of the moment's part of B
+        columns, rows = axes[:, None], axes.swapaxes(1, 2)[:, None]
+        b, g, bend = b @ axes, rows @ g @ columns, rows @ bend @ columns  # along the rotor's axes
+        by_state = np.zeros((*b.shape[:2], 12))
         by_state[..., :3] = strength * length * np.einsum("na,nkab->nkb", moment, g)
         by_state[..., 6:9] = strength * b
         across = strength / inertia * np.cross(moment[:, None], b)
-        pull = np.zeros((len(times), count, 12, 6))
-        pull[..., :3, :3] = strength * length**2 * np.einsum("na,nkabc->nkcb", moment, h)
+        pull = np.zeros((*b.shape[:2], 12, 6))
+        pull[..., :3, :3] = strength * length**2 * bend
         pull[..., 6:9, :3] = strength * length * g
-        pull[..., :3, 3:] = strength * length / inertia * np.cross(moment[:, None, None], g.swapaxes(2, 3))
+        pull[..., :3, 3:] = strength * length / inertia * np.cross(moment[:, None, None], g)
         pull[..., 6:9, 3:] = strength / inertia * np.cross(np.eye(3), b[:, :, None])
-        weights = self.memory.table.weights
         own = strength * np.einsum("na,nka->nk", moment, b)
+        angles = self.values[Parameter.RATE] * times
+        shares = self.values[Parameter.PLATE_SHARE] * self.memory.share.signals(angles, self._depth)
         return PlateCoupling(
-            own @ weights.T + self._shares(times),
+            own @ weights.T + shares,
             np.einsum("ik,nkx->nix", weights, by_state),
             np.einsum("ik,nkx->nix", weights, np.concatenate([by_state[..., :3], across], axis=2)),
             pull,
@@ -255,25 +263,8 @@ class PlateForce:
         signals = self(times, np.broadcast_to(state, (count, 12))).signals
         return np.asarray(np.einsum("ib,bi->i", self.remembered(count)[:, 0], signals))
 
-    def _shares(self, times: Array) -> Array:
-        angles = self.values[Parameter.RATE] * times
-        return np.asarray(self.values[Parameter.PLATE_SHARE] * self.memory.share.signals(angles, self._depth))
-
     @property
     def _depth(self) -> float:
         if self.memory.plate.lowering is None:
             return 0.0
         return float(self.values[Parameter.PLATE_DEPTH] * self.values[Parameter.LENGTH])
-
-    def _multipoles(self, times: Array, position: Array) -> tuple[Array, Array, Array]:
-        """B (n, k, 3), its first and second derivatives at positions (n, 3) m, along the rotor's axes."""
-        box = self.memory.plate.box
-        turn = turned_about_z(np.eye(3)[None], -(self.values[Parameter.RATE] * times)[:, None])  # rows: lab axes
-        axes = np.einsum("ia,nib->nab", box.rotation, turn)  # rows: the plate's axes, seen from the rotor
-        lab = np.einsum("nib,nb->ni", turn, position) + np.array([0.0, 0.0, self._depth])
-        places = box.to_body(lab)
-        b, g = self.memory.table.multipoles.evaluate(places)
-        h = self.memory.table.multipoles.curvature(places)
-        columns, rows = axes[:, None], axes.swapaxes(1, 2)[:, None]
-        bent = rows[:, None] @ h @ columns[:, None]
-        return b @ axes, rows @ g @ columns, (rows @ bent.reshape(*h.shape[:3], 9)).reshape(h.shape)

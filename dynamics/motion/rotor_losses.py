@@ -18,6 +18,7 @@ from numpy.typing import ArrayLike
 
 from ...fem.harmonics.interior import Ball
 from ...fem.harmonics.local import BallField
+from ...fem.plate.multipoles import weighted
 from ...fem.rotor.table import FieldTable
 from ...fem.rotor_metal import RotorLosses
 from ...geometry.common import Array
@@ -79,8 +80,8 @@ class RotorCurrents:
             parts = self.table.multipoles.expressions(metres)
             rows = [[*(slope[i][j] for i, j in UPPER), *field] for field, slope in parts]
             signals, weights = [dotted(row, rates) for row in rows], self.table.weights
-            induced = [_weighted(w, signals) for w in weights]
-            strengths = [_weighted(w, induced) for w in weights.T]
+            induced = [weighted(w, signals) for w in weights]
+            strengths = [weighted(w, induced) for w in weights.T]
             return [dotted(strengths, column) for column in zip(*rows, strict=True)]
         if self.ball is None:
             entries = [hy.par[self.first + k] for k in range(len(ENTRIES))]
@@ -116,10 +117,6 @@ class RotorCurrents:
         fields, slopes = self.table.fields(places)
         rows = np.concatenate([np.stack([slopes[..., i, j] for i, j in UPPER], axis=2), fields], axis=2)
         return np.array([np.einsum("nk,nk->n", rows[..., a], rows[..., b]) for a, b in ENTRIES])
-
-
-def _weighted(weights: Array, terms: Vector) -> hy.expression:
-    return hy.sum([float(w) * t for w, t in zip(weights, terms, strict=True) if w])
 
 
 class Dissipation(Protocol):

@@ -5,19 +5,19 @@ B = -∇ Σ c_k Θ_k: each multipole is free of divergence and curl by construct
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
-from functools import cached_property
-from itertools import combinations_with_replacement, product
+from functools import cache, cached_property
+from itertools import product
 
 import heyoka as hy
 import numpy as np
-from numpy.typing import NDArray
+import scipy
 
 from ...geometry.common import Array, Watch, frozen_array, unwatched
 from ..compiled_code import compiled
-from ..harmonics.expansion import MultipoleExpansion
-from ..harmonics.expressions import FieldExpressions
+from ..harmonics.expressions import FieldExpressions, harmonic_sums
 from ..harmonics.solid import derivative, outer_sums
 
 INDEPENDENT = 1e-10  # Squared part of a multipole that the chosen ones must leave for it to be taken
@@ -26,19 +26,32 @@ NOISE = 1e-11  # Weights below this share of the largest are what symmetry forbi
 STEP, PATIENCE, STALLED = 2, 6, 0.95
 
 
-def _unfolded(rank: int) -> NDArray[np.int_]:
-    """Where the entries of a symmetric tensor (3, …, 3) lie among those with indices in order."""
-    distinct = list(combinations_with_replacement(range(3), rank))
-    places = [distinct.index(tuple(sorted(indices))) for indices in product(range(3), repeat=rank)]
-    return np.array(places).reshape((3,) * rank)
-
-
 def real_kinds(lowest: int, highest: int) -> list[tuple[int, int, int]]:
     """Degree, order and part of all multipoles with degrees from the lowest to the highest."""
     return [(l, m, i) for l in range(lowest, highest + 1) for m in range(l + 1) for i in (0, 1)[: 1 + (m > 0)]]
 
 
-TWICE, THRICE = _unfolded(2), _unfolded(3)  # For the gradient of a curl-free field, and for its second derivatives
+@cache
+def cartesian(order: int) -> Array:
+    """(3, …, 3, 2 order + 1): minus the derivatives by x, y and z from those that `Multipoles.derivatives` gives."""
+    found = np.zeros((*(3,) * order, 2 * order + 1))
+    steps = [((1, 0.5), (-1, 0.5)), ((1, -0.5j), (-1, 0.5j)), ((0, 1.0),)]  # ∂x and ∂y by ∂x ± i∂y; ∂z
+    for axes in product(range(3), repeat=order):
+        terms: dict[int, complex] = {0: 1.0}  # by the power b of ∂x + i∂y, or -b of ∂x - i∂y; all other factors are ∂z
+        for axis in axes:
+            last, terms = terms, defaultdict(complex)
+            for b, value in last.items():
+                for step, factor in steps[axis]:
+                    terms[b + step] += factor * value * (-1 if b * step < 0 else 1)  # both together are -∂z²
+        for b, value in terms.items():
+            parts = np.array([value.real, -np.sign(b) * value.imag])[: 1 + (b != 0)]
+            found[axes][max(2 * abs(b) - 1, 0) : 2 * abs(b) + 1] -= (-1.0) ** order * parts
+    return found
+
+
+def weighted(weights: Array, terms: Sequence[hy.expression]) -> hy.expression:
+    """Σ weight · term, where weights of zero cost nothing."""
+    return hy.sum([float(w) * t for w, t in zip(weights, terms, strict=True) if w])
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,42 +82,81 @@ class Multipoles:
     def subset(self, numbers: Sequence[int]) -> Multipoles:
         return Multipoles(self.centers[list(numbers)], self.kinds[list(numbers)], self.scale)
 
-    @cached_property
-    def _expansions(self) -> list[MultipoleExpansion]:
-        found = []
-        for center, (degree, order, imaginary) in zip(self.centers, self.kinds.astype(int), strict=True):
-            coefficients = np.zeros((degree + 1, degree + 1), complex)
-            coefficients[degree, order] = 1j if imaginary else 1.0
-            found.append(MultipoleExpansion(center, self.scale, coefficients))
-        return found
+    def factors(self, order: int) -> Array:
+        """(k,) of `derivatives`."""
+        degree, m, _ = self.kinds.astype(int).T
+        return np.asarray((-1.0) ** m * scipy.special.factorial2(2 * (degree + order) - 1))
+
+    def derivatives(self, position: Sequence[hy.expression], order: int) -> list[list[hy.expression]]:
+        """Derivatives of each harmonic f by scaled lengths over its factor, as heyoka expressions of a position (m).
+
+        With n = `order`, (-∂z)ⁿ f and then real and imaginary part of (-1)ᵇ (-∂z)ⁿ⁻ᵇ (∂x + i∂y)ᵇ f for b = 1 … n: sums
+        of two monic harmonics of degree l + n, as (∂x ± i∂y) Θ_lm = ±Θ_(l+1)(m±1).  Their factors, and those by which x
+        and y come from x ± iy, are left to those who sum many of them: in Taylor's method every product costs.
+        """
+        found: dict[int, list[hy.expression]] = {}
+        for center in np.unique(self.centers, axis=0):
+            here = np.flatnonzero((self.centers == center).all(axis=1)).tolist()
+            kinds = {number: self.kinds[number].astype(int).tolist() for number in here}
+            keys = sorted({(l + order, abs(m + b)) for l, m, _ in kinds.values() for b in range(-order, order + 1)})
+            place = [(p - float(c)) * (1.0 / self.scale) for p, c in zip(position, center, strict=True)]
+            single = [{(*key, part): 1.0} for key in keys for part in ("re", "im")]
+            sums = harmonic_sums(place, single, lambda _: 1.0)
+            known = dict(zip(keys, zip(sums[::2], sums[1::2], strict=True), strict=True))
+            for number, (l, m, part) in kinds.items():
+                if m == 0:
+                    found[number] = [
+                        known[l + order, 0][0],
+                        *(e for b in range(order) for e in known[l + order, b + 1]),
+                    ]
+                    continue
+                found[number] = [
+                    (-2.0 if part else 2.0) * known[l + order, m][part]
+                ]  # f is Θ_lm + conj, or i times -conj
+                for b in range(1, order + 1):
+                    (re, im), (other_re, other_im) = known[l + order, m + b], known[l + order, abs(m - b)]
+                    sign = (-1.0) ** min(m, b)  # of what conj Θ_lm adds: Θ_l(-m) = (-1)^m conj Θ_lm
+                    other_re, other_im = sign * other_re, (-sign if m >= b else sign) * other_im
+                    found[number] += [other_im - im, re - other_re] if part else [re + other_re, im + other_im]
+        return [found[number] for number in range(len(self.kinds))]
 
     def expressions(self, position: Sequence[hy.expression]) -> list[FieldExpressions]:
         """B (T) and its gradient (T/m) of each as heyoka expressions of a position (m)."""
-        return [expansion.expressions(position) for expansion in self._expansions]
+        found = []
+        numbers = self.factors(1), self.factors(2) / self.scale
+        for *each, one, two in zip(self.derivatives(position, 1), self.derivatives(position, 2), *numbers, strict=True):
+            flux = [weighted(one * row, each[0]) for row in cartesian(1)]
+            found.append((flux, [[weighted(two * row, each[1]) for row in rows] for rows in cartesian(2)]))
+        return found
 
-    @cached_property
-    def _compiled(self) -> hy.cfunc_dbl:
+    def _compiled(self, *orders: int) -> hy.cfunc_dbl:
         variables = hy.make_vars("x", "y", "z")
-        outputs: list[hy.expression] = []
-        for flux, gradient in self.expressions(variables):
-            outputs += [*flux, *(gradient[i][j] for i in range(3) for j in range(i, 3))]
+        parts = zip(*(self.derivatives(variables, order) for order in orders), strict=True)
+        outputs = [entry for several in parts for part in several for entry in part]
         # Optimised it would be twice as fast at best, and compiled in ten times the time.
         return compiled(hy.cfunc, outputs, variables, compact_mode=len(outputs) > 2000, opt_level=0, batch_size=1)
 
     @cached_property
-    def _compiled_curvature(self) -> hy.cfunc_dbl:
-        variables = hy.make_vars("x", "y", "z")
-        outputs = [
-            hy.diff(gradient[i][j], variables[k])
-            for _, gradient in self.expressions(variables)
-            for i, j, k in combinations_with_replacement(range(3), 3)
-        ]
-        return compiled(hy.cfunc, outputs, variables, compact_mode=True, opt_level=0)
+    def _field_and_slope(self) -> hy.cfunc_dbl:
+        return self._compiled(1, 2)
+
+    @cached_property
+    def _bend(self) -> hy.cfunc_dbl:
+        return self._compiled(3)
+
+    def _tensors(self, order: int, values: Array) -> Array:
+        """(n, k, 3, …, 3) from derivatives (k, 2 order + 1, n)."""
+        whole = values * self.factors(order)[:, None, None] / self.scale ** (order - 1)
+        return np.moveaxis(np.tensordot(whole, cartesian(order), (1, -1)), 1, 0)
+
+    def evaluate(self, points: Array) -> tuple[Array, Array]:
+        """B (n, k, 3) T and ∂B_i/∂x_j (n, k, 3, 3) T/m at points (n, 3) m."""
+        values = self._field_and_slope(np.ascontiguousarray(points.T)).reshape(len(self.kinds), 8, -1)
+        return self._tensors(1, values[:, :3]), self._tensors(2, values[:, 3:])
 
     def curvature(self, points: Array) -> Array:
         """∂²B_i/∂x_j∂x_k (n, k, 3, 3, 3) T/m² at points (n, 3) m."""
-        values = self._compiled_curvature(np.ascontiguousarray(points.T)).reshape(len(self.kinds), 10, -1)
-        return np.moveaxis(values[:, THRICE], -1, 0)
+        return self._tensors(3, self._bend(np.ascontiguousarray(points.T)).reshape(len(self.kinds), 7, -1))
 
     def fields(self, points: Array) -> Array:
         """B (n, k, 3) T at points (n, 3) m, without compilation."""
@@ -114,16 +166,11 @@ class Multipoles:
             here = np.flatnonzero((self.centers == center).all(axis=1))
             single = np.zeros((len(here), degree + 1, degree + 1), complex)
             for row, number in enumerate(here):
-                coefficients = self._expansions[number].coefficients
-                single[row, : len(coefficients), : len(coefficients)] = coefficients
+                l, m, part = self.kinds[number].astype(int)
+                single[row, l, m] = 1j if part else 1.0
             parts = [-derivative(coefficients, axis) for coefficients in single for axis in range(3)]
             found[:, here] = outer_sums(parts, (points - center) / self.scale).reshape(len(points), len(here), 3)
         return found
-
-    def evaluate(self, points: Array) -> tuple[Array, Array]:
-        """B (n, k, 3) T and ∂B_i/∂x_j (n, k, 3, 3) T/m at points (n, 3) m."""
-        values = self._compiled(np.ascontiguousarray(points.T)).reshape(len(self.kinds), 9, -1)
-        return np.moveaxis(values[:, :3], -1, 0), np.moveaxis(values[:, 3:][:, TWICE], -1, 0)
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import NoReturn
 
 import heyoka as hy
@@ -132,14 +132,6 @@ class RotorShare:
         """s_i (..., states), √J, at angles (...) of the rotor (rad) and a depth of the plate (m)."""
         factors = np.polynomial.chebyshev.chebvander(np.array([self._place(depth)]), self.series.shape[2] - 1)[0]
         return np.asarray(turn_harmonics(angle, len(self.series)) @ (self.series @ factors))
-
-    def filtered(self, factors: ComplexArray) -> RotorShare:
-        """What a linear system makes of the share, with the response (H+1, states) to cos hφ → Re(… e^{ihφ})."""
-        turns = (self.series[1::2] - 1j * self.series[2::2]) * factors[1:, :, None]
-        series = np.empty_like(self.series)
-        series[0] = self.series[0] * factors[0].real[:, None]
-        series[1::2], series[2::2] = turns.real, -turns.imag
-        return replace(self, series=series)
 
     def _place(self, depth: float) -> float:
         return 2 * depth / self.distance - 1 if self.distance else 0.0
