@@ -1,4 +1,4 @@
-"""What acts on the floater beyond the rigid dipole: in the motion or not, and what it changes."""
+"""What acts on the floater beyond the rigid dipole: included or neglected, and what it changes."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -27,12 +27,12 @@ from ..geometry.common import MAGNET_CONDUCTIVITY, Array
 from ..geometry.scene.contents import Scene
 from .levitation import Levitation
 
-PLATE_NOT_MODELLED = "The plate's eddy currents are left out: the plate is only an obstacle."
-
-UNKNOWN_NEAR = "the floater is so near to the magnets that their size is not known"
+PLATE_NEGLECTED = "The plate's eddy currents are neglected: the plate is only an obstacle."
 OF_SPHERES = "known for spherical floaters alone"
 EXACT_SLOPES = 4  # degree of a potential that has all derivatives which the slopes of the floater's currents ask for
 AROUND = 1 / 32  # radius of the ball of that expansion, in radii of the floater
+CLEARLY_SLOW = 0.02
+"""Relative error of what an effect adds to the growth of modes that goes without saying."""
 
 
 @dataclass(frozen=True)
@@ -46,8 +46,9 @@ class ListedEffect:
     shift_mm : how far it moves the first equilibrium, about; None where that is not known
     growth_per_s : what it adds there to the growth of the mode that grows fastest with it, about; None where that is
         not known
-    why : it is in the motion or not
-    motion_error : relative error of what it adds, or would, to the growth of motions: they are taken as slow against it
+    why : it is included or not
+    motion_error : relative error of what it adds, or would, to the growth of modes: motions are taken as slow against
+        it; torque and lift are exact in a steady turn
     """
 
     name: str
@@ -57,18 +58,31 @@ class ListedEffect:
     why: str
     motion_error: float = 0.0
 
+    def __str__(self) -> str:
+        text = f"{self.name}: {'included' if self.included else 'neglected'} ({self.why})"
+        if self.shift_mm:
+            verb = "shifts" if self.included else "would shift"
+            text += f"; {verb} the equilibrium by {self.shift_mm:.2g} mm"
+        if self.growth_per_s is not None:
+            doubt = f" ± {self.motion_error:.0%}" if self.motion_error > CLEARLY_SLOW else ""
+            verb = "changes" if self.included else "would change"
+            text += f"; {verb} the growth rate by {self.growth_per_s:+.2g} s⁻¹{doubt}"
+        return text
 
-def effects_summary(levitation: Levitation, equilibria: Sequence[Equilibrium]) -> dict[str, Any]:
-    """For JSON: the interaction, all effects that are known with what they do to the first of the equilibria, and in
-    sentences what is in the scene but not in the motion."""
+
+def listed_effects(levitation: Levitation, equilibria: Sequence[Equilibrium]) -> list[ListedEffect]:
+    """All effects that are known, with what they do to the first of the equilibria."""
     first = next(iter(equilibria), None)
-    found = [part(levitation, first) for part in (_mutual, _rotor_currents, _floater_currents, _air)]
-    missing = [PLATE_NOT_MODELLED] if levitation.scene.plate and levitation.plate is None else []
-    missing += [f"Left out: {e.name} ({e.why})." for e in found if not e.included and e.why != NOTHING_ANSWERS]
+    return [part(levitation, first) for part in (_mutual, _rotor_currents, _floater_currents, _air)]
+
+
+def effects_summary(levitation: Levitation, effects: Sequence[ListedEffect]) -> dict[str, Any]:
+    """For JSON: the interaction, the effects, and in sentences what is in the scene but neglected."""
+    missing = [PLATE_NEGLECTED] if levitation.scene.plate and levitation.plate is None else []
     return {
         "interaction": levitation.interaction_model,
-        "effects": [vars(effect) for effect in found],
-        "not_modelled": missing,
+        "effects": [vars(effect) for effect in effects],
+        "not_modelled": missing + [f"{e}." for e in effects if not e.included and e.why != NOTHING_ANSWERS],
     }
 
 
@@ -88,8 +102,8 @@ def _floater_currents(levitation: Levitation, first: Equilibrium | None) -> List
     doubt = slow_error(there)
     if first and scene.frequency and doubt <= SLOW_ENOUGH:
         growth = growth_by_floater(there, levitation.table, first, bool(floater.conductivity))
-    listed = _conducting(FLOATER_CURRENTS, "floater.conductivity_S_m", bool(floater.conductivity), growth, doubt)
-    return replace(listed, motion_error=doubt)
+    why = _why("floater.conductivity_S_m", bool(floater.conductivity), growth, doubt)
+    return ListedEffect(FLOATER_CURRENTS, bool(floater.conductivity), 0.0, growth, why, doubt)
 
 
 def _rotor_currents(levitation: Levitation, first: Equilibrium | None) -> ListedEffect:
@@ -107,17 +121,18 @@ def _rotor_currents(levitation: Levitation, first: Equilibrium | None) -> Listed
         near = any(np.linalg.norm(place - m.body.center) < m.body.circumradius for m in scene.rotor)
     if first and losses and scene.frequency and doubt <= SLOW_ENOUGH and not near:
         growth = growth_by_rotor(scene, first, losses, included)
-    listed = _conducting(ROTOR_CURRENTS, "rotor.conductivity_S_m", included, growth, doubt)
-    return replace(listed, why=f"{listed.why}; {UNKNOWN_NEAR}") if near else listed
+    why = _why("rotor.conductivity_S_m", included, growth, doubt)
+    why += "; the floater is so near to the magnets that their size is not known" if near else ""
+    return ListedEffect(ROTOR_CURRENTS, included, 0.0, growth, why)
 
 
-def _conducting(name: str, key: str, included: bool, growth: float | None, doubt: float) -> ListedEffect:
-    why = "a conductivity is given" if included else f"no {key}"
-    if not included and doubt > SLOW_ENOUGH:
-        why += f"; at {MAGNET_CONDUCTIVITY:.2g} S/m, as of sintered magnets, it would be too slow to tell what it adds"
-    elif not included and growth is not None:
-        why += f"; at {MAGNET_CONDUCTIVITY:.2g} S/m, as of sintered magnets, it would add {growth:.2g} /s to the growth"
-    return ListedEffect(name, included, 0.0, growth, why)
+def _why(key: str, included: bool, growth: float | None, doubt: float) -> str:
+    if included:
+        return "a conductivity is given"
+    assumed = f"{MAGNET_CONDUCTIVITY:.2g} S/m, as of sintered magnets,"
+    if doubt > SLOW_ENOUGH:
+        return f"no {key}; with {assumed} it would be too slow to tell what it adds"
+    return f"no {key}" if growth is None else f"no {key}; estimated with {assumed[:-1]}"
 
 
 def _air(levitation: Levitation, first: Equilibrium | None) -> ListedEffect:

@@ -25,9 +25,9 @@ from ..fem.rotor.table import FieldTable
 from ..geometry.common import Array, millimetres
 from ..geometry.scene.contents import Scene
 from ..geometry.scene.files import scene_text
-from .effects import effects_summary
+from .effects import PLATE_NEGLECTED, ListedEffect, effects_summary, listed_effects
 from .levitation import Levitation
-from .words import comparison_lines, effects_words, equilibria_words, flight_words, kind_of_flight, plate_words
+from .words import comparison_words, equilibria_words, flight_words, kind_of_flight, plate_words
 
 AXIS = ("x", "y", "z")
 MODES = ("bounce", *SIDE, *TILT)
@@ -128,22 +128,26 @@ class Result:
                 "field_changes": vars(flight.field_changes),
                 "realtime_factor": flight.realtime_factor,
             }
+        return {**values, **effects_summary(levitation, self._effects)}
+
+    @cached_property
+    def _effects(self) -> list[ListedEffect]:
         # A flight that begins where the scene says needs no equilibrium, and searches for none.
-        alone = flight is not None and levitation.absolute
-        known = () if alone else (self.survey or levitation.survey).equilibria
-        return {**values, **effects_summary(levitation, known)}
+        alone = self.flight is not None and self.levitation.absolute
+        return listed_effects(self.levitation, () if alone else (self.survey or self.levitation.survey).equilibria)
 
     def text(self) -> list[str]:
         """Lines for a person."""
         levitation, lines = self.levitation, [self.failed] if self.failed else []
         if self.survey is not None and not self.failed:
             lines += equilibria_words(levitation, self.survey)
-        lines += comparison_lines(self.comparison)
+        lines += comparison_words(self.comparison)
         if self.flight is not None:
             lines.append(flight_words(levitation, self.flight))
         if self.flight is not None or not self.failed:
             lines += plate_words(levitation)
-        return [*lines, *effects_words(self.summary)]
+        lines += [PLATE_NEGLECTED] if PLATE_NEGLECTED in self.summary["not_modelled"] else []
+        return [*lines, "Effects beyond the rigid dipole:", *(f"  {effect}" for effect in self._effects)]
 
 
 def equilibrium_summary(equilibrium: Equilibrium) -> dict[str, Any]:
@@ -156,6 +160,8 @@ def equilibrium_summary(equilibrium: Equilibrium) -> dict[str, Any]:
             numbers[name + end] = value if scale == 1 else value / scale
     return {
         **numbers,
+        "stability": equilibrium.stability,
+        "efolding_s": equilibrium.efolding_s,
         "spin_about_moment_hz": equilibrium.spin_rate / (2 * math.pi),
         "frequencies_hz": equilibrium.frequencies_hz,
         "modes": [vars(mode) for mode in equilibrium.modes],

@@ -14,7 +14,7 @@ import xarray as xr
 from ..dynamics.equilibria.equilibrium import EquilibriumError, Survey
 from ..dynamics.equilibria.search import free_of_bodies
 from ..dynamics.flights.checkpoint import Checkpoint
-from ..dynamics.flights.start import starting_point
+from ..dynamics.flights.start import most_like_levitation, starting_point
 from ..dynamics.flights.trajectory import FlightStopped, Trajectory
 from ..fem.cache import owned, program_digest
 from ..fem.files import write_whole
@@ -122,7 +122,7 @@ def _simulated(scene: Scene, asked: Models, duration: float, out: Path, resume: 
             note(line)
         begin = starting_point(levitation.equilibria)
         if begin is not None and not begin.stable:
-            note(f"The flight begins at an unstable equilibrium: e-fold in {1 / begin.growth_per_s:.2g} s.")
+            note(f"The simulation begins at an unstable equilibrium, e-folding time {1 / begin.growth_per_s:.2g} s.")
     path = out / "trajectory.nc"
 
     def kept(flight: Trajectory) -> Result:
@@ -208,13 +208,19 @@ def main_job(scene: Scene, asked: Models, spin: float, duration: float, out: Pat
 
 
 def _compared(dipole: Survey, best: Survey, name: str) -> dict[str, Any] | None:
-    """Levitation distance by the point dipole against the true field, mm; None if either has no stable equilibrium."""
-    rough, true = (next((e for e in found.equilibria if e.stable), None) for found in (dipole, best))
-    if rough is None or true is None:
+    """Levitation distances (mm) by the point dipole and the field of the finite magnets, both without the plate.
+
+    Of the dipole's equilibria the one nearest to where the floater levitates; None where one of both has none.
+    """
+    true = most_like_levitation(best.equilibria)
+    if true is None or not dipole.equilibria:
         return None
+    rough = min(dipole.equilibria, key=lambda e: float(np.linalg.norm(e.position - true.position)))
     distances = [-float(e.position[2]) * 1e3 for e in (rough, true)]
     return {
         "true_model": name,
+        "dipole_stability": rough.stability,
+        "true_stability": true.stability,
         "dipole_distance_mm": distances[0],
         "true_distance_mm": distances[1],
         "difference_mm": distances[0] - distances[1],

@@ -20,6 +20,10 @@ IN_PLATE, IN_ROTOR = "in the plate", "in the rotor"
 FOLD, NOT_CONVERGED, PAST_TABLE = "fold", "not converged", "past the plate's table"
 
 
+MARGINAL = 0.004
+"""Growth rate (1/s) up to which an unstable equilibrium is marginal: e-folding in 250 s, the article's criterion."""
+
+
 class EquilibriumError(ComputationError):
     """There is no synchronous equilibrium, or not of the kind that was asked for."""
 
@@ -64,6 +68,16 @@ class Equilibrium:
     slope: Array = field(default_factory=lambda: np.full((5, 5), np.nan))
     jacobian: Array = field(default_factory=lambda: np.full((12, 12), np.nan))
     steady_frame: bool = False
+
+    @property
+    def stability(self) -> str:
+        """Stable, or unstable and marginal up to the growth rate `MARGINAL`."""
+        return "stable" if self.stable else "marginal" if self.growth_per_s <= MARGINAL else "unstable"
+
+    @property
+    def efolding_s(self) -> float | None:
+        """Time in which the least stable mode grows e-fold, s; None where none grows."""
+        return None if self.stable else 1 / self.growth_per_s
 
     @property
     def start(self) -> State:
@@ -148,7 +162,7 @@ class Equilibrium:
         x, y, z = 1e3 * (self.position if self.turn is None else self.laboratory_position)
         place = f"({x:.4f}, {y:.4f}, {z:.4f}) ± {1e3 * self.position_error:.1g} mm"
         place += "" if self.turn is None else ", mean over a turn in the laboratory"
-        kind = "stable" if self.stable else f"unstable, e-fold in {1 / self.growth_per_s:.2g} s"
+        kind = self.stability if self.stable else f"{self.stability}, e-folding time {self.efolding_s:.2g} s"
         return f"Equilibrium at {place}, polar angle {self.polar_angle_deg:.3f}°, spin {self.spin:g}, {kind}"
 
     def _repr_html_(self) -> str:
@@ -157,10 +171,10 @@ class Equilibrium:
             "mean position": f"{millimetres(self.laboratory_position)}, laboratory",
             "polar angle": f"{self.polar_angle_deg:.3f}°",
             "body spin": f"{self.spin:g}",
-            "growth": f"{self.growth_per_s:.3g} /s",
-            "small motions": ", ".join(f"{mode.name} {mode.frequency_hz:.4g} Hz" for mode in self.modes),
+            "growth rate": f"{self.growth_per_s:.3g} s⁻¹",
+            "modes": ", ".join(f"{mode.name} {mode.frequency_hz:.4g} Hz" for mode in self.modes),
         }
-        return html_table(f"Equilibrium, {'stable' if self.stable else 'unstable'}", rows)
+        return html_table(f"Equilibrium, {self.stability}", rows)
 
 
 def _extremes(values: Array) -> Array:

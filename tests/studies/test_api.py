@@ -125,7 +125,7 @@ def test_objects_print_what_they_are():
     assert re.match(
         r"Equilibrium at \(0\.\d{4}, -?0\.0000, -19\.6788\) ± .* mm, polar .* spin 0, stable$", repr(found[0])
     )
-    assert "unstable, e-fold in" in repr(found[-1])
+    assert "unstable, e-folding time" in repr(found[-1])
     memory = sl.plate_table(lowered, "cuboid", "slab", plate_rtol=3e-2)
     first, second, *_ = repr(memory).splitlines()
     assert re.match(r"PlateMemory 'slab': relative error \d\.\de[-+]0\d, \d+ harmonics of the rotor$", first)

@@ -26,7 +26,8 @@ from spinlev.studies.levitation import Levitation
 from spinlev.studies.result import Result
 from spinlev.studies.words import (
     bracketed,
-    comparison_lines,
+    comparison_words,
+    equilibria_rows,
     equilibria_words,
     flight_words,
     headline,
@@ -56,18 +57,27 @@ def test_a_number_with_its_uncertainty(value, error, said):
 def test_the_plate_is_named_where_it_damps(levitation):
     alone = equilibrium(growth=-1e-4)
     damped = equilibrium(currents=np.zeros((1, 3)), without=alone)
-    assert headline(levitation, [alone]).endswith("damped at 0.0001 /s by the air.")
+    assert headline(levitation, [alone]).endswith("decays at 0.0001 s⁻¹ by air drag.")
     assert headline(levitation, [damped]) == (
-        "Floats 17.21(1) mm below the rotor's centre, polar angle 9.8°; stable, slowest motion (a small motion) damped "
-        "at 2.9 /s by the plate."
+        "Stable levitation 17.21(1) mm below the rotor's centre, polar angle 9.8°. Least stable mode: unnamed, decays at "
+        "2.9 s⁻¹ by eddy currents in the plate."
     )
+
+
+def test_stable_is_said_in_one_way(levitation):
+    """The article's criterion, 250 s, parts marginal equilibria from unstable ones; row, sentence and number agree."""
+    for growth, kind, said in ((2.2e-5, "marginal", "Marginally unstable"), (0.01, "unstable", "Unstable")):
+        found = equilibrium(stable=False, growth=growth)
+        assert found.stability == equilibria_rows(levitation, [found])[1][-1] == kind
+        assert headline(levitation, [found]).startswith(f"{said} 17.21(1) mm below")
+    assert headline(levitation, [equilibrium(stable=False, growth=2.2e-5)]).endswith("e-folding time of 12.6 h.")
 
 
 def test_rows_that_mean_nothing_are_not_printed(levitation):
     rough = equilibrium(error=0.12)
     lines = equilibria_words(levitation, Survey((equilibrium(), rough), ()))
     assert len(lines) == 3  # headline, head of the table, one row
-    assert headline(levitation, [rough]).startswith("Nothing floats")
+    assert headline(levitation, [rough]).startswith("No levitation")
 
 
 def test_places_where_the_floater_would_overlap_the_plate_are_no_equilibria(levitation):
@@ -102,7 +112,7 @@ def test_places_in_metal_that_turns_with_the_rotor_are_none_either(levitation):
 def test_what_could_not_be_computed_is_told(levitation):
     """And never that there is nothing."""
     lost = [LeftOut(equilibrium(), why, 0.4) for why in (FOLD, NOT_CONVERGED, PAST_TABLE)]
-    assert headline(levitation, [], lost[:1]) == "Nothing floats at 130 Hz: no solution is an equilibrium."
+    assert headline(levitation, [], lost[:1]) == "No levitation at 130 Hz: no solution is an equilibrium."
     assert headline(levitation, [], lost).endswith("but not all could be computed.")
     fold, unknown, past = left_out_words(levitation, lost)
     assert "17.21(1) mm" in fold
@@ -123,7 +133,7 @@ def test_what_could_not_be_computed_is_told(levitation):
 )
 def test_a_difference_below_its_error_is_none(apart, error, said):
     compared = {"true_model": "fem", "dipole_distance_mm": 18.83, "difference_mm": apart, "difference_error_mm": error}
-    (line,) = comparison_lines(compared)
+    (line,) = comparison_words(compared | {"dipole_stability": "stable", "true_stability": "stable"})
     assert line == f"Point-dipole model, same conditions: levitation distance {said}"
 
 
@@ -137,7 +147,10 @@ def test_a_flight_from_an_unstable_equilibrium_is_never_called_stable():
         time=time, lab=places, rotor=places, ended_by="duration", levitated_s=1.0, left_plate_table=False
     )
     assert kind_of_flight(unstable, flight) == "growing oscillation"
-    assert flight_words(unstable, flight) == "Flew 1 s, still up; the oscillation grows (e-fold in 11 s)."
+    assert (
+        flight_words(unstable, flight)
+        == "Simulated 1 s: still levitating, with a growing oscillation (e-folding time 11.1 s)."
+    )
     at_rest = SimpleNamespace(absolute=False, stability=equilibrium())
     assert kind_of_flight(at_rest, flight) == "stable"
-    assert "stable" not in headline(unstable, [start]).replace("unstable", "")
+    assert "stable" not in headline(unstable, [start]).lower().replace("unstable", "")

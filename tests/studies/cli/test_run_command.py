@@ -45,7 +45,7 @@ def test_a_field_model_of_one_s_own_is_run_and_drawn(tmp_path, monkeypatch):
     scene = sl.parse_scene(GOOD.replace("recoil_permeability = 1.05", "recoil_permeability = 1.0"))
     values, lines = main_job(scene, Models("own", "none"), 0.0, 0.01, tmp_path)
     assert values["model"] == "own"
-    assert lines[0].startswith("Floats ")
+    assert lines[0].startswith("Stable levitation ")
     assert (tmp_path / "force.png").exists()
 
 

@@ -70,7 +70,13 @@ def put_in(page, text, name="mine.toml"):
 
 
 SHAPES = {
-    "spheres": ("sphere", "sphere", "", ["rotor.angle_deg", "rotor.diameter_mm", "floater.diameter_mm"], "Floats"),
+    "spheres": (
+        "sphere",
+        "sphere",
+        "",
+        ["rotor.angle_deg", "rotor.diameter_mm", "floater.diameter_mm"],
+        "Stable levitation",
+    ),
     "cylinders over a plate": (
         *("cylinder", "cylinder", PLATE),
         ["rotor.displacement_mm", "rotor.diameter_mm", "rotor.height_mm", "floater.height_mm", "plate.center_mm.2"],
