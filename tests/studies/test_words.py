@@ -59,8 +59,8 @@ def test_the_plate_is_named_where_it_damps(levitation):
     damped = equilibrium(currents=np.zeros((1, 3)), without=alone)
     assert headline(levitation, [alone]).endswith("decays at 0.0001 s⁻¹ by air drag.")
     assert headline(levitation, [damped]) == (
-        "Stable levitation 17.21(1) mm below the rotor's centre, polar angle 9.8°. Least stable mode: unnamed, decays at "
-        "2.9 s⁻¹ by eddy currents in the plate."
+        "Stable levitation 17.21(1) mm below the rotor's centre, polar angle 9.8°. Least stable mode: unnamed, decays "
+        "at 2.9 s⁻¹ by eddy currents in the plate."
     )
 
 
