@@ -23,7 +23,7 @@ def frozen_array(values: ArrayLike, shape: tuple[int, ...]) -> Array:
 
 
 def spread_points(lower: ArrayLike, upper: ArrayLike, number: int) -> Array:
-    """Points (number, 3) spread evenly through a box: multiples of irrational numbers, modulo 1 (H. Weyl, 1916)."""
+    """Points (`number`, 3) evenly between `lower` and `upper` ends: multiples of irrational numbers (H. Weyl, 1916)."""
     parts = np.arange(1, number + 1)[:, None] * np.sqrt([2.0, 3.0, 5.0]) % 1.0
     low, high = np.asarray(lower, float), np.asarray(upper, float)
     return np.asarray(low + parts * (high - low))
@@ -108,7 +108,7 @@ def unwatched(stage: str, share: float) -> None:
 
 
 def watched(items: Iterable[Item], watch: Watch, stage: str) -> Iterator[Item]:
-    """The items one after the other, of which a stage of the work takes each."""
+    """The `items` one after the other, of which a `stage` of the work, as `watch` is told, takes each."""
     known = list(items)
     for done, item in enumerate(known):
         watch(stage, done / len(known))

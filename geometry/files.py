@@ -67,7 +67,10 @@ def regular_file(path: str | Path, most_bytes: int, name: str, kind: str) -> Bin
 
 
 def file_content(path: str | Path, most_bytes: int, name: str, kind: str) -> bytes:
-    """All of a file that a user named, as `regular_file` opens it. Raises InputError, also where reading fails."""
+    """All of a file that a user named.
+
+    `path`, `most_bytes`, `name` and `kind` are as for `regular_file`. Raises InputError, also where reading fails.
+    """
     with regular_file(path, most_bytes, name, kind) as stream:
         try:
             return stream.read(most_bytes)

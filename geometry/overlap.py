@@ -115,7 +115,7 @@ def body_overlap(first: Solid, second: Solid) -> float:
 
 
 def sphere_overlap(center: ArrayLike, radius: float, body: Solid) -> float:
-    """Penetration depth of a sphere into a body, m; negative if they are apart."""
+    """Penetration depth of a sphere about `center` (3,) of a `radius` (m) into a `body`, m; negative if apart."""
     return radius - float(body.distance(center))
 
 

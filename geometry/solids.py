@@ -189,19 +189,18 @@ def places_off(body: Solid, directions: Array, distance: float) -> Array:
 
 
 def moved(body: Solid, center: Array, rotation: Array | None = None) -> Solid:
-    """The body with its centre (3,) m elsewhere, and with other body axes (3, 3) if they are given."""
+    """The `body` with its `center` (3,) m elsewhere, and with other body axes, a `rotation` (3, 3), if it is given."""
     return replace(body, center=center, rotation=body.rotation if rotation is None else rotation)
 
 
 def solid_of(numbers: Array, center: Array, rotation: Array) -> Solid:
-    """The body of its `shape_numbers` in its place; of a part they do not tell it."""
-    if len(numbers) == 3:
+    """The body of its `shape_numbers`, but for a part, which they do not tell, with a `center` and a `rotation`."""
+    sizes = [float(number) for number in numbers]
+    if len(sizes) == 3:
         return Box(numbers, center, rotation)
-    if len(numbers) == 1:
-        return Sphere(float(numbers[0]), center, rotation)
-    if len(numbers) == 2:
-        return Cylinder(float(numbers[0]), float(numbers[1]), center, rotation)
-    return Ring(float(numbers[0]), float(numbers[1]), float(numbers[2]), center, rotation)
+    if len(sizes) == 1:
+        return Sphere(*sizes, center, rotation)
+    return Cylinder(*sizes, center, rotation) if len(sizes) == 2 else Ring(*sizes[:3], center, rotation)
 
 
 def known_shape(part: Part) -> Solid | None:

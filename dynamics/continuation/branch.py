@@ -113,7 +113,7 @@ class Family(BalanceCurve):
         return np.concatenate([position[0], moment[0], [parameter / self.unit]])
 
     def at(self, unknowns: Array, tangent: Array, parameter: float) -> BranchPoint:
-        """The equilibrium at a solution (7,)."""
+        """The equilibrium at a solution `unknowns` (7,) at `parameter`, whose branch goes on along a `tangent` (7,)."""
         balance = self.balance(parameter)
         state = balance.states(unknowns[None, :3], unknowns[None, 3:6])
         return BranchPoint(
@@ -127,7 +127,7 @@ class Family(BalanceCurve):
         )
 
     def point(self, position: Array, moment: Array, parameter: float) -> BranchPoint:
-        """The same at scaled place and moment (3,), with the tangent towards growing values of the parameter."""
+        """The same at a scaled `position` and `moment` (3,), with the tangent towards growing values of `parameter`."""
         unknowns = np.concatenate([position, moment, [parameter / self.unit]])
         return self.at(unknowns, directions(self, unknowns[None], np.eye(7)[6:])[0], parameter)
 
@@ -143,6 +143,8 @@ def follow_branch(
 ) -> list[BranchPoint]:
     """The branch through an equilibrium, towards `end` of the parameter and on through every fold.
 
+    Points are in order and good to round-off.  Folds and changes of stability are points of their own, by `kind`.
+
     Parameters
     ----------
     family : the problem
@@ -153,11 +155,6 @@ def follow_branch(
     until : ends the branch after the first point of which it is true
     tolerated : growth that still counts as stable, 1/s
 
-    Returns
-    -------
-    Points in order, good to round-off.  Folds and changes of stability are points of their own, by `kind`; the
-    parameter at a fold is good to round-off too.
-
     Raises
     ------
     EquilibriumError : there is no equilibrium near `start`
@@ -167,8 +164,7 @@ def follow_branch(
         raise EquilibriumError(
             f"Input start must be near an equilibrium; instead Newton's method found none at {parameter:.6g}."
         )
-    unknowns = first
-    tangent = directions(family, unknowns[None], np.sign(end - parameter) * np.eye(7)[6:])
+    unknowns, tangent = first, directions(family, first[None], np.sign(end - parameter) * np.eye(7)[6:])
     points = [family.at(unknowns, tangent[0], parameter)]
 
     def beyond(value: float) -> float | None:

@@ -79,19 +79,15 @@ def by_frequency(scene: Scene, rates: Rates) -> Family:
 
 
 def levitating_branch(scene: Scene, table: FieldTable, rates: Rates, highest: float) -> Branch:
-    """The branch of a scene's floater up to the frequency `highest` (Hz) or contact; gravity along the axis, s = 0.
+    """The branch of a `scene`'s floater up to the frequency `highest` (Hz) or contact; gravity along the axis, s = 0.
 
-    Raises
-    ------
-    EquilibriumError : no distance at which attraction carries the weight, or no fold above `SLOWEST`
+    `rates` are those in the field of `table`. Raises EquilibriumError where attraction carries the weight at no
+    distance, or there is no fold above `SLOWEST`.
     """
     family = by_frequency(scene, rates)
     start = _hanging(replace(scene, frequency=highest), table, family)
-
-    def over(point: BranchPoint) -> bool:
-        return rotor_gap(scene, point.position) < 0
-
-    points = follow_branch(family, start, highest, SLOWEST, Steps(longest=0.1), over)
+    steps = Steps(longest=0.1)
+    points = follow_branch(family, start, highest, SLOWEST, steps, lambda p: rotor_gap(scene, p.position) < 0)
     folds = [k for k, point in enumerate(points) if point.kind == FOLD]
     if not folds:
         raise EquilibriumError(f"The levitating branch has no fold between {SLOWEST:g} and {highest:g} Hz.")
@@ -100,7 +96,7 @@ def levitating_branch(scene: Scene, table: FieldTable, rates: Rates, highest: fl
 
 
 def kicked(scene: Scene, point: BranchPoint, speed: float) -> Scene:
-    """The scene at the frequency of an equilibrium, beginning there with `speed` (m/s) upwards."""
+    """The `scene` at the frequency of an equilibrium, a `point`, beginning there with `speed` (m/s) upwards."""
     there = replace(scene, frequency=point.parameter)
     state = Scales.of(there).unpack(point.state)
     start = AbsoluteStart(state.position, state.velocity + speed * np.eye(3)[2], state.moment, state.spin)
@@ -128,7 +124,13 @@ def _hanging(scene: Scene, table: FieldTable, family: Family) -> Array:
 
 
 def distance_error(scene: Scene, table: FieldTable, family: Family, point: BranchPoint) -> float:
-    """What the errors that a table and its effects state may change of the distance along the axis, first order, m."""
+    """What the errors that a table and its effects state may change of the distance along the axis, first order, m.
+
+    Parameters
+    ----------
+    scene, table : all but the frequency, and the rotor's field with its errors
+    family, point : the scene's equilibria against the frequency, and the one of them
+    """
     here = replace(scene, frequency=point.parameter)
     scales = Scales.of(here)
     values = parameters(here, scales, frozen_spin=True)
@@ -159,9 +161,7 @@ class StableRange:
 def reference_state(scene: Scene) -> tuple[Array, float]:
     """Scaled state (12,) and frequency (Hz) of a stable equilibrium of point dipoles, amid those from the fold on.
 
-    Raises
-    ------
-    EquilibriumError : there is none up to `HIGHEST`
+    Raises EquilibriumError where there is none up to `HIGHEST`.
     """
     table = rotor_table(scene.rotor, "dipole")
     found = levitating_ranges(scene, table, Rates(with_effects(scene, table)))
@@ -173,22 +173,18 @@ def reference_state(scene: Scene) -> tuple[Array, float]:
 
 
 def levitating_ranges(scene: Scene, table: FieldTable, rates: Rates) -> list[StableRange]:
-    """All intervals of stability on the branch that levitates below the rotor, by ascending frequency.
+    """All intervals of stability of a `scene` on the branch that levitates below the rotor, by ascending frequency.
 
-    The branch is found without a search, see `levitating_branch`.  Raises EquilibriumError where there is no branch.
+    The branch is found without a search, see `levitating_branch`, whose `table`, `rates` and errors these are.
     """
     bare = replace(scene, plate=None)
     near = levitating_branch(bare, table, rates, HIGHEST).near
     start = near[len(near) // 2]
-    return stable_ranges(bare, rates, start.state, start.parameter)
+    return _stable_ranges(bare, rates, start.state, start.parameter)
 
 
-def stable_ranges(scene: Scene, rates: Rates, start: Array, frequency: float) -> list[StableRange]:
-    """All intervals of stability on the branch through the equilibrium near `start` (12,) at `frequency` (Hz).
-
-    The branch is followed both ways to its first fold, contact with the rotor or the border. Frequencies of the ends
-    are good to round-off in the table's field.
-    """
+def _stable_ranges(scene: Scene, rates: Rates, start: Array, frequency: float) -> list[StableRange]:
+    """Those on the branch through an equilibrium, both ways to its first fold, contact with the rotor or the border."""
     walk = partial(_side, replace(scene, plate=None), by_frequency(scene, rates), start, frequency)
     below, above = walk(LOWEST), walk(HIGHEST)
     runs: list[list[BranchPoint]] = [[]]
@@ -205,8 +201,12 @@ def stable_ranges(scene: Scene, rates: Rates, start: Array, frequency: float) ->
 
 
 def stable_range(scene: Scene, rates: Rates, start: Array, frequency: float) -> StableRange:
-    """The one of these intervals that holds the frequency or is nearest to it. Raises EquilibriumError without any."""
-    found = stable_ranges(scene, rates, start, frequency)
+    """The interval of stability that holds `frequency` (Hz) or is nearest to it, its ends good to round-off.
+
+    On the branch through the equilibrium of `scene` and `rates` near `start` (12,) there. Raises EquilibriumError where
+    there is none.
+    """
+    found = _stable_ranges(scene, rates, start, frequency)
     if not found:
         raise EquilibriumError("There is no stable levitation on the branch of the point dipoles.")
     return min(found, key=lambda run: max(run.low.parameter - frequency, frequency - run.high.parameter))
@@ -245,8 +245,20 @@ def at_frequency(
 def stability_end(
     scene: Scene, family: Family, start: Array, frequency: float, towards: float, steps: Steps = STEPS
 ) -> BranchPoint:
-    """The first fold, change of stability, contact or border that is met from `frequency` towards another (Hz)."""
+    """The first fold, change of stability, contact or border that is met from `frequency` `towards` another (Hz).
+
+    Parameters
+    ----------
+    scene, family : all but the frequency, and the equilibria against it
+    start : scaled state (12,) near the equilibrium at `frequency`
+    steps : along the branch
+    """
     return next(point for point in _side(scene, family, start, frequency, towards, steps) if point.kind)
+
+
+def is_over(scene: Scene, point: BranchPoint) -> bool:
+    """Whether a branch ends at a point: in a fold, or as the floater touches the rotor."""
+    return point.kind == FOLD or rotor_gap(scene, point.position) < 0
 
 
 def levitates(point: BranchPoint) -> bool:
@@ -258,11 +270,7 @@ def _side(
     scene: Scene, family: Family, start: Array, frequency: float, end: float, steps: Steps = STEPS
 ) -> list[BranchPoint]:
     """The branch from `frequency` towards `end`, to its first fold, contact or the border, which is marked."""
-
-    def over(point: BranchPoint) -> bool:
-        return point.kind == FOLD or rotor_gap(scene, point.position) < 0
-
-    points = follow_branch(family, start, frequency, end, steps, over, TOLERATED)
+    points = follow_branch(family, start, frequency, end, steps, partial(is_over, scene), TOLERATED)
     for k, point in enumerate(points):
         if point.kind == FOLD:
             return points[: k + 1]
@@ -287,15 +295,11 @@ def way_out(
 ) -> str:
     """What is wrong with a scene of which these are all equilibria, and what would help.
 
-    Without the plate, and with gravity along the axis, equilibria are found at frequencies up to `widest` times the
-    scene's and down to as small a part of it.  Of those between which there is a stable one the nearest count; with the
-    plate and the whole gravity a search has to find it too before its frequency is named.
-
     Parameters
     ----------
     scene, table : with the rotor's field and what acts beside it
     equilibria : all that the scene has
-    widest : ratio of frequencies
+    widest : ratio of frequencies, up and down, within which one that works is looked for
     memory : the plate's currents, if they are modelled
     """
     kinds = dict.fromkeys(f"{1e3 * e.distance:.2f} mm (grows e-fold in {1 / e.growth_per_s:.2g} s)" for e in equilibria)
@@ -307,6 +311,7 @@ def way_out(
 
 def _levitating_frequency(scene: Scene, table: FieldTable, widest: float, memory: PlateMemory | None) -> float | None:
     """A frequency (Hz) in the nearest window with a stable equilibrium; not in one that holds the scene's own."""
+    # A map without plate, in upright gravity, finds the windows; with all that acts a search has to find one too.
     own, rates = scene.frequency, Rates(with_effects(scene, table))
     upright = replace(scene, plate=None, gravity=np.array([0.0, 0.0, scene.gravity[2]]))
     tried = [replace(upright, frequency=float(f)) for f in own * widest ** np.linspace(-1, 1, FREQUENCIES)]

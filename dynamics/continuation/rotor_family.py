@@ -53,7 +53,7 @@ class Move:
         return self.into([p - w * measure if w else p for p, w in zip(position, self.way, strict=True)], measure)
 
     def into(self, vector: Numbers, measure: Any, sign: int = 1) -> list[Any]:
-        """A vector (3) along the axes of the part's own frame."""
+        """A `vector` (3) along the axes of the part's own frame at a `measure`; with the `sign` -1 from these."""
         x, y, z = vector
         if not self.turning:
             return [x, y, z]
@@ -66,7 +66,7 @@ class Move:
         return self.into(vector, measure, -1)
 
     def tensor(self, rows: Sequence[Numbers], measure: Any, sign: int = 1) -> list[list[Any]]:
-        """A tensor (3, 3) along the axes of the part's own frame; with the sign -1, from these to the rotor's."""
+        """A tensor of `rows` (3, 3) along these axes at a `measure`; with the `sign` -1 from these."""
         half = zip(*(self.into(row, measure, sign) for row in rows), strict=True)
         columns = [self.into(column, measure, sign) for column in half]
         return [list(row) for row in zip(*columns, strict=True)]

@@ -5,7 +5,7 @@ That of air goes beyond Stokes' range (`effects.air`): 8πηR³Ω times f for a 
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import cache
+from functools import cache, partial
 from typing import Self
 
 import numpy as np
@@ -25,7 +25,7 @@ from ..motion.events import rotor_gap
 from ..motion.rates import Rates
 from ..motion.state import Parameter, Scales, State
 from .branch import BranchPoint, Family, follow_branch, spins
-from .frequencies import BORDER, HIGHEST, LONG_STEPS, LOWEST, at_frequency, by_frequency
+from .frequencies import BORDER, HIGHEST, LONG_STEPS, LOWEST, at_frequency, by_frequency, is_over
 
 BALANCE, DURATION, INSTABILITY, CONTACT = "balance", "duration", "instability", "contact"
 SETTLED = 1e-3  # A balance is reached where ds/dt has fallen to this part of what it was at the start
@@ -63,7 +63,10 @@ class SlowTorque:
 
     @classmethod
     def of(cls, scene: Scene, rates: Rates, stokes: bool = False) -> Self:
-        """The slow torques of a scene. Raises InputError for a floater that is no sphere."""
+        """The slow torques of a `scene` by its `rates`; with `stokes`, drag is Stokes'.
+
+        Raises InputError for a floater that is no sphere.
+        """
         scene.floater.must_be("sphere", where="for its slow drift", instead="Fly it (`simulate`).")
         return cls(rates, parameters(scene, Scales.of(scene)), scene.floater.radius, not (stokes or scene.drag.air))
 
@@ -110,8 +113,7 @@ class Drift:
     def fall_rate(self, start: float, end: float) -> float:
         """Mean rate at which the distance grows between two parts (0 to 1) of the flight, m/s."""
         times = np.array([start, end]) * self.time[-1]
-        ends = np.interp(times, self.time, self.distance)
-        return float((ends[1] - ends[0]) / (times[1] - times[0]))
+        return float(np.diff(np.interp(times, self.time, self.distance))[0] / np.diff(times)[0])
 
 
 def _steady(start: BranchPoint, duration: float, e_folds: float) -> Drift:
@@ -224,7 +226,7 @@ def drift(
     towards = spin + np.copysign(3.0, torque(state))
 
     def over(point: BranchPoint) -> bool:
-        return point.kind == FOLD or torque(point.state) * (towards - spin) <= 0 or rotor_gap(scene, point.position) < 0
+        return is_over(scene, point) or torque(point.state) * (towards - spin) <= 0
 
     points = follow_branch(family, state, spin, towards, Steps(longest=0.03, turn=0.05), over)
     fold = next((k for k, point in enumerate(points) if point.kind == FOLD), None)
@@ -269,12 +271,7 @@ def lasting_frequencies(
     e_folds : see `drift`
     resolution : of the two ends, Hz
     """
-    family = by_frequency(scene, rates)
-
-    def over(point: BranchPoint) -> bool:
-        return point.kind == FOLD or rotor_gap(scene, point.position) < 0
-
-    sides = []
+    family, over, sides = by_frequency(scene, rates), partial(is_over, scene), []
     for border in (LOWEST, HIGHEST):
         side = follow_branch(family, start, frequency, border, LONG_STEPS, over, np.inf)
         sides.append(side[: next((k for k, point in enumerate(side) if over(point)), len(side))])

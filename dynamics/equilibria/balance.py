@@ -78,7 +78,7 @@ def tangent_basis(moment: Array) -> Array:
 
 
 def moved_pose(position: Array, moment: Array, step: Array) -> tuple[Array, Array]:
-    """Positions and moments (n, 3) after a step (n, 5) of the unknowns; the moments stay unit vectors."""
+    """A `position` and `moment` (n, 3) each after a `step` (n, 5) of the unknowns; the moments stay unit vectors."""
     moment = moment + np.einsum("nk,nka->na", step[:, 3:], tangent_basis(moment))
     return position + step[:, :3], moment / np.linalg.norm(moment, axis=1, keepdims=True)
 

@@ -50,7 +50,10 @@ class AtRest:
 
     @staticmethod
     def extended(value: Array, slope: Array, moment: Array) -> tuple[Array, Array]:
-        """Equations (n, k) and derivatives (n, k, 5 + e) by position, tilts, the rest; one more keeps |m̂| = 1."""
+        """Equations with one more, which keeps |m̂| = 1, and their derivatives by the unknowns (n, 6 + e).
+
+        From a `value` (n, k) and a `slope` (n, k, 5 + e) by position, tilts of the `moment` (n, 3), and the rest.
+        """
         n, k, unknowns = slope.shape
         values, slopes = np.zeros((n, k + 1)), np.zeros((n, k + 1, unknowns + 1))
         values[:, :k], slopes[:, k, 3:6] = value, moment
@@ -118,7 +121,7 @@ Watch = Callable[[Indices, Array, Array, Array], int | NDArray[np.int_]]
 
 
 def follow(equations: Equations, points: Array, tangents: Array, steps: Steps, watch: Watch) -> None:
-    """Follow curves from points (n, k + 1) along tangents (n, k + 1), all at once, each with its own steps.
+    """Follow curves of `equations` from `points` (n, k + 1) along `tangents`, all at once, each with its own `steps`.
 
     A curve ends where `watch` says so, or where no step that is long enough succeeds.
     """
@@ -141,9 +144,9 @@ def follow(equations: Equations, points: Array, tangents: Array, steps: Steps, w
 def stepped(
     equations: Equations, points: Array, tangents: Array, lengths: Array, which: Indices = ONE
 ) -> tuple[Array, Array, Truth]:
-    """Points and tangents (n, k + 1) at steps (n,) along the curves, and where Newton's method found these again.
+    """Points and tangents (n, k + 1) at `lengths` (n,) along curves of `equations`, `which` of them, and where found.
 
-    The tangents are by the derivatives of the last correction, which moved the points by less than `CLOSE`.
+    From `points` and `tangents` (n, k + 1). Those found are by the last correction, which moved less than `CLOSE`.
     """
     ahead = equations.onto(points + lengths[:, None] * tangents)
     ahead, good, slope = _corrected(equations, ahead, tangents, np.maximum(lengths / 2, 1e-8), which)
@@ -180,7 +183,10 @@ def _corrected(
 
 
 def directions(equations: Equations, points: Array, before: Array, which: Indices = ONE) -> Array:
-    """Unit tangents (n, k + 1) of the curves that go on as `before` (n, k + 1); not a number where there is none."""
+    """Unit tangents (n, k + 1) at `points` that go on as `before` (n, k + 1); not a number where there is none.
+
+    Of the curves of `equations`, `which` of several.
+    """
     return _along(equations.linear(points, which)[1], before)
 
 
@@ -209,10 +215,10 @@ Traced = tuple[Array, Array]  # Points and tangents (n, k + 1) of a curve
 def whole_curves(
     equations: Equations, starts: Array, steps: Steps, inside: Callable[[Array], Truth]
 ) -> list[Traced | None]:
-    """Points and tangents (n, k + 1) of the curve through each of the starts (m, k + 1), followed all at once.
+    """Points and tangents (n, k + 1) of the curve through each of the `starts` (m, k + 1), followed all at once.
 
-    Each is followed both ways until it closes or leaves: the first point that is not `inside` belongs to it, and a
-    closed curve ends in its start.  None where the equations do not fix a curve.
+    Each is followed by its own `steps`, both ways until it closes or leaves: the first point that is not `inside`
+    belongs to it, and a closed curve ends in its start.  None where the `equations` do not fix a curve.
     """
     _, sizes, rows = np.linalg.svd(equations.linear(starts, np.zeros(len(starts), int))[1])
     fixed = np.flatnonzero(sizes[:, -1] >= 1e-12 * sizes[:, 0])
@@ -288,8 +294,7 @@ def carried(
 
     Returns
     -------
-    which, arrived, position, moment : the equilibria (k,) that were followed; whether they are those at the end, or
-        beyond a fold others at the start; and where they have led to, (k, 3)
+    Which (k,) were followed; whether to the end, or beyond a fold to others at the start; position and moment (k, 3).
     """
     places, turned, size = solve(end, position, moment, EVERY, NEWTON_STEPS)
     apart = np.linalg.norm(np.concatenate([places - position, turned - moment], axis=1), axis=1)

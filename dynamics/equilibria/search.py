@@ -46,7 +46,7 @@ class FixedPoints:
 
     @classmethod
     def at(cls, balance: Balance, points: Array, doubts: Array, curves: tuple[ForceCurve, ...] = ()) -> Self:
-        """The balance's own rates and derivatives at points that were found."""
+        """The balance's own rates and derivatives at `points` that were found, with `doubts` and `curves`."""
         position, moment = points[:, :3], points[:, 3:]
         if not len(points):
             return cls(points, doubts, np.zeros((0, 5)), np.zeros((0, 5, 5)), np.zeros((0, 12, 12)), curves)
@@ -62,15 +62,10 @@ FIXED_POINTS = TableKind("equilibria", FixedPoints, "Fixed points of a scene wit
 def cached_points(
     scene: Scene, equations: str, spin: float, make: Callable[[], FixedPoints], report: Callable[[str], None]
 ) -> tuple[FixedPoints, bool]:
-    """What a search finds, from the cache if it is there, and whether it was.
+    """What a search `make` finds, from the cache if it is there, and whether it was.
 
-    Parameters
-    ----------
-    scene : its plate decides nothing
-    equations : tells the rotor's table and the equations of motion from all others
-    spin : body spin
-    make : the search
-    report : hears what is wrong with the cache
+    Of a `scene`, whose plate decides nothing, with body `spin`; `equations` tells the rotor's table and the equations
+    of motion from all others, and `report` hears what is wrong with the cache.
     """
     inputs = equations, spin, _own_spin(scene), parameters(scene, Scales.of(scene), frozen_spin=True)
     return FIXED_POINTS.cached(inputs, make, report)
@@ -88,12 +83,8 @@ def find_equilibria(
 
     Parameters
     ----------
-    scene, table, spin, farthest, rates : see `survey`
+    scene, table, spin, farthest, rates : see `survey`, as for what it raises
     memory : the plate's currents; None leaves them out
-
-    Raises
-    ------
-    EquilibriumError : the rotor is at rest and the floater does not spin
     """
     rates = rates or Rates(with_effects(scene, table))
     found = survey(scene, table, spin, farthest, rates)
@@ -127,9 +118,7 @@ def survey(
 
     Returns
     -------
-    Equilibria, the stable ones first, then by distance, accurate to round-off in the table's field: every curve of
-    lateral balance that is met from nearly five thousand starts is followed, and every zero of the axial force on it is
-    polished; so is what Newton's method finds directly from a third of these starts (see `fixed_points`).
+    Equilibria, the stable ones first, then by distance, accurate to round-off in the table's field.
 
     Raises
     ------
@@ -160,10 +149,8 @@ def _search(scene: Scene, table: FieldTable, balance: Balance, farthest: float, 
 def _of_shape(
     scene: Scene, table: FieldTable, known: NDArray[np.bool_], doubts: Array, where: Array
 ) -> tuple[NDArray[np.bool_], Array]:
-    """Of a floater that is no sphere: where it is free of the rotor and its multipoles tell the force, and the doubts.
-
-    The search knows the largest sphere in it alone; what the multipoles leave out is added to the doubts.
-    """
+    """Of a floater that is no sphere: where it is free of the rotor and its multipoles tell the force, and doubts."""
+    # The search knows the largest sphere in it alone; what the multipoles leave out is added to the doubts.
     floater, length = scene.floater, Scales.of(scene).length
     (shape,) = (effect for effect in with_effects(scene, table).effects if isinstance(effect, FloaterShape))
     unit = float(np.linalg.norm(scene.gravity)) or scene.angular_velocity**2 * length
@@ -180,7 +167,7 @@ def _of_shape(
 
 
 def survey_of(scene: Scene, balance: Balance, known: FixedPoints) -> Survey:
-    """The survey of a scene of which all fixed points are known."""
+    """The survey of a `scene` with its `balance`, of which all fixed points are `known`."""
     rows = zip(known.points, known.doubts, known.residuals, known.slopes, known.jacobians, strict=True)
     found = _survey([_equilibrium(Scales.of(scene), balance, *row) for row in rows], known.curves)
     if not np.any(scene.gravity[:2]):
@@ -223,6 +210,11 @@ def with_plate(
 
     Those beyond the range of the plate's table stay as they are, without `currents`; those that the plate undoes or
     pushes against a body, and those that overlap one, are left out.
+
+    Parameters
+    ----------
+    scene, table, rates : as for the survey `known` without the plate's currents
+    memory : these currents
     """
     known = free_of_bodies(scene, known)
     values = parameters(scene, Scales.of(scene), frozen_spin=True)
