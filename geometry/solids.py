@@ -199,8 +199,10 @@ def solid_of(numbers: Array, center: Array, rotation: Array) -> Solid:
     if len(sizes) == 3:
         return Box(numbers, center, rotation)
     if len(sizes) == 1:
-        return Sphere(*sizes, center, rotation)
-    return Cylinder(*sizes, center, rotation) if len(sizes) == 2 else Ring(*sizes[:3], center, rotation)
+        return Sphere(sizes[0], center, rotation)
+    if len(sizes) == 2:
+        return Cylinder(sizes[0], sizes[1], center, rotation)
+    return Ring(sizes[0], sizes[1], sizes[2], center, rotation)
 
 
 def known_shape(part: Part) -> Solid | None:

@@ -13,7 +13,7 @@ import numpy as np
 import xarray as xr
 
 from ..dynamics.continuation.map import surveys
-from ..dynamics.continuation.rotor_family import article_measure, rotor_family
+from ..dynamics.continuation.rotor_family import rotor_family
 from ..dynamics.equilibria.balance import Indices
 from ..dynamics.flights.balls import is_long
 from ..dynamics.flights.batch import fly_together
@@ -69,7 +69,12 @@ def _family_key(levitation: Levitation) -> str | None:
 
 
 def _measure(scene: Scene) -> tuple[str, float] | None:
-    return article_measure(scene_keys(scene)["rotor"])
+    """Configuration and displacement (m) or tilt (rad) of one of the article's rotors."""
+    rotor = scene_keys(scene)["rotor"]
+    if (configuration := rotor.get("configuration")) is None:
+        return None
+    tilted = configuration == "tilt"
+    return configuration, float(np.radians(rotor["angle_deg"])) if tilted else 1e-3 * rotor["displacement_mm"]
 
 
 def _find_together(alike: Sequence[Levitation], places: Indices) -> None:

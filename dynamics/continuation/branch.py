@@ -175,9 +175,9 @@ def follow_branch(
 
     def arrived(which: Indices, places: Array, tangents: Array, lengths: Array) -> int:
         nonlocal unknowns
-        segment = _Segment(family, unknowns, points[-1], float(lengths[0]), tolerated)
+        step = float(lengths[0]), tolerated
         point = family.at(places[0], tangents[0], float(places[0, 6]) * family.unit)
-        marked = segment.marked(point)
+        marked = _marked(family, unknowns, points[-1], point, *step)
         if any(mark.kind == FOLD and beyond(mark.parameter) is not None for mark in marked):
             return SHORTER  # past the end and on round a fold: the point at the end would be missed
         border = beyond(point.parameter)
@@ -185,7 +185,7 @@ def follow_branch(
             landed = family.solution(places[0, :6], border)
             if landed is not None:
                 point = family.at(landed, directions(family, landed[None], tangents)[0], border)
-            marked = segment.marked(point)
+            marked = _marked(family, unknowns, points[-1], point, *step)
         points.extend([*marked, point])
         unknowns = places[0]
         return END if border is not None or (until is not None and until(point)) else ON
@@ -194,45 +194,33 @@ def follow_branch(
     return points
 
 
-@dataclass(frozen=True, eq=False)
-class _Segment:
-    """A step along a branch, of a `length`, from the unknowns (7,) of the point `before`."""
+def _marked(
+    family: Family, unknowns: Array, before: BranchPoint, after: BranchPoint, length: float, tolerated: float
+) -> list[BranchPoint]:
+    """Folds and changes of stability, in order, on a step from unknowns (7,) of the point before to a point after."""
 
-    family: Family
-    unknowns: Array
-    before: BranchPoint
-    length: float
-    tolerated: float
-
-    def marked(self, after: BranchPoint) -> list[BranchPoint]:
-        """Folds and changes of stability on the way to a point, in order."""
-        located = []
-        folds = self.before.tangent[6] * after.tangent[6] < 0
-        if folds:
-            located.append(self._located(lambda point: float(point.tangent[6]), FOLD))
-        excess = self.before.excess(self.tolerated), after.excess(self.tolerated)
-        if excess[0] * excess[1] < 0:
-            growing = self.before if excess[0] > 0 else after
-            kind = OSCILLATORY if growing.leading_hz * growing.time_unit > 1e-6 else REAL
-            if not (folds and kind == REAL):
-                located.append(self._located(lambda point: point.excess(self.tolerated), kind))
-        return [point for _, point in sorted(located, key=lambda pair: pair[0])]
-
-    def _located(self, measure: Callable[[BranchPoint], float], kind: str) -> tuple[float, BranchPoint]:
-        """How far along the step a measure changes its sign, and the point there."""
-        begin, step = measure(self.before), self.length
-        if begin * measure(self._at(step)) <= 0:  # else a landed end: the change is beyond it
-
-            def at(length: float) -> float:
-                return measure(self._at(length)) if length else begin
-
-            step = float(scipy.optimize.brentq(at, 0.0, step, xtol=1e-13, rtol=1e-12))
-        return step, replace(self._at(step), kind=kind)
-
-    def _at(self, length: float) -> BranchPoint:
-        points, tangents, good = stepped(
-            self.family, self.unknowns[None], self.before.tangent[None], np.array([length])
-        )
+    def at(step: float) -> BranchPoint:
+        points, tangents, good = stepped(family, unknowns[None], before.tangent[None], np.array([step]))
         if not good[0]:
-            raise EquilibriumError(f"Lost the branch at {self.before.parameter:.6g}: give it shorter steps.")
-        return self.family.at(points[0], tangents[0], float(points[0, 6]) * self.family.unit)
+            raise EquilibriumError(f"Lost the branch at {before.parameter:.6g}: give it shorter steps.")
+        return family.at(points[0], tangents[0], float(points[0, 6]) * family.unit)
+
+    def located(measure: Callable[[BranchPoint], float], kind: str) -> tuple[float, BranchPoint]:
+        """How far along the step a measure changes its sign, and the point there."""
+        begin, step = measure(before), length
+        if begin * measure(at(step)) <= 0:  # else a landed end: the change is beyond it
+            root = scipy.optimize.brentq
+            step = float(root(lambda way: measure(at(way)) if way else begin, 0.0, step, xtol=1e-13, rtol=1e-12))
+        return step, replace(at(step), kind=kind)
+
+    found = []
+    folds = before.tangent[6] * after.tangent[6] < 0
+    if folds:
+        found.append(located(lambda point: float(point.tangent[6]), FOLD))
+    excess = before.excess(tolerated), after.excess(tolerated)
+    if excess[0] * excess[1] < 0:
+        growing = before if excess[0] > 0 else after
+        kind = OSCILLATORY if growing.leading_hz * growing.time_unit > 1e-6 else REAL
+        if not (folds and kind == REAL):
+            found.append(located(lambda point: point.excess(tolerated), kind))
+    return [point for _, point in sorted(found, key=lambda pair: pair[0])]

@@ -326,18 +326,10 @@ def _levitating_frequency(scene: Scene, table: FieldTable, widest: float, memory
     for window in sorted(windows, key=lambda window: abs(np.log(window[0] / own))):
         near, far = window[0], window[-1]
         there = replace(scene, frequency=float(near + INSIDE * (far - near)))
-        if _levitates(there, table, rates, memory):
+        bare = there.plate is None and not np.any(there.gravity[:2])
+        if too_slow(there) or (not bare and memory is not None and there.frequency > memory.table.frequencies[1]):
+            continue
+        found_there = [] if bare else find_equilibria(there, table, rates=rates, memory=memory)
+        if bare or any(e.stable and (memory is None or e.currents is not None) for e in found_there):
             return there.frequency
     return None
-
-
-def _levitates(scene: Scene, table: FieldTable, rates: Rates, memory: PlateMemory | None) -> bool:
-    """Whether a scene with a stable equilibrium without plate, in upright gravity, has one too with all that acts."""
-    if too_slow(scene):
-        return False
-    if scene.plate is None and not np.any(scene.gravity[:2]):
-        return True
-    if memory is not None and scene.frequency > memory.table.frequencies[1]:
-        return False
-    found = find_equilibria(scene, table, rates=rates, memory=memory)
-    return any(e.stable and (memory is None or e.currents is not None) for e in found)

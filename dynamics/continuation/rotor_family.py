@@ -4,7 +4,7 @@ A part of the rotor that moves with the measure keeps its field and its effects:
 which is where it is at measure zero, and are evaluated with the floater's motion as seen from there.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -262,13 +262,3 @@ def _currents(scene: Scene, parts: Sequence[Part]) -> list[Effect]:
             name = ROTOR_CURRENTS if len(parts) == 1 else f"{ROTOR_CURRENTS}, magnet {k}"
             found.append(MovedEffect(RotorCurrents(table), move, alone, name))
     return found
-
-
-def article_measure(rotor: Mapping[str, Any]) -> tuple[str, float] | None:
-    """Configuration and displacement (m) or tilt (rad) in the keys of a scene file's rotor; None if it has none."""
-    configuration = rotor.get("configuration")
-    if configuration is None:
-        return None
-    if configuration == "tilt":
-        return configuration, float(np.radians(rotor["angle_deg"]))
-    return configuration, 1e-3 * rotor["displacement_mm"]

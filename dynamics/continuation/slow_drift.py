@@ -70,27 +70,19 @@ class SlowTorque:
         scene.floater.must_be("sphere", where="for its slow drift", instead="Fly it (`simulate`).")
         return cls(rates, parameters(scene, Scales.of(scene)), scene.floater.radius, not (stokes or scene.drag.air))
 
-    @property
-    def absent(self) -> bool:
-        """Whether nothing moves the spin."""
-        return not np.any(self.values[[Parameter.SPIN_DRAG, Parameter.SPIN_EDDY]])
-
     def __call__(self, state: Array) -> float:
         """ds/dt, 1/s, at a scaled state (12,) at rest in the rotor's frame."""
         moment, spin = state[6:9], state[9:]
         change = self.rates(state[None], self.values)[0][0]
         rate = change[9:] @ moment + spin @ change[6:9]
         if self.beyond_stokes:
-            rate -= self.values[Parameter.SPIN_DRAG] * self._beyond_stokes(moment, spin)
+            # Scaled spin about the moment, each part times what its drag is more than Stokes'.
+            time, turning = self.values[Parameter.TIME], self.values[Parameter.RATE]
+            steady = spin[2] * moment[2]
+            more = (float(spinning(reynolds(self.radius, spin[2] / time))) - 1) * steady
+            more += (float(swinging(reynolds(self.radius, turning / time))) - 1) * (spin @ moment - steady)
+            rate -= self.values[Parameter.SPIN_DRAG] * more
         return float(rate / self.values[Parameter.RATE] / self.values[Parameter.TIME])
-
-    def _beyond_stokes(self, moment: Array, spin: Array) -> float:
-        """Scaled spin about the moment, each part times what its drag is more than Stokes'."""
-        time, turning = self.values[Parameter.TIME], self.values[Parameter.RATE]
-        steady = float(spin[2] * moment[2])
-        more_steady = float(spinning(reynolds(self.radius, spin[2] / time))) - 1
-        more_swing = float(swinging(reynolds(self.radius, turning / time))) - 1
-        return more_steady * steady + more_swing * float(spin @ moment - steady)
 
 
 @dataclass(frozen=True, eq=False)
@@ -127,7 +119,10 @@ def _steady(start: BranchPoint, duration: float, e_folds: float) -> Drift:
 
 def _averaged(torque: SlowTorque, points: list[BranchPoint], duration: float, end: str, e_folds: float) -> Drift:
     """The flight along the points of a branch, to its `end` or to what comes first."""
-    arc, course = _course(points)
+    places = np.array([np.concatenate([p.state[:3], p.state[6:9], [p.spin]]) for p in points])
+    arc = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(places, axis=0), axis=1)))
+    slopes = [(p.tangent[6], p.tangent[:3] @ p.position / np.linalg.norm(p.state[:3])) for p in points]
+    course = CubicHermiteSpline(arc, [(p.spin, p.distance) for p in points], slopes)  # spin and distance by arc length
     pace = CubicSpline(arc, [torque(p.state) for p in points])
     growth = PchipInterpolator(arc, [p.growth_per_s for p in points])
     first = abs(float(pace(0.0)))
@@ -166,15 +161,6 @@ def _averaged(torque: SlowTorque, points: list[BranchPoint], duration: float, en
         balance_spin=float(course(balances[0])[0]) if len(balances) else np.nan,
         last_fall_s=_escape(points, arc, float(course(arc[-1], 2)[0] / pace(arc[-1]))) if ended == FOLD else 0.0,
     )
-
-
-def _course(points: list[BranchPoint]) -> tuple[Array, CubicHermiteSpline]:
-    """Length along the branch (n,), and spin and distance as functions of it."""
-    places = np.array([np.concatenate([p.state[:3], p.state[6:9], [p.spin]]) for p in points])
-    arc = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(places, axis=0), axis=1)))
-    values = np.array([[p.spin, p.distance] for p in points])
-    slopes = np.array([[p.tangent[6], p.tangent[:3] @ p.position / np.linalg.norm(p.state[:3])] for p in points])
-    return arc, CubicHermiteSpline(arc, values, slopes)
 
 
 def _escape(points: list[BranchPoint], arc: Array, bend: float) -> float:
@@ -221,7 +207,7 @@ def drift(
             raise EquilibriumError(f"At {scene.frequency:g} Hz the floater has no equilibrium with body spin {spin:g}.")
         start = min(known, key=lambda equilibrium: equilibrium.growth_per_s).state
     state = Scales.of(scene).pack(start)
-    if torque.absent:
+    if not np.any(torque.values[[Parameter.SPIN_DRAG, Parameter.SPIN_EDDY]]):  # nothing moves the spin
         return _steady(family.point(state[:3], state[6:9], spin), duration, e_folds)
     towards = spin + np.copysign(3.0, torque(state))
 
@@ -229,10 +215,11 @@ def drift(
         return is_over(scene, point) or torque(point.state) * (towards - spin) <= 0
 
     points = follow_branch(family, state, spin, towards, Steps(longest=0.03, turn=0.05), over)
-    fold = next((k for k, point in enumerate(points) if point.kind == FOLD), None)
-    if fold is not None:
-        return _averaged(torque, points[: fold + 1], duration, FOLD, e_folds)
     end = CONTACT if rotor_gap(scene, points[-1].position) < 0 else BALANCE
+    for k, point in enumerate(points):
+        if point.kind == FOLD:
+            points, end = points[: k + 1], FOLD
+            break
     return _averaged(torque, points, duration, end, e_folds)
 
 
