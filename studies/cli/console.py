@@ -118,17 +118,11 @@ def _loads(library: str) -> bool:
 
 
 PAUSE = 2.5
-"""Silence after which a line is said, s."""
-SHARE = 1 / 60
-"""The same as a part of the time that the step has taken, once that is longer."""
-TELLING = 0.01
-"""Finished share from which the time left can be told."""
-ALL = 0.995
-"""Share that would be shown as the whole; what still goes on then has no share."""
+"""Silence after which a line is said, s, once; after long steps a 60th of their time."""
 
 
 class Heartbeat(threading.Thread):
-    """Says for how long a step of the work has gone on, as often as nothing else was said for a while.
+    """Says how far a step of the work has come, or how long it has taken, after a while in which nothing else was said.
 
     The thread begins with the first step.
 
@@ -142,8 +136,7 @@ class Heartbeat(threading.Thread):
         super().__init__(name="heartbeat", daemon=True)
         self._say, self._pause, self._over = say, pause, threading.Event()
         self._began: float | None = None
-        self._said = self._stage_began = self._advanced = time.monotonic()
-        self._stage, self._fraction = "", 0.0
+        self._said, self._stage, self._fraction = time.monotonic(), "", 0.0
 
     def said(self, text: str = "") -> None:
         """Something was shown; a text that ends in " ..." begins a step, any other ends it."""
@@ -156,10 +149,7 @@ class Heartbeat(threading.Thread):
 
     def advanced(self, fraction: float, stage: str = "") -> None:
         """How much of the step is finished, 0 to 1, or of one of its stages."""
-        now = time.monotonic()
-        if stage != self._stage or fraction < self._fraction:
-            self._stage, self._stage_began = stage, now
-        self._fraction, self._advanced = fraction, now
+        self._fraction, self._stage = fraction, stage
 
     def stop(self) -> None:
         """Say no more; returns when the thread has ended."""
@@ -170,23 +160,12 @@ class Heartbeat(threading.Thread):
     def run(self) -> None:
         while not self._over.wait(self._pause / 5):
             now, began = time.monotonic(), self._began
-            if began is not None and now - self._said > max(self._pause, SHARE * (now - began)):
+            if began is not None and now - self._said > max(self._pause, (now - began) / 60):
                 self._said = now
-                self._say(f"  {self._progress(now, began)}")
-
-    def _progress(self, now: float, began: float) -> str:
-        stage = self._stage and f"{self._stage}, "
-        if not TELLING <= self._fraction < ALL:
-            return f"{stage}{_rounded(now - began)} so far"
-        left = (self._advanced - self._stage_began) * (1 / self._fraction - 1) - (now - self._advanced)
-        told = f", {_rounded(left)} left" if left > 0 else ""  # a part that takes longer than its share tells no time
-        return f"{stage}{self._fraction:.0%}{told}"
-
-
-def _rounded(seconds: float) -> str:
-    if seconds < 300:
-        return f"{seconds:.0f} s"
-    return f"{seconds / 60:.0f} min" if seconds < 7200 else f"{seconds / 3600:.1f} h"
+                # The last of a hundred parts may take long: 100 % would look like the end.
+                known = 0.01 <= self._fraction < 0.995
+                share = f"{self._fraction:.0%}" if known else f"{now - began:.0f} s so far"
+                self._say(f"  {', '.join(filter(None, (self._stage, share)))}")
 
 
 LOG = logging.getLogger("spinlev")
