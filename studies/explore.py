@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 from ..geometry.common import ComputationError, SpinlevError
 from ..geometry.scene.contents import Scene
-from .levitation import SceneLike, given_scene
+from .scene_tables import SceneLike, given_scene
 
 if TYPE_CHECKING:
     from .page.server import Pages

@@ -13,8 +13,9 @@ from ..geometry.scene.files import scene_text
 from ..geometry.solids import moved
 from .cli.console import heard, note
 from .cli.options import FieldModel, Models
-from .levitation import Levitation, SceneLike
+from .levitation import Levitation
 from .result import AXIS, variable
+from .scene_tables import SceneLike
 
 COARSE = 12
 """Degree of the rule whose difference from the full one is told as an error."""

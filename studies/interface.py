@@ -33,10 +33,11 @@ from .cli.options import (
     positive,
 )
 from .demagnetising import working_point_dataset
-from .levitation import Levitation, SceneLike, given_scene
+from .levitation import Levitation
 from .processes import mapped
 from .question import Question
 from .result import AXIS, Result, found_dataset, state_columns, variable
+from .scene_tables import SceneLike, given_scene
 from .starts import drawn_starts, given_starts
 from .study import Point, Study
 from .sweep import forget, swept

@@ -1,99 +1,45 @@
-"""One scene, led along: rotor's table, equilibria, plate around the place, equilibria with it, flight."""
+"""One scene, led along: equilibria, the plate around the place, equilibria with it, and the flight that it follows."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
-from functools import cached_property, partial
-from pathlib import Path
-from time import perf_counter
-from typing import Any, TypeVar, cast
+from functools import cached_property
+from typing import Any
 
 import numpy as np
 
 from ..dynamics.equilibria.equilibrium import Equilibrium, EquilibriumError, Survey
-from ..dynamics.equilibria.search import FixedPoints, cached_points, free_of_bodies, survey, with_plate
+from ..dynamics.equilibria.search import free_of_bodies, with_plate
 from ..dynamics.flights.checkpoint import Checkpoint
 from ..dynamics.flights.flight import simulate
 from ..dynamics.flights.live import LiveFlight
-from ..dynamics.flights.start import initial_state, most_like_levitation, starting_point
+from ..dynamics.flights.start import initial_state, starting_point
 from ..dynamics.flights.trajectory import FlightStopped, Trajectory
-from ..dynamics.motion.effect import Interaction, interaction_of
-from ..dynamics.motion.effects import BESIDE_METAL, WITHOUT_METAL, with_effects
-from ..dynamics.motion.equations import FORCE_ALONE
 from ..dynamics.motion.events import plate_depth
-from ..dynamics.motion.mutual import Mutual
 from ..dynamics.motion.plate import PlateMemory
-from ..dynamics.motion.rates import Rates
-from ..dynamics.motion.rotor_losses import RotorCurrents
-from ..fem.maps_of_B.table import GriddedTable, map_table
-from ..fem.mutual.making import cached_mutual_table, mutual_key
-from ..fem.mutual.table import MutualTable
 from ..fem.plate.choice import plate_around, rotor_nearby, wider_region
 from ..fem.plate.slab import cached_edge_error, edge_error
 from ..fem.plate.table import PlateTable, Region, RotorShare
-from ..fem.rotor.choice import cached_rotor_table, rotor_table
 from ..fem.rotor.models import AccuracyError
-from ..fem.rotor.table import FieldTable, RotorTable
-from ..fem.rotor_metal import Pieces, RotorLosses, cached_rotor_losses, check_metal, losses_key, pieces_of
-from ..geometry.common import Array, InputError, SpinlevError, Watch, shown, unwatched
+from ..fem.rotor.table import RotorTable
+from ..geometry.common import Array, SpinlevError, Watch
 from ..geometry.scene.contents import AbsoluteStart, Plate, Scene
-from ..geometry.scene.files import check_files, load_scene
-from .cli.console import detail, note, progress, stages
-from .cli.options import FieldModel, Models, finite, positive
+from .cli.console import detail, note, progress
+from .cli.options import Models, positive
 from .plan import (
     RotorField,
     check_room,
-    check_way,
-    equations_key,
     far_plan,
-    field_key,
-    field_plan,
     looser,
-    mutual_plan,
-    nearest_faces,
     plate_plan,
 )
+from .scene_tables import SceneLike, SceneTables, SharedTables, sources
 
 AHEAD = 1.0
 """Of a flight, s, that is looked at beforehand."""
 PLACES = 50
 """On a flight's way, at which the error by a slab's missing edges is looked at."""
-UP = np.array([0.0, 0.0, 1.0])
-Made = TypeVar("Made")
-SceneLike = Scene | str | Path
-"""A scene, or the path of its file."""
-
-
-class SharedTables:
-    """Tables and equations for any number of scenes to share; a scene finds those that were made for what it needs."""
-
-    def __init__(self) -> None:
-        self.from_cache: list[str] = []
-        """Names of the tables that were found in the user's cache."""
-        self._known: dict[str, Any] = {}
-
-    def once(self, key: str, make: Callable[[], Made]) -> Made:
-        """What was made under this key for any of the scenes, or else made now."""
-        if key not in self._known:
-            self._known[key] = make()
-        made: Made = self._known[key]
-        return made
-
-    def table(self, key: str, name: str, title: str, make: Callable[[Watch], tuple[Made, bool]]) -> Made:
-        """The same of a table from the cache, told with its title; `make` also says whether it was there."""
-
-        def told() -> Made:
-            note(f"{title} ...")
-            begun = perf_counter()
-            with stages(title) as watch:
-                made, found = make(watch)
-            note("  from the cache." if found else f"  done in {perf_counter() - begun:.1f} s.")
-            if found and name not in self.from_cache:
-                self.from_cache.append(name)
-            return made
-
-        return self.once(key, told)
 
 
 def plate_memory(
@@ -126,7 +72,7 @@ def plate_memory(
     return PlateMemory(asked.plate, made, share, model, edges)
 
 
-class Levitation:
+class Levitation(SceneTables):
     """What one scene does, by the models that are asked for.
 
     Every member is computed when it is first used and then kept: the rotor's `table`, the `survey` of all equilibria,
@@ -145,17 +91,13 @@ class Levitation:
     """
 
     def __init__(self, scene: SceneLike, models: Models = Models(), spin: float = 0.0) -> None:
-        self.scene = given_scene(scene)
-        self.models = models.checked()
-        self.spin = finite("spin", spin)
-        self.searched = True
-        """Whether the equilibria were searched for; else they were carried here from scenes nearby."""
+        super().__init__(scene, models, spin)
+        self.wider: PlateMemory | None = None
+        """The plate's currents for all of a flight's way, where it left the range of `plate`."""
         self.no_wider = ""
-        """Why the plate's table could not be made for where a flight went, if so."""
-        self._tables = SharedTables()
-        self._flown: dict[float, Trajectory] = {}
-        self._wider: PlateMemory | None = None  # the plate's currents for all of a flight's way
+        """Why they could not be known, if so."""
         self._nearest: Array | None = None  # to the plate, of a flight that had begun without its currents
+        self._flown: dict[float, Trajectory] = {}
         self._ahead = 0.0  # duration of the flight that is asked for, s
 
     # Sharing with other scenes
@@ -178,97 +120,6 @@ class Levitation:
         """Take over a flight of this duration (s) that was flown together with others."""
         self._flown[duration] = flown
 
-    # The rotor's field and what else acts
-
-    @cached_property
-    def table(self) -> RotorField:
-        """The rotor's field by the model that was asked for; `auto` chooses and says why."""
-        return self.field(self.models.model)
-
-    def field(self, model: str) -> RotorField:
-        """The rotor's field by any model, accurate wherever the floater can be: from its radius off the magnets on.
-
-        Raises
-        ------
-        InputError : the map cannot be used
-        """
-        scene, rtol, nearest = self.scene, self.models.rtol, nearest_faces(self.scene.floater)
-        key = partial(field_key, scene, rtol=rtol)
-        name, reason = self._tables.once(f"model {key(model)}", lambda: field_plan(scene, model, rtol))
-        if model == "auto":
-            detail(f"Field model: {name} ({reason})")
-        if name == "fem":
-            make = partial(cached_rotor_table, scene.rotor, name, rtol, note, nearest)
-            return self._tables.table(key(name), name, "Rotor's field by finite elements", make)
-        if name == "map":
-            return self._tables.once(key(name), lambda: _map(scene))
-        return self._tables.once(key(name), lambda: rotor_table(scene.rotor, name, rtol, nearest))
-
-    @cached_property
-    def answers(self) -> tuple[MutualTable | None, str]:
-        """What rotor and floater do to each other's magnetisation, or None; and why."""
-        scene = self.scene
-        known, why = mutual_plan(scene, self.table, self.models)
-        if not known:
-            return None, why
-        title, make = (
-            "Mutual magnetisation of rotor and floater",
-            partial(cached_mutual_table, scene.rotor, scene.floater),
-        )
-        return self._tables.table(mutual_key(scene.rotor, scene.floater), "mutual", title, partial(make, note)), why
-
-    def _metal(self) -> Pieces:
-        """The rotor's pieces of metal, once they and the floater are found fit for a table of losses."""
-        scene, pieces = self.scene, pieces_of(self.scene.rotor, self.scene.conductors)
-        if pieces:
-            scene.floater.must_be("sphere", where=BESIDE_METAL, instead=WITHOUT_METAL)
-            check_metal(pieces, scene.frequency, scene.floater.radius)
-        return pieces
-
-    @cached_property
-    def losses(self) -> RotorLosses | None:
-        """The losses in the rotor's metal, or None where none has a conductivity.
-
-        Raises
-        ------
-        InputError : the rotor turns too fast for its metal, or the floater is no sphere
-        """
-        scene = self.scene
-        if not self._metal():
-            return None
-        make = partial(cached_rotor_losses, scene, note)
-        return self._tables.table(losses_key(scene), "rotor losses", "Currents in the rotor's metal", make)
-
-    @cached_property
-    def interaction(self) -> Interaction:
-        """The rotor's field with what else acts on the floater.
-
-        Raises
-        ------
-        InputError : mutual magnetisation is asked for where it cannot be known, or the floater is a cuboid
-        """
-        self.scene.floater.must_be("sphere", "cylinder", where="where it moves", instead=FORCE_ALONE)
-        self._metal()  # refused before the field's table is made, which takes minutes
-        return self._with_effects(self.table)
-
-    def _with_effects(self, table: RotorField) -> Interaction:
-        answers, effects = self.answers[0], interaction_of(table)
-        if answers is not None:
-            effects = effects.joined(Mutual(answers, self.scene.floater.moment))
-        if self.losses is not None:
-            effects = effects.joined(RotorCurrents(self.losses))
-        return with_effects(self.scene, effects)
-
-    @cached_property
-    def equations_key(self) -> str:
-        """All that decides tables and equations; scenes where it is the same differ in parameters of the motion."""
-        return equations_key(self.scene, self.models)
-
-    @property
-    def rates(self) -> Rates:
-        """The equations of motion in the rotor's field, compiled."""
-        return self._tables.once(f"rates {self.equations_key}", lambda: Rates(self.interaction))
-
     # What a result says of its models
 
     @property
@@ -286,46 +137,6 @@ class Levitation:
         """What a result says of its models."""
         plate = self.plate.model if self.plate else "none"
         return {"model": self.table.model, "plate_model": plate, "interaction": self.interaction_model}
-
-    # Equilibria
-
-    @cached_property
-    def without_plate(self) -> Survey:
-        """All equilibria as if there were no plate.
-
-        Raises
-        ------
-        EquilibriumError : the rotor is at rest
-        InputError : a conductor is in the floater's way, or the rotor turns too fast for its metal
-        """
-        interaction = self.interaction
-        note("Equilibria ...")
-        with stages("Equilibria") as watch:
-            watch("compiling the equations of motion", 0.0)
-            found = self._searched(interaction, self.equations_key, watch, self.rates)
-        place = most_like_levitation(found.equilibria)
-        if place is not None:
-            check_way(self.scene, place.position)
-        return found
-
-    def survey_in(self, model: str) -> Survey:
-        """All equilibria in the rotor's field alone by a model: without plate and without all that it brings about."""
-        models = replace(self.models, model=cast(FieldModel, model), interaction="rigid")
-        key = equations_key(self.scene, models)
-        return self._searched(self.field(model), f"alone {key}", unwatched)
-
-    def _searched(self, table: FieldTable, equations: str, watch: Watch, rates: Rates | None = None) -> Survey:
-        """All equilibria in a table, from the cache if they were searched for before."""
-
-        def remembered(search: Callable[[], FixedPoints]) -> FixedPoints:
-            if self.scene.field_map:  # no number in a key stands for how a map is fitted
-                return search()
-            found, known = cached_points(self.scene, equations, self.spin, search, note)
-            if known:
-                detail("  from the cache.")
-            return found
-
-        return survey(self.scene, table, self.spin, rates=rates, remembered=remembered, watch=watch)
 
     @cached_property
     def survey(self) -> Survey:
@@ -400,10 +211,10 @@ class Levitation:
             raise KeyboardInterrupt from None  # it is not the flight that was asked for
         except SpinlevError:
             return None  # the plate is no slab for it
-        found = slab._wider
+        found = slab.wider
         if found is None:
             return None
-        way = _seen(found.plate, flown)[:: _stride(flown)]
+        way = _seen(found.plate, flown, PLACES)
         worst = way[int(np.argmax([edge_error(found.plate, place) for place in way]))]
         rotor = np.mean([magnet.box.center for magnet in self.scene.rotor], axis=0)
         edges = cached_edge_error(found.plate, np.array([worst, rotor]), self.scene.frequency, note)
@@ -432,13 +243,13 @@ class Levitation:
     @property
     def flight_plate(self) -> PlateMemory | None:
         """The plate's currents as a flight has them: by a table for all of its way, where that about its place ends."""
-        return self._wider or self.plate
+        return self.wider or self.plate
 
     @property
     def flight_table(self) -> RotorField:
         """The rotor's field for the motion: beside a plate, whose own table reaches no farther, with fewer terms."""
         table = self.table
-        if self._wider or self.plate is None or not isinstance(table, RotorTable):
+        if self.wider or self.plate is None or not isinstance(table, RotorTable):
             return table
         place, scene = self._flight_place, self.scene
         return (
@@ -450,9 +261,9 @@ class Levitation:
         """The equilibria at which a flight may begin, with the currents of its own table."""
         if self.absolute:
             return ()
-        if self._wider is None:
+        if self.wider is None:
             return self.equilibria
-        return with_plate(self.scene, self.interaction, self.without_plate, self._wider, self.rates).equilibria
+        return with_plate(self.scene, self.interaction, self.without_plate, self.wider, self.rates).equilibria
 
     def flight(self, duration: float, checkpoint: Checkpoint | None = None) -> Trajectory:
         """The motion for `duration` (s) from where the scene says, kept in `checkpoint` while it lasts.
@@ -489,11 +300,11 @@ class Levitation:
                 break
             if checkpoint:
                 checkpoint.remove()
-        memory, place = self._wider, self._flight_place
+        memory, place = self.wider, self._flight_place
         if memory is not None and place is not None and memory.neglected:  # a slab's missing edges, for where it went
-            there = max(edge_error(memory.plate, seen) for seen in _seen(memory.plate, flown)[:: _stride(flown)])
+            there = max(edge_error(memory.plate, seen) for seen in _seen(memory.plate, flown, PLACES))
             there /= edge_error(memory.plate, place)
-            self._wider = replace(memory, neglected=min(1.0, memory.neglected * max(1.0, there)))
+            self.wider = replace(memory, neglected=min(1.0, memory.neglected * max(1.0, there)))
         return flown
 
     def live_flight(self) -> LiveFlight:
@@ -509,7 +320,8 @@ class Levitation:
         """Whether there is now a plate's table for a floater that left the last one at a place (3,) m at a time, s."""
         memory = self.flight_plate
         assert memory is not None
-        body = memory.plate.box.to_body(place + plate_depth(memory.plate, np.array([time])) * UP)
+        up = np.array([0.0, 0.0, 1.0])
+        body = memory.plate.box.to_body(place + plate_depth(memory.plate, np.array([time])) * up)
         try:
             region = wider_region(memory.plate, memory.table.region, self.scene.floater.radius, body)
             note(
@@ -541,39 +353,16 @@ class Levitation:
         assert known is not None
         assert place is not None
         try:
-            self._wider = self._plate_memory(place, known.model, rtol, known.neglected, region)
+            self.wider = self._plate_memory(place, known.model, rtol, known.neglected, region)
         except AccuracyError:
-            self._wider = self._plate_memory(place, known.model, looser(rtol), known.neglected, region)
+            self.wider = self._plate_memory(place, known.model, looser(rtol), known.neglected, region)
 
 
-def given_scene(scene: SceneLike) -> Scene:
-    """A scene as it is, or from the path of its file. Raises SceneError, and InputError for anything else."""
-    if isinstance(scene, Scene):
-        return scene
-    if isinstance(scene, str | Path):
-        return load_scene(scene)
-    raise InputError(f"Input scene must be a Scene or the path of a scene file; instead received {shown(scene)}.")
-
-
-def sources(table: RotorField) -> RotorTable:
-    """The closed forms and expansions that make a table's field."""
-    return table.expansions if isinstance(table, GriddedTable) else table
-
-
-def _map(scene: Scene) -> GriddedTable:
-    note("Rotor's field from its map ...")
-    table = map_table(scene.field_map, scene.rotor, scene.map_reading)
-    check_files(scene)  # the map may have been replaced since the scene was read
-    return table
-
-
-def _seen(plate: Plate, flown: Trajectory) -> Array:
-    """Places (n, 3) m of a flight as the plate at its start would see them: it may be lowered."""
-    return np.asarray(flown.lab.position + plate_depth(plate, flown.time)[:, None] * UP)
-
-
-def _stride(flown: Trajectory) -> int:
-    return max(1, len(flown.time) // PLACES)
+def _seen(plate: Plate, flown: Trajectory, most: int | None = None) -> Array:
+    """Places (n, 3) m of a trajectory, `most` or some more, as the plate at its start would see them."""
+    height = plate_depth(plate, flown.time)  # the plate may be lowered
+    places = flown.lab.position + np.column_stack([np.zeros((len(height), 2)), height])
+    return np.asarray(places[:: max(1, len(places) // most) if most else 1])
 
 
 def _first(known: Sequence[Equilibrium]) -> Equilibrium | None:

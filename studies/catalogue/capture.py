@@ -29,8 +29,8 @@ from ...geometry.common import Array
 from ...geometry.scene.contents import Lowering, Plate, Scene
 from ...geometry.shapes import Box
 from ..figures.style import PAGE, PALETTE, legend_below, panels, styled
-from ..levitation import sources
 from ..result import Columns, columns
+from ..scene_tables import sources
 from ..study import Point, Study, cases_with, one_case
 from .article import (
     CONFIGURATIONS,

@@ -10,8 +10,8 @@ from matplotlib.ticker import ScalarFormatter
 
 from ...geometry.common import Array
 from ..figures.style import DASHES, NAMES, PALETTE, legend_below, styled
-from ..levitation import sources
 from ..result import Columns, columns, variable
+from ..scene_tables import sources
 from ..study import Point, Study, cases_with, one_case
 from .article import CONFIGURATIONS, article_scene, field, label_of, levitation_of
 from .drawing import by_configuration, configuration_panels, explain, text_table

@@ -11,8 +11,9 @@ from numpy.typing import ArrayLike
 
 from ...geometry.common import Array
 from ..figures.style import PAGE, PALETTE, legend_below, panels, styled
-from ..levitation import Levitation, sources
+from ..levitation import Levitation
 from ..result import Columns, columns, variable
+from ..scene_tables import sources
 from ..study import Point, Study, case_with, one_case
 from .article import CONTACT, FLOATER, WEIGHT, article_scene, force, levitation_of, polar_angle
 from .drawing import explain, text_table

@@ -9,8 +9,8 @@ from ...dynamics.continuation.frequencies import kicked, levitating_branch
 from ...dynamics.flights.flight import simulate
 from ...geometry.common import Array
 from ..figures.style import PAGE, PALETTE, legend_below, panels, styled
-from ..levitation import sources
 from ..result import Columns, columns, variable
+from ..scene_tables import sources
 from ..study import Point, Study, case_with, cases_with, one_case
 from .article import (
     CONFIGURATIONS,
