@@ -189,7 +189,8 @@ def computed(by: Workers, study: Study, points: Sequence[Point], missing: Set[in
     """
     numbered = dict(enumerate(points))
     grouped = study.batches(numbered) if study.batches else [[k] for k in numbered]
-    batches = deque({k: points[k] for k in batch} for batch in grouped if not missing.isdisjoint(batch))
+    wanted = [batch for batch in grouped if not missing.isdisjoint(batch)]
+    batches: deque[Batch] = deque({k: points[k] for k in batch} for batch in wanted)
     job = partial(attempts, study.compute, study.prepared, missing)
     number = min(by.workers or os.cpu_count() or 1, len(batches))
     if batches and by.scheduler is not None:
