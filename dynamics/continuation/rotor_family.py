@@ -23,7 +23,7 @@ from ...geometry.magnets import Magnet
 from ...geometry.scene.contents import Scene
 from ...geometry.shapes import rotation_matrix
 from ...geometry.solids import moved
-from ..motion.effect import Added, Effect, Interaction, Motion, Placeable, Placed
+from ..motion.effect import Added, Effect, Interaction, Motion, Placeable
 from ..motion.effects import mutual_choice, with_effects
 from ..motion.equations import parameters
 from ..motion.floater_currents import check_floater_metal
@@ -100,9 +100,9 @@ class MovableField:
 
 @dataclass(frozen=True, eq=False)
 class MovedEffect:
-    """An effect that `Rates` has as a `Placed` one."""
+    """An effect of a part of the rotor that moves with the measure."""
 
-    effect: Effect  # of the part where it is at measure zero
+    effect: Placeable  # of the part where it is at measure zero
     move: Move  # how the part moves
     alone: FieldTable  # field of the part at measure zero
     name: str  # in results
@@ -118,15 +118,9 @@ class MovedEffect:
         vectors = ("force", "torque", "pulled", "turning")
         return replace(found, **{name: move.back(getattr(found, name), measure) for name in vectors})
 
-    def placed(self, first: int) -> "_MovedAtPlace":
-        """The same about one pose."""
-        assert isinstance(self.effect, Placeable)
-        return _MovedAtPlace(self.effect.placed(first), self.move, self.alone, self.name)
-
-
-@dataclass(frozen=True, eq=False)
-class _MovedAtPlace(MovedEffect):
-    effect: Placed
+    def placed(self, first: int) -> "MovedEffect":
+        """See `Placeable`."""
+        return replace(self, effect=self.effect.placed(first))
 
     @property
     def count(self) -> int:

@@ -17,7 +17,7 @@ from ...fem.harmonics.local import BallField
 from ...fem.rotor.table import FieldTable, RangeError
 from ...geometry.common import Array
 from ...geometry.scene.contents import Scene
-from ..motion.effect import Effect, Fittable, InBall, Interaction, interaction_of
+from ..motion.effect import Effect, Fittable, Interaction, interaction_of
 from ..motion.events import clearance, rotor_gap
 from ..motion.state import Parameter, Vector, turned_about_z
 
@@ -153,9 +153,9 @@ class Balls:
         )
 
 
-def _fitted(whole: Interaction, formula: BallField) -> list[InBall]:
+def _fitted(whole: Interaction, formula: BallField) -> list[Fittable]:
     """Those of the effects in a ball that have numbers of their own."""
-    return [effect for effect in in_ball(whole, formula).effects if isinstance(effect, InBall)]
+    return [effect for effect in in_ball(whole, formula).effects if isinstance(effect, Fittable)]
 
 
 def _room(scene: Scene, center: Array, reach: float) -> float:

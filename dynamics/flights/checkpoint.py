@@ -3,8 +3,6 @@
 import hashlib
 import io
 import os
-import zipfile
-import zlib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,14 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from ...fem.files import write_whole
+from ...fem.files import seal, unsealed, write_whole
 from ...geometry.common import InputError
-from ...geometry.files import regular_file
-
-KEPT = ("time", "state", "values", "times", "states", "interval", "steps", "changes", "region")
-MOST = 2_000_000_000  # Bytes of a checkpoint
-# What damage to a file of arrays is noticed by; its header may say any size.
-BROKEN = (OSError, ValueError, KeyError, TypeError, EOFError, RuntimeError, MemoryError, zipfile.BadZipFile, zlib.error)
 
 
 @dataclass(frozen=True)
@@ -38,7 +30,7 @@ class Checkpoint:
         """Keep arrays by name; the file is whole or as it was."""
         stream = io.BytesIO()
         np.savez(stream, allow_pickle=False, key=np.array(self._key), **content)
-        write_whole(self.path, stream.getvalue())
+        write_whole(self.path, seal(stream.getvalue()))
 
     def read(self) -> dict[str, Any] | None:
         """Arrays by name, with the `region` (2, 3) m of the plate's table (zeros: none), or None without a file.
@@ -49,15 +41,12 @@ class Checkpoint:
         """
         if not os.path.lexists(self.path):
             return None
-        try:
-            with regular_file(self.path, MOST, "checkpoint", "a regular file") as stream, np.load(stream) as data:
-                content = {name: data[name] for name in ("key", *KEPT)}
-            key = str(content.pop("key"))
-        except InputError:
-            raise
-        except BROKEN as error:
-            raise InputError(f"Input {self.path} must be a checkpoint; instead it is damaged: delete it.") from error
-        if key != self._key:
+        whole = unsealed(self.path)  # so that no library meets a damaged archive
+        if whole is None:
+            raise InputError(f"Input {self.path} must be a checkpoint; instead it is damaged: delete it.")
+        with np.load(io.BytesIO(whole)) as data:
+            content = dict(data)
+        if str(content.pop("key")) != self._key:
             raise InputError(
                 f"Input {self.path} must be a checkpoint of this flight; instead it was kept by another scene, model, "
                 "duration or version: delete it, choose another --out, or leave out --resume."

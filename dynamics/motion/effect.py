@@ -61,43 +61,30 @@ class Effect(Protocol):
         """Its part of the equations of motion; it may use every runtime `Parameter`."""
 
 
-class Placed(Effect, Protocol):
-    """An effect with numbers of its own among the runtime parameters; it and its first derivatives hold at one pose."""
-
-    @property
-    def count(self) -> int:
-        """Of the numbers."""
-
-    def numbers(self, field: FieldTable, position: Array, moment: Array, values: Array) -> Array:
-        """(n, count) for scaled positions and moments (n, 3) in a field, and runtime parameters (n, p)."""
-
-
 @runtime_checkable
 class Placeable(Effect, Protocol):
-    """An effect whose expressions are so long that `Rates` has it as a `Placed` one."""
-
-    def placed(self, first: int) -> Placed:
-        """The same with numbers from the runtime parameter `first` on."""
-
-
-@runtime_checkable
-class InBall(Effect, Protocol):
-    """An effect with numbers of its own among the runtime parameters, which hold in a ball of a flight."""
+    """An effect of so long expressions that `Rates` has it at one pose, by numbers among the runtime parameters."""
 
     @property
     def count(self) -> int:
-        """Of the numbers."""
+        """Of its numbers."""
+
+    def placed(self, first: int) -> Placeable:
+        """The same with numbers from runtime parameter `first` on; it and its first derivatives hold at one pose."""
+
+    def numbers(self, field: FieldTable, position: Array, moment: Array, values: Array) -> Array:
+        """(n, count) for scaled positions and moments (n, 3) in a field, and runtime parameters `values` (n, p)."""
+
+
+@runtime_checkable
+class Fittable(Placeable, Protocol):
+    """One that flights have in balls."""
+
+    def in_ball(self, ball: BallField, first: int) -> Fittable:
+        """The same with numbers from the runtime parameter `first` on, in a ball that other parameters tell."""
 
     def fit(self, ball: Ball, gradient: Array) -> tuple[Array, float]:
         """The numbers (count,) in a ball, where the rotor's gradient is ∇B0 (3, 3) T/m; the error by that allowed."""
-
-
-@runtime_checkable
-class Fittable(Effect, Protocol):
-    """An effect whose expressions are so long that flights have it as an `InBall` one."""
-
-    def in_ball(self, ball: BallField, first: int) -> InBall:
-        """The same with numbers from the runtime parameter `first` on, in a ball that other parameters tell."""
 
 
 @runtime_checkable
@@ -109,7 +96,7 @@ class Unsure(Effect, Protocol):
 
 
 def dissipative(force: Vector, torque: Vector, motion: Motion) -> Added:
-    """An effect that stores no energy, from its accelerations: its power is what they do to drift and lag."""
+    """An effect without energy, from its accelerations `force` and `torque`: its power is what they do in `motion`."""
     work = [f * v for f, v in zip(force, motion.drift, strict=True)]
     turning = [t * w for t, w in zip(torque, motion.lag, strict=True)]
     return Added(force, torque, power=hy.sum(work) + hy.par[Parameter.INERTIA] * hy.sum(turning))

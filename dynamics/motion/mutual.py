@@ -112,7 +112,7 @@ class Mutual:
         return self.table.energy(place, [strength * m for m in moment], [share * b for b in field], share)
 
     def numbers(self, field: FieldTable, position: Array, moment: Array, values: Array) -> Array:
-        """See `Placed`."""
+        """See `Placeable`."""
         length, strength, share = values[:, WHICH].T[:, :, None]
         place = position * length
         try:
@@ -130,7 +130,7 @@ class Mutual:
         return np.concatenate([position, whole, energy[:, None], slope[:, :3], quadratic, linear, constant], axis=1)
 
     def fit(self, ball: Ball, gradient: Array) -> tuple[Array, float]:
-        """See `InBall`; what is missed of the energy is taken to change as fast as a cubic."""
+        """See `Fittable`; what is missed of the energy is taken to change as fast as a cubic."""
         places = ball.center + ball.radius * nodes()
         values, slope, second = self.table.derivatives(places, np.zeros_like(places))
         parts = np.array([values, *slope[:, 3:].T, *(second[:, 3 + a, 3 + b] for a, b in PAIRS)])

@@ -16,7 +16,7 @@ from ...fem.compiled_code import RuntimeNumbers, compiled_later, one_thread
 from ...fem.harmonics.expressions import FieldExpressions
 from ...fem.rotor.table import FieldFormula, FieldTable, RotorTable
 from ...geometry.common import Array
-from .effect import Effect, Interaction, Placeable, Placed, interaction_of
+from .effect import Effect, Interaction, Placeable, interaction_of
 from .equations import Equations, balances, equations_of_motion
 from .state import Parameter
 
@@ -33,7 +33,7 @@ class Rates:
     def __init__(self, table: FieldFormula, optimised: bool = False) -> None:
         whole = interaction_of(table)
         self._field, self._rough = whole.field, False
-        self._placed: list[Placed] = []
+        self._placed: list[Placeable] = []
         effects: list[Effect] = []
         for effect in whole.effects:
             if isinstance(effect, Placeable):

@@ -97,11 +97,11 @@ class RotorCurrents:
         return [dotted([known[min(a, b), max(a, b)] for b in range(NUMBERS)], rates) for a in range(NUMBERS)]
 
     def numbers(self, field: FieldTable, position: Array, moment: Array, values: Array) -> Array:
-        """See `Placed`."""
+        """See `Placeable`."""
         return self._entries(position * values[:, Parameter.LENGTH, None]).T
 
     def fit(self, ball: Ball, gradient: Array) -> tuple[Array, float]:
-        """See `InBall`."""
+        """See `Fittable`."""
         parts = self._entries(ball.center + ball.radius * nodes())
         lengths = np.repeat([UNIT, 1.0], (5, 3))
         units = np.array([lengths[a] * lengths[b] for a, b in ENTRIES])
