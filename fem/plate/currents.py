@@ -222,38 +222,29 @@ class ClassBasis:
         inductance = potentials @ fields.T
         return ClassBasis(fields, potentials, (inductance + inductance.T) / 2)
 
-    def response(self, couplings: Array, angular_frequency: float) -> ComplexArray:
-        """Amplitudes (sources, n) of the fields that sources with `couplings` (sources, n) drive."""
-        matrix = np.eye(len(self.fields)) + 1j * angular_frequency * self.inductance
-        return np.asarray(np.linalg.solve(matrix, couplings.T.astype(complex)).T)
-
 
 class Residuals:
-    """What a basis leaves of gradient-free sources (m, width), by products of all rows involved.
-
-    Attributes
-    ----------
-    couplings : (m, n) of the sources
-    """
+    """What a basis leaves of gradient-free sources (m, width), by products of all rows involved."""
 
     def __init__(self, sources: Array, basis: ClassBasis) -> None:
-        self.basis, self._rows = basis, np.concatenate([sources, basis.fields, basis.potentials])
-        self._products = self._rows @ self._rows.T
+        self._rows, self._inductance = np.concatenate([sources, basis.fields, basis.potentials]), basis.inductance
+        self._products = self._rows @ self._rows.T  # residuals are sums of few rows, of which only products are needed
         self.couplings = self._products[: len(sources), len(sources) : len(sources) + len(basis.fields)]
+
+    def amplitudes(self, angular_frequency: float) -> ComplexArray:
+        """(m, n) of the fields that the sources drive."""
+        matrix = np.eye(len(self._inductance)) + 1j * angular_frequency * self._inductance
+        return np.asarray(np.linalg.solve(matrix, self.couplings.T.astype(complex)).T)
 
     def _combinations(self, angular_frequency: float) -> ComplexArray:
         """(m, rows) factors that make the residuals out of the rows."""
-        amplitudes = self.basis.response(self.couplings, angular_frequency)
+        amplitudes = self.amplitudes(angular_frequency)
         return np.concatenate([np.eye(len(amplitudes)), -amplitudes, -1j * angular_frequency * amplitudes], axis=1)
 
     def gram(self, angular_frequency: float) -> ComplexArray:
         """(m, m) products of the residuals."""
         factors = self._combinations(angular_frequency)
         return np.asarray(factors @ self._products @ factors.conj().T)
-
-    def driven(self, angular_frequency: float) -> Array:
-        """Re ∫ σ A_s·e dV of every source: what its coupling with itself is made of."""
-        return np.asarray(np.sum(self.couplings * self.basis.response(self.couplings, angular_frequency).real, axis=1))
 
     def largest(self, angular_frequencies: Array, scales: Array, allowed: float) -> Array:
         """Rows (k, width): principal components of all residuals times `scales` (frequencies, m), but for a tail."""
@@ -273,6 +264,7 @@ def class_basis(
     ----------
     sources : (m, width) without gradients, of about unit power each
     solve : fields e and their potentials T e for rows, at the shift
+    angular_frequencies : at which residuals are looked at, rad/s
     """
     energies, vectors = np.linalg.eigh(sources @ sources.T)
     kept = np.cumsum(np.maximum(energies, 0.0)) > MODE_SHARE * allowed
@@ -285,7 +277,9 @@ def class_basis(
             break
         basis = basis.extended(*solve(starts))
         left = Residuals(modes, basis)
-        shares = np.array([left.driven(w) @ strengths**2 for w in angular_frequencies]) / np.sum(strengths**2)
+        # Re ∫ σ A_s·e dV of every source: what its coupling with itself is made of
+        driven = [np.sum(left.couplings * left.amplitudes(w).real, axis=1) for w in angular_frequencies]
+        shares = np.array(driven) @ strengths**2 / np.sum(strengths**2)
         grams = [left.gram(w).real / share for w, share in zip(angular_frequencies, shares, strict=True)]
         if max(float(np.max(np.sum(mixture @ gram * mixture, axis=1))) for gram in grams) <= allowed:
             break
@@ -293,27 +287,20 @@ def class_basis(
     return basis
 
 
-@dataclass(frozen=True, eq=False)
-class Missing:
-    """What a space misses of some sources, at angular frequencies (rad/s)."""
+def worst_error(angular_frequencies: Array, residuals: ComplexArray, couplings: ComplexArray, places: int) -> float:
+    """Largest relative error of a dipole's own tensor, and of another source's field at the dipoles' places.
 
-    angular_frequencies: Array  # (k,)
-    # (k, sources, sources) products of the residuals ρ, whose norms are bounds of the errors of fields
-    residuals: ComplexArray
-    couplings: ComplexArray  # (k, sources, sources)
-    places: int  # of the dipoles among the sources; they come first
-
-    @property
-    def worst(self) -> float:
-        """Largest relative error of a dipole's own tensor, and of another source's field at the places."""
-        n, omega = self.places, self.angular_frequencies[:, None]
-        tensors = np.einsum("kiaib->kiab", self.couplings[:, : 3 * n, : 3 * n].reshape(-1, n, 3, n, 3))
-        sizes = np.einsum("kii->ki", self.residuals).real
-        powers = sizes[:, : 3 * n].reshape(-1, n, 3)
-        own = omega * powers.sum(axis=2) / np.linalg.norm(tensors, axis=(2, 3))
-        products = np.sqrt(sizes[:, 3 * n :] * powers.sum(axis=(1, 2))[:, None])
-        others = omega * products / np.linalg.norm(self.couplings[:, 3 * n :, : 3 * n], axis=2)
-        return float(max(own.max(), others.max(initial=0.0)))
+    Of sources of which dipoles at so many `places` come first, at `angular_frequencies` (k,) rad/s: from products
+    `residuals` (k, sources, sources), whose norms bound the errors of fields, and `couplings` of the same shape.
+    """
+    n, omega = places, angular_frequencies[:, None]
+    tensors = np.einsum("kiaib->kiab", couplings[:, : 3 * n, : 3 * n].reshape(-1, n, 3, n, 3))
+    sizes = np.einsum("kii->ki", residuals).real
+    powers = sizes[:, : 3 * n].reshape(-1, n, 3)
+    own = omega * powers.sum(axis=2) / np.linalg.norm(tensors, axis=(2, 3))
+    products = np.sqrt(sizes[:, 3 * n :] * powers.sum(axis=(1, 2))[:, None])
+    others = omega * products / np.linalg.norm(couplings[:, 3 * n :, : 3 * n], axis=2)
+    return float(max(own.max(), others.max(initial=0.0)))
 
 
 def train(
@@ -324,11 +311,14 @@ def train(
     frequencies: tuple[float, float],
     allowed: float,
     watch: Watch = unwatched,
-) -> tuple[CurrentSpace, Missing]:
+) -> tuple[CurrentSpace, float, Array, ComplexArray]:
     """Currents of the sources at all frequencies (Hz) between the two, and what is missing of the probes.
+
+    That is the `worst_error`, and at angular frequencies (k,) the products of the dipoles' residuals.
 
     Parameters
     ----------
+    space : finite elements
     grid, probes : (n, 3) m, places of the dipoles that are trained and of those that are not
     others : more sources of both kinds
     allowed : |ρ|² of a source relative to what it drives, and thus relative error of its coupling with itself
@@ -359,11 +349,12 @@ def train(
         left = Residuals(testing, basis)
         for k, omega in enumerate(omegas):
             residuals[k] += left.gram(omega)
-            couplings[k] -= 1j * omega * left.couplings @ basis.response(left.couplings, omega).T
+            couplings[k] -= 1j * omega * left.couplings @ left.amplitudes(omega).T
         fields.append(basis.fields)
         inductances.append(basis.inductance)
     made = CurrentSpace(
         space.parity, space.points, space.root, tuple(fields), tuple(inductances),
         space.order, int(space.conductors.mesh.ne),
     )  # fmt: skip
-    return made, Missing(omegas, residuals, couplings, len(probes))
+    dipoles = residuals[:, : 3 * len(probes), : 3 * len(probes)]
+    return made, worst_error(omegas, residuals, couplings, len(probes)), omegas, dipoles

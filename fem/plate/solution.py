@@ -124,7 +124,7 @@ def solve_currents(
     probes = np.concatenate([probe_places(box, fold=True) for box in boxes])
     while True:
         if ladder.expected() <= HOPEFUL * ladder.allowed or ladder.order + 1 == ladder.highest:
-            space, missing = train(ladder.next_space(), grid, probes, others, frequencies, SPACE_SHARE * rtol, watch)
+            space, *missing = train(ladder.next_space(), grid, probes, others, frequencies, SPACE_SHARE * rtol, watch)
             couplings = space_couplings(space.dipole_couplings(corners), space.inductances, 2 * np.pi * frequencies[1])
             ladder.take(couplings)
             if ladder.error <= KEPT * ladder.allowed:
@@ -133,8 +133,7 @@ def solve_currents(
             ladder.climb()
         ladder.refuse()
     return PlateSolution(
-        tuple(boxes), frequencies, space, ladder.error, missing.worst, probes, missing.angular_frequencies,
-        missing.residuals[:, : 3 * len(probes), : 3 * len(probes)], time.perf_counter() - start,
+        tuple(boxes), frequencies, space, ladder.error, missing[0], probes, *missing[1:], time.perf_counter() - start
     )  # fmt: skip
 
 
