@@ -90,11 +90,8 @@ def key_of(name: str, *inputs: Any) -> str:
     """SHA-256 of the inputs of a solver, of its number in `FORMATS`, and of the libraries' versions.
 
     Counted are types, shapes and every bit of dataclasses, arrays, numbers, texts, tuples and mappings; of a path the
-    content of its file. A field of a dataclass that decides nothing has `compare=False`.
-
-    Raises
-    ------
-    TypeError : an input of another type
+    content of its file. A field of a dataclass that decides nothing has `compare=False`. Raises TypeError: an input of
+    another type.
     """
     digest = hashlib.sha256(f"{name} {FORMATS[name]} {libraries()}".encode())
     _count(inputs, digest.update)
@@ -159,9 +156,7 @@ class TableKind(Generic[Table]):
     def load(self, path: str | Path, key: str = "") -> Table:
         """Read a table, with a key only the one that was saved with it.
 
-        Raises
-        ------
-        TableFileError : the file is not of this kind and key, or its content is not what was written
+        Raises TableFileError: the file is not of this kind and key, or its content is not what was written.
         """
         dataset = read_checked(path, self.format)
         if key and dataset.attrs.get("key") != key:
@@ -179,11 +174,7 @@ class TableKind(Generic[Table]):
         A damaged entry, or one that was kept under another key, is reported, computed anew and replaced; a cache that
         cannot be written is reported and does no harm.  While one process makes a table, others that need the same one
         wait for it.  All tables in its folder together keep `cache_limit` and `most`; what was not used for the longest
-        time makes room.
-
-        Raises
-        ------
-        InputError : SPINLEV_CACHE_GB is no positive number
+        time makes room. Raises InputError: SPINLEV_CACHE_GB is no positive number.
         """
         key, limit = self.key(*inputs), min(self.most or 2**63, cache_limit())
         path = cache_folder() / (self.name if self.most else "") / f"{self.name}-{key}.nc"
@@ -219,13 +210,8 @@ def write_checked(dataset: xr.Dataset, path: str | Path) -> None:
 def read_checked(path: str | Path, file_format: str | None = None) -> xr.Dataset:
     """Read a dataset that is as it was written.
 
-    Parameters
-    ----------
-    file_format : that it must have; None for any, and for files that others have written or changed
-
-    Raises
-    ------
-    TableFileError : the file is missing, no file, too large, damaged, no netCDF, or not of this format
+    `file_format`: that it must have; None for any, and for files that others have written or changed. Raises
+    TableFileError: the file is missing, no file, too large, damaged, no netCDF, or not of this format.
     """
     try:
         whole = sealed(Path(path))
@@ -380,12 +366,7 @@ def owned(folder: Path) -> Iterator[None]:
     """Be the only process that computes into a folder while the block lasts.
 
     The system frees the lock of a process that has ended, however it did. Where there are no locks the block runs
-    without.
-
-    Raises
-    ------
-    InputError : another process is at work there
-    OSError : the folder cannot be made or written
+    without. Raises InputError: another process is at work there; OSError: the folder cannot be made or written.
     """
     is_new = not folder.exists()
     folder.mkdir(parents=True, exist_ok=True)

@@ -31,9 +31,7 @@ class CodecError(InputError):
 def to_dataset(value: Any) -> xr.Dataset:
     """A dataclass, or a tuple or number, with all that is in it: dataclasses, tuples, mappings, arrays, texts, numbers.
 
-    Raises
-    ------
-    TypeError : something else is in it
+    Raises TypeError: something else is in it.
     """
     pools: dict[str, list[np.ndarray]] = {}
     labels: dict[str, dict[str, str]] = {}
@@ -72,9 +70,7 @@ def to_dataset(value: Any) -> xr.Dataset:
 def from_dataset(dataset: xr.Dataset, form: type[Table]) -> Table:
     """The object of a type, or of `tuple[...]`, that `to_dataset` made a data set of.
 
-    Raises
-    ------
-    CodecError : the data set holds something else
+    Raises CodecError: the data set holds something else.
     """
     classes, left = _classes(form, {}), dict[str, np.ndarray]()
 

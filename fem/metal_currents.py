@@ -94,9 +94,7 @@ def flat(values: Array) -> Array:
 def metal_of(bodies: Sequence[Solid], conductivity: float, order: int) -> Metal:
     """Mesh and factorise a piece of metal, bodies that touch, with elements of degree `order`.
 
-    Raises
-    ------
-    TooLargeError : the memory does not hold the system
+    Raises TooLargeError: the memory does not hold the system.
     """
     return metal_on(mesh_metal(bodies), conductivity, order)
 

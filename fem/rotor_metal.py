@@ -138,13 +138,9 @@ def rotor_losses(
 ) -> RotorLosses:
     """Table of the dissipation for a floater whose centre is at least `nearest` (m) from every face.
 
-    It is fitted in so many `directions` of each octant; `watch` is a progress callback.
-
-    Raises
-    ------
-    ValueError : nothing conducts
-    InputError : a ring conducts into whose hole the floater fits
-    TooLargeError : the memory does not hold the finite elements
+    It is fitted in so many `directions` of each octant; `watch` is a progress callback. Raises ValueError: nothing
+    conducts; InputError: a ring conducts into whose hole the floater fits; TooLargeError: the memory does not hold the
+    finite elements.
     """
     start, pieces = time.perf_counter(), pieces_of(rotor, conductors)
     if not pieces:
@@ -217,14 +213,12 @@ def _error(table: RotorLosses, metals: Sequence[Metal], places: Array) -> float:
 def check_metal(pieces: Pieces, frequency: float, nearest: float) -> None:
     """Refuse pieces of metal whose losses a table cannot hold: too fast ones, and those around the floater.
 
+    Raises InputError: with the skin depth, and the conductivity or frequency up to which it would do.
+
     Parameters
     ----------
     frequency : of the rotor, Hz
     nearest : how near the floater's centre comes to a face, m
-
-    Raises
-    ------
-    InputError : with the skin depth, and the conductivity or frequency up to which it would do
     """
     refuse_wide_holes(pieces, nearest)
     for bodies, conductivity in pieces:

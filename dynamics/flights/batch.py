@@ -132,12 +132,7 @@ class Lanes:
         )
 
     def fly(self, passengers: Sequence[_Passenger]) -> None:
-        """Fly each until it does not go on here.
-
-        Raises
-        ------
-        IntegrationError : a state became infinite
-        """
+        """Fly each until it does not go on here. Raises IntegrationError: a state became infinite."""
         integrator, waiting, ends = self._integrator, iter(passengers), np.zeros(LANES)
         integrator.set_time(ends)
         for lane in range(LANES):  # one that stays empty must be finite too: the equations are not, where all is zero
@@ -248,7 +243,8 @@ def ensemble(
 ) -> Endings:
     """Fly a scene's floater from many starts for `duration` (s) each, or until contact or loss.
 
-    A plate is an obstacle only: its currents are not modelled.
+    A plate is an obstacle only: its currents are not modelled. Raises InputError: `duration` is not positive, there is
+    no start, or the floater is no sphere; IntegrationError: a state became infinite.
 
     Parameters
     ----------
@@ -258,11 +254,6 @@ def ensemble(
     together : flights that a worker gets at once
 
     Accuracy: that of a flight in balls, whose field errs by 1e-6 of its gradient.
-
-    Raises
-    ------
-    InputError : `duration` is not positive, there is no start, or the floater is no sphere
-    IntegrationError : a state became infinite
     """
     _check(scene, starts, duration)
     pieces = [slice(first, first + together) for first in range(0, len(starts.position), together)]
@@ -302,10 +293,7 @@ def fly_together(
     """Trajectories of scenes whose equations are the same but for runtime parameters, from one start each.
 
     Each is what `simulate` gives without a plate's currents, but for round-off; None where the start is in contact.
-
-    Raises
-    ------
-    IntegrationError : a state became infinite
+    Raises IntegrationError: a state became infinite.
     """
     began, known = perf_counter(), dict[str, Flight]()
     flown = []
@@ -359,7 +347,8 @@ def launched(
 
     Contact with the rotor is that of `flight_events`; where a step misses an edge, contact is told at the latest where
     the sphere meets the largest one inside the magnet.  The plate is an obstacle without edges.  The field is the
-    table's own expressions, so that a short one (dipoles, closed forms) is fast.
+    table's own expressions, so that a short one (dipoles, closed forms) is fast. Raises InputError: `duration` is not
+    positive, there is no start, the plate does not lie flat, or the floater is no sphere.
 
     Parameters
     ----------
@@ -372,10 +361,6 @@ def launched(
 
     Accuracy: that of the tables; beyond the range of the plate's the currents' field is continued as it is, and
     `Endings.left_plate_table` says which flights went there.
-
-    Raises
-    ------
-    InputError : `duration` is not positive, there is no start, the plate does not lie flat, or the floater is no sphere
     """
     _check(scene, starts, duration)
     flight, count = Flight(scene, table, duration, memory=memory, in_balls=False), len(starts.position)
@@ -409,9 +394,7 @@ def launched(
 def _obstacles(scene: Scene, memory: PlateMemory, position: Vector) -> list[hy.expression]:
     """What becomes negative in contact, and is a polynomial of the scaled position, so that no step misses it.
 
-    Raises
-    ------
-    InputError : the plate does not lie flat
+    Raises InputError: the plate does not lie flat.
     """
     box, length = memory.plate.box, hy.par[Parameter.LENGTH]
     normal = int(np.argmin(box.size))

@@ -35,9 +35,7 @@ class Checkpoint:
     def read(self) -> dict[str, Any] | None:
         """Arrays by name, with the `region` (2, 3) m of the plate's table (zeros: none), or None without a file.
 
-        Raises
-        ------
-        InputError : the file is damaged, or belongs to another flight
+        Raises InputError: the file is damaged, or belongs to another flight.
         """
         if not os.path.lexists(self.path):
             return None

@@ -360,6 +360,9 @@ def integrate(
 ) -> Trajectory:
     """Fly from `start` (rotor's frame, t = 0) until `duration` (s), contact or loss.
 
+    Raises FlightStopped: by a keyboard interrupt; it has what is finished, and so has the checkpoint; IntegrationError:
+    the state became infinite.
+
     Parameters
     ----------
     flight : the compiled problem
@@ -370,11 +373,6 @@ def integrate(
 
     Accuracy: a step errs by round-off, so that energy and |m̂| drift by about 1e-14 in a thousand turns;
     `Trajectory.energy_error` tells.
-
-    Raises
-    ------
-    FlightStopped : by a keyboard interrupt; it has what is finished, and so has the checkpoint
-    IntegrationError : the state became infinite
     """
     began, known = perf_counter(), flight.compile_seconds
     course = flight.begin(start, duration, currents, flight.interval(duration))
@@ -412,6 +410,9 @@ def simulate(
 ) -> Trajectory:
     """Simulate the trajectory of a scene's floater for `duration` (s), or until contact or loss.
 
+    Raises EquilibriumError: the flight shall begin near a stable equilibrium and there is none; StartError: it would
+    begin in contact, or `duration` is not positive; FlightStopped: by a keyboard interrupt; it has what is finished.
+
     Parameters
     ----------
     equilibria : of this scene, if they are already known
@@ -419,12 +420,6 @@ def simulate(
     progress : called with the finished part, 0 to 1, a few times a second
     memory : the plate's currents; left out, the plate is only an obstacle
     checkpoint : where the flight is kept while it lasts; it goes on from there if there is something
-
-    Raises
-    ------
-    EquilibriumError : the flight shall begin near a stable equilibrium and there is none
-    StartError : it would begin in contact, or `duration` is not positive
-    FlightStopped : by a keyboard interrupt; it has what is finished
     """
     if not duration > 0:
         raise StartError(f"Input duration must be positive; instead received {duration} s.")

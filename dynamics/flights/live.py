@@ -78,10 +78,7 @@ class LiveFlight:
     def onward(self, seconds: float) -> Piece:
         """Fly on so long (s), or to contact or loss, after which there is nothing to fly.
 
-        Raises
-        ------
-        InputError : `seconds` is not positive
-        IntegrationError : the state became infinite
+        Raises InputError: `seconds` is not positive; IntegrationError: the state became infinite.
         """
         if not seconds > 0:
             raise InputError(f"Input seconds must be positive; instead received {seconds}.")
@@ -105,10 +102,8 @@ class LiveFlight:
     def put(self, position: Array) -> None:
         """Hold the floater at a position (3,) m, rotor's frame, at rest there, and let go; moment and spin stay.
 
-        Raises
-        ------
-        StartError : it would overlap a magnet or the plate, or the field of the plate's currents is not known there;
-            nothing is changed
+        Raises StartError: it would overlap a magnet or the plate, or the field of the plate's currents is not known
+        there; nothing is changed.
         """
         check_free("position", self.scene, np.asarray(position, float), self.time)
         place = turned_about_z(position, self.scene.angular_velocity * self.time)

@@ -32,12 +32,9 @@ def initial_state(
 
     An `OffsetStart` displaces the stable equilibrium in the rotor's frame and keeps the floater at rest in it; among
     several it takes the nearest; where there is none, what `starting_point` says.  An absolute start finds the plate as
-    if the floater had long turned with the rotor there.  `equilibria` are found if they are not given.
-
-    Raises
-    ------
-    EquilibriumError : no equilibrium to start from; it says why and which frequency has one
-    StartError : the floater would overlap a magnet or the plate
+    if the floater had long turned with the rotor there.  `equilibria` are found if they are not given. Raises
+    EquilibriumError: no equilibrium to start from; it says why and which frequency has one; StartError: the floater
+    would overlap a magnet or the plate.
     """
     currents = np.zeros(0)
     if isinstance(scene.start, AbsoluteStart):

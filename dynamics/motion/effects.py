@@ -22,9 +22,7 @@ NEAR = 2.0  # Distance from the rotor, in floater radii, at which the answers ar
 def mutual_choice(scene: Scene, table: FieldTable, asked: str, rtol: float) -> tuple[bool, str]:
     """Whether it is in the motion, for "rigid", "mutual" or "auto"; and why.
 
-    Raises
-    ------
-    InputError : "mutual" is asked for with a measured map, or with magnets whose answer is not known
+    Raises InputError: "mutual" is asked for with a measured map, or with magnets whose answer is not known.
     """
     if asked == "rigid":
         return False, "as asked"
@@ -78,10 +76,8 @@ WITHOUT_METAL = "Leave conductivity_S_m of the rotor and rotor.conductors out."
 def with_effects(scene: Scene, table: FieldFormula) -> Interaction:
     """A table with the effects of a scene's conductivities and air, that of the rotor's from the cache; others stay.
 
-    Raises
-    ------
-    InputError : the rotor turns too fast for its metal or the floater's, or metal turns with it beside a floater that
-        is no sphere, or the floater is a cuboid
+    Raises InputError: the rotor turns too fast for its metal or the floater's, or metal turns with it beside a floater
+    that is no sphere, or the floater is a cuboid.
     """
     whole = interaction_of(table)
     check_floater_metal(scene)

@@ -49,9 +49,7 @@ class Equations:
 def parameters(scene: Scene, scales: Scales, frozen_spin: bool = False) -> Array:
     """Values of the runtime parameters; `frozen_spin` takes the drag off the spin about the moment.
 
-    Raises
-    ------
-    InputError : the floater is a cuboid, whose turn about its own moment the equations do not have
+    Raises InputError: the floater is a cuboid, whose turn about its own moment the equations do not have.
     """
     scene.floater.must_be("sphere", "cylinder", where="where it moves", instead=FORCE_ALONE)
     floater, drag, (length, time) = scene.floater, scene.drag, (scales.length, scales.time)

@@ -49,9 +49,7 @@ FLOATER_CURRENTS = "currents in the floater"
 def check_floater_metal(scene: Scene) -> None:
     """Refuse a floater whose currents are more modes than are followed, or too slow for the motions of a magnet.
 
-    Raises
-    ------
-    InputError : with the skin depth, and the conductivity or frequency up to which it would do
+    Raises InputError: with the skin depth, and the conductivity or frequency up to which it would do.
     """
     floater, frequency = scene.floater, scene.frequency
     number = skin_number(floater.radius, floater.conductivity or 0.0, frequency)

@@ -143,9 +143,7 @@ class Column:
     def known_unit(self, reading: MapReading, usual: str | None = None) -> str:
         """Its unit, a key of `UNITS`: that which the scene names, else its own, else the `usual` one of such files.
 
-        Raises
-        ------
-        FieldMapError : no unit, or one that is none of length or of B
+        Raises FieldMapError: no unit, or one that is none of length or of B.
         """
         kind = "length" if self.name in AXES else "field"
         said = getattr(reading, f"{kind}_unit") or self.unit or usual
@@ -214,9 +212,7 @@ def known_columns(titles: Sequence[str], reading: MapReading, vectors: bool = Fa
 def chosen(titles: Sequence[str], reading: MapReading, vectors: bool = False) -> dict[int, Column]:
     """The columns of a map by number: each quantity once, of several those that `reading.columns` tells.
 
-    Raises
-    ------
-    FieldMapError : two columns for one quantity, or none that has what `reading.columns` says
+    Raises FieldMapError: two columns for one quantity, or none that has what `reading.columns` says.
     """
     known = known_columns(titles, reading, vectors)
     if reading.columns and any(c.is_field for c in known.values()):

@@ -110,9 +110,7 @@ EXPLAINED = 0.7
 def find_center(field_map: FieldMap) -> Array:
     """Centre (1, 3) m of the dipole that fits a map best, sought from the origin.
 
-    Raises
-    ------
-    FieldMapError : too few observations, or no dipole near the origin fits better than none
+    Raises FieldMapError: too few observations, or no dipole near the origin fits better than none.
     """
     field_map.require_observations(6)
     some = field_map.where(np.linspace(0, len(field_map.points) - 1, min(len(field_map.points), SUBSET)).astype(int))

@@ -48,12 +48,9 @@ def require_plausible(field_map: FieldMap, magnets: Sequence[Magnet], radius: fl
     """Refuse a map that contradicts the magnets.
 
     The stronger half of `SUBSET` points outside the spheres of `radius` (m) about the magnets is compared with the
-    field of the remanent polarisation.
-
-    Raises
-    ------
-    FieldMapError : B larger or smaller by more than a factor of two than that of the magnets, along other directions,
-        or exactly zero where they have a field; or no point outside. Where another unit would explain it, it is named.
+    field of the remanent polarisation. Raises FieldMapError: B larger or smaller by more than a factor of two than that
+    of the magnets, along other directions, or exactly zero where they have a field; or no point outside. Where another
+    unit would explain it, it is named.
     """
     if not any(magnet.polarization.any() for magnet in magnets):
         return

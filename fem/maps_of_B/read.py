@@ -80,9 +80,7 @@ class _Table:
 def _text(path: Path, reading: MapReading) -> FieldMap:
     """A map from a table as text.
 
-    Raises
-    ------
-    FieldMapError : no text, no titles of a map, a cell that is no number, or one that could be two
+    Raises FieldMapError: no text, no titles of a map, a cell that is no number, or one that could be two.
     """
     lines = _lines(file_content(path, MOST_BYTES, "map", "a file"))
     separators: Sequence[str | None] = (",", ";", "\t", "|", None)
@@ -288,10 +286,8 @@ def read_field_map(path: str | Path, reading: MapReading | None = None) -> Field
       neither their names nor `reading` tell others. Points that VTK marks as hidden or without a value are left out.
     - any other file: a table as text, with columns x, y, z, Bx, By, Bz, Bx_err, By_err, Bz_err, not all of them needed.
 
-    Raises
-    ------
-    FieldMapError : no such file, unreadable, coordinates or every component missing or twice, an unknown unit, or what
-        `FieldMap` refuses
+    Raises FieldMapError: no such file, unreadable, coordinates or every component missing or twice, an unknown unit, or
+    what `FieldMap` refuses.
     """
     path, reading = Path(path), reading or MapReading()
     try:

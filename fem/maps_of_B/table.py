@@ -89,9 +89,7 @@ class GriddedTable:
     def evaluate(self, points: ArrayLike) -> tuple[Array, Array]:
         """B (n, 3) T and ∂B_i/∂x_j (n, 3, 3) T/m at points (n, 3) m in the rotor's frame.
 
-        Raises
-        ------
-        RangeError : a point lies where the map does not determine the field
+        Raises RangeError: a point lies where the map does not determine the field.
         """
         points = np.asarray(points, float).reshape(-1, 3)
         known = self.in_range(points)
@@ -144,6 +142,8 @@ def fit_field_map(
 ) -> GriddedTable:
     """Fit multipole expansions to a map of B.
 
+    Raises FieldMapError: too few observations for a dipole, points inside a sphere of sources, or no centre found.
+
     Parameters
     ----------
     field_map : what is known of B; without errors they are taken as a common fraction of B at each distance, and the
@@ -158,10 +158,6 @@ def fit_field_map(
 
     Accuracy: B of a 10 mm cube, or of two that touch, on a 2 mm grid to 3e-6 at 13 mm. 1e5 observations about two
     centres take 20 s of processor time; it grows as the square of the number of centres.
-
-    Raises
-    ------
-    FieldMapError : too few observations for a dipole, points inside a sphere of sources, or no centre found
     """
     start = time.perf_counter()
     middle = find_center(field_map) if centers is None else np.asarray(centers, float).reshape(-1, 3)
@@ -271,11 +267,8 @@ def map_table(path: Path | None, magnets: Sequence[Magnet], reading: MapReading 
     """Table of a map of B in the rotor's frame; the sources lie in the smallest spheres about the magnets.
 
     What the map holds inside those spheres is left out. The magnets' shapes and places say where sources can be; their
-    strength, whether the map is theirs.
-
-    Raises
-    ------
-    FieldMapError : no map, a file that is none, one that contradicts the magnets, or too few values outside the spheres
+    strength, whether the map is theirs. Raises FieldMapError: no map, a file that is none, one that contradicts the
+    magnets, or too few values outside the spheres.
     """
     if path is None:
         raise FieldMapError("Input rotor.field_map must name a file for the model map; instead it is missing.")

@@ -134,6 +134,8 @@ def plate_around(
 ) -> PlateAround:
     """The plate's table for a floater about a place, to be made.
 
+    Raises InputError: the plate leaves the floater no room.
+
     Parameters
     ----------
     model : "slab", or "reduced" for the network of the finite elements
@@ -141,10 +143,6 @@ def plate_around(
     place : (3,) m, in the frame that turns with the rotor
     radius, frequency : of the floater, m, and of the rotor, Hz
     region : in the frame of the plate, where the floater may be; left out, `REACH` about the place, all the way down
-
-    Raises
-    ------
-    InputError : the plate leaves the floater no room
     """
     if model == "slab" and plate.lowering and abs(plate.box.rotation[2, np.argmin(plate.box.size)]) < PLUMB:
         plate = replace(plate, lowering=None)  # an infinite slab that moves along itself stays where it is
@@ -160,16 +158,12 @@ def reachable_region(plate: Plate, center: ArrayLike, half_edges: ArrayLike, rad
     """Where a floater can come to in the plate's frame, during all of its lowering.
 
     The box about `center` and its image under the lowering are united; what is nearer to the plate than the floater's
-    radius is cut off.
+    radius is cut off. Raises InputError: the centre is not farther than the radius from the plate's face, all the way.
 
     Parameters
     ----------
     center, half_edges : (3,) m, box along the laboratory's axes, where the floater may be
     radius : of the floater, m
-
-    Raises
-    ------
-    InputError : the centre is not farther than the radius from the plate's face, all the way
     """
     center, half = np.asarray(center, float), plate.box.half_edges
     way = plate.lowering.distance if plate.lowering else 0.0
@@ -198,11 +192,7 @@ def wider_region(plate: Plate, region: Region, radius: float, seen: Array) -> Re
 
     Bounds that it crossed are moved out by so much that a fall from far off to the face needs few tables; along the
     face all, as a floater that turns with the rotor comes to the others next.  Nearer to the face than the floater's
-    radius (m) it has touched it.
-
-    Raises
-    ------
-    AccuracyError : the region would be too wide for its distance from the plate
+    radius (m) it has touched it. Raises AccuracyError: the region would be too wide for its distance from the plate.
     """
     half, size = plate.box.half_edges, region.upper - region.lower
     facing = int(np.argmax(np.abs(region.center) - half))

@@ -209,13 +209,10 @@ def solve_eddy(
 ) -> EddyResponse:
     """Eddy currents of all `sources` at `frequency` (Hz).
 
-    Any frequency from 0 up is safe: the gauge needs no parameter, and below ωμ0σL² = 1e-2 the resistive limit
-    is used, exact to 1e-8.  At high frequency the mesh must resolve the skin depth: `plate_reaction` sees to it.
-
-    Raises
-    ------
-    ValueError : frequency negative or not finite, order below 1, or no sources
-    TooLargeError : the memory does not hold the system
+    Any frequency from 0 up is safe: the gauge needs no parameter, and below ωμ0σL² = 1e-2 the resistive limit is used,
+    exact to 1e-8.  At high frequency the mesh must resolve the skin depth: `plate_reaction` sees to it. Raises
+    ValueError: frequency negative or not finite, order below 1, or no sources; TooLargeError: the memory does not hold
+    the system.
     """
     if not (np.isfinite(frequency) and frequency >= 0):
         raise ValueError(f"Input frequency_hz must be finite and not negative; instead received {frequency!r}.")
@@ -235,9 +232,7 @@ def solve_eddy(
 def solve_shifted(space: EddySpace, shift: complex, sources: Sequence[Source]) -> EddyResponse:
     """Eddy currents of all `sources` where iω is `shift`, rad/s: a real one is that of fields that grow as e^{st}.
 
-    Raises
-    ------
-    TooLargeError : the memory does not hold the system
+    Raises TooLargeError: the memory does not hold the system.
     """
     system = ShiftedSystem(space, shift)
     images = space.class_images(sources)
@@ -256,16 +251,12 @@ def solve_shifted(space: EddySpace, shift: complex, sources: Sequence[Source]) -
 def current_density(
     response: EddyResponse, applied: ComplexArray, amplitudes: ArrayLike, points: ArrayLike
 ) -> ComplexArray:
-    """J = -iωσ(A_s + A) (n, 3), A/m², at points (n, 3), m; zero in air.
+    """J = -iωσ(A_s + A) (n, 3), A/m², at points (n, 3), m; zero in air. Raises ValueError: a point outside the mesh.
 
     Parameters
     ----------
     applied : (n, 3) T m, potential A_s of the sources with their amplitudes at the same points
     amplitudes : of the sources that `response` was solved for
-
-    Raises
-    ------
-    ValueError : a point outside the mesh
     """
     points, space = np.asarray(points, float).reshape(-1, 3), response.space
     mirrors = list(space.parity.mirrors)

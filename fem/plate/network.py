@@ -162,12 +162,7 @@ def tensor_error(values: Array, error: Array, rates: Array, omega: float) -> flo
 
 
 def checked_ranges(frequencies: tuple[float, float], rtol: float) -> tuple[float, float]:
-    """The frequencies (Hz), once they and the tolerance are found good.
-
-    Raises
-    ------
-    ValueError : they are not
-    """
+    """The frequencies (Hz), once they and the tolerance are found good. Raises ValueError: they are not."""
     low, high = frequencies
     if not 0 < low < high < np.inf:
         raise ValueError(f"Input frequencies_hz must be positive and increasing; instead received {frequencies}.")
@@ -187,15 +182,13 @@ def from_elements(
 ) -> Reduction:
     """Networks for a region within the boxes and frequencies (Hz) within those of a `solution`.
 
+    Raises AccuracyError: (the reduction) all of the solution's states do not suffice.
+
     Parameters
     ----------
     rtol : relative accuracy of reaction tensors (Frobenius norm) and of the fields of `others`
     others : more sources whose currents the networks shall hold: the rotor's
     space_error : what the solution's states miss of these, relative
-
-    Raises
-    ------
-    AccuracyError : (the reduction) all of the solution's states do not suffice
     """
     space, (low, high) = solution.space, frequencies
     # Classes of the plate's mirrors that do not mirror the region are mixed by every source: they share their states.
@@ -294,11 +287,7 @@ def _functions(
 def candidates(region: Region, half_edges: Array, degree: int = DEGREE) -> Multipoles:
     """Multipoles to choose from for a region beside a plate with these half edges (m), both about the plate's centre.
 
-    They lie behind the plate's surface, on lines away from the region.
-
-    Raises
-    ------
-    ValueError : the region touches the plate
+    They lie behind the plate's surface, on lines away from the region. Raises ValueError: the region touches the plate.
     """
     of_region, of_plate = region.nearest(half_edges)
     gap = region.gap(half_edges)

@@ -35,9 +35,7 @@ class MeshTooLargeError(AccuracyError):
 def highest_order(cells: int) -> int:
     """The highest order, at most `HIGHEST_ORDER`, within `MOST_UNKNOWNS` on a mesh of so many hexahedra.
 
-    Raises
-    ------
-    MeshTooLargeError : it is below 3
+    Raises MeshTooLargeError: it is below 3.
     """
     found = [p for p in range(3, HIGHEST_ORDER + 1) if cells * (3 * p * (p + 2) + 2 * p + 1) <= MOST_UNKNOWNS]
     if not found:
@@ -139,12 +137,7 @@ class Ladder:
         return self.order > 1 and self.error > self.allowed and (out_of_reach or stalled)
 
     def refuse(self) -> None:
-        """Go on only where that can help.
-
-        Raises
-        ------
-        AccuracyError : the mesh is too coarse
-        """
+        """Go on only where that can help. Raises AccuracyError: the mesh is too coarse."""
         if self.hopeless:
             raise AccuracyError(
                 f"Input {OPTION} must be at least {self.error / MESH_SHARE:.2g} for the finite elements of this plate; "
@@ -173,6 +166,9 @@ def plate_reaction(
 ) -> PlateReaction:
     """Reaction tensors of `plate` at `positions` (n, 3), m, and `frequency`, Hz, phasors e^{+iωt}.
 
+    Raises ValueError: a position inside the plate, a size, a conductivity or a frequency out of range; AccuracyError:
+    `rtol` not reached after all refinements of the mesh, or with `MOST_UNKNOWNS`.
+
     Parameters
     ----------
     plate : its box may have any pose; it is solved in its own frame
@@ -180,11 +176,6 @@ def plate_reaction(
     rtol : estimated relative error asked of every own tensor
     rule : first mesh
     refinements : how often the mesh may be refined
-
-    Raises
-    ------
-    ValueError : a position inside the plate, a size, a conductivity or a frequency out of range
-    AccuracyError : `rtol` not reached after all refinements of the mesh, or with `MOST_UNKNOWNS`
     """
     places = np.asarray(positions, float).reshape(-1, 3)
     if frequency == 0:

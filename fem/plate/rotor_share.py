@@ -86,13 +86,8 @@ class RotorSource:
 def rotor_parts(table: RotorTable, plate: Plate, left_out: float = LEFT_OUT) -> list[Source]:
     """The parts of a rotor's table that reach the plate, in the rotor's frame.
 
-    Parameters
-    ----------
-    left_out : degrees whose field at the plate is below this share of the rotor's are dropped
-
-    Raises
-    ------
-    InputError : the plate comes so near that an expansion does not converge in it
+    `left_out`: degrees whose field at the plate is below this share of the rotor's are dropped. Raises InputError: the
+    plate comes so near that an expansion does not converge in it.
     """
     parts: list[Source] = [
         PolarizedCuboid.of_magnet(magnet) for magnet in table.uniform if isinstance(magnet.body, Box)
@@ -175,15 +170,13 @@ def rotor_share(
 ) -> RotorShare:
     """Signals of a rotor for the pose and the way of `plate`.
 
+    Raises AccuracyError: the tolerance is not met with the most terms.
+
     Parameters
     ----------
     network : of a plate of the same size and conductivity, or of what stands for it
     tolerance : for the estimated error; harmonics and depths are added until it is met
     watch : progress callback
-
-    Raises
-    ------
-    AccuracyError : the tolerance is not met with the most terms
     """
     signals = _signals(network, plate, rotor_parts(rotor, plate, UNNOTICED * tolerance), watch)
     distance = _way(plate)

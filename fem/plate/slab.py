@@ -80,9 +80,7 @@ class Slab:
 def checked(height: ArrayLike, frequency: ArrayLike) -> tuple[Array, Array]:
     """Heights (m) and frequencies (Hz) as arrays of one shape.
 
-    Raises
-    ------
-    ValueError : a height is not above the face, or a frequency is negative or not finite
+    Raises ValueError: a height is not above the face, or a frequency is negative or not finite.
     """
     h, f = np.broadcast_arrays(np.asarray(height, float), np.asarray(frequency, float))
     if not np.all(h > 0):
@@ -111,10 +109,7 @@ def reaction_tensor(slab: Slab, height: ArrayLike, frequency: ArrayLike) -> Comp
     """G (..., 3, 3), T/(A m²): B = G m at a dipole `height` (m) over the face, phasors e^{+iωt}.
 
     Heights and frequencies (Hz) are broadcast.  Relative error below 1e-12 from 0 to beyond 1 MHz; G = 0 at 0 Hz.
-
-    Raises
-    ------
-    ValueError : height not positive, or frequency negative
+    Raises ValueError: height not positive, or frequency negative.
     """
     h, f = checked(height, frequency)
     normal = -MU_0 / (4 * np.pi) * power_integral(slab, h, f, 2)
@@ -141,9 +136,7 @@ class SlabFrame:
 def slab_frame(plate: Plate, region: Region) -> SlabFrame:
     """The slab that stands for `plate` under `region` (plate's frame).
 
-    Raises
-    ------
-    InputError : the region is not over one of the plate's two largest faces
+    Raises InputError: the region is not over one of the plate's two largest faces.
     """
     normal, half = int(np.argmin(plate.box.size)), plate.box.half_edges
     others = [(normal + 1) % 3, (normal + 2) % 3]
@@ -172,9 +165,7 @@ def corners(region: Region, frame: SlabFrame) -> Array:
 def rotor_reach(plate: Plate, rotor: RotorTable, frame: SlabFrame) -> Array:
     """Corners (n, 3) m of the rotor's magnets at many angles, and both ends of the plate's way, in cylinder's frame.
 
-    Raises
-    ------
-    InputError : they are not all on the region's side of the slab
+    Raises InputError: they are not all on the region's side of the slab.
     """
     own = np.concatenate([magnet.box.corners for magnet in rotor.magnets])
     turns = [rotation_matrix((0.0, 0.0, angle)) for angle in np.linspace(0.0, 360.0, ANGLES, endpoint=False)]

@@ -98,7 +98,8 @@ def solve_currents(
     """Currents for dipoles in `boxes` and for `others`, at all frequencies between the two (Hz).
 
     An order that is expected to do is not solved for the sake of its error alone: the currents are trained on it at
-    once, and its error follows from their network.
+    once, and its error follows from their network. Raises ValueError: a box touches the plate; AccuracyError: the mesh
+    is too coarse for `rtol`.
 
     Parameters
     ----------
@@ -107,11 +108,6 @@ def solve_currents(
     rule : mesh; left out, the one that has been found to need the least work for `rtol`
     others : more sources whose currents are held
     watch : progress callback
-
-    Raises
-    ------
-    ValueError : a box touches the plate
-    AccuracyError : the mesh is too coarse for `rtol`
     """
     start = time.perf_counter()
     others = others or OtherSources()

@@ -176,12 +176,8 @@ class PlateErrors:
     def check(self, rtol: float, conductor: str) -> None:
         """Refuse a table of a conductor, in words, that misses its tolerance.
 
-        The states follow what is asked, while what the field functions miss hardly does: with more than the sum of
-        both there are states enough.
-
-        Raises
-        ------
-        AccuracyError : it names a tolerance that can be met
+        The states follow what is asked, while what the field functions miss hardly does: with more than the sum of both
+        there are states enough. Raises AccuracyError: it names a tolerance that can be met.
         """
         if self.total > rtol:
             refuse(rtol, ENOUGH * self.total, conductor)
@@ -190,9 +186,7 @@ class PlateErrors:
 def refuse(rtol: float, enough: float, conductor: str) -> NoReturn:
     """Refuse a tolerance that a table of a conductor, in words, misses, where `enough` can be met.
 
-    Raises
-    ------
-    AccuracyError : always
+    Raises AccuracyError: always.
     """
     unit = 10.0 ** math.floor(math.log10(enough))
     enough = math.ceil(enough / unit - 1e-9) * unit
@@ -260,9 +254,7 @@ class PlateTable:
     def field_functions(self, points: ArrayLike) -> tuple[Array, Array]:
         """b_i (n, states, 3), T/√J, and ∂b_ia/∂x_c (n, states, 3, 3), T/(√J m), at points (n, 3), m.
 
-        Raises
-        ------
-        RangeError : a point outside the region
+        Raises RangeError: a point outside the region.
         """
         points = np.asarray(points, float).reshape(-1, 3)
         known = self.in_range(points)
@@ -286,9 +278,7 @@ class PlateTable:
     def reaction_tensor(self, points: ArrayLike, frequency: float) -> ComplexArray:
         """G (n, 3, 3), T/(A m²), at points (n, 3), m, and a frequency, Hz: symmetric and passive to round-off.
 
-        Raises
-        ------
-        RangeError : a point outside the region, or a frequency not between 0 and the highest of the table
+        Raises RangeError: a point outside the region, or a frequency not between 0 and the highest of the table.
         """
         b, _ = self.field_functions(points)
         return np.asarray(np.einsum("nia,i,nib->nab", b, self._response(frequency), b, optimize=True))

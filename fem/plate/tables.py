@@ -39,15 +39,12 @@ def plate_table(
 ) -> PlateTable:
     """Table of `plate` for dipoles in `region` (plate's frame) and frequencies (Hz).
 
+    Raises ValueError: region in the plate, or a parameter out of range; AccuracyError: `rtol` not reached.
+
     Parameters
     ----------
     rtol : relative accuracy asked of reaction tensors G, Frobenius norm
     rule : mesh (default by `rtol`)
-
-    Raises
-    ------
-    ValueError : region in the plate, or a parameter out of range
-    AccuracyError : `rtol` not reached
     """
     checked_ranges(frequencies, rtol)
     solution = solve_currents(plate, [region], frequencies, rtol, rule)
@@ -67,6 +64,9 @@ def plate_and_rotor_table(
 ) -> tuple[PlateTable, RotorShare]:
     """Table of `plate` and the rotor's share of its signals, of one network.
 
+    Raises InputError: the plate is too near to the rotor; ValueError: region in the plate, or a parameter out of range;
+    AccuracyError: `rtol` not reached.
+
     Parameters
     ----------
     plate : with its pose at the start and its lowering
@@ -83,12 +83,6 @@ def plate_and_rotor_table(
     The finite elements are solved for dipoles in boxes around the region and around the rotor, on a coarse raster, so
     that neighbours of the scene and other models of the rotor need the same ones.  A rotor that these dipoles do not
     stand for gets its own.
-
-    Raises
-    ------
-    InputError : the plate is too near to the rotor
-    ValueError : region in the plate, or a parameter out of range
-    AccuracyError : `rtol` not reached
     """
     others = turning_rotor(plate, rotor)
     half = plate.box.half_edges
@@ -115,13 +109,9 @@ def slab_and_rotor_table(
 ) -> tuple[PlateTable, RotorShare]:
     """As `plate_and_rotor_table`, but for a plate that is infinite along its two longer edges.
 
-    The errors do not tell how far the plate is from infinite.
-
-    Raises
-    ------
-    InputError : the region is not over one of the plate's two largest faces, or the rotor not on its side of the slab
-    ValueError : a parameter out of range
-    AccuracyError : `rtol` not reached
+    The errors do not tell how far the plate is from infinite. Raises InputError: the region is not over one of the
+    plate's two largest faces, or the rotor not on its side of the slab; ValueError: a parameter out of range;
+    AccuracyError: `rtol` not reached.
     """
     far = rotor_reach(plate, rotor, slab_frame(plate, region))
     size = np.where(np.arange(3) == np.argmin(plate.box.size), plate.box.size, ENDLESS)
@@ -140,12 +130,7 @@ def _with_share(
 
 
 def _reduced_table(reduced: Reduction, rtol: float, conductor: str, watch: Watch) -> tuple[PassiveNetwork, PlateTable]:
-    """The network that a table needs, and the table.
-
-    Raises
-    ------
-    AccuracyError : its errors add up to more than `rtol`
-    """
+    """The network that a table needs, and the table. Raises AccuracyError: its errors add up to more than `rtol`."""
     network = reduced(0.0)
     table = tabulate(network, rtol, watch)
     if table.errors.total > rtol:  # more states leave room for what the field functions miss

@@ -181,17 +181,15 @@ def from_slab(
 ) -> Reduction:
     """Networks of the slab that stands for `plate`, for dipoles in `region` and `others`.
 
+    Raises InputError: the region is not over one of the plate's two largest faces; ValueError: frequencies not 0 <
+    lowest < highest, or rtol not between 0 and 1.
+
     Parameters
     ----------
     frequencies : lowest and highest, Hz
     rtol : relative accuracy of reaction tensors and of the others' fields
     others : more sources whose currents the networks shall hold: the rotor's
     far : (n, 3) m, how far these reach, in the frame of the cylinder
-
-    Raises
-    ------
-    InputError : the region is not over one of the plate's two largest faces
-    ValueError : frequencies not 0 < lowest < highest, or rtol not between 0 and 1
     """
     start = time.perf_counter()
     low, high = checked_ranges(frequencies, rtol)
