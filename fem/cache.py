@@ -141,11 +141,9 @@ class TableKind(Generic[Table]):
 
     @property
     def format(self) -> str:
-        """What the files say that they are."""
         return f"spinlev {self.name} {FORMATS[self.name]}"
 
     def key(self, *inputs: Any) -> str:
-        """The `key_of` a table's inputs."""
         return key_of(self.name, *inputs)
 
     def save(self, table: Table, path: str | Path, key: str = "") -> None:

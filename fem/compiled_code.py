@@ -141,7 +141,6 @@ def _content(asked: object) -> bytes:
 
     class Writer(pickle.Pickler):
         def persistent_id(self, thing: Any) -> int | None:
-            """The number of an expression; None for what is no expression."""
             if not isinstance(thing, hy.expression):
                 return None
             expressions.append(thing)
@@ -153,7 +152,6 @@ def _content(asked: object) -> bytes:
 
 @cache
 def _target() -> str:
-    """What code is compiled for: heyoka, and the processor as its compiler sees it."""
     import heyoka as hy
 
     with _alone():
@@ -206,5 +204,4 @@ class RuntimeNumbers:
 
     @property
     def values(self) -> list[float]:
-        """Of the parameters so far."""
         return list(self._known)

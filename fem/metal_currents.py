@@ -37,7 +37,6 @@ class Metal:
 
     @cached_property
     def places(self) -> Array:
-        """Integration points (n, 3), m."""
         return self.mesh.to_meter(self.points.points)
 
     @cached_property
@@ -155,7 +154,6 @@ class CurrentPatterns:
 
     @property
     def count(self) -> int:
-        """Number of patterns."""
         return int(self.patterns[0].shape[2])
 
     def fields(self, positions: Array, watch: Watch = unwatched) -> Array:

@@ -251,12 +251,10 @@ def slow_error(pieces: Pieces, frequency: float) -> float:
 
 
 def _radius(bodies: Sequence[Solid]) -> float:
-    """Of the ball of the same volume, m."""
     return float((3 * sum(body.volume for body in bodies) / (4 * np.pi)) ** (1 / 3))
 
 
 def _deciding(scene: Scene) -> tuple[Any, ...]:
-    """The rotor's bodies, which conduct together, and how near the floater can come."""
     return scene.turning_bodies, pieces_of(scene.rotor, scene.conductors), scene.floater.radius
 
 

@@ -72,7 +72,6 @@ class _Passenger(Course):
         return self.flight.degree(self.values) == degree
 
     def alone(self) -> None:
-        """Fly on to the end outside of lanes."""
         if self.recorder is None:
             self.recorder = Recorder(self.state, self.flight.interval(self.duration), MOST_SAMPLES, self.time[0])
         self.fly()
@@ -186,7 +185,6 @@ class Lanes:
             self._integrator.reset_cooldowns(lane)
 
     def _record(self, flying: Mapping[int, _Passenger], ends: Array, found: Any) -> None:
-        """Keep the samples of the steps just taken."""
         now, due = self._integrator.time, dict[int, Array]()
         for lane, one in flying.items():
             if one.recorder:
@@ -216,7 +214,6 @@ class Endings:
 
     @classmethod
     def joined(cls, parts: Sequence[Endings]) -> Endings:
-        """The parts one after the other."""
         vectors = zip(*(part.last.vectors for part in parts), strict=True)
         return cls(
             np.concatenate([part.ended_by for part in parts]),
@@ -312,7 +309,6 @@ def _flight(scene: Scene, table: FieldTable, duration: float) -> Flight:
 
 
 def _begun(flight: Flight, start: State, duration: float, recorded: bool) -> _Passenger:
-    """At t = 0; over if it begins in contact."""
     start = replace(start, moment=start.moment / np.linalg.norm(start.moment))
     free = clearance(flight.scene, np.zeros(1), start.position[None])[0] >= 0
     course = flight.begin(start, duration, interval=flight.interval(duration) if recorded and free else None)

@@ -220,7 +220,6 @@ class Course:
 
     @property
     def seconds(self) -> float:
-        """Time since the start, s."""
         return self.time[0] * self.flight.scales.time
 
     def enter_ball(self) -> None:
@@ -317,7 +316,6 @@ class Course:
         }
 
     def restore(self, content: Mapping[str, Any]) -> None:
-        """Go back to where it was."""
         assert self.recorder is not None
         high, low = content["time"].tolist()
         self.time, self.state, self.values = (high, low), content["state"], content["values"]

@@ -57,7 +57,6 @@ class LiveFlight:
 
     @property
     def time(self) -> float:
-        """Since the flight began, s."""
         return self._course.seconds
 
     @property
@@ -67,7 +66,6 @@ class LiveFlight:
 
     @property
     def ended_by(self) -> str:
-        """See `Piece`."""
         return self._course.ended_by
 
     @property

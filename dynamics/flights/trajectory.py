@@ -27,12 +27,10 @@ class Recorder:
 
     @property
     def times(self) -> Array:
-        """(m,) of the samples."""
         return self._times[: self._count]
 
     @property
     def states(self) -> Array:
-        """(m, n) samples."""
         return self._states[: self._count]
 
     def put(self, times: Array, states: Array) -> None:
@@ -64,7 +62,6 @@ class Recorder:
             self.put(self.times[kept], self.states[kept])
 
     def _append(self, times: Array, states: Array) -> None:
-        """At the end, in arrays that double where they are full."""
         count = self._count + len(times)
         if count > len(self._times):
             roomy = np.empty(2 * count), np.empty((2 * count, states.shape[1]))
@@ -133,7 +130,6 @@ class Trajectory:
 
     @property
     def levitated_s(self) -> float:
-        """Duration of the flight, s."""
         return float(self.time[-1])
 
     @property

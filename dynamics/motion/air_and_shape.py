@@ -76,7 +76,6 @@ class RealAir:
     name: str = REAL_AIR
 
     def added(self, motion: Motion) -> Added:
-        """Its accelerations of place and spin; the spin's across the moment and along it."""
         length, time, spin, moment = hy.par[Parameter.LENGTH], hy.par[Parameter.TIME], motion.spin, motion.moment
         unit = length * length / time * (AIR_DENSITY / AIR_VISCOSITY)  # Reynolds number of unit spin or speed
         fast = hy.relu(spin[2]) + hy.relu(-spin[2])
@@ -130,7 +129,6 @@ class FloaterShape:
         return cls(field, heights, dipoles - (heights == 0) * bool(floater.moment), floater, sources)
 
     def added(self, motion: Motion) -> Added:
-        """Force and torque of one energy."""
         length, torque, inertia = (hy.par[p] for p in (Parameter.LENGTH, Parameter.TORQUE, Parameter.INERTIA))
         moment, force, turn = motion.moment, [hy.expression(0.0)] * 3, [hy.expression(0.0)] * 3
         energy = hy.expression(0.0)

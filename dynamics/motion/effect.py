@@ -129,16 +129,13 @@ class Interaction:
     effects: tuple[Effect, ...] = ()  # what else acts on the floater
 
     def expressions(self, position: Sequence[hy.expression]) -> FieldExpressions:
-        """B and its gradient as heyoka expressions of a position (m, rotor's frame)."""
         return self.field.expressions(position)
 
     @property
     def model(self) -> str:
-        """Name of the field's model."""
         return self._table.model
 
     def evaluate(self, points: ArrayLike) -> tuple[Array, Array]:
-        """B (n, 3) T and ∂B_i/∂x_j (n, 3, 3) T/m at points (n, 3) m in the rotor's frame."""
         return self._table.evaluate(points)
 
     def relative_error(self, points: ArrayLike) -> tuple[Array, Array]:
@@ -154,7 +151,6 @@ class Interaction:
         return b, g
 
     def in_range(self, points: ArrayLike) -> NDArray:  # type: ignore[type-arg]
-        """Which of the points (n, 3) m lie where the table knows the field: (n,)."""
         return self._table.in_range(points)
 
     def joined(self, *effects: Effect) -> Interaction:

@@ -91,7 +91,6 @@ class FloaterCurrents:
     name: str = FLOATER_CURRENTS
 
     def added(self, motion: Motion) -> Added:
-        """Its accelerations of place and spin; the spin's across the moment and along it."""
         length, inertia = hy.par[Parameter.LENGTH], hy.par[Parameter.INERTIA]
         tilt, along = hy.par[Parameter.TILT_EDDY], hy.par[Parameter.SPIN_EDDY]
         moment, drift, lag = motion.moment, motion.drift, motion.lag

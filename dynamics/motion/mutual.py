@@ -47,20 +47,16 @@ class Mutual:
     ball: BallField | None = None  # whose centre and radius are among the runtime parameters
 
     def placed(self, first: int) -> Mutual:
-        """About one pose, whose numbers are: place (3) and M (3), scaled, then the weights."""
         return replace(self, first=first)
 
     def in_ball(self, ball: BallField, first: int) -> Mutual:
-        """In a ball; its numbers are the weights of q and of all other parts."""
         return replace(self, ball=ball, first=first)
 
     @property
     def count(self) -> int:
-        """Of its numbers."""
         return 6 + sum(COUNT[n] for n in AT_POSE) if self.ball is None else sum(COUNT[n] for n in (2, *IN_BALL))
 
     def added(self, motion: Motion) -> Added:
-        """Force and torque are the derivatives of one energy."""
         if self.first is None:
             return conservative(self._energy, motion)
         length, strength, share, induced = (
@@ -112,7 +108,6 @@ class Mutual:
         return self.table.energy(place, [strength * m for m in moment], [share * b for b in field], share)
 
     def numbers(self, field: FieldTable, position: Array, moment: Array, values: Array) -> Array:
-        """See `Placeable`."""
         length, strength, share = values[:, WHICH].T[:, :, None]
         place = position * length
         try:

@@ -210,7 +210,6 @@ class PlateForce:
 
     @property
     def rates(self) -> Array:
-        """(states,) decay of the currents, scaled."""
         return np.asarray(self.memory.table.rates * self.values[Parameter.TIME])
 
     def __call__(self, times: Array, states: Array) -> PlateCoupling:

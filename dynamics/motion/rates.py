@@ -79,7 +79,6 @@ class Rates:
 
     @property
     def has_rough(self) -> bool:
-        """Whether there are such effects."""
         return bool(self._placed)
 
     @cached_property
@@ -135,7 +134,6 @@ class _Written:
     numbers: RuntimeNumbers
 
     def expressions(self, position: Sequence[hy.expression]) -> FieldExpressions:
-        """B and its gradient as heyoka expressions of a position (m, rotor's frame)."""
         return self.table.expressions(position, self.numbers)
 
 

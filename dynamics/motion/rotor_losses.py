@@ -47,16 +47,13 @@ class RotorCurrents:
     ball: BallField | None = None  # whose centre and radius are among the runtime parameters
 
     def placed(self, first: int) -> RotorCurrents:
-        """About one pose; its numbers are the entries of S."""
         return replace(self, first=first)
 
     def in_ball(self, ball: BallField, first: int) -> RotorCurrents:
-        """In a ball; its numbers are the weights of q and of the entries of S."""
         return replace(self, ball=ball, first=first)
 
     @property
     def count(self) -> int:
-        """Of its numbers."""
         return len(ENTRIES) if self.ball is None else COUNT[2] + len(ENTRIES) * COUNT[1]
 
     def added(self, motion: Motion) -> Added:
@@ -97,11 +94,9 @@ class RotorCurrents:
         return [dotted([known[min(a, b), max(a, b)] for b in range(NUMBERS)], rates) for a in range(NUMBERS)]
 
     def numbers(self, field: FieldTable, position: Array, moment: Array, values: Array) -> Array:
-        """See `Placeable`."""
         return self._entries(position * values[:, Parameter.LENGTH, None]).T
 
     def fit(self, ball: Ball, gradient: Array) -> tuple[Array, float]:
-        """See `Fittable`."""
         parts = self._entries(ball.center + ball.radius * nodes())
         lengths = np.repeat([UNIT, 1.0], (5, 3))
         units = np.array([lengths[a] * lengths[b] for a, b in ENTRIES])

@@ -50,17 +50,14 @@ class Parameter(IntEnum):
 
 
 def dotted(a: Vector, b: Vector) -> hy.expression:
-    """Σ a · b of vectors of any length."""
     return hy.sum([x * y for x, y in zip(a, b, strict=True)])
 
 
 def dot(a: Vector, b: Vector) -> hy.expression:
-    """Scalar product of two vectors of expressions."""
     return hy.sum([a[i] * b[i] for i in range(3)])
 
 
 def cross(a: Vector, b: Vector) -> list[hy.expression]:
-    """Vector product of two vectors of expressions."""
     return [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 
 
@@ -70,7 +67,6 @@ def turned(vector: Vector) -> list[hy.expression]:
 
 
 def subtract(a: Vector, b: Vector) -> list[hy.expression]:
-    """Difference of two vectors of expressions."""
     return [a[i] - b[i] for i in range(3)]
 
 
@@ -100,7 +96,6 @@ class State:
 
     @property
     def vectors(self) -> tuple[Array, Array, Array, Array]:
-        """Position, velocity, moment, spin."""
         return self.position, self.velocity, self.moment, self.spin
 
 
@@ -125,7 +120,6 @@ class Scales:
 
     @classmethod
     def of(cls, scene: Scene) -> Scales:
-        """Units that suit a scene."""
         radius, weight = scene.floater.radius, float(np.linalg.norm(scene.gravity))
         ratio = scene.floater.spin_ratio
         if scene.frequency:

@@ -51,7 +51,6 @@ class FieldMap:
 
     @property
     def observations(self) -> int:
-        """How many field components were observed."""
         return int(np.isfinite(self.field).sum())
 
     def require_observations(self, needed: int) -> None:
@@ -137,7 +136,6 @@ class Column:
 
     @property
     def is_field(self) -> bool:
-        """Whether it holds B or a component of it."""
         return self.name in (*COMPONENTS, "B")
 
     def known_unit(self, reading: MapReading, usual: str | None = None) -> str:

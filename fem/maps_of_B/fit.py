@@ -36,7 +36,6 @@ class HarmonicBasis:
 
     @property
     def background_count(self) -> int:
-        """Unknowns of the background."""
         return (self.background_degree + 1) ** 2 - 1
 
     def count(self, degree: int) -> int:

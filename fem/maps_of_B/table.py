@@ -58,7 +58,6 @@ class GriddedTable:
 
     @property
     def model(self) -> str:
-        """Name of the model."""
         return self.expansions.model
 
     @cached_property
@@ -83,7 +82,6 @@ class GriddedTable:
         return np.sqrt(squares[:, :3].sum(axis=1)), np.sqrt(squares[:, 3:] @ TWICE)
 
     def expressions(self, position: Sequence[hy.expression]) -> FieldExpressions:
-        """B and its gradient as heyoka expressions of a position (m, rotor's frame)."""
         return self.expansions.expressions(position)
 
     def evaluate(self, points: ArrayLike) -> tuple[Array, Array]:

@@ -101,7 +101,6 @@ class PlateAround:
 
     @cached_property
     def key(self) -> str:
-        """The same for scenes that share the table."""
         return self._kind.key(*deciding(*self._asked))
 
     def made(self, report: Callable[[str], None], watch: Watch = unwatched) -> tuple[PlateTable, RotorShare, bool]:

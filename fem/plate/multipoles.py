@@ -75,7 +75,6 @@ class Multipoles:
 
     @classmethod
     def at(cls, centers: Iterable[Array], kinds: Sequence[tuple[int, int, int]], scale: float) -> Multipoles:
-        """All of these kinds at each of these centres."""
         pairs = list(product(centers, kinds))
         return cls(np.array([p[0] for p in pairs]), np.array([p[1] for p in pairs], float), scale)
 

@@ -87,7 +87,6 @@ class Ladder:
 
     @property
     def error(self) -> float:
-        """The largest of the estimates."""
         return float(self.errors.max())
 
     def next_space(self) -> EddySpace:

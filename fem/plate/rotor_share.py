@@ -61,7 +61,6 @@ class ExpansionSource:
         return [-derivative(self.expansion.coefficients / degrees, axis) for axis in range(3)]
 
     def vector_potential(self, points: Array) -> Array:
-        """A (n, 3), T m, at points (n, 3), m."""
         offset = points - self.expansion.center
         return np.cross(offset, outer_sums(self._by_degree, offset / self.expansion.radius))
 
@@ -75,7 +74,6 @@ class RotorSource:
     center: Array  # (3,) m, of the plate in the rotor's frame
 
     def vector_potential(self, points: Array) -> Array:
-        """A (n, 3), T m, at points (n, 3), m, in the plate's frame."""
         places = self.center + points @ self.turn
         total = np.zeros(places.shape)  # a rotor without a field has no parts
         for part in self.parts:
@@ -130,7 +128,6 @@ def _nearest(place: Array, plate: Plate) -> float:
 
 
 def _way(plate: Plate) -> float:
-    """How far the plate goes down, m."""
     return plate.lowering.distance if plate.lowering else 0.0
 
 

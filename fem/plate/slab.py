@@ -129,7 +129,6 @@ class SlabFrame:
         return (points - self.origin) @ self.axes
 
     def to_plate(self, points: Array) -> Array:
-        """The inverse of `to_local`."""
         return np.asarray(self.origin + points @ self.axes.T)
 
 

@@ -272,7 +272,6 @@ class PlateTable:
         )
 
     def in_range(self, points: ArrayLike) -> NDArray[np.bool_]:
-        """Which of the points (n, 3) m lie in the region: (n,)."""
         return self.region.contains(points)
 
     def reaction_tensor(self, points: ArrayLike, frequency: float) -> ComplexArray:
