@@ -3,14 +3,14 @@
 import numpy as np
 import pytest
 from peers import PLATE, SLAB, scipy_slab
+from second_opinions.plate_tables import over_face
 
 from spinlev.fem.plate.reaction import plate_reaction
 from spinlev.fem.plate.slab import reaction_tensor
-from spinlev.fem.plate.table import Region
 from spinlev.fem.plate.tables import plate_table
 
 HEIGHTS = np.linspace(0.008, 0.06, 50)
-REGION = Region.over_face(PLATE.box.size, (0.01, 0.04), 0.005)
+REGION = over_face(PLATE.box.size, (0.01, 0.04), 0.005)
 PLACES = np.random.default_rng(1).uniform((-0.004, -0.004, 0.027), (0.004, 0.004, 0.045), (10, 3))
 MADE = {}
 """The table, made by one benchmark and evaluated by the next."""

@@ -166,9 +166,8 @@ def _room(scene: Scene, center: Array, reach: float) -> float:
         return room
     angles = 2 * np.pi * np.arange(ANGLES) / ANGLES
     places, slack = turned_about_z(center, angles), float(np.hypot(*center[:2])) * np.pi / ANGLES
-    lowering = scene.plate.lowering
     still = replace(scene, rotor=(), conductors=(), plate=replace(scene.plate, lowering=None))
-    way = lowering.distance if lowering else 0.0
+    way = scene.plate.way
     depths = np.linspace(0.0, way, DEPTHS if way else 1)
     seen = (places[:, None] + depths[:, None] * [0.0, 0.0, 1.0]).reshape(-1, 3)
     return min(room, float(clearance(still, np.zeros(len(seen)), seen).min()) - slack - way / DEPTHS / 2)

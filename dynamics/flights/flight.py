@@ -10,7 +10,7 @@ bit.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import astuple, dataclass, field
+from dataclasses import astuple, dataclass, field, replace
 from time import perf_counter
 from typing import Any
 
@@ -239,7 +239,9 @@ class Course:
         jump = float(self.flight.jacobi(after, now, row).sum() - self.flight.jacobi(self.values, now, row).sum())
         self.state, self.values = self.state.copy(), after
         self.state[-1] += jump
-        self.changes = self.changes.and_one(jump, error)
+        known = self.changes
+        total, error = known.total + abs(jump), max(known.error, error)
+        self.changes = FieldChanges(known.count + 1, known.energy + jump, total, error)
 
     def fly(self, progress: Callable[[float], None] | None = None, checkpoint: Checkpoint | None = None) -> None:
         """Propagate in pieces until something ends the trajectory."""
@@ -321,13 +323,13 @@ class Course:
         self.time, self.state, self.values = (high, low), content["state"], content["values"]
         count, *rest = content["changes"].tolist()
         self.steps, self.changes = int(content["steps"]), FieldChanges(int(count), *rest)
-        self.recorder.put(content["times"], content["states"])
+        self.recorder.times, self.recorder.states = content["times"], content["states"]
         self.recorder.interval = float(content["interval"])
 
     def trajectory(self, speed: float) -> Trajectory:
         """The samples, at so many simulated seconds per second."""
         assert self.recorder is not None
-        scales, velocity = self.flight.scales, self.flight.scene.angular_velocity
+        scales, velocity, changes = self.flight.scales, self.flight.scene.angular_velocity, self.changes
         time, states = np.minimum(self.recorder.times * scales.time, self.duration), self.recorder.states
         lab, memory, beyond = scales.unpack(states).to_lab(velocity * time), self.flight.memory, 0.0
         if memory is not None:
@@ -344,7 +346,7 @@ class Course:
             compile_seconds=self.flight.compile_seconds,
             beyond_plate_table=beyond,
             left_plate_table=self.ended_by == BEYOND,
-            field_changes=self.changes.relative(self.scale),
+            field_changes=replace(changes, energy=changes.energy / self.scale, total=changes.total / self.scale),
         )
 
 

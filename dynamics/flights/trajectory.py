@@ -1,7 +1,6 @@
 """Samples of a long motion: evenly spaced, and never more than fit."""
 
 from dataclasses import dataclass, field
-from typing import Self
 
 import numpy as np
 
@@ -23,19 +22,7 @@ class Recorder:
 
     def __init__(self, state: Array, interval: float, capacity: int, now: float = 0.0) -> None:
         self.interval, self.capacity = interval, capacity
-        self.put(np.array([now]), state[None])
-
-    @property
-    def times(self) -> Array:
-        return self._times[: self._count]
-
-    @property
-    def states(self) -> Array:
-        return self._states[: self._count]
-
-    def put(self, times: Array, states: Array) -> None:
-        """Forget all samples and have these instead."""
-        self._count, self._times, self._states = len(times), times.copy(), states.copy()
+        self.times, self.states = np.array([now]), state[None]  # (m,) and (m, n)
 
     def grid(self, now: float, end: float, count: int) -> Array:
         """Times to visit next: `now`, then at most `count` multiples of the interval, and `end` if they reach it."""
@@ -53,22 +40,14 @@ class Recorder:
     def add(self, times: Array, states: Array, last: bool) -> None:
         """Keep samples at multiples of the interval; of the `last` ones all."""
         on_grid = np.abs(times / self.interval - np.round(times / self.interval)) < 1e-9
-        self._append(times[on_grid | last], states[on_grid | last])
-        while self._count > self.capacity:
+        kept = on_grid | last
+        self.times, self.states = np.append(self.times, times[kept]), np.concatenate([self.states, states[kept]])
+        while len(self.times) > self.capacity:
             self.interval *= 2
             even = np.round(self.times / self.interval) * self.interval
             kept = np.abs(self.times - even) < 1e-6 * self.interval
             kept[-1] |= last
-            self.put(self.times[kept], self.states[kept])
-
-    def _append(self, times: Array, states: Array) -> None:
-        count = self._count + len(times)
-        if count > len(self._times):
-            roomy = np.empty(2 * count), np.empty((2 * count, states.shape[1]))
-            roomy[0][: self._count], roomy[1][: self._count] = self.times, self.states
-            self._times, self._states = roomy
-        self._times[self._count : count], self._states[self._count : count] = times, states
-        self._count = count
+            self.times, self.states = self.times[kept], self.states[kept]
 
 
 DURATION, STOPPED = "duration", "stopped"
@@ -82,14 +61,6 @@ class FieldChanges:
     energy: float = 0.0  # their sum U_new - U_old, each at the place of the change; relative, as the ledger's error
     total: float = 0.0  # sum of |U_new - U_old|, relative
     error: float = 0.0  # largest error of a ball's field or gradient against the table, relative
-
-    def and_one(self, energy: float, error: float) -> Self:
-        """With one more, of an energy (in the unit of the others), to a ball with an error."""
-        return type(self)(self.count + 1, self.energy + energy, self.total + abs(energy), max(self.error, error))
-
-    def relative(self, scale: float) -> Self:
-        """With energies in units of `scale`."""
-        return type(self)(self.count, self.energy / scale, self.total / scale, self.error)
 
 
 @dataclass(frozen=True, eq=False)

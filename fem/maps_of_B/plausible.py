@@ -127,23 +127,22 @@ def _received(found: _Comparison) -> str:
 def _way_out(likely: Sequence[tuple[str, str]], read_as: tuple[str, str]) -> str:
     if not likely:
         return ". Is it the map of another rotor, in another frame, or are the magnets' sizes or polarisations others?"
-    guesses, titles, keys = [], [], []
-    for units in likely:
-        changed = [
-            (*words, unit, read)
-            for *words, unit, read in zip(
-                ("lengths", "B"), ("x", "Bx"), ("length", "field"), units, read_as, strict=True
-            )
-            if unit != read
+    words = ({"name": "lengths", "title": "x", "key": "length"}, {"name": "B", "title": "Bx", "key": "field"})
+    guess, title, key = "{name} in {unit}, but read as {read}", "{title}_{unit}", 'rotor.map_{key}_unit = "{plain}"'
+
+    def said(form: str) -> str:
+        ways = [
+            [
+                form.format(**word, unit=unit, read=read, plain=unit.replace("µ", "u"))
+                for word, unit, read in zip(words, units, read_as, strict=True)
+                if unit != read
+            ]
+            for units in likely
         ]
-        guesses.append(" and ".join(f"{name} in {unit}, but read as {read}" for name, _, _, unit, read in changed))
-        titles.append(" and ".join(f"{title}_{unit}" for _, title, _, unit, _ in changed))
-        keys.append(
-            " and ".join(f'rotor.map_{key}_unit = "{unit.replace("µ", "u")}"' for _, _, key, unit, _ in changed)
-        )
+        return ", or ".join(" and ".join(changed) for changed in ways)
+
     return (
-        f": probably {', or '.join(guesses)}. Correct the unit in the file (a title such as {', or '.join(titles)}), "
-        f"or set {', or '.join(keys)}."
+        f": probably {said(guess)}. Correct the unit in the file (a title such as {said(title)}), or set {said(key)}."
     )
 
 

@@ -165,8 +165,7 @@ def reachable_region(plate: Plate, center: ArrayLike, half_edges: ArrayLike, rad
     radius : of the floater, m
     """
     center, half = np.asarray(center, float), plate.box.half_edges
-    way = plate.lowering.distance if plate.lowering else 0.0
-    ends = plate.box.to_body(np.array([center, center - way * DOWN]))
+    ends = plate.box.to_body(np.array([center, center - plate.way * DOWN]))
     beyond = np.min(np.abs(ends) - half, axis=0)
     axis = int(np.argmax(beyond))
     if beyond[axis] <= radius or ends[0, axis] * ends[1, axis] < 0:
@@ -177,7 +176,7 @@ def reachable_region(plate: Plate, center: ArrayLike, half_edges: ArrayLike, rad
         )
     signs = np.stack(np.meshgrid(*[(-1.0, 1.0)] * 3, indexing="ij"), -1).reshape(8, 3)
     corners = center + np.asarray(half_edges, float) * signs
-    body = plate.box.to_body(np.concatenate([corners, corners - way * DOWN]))
+    body = plate.box.to_body(np.concatenate([corners, corners - plate.way * DOWN]))
     lower, upper = body.min(axis=0), body.max(axis=0)
     if ends[0, axis] > 0:
         lower[axis] = max(lower[axis], half[axis] + radius)

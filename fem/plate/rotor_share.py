@@ -124,17 +124,13 @@ def _nearest(place: Array, plate: Plate) -> float:
     angles = np.linspace(0.0, 2 * np.pi, 73)
     radius, height = np.hypot(place[0], place[1]), np.full(len(angles), place[2])
     circle = np.stack([radius * np.cos(angles), radius * np.sin(angles), height], axis=1)
-    return min(float(plate.box.distance(circle - depth * DOWN).min()) for depth in np.linspace(0.0, _way(plate), 25))
-
-
-def _way(plate: Plate) -> float:
-    return plate.lowering.distance if plate.lowering else 0.0
+    return min(float(plate.box.distance(circle - depth * DOWN).min()) for depth in np.linspace(0.0, plate.way, 25))
 
 
 def turning_rotor(plate: Plate, rotor: RotorTable) -> OtherSources:
     """The rotor at some angles and depths of the plate, to train and to probe a network with."""
     parts = rotor_parts(rotor, plate)
-    way = _way(plate)
+    way = plate.way
     depths = way * (1 - np.cos(np.pi * np.arange(TRAINED_DEPTHS) / (TRAINED_DEPTHS - 1))) / 2 if way else np.zeros(1)
     angles = 2 * np.pi * np.arange(TRAINED_ANGLES) / TRAINED_ANGLES
     training = [posed_rotor(parts, plate, angle, depth) for depth in depths for angle in angles]
@@ -153,7 +149,7 @@ def rotor_box(plate: Plate, rotor: RotorTable) -> Region:
     radius = max(float(np.hypot(*box.center[:2])) + r for box, r in zip(boxes, inner, strict=True))
     low = min(float(box.center[2]) - r for box, r in zip(boxes, inner, strict=True))
     high = max(float(box.center[2]) + r for box, r in zip(boxes, inner, strict=True))
-    corners = np.stack(np.meshgrid((-radius, radius), (-radius, radius), (low, high + _way(plate))), -1).reshape(8, 3)
+    corners = np.stack(np.meshgrid((-radius, radius), (-radius, radius), (low, high + plate.way)), -1).reshape(8, 3)
     body = plate.box.to_body(corners)
     return Region(body.min(axis=0), body.max(axis=0))
 
@@ -176,7 +172,7 @@ def rotor_share(
     watch : progress callback
     """
     signals = _signals(network, plate, rotor_parts(rotor, plate, UNNOTICED * tolerance), watch)
-    distance = _way(plate)
+    distance = plate.way
     angles, depths = 12, 4 if distance else 1
     while True:
         nodes = np.cos(np.pi * (np.arange(depths) + 0.5) / depths)

@@ -98,22 +98,14 @@ def wave_numbers(height: Array, aperture: float = np.pi / 4) -> tuple[Array, Arr
     return k, step * k
 
 
-def power_integral(slab: Slab, height: Array, frequency: Array, power: int) -> ComplexArray:
-    """∫ k^power e^{-2kh} Γ dk of the shape of `height` and `frequency`, 1/m^(power+1)."""
-    k, weight = wave_numbers(height)
-    return np.asarray(np.sum(weight * k**power * np.exp(-2 * k * height[..., None])
-                             * slab.reflection(k, frequency[..., None]), axis=-1))  # fmt: skip
-
-
 def reaction_tensor(slab: Slab, height: ArrayLike, frequency: ArrayLike) -> ComplexArray:
     """G (..., 3, 3), T/(A m²): B = G m at a dipole `height` (m) over the face, phasors e^{+iωt}.
 
     Heights and frequencies (Hz) are broadcast.  Relative error below 1e-12 from 0 to beyond 1 MHz; G = 0 at 0 Hz.
     Raises ValueError: height not positive, or frequency negative.
     """
-    h, f = checked(height, frequency)
-    normal = -MU_0 / (4 * np.pi) * power_integral(slab, h, f, 2)
-    return normal[..., None, None] * np.diag([0.5, 0.5, 1.0])
+    places = np.asarray(height, float)[..., None] * [0.0, 0.0, 1.0]
+    return mutual_tensor(slab, places, places, frequency)
 
 
 @dataclass(frozen=True, eq=False)
@@ -168,8 +160,7 @@ def rotor_reach(plate: Plate, rotor: RotorTable, frame: SlabFrame) -> Array:
     """
     own = np.concatenate([magnet.box.corners for magnet in rotor.magnets])
     turns = [rotation_matrix((0.0, 0.0, angle)) for angle in np.linspace(0.0, 360.0, ANGLES, endpoint=False)]
-    way = plate.lowering.distance if plate.lowering else 0.0
-    places = np.concatenate([own @ turn.T - depth * DOWN for turn in turns for depth in (0.0, way)])
+    places = np.concatenate([own @ turn.T - depth * DOWN for turn in turns for depth in (0.0, plate.way)])
     found = frame.to_local(plate.box.to_body(places))
     if found[:, 2].min() <= 0:
         raise InputError(

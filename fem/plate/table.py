@@ -10,7 +10,7 @@ and floater is not in these sums.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import NoReturn
 
@@ -53,13 +53,6 @@ class Region:
         if not np.all(self.upper > self.lower):
             bounds = f"{self.lower.tolist()} and {self.upper.tolist()}"
             raise ValueError(f"Input region upper bounds must exceed the lower ones; instead received {bounds}.")
-
-    @classmethod
-    def over_face(cls, size: ArrayLike, heights: tuple[float, float], lateral: ArrayLike) -> Region:
-        """Heights (m) over the face +z of a plate with edges `size`, and ± `lateral` (m) about its axis."""
-        face = float(np.asarray(size, float)[2]) / 2
-        reach = np.broadcast_to(np.asarray(lateral, float), (2,))
-        return cls(np.array([*-reach, face + heights[0]]), np.array([*reach, face + heights[1]]))
 
     @property
     def center(self) -> Array:
@@ -146,12 +139,6 @@ class RotorShare:
         for h in range(1, len(self.series) // 2 + 1):
             turns += [hy.cos(float(h) * angle), hy.sin(float(h) * angle)]
         return [[turn * power for power in powers[: self.series.shape[2]]] for turn in turns]
-
-    def expressions(self, basis: Sequence[Sequence[hy.expression]]) -> list[hy.expression]:
-        """s_i of every state as heyoka expressions of the `basis`, whose members all of them share."""
-        members = [member for row in basis for member in row]
-        columns = self.series.swapaxes(0, 1).reshape(self.series.shape[1], len(members))
-        return [hy.sum([float(c) * m for c, m in zip(row, members, strict=True) if c]) for row in columns]
 
 
 def turn_harmonics(angle: ArrayLike, count: int) -> Array:
@@ -281,11 +268,6 @@ class PlateTable:
         """
         b, _ = self.field_functions(points)
         return np.asarray(np.einsum("nia,i,nib->nab", b, self._response(frequency), b, optimize=True))
-
-    def reaction_gradient(self, points: ArrayLike, frequency: float) -> ComplexArray:
-        """T (n, 3, 3, 3), T/(A m³): ∂_l B_i = T_lij m_j at the dipole's own place. Errors as `reaction_tensor`."""
-        b, gradient = self.field_functions(points)
-        return np.asarray(np.einsum("nkil,k,nkj->nlij", gradient, self._response(frequency), b, optimize=True))
 
     def _response(self, frequency: float) -> ComplexArray:
         if not 0 <= frequency <= self.frequencies[1]:

@@ -168,5 +168,4 @@ def deciding(
     plate: Plate, rotor: RotorTable, region: Region, frequencies: tuple[float, float], rtol: float
 ) -> tuple[Any, ...]:
     """What decides a plate's table and the rotor's share: the way of a lowering does, but not when and how fast."""
-    way = plate.lowering.distance if plate.lowering else 0.0
-    return plate.box, plate.conductivity, way, rotor.uniform, rotor.expansions, region, frequencies, rtol
+    return plate.box, plate.conductivity, plate.way, rotor.uniform, rotor.expansions, region, frequencies, rtol

@@ -144,6 +144,11 @@ class Plate:
     conductivity: float
     lowering: Lowering | None = None
 
+    @property
+    def way(self) -> float:
+        """How far it goes down, m."""
+        return self.lowering.distance if self.lowering else 0.0
+
     def __repr__(self) -> str:
         text = f"Plate {millimetres(self.box.size)} at {millimetres(self.box.center)}, {self.conductivity:.3g} S/m"
         down = self.lowering

@@ -8,6 +8,7 @@ from article import FLOATER, MAGNETS
 from ngsolve import SetNumThreads
 from scipy.integrate import solve_ivp
 from second_opinions.phasor import mean_force, mean_torque
+from second_opinions.plate_tables import reaction_gradient
 
 from spinlev.dynamics.equilibria.equilibrium import Survey
 from spinlev.dynamics.equilibria.orbits import differentiation, floquet_modes, periodic_orbit, resampled
@@ -88,7 +89,7 @@ def test_steady_drag_lift_and_torque_are_those_of_the_frequency_domain(memory, k
     found_torque = push[5] * FLOATER.inertia / scales.time**2
     body, turning = PLATE.box.to_body(place), FLOATER.moment * np.sin(0.4) * np.array([1, -1j, 0])
     tensor = memory.table.reaction_tensor(body, SCENE.frequency)[0]
-    gradient = memory.table.reaction_gradient(body, SCENE.frequency)[0]
+    gradient = reaction_gradient(memory.table, body, SCENE.frequency)[0]
     assert found_torque == pytest.approx(mean_torque(tensor, turning)[2], rel=1e-10)
     assert found_force == pytest.approx(mean_force(gradient, turning)[2], rel=1e-10)
     settled = force.settled(state)

@@ -12,6 +12,7 @@ from ngsolve import SetNumThreads
 from scipy.integrate import solve_ivp
 from second_opinions.dipole_derivative import DipoleDerivative
 from second_opinions.phasor import mean_force, mean_loss, mean_torque
+from second_opinions.plate_tables import over_face, reaction_gradient, signal_expressions
 from second_opinions.time_stepping import TimeStepper, work_on
 
 from spinlev.fem.closed_forms.potentials import Dipole, unit_dipoles
@@ -19,7 +20,6 @@ from spinlev.fem.plate.currents import OtherSources
 from spinlev.fem.plate.eddy import EddySpace
 from spinlev.fem.plate.network import from_elements
 from spinlev.fem.plate.solution import solve_currents
-from spinlev.fem.plate.table import Region
 from spinlev.fem.plate.tables import slab_and_rotor_table, tabulate
 from spinlev.fem.rotor.choice import rotor_table
 from spinlev.geometry.meshes.plate import MeshRule, plate_mesh
@@ -29,7 +29,7 @@ from spinlev.geometry.shapes import Box
 
 SetNumThreads(1)
 PLATE = Plate(Box((0.1, 0.24, 0.03), (0.0, 0.0, -0.055)), 3.5e7, Lowering(0.0, 0.02, 0.02))
-REGION = Region.over_face(PLATE.box.size, (0.018, 0.026), 0.0015)
+REGION = over_face(PLATE.box.size, (0.018, 0.026), 0.0015)
 RTOL = 0.1
 ROTOR = rotor_table(horizontal(0.002, 0.01, 1.305, 1.0), "cuboid")
 MOMENT = 1.1
@@ -107,7 +107,7 @@ def test_steady_means_in_time_are_those_of_the_phasors(table):
     )  # fmt: skip
     assert states[:n, -1] == pytest.approx(steady, abs=1e-9 * np.abs(steady).max())
     mean = states[n:, -1] * frequency
-    tensor, gradient = table.reaction_tensor(point, frequency)[0], table.reaction_gradient(point, frequency)[0]
+    tensor, gradient = table.reaction_tensor(point, frequency)[0], reaction_gradient(table, point, frequency)[0]
     assert mean[1] == pytest.approx(mean_loss(tensor, phasor, frequency), rel=1e-6)
     torque, force = mean_torque(tensor, phasor), mean_force(gradient, phasor)
     assert mean[5:] == pytest.approx(torque, rel=1e-6, abs=1e-6 * np.linalg.norm(torque))
@@ -166,7 +166,7 @@ def test_ledger_with_the_rotor_closes(made):
     table, share = made
     n, omega, slope = len(table.rates), 2 * np.pi * 100, 0.02
     variables = hy.make_vars("angle", "depth")
-    signals = share.expressions(share.basis(*variables))
+    signals = signal_expressions(share, variables)
     driven = hy.cfunc(
         [*signals, *(hy.diff(s, v) for v in variables for s in signals)], variables, compact_mode=True, opt_level=0
     )

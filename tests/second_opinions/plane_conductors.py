@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from spinlev.fem.closed_forms.eddy_sphere import ComplexArray
-from spinlev.fem.plate.slab import Slab, checked, power_integral
+from spinlev.fem.plate.slab import Slab, checked, wave_numbers
 from spinlev.geometry.common import MU_0
 
 
@@ -35,9 +35,11 @@ def reaction_gradient(slab: Slab, height: ArrayLike, frequency: ArrayLike) -> Co
     It is symmetric and without trace in its first two indices.  Accuracy and errors as `reaction_tensor`.
     """
     h, f = checked(height, frequency)
+    k, weight = wave_numbers(h)
+    integral = np.sum(weight * k**3 * np.exp(-2 * k * h[..., None]) * slab.reflection(k, f[..., None]), axis=-1)
     pattern = np.zeros((3, 3, 3))
     pattern[2, 2, 2] = 1.0
     for a in (0, 1):
         pattern[2, a, a] = pattern[a, 2, a] = 0.5
         pattern[a, a, 2] = -0.5
-    return MU_0 / (4 * np.pi) * power_integral(slab, h, f, 3)[..., None, None, None] * pattern
+    return MU_0 / (4 * np.pi) * integral[..., None, None, None] * pattern

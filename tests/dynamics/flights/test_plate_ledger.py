@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from article import FLOATER, MAGNETS, RADIUS
 from second_opinions.phasor import mean_force, mean_loss, mean_torque
+from second_opinions.plate_tables import reaction_gradient
 
 from spinlev.dynamics.equilibria.equilibrium import Survey
 from spinlev.dynamics.equilibria.search import find_equilibria, with_plate
@@ -52,7 +53,7 @@ def test_what_a_steady_turn_loses_is_that_of_the_frequency_domain():
     torque = heavy.inertia * (spin[last] - spin[first]) / seconds
     body = PLATE.box.to_body(place)
     phasor = heavy.moment * np.sin(tilt) * np.array([1, -1j, 0])
-    tensor, gradient = memory.table.reaction_tensor(body, 110.0)[0], memory.table.reaction_gradient(body, 110.0)[0]
+    tensor, gradient = memory.table.reaction_tensor(body, 110.0)[0], reaction_gradient(memory.table, body, 110.0)[0]
     still = heavy.moment * np.cos(tilt) * np.array([0, 0, 1])
     lift = mean_force(gradient, phasor)[2]
     assert np.abs(memory.table.reaction_tensor(body, 0.0)[0] @ still).max() == 0  # what does not turn induces nothing

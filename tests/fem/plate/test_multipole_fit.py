@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from second_opinions.plate_tables import over_face
 
 from spinlev.fem.plate.multipoles import Multipoles, fit_multipoles
 from spinlev.fem.plate.network import candidates
-from spinlev.fem.plate.table import Region
 
-REGION = Region.over_face((0.1, 0.1, 0.02), (0.015, 0.025), 0.004)
+REGION = over_face((0.1, 0.1, 0.02), (0.015, 0.025), 0.004)
 CHOICE = candidates(REGION, np.array([0.05, 0.05, 0.01]))
 DIPOLE = np.array([[1, 0, 0], [1, 1, 0], [1, 1, 1]], float)
 POINTS = REGION.surface((6, 6, 6))
@@ -56,7 +56,7 @@ def test_no_functions_need_no_multipoles():
 
 def test_a_higher_degree_reaches_off_axis_images():
     """Mirror dipoles below a face 10 mm away, 5 mm off the axis: degree 4 ends near 3e-4, 7 below 1e-6."""
-    size, column = np.array([0.1, 0.24, 0.03]), Region.over_face((0.1, 0.24, 0.03), (0.01, 0.04), 0.005)
+    size, column = np.array([0.1, 0.24, 0.03]), over_face((0.1, 0.24, 0.03), (0.01, 0.04), 0.005)
     points = column.surface((7, 7, 13))
     places = column.grid((2, 2, 3)) * [1, 1, -1] + [0, 0, size[2]]
     values = np.concatenate([Multipoles(np.tile(p, (3, 1)), DIPOLE, 0.01).fields(points) for p in places], axis=1)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from ngsolve import SetNumThreads
+from second_opinions.plate_tables import over_face
 
 from spinlev.fem.plate.reaction import plate_reaction
 from spinlev.fem.plate.table import Region
@@ -16,7 +17,7 @@ from spinlev.geometry.shapes import Box
 SetNumThreads(1)
 pytestmark = pytest.mark.slow
 PLATE = Plate(Box((0.1, 0.24, 0.03)), 3.5e7)
-COLUMN = Region.over_face(PLATE.box.size, (0.01, 0.04), 0.005)
+COLUMN = over_face(PLATE.box.size, (0.01, 0.04), 0.005)
 FINER, FINEST = MeshRule(1.0, 1.6, 1.4, 18.0), MeshRule(0.9, 1.5, 1.3, 18.0)
 """For the reference: other cells than the table's, and air that reaches farther."""
 POINT = Region((-0.003, 0.002, 0.032), (0.003, 0.008, 0.038))

@@ -6,6 +6,7 @@ import heyoka as hy
 import numpy as np
 import pytest
 from ngsolve import SetNumThreads
+from second_opinions.plate_tables import over_face, reaction_gradient, signal_expressions
 
 from spinlev.fem.cache import TableFileError
 from spinlev.fem.closed_forms.potentials import unit_dipoles
@@ -29,7 +30,7 @@ from spinlev.geometry.shapes import Box
 
 SetNumThreads(1)
 PLATE = Plate(Box((0.1, 0.24, 0.03), (0.0, 0.0, -0.055)), 3.5e7, Lowering(0.0, 0.01, 0.02))
-REGION = Region.over_face(PLATE.box.size, (0.016, 0.026), 0.004)
+REGION = over_face(PLATE.box.size, (0.016, 0.026), 0.004)
 RTOL = 0.1
 
 
@@ -93,7 +94,7 @@ def test_field_functions_are_harmonic_and_their_gradient_exact(table):
 def test_reaction_gradient_is_half_the_derivative_of_the_tensor(table):
     """d(mᵀGm)/dx_l = 2 m_i T_lij m_j, since G is symmetric in its two places."""
     point, m, step = REGION.center, np.array([0.3, -0.5, 0.8]), 1e-4
-    gradient = table.reaction_gradient(point, 80.0)[0]
+    gradient = reaction_gradient(table, point, 80.0)[0]
     for axis, unit in enumerate(np.eye(3)):
         ends = [m @ table.reaction_tensor(point + s * step * unit, 80.0)[0] @ m for s in (-2, -1, 1, 2)]
         slope = (ends[0] - 8 * ends[1] + 8 * ends[2] - ends[3]) / (12 * step)
@@ -117,7 +118,7 @@ def test_rotor_share_follows_the_turning_rotor(network):
     exact = network.couplings([source])[0]
     assert abs(share.signals(angle, depth) - exact).max() < 2 * share.error * abs(exact).max()
     variables = hy.make_vars("angle", "depth")
-    expressed = hy.cfunc(share.expressions(share.basis(*variables)), variables, compact_mode=True, opt_level=0)(
+    expressed = hy.cfunc(signal_expressions(share, variables), variables, compact_mode=True, opt_level=0)(
         [angle, depth]
     )
     assert expressed == pytest.approx(share.signals(angle, depth), rel=1e-10, abs=1e-13 * abs(exact).max())
