@@ -21,7 +21,7 @@ FAST := not slow and not browser
 .PHONY: install run develop test test-browser lint types check-pins coverage bench bench-compare bench-peers house dist dependencies docs \
   validate fuzz lock clean
 
-# What the program needs, the page in the browser included; `develop` adds what tests it and writes its pages.
+# What a run needs, its 3-D pictures included; `develop` adds the other extras, and what tests it and writes its pages.
 install: $(VENV)/installed
 
 develop: $(VENV)/installed $(VENV)/developing
@@ -128,8 +128,8 @@ dist: develop
 lock:
 	$(PYTHON) -m venv out/solver
 	out/solver/bin/pip install --quiet --disable-pip-version-check uv
-	$(SOLVE) $(LOCK) --extra explore --extra build --extra dev --output-file requirements-dev.txt
-	$(SOLVE) --extra explore --extra build --constraints requirements-dev.txt --no-annotate --output-file requirements.txt
+	$(SOLVE) $(LOCK) --all-extras --output-file requirements-dev.txt
+	$(SOLVE) --extra view --extra build --constraints requirements-dev.txt --no-annotate --output-file requirements.txt
 
 # Every pin admits that Python and needs nothing that is not pinned.
 check-pins: develop

@@ -52,20 +52,17 @@ def needed_by(text):
 def page():
     """The whole page."""
     run, _, rest = (ROOT / "pyproject.toml").read_text("utf-8").partition("[project.optional-dependencies]")
-    extra, _, dev = rest.partition("[project.scripts]")[0].partition("\ndev = [")
-    run, extra, dev = reasons(run.partition("dependencies = [")[2]), reasons(extra), reasons(dev)
+    extras = re.split(r"^(\w+) = \[$", rest.partition("[project.urls]")[0], flags=re.MULTILINE)[1:]
+    groups = {"To run": reasons(run.partition("dependencies = [")[2])}
+    groups |= {f"Extra `{name}`": reasons(lines) for name, lines in zip(extras[::2], extras[1::2], strict=True)}
     pinned = needed_by((ROOT / "requirements-dev.txt").read_text("utf-8"))
     lines = [HEAD]
-    for title, names in (
-        ("To run", run),
-        ("For the page in the browser (`spinlev[explore]`)", extra),
-        ("To develop", dev),
-    ):
+    for title, names in groups.items():
         lines += [f"## {title}", "", "| package | for | licence |", "| --- | --- | --- |"]
         lines += [f"| {name} | {reason} | {licence(name)} |" for name, reason in names.items()]
         lines += [""]
     lines += ["## What these need", "", "| package | needed by | licence |", "| --- | --- | --- |"]
-    others = sorted(set(pinned) - set(run) - set(extra) - set(dev))
+    others = sorted(set(pinned).difference(*groups.values()))
     lines += [f"| {name} | {', '.join(pinned[name])} | {licence(name)} |" for name in others]
     return "\n".join(lines) + "\n"
 

@@ -5,11 +5,10 @@ from __future__ import annotations
 import asyncio
 import html
 import threading
-from collections.abc import Callable
 from concurrent.futures import Future
 from typing import TYPE_CHECKING
 
-from ..geometry.common import ComputationError, SpinlevError
+from ..geometry.common import SpinlevError
 from ..geometry.scene.contents import Scene
 from .scene_tables import SceneLike, given_scene
 
@@ -64,9 +63,11 @@ def explore(scene: SceneLike, port: int = 0) -> LivePage:
     SceneError
         The scene cannot be used.
     ComputationError
-        The libraries of the page are missing, or the port is taken.
+        The port is taken.
     """
-    loaded, serve = given_scene(scene), page_server()
+    from .page.server import serve
+
+    loaded = given_scene(scene)
     source = "scene" if isinstance(scene, Scene) else str(scene)
     begun: Future[tuple[Pages, asyncio.AbstractEventLoop]] = Future()
 
@@ -86,16 +87,3 @@ def explore(scene: SceneLike, port: int = 0) -> LivePage:
     thread.start()
     pages, loop = begun.result()
     return LivePage(pages, thread, loop)
-
-
-def page_server() -> Callable[..., Pages]:
-    """The function that serves pages. Raises ComputationError where its libraries are missing."""
-    try:
-        from .page.server import serve
-    except ModuleNotFoundError as error:
-        if (error.name or "").partition(".")[0] not in ("bokeh", "plotly", "tornado"):
-            raise
-        raise ComputationError(
-            f"The page needs {error.name}, which is not installed. Write pip install 'spinlev[explore]' and try again."
-        ) from None
-    return serve

@@ -336,15 +336,10 @@ def _lost(address: str) -> ComputationError:
 
 @contextmanager
 def _client(address: str) -> Iterator[Client]:
-    try:
-        from dask import config
-        from dask.utils import parse_timedelta
-        from distributed import Client
-    except ModuleNotFoundError as error:
-        raise InputError(
-            f"Input --scheduler must be left out where dask is not installed; instead received {address!r} (no module "
-            f"{error.name}). Install distributed, or choose --workers."
-        ) from None
+    from dask import config
+    from dask.utils import parse_timedelta
+    from distributed import Client
+
     patience = min(parse_timedelta(config.get("distributed.comm.timeouts.connect"), "s"), PATIENCE)
     of_dask = [name for name in logging.root.manager.loggerDict if name.partition(".")[0] == "distributed"]
     for name in (*of_dask, "tornado.application", "asyncio"):  # what is wrong is said here

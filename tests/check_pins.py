@@ -17,7 +17,7 @@ from packaging.utils import canonicalize_name
 
 ROOT = Path(__file__).parent.parent
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]
-LISTS = {"requirements.txt": ("explore", "build"), "requirements-dev.txt": ("explore", "build", "dev")}
+LISTS = {"requirements.txt": ("view", "build"), "requirements-dev.txt": tuple(PROJECT["optional-dependencies"])}
 """Each list, and the extras that it is for."""
 PIN = re.compile(r"^([\w.-]+)==(\S+)(.*(?:\n +--hash=.*)*)", re.MULTILINE)
 

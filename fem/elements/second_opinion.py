@@ -1,10 +1,11 @@
 """The field of magnets without permeability by Coulomb's law, in 80-bit numbers: slow, and without cancellation."""
 
+from __future__ import annotations
+
 from itertools import product
+from typing import TYPE_CHECKING
 
 import numpy as np
-import skfem
-from skfem.helpers import dot, grad, mul
 
 from ...geometry.common import Array
 from ...geometry.magnets import Magnet
@@ -12,6 +13,9 @@ from ...geometry.meshes.magnets import MagnetMesh, to_meshio
 from ..closed_forms.moments import volume_rule
 from ..closed_forms.uniform import remanent_field
 from .magnetostatics import Formulation
+
+if TYPE_CHECKING:
+    import skfem
 
 NODES = 60
 """A side of the Gauss rule on a face; farther than 1.2 half edges from the faces its error is below 1e-40."""
@@ -44,6 +48,9 @@ def magnet_dipoles(mesh: MagnetMesh, formulation: Formulation = "split") -> Arra
     ------
     ValueError : the mesh holds other elements than tetrahedra (hp_layers must be 0)
     """
+    import skfem
+    from skfem.helpers import dot, grad, mul
+
     exchange = to_meshio(mesh)
     if set(exchange.cells_dict) != {"tetra"}:
         raise ValueError(f"Input mesh must hold tetrahedra only; instead received {', '.join(exchange.cells_dict)}.")

@@ -9,7 +9,6 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
-import jinja2
 import numpy as np
 import xarray as xr
 
@@ -94,6 +93,8 @@ def report_job(folder: Path, out: Path) -> tuple[Path, list[str]]:
     ------
     InputError : the folder is missing, has no result, or one that cannot be read
     """
+    import jinja2
+
     if not os.path.isdir(folder):  # unlike Path.is_dir never raises
         raise InputError(f"Input DIR must be a folder with results; instead received {folder}.")
     paths = sorted(folder.glob("*.nc"))

@@ -13,7 +13,6 @@ from multiprocessing import get_context
 from pathlib import Path
 
 import heyoka as hy
-import magpylib
 import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
@@ -226,6 +225,8 @@ def _many(number: int) -> Array:
 
 def peer_pace() -> float:
     """Seconds per point of magpylib's B alone for the same cube."""
+    import magpylib
+
     peer = magpylib.magnet.Cuboid(polarization=(1.305, 0, 0), dimension=(0.01,) * 3)
     points = _many(TIMED_POINTS)
     peer.getB(points[:10])

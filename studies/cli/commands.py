@@ -406,9 +406,9 @@ def explore(
         raise InputError(f"Input --port must be between 0 and 65535; instead received {port}.")
     source = scene or default_scene()
     loaded = _loaded(source)
-    from ..explore import page_server
+    from ..page.server import serve
 
-    pages = page_server()(loaded, str(source), host, port)
+    pages = serve(loaded, str(source), host, port)
     if not pages.local:
         note(
             f"Other machines can open this page (--host {host}). What it sends, the token in its address included, is "

@@ -48,6 +48,13 @@ def _readable(error: UnicodeError) -> tuple[str, int]:
 codecs.register_error(READABLE, _readable)
 
 
+EXTRAS = {
+    "view": ("pyvista", "vtkmodules", "imageio", "trame_vtk"),
+    "studies": ("skfem", "magpylib", "dynesty", "jinja2"),
+    "explore": ("bokeh", "plotly", "tornado"),
+    "cluster": ("distributed", "dask"),
+}
+"""What is not needed by the first run, and the modules of each."""
 FORTRAN, DRAWING = "libraries of Fortran", "3-D pictures"
 PACKAGES = {
     "Debian or Ubuntu": {FORTRAN: "apt-get install libquadmath0", DRAWING: "apt-get install libegl1 libgl1"},
@@ -69,6 +76,14 @@ def way_out(need: str) -> str:
 def is_missing_library(error: Exception) -> bool:
     """Whether an error is that a module's compiled code did not find a library of the system."""
     return isinstance(error, ImportError) and any(word in str(error) for word in ("shared object", "dlopen"))
+
+
+def missing_extra(error: BaseException) -> str | None:
+    """A sentence: what to install where an optional library is missing; None for other errors."""
+    top = (getattr(error, "name", None) or "").partition(".")[0] if isinstance(error, ModuleNotFoundError) else ""
+    extra = next((extra for extra, modules in EXTRAS.items() if top in modules), None)
+    way = f"pip install 'spinlev[{extra}]', or `make develop` in a checkout"
+    return extra and f"{top} is needed for this and is not installed: {way}."
 
 
 def _system() -> str | None:

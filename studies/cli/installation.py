@@ -8,7 +8,7 @@ from ..figures.renderer import unavailable
 from .console import FORTRAN, lend_quadmath, way_out
 
 MODULES = (
-    *("ngsolve", "netgen.occ", "heyoka", "h5py", "matplotlib.backends.backend_pdf", "distributed"),
+    *("ngsolve", "netgen.occ", "heyoka", "h5py", "matplotlib.backends.backend_pdf"),
     *("spinlev.studies", "spinlev.studies.cli.main"),
 )
 """Those with compiled code, and what stands on them: what is loaded here, Python has compiled before the first run."""

@@ -18,7 +18,7 @@ from rich.console import Console
 
 from ...geometry.common import SpinlevError, printable
 from . import commands
-from .console import FORTRAN, answers_only, heard, is_missing_library, note, to_json, way_out
+from .console import FORTRAN, answers_only, heard, is_missing_library, missing_extra, note, to_json, way_out
 from .options import Answer
 from .start import STOPPED, TOO_MANY_FILES
 
@@ -68,6 +68,9 @@ def _status(arguments: list[str], out: Any, stop: threading.Event | None = None)
                 return 1
             if "SPINLEV_TRACEBACK" in os.environ:
                 raise
+            if needed := missing_extra(error):
+                note(f"spinlev: {needed}")
+                return 1
             note(f"spinlev: {_unforeseen(error)}")  # the last resort: what and where, without a traceback
             return 1
     return 0

@@ -148,9 +148,9 @@ def _main() -> None:
         for number, picture in enumerate(pictures):
             send(picture.draw(lambda fraction, number=number: send((number + fraction) / len(pictures))))
     except Exception as error:  # whatever it is, the other process says it in a line
-        from ..cli.console import DRAWING, is_missing_library, way_out
+        from ..cli.console import DRAWING, is_missing_library, missing_extra, way_out
 
-        reason = " ".join(f"{type(error).__name__}: {error}.".split())
+        reason = missing_extra(error) or " ".join(f"{type(error).__name__}: {error}.".split())
         send(f"{reason} {way_out(DRAWING)}" if is_missing_library(error) else reason)
         if "SPINLEV_TRACEBACK" in os.environ:
             raise

@@ -12,7 +12,7 @@ from types import SimpleNamespace
 
 import check_pins
 import pytest
-from places import HORIZONTAL
+from places import HORIZONTAL, QUICK
 
 from spinlev.studies.cli import console as system_libraries, installation, main as cli
 from spinlev.studies.cli.console import DRAWING, FORTRAN, READABLE, lend_quadmath, make_readable, way_out
@@ -188,8 +188,19 @@ def test_a_command_on_a_terminal_that_knows_only_ascii(tmp_path, settings):
 
 def test_what_is_installed_to_run_has_no_tools_in_it():
     run = check_pins.pins((check_pins.ROOT / "requirements.txt").read_text("utf-8"))
-    assert {"ngsolve", "heyoka", "bokeh", "plotly", "tornado", "setuptools"} <= set(run)
-    assert not {"pytest", "mypy", "ruff", "hypothesis", "coverage", "numpydoc", "docutils"} & set(run)
+    assert {"ngsolve", "heyoka", "pyvista", "setuptools"} <= set(run)
+    assert not {
+        "bokeh",
+        "distributed",
+        "dynesty",
+        "pytest",
+        "mypy",
+        "ruff",
+        "hypothesis",
+        "coverage",
+        "numpydoc",
+        "docutils",
+    } & set(run)
     assert [name for name in run if "sphinx" in name] == []
 
 
@@ -230,3 +241,22 @@ def test_a_pin_that_the_oldest_python_cannot_install_is_found(package, said):
 
     line = "a==1.0" + package.get("hash", " \\\n    --hash=sha256:0123")
     assert check_pins.faults(line, "3.11.0", package.get("asked", ()), find) == said
+
+
+@pytest.mark.parametrize(
+    ("extra", "hidden", "given"),
+    [
+        ("explore", "bokeh", ["explore", "SCENE"]),
+        ("studies", "jinja2", ["report", "QUICK"]),
+        ("cluster", "dask", ["study", "SCENE", "--vary", "frequency_hz=100:120:10", "--scheduler", "tcp://x:1"]),
+    ],
+)
+def test_a_command_whose_extra_is_missing_says_so(tmp_path, extra, hidden, given):
+    """In a process that does not find the library, as after `pip install spinlev` alone."""
+    named = {"SCENE": SCENE, "QUICK": str(QUICK)}
+    code = f"import sys; sys.modules[{hidden!r}] = None\nfrom spinlev.studies.cli.start import main; sys.exit(main())"
+    command = [sys.executable, "-c", code, *(named.get(word, word) for word in given), "--out", str(tmp_path)]
+    found = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert found.returncode == 1
+    assert f"{hidden} is needed for this and is not installed: pip install 'spinlev[{extra}]'" in found.stderr
+    assert "Traceback" not in found.stderr
