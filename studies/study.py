@@ -11,6 +11,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import xarray as xr
 
+from .result import Columns, columns
+
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
@@ -40,6 +42,23 @@ def one_case(point: Point, dataset: xr.Dataset) -> xr.Dataset:
     """A point's result with those of `LABELS` that the point has, ready to be joined along `case`."""
     labels = {name: xr.Variable((), point[name], attrs) for name, attrs in LABELS.items() if name in point}
     return dataset.assign(labels).expand_dims("case")
+
+
+def recorded(
+    point: Point, table: Columns, found: Mapping[str, Any] | Sequence[Any], axes: Mapping[str, Any], **sizes: int
+) -> xr.Dataset:
+    """A point's result from numbers.
+
+    Parameters
+    ----------
+    point : that it is of
+    table : dimensions, unit and label of each quantity
+    found : the quantities by name, or all of them in the table's order
+    axes : coordinates
+    sizes : of the dimensions of what was not found, which is NaN
+    """
+    named = found if isinstance(found, Mapping) else dict(zip(table, found, strict=True))
+    return one_case(point, xr.Dataset(columns(table, named, **sizes), axes))
 
 
 def cases_with(result: xr.Dataset, **labels: object) -> xr.Dataset:

@@ -3,7 +3,7 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cache, cached_property
+from functools import cache
 from itertools import product
 from typing import Any
 from zlib import crc32
@@ -13,9 +13,9 @@ import scipy
 import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
-from ...dynamics.continuation.frequencies import StableRange, at_frequency, reference_state, stable_range
+from ...dynamics.continuation.frequencies import at_frequency, reference_state, stable_range
 from ...dynamics.equilibria.equilibrium import EquilibriumError
 from ...dynamics.flights.batch import Endings, launched
 from ...dynamics.flights.trajectory import DURATION
@@ -24,14 +24,13 @@ from ...dynamics.motion.plate import PlateMemory
 from ...dynamics.motion.state import State
 from ...fem.plate.choice import reachable_region
 from ...fem.plate.tables import slab_and_rotor_table
-from ...fem.rotor.table import FieldTable
+from ...fem.rotor.table import RotorTable
 from ...geometry.common import Array
 from ...geometry.scene.contents import Lowering, Plate, Scene
 from ...geometry.shapes import Box
 from ..figures.style import PAGE, PALETTE, legend_below, panels, styled
-from ..result import Columns, columns
-from ..scene_tables import sources
-from ..study import Point, Study, cases_with, one_case
+from ..result import Columns
+from ..study import Point, Study, cases_with, recorded
 from .article import (
     CONFIGURATIONS,
     PLATE_CONDUCTIVITY,
@@ -43,7 +42,7 @@ from .article import (
     levitation_of,
     rotor_label,
 )
-from .drawing import by_configuration, configuration_panels, text_table
+from .drawing import by_rotor, configuration_panels, text_table
 
 NEARER, FARTHER, SIDEWAYS = 4e-3, 8e-3, 6e-3
 """From where it would levitate without a plate: so much nearer to the rotor, farther from it, and to the side, m."""
@@ -55,6 +54,7 @@ BELOW = 0.018
 SETTLED, LOWERED, LOWERING_SPEED, AFTER = 1.0, 0.055, 0.01, 1.0
 """The plate goes down after (s), by (m), at (m/s: the article's), and the flight goes on for (s)."""
 PLATE_RTOL = 1e-2  # Of the plate's tables: capture is decided by the field's attraction, the plate only brakes
+ONE_SIGMA = math.erf(0.5**0.5)
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,12 +66,6 @@ class Place:
     low: float  # ends of the stable frequencies without a plate, Hz
     high: float
 
-    @cached_property
-    def lowered(self) -> Scene:
-        """The scene whose plate goes down once the floater has settled."""
-        assert self.scene.plate is not None
-        return replace(self.scene, plate=replace(self.scene.plate, lowering=Lowering(SETTLED, LOWERING_SPEED, LOWERED)))
-
 
 @cache
 def place_of(configuration: str, measure: float, part: float) -> Place:
@@ -79,13 +73,18 @@ def place_of(configuration: str, measure: float, part: float) -> Place:
 
     Field: closed form, μr = 1, which the ranges of frequencies are of as well.
 
+    Parameters
+    ----------
+    configuration, measure : of the rotor; mm or degrees
+    part : of the way from the lowest to the highest stable frequency
+
     Raises
     ------
     EquilibriumError : it levitates stably at no frequency
     """
     scene = article_scene(configuration, measure, permeability=1.0)
     rates = levitation_of(scene, "cuboid").rates
-    stable: StableRange = stable_range(scene, rates, *reference_state(scene))
+    stable = stable_range(scene, rates, *reference_state(scene))
     low, high = stable.low.parameter, stable.high.parameter
     frequency = low + part * (high - low)
     distance = at_frequency(scene, rates, stable.near(frequency), frequency).distance
@@ -96,40 +95,43 @@ def place_of(configuration: str, measure: float, part: float) -> Place:
 
 
 @cache
-def plate_under(place: Place, scene: Scene) -> PlateMemory:
-    """The currents in the plate of a place's scene, taken as an infinite slab, wherever launches begin."""
-    plate = scene.plate
+def plate_under(place: Place, lowered: bool = False) -> PlateMemory:
+    """The currents in a place's plate, taken as an infinite slab, wherever launches begin.
+
+    Where it is `lowered` it goes down once the floater has settled.
+    """
+    scene, plate = place.scene, place.scene.plate
     assert plate is not None
+    if lowered:
+        plate = replace(plate, lowering=Lowering(SETTLED, LOWERING_SPEED, LOWERED))
     middle = np.array([0.0, 0.0, -place.distance - (FARTHER - NEARER) / 2])
     half = [SIDEWAYS, SIDEWAYS, (FARTHER + NEARER) / 2]
     region = reachable_region(plate, middle, half, scene.floater.radius)
     frequencies = (0.5, max(250.0, 2 * scene.frequency))
-    rotor = sources(levitation_of(replace(scene, plate=None), "cuboid").table)
-    table, share = slab_and_rotor_table(plate, rotor, region, frequencies, PLATE_RTOL)
+    table, share = slab_and_rotor_table(plate, field_of(place), region, frequencies, PLATE_RTOL)
     return PlateMemory(plate, table, share, "slab")
 
 
 @cache
-def field_of(place: Place, model: str = "cuboid") -> FieldTable:
+def field_of(place: Place) -> RotorTable:
     """The rotor's field."""
-    return levitation_of(replace(place.scene, plate=None), model).table  # type: ignore[arg-type]
+    table = levitation_of(replace(place.scene, plate=None), "cuboid").table
+    assert isinstance(table, RotorTable)
+    return table
 
 
-@dataclass(frozen=True, eq=False)
-class Launches:
-    """How n floaters are let go."""
-
-    farther: Array  # (n,) from the rotor than where it levitates, m
-    sideways: Array  # (n,) m
-    lean: Array  # (n,) angle of the moment to the axis, rad
-    spin: Array  # (n,) about the moment, over the rotor's
-    states: State  # (n, 3) at t = 0, along the rotor's axes
-
-
-def launches(place: Place, count: int, seed: list[int]) -> Launches:
+def launches(place: Place, count: int, seed: list[int]) -> tuple[dict[str, Array], State]:
     """Launches drawn evenly over heights, a disc, a cap of directions and spins; let go with a hand's speed.
 
-    The same seed gives the same launches, to the last bit.
+    Parameters
+    ----------
+    place : below which
+    count : how many, n
+    seed : the same gives the same launches, to the last bit
+
+    Returns
+    -------
+    How each is let go (n,) by the names of `COLUMNS`, and its state (n, 3) at t = 0, along the rotor's axes
     """
     draws = np.random.default_rng(seed)
     height, area, cap, along = draws.uniform(size=(4, count))
@@ -137,162 +139,29 @@ def launches(place: Place, count: int, seed: list[int]) -> Launches:
     velocity = draws.normal(0, SPEED, (count, 3))
     farther = -NEARER + (NEARER + FARTHER) * height
     sideways, spin = SIDEWAYS * np.sqrt(area), SPIN * (2 * along - 1)
-    cosine = 1 - (1 - np.cos(LEAN)) * cap
+    cosine = 1 - (1 - np.cos(LEAN)) * cap  # even over the sphere's cap
     sine = np.sqrt(1 - cosine**2)
     position = np.stack(
         [sideways * np.cos(place_angle), sideways * np.sin(place_angle), -place.distance - farther], axis=-1
     )
     moment = np.stack([sine * np.cos(moment_angle), sine * np.sin(moment_angle), cosine], axis=-1)
     turning = (spin * place.scene.angular_velocity)[:, None] * moment
-    return Launches(farther, sideways, np.arccos(cosine), spin, State(position, velocity, moment, turning))
+    how = {"farther": farther, "sideways": sideways, "lean": np.arccos(cosine), "spin": spin}
+    return how, State(position, velocity, moment, turning)
 
 
 def seed_of(configuration: str, measure: float, part: float, batch: int) -> list[int]:
-    """A seed of its own for each batch of launches."""
+    """A seed of its own for each batch of launches below a rotor (as of `place_of`)."""
     return [crc32(f"{configuration} {measure:g} {part:.6f}".encode()), batch]
 
 
 HELD, PLATE, ROTOR, LOST, NO_EQUILIBRIUM = range(5)
 """Up at the end; touched the plate; touched the rotor; far away; never flown, as no frequency is stable."""
 WORDS = ("held", "touched the plate", "touched the rotor", "lost to the side", "no stable frequency")
-
-
-@dataclass(frozen=True)
-class Share:
-    """A share of n trials with its binomial error (E. B. Wilson, J. Am. Stat. Assoc. 22 (1927) 209, one sigma)."""
-
-    hits: int
-    trials: int
-
-    @property
-    def value(self) -> float:
-        """The share itself; NaN of no trial."""
-        return self.hits / self.trials if self.trials else np.nan
-
-    @property
-    def bounds(self) -> tuple[float, float]:
-        """Ends of Wilson's interval of one standard deviation."""
-        if not self.trials:
-            return np.nan, np.nan
-        n, p = self.trials, self.value
-        middle, half = (p + 0.5 / n) / (1 + 1 / n), np.sqrt(p * (1 - p) / n + 0.25 / n**2) / (1 + 1 / n)
-        return max(0.0, middle - half), min(1.0, middle + half)
-
-    @property
-    def error(self) -> float:
-        """Half of the interval."""
-        low, high = self.bounds
-        return (high - low) / 2
-
-    def __str__(self) -> str:
-        digits = max(1, math.ceil(-math.log10(100 * self.error))) if self.trials else 1
-        return f"{100 * self.value:.{digits}f} ± {100 * self.error:.{digits}f} %"
-
-
-@dataclass(frozen=True, eq=False)
-class Captured:
-    """One rotor at one frequency: all of its launches."""
-
-    configuration: str  # of the rotor and of its range of stable frequencies
-    measure: float
-    part: float
-    frequency: float  # Hz, NaN where none is stable
-    flights: xr.Dataset  # outcome and how each was let go, over `flight`
-    settled: int  # of those flown on while the plate went down: up before, and after
-    stayed: int
-
-    @property
-    def captured(self) -> NDArray[np.bool_]:
-        """Which launches are captured."""
-        return np.asarray(self.flights["outcome"].values == HELD)
-
-    @property
-    def probability(self) -> Share:
-        """Share of launches that are captured."""
-        return Share(int(self.captured.sum()), self.captured.size)
-
-    @property
-    def beyond(self) -> NDArray[np.bool_]:
-        """Which launches left the range of the plate's table."""
-        return np.asarray(self.flights["left_plate_table"].values == 1)
-
-    @property
-    def others(self) -> dict[str, float]:
-        """Shares of launches that ended otherwise, by name."""
-        return {word: float(np.mean(self.flights["outcome"].values == k)) for k, word in enumerate(WORDS) if k != HELD}
-
-    @property
-    def levitated(self) -> bool:
-        """Whether the article's experiment levitated with this rotor."""
-        return self.measure in CONFIGURATIONS[self.configuration].levitated
-
-
-def captured(result: xr.Dataset) -> list[Captured]:
-    """Each rotor and frequency of a joined result, its batches put together."""
-    found = []
-    for _, some in by_configuration(result):
-        for measure, part in sorted({(float(m), float(p)) for m, p in zip(some["measure"], some["part"], strict=True)}):
-            found.append(_together(cases_with(some, measure=measure, part=part)))
-    return found
-
-
-def _together(part: xr.Dataset) -> Captured:
-    names = ["outcome", "farther", "sideways", "lean", "spin", "levitated", "left_plate_table"]
-    whole = part[names].drop_vars(["configuration", "measure"], errors="ignore")
-    flights = whole.stack(every=("case", "flight"), create_index=False).rename(every="flight")
-    flights = flights.isel(flight=np.flatnonzero(np.isfinite(flights["outcome"].values)))
-    first = part.isel(case=0)
-    rotor = str(first["configuration"].values), float(first["measure"]), float(first["part"])
-    counts = int(part["settled"].sum()), int(part["stayed"].sum())
-    return Captured(*rotor, float(first["rotor_frequency"]), flights, *counts)
-
-
 PARTS = (1 / 6, 1 / 2, 5 / 6)  # Places in the range of stable frequencies
 TOGETHER, BATCHES = 2000, 5  # Flights of a point, and points for each rotor and frequency: ten thousand flights
 CHECKED = 8  # Launches of each rotor and frequency that are flown on while the plate goes down
 FEW = 24  # Launches of a point in the quick setting
-
-
-def capture_points(quick: bool) -> list[Point]:
-    """All rotors and frequencies again and again, a batch of launches each time, so that a stop leaves equal shares."""
-    if quick:
-        return [_point(*rotor, 0.5, 0, FEW, 0) for rotor in QUICK_ROTORS]
-    rotors = [(name, value) for name, kind in CONFIGURATIONS.items() for value in kind.tested]
-    return [
-        _point(*rotor, part, batch, TOGETHER, CHECKED if batch == 0 else 0)
-        for batch, rotor, part in product(range(BATCHES), rotors, PARTS)
-    ]
-
-
-def _point(configuration: str, measure: float, part: float, batch: int, flights: int, checked: int) -> Point:
-    return {
-        "configuration": configuration, "measure": measure, "part": part,
-        "batch": batch, "flights": flights, "checked": checked,
-    }  # fmt: skip
-
-
-def capture(point: Point) -> xr.Dataset:
-    """One batch of launches below one rotor, see `COLUMNS`; the outcomes are numbers of `WORDS`."""
-    rotor = point["configuration"], point["measure"], point["part"]
-    found: dict[str, Any] = {"part": point["part"], "batch": point["batch"], "settled": 0, "stayed": 0}
-    empty = np.full(point["flights"], np.nan)
-    try:
-        place = place_of(*rotor)
-    except EquilibriumError:
-        found |= {name: np.nan for name, (dims, *_) in COLUMNS.items() if not dims and name not in found}
-        found["outcome"] = np.full(point["flights"], float(NO_EQUILIBRIUM))
-    else:
-        begun = launches(place, point["flights"], seed_of(*rotor, point["batch"]))
-        ended = launched(place.scene, field_of(place), plate_under(place, place.scene), begun.states, SETTLED)
-        found |= {"rotor_frequency": place.scene.frequency, "distance": place.distance, "low": place.low}
-        found |= {"high": place.high, "levitated": ended.levitated_s, "outcome": outcomes(place, ended).astype(float)}
-        found |= {name: getattr(begun, name) for name in ("farther", "sideways", "lean", "spin")}
-        found["left_plate_table"] = ended.left_plate_table.astype(float)
-        found["settled"], found["stayed"] = _flown_on(place, begun, point["checked"])
-    found = {name: found.get(name, empty) for name in COLUMNS}
-    return one_case(point, xr.Dataset(columns(COLUMNS, {name: np.asarray(value) for name, value in found.items()})))
-
-
 FLIGHTS = ("flight",)
 COLUMNS: Columns = {
     "rotor_frequency": ((), "Hz", "frequency of the rotor"),
@@ -313,24 +182,91 @@ COLUMNS: Columns = {
 }
 
 
-def outcomes(place: Place, ended: Endings) -> NDArray[np.int_]:
-    """What became of each flight (n,), see `outcomes`."""
-    found = np.full(len(ended.ended_by), LOST)
-    found[ended.ended_by == DURATION] = HELD
-    touched = ended.ended_by == CONTACT
+def capture_points(quick: bool) -> list[Point]:
+    """All rotors and frequencies again and again, a batch of launches each time, so that a stop leaves equal shares."""
+    rotors = [(name, value) for name, kind in CONFIGURATIONS.items() for value in kind.tested]
+    every = [
+        (*rotor, part, batch, TOGETHER, 0 if batch else CHECKED)
+        for batch, rotor, part in product(range(BATCHES), rotors, PARTS)
+    ]
+    names = ("configuration", "measure", "part", "batch", "flights", "checked")
+    asked = [(*rotor, 0.5, 0, FEW, 0) for rotor in QUICK_ROTORS] if quick else every
+    return [dict(zip(names, values, strict=True)) for values in asked]
+
+
+def capture(point: Point) -> xr.Dataset:
+    """One batch of launches below one rotor, see `COLUMNS`; the outcomes are numbers of `WORDS`."""
+    rotor, count = (point["configuration"], point["measure"], point["part"]), point["flights"]
+    found: dict[str, Any] = {"part": point["part"], "batch": point["batch"], "settled": 0, "stayed": 0}
+    try:
+        place = place_of(*rotor)
+    except EquilibriumError:
+        found["outcome"] = np.full(count, float(NO_EQUILIBRIUM))
+        return recorded(point, COLUMNS, found, {}, flight=count)
+    how, states = launches(place, count, seed_of(*rotor, point["batch"]))
+    ended = _flown(place, states, SETTLED)
+    found |= {"rotor_frequency": place.scene.frequency, "distance": place.distance, "low": place.low}
+    found |= {"high": place.high, "levitated": ended.levitated_s, "outcome": _outcomes(place, ended).astype(float)}
+    found |= {**how, "left_plate_table": ended.left_plate_table.astype(float)}
+    if point["checked"]:
+        first = State(*(v[: point["checked"]] for v in states.vectors))
+        later = _flown(place, first, SETTLED + LOWERED / LOWERING_SPEED + AFTER, lowered=True)
+        found["settled"] = np.sum(later.levitated_s >= SETTLED)
+        found["stayed"] = np.sum(later.ended_by == DURATION)
+    return recorded(point, COLUMNS, found, {}, flight=count)
+
+
+def _flown(place: Place, states: State, seconds: float, lowered: bool = False) -> Endings:
+    memory = plate_under(place, lowered)
+    return launched(replace(place.scene, plate=memory.plate), field_of(place), memory, states, seconds)
+
+
+def _outcomes(place: Place, ended: Endings) -> NDArray[np.int_]:
     low = ended.last.position[:, 2] < -(place.distance + BELOW) / 2
-    found[touched] = np.where(low, PLATE, ROTOR)[touched]
+    touched = np.where(ended.ended_by == CONTACT, np.where(low, PLATE, ROTOR), LOST)
+    return np.where(ended.ended_by == DURATION, HELD, touched)
+
+
+def share(hits: ArrayLike) -> tuple[float, float, float]:
+    """Share of trials (n,) that hit, and the ends of Wilson's binomial interval of one standard deviation."""
+    trials = np.asarray(hits, bool)
+    if not trials.size:
+        return np.nan, np.nan, np.nan
+    found = scipy.stats.binomtest(int(trials.sum()), trials.size)
+    return float(found.statistic), *found.proportion_ci(ONE_SIGMA, "wilson")
+
+
+def share_text(hits: ArrayLike) -> str:
+    """The same in per cent, with half of the interval as its error."""
+    value, low, high = share(hits)
+    error = (high - low) / 2
+    digits = max(1, math.ceil(-math.log10(100 * error))) if np.isfinite(error) else 1
+    return f"{100 * value:.{digits}f} ± {100 * error:.{digits}f} %"
+
+
+def each_place(result: xr.Dataset) -> list[xr.Dataset]:
+    """The launches of each rotor and frequency of a joined result, its batches put together over `flight`."""
+    found = []
+    for _, rotor in by_rotor(result):
+        for part in np.unique(rotor["part"].values):
+            some = cases_with(rotor, part=part)
+            flights = {name: some[name].values.ravel() for name, (dims, *_) in COLUMNS.items() if dims}
+            known = np.isfinite(flights["outcome"])
+            one = xr.Dataset({name: ("flight", values[known]) for name, values in flights.items()})
+            for name in ("configuration", "measure", "part", "rotor_frequency"):
+                one[name] = (), some[name].values[0]
+            one["settled"], one["stayed"] = some["settled"].sum(), some["stayed"].sum()
+            found.append(one)
     return found
 
 
-def _flown_on(place: Place, begun: Launches, count: int) -> tuple[int, int]:
-    """Of the first launches, flown with the plate going down after a while: held until then, and to the end."""
-    if not count:
-        return 0, 0
-    starts = State(*(v[:count] for v in begun.states.vectors))
-    duration = SETTLED + LOWERED / LOWERING_SPEED + AFTER
-    ended = launched(place.lowered, field_of(place), plate_under(place, place.lowered), starts, duration)
-    return int(np.sum(ended.levitated_s >= SETTLED)), int(np.sum(ended.ended_by == DURATION))
+def _held(one: xr.Dataset) -> NDArray[np.bool_]:
+    return np.asarray(one["outcome"].values == HELD)
+
+
+def _others(one: xr.Dataset) -> dict[str, float]:
+    """Shares of launches that ended otherwise, by name."""
+    return {word: float(np.mean(one["outcome"].values == k)) for k, word in enumerate(WORDS) if k != HELD}
 
 
 SHOWN = (("horizontal", 2.0), ("vertical", 14.0), ("vertical", 18.0), ("tilt", 10.0))
@@ -340,48 +276,47 @@ BINS = 6
 
 @styled
 def share_figure(result: xr.Dataset) -> Figure:
-    """The capture probability against each configuration's displacement or tilt, at each part of its frequencies."""
-    found = captured(result)
+    """The capture probability of each rotor at each part of its frequencies; bars: one standard deviation."""
     figure, rows = configuration_panels(result, 2.7, ylabel="capture probability (%)", sharey=True)
-    for axes, name, _ in rows:
-        own = [one for one in found if one.configuration == name]
-        for part, color in zip(sorted({one.part for one in own}), PALETTE, strict=False):
-            some = [one for one in own if one.part == part]
+    for axes, name, own in rows:
+        every = each_place(own)
+        for part, color in zip(sorted({float(one["part"]) for one in every}), PALETTE, strict=False):
+            some = [one for one in every if float(one["part"]) == part]
             label = f"{part:.0%} of the stable range"
-            _shares(axes, [one.measure for one in some], [one.probability for one in some], color, label)
+            _shares(axes, [float(one["measure"]) for one in some], [_held(one) for one in some], color, label)
         for measure in CONFIGURATIONS[name].levitated:
             axes.axvline(measure, color="0.85", lw=4, zorder=0, label="levitated in the article")
         axes.set(xlabel=label_of(name), ylim=(-2, 102))
-    legend_below(figure, rows[0][0])
+    legend_below(figure)
     return figure
 
 
-def _shares(axes: Axes, x: Sequence[float], shares: Sequence[Share], color: str, label: str) -> None:
+def _shares(axes: Axes, x: ArrayLike, hits: Sequence[ArrayLike], color: str, label: str) -> None:
     """Shares in per cent with Wilson's intervals."""
-    values, around = np.array([s.value for s in shares]), np.array([s.bounds for s in shares])
-    bars = np.maximum(np.stack([values - around[:, 0], around[:, 1] - values]), 0)
-    axes.errorbar(x, 100 * values, 100 * bars, fmt="o-", ms=4, capsize=2, color=color, label=label)
+    values, low, high = 100 * np.array([share(each) for each in hits]).T
+    bars = np.maximum([values - low, high - values], 0)
+    axes.errorbar(x, values, bars, fmt="o-", ms=4, capsize=2, color=color, label=label, clip_on=False)
 
 
 @styled
 def place_figure(result: xr.Dataset) -> Figure:
     """From where floaters are captured: over height and lateral offset, and over the moment's angle to the axis."""
-    found = [[one for one in captured(result) if (one.configuration, one.measure) == rotor] for rotor in SHOWN]
+    every = each_place(result)
+    found = [[one for one in every if (one["configuration"].item(), float(one["measure"])) == rotor] for rotor in SHOWN]
     chosen = [some[len(some) // 2] for some in found if some]
     figure, (maps, leans) = panels(2, len(chosen), (PAGE, 4.6), sharey="row")
     side, height = np.linspace(0, SIDEWAYS, 5), np.linspace(-NEARER, FARTHER, 9)
     edges = np.degrees(np.linspace(0, LEAN, BINS + 1))
     for top, bottom, one in zip(maps, leans, chosen, strict=True):
-        at = one.flights["sideways"].values, one.flights["farther"].values
-        hits = one.captured.astype(float)
-        share = 100 * scipy.stats.binned_statistic_2d(*at, hits, bins=(side, height)).statistic
-        drawn = top.pcolormesh(1e3 * side, 1e3 * height, share.T, vmin=0, vmax=100, cmap="viridis")
+        at, hits = (one["sideways"].values, one["farther"].values), _held(one)
+        mean = 100 * scipy.stats.binned_statistic_2d(*at, hits.astype(float), bins=(side, height)).statistic
+        drawn = top.pcolormesh(1e3 * side, 1e3 * height, mean.T, vmin=0, vmax=100, cmap="viridis")
         top.grid(False)
-        top.set(title=f"{rotor_label(one.configuration, one.measure)}, {one.frequency:.0f} Hz")
+        rotor = rotor_label(one["configuration"].item(), float(one["measure"]))
+        top.set_title(f"{top.get_title('left')} {rotor}, {float(one['rotor_frequency']):.0f} Hz")
         top.set_xlabel("lateral offset (mm)")
-        lean = np.digitize(np.degrees(one.flights["lean"].values), edges) - 1
-        shares = [Share(int(one.captured[lean == k].sum()), int((lean == k).sum())) for k in range(BINS)]
-        _shares(bottom, ((edges[1:] + edges[:-1]) / 2).tolist(), shares, PALETTE[0], "")
+        lean = np.digitize(np.degrees(one["lean"].values), edges) - 1
+        _shares(bottom, (edges[1:] + edges[:-1]) / 2, [hits[lean == k] for k in range(BINS)], PALETTE[0], "")
         bottom.set(xlabel="moment to the axis (°)", ylim=(-2, 102))
     maps[0].set_ylabel("farther from the rotor (mm)")
     maps[0].invert_yaxis()  # shared by all
@@ -392,53 +327,60 @@ def place_figure(result: xr.Dataset) -> Figure:
 
 def capture_lines(result: xr.Dataset) -> list[str]:
     """The capture probability of each rotor and frequency, and what became of the others."""
-    found, rows = captured(result), []
+    found, rows = each_place(result), []
     for one in found:
-        rest = sorted(((share, word) for word, share in one.others.items() if share > 0), reverse=True)
-        after = f"{one.stayed} of {one.settled}" if one.settled else ""
-        seen = "levitated" if one.levitated else "did not levitate"
-        name = f"{rotor_label(one.configuration, one.measure)}, {one.frequency:.1f} Hz"
-        ends = ", ".join(f"{100 * share:.0f} % {word}" for share, word in rest)
-        rows.append((name, f"{one.probability}", str(one.probability.trials), seen, after, ends))
+        rest = sorted(((part, word) for word, part in _others(one).items() if part > 0), reverse=True)
+        after = f"{int(one['stayed'])} of {int(one['settled'])}" if one["settled"] else ""
+        seen = "levitated" if _levitated(one) else "did not levitate"
+        rotor = rotor_label(one["configuration"].item(), float(one["measure"]))
+        ends = ", ".join(f"{100 * part:.0f} % {word}" for part, word in rest)
+        name = f"{rotor}, {float(one['rotor_frequency']):.1f} Hz"
+        rows.append((name, share_text(_held(one)), str(one.sizes["flight"]), seen, after, ends))
     head = ("rotor", "captured", "launches", "article", "stay, plate lowered", "others")
     lines = text_table(head, rows)
-    flown = sum(int(np.isfinite(one.flights["left_plate_table"]).sum()) for one in found)
-    beyond = sum(int(one.beyond.sum()) for one in found)
-    if beyond:
-        inside = sum(int((one.beyond & one.captured).sum()) for one in found)
+    every = xr.concat([one[["outcome", "left_plate_table"]] for one in found], "flight")
+    beyond = every["left_plate_table"] == 1
+    if beyond.any():
         lines.append(
-            f"{beyond} of {flown} trajectories, {inside} of them captured, were for a while beyond the range of the "
+            f"{int(beyond.sum())} of {int(every['left_plate_table'].count())} trajectories, "
+            f"{int((beyond & _held(every)).sum())} of them captured, were for a while beyond the range of the "
             "plate's table, where the field of its currents is a continuation of unknown error."
         )
-    settled, stayed = sum(one.settled for one in found), sum(one.stayed for one in found)
+    settled, stayed = (int(sum(one[name] for one in found)) for name in ("settled", "stayed"))
     if settled:
         lines.append(
             f"Of {settled} captured floaters {stayed} still levitate after the plate was lowered (10 mm/s over 55 mm): "
-            f"{Share(settled - stayed, settled)} are lost."
+            f"{share_text(np.arange(settled) >= stayed)} are lost."
         )
     return lines
 
 
+def _levitated(one: xr.Dataset) -> bool:
+    return float(one["measure"]) in CONFIGURATIONS[one["configuration"].item()].levitated
+
+
 def capture_numbers(result: xr.Dataset) -> dict[str, Any]:
     """The shares as numbers: `shares`, one entry for each rotor and frequency; and what the plate's lowering loses."""
-    found = captured(result)
-    rows = [
-        {
-            "configuration": one.configuration,
-            "value": one.measure,
-            "levitated_in_article": one.levitated,
-            "frequency_hz": None if np.isnan(one.frequency) else one.frequency,
-            "flights": one.probability.trials,
-            "held": one.probability.value,
-            "held_error": one.probability.error,
-            "left_plate_table": float(np.mean(one.beyond)),
-            **{word.replace(" ", "_"): share for word, share in one.others.items()},
-        }
-        for one in found
-    ]
+    found, rows = each_place(result), []
+    for one in found:
+        value, low, high = share(_held(one))
+        frequency = float(one["rotor_frequency"])
+        rows.append({
+            "configuration": one["configuration"].item(),
+            "value": float(one["measure"]),
+            "levitated_in_article": _levitated(one),
+            "frequency_hz": None if np.isnan(frequency) else frequency,
+            "flights": one.sizes["flight"],
+            "held": value,
+            "held_error": (high - low) / 2,
+            "left_plate_table": float(np.mean(one["left_plate_table"] == 1)),
+            **{word.replace(" ", "_"): part for word, part in _others(one).items()},
+        })  # fmt: skip
     return {
-        "shares": rows, "flown_on": sum(one.settled for one in found), "stayed_up": sum(one.stayed for one in found),
-    }  # fmt: skip
+        "shares": rows,
+        "flown_on": int(sum(one["settled"] for one in found)),
+        "stayed_up": int(sum(one["stayed"] for one in found)),
+    }
 
 
 STUDY = Study(

@@ -18,11 +18,7 @@ from ..figures.style import PAGE, PALETTE, panels
 from ..study import cases_with
 from .article import CONFIGURATIONS, label_of, rotor_label
 
-TITLES = {
-    "horizontal": "Cube displaced by δx",
-    "vertical": "Two cubes, δz apart",
-    "tilt": "Cube tilted by δθ",
-}
+TITLES = {"horizontal": "displaced cube", "vertical": "two cubes", "tilt": "tilted cube"}
 
 
 def small_multiples(
@@ -32,25 +28,32 @@ def small_multiples(
 
     Parameters
     ----------
-    titles : of the panels
+    titles : of the panels, behind their letters
     height : of a row, inches
     columns : panels side by side, at most
     xlabel, ylabel : of the lowest panel of each column, and of the first of each row
     shared : as of `Figure.subplots`
     """
-    columns = min(columns, len(titles))
-    rows = -(-len(titles) // columns)
+    count = len(titles)
+    columns = min(columns, count)
+    rows = -(-count // columns)
     figure, grid = panels(rows, columns, (PAGE, height * rows + 0.5), **shared)
-    for unused in grid.flat[len(titles) :]:
+    for unused in grid.flat[count:]:
         unused.remove()
-    for k, (panel, title) in enumerate(zip(grid.flat, titles, strict=False)):
-        panel.set_title(title)
+    axes = list(grid.flat[:count])
+    for k, (panel, title) in enumerate(zip(axes, titles, strict=True)):
+        _entitle(panel, title, " ")
         if k % columns == 0:
             panel.set_ylabel(ylabel)
-        if k + columns >= len(titles):
+        if k + columns >= count:
             panel.set_xlabel(xlabel)
             panel.tick_params(labelbottom=True)  # the last in its column, though another row may follow
-    return figure, list(grid.flat[: len(titles)])
+    return figure, axes
+
+
+def _entitle(panel: Axes, text: str, between: str = ", ") -> None:
+    before = panel.get_title("left")
+    panel.set_title(f"{before}{between}{text}" if before else text)
 
 
 def by_configuration(result: xr.Dataset) -> Iterator[tuple[str, xr.Dataset]]:
@@ -58,7 +61,19 @@ def by_configuration(result: xr.Dataset) -> Iterator[tuple[str, xr.Dataset]]:
     for configuration in CONFIGURATIONS:
         part = cases_with(result, configuration=configuration)
         if part.sizes["case"]:
-            yield configuration, part.sortby("measure" if "measure" in part else "value")
+            yield configuration, part.sortby(_measure(part))
+
+
+def by_rotor(result: xr.Dataset) -> Iterator[tuple[str, xr.Dataset]]:
+    """Each rotor that a joined result has, by its label, with all of its cases."""
+    for configuration, part in by_configuration(result):
+        for value in np.unique(part[_measure(part)].values):
+            yield rotor_label(configuration, float(value)), cases_with(part, **{_measure(part): value})
+
+
+def _measure(part: xr.Dataset) -> str:
+    """What a study calls displacement or tilt."""
+    return "measure" if "measure" in part else "value"
 
 
 def configuration_panels(
@@ -70,6 +85,34 @@ def configuration_panels(
     return figure, [(panel, *part) for panel, part in zip(axes, parts, strict=True)]
 
 
+def rotor_panels(
+    result: xr.Dataset, height: float, xlabel: str, ylabel: str
+) -> tuple[Figure, list[tuple[Axes, xr.Dataset, Any]]]:
+    """A panel for each configuration, and for each rotor its panel, its cases and its colour.
+
+    Colours go from dark to bright along viridis with displacement or tilt; a bar below the panel tells them.
+    Parameters are those of `small_multiples`.
+    """
+    figure, rows = configuration_panels(result, height, xlabel, ylabel, sharey=True)
+    found: list[tuple[Axes, xr.Dataset, Any]] = []
+    for axes, configuration, part in rows:
+        rotors = [rotor for _, rotor in by_rotor(part)]
+        known = [float(rotor[_measure(rotor)][0]) for rotor in rotors]
+        if len(known) == 1:
+            _entitle(axes, rotor_label(configuration, known[0]))
+            found.append((axes, rotors[0], PALETTE[0]))
+            continue
+        colors = mpl.colormaps["viridis"](np.linspace(0, 0.88, len(known)))
+        norm = BoundaryNorm(np.arange(len(known) + 1) - 0.5, len(known))
+        bar = figure.colorbar(
+            ScalarMappable(norm, ListedColormap(colors)), ax=axes, location="bottom", ticks=range(len(known)), aspect=25
+        )
+        bar.ax.set_xticklabels([f"{value:g}" for value in known])
+        bar.set_label(label_of(configuration))
+        found += [(axes, rotor, color) for rotor, color in zip(rotors, colors, strict=True)]
+    return figure, found
+
+
 def rotor_places(axes: Axes, configuration: str, part: xr.Dataset) -> Array:
     """Numbered places (case,) for the rotors of one configuration along x, labelled by their displacement or tilt."""
     count = part.sizes["case"]
@@ -78,26 +121,18 @@ def rotor_places(axes: Axes, configuration: str, part: xr.Dataset) -> Array:
     return np.arange(count, dtype=float)
 
 
-def rotor_colors(figure: Figure, axes: Axes, configuration: str, values: ArrayLike) -> dict[float, Any]:
-    """A colour for each displacement or tilt, dark to bright along viridis, with a bar below the panel."""
-    known = sorted(set(np.ravel(values).tolist()))
-    if len(known) == 1:
-        axes.set_title(rotor_label(configuration, known[0]))
-        return {known[0]: PALETTE[0]}
-    colors = mpl.colormaps["viridis"](np.linspace(0, 0.88, len(known)))
-    norm = BoundaryNorm(np.arange(len(known) + 1) - 0.5, len(known))
-    bar = figure.colorbar(
-        ScalarMappable(norm, ListedColormap(colors)), ax=axes, location="bottom", ticks=range(len(known)), aspect=25
-    )
-    bar.ax.set_xticklabels([f"{value:g}" for value in known])
-    bar.set_label(label_of(configuration))
-    return dict(zip(known, colors, strict=True))
-
-
 def explain(axes: Axes, formats: Mapping[str, str], **style: Any) -> None:
-    """Entries of a legend that no curve has by itself: a format of `Axes.plot` by its meaning."""
+    """Entries of a legend that no curve has by itself.
+
+    Parameters
+    ----------
+    axes : that has them
+    formats : of `Axes.plot`, by meaning; grey where neither it nor `style` has a colour
+    style : of all
+    """
     for words, shape in formats.items():
-        axes.plot([], [], shape, **{"color": "0.3", "label": words, **style})
+        grey = {} if "C" in shape or "k" in shape else {"color": "0.3"}
+        axes.plot([], [], shape, **{**grey, "label": words, **style})
 
 
 def plain_log(axes: Axes, ticks: Sequence[float]) -> None:
@@ -116,17 +151,16 @@ def plot_branch(axes: Axes, x: Array, y: Array, solid: NDArray[np.bool_], **styl
 
 def text_table(head: Sequence[str], rows: Iterable[Sequence[object]]) -> list[str]:
     """Lines with aligned columns below their heads; numbers with four significant digits, NaN as a dash."""
-    cells = [tuple(head), *(tuple(map(_cell, row)) for row in rows)]
+
+    def cell(value: Any) -> str:
+        if isinstance(value, str):
+            return value
+        return f"{float(value):.4g}" if np.isfinite(float(value)) else "–"
+
+    cells = [tuple(head), *(tuple(map(cell, row)) for row in rows)]
     widths = [max(map(len, column)) for column in zip(*cells, strict=True)]
     sides = ["<"] + [">"] * (len(widths) - 1)
     return ["  ".join(f"{c:{s}{w}}" for c, s, w in zip(row, sides, widths, strict=True)).rstrip() for row in cells]
-
-
-def _cell(value: object) -> str:
-    if isinstance(value, str):
-        return value
-    number = float(value)  # type: ignore[arg-type]
-    return f"{number:.4g}" if np.isfinite(number) else "–"
 
 
 def span(values: ArrayLike, digits: str = ".3g") -> str:
@@ -148,7 +182,13 @@ def uncertain(value: SupportsFloat, error: SupportsFloat) -> str:
 
 
 def range_text(value: xr.DataArray, error: xr.DataArray, scale: float = 1.0) -> str:
-    """A range of values with signs, and the largest error."""
+    """A range of values with signs, and the largest error.
+
+    Parameters
+    ----------
+    value, error : over the same dimensions
+    scale : from their unit to the one that is written
+    """
     known: Array = scale * value.values[np.isfinite(value.values)]
     if not known.size:
         return "–"
@@ -159,7 +199,13 @@ def range_text(value: xr.DataArray, error: xr.DataArray, scale: float = 1.0) -> 
 
 
 def last_crossing(distance: Array, values: Array, level: float) -> float:
-    """The distance from which on values stay below a level, NaN if beyond the last; logarithms are interpolated."""
+    """The distance from which on values stay below a level, NaN if beyond the last.
+
+    Parameters
+    ----------
+    distance, values : (n,), by growing distance; between them logarithms are interpolated
+    level : positive
+    """
     above = np.flatnonzero(values > level)
     if not len(above):
         return float(distance[0])

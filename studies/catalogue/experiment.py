@@ -2,6 +2,10 @@
 
 First the rotors of the designs, point by point, then the posterior of each variant of the model on the surrogates that
 are fitted to them; a variant finds the rotors in the cache, and computes what is not there.
+
+The posterior is by nested sampling: J. Skilling, Bayesian Anal. 1 (2006) 833, in the program dynesty (J. S. Speagle,
+Mon. Not. R. Astron. Soc. 493 (2020) 3132), which also gives the evidence.  A plain mean of the likelihood over draws
+from the prior gives the evidence of every single fact, of every pair and of all again, independently.
 """
 
 from collections.abc import Mapping, Sequence
@@ -10,16 +14,146 @@ from typing import Any
 import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
+from scipy.special import logsumexp, ndtri
+from scipy.stats import qmc
 
 from ...geometry.common import Array
 from ..figures.style import PAGE, PALETTE, legend_below, panels, styled
-from ..result import Columns, columns, variable
+from ..result import columns, variable
 from ..study import Point, Study
 from .drawing import text_table, uncertain
-from .experiment_design import cached_row
-from .experiment_facts import FACTS, NAMES, QUICK_FACTS, UNKNOWNS, Fact, Models, Unknown
-from .experiment_fit import EVIDENCES, POSTERIOR, SYNTHETIC, TRUTH, evidences, posterior, synthetic_facts
-from .experiment_surrogate import FITTED, Surrogate, corrected, fitted
+from .experiment_design import design_row
+from .experiment_model import (
+    EVEN,
+    FACTS,
+    FITTED,
+    LONGEST,
+    NAMES,
+    QUICK_FACTS,
+    UNKNOWNS,
+    Fact,
+    Flight,
+    Models,
+    Surrogate,
+    Unknown,
+    corrected,
+    courses,
+    drawn,
+    ended,
+    ends,
+    fitted,
+    log_likelihoods,
+)
+
+KEPT = 1000  # Draws of the posterior that are kept
+TOGETHER = 500  # Draws that are evaluated in one call
+DONE = 0.1  # What the evidence that remains may add to its logarithm
+
+
+POSTERIOR: dict[str, Any] = {
+    "posterior": (("draw", "unknown"), "see unit", "draw of the posterior"),
+    "fact_log_likelihood": (("draw", "fact"), "1", "logarithm of the likelihood of a fact"),
+    "log_evidence": ((), "1", "logarithm of the evidence by nested sampling"),
+    "log_evidence_error": ((), "1", "its standard deviation"),
+    "calls": ((), "1", "evaluations of the likelihood"),
+}
+EVIDENCES: dict[str, Any] = {
+    "log_evidence_drawn": ((), "1", "logarithm of the evidence by draws of the prior"),
+    "log_evidence_drawn_error": ((), "1", "its standard deviation"),
+    "log_evidence_single": (("fact",), "1", "logarithm of the evidence of one fact"),
+    "log_evidence_pair": (("fact", "other_fact"), "1", "logarithm of the evidence of two facts"),
+    "log_evidence_others": (("fact",), "1", "logarithm of the evidence of all other facts"),
+    "fact_shift": (("fact", "unknown"), "1", "mean given one fact, in deviations of the prior"),
+    "fact_width": (("fact", "unknown"), "1", "deviation given one fact, in deviations of the prior"),
+}
+
+
+def posterior(models: Models, facts: Mapping[str, Fact], live: int, walks: int, seed: int) -> dict[str, Any]:
+    """Draws of the posterior and the evidence, by the names of `POSTERIOR`; the same seed gives the same draws.
+
+    Parameters
+    ----------
+    models, facts : whose likelihood is asked for
+    live, walks : points of nested sampling, and steps of the walk by which each new one is found
+    seed : of all random numbers
+    """
+    from dynesty import NestedSampler
+
+    def likelihood(shares: Array) -> float:
+        known = log_likelihoods(models, drawn(shares[None]), facts)
+        return float(sum(value[0] for value in known.values()))
+
+    generator = np.random.default_rng(seed)
+    sampler = NestedSampler(
+        likelihood, lambda shares: shares, len(UNKNOWNS),  # shares of the priors
+        nlive=live, bound="multi", sample="rwalk", walks=walks, rstate=generator,
+    )  # fmt: skip
+    sampler.run_nested(dlogz=DONE, print_progress=False)
+    found = sampler.results
+    weights = np.exp(found.logwt - logsumexp(found.logwt))
+    shares = found.samples[generator.choice(len(weights), KEPT, p=weights / weights.sum())]
+    each = log_likelihoods(models, drawn(shares), facts)
+    values = np.stack([drawn(shares)[name] for name in NAMES], axis=1)
+    likelihoods = np.stack([each[name] for name in facts], axis=1)
+    numbers = (values, likelihoods, found.logz[-1], found.logzerr[-1], np.sum(found.ncall))
+    return dict(zip(POSTERIOR, numbers, strict=True))
+
+
+def evidences(models: Models, facts: Mapping[str, Fact], draws: int, seed: int) -> dict[str, Any]:
+    """Evidences by draws of the prior (Sobol's sequence), by the names of `EVIDENCES`.
+
+    Parameters
+    ----------
+    models, facts : whose likelihood is asked for
+    draws : how many, a power of two
+    seed : of the sequence
+    """
+    shares = qmc.Sobol(len(UNKNOWNS), seed=seed).random(draws)
+    shares = np.clip(shares, 1e-12, 1 - 1e-12)
+    parts = [log_likelihoods(models, drawn(part), facts) for part in np.array_split(shares, max(1, draws // TOGETHER))]
+    known = np.stack([np.concatenate([part[name] for part in parts]) for name in facts], axis=1)
+
+    def mean(logarithms: Array) -> Array:
+        return np.asarray(logsumexp(logarithms, axis=0) - np.log(draws))
+
+    every = known.sum(axis=1)
+    pair = np.stack([mean(known + one[:, None]) for one in known.T])
+    np.fill_diagonal(pair, mean(known))
+    whole = float(mean(every))
+    spread, deviates = np.exp(every - whole), ndtri(shares)
+    weights = np.exp(known - logsumexp(known, axis=0)).T
+    shift = weights @ deviates
+    width = np.sqrt(np.maximum(weights @ deviates**2 - shift**2, 0.0))
+    error = float(spread.std() / np.sqrt(draws))
+    numbers = (whole, error, mean(known), pair, mean(every[:, None] - known), shift, width)
+    return dict(zip(EVIDENCES, numbers, strict=True))
+
+
+SYNTHETIC = "made-up facts"
+TRUTH: dict[str, float] = {u.name: (u.first + u.second) / 2 if u.prior == EVEN else u.first for u in UNKNOWNS}
+TRUTH |= {"displacement": 1.2, "tilt": 1.6, "stack": 14.2, "stack_tilt": 1.0}
+TRUTH |= {"magnets": 7.5e5, "steel": 3.0, "motion": 9.0}
+"""Unknowns of which facts are made up: off the prior's middle by up to 1.5 of its deviations."""
+FLIGHTS: tuple[Flight, ...] = (
+    *(("single", 1.0, frequency, LONGEST) for frequency in np.arange(95.0, 185.0, 10.0)),
+    *(("stack", 14.0, frequency, LONGEST) for frequency in np.arange(52.0, 68.0, 3.0)),
+)
+
+
+def synthetic_facts(models: Models) -> dict[str, Fact]:
+    """How each of `FLIGHTS` of the true rotors most probably ends, and the times of falls, by the models themselves."""
+    values = {name: np.array([value]) for name, value in TRUTH.items()}
+    facts = {}
+    for flight in (flight for flight in FLIGHTS if flight[0] in models.surrogates):
+        course = courses(models, values, [flight])[flight]
+        found = ends(models, flight[0], course, values, flight[3])
+        way = max(found, key=lambda name: float(found[name][0]))
+        lasted = float(course["fall"][0]) if way == "falls" else None
+        when = "" if lasted is None else f" after {lasted:.3g} s"
+        says = f"{flight[0]} of {flight[1]:g} mm, {flight[2]:g} Hz: {way}{when}"
+        facts[says] = Fact(says, (flight,), ended(flight, way, lasted))
+    return facts
+
 
 EVERYTHING = ("floater", "rotor", "air", "mutual")
 VARIANTS = {
@@ -43,7 +177,7 @@ SETTINGS: Mapping[bool, Point] = {
 }  # fmt: skip
 """Nodes of a rotor, whether there is steel, rotors of designs, degrees of surrogates, live points, walks, draws."""
 SEED = 42
-SURROGATES: Columns = {
+SURROGATES: dict[str, Any] = {
     "surrogate_error": (("rotor_kind", "fitted"), "1", "error for rotors left out"),
     "surrogate_rotors": (("rotor_kind",), "1", "rotors that it is fitted to"),
     "truth": (("unknown",), "see unit", "unknowns of which the facts were made up"),
@@ -84,7 +218,7 @@ def experiment(point: Point) -> xr.Dataset:
     Of a variant a dataset over `draw`, `unknown`, `fact`, and `rotor_kind` and `fitted` of the surrogates
     """
     if "rotor" in point:
-        row = cached_row(point)
+        row = design_row(point)
         return xr.Dataset({"hanging": row["hanging"]}).expand_dims("design")
     settings, effects = SETTINGS[point["quick"]], VARIANTS[point["variant"]]
     models = Models(surrogates_of(settings, effects), effects)
@@ -95,7 +229,7 @@ def experiment(point: Point) -> xr.Dataset:
     found["surrogate_error"] = [surrogate.errors for surrogate in surrogates]
     found["surrogate_rotors"] = [surrogate.rotors for surrogate in surrogates]
     found["truth"] = [TRUTH[unknown] if name == SYNTHETIC else np.nan for unknown in NAMES]
-    data = columns({**POSTERIOR, **EVIDENCES, **SURROGATES}, {key: np.asarray(value) for key, value in found.items()})
+    data = columns(POSTERIOR | EVIDENCES | SURROGATES, found)
     says = ("fact", [fact.says for fact in facts.values()])
     labels = {"fact": list(facts), "other_fact": list(facts), "unknown": list(NAMES)}
     labels |= {"rotor_kind": list(models.surrogates), "fitted": list(FITTED)}
@@ -116,7 +250,7 @@ def surrogates_of(settings: Point, effects: Sequence[str]) -> dict[str, Surrogat
     """
     designs = {
         (kind, model): xr.concat(
-            [cached_row(_rotor(settings, kind, model, number)) for number in range(int(settings[count]))], "rotor",
+            [design_row(_rotor(settings, kind, model, number)) for number in range(int(settings[count]))], "rotor",
             data_vars="all", coords="minimal", compat="override",
         )
         for kind, model, count in _designs(settings, "mutual" in effects)

@@ -39,7 +39,7 @@ from ..cli.options import FieldModel
 from ..result import variable
 from ..study import Point
 from .article import EDGE, FLOATER, REMANENCE, levitation_of
-from .upper_limit import spacer
+from .regions import spacer
 
 GRAVITY = 9.81
 PER_MILLIMETRE = 5.0  # Tilt, in degrees, that does about what a millimetre of displacement does
@@ -48,43 +48,25 @@ SPACER = spacer(1e-3)  # The block of steel that balances a cube displaced by 1 
 
 @dataclass(frozen=True)
 class Kind:
-    """One kind of rotor."""
+    """One kind of rotor.
 
-    # ends of each input, by name: `on_axis` (°, tilt and displacement of the cube together), `displacement`
-    # (mm), `stack` (mm, of the second cube), `radius` (of the floater, over the article's), `weight` (gravity
-    # over 9.81)
+    Parameters
+    ----------
+    box : ends of each input, by name: `on_axis` (°, tilt and displacement of the cube together), `displacement` (mm),
+        `stack` (mm, of the second cube), `radius` (of the floater, over the article's), `weight` (gravity over 9.81)
+    near, far : ends of the way from contact to where the attraction alone carries the weight that is looked at, 0 to 1
+    """
+
     box: Mapping[str, tuple[float, float]]
-    # part of the way from contact to where the attraction alone carries the weight, ends of what is looked at
     near: float
     far: float
 
-    @property
-    def inputs(self) -> tuple[str, ...]:
-        """Names of the inputs."""
-        return tuple(self.box)
 
-    def at(self, unit: Array) -> dict[str, float]:
-        """Inputs at a point (k,) of the unit cube."""
-        return {
-            name: low + (high - low) * float(u) for (name, (low, high)), u in zip(self.box.items(), unit, strict=True)
-        }
-
-
+BALL = {"radius": (0.97, 1.03), "weight": (0.93, 1.07)}
 KINDS = {
-    "single": Kind(
-        {"on_axis": (4.0, 13.0), "displacement": (-0.2, 2.2), "radius": (0.97, 1.03), "weight": (0.93, 1.07)},
-        0.15,
-        0.86,
-    ),
-    "stack": Kind(
-        {
-            "on_axis": (-4.5, 6.5), "displacement": (-1.2, 1.2), "stack": (9.9, 21.0), "radius": (0.97, 1.03),
-            "weight": (0.93, 1.07),
-        },
-        0.3,
-        0.88,
-    ),
-}  # fmt: skip
+    "single": Kind({"on_axis": (4.0, 13.0), "displacement": (-0.2, 2.2), **BALL}, 0.15, 0.86),
+    "stack": Kind({"on_axis": (-4.5, 6.5), "displacement": (-1.2, 1.2), "stack": (9.9, 21.0), **BALL}, 0.3, 0.88),
+}
 
 
 def magnets_of(inputs: Mapping[str, float], permeability: float) -> tuple[Magnet, ...]:
@@ -294,17 +276,13 @@ class CarriedLosses:
 
 def design_inputs(kind: str, number: int) -> dict[str, float]:
     """Inputs of one rotor of a design: that number of Sobol's sequence (I. M. Sobol, 1967; scrambled by A. B. Owen)."""
-    box = KINDS[kind]
-    return box.at(qmc.Sobol(len(box.inputs), seed=SEED).random(LONGEST_DESIGN)[number])
+    box = KINDS[kind].box
+    unit = qmc.Sobol(len(box), seed=SEED).random(LONGEST_DESIGN)[number]
+    return {name: low + (high - low) * float(u) for (name, (low, high)), u in zip(box.items(), unit, strict=True)}
 
 
-def cached_row(point: Point) -> xr.Dataset:
-    """`design_row` from the cache if it is there: whoever fits a surrogate finds the rotors that others computed."""
-    return design_row(point, lambda make: NODES.cached((point,), make, lambda _: None)[0])
-
-
-def design_row(point: Point, remembered: Callable[[Callable[[], Nodes]], Nodes] = lambda make: make()) -> xr.Dataset:
-    """One rotor of a design, computed; `remembered` gets what computes it and gives its nodes.
+def design_row(point: Point, cached: bool = True) -> xr.Dataset:
+    """One rotor of a design; from the cache whoever fits a surrogate finds the rotors that others computed.
 
     Returns
     -------
@@ -325,7 +303,7 @@ def design_row(point: Point, remembered: Callable[[Callable[[], Nodes]], Nodes] 
         hanging = floater.hanging
         return floater.nodes(CONTACT + part * (hanging - CONTACT), spins), float(hanging)
 
-    nodes, hanging = remembered(make)
+    nodes, hanging = NODES.cached((point,), make, lambda _: None)[0] if cached else make()
     return xr.Dataset(
         {
             "node": variable(("height", "body_spin", "quantity"), nodes, "see quantity", "what is known of a node"),

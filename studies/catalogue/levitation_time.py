@@ -1,9 +1,9 @@
 """Levitation time against frequency by the slow drift of the spin, with what is not known of the experiment."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
@@ -18,43 +18,37 @@ from ...dynamics.motion.rates import Rates
 from ...dynamics.motion.state import Scales
 from ...fem.rotor.table import FieldTable
 from ...geometry.common import MAGNET_CONDUCTIVITY, Array
-from ...geometry.magnets import Magnet
-from ...geometry.rotor import horizontal, tilt, vertical
 from ...geometry.scene.contents import Drag, Scene
 from ..cli.options import FieldModel
 from ..figures.style import PALETTE, legend_below, styled
 from ..result import Columns, columns, variable
 from ..study import Point, Study
-from .article import EDGE, FLOATER, PERMEABILITY, REMANENCE, levitation_of
+from .article import FLOATER, PERMEABILITY, REMANENCE, article_scene, conducting, levitation_of
 from .drawing import explain, small_multiples, span, text_table
 
 
-@dataclass(frozen=True)
-class DriftCase:
-    """One rotor: a maker of magnets, its displacement and what may be wrong with it (m or rad), and frequencies, Hz.
+class DriftCase(NamedTuple):
+    """One rotor."""
 
-    At `reference` it has an equilibrium for all variants; `lowest` and `highest` bound what is asked.
-    """
-
-    make: Callable[..., tuple[Magnet, ...]]
-    size: float
-    tolerance: float
-    reference: float
-    lowest: float
+    configuration: str
+    measure: float  # mm or degrees
+    reference: float  # frequency at which it has an equilibrium for all variants, Hz
+    lowest: float  # frequencies that bound what is asked, Hz
     highest: float
 
 
 CASES = {
-    "horizontal 1 mm": DriftCase(horizontal, 1e-3, 0.2e-3, 215.0, 110.0, 250.0),
-    "vertical 14 mm": DriftCase(vertical, 14e-3, 0.5e-3, 78.0, 58.0, 93.0),
-    "horizontal 1.5 mm": DriftCase(horizontal, 1.5e-3, 0.2e-3, 160.0, 95.0, 220.0),
-    "vertical 12.6 mm": DriftCase(vertical, 12.6e-3, 0.5e-3, 70.0, 51.0, 86.0),
-    "horizontal 2 mm": DriftCase(horizontal, 2e-3, 0.2e-3, 130.0, 80.0, 195.0),
-    "vertical 16 mm": DriftCase(vertical, 16e-3, 0.5e-3, 95.0, 68.0, 110.0),
-    "tilt 5 deg": DriftCase(tilt, np.radians(5), np.radians(0.5), 185.0, 130.0, 250.0),
-    "tilt 10 deg": DriftCase(tilt, np.radians(10), np.radians(0.5), 110.0, 75.0, 180.0),
+    "horizontal 1 mm": DriftCase("horizontal", 1.0, 215.0, 110.0, 250.0),
+    "vertical 14 mm": DriftCase("vertical", 14.0, 78.0, 58.0, 93.0),
+    "horizontal 1.5 mm": DriftCase("horizontal", 1.5, 160.0, 95.0, 220.0),
+    "vertical 12.6 mm": DriftCase("vertical", 12.6, 70.0, 51.0, 86.0),
+    "horizontal 2 mm": DriftCase("horizontal", 2.0, 130.0, 80.0, 195.0),
+    "vertical 16 mm": DriftCase("vertical", 16.0, 95.0, 68.0, 110.0),
+    "tilt 5 deg": DriftCase("tilt", 5.0, 185.0, 130.0, 250.0),
+    "tilt 10 deg": DriftCase("tilt", 10.0, 110.0, 75.0, 180.0),
 }
 """Rotors of the article, and two whose displacement is chosen so that they fly where the article's did."""
+TOLERANCES = {"horizontal": 0.2, "vertical": 0.5, "tilt": 0.5}  # Of the displacement or tilt, mm or degrees
 QUICK = ("horizontal 1 mm", "vertical 14 mm")
 OUTCOMES = ("contact", "fold", "instability", "levitates", "no equilibrium")  # How a flight may end
 LEVITATES, NO_EQUILIBRIUM = 3, 4  # Numbers of two of these
@@ -96,11 +90,14 @@ QUICK_VARIANTS = ("nominal", "spin -0.1", "spin +0.1", "displacement smaller", "
 
 def scene_of(case: DriftCase, variant: Variant) -> Scene:
     """The scene of a case at its reference frequency."""
-    floater = replace(FLOATER, remanence=variant.remanence, conductivity=variant.conductivity)
-    permeability, metal = 1.0 if variant.rotor == "rigid" else PERMEABILITY, variant.rotor == "conducting"
-    magnets = case.make(case.size + variant.misplaced * case.tolerance, EDGE, variant.remanence, permeability)
-    magnets = tuple(replace(magnet, conductivity=MAGNET_CONDUCTIVITY if metal else None) for magnet in magnets)
-    return Scene(case.reference, magnets, floater, Drag.stokes(floater.radius))
+    measure = case.measure + variant.misplaced * TOLERANCES[case.configuration]
+    permeability = 1.0 if variant.rotor == "rigid" else PERMEABILITY
+    scene = article_scene(
+        case.configuration, measure, case.reference,
+        remanence=variant.remanence, permeability=permeability, floater=replace(FLOATER, remanence=variant.remanence),
+    )  # fmt: skip
+    scene = conducting(scene, rotor=variant.rotor == "conducting")
+    return replace(scene, floater=replace(scene.floater, conductivity=variant.conductivity))
 
 
 CAP, SHORTEST = 250.0, 3.0  # The article stopped a flight after 250 s, and did not count one of less than 3 s
@@ -148,12 +145,9 @@ def levitation_times(point: Point) -> xr.Dataset:
 
 def gather_times(parts: Sequence[xr.Dataset]) -> xr.Dataset:
     """All rows by `case` and `variant`; NaN where one is missing."""
-    together: dict[str, list[xr.Dataset]] = {}
-    for part in parts:
-        together.setdefault(str(part["case"].item()), []).append(part)
-    cases = [
-        xr.concat(rows, "variant", data_vars="all", coords="minimal", compat="override") for rows in together.values()
-    ]
+    names = dict.fromkeys(part["case"].item() for part in parts)
+    rotors = [[part for part in parts if part["case"].item() == name] for name in names]
+    cases = [xr.concat(rows, "variant", data_vars="all", coords="minimal", compat="override") for rows in rotors]
     return xr.concat(cases, "case", data_vars="all", coords="different", compat="equals", join="outer")
 
 
@@ -247,7 +241,7 @@ def times_figure(result: xr.Dataset) -> Figure:
             panel.axvline(frequency, ls=ENDS[end], color=PALETTE[3], lw=1.0, label=f"article: {end}")
     first = rows[0][0]
     explain(first, {words: MARKS[name] for name, words in zip(OUTCOMES, MEANINGS, strict=True)}, color=PALETTE[0], ms=4)
-    legend_below(figure, *(panel for panel, _, _ in rows), columns=4)
+    legend_below(figure, columns=3)
     return figure
 
 
@@ -270,12 +264,9 @@ def flights_figure(result: xr.Dataset) -> Figure:
     return figure
 
 
-FIGURES = {"levitation-time": times_figure, "levitation-time-flights": flights_figure}
-
-
 def _rotors(result: xr.Dataset, xlabel: str, ylabel: str) -> tuple[Figure, list[tuple[Axes, str, xr.Dataset]]]:
-    """A panel for each rotor, in the order of the cases, with its name and its part of the result."""
-    cases = sorted(result["case"].values.tolist(), key=list(CASES).index)
+    """A panel for each rotor, in the order of its displacement or tilt, with its name and its part of the result."""
+    cases = sorted(result["case"].values.tolist(), key=lambda name: CASES[name][:2])
     figure, axes = small_multiples([case.replace(" deg", "°") for case in cases], 2.2, 3, xlabel, ylabel)
     return figure, [(panel, case, result.sel(case=case)) for panel, case in zip(axes, cases, strict=True)]
 
@@ -326,6 +317,6 @@ STUDY = Study(
     points=time_points,
     compute=levitation_times,
     gather=gather_times,
-    figures=FIGURES,
+    figures={"levitation-time": times_figure, "levitation-time-flights": flights_figure},
     report=time_lines,
 )

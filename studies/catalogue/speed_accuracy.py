@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 from functools import partial
 from multiprocessing import get_context
 from pathlib import Path
+from typing import Any
 
 import heyoka as hy
 import numpy as np
@@ -34,7 +35,7 @@ from ...geometry.rotor import horizontal
 from ..cli.console import note
 from ..figures.style import PALETTE, legend_below, styled
 from ..processes import safe_path
-from ..result import Columns, columns, variable
+from ..result import columns, variable
 from ..study import study_of_one
 from .article import EDGE, REMANENCE
 from .drawing import explain, small_multiples, text_table
@@ -58,7 +59,7 @@ def _moments(degree: int, magnets: Magnets) -> tuple[FieldTable, int]:
     return table, degree * (degree + 2)
 
 
-def _closed_form(magnets: Magnets) -> tuple[FieldTable, int]:
+def _closed_form(_: int, magnets: Magnets) -> tuple[FieldTable, int]:
     return RotorTable("cuboid", magnets, magnets), 0
 
 
@@ -98,8 +99,9 @@ def _second_opinion(size: float, magnets: Magnets) -> tuple[FieldTable, int]:
     return RotorTable("cuboid", raised, raised), int(mesh.mesh.nv + mesh.mesh.nedge)
 
 
-def _gridded(step: float, magnets: Magnets) -> tuple[FieldTable, int]:
+def _gridded(step_mm: float, magnets: Magnets) -> tuple[FieldTable, int]:
     """Fit of the exact values on a grid between 13 and 40 mm."""
+    step = 1e-3 * step_mm
     line = np.arange(-0.04, 0.04 + step / 2, step)
     grid = np.stack(np.meshgrid(line, line, line, indexing="ij"), -1).reshape(-1, 3)
     radius = np.linalg.norm(grid, axis=1)
@@ -111,26 +113,30 @@ def _gridded(step: float, magnets: Magnets) -> tuple[FieldTable, int]:
 
 def methods(quick: bool) -> dict[str, Method]:
     """The catalogue; `quick` leaves out what takes longer than some seconds."""
-    found = {"dipole": Method("moments", "exact", partial(_moments, 1))}
-    found |= {f"moments to {d}": Method("moments", "exact", partial(_moments, d)) for d in (5, 9, 13, 21)}
-    found["closed form"] = Method("closed form", "exact", _closed_form)
-    for order in (1, 2, 3) if quick else (1, 2, 3, 4, 5, 6):
-        found[f"direct, order {order}"] = Method("direct finite elements", "exact", partial(_direct, order))
-    for step in (0.004,) if quick else (0.004, 0.002):
-        found[f"gridded, {1e3 * step:g} mm"] = Method("gridded table", "exact", partial(_gridded, step))
-    found["dipole, μr left out"] = Method("moments", "permeable", partial(_moments, 1))
-    found["closed form, μr left out"] = Method("closed form", "permeable", _closed_form)
-    for size in (0.5,) if quick else (0.5, 0.25):
-        name = f"scikit-fem P2, size {size:g}"
-        found[name] = Method("scikit-fem P2, mean only", "permeable", partial(_second_opinion, size))
-    for order in (2, 3) if quick else (1, 2, 3, 4, 5, 6):
-        name = f"direct, μr, order {order}"
-        found[name] = Method("direct finite elements", "permeable", partial(_direct, order))
-    for order in (2, 3) if quick else (2, 3, 4, 5, 6, 7):
-        found[f"split, order {order}"] = Method("split finite elements", "permeable", partial(_split, order))
-    for rtol in (1e-3, 1e-5) if quick else (1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8):
-        found[f"table, rtol {rtol:g}"] = Method("table of the ladder", "permeable", partial(_table, rtol))
-    return found
+    orders, sizes, steps = ((1, 2, 3), (0.5,), (4,)) if quick else ((1, 2, 3, 4, 5, 6), (0.5, 0.25), (4, 2))
+    direct, split = ((2, 3), (2, 3)) if quick else (orders, (2, 3, 4, 5, 6, 7))
+    rtols = (1e-3, 1e-5) if quick else (1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8)
+    dipole, elements = "moments", "direct finite elements"
+    rows: list[
+        tuple[str, str, str, Any, Sequence[float]]
+    ] = [  # how a method is called, its family, what it takes, and for which numbers
+        ("exact", "dipole", dipole, _moments, (1,)),
+        ("exact", "moments to {}", dipole, _moments, (5, 9, 13, 21)),
+        ("exact", "closed form", "closed form", _closed_form, (0,)),
+        ("exact", "direct, order {}", elements, _direct, orders),
+        ("exact", "gridded, {} mm", "gridded table", _gridded, steps),
+        ("permeable", "dipole, μr left out", dipole, _moments, (1,)),
+        ("permeable", "closed form, μr left out", "closed form", _closed_form, (0,)),
+        ("permeable", "scikit-fem P2, size {}", "scikit-fem P2, mean only", _second_opinion, sizes),
+        ("permeable", "direct, μr, order {}", elements, _direct, direct),
+        ("permeable", "split, order {}", "split finite elements", _split, split),
+        ("permeable", "table, rtol {:g}", "table of the ladder", _table, rtols),
+    ]
+    return {
+        name.format(number): Method(family, problem, partial(build, number))
+        for problem, name, family, build, numbers in rows
+        for number in numbers
+    }
 
 
 DISTANCES = (0.013, 0.015, 0.02, 0.03, 0.05)
@@ -148,14 +154,14 @@ class Measured:
     costs: dict[str, float]  # by name, see `COSTS`
 
 
-COSTS: Columns = {
+COSTS: dict[str, Any] = {
     "unknowns": (("approach",), "1", "degrees of freedom"),
     "seconds": (("approach",), "s", "time from nothing"),
     "cpu_seconds": (("approach",), "s", "processor time from nothing"),
     "memory": (("approach",), "B", "memory that it took"),
     "per_point": (("approach",), "s", "time of B and its gradient per point"),
 }
-ERRORS: Columns = {
+ERRORS: dict[str, Any] = {
     "field_error": (("approach", "distance"), "1", "largest relative error of B"),
     "gradient_error": (("approach", "distance"), "1", "largest relative error of grad B"),
     "stated_error": (("approach", "distance"), "1", "error of B that is stated"),
@@ -175,7 +181,13 @@ def sphere_points(number: int = 200) -> Array:
 
 
 def measure(name: str, quick: bool, timed_points: int = TIMED_POINTS) -> Measured:
-    """Run one method of the catalogue, and its table at `timed_points`; meant for a fresh process."""
+    """Run one method; meant for a fresh process.
+
+    Parameters
+    ----------
+    name, quick : of the catalogue `methods`
+    timed_points : at how many points its table is timed
+    """
     method = methods(quick)[name]
     magnets = cube(method.problem)
     compiled(hy.cfunc, [hy.expression("x")], [hy.expression("x")])  # the compiler's own start is nobody's cost
@@ -188,7 +200,7 @@ def measure(name: str, quick: bool, timed_points: int = TIMED_POINTS) -> Measure
     grown = _memory("VmHWM") - memory
     many = _many(timed_points)
     table.evaluate(many)
-    pace = _fastest(lambda: table.evaluate(many)) / timed_points
+    pace = min(timeit.repeat(lambda: table.evaluate(many), timer=time.process_time, number=1)) / timed_points
     costs = dict(zip(COSTS, (unknowns, seconds, cpu_seconds, grown, pace), strict=True))
     return Measured(field, gradient, _stated(table), costs)
 
@@ -212,10 +224,6 @@ def _memory(entry: str) -> float:
     return 1024.0 * next(float(line.split()[1]) for line in lines if line.startswith(entry))
 
 
-def _fastest(work: Callable[[], object]) -> float:
-    return min(timeit.repeat(work, timer=time.process_time, number=1))
-
-
 def _many(number: int) -> Array:
     """Where a floater may be: all around, 13 to 40 mm from the cube's centre."""
     rng = np.random.default_rng(0)
@@ -230,7 +238,7 @@ def peer_pace() -> float:
     peer = magpylib.magnet.Cuboid(polarization=(1.305, 0, 0), dimension=(0.01,) * 3)
     points = _many(TIMED_POINTS)
     peer.getB(points[:10])
-    return _fastest(lambda: peer.getB(points)) / TIMED_POINTS
+    return min(timeit.repeat(lambda: peer.getB(points), timer=time.process_time, number=1)) / TIMED_POINTS
 
 
 def apart(name: str, quick: bool) -> Measured:
@@ -255,6 +263,7 @@ def speed_accuracy(quick: bool, names: Sequence[str] | None = None, truth: float
 
     Parameters
     ----------
+    quick : fewer methods, and a reference that takes less time
     names : of the methods; None for all
     truth : tolerance of the reference; None for the one of the study
     """
@@ -272,12 +281,12 @@ def speed_accuracy(quick: bool, names: Sequence[str] | None = None, truth: float
         row, (b, g, own) = apart(name, quick), truths[method.problem]
         errors.append([_largest(row.field, b, 1), _largest(row.gradient, g, 2), row.stated, own])
         costs.append(list(row.costs.values()))
-    data = columns(ERRORS, dict(zip(ERRORS, np.array(errors).swapaxes(0, 1), strict=True)))
-    data |= columns(COSTS, dict(zip(COSTS, np.array(costs, float).T, strict=True)))
+    found = (*np.array(errors).swapaxes(0, 1), *np.array(costs, float).T)
+    data = columns(ERRORS | COSTS, dict(zip(ERRORS | COSTS, found, strict=True)))
     coords = {
         "approach": list(catalogue),
-        "family": (("approach",), [method.family for method in catalogue.values()]),
-        "problem": (("approach",), [method.problem for method in catalogue.values()]),
+        "family": ("approach", [method.family for method in catalogue.values()]),
+        "problem": ("approach", [method.problem for method in catalogue.values()]),
         "distance": variable(("distance",), np.array(DISTANCES), "m", "distance from the cube's centre"),
     }
     return xr.Dataset(data, coords, {"magpylib_seconds_per_point": peer_pace()})
@@ -328,7 +337,7 @@ def speed_figure(result: xr.Dataset) -> Figure:
         panel.axhspan(1e-17, max(own, 1e-16), facecolor="0.9", edgecolor="0.6", label="error of the reference")
         panel.set_ylim(1e-16, None)
     explain(axes[0], {"error that the table states": "o"}, mfc="none", ms=4)
-    legend_below(figure, axes[0], columns=4)
+    legend_below(figure, columns=3)
     return figure
 
 

@@ -6,6 +6,7 @@ import io
 from collections.abc import Callable, Mapping
 from functools import wraps
 from pathlib import Path
+from string import ascii_lowercase
 from typing import TYPE_CHECKING, Any, ParamSpec
 
 from ...fem.files import write_whole
@@ -33,7 +34,7 @@ STYLE: Any = {
     "pdf.fonttype": 42,  # journals take no Type 3 fonts
     "figure.constrained_layout.use": True,
 }
-COLUMN, PAGE = 3.4, 7.0
+COLUMN, PAGE = 85 / 25.4, 170 / 25.4
 """Width of a figure in one column of a journal and across its page, inches."""
 
 
@@ -73,16 +74,34 @@ def styled(draw: Callable[Arguments, Figure]) -> Callable[Arguments, Figure]:
 
 
 def panels(rows: int, columns: int, size: tuple[float, float], **shared: Any) -> tuple[Figure, Any]:
-    """A figure without a window and its axes (rows, columns); `size` in inches, `shared` as of `Figure.subplots`."""
+    """A figure without a window and its axes, lettered (a), (b) where there are several.
+
+    Parameters
+    ----------
+    rows, columns : of the panels
+    size : width and height, inches
+    shared : as of `Figure.subplots`
+    """
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=size)
-    return figure, figure.subplots(rows, columns, squeeze=False, **shared)
+    axes = figure.subplots(rows, columns, squeeze=False, **shared)
+    for letter, panel in zip(ascii_lowercase, axes.flat if rows * columns > 1 else (), strict=False):
+        panel.set_title(f"({letter})")
+    return figure, axes
 
 
 def legend_below(figure: Figure, *labelled: Any, columns: int = 6) -> None:
-    """One legend below all panels, of what the axes `labelled` name: nothing that is drawn lies under it."""
-    entries = {n: h for axes in labelled for h, n in zip(*axes.get_legend_handles_labels(), strict=True)}
+    """One legend below all panels, where nothing that is drawn lies under it.
+
+    Parameters
+    ----------
+    figure : with its panels
+    labelled : the axes whose names it explains; all where none are given
+    columns : at most
+    """
+    named = labelled or figure.axes
+    entries = {n: h for axes in named for h, n in zip(*axes.get_legend_handles_labels(), strict=True)}
     if entries:
         figure.legend(entries.values(), entries.keys(), loc="outside lower center", ncols=min(columns, len(entries)))
 

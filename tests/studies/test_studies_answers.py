@@ -17,12 +17,10 @@ from spinlev.dynamics.motion.state import Scales
 from spinlev.fem.mutual.making import cached_mutual_table
 from spinlev.fem.mutual.response import rotor_ladder, two_body
 from spinlev.fem.rotor.choice import cached_rotor_table, rotor_table
-from spinlev.studies.catalogue import dipole_vs_fem, stability_map
 from spinlev.studies.catalogue.article import FLOATER, article_scene
-from spinlev.studies.catalogue.design import designed
-from spinlev.studies.catalogue.dipole_vs_fem import CAUSES, TOTAL, change
-from spinlev.studies.catalogue.floater_permeability import shifted_equilibrium
-from spinlev.studies.catalogue.sensitivity import PARAMETERS, QUANTITIES, levitation, nominal, scene_of, slope_by
+from spinlev.studies.catalogue.finite_magnets import CAUSES, TOTAL, change, dipole_vs_fem, shifted_equilibrium
+from spinlev.studies.catalogue.margins import PARAMETERS, QUANTITIES, designed, levitation, nominal, scene_of, slope_by
+from spinlev.studies.catalogue.regions import stability_map
 
 
 @pytest.fixture(scope="module")
@@ -75,7 +73,7 @@ def test_a_narrow_range_is_found_and_a_survey_confirms_it():
 def test_vertical_range_against_known_numbers():
     """PHYSICS.md, dipoles of μr = 1: with 14 mm none at 60 Hz, stable at 80 Hz, unstable from about 100 Hz."""
     point = {"configuration": "vertical", "measure": 14.0, "model": "dipole", "with_plate": 0}
-    result = stability_map.compute(point).isel(case=0, interval=0)
+    result = stability_map(point).isel(case=0, interval=0)
     assert 60 < float(result["lowest"]) < 80 < float(result["highest"]) < 100
     assert result["low_kind"].item() == "fold"
     assert result["high_kind"].item() == "oscillatory"
@@ -137,7 +135,7 @@ def test_mutual_magnetisation_moves_the_floater_as_the_perturbed_balance_says(ti
 def test_causes_add_up_and_the_default_scene_is_met():
     """README: in the default rotor at 110 Hz the point dipole (floater's moment true) is 0.067 mm too far away."""
     point = {"configuration": "horizontal", "measure": 2.0, "steps": 3}
-    result = dipole_vs_fem.compute(point)
+    result = dipole_vs_fem(point)
     parts = sum(change(result, "distance", models)[0] for models in CAUSES.values())
     np.testing.assert_allclose(parts, change(result, "distance", TOTAL)[0], atol=1e-15)
     apart = (result["distance"].sel(model="fem") - result["distance"].sel(model="dipole")).values[0]

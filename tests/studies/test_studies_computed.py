@@ -17,9 +17,10 @@ from spinlev.dynamics.motion.rates import Rates
 from spinlev.dynamics.motion.state import Scales
 from spinlev.fem.mutual.making import cached_mutual_table
 from spinlev.fem.rotor.choice import rotor_table
-from spinlev.studies.catalogue import design, dipole_vs_fem, sensitivity, stability_map
 from spinlev.studies.catalogue.article import article_scene
-from spinlev.studies.catalogue.design import designed
+from spinlev.studies.catalogue.finite_magnets import dipole_vs_fem
+from spinlev.studies.catalogue.margins import design, designed, sensitivity
+from spinlev.studies.catalogue.regions import stability_map
 
 
 def nearest(scene, model, distance):
@@ -32,7 +33,7 @@ def nearest(scene, model, distance):
 def derived():
     """Derivatives and a sample of a rotor of point dipoles."""
     point = {"configuration": "horizontal", "measure": 2.0, "field": "dipole", "samples": 1, "steps": [1]}
-    return sensitivity.compute(point).isel(case=0)
+    return sensitivity(point).isel(case=0)
 
 
 NOMINAL = {
@@ -94,7 +95,7 @@ def test_a_small_tilt_of_the_axis_moves_the_floater_in_second_order(derived):
 def test_a_design_is_stable_up_to_its_margin():
     """Half a hertz beyond its ends a search finds nothing stable; cubes of 2 mm are too weak."""
     asked = {"configuration": "tilt", "distance_mm": 25.0, "frequency": 100.0, "edges_mm": [2.0, 12.7]}
-    found = design.compute(asked, rtol=1e-2, close=1e-5).isel(case=0)
+    found = design(asked, rtol=1e-2, close=1e-5).isel(case=0)
     weak, chosen = (found.isel(edge=k) for k in (0, 1))
     assert np.isnan(weak["measure"])
     assert int(found["best"]) == 1
@@ -137,7 +138,7 @@ def test_an_unstable_design_has_no_margin():
 def compared():
     """Levitation by every model, with finite elements of 1e-3 and answers of the lowest degrees."""
     point = {"configuration": "horizontal", "measure": 2.0, "steps": 1, "rtols": [1e-3, 1e-2]}
-    return dipole_vs_fem.compute(point).isel(case=0, step=0)
+    return dipole_vs_fem(point).isel(case=0, step=0)
 
 
 @pytest.mark.slow
@@ -188,7 +189,7 @@ def test_with_mutual_magnetisation_a_fold_is_where_the_balance_has_a_double_root
 def test_a_plate_below_damps_what_is_neutral_without_it():
     """Without drag nothing decays. Beside the fold the bounce is soft: the place moves by a millimetre or two."""
     asked = {"configuration": "vertical", "measure": 14.0, "model": "fem", "with_plate": 1}
-    found = stability_map.compute(asked, rtol=1e-2).isel(case=0)
+    found = stability_map(asked, rtol=1e-2).isel(case=0)
     assert 60 < float(found["lowest"][0]) < 65
     assert found["high_kind"].values[0] == "oscillatory"
     tried = found.isel(tried=0)
@@ -208,7 +209,7 @@ def test_a_rotor_without_levitation_has_an_empty_row(monkeypatch):
     weak = replace(scene, floater=replace(scene.floater, remanence=1e-3))
     monkeypatch.setattr(stability_map, "article_scene", lambda *rotor, **changes: weak)
     asked = {"configuration": "horizontal", "measure": 2.0, "model": "dipole", "with_plate": 2}
-    found = stability_map.compute(asked)
+    found = stability_map(asked)
     assert np.isnan(found["lowest"]).all()
     assert np.isnan(found["plate_frequency"]).all()
     assert find_equilibria(weak, rotor_table(weak.rotor, "dipole")) == []

@@ -18,9 +18,9 @@ from spinlev.fem.rotor.choice import rotor_table
 from spinlev.geometry.common import InputError
 from spinlev.geometry.scene.files import load_scene
 from spinlev.studies import reaction as plate_job
-from spinlev.studies.catalogue import hard_cases as field_hard_cases
+from spinlev.studies.catalogue import field_quality
 from spinlev.studies.catalogue.entries import CATALOGUE
-from spinlev.studies.catalogue.hard_cases import CASES
+from spinlev.studies.catalogue.field_quality import CASES
 from spinlev.studies.catalogue.report import LONGEST, report_job
 from spinlev.studies.catalogue.runner import read_result, show_job
 from spinlev.studies.cli import main as cli
@@ -231,7 +231,7 @@ def test_the_reduced_plate_is_that_of_the_finite_elements():
 def test_the_study_of_hard_cases_is_its_cases():
     """Quick: those that are marked so, each as alone."""
     names = "extensions, μr = 1", "no polarisation", "long"
-    result = field_hard_cases.field_hard_cases(quick=True, cases={name: CASES[name] for name in names}, places=4)
+    result = field_quality.field_hard_cases(quick=True, cases={name: CASES[name] for name in names}, places=4)
     assert list(result["case"].values) == list(names[:2])
-    alone = field_hard_cases.case_errors(CASES[names[0]], 2)
+    alone = field_quality.case_errors(CASES[names[0]], 2)
     np.testing.assert_array_equal(result["true_error"].sel(case=names[0]), alone["true_error"])

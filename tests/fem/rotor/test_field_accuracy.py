@@ -18,7 +18,7 @@ from spinlev.geometry.magnets import Magnet
 from spinlev.geometry.meshes.magnets import MeshSettings
 from spinlev.geometry.rotor import horizontal, vertical
 from spinlev.geometry.shapes import Box
-from spinlev.studies.catalogue.hard_cases import CASES, MORE_LAYERS, OTHER_MESH, extensions, reference
+from spinlev.studies.catalogue.field_quality import CASES, MORE_LAYERS, OTHER_MESH, extensions, reference
 
 CUBE = (0.01, 0.01, 0.01)
 

@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from scipy.stats import binomtest, norm
 
 from spinlev.dynamics.flights.batch import ensemble, launched
 from spinlev.dynamics.flights.trajectory import DURATION
@@ -17,12 +16,13 @@ from spinlev.studies.catalogue.capture import (
     SPIN,
     STUDY as CAPTURE,
     WORDS,
-    Share,
     field_of,
     launches,
     place_of,
     plate_under,
     seed_of,
+    share,
+    share_text,
 )
 from spinlev.studies.cli.options import Workers
 from spinlev.studies.sweep import swept
@@ -47,13 +47,15 @@ def test_points_are_ten_thousand_launches_of_every_rotor_that_was_tried():
     assert len({(p["configuration"], p["measure"], p["part"]) for p in first}) == len(flights)  # equal shares at a stop
 
 
-def test_errors_of_shares_are_those_of_another_program():
-    one_sigma = norm.cdf(1) - norm.cdf(-1)
-    for hits, trials in ((0, 10), (3, 24), (500, 1000), (7, 7)):
-        known = binomtest(hits, trials).proportion_ci(one_sigma, method="wilson")
-        assert Share(hits, trials).bounds == pytest.approx((known.low, known.high), abs=1e-12)
-    assert np.isnan(Share(0, 0).value)
-    assert [str(share) for share in (Share(142, 200), Share(3, 4000), Share(0, 4000), Share(0, 10_000))] == [
+def test_shares_have_errors_of_one_standard_deviation():
+    """Many trials: √(p (1 - p)/n); none that hit: what Wilson's interval has left, 1/(n + 1)."""
+    value, low, high = share(np.arange(10_000) < 3000)
+    assert value == 0.3
+    assert (high - low) / 2 == pytest.approx(np.sqrt(0.3 * 0.7 / 10_000), rel=1e-3)
+    assert share([False] * 10) == pytest.approx((0.0, 0.0, 1 / 11))
+    assert np.isnan(share([])).all()
+    asked = ((142, 200), (3, 4000), (0, 4000), (0, 10_000))
+    assert [share_text(np.arange(trials) < hits) for hits, trials in asked] == [
         "71.0 ± 3.2 %",
         "0.07 ± 0.05 %",
         "0.00 ± 0.01 %",
@@ -62,26 +64,25 @@ def test_errors_of_shares_are_those_of_another_program():
 
 
 def test_launches_are_within_their_bounds_evenly_and_the_same_for_the_same_seed(place):
-    found, again = (launches(place, 4000, [1, 2]) for _ in range(2))
-    for a, b in zip(found.states.vectors, again.states.vectors, strict=True):
+    (found, states), (_, again) = (launches(place, 4000, [1, 2]) for _ in range(2))
+    for a, b in zip(states.vectors, again.vectors, strict=True):
         np.testing.assert_array_equal(a, b)
-    assert not np.array_equal(launches(place, 4000, [1, 3]).farther, found.farther)
+    assert not np.array_equal(launches(place, 4000, [1, 3])[0]["farther"], found["farther"])
     evenly = (
-        (found.farther + NEARER) / (FARTHER + NEARER),
-        (found.sideways / SIDEWAYS) ** 2,
-        (1 - np.cos(found.lean)) / (1 - np.cos(LEAN)),
-        (found.spin / SPIN + 1) / 2,
+        (found["farther"] + NEARER) / (FARTHER + NEARER),
+        (found["sideways"] / SIDEWAYS) ** 2,
+        (1 - np.cos(found["lean"])) / (1 - np.cos(LEAN)),
+        (found["spin"] / SPIN + 1) / 2,
     )
-    for share in evenly:  # of a uniform variable; five standard deviations of 4000 draws
-        assert share.min() >= 0
-        assert share.max() <= 1
-        assert share.mean() == pytest.approx(0.5, abs=5 / np.sqrt(12 * 4000))
-        assert share.std() == pytest.approx(np.sqrt(1 / 12), rel=0.05)
-    states = found.states
-    np.testing.assert_allclose(np.hypot(*states.position.T[:2]), found.sideways, atol=1e-15)
+    for even in evenly:  # of a uniform variable; five standard deviations of 4000 draws
+        assert even.min() >= 0
+        assert even.max() <= 1
+        assert even.mean() == pytest.approx(0.5, abs=5 / np.sqrt(12 * 4000))
+        assert even.std() == pytest.approx(np.sqrt(1 / 12), rel=0.05)
+    np.testing.assert_allclose(np.hypot(*states.position.T[:2]), found["sideways"], atol=1e-15)
     np.testing.assert_allclose(np.sum(states.moment**2, axis=1), 1, atol=1e-14)
     along = np.sum(states.spin * states.moment, axis=1) / place.scene.angular_velocity
-    np.testing.assert_allclose(along, found.spin, atol=1e-14)
+    np.testing.assert_allclose(along, found["spin"], atol=1e-14)
 
 
 def test_seeds_differ_from_rotor_to_rotor_and_from_batch_to_batch():
@@ -119,13 +120,13 @@ def test_a_rotor_without_a_stable_frequency_is_said_not_left_out():
 
 @pytest.mark.slow
 def test_without_the_plates_currents_nothing_is_held(place):
-    begun = launches(place, 200, seed_of("vertical", 14.0, 0.5, 0))
-    braked = launched(place.scene, field_of(place), plate_under(place, place.scene), begun.states, SETTLED)
-    unbraked = ensemble(place.scene, field_of(place), begun.states, SETTLED)
-    held, none = (Share(int(np.sum(ended.ended_by == DURATION)), 200) for ended in (braked, unbraked))
-    print(f"\nheld over aluminium {held}, over a plate that does not conduct {none}")
-    assert 0.6 < held.value < 0.8
-    assert none.hits == 0
+    _, states = launches(place, 200, seed_of("vertical", 14.0, 0.5, 0))
+    braked = launched(place.scene, field_of(place), plate_under(place), states, SETTLED)
+    unbraked = ensemble(place.scene, field_of(place), states, SETTLED)
+    held, none = (ended.ended_by == DURATION for ended in (braked, unbraked))
+    print(f"\nheld over aluminium {share_text(held)}, over a plate that does not conduct {share_text(none)}")
+    assert 0.6 < held.mean() < 0.8
+    assert not none.any()
 
 
 @pytest.mark.slow

@@ -15,38 +15,40 @@ from spinlev.geometry.common import MAGNET_CONDUCTIVITY
 from spinlev.geometry.scene.contents import Drag
 from spinlev.studies.catalogue import experiment, experiment_design as design
 from spinlev.studies.catalogue.article import levitation_of
-from spinlev.studies.catalogue.experiment import SETTINGS, STUDY as EXPERIMENT, VARIANTS
+from spinlev.studies.catalogue.experiment import (
+    SETTINGS,
+    STUDY as EXPERIMENT,
+    TRUTH,
+    VARIANTS,
+    evidences,
+    posterior,
+    synthetic_facts,
+)
 from spinlev.studies.catalogue.experiment_design import (
     EFFECTS,
     KINDS,
     QUANTITIES,
     Levitating,
-    cached_row,
     design_inputs,
     design_row,
     losses_of,
     scene_of,
 )
-from spinlev.studies.catalogue.experiment_facts import (
+from spinlev.studies.catalogue.experiment_model import (
     FACTS,
+    FITTED,
     NAMES,
     UNKNOWNS,
     Models,
-    drawn,
-    ends,
-    likeness,
-    log_likelihoods,
-)
-from spinlev.studies.catalogue.experiment_fit import TRUTH, evidences, posterior, synthetic_facts
-from spinlev.studies.catalogue.experiment_surrogate import (
-    FITTED,
-    Conditions,
-    Course,
     Surrogate,
     at_spin,
+    drawn,
+    ends,
     exponents,
     fitted,
     flown,
+    likeness,
+    log_likelihoods,
     targets,
 )
 from spinlev.studies.cli.options import Workers
@@ -169,16 +171,15 @@ def test_likeness_keeps_the_motion():
 
 def test_ends_of_flights_are_probabilities_that_add_to_one():
     """One that falls, one that grows by 9 e-folds of 6.4, and one without an equilibrium."""
-    rest, none = np.full(3, 0.1), np.zeros((3, 2))
+    rest = np.full(3, 0.1)
     margin, fall, growth = np.array([0.1, 0.1, -0.1]), np.array([20.0, np.inf, 5.0]), np.array([3.0, 9.0, 0.0])
-    course = Course(margin, fall, growth, rest, np.full(3, np.inf), rest, none, none)
+    course = {"margin": margin, "fall": fall, "growth": growth, "doubt": rest, "shaken": np.full(3, np.inf)}
     surrogate = Surrogate("single", np.zeros((1, 6), int), np.zeros((1, len(FITTED))), np.full(len(FITTED), 0.01), 1)
     found = ends(Models({"single": surrogate}), "single", course, {"motion": np.full(3, 5.0)})
-    total = found.nothing + found.falls + found.stays + found.oscillates
-    np.testing.assert_allclose(total, 1.0, atol=1e-12)
-    assert found.falls[0] > 0.99
-    assert found.oscillates[1] > 0.99
-    assert found.nothing[2] > 0.99
+    np.testing.assert_allclose(sum(found.values()), 1.0, atol=1e-12)
+    assert found["falls"][0] > 0.99
+    assert found["oscillates"][1] > 0.99
+    assert found["nothing"][2] > 0.99
 
 
 def test_points_are_the_rotors_of_the_designs_and_then_the_variants():
@@ -221,26 +222,26 @@ def models():
     smaller = {"stack": 0, "single": 6, "single_degree": 1, "heights": 5}
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(design, "losses_of", lambda scene, steel: (SmallBall(scene.rotor[0].body.center), None))
-        patch.setattr(experiment, "cached_row", design.design_row)
+        patch.setattr(experiment, "design_row", partial(design_row, cached=False))
         return Models(experiment.surrogates_of({**SETTINGS[True], **smaller}, ("floater", "rotor", "air")))
 
 
 def test_flights_on_a_surrogate_are_the_averaged_ones(models):
     """δx = 1 mm with 2.3°: the fold, and 140 Hz for 250 s, within three times what the surrogate misses."""
     strengths, inputs = np.tile([1.0, 0.0, 0.0, 1.0], (2, 1)), np.tile(list(INPUTS.values()), (2, 1))
-    asked = Conditions(inputs, np.array([118.0, 140.0]), np.zeros(2), strengths, np.full(2, 250.0))
-    course = flown(models.surrogates["single"], asked)
+    frequency = np.array([118.0, 140.0])
+    course = flown(models.surrogates["single"], inputs, frequency, np.zeros(2), strengths, np.full(2, 250.0))
     scene = scene_of(INPUTS)
     bare, whole = levitation_of(scene, "cuboid"), levitation_of(in_air(scene), "cuboid")
     stable = levitating_ranges(scene, bare.table, bare.rates)[0]
     error = 3 * models.error("single", "frequency")
-    assert course.margin == pytest.approx(np.log(asked.frequency / stable.low.parameter), abs=error)
+    assert course["margin"] == pytest.approx(np.log(frequency / stable.low.parameter), abs=error)
     there = replace(in_air(scene), frequency=140.0)
     start = Scales.of(there).unpack(at_frequency(scene, bare.rates, stable.near(140.0), 140.0).state)
     flight = drift(there, whole.interaction, 0.0, 250.0, whole.rates, start)
     assert flight.ended_by == "duration"
-    assert course.fall[1] > 250.0
-    assert course.circle[1] == pytest.approx(np.hypot(*start.position[:2]), rel=0.2)
+    assert course["fall"][1] > 250.0
+    assert course["circle"][1] == pytest.approx(np.hypot(*start.position[:2]), rel=0.2)
 
 
 def test_made_up_facts_of_known_rotors_are_found_again(models):
@@ -276,8 +277,8 @@ def test_no_fact_is_impossible_and_none_is_more_than_certain(models):
 def test_a_variant_without_an_effect_has_none_of_it(models):
     values = {name: np.array([value]) for name, value in TRUTH.items()}
     flight = ("single", 1.0, 140.0, 250.0)
-    every = models.conditions(values, flight).strengths
-    without = replace(models, effects=("floater", "air")).conditions(values, flight).strengths
+    every = models.conditions(values, flight)[3]
+    without = replace(models, effects=("floater", "air")).conditions(values, flight)[3]
     np.testing.assert_array_equal(without, every * [1, 0, 0, 1])
 
 
@@ -289,6 +290,6 @@ def test_the_number_of_workers_does_not_matter(tmp_path):
     for name in one.data_vars:
         np.testing.assert_array_equal(one[name].values, two[name].values)
     for k in (0, SETTINGS[True]["single"]):
-        np.testing.assert_array_equal(design_row(points[k])["node"], cached_row(points[k])["node"])
+        np.testing.assert_array_equal(design_row(points[k], cached=False)["node"], design_row(points[k])["node"])
     assert "logarithm of the evidence" in EXPERIMENT.report(one)[-1]
     assert all(draw(one).axes for draw in EXPERIMENT.figures.values())

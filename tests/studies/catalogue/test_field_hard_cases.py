@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from spinlev.studies.catalogue.hard_cases import CASES, case_errors, extensions, hard_case_figure, hard_case_lines
+from spinlev.studies.catalogue.field_quality import CASES, case_errors, extensions, hard_case_figure, hard_case_lines
 
 
 def test_extensions_lie_on_the_lines_and_planes_of_edges_and_faces():

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from spinlev.fem.rotor.choice import rotor_table
-from spinlev.studies.catalogue import dipole_validity, speed_accuracy
-from spinlev.studies.catalogue.dipole_validity import LEVELS
+from spinlev.studies.catalogue import field_quality, speed_accuracy
+from spinlev.studies.catalogue.field_quality import LEVELS
 from spinlev.studies.catalogue.speed_accuracy import DISTANCES, cube, measure, methods, sphere_points
 
 QUICK = methods(quick=True)
@@ -104,7 +104,7 @@ def test_the_study_measures_a_method_in_a_process_of_its_own():
 @pytest.fixture(scope="module")
 def validity():
     name = "horizontal, δx = 2 mm"
-    return dipole_validity.dipole_validity(True, {name: dipole_validity.ROTORS[name]}).isel(rotor=0)
+    return field_quality.dipole_validity(True, {name: field_quality.ROTORS[name]}).isel(rotor=0)
 
 
 def test_far_away_only_the_moment_counts(validity):

@@ -13,7 +13,7 @@ from spinlev.fem.mutual.response import rotor_ladder
 from spinlev.fem.rotor.choice import rotor_table
 from spinlev.geometry.scene.contents import Drag, Floater, Scene
 from spinlev.geometry.scene.files import load_scene
-from spinlev.studies.catalogue.floater_permeability import (
+from spinlev.studies.catalogue.finite_magnets import (
     LEVELS,
     floater_figure,
     floater_lines,
@@ -102,7 +102,7 @@ def test_additional_weight_moves_the_equilibrium_like_gravity(scene):
 @pytest.mark.slow
 def test_with_coarse_elements_the_study_tells_the_same(scene, monkeypatch):
     """Elements of the lowest degrees give the missed lift and the shift to some per cent; both are on the figure."""
-    name = "spinlev.studies.catalogue.floater_permeability.rotor_ladder"
+    name = "spinlev.studies.catalogue.finite_magnets.rotor_ladder"
     monkeypatch.setattr(name, lambda magnets, orders: rotor_ladder(magnets, (1, 2)))
     result = floater_permeability(scene, quick=True)
     nearest, farthest = result["distance"].values[[0, -1]]

@@ -3,8 +3,8 @@
 import numpy as np
 
 from spinlev.studies.catalogue.levitation_time import (
-    FIGURES,
     OUTCOMES,
+    STUDY,
     gather_times,
     levitation_times,
     time_lines,
@@ -27,7 +27,7 @@ def test_vertical_rotor_below_within_and_above_its_range():
     lines = time_lines(result)
     assert lines[-1].startswith("vertical 14 mm, nominal: no equilibrium")
     assert len(lines) == 4
-    assert [len(draw(result).axes) for draw in FIGURES.values()] == [1, 1]
+    assert [len(draw(result).axes) for draw in STUDY.figures.values()] == [1, 1]
 
 
 def test_points_are_every_case_with_every_variant():

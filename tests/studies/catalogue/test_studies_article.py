@@ -9,12 +9,15 @@ from spinlev.fem.rotor.choice import rotor_table
 from spinlev.geometry.scene.contents import Scene
 from spinlev.studies.catalogue import article as formulas
 from spinlev.studies.catalogue.article import CONFIGURATIONS, FLOATER, WEIGHT, article_scene, stable_in_flight
+from spinlev.studies.catalogue.article_figures import (
+    FIELD_MODELS,
+    FORCE_MODELS,
+    field_components,
+    force_curve,
+    side_mode,
+)
+from spinlev.studies.catalogue.article_flights import NONE, levitation_distance, trajectories
 from spinlev.studies.catalogue.entries import CATALOGUE
-from spinlev.studies.catalogue.field_components import MODELS as FIELD_MODELS, field_components
-from spinlev.studies.catalogue.force_curve import MODELS as FORCE_MODELS, force_curve
-from spinlev.studies.catalogue.levitation_distance import levitation_distance
-from spinlev.studies.catalogue.side_mode import side_mode
-from spinlev.studies.catalogue.trajectories import NONE, trajectories
 from spinlev.studies.figures.style import save_figure
 from spinlev.studies.study import by_case
 

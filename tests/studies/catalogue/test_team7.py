@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from ngsolve import SetNumThreads
 
-from spinlev.studies.catalogue.team7 import (
+from spinlev.studies.catalogue.plates import (
     CURVES,
     compared,
     compute_line,

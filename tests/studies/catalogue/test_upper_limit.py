@@ -12,10 +12,10 @@ from spinlev.dynamics.flights.flight import simulate
 from spinlev.dynamics.motion.state import Scales
 from spinlev.geometry.scene.contents import AbsoluteStart
 from spinlev.studies.catalogue.article import article_scene, levitation_of
-from spinlev.studies.catalogue.upper_limit import (
+from spinlev.studies.catalogue.regions import (
     MAGNET_DENSITY,
     STEEL_DENSITY,
-    STUDY as UPPER_LIMIT,
+    UPPER_LIMIT,
     VARIANTS,
     scene_of,
     spacer,

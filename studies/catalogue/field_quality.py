@@ -1,4 +1,4 @@
-"""Rotors whose field is hard to compute, and how fine an independent solution must be to judge a table of them."""
+"""Where models of the rotor's field can be trusted, and rotors whose field is hard to compute."""
 
 import time
 import warnings
@@ -14,6 +14,8 @@ from matplotlib.figure import Figure
 from ...fem.closed_forms.moments import added_by_closed_form, carrier, oblique_contact
 from ...fem.elements.ladder import Refinement, solve_rotor
 from ...fem.elements.second_opinion import coulomb_field
+from ...fem.harmonics.expansion import uniform_moments
+from ...fem.rotor.choice import rotor_table
 from ...fem.rotor.models import Accuracy, AccuracyWarning, fem_table, points_around, typical_field
 from ...fem.rotor.table import RotorTable
 from ...geometry.common import Array
@@ -24,11 +26,127 @@ from ...geometry.rotor import horizontal, tilt, vertical
 from ...geometry.shapes import Box, Cylinder, Ring, rotation_matrix
 from ..cli.console import progress
 from ..figures.style import PALETTE, legend_below, styled
-from ..result import Columns, columns
+from ..result import Columns, columns, variable
 from ..study import study_of_one
 from .article import EDGE, FLOATER, PERMEABILITY, REMANENCE
-from .drawing import small_multiples, text_table
+from .drawing import explain, last_crossing, small_multiples, text_table
 
+# Where the point dipole, and models between it and the field of the finite magnets, can be trusted.
+#
+# Region: distance below the lower magnet's centre × lateral offset, worst azimuth, for the article's three rotors.
+# Truth: the finite-element table, whose own error is stored beside.
+ROTORS = {
+    "horizontal, δx = 2 mm": horizontal(0.002, EDGE, REMANENCE, PERMEABILITY),
+    "vertical, δz = 14 mm": vertical(0.014, EDGE, REMANENCE, PERMEABILITY),
+    "tilt, δθ = 10°": tilt(float(np.radians(10)), EDGE, REMANENCE, PERMEABILITY),
+}
+AZIMUTHS = np.radians(np.arange(0.0, 360.0, 30.0))
+
+
+def dipole_validity(quick: bool, rotors: Mapping[str, tuple[Magnet, ...]] = ROTORS) -> xr.Dataset:
+    """Relative errors of B and of its gradient by rotor, model, distance and lateral offset."""
+    distance = np.linspace(0.0115, 0.05, 12 if quick else 60)
+    offset = np.linspace(0.0, 0.01, 5 if quick else 21)
+    d, r, phi = np.meshgrid(distance, offset, AZIMUTHS, indexing="ij")
+    points = np.stack([r * np.cos(phi), r * np.sin(phi), -d], axis=-1).reshape(-1, 3)
+
+    def worst(values: Array) -> Array:
+        """The largest over the azimuth (distance, offset)."""
+        return np.asarray(values.reshape(d.shape).max(axis=2))
+
+    errors, gradients, own = [], [], []
+    for magnets in rotors.values():
+        truth = rotor_table(magnets, "fem", 1e-6)
+        exact, slope = truth.evaluate(points)
+        size, steepness = np.linalg.norm(exact, axis=1), np.linalg.norm(slope, axis=(1, 2))
+        factor = float(np.linalg.norm(truth.moment) / np.linalg.norm(sum(m.moment for m in magnets)))
+        found = [table.evaluate(points) for table in models(magnets, factor).values()]
+        errors.append([worst(np.linalg.norm(b - exact, axis=1) / size) for b, _ in found])
+        gradients.append([worst(np.linalg.norm(g - slope, axis=(1, 2)) / steepness) for _, g in found])
+        own.append(worst(truth.relative_error(points)[0]))
+    found_in = ("rotor", "model", "distance", "offset")
+    return xr.Dataset(
+        {
+            "field_error": variable(found_in, errors, "1", "largest relative error of B over the azimuth"),
+            "gradient_error": variable(found_in, gradients, "1", "largest relative error of the gradient of B"),
+            "truth_error": variable(("rotor", "distance", "offset"), own, "1", "stated relative error of the truth"),
+        },
+        coords={
+            "rotor": list(rotors),
+            "model": list(models(next(iter(rotors.values())), 1.0)),
+            "distance": variable(("distance",), distance, "m", "distance below the lower magnet's centre"),
+            "offset": variable(("offset",), offset, "m", "distance from the axis"),
+        },
+    )
+
+
+def models(magnets: tuple[Magnet, ...], factor: float) -> dict[str, RotorTable]:
+    """Models from the article's dipole to the closed form; `factor` is true over remanent moment."""
+    true = tuple(replace(magnet, polarization=factor * magnet.polarization) for magnet in magnets)
+
+    def moments(sources: tuple[Magnet, ...], degree: int) -> RotorTable:
+        return RotorTable("moments", sources, (), tuple(uniform_moments(magnet, degree) for magnet in sources))
+
+    return {
+        "dipole": moments(magnets, 1),
+        "dipole, true moment": moments(true, 1),
+        "moments to 5, true moment": moments(true, 5),
+        "moments to 13, true moment": moments(true, 13),
+        "cuboid": RotorTable("cuboid", magnets, magnets),
+        "cuboid, true moment": RotorTable("cuboid", true, true),
+    }
+
+
+LEVELS = (1e-1, 1e-2, 1e-3, 1e-4)
+
+
+def validity_lines(result: xr.Dataset) -> list[str]:
+    """From which distance on each model is good to 10, 1, 0.1 and 0.01 % on the axis, by rotor."""
+    distance, rows = 1e3 * result["distance"].values, []
+
+    def reach(error: Array, level: float) -> str:
+        """The distance beyond which the error stays below a level, with a sign where that is not in the range."""
+        found = last_crossing(distance, error, level)
+        if np.isnan(found):
+            return f">{distance[-1]:.1f}"
+        return f"<{found:.1f}" if found == distance[0] else f"{found:.1f}"
+
+    for rotor in result["rotor"].values:
+        for model in result["model"].values:
+            error = result["field_error"].sel(rotor=rotor, model=model).isel(offset=0).values
+            rows.append((f"{rotor}, {model}", *(reach(error, level) for level in LEVELS)))
+    words = "Distance (mm) below the lower magnet from which on B on the axis is good to each error:"
+    return [words, *text_table(("rotor, model", *(f"{100 * level:g} %" for level in LEVELS)), rows)]
+
+
+@styled
+def validity_figure(result: xr.Dataset) -> Figure:
+    """Error of each model against the distance, on the axis and at the largest lateral offset, rotor by rotor."""
+    names, distance = result["rotor"].values.tolist(), 1e3 * result["distance"].values
+    figure, axes = small_multiples(names, 3.0, xlabel="distance (mm)", ylabel="relative error of B", sharey=True)
+    for panel, rotor in zip(axes, names, strict=True):
+        for model, color in zip(result["model"].values, PALETTE, strict=False):
+            error = result["field_error"].sel(rotor=rotor, model=model)
+            panel.semilogy(distance, error.isel(offset=0), color=color, label=str(model))
+            panel.semilogy(distance, error.isel(offset=-1), ":", color=color)
+        own = result["truth_error"].sel(rotor=rotor)
+        panel.semilogy(distance, own.max("offset"), color="0.6", lw=2.5, label="error of the finite elements")
+    widest = 1e3 * float(result["offset"][-1])
+    explain(axes[0], {"on the axis": "-", f"{widest:g} mm off the axis, worst azimuth": ":"})
+    legend_below(figure, columns=3)
+    return figure
+
+
+DIPOLE_VALIDITY = study_of_one(
+    name="dipole-validity",
+    summary="where the dipole and each further model are good to 10, 1, 0.1 and 0.01 %",
+    compute=dipole_validity,
+    figures={"dipole-validity": validity_figure},
+    report=validity_lines,
+)
+
+
+# Rotors whose field is hard to compute, and how fine an independent solution must be to judge a table of them.
 CUBE = (EDGE, EDGE, EDGE)
 CONTACT = FLOATER.radius
 """The floater's radius (m): it touches a face of the cube when their centres are 11.35 mm apart."""
@@ -67,8 +185,8 @@ def _magnet(
     return Magnet(box, np.array(polarization, float), PERMEABILITY, across)
 
 
-def _round(body: Cylinder | Ring, polarization: tuple[float, float, float]) -> tuple[Magnet, ...]:
-    return (Magnet(body, np.array(polarization), PERMEABILITY),)
+def _round(body: Cylinder | Ring, *polarization: float) -> tuple[Magnet, ...]:
+    return (Magnet(body, np.array(polarization, float), PERMEABILITY),)
 
 
 def _cube(permeability: float) -> tuple[Magnet, ...]:
@@ -79,17 +197,10 @@ def _pair(distance: float) -> tuple[Magnet, ...]:
     return vertical(distance, EDGE, REMANENCE, PERMEABILITY)
 
 
-EDGE_WITHIN_A_FACE = (
-    _magnet(CUBE, (1, 0, 0)),
-    _magnet((0.006,) * 3, (0, 0.5, 1), (0.001, 0.0015, 0.008), (0, 0, 30)),
-)
+SMALL = (0.006,) * 3
+EDGE_WITHIN_A_FACE = (_magnet(CUBE, (1, 0, 0)), _magnet(SMALL, (0, 0.5, 1), (0.001, 0.0015, 0.008), (0, 0, 30)))
 EIGHT = tuple(
-    _magnet(
-        (0.006,) * 3,
-        (1.2 + 0.01 * k, 0.1 * k, 0),
-        (0.012 * np.cos(a), 0.012 * np.sin(a), 0.001 * k),
-        (10 * k, 20, 30),
-    )
+    _magnet(SMALL, (1.2 + 0.01 * k, 0.1 * k, 0), (0.012 * np.cos(a), 0.012 * np.sin(a), 0.001 * k), (10 * k, 20, 30))
     for k, a in enumerate(np.arange(8) * np.pi / 4)
 )
 OBLIQUE = (_magnet(CUBE, (1, 0, 0), angles=(15, 40, 70), across=1.15),)
@@ -105,9 +216,9 @@ CASES = {
     "flat, across": HardCase((_magnet(FLAT, (0, 0, 1.3)),), CONTACT, order=4),
     "flat, along": HardCase((_magnet(FLAT, (1.3, 0, 0)),), CONTACT, order=4),
     "long": HardCase((_magnet(LONG, (1.3, 0, 0)),), CONTACT),
-    "disc of 20 : 1, across": HardCase(_round(DISC, (0, 0, 1.3)), CONTACT, order=4),
-    "disc of 20 : 1, along": HardCase(_round(DISC, (1.3, 0, 0)), CONTACT, order=4),
-    "thin ring": HardCase(_round(THIN_RING, (1.3, 0, 0)), CONTACT, order=4),
+    "disc of 20 : 1, across": HardCase(_round(DISC, 0, 0, 1.3), CONTACT, order=4),
+    "disc of 20 : 1, along": HardCase(_round(DISC, 1.3, 0, 0), CONTACT, order=4),
+    "thin ring": HardCase(_round(THIN_RING, 1.3, 0, 0), CONTACT, order=4),
     "touching": HardCase(_pair(0.01)),
     "gap of 1 µm": HardCase(_pair(0.010001)),
     "gap of 50 µm": HardCase(_pair(0.01005), order=4),
@@ -143,7 +254,14 @@ COLUMNS: Columns = {
 
 
 def field_hard_cases(quick: bool, cases: Mapping[str, HardCase] = CASES, places: int = PLACES) -> xr.Dataset:
-    """Errors of B by case and distance from the faces; a quick run has few cases and coarse references."""
+    """Errors of B by case and distance from the faces; a quick run has few cases and coarse references.
+
+    Parameters
+    ----------
+    quick : whether it is one
+    cases : by name
+    places : distances, from the case's own nearest one on
+    """
     if quick:
         cases = {name: replace(case, order=min(case.order, 4)) for name, case in cases.items() if case.quick}
     rows = []
@@ -165,10 +283,8 @@ def case_errors(case: HardCase, places: int) -> xr.Dataset:
     points = [extensions(case, d) if case.extensions else points_around(case.magnets, d) for d in distance]
     before, truth = reference(case, np.concatenate(points))
     ends = np.cumsum([len(p) for p in points])[:-1]
-    rows = [
-        _errors(field, case, *parts)
-        for parts in zip(points, np.split(before, ends), np.split(truth, ends), strict=True)
-    ]
+    parts = zip(points, np.split(before, ends), np.split(truth, ends), strict=True)
+    rows = [_errors(field, case, *part) for part in parts]
     found = {key: field.provenance[key] for key in ("order", "unknowns")}
     found |= dict(zip(ERRORS, np.array(rows).T, strict=True)) | {"distance": distance, "seconds": seconds}
     return xr.Dataset(columns(COLUMNS, {key: np.asarray(value, float) for key, value in found.items()}))
@@ -236,7 +352,7 @@ def hard_case_figure(result: xr.Dataset) -> Figure:
         panel.axhline(RTOL, color="0.2", lw=0.7, label="tolerance asked for")
         small = float(row["true_error"].min()) < 1e-11  # such panels show round-off too
         panel.set(ylim=(3e-17 if small else 1e-10, 1e-4))
-    legend_below(figure, axes[0])
+    legend_below(figure)
     return figure
 
 
@@ -257,7 +373,7 @@ def hard_case_lines(result: xr.Dataset) -> list[str]:
     ]
 
 
-STUDY = study_of_one(
+FIELD_HARD_CASES = study_of_one(
     name="field-hard-cases",
     summary="true and stated error of the rotor's table in hard cases: contact, extensions, flat, touching, many",
     compute=field_hard_cases,

@@ -1,8 +1,9 @@
-"""What a plate does to each mode of the floater, against its place, conductivity, thickness, and the rotor."""
+"""What a conducting plate does to a floater, and its eddy currents against a measurement."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import cache, partial
+from importlib.resources import files
 from typing import Any
 
 import numpy as np
@@ -16,25 +17,29 @@ from ...dynamics.equilibria.equilibrium import Equilibrium, EquilibriumError, Su
 from ...dynamics.motion.equations import parameters
 from ...dynamics.motion.plate import PlateForce, PlateMemory
 from ...dynamics.motion.state import Scales, State
+from ...fem.closed_forms.potentials import Dipole, Racetrack
+from ...fem.plate.eddy import solve_eddy
 from ...geometry.common import Array
+from ...geometry.meshes.plate import Block, ConductorMesh, graded_partition, hex_mesh, skin_depth
 from ...geometry.scene.contents import Plate, Scene
 from ...geometry.shapes import Box, rotation_matrix
 from ..cli.options import PlateModel
 from ..figures.style import PAGE, PALETTE, legend_below, panels, styled
 from ..levitation import Levitation
 from ..result import AXIS, MODES, Columns, columns, variable
-from ..study import Point, Study, cases_with, each_case
+from ..study import Point, Study, cases_with, each_case, study_of_one
 from .article import (
-    CONFIGURATIONS,
     PLATE_CONDUCTIVITY,
     PLATE_SIZE,
     article_scene,
     conducting,
+    levitated_rotors,
     levitation_of,
     rotor_label,
 )
 from .drawing import explain, plain_log, range_text, small_multiples, text_table, uncertain
 
+# What a plate does to each mode of the floater, against its place, conductivity, thickness, and the rotor.
 DISTANCE = 0.018  # Face below or beside the floater's centre in the sweeps over all else, m
 CONFIGURATION, MEASURE, FREQUENCY = "tilt", 10.0, 130.0
 """The rotor of the sweeps over plates, that of the scene `tilt-over-plate`: tilt in degrees, Hz."""
@@ -43,6 +48,7 @@ REAL = (DISTANCE,)
 FIELD_RTOL = 1e-4
 MIDDLE = 0.5
 ROTORS = ("rotors, below", "rotors, beside")  # Sweeps over the article's rotors
+PLACES, REAL_PLATE = ("below", "beside"), ", real plate"
 
 
 @dataclass(frozen=True)
@@ -76,20 +82,18 @@ class PlateCase:
 def cases(quick: bool) -> list[PlateCase]:
     """The plates and rotors of the study."""
     few, real = (3, ()) if quick else (10, REAL)
-    found = [PlateCase("below", d, distance=d) for d in (*np.geomspace(0.0085, 0.06, few).tolist(), *real)]
-    found += [
-        PlateCase("beside", d, upright=True, distance=d) for d in (*np.geomspace(0.01, 0.06, few).tolist(), *real)
-    ]
+    found: list[PlateCase] = []
+    for sweep, nearest, upright in (("below", 0.0085, False), ("beside", 0.01, True)):
+        places = (*np.geomspace(nearest, 0.06, few).tolist(), *real)
+        found += [PlateCase(sweep, d, upright=upright, distance=d) for d in places]
     found += [PlateCase("conductivity", s, conductivity=s) for s in np.geomspace(1e6, 6e7, few).tolist()]
     found += [PlateCase("thickness", t, thickness=t) for t in np.geomspace(1e-3, 5e-2, few).tolist()]
     found += [PlateCase("frequency", p, part=p) for p in np.linspace(0.02, 0.98, 2 if quick else 9).tolist()]
-    for sweep in ROTORS:
-        for name, kind in CONFIGURATIONS.items():
-            some = kind.levitated[1:2] if quick else kind.levitated
-            beside = sweep == ROTORS[1]
-            found += [PlateCase(sweep, m, upright=beside, configuration=name, measure=m, part=MIDDLE) for m in some]
-    found += [PlateCase("below, real plate", d, "reduced", distance=d) for d in real]
-    found += [PlateCase("beside, real plate", d, "reduced", upright=True, distance=d) for d in real]
+    for sweep, upright in zip(ROTORS, (False, True), strict=True):
+        for rotor in levitated_rotors(quick):
+            found.append(PlateCase(sweep, rotor["measure"], upright=upright, part=MIDDLE, **rotor))
+    for place, upright in zip(PLACES, (False, True), strict=True):
+        found += [PlateCase(place + REAL_PLATE, d, "reduced", upright=upright, distance=d) for d in real]
     return [replace(case, complete=not quick) for case in found]
 
 
@@ -101,8 +105,7 @@ def _in_field(configuration: str, measure: float, complete: bool) -> Levitation:
 
 
 @cache
-def _stable_range(configuration: str, measure: float, complete: bool) -> StableRange:
-    levitation = _in_field(configuration, measure, complete)
+def _stable_range(levitation: Levitation) -> StableRange:
     return stable_range(levitation.scene, levitation.rates, *reference_state(levitation.scene))
 
 
@@ -122,7 +125,7 @@ def without_plate(
     """
     alone, frequency = _in_field(configuration, measure, complete), FREQUENCY
     if part is not None:
-        stable = _stable_range(configuration, measure, complete)
+        stable = _stable_range(alone)
         frequency = stable.low.parameter + part * (stable.high.parameter - stable.low.parameter)
         near = at_frequency(alone.scene, alone.rates, stable.near(frequency), frequency).distance
     else:
@@ -164,7 +167,7 @@ def plate_damping(point: Point) -> xr.Dataset:
     models = replace(alone.models, plate_model=case.model, plate_rtol=RTOL)
     beside = alone.elsewhere(models, plate=case.plate(start.position))
     beside.adopt(Survey((start,), ()))
-    row, scene = _row(beside, start), alone.scene
+    row, scene = _damping_row(beside, start), alone.scene
     return xr.Dataset(
         {
             **columns(COLUMNS, row, mode=len(MODES), axis=len(AXIS)),
@@ -214,7 +217,7 @@ def plate_action(scene: Scene, memory: PlateMemory, equilibrium: Equilibrium) ->
     return {"force": lab.position.mean(axis=0), "torque": lab.moment.mean(axis=0), "loss": loss}
 
 
-def _row(levitation: Levitation, start: Equilibrium) -> dict[str, ArrayLike]:
+def _damping_row(levitation: Levitation, start: Equilibrium) -> dict[str, ArrayLike]:
     memory, found = levitation.plate, levitation.equilibria
     row: dict[str, ArrayLike] = {"growth_without": [mode.growth_per_s for mode in start.modes]}
     if memory is None or not found or found[0].currents is None:
@@ -230,21 +233,20 @@ def _row(levitation: Levitation, start: Equilibrium) -> dict[str, ArrayLike]:
 
 
 SWEEPS = {
-    "below": ("Plate below", "distance of the face (mm)", 1e3),
-    "beside": ("Plate standing beside", "distance of the face (mm)", 1e3),
-    "frequency": ("Frequency", "frequency of the rotor (Hz)", 1.0),
-    "conductivity": ("Conductivity", "conductivity (MS/m)", 1e-6),
-    "thickness": ("Thickness", "thickness (mm)", 1e3),
+    "below": ("plate below", "distance of the face (mm)", 1e3),
+    "beside": ("plate standing beside", "distance of the face (mm)", 1e3),
+    "frequency": ("frequency", "frequency of the rotor (Hz)", 1.0),
+    "conductivity": ("conductivity", "conductivity (MS/m)", 1e-6),
+    "thickness": ("thickness", "thickness (mm)", 1e3),
 }
 DISTANCES = (10, 15, 20, 30, 40, 60)
-PLACES, REAL_PLATE = ("below", "beside"), ", real plate"
 ENDINGS = {"": ("infinite slab", "o-", None), REAL_PLATE: ("real plate", "s", "none")}
 """By the ending of a sweep's name: what the plate is, its marks and their face."""
 MEANS = {
-    "moved": ("Equilibrium moved by", "displacement (mm)"),
-    "lift": ("Mean force, up", "of the weight (%)"),
-    "torque": ("Braking torque on the floater", "torque (µN m)"),
-    "loss": ("Loss in the plate", "loss (mW)"),
+    "moved": ("equilibrium moved", "displacement (mm)"),
+    "lift": ("mean force, up", "of the weight (%)"),
+    "torque": ("braking torque on the floater", "torque (µN m)"),
+    "loss": ("loss in the plate", "loss (mW)"),
 }
 """Titles and labels of what `means` gives."""
 
@@ -281,7 +283,7 @@ def growth_figure(result: xr.Dataset, sweeps: Sequence[str]) -> Figure:
         for words, style, fill in ENDINGS.values():
             explain(panel, {words: style}, mfc=fill, ms=4)
         explain(panel, {"growth rate (unstable)": "x"}, ms=4)
-    legend_below(figure, axes[0])
+    legend_below(figure)
     return figure
 
 
@@ -297,7 +299,7 @@ def _damped(
 
 @styled
 def rotors_figure(result: xr.Dataset) -> Figure:
-    """Damping rate of the least stable mode of every rotor of the article, plate below and beside."""
+    """Damping rate of the least stable mode of every rotor of the article, plate below and beside, face at 18 mm."""
     figure, ((axes,),) = panels(1, 1, (PAGE, 3.4))
     for sweep, marker, color in zip(ROTORS, "os", PALETTE, strict=False):
         part = part_of(result, sweep)
@@ -307,8 +309,8 @@ def rotors_figure(result: xr.Dataset) -> Figure:
         rotors = zip(part["configuration"].values, part["value"].values, strict=True)
         axes.set_xticks(places, [rotor_label(str(name), float(value)) for name, value in rotors], rotation=90)
     explain(axes, {"growth rate (unstable)": "x"}, ms=5)
-    axes.set(title="Rotors of the article, plate at 18 mm", ylabel="damping rate of the\nleast stable mode (1/s)")
-    legend_below(figure, axes)
+    axes.set(xlabel="rotor; face of the plate at 18 mm", ylabel="damping rate of the\nleast stable mode (1/s)")
+    legend_below(figure)
     return figure
 
 
@@ -326,16 +328,8 @@ def means_figure(result: xr.Dataset) -> Figure:
                 panel.errorbar(1e3 * part["value"], values, np.abs(values) * part["error"], fmt=marks, **more)
         panel.set(ylabel=MEANS[name][1], yscale="linear" if name == "lift" else "log")
         plain_log(panel, DISTANCES)
-    legend_below(figure, axes[0])
+    legend_below(figure)
     return figure
-
-
-FIGURES: dict[str, Callable[[xr.Dataset], Figure]] = {
-    "plate-damping-distance": partial(growth_figure, sweeps=PLACES),
-    "plate-damping-material": partial(growth_figure, sweeps=("frequency", "conductivity", "thickness")),
-    "plate-damping-rotors": rotors_figure,
-    "plate-damping-means": means_figure,
-}
 
 
 def part_of(result: xr.Dataset, sweep: str) -> xr.Dataset:
@@ -363,15 +357,8 @@ def damping_lines(result: xr.Dataset) -> list[str]:
             mode = str(one["mode"].values[int(one["growth"].argmax("mode"))])
             rate = uncertain(worst, abs(worst) * float(one["error"]))
             rows.append((where, frequency, mode, rate, before, *(f"{float(v):.3g}" for v in means(one).values())))
-    head = (
-        "where",
-        "rotor (Hz)",
-        "least stable mode",
-        "growth (1/s)",
-        "without plate",
-        *(w for _, w in MEANS.values()),
-    )
-    return [*text_table(head, rows), sentence(result)]
+    head = ("where", "rotor (Hz)", "least stable mode", "growth (1/s)", "without plate")
+    return [*text_table((*head, *(words for _, words in MEANS.values())), rows), sentence(result)]
 
 
 def sentence(result: xr.Dataset) -> str:
@@ -393,12 +380,163 @@ def sentence(result: xr.Dataset) -> str:
     )
 
 
-STUDY = Study(
+PLATE_DAMPING = Study(
     name="plate-damping",
     summary="what a plate does to each mode, against its place, conductivity and thickness",
     points=damping_points,
     compute=plate_damping,
     gather=gather_damping,
-    figures=FIGURES,
+    figures={
+        "plate-damping-distance": partial(growth_figure, sweeps=PLACES),
+        "plate-damping-material": partial(growth_figure, sweeps=("frequency", "conductivity", "thickness")),
+        "plate-damping-rotors": rotors_figure,
+        "plate-damping-means": means_figure,
+    },
     report=damping_lines,
+)
+
+
+# TEAM workshop problem 7: an asymmetrical conductor with a hole under a racetrack coil, against measurement.
+#
+# Aluminium 294 × 294 × 19 mm, σ = 3.526e7 S/m, with a hole of 108 × 108 mm whose corner is at (18, 18) mm; a coil
+# of 2742 ampere-turns above it.  B_z was measured on the line y = 72, z = 34 mm at 50 and 200 Hz, for ωt = 0 and 90°:
+# with phasors e^{+iωt} and the current I cos ωt these are Re B and -Im B.
+#
+# K. Fujiwara, T. Nakata, COMPEL 9 (1990) 137-154, doi 10.1108/eb010071.
+CONDUCTIVITY = 3.526e7
+COIL = Racetrack(np.array([0.194, 0.100, 0.099]), (0.2, 0.2), 0.1, 0.025, 0.05, 2742.0)
+FREQUENCIES = (50.0, 200.0)
+CURVES = ("50 Hz, ωt = 0", "50 Hz, ωt = 90°", "200 Hz, ωt = 0", "200 Hz, ωt = 90°")
+FACES = (np.array([0.0, 18.0, 126.0, 294.0]), np.array([0.0, 18.0, 126.0, 294.0]), np.array([0.0, 19.0]))
+"""Faces of plate and hole across each axis, mm."""
+REACH = 1500.0  # Distance from the plate to the outer boundary, mm
+GAUSS = 1e-4
+
+
+def team7_mesh(frequency: float, cell: float = 70.0, skin_share: float = 2.0, growth: float = 2.0) -> ConductorMesh:
+    """Structured mesh, finer at the plate's faces.
+
+    Parameters
+    ----------
+    frequency : Hz, of which the skin depth is
+    cell : largest in the plate, mm
+    skin_share, growth : size of cells at a face over the skin depth, and what is added to it a mm away
+    """
+    skin = skin_share * 1e3 * skin_depth(CONDUCTIVITY, frequency)
+
+    def size(coordinate: Array, faces: Array) -> Array:
+        near = growth * np.abs(coordinate[:, None] - faces).min(axis=1)
+        inside = (coordinate > faces[0]) & (coordinate < faces[-1])
+        return np.asarray(np.where(inside, np.minimum(cell, skin + near), cell / 2 + near))
+
+    lines = [graded_partition([f[0] - REACH, *f, f[-1] + REACH], partial(size, faces=f)) for f in FACES]
+    lower, upper = np.array([f[0] for f in FACES]), np.array([f[-1] for f in FACES])
+    plate = Block("plate", lower, upper)
+    hole = Block("air", np.array([18.0, 18.0, 0.0]), np.array([126.0, 126.0, 19.0]))
+    return ConductorMesh(hex_mesh(lines, [plate, hole]), {"plate": CONDUCTIVITY})
+
+
+def measured_line() -> tuple[Array, Array]:
+    """x (17,) m and measured B_z (17, 4) T."""
+    text = files(__package__).joinpath("team7_line_A1B1.csv").read_text(encoding="utf-8")
+    table = np.array([[float(entry) for entry in row.split(",")] for row in text.splitlines() if row[:1].isdigit()])
+    return table[:, 0] * 1e-3, table[:, 1:] * GAUSS
+
+
+def compute_line(frequency: float, x: Array, mesh: ConductorMesh, order: int = 3) -> Array:
+    """B_z (n, 2), T, at ωt = 0 and 90° on the line y = 72, z = 34 mm; the reaction by reciprocity.
+
+    Parameters
+    ----------
+    frequency : Hz
+    x : (n,) m
+    mesh, order : of the elements
+    """
+    points = np.column_stack([x, np.full_like(x, 0.072), np.full_like(x, 0.034)])
+    response = solve_eddy(mesh, order, frequency, [COIL])
+    reaction = response.couplings_to([Dipole(p, np.array([0.0, 0.0, 1.0])) for p in points])[:, 0]
+    total = COIL.flux_density(points)[:, 2] + reaction
+    return np.column_stack([total.real, -total.imag])
+
+
+def team7(order: int = 3) -> xr.Dataset:
+    """Measured and computed B_z on the line, in T, and their deviation in units of the line's peak."""
+    x, measured = measured_line()
+    return compared(x, measured, np.hstack([compute_line(f, x, team7_mesh(f), order) for f in FREQUENCIES]))
+
+
+def compared(x: Array, measured: Array, computed: Array) -> xr.Dataset:
+    """Both by `CURVES`, and their deviation in units of the largest measured |B| of that frequency.
+
+    Parameters
+    ----------
+    x : (17,) m
+    measured, computed : B_z (17, 4) T
+    """
+    amplitude = np.hypot(measured[:, 0::2], measured[:, 1::2]).max(axis=0)
+    deviation = (computed - measured) / np.repeat(amplitude, 2)
+    return xr.Dataset(
+        {
+            "measured": variable(("x", "curve"), measured, "T", "measured B_z"),
+            "computed": variable(("x", "curve"), computed, "T", "computed B_z"),
+            "deviation": variable(("x", "curve"), deviation, "1", "deviation over the line's peak"),
+        },
+        {"x": variable(("x",), x, "m", "x"), "curve": list(CURVES)},
+    )
+
+
+def team7_study(quick: bool) -> xr.Dataset:
+    """`team7` by elements of second or third order."""
+    return team7(order=2 if quick else 3)
+
+
+def team7_lines(result: xr.Dataset) -> list[str]:
+    """Largest and mean deviation by curve."""
+    lines = ["TEAM workshop problem 7, B_z on y = 72, z = 34 mm: deviation in per cent of the line's peak"]
+    for curve in result["curve"].values:
+        size = 100 * np.abs(result["deviation"].sel(curve=curve).values)
+        lines.append(f"  {curve:18} largest {size.max():5.2f}, mean {size.mean():5.2f}")
+    size = 100 * np.abs(result["deviation"].values)
+    lines.append(f"  all {size.size} values         largest {size.max():5.2f}, mean {size.mean():5.2f}")
+    return [*lines, *(_common_phase(result, number) for number in (0, 2))]
+
+
+def _common_phase(result: xr.Dataset, number: int) -> str:
+    """What stays at a frequency, whose curves are `number` and the next, once all phases are turned by one angle."""
+    measured, computed = (
+        result[name].values[:, number] - 1j * result[name].values[:, number + 1] for name in ("measured", "computed")
+    )
+    angle = float(np.angle(np.vdot(computed, measured)))
+    left = 100 * (computed * np.exp(1j * angle) - measured) / np.abs(measured).max()
+    size = np.abs([left.real, left.imag])
+    return (
+        f"  {str(result['curve'].values[number]).split(',')[0]}, all phases turned by {np.degrees(angle):+.2f}°: "
+        f"largest {size.max():.2f}, mean {size.mean():.2f}; at 90° largest {size[1].max():.2f}"
+    )
+
+
+@styled
+def team7_figure(result: xr.Dataset) -> Figure:
+    """The four curves with what is measured, and their deviation."""
+    figure, ((left, right),) = panels(1, 2, (PAGE, 3.2))
+    x = 1e3 * result["x"].values
+    for curve, color in zip(result["curve"].values, PALETTE, strict=False):
+        here = result.sel(curve=curve)
+        left.plot(x, 1e3 * here["computed"], color=color, label=curve)
+        left.plot(x, 1e3 * here["measured"], "o", ms=3.5, color=color)
+        right.plot(x, 100 * here["deviation"], "o-", ms=3, color=color, label=curve)
+    explain(left, {"computed, at the same places": "-", "measured (COMPEL 1990)": "o"}, ms=3.5)
+    right.axhspan(-5, 5, color="0.93", zorder=0)
+    left.set(xlabel="x (mm)", ylabel="$B_z$ (mT)")
+    right.set(xlabel="x (mm)", ylabel="computed less measured (% of the peak)")
+    legend_below(figure, columns=3)
+    return figure
+
+
+TEAM7 = study_of_one(
+    name="team7",
+    summary="eddy currents against the measurement of TEAM workshop problem 7",
+    compute=team7_study,
+    figures={"team7": team7_figure},
+    report=team7_lines,
 )

@@ -1,0 +1,465 @@
+"""The article's figures of field, force along the axis and side mode, beside those of the finite magnets."""
+
+from functools import partial
+from typing import Any
+
+import numpy as np
+import scipy
+import xarray as xr
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import ScalarFormatter
+from numpy.typing import ArrayLike
+
+from ...dynamics.continuation.frequencies import kicked, levitating_branch
+from ...dynamics.flights.flight import simulate
+from ...geometry.common import Array
+from ..figures.style import DASHES, NAMES, PAGE, PALETTE, legend_below, panels, styled
+from ..levitation import Levitation
+from ..result import Columns, variable
+from ..scene_tables import sources
+from ..study import Point, Study, case_with, cases_with, recorded
+from .article import (
+    CONFIGURATIONS,
+    CONTACT,
+    FLOATER,
+    HIGHEST,
+    LOWEST,
+    MODELS,
+    QUICK,
+    WEIGHT,
+    article_scene,
+    field,
+    force,
+    label_of,
+    levitation_of,
+    polar_angle,
+    side_radius,
+    stable_in_flight,
+)
+from .drawing import (
+    by_configuration,
+    by_rotor,
+    configuration_panels,
+    explain,
+    plot_branch,
+    rotor_panels,
+    span,
+    text_table,
+)
+
+# On-axis and off-axis field at several places of the floater against the parameter of each of the article's rotors.
+DISTANCES = (15e-3, 20e-3, 25e-3, 30e-3, 40e-3)
+"""Places of the floater on the axis below the rotor, m; the article's text does not give its own."""
+FIELD_MODELS = ("article", "dipole", "cuboid", "fem")
+FIELD_COLUMNS: Columns = {
+    "off_axis": (("distance",), "T", "field across the axis"),
+    "on_axis": (("distance",), "T", "field along the axis"),
+    "field_error": (("distance",), "T", "estimated error of the field"),
+}
+
+
+def field_points(quick: bool) -> list[Point]:
+    """Every rotor of the article; `quick` takes the first, the middle and the last of each configuration."""
+    return [
+        {"configuration": name, "value": value, "model": model}
+        for name, kind in CONFIGURATIONS.items()
+        for value in (kind.tested[:: (len(kind.tested) - 1) // 2] if quick else kind.tested)
+        for model in FIELD_MODELS
+    ]
+
+
+def field_components(point: Point) -> xr.Dataset:
+    """Field of one rotor by one model over `distance`, with the model's own error (0 for the article's formula)."""
+    distance = np.array(DISTANCES)
+    if point["model"] == "article":
+        across, along = field(point["configuration"], point["value"], distance)
+        error = np.zeros_like(distance)
+    else:
+        scene = article_scene(point["configuration"], point["value"])
+        model = sources(levitation_of(scene, point["model"]).table)
+        places = distance[:, None] * np.array([0.0, 0.0, -1.0])
+        b, _ = model.evaluate(places)
+        across, along, error = np.hypot(b[:, 0], b[:, 1]), b[:, 2], model.absolute_error(places)[0]
+    there = variable(("distance",), distance, "m", "distance below the rotor's origin")
+    return recorded(point, FIELD_COLUMNS, (across, along, error), {"distance": there})
+
+
+def _of(part: xr.Dataset, model: str) -> xr.Dataset:
+    return cases_with(part, model=model).sortby("value")
+
+
+def deviations(part: xr.Dataset) -> dict[str, Any]:
+    """|B - B_fem| / |B_fem| (case, distance) of each simpler model, and last the finite elements' own error."""
+    true = _of(part, "fem")
+    size = np.hypot(true["off_axis"], true["on_axis"])
+    found: dict[str, Any] = {}
+    for model in FIELD_MODELS[:-1]:
+        apart = _of(part, model)[["off_axis", "on_axis"]] - true[["off_axis", "on_axis"]]
+        found[model] = np.hypot(apart["off_axis"], apart["on_axis"]) / size
+    return {**found, "fem": true["field_error"] / size}
+
+
+@styled
+def component_figure(result: xr.Dataset, quantity: str, ylabel: str) -> Figure:
+    """One component of the field below the rotor against the parameter of each configuration."""
+    figure, rows = configuration_panels(result, 2.7, ylabel=ylabel, sharey=True)
+    for axes, configuration, part in rows:
+        for model, style in (("fem", DASHES["fem"]), ("dipole", DASHES["dipole"]), ("article", "+")):
+            found = _of(part, model)
+            for k, color in zip(range(found.sizes["distance"]), PALETTE, strict=False):
+                axes.plot(found["value"], 1e3 * found[quantity][:, k], style, color=color, ms=4)
+        axes.set(xlabel=label_of(configuration), yscale="log")
+    rows[0][0].yaxis.set_major_formatter(ScalarFormatter())
+    _legend(figure, result, {"fem": NAMES["fem"], "dipole": NAMES["dipole"]}, {"formulas of the article": "+"})
+    return figure
+
+
+@styled
+def differences_figure(result: xr.Dataset) -> Figure:
+    """How far the simpler models are from the finite elements."""
+    figure, rows = configuration_panels(result, 2.7, ylabel="deviation |ΔB| / |B| (%)", sharey=True)
+    for axes, configuration, part in rows:
+        value, off = _of(part, "fem")["value"], deviations(part)
+        for k, color in zip(range(part.sizes["distance"]), PALETTE, strict=False):
+            for model in ("dipole", "cuboid"):
+                axes.plot(value, 100 * off[model][:, k], DASHES[model], color=color)
+        axes.plot(value, 100 * off["fem"].max("distance"), ":", color="0.5", lw=1.6)
+        axes.set(xlabel=label_of(configuration), yscale="log")
+    names = {model: NAMES[model] for model in ("dipole", "cuboid")}
+    _legend(figure, result, names, {"largest error of the finite elements": ":"})
+    return figure
+
+
+def _legend(figure: Figure, result: xr.Dataset, models: dict[str, str], more: dict[str, str]) -> None:
+    axes = figure.axes[0]
+    explain(axes, {f"{1e3 * distance:g} mm below": f"C{k}-" for k, distance in enumerate(result["distance"].values)})
+    explain(axes, {name: DASHES[model] for model, name in models.items()} | more)
+    legend_below(figure, columns=4)
+
+
+def components_lines(result: xr.Dataset) -> list[str]:
+    """Range of each component, and how far the simpler models are off, at each distance."""
+    rows = []
+    for configuration, part in by_configuration(result):
+        true, off = _of(part, "fem"), deviations(part)
+        for k, distance in enumerate(1e3 * result["distance"].values):
+            ends = [" to ".join(f"{1e3 * true[q].values[n, k]:.3f}" for n in (0, -1)) for q in ("off_axis", "on_axis")]
+            worst = [f"{100 * float(off[name][:, k].max()):.2g}" for name in ("dipole", "cuboid", "article", "fem")]
+            rows.append((f"{configuration}, {distance:g} mm", *ends, *worst))
+    head = ("rotors, distance", "off-axis (mT)", "on-axis (mT)", "dipole", "μr = 1", "formula", "error")
+    last = "Largest deviations from the finite elements, and their own estimated error, in per cent of |B|."
+    return [*text_table(head, rows), last]
+
+
+OFF, ON = r"off-axis field $B_\perp$ (mT)", r"on-axis field $B_z$ (mT)"
+FIELD_COMPONENTS = Study(
+    name="field-components",
+    summary="off-axis and on-axis field against the parameter of each rotor of the article, by four models",
+    points=field_points,
+    compute=field_components,
+    figures={
+        "field-components-off-axis": partial(component_figure, quantity="off_axis", ylabel=OFF),
+        "field-components-on-axis": partial(component_figure, quantity="on_axis", ylabel=ON),
+        "field-components-differences": differences_figure,
+    },
+    report=components_lines,
+)
+
+
+# Force along the axis against distance, with its repelling and its attracting part: the article's second figure.
+CONFIGURATION, VALUE = "horizontal", 1.0  # The rotor of the article's figure; its text does not give the frequency
+FREQUENCIES = (165.0, 170.0, 185.0, 200.0)
+FORCE_MODELS = ("semi-analytic", "small angles", "dipole", "fem")
+TOLD_ANGLE, TOLD_DISTANCE = 9.0, 0.04
+"""θ at the tipping point nearest to the rotor, °, in the article's text, and where that calls it almost zero, m."""
+BOTH, ONE = ("frequency", "distance"), ("frequency",)
+FORCE_COLUMNS: Columns = {
+    "attracting": (BOTH, "N", "force by the on-axis field, upwards"),
+    "repelling": (BOTH, "N", "force by the rotating field, upwards"),
+    "force_error": (BOTH, "N", "error of the force by the field's own estimate"),
+    "polar_angle": (BOTH, "rad", "polar angle of the moment"),
+    "equilibrium": (ONE, "m", "stable point"),
+    "far_tipping": (ONE, "m", "tipping point far from the rotor"),
+    "near_tipping": (ONE, "m", "tipping point near the rotor: released there the floater just reaches the far one"),
+    "angle_near": (ONE, "rad", "polar angle at the near tipping point"),
+    "angle_equilibrium": (ONE, "rad", "polar angle at the stable point"),
+}
+
+
+def force_points(quick: bool) -> list[Point]:
+    """The rotor of the figure by both formulas and in both fields; `quick` has a coarser grid and one frequency."""
+    frequencies, spacing = (FREQUENCIES[1:2], 5e-4) if quick else (FREQUENCIES, 1e-4)
+    asked = {"configuration": CONFIGURATION, "value": VALUE, "frequencies_hz": list(frequencies), "spacing": spacing}
+    return [{**asked, "model": model} for model in FORCE_MODELS]
+
+
+def force_curve(point: Point) -> xr.Dataset:
+    """Axial force by one formula or in one field, where everything else is balanced, see `FORCE_COLUMNS`."""
+    grid = np.arange(CONTACT, 0.0451, point["spacing"])
+    frequencies = np.asarray(point["frequencies_hz"], float)
+    if point["model"] in FORCE_MODELS[:2]:
+        simple = point["model"] == "small angles"
+        found = [force(CONFIGURATION, VALUE, grid, frequency, simple) for frequency in frequencies]
+        rows = np.array([[one.attracting, one.repelling, np.zeros_like(grid), one.polar_angle] for one in found])
+    else:
+        shared = levitation_of(article_scene(CONFIGURATION, VALUE, frequencies[0]), point["model"])
+        rows = np.array([_full(shared.elsewhere(frequency=float(f)), grid) for f in frequencies])
+    marks = np.array([balance_points(grid, row[0] + row[1], row[3]) for row in rows])
+    frequency = variable(ONE, frequencies, "Hz", "frequency of the rotor")
+    distance = variable(("distance",), grid, "m", "distance along the axis")
+    axes = {"frequency": frequency, "distance": distance}
+    return recorded(point, FORCE_COLUMNS, (*rows.swapaxes(0, 1), *marks.T), axes)
+
+
+def _full(levitation: Levitation, grid: Array) -> list[Array]:
+    """The first four columns on the curve that holds the stable equilibrium; NaN beyond its ends."""
+    # along the axis the moment comes nearest to upright on the curve that holds the stable equilibrium
+    model, curves = sources(levitation.table), levitation.without_plate.curves
+    curve = max(curves, key=lambda curve: float(curve.moment[:, 2].max()))
+    parts = FLOATER.moment * curve.moment * model.evaluate(curve.position)[1][:, :, 2]
+    error = FLOATER.moment * model.absolute_error(curve.position)[1]
+    depth = -curve.position[:, 2]
+    order = np.argsort(depth)
+    found = (parts[:, 2], parts[:, 0] + parts[:, 1], error, polar_angle(curve.moment))
+    return [scipy.interpolate.CubicSpline(depth[order], column[order], extrapolate=False)(grid) for column in found]
+
+
+def balance_points(distance: Array, magnetic: Array, angle: Array) -> tuple[float, float, float, float, float]:
+    """Stable point, far and near tipping points (m), and θ at the near and at the stable one; NaN where there is none.
+
+    At the near one the force has done as much work up to the far one as is needed to come to rest there.
+    """
+    known = np.isfinite(magnetic)
+    rest = scipy.interpolate.PchipInterpolator(distance[known], magnetic[known] - WEIGHT)
+    roots = rest.roots(extrapolate=False)
+    roots = roots[np.isfinite(roots)]
+    if len(roots) < 2:
+        return (np.nan,) * 5
+    stable, far = float(roots[-2]), float(roots[-1])
+    work = rest.antiderivative()
+    low, high = distance[known][0], stable
+    near = float(scipy.optimize.brentq(lambda d: work(far) - work(d), low, high)) if work(far) < work(low) else np.nan
+    theta = scipy.interpolate.PchipInterpolator(distance[known], angle[known])
+    return stable, far, near, float(theta(near)), float(theta(stable))
+
+
+STYLES = {
+    "fem": ("-", "finite elements"),
+    "dipole": ("--", "point dipole"),
+    "semi-analytic": (":", "article, semi-analytic"),
+    "small angles": ("-.", "article, small angles"),
+}
+POINTS = {"near_tipping": ("<", "near tipping point"), "equilibrium": ("o", "stable"), "far_tipping": (">", "far one")}
+
+
+@styled
+def parts_figure(result: xr.Dataset) -> Figure:
+    """Attraction, repulsion and net force at one frequency by each way of computing, and how far these are apart."""
+    figure, ((left, right),) = panels(1, 2, (PAGE, 3.9))
+    one = result.isel(frequency=min(1, result.sizes["frequency"] - 1))
+    true = case_with(one, model="fem")
+    for model, (style, text) in STYLES.items():
+        found = case_with(one, model=model)
+        for part, color in (("attracting", PALETTE[0]), ("repelling", PALETTE[1])):
+            _plot(left, found, found[part], style, color=color, lw=1.0)
+            if model != "fem":
+                # in units of the weight: the parts themselves cross zero
+                _plot(right, found, 100e-3 * (found[part] - true[part]) / WEIGHT, style, color=color)
+        _plot(left, found, _net(found), style, color="k")
+        explain(left, {text: style})
+    explain(left, {"attracting part": "C0-", "repelling part": "C1-", "net force, with gravity": "k-"})
+    _points(left, true, PALETTE[2], named=True)
+    left.axhline(0.0, color="0.3", lw=0.6)
+    left.set(ylabel="force, upwards (mN)", ylim=(-470, 350), title=f"(a) δx = 1 mm, {float(one['frequency']):g} Hz")
+    right.set(ylabel="deviation from finite elements\n(% of the weight)", ylim=(-25, 25))
+    legend_below(figure, columns=5)
+    return figure
+
+
+@styled
+def net_figure(result: xr.Dataset) -> Figure:
+    """The net force at every frequency, and the polar angle that goes with it."""
+    figure, ((net, angle),) = panels(1, 2, (PAGE, 3.2))
+    for k, color in zip(range(result.sizes["frequency"]), PALETTE, strict=False):
+        for model in ("fem", "dipole"):
+            found = case_with(result, model=model).isel(frequency=k)
+            _plot(net, found, _net(found), STYLES[model][0], color=color)
+        true = case_with(result, model="fem").isel(frequency=k)
+        _points(net, true, color, named=False)
+        _plot(angle, true, 1e-3 * np.degrees(true["polar_angle"].values), "-", color=color)
+        explain(net, {f"{float(true['frequency']):g} Hz": f"C{k}-"})
+    explain(net, {text: style for style, text in list(STYLES.values())[:2]} | {t: s for s, t in POINTS.values()})
+    net.axhline(0.0, color="0.3", lw=0.6)
+    net.set(ylabel="net force, with gravity (mN)", ylim=(-60, 40))
+    angle.axhline(TOLD_ANGLE, color="0.4", lw=0.8, ls="-.", label="near tipping point in the article")
+    angle.set(ylabel="polar angle θ (°)", ylim=(0, 20))
+    legend_below(figure, columns=5)
+    return figure
+
+
+def _net(found: xr.Dataset) -> xr.DataArray:
+    return found["attracting"] + found["repelling"] - WEIGHT
+
+
+def _plot(axes: Axes, found: xr.Dataset, values: ArrayLike, style: str, **more: Any) -> None:
+    """Thousandfold values against the distance in mm."""
+    axes.plot(1e3 * found["distance"], 1e3 * np.asarray(values), style, **more)
+    axes.set(xlabel="distance along the axis (mm)", xlim=(11, 45))
+
+
+def _points(axes: Axes, found: xr.Dataset, color: str, named: bool) -> None:
+    for mark, (symbol, text) in POINTS.items():
+        axes.plot(1e3 * float(found[mark]), 0.0, symbol, color=color, ms=5, label=text if named else None)
+
+
+def force_lines(result: xr.Dataset) -> list[str]:
+    """Stable and tipping points at each frequency, by each way, and the angles there."""
+    rows = []
+    for k, frequency in enumerate(result["frequency"].values):
+        for model, (_, text) in STYLES.items():
+            found = case_with(result, model=model).isel(frequency=k)
+            far = np.interp(TOLD_DISTANCE, result["distance"].values, found["polar_angle"].values)
+            places = [f"{1e3 * float(found[name]):.3f}" for name in ("near_tipping", "equilibrium", "far_tipping")]
+            angles = [f"{np.degrees(float(a)):.2f}" for a in (found["angle_near"], found["angle_equilibrium"], far)]
+            rows.append((f"{frequency:g} Hz, {text}", *places, *angles))
+    head = ("δx = 1 mm", "near tipping (mm)", "stable (mm)", "far tipping (mm)", "θ near (°)", "θ stable", "θ at 40 mm")
+    return [*text_table(head, rows), "The article: θ = 9° at the near tipping point, almost zero at 40 mm."]
+
+
+FORCE_CURVE = Study(
+    name="force-curve",
+    summary="force along the axis with its parts, stable and tipping points; the article's formulas and full fields",
+    points=force_points,
+    compute=force_curve,
+    figures={"force-curve-parts": parts_figure, "force-curve-net": net_figure},
+    report=force_lines,
+)
+
+
+# The circle on which the floater goes with the rotor: its radius in the finite magnets' field, flown, by formula.
+KICK, SECONDS, SAMPLES = 0.01, 2.0, 400
+"""Speed upwards with which the flight begins, m/s; its duration, s; samples of its last turns that are kept."""
+FLOWN_HZ, TURNS = 170.0, 3
+"""Of the flight in the article's figure, for δx = 1 mm: Hz, and how many of its last turns are shown."""
+FLOWN = {"configuration": "horizontal", "value": 1.0}
+TYPICAL = (0.1, 0.3)  # Radii that the article calls typical, mm
+SIDE_COLUMNS: Columns = {
+    "radius": (("frequency",), "m", "radius of the floater's circle"),
+    "distance": (("frequency",), "m", "levitation distance"),
+    "growth": (("frequency",), "1/s", "largest growth rate of a mode"),
+    "article_radius": (("frequency",), "m", "𝒢/(μ_f ω²) at the same distance"),
+    "flight_angle": (("sample",), "rad", "angle of the rotor"),
+    "flight_x": (("sample",), "m", "x of the floater in flight, laboratory frame"),
+    "flight_y": (("sample",), "m", "y of the floater in flight, laboratory frame"),
+    "flight_z": (("sample",), "m", "z of the floater in flight"),
+}
+
+
+def side_points(quick: bool) -> list[Point]:
+    """Every rotor that levitated in the article's experiment in both fields; `quick` takes three of them."""
+    return [
+        {"configuration": name, "value": value, "model": model, "step_hz": 10.0 if quick else 2.5}
+        for name, kind in CONFIGURATIONS.items()
+        for value in (QUICK[name] if quick else kind.levitated)
+        for model in MODELS
+    ]
+
+
+def side_mode(point: Point) -> xr.Dataset:
+    """Radius of the circle of one rotor's floater at all frequencies, and for δx = 1 mm a flight at `FLOWN_HZ`."""
+    grid = np.arange(LOWEST, HIGHEST + 1e-9, point["step_hz"])
+    scene = article_scene(point["configuration"], point["value"], HIGHEST)
+    levitation = levitation_of(scene, point["model"])
+    field = sources(levitation.table)
+    branch = levitating_branch(scene, field, levitation.rates, HIGHEST)
+    rows = np.full((len(grid), 3), np.nan)
+    for k, there in enumerate(branch.side("near", grid)):
+        if there is not None:
+            rows[k] = np.hypot(*there.position[:2]), -there.position[2], there.growth_per_s
+    flown = np.full((4, SAMPLES), np.nan)
+    start = branch.side("near", np.array([FLOWN_HZ]))[0] if all(point[k] == v for k, v in FLOWN.items()) else None
+    if start is not None:
+        flight = simulate(kicked(scene, start, KICK), field, SECONDS, [])
+        times = flight.time[-1] - np.linspace(TURNS / FLOWN_HZ, 0.0, SAMPLES)
+        place = [np.interp(times, flight.time, column) for column in flight.lab.position.T]
+        flown = np.array([2 * np.pi * FLOWN_HZ * times, *place])
+    frequency = variable(("frequency",), grid, "Hz", "frequency of the rotor")
+    found = (*rows.T, side_radius(rows[:, 1], grid), *flown)
+    return recorded(point, SIDE_COLUMNS, found, {"frequency": frequency})
+
+
+def _predicted(flown: xr.Dataset) -> float:
+    """The article's radius at the mean distance of the flight, mm."""
+    return 1e3 * float(side_radius(-float(flown["flight_z"].mean()), FLOWN_HZ))
+
+
+@styled
+def orbit_figure(result: xr.Dataset) -> Figure:
+    """The orbit of rotor and floater seen from above, and their coordinates, in one flight."""
+    figure, ((above, *others),) = panels(1, 3, (PAGE, 2.9))
+    flown = case_with(result, model="fem", **FLOWN)
+    circle, radius = np.linspace(0, 2 * np.pi, 200), _predicted(flown)
+    x, y, turned = 1e3 * flown["flight_x"], 1e3 * flown["flight_y"], flown["flight_angle"].values
+    above.plot(np.cos(circle), np.sin(circle), color=PALETTE[1], label="rotor's cube")
+    above.plot(x, y, color=PALETTE[0], label="floater")
+    above.plot(radius * np.cos(circle), radius * np.sin(circle), ":k", lw=1.6, label="radius a of the formula")
+    above.plot(np.cos(turned[-1]), np.sin(turned[-1]), "o", color=PALETTE[1], ms=4, label="at one time")
+    above.plot(x[-1], y[-1], "o", color=PALETTE[0], ms=4)
+    above.set(xlabel="x (mm)", ylabel="y (mm)", title=f"(a) from above, {FLOWN_HZ:g} Hz", aspect="equal")
+    time = 1e3 * (turned - turned[0]) / (2 * np.pi * FLOWN_HZ)
+    for panel, floater, turn in zip(others, (x, y), (np.cos, np.sin), strict=True):
+        panel.plot(time, turn(turned), color=PALETTE[1])
+        panel.plot(time, floater, color=PALETTE[0])
+        for sign in (-1, 1):
+            panel.axhline(sign * radius, color="k", ls=":", lw=1.6)
+        panel.set(xlabel="time (ms)", ylabel=f"{str(floater.name)[-1]} (mm)")
+    legend_below(figure, above)
+    return figure
+
+
+@styled
+def radius_figure(result: xr.Dataset) -> Figure:
+    """The radius of the side mode against frequency for every rotor, and the article's formula."""
+    figure, rotors = rotor_panels(result, 3.2, "frequency of the rotor (Hz)", "radius of the side mode (mm)")
+    for axes, rotor, color in rotors:
+        axes.axhspan(*TYPICAL, color="0.92", lw=0, label="called typical in the article")
+        found = case_with(rotor, model="fem")
+        frequency, stable = found["frequency"].values, stable_in_flight(found["growth"])
+        plot_branch(axes, frequency, 1e3 * found["radius"].values, stable, color=color)
+        axes.plot(frequency, 1e3 * found["article_radius"], ":", lw=1.6, color=color)
+        axes.set(xlim=(35, 255), ylim=(0, None))
+    explain(rotors[0][0], {"stable": "-", "unstable": "--", "$\\mathcal{G}/\\mu_f\\omega^2$ of the article": ":"})
+    legend_below(figure)
+    return figure
+
+
+def side_lines(result: xr.Dataset) -> list[str]:
+    """The flight, and for each rotor the range of radii and how far the formula is off where it is stable."""
+    lines, rows = [], []
+    for flown in (case_with(result, model=model, **FLOWN) for model in MODELS):
+        radius = 1e3 * np.hypot(flown["flight_x"].values, flown["flight_y"].values)
+        lines.append(
+            f"Flight of δx = 1 mm at {FLOWN_HZ:g} Hz, {flown['model'].item()}: radius {radius.mean():.4f} mm "
+            f"({span(radius, '.4f')}) at {-1e3 * float(flown['flight_z'].mean()):.3f} mm; "
+            f"𝒢/(μ_f ω²) = {_predicted(flown):.4f} mm."
+        )
+    for label, rotor in by_rotor(result):
+        cells = []
+        for found in (case_with(rotor, model=model) for model in MODELS):
+            good = stable_in_flight(found["growth"])
+            radius, formula = found["radius"].values[good], found["article_radius"].values[good]
+            cells += [span(1e3 * radius, ".3f"), span(100 * (formula / radius - 1), "+.1f")]
+        rows.append((label, *cells))
+    head = ("where stable", *(f"{model} {words}" for model in MODELS for words in ("(mm)", "formula off (%)")))
+    return [*lines, *text_table(head, rows)]
+
+
+SIDE_MODE = Study(
+    name="side-mode",
+    summary="the circle on which the floater goes with the rotor, and the article's formula for its radius",
+    points=side_points,
+    compute=side_mode,
+    figures={"side-mode-orbit": orbit_figure, "side-mode-radius": radius_figure},
+    report=side_lines,
+)

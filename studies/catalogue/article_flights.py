@@ -1,0 +1,392 @@
+"""The article's figures of levitation distances and of flights."""
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from ...dynamics.continuation.branch import BranchPoint, Family
+from ...dynamics.continuation.frequencies import by_frequency, distance_error, kicked, levitating_branch
+from ...dynamics.continuation.slow_drift import drift
+from ...dynamics.flights.flight import simulate
+from ...dynamics.flights.trajectory import Trajectory, flight_kind
+from ...dynamics.motion.rates import Rates
+from ...dynamics.motion.state import Scales
+from ...fem.rotor.table import FieldTable
+from ...geometry.common import Array
+from ...geometry.scene.contents import Scene
+from ..figures.style import PALETTE, legend_below, styled
+from ..result import Columns, variable
+from ..study import Point, Study, case_with, cases_with, each_case, recorded
+from .article import (
+    CONFIGURATIONS,
+    FLIGHT,
+    HIGHEST,
+    LOWEST,
+    QUICK,
+    WEIGHT,
+    analytic_distance,
+    article_scene,
+    balanced,
+    conducting,
+    levitation_of,
+    polar_angle,
+    rotor_label,
+    stable_in_flight,
+)
+from .drawing import by_configuration, by_rotor, explain, plot_branch, rotor_panels, small_multiples, span, text_table
+
+# Distance at which the floater levitates against frequency, for every rotor of the article: its third figure.
+#
+# The motion has Stokes drag, and in the field of finite elements rotor and floater magnetise each other.  Currents in
+# their metal do not move an equilibrium, and are left out.
+SIDES = ("near", "far")
+FORMULAS, FIELDS = ("semi-analytic", "analytic"), ("dipole", "fem")
+FLOWN = "dipole"  # The field of the simulated flights, which are spread over a rotor's stable frequencies
+DISTANCE_KICK, SECONDS = 0.01, 1.0
+"""Speed with which a simulated floater leaves its equilibrium upwards, m/s, and duration of the flight."""
+BOTH: tuple[str, ...] = ("frequency", "side")
+DISTANCE_COLUMNS: Columns = {
+    "distance": (BOTH, "m", "levitation distance"),
+    "distance_error": (BOTH, "m", "what the field's estimated error changes of the distance"),
+    "growth": (BOTH, "1/s", "largest growth rate of a mode"),
+    "polar_angle": (BOTH, "rad", "polar angle of the moment"),
+    "fold_frequency": ((), "Hz", "lowest frequency with an equilibrium"),
+    "fold_distance": ((), "m", "levitation distance there"),
+    "flight_frequency": (("flight",), "Hz", "frequency of a simulated flight"),
+    "flight_distance": (("flight",), "m", "mean levitation distance of a simulated flight"),
+    "flight_error": (("flight",), "m", "difference between the flight's halves"),
+}
+
+
+def distance_points(quick: bool) -> list[Point]:
+    """Every rotor by every formula and field; `quick` takes three rotors, a coarser grid and a rigid floater."""
+    step, flights, interaction = (10.0, 1, "rigid") if quick else (2.5, 3, "auto")
+    more = {"step_hz": step, "flights": flights, "interaction": interaction}
+    return [
+        {"configuration": name, "value": value, "model": model, **more}
+        for name, kind in CONFIGURATIONS.items()
+        for value in (QUICK[name] if quick else kind.tested)
+        for model in (*FORMULAS, *FIELDS)
+        if (name, model) != ("vertical", "analytic")
+    ]
+
+
+def levitation_distance(point: Point) -> xr.Dataset:
+    """Distances of one rotor by one formula, or in one field, at all frequencies, see `DISTANCE_COLUMNS`."""
+    grid = np.arange(LOWEST, HIGHEST + 1e-9, point["step_hz"])
+    found = _by_formula(point, grid) if point["model"] in FORMULAS else _in_field(point, grid)
+    frequency = variable(("frequency",), grid, "Hz", "frequency of the rotor")
+    axes, sizes = {"side": list(SIDES), "frequency": frequency}, {"frequency": len(grid), "side": len(SIDES)}
+    return recorded(point, DISTANCE_COLUMNS, found, axes, **sizes, flight=point["flights"])
+
+
+def _by_formula(point: Point, grid: Array) -> dict[str, Array]:
+    rotor = point["configuration"], point["value"]
+    if point["model"] == "semi-analytic":
+        return {"distance": np.array([balanced(*rotor, frequency, WEIGHT) for frequency in grid])}
+    near = analytic_distance(*rotor, grid)
+    return {"distance": np.stack([near, np.full(near.shape, np.nan)], axis=1)}
+
+
+def _in_field(point: Point, grid: Array) -> dict[str, Array]:
+    scene = article_scene(point["configuration"], point["value"], HIGHEST)
+    levitation = levitation_of(scene, point["model"], interaction=point.get("interaction", "rigid"))
+    field = levitation.interaction
+    branch = levitating_branch(scene, field, levitation.rates, HIGHEST)
+    found = [branch.side(side, grid) for side in SIDES]
+    family = by_frequency(scene, levitation.rates)
+    rows = np.array([[_distance_row(scene, field, family, p) for p in side] for side in found])
+    fold = branch.fold
+    flown = found[0] if point["model"] == FLOWN else []
+    known = [p for p in flown if p is not None and stable_in_flight(p.growth_per_s)]
+    places = np.unique(np.linspace(0, len(known) - 1, point["flights"] if known else 0).astype(int))
+    flights = np.full((3, point["flights"]), np.nan)
+    for k, place in enumerate(places):
+        flights[:, k] = known[place].parameter, *mean_height(scene, field, known[place])
+    return dict(zip(DISTANCE_COLUMNS, (*rows.T, fold.parameter, -fold.position[2], *flights), strict=True))
+
+
+def _distance_row(scene: Scene, field: FieldTable, family: Family, point: BranchPoint | None) -> list[float]:
+    if point is None:
+        return [np.nan] * 4
+    error = distance_error(scene, field, family, point)
+    return [-point.position[2], error, point.growth_per_s, float(polar_angle(point.state[6:9]))]
+
+
+def mean_height(scene: Scene, field: FieldTable, point: BranchPoint) -> tuple[float, float]:
+    """Mean distance along the axis (m) of a flight that a kick began, and by how much its halves differ.
+
+    Parameters
+    ----------
+    scene, field : of which the frequency is that of `point`
+    point : the equilibrium in which it begins
+
+    Means are weighted by sin², which takes out the axial mode; NaN where the flight did not last.
+    """
+    flight = simulate(kicked(scene, point, DISTANCE_KICK), field, SECONDS, [])
+    if flight.ended_by != "duration":
+        return np.nan, np.nan
+    height = -flight.lab.position[:, 2]
+    halves = [_smooth_mean(part) for part in np.array_split(height, 2)]
+    return _smooth_mean(height), abs(halves[1] - halves[0])
+
+
+def _smooth_mean(values: Array) -> float:
+    return float(np.average(values, weights=np.sin(np.pi * (np.arange(len(values)) + 0.5) / len(values)) ** 2))
+
+
+AXES = "frequency of the rotor (Hz)", "levitation distance (mm)"
+
+
+@styled
+def models_figure(result: xr.Dataset) -> Figure:
+    """The levitation distance of every rotor by finite elements and by the dipole."""
+    figure, rotors = rotor_panels(result, 4.0, *AXES)
+    for axes, rotor, color in rotors:
+        width = 1.8 if _levitated(rotor) else 0.8
+        for side in SIDES:
+            frequency, distance, stable = _side(rotor, "fem", side)
+            plot_branch(axes, frequency, 1e3 * distance, stable, color=color, lw=width)
+            axes.plot(frequency, 1e3 * _side(rotor, "dipole", side)[1], ":", color=color, lw=0.8)
+        found = case_with(rotor, model="fem")
+        axes.plot(found["fold_frequency"], 1e3 * found["fold_distance"], "o", color=color, ms=3)
+        axes.set_ylim(8, 52)
+    key = {"finite elements, stable": "-", "unstable": "--", "point dipole": ":", "lowest frequency (fold)": "o"}
+    explain(rotors[0][0], key, ms=3)
+    explain(rotors[0][0], {"thick: levitated in the experiment": "-"}, lw=1.8)
+    legend_below(figure, columns=3)
+    return figure
+
+
+@styled
+def formulas_figure(result: xr.Dataset) -> Figure:
+    """The article's formulas and simulated flights beside the dipole's equilibrium, for the rotors that levitated."""
+    levitated = [k for k, one in enumerate(each_case(result)) if _levitated(one.expand_dims("case"))]
+    figure, rotors = rotor_panels(result.isel(case=levitated), 3.4, *AXES)
+    for axes, rotor, color in rotors:
+        frequency, distance, stable = _side(rotor, "dipole", "near")
+        plot_branch(axes, frequency, 1e3 * distance, stable, lw=0.8, color=color)
+        for model, style in (("semi-analytic", ":"), ("analytic", "-.")):
+            if model in rotor["model"].values:
+                axes.plot(frequency, 1e3 * _side(rotor, model, "near")[1], style, color=color)
+        flown = case_with(rotor, model=FLOWN)
+        axes.plot(flown["flight_frequency"], 1e3 * flown["flight_distance"], "x", ms=4, color=color)
+        axes.set_ylim(8, 62)
+    key = {"point dipole, stable": "-", "unstable": "--", "semi-analytic formula": ":"}
+    explain(rotors[0][0], key | {"analytic formula, no gravity": "-.", "simulated flight, mean": "x"})
+    legend_below(figure, columns=3)
+    return figure
+
+
+def _levitated(rotor: xr.Dataset) -> bool:
+    """Whether the article's experiment levitated with a rotor."""
+    return float(rotor["value"][0]) in CONFIGURATIONS[str(rotor["configuration"].values[0])].levitated
+
+
+def _side(rotor: xr.Dataset, model: str, side: str) -> tuple[Array, Array, NDArray[np.bool_]]:
+    """Frequency (Hz), distance (m) and whether it is stable on one side, by one model."""
+    found = case_with(rotor, model=model).sel(side=side)
+    return found["frequency"].values, found["distance"].values, stable_in_flight(found["growth"])
+
+
+def distance_lines(result: xr.Dataset) -> list[str]:
+    """For each rotor: where it levitates, and how far formulas and simulations are from the equilibrium."""
+    rows, lines = [], []
+    for label, rotor in by_rotor(result):
+        frequency, near, stable = _side(rotor, "dipole", "near")
+        for model in FIELDS:
+            _, distance, good = _side(rotor, model, "near")
+            power = np.polyfit(np.log(frequency[good]), np.log(distance[good]), 1)[0] if good.sum() > 2 else np.nan
+            lowest = float(case_with(rotor, model=model)["fold_frequency"])
+            off = [""] * 3
+            if model == "dipole":
+                apart = {
+                    name: 1e3 * ((near - _side(rotor, name, "near")[1]) * (1 if name == "fem" else -1))[stable]
+                    for name in rotor["model"].values
+                }
+                off = [span(apart.get(name, np.nan), "+.2f") for name in ("fem", *FORMULAS)]
+            where = f"{lowest:.2f}", span(frequency[good]), span(1e3 * distance[good], ".2f"), power
+            rows.append((f"{label}, {model}", *where, *off))
+    for configuration, part in by_configuration(result):
+        for model in FIELDS:
+            found = cases_with(part, model=model)
+            folds = found["fold_frequency"].values[np.isin(found["value"], CONFIGURATIONS[configuration].levitated)]
+            if len(folds) > 1:
+                lines.append(
+                    f"{configuration}, {model}: the levitated rotors lower the lowest frequency from {folds.max():.1f} "
+                    f"to {folds.min():.1f} Hz, a factor of {folds.max() / folds.min():.2f}."
+                )
+    flown = cases_with(result, model=FLOWN)
+    off_mean = [
+        one["flight_distance"] - np.interp(one["flight_frequency"], one["frequency"], one["distance"].sel(side="near"))
+        for one in each_case(flown)
+    ]
+    worst = 1e6 * np.max(np.abs(off_mean), initial=0.0, where=np.isfinite(off_mean))
+    if np.isfinite(off_mean).any():
+        lines.append(f"Means of simulated flights agree with the equilibria within {worst:.3g} µm.")
+    head = ("rotor, model", "lowest (Hz)", "stable (Hz)", "distance (mm)", "power of f")
+    last = "Last columns: point dipole less finite elements, and each formula less the point dipole, in mm."
+    return [*text_table((*head, "- fem (mm)", "semi-an.", "analytic"), rows), last, *lines]
+
+
+LEVITATION_DISTANCE = Study(
+    name="levitation-distance",
+    summary="distance against frequency for every rotor of the article: equilibria, its formulas, simulated flights",
+    points=distance_points,
+    compute=levitation_distance,
+    figures={"levitation-distance-models": models_figure, "levitation-distance-formulas": formulas_figure},
+    report=distance_lines,
+)
+
+
+# Linear fall, stable and unstable flight: levitation distance against time, the article's last supplementary figure.
+#
+# Its experiment had δx = 1 mm and fell at 115 Hz, stayed at 140 Hz and was lost in oscillations at 150 Hz.  Each flight
+# is simulated in full, from equilibrium with spin s = 0, and compared with the averaged flight along the branch of
+# equilibria.  In the motion are real air, eddy currents in floater and rotor, and mutual magnetisation; in that of
+# `quick` Stokes drag and the floater's currents alone.
+FREQUENCIES = (115.0, 140.0, 150.0, 160.0, 170.0, 200.0)
+DISPLACEMENTS = (1.0, 1.5, 2.0)
+"""δx in mm: as in the experiment, what gives its fall at 115 Hz, and what is lost in oscillations within these."""
+KICK = 1e-3  # Speed with which a flight begins upwards, m/s
+PARTS, SAMPLES = 400, 100
+SHORTEST = 3.0  # What stays up for less, the article does not call levitation, s
+REPORTED = {115.0: "linear fall", 140.0: "stable", 150.0: "oscillating loss"}
+"""The article's three flights, by frequency in Hz."""
+NONE, SHORT = "no equilibrium", "lost within 3 s"  # Of a flight that is none
+FLIGHT_COLUMNS: Columns = {
+    "levitated": (("frequency",), "s", "time until the loss in the simulated flight, or its duration"),
+    "averaged_levitated": (("frequency",), "s", "the same in the averaged flight; infinite for a balance"),
+    "growth": (("frequency",), "1/s", "largest growth rate of a mode at the start"),
+    "energy_error": (("frequency",), "1", "largest violation of the energy balance"),
+    "time": (("frequency", "part"), "s", "middle of a part of the simulated flight"),
+    "lowest": (("frequency", "part"), "m", "least distance in the part"),
+    "mean": (("frequency", "part"), "m", "mean distance in the part"),
+    "highest": (("frequency", "part"), "m", "largest distance in the part"),
+    "averaged_time": (("frequency", "sample"), "s", "time of the averaged flight"),
+    "averaged_distance": (("frequency", "sample"), "m", "distance of the averaged flight"),
+}
+SIZES = {"part": PARTS, "sample": SAMPLES}
+
+
+def flight_points(quick: bool) -> list[Point]:
+    """The displacements, flown for 60 s in the field of finite elements, `quick` in the dipole's."""
+    asked = {"configuration": "horizontal", "model": "dipole" if quick else "fem", "duration_s": 60.0}
+    return [{**asked, "complete": not quick, "value": value} for value in DISPLACEMENTS]
+
+
+def trajectories(point: Point) -> xr.Dataset:
+    """The flights of one rotor, simulated and averaged, see `FLIGHT_COLUMNS`; and what became of each."""
+    complete = point.get("complete", False)
+    scene = conducting(article_scene(point["configuration"], point["value"], HIGHEST), rotor=complete)
+    scene = replace(scene, drag=replace(scene.drag, air=complete))
+    levitation = levitation_of(scene, point["model"], interaction="auto" if complete else "rigid")
+    field, rates = levitation.interaction, levitation.rates
+    starts = levitating_branch(scene, field, rates, HIGHEST).side("near", np.array(FREQUENCIES))
+    rows = [_flight_row(scene, field, rates, start, point["duration_s"]) for start in starts]
+    frequency = variable(("frequency",), np.array(FREQUENCIES), "Hz", "frequency of the rotor")
+    found = {name: np.array([row[name] for row in rows]) for name in FLIGHT_COLUMNS}
+    kinds = {name: (("case", "frequency"), [[str(row[name]) for row in rows]]) for name in ("kind", "averaged_end")}
+    return recorded(point, FLIGHT_COLUMNS, found, {"frequency": frequency}).assign(kinds)
+
+
+def _flight_row(
+    scene: Scene, field: FieldTable, rates: Rates, start: BranchPoint | None, seconds: float
+) -> dict[str, Any]:
+    if start is None:
+        empty = {name: np.full([SIZES[d] for d in dims[1:]], np.nan) for name, (dims, _, _) in FLIGHT_COLUMNS.items()}
+        return {**empty, "kind": NONE, "averaged_end": NONE}
+    there = replace(scene, frequency=start.parameter)
+    slow = drift(there, field, 0.0, FLIGHT, rates, Scales.of(there).unpack(start.state), stokes=True)
+    times = np.linspace(0.0, slow.time[-1], SAMPLES)
+    flight = simulate(kicked(there, start, KICK), field, seconds, [])
+    lost_at_once = flight.ended_by != "duration" and flight.levitated_s < SHORTEST
+    return {
+        **_parts(flight),
+        "kind": SHORT if lost_at_once else flight_kind(flight),
+        "averaged_end": slow.ended_by,
+        "levitated": flight.levitated_s,
+        "averaged_levitated": slow.levitated_s,
+        "growth": start.growth_per_s,
+        "energy_error": flight.energy_error,
+        "averaged_time": times,
+        "averaged_distance": np.interp(times, slow.time, slow.distance),
+    }
+
+
+def _parts(flight: Trajectory) -> dict[str, Array]:
+    """Time, and least, mean and largest distance in equal parts of a flight; NaN in parts without a sample."""
+    edges = np.linspace(0.0, flight.time[-1], PARTS + 1)
+    place = np.clip(np.searchsorted(edges, flight.time, side="right") - 1, 0, PARTS - 1)
+    distance = -flight.lab.position[:, 2]
+    found = {name: np.full(PARTS, np.nan) for name in ("lowest", "mean", "highest")}
+    for part in np.unique(place):
+        here = distance[place == part]
+        found["lowest"][part], found["mean"][part], found["highest"][part] = here.min(), here.mean(), here.max()
+    return {"time": (edges[1:] + edges[:-1]) / 2, **found}
+
+
+@styled
+def flight_figure(result: xr.Dataset) -> Figure:
+    """The distance in each flight, one panel for each displacement."""
+    titles = [rotor_label("horizontal", value) for value in result["value"].values]
+    figure, axes = small_multiples(titles, 3.6, xlabel="time (s)", ylabel="levitation distance (mm)", sharey=True)
+    for panel, rotor in zip(axes, each_case(result), strict=True):
+        for k, color in zip(range(rotor.sizes["frequency"]), PALETTE, strict=False):
+            _flight(panel, rotor.isel(frequency=k), color)
+        panel.set_ylim(11, 40)
+    explain(axes[0], {f"{frequency:g} Hz": f"C{k}-" for k, frequency in enumerate(result["frequency"].values)})
+    explain(axes[0], {"averaged flight": "--", "lost in a fall": "v", "lost in oscillations": "x"}, ms=4)
+    legend_below(figure)
+    return figure
+
+
+def _flight(axes: Axes, flight: xr.Dataset, color: str) -> None:
+    kind = str(flight["kind"].values)
+    if kind == NONE:
+        return
+    time = flight["time"].values
+    low, mean, high = (1e3 * flight[name].values for name in ("lowest", "mean", "highest"))
+    axes.fill_between(time, low, high, color=color, alpha=0.3, lw=0)
+    axes.plot(time, mean, color=color)
+    axes.plot(flight["averaged_time"], 1e3 * flight["averaged_distance"], "--", color="k", lw=0.7)
+    # an averaged flight that ends at the fold falls; what is lost otherwise is lost in an oscillation
+    if kind not in ("stable", "drifting"):
+        last = np.flatnonzero(np.isfinite(mean))[-1]
+        falls = str(flight["averaged_end"].values) == "fold"
+        axes.plot(time[last], np.clip(mean[last], 12, 34), "v" if falls else "x", color=color, ms=5)
+
+
+def flight_lines(result: xr.Dataset) -> list[str]:
+    """What became of each flight, simulated and averaged, beside what the article saw at that frequency."""
+    rows = []
+    for rotor in each_case(result):
+        for k, frequency in enumerate(rotor["frequency"].values):
+            one = rotor.isel(frequency=k)
+            mean = 1e3 * one["mean"].dropna("part").values
+            ends = "–" if not len(mean) else f"{mean[0]:.2f} to {mean[-1]:.2f}"
+            name = f"{rotor_label('horizontal', float(rotor['value']))}, {frequency:g} Hz"
+            seen = REPORTED.get(float(frequency), "")
+            kind, averaged = one["kind"].item(), one["averaged_end"].item()
+            numbers = [float(one[key]) for key in ("averaged_levitated", "growth", "energy_error")]
+            rows.append((name, kind, float(one["levitated"]), ends, averaged, *numbers, seen))
+    head = ("rotor", "simulated", "for (s)", "mean distance (mm)", "averaged", "for (s)", "growth (1/s)", "energy")
+    return [
+        *text_table((*head, "article"), rows),
+        "Energy: violation of its balance. Article: what it reports for δx = 1 mm.",
+    ]
+
+
+TRAJECTORIES = Study(
+    name="trajectories",
+    summary="linear fall, stable and unstable flight: the distance against time, simulated and averaged",
+    points=flight_points,
+    compute=trajectories,
+    figures={"trajectories": flight_figure},
+    report=flight_lines,
+)

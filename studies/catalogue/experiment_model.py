@@ -1,0 +1,604 @@
+"""What rotors do by surrogates, and how probable that makes each of the article's facts.
+
+Surrogates are polynomials of a rotor's inputs, height and body spin, fitted to a design by least squares; radius and
+gravity, whose ranges are narrow, enter to first order.  The error that is stated is
+that of rotors left out of the fit, each in its turn: with H the projection onto the polynomials and r the residuals,
+the rows B of one rotor are missed by (1 - H_BB)⁻¹ r_B if it is left out (R. D. Cook, S. Weisberg, Residuals and
+Influence in Regression, 1982), so that one fit gives all.
+
+Each flight ends in one of four ways: it falls through the fold, stays for the experiment's 250 s, is lost in
+oscillations, or there is no equilibrium.  Of each the model gives a probability, soft by the surrogate's error and by
+how much the residual motion of one flight differs from another's.  One flight in fifty is granted to end in any of the
+four ways for a reason that nobody thought of, so that no fact can rule out everything.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import product
+
+import numpy as np
+import xarray as xr
+from numpy.polynomial.legendre import legval, legvander
+from numpy.typing import NDArray
+from scipy.special import ndtr, ndtri
+
+from ...geometry.common import Array
+from .experiment_design import EFFECTS, KINDS, MOTIONS, PER_MILLIMETRE, QUANTITIES, SPINS, Kind
+
+NARROW = ("radius", "weight")
+FITTED = (
+    *("frequency", "eddy", "air", "circle", "squared bounce", "precession", "meeting", "lateral"),
+    *(f"{motion} {name}" for motion in MOTIONS for name in EFFECTS),
+)
+"""What is fitted, see `targets`."""
+STRENGTHS = {"single": (4.0, 13.0), "stack": (2.0, 28.0)}  # Ends of what `strength` may be
+WITH_STRENGTH = -0.78  # The frequency goes about as this power of it
+FASTEST = 300.0  # Nodes of faster rotors are left out, Hz: no fact asks for more than 200
+STABLE = 0.02  # Growth without losses that is taken as none, 1/s
+APART = 0.03, 0.004
+"""Squared distances of bounce and side motion from precession, over the frequency, from which on growth is its own."""
+
+
+PLACE = {name: k for k, name in enumerate(FITTED)}
+
+
+def strength(name: str, inputs: Array) -> Array:
+    """How strong the field on the axis is (n,), as the tilt (°) of a lone cube that levitates at the same frequency.
+
+    Inputs (n, input) are those of the kind of rotor of this name.  The field of a second cube falls off as its distance
+    grows; fitted to 10, 14 and 20 mm, good to 5 %.
+    """
+    names = list(KINDS[name].box)
+    found = inputs[:, names.index("on_axis")]
+    if "stack" in names:
+        found = found + 13.5 * np.exp(-0.112 * (inputs[:, names.index("stack")] - 14.0))
+    return np.asarray(np.clip(found, *STRENGTHS[name]))
+
+
+def coordinates(name: str, inputs: Array) -> Array:
+    """Inputs (n, input) between -1 and 1, the field on the axis by the logarithm of its strength."""
+    ends = np.array(list(KINDS[name].box.values()))
+    scaled = (2 * inputs - ends.sum(axis=1)) / (ends[:, 1] - ends[:, 0])
+    low, high = np.log(STRENGTHS[name])
+    scaled[:, list(KINDS[name].box).index("on_axis")] = _scaled(np.log(strength(name, inputs)), (low, high))
+    return np.asarray(scaled)
+
+
+def targets(name: str, design: xr.Dataset) -> Array:
+    """What is fitted (rotor, height, spin, fitted) of a design's nodes: smooth functions, NaN where one has no sense.
+
+    The frequency goes as [(1 - part)(1 - spin)]^(-1/2), and a power of `strength`: its logarithm is fitted
+    without these.  "meeting" is the square of the distance of bounce and precession over the frequency squared,
+    negative where they have met and grow;
+    "lateral" that of the side motion from the rotor.  Growth by currents is over the drift by those in the floater,
+    that of the side motion over drift by (1 - spin) times the root of "lateral".
+    """
+    nodes = dict(zip(QUANTITIES, np.moveaxis(design["node"].values, -1, 0), strict=True))
+    part, spins = design["part"].values[:, :, None], design["body_spin"].values
+    frequency, bounce, bare, turning = (nodes[name] for name in ("frequency", "bounce", "bare", "precession frequency"))
+    aside = (1 - nodes["side frequency"] / frequency) ** 2
+    stable, steady = bare <= STABLE, bounce > 1e-6 * frequency
+    met = ~stable & steady & (np.abs(bounce - turning) < 1e-6 * frequency)
+    loose = ~stable & steady & ~met & (aside < APART[1])
+    unstable = -((bare / (2 * np.pi * frequency)) ** 2)
+
+    def signed(values: Array, ended: Array, times: float = 1.0) -> Array:
+        return np.where(stable, values, np.where(ended, times * unstable, np.nan))
+
+    between = (bounce - turning) ** 2 / frequency**2
+    own = stable & (between > APART[0]) & ((turning - nodes["side frequency"]) ** 2 > APART[1] * frequency**2)
+    eddy = nodes["eddy"] / (1 - spins)
+    usual = -WITH_STRENGTH * np.log(strength(name, design["input"].values))
+    found = {
+        "frequency": np.log(frequency) + 0.5 * np.log((1 - part) * (1 - spins)) + usual[:, None, None],
+        "eddy": np.log(eddy),
+        "air": 1e3 * nodes["air"],
+        "circle": np.log(nodes["circle"]),
+        "squared bounce": signed((bounce / frequency) ** 2, ~steady),
+        "precession": np.where(stable, turning / frequency, np.nan),
+        "meeting": signed(between, met, 4.0),
+        "lateral": signed(aside, loose),
+    }
+    for motion, over in (("precession", nodes["eddy"]), ("side", eddy / np.sqrt(aside))):
+        for name in EFFECTS:
+            size = 1e-3 if name == "air" else over
+            found[f"{motion} {name}"] = np.where(own, nodes[f"{motion} {name}"] / size, np.nan)
+    whole = np.stack([found[name] for name in FITTED], axis=-1)
+    whole[~(frequency < FASTEST)] = np.nan
+    return whole
+
+
+def exponents(kind: Kind, degree: int) -> Array:
+    """Degrees (term, input + 2) of the terms of a surrogate: in each input, the part of the way and the spin."""
+    names = (*kind.box, "part", "spin")
+    narrow = np.array([name in NARROW for name in names])
+    ranges = [range(2) if few else range(degree + 1) for few in narrow]
+    every = np.array([d for d in product(*ranges) if sum(d) <= degree])
+    few = every[:, narrow].sum(axis=1)
+    return np.asarray(every[(few == 0) | ((few == 1) & (every.sum(axis=1) <= max(1, degree - 2)))])
+
+
+@dataclass(frozen=True, eq=False)
+class Surrogate:
+    """Polynomials for one kind of rotor."""
+
+    name: str  # of the kind
+    terms: Array  # (term, input + 2) degrees
+    weights: Array  # (term, fitted)
+    errors: Array  # (fitted,) root mean square of what rotors left out are missed by
+    rotors: int  # how many it is fitted to
+
+    @property
+    def kind(self) -> Kind:
+        """The box in which it holds."""
+        return KINDS[self.name]
+
+    def along(self, inputs: Array, part: Array) -> Array:
+        """Coefficients (spin power, n, k, fitted) of the polynomials in spin alone: inputs (n, input), parts (k,)."""
+        scaled, count = coordinates(self.name, inputs), self._spread.shape[1]
+        powers = legvander(scaled, int(self.terms.max()))
+        picked = np.ones((len(inputs), len(self.terms)))
+        for k in range(inputs.shape[1]):
+            picked = picked * powers[:, k, self.terms[:, k]]
+        reduced = picked @ self._spread.reshape(len(self.terms), -1)
+        along = legvander(_scaled(part, (self.kind.near, self.kind.far)), count - 1)
+        found = along @ reduced.reshape(len(inputs), count, -1)
+        return np.moveaxis(found.reshape(len(inputs), len(part), -1, len(FITTED)), 2, 0)
+
+    @cached_property
+    def _spread(self) -> Array:
+        """Weights (term, part power, spin power, fitted), each at the powers that its term has."""
+        along, turning = self.terms[:, -2:].T
+        spread = np.zeros((len(self.terms), along.max() + 1, turning.max() + 1, len(FITTED)))
+        spread[np.arange(len(self.terms)), along, turning] = self.weights
+        return spread
+
+
+def at_spin(along: Array, spin: Array) -> Array:
+    """What is fitted (n, k, fitted), at spins (n, k) for what `Surrogate.along` gives; or (n, k) for one of them."""
+    scaled = _scaled(spin, SPINS)
+    return np.asarray(legval(scaled[..., None] if along.ndim > 3 else scaled, along, tensor=False))
+
+
+def fitted(name: str, design: xr.Dataset, degree: int) -> Surrogate:
+    """The surrogate of a design, a dataset over `rotor`, `height`, `body_spin` and `quantity`."""
+    return _of(name, design, targets(name, design), exponents(KINDS[name], degree))
+
+
+def corrected(surrogate: Surrogate, design: xr.Dataset, better: xr.Dataset, degree: int) -> Surrogate:
+    """A surrogate with what the nodes of a better model differ by, fitted to the rotors that both designs have."""
+    name, count = surrogate.name, min(design.sizes["rotor"], better.sizes["rotor"])
+    difference = targets(name, better.isel(rotor=slice(count))) - targets(name, design.isel(rotor=slice(count)))
+    more = _of(name, better.isel(rotor=slice(count)), difference, exponents(surrogate.kind, degree))
+    terms, where = np.unique(np.concatenate([surrogate.terms, more.terms]), axis=0, return_inverse=True)
+    weights = np.zeros((len(terms), len(FITTED)))
+    np.add.at(weights, where.ravel(), np.concatenate([surrogate.weights, more.weights]))
+    return Surrogate(name, terms, weights, np.hypot(surrogate.errors, more.errors), surrogate.rotors)
+
+
+def _of(name: str, design: xr.Dataset, wanted: Array, terms: Array) -> Surrogate:
+    kind, inputs, shape = KINDS[name], design["input"].values, wanted.shape[:-1]
+    columns = np.empty((*shape, terms.shape[1]))
+    columns[..., :-2] = coordinates(name, inputs)[:, None, None, :]
+    columns[..., -2] = _scaled(design["part"].values, (kind.near, kind.far))[:, :, None]
+    columns[..., -1] = _scaled(design["body_spin"].values, SPINS)
+    powers = legvander(columns, int(terms.max()))
+    matrix = np.prod([powers[..., k, terms[:, k]] for k in range(terms.shape[1])], axis=0)
+    weights, errors = np.zeros((len(terms), len(FITTED))), np.zeros(len(FITTED))
+    for k in range(len(FITTED)):
+        known = np.isfinite(wanted[..., k])
+        if known.any():
+            weights[:, k], errors[k] = _least_squares(matrix[known], wanted[..., k][known], np.nonzero(known)[0])
+    return Surrogate(name, terms, weights, errors, len(inputs))
+
+
+def _least_squares(rows: Array, values: Array, rotor: NDArray[np.intp]) -> tuple[Array, float]:
+    """Weights (term,), and the root mean square of what is missed of rotors that are left out."""
+    orthogonal, triangle = np.linalg.qr(rows)
+    weights = np.linalg.solve(triangle, orthogonal.T @ values)
+    missed = values - rows @ weights
+    for k in np.unique(rotor):
+        own = rotor == k
+        share = orthogonal[own] @ orthogonal[own].T
+        missed[own] = np.linalg.solve(np.eye(own.sum()) - share, missed[own])
+    return weights, float(np.sqrt(np.mean(missed**2)))
+
+
+def _scaled(values: Array, ends: tuple[float, float]) -> Array:
+    return (2 * values - ends[0] - ends[1]) / (ends[1] - ends[0])
+
+
+STEPS = 40  # Places on the way to the fold
+LONGEST = 250.0
+SLOWEST = 1e-7  # Drift slower than this, 1/s, is a balance
+TURNS = 4  # Corrections of the spin at a height, of which each leaves a tenth of its error or less
+WINDOW, DWELL = 0.2, 10.0
+"""A floater is lost where twice the bounce is so near to precession (Hz) for so long (s), see docs/learned.md."""
+NARROWEST = 1e-4
+"""Of "lateral": nearer to zero the side motion is lost before it grows by currents."""
+Course = Mapping[str, Array]
+"""What becomes of n flights, by name, see `flown`."""
+
+
+def flown(
+    surrogate: Surrogate, inputs: Array, frequency: Array, spin: Array, strengths: Array, longest: Array
+) -> Course:
+    """Flights of n rotors, in the units of the surrogate's scenes.
+
+    Parameters
+    ----------
+    surrogate : of their kind
+    inputs : (n, input) of the rotors
+    frequency, spin : (n,) Hz, and of the body at release
+    strengths : (n, 4) of the floater's currents, the magnets', the steel's and air, over the surrogate's
+    longest : (n,) how long they are followed, s
+
+    Returns
+    -------
+    margin : (n,) logarithm of the frequency over the lowest at which there is an equilibrium with the spin at release
+    fall : (n,) time until the fold, s; infinite where a balance comes before
+    growth, doubt : (n,) e-folds of small motions until the fold or the longest time, and their error by the surrogate's
+    shaken : (n,) time until bounce and precession meet, or two bounces take as long as a precession for long enough, s
+    circle : (n,) distance from the axis at release, m
+    clock, folds : (n, k) times on the way, s, and e-folds up to them
+    """
+    longest = longest[:, None]
+    part = np.linspace(surrogate.kind.near, surrogate.kind.far, STEPS)
+    along = surrogate.along(inputs, part)
+    usual = WITH_STRENGTH * np.log(strength(surrogate.name, inputs))
+    spins = _spins(along[..., PLACE["frequency"]], part, np.log(frequency) - usual)
+    rest = 1 - np.clip(spins, *SPINS)
+    known = at_spin(along, 1 - rest)
+    eddy = rest * np.exp(known[..., PLACE["eddy"]])
+    top = np.argmax(spins, axis=1)
+    highest = np.take_along_axis(spins, top[:, None], 1)[:, 0]
+    # The spin grows with the drift; the way ends where no place has a larger one: at the fold.
+    way = np.diff(np.clip(spins, np.minimum(spin, highest)[:, None], None), axis=1)
+    way = np.where(np.arange(1, STEPS) <= top[:, None], np.maximum(way, 0.0), 0.0)
+    drift = _middle(strengths[:, :1] * eddy + 1e-3 * strengths[:, 3:] * known[..., PLACE["air"]])
+    time = np.cumsum(way / np.maximum(drift, SLOWEST), axis=1)
+    begun = np.concatenate([np.zeros((len(time), 1)), time[:, :-1]], axis=1)
+    spent = np.clip(np.minimum(time, longest) - begun, 0.0, None)
+    flying = (way > 0) & (begun < longest)
+    # What growth of each small motion is fitted over, see `targets`.
+    lateral = np.sqrt(np.maximum(known[..., PLACE["lateral"]], NARROWEST))
+    over = {"precession": eddy, "side": eddy / rest / lateral}
+    growths = [_growth(surrogate, known, over[motion], strengths, motion) for motion in MOTIONS]
+    each = np.stack([np.cumsum(np.maximum(_middle(growth), 0.0) * spent, axis=1) for growth, _ in growths])
+    folds, which = each.max(axis=0), np.argmax(each[:, :, -1], axis=0)
+    doubts = np.stack([np.sum(_middle(doubt) * spent, axis=1) for _, doubt in growths])
+    met = flying & (_middle(np.minimum(known[..., PLACE["meeting"]], known[..., PLACE["lateral"]])) < 0)
+    met |= flying & _two_bounces(known, frequency, np.minimum(spent, longest))
+    balanced = (np.where(way > 0, drift, np.inf) <= SLOWEST).any(axis=1)
+    return {
+        "margin": 0.5 * np.log((1 - np.minimum(spin, 0.9)) / np.maximum(1 - highest, 0.05)),
+        "fall": np.where(balanced, np.inf, time[:, -1]),
+        "growth": folds[:, -1],
+        "doubt": np.take_along_axis(doubts, which[None], 0)[0],
+        "shaken": np.where(met.any(axis=1), _first(begun, met), np.inf),
+        "circle": np.exp(_first(known[:, :-1, PLACE["circle"]], way > 0)),
+        "clock": np.minimum(time, longest),
+        "folds": folds,
+    }
+
+
+def _lasts(course: Course, needed: Array) -> Array:
+    """Time (n,) s until the fold, or until small motions have grown by `needed` (n,) e-folds or met; or the end."""
+    over = course["folds"] >= needed[:, None]
+    loose = np.where(over.any(axis=1), _first(course["clock"], over), np.inf)
+    return np.asarray(np.minimum(np.minimum(course["fall"], course["shaken"]), loose))
+
+
+def _growth(surrogate: Surrogate, known: Array, over: Array, strengths: Array, motion: str) -> tuple[Array, Array]:
+    """Growth of a small motion, and its error by the surrogate's (n, k), 1/s."""
+    first, air = (PLACE[f"{motion} {name}"] for name in (EFFECTS[0], EFFECTS[-1]))
+    currents, errors = strengths[:, :-1], surrogate.errors[first:air]
+    growth = over * (known[..., first:air] @ currents[..., None])[..., 0]
+    growth += 1e-3 * strengths[:, -1:] * known[..., air]
+    still = (1e-3 * strengths[:, -1:] * surrogate.errors[air]) ** 2
+    return growth, np.sqrt(over**2 * ((currents * errors) ** 2).sum(axis=1)[:, None] + still)
+
+
+def _two_bounces(known: Array, frequency: Array, spent: Array) -> NDArray[np.bool_]:
+    """Where (n, k - 1) two bounces come to take as long as a precession, and stay so for long enough."""
+    bounce = np.sqrt(np.maximum(known[..., PLACE["squared bounce"]], 0.0))
+    apart = (2 * bounce - known[..., PLACE["precession"]]) * frequency[:, None]
+    change = np.abs(np.diff(apart, axis=1))
+    long = spent * 2 * WINDOW / np.maximum(change, WINDOW) > DWELL
+    return np.asarray((apart[:, 1:] * apart[:, :-1] < 0) & long)
+
+
+def _first(values: Array, where: NDArray[np.bool_]) -> Array:
+    """The first value (n,) of each row (n, k) at which something holds; that of the beginning where it never does."""
+    return np.asarray(np.take_along_axis(values, np.argmax(where, axis=1)[:, None], 1)[:, 0])
+
+
+def _spins(along: Array, part: Array, pitch: Array) -> Array:
+    """Body spin (n, k) at which a floater levitates at each part of the way; `pitch` (n,) as the fitted frequency."""
+    spin = np.full((len(pitch), len(part)), 0.1)
+    for _ in range(TURNS):
+        spin = 1 - np.exp(2 * (at_spin(along, np.clip(spin, *SPINS)) - pitch[:, None])) / (1 - part)
+    return spin
+
+
+def _middle(values: Array) -> Array:
+    return (values[:, 1:] + values[:, :-1]) / 2
+
+
+UNFORESEEN = 0.02  # Probability that a flight's end has a reason outside of the model
+LARGE = 3e-3  # Motion with which a floater is lost, m
+SCATTER = 0.7  # Of the logarithm of the residual motion from flight to flight
+TIMES = 0.1  # Of the logarithm of computed times
+SOFT = 0.003  # Of the logarithm of frequencies, which are told in whole Hz
+TOLD = 0.1  # Of the logarithm of a made-up time
+DAY, SHORTEST = 86400.0, 3.0  # Longest flight of the experiment, and the shortest that counts, s
+NOT_CAUGHT = 0.05
+"""Probability that all launches fail below a rotor that can hold a floater: some half of them are held (`capture`)."""
+Values = Mapping[str, Array]
+Flight = tuple[str, float, float, float]  # Kind of rotor, its δx or δz (mm), frequency (Hz) and longest time (s)
+Known = Mapping[Flight, Course]
+PARTS = (("floater", "floater"), ("magnets", "rotor"), ("steel", "rotor"), ("air", "air"))
+"""Strengths, and the effect that each belongs to."""
+
+
+@dataclass(frozen=True, eq=False)
+class Models:
+    """Surrogates by kind of rotor, and which effects are in the motion."""
+
+    surrogates: Mapping[str, Surrogate]
+    effects: Sequence[str] = ("floater", "rotor", "air")
+
+    def conditions(self, values: Values, flight: Flight) -> tuple[Array, ...]:
+        """One flight of each of the rotors with drawn unknowns, as `flown` takes them."""
+        kind, distance, frequency, longest = flight
+        rotor = _single(values) if kind == "single" else _stack(values, distance)
+        known, surrogate = likeness(values), self.surrogates[kind]
+        displacement = rotor["displacement"] / known["edge"]
+        every = {
+            "displacement": displacement, "on_axis": rotor["tilt"] + PER_MILLIMETRE * displacement,
+            "radius": known["radius"], "weight": known["weight"],
+        }  # fmt: skip
+        if "stack" in rotor:
+            every["stack"] = rotor["stack"] / known["edge"]
+        box = surrogate.kind.box
+        inputs = np.stack([np.clip(every[name], *box[name]) for name in box], axis=1)
+        strengths = np.stack([known[name] * (part in self.effects) for name, part in PARTS], axis=1)
+        return inputs, frequency * known["frequency"], values["spin"], strengths, np.full(len(inputs), longest)
+
+    def error(self, kind: str, quantity: str) -> float:
+        """What a surrogate misses, see `Surrogate`."""
+        return float(self.surrogates[kind].errors[PLACE[quantity]])
+
+
+def ends(models: Models, kind: str, course: Course, values: Values, longest: float = LONGEST) -> dict[str, Array]:
+    """Probabilities (n,) of how flights end: "nothing" (no equilibrium), "falls", "stays", "oscillates".
+
+    Parameters
+    ----------
+    models, kind : surrogates, and the kind of rotor
+    course : what becomes of the flights
+    values : the unknowns (n,)
+    longest : how long they are followed, s
+    """
+    there = ndtr(course["margin"] / np.hypot(models.error(kind, "frequency"), SOFT))
+    error = np.hypot(TIMES, models.error(kind, "eddy"))
+    grown = ndtr((course["growth"] - needed(values)) / np.hypot(SCATTER, course["doubt"]))
+    fall, shaken = (np.log(np.clip(course[name], 1e-3, 1e9)) for name in ("fall", "shaken"))
+    loose = 1 - (1 - grown) * (1 - ndtr((np.log(longest) - shaken) / error))
+    falls = ndtr((np.log(longest) - fall) / error)
+    up = there * (1 - loose)
+    return {"nothing": 1 - there, "falls": up * falls, "stays": up * (1 - falls), "oscillates": there * loose}
+
+
+def needed(values: Values) -> Array:
+    """E-folds (n,) from the motion at release to that with which a floater is lost."""
+    return np.asarray(np.log(LARGE / (1e-6 * values["motion"])))
+
+
+def _single(values: Values) -> dict[str, Array]:
+    """The rotor of δx = 1 mm: only the part of its displacement along the magnetisation counts."""
+    along = np.cos(np.radians(values["direction"]))
+    return {"displacement": values["displacement"] * along, "tilt": values["tilt"]}
+
+
+def _stack(values: Values, distance: float) -> dict[str, Array]:
+    """The stack of 14 mm, and those of other distances (mm), of which displacement and tilt are one unknown."""
+    if distance == 14.0:
+        return {
+            "displacement": values["stack_displacement"], "tilt": values["stack_tilt"], "stack": values["stack"],
+        }  # fmt: skip
+    every = values[f"tilt_{distance:g}"]
+    return {"displacement": 0 * every, "tilt": every, "stack": np.full_like(every, distance)}
+
+
+def log_likelihoods(models: Models, values: Values, facts: Mapping[str, Fact]) -> dict[str, Array]:
+    """Logarithm of the likelihood (n,) of each of the facts, for unknowns (n,) by name."""
+    flights = dict.fromkeys(flight for fact in facts.values() for flight in fact.flights)
+    known = courses(models, values, tuple(flights))
+    return {name: np.log(fact.likelihood(models, values, known)) for name, fact in facts.items()}
+
+
+def courses(models: Models, values: Values, flights: Sequence[Flight]) -> dict[Flight, Course]:
+    """Flights of all rotors, for unknowns (n,) by name; those of one kind are flown in one call."""
+    found: dict[Flight, Course] = {}
+    for kind, surrogate in models.surrogates.items():
+        own = [flight for flight in flights if flight[0] == kind]
+        if own:
+            asked = zip(*(models.conditions(values, flight) for flight in own), strict=True)
+            together = flown(surrogate, *map(np.concatenate, asked))
+            parts = {name: np.split(each, len(own)) for name, each in together.items()}
+            found |= {flight: {name: each[k] for name, each in parts.items()} for k, flight in enumerate(own)}
+    return found
+
+
+Likelihood = Callable[[Models, Values, Known], Array]
+
+
+@dataclass(frozen=True)
+class Fact:
+    """One reported fact."""
+
+    says: str  # what is reported
+    flights: tuple[Flight, ...]  # that it is about
+    likelihood: Likelihood  # its probability (n,) from the surrogates, the unknowns (n,) and these flights
+
+
+LOW, MIDDLE, HIGH, BEYOND = (("single", 1.0, frequency, LONGEST) for frequency in (115.0, 140.0, 150.0, 165.0))
+ENDLESS = ("stack", 14.0, 60.0, DAY)
+LOWEST = ("stack", 10.0, 50.0, LONGEST)
+NEVER = {distance: ("stack", distance, 200.0, LONGEST) for distance in (18.0, 20.0)}
+
+
+def robust(probability: Array, ways: int = 4) -> Array:
+    """The probability, if now and then a fact has a reason outside of the model."""
+    return (1 - UNFORESEEN) * probability + UNFORESEEN / ways
+
+
+def ended(flight: Flight, way: str, lasted: float | None = None) -> Likelihood:
+    """That a flight ended in one of the ways of `Ends`, and for a fall after which time (s), if it is known."""
+
+    def likelihood(models: Models, values: Values, known: Known) -> Array:
+        found = ends(models, flight[0], known[flight], values, flight[3])[way]
+        if lasted is None:
+            return robust(found)
+        distance = np.log(np.clip(known[flight]["fall"], 1e-3, 1e9) / lasted)
+        return robust(found * np.exp(-0.5 * (distance / TOLD) ** 2))
+
+    return likelihood
+
+
+def _falls(models: Models, values: Values, known: Known) -> Array:
+    error = np.hypot(TIMES, models.error("single", "eddy"))
+    long_enough = ndtr((np.log(np.clip(known[LOW]["fall"], 1e-3, 1e9)) - np.log(SHORTEST)) / error)
+    return robust(ends(models, "single", known[LOW], values)["falls"] * long_enough)
+
+
+def _lowest(models: Models, values: Values, known: Known) -> Array:
+    return robust(1 - ends(models, "stack", known[LOWEST], values)["nothing"])
+
+
+def _third(models: Models, values: Values, known: Known) -> Array:
+    ratio = 115.0 / 50.0 * np.exp(known[LOWEST]["margin"] - known[LOW]["margin"])
+    return robust(np.exp(-0.5 * ((ratio - 3.0) / 0.3) ** 2))
+
+
+def _circle(models: Models, values: Values, known: Known) -> Array:
+    inside = [1e3 * known[flight]["circle"] for flight in (MIDDLE, ENDLESS)]
+    each = [ndtr((a - 0.1) / 0.03) * ndtr((0.3 - a) / 0.03) for a in inside]
+    return robust(each[0] * each[1])
+
+
+def _peak(models: Models, values: Values, known: Known) -> Array:
+    """The time falls off faster above 140 Hz than it rises below: 25 Hz above it is shorter than 25 Hz below."""
+    times = [np.log(np.clip(_lasts(known[flight], needed(values)), 1.0, LONGEST)) for flight in (LOW, BEYOND)]
+    return robust(ndtr((times[0] - times[1]) / 0.3))
+
+
+def _never(distance: float) -> Likelihood:
+    def likelihood(models: Models, values: Values, known: Known) -> Array:
+        nothing = ends(models, "stack", known[NEVER[distance]], values)["nothing"]
+        return robust(nothing + (1 - nothing) * NOT_CAUGHT)
+
+    return likelihood
+
+
+FACTS = {
+    "falls at 115 Hz": Fact("δx = 1 mm falls linearly at 115 Hz, after more than 3 s", (LOW,), _falls),
+    "stays at 140 Hz": Fact("δx = 1 mm stays at 140 Hz for 250 s", (MIDDLE,), ended(MIDDLE, "stays")),
+    "oscillates at 150 Hz": Fact("δx = 1 mm is lost in oscillations at 150 Hz", (HIGH,), ended(HIGH, "oscillates")),
+    "24 h at 60 Hz": Fact("δz = 14 mm flew for 24 hours at 60 Hz", (ENDLESS,), ended(ENDLESS, "stays")),
+    "below 50 Hz": Fact("levitation below 50 Hz (δz = 10 mm)", (LOWEST,), _lowest),
+    "a third": Fact(
+        "the lowest frequency is lowered by a factor of 3 (δz = 10 mm against δx = 1 mm)", (LOW, LOWEST), _third
+    ),
+    "peak": Fact("levitation time declines faster above its peak than it rises below", (LOW, BEYOND), _peak),
+    "side circle": Fact(
+        "side circle of 0.1 to 0.3 mm (δx = 1 mm at 140 Hz, δz = 14 mm at 60 Hz)", (MIDDLE, ENDLESS), _circle
+    ),
+    "never at 18 mm": Fact("δz = 18 mm never levitated (up to 200 Hz)", (NEVER[18.0],), _never(18.0)),
+    "never at 20 mm": Fact("δz = 20 mm never levitated (up to 200 Hz)", (NEVER[20.0],), _never(20.0)),
+}
+QUICK_FACTS = tuple(FACTS)[:4]
+EVEN, NORMAL, POSITIVE = "even", "normal", "positive"
+"""Kinds of priors: even between two ends; normal with mean and deviation; logarithm normal, by median and deviation."""
+
+
+@dataclass(frozen=True)
+class Unknown:
+    """One number that is not known."""
+
+    name: str  # its name in results, its unit, and what figures call it
+    unit: str
+    symbol: str
+    prior: str  # kind
+    first: float  # ends; mean and deviation; or median and deviation of the logarithm
+    second: float
+    why: str  # where the range comes from
+
+    def at(self, share: Array) -> Array:
+        """The value below which a share (n,) of the prior lies."""
+        if self.prior == EVEN:
+            return np.asarray(self.first + (self.second - self.first) * share)
+        deviates = ndtri(share)
+        if self.prior == NORMAL:
+            return np.asarray(self.first + self.second * deviates)
+        return np.asarray(self.first * np.exp(self.second * deviates))
+
+
+COATED = "of the floater's currents: copper and nickel add up to a half"
+STEEL = "its losses over those of the balancing block: amount unknown"
+LEFT = "left of the launch when the plate is down: 1 to 100 µm"
+TEN = "of the stack of 10 mm, displacement and tilt together"
+UNKNOWNS = (
+    Unknown("displacement", "mm", "δx", NORMAL, 1.0, 0.3, "1 mm stated; 'sub-millimeter precision is required'"),
+    Unknown("tilt", "deg", "tilt of δx", NORMAL, 0.0, 2.0, "printed holder, glue, and magnetisation against the cube"),
+    Unknown("direction", "deg", "direction of δx", NORMAL, 0.0, 10.0, "of the displacement against the magnetisation"),
+    Unknown("stack", "mm", "δz", NORMAL, 14.0, 0.3, "14 mm stated, as δx"),
+    Unknown("stack_displacement", "mm", "δx of δz", NORMAL, 0.0, 0.3, "of the lower cube, as δx"),
+    Unknown("stack_tilt", "deg", "tilt of δz", NORMAL, 0.0, 2.0, "of the lower cube, as that of δx"),
+    Unknown("rotor_remanence", "T", "Br rotor", EVEN, 1.29, 1.32, "stated"),
+    Unknown("floater_remanence", "T", "Br floater", EVEN, 1.29, 1.32, "stated: identical to the rotor's"),
+    Unknown("density", "kg/m3", "density", NORMAL, 7500.0, 75.0, "makers: 7400 to 7600"),
+    Unknown("edge", "mm", "edge", NORMAL, 10.0, 0.05, "makers: 0.1 mm"),
+    Unknown("diameter", "mm", "diameter", NORMAL, 12.7, 0.05, "makers: 0.1 mm"),
+    Unknown("magnets", "S/m", "σ magnets", POSITIVE, 6.7e5, 0.15, "makers: 6.2e5 to 9e5"),
+    Unknown("floater", "1", "floater's σ (plating)", POSITIVE, 1.2, 0.15, COATED),
+    Unknown("steel", "1", "steel over block", POSITIVE, 1.0, 1.0, STEEL),
+    Unknown("motion", "um", "residual motion", POSITIVE, 5.0, 1.2, LEFT),
+    Unknown("spin", "1", "spin at release", NORMAL, 0.02, 0.05, "at release: 0 to 0.05 in settling over the plate"),
+    Unknown("tilt_10", "deg", "tilt at 10 mm", NORMAL, 0.0, 2.5, TEN),
+    Unknown("tilt_18", "deg", "tilt at 18 mm", NORMAL, 0.0, 2.5, "of that of 18 mm"),
+    Unknown("tilt_20", "deg", "tilt at 20 mm", NORMAL, 0.0, 2.5, "of that of 20 mm"),
+    Unknown("lean", "deg", "tilt of the shaft", NORMAL, 0.0, 3.0, "of the shaft"),
+)
+NAMES = tuple(unknown.name for unknown in UNKNOWNS)
+
+
+def drawn(shares: Array, unknowns: Sequence[Unknown] = UNKNOWNS) -> dict[str, Array]:
+    """Values (n,) by name at points (n, unknown) of the unit cube."""
+    return {unknown.name: unknown.at(shares[:, k]) for k, unknown in enumerate(unknowns)}
+
+
+def likeness(values: Mapping[str, Array]) -> dict[str, Array]:
+    """By what a scene is like one of the surrogate's (`dynamics.motion.likeness`), each (n,).
+
+    With p = Br Br'/ρ over the article's and lengths over the edge, frequencies times the edge over √p, gravity times
+    the edge over p and all displacements over the edge tell the motion; losses go as conductivity times Br² over ρ.
+    """
+    edge = values["edge"] / 10.0
+    rotor, floater = values["rotor_remanence"] / 1.305, values["floater_remanence"] / 1.305
+    density, radius = values["density"] / 7500.0, values["diameter"] / 12.7
+    strength = rotor * floater / density
+    return {
+        "edge": edge,
+        "frequency": edge / np.sqrt(strength),
+        "weight": np.cos(np.radians(values["lean"])) * edge / strength,
+        "radius": radius / edge,
+        "floater": values["floater"] * values["magnets"] / 6.7e5 * rotor**2 / density,
+        "magnets": values["magnets"] / 6.7e5 * floater**2 / density,
+        "steel": values["steel"] * floater**2 / density,
+        "air": 1 / (density * radius**2),
+    }

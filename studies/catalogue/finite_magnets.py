@@ -1,0 +1,507 @@
+"""What finite and permeable magnets change: levitation by dipoles and by the true field, and mutual magnetisation."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from functools import partial
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from matplotlib.figure import Figure
+
+from ...dynamics.continuation.frequencies import StableRange, at_frequency, reference_state, stable_range
+from ...dynamics.equilibria.balance import CONVERGED_STEP, Balance, moved_pose, solve, tangent_basis
+from ...dynamics.equilibria.equilibrium import Equilibrium
+from ...dynamics.equilibria.modes import named_modes
+from ...dynamics.motion.effects import with_effects
+from ...dynamics.motion.equations import parameters
+from ...dynamics.motion.rates import Rates
+from ...dynamics.motion.state import Scales
+from ...fem.mutual.response import RotorResponse, rotor_ladder, two_body, two_body_ladder
+from ...geometry.common import Array
+from ...geometry.scene.contents import Floater, Scene
+from ...geometry.scene.files import load_scene
+from ..cli.options import Models, shipped_scene
+from ..figures.style import PAGE, PALETTE, legend_below, panels, styled
+from ..levitation import Levitation
+from ..result import AXIS, columns, variable
+from ..study import Point, Study, one_case, study_of_one
+from .article import article_scene, levitated_rotors, levitation_of, polar_angle
+from .drawing import (
+    by_configuration,
+    by_rotor,
+    configuration_panels,
+    explain,
+    last_crossing,
+    range_text,
+    rotor_panels,
+    rotor_places,
+    text_table,
+    uncertain,
+)
+
+# How wrong is the dipole? Levitation of the article's rotors by dipoles and by finite magnets, cause by cause.
+MODELS = ("article", "dipole", "cuboid", "fem", "mutual")
+"""Point dipoles of the full remanence; the floater's moment lowered by its own permeability; the rotor's shape; its
+permeability; both bodies magnetise each other."""
+COLUMNS: dict[str, Any] = {
+    "distance": (("model", "step"), "m", "distance from the rotor"),
+    "polar_angle": (("model", "step"), "°", "polar angle of the moment"),
+    "mode_frequency": (("model", "step", "mode"), "Hz", "frequency of a mode, rotor's frame"),
+    "lowest": (("model",), "Hz", "lowest frequency of stable levitation"),
+    "highest": (("model",), "Hz", "highest frequency of stable levitation"),
+}
+ERRORS = {f"{key}_error": (dims, unit, f"error of the {of}") for key, (dims, unit, of) in COLUMNS.items()}
+MODES = ("bounce", "side, backward", "side, forward", "precession", "nutation")
+RTOL, COARSE = 1e-5, 1e-4
+"""Accuracy of the finite elements, and of those whose distance from them is the error estimate."""
+ROUND_OFF = 1e-10  # Relative error of what needs no finite elements
+
+
+def dipole_points(quick: bool) -> list[Point]:
+    """The rotors that levitated; quick: one frequency."""
+    return [{**rotor, "steps": 1 if quick else 4, "rtols": [RTOL, COARSE]} for rotor in levitated_rotors(quick)]
+
+
+def dipole_vs_fem(point: Point) -> xr.Dataset:
+    """Distance, polar angle, modes and limits of stability of one rotor, by every model and with errors."""
+    scene = article_scene(point["configuration"], point["measure"], drag=False)
+    bare = replace(scene, floater=replace(scene.floater, recoil_permeability=1.0))
+    start, (fine, coarse) = reference_state(scene), point["rtols"]
+    dipole, together = levitation_of(scene, "dipole").rates, levitation_of(scene, "fem", fine, "mutual")
+    made = {
+        "article": (bare, dipole),
+        "dipole": (scene, dipole),
+        "cuboid": (scene, levitation_of(scene, "cuboid").rates),
+        "fem": (scene, levitation_of(scene, "fem", fine).rates),
+        "coarse": (scene, levitation_of(scene, "fem", coarse).rates),
+        "mutual": (scene, together.rates),
+    }
+    ranges = {name: stable_range(*each, *start) for name, each in made.items()}
+    low = max(each.low.parameter for each in ranges.values())
+    high = min(each.high.parameter for each in ranges.values())
+    grid = low + (high - low) * (np.arange(point["steps"]) + 0.5) / point["steps"]
+    rows = {name: _levitation(*each, ranges[name], grid) for name, each in made.items()}
+    middle, answers = ranges["mutual"].near(float(grid[len(grid) // 2])), together.answers[0]
+    doubt = max(float(part[0]) for part in answers.relative_error(middle.position)) if answers else 0.0
+    errors = {name: {key: ROUND_OFF * np.abs(value) for key, value in rows[name].items()} for name in MODELS[:3]}
+    errors["fem"] = {key: np.abs(value - rows["coarse"][key]) for key, value in rows["fem"].items()}
+    errors["mutual"] = {
+        key: doubt * np.abs(value - rows["fem"][key]) + errors["fem"][key] for key, value in rows["mutual"].items()
+    }
+    found = {name: np.array([rows[model][name] for model in MODELS]) for name in COLUMNS}
+    found |= {f"{name}_error": np.array([errors[model][name] for model in MODELS]) for name in COLUMNS}
+    data = columns(COLUMNS | ERRORS, found)
+    data["frequency"] = variable(("step",), grid, "Hz", "frequency of the rotor")
+    for end in ("low", "high"):
+        data[f"{end}_kind"] = xr.Variable(("model",), [getattr(ranges[model], end).kind for model in MODELS])
+    return one_case(point, xr.Dataset(data, {"model": list(MODELS), "mode": list(MODES)}))
+
+
+def _levitation(scene: Scene, rates: Rates, stable: StableRange, grid: Array) -> dict[str, Array]:
+    """What one model gives at the frequencies of a grid, and between which it levitates."""
+    found = [at_frequency(scene, rates, stable.near(float(f)), float(f)) for f in grid]
+    modes = [named_modes(point.motion, point.time_unit) for point in found]
+    return {
+        "distance": np.array([point.distance for point in found]),
+        "polar_angle": np.degrees(polar_angle(np.array([point.state[6:9] for point in found]))),
+        "mode_frequency": np.array([[mode.frequency_hz for mode in row] for row in modes]),
+        "lowest": np.array(stable.low.parameter),
+        "highest": np.array(stable.high.parameter),
+    }
+
+
+CAUSES = {
+    "floater's permeability": ("article", "dipole"),
+    "shape": ("dipole", "cuboid"),
+    "rotor's permeability": ("cuboid", "fem"),
+    "mutual magnetisation": ("fem", "mutual"),
+}
+"""What lies between two models."""
+TOTAL = ("article", "mutual")
+ENDS = {"contact": ("v", "ends at the rotor"), "border": ("^", "goes on beyond")}
+"""Upper ends that are no loss of stability."""
+
+
+def change(result: xr.Dataset, name: str, models: tuple[str, str]) -> tuple[xr.DataArray, xr.DataArray]:
+    """By how much a quantity is larger in the second model than in the first, and the estimated error.
+
+    Parameters
+    ----------
+    result : of the study
+    name : of the quantity
+    models : the first and the second
+    """
+    first, second = models
+    value = result[name].sel(model=second) - result[name].sel(model=first)
+    return value, result[f"{name}_error"].sel(model=second) + result[f"{name}_error"].sel(model=first)
+
+
+PAIR = {"article": ("--", PALETTE[5], "point dipoles"), "mutual": ("-", PALETTE[0], "finite magnets")}
+"""Models that are compared in figures: line, colour, name."""
+
+
+@styled
+def distances_figure(result: xr.Dataset) -> Figure:
+    """The levitation distance by point dipoles and in the field of the finite magnets."""
+    figure, rotors = rotor_panels(result, 3.0, "frequency of the rotor (Hz)", "levitation distance (mm)")
+    for axes, rotor, color in rotors:
+        one = rotor.isel(case=0)
+        for model, (style, _, name) in PAIR.items():
+            look: Any = {"ms": 3} if model == "mutual" else {"ms": 3, "mfc": "white"}
+            axes.plot(one["frequency"], 1e3 * one["distance"].sel(model=model), f"o{style}", color=color, **look)
+            explain(rotors[0][0], {name: f"o{style}"}, **look)
+    legend_below(figure)
+    return figure
+
+
+@styled
+def causes_figure(result: xr.Dataset) -> Figure:
+    """By how much each cause changes the distance: mean and range over the frequencies."""
+    figure, rows = configuration_panels(result, 2.8, ylabel="change of the distance (mm)", sharey=True)
+    width = 0.8 / (len(CAUSES) + 1)
+    for axes, configuration, part in rows:
+        places = rotor_places(axes, configuration, part)
+        for k, (cause, models) in enumerate([*CAUSES.items(), ("all together", TOTAL)]):
+            value, error = (1e3 * values.values for values in change(part, "distance", models))
+            mean = value.mean(axis=1)
+            spread = np.array([mean - (value - error).min(axis=1), (value + error).max(axis=1) - mean])
+            color = "0.3" if models == TOTAL else PALETTE[k]
+            style: Any = {"color": color, "label": cause, "error_kw": {"lw": 0.7, "capsize": 1.5}}
+            axes.bar(places + (k - len(CAUSES) / 2) * width, mean, width, yerr=spread, **style)
+        axes.axhline(0.0, color="0.3", lw=0.8)
+    explain(rows[0][0], {"bar: range over the frequencies, with errors": "|"})
+    legend_below(figure, columns=3)
+    return figure
+
+
+@styled
+def ranges_figure(result: xr.Dataset) -> Figure:
+    """The frequencies of stable levitation by point dipoles and in the field of the finite magnets."""
+    figure, rows = configuration_panels(result, 2.8, ylabel="stable frequencies (Hz)", sharey=True)
+    for axes, configuration, part in rows:
+        for (model, (_, color, name)), offset in zip(PAIR.items(), (-0.2, 0.2), strict=True):
+            places = rotor_places(axes, configuration, part) + offset
+            low, high = (part[end].sel(model=model).values for end in ("lowest", "highest"))
+            axes.bar(places, high - low, 0.35, bottom=low, color=color, label=name)
+            for end, values in (("lowest", low), ("highest", high)):
+                axes.errorbar(places, values, part[f"{end}_error"].sel(model=model), fmt="none", ecolor="0.1", lw=1)
+            for kind, (marker, _) in ENDS.items():
+                ends = part["high_kind"].sel(model=model).values == kind
+                axes.plot(places[ends], high[ends], marker, color="k", ms=4)
+        axes.use_sticky_edges = False
+        axes.margins(y=0.08)
+    explain(rows[0][0], {words: marker for marker, words in ENDS.values()}, color="k", ms=4)
+    legend_below(figure)
+    return figure
+
+
+def dipole_lines(result: xr.Dataset) -> list[str]:
+    """Ranges of the changes for each configuration and cause, the limits of every rotor, and the sentence."""
+    causes = [*CAUSES.items(), ("all together", TOTAL)]
+    rows = [
+        (f"{configuration}: {cause}", *_changes(part, models))
+        for configuration, part in by_configuration(result)
+        for cause, models in causes
+    ]
+    head = ("change by", "distance (mm)", "polar angle (°)", "lowest (Hz)", "highest (Hz)", "axial mode (%)")
+    limits = [
+        (f"{rotor}, {model}", *_limits(part.isel(case=0).sel(model=model)))
+        for rotor, part in by_rotor(result)
+        for model in ("article", "cuboid", "fem", "mutual")
+    ]
+    ends = text_table(("stable frequencies", "lowest (Hz)", "", "highest (Hz)", ""), limits)
+    return [*text_table(head, rows), *ends, sentence(result)]
+
+
+def _changes(part: xr.Dataset, models: tuple[str, str]) -> list[str]:
+    """What lies between two models: range and largest error of distance, angle, ends of stability and axial mode."""
+    scales = {"distance": 1e3, "polar_angle": 1.0, "lowest": 1.0, "highest": 1.0}
+    cells = [range_text(*change(part, name, models), scale) for name, scale in scales.items()]
+    relative, bounce = 100 / part["mode_frequency"].sel(model=models[0]), {"mode": "bounce"}
+    value, error = ((each * relative).sel(bounce) for each in change(part, "mode_frequency", models))
+    return [*cells, range_text(value, error)]
+
+
+def _limits(one: xr.Dataset) -> list[str]:
+    ends = (("lowest", "low_kind"), ("highest", "high_kind"))
+    return [text for name, kind in ends for text in (uncertain(one[name], one[f"{name}_error"]), one[kind].item())]
+
+
+def sentence(result: xr.Dataset) -> str:
+    """The answer in one sentence, point dipoles less finite magnets: ranges over rotors and frequencies."""
+
+    def wrong(name: str, scale: float = 1.0) -> str:
+        value, error = change(result, name, TOTAL)
+        return range_text(-value, error, scale)
+
+    return (
+        f"For the {result.sizes['case']} rotors that levitated, the dipole model errs by {wrong('distance', 1e3)} mm "
+        f"in the levitation distance, {wrong('polar_angle')}° in the polar angle, and by {wrong('lowest')} Hz at the "
+        f"lower and {wrong('highest')} Hz at the upper end of stable levitation."
+    )
+
+
+DIPOLE_VS_FEM = Study(
+    name="dipole-vs-fem",
+    summary="what finite magnets change in distance, angle, modes, limits: shape, permeability, mutual magnetisation",
+    points=dipole_points,
+    compute=dipole_vs_fem,
+    figures={
+        "dipole-vs-fem-distance": distances_figure,
+        "dipole-vs-fem-causes": causes_figure,
+        "dipole-vs-fem-ranges": ranges_figure,
+    },
+    report=dipole_lines,
+)
+
+
+# When is the floater a rigid dipole? Force and torque with and without mutual magnetisation.
+LEVELS = (0.1, 0.01, 1e-3, 1e-4)
+FARTHEST = 0.05  # Depth that the study reaches below the rotor's origin, m
+TILTS = np.array([3, 4])  # of the unknowns of a `Balance`
+MOST_STEPS = 20  # of the quasi-Newton method
+FORCE_PARTS = ("rigid", "floater_answer", "rotor_answer", "total")
+
+
+def floater_permeability(scene: Scene, distances: Sequence[float] | None = None, quick: bool = False) -> xr.Dataset:
+    """Rigid dipole against mutual magnetisation, on the axis below the rotor and at the stable equilibrium.
+
+    Parameters
+    ----------
+    distances : of the floater's centre below the rotor's origin, m; by default from contact to 50 mm
+    quick : coarser elements and fewer distances
+
+    Returns
+    -------
+    Dataset over `distance`: force and torque by part with error, relative difference of the rigid dipole; over `level`
+    and `quantity`: the distance from which on the rigid dipole is good to that level; and the levitation shift. The
+    moment points as it does in synchronous motion (body spin 0, torques balanced) at that distance, followed from the
+    stable equilibrium (along -x if there is none) and held where no balance is near.
+    """
+    rotors = rotor_ladder(scene.rotor, (2, 3) if quick else (3, 4))
+    alone = Levitation(scene, Models("auto", "none", 1e-4 if quick else 1e-6, interaction="rigid"))
+    depths = np.array(distances if distances is not None else _depths(scene, 8 if quick else 24))
+    stable = next((e for e in alone.equilibria if e.stable), None)
+    values = parameters(scene, Scales.of(scene), frozen_spin=True)
+    balance = Balance(Rates(with_effects(scene, alone.table)), values, 0.0)
+    places = np.stack([0 * depths, 0 * depths, -depths], axis=1)
+    start, guess = (stable.distance, stable.state.moment) if stable else (FARTHEST, np.array([-1.0, 0.0, 0.0]))
+    dataset = missed(rotors, scene.floater, places, balanced_directions(scene, balance, places, start, guess))
+    weight = scene.floater.mass * float(np.linalg.norm(scene.gravity))
+    dataset = dataset.merge(sufficient(dataset)).assign_attrs(weight_N=weight)
+    return dataset.merge(shifted(rotors, scene, balance, stable)) if stable else dataset
+
+
+def missed(rotors: Sequence[RotorResponse], floater: Floater, places: Array, directions: Array) -> xr.Dataset:
+    """Force and torque by part, with the error of the total.
+
+    Parameters
+    ----------
+    rotors : the rotor's response by elements of growing order
+    floater : the sphere
+    places, directions : (n, 3) m, and of its moment (n, 3)
+    """
+    found = [two_body_ladder(rotors, floater, r, m) for r, m in zip(places, directions, strict=True)]
+    distance = variable(("distance",), -places[:, 2], "m", "distance below the rotor")
+    data = {"moment": variable(("distance", "axis"), directions, "1", "direction of the floater's remanence")}
+    for name, units in (("force", "N"), ("torque", "N m")):
+        values = np.array([[getattr(getattr(both, part), name) for part in FORCE_PARTS] for both, _ in found])
+        errors = np.array([getattr(error, name) for _, error in found])
+        size = np.linalg.norm(values[:, -1], axis=1)
+        share = np.linalg.norm(values[:, -1] - values[:, 0], axis=1) / size
+        doubt, of = np.linalg.norm(errors, axis=1) / size, f"share of the {name}"
+        data[name] = variable(("distance", "part", "axis"), values, units, f"{name} on the floater")
+        data[f"{name}_error"] = variable(("distance", "axis"), errors, units, f"estimated error of the {name}")
+        data[f"{name}_missed"] = variable(("distance",), share, "1", f"{of} that a dipole misses")
+        data[f"{name}_missed_error"] = variable(("distance",), doubt, "1", f"estimated error of the {of}")
+    return xr.Dataset(data, {"distance": distance, "part": list(FORCE_PARTS), "axis": list(AXIS)})
+
+
+def sufficient(dataset: xr.Dataset) -> xr.Dataset:
+    """Distance from which on the rigid dipole is good to each level, NaN if that is beyond the last one.
+
+    Between computed distances by interpolation of logarithms; the error is added to what is missed.
+    """
+    rising = dataset.sortby("distance")
+    rows = []
+    for quantity in ("force", "torque"):
+        share = (rising[f"{quantity}_missed"] + rising[f"{quantity}_missed_error"]).values
+        rows.append([last_crossing(rising["distance"].values, share, level) for level in LEVELS])
+    values = variable(("quantity", "level"), rows, "m", "distance from which on the rigid dipole suffices")
+    return xr.Dataset({"sufficient_from": values}, {"quantity": ["force", "torque"], "level": list(LEVELS)})
+
+
+def shifted(rotors: Sequence[RotorResponse], scene: Scene, balance: Balance, stable: Equilibrium) -> xr.Dataset:
+    """What the rigid dipole misses at its stable equilibrium, and where the equilibrium really is.
+
+    Parameters
+    ----------
+    rotors : the rotor's response by elements of growing order, two at least
+    scene, balance, stable : the scene, its equations for the rigid dipole, and their equilibrium
+    """
+    place, moment = stable.position, stable.state.moment
+
+    def added(rotor: RotorResponse, position: Array, direction: Array) -> tuple[Array, Array]:
+        both = two_body(rotor, scene.floater, position, direction)
+        extra = both.total - both.rigid
+        return extra.force, extra.torque
+
+    both, error = two_body_ladder(rotors, scene.floater, place, moment)
+    (_, coarse), (linear, fine) = (
+        shifted_equilibrium(scene, balance, place, moment, partial(added, rotor)) for rotor in rotors[-2:]
+    )
+    extra, doubt = both.total - both.rigid, np.abs(fine - coarse) + stable.position_error
+    rows = {
+        "rigid_position": (place, "m", "stable equilibrium of the rigid dipole"),
+        "missed_force": (extra.force, "N", "force that the rigid dipole misses there"),
+        "missed_force_error": (error.force, "N", "its estimated error"),
+        "missed_torque": (extra.torque, "N m", "torque that the rigid dipole misses there"),
+        "linear_shift": (linear, "m", "shift of the equilibrium, linearised"),
+        "shift": (fine - place, "m", "shift of the equilibrium"),
+        "shift_error": (doubt, "m", "its estimated error"),
+    }
+    return xr.Dataset({name: variable(("axis",), *row) for name, row in rows.items()}, {"axis": list(AXIS)})
+
+
+def balanced_directions(scene: Scene, balance: Balance, places: Array, start: float, guess: Array) -> Array:
+    """Moment directions (n, 3) whose torque is balanced, followed downwards and upwards from `start` (m) below.
+
+    Parameters
+    ----------
+    scene, balance : a scene's
+    places : (n, 3) m
+    start : distance below the rotor's origin, m
+    guess : (3,) for the first ones; each other begins at its neighbour's, which stays where no balance is near
+    """
+    result, depths = np.zeros_like(places), -places[:, 2]
+    order = np.argsort(depths)
+    for chain in (order[depths[order] >= start], order[::-1][depths[order[::-1]] < start]):
+        direction = guess
+        for k in chain:
+            _, moment, step = solve(balance, places[None, k] / scene.floater.radius, direction[None], TILTS)
+            direction = result[k] = moment[0] if step[0] < CONVERGED_STEP else direction
+    return result
+
+
+def shifted_equilibrium(
+    scene: Scene,
+    balance: Balance,
+    position: Array,
+    moment: Array,
+    extra: Callable[[Array, Array], tuple[Array, Array]],
+    tolerance: float = 1e-7,
+) -> tuple[Array, Array]:
+    """Follow an equilibrium to where additional forces put it.
+
+    Quasi-Newton from the table's own Jacobian (C. G. Broyden, Math. Comp. 19 (1965) 577).
+
+    Parameters
+    ----------
+    scene, balance : a scene's, without the additional forces
+    position, moment : (3,) m and direction of the equilibrium
+    extra : of a position (3,) m and a direction (3,): additional force (3,) N and torque (3,) N m, rotor's frame
+    tolerance : of the place, in radii of the floater
+
+    Returns
+    -------
+    The shift (3,) m to first order, and the new position (3,) m; NaN if none was reached.
+    """
+    scales, floater = Scales.of(scene), scene.floater
+
+    def residual(position: Array, moment: Array) -> Array:
+        value = balance(position[None], moment[None])[0][0]
+        force, torque = extra(position * scales.length, moment)
+        value[:3] += force * scales.time**2 / (floater.mass * scales.length)
+        value[3:] += tangent_basis(moment[None])[0] @ torque * scales.time**2 / floater.inertia
+        return np.asarray(value)
+
+    position = position / scales.length
+    inverse, left = np.linalg.inv(balance(position[None], moment[None])[1][0]), residual(position, moment)
+    step = -inverse @ left
+    linear = step[:3] * scales.length
+    for _ in range(MOST_STEPS):
+        (position,), (moment,) = moved_pose(position[None], moment[None], step[None])
+        place = position * scales.length
+        if np.linalg.norm(step) < tolerance:
+            return linear, place
+        if np.linalg.norm(step) > 1.0 or any(body.distance(place) <= floater.radius for body in scene.turning_bodies):
+            break
+        new = residual(position, moment)
+        change = inverse @ (new - left)
+        inverse = inverse + np.outer(step - change, step @ inverse) / (step @ change)
+        left, step = new, -inverse @ new
+    return linear, np.full(3, np.nan)
+
+
+def _depths(scene: Scene, number: int) -> Array:
+    """From contact on the axis to `FARTHEST`, evenly in their logarithm."""
+    radius, step = scene.floater.radius, 1e-5
+    heights = np.arange(0.0, FARTHEST, step)
+    places = np.stack([0 * heights, 0 * heights, -heights], axis=1)
+    gap = np.min([magnet.body.distance(places) for magnet in scene.rotor], axis=0) - radius
+    nearest = heights[gap < 0].max(initial=0.0) + step
+    return np.geomspace(nearest, FARTHEST, number)
+
+
+def in_the_horizontal_scene(quick: bool) -> xr.Dataset:
+    return floater_permeability(load_scene(shipped_scene("horizontal")), quick=quick)
+
+
+LABELS = {
+    "floater_answer": "floater magnetised by the rotor",
+    "rotor_answer": "rotor magnetised by the floater",
+    "total": "both",
+}
+
+
+@styled
+def floater_figure(result: xr.Dataset) -> Figure:
+    """What the rigid dipole misses against distance: share of force and torque; axial force by its two causes."""
+    figure, ((left, right),) = panels(1, 2, (PAGE, 3.3))
+    distance, weight = 1e3 * result["distance"].values, float(result.attrs["weight_N"])
+    for quantity, color in zip(("force", "torque"), PALETTE, strict=False):
+        share, error = (result[f"{quantity}_{name}"].values for name in ("missed", "missed_error"))
+        left.semilogy(distance, share, "o-", ms=3, color=color, label=f"{quantity}, |Δ| / |total|")
+        left.fill_between(distance, np.maximum(share - error, share / 100), share + error, color=color, alpha=0.25)
+    force = result["force"].sel(axis="z")
+    for (part, label), color in zip(LABELS.items(), PALETTE[2:], strict=False):
+        missed = 100 * (force.sel(part=part) - (force.sel(part="rigid") if part == "total" else 0.0)).values / weight
+        right.semilogy(distance, np.abs(missed), color=color, label=f"axial force, {label}")
+        right.semilogy(distance, missed.clip(0), "o", ms=3, color=color)
+        right.semilogy(distance, (-missed).clip(0), "o", ms=3, mfc="white", color=color)
+    for axes in (left, right):
+        axes.set_xlabel("distance below the rotor (mm)")
+        if "rigid_position" in result:
+            place = -1e3 * float(result["rigid_position"].sel(axis="z"))
+            axes.axvline(place, color="0.3", lw=0.8, ls=":", label="stable equilibrium")
+    right.plot([], [], "o", ms=3, mfc="white", color="0.3", label="open: downwards")
+    left.set_ylabel("missed share")
+    right.set_ylabel("missed axial force (% of the weight)")
+    legend_below(figure, columns=3)
+    return figure
+
+
+def floater_lines(result: xr.Dataset) -> list[str]:
+    """From where on the rigid dipole suffices, and what it misses at the stable equilibrium."""
+    reach = 1e3 * result["sufficient_from"]
+    rows = [(f"{100 * float(k):g} %", *reach.sel(level=k, quantity=["force", "torque"]).values) for k in reach["level"]]
+    lines = text_table(("rigid dipole good to", "force, from (mm)", "torque, from (mm)"), rows)
+    if "shift" in result:
+        force, error = (float(result[name].sel(axis="z")) for name in ("missed_force", "missed_force_error"))
+        shift, doubt = (1e3 * float(result[name].sel(axis="z")) for name in ("shift", "shift_error"))
+        share = 100 * abs(force) / result.attrs["weight_N"]
+        lines.append(
+            f"Mutual magnetisation adds {1e3 * force:+.4f} ± {1e3 * error:.1g} mN ({share:.1f} % of the weight) at the "
+            f"rigid dipole's equilibrium, and moves the equilibrium by {shift:+.4f} ± {doubt:.1g} mm, up positive."
+        )
+    return lines
+
+
+FLOATER_PERMEABILITY = study_of_one(
+    name="floater-permeability",
+    summary="what the rigid dipole misses once rotor and floater magnetise each other, in the scene horizontal",
+    compute=in_the_horizontal_scene,
+    figures={"floater-permeability": floater_figure},
+    report=floater_lines,
+)

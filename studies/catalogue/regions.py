@@ -1,0 +1,410 @@
+"""Where floaters levitate: regions in frequency and displacement, and the frequency until which flights last."""
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from ...dynamics.continuation.frequencies import (
+    HIGHEST,
+    StableRange,
+    at_frequency,
+    levitating_ranges,
+    reference_state,
+    stable_range,
+)
+from ...dynamics.continuation.slow_drift import Lasting, drift, lasting_frequencies
+from ...dynamics.equilibria.equilibrium import EquilibriumError, Survey
+from ...dynamics.motion.state import Scales
+from ...geometry.common import Array
+from ...geometry.rotor import Conductor
+from ...geometry.scene.contents import Drag, Plate, Scene
+from ...geometry.shapes import Box
+from ..cli.console import note
+from ..figures.style import COLORS, NAMES, PALETTE, legend_below, styled
+from ..levitation import Levitation
+from ..result import Columns, columns
+from ..study import Point, Study, cases_with, each_case, one_case, recorded
+from .article import (
+    CONFIGURATIONS,
+    EDGE,
+    FLIGHT,
+    MODELS,
+    PLATE_CONDUCTIVITY,
+    PLATE_SIZE,
+    QUICK_ROTORS,
+    article_scene,
+    conducting,
+    label_of,
+    levitated_rotors,
+    levitation_of,
+)
+from .drawing import by_rotor, configuration_panels, explain, small_multiples, text_table
+
+# Regions of stable levitation in frequency and displacement, what bounds them, and what a plate makes of them.
+#
+# Regions: the motion without losses, of a rigid floater in the dipole's field, and in that of finite elements with
+# mutual magnetisation.  Where flights last, every effect takes part: the currents in the floater, real air, and
+# those in the rotor's magnets or not.
+MEASURES = {
+    "horizontal": (0.5, 1.0, 1.5, 2.0, 2.5, 3.0, 3.5, 4.0, 5.0, 6.0, 7.0, 8.0),
+    "vertical": (10.0, 11.0, 12.0, 13.0, 14.0, 15.0, 16.0, 18.0, 20.0),
+    "tilt": (2.5, 5.0, 7.5, 10.0, 12.5, 15.0, 17.5, 20.0, 25.0, 30.0, 35.0, 40.0, 45.0),
+}
+"""Displacements (mm) and tilts (degrees): the article's tested ones and some between."""
+RTOL, PLATE_RTOL = 1e-4, 1e-2
+MOST = 4  # Intervals of stability that are kept of one rotor
+BEYOND = 1.15  # How far above the last stable frequency the plate is tried
+
+
+FACE = -0.045  # Height of the plate's upper face below the rotor's origin, m: no floater that levitates touches it
+METAL = {"insulating": False, "conducting": True}  # The rotor's magnets: whether they have eddy currents
+LASTING = {
+    "low": (("metal",), "Hz", "lowest frequency at which flights last"),
+    "high": (("metal",), "Hz", "highest frequency up to which flights last"),
+    "growth_per_s": (("metal",), "1/s", "largest growth rate of a mode in the flight there"),
+}
+INTERVAL: dict[str, Any] = {
+    "lowest": (("interval",), "Hz", "lower end of an interval of stability"),
+    "highest": (("interval",), "Hz", "upper end of an interval of stability"),
+    "distance_lowest": (("interval",), "m", "distance at the lower end"),
+    "distance_highest": (("interval",), "m", "distance at the upper end"),
+    "leading_highest": (("interval",), "Hz", "frequency of the mode that becomes unstable at the upper end"),
+}
+PLATE = {
+    "plate_frequency": (("tried",), "Hz", "frequency at which a plate below is tried"),
+    "plate_growth": (("tried",), "1/s", "largest growth rate with a plate below"),
+    "plate_distance": (("tried",), "m", "distance with a plate below"),
+    "plate_error": (("tried",), "1", "estimated relative error of the plate's table"),
+}
+
+
+def map_points(quick: bool) -> list[Point]:
+    """All rotors with both models; with the plate, and flights, the rotors that levitated in the article.
+
+    `quick` leaves out the mutual magnetisation and the flights.
+    """
+    rotors = {name: (value,) for name, value in QUICK_ROTORS} if quick else MEASURES
+    return [
+        {
+            "configuration": c, "measure": m, "model": model, "with_plate": (2 if quick else 5) if known else 0,
+            **({} if quick else {"flights": known, "interaction": "auto"}),
+        }
+        for c, measures in rotors.items() for m in measures for model in MODELS
+        for known in [model == "fem" and m in CONFIGURATIONS[c].levitated]
+    ]  # fmt: skip
+
+
+def stability_map(point: Point, rtol: float = RTOL) -> xr.Dataset:
+    """Intervals of stable frequencies of one rotor, and growth with a plate below at some frequencies."""
+    scene = article_scene(point["configuration"], point["measure"], drag=False)
+    levitation = levitation_of(scene, point["model"], rtol, point.get("interaction", "rigid"))
+    try:
+        found = levitating_ranges(scene, levitation.interaction, levitation.rates)
+    except EquilibriumError as error:
+        note(str(error))
+        found = []
+    rows, kinds = np.full((len(INTERVAL), MOST), np.nan), np.full((2, MOST), "", dtype="U12")
+    for k, run in enumerate(found[:MOST]):
+        ends = run.low, run.high
+        rows[:, k] = [*(e.parameter for e in ends), *(e.distance for e in ends), run.high.leading_hz]
+        kinds[:, k] = [e.kind for e in ends]
+    plate = _with_plate(levitation, found[0] if found else None, point["with_plate"])
+    values, table, axes = [*rows, *plate.T], INTERVAL | PLATE, {}
+    texts = {"low_kind": ("interval", kinds[0]), "high_kind": ("interval", kinds[1])}
+    if "flights" in point:
+        stable = found[0] if found and point["flights"] else None
+        lasting = [_lasting(levitation, stable, metal) if stable else Lasting() for metal in METAL]
+        values += [[getattr(one, name) for one in lasting] for name in LASTING]
+        table, axes = table | LASTING, {"metal": list(METAL)}
+        texts["ended_by"] = "metal", np.array([one.ended_by for one in lasting], "U12")
+    data = columns(table, dict(zip(table, values, strict=True)))
+    return one_case(point, xr.Dataset({**data, **texts}, axes))
+
+
+def _lasting(alone: Levitation, stable: StableRange, metal: str) -> Lasting:
+    """Where flights of `FLIGHT` last from spin 0, with all effects."""
+    scene = conducting(alone.scene, METAL[metal])
+    scene = replace(scene, drag=replace(Drag.stokes(scene.floater.radius), air=True))
+    whole = Levitation(scene, alone.models)
+    whole.share(alone)
+    middle = stable.near((stable.low.parameter + stable.high.parameter) / 2)
+    return lasting_frequencies(scene, whole.table, whole.rates, middle.state, middle.parameter, FLIGHT)
+
+
+def _with_plate(alone: Levitation, stable: StableRange | None, number: int) -> Array:
+    """Frequency (Hz), growth (1/s), distance (m) and error of the plate's table (number, 4); NaN where it fails."""
+    rows = np.full((6, 4), np.nan)
+    if stable is None or not number:
+        return rows
+    last = min(BEYOND * stable.high.parameter, HIGHEST)
+    center = np.array([0.0, 0.0, FACE - PLATE_SIZE[2] / 2])
+    plate = Plate(Box(np.array(PLATE_SIZE), center), PLATE_CONDUCTIVITY)
+    for k, frequency in enumerate(np.linspace(1.01 * stable.low.parameter, last, number)):
+        models = replace(alone.models, plate_model="slab", plate_rtol=PLATE_RTOL)
+        there = alone.elsewhere(models, frequency=float(frequency), plate=plate)
+        rows[k, 0] = frequency
+        try:
+            near = at_frequency(alone.scene, alone.rates, stable.near(frequency), float(frequency))
+        except EquilibriumError:
+            continue
+        known = [e for e in there.without_plate.equilibria if abs(e.distance - near.distance) < 1e-6]
+        if not known:
+            continue
+        there.adopt(Survey((known[0],), ()))
+        memory, moved = there.plate, there.equilibria
+        if memory is not None and moved and moved[0].currents is not None:
+            rows[k, 1:] = moved[0].growth_per_s, moved[0].distance, max(memory.table.errors.total, memory.share.error)
+    return rows
+
+
+MARKERS = {
+    "fold": ("^", "fold: no equilibrium beyond"),
+    "oscillatory": ("o", "growing oscillation (Hopf)"),
+    "real": ("D", "growing without oscillation"),
+    "contact": ("v", "contact with the rotor"),
+    "border": ("_", "end of the search"),
+}
+VERDICTS = (
+    ("P", PALETTE[4], "plate: stable"),
+    ("x", PALETTE[3], "plate: unstable"),
+    ("1", "0.2", "plate: no equilibrium"),
+)
+MARKS = {
+    "insulating": ("<", f"trajectories last {FLIGHT:g} s up to here"),
+    "conducting": ("*", "… with currents in the rotor"),
+}
+
+
+@styled
+def map_figure(result: xr.Dataset) -> Figure:
+    """Regions of stable levitation by dipole and by finite elements, kinds of boundary, and the plate's verdict."""
+    figure, rows = configuration_panels(result, 3.9, ylabel="frequency of the rotor (Hz)", sharey=True)
+    for axes, configuration, rotors in rows:
+        for model in MODELS:
+            _region(axes, cases_with(rotors, model=model), COLORS[model])
+        true = cases_with(rotors, model="fem")
+        growth, frequency = true["plate_growth"].values, true["plate_frequency"].values
+        measure = np.broadcast_to(true["measure"].values[:, None], growth.shape)
+        found = (growth < 0, growth >= 0, np.isnan(growth) & np.isfinite(frequency))
+        for here, (marker, color, _) in zip(found, VERDICTS, strict=True):
+            axes.plot(measure[here], frequency[here], marker, color=color, ms=4, mew=0.8)
+        for metal, (marker, _) in MARKS.items() if "high" in true else ():
+            axes.plot(true["measure"], true["high"].sel(metal=metal), marker, color="k", ms=5)
+        axes.set(xlabel=label_of(configuration), ylim=(20, 410))
+        axes.margins(x=0.08)
+    first = rows[0][0]
+    for model in MODELS:
+        explain(first, {f"stable: {NAMES[model]}": "s"}, color=COLORS[model], alpha=0.5)
+    explain(first, {words: marker for marker, words in MARKERS.values()}, mfc="white", ms=4)
+    for marker, color, words in VERDICTS:
+        explain(first, {f"{words}, face {-1e3 * FACE:g} mm below": marker}, color=color, ms=4)
+    if "high" in result:
+        explain(first, {words: marker for marker, words in MARKS.values()}, color="k", ms=5)
+    legend_below(figure, columns=3)
+    return figure
+
+
+def _region(axes: Axes, part: xr.Dataset, color: str) -> None:
+    measure = part["measure"].values
+    wide = measure if len(measure) > 1 else measure * np.array([0.99, 1.01])  # one rotor alone is a bar
+    for k in range(part.sizes["interval"]):
+        ends = [part[name].values[:, k] for name in ("lowest", "highest")]
+        low, high = (np.broadcast_to(end, wide.shape) for end in ends)
+        axes.fill_between(wide, low, high, color=color, alpha=0.2, lw=0)
+        for values, name in zip(ends, ("low_kind", "high_kind"), strict=True):
+            axes.plot(measure, values, color=color, lw=0.8)
+            for kind, (marker, _) in MARKERS.items():
+                here = part[name].values[:, k] == kind
+                axes.plot(measure[here], values[here], marker, color=color, mfc="white", ms=4)
+
+
+def map_lines(result: xr.Dataset) -> list[str]:
+    """Every rotor's intervals by both models, where the plate below keeps or undoes stability, where flights last."""
+    rows = []
+    for label, rotor in by_rotor(result):
+        for one in each_case(rotor):
+            rows.append((f"{label}, {one['model'].item()}", _intervals(one), _verdicts(one), _lasts(one)))
+    flights = f"trajectories last {FLIGHT:g} s"
+    return text_table(("rotor, model", "stable", "growth with the plate (1/s)", flights), rows)
+
+
+def _intervals(one: xr.Dataset) -> str:
+    ends = zip(*(one[name].values for name in ("lowest", "low_kind", "highest", "high_kind")), strict=True)
+    words = [f"{low:.1f} ({a}) to {high:.1f} Hz ({b})" for low, a, high, b in ends if np.isfinite(low)]
+    return " and ".join(words) or "never"
+
+
+def _verdicts(one: xr.Dataset) -> str:
+    pairs = zip(one["plate_frequency"].values, one["plate_growth"].values, strict=True)
+    tried = [f"{f:.0f} Hz {f'{g:+.2g}' if np.isfinite(g) else 'no equilibrium'}" for f, g in pairs if np.isfinite(f)]
+    return ", ".join(tried)
+
+
+def _lasts(one: xr.Dataset) -> str:
+    if "high" not in one:
+        return ""
+    found = zip(*(one[name].values for name in ("metal", "low", "high", "ended_by")), strict=True)
+    return " and ".join(
+        f"{low:.1f} to {high:.1f} Hz ({metal} rotor; then {end})" for metal, low, high, end in found if end
+    )
+
+
+STABILITY_MAP = Study(
+    name="stability-map",
+    summary="regions of stable levitation in frequency and displacement, their boundaries, with and without a plate",
+    points=map_points,
+    compute=stability_map,
+    figures={"stability-map": map_figure},
+    report=map_lines,
+)
+
+
+# The upper frequency: until when a floater stays above it, with and without currents in the rotor's metal.
+#
+# For each rotor that levitated in the article: averaged flights along its stable frequencies with body spin 0 at
+# release, below a rotor that does not conduct (as one of ferrite or of powder in plastic, of the same field), one whose
+# magnets do, and for displaced cubes one that also has the steel with which the article balances them.
+# Closed form of μr = 1, rigid floater with its own currents, real air.
+VARIANTS = ("does not conduct", "magnets conduct", "magnets and spacers conduct")
+STEEL_CONDUCTIVITY, STEEL_DENSITY, MAGNET_DENSITY = 1.4e6, 7900.0, 7500.0
+"""Of non-magnetic steel (AISI 304), S/m and kg/m³; of NdFeB."""
+STEPS, LONGEST = 16, 3600.0  # Frequencies of flights; how long they are followed, s
+COLUMNS: Columns = {
+    "low": ((), "Hz", "lowest stable frequency without losses"),
+    "high": ((), "Hz", "highest stable frequency without losses"),
+    "lasts_from": ((), "Hz", "lowest frequency at which flights last"),
+    "lasts_to": ((), "Hz", "highest frequency at which flights last"),
+    "rotor_frequency": (("step",), "Hz", "frequency of the rotor"),
+    "levitated": (("step",), "s", "time until the loss"),
+    "growth": (("step",), "1/s", "largest growth rate of a mode in the flight"),
+}
+ENDS = tuple(COLUMNS)[:4]
+
+
+def limit_points(quick: bool) -> list[Point]:
+    """Every rotor that levitated, without and with its metal; `quick` only δx = 2 mm."""
+    rotors = levitated_rotors(False) if not quick else [{"configuration": "horizontal", "measure": 2.0}]
+    return [
+        {**rotor, "variant": variant}
+        for rotor in rotors
+        for variant in (VARIANTS if rotor["configuration"] == "horizontal" and not quick else VARIANTS[:2])
+    ]
+
+
+def spacer(displacement: float) -> Conductor:
+    """A steel block as wide and deep as the cube, behind it, that puts the centre of mass on the axis.
+
+    With a displacement x and half an edge a the balance is ρ_m 2a x = ρ_s t (a - x + t/2) for its thickness t.
+    """
+    gap, load = EDGE / 2 - displacement, MAGNET_DENSITY / STEEL_DENSITY * EDGE * displacement
+    thickness = np.sqrt(gap**2 + 2 * load) - gap
+    center = np.array([-gap - thickness / 2, 0.0, 0.0])
+    return Conductor(Box(np.array([thickness, EDGE, EDGE]), center), STEEL_CONDUCTIVITY)
+
+
+def scene_of(point: Point) -> Scene:
+    """The rotor of a point in real air, with the currents that its variant has."""
+    bare = article_scene(point["configuration"], point["measure"], permeability=1.0)
+    scene = conducting(replace(bare, drag=replace(bare.drag, air=True)), rotor=point["variant"] != VARIANTS[0])
+    if point["variant"] == VARIANTS[2]:
+        return replace(scene, conductors=(spacer(1e-3 * point["measure"]),))
+    return scene
+
+
+def upper_limit(point: Point) -> xr.Dataset:
+    """How long flights last at each frequency (`step`), and between which they last for the article's 250 s."""
+    scene = scene_of(point)
+    bare = article_scene(point["configuration"], point["measure"], permeability=1.0, drag=False)
+    alone, whole = levitation_of(bare, "cuboid"), levitation_of(scene, "cuboid")
+    stable = stable_range(bare, alone.rates, *reference_state(bare))
+    low, high = stable.low.parameter, stable.high.parameter
+    middle = stable.near((low + high) / 2)
+    lasts = lasting_frequencies(scene, whole.interaction, whole.rates, middle.state, middle.parameter, FLIGHT)
+    frequencies = np.linspace(low, high, STEPS + 2)[1:-1]
+    flights = []
+    for frequency in frequencies:
+        point_there = at_frequency(bare, alone.rates, stable.near(frequency), frequency)
+        there = replace(scene, frequency=float(frequency))
+        start = Scales.of(there).unpack(point_there.state)
+        flight = drift(there, whole.interaction, 0.0, LONGEST, whole.rates, start)
+        flights.append((min(flight.levitated_s, LONGEST), flight.growth_per_s.max(), flight.ended_by))
+    times, growth, ends = zip(*flights, strict=True)
+    found = (low, high, lasts.low, lasts.high, frequencies, times, growth)
+    labels: dict[str, Any] = {"variant": ("case", [point["variant"]]), "ended_by": ("case", [lasts.ended_by])}
+    return recorded(point, COLUMNS, found, {}).assign(end=(("case", "step"), [list(ends)]), **labels)
+
+
+@styled
+def limit_figure(result: xr.Dataset) -> Figure:
+    """Levitation time against frequency of each rotor, one line for each variant."""
+    rotors = dict(by_rotor(result))
+    words = "frequency (Hz)", "levitation time (s)"
+    figure, axes = small_multiples(list(rotors), 1.9, 4, *words, sharey=True)
+    for panel, rotor in zip(axes, rotors.values(), strict=True):
+        for one, style, color in zip(each_case(rotor), ("o-", "s--", "^:"), PALETTE, strict=False):
+            panel.semilogy(
+                one["rotor_frequency"], one["levitated"], style, ms=3, color=color, label=one["variant"].item()
+            )
+        panel.axhline(FLIGHT, color="0.6", lw=0.8, zorder=0, label=f"longest of the experiment, {FLIGHT:g} s")
+        panel.axhline(LONGEST, color="0.6", lw=0.8, ls=":", zorder=0, label=f"followed no longer, {LONGEST:g} s")
+    legend_below(figure, columns=3)
+    return figure
+
+
+def limit_lines(result: xr.Dataset) -> list[str]:
+    """Where flights last by variant, and what a rotor that does not conduct would change."""
+    rows, lines = [], []
+    for label, rotor in by_rotor(result):
+        for one in each_case(rotor):
+            ends = [f"{float(one[name]):.1f}" for name in ("low", "high", "lasts_from", "lasts_to")]
+            lasts = "none" if np.isnan(one["lasts_to"]) else f"{ends[2]} to {ends[3]} ± 0.5"
+            rows.append((f"{label}, {one['variant'].item()}", f"{ends[0]} to {ends[1]}", lasts, one["ended_by"].item()))
+        lines.append(f"{label}: {_limit_change(rotor)}")
+    head = ("rotor", "stable without losses (Hz)", f"trajectories last {FLIGHT:g} s (Hz)", "then")
+    return [*text_table(head, rows), *lines]
+
+
+def _limit_change(rotor: xr.Dataset) -> str:
+    """What conduction changes where it changes the most: the end in Hz, and a flight in s."""
+    first, second = each_case(rotor)[:2]
+    less = max(0.0, float(first["lasts_to"] - second["lasts_to"]))
+    ratio = first["levitated"].values / second["levitated"].values
+    lost = second["end"].values == "instability"
+    if not lost.any():
+        return f"the magnets' currents lower the end by {less:.1f} Hz and shorten no trajectory."
+    k = int(np.argmax(np.where(lost, ratio, 0.0)))
+    times = [float(f"{float(one['levitated'][k]):.3g}") for one in (first, second)]
+    return (
+        f"a rotor that does not conduct levitates up to {less:.1f} Hz more; at "
+        f"{float(first['rotor_frequency'][k]):.1f} Hz its floater stays for {times[0]:g} instead of {times[1]:g} s."
+    )
+
+
+def limit_numbers(result: xr.Dataset) -> dict[str, Any]:
+    """Ends of lasting flights by rotor and variant as numbers: `limits`."""
+    return {
+        "limits": [
+            {
+                "configuration": str(one["configuration"].values),
+                "value": float(one["measure"]),
+                "variant": str(one["variant"].values),
+                **{f"{name}_hz": None if np.isnan(one[name]) else float(one[name]) for name in ENDS},
+            }
+            for one in each_case(result)
+        ]
+    }
+
+
+UPPER_LIMIT = Study(
+    name="upper-limit",
+    summary="until which frequency flights last, below rotors that do and do not conduct",
+    points=limit_points,
+    compute=upper_limit,
+    figures={"upper-limit": limit_figure},
+    report=limit_lines,
+    numbers=limit_numbers,
+)
