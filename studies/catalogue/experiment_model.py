@@ -1,15 +1,13 @@
 """What rotors do by surrogates, and how probable that makes each of the article's facts.
 
 Surrogates are polynomials of a rotor's inputs, height and body spin, fitted to a design by least squares; radius and
-gravity, whose ranges are narrow, enter to first order.  The error that is stated is
-that of rotors left out of the fit, each in its turn: with H the projection onto the polynomials and r the residuals,
-the rows B of one rotor are missed by (1 - H_BB)⁻¹ r_B if it is left out (R. D. Cook, S. Weisberg, Residuals and
-Influence in Regression, 1982), so that one fit gives all.
+gravity, whose ranges are narrow, enter to first order.  Their stated error is that of rotors left out of the fit one by
+one: with H the projection onto the polynomials and r the residuals, the rows B of one rotor are then missed by
+(1 - H_BB)⁻¹ r_B (R. D. Cook, S. Weisberg, Residuals and Influence in Regression, 1982).
 
-Each flight ends in one of four ways: it falls through the fold, stays for the experiment's 250 s, is lost in
-oscillations, or there is no equilibrium.  Of each the model gives a probability, soft by the surrogate's error and by
-how much the residual motion of one flight differs from another's.  One flight in fifty is granted to end in any of the
-four ways for a reason that nobody thought of, so that no fact can rule out everything.
+A flight falls through the fold, stays for the experiment's 250 s, is lost in oscillations, or has no equilibrium: each
+has a probability, soft by the surrogate's error and by how the residual motion differs from flight to flight.  One
+flight in fifty may end for a reason that nobody thought of, so that no fact can rule out everything.
 """
 
 from __future__ import annotations
@@ -342,6 +340,7 @@ Flight = tuple[str, float, float, float]  # Kind of rotor, its δx or δz (mm), 
 Known = Mapping[Flight, Course]
 PARTS = (("floater", "floater"), ("magnets", "rotor"), ("steel", "rotor"), ("air", "air"))
 """Strengths, and the effect that each belongs to."""
+STACK = {"displacement": "stack_displacement", "tilt": "stack_tilt", "stack": "stack"}
 
 
 @dataclass(frozen=True, eq=False)
@@ -354,8 +353,7 @@ class Models:
     def conditions(self, values: Values, flight: Flight) -> tuple[Array, ...]:
         """One flight of each of the rotors with drawn unknowns, as `flown` takes them."""
         kind, distance, frequency, longest = flight
-        rotor = _single(values) if kind == "single" else _stack(values, distance)
-        known, surrogate = likeness(values), self.surrogates[kind]
+        rotor, known, surrogate = _rotor(values, kind, distance), likeness(values), self.surrogates[kind]
         displacement = rotor["displacement"] / known["edge"]
         every = {
             "displacement": displacement, "on_axis": rotor["tilt"] + PER_MILLIMETRE * displacement,
@@ -398,18 +396,16 @@ def needed(values: Values) -> Array:
     return np.asarray(np.log(LARGE / (1e-6 * values["motion"])))
 
 
-def _single(values: Values) -> dict[str, Array]:
-    """The rotor of δx = 1 mm: only the part of its displacement along the magnetisation counts."""
-    along = np.cos(np.radians(values["direction"]))
-    return {"displacement": values["displacement"] * along, "tilt": values["tilt"]}
+def _rotor(values: Values, kind: str, distance: float) -> dict[str, Array]:
+    """Displacement (mm) and tilt (°) of the rotor of δx = 1 mm, of the stack of 14 mm, or of one of another distance.
 
-
-def _stack(values: Values, distance: float) -> dict[str, Array]:
-    """The stack of 14 mm, and those of other distances (mm), of which displacement and tilt are one unknown."""
+    Of the first only the part of its displacement along the magnetisation counts; of the last both are one unknown.
+    """
+    if kind == "single":
+        along = np.cos(np.radians(values["direction"]))
+        return {"displacement": values["displacement"] * along, "tilt": values["tilt"]}
     if distance == 14.0:
-        return {
-            "displacement": values["stack_displacement"], "tilt": values["stack_tilt"], "stack": values["stack"],
-        }  # fmt: skip
+        return {name: values[of] for name, of in STACK.items()}
     every = values[f"tilt_{distance:g}"]
     return {"displacement": 0 * every, "tilt": every, "stack": np.full_like(every, distance)}
 

@@ -24,7 +24,7 @@ from spinlev.fem.rotor.table import RotorTable
 from spinlev.geometry.meshes.plate import MeshRule
 from spinlev.geometry.scene.contents import Drag, Lowering, OffsetStart, Plate, Scene
 from spinlev.geometry.shapes import Box
-from spinlev.studies.catalogue.plate_damping import plate_action
+from spinlev.studies.catalogue.plates import plate_action
 
 SetNumThreads(1)
 CUBOID = RotorTable("cuboid", MAGNETS, MAGNETS)

@@ -17,6 +17,7 @@ from spinlev.dynamics.motion.rates import Rates
 from spinlev.dynamics.motion.state import Scales
 from spinlev.fem.mutual.making import cached_mutual_table
 from spinlev.fem.rotor.choice import rotor_table
+from spinlev.studies.catalogue import regions
 from spinlev.studies.catalogue.article import article_scene
 from spinlev.studies.catalogue.finite_magnets import dipole_vs_fem
 from spinlev.studies.catalogue.margins import design, designed, sensitivity
@@ -207,7 +208,7 @@ def test_a_rotor_without_levitation_has_an_empty_row(monkeypatch):
     """Where attraction nowhere carries the weight there is no branch, and a search finds nothing."""
     scene = article_scene("horizontal", 2.0, drag=False)
     weak = replace(scene, floater=replace(scene.floater, remanence=1e-3))
-    monkeypatch.setattr(stability_map, "article_scene", lambda *rotor, **changes: weak)
+    monkeypatch.setattr(regions, "article_scene", lambda *rotor, **changes: weak)
     asked = {"configuration": "horizontal", "measure": 2.0, "model": "dipole", "with_plate": 2}
     found = stability_map(asked)
     assert np.isnan(found["lowest"]).all()

@@ -22,7 +22,7 @@ from spinlev.geometry.cutting import CONVERGENCE, cut_magnets
 from spinlev.geometry.magnets import Magnet
 from spinlev.geometry.meshes.plate import Block, ConductorMesh, graded_partition, hex_mesh
 from spinlev.geometry.shapes import Box, rotation_matrix
-from spinlev.studies.catalogue.floater_permeability import TILTS, balanced_directions, shifted_equilibrium
+from spinlev.studies.catalogue.finite_magnets import TILTS, balanced_directions, shifted_equilibrium
 
 TABLE = rotor_table(SCENE.rotor, "dipole")
 WEAK = replace(SCENE, floater=replace(FLOATER, remanence=1e-3))
