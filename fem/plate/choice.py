@@ -148,7 +148,7 @@ def plate_around(
     if region is None:
         sideways = float(np.hypot(place[0], place[1])) + REACH
         region = reachable_region(plate, [0.0, 0.0, place[2]], [sideways, sideways, REACH], radius)
-        region = _off_the_face(_rastered(region), plate, radius)
+        region = _rastered(region, plate, radius)
     highest = max(HIGHEST, COARSE * math.ceil(HARMONICS * frequency / COARSE - 1e-9))
     return PlateAround(plate, model, table, region, (LOWEST, highest), rtol)
 
@@ -206,7 +206,7 @@ def wider_region(plate: Plate, region: Region, radius: float, seen: Array) -> Re
         lower[facing] = touching
     if region.center[facing] < 0 and upper[facing] > -touching - radius:
         upper[facing] = -touching
-    found = _off_the_face(_rastered(Region(lower, upper)), plate, radius)
+    found = _rastered(Region(lower, upper), plate, radius)
     gap = float(max(found.lower[facing], -found.upper[facing]) - half[facing])
     wide = float(np.max((found.upper - found.lower)[~across])) / 2
     if wide > WIDEST * gap:
@@ -218,28 +218,26 @@ def wider_region(plate: Plate, region: Region, radius: float, seen: Array) -> Re
     return found
 
 
-def _off_the_face(region: Region, plate: Plate, radius: float) -> Region:
-    """The region without what is nearer to the face that it lies over than `SKIN` radii (m): the raster is coarse."""
-    half, lower, upper = plate.box.half_edges, region.lower.copy(), region.upper.copy()
-    facing = int(np.argmax(np.maximum(lower, -upper) - half))
-    near = half[facing] + SKIN * radius
-    if region.center[facing] > 0:
-        lower[facing] = max(lower[facing], near)
-    else:
-        upper[facing] = min(upper[facing], -near)
-    return Region(lower, upper)
-
-
 def rotor_nearby(table: RotorTable, rotor: tuple[Magnet, ...], place: Array, radius: float, rtol: float) -> RotorTable:
     """The rotor's table with the coefficients that count from `REACH` nearer to the magnets than `place` (3,) m on."""
     gap = min(float(magnet.body.distance(place)) for magnet in rotor) - REACH
     return shortened_table(table, Accuracy(rtol, max(gap, radius)))
 
 
-def _rastered(region: Region) -> Region:
-    """The region with bounds on the raster; what is nearly symmetric becomes so, which halves the work."""
+def _rastered(region: Region, plate: Plate, radius: float) -> Region:
+    """The region with bounds on the raster, but not nearer to the face that it lies over than `SKIN` radii (m).
+
+    What is nearly symmetric becomes so, which halves the work.
+    """
     lower, upper = np.floor(region.lower / RASTER + 1e-6), np.ceil(region.upper / RASTER - 1e-6)
     for axis in np.flatnonzero((lower < 0) & (upper > 0)):
         upper[axis] = max(-lower[axis], upper[axis])
         lower[axis] = -upper[axis]
-    return Region(lower * RASTER, upper * RASTER)
+    lower, upper, half = lower * RASTER, upper * RASTER, plate.box.half_edges
+    facing = int(np.argmax(np.maximum(lower, -upper) - half))
+    near = half[facing] + SKIN * radius
+    if lower[facing] + upper[facing] > 0:
+        lower[facing] = max(lower[facing], near)
+    else:
+        upper[facing] = min(upper[facing], -near)
+    return Region(lower, upper)

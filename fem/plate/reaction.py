@@ -32,20 +32,6 @@ class MeshTooLargeError(AccuracyError):
     """A mesh has more unknowns than are solved."""
 
 
-def highest_order(cells: int) -> int:
-    """The highest order, at most `HIGHEST_ORDER`, within `MOST_UNKNOWNS` on a mesh of so many hexahedra.
-
-    Raises MeshTooLargeError: it is below 3.
-    """
-    found = [p for p in range(3, HIGHEST_ORDER + 1) if cells * (3 * p * (p + 2) + 2 * p + 1) <= MOST_UNKNOWNS]
-    if not found:
-        raise MeshTooLargeError(
-            f"Input mesh must have at most {MOST_UNKNOWNS} unknowns; instead one of {cells} cells has more. Lower the "
-            "frequency, allow a larger error, or take the infinite slab (model slab), which has no such limit."
-        )
-    return found[-1]
-
-
 class Ladder:
     """Orders of the finite elements on one mesh, one after the other, and the estimated error of each.
 
@@ -56,7 +42,7 @@ class Ladder:
     ----------
     places : (n, 3) m, of the dipoles whose own tensors are compared, plate's frame
     frequency : Hz
-    allowed : relative error
+    rule, allowed : mesh, and relative error
     growing : compare fields that grow as e^{ωt} instead of phasors: half the memory, a quarter of the work
     watch : progress callback
 
@@ -76,7 +62,14 @@ class Ladder:
         watch: Watch = unwatched,
     ) -> None:
         self.mesh = plate_mesh(plate.box.size, plate.conductivity, places, frequency, rule)
-        self.highest = highest_order(self.mesh.mesh.ne)
+        cells = int(self.mesh.mesh.ne)
+        orders = [p for p in range(3, HIGHEST_ORDER + 1) if cells * (3 * p * (p + 2) + 2 * p + 1) <= MOST_UNKNOWNS]
+        if not orders:
+            raise MeshTooLargeError(
+                f"Input mesh must have at most {MOST_UNKNOWNS} unknowns; instead one of {cells} cells has more. Lower "
+                "the frequency, allow a larger error, or take the infinite slab (model slab), which has no such limit."
+            )
+        self.highest = orders[-1]
         self.places, self.frequency, self.allowed, self.growing, self.watch = places, frequency, allowed, growing, watch
         self.reach = rule.reach * float(plate.box.size.max())
         self.order, self.unknowns, self.errors = 0, 0, np.full(len(places), np.inf)

@@ -12,7 +12,7 @@ The share's series in angle and depth interpolate at equidistant angles and at C
 geometrically.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -171,8 +171,19 @@ def rotor_share(
     tolerance : for the estimated error; harmonics and depths are added until it is met
     watch : progress callback
     """
-    signals = _signals(network, plate, rotor_parts(rotor, plate, UNNOTICED * tolerance), watch)
-    distance = plate.way
+    parts, distance = rotor_parts(rotor, plate, UNNOTICED * tolerance), plate.way
+    cached: dict[tuple[float, float], Array] = {}
+
+    def signals(depths: Array, angles: Array) -> Array:
+        """(depths × angles, states) at depths (m) and angles (rad); each is computed once."""
+        places = [(float(depth), float(angle)) for depth in depths for angle in angles]
+        new = [place for place in places if place not in cached]
+        groups = [new[first : first + TOGETHER] for first in range(0, len(new), TOGETHER)]
+        for some in watched(groups, watch, f"signals of the rotor at {len(new)} places"):
+            sources = [posed_rotor(parts, plate, angle, depth) for depth, angle in some]
+            cached.update(zip(some, network.couplings(sources), strict=True))
+        return np.array([cached[place] for place in places])
+
     angles, depths = 12, 4 if distance else 1
     while True:
         nodes = np.cos(np.pi * (np.arange(depths) + 0.5) / depths)
@@ -204,24 +215,6 @@ def _trimmed(distance: float, series: Array, error: float, tolerance: float, siz
     part = series[:kept]
     small = np.abs(part) < NOISE * size
     return RotorShare(distance, np.where(small, 0.0, part), error + float(np.append(tails, [0.0, 0.0])[kept]))
-
-
-def _signals(
-    network: PassiveNetwork, plate: Plate, parts: Sequence[Source], watch: Watch
-) -> Callable[[Array, Array], Array]:
-    """Signals (depths × angles, states) of the rotor at depths (m) and angles (rad); each is computed once."""
-    cached: dict[tuple[float, float], Array] = {}
-
-    def signals(depths: Array, angles: Array) -> Array:
-        places = [(float(depth), float(angle)) for depth in depths for angle in angles]
-        new = [place for place in places if place not in cached]
-        groups = [new[first : first + TOGETHER] for first in range(0, len(new), TOGETHER)]
-        for some in watched(groups, watch, f"signals of the rotor at {len(new)} places"):
-            sources = [posed_rotor(parts, plate, angle, depth) for depth, angle in some]
-            cached.update(zip(some, network.couplings(sources), strict=True))
-        return np.array([cached[place] for place in places])
-
-    return signals
 
 
 def without_high_harmonics(share: RotorShare, table: PlateTable, allowed: float) -> RotorShare:

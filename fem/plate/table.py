@@ -67,10 +67,8 @@ class Region:
     def nearest(self, half_edges: Array) -> tuple[Array, Array]:
         """Nearest points (3,) of the region and of a plate with these half edges, m; equal if they touch."""
         of_plate = np.clip(self.center, -half_edges, half_edges)
-        for _ in range(100):  # alternating projections onto two convex boxes converge to a nearest pair
-            of_region = np.clip(of_plate, self.lower, self.upper)
-            of_plate = np.clip(of_region, -half_edges, half_edges)
-        return of_region, of_plate
+        of_region = np.clip(of_plate, self.lower, self.upper)
+        return of_region, np.clip(of_region, -half_edges, half_edges)
 
     def gap(self, half_edges: Array) -> float:
         """Distance (m) from a plate with these half edges."""

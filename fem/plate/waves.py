@@ -15,7 +15,7 @@ Turning waves add up to the waves of a cylinder, by DLMF 10.9.2:
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import partial, singledispatch
+from functools import partial
 
 import numpy as np
 
@@ -23,7 +23,7 @@ from ...geometry.common import MU_0, Array, Watch
 from ...geometry.scene.contents import Plate
 from ..closed_forms.eddy_sphere import ComplexArray
 from ..closed_forms.potentials import Dipole, PolarizedCuboid
-from ..harmonics.expansion import without_noise
+from ..harmonics.expansion import MultipoleExpansion, without_noise
 from ..harmonics.solid import Coefficients, rotated_harmonics
 from .currents import OtherSources, probe_places, unit_power
 from .eddy import Source
@@ -52,35 +52,33 @@ SLOW = 100.0  # How much slower than the lowest frequency changes may be: a slab
 REDUCTION_POINTS = 8  # Places of the training along radius and height
 # Depths of the multipoles' centres below the face, in units of the distance between region and face.
 DEPTHS = (0.0, 0.25, 0.5, 0.75, 1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0, 12.0, 16.0)
-DEGREES = 2  # Degrees of the multipoles for each order: m and m + 1
 POINTS = 13  # Places of the fit along radius and height
 # First tolerance of the fits, in units of that for the tensors, and how often it may be halved.
 COARSEST, HALVINGS = 4.0, 8
 ROUND_OFF = 1e-12
 
 
-@singledispatch
 def wave_moment(source: Source, vectors: ComplexArray, shift: ComplexArray) -> ComplexArray:
-    """∫ M·∇e^{a·x + shift} dV (...), A m, of a source for vectors a (..., 3), 1/m, and shifts (...)."""
+    """∫ M·∇e^{a·x + shift} dV (...), A m, of a `source` for `vectors` a (..., 3), 1/m, and shifts (...)."""
+    if isinstance(source, RotorSource):
+        seen = vectors @ source.turn
+        there, total = shift - seen @ source.center, np.zeros(shift.shape, complex)
+        for part in source.parts:  # of which a rotor without a field has none
+            total += wave_moment(part, seen, there)
+        return total
+    if isinstance(source, Dipole):
+        return np.asarray(vectors @ source.moment * np.exp(vectors @ source.position + shift))
+    if isinstance(source, PolarizedCuboid):
+        moment = source.polarization * source.box.volume / MU_0
+        along = vectors @ source.box.rotation * source.box.half_edges
+        shape = np.prod(np.sinc(1j * along / np.pi), axis=-1)  # sin(ix)/(ix) = sinh(x)/x
+        return np.asarray(vectors @ moment * shape * np.exp(vectors @ source.box.center + shift))
+    if isinstance(source, ExpansionSource):
+        return _expansion_moment(source.expansion, vectors, shift)
     raise TypeError(f"Input source must be a magnetisation; instead received a {type(source).__name__}.")
 
 
-@wave_moment.register
-def _(source: Dipole, vectors: ComplexArray, shift: ComplexArray) -> ComplexArray:
-    return np.asarray(vectors @ source.moment * np.exp(vectors @ source.position + shift))
-
-
-@wave_moment.register
-def _(source: PolarizedCuboid, vectors: ComplexArray, shift: ComplexArray) -> ComplexArray:
-    moment = source.polarization * source.box.volume / MU_0
-    along = vectors @ source.box.rotation * source.box.half_edges
-    shape = np.prod(np.sinc(1j * along / np.pi), axis=-1)  # sin(ix)/(ix) = sinh(x)/x
-    return np.asarray(vectors @ moment * shape * np.exp(vectors @ source.box.center + shift))
-
-
-@wave_moment.register
-def _(source: ExpansionSource, vectors: ComplexArray, shift: ComplexArray) -> ComplexArray:
-    expansion = source.expansion
+def _expansion_moment(expansion: MultipoleExpansion, vectors: ComplexArray, shift: ComplexArray) -> ComplexArray:
     x, y, z = np.moveaxis(expansion.radius * vectors, -1, 0)
     plus, minus = x + 1j * y, x - 1j * y
     total = np.zeros(z.shape, complex)
@@ -93,16 +91,6 @@ def _(source: ExpansionSource, vectors: ComplexArray, shift: ComplexArray) -> Co
             total += part * (1 if m else z)
     scale = 4 * np.pi * expansion.radius**2 / MU_0
     return np.asarray(scale * total * np.exp(vectors @ expansion.center + shift))
-
-
-@wave_moment.register
-def _(source: RotorSource, vectors: ComplexArray, shift: ComplexArray) -> ComplexArray:
-    seen = vectors @ source.turn
-    there = shift - seen @ source.center
-    total: ComplexArray = np.zeros(shift.shape, complex)  # a rotor without a field has no parts
-    for part in source.parts:
-        total = total + wave_moment(part, seen, there)
-    return total
 
 
 def cylinder_moments(
@@ -301,7 +289,10 @@ def _functions(
     point_scale = 1 / np.linalg.norm(
         np.concatenate([value * scale[:, None, None] for value, scale in zip(values, scales, strict=True)]), axis=(0, 2)
     )
-    choices = [_candidates(m, float(height.min())) for m in range(len(values))]
+    gap = float(height.min())
+    centers = [np.array([0.0, 0.0, -depth * gap]) for depth in DEPTHS]
+    # they go with cos mφ, in the cylinder's frame
+    choices = [Multipoles.at(centers, [(m, m, 0), (m + 1, m, 0)], gap) for m in range(len(values))]
     for halving in range(HALVINGS):
         part = COARSEST * tolerance / 2**halving
         fits = []
@@ -328,13 +319,6 @@ def _turn(order: int) -> Array:
     """To the meridian where cos mφ = sin mφ."""
     angle = np.pi / (4 * order) if order else 0.0
     return np.array([[np.cos(angle), -np.sin(angle), 0], [np.sin(angle), np.cos(angle), 0], [0, 0, 1.0]])
-
-
-def _candidates(order: int, gap: float) -> Multipoles:
-    """Multipoles of one order that go with cos mφ, in the cylinder's frame."""
-    pairs = [(depth, degree) for depth in DEPTHS for degree in range(order, order + DEGREES)]
-    centers = np.array([[0.0, 0.0, -depth * gap] for depth, _ in pairs])
-    return Multipoles(centers, np.array([[degree, order, 0.0] for _, degree in pairs]), gap)
 
 
 def _in_plate(fits: Sequence[Fit], frame: SlabFrame) -> tuple[Multipoles, Array]:
