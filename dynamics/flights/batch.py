@@ -23,16 +23,7 @@ from ...geometry.common import Array, InputError
 from ...geometry.scene.contents import Scene
 from ...geometry.scene.files import startless_text
 from ..motion.equations import Equations
-from ..motion.events import (
-    BEYOND,
-    CONTACT,
-    Events,
-    clearance,
-    flight_events,
-    plate_depth,
-    plate_legs,
-    range_events,
-)
+from ..motion.events import BEYOND, CONTACT, Events, clearance, flight_events, plate_depth, plate_legs, range_events
 from ..motion.plate import PlateForce, PlateMemory
 from ..motion.state import Parameter, State, Vector
 from .balls import LARGE, SMALL

@@ -23,10 +23,7 @@ class StartError(InputError):
 
 
 def initial_state(
-    scene: Scene,
-    table: FieldTable,
-    equilibria: Sequence[Equilibrium] | None = None,
-    memory: PlateMemory | None = None,
+    scene: Scene, table: FieldTable, equilibria: Sequence[Equilibrium] | None = None, memory: PlateMemory | None = None
 ) -> tuple[State, Array]:
     """State at t = 0, when the rotor's frame is the laboratory's, and the plate's states (k,), √J.
 

@@ -75,10 +75,7 @@ def parameters(scene: Scene, scales: Scales, frozen_spin: bool = False) -> Array
 
 
 def equations_of_motion(
-    table: FieldFormula,
-    tilted_gravity: bool = False,
-    memory: PlateMemory | None = None,
-    first: int = len(Parameter),
+    table: FieldFormula, tilted_gravity: bool = False, memory: PlateMemory | None = None, first: int = len(Parameter)
 ) -> Equations:
     """Rates of the scaled state in the field of a table.
 

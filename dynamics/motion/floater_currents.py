@@ -157,10 +157,7 @@ def _turned_gradient(lag: Vector, gradient: Matrix) -> Matrix:
     odd, even = [], []
     for m in modes:
         once, both = 1 / (1 + m.square), 1 / ((1 + m.square) * (1 + 4 * m.square))
-        weights = [
-            m.share * (m.delay**2.0 * once + square * m.delay**4.0 * both),
-            m.share * m.delay**4.0 * both,
-        ]
+        weights = [m.share * (m.delay**2.0 * once + square * m.delay**4.0 * both), m.share * m.delay**4.0 * both]
         odd.append(weights)
         even.append([m.delay * weight for weight in weights])
     slow = hy.sum([m.share * m.delay for m in modes])

@@ -155,11 +155,7 @@ def rotor_box(plate: Plate, rotor: RotorTable) -> Region:
 
 
 def rotor_share(
-    network: PassiveNetwork,
-    plate: Plate,
-    rotor: RotorTable,
-    tolerance: float,
-    watch: Watch = unwatched,
+    network: PassiveNetwork, plate: Plate, rotor: RotorTable, tolerance: float, watch: Watch = unwatched
 ) -> RotorShare:
     """Signals of a rotor for the pose and the way of `plate`.
 

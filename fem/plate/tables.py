@@ -101,11 +101,7 @@ def plate_and_rotor_table(
 
 
 def slab_and_rotor_table(
-    plate: Plate,
-    rotor: RotorTable,
-    region: Region,
-    frequencies: tuple[float, float] = (0.5, 250.0),
-    rtol: float = 1e-3,
+    plate: Plate, rotor: RotorTable, region: Region, frequencies: tuple[float, float] = (0.5, 250.0), rtol: float = 1e-3
 ) -> tuple[PlateTable, RotorShare]:
     """As `plate_and_rotor_table`, but for a plate that is infinite along its two longer edges.
 
