@@ -1,4 +1,4 @@
-"""What is in the scene: magnets, rotor, floater, plate, scene file, meshes.
+"""The scene: magnets, rotor, floater, plate, scene file, meshes.
 
 The public names are listed in `__init__.pyi`; each is loaded when it is first used.
 """

@@ -38,13 +38,13 @@ def even_directions(number: int) -> Array:
 
 
 class SpinlevError(Exception):
-    """What the user is told in one message."""
+    """An error whose message is for the user."""
 
     exit_status = 1
 
 
 class InputError(SpinlevError, ValueError):
-    """What the user gave cannot be used; the message names it, the rule and the value."""
+    """Input that cannot be used; the message names it, the rule and the value."""
 
     exit_status = 2
 
@@ -58,7 +58,7 @@ class MeshError(ComputationError):
 
 
 def shown(value: object, most: int = 80) -> str:
-    """What was received, for a message: as Python writes it, on one line, no longer than `most`."""
+    """A value that was received, for a message: as Python writes it, on one line, no longer than `most`."""
     try:
         text = repr(value)
     except (ValueError, RecursionError):  # an integer of thousands of digits; lists in lists by the thousand
@@ -67,7 +67,7 @@ def shown(value: object, most: int = 80) -> str:
 
 
 def printable(text: str) -> str:
-    """The same on a terminal, which must not obey what a file or a name holds: control characters are escaped."""
+    """Text for a terminal, which must not obey what a file or a name holds: control characters are escaped."""
     if text.isprintable():
         return text
     return "".join(c if c.isprintable() or c in "\n\t" else c.encode("unicode_escape").decode() for c in text)
@@ -108,7 +108,7 @@ def unwatched(stage: str, share: float) -> None:
 
 
 def watched(items: Iterable[Item], watch: Watch, stage: str) -> Iterator[Item]:
-    """The `items` one after the other, of which a `stage` of the work, as `watch` is told, takes each."""
+    """The `items` one after the other, each reported to `watch` as a share of a `stage`."""
     known = list(items)
     for done, item in enumerate(known):
         watch(stage, done / len(known))

@@ -36,7 +36,7 @@ Answer = TypeVar("Answer")
 
 
 def regular_file(path: str | Path, most_bytes: int, name: str, kind: str) -> BinaryIO:
-    """A file that a user named, opened for reading once it is known to be one: what is none can hang, or never end.
+    """A file that a user named, opened for reading once it is known to be one: others may block, or never end.
 
     Parameters
     ----------
@@ -130,7 +130,7 @@ class CrashError(LostError):
 
 
 def call_apart(seconds: float, function: Callable[..., Answer], *given: Any) -> Answer:
-    """What a function of this package returns, called in another process.
+    """Call a function of this package in another process.
 
     Parameters
     ----------
@@ -181,7 +181,7 @@ def _serve() -> None:
 
 
 def sent_answer(task: bytes) -> bytes:
-    """What a process sends that has the limits of its task from here on."""
+    """Answer of a process that has the limits of its task from here on."""
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
     with contextlib.suppress(ValueError):  # the limit of this process may be lower already
         resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))

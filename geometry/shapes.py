@@ -76,7 +76,7 @@ class Body:
 
     @abstractmethod
     def reach(self, directions: Array) -> Array:
-        """How far (n,) it reaches from its centre along unit vectors (n, 3), m, or against them if that is more."""
+        """Extent (n,) from its centre along unit vectors (n, 3), m, or against them if that is more."""
 
     @abstractmethod
     def distance(self, points: ArrayLike) -> Array:
@@ -87,7 +87,7 @@ class Body:
         """Distances (n,) m of points (n, 3) m from the nearest edge; infinite where it has none."""
 
     def support(self, directions: Array) -> Array:
-        """How far (n,) it reaches along unit vectors (n, 3), m, whatever lies against them."""
+        """Extent (n,) from its centre along unit vectors (n, 3), m."""
         return self.reach(directions)
 
     def within(self, points: Array) -> Array:
@@ -185,7 +185,7 @@ class Box(Body):
 
 
 class _Turned(Body):
-    """What a rectangle beside the body's z axis makes as it turns about that."""
+    """The solid of revolution of a rectangle beside the body's z axis."""
 
     if TYPE_CHECKING:
         radius: float

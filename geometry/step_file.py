@@ -63,7 +63,7 @@ def _measured(text: str) -> tuple[Any, ...]:
 
 
 def measured(text: str) -> tuple[str, Array, Array, Array, float, float, Array]:
-    """What `Part` knows of the solid of a STEP file's text, from its BREP text on.
+    """Fields of a `Part` from its BREP text on, of the solid of a STEP file's text.
 
     Raises InputError where there is not one closed solid, with the end of a sentence that begins with the file.
     """

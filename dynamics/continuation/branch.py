@@ -68,7 +68,7 @@ class BranchPoint:
 
     @property
     def doubt_per_s(self) -> float:
-        """What round-off may do to it, 1/s."""
+        """Round-off error of the growth rate, 1/s."""
         return float(self.motion.errors.max()) / self.time_unit
 
     @property
@@ -102,7 +102,6 @@ class Family(BalanceCurve):
         return Balance(self.rates, *self.problem(parameter))
 
     def balances(self, parameter: Array, which: Indices) -> Balance:
-        """Of the one curve there is."""
         return self.balance(float(parameter[0]))
 
     def solution(self, guess: Array, parameter: float) -> Array | None:
@@ -127,7 +126,7 @@ class Family(BalanceCurve):
         )
 
     def point(self, position: Array, moment: Array, parameter: float) -> BranchPoint:
-        """The same at a scaled `position` and `moment` (3,), with the tangent towards growing values of `parameter`."""
+        """Equilibrium at a scaled `position` and `moment` (3,), its tangent towards growing values of `parameter`."""
         unknowns = np.concatenate([position, moment, [parameter / self.unit]])
         return self.at(unknowns, directions(self, unknowns[None], np.eye(7)[6:])[0], parameter)
 
@@ -206,7 +205,7 @@ def _marked(
         return family.at(points[0], tangents[0], float(points[0, 6]) * family.unit)
 
     def located(measure: Callable[[BranchPoint], float], kind: str) -> tuple[float, BranchPoint]:
-        """How far along the step a measure changes its sign, and the point there."""
+        """Length along the step at which a measure changes its sign, and the point there."""
         begin, step = measure(before), length
         if begin * measure(at(step)) <= 0:  # else a landed end: the change is beyond it
             root = scipy.optimize.brentq

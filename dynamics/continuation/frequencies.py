@@ -124,7 +124,7 @@ def _hanging(scene: Scene, table: FieldTable, family: Family) -> Array:
 
 
 def distance_error(scene: Scene, table: FieldTable, family: Family, point: BranchPoint) -> float:
-    """What the errors that a table and its effects state may change of the distance along the axis, first order, m.
+    """Error of the distance along the axis by the errors that a table and its effects state, to first order, m.
 
     Parameters
     ----------
@@ -184,7 +184,7 @@ def levitating_ranges(scene: Scene, table: FieldTable, rates: Rates) -> list[Sta
 
 
 def _stable_ranges(scene: Scene, rates: Rates, start: Array, frequency: float) -> list[StableRange]:
-    """Those on the branch through an equilibrium, both ways to its first fold, contact with the rotor or the border."""
+    """Intervals of stability through an equilibrium, both ways to the first fold, contact with the rotor or border."""
     walk = partial(_side, replace(scene, plate=None), by_frequency(scene, rates), start, frequency)
     below, above = walk(LOWEST), walk(HIGHEST)
     runs: list[list[BranchPoint]] = [[]]
@@ -293,7 +293,7 @@ def way_out(
     widest: float = WIDEST,
     memory: PlateMemory | None = None,
 ) -> str:
-    """What is wrong with a scene of which these are all equilibria, and what would help.
+    """Message for a scene without a stable equilibrium, with a frequency that has one.
 
     Parameters
     ----------

@@ -254,7 +254,7 @@ def surveys(
     rates: Rates,
     measures: ArrayLike = 0.0,
 ) -> list[tuple[Survey, bool]]:
-    """What `equilibria.survey` finds for each scene, without its curves; neighbours help each other as in a map.
+    """Survey of each scene as by `equilibria.survey`, without curves; neighbours help each other as in a map.
 
     Parameters
     ----------

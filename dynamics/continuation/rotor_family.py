@@ -37,7 +37,7 @@ Numbers = Sequence[Any]  # A vector of heyoka expressions, or of arrays (n,)
 
 @dataclass(frozen=True)
 class Move:
-    """How a part of the rotor moves with the measure."""
+    """Motion of a part of the rotor with the measure."""
 
     way: tuple[float, float, float] = (0.0, 0.0, 0.0)  # it moves by the measure (m) along this vector
     turning: bool = False  # it turns by the measure (rad) about the rotor's y, so that +x comes towards +z

@@ -1,4 +1,4 @@
-"""What moves the body spin: torques along the floater's own moment, on which magnetic torque has no part.
+"""Slow drift of the body spin: torques along the floater's own moment, on which magnetic torque has no part.
 
 That of air goes beyond Stokes' range (`effects.air`): 8πηR³Ω times f for a steady spin, times h for a small swing.
 """
@@ -99,7 +99,7 @@ class Drift:
 
     @property
     def levitated_s(self) -> float:
-        """How long the floater stayed up, s; infinite where it comes to a balance."""
+        """Levitation time, s; infinite where the floater comes to a balance."""
         return np.inf if self.ended_by == BALANCE else float(self.time[-1]) + self.last_fall_s
 
     def fall_rate(self, start: float, end: float) -> float:
@@ -266,7 +266,7 @@ def lasting_frequencies(
 
     @cache
     def ended(at: float) -> tuple[str, float]:
-        """What ends the flight at a frequency (Hz), "" if it lasts; and the largest growth in it, 1/s."""
+        """End of the trajectory at a frequency (Hz), "" if it lasts, and the largest growth in it, 1/s."""
         near = min(branch, key=lambda point: abs(point.parameter - at))
         point, there = at_frequency(scene, rates, near, at, LONG_STEPS, np.inf), replace(scene, frequency=at)
         flight = drift(there, table, 0.0, duration, rates, Scales.of(there).unpack(point.state), False, e_folds)
@@ -274,7 +274,7 @@ def lasting_frequencies(
         return "" if lasts else flight.ended_by, float(flight.growth_per_s.max())
 
     def edge(kept: float, gone: float) -> tuple[float, float]:
-        """The same two frequencies, at which the flight lasts and does not, nearer to each other."""
+        """Two frequencies, at which the trajectory lasts and does not, nearer to each other."""
         while abs(gone - kept) > resolution:
             middle = (kept + gone) / 2
             kept, gone = (kept, middle) if ended(middle)[0] else (middle, gone)

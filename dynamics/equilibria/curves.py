@@ -86,7 +86,7 @@ def newton_search(
     far: float = np.inf,
     watch: Watch = unwatched,
 ) -> tuple[Indices, Array]:
-    """What starts lead to by Newton's method, in one problem or in several side by side, each solution once.
+    """Solutions that Newton's method finds from starts, in one problem or in several side by side, each once.
 
     Parameters
     ----------
@@ -97,7 +97,7 @@ def newton_search(
     free : which balances shall vanish and which unknowns move, see `balance.solve`
     margin : so far outside the range (radii) solutions are kept
     reach, far : longest steps, see `balance.solve`
-    watch : is told the stage of the search and its share that is done
+    watch : progress of the search
 
     Returns
     -------
@@ -206,7 +206,7 @@ def fixed_points(balance: Balance, where: SearchRange, watch: Watch = unwatched)
     Parameters
     ----------
     balance, where : of one problem
-    watch : is told the stage of the search and its share that is done
+    watch : progress of the search
     """
     curves = _all_curves(balance, where, watch)
     guesses = [*(curve.balanced() for curve in curves), from_starts(balance, where, EVERY, SPARE, watch)]

@@ -1,4 +1,4 @@
-"""What is known of a synchronous equilibrium, and of the curve on which it lies."""
+"""A synchronous equilibrium, the curve on which it lies, and the survey of all."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ class EquilibriumError(ComputationError):
 class Equilibrium:
     """One synchronous equilibrium, along the rotor's axes.
 
-    Where a plate or tilted gravity shakes the floater once a turn it is a periodic motion, and `state` its mean.
+    Where a plate or tilted gravity forces the floater once a turn it is a periodic motion, and `state` its mean.
 
     Parameters
     ----------
@@ -216,5 +216,5 @@ class Survey:
 
     @property
     def unknown(self) -> tuple[LeftOut, ...]:
-        """Of what is left out that of which it is not known whether it is an equilibrium."""
+        """Solutions left out of which it is not known whether they are equilibria."""
         return tuple(one for one in self.left_out if one.why in (NOT_CONVERGED, PAST_TABLE))

@@ -38,7 +38,7 @@ class Modes:
         return positive[np.diff(positive, prepend=-np.inf) > 1e-9]
 
     def in_seconds(self, time: float) -> dict[str, Any]:
-        """What an `Equilibrium` says of them, in SI units; `time` is the unit of the eigenvalues', s."""
+        """Fields of an `Equilibrium` in SI units; `time` is the unit of the eigenvalues', s."""
         return {
             "stable": self.stable,
             "growth_per_s": self.growth / time,

@@ -1,4 +1,4 @@
-"""Periodic motion in the rotor's frame, where a plate or tilted gravity shakes the floater once a turn.
+"""Periodic motion in the rotor's frame, where a plate or tilted gravity forces the floater once a turn.
 
 The floater's state at N equidistant instants of a turn is unknown; derivatives are those of the trigonometric
 interpolation, so that the error falls geometrically with N.  The plate's states are eliminated exactly: at the
@@ -115,20 +115,22 @@ class OrbitProblem:
         return 2 * np.pi * np.arange(self.count) / self.count
 
     def __call__(self, states: Array) -> tuple[Array, Array]:
-        """What shall vanish (12 n,), and its derivatives (12 n, 12 n)."""
+        """Residual (12 n,) and its derivatives (12 n, 12 n)."""
         n, change = self.count, differentiation(self.count)
         rates, slopes = self._floater(states)
         residual = change @ states - rates
         slope = np.einsum("ab,xy->axby", change, np.eye(12))
         slope[np.arange(n), :, np.arange(n)] -= slopes
         if self.plate is not None:
-            heard, memory = self.plate(self.times, states), self.plate.remembered(n)
-            currents = np.einsum("iab,bi->ai", memory, heard.signals) - heard.signals
-            residual[:, ACCELERATED] -= np.einsum("aix,ai->ax", heard.fields, currents)
-            pull = np.einsum("akyx,ak->axy", heard.pull, self.plate.strengths(currents))
+            # The plate pulls with what its states have relaxed to, less the signals themselves: F (M - 1) s(x).
+            drive, memory = self.plate(self.times, states), self.plate.remembered(n)
+            currents = np.einsum("iab,bi->ai", memory, drive.signals) - drive.signals
+            residual[:, ACCELERATED] -= np.einsum("aix,ai->ax", drive.fields, currents)
+            pull = np.einsum("akyx,ak->axy", drive.pull, self.plate.strengths(currents))
             slope[np.arange(n)[:, None], ACCELERATED, np.arange(n)[:, None]] -= pull
+            # F changes at the same instant alone, the currents with the signals of all instants.
             answer = memory - np.eye(n)
-            slope[:, ACCELERATED] -= np.einsum("aix,iab,biy->axby", heard.fields, answer, heard.by_state, optimize=True)
+            slope[:, ACCELERATED] -= np.einsum("aix,iab,biy->axby", drive.fields, answer, drive.by_state, optimize=True)
         return residual.ravel(), slope.reshape(12 * n, 12 * n)
 
     def whole(self, states: Array) -> tuple[Array, Array]:
@@ -136,16 +138,16 @@ class OrbitProblem:
         slopes = self._floater(states)[1]
         if self.plate is None:
             return np.zeros((self.count, 0)), slopes
-        heard, decay = self.plate(self.times, states), self.plate.rates
-        memory = np.einsum("iab,bi->ai", self.plate.remembered(self.count), heard.signals)
+        drive, decay = self.plate(self.times, states), self.plate.rates
+        memory = np.einsum("iab,bi->ai", self.plate.remembered(self.count), drive.signals)
         size = 12 + len(decay)
         full = np.zeros((self.count, size, size))
         full[:, :12, :12] = slopes
-        strengths = self.plate.strengths(memory - heard.signals)
-        full[:, ACCELERATED, :12] += np.einsum("akyx,ak->axy", heard.pull, strengths)
-        full[:, ACCELERATED, :12] -= np.einsum("aix,aiy->axy", heard.fields, heard.by_state)
-        full[:, ACCELERATED, 12:] = heard.fields.swapaxes(1, 2)
-        full[:, 12:, :12] = decay[:, None] * heard.by_state
+        strengths = self.plate.strengths(memory - drive.signals)
+        full[:, ACCELERATED, :12] += np.einsum("akyx,ak->axy", drive.pull, strengths)
+        full[:, ACCELERATED, :12] -= np.einsum("aix,aiy->axy", drive.fields, drive.by_state)
+        full[:, ACCELERATED, 12:] = drive.fields.swapaxes(1, 2)
+        full[:, 12:, :12] = decay[:, None] * drive.by_state
         full[:, 12:, 12:] = -np.diag(decay)
         return memory, full
 
@@ -194,9 +196,9 @@ WEIGHTS = np.array([5, 8, 5]) / 18
 def floquet_modes(orbit: Orbit) -> Modes:
     """Small motions about an orbit that keep |m̂| and the body spin: growth and frequencies over a turn.
 
-    A multiplier ρ leaves a frequency open to whole multiples of the rotor's; each mode is told at the one that is
+    A multiplier ρ leaves a frequency open to whole multiples of the rotor's; each mode is given at the one that is
     strongest in its motion along the rotor's axes.  The error is that of the steps (twice as long for comparison) and
-    of round-off.  Of the plate's own modes, which only decay, the ten of the floater are told apart by their shapes.
+    of round-off.  Of the plate's own modes, which only decay, the ten of the floater are distinguished by their shapes.
     """
     size = orbit.derivatives.shape[1]
     tangent, projection = np.zeros((size, size - 2)), np.zeros((size - 2, size))
@@ -222,7 +224,7 @@ def floquet_modes(orbit: Orbit) -> Modes:
 
 
 def _propagated(derivatives: Array, steps: int) -> Array:
-    """What unit deviations have become (steps + 1, s, s) after every step of a turn.
+    """Propagator of deviations (steps + 1, s, s) after every step of a turn.
 
     The plate's states, each of which decays by itself, are eliminated from the equations of a step's stages: what is
     solved for are the floater's slopes alone.
@@ -244,12 +246,12 @@ def _propagated(derivatives: Array, steps: int) -> Array:
     system = np.eye(36) - step * np.einsum("njxky,km->njxmy", pull, COLLOCATION).reshape(steps, 36, 36)
     right = np.concatenate([pull.sum(axis=3), kept], axis=-1).reshape(steps, 36, size)
     stages = np.linalg.solve(system, right).reshape(steps, 3, 12, size)
-    heard = driven @ (np.eye(12, size) + step * np.einsum("km,nmxs->nkxs", COLLOCATION, stages))
-    heard -= np.eye(size)[12:] * decay[:, None]
+    signals = driven @ (np.eye(12, size) + step * np.einsum("km,nmxs->nkxs", COLLOCATION, stages))
+    signals -= np.eye(size)[12:] * decay[:, None]
     moved = step * np.einsum("j,njxs->nxs", WEIGHTS, stages)
-    remembered = step * sum(heard[:, k] * (WEIGHTS @ damped)[:, k, None] for k in range(3))
+    relaxed = step * sum(signals[:, k] * (WEIGHTS @ damped)[:, k, None] for k in range(3))
     found = [np.eye(size)]
-    for change in np.concatenate([moved, remembered], axis=1):
+    for change in np.concatenate([moved, relaxed], axis=1):
         found.append(found[-1] + change @ found[-1])
     return np.array(found)
 

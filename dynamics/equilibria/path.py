@@ -33,7 +33,7 @@ class Equations(Protocol):
     """k equations in k + 1 unknowns, at points of many curves in one call."""
 
     def linear(self, points: Array, which: Indices) -> tuple[Array, Array]:
-        """What shall vanish (n, k) at points (n, k + 1) of curves `which` (n,), and its derivatives (n, k, k + 1)."""
+        """Residuals (n, k) at points (n, k + 1) of curves `which` (n,), and its derivatives (n, k, k + 1)."""
 
     def onto(self, points: Array) -> Array:
         """The points, with what shall be a unit vector made one."""
@@ -91,7 +91,7 @@ class BalanceCurve(AtRest, ABC):
 
 @dataclass(frozen=True)
 class Steps:
-    """How a curve is followed.
+    """Step control along a curve.
 
     Parameters
     ----------
@@ -196,7 +196,7 @@ def _along(slope: Array, before: Array) -> Array:
 
 
 def _solved(slope: Array, row: Array, value: Array, last: float) -> Array:
-    """What has the products (n, k) with derivatives (n, k, k + 1) and `last` with a row (n, k + 1); or not a number."""
+    """Vectors with products (n, k) with derivatives (n, k, k + 1) and `last` with a row (n, k + 1); or not a number."""
     matrices = np.concatenate([slope, row[:, None]], axis=1)
     found = np.full((*row.shape, 1), last)
     found[:, :-1, 0] = value

@@ -34,7 +34,7 @@ class OrbitCurve:
     spin: float  # body spin s
 
     def linear(self, points: Array, which: Indices) -> tuple[Array, Array]:
-        """What shall vanish (1, 12 n) at one point (1, 12 n + 1), and its derivatives (1, 12 n, 12 n + 1).
+        """Residual (1, 12 n) at one point (1, 12 n + 1), and its derivatives (1, 12 n, 12 n + 1).
 
         The equations of an orbit keep |m̂| and the spin, so that two of the 12 n + 2 follow from the others; of their
         singular value decomposition as many are taken as there are unknowns but one.
@@ -81,7 +81,7 @@ class ForcedMotion:
         return bool(np.all(self.memory.table.in_range(self.memory.plate.box.to_body(known.laboratory_turn.position))))
 
     def equilibrium(self, known: Equilibrium) -> Equilibrium | LeftOut:
-        """What a fixed point, or a motion in tilted gravity before there is a plate, becomes; or why it is none."""
+        """Periodic motion that a fixed point, or one in tilted gravity without plate, becomes; or why it is none."""
         scales, fixed = Scales.of(self.scene), known.without or known
         begun = known.state if known.turn is None else known.turn
         orbit, why, part = self._followed(scales.pack(begun), known.spin, known.turn is None)
@@ -162,7 +162,7 @@ def _turned(curve: OrbitCurve, states: Array, done: float) -> tuple[Array | None
 
 
 def _moved(before: Array, after: Array) -> float:
-    """How far an orbit (n, 12) is on the average from another one, or from a state (12,), in floater radii."""
+    """Distance of the means of an orbit (n, 12) and of another one, or a state (12,), in floater radii."""
     start = before if before.ndim == 1 else before.mean(axis=0)
     return float(np.linalg.norm((after.mean(axis=0) - start)[:3]))
 

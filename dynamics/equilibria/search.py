@@ -62,10 +62,10 @@ FIXED_POINTS = TableKind("equilibria", FixedPoints, "Fixed points of a scene wit
 def cached_points(
     scene: Scene, equations: str, spin: float, make: Callable[[], FixedPoints], report: Callable[[str], None]
 ) -> tuple[FixedPoints, bool]:
-    """What a search `make` finds, from the cache if it is there, and whether it was.
+    """Result of a search `make`, from the cache if it is there, and whether it was.
 
     Of a `scene`, whose plate decides nothing, with body `spin`; `equations` tells the rotor's table and the equations
-    of motion from all others, and `report` hears what is wrong with the cache.
+    of motion from all others, and `report` is called with faults of the cache.
     """
     inputs = equations, spin, _own_spin(scene), parameters(scene, Scales.of(scene), frozen_spin=True)
     return FIXED_POINTS.cached(inputs, make, report)
@@ -112,7 +112,7 @@ def survey(
     farthest : largest depth, and distance from the axis, m
     rates : `Rates` of the same table, to compile them once for many scenes
     remembered : gets the search and gives what it finds, perhaps from an earlier one, see `cached_points`
-    watch : is told the stage of the search and its share that is done
+    watch : progress of the search
 
     With gravity across the axis equilibria are periodic motions, followed from the fixed points without it.
 
@@ -149,7 +149,7 @@ def _search(scene: Scene, table: FieldTable, balance: Balance, farthest: float, 
 def _of_shape(
     scene: Scene, table: FieldTable, known: NDArray[np.bool_], doubts: Array, where: Array
 ) -> tuple[NDArray[np.bool_], Array]:
-    """Of a floater that is no sphere: where it is free of the rotor and its multipoles tell the force, and doubts."""
+    """Places where a floater that is no sphere is free of the rotor and its multipoles tell the force, and doubts."""
     # The search knows the largest sphere in it alone; what the multipoles leave out is added to the doubts.
     floater, length = scene.floater, Scales.of(scene).length
     (shape,) = (effect for effect in with_effects(scene, table).effects if isinstance(effect, FloaterShape))
@@ -222,7 +222,7 @@ def with_plate(
 
 
 def _forced(problem: ForcedMotion, known: Survey) -> Survey:
-    """The same equilibria with the plate's currents and the whole gravity; those that are none are left out."""
+    """Equilibria with the plate's currents and the whole gravity; those that are none are left out."""
     found = [problem.equilibrium(e) if problem.reaches(e) else e for e in known.equilibria]
     return _survey(found, known.curves, known.left_out)
 

@@ -38,7 +38,7 @@ ON_EDGE = 5e-3  # How near to the edges of a part's triangles its own lie, in ci
 
 @dataclass(frozen=True)
 class MeshSettings:
-    """How fine the mesh is."""
+    """Fineness of the mesh."""
 
     ball_radius: float = 1.3  # of the ball of air, in radii of the smallest ball about all magnets
     magnet_size: float = 1.0  # largest element in a magnet, in cube roots of its volume

@@ -124,7 +124,7 @@ def hex_mesh(lines: Sequence[Array], blocks: Sequence[Block], mirrors: tuple[int
 
 @dataclass(frozen=True)
 class MeshRule:
-    """How fine the mesh is; the defaults suit orders 3 to 5, for which few large cells cost least."""
+    """Fineness of the mesh; the defaults suit orders 3 to 5, for which few large cells cost least."""
 
     distance_share: float = 1.2  # cell size in the plate, in units of the distance to the nearest dipole
     skin_share: float = 2.0  # cell size at the faces, in units of the skin depth

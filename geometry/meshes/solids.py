@@ -130,7 +130,7 @@ def _rule(brep: str, order: int) -> tuple[Array, Array]:
 
 
 def unmeshed(error: LostError, name: str) -> ComputationError:
-    """What is told of files whose mesh another process did not make; a MeshError where another mesh may do."""
+    """Error for files whose mesh another process did not make; a MeshError where another mesh may do."""
     kind = MeshError if isinstance(error, CrashError) else ComputationError
     return kind(f"The mesher {error}: {name}. {SIMPLER}")
 

@@ -1,4 +1,4 @@
-"""The floater: a permanent magnet, a sphere or another solid, that hangs below the rotor."""
+"""The scene in SI units: floater, plate, drag, start, and the whole."""
 
 from __future__ import annotations
 
@@ -132,7 +132,7 @@ class Lowering:
     distance: float
 
     def depth(self, time: float) -> float:
-        """How far the plate has gone down at `time`, m."""
+        """Way of the plate down at `time`, m."""
         return min(max(time - self.start, 0.0) * self.speed, self.distance)
 
 
@@ -195,7 +195,7 @@ class OffsetStart:
 
 @dataclass(frozen=True)
 class MapReading:
-    """How a map of the field is to be read where its file does not tell."""
+    """Reading of a map of the field where its file does not tell."""
 
     # length_unit, field_unit: of the coordinates and of B, whatever the file says; None: as it says
     length_unit: str | None = None
@@ -206,7 +206,7 @@ class MapReading:
 
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """All that a computation needs to know.
+    """Everything that a computation needs.
 
     Parameters
     ----------

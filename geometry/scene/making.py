@@ -82,7 +82,7 @@ def _digest(path: Path, state: tuple[int, ...]) -> str:
 
 
 def _too_many(rotor: AnyRotor, known: Scene) -> list[str]:
-    """What is wrong with a number of bodies whose overlaps would take minutes."""
+    """Fault of a number of bodies whose overlaps would take minutes."""
     number = len(rotor.conductors) + (len(rotor.magnets) if isinstance(rotor, ExplicitRotor) else 0)
     most = max(MOST_BODIES, len(known.turning_bodies))
     if number <= most:

@@ -1,4 +1,4 @@
-"""What is wrong with a scene, in one grammar: Input KEY must be RULE; instead received VALUE."""
+"""Faults of a scene, in one grammar: Input KEY must be RULE; instead received VALUE."""
 
 import difflib
 from collections.abc import Sequence

@@ -132,7 +132,7 @@ class MagnetTable(_Placed):
 
 
 class AnyRotor(Table):
-    """What every rotor may have."""
+    """Keys of every rotor."""
 
     field_map: Name | None = None
     map_length_unit: Literal["m", "cm", "mm", "um", "in"] | None = None
@@ -377,7 +377,7 @@ def _start_faults(start: StartTable) -> list[str]:
 
 
 def _shape_faults(place: str, table: Any) -> list[str]:
-    """What is wrong with the sizes of a shape at a place of the scene file."""
+    """Faults of the sizes of a shape at a place of the scene file."""
     given = [key for key in SIZE_KEYS if getattr(table, key, None) is not None]
     if getattr(table, "file", None):
         if table.shape != "cuboid":
