@@ -108,18 +108,21 @@ def parse_scene(
 
 def _keys(text: str, source: str) -> dict[str, Any]:
     """The tables of a text, of which TOML's parser survives the reading."""
+    if LONGEST_KEY.search(text):
+        raise SceneError(source, ["Input key must have fewer than 20 parts; instead there is one with more."])
     try:
-        if not LONGEST_KEY.search(text):
-            return tomllib.loads(text)
-        fault = "Input key must have fewer than 20 parts; instead there is one with more."
+        return tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
         point = " Decimals have a point, lists square brackets." if DECIMAL_COMMA.search(text) else ""
-        fault = f"Input scene must be TOML; instead: {str(error)[:200]}.{point}"
+        raise SceneError(source, [f"Input scene must be TOML; instead: {str(error)[:200]}.{point}"]) from None
     except RecursionError:
-        fault = "Input scene must be TOML with few lists in each other; instead some are nested too deep."
+        raise SceneError(
+            source, ["Input scene must be TOML with few lists in each other; instead some are nested too deep."]
+        ) from None
     except ValueError:  # Python's own limit
-        fault = "Input scene must have numbers of a few digits; instead one has thousands."
-    raise SceneError(source, [fault])
+        raise SceneError(
+            source, ["Input scene must have numbers of a few digits; instead one has thousands."]
+        ) from None
 
 
 def changed(scene: Scene, changes: Mapping[str, float], source: str = "scene", known: Scene | None = None) -> Scene:
@@ -145,8 +148,10 @@ def _check_same(scene: Scene, files: Iterable[tuple[str, str]], source: str) -> 
     for path, digest in files:
         if before.get(path, digest) != digest:
             instead = "its content is another one" if digest else "it cannot be read any more"
-            fault = f"Input {path} must stay as it was when the scene was read; instead {instead}."
-            raise SceneError(source, [f"{fault} Begin again, and what needs the file is computed anew."])
+            way_out = "Begin again, and what needs the file is computed anew."
+            raise SceneError(
+                source, [f"Input {path} must stay as it was when the scene was read; instead {instead}. {way_out}"]
+            )
 
 
 def _replace(raw: Any, key: str, value: float, source: str) -> None:
@@ -160,8 +165,10 @@ def _replace(raw: Any, key: str, value: float, source: str) -> None:
         else:
             raw.update({last: value})
     except (ValueError, KeyError, IndexError, TypeError, AttributeError):
-        fault = f"Input {shown(key)} must be a key inside the tables and lists that the scene has; instead it is not."
-        raise SceneError(source, [fault]) from None
+        raise SceneError(
+            source,
+            [f"Input {shown(key)} must be a key inside the tables and lists that the scene has; instead it is not."],
+        ) from None
 
 
 def scene(
