@@ -44,7 +44,7 @@ class SpinlevError(Exception):
 
 
 class InputError(SpinlevError, ValueError):
-    """Input that cannot be used; the message names it, the rule and the value."""
+    """An input that cannot be used; the message names it, the rule and the value."""
 
     exit_status = 2
 
