@@ -42,18 +42,13 @@ def small_multiples(
         unused.remove()
     axes = list(grid.flat[:count])
     for k, (panel, title) in enumerate(zip(axes, titles, strict=True)):
-        _entitle(panel, title, " ")
+        panel.set_title(f"{panel.get_title('left')} {title}".strip())
         if k % columns == 0:
             panel.set_ylabel(ylabel)
         if k + columns >= count:
             panel.set_xlabel(xlabel)
             panel.tick_params(labelbottom=True)  # the last in its column, though another row may follow
     return figure, axes
-
-
-def _entitle(panel: Axes, text: str, between: str = ", ") -> None:
-    before = panel.get_title("left")
-    panel.set_title(f"{before}{between}{text}" if before else text)
 
 
 def by_configuration(result: xr.Dataset) -> Iterator[tuple[str, xr.Dataset]]:
@@ -99,7 +94,7 @@ def rotor_panels(
         rotors = [rotor for _, rotor in by_rotor(part)]
         known = [float(rotor[_measure(rotor)][0]) for rotor in rotors]
         if len(known) == 1:
-            _entitle(axes, rotor_label(configuration, known[0]))
+            axes.set_title(axes.get_title("left").replace(TITLES[configuration], rotor_label(configuration, known[0])))
             found.append((axes, rotors[0], PALETTE[0]))
             continue
         colors = mpl.colormaps["viridis"](np.linspace(0, 0.88, len(known)))

@@ -9,7 +9,7 @@ import xarray as xr
 from scipy.interpolate import CubicSpline
 
 from ...geometry.common import Array
-from .style import COLORS, DASHES, NAMES, PAGE, PALETTE, legend_below, panels, styled
+from .style import COLORS, COLUMN, DASHES, NAMES, PAGE, PALETTE, legend_below, panels, styled
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -17,11 +17,12 @@ if TYPE_CHECKING:
 
 DISTANCE = "distance below the rotor (mm)"
 MARKS = (
-    ("o", None, "stable, no plate"),
-    ("o", "white", "unstable, no plate"),
-    ("D", None, "stable, with the plate"),
-    ("D", "white", "unstable, with the plate"),
+    (False, 1, "o", None, "stable, no plate"),
+    (False, 0, "o", "white", "unstable, no plate"),
+    (True, 1, "D", None, "stable, with the plate"),
+    (True, 0, "D", "white", "unstable, with the plate"),
 )
+"""Of equilibria: whether the plate's currents act, whether it is stable, marker, its face, and what it means."""
 PARTS = 120
 """Intervals of an envelope: more than a printed figure tells apart."""
 SHOWN = 200
@@ -32,7 +33,8 @@ HOURS = 7200.0
 """Flights that take longer are drawn over hours, s."""
 MODE_MARKERS = "osD^v"
 NO_GROWTH = 1e-9
-"""Growth that counts as none on the axis, 1/s."""
+"""Growth that counts as none, 1/s."""
+UNITS = {"hz": "Hz", "mm": "mm", "deg": "°", "T": "T", "s": "s"}
 QUANTITIES = {
     "equilibria": ("depth", "lateral_offset", "polar_angle", "growth"),
     "flight": ("levitated", "height_spread"),
@@ -44,7 +46,7 @@ QUANTITIES = {
 @styled
 def field_figure(result: xr.Dataset) -> Figure:
     """Field components on the axis below the rotor for every model, and how far the models are apart."""
-    figure, ((left, right),) = panels(1, 2, (8.0, 3.4))
+    figure, ((left, right),) = panels(1, 2, (PAGE, 3.2))
     distance = -1e3 * result["axis_height"].values
     reference = str(result.attrs["best_model"])
     true = result["axis_field"].sel(model=reference).values
@@ -52,47 +54,45 @@ def field_figure(result: xr.Dataset) -> Figure:
         field = result["axis_field"].sel(model=model).values
         look: dict[str, Any] = {"color": COLORS[model], "linestyle": DASHES[model]}
         left.semilogy(distance, 1e3 * np.hypot(field[:, 0], field[:, 1]), label=NAMES[model], **look)
-        left.semilogy(distance, 1e3 * np.abs(field[:, 2]), **look)
+        left.semilogy(distance, 1e3 * np.abs(field[:, 2]), **{**look, "lw": 0.6})
         if model != reference:
             apart = np.linalg.norm(field - true, axis=1) / np.linalg.norm(true, axis=1)
             right.semilogy(distance, apart, label=NAMES[model], **look)
+    left.plot([], [], color="0.3", lw=0.6, label="thin: along the axis, else across it")
     error = result["axis_error"].sel(model=reference).values
     right.fill_between(distance, np.nanmin(error) / 3, error, color="0.85", label=f"error estimate, {NAMES[reference]}")
-    middle = len(distance) // 2
-    across, along = 1e3 * np.hypot(*true[middle, :2]), 1e3 * np.abs(true[middle, 2])
-    above, below = (4, 2, "left", "bottom"), (-4, -2, "right", "top")
-    for name, size, (x, y, ha, va) in (
-        ("across the axis", across, above if across > along else below),
-        ("along the axis", along, below if across > along else above),
-    ):
-        left.annotate(name, (distance[middle], size), xytext=(x, y), textcoords="offset points", ha=ha, va=va)
-    left.set(xlabel=DISTANCE, ylabel="|B component| (mT)", title="Field on the axis")
-    right.set(xlabel=DISTANCE, ylabel="|ΔB| / |B|", title=f"Difference from {NAMES[reference]}")
-    left.legend(loc="upper right")  # fields fall
-    right.legend()
+    left.set(xlabel=DISTANCE, ylabel="|B component| (mT)")
+    right.set(xlabel=DISTANCE, ylabel=f"deviation from {NAMES[reference]}, |ΔB| / |B|")
+    legend_below(figure, columns=3)
     return figure
 
 
 @styled
 def force_figure(result: xr.Dataset) -> Figure:
     """Axial force against distance with its equilibria marked, for every model that has them; a zoom on the first."""
-    figure, ((axes, near),) = panels(1, 2, (8.0, 3.8))
-    weight = -1e3 * float(result.attrs["weight_N"])
+    figure, ((axes, near),) = panels(1, 2, (PAGE, 3.6))
+    weight, felt = -1e3 * float(result.attrs["weight_N"]), _with_plate(result)
     for panel in (axes, near):
         panel.axhline(weight, color="0.3", lw=0.8, label="weight of the floater")
         for model in dict.fromkeys(result["curve_model"].values.tolist()):
             _draw_curves(panel, result, model)
-            _mark_equilibria(panel, result, model, weight)
-        for marker, fill, label in MARKS if _with_plate(result).any() else MARKS[:2]:
+            for plate, stable, marker, fill, _ in MARKS:
+                chosen = (felt == plate) & (result["equilibrium_stable"] == stable)
+                chosen &= result["equilibrium_model"] == model
+                place = -1e3 * result["equilibrium_position"].sel(axis="z").where(chosen).dropna("equilibrium").values
+                look: dict[str, Any] = {"color": COLORS[model], "mfc": fill or COLORS[model]}
+                panel.plot(place, np.full(place.shape, weight), marker, ms=5, clip_on=True, **look)
+        for _, _, marker, fill, label in MARKS if felt.any() else MARKS[:2]:
             panel.plot([], [], marker, color="0.3", mfc=fill or "0.3", label=label)
         panel.set(xlabel=DISTANCE)
-    axes.set(xlim=(5, 60), ylabel="axial magnetic force (mN), up positive", title="Force on the balanced floater")
+    axes.set(xlim=(5, 60), ylabel="axial magnetic force (mN), up positive")
     if weight > 0:
         axes.set_ylim(-2.5 * weight, 3.5 * weight)
-    stable = result["equilibrium_position"].sel(axis="z").where(result["equilibrium_stable"] == 1).dropna("equilibrium")
-    if stable.size and weight > 0:
-        first = -1e3 * float(stable[0])
-        near.set(xlim=(first - 1.0, first + 1.0), ylim=(0.0, 2 * weight), title="Where it levitates")
+    stable_ones = result["equilibrium_position"].sel(axis="z").where(result["equilibrium_stable"] == 1)
+    first = -1e3 * stable_ones.dropna("equilibrium").values[:1]
+    if first.size and weight > 0:
+        near.set(xlim=(first[0] - 1.0, first[0] + 1.0), ylim=(0.0, 2 * weight))
+        near.locator_params(nbins=5)
     else:
         near.set_axis_off()
     legend_below(figure, axes, columns=3)
@@ -109,16 +109,6 @@ def _draw_curves(axes: Axes, result: xr.Dataset, model: str) -> None:
     axes.plot([], [], DASHES[model], color=COLORS[model], label=NAMES[model])
 
 
-def _mark_equilibria(axes: Axes, result: xr.Dataset, model: str, weight: float) -> None:
-    """Circles without the plate's currents, diamonds with them; filled where stable."""
-    here, felt = result["equilibrium_model"] == model, _with_plate(result)
-    for plate, marker in ((False, "o"), (True, "D")):
-        for stable, fill in ((1, COLORS[model]), (0, "white")):
-            chosen = here & (felt == plate) & (result["equilibrium_stable"] == stable)
-            distance = -1e3 * result["equilibrium_position"].sel(axis="z").where(chosen).dropna("equilibrium").values
-            axes.plot(distance, np.full(distance.shape, weight), marker, color=COLORS[model], mfc=fill, ms=5)
-
-
 def _with_plate(result: xr.Dataset) -> xr.DataArray:
     """Which equilibria feel the plate's currents; older results do not say."""
     return xr.DataArray(result.get("equilibrium_with_plate", 0 * result["equilibrium_stable"]) == 1)
@@ -127,52 +117,46 @@ def _with_plate(result: xr.Dataset) -> xr.DataArray:
 @styled
 def trajectory_figure(result: xr.Dataset) -> Figure:
     """Distance and polar angle of a flight as envelopes, and a closer look at its beginning, or at its end if lost."""
-    figure, axes = panels(2, 2, (8.0, 5.4))
+    figure, ((far, look), (tilt, above)) = panels(2, 2, (PAGE, 4.8))
     seconds, moment = result["time"].values, result["moment"].values
     time, unit = (seconds / 3600, "h") if seconds[-1] > HOURS else (seconds, "s")
     distance = -1e3 * result["position"].sel(axis="z").values
     angle = np.degrees(np.arctan2(np.hypot(moment[:, 0], moment[:, 1]), moment[:, 2]))
     up = str(result.attrs.get("ended_by", "duration")) in ("duration", "stopped")
     near = slice(0, SHOWN) if up else slice(-SHOWN, None)
-    for panel, values in ((axes[0, 0], distance), (axes[1, 0], angle)):
-        _envelope(panel, time, values)
-        panel.axvspan(time[near][0], time[near][-1], color=PALETTE[4], alpha=0.4, lw=0, label="shown on the right")
+    parts = np.array_split(np.arange(len(time)), min(PARTS, max(1, len(time) // 8)))
+    for panel, values in ((far, distance), (tilt, angle)):
+        rows = [(time[p].mean(), values[p].min(), values[p].mean(), values[p].max()) for p in parts]
+        middle, low, mean, high = np.array(rows).T
+        panel.fill_between(middle, low, high, color=PALETTE[5], alpha=0.6, lw=0, label="smallest to largest")
+        panel.plot(middle, mean, color=PALETTE[0], lw=1.0, label="mean")
+        panel.axvspan(time[near][0], time[near][-1], color=PALETTE[4], alpha=0.4, lw=0, label="shown in (b) and (d)")
         if "lowered_from_s" in result.attrs:
-            lowered = [min(float(result.attrs[f"lowered_{word}_s"]), seconds[-1]) for word in ("from", "until")]
-            span = np.array(lowered) * time[-1] / seconds[-1]
+            ends = [min(float(result.attrs[f"lowered_{word}_s"]), seconds[-1]) for word in ("from", "until")]
+            span = np.array(ends) * time[-1] / seconds[-1]
             panel.axvspan(*span, color="0.88", lw=0, zorder=0, label="plate is lowered")
         panel.set_xlabel(f"time ({unit})")
-    axes[0, 0].legend(frameon=True, framealpha=0.9, edgecolor="none")
     seen = {"rotor's frame": "position_rotor_frame", "laboratory": "position"}  # the one in which it moves less
-    moved = {frame: np.ptp(result[name].values[near], axis=0).max() for frame, name in seen.items()}
-    frame = min(moved, key=lambda frame: moved[frame])
+    frame = min(seen, key=lambda frame: np.ptp(result[seen[frame]].values[near], axis=0).max())
     here, x, y = time[near], *(1e3 * result[seen[frame]].values[near].T[:2])
     step = float(np.diff(seconds[near]).max(initial=0.0))
-    title, look = (f"A closer look: a sample every {step:.2g} s", ".") if step > COARSE else ("A closer look", "-")
+    style = "." if step > COARSE else "-"
+    if step > COARSE:
+        look.set_title(f"(b) a sample every {step:.2g} s")
     close: tuple[Array, ...] = (here, distance[near], x, y)
     close = close if step > COARSE else _smooth(here, *close)
-    axes[0, 1].plot(close[0], close[1], look, lw=0.8, ms=3)
-    axes[1, 1].plot(close[2], close[3], look, lw=0.8, ms=3)
-    axes[1, 1].plot(x[0], y[0], "o", color=PALETTE[2], ms=4, label="start")
-    axes[1, 1].plot(x[-1], y[-1], "o", color=PALETTE[1], ms=4, label="end")
-    axes[1, 1].legend()
-    axes[0, 0].set(ylabel="distance along the axis (mm)", title="Distance: smallest, mean, largest")
-    axes[1, 0].set(ylabel="polar angle of the moment (°)", title="Polar angle: smallest, mean, largest")
-    axes[0, 1].set(xlabel=f"time ({unit})", ylabel="distance along the axis (mm)", title=title)
-    axes[1, 1].set(xlabel="x (mm)", ylabel="y (mm)", title=f"The same from above, {frame}")
-    axes[1, 1].set(aspect="equal", adjustable="datalim")
-    for panel in axes.flat:
-        panel.locator_params(axis="x", nbins=6)
+    look.plot(close[0], close[1], style, lw=0.8, ms=3)
+    above.plot(close[2], close[3], style, lw=0.8, ms=3)
+    above.plot(x[0], y[0], "o", color=PALETTE[2], ms=4, label="start of (d)")
+    above.plot(x[-1], y[-1], "o", color=PALETTE[1], ms=4, label="end of (d)")
+    far.set(ylabel="distance along the axis (mm)")
+    tilt.set(ylabel="polar angle of the moment (°)")
+    look.set(xlabel=f"time ({unit})", ylabel="distance along the axis (mm)")
+    above.set(xlabel=f"x (mm), {frame}", ylabel="y (mm)", aspect="equal", adjustable="datalim")
+    for panel in (far, look, tilt, above):
+        panel.locator_params(axis="x", nbins=5)
+    legend_below(figure, columns=3)
     return figure
-
-
-def _envelope(axes: Axes, time: Array, values: Array) -> None:
-    """Smallest, mean and largest value of each of many short intervals."""
-    parts = np.array_split(np.arange(len(time)), min(PARTS, max(1, len(time) // 8)))
-    middle, mean = (np.array([v[part].mean() for part in parts]) for v in (time, values))
-    low, high = (np.array([pick(values[part]) for part in parts]) for pick in (np.min, np.max))
-    axes.fill_between(middle, low, high, color=PALETTE[5], alpha=0.6, lw=0)
-    axes.plot(middle, mean, color=PALETTE[0], lw=1.0)
 
 
 def _smooth(parameter: Array, *curves: Array) -> tuple[Array, ...]:
@@ -201,7 +185,8 @@ def working_point_figure(found: xr.Dataset) -> Figure:
         away = one["place"].values - one["center"].values
         where = [1e3 * float(away @ one[name].values) for name in ("easy_axis", "across_axis")]
         section.plot(*where, "o", color=PALETTE[1], markersize=5, markeredgecolor="white", clip_on=False)
-        section.set(title=f"Magnet {int(one['magnet'])}", xlabel="along the easy axis (mm)", ylabel="across (mm)")
+        section.set_title(f"{section.get_title('left')} magnet {int(one['magnet'])}")
+        section.set(xlabel="along the easy axis (mm)", ylabel="across (mm)")
         section.set_aspect("equal")
         section.grid(False)
         volume.plot(one["levels"], 100 * found["share"])
@@ -215,8 +200,8 @@ def working_point_figure(found: xr.Dataset) -> Figure:
 
 @styled
 def modes_figure(result: xr.Dataset) -> Figure:
-    """Growth against frequency of every small motion, from a result of `equilibria` or `stability`."""
-    figure, ((axes,),) = panels(1, 1, (5.5, 3.6))
+    """Rate and frequency of every normal mode; open where it decays, filled where it grows."""
+    figure, ((axes,),) = panels(1, 1, (1.5 * COLUMN, 3.4))
     listed = result if "equilibrium" in result.dims else result.expand_dims("equilibrium")
     for k, color in zip(range(listed.sizes["equilibrium"]), PALETTE * 9, strict=False):
         one = listed.isel(equilibrium=k)
@@ -224,16 +209,15 @@ def modes_figure(result: xr.Dataset) -> Figure:
         axes.plot([], [], "s", color=color, label=f"z = {height:.2f} mm, {'stable' if one['stable'] else 'unstable'}")
         for name, marker in zip(one["mode"].values.tolist(), MODE_MARKERS, strict=True):
             mode = one.sel(mode=name)
-            axes.plot(mode["mode_frequency"], mode["mode_growth"], marker, color=color, mfc="none", ms=6)
+            rate = float(mode["mode_growth"])
+            fill = color if rate > NO_GROWTH else "none"
+            axes.plot(mode["mode_frequency"], max(abs(rate), NO_GROWTH), marker, color=color, mfc=fill, ms=6)
     for name, marker in zip(listed["mode"].values.tolist(), MODE_MARKERS, strict=True):
         axes.plot([], [], marker, color="0.3", mfc="none", label=name)
-    axes.axhline(0.0, color="0.3", lw=0.8)
-    sizes = np.abs(listed["mode_growth"].values)
-    smallest = sizes[sizes > NO_GROWTH].min(initial=1.0)
-    axes.set_yscale("symlog", linthresh=10.0 ** np.floor(np.log10(smallest)))
+    axes.plot([], [], "o", color="0.3", label="filled: grows")
+    axes.set(yscale="log", xlabel="frequency, rotor's frame (Hz)", ylabel="rate of decay or growth (1/s)")
     axes.margins(0.08)
-    axes.set(xlabel="frequency, rotor's frame (Hz)", ylabel="growth (1/s), negative: dies out", title="Small motions")
-    legend_below(figure, axes, columns=3)
+    legend_below(figure, columns=3)
     return figure
 
 
@@ -247,10 +231,11 @@ def question_figure(result: xr.Dataset) -> Figure:
     """Curves over one parameter, one for each model if these were varied too, or maps over two numbers."""
     shown = _derived(result)
     names, varied = _shown(shown), _varied(result)
-    figure, axes = panels(-(-len(names) // 2), 2, (8.4, 3.6 * -(-len(names) // 2)))
+    rows = -(-len(names) // 2)
+    figure, axes = panels(rows, 2, (PAGE, 2.9 * rows + 0.4))
     words = [key for key in varied if result[key].dtype.kind not in "iuf"]
     for panel in axes.ravel()[len(names) :]:
-        panel.set_axis_off()
+        panel.remove()
     for panel, name in zip(axes.ravel(), names, strict=False):
         if len(varied) == 1:
             _curves(panel, shown, name, varied[0], PALETTE[0])
@@ -260,7 +245,7 @@ def question_figure(result: xr.Dataset) -> Figure:
                 _curves(panel, shown.sel({words[0]: value}), name, number, color, f"{NAMES[str(value)]}, ")
         else:
             _map(panel, shown, name, varied)
-    legend_below(figure, *axes.ravel())
+    legend_below(figure, columns=2)
     return figure
 
 
@@ -293,7 +278,7 @@ def _curves(axes: Axes, result: xr.Dataset, name: str, key: str, color: str, of:
             chosen = values.where(result["stable"] == stable).transpose(key, "equilibrium").values
             axes.plot([], [], "o", color=color, mfc=fill, ms=4, label=f"{of}{'stable' if stable else 'unstable'}")
             axes.plot(x, chosen, "o", color=color, mfc=fill, ms=4)
-    axes.set(xlabel=key, ylabel=_label(values))
+    axes.set(xlabel=_axis(key), ylabel=_label(values))
     if name == "growth":
         axes.set_yscale("symlog", linthresh=1e-3)
 
@@ -302,17 +287,23 @@ def _map(axes: Axes, result: xr.Dataset, name: str, keys: list[str]) -> None:
     values = result[name]
     if "equilibrium" in values.dims:  # the first is stable wherever any is
         values = values.where(result["stable"] == 1).isel(equilibrium=0).assign_attrs(values.attrs)
-        axes.set_title("stable equilibrium nearest to the rotor")
+        axes.set_title(f"{axes.get_title('left')} stable equilibrium nearest to the rotor")
     drawn = axes.pcolormesh(
         result[keys[1]].values, result[keys[0]].values, values.transpose(*keys).values, shading="nearest"
     )
-    axes.set(xlabel=keys[1], ylabel=keys[0])
+    axes.set(xlabel=_axis(keys[1]), ylabel=_axis(keys[0]))
     if axes.figure is not None:
         axes.figure.colorbar(drawn, ax=axes, label=_label(values))
 
 
 def _label(values: xr.DataArray) -> str:
-    return f"{values.attrs['long_name']} ({values.attrs['units']})"
+    return f"{values.attrs['long_name']} ({values.attrs['units'].replace('deg', '°')})"
+
+
+def _axis(key: str) -> str:
+    """A key of the scene file with its unit apart."""
+    name, _, unit = key.rpartition("_")
+    return f"{name} ({UNITS[unit]})" if unit in UNITS else key
 
 
 def _varied(result: xr.Dataset) -> list[str]:

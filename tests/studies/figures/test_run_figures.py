@@ -18,7 +18,7 @@ def flight(time, height):
     return xr.Dataset(columns, {"time": time, "axis": ["x", "y", "z"]})
 
 
-@pytest.mark.parametrize(("interval", "title", "unit"), [(0.005, "A closer look", "s"), (6.4, "every 6.4 s", "h")])
+@pytest.mark.parametrize(("interval", "title", "unit"), [(0.005, "(b)", "s"), (6.4, "every 6.4 s", "h")])
 def test_samples_farther_apart_than_a_bounce_are_points(interval, title, unit):
     """Ten bounces a second: joined every 6.4 s they would look like slow ones."""
     time = interval * np.arange(2000)
