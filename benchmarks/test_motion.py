@@ -9,8 +9,7 @@ from peers import SCENE, magpylib_rotor
 
 from spinlev.dynamics.equilibria.search import survey, with_plate
 from spinlev.dynamics.flights.batch import ensemble
-from spinlev.dynamics.flights.flight import PLATE_TOLERANCE, Flight, integrate
-from spinlev.dynamics.flights.start import initial_state
+from spinlev.dynamics.flights.flight import PLATE_TOLERANCE, Flight, initial_state, integrate
 from spinlev.dynamics.motion.rates import Rates
 from spinlev.dynamics.motion.state import State
 from spinlev.fem.plate.choice import rotor_nearby

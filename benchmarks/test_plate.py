@@ -5,7 +5,7 @@ import pytest
 from peers import PLATE, SLAB, scipy_slab
 from second_opinions.plate_tables import over_face
 
-from spinlev.fem.plate.reaction import plate_reaction
+from spinlev.fem.plate.eddy import plate_reaction
 from spinlev.fem.plate.slab import reaction_tensor
 from spinlev.fem.plate.tables import plate_table
 

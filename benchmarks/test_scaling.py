@@ -8,8 +8,7 @@ from peers import PLATE, SCENE, around
 
 from spinlev.dynamics.continuation.map import equilibrium_map
 from spinlev.dynamics.continuation.rotor_family import rotor_family
-from spinlev.dynamics.flights.flight import PLATE_TOLERANCE, Flight, integrate
-from spinlev.dynamics.flights.start import initial_state
+from spinlev.dynamics.flights.flight import PLATE_TOLERANCE, Flight, initial_state, integrate
 from spinlev.fem.closed_forms.moments import carrier
 from spinlev.fem.closed_forms.potentials import unit_dipoles
 from spinlev.fem.elements.ladder import refinement_of, solve_rotor

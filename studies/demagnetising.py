@@ -9,7 +9,7 @@ import numpy as np
 import xarray as xr
 
 from ..dynamics.equilibria.equilibrium import EquilibriumError
-from ..dynamics.flights.start import most_like_levitation
+from ..dynamics.flights.flight import most_like_levitation
 from ..fem.files import write_whole
 from ..fem.rotor.working_point import EasyField, easy_axis, working_points
 from ..geometry.common import InputError

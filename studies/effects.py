@@ -9,14 +9,20 @@ import numpy as np
 from ..dynamics.equilibria.balance import tangent_basis
 from ..dynamics.equilibria.equilibrium import Equilibrium
 from ..dynamics.equilibria.modes import left_eigenvectors, tangent_spaces
-from ..dynamics.motion.air_and_shape import REAL_AIR, reynolds, swinging
 from ..dynamics.motion.effect import Interaction
 from ..dynamics.motion.effects import NOTHING_ANSWERS
 from ..dynamics.motion.equations import parameters
-from ..dynamics.motion.floater_currents import FLOATER_CURRENTS, SLOW_ENOUGH, FloaterCurrents, slow_error
-from ..dynamics.motion.mutual import MUTUAL, Mutual, rough_force
+from ..dynamics.motion.floater_effects import (
+    FLOATER_CURRENTS,
+    REAL_AIR,
+    SLOW_ENOUGH,
+    FloaterCurrents,
+    reynolds,
+    slow_error,
+    swinging,
+)
 from ..dynamics.motion.rates import Rates
-from ..dynamics.motion.rotor_losses import ROTOR_CURRENTS, brake_slope
+from ..dynamics.motion.rotor_effects import MUTUAL, ROTOR_CURRENTS, Mutual, brake_slope, rough_force
 from ..dynamics.motion.state import Parameter, Scales
 from ..fem.harmonics.interior import Ball
 from ..fem.harmonics.local import BallField

@@ -11,10 +11,8 @@ import numpy as np
 
 from ..dynamics.equilibria.equilibrium import Equilibrium, EquilibriumError, Survey
 from ..dynamics.equilibria.search import free_of_bodies, with_plate
-from ..dynamics.flights.checkpoint import Checkpoint
-from ..dynamics.flights.flight import simulate
+from ..dynamics.flights.flight import Checkpoint, initial_state, simulate, starting_point
 from ..dynamics.flights.live import LiveFlight
-from ..dynamics.flights.start import initial_state, starting_point
 from ..dynamics.flights.trajectory import FlightStopped, Trajectory
 from ..dynamics.motion.events import plate_depth
 from ..dynamics.motion.plate import PlateMemory

@@ -17,7 +17,7 @@ from ..dynamics.continuation.rotor_family import rotor_family
 from ..dynamics.equilibria.balance import Indices
 from ..dynamics.flights.balls import is_long
 from ..dynamics.flights.batch import fly_together
-from ..dynamics.flights.start import initial_state
+from ..dynamics.flights.flight import initial_state
 from ..dynamics.motion.rates import Rates
 from ..fem.rotor.pose import at_home
 from ..geometry.common import Array, InputError, SpinlevError

@@ -8,7 +8,7 @@ import numpy as np
 
 from ..fem.closed_forms.eddy_sphere import ComplexArray
 from ..fem.files import write_whole
-from ..fem.plate.reaction import plate_reaction
+from ..fem.plate.eddy import plate_reaction
 from ..fem.plate.slab import Slab, edge_error, reaction_tensor
 from ..fem.plate.table import Region
 from ..fem.plate.tables import cached_plate_table

@@ -13,8 +13,7 @@ import xarray as xr
 
 from ..dynamics.equilibria.equilibrium import EquilibriumError, Survey
 from ..dynamics.equilibria.search import free_of_bodies
-from ..dynamics.flights.checkpoint import Checkpoint
-from ..dynamics.flights.start import most_like_levitation, starting_point
+from ..dynamics.flights.flight import Checkpoint, most_like_levitation, starting_point
 from ..dynamics.flights.trajectory import FlightStopped, Trajectory
 from ..fem.cache import owned, program_digest
 from ..fem.files import write_whole

@@ -11,13 +11,12 @@ from typing import Any, TypeVar, cast
 
 from ..dynamics.equilibria.equilibrium import Survey
 from ..dynamics.equilibria.search import FixedPoints, cached_points, survey
-from ..dynamics.flights.start import most_like_levitation
+from ..dynamics.flights.flight import most_like_levitation
 from ..dynamics.motion.effect import Interaction, interaction_of
 from ..dynamics.motion.effects import BESIDE_METAL, WITHOUT_METAL, with_effects
 from ..dynamics.motion.equations import FORCE_ALONE
-from ..dynamics.motion.mutual import Mutual
 from ..dynamics.motion.rates import Rates
-from ..dynamics.motion.rotor_losses import RotorCurrents
+from ..dynamics.motion.rotor_effects import Mutual, RotorCurrents
 from ..fem.maps_of_B.table import GriddedTable, map_table
 from ..fem.mutual.making import cached_mutual_table, mutual_key
 from ..fem.mutual.table import MutualTable

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from ..dynamics.flights.start import displaced, initial_state
+from ..dynamics.flights.flight import displaced, initial_state
 from ..dynamics.motion.state import State
 from ..geometry.common import Array, InputError
 from ..geometry.scene.contents import OffsetStart

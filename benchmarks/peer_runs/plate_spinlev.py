@@ -10,7 +10,7 @@ import numpy as np
 from problems import CONDUCTIVITY, FREQUENCIES, MOMENTS, PLACES, PLATE_SIZE
 from said import measure, say
 
-from spinlev.fem.plate.reaction import plate_reaction
+from spinlev.fem.plate.eddy import plate_reaction
 from spinlev.geometry import Box, Plate
 
 frequency, rtol = FREQUENCIES[sys.argv[1]], float(sys.argv[2])

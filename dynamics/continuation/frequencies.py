@@ -23,7 +23,7 @@ from ..equilibria.search import find_equilibria
 from ..motion.effects import with_effects
 from ..motion.equations import parameters
 from ..motion.events import rotor_gap
-from ..motion.floater_currents import too_slow
+from ..motion.floater_effects import too_slow
 from ..motion.plate import PlateMemory
 from ..motion.rates import Rates
 from ..motion.state import Parameter, Scales

@@ -26,10 +26,9 @@ from ...geometry.solids import moved
 from ..motion.effect import Added, Effect, Interaction, Motion, Placeable
 from ..motion.effects import mutual_choice, with_effects
 from ..motion.equations import parameters
-from ..motion.floater_currents import check_floater_metal
-from ..motion.mutual import MUTUAL, Mutual
+from ..motion.floater_effects import check_floater_metal
 from ..motion.rates import Rates
-from ..motion.rotor_losses import ROTOR_CURRENTS, RotorCurrents
+from ..motion.rotor_effects import MUTUAL, ROTOR_CURRENTS, Mutual, RotorCurrents
 from ..motion.state import Parameter, Scales
 
 Numbers = Sequence[Any]  # A vector of heyoka expressions, or of arrays (n,)

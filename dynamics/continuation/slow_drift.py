@@ -18,10 +18,10 @@ from ...geometry.scene.contents import Scene
 from ..equilibria.equilibrium import FOLD, EquilibriumError
 from ..equilibria.path import Steps
 from ..equilibria.search import find_equilibria
-from ..motion.air_and_shape import reynolds, spinning, swinging
 from ..motion.effects import with_effects
 from ..motion.equations import parameters
 from ..motion.events import rotor_gap
+from ..motion.floater_effects import reynolds, spinning, swinging
 from ..motion.rates import Rates
 from ..motion.state import Parameter, Scales, State
 from .branch import BranchPoint, Family, follow_branch, spins

@@ -12,11 +12,11 @@ from ...fem.cache import TableKind
 from ...fem.rotor.table import ROUND_OFF, FieldTable, RangeError, RotorTable
 from ...geometry.common import Array, Watch, unwatched
 from ...geometry.scene.contents import AbsoluteStart, Scene
-from ..motion.air_and_shape import FloaterShape
 from ..motion.effect import Interaction
 from ..motion.effects import with_effects
 from ..motion.equations import parameters
 from ..motion.events import rotor_gap
+from ..motion.floater_effects import FloaterShape
 from ..motion.plate import PlateMemory
 from ..motion.rates import Rates
 from ..motion.state import Parameter, Scales

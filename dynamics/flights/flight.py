@@ -3,14 +3,18 @@
 A. Jorba and M. Zou, Exp. Math. 14 (2005) 99; heyoka: F. Biscani and D. Izzo, MNRAS 504 (2021) 2614.
 
 A `Flight` is a scene's motion in machine code, one part for each kind of ball and one for the table's own field.  A
-`Course` is how far one trajectory is: all that decides the rest of it, so that it goes on from a checkpoint to the last
-bit.
+`Course` is how far one trajectory is: all that decides the rest of it, so that it goes on from a `Checkpoint` to the
+last bit.  `initial_state` says where a trajectory begins.
 """
 
 from __future__ import annotations
 
+import hashlib
+import io
+import os
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import astuple, dataclass, field, replace
+from pathlib import Path
 from time import perf_counter
 from typing import Any
 
@@ -18,11 +22,14 @@ import heyoka as hy
 import numpy as np
 
 from ...fem.compiled_code import compiled
+from ...fem.files import seal, unsealed, write_whole
 from ...fem.harmonics.local import BallField
 from ...fem.rotor.table import FieldTable
-from ...geometry.common import Array, ComputationError
-from ...geometry.scene.contents import Scene
-from ..equilibria.equilibrium import Equilibrium
+from ...geometry.common import Array, ComputationError, InputError
+from ...geometry.scene.contents import AbsoluteStart, Scene
+from ..continuation.frequencies import way_out
+from ..equilibria.equilibrium import Equilibrium, EquilibriumError
+from ..equilibria.search import find_equilibria
 from ..motion.effects import with_effects
 from ..motion.equations import Equations, equations_of_motion, parameters
 from ..motion.events import (
@@ -37,12 +44,52 @@ from ..motion.events import (
     plate_legs,
     range_events,
 )
-from ..motion.plate import PlateMemory, plate_numbers
+from ..motion.plate import PlateForce, PlateMemory, plate_numbers
 from ..motion.state import Parameter, Scales, State
 from .balls import DEGREE, LARGE, SMALL, Balls, in_ball, is_long, within
-from .checkpoint import Checkpoint
-from .start import StartError, in_plate_range, initial_state
 from .trajectory import DURATION, STOPPED, FieldChanges, FlightStopped, Recorder, Trajectory
+
+
+@dataclass(frozen=True)
+class Checkpoint:
+    """The file in which a `Course` is kept while it lasts."""
+
+    path: Path  # where it is
+    identity: str  # everything that the flight depends on, as text; another flight's checkpoint is refused
+    every: float = 5.0  # seconds between two writings
+
+    @property
+    def _key(self) -> str:
+        return hashlib.sha256(self.identity.encode()).hexdigest()
+
+    def write(self, content: Mapping[str, Any]) -> None:
+        """Keep arrays by name; the file is whole or as it was."""
+        stream = io.BytesIO()
+        np.savez(stream, allow_pickle=False, key=np.array(self._key), **content)
+        write_whole(self.path, seal(stream.getvalue()))
+
+    def read(self) -> dict[str, Any] | None:
+        """Arrays by name, with the `region` (2, 3) m of the plate's table (zeros: none), or None without a file.
+
+        Raises InputError: the file is damaged, or belongs to another flight.
+        """
+        if not os.path.lexists(self.path):
+            return None
+        whole = unsealed(self.path)  # so that no library meets a damaged archive
+        if whole is None:
+            raise InputError(f"Input {self.path} must be a checkpoint; instead it is damaged: delete it.")
+        with np.load(io.BytesIO(whole)) as data:
+            content = dict(data)
+        if str(content.pop("key")) != self._key:
+            raise InputError(
+                f"Input {self.path} must be a checkpoint of this flight; instead it was kept by another scene, model, "
+                "duration or version: delete it, choose another --out, or leave out --resume."
+            )
+        return content
+
+    def remove(self) -> None:
+        self.path.unlink(missing_ok=True)
+
 
 LEFT = "left"
 # Of a Taylor step. Measured over 1300 turns: J drifts by 3e-13 at 1e-15, by 1e-14 at 1e-16 with 1 % more steps.
@@ -428,3 +475,83 @@ def simulate(
         tolerance = max(tolerance, PLATE_TOLERANCE)
     flight = Flight(scene, table, duration, tolerance, compact, memory)
     return integrate(flight, start, duration, progress, currents, checkpoint)
+
+
+SLOWLY = 1 / 3  # Growth (1/s) with which a flight may still begin: an e-fold in the shortest flight that counts, 3 s
+
+
+class StartError(InputError):
+    """The flight cannot begin where it was asked to."""
+
+
+def initial_state(
+    scene: Scene, table: FieldTable, equilibria: Sequence[Equilibrium] | None = None, memory: PlateMemory | None = None
+) -> tuple[State, Array]:
+    """State at t = 0, when the rotor's frame is the laboratory's, and the plate's states (k,), √J.
+
+    An `OffsetStart` displaces the stable equilibrium in the rotor's frame and keeps the floater at rest in it; among
+    several it takes the nearest; where there is none, what `starting_point` says.  An absolute start finds the plate as
+    if the floater had long turned with the rotor there.  `equilibria` are found if they are not given. Raises
+    EquilibriumError: no equilibrium to start from; it says why and which frequency has one; StartError: the floater
+    would overlap a magnet or the plate.
+    """
+    currents = np.zeros(0)
+    if isinstance(scene.start, AbsoluteStart):
+        start = scene.start
+        state = State(start.position, start.velocity, start.moment / np.linalg.norm(start.moment), start.spin)
+        if memory is not None:
+            scales = Scales.of(scene)
+            plate = PlateForce(memory, parameters(scene, scales))
+            currents = plate.settled(scales.pack(state)) / plate.values[Parameter.PLATE_SHARE]
+    else:
+        known = find_equilibria(scene, table, memory=memory) if equilibria is None else equilibria
+        chosen = starting_point(known)
+        if chosen is None:
+            raise EquilibriumError(way_out(scene, table, known, memory=memory))
+        state = displaced(chosen.start, scene.start.offset, scene.angular_velocity)
+        currents = currents if chosen.currents is None else chosen.currents[0]
+    check_free("start", scene, state.position, moment=state.moment)
+    return state, currents
+
+
+def check_free(name: str, scene: Scene, position: Array, time: float = 0.0, moment: Array | None = None) -> None:
+    """Raises StartError where a floater at a position (3,) m, rotor's frame, would overlap a body at a time (s)."""
+    pointing = None if moment is None else moment[None]
+    gap = float(clearance(scene, np.array([time]), position[None], pointing)[0])
+    if gap < 0:
+        where = ", ".join(f"{1e3 * c:.6g}" for c in position)
+        raise StartError(
+            f"Input {name} must leave the floater free of the magnets and the plate; instead it begins at ({where}) "
+            f"mm, {-1e3 * gap:.3g} mm inside one of them. Move the plate or the {name}."
+        )
+
+
+def starting_point(equilibria: Sequence[Equilibrium]) -> Equilibrium | None:
+    """The nearest stable equilibrium, or else the nearest that only the plate, or only slowly something, undoes.
+
+    The floater's own eddy currents do so slowly, in minutes.
+    """
+    stable = [e for e in equilibria if e.stable]
+    without = [e for e in equilibria if e.without and e.without.stable]
+    slowly = [e for e in equilibria if e.growth_per_s < SLOWLY]
+    return next(iter([*stable, *without, *slowly]), None)
+
+
+def most_like_levitation(equilibria: Sequence[Equilibrium]) -> Equilibrium | None:
+    """Where a flight begins, or, where none may, the equilibrium whose small motions grow least; None without any.
+
+    A brake undoes those near the rotor the most.
+    """
+    return starting_point(equilibria) or min(equilibria, key=lambda e: e.growth_per_s, default=None)
+
+
+def displaced(start: State, offset: Array, angular_velocity: float) -> State:
+    """A state moved by one or more offsets (..., 3) m, as much at rest in the frame that turns (rad/s) as it was."""
+    turning = np.cross([0.0, 0.0, angular_velocity], offset)
+    moment, spin = (np.broadcast_to(v, offset.shape) for v in (start.moment, start.spin))
+    return State(start.position + offset, start.velocity + turning, moment, spin)
+
+
+def in_plate_range(memory: PlateMemory | None, lab: State, time: float = 0.0) -> bool:
+    """Whether a plate's table, if there is one, knows the field at a place along the laboratory's axes at a time, s."""
+    return memory is None or bool(memory.in_range(lab.position, plate_depth(memory.plate, np.array([time])))[0])

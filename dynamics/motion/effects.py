@@ -8,12 +8,10 @@ from ...fem.rotor.table import FieldFormula, FieldTable
 from ...fem.rotor_metal import cached_rotor_losses, check_metal, pieces_of
 from ...geometry.common import InputError
 from ...geometry.scene.contents import Scene
-from .air_and_shape import FLOATER_SHAPE, FloaterShape, RealAir
 from .effect import Effect, Interaction, interaction_of
 from .equations import FORCE_ALONE
-from .floater_currents import FloaterCurrents, check_floater_metal
-from .mutual import STEP, rough_force
-from .rotor_losses import ROTOR_CURRENTS, RotorCurrents
+from .floater_effects import FLOATER_SHAPE, FloaterCurrents, FloaterShape, RealAir, check_floater_metal
+from .rotor_effects import ROTOR_CURRENTS, STEP, RotorCurrents, rough_force
 
 NOTHING_ANSWERS = "neither rotor nor floater is permeable"
 NEAR = 2.0  # Distance from the rotor, in floater radii, at which the answers are compared with the accuracy asked for

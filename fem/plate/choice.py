@@ -17,9 +17,9 @@ from ...geometry.scene.contents import Plate, Scene
 from ..cache import TableKind
 from ..rotor.models import Accuracy, AccuracyError, shortened_table
 from ..rotor.table import RotorTable
+from .currents import cached_currents
 from .rotor_share import DOWN
 from .slab import cached_edge_error, edge_error
-from .solution import cached_currents
 from .table import PlateTable, Region, RotorShare
 from .tables import DRIVEN, SLAB, deciding, plate_and_rotor_table, slab_and_rotor_table
 

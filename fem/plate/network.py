@@ -25,10 +25,9 @@ import scipy
 from ...geometry.common import Array, Watch
 from ...geometry.scene.contents import Plate
 from ..closed_forms.eddy_sphere import ComplexArray
-from .currents import OtherSources, grid_counts, probe_places, space_couplings, unit_power
+from .currents import STRICT, OtherSources, PlateSolution, grid_counts, probe_places, space_couplings, unit_power
 from .eddy import Source
 from .multipoles import Multipoles, fit_multipoles, real_kinds
-from .solution import STRICT, PlateSolution
 from .table import ENOUGH, Region, refuse
 
 NEGLIGIBLE = 1e-12  # Snapshot energies below this share of the largest are round-off

@@ -12,11 +12,10 @@ from ...geometry.meshes.plate import MeshRule
 from ...geometry.scene.contents import Plate
 from ..cache import TableKind
 from ..rotor.table import RotorTable
-from .currents import OtherSources
+from .currents import OtherSources, PlateSolution, error_of, outer_box, outer_frequencies, solve_currents
 from .network import CONDUCTOR, NETWORK_SHARE, PassiveNetwork, Reduction, checked_ranges, from_elements
 from .rotor_share import MISSED, SHARE_PART, rotor_box, rotor_share, turning_rotor, without_high_harmonics
 from .slab import rotor_reach, slab_frame
-from .solution import PlateSolution, error_of, outer_box, outer_frequencies, solve_currents
 from .table import PlateErrors, PlateTable, Region, RotorShare
 from .waves import from_slab
 

@@ -24,7 +24,7 @@ from ...dynamics.motion.effect import Interaction
 from ...dynamics.motion.effects import with_effects
 from ...dynamics.motion.equations import parameters
 from ...dynamics.motion.rates import Rates
-from ...dynamics.motion.rotor_losses import Dissipation, brake_slope
+from ...dynamics.motion.rotor_effects import Dissipation, brake_slope
 from ...dynamics.motion.state import Parameter, Scales
 from ...fem.cache import TableKind
 from ...fem.harmonics.expressions import CompiledField

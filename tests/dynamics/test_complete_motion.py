@@ -11,15 +11,13 @@ from spinlev.dynamics.equilibria.equilibrium import Survey
 from spinlev.dynamics.equilibria.orbits import floquet_modes, periodic_orbit
 from spinlev.dynamics.equilibria.search import survey, with_plate
 from spinlev.dynamics.flights.flight import Flight, simulate
-from spinlev.dynamics.motion.air_and_shape import REAL_AIR
 from spinlev.dynamics.motion.effect import Interaction
 from spinlev.dynamics.motion.effects import with_effects
 from spinlev.dynamics.motion.equations import parameters
-from spinlev.dynamics.motion.floater_currents import FLOATER_CURRENTS
-from spinlev.dynamics.motion.mutual import MUTUAL, Mutual
+from spinlev.dynamics.motion.floater_effects import FLOATER_CURRENTS, REAL_AIR
 from spinlev.dynamics.motion.plate import PlateForce, PlateMemory
 from spinlev.dynamics.motion.rates import Rates
-from spinlev.dynamics.motion.rotor_losses import ROTOR_CURRENTS, RotorCurrents
+from spinlev.dynamics.motion.rotor_effects import MUTUAL, ROTOR_CURRENTS, Mutual, RotorCurrents
 from spinlev.dynamics.motion.state import Parameter, Scales
 from spinlev.fem.mutual.making import cached_mutual_table
 from spinlev.fem.plate.table import Region

@@ -8,8 +8,7 @@ import pytest
 
 from spinlev.fem import rotor_metal as tabulate
 from spinlev.fem.cache import TableFileError
-from spinlev.fem.metal_currents import metal_of, of_motion
-from spinlev.fem.rotor_metal import LOSSES, check_metal, pieces_of, rotor_losses
+from spinlev.fem.rotor_metal import LOSSES, check_metal, metal_of, of_motion, pieces_of, rotor_losses
 from spinlev.geometry.common import InputError
 from spinlev.geometry.rotor import Conductor, horizontal
 from spinlev.geometry.shapes import Box, Cylinder

@@ -8,8 +8,17 @@ import numpy as np
 import pytest
 
 from spinlev.fem.closed_forms.eddy_sphere import thin_field_torque
-from spinlev.fem.metal_currents import current_patterns, metal_of, metal_on, of_motion, of_places
-from spinlev.fem.rotor_metal import CUBE, ball_losses, places_around, rotor_losses
+from spinlev.fem.rotor_metal import (
+    CUBE,
+    ball_losses,
+    current_patterns,
+    metal_of,
+    metal_on,
+    of_motion,
+    of_places,
+    places_around,
+    rotor_losses,
+)
 from spinlev.geometry.common import InputError
 from spinlev.geometry.meshes.solids import SolidMesh
 from spinlev.geometry.rotor import Conductor

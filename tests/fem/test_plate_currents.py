@@ -8,11 +8,20 @@ from ngsolve import SetNumThreads
 
 from spinlev.fem.closed_forms.potentials import unit_dipoles
 from spinlev.fem.plate.choice import reachable_region
-from spinlev.fem.plate.currents import OtherSources, dipole_images, source_images, space_couplings, train
-from spinlev.fem.plate.eddy import EddySpace, solve_eddy
-from spinlev.fem.plate.reaction import MESH_SHARE, Ladder
+from spinlev.fem.plate.currents import (
+    CURRENTS,
+    OtherSources,
+    dipole_images,
+    error_of,
+    outer_box,
+    outer_frequencies,
+    solve_currents,
+    source_images,
+    space_couplings,
+    train,
+)
+from spinlev.fem.plate.eddy import MESH_SHARE, EddySpace, Ladder, solve_eddy
 from spinlev.fem.plate.rotor_share import rotor_box, turning_rotor
-from spinlev.fem.plate.solution import CURRENTS, error_of, outer_box, outer_frequencies, solve_currents
 from spinlev.fem.plate.table import Region
 from spinlev.fem.plate.tables import plate_and_rotor_table
 from spinlev.fem.rotor.choice import rotor_table

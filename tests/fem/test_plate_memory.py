@@ -16,10 +16,9 @@ from second_opinions.plate_tables import over_face, reaction_gradient, signal_ex
 from second_opinions.time_stepping import TimeStepper, work_on
 
 from spinlev.fem.closed_forms.potentials import Dipole, unit_dipoles
-from spinlev.fem.plate.currents import OtherSources
+from spinlev.fem.plate.currents import OtherSources, solve_currents
 from spinlev.fem.plate.eddy import EddySpace
 from spinlev.fem.plate.network import from_elements
-from spinlev.fem.plate.solution import solve_currents
 from spinlev.fem.plate.tables import slab_and_rotor_table, tabulate
 from spinlev.fem.rotor.choice import rotor_table
 from spinlev.geometry.meshes.plate import MeshRule, plate_mesh

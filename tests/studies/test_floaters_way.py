@@ -7,7 +7,7 @@ import pytest
 from article import BALL
 
 import spinlev as sl
-from spinlev.dynamics.flights.start import most_like_levitation
+from spinlev.dynamics.flights.flight import most_like_levitation
 from spinlev.geometry.common import InputError
 from spinlev.studies.plan import check_way
 

@@ -12,8 +12,8 @@ from spinlev.dynamics.equilibria.equilibrium import FOLD, EquilibriumError
 from spinlev.dynamics.equilibria.search import find_equilibria
 from spinlev.dynamics.motion.effect import Interaction
 from spinlev.dynamics.motion.equations import parameters
-from spinlev.dynamics.motion.mutual import Mutual
 from spinlev.dynamics.motion.rates import Rates
+from spinlev.dynamics.motion.rotor_effects import Mutual
 from spinlev.dynamics.motion.state import Scales
 from spinlev.fem.mutual.making import cached_mutual_table
 from spinlev.fem.rotor.choice import rotor_table

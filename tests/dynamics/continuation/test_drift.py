@@ -9,8 +9,8 @@ from scipy.special import spherical_kn
 from spinlev.dynamics.continuation.slow_drift import SlowTorque, drift
 from spinlev.dynamics.equilibria.search import find_equilibria
 from spinlev.dynamics.flights.flight import Flight, integrate
-from spinlev.dynamics.motion.air_and_shape import reynolds, spinning, swinging
 from spinlev.dynamics.motion.effects import with_effects
+from spinlev.dynamics.motion.floater_effects import reynolds, spinning, swinging
 from spinlev.dynamics.motion.rates import Rates
 from spinlev.dynamics.motion.state import Scales, State
 from spinlev.fem.rotor.choice import rotor_table

@@ -11,9 +11,8 @@ from spinlev.dynamics.continuation.rotor_family import Move, MovedEffect, rotor_
 from spinlev.dynamics.equilibria.search import find_equilibria
 from spinlev.dynamics.motion.effect import Interaction
 from spinlev.dynamics.motion.equations import equations_of_motion, parameters
-from spinlev.dynamics.motion.mutual import Mutual
 from spinlev.dynamics.motion.rates import Rates
-from spinlev.dynamics.motion.rotor_losses import RotorCurrents
+from spinlev.dynamics.motion.rotor_effects import Mutual, RotorCurrents
 from spinlev.dynamics.motion.state import Parameter, Scales
 from spinlev.fem.mutual.making import cached_mutual_table
 from spinlev.fem.rotor.choice import rotor_table

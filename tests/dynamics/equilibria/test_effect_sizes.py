@@ -10,9 +10,8 @@ from spinlev.dynamics.equilibria.search import find_equilibria
 from spinlev.dynamics.motion.effect import Interaction
 from spinlev.dynamics.motion.effects import with_effects
 from spinlev.dynamics.motion.equations import parameters
-from spinlev.dynamics.motion.mutual import Mutual, rough_force
 from spinlev.dynamics.motion.rates import Rates
-from spinlev.dynamics.motion.rotor_losses import RotorCurrents
+from spinlev.dynamics.motion.rotor_effects import Mutual, RotorCurrents, rough_force
 from spinlev.dynamics.motion.state import Scales
 from spinlev.fem.mutual.making import cached_mutual_table
 from spinlev.fem.rotor.choice import rotor_table

@@ -9,8 +9,7 @@ import pytest
 from article import MAGNETS, SCENE
 
 from spinlev.dynamics.flights.batch import ensemble
-from spinlev.dynamics.flights.flight import simulate
-from spinlev.dynamics.flights.start import initial_state
+from spinlev.dynamics.flights.flight import initial_state, simulate
 from spinlev.dynamics.motion.state import State
 from spinlev.fem.harmonics.expansion import uniform_moments
 from spinlev.fem.rotor.table import RotorTable

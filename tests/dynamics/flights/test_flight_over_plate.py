@@ -6,9 +6,7 @@ import numpy as np
 import pytest
 from article import FLOATER, MAGNETS
 
-from spinlev.dynamics.flights.checkpoint import Checkpoint
-from spinlev.dynamics.flights.flight import PLATE_TOLERANCE, Flight, integrate
-from spinlev.dynamics.flights.start import initial_state
+from spinlev.dynamics.flights.flight import PLATE_TOLERANCE, Checkpoint, Flight, initial_state, integrate
 from spinlev.dynamics.flights.trajectory import FlightStopped
 from spinlev.dynamics.motion.plate import PlateMemory
 from spinlev.fem.plate.table import Region

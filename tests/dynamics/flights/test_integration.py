@@ -9,8 +9,15 @@ from article import MAGNETS, RADIUS, SCENE
 
 from spinlev.dynamics.equilibria.equilibrium import EquilibriumError
 from spinlev.dynamics.equilibria.search import find_equilibria
-from spinlev.dynamics.flights.flight import SHORT_TURNS, STRAIGHT_TURNS, Flight, integrate, simulate
-from spinlev.dynamics.flights.start import StartError, initial_state
+from spinlev.dynamics.flights.flight import (
+    SHORT_TURNS,
+    STRAIGHT_TURNS,
+    Flight,
+    StartError,
+    initial_state,
+    integrate,
+    simulate,
+)
 from spinlev.dynamics.flights.trajectory import FlightStopped
 from spinlev.dynamics.motion.events import clearance
 from spinlev.fem.harmonics.expansion import uniform_moments

@@ -7,9 +7,8 @@ import pytest
 from article import FLOATER, MAGNETS
 from places import OVER_PLATE
 
-from spinlev.dynamics.flights.flight import simulate
+from spinlev.dynamics.flights.flight import StartError, simulate
 from spinlev.dynamics.flights.live import LiveFlight
-from spinlev.dynamics.flights.start import StartError
 from spinlev.fem.harmonics.expansion import uniform_moments
 from spinlev.fem.rotor.table import RotorTable
 from spinlev.geometry.common import InputError

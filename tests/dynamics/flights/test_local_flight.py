@@ -8,9 +8,7 @@ import pytest
 from article import MAGNETS, SCENE
 
 from spinlev.dynamics.flights.balls import ERROR
-from spinlev.dynamics.flights.checkpoint import Checkpoint
-from spinlev.dynamics.flights.flight import Flight, integrate, simulate
-from spinlev.dynamics.flights.start import initial_state
+from spinlev.dynamics.flights.flight import Checkpoint, Flight, initial_state, integrate, simulate
 from spinlev.dynamics.flights.trajectory import FlightStopped
 from spinlev.dynamics.motion.plate import PlateMemory
 from spinlev.fem.harmonics.expansion import uniform_moments

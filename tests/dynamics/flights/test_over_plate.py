@@ -7,8 +7,7 @@ import pytest
 from article import FLOATER
 
 from spinlev.dynamics.flights.batch import launched
-from spinlev.dynamics.flights.flight import PLATE_TOLERANCE, Flight, integrate
-from spinlev.dynamics.flights.start import initial_state
+from spinlev.dynamics.flights.flight import PLATE_TOLERANCE, Flight, initial_state, integrate
 from spinlev.dynamics.motion.plate import PlateMemory
 from spinlev.dynamics.motion.state import State
 from spinlev.fem.plate.table import Region

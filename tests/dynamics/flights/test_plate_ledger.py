@@ -10,8 +10,7 @@ from second_opinions.plate_tables import reaction_gradient
 
 from spinlev.dynamics.equilibria.equilibrium import Survey
 from spinlev.dynamics.equilibria.search import find_equilibria, with_plate
-from spinlev.dynamics.flights.flight import Flight, integrate
-from spinlev.dynamics.flights.start import initial_state, starting_point
+from spinlev.dynamics.flights.flight import Flight, initial_state, integrate, starting_point
 from spinlev.dynamics.motion.effects import with_effects
 from spinlev.dynamics.motion.plate import PlateMemory
 from spinlev.dynamics.motion.rates import Rates

@@ -7,9 +7,9 @@ import pytest
 from article import FLOATER, RADIUS
 
 from spinlev.dynamics.flights.flight import simulate
-from spinlev.dynamics.motion.air_and_shape import moving, reynolds, spinning, swinging
 from spinlev.dynamics.motion.effects import with_effects
 from spinlev.dynamics.motion.equations import parameters
+from spinlev.dynamics.motion.floater_effects import moving, reynolds, spinning, swinging
 from spinlev.dynamics.motion.rates import Rates
 from spinlev.dynamics.motion.state import Scales, State
 from spinlev.fem.rotor.choice import rotor_table

@@ -11,7 +11,7 @@ import scipy
 from spinlev.dynamics.motion.effect import Interaction
 from spinlev.dynamics.motion.effects import with_effects
 from spinlev.dynamics.motion.equations import equations_of_motion, parameters
-from spinlev.dynamics.motion.floater_currents import SLOW_ENOUGH, FloaterCurrents, slow_error
+from spinlev.dynamics.motion.floater_effects import SLOW_ENOUGH, FloaterCurrents, slow_error
 from spinlev.dynamics.motion.rates import Rates
 from spinlev.dynamics.motion.state import Parameter, Scales, State
 from spinlev.fem.closed_forms.eddy_sphere import thin_field_torque

@@ -10,10 +10,10 @@ from scipy.spatial.transform import Rotation
 from spinlev.dynamics.equilibria.search import survey
 from spinlev.dynamics.flights.batch import ensemble
 from spinlev.dynamics.flights.flight import simulate
-from spinlev.dynamics.motion.air_and_shape import FloaterShape
 from spinlev.dynamics.motion.effects import mutual_choice, with_effects
 from spinlev.dynamics.motion.equations import parameters
 from spinlev.dynamics.motion.events import clearance, rotor_gap
+from spinlev.dynamics.motion.floater_effects import FloaterShape
 from spinlev.dynamics.motion.state import Scales, State
 from spinlev.fem.rotor.choice import rotor_table
 from spinlev.fem.rotor.floater import floater_sources, force_and_torque

@@ -14,8 +14,8 @@ from spinlev.dynamics.flights.flight import Flight, integrate
 from spinlev.dynamics.motion.effect import Interaction
 from spinlev.dynamics.motion.effects import mutual_choice
 from spinlev.dynamics.motion.equations import equations_of_motion, parameters
-from spinlev.dynamics.motion.mutual import Mutual
 from spinlev.dynamics.motion.rates import Rates
+from spinlev.dynamics.motion.rotor_effects import Mutual
 from spinlev.dynamics.motion.state import Parameter, Scales
 from spinlev.fem.mutual.making import cached_mutual_table
 from spinlev.fem.mutual.response import rotor_ladder, two_body

@@ -16,7 +16,7 @@ from spinlev.dynamics.motion.effect import Interaction
 from spinlev.dynamics.motion.effects import with_effects
 from spinlev.dynamics.motion.equations import equations_of_motion, parameters
 from spinlev.dynamics.motion.rates import Rates
-from spinlev.dynamics.motion.rotor_losses import RotorCurrents
+from spinlev.dynamics.motion.rotor_effects import RotorCurrents
 from spinlev.dynamics.motion.state import Scales, State
 from spinlev.fem.rotor.choice import rotor_table
 from spinlev.fem.rotor_metal import ball_losses, pieces_of

@@ -15,7 +15,7 @@ from spinlev.dynamics.motion.effect import Interaction
 from spinlev.dynamics.motion.effects import with_effects
 from spinlev.dynamics.motion.equations import equations_of_motion, parameters
 from spinlev.dynamics.motion.rates import Rates
-from spinlev.dynamics.motion.rotor_losses import RotorCurrents
+from spinlev.dynamics.motion.rotor_effects import RotorCurrents
 from spinlev.dynamics.motion.state import Scales
 from spinlev.fem.harmonics.expansion import uniform_moments
 from spinlev.fem.rotor.table import RotorTable

@@ -12,7 +12,7 @@ from second_opinions.small_motions import Levitator
 from spinlev.dynamics.equilibria.search import find_equilibria
 from spinlev.dynamics.flights.flight import simulate
 from spinlev.dynamics.motion.effect import Interaction
-from spinlev.dynamics.motion.rotor_losses import RotorCurrents
+from spinlev.dynamics.motion.rotor_effects import RotorCurrents
 from spinlev.fem.rotor.choice import cached_rotor_table
 from spinlev.fem.rotor_metal import cached_rotor_losses
 from spinlev.geometry.rotor import horizontal, vertical

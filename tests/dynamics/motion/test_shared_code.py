@@ -6,8 +6,8 @@ from article import PERMEABLE
 
 from spinlev.dynamics.motion.effect import Interaction
 from spinlev.dynamics.motion.equations import parameters
-from spinlev.dynamics.motion.mutual import Mutual
 from spinlev.dynamics.motion.rates import Rates
+from spinlev.dynamics.motion.rotor_effects import Mutual
 from spinlev.dynamics.motion.state import Scales
 from spinlev.fem.mutual.grid import AnswerGrid, answer_box
 from spinlev.fem.mutual.table import MutualTable

@@ -7,7 +7,7 @@ import pytest
 from ngsolve import SetNumThreads
 from second_opinions.phasor import mean_loss
 
-from spinlev.fem.plate.reaction import plate_reaction
+from spinlev.fem.plate.eddy import plate_reaction
 from spinlev.fem.plate.slab import Slab, reaction_tensor
 from spinlev.fem.rotor.models import AccuracyError
 from spinlev.geometry.meshes.plate import MeshRule

@@ -7,7 +7,7 @@ import pytest
 from ngsolve import SetNumThreads
 from second_opinions.plate_tables import over_face
 
-from spinlev.fem.plate.reaction import plate_reaction
+from spinlev.fem.plate.eddy import plate_reaction
 from spinlev.fem.plate.table import Region
 from spinlev.fem.plate.tables import plate_table
 from spinlev.geometry.meshes.plate import MeshRule

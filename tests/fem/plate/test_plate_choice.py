@@ -7,7 +7,7 @@ import pytest
 from places import HORIZONTAL
 
 from spinlev.fem.plate.choice import resolve_plate_model
-from spinlev.fem.plate.reaction import plate_reaction
+from spinlev.fem.plate.eddy import plate_reaction
 from spinlev.fem.plate.slab import Slab, edge_error, measured_edge_error, reaction_tensor
 from spinlev.geometry.scene.contents import Plate
 from spinlev.geometry.scene.files import load_scene

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from spinlev.fem.plate.reaction import plate_reaction
+from spinlev.fem.plate.eddy import plate_reaction
 from spinlev.fem.plate.slab import Slab, reaction_tensor
 from spinlev.geometry.meshes.plate import MeshRule
 from spinlev.geometry.scene.contents import Plate

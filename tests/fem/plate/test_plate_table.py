@@ -10,10 +10,9 @@ from second_opinions.plate_tables import over_face, reaction_gradient, signal_ex
 
 from spinlev.fem.cache import TableFileError
 from spinlev.fem.closed_forms.potentials import unit_dipoles
-from spinlev.fem.plate.currents import OtherSources
+from spinlev.fem.plate.currents import OtherSources, solve_currents
 from spinlev.fem.plate.network import from_elements
 from spinlev.fem.plate.rotor_share import posed_rotor, rotor_parts, rotor_share, without_high_harmonics
-from spinlev.fem.plate.solution import solve_currents
 from spinlev.fem.plate.table import Region
 from spinlev.fem.plate.tables import (
     PLATE as PLATES,

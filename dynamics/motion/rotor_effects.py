@@ -1,0 +1,346 @@
+"""What rotor and floater do to each other beyond the rotor's field: mutual magnetisation, and a brake by its currents.
+
+Both are known as tables, whose expressions are long.  About a pose and in a ball they are polynomials about a place,
+whose numbers are runtime parameters.  What bodies do to each other falls steeply with their distance, but much the same
+in all its parts: in a ball they are q⁻³ times polynomials with one q of degree 2.  With degree 2 they err by a tenth of
+what polynomials of degree 3 alone do.
+
+Mutual magnetisation has one energy.  With M = m + α B0 the floater's whole moment, the rotor's answer to it and what
+the floater's own currents of magnetisation do have the energy u(x) + V(x)·M + ½ M·H(x)·M.  About one pose (searches,
+modes) the table's values and first and second derivatives are all that counts: u, V and H are polynomials of degree 2,
+1 and 0, and M is counted from the pose's.  In a ball (flights) they are q⁻³ times polynomials.
+
+The currents are in metal that turns with the rotor.  A rate u_k = d/dt m·c_k is linear in eight numbers, the five of
+the traceless symmetric part of m ⊗ (drift) and the three of the rate of m, by the five of ∇c_k and the three of c_k.
+So the power is quadratic in them, with a matrix S of place alone, S_ab = Σ_k w_ka w_kb, whatever the moment is.  About
+one pose S is a constant: where the floater is in step the rates vanish, so that derivatives are right as well.  In a
+ball S is q⁻³ times polynomials of degree 1. The work that force and torque do is that power exactly.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cache
+from typing import Any, Protocol
+
+import heyoka as hy
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ...fem.harmonics.interior import Ball
+from ...fem.harmonics.local import BallField
+from ...fem.mutual.making import answers
+from ...fem.mutual.table import MutualTable
+from ...fem.plate.multipoles import weighted
+from ...fem.rotor.table import FieldTable, RangeError
+from ...fem.rotor_metal import RotorLosses
+from ...geometry.common import MU_0, Array, even_directions
+from ...geometry.magnets import Magnet, polarizability
+from ...geometry.scene.contents import Floater, Scene
+from .effect import Added, Motion, conservative, dissipative
+from .state import Parameter, Scales, State, Vector, cross, dot, dotted, subtract
+
+NORMALS, RADII = 32, (0.35, 0.7, 1.0)
+FALL = 3  # Minus the power of q
+COUNT = (1, 4, 10)  # Of the monomials up to a degree
+PAIRS = [(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)]  # Of the coordinates in the monomials of degree 2
+
+
+def monomials(degree: int, offset: Sequence[Any], one: Any) -> list[Any]:
+    """1, x, y, z, xx, xy, xz, yy, yz, zz up to a degree; `offset` (3) and `one` are expressions or arrays."""
+    return [one, *offset, *(offset[a] * offset[b] for a, b in PAIRS)][: COUNT[degree]]
+
+
+def polynomial(weights: Sequence[hy.expression], basis: Sequence[hy.expression]) -> hy.expression:
+    """Σ weight · monomial, up to the degree that the number of weights says."""
+    return hy.sum([weights[0], *(w * p for w, p in zip(weights[1:], basis[1:], strict=False))])
+
+
+@cache
+def nodes() -> Array:
+    """(n, 3) places in the unit ball at which functions are fitted."""
+    normals = even_directions(NORMALS)
+    return np.concatenate([np.zeros((1, 3)), *(radius * normals for radius in RADII)])
+
+
+@cache
+def fitting(degree: int) -> tuple[Array, Array]:
+    """(count, n): weights by the values at the nodes; and (n, count): the values by the weights."""
+    values = np.array(monomials(degree, list(nodes().T), np.ones(len(nodes())))).T
+    return np.linalg.pinv(values), values
+
+
+def falling(size: Array) -> tuple[Array, Array]:
+    """Weights (10,) of q and q⁻³ (n,) for the size (n,) > 0, at the nodes, of what is told by it."""
+    solve, basis = fitting(2)
+    weights = solve @ (size / size[0]) ** (-1 / FALL)
+    return weights, (basis @ weights) ** -FALL
+
+
+MUTUAL = "mutual magnetisation"
+# Degrees of u, the three of V, and xx, xy, xz, yy, yz, zz of H in a ball; V is small.
+IN_BALL = (2, *(1, 1, 1), *(2, 2, 2, 2, 2, 2))
+AT_POSE = (2, *(1, 1, 1), *(0, 0, 0, 0, 0, 0))
+ALLOWED = 1e-5  # Error of the force by that of the rigid dipole
+WHICH = [Parameter.LENGTH, Parameter.PLATE_MOMENT, Parameter.PLATE_SHARE]
+STEP = 0.02  # Of the differences of `rough_force`, in floater radii
+
+
+@dataclass(frozen=True, eq=False)
+class Mutual:
+    """Rotor and floater magnetise each other."""
+
+    table: MutualTable  # of their answers
+    moment: float  # of the floater, A m²
+    name: str = MUTUAL
+    # number of the first of its runtime parameters about a pose or in a ball; None: as the table writes it
+    first: int | None = None
+    ball: BallField | None = None  # whose centre and radius are among the runtime parameters
+
+    def placed(self, first: int) -> Mutual:
+        return replace(self, first=first)
+
+    def in_ball(self, ball: BallField, first: int) -> Mutual:
+        return replace(self, ball=ball, first=first)
+
+    @property
+    def count(self) -> int:
+        return 6 + sum(COUNT[n] for n in AT_POSE) if self.ball is None else sum(COUNT[n] for n in (2, *IN_BALL))
+
+    def added(self, motion: Motion) -> Added:
+        if self.first is None:
+            return conservative(self._energy, motion)
+        length, strength, share, induced = (
+            hy.par[p] for p in (Parameter.LENGTH, Parameter.PLATE_MOMENT, Parameter.PLATE_SHARE, Parameter.INDUCED)
+        )
+        flux = [share * b for b in motion.field]
+        # in the unit of √energy, so that the unit of energy enters nowhere else
+        away = [strength * m + induced * b for m, b in zip(motion.moment, motion.field, strict=True)]
+        if self.ball is None:
+            centre = [hy.par[self.first + k] for k in range(6)]
+            offset, unit = subtract(motion.position, centre[:3]), hy.expression(1.0)
+            away, start, degrees = subtract(away, centre[3:]), self.first + 6, [*AT_POSE]
+        else:
+            offset = self.ball.offset([length * x for x in motion.position])
+            unit, start, degrees = length * hy.par[self.ball.first + 3], self.first, [2, *IN_BALL]
+        basis, weights = monomials(2, offset, hy.expression(1.0)), []
+        for degree in degrees:
+            weights.append([hy.par[start + k] for k in range(COUNT[degree])])
+            start += COUNT[degree]
+        value, *rest = [polynomial(row, basis) for row in weights[-len(AT_POSE) :]]
+        linear = [share * v for v in rest[:3]]
+        rows = [[rest[3 + _pair(a, b)] for b in range(3)] for a in range(3)]
+        seen = [v + dot(row, away) for v, row in zip(linear, rows, strict=True)]  # the energy's derivative by M
+        level = share * share * value + 0.5 * dot(away, [v + s for v, s in zip(linear, seen, strict=True)])
+        # the energy is Σ factor · part: first the factors are summed into one polynomial, which is then differentiated
+        factors = [share * share, *(share * m for m in away)]
+        factors += [(0.5 if a == b else 1.0) * away[a] * away[b] for a, b in PAIRS]
+        fall = hy.expression(1.0)
+        if self.ball is not None:
+            inverse = 1.0 / polynomial(weights[0], basis)
+            fall, factors = inverse * inverse * inverse, [-FALL * (level * inverse), *factors]
+        pairs = list(zip(factors, weights, strict=True))
+        slope = [hy.sum([f * row[1 + j] for f, row in pairs if len(row) > 1]) for j in range(3)]
+        bend = [hy.sum([f * row[4 + k] for f, row in pairs if len(row) > 4]) for k in range(len(PAIRS))]
+        scale, answer = -unit * fall, [-fall * s for s in seen]
+        return Added(
+            force=[
+                scale * hy.sum([slope[j], *(_twice(j, b) * bend[_pair(j, b)] * offset[b] for b in range(3))])
+                for j in range(3)
+            ],
+            pulled=[(length * induced) * (a + b) for a, b in zip(answer, flux, strict=True)],
+            turning=[strength / hy.par[Parameter.INERTIA] * a for a in answer],
+            energy=fall * level - 0.5 * induced * dot(motion.field, flux),
+        )
+
+    def _energy(self, position: Vector, moment: Vector, field: Vector) -> hy.expression:
+        place = [hy.par[Parameter.LENGTH] * x for x in position]
+        strength, share = hy.par[Parameter.PLATE_MOMENT], hy.par[Parameter.PLATE_SHARE]
+        return self.table.energy(place, [strength * m for m in moment], [share * b for b in field], share)
+
+    def numbers(self, field: FieldTable, position: Array, moment: Array, values: Array) -> Array:
+        length, strength, share = values[:, WHICH].T[:, :, None]
+        place = position * length
+        try:
+            flux = field.evaluate(place)[0]
+        except RangeError:  # some are in a magnet
+            flux, known = np.zeros(place.shape), field.in_range(place)
+            flux[known] = field.evaluate(place[known])[0]
+        whole = strength * moment + self.table.polarizability * share * flux
+        energy, slope, second = self.table.derivatives(place, whole / share)
+        units = np.repeat(np.concatenate([length, np.ones_like(length)], axis=1), 3, axis=1)
+        slope, second = slope * units, second * units[:, :, None] * units[:, None, :]
+        quadratic = np.stack([second[:, a, b] / _twice(a, b) for a, b in PAIRS], axis=1)
+        linear = np.concatenate([slope[:, 3:, None], second[:, 3:, :3]], axis=2).reshape(len(place), -1)
+        constant = np.stack([second[:, 3 + a, 3 + b] for a, b in PAIRS], axis=1)
+        return np.concatenate([position, whole, energy[:, None], slope[:, :3], quadratic, linear, constant], axis=1)
+
+    def fit(self, ball: Ball, gradient: Array) -> tuple[Array, float]:
+        """See `Fittable`; what is missed of the energy is taken to change as fast as a cubic."""
+        places = ball.center + ball.radius * nodes()
+        values, slope, second = self.table.derivatives(places, np.zeros_like(places))
+        parts = np.array([values, *slope[:, 3:].T, *(second[:, 3 + a, 3 + b] for a, b in PAIRS)])
+        units = np.array([1.0, *[self.moment] * 3, *[self.moment**2 / 2] * len(PAIRS)])
+        quadratic, fall = falling(np.linalg.norm(units[:, None] * parts, axis=0))
+        numbers, missed = [quadratic], []
+        for degree, unit, part in zip(IN_BALL, units, parts, strict=True):
+            solve, basis = fitting(degree)
+            numbers.append(solve @ (part / fall))
+            missed.append(unit * np.abs(fall * (basis @ numbers[-1]) - part).max())
+        wrong = missed[0] + max(missed[1:4]) + max(missed[4:])
+        error = 3 * wrong / (ball.radius * self.moment * float(np.linalg.norm(gradient)))
+        return np.concatenate(numbers), float(error) / ALLOWED
+
+    def wrench(self, place: Array, direction: Array, field: Array, gradient: Array) -> tuple[Array, Array]:
+        """Force (n, 3) N and torque (n, 3) N m at places and directions of the moment (n, 3) in B0 and ∇B0."""
+        _, force, torque = answers(self.table, place, self.moment * direction, field, gradient)
+        return force, torque
+
+    def doubt(self, points: Array, field: Array) -> tuple[Array, Array]:
+        """Errors of torque and force, over the moment, of the moment that turns the worst: (n,) T and (n,) T/m."""
+        force, torque = np.zeros(len(points)), np.zeros(len(points))
+        for direction in np.eye(3):
+            moments = np.broadcast_to(self.moment * direction, points.shape)
+            _, slope, _ = self.table.derivatives(points, moments + self.table.polarizability * field)
+            force = np.maximum(force, np.linalg.norm(slope[:, :3], axis=1))
+            torque = np.maximum(torque, np.linalg.norm(np.cross(moments, slope[:, 3:]), axis=1))
+        of_force, of_torque = self.table.relative_error(points)
+        return torque * of_torque / self.moment, force * of_force / self.moment
+
+
+def _pair(a: int, b: int) -> int:
+    return PAIRS.index((min(a, b), max(a, b)))
+
+
+def _twice(a: int, b: int) -> float:
+    """Second derivative of the monomial x_a x_b."""
+    return 2.0 if a == b else 1.0
+
+
+def rough_force(
+    magnets: Sequence[Magnet], floater: Floater, table: FieldTable, place: Array, direction: Array
+) -> Array:
+    """Force (3,) N that the answers add at a place (3,) m for a direction of the moment; good to a factor of two."""
+    step = STEP * floater.radius
+    places = place + step * np.concatenate([np.eye(3), -np.eye(3)])
+    field = table.evaluate(places)[0]
+    energy = -floater.polarizability / 2 * np.sum(field**2, axis=1)
+    for magnet in magnets:
+        offset = places - magnet.box.center
+        distance = np.linalg.norm(offset, axis=1)
+        along = offset @ direction / distance
+        square = (MU_0 / (4 * np.pi) * floater.moment / distance**3) ** 2 * (1 + 3 * along**2)
+        energy -= polarizability(magnet.body.volume, 1 + magnet.contrast) / 2 * square
+    return np.asarray((energy[3:] - energy[:3]) / (2 * step))
+
+
+ROTOR_CURRENTS = "currents in the rotor"
+NUMBERS = 8
+UPPER = ((0, 0), (1, 1), (0, 1), (0, 2), (1, 2))  # Entries of the gradient that tell it
+ENTRIES = [(a, b) for a in range(NUMBERS) for b in range(a, NUMBERS)]
+DIAGONAL = [ENTRIES.index((a, a)) for a in range(NUMBERS)]
+UNIT = 1e-2  # Length by which gradients count beside fields, m: about a place's distance from the currents
+BRAKE_ALLOWED = 5e-3  # Error of S by its largest entry; the table has 1e-2 in contact and 1e-3 farther off
+
+
+@dataclass(frozen=True, eq=False)
+class RotorCurrents:
+    """The brake of a table."""
+
+    table: RotorLosses  # of the losses
+    name: str = ROTOR_CURRENTS
+    # number of the first of its runtime parameters about a pose or in a ball; None: as the table writes it
+    first: int | None = None
+    ball: BallField | None = None  # whose centre and radius are among the runtime parameters
+
+    def placed(self, first: int) -> RotorCurrents:
+        return replace(self, first=first)
+
+    def in_ball(self, ball: BallField, first: int) -> RotorCurrents:
+        return replace(self, ball=ball, first=first)
+
+    @property
+    def count(self) -> int:
+        return len(ENTRIES) if self.ball is None else COUNT[2] + len(ENTRIES) * COUNT[1]
+
+    def added(self, motion: Motion) -> Added:
+        """Force and torque are minus half the derivatives of the power by drift and turning."""
+        length, moment, drift = hy.par[Parameter.LENGTH], motion.moment, motion.drift
+        last = moment[2] * drift[2]
+        pairs = [moment[0] * drift[0] - last, moment[1] * drift[1] - last]
+        pairs += [moment[i] * drift[j] + moment[j] * drift[i] for i, j in UPPER[2:]]
+        rates = [*(length * p for p in pairs), *cross(motion.lag, moment)]
+        strength = hy.par[Parameter.PLATE_MOMENT] * hy.par[Parameter.PLATE_MOMENT] / hy.par[Parameter.TIME]
+        xx, yy, xy, xz, yz, *field = (-strength * s for s in self._response(motion, rates))
+        slopes = [[xx, xy, xz], [xy, yy, yz], [xz, yz, -xx - yy]]
+        force = [length * dotted(moment, row) for row in slopes]
+        torque = [t / hy.par[Parameter.INERTIA] for t in cross(moment, field)]
+        return dissipative(force, torque, motion)
+
+    def _response(self, motion: Motion, rates: Vector) -> Vector:
+        """S · rates."""
+        metres = [hy.par[Parameter.LENGTH] * x for x in motion.position]
+        if self.first is None:
+            parts = self.table.multipoles.expressions(metres)
+            rows = [[*(slope[i][j] for i, j in UPPER), *field] for field, slope in parts]
+            signals, weights = [dotted(row, rates) for row in rows], self.table.weights
+            induced = [weighted(w, signals) for w in weights]
+            strengths = [weighted(w, induced) for w in weights.T]
+            return [dotted(strengths, column) for column in zip(*rows, strict=True)]
+        if self.ball is None:
+            entries = [hy.par[self.first + k] for k in range(len(ENTRIES))]
+        else:
+            basis, start = monomials(2, self.ball.offset(metres), hy.expression(1.0)), self.first
+            inverse = 1.0 / polynomial([hy.par[start + k] for k in range(COUNT[2])], basis)
+            rates = [inverse * inverse * inverse * r for r in rates]
+            start, size = start + COUNT[2], COUNT[1]
+            entries = [
+                polynomial([hy.par[start + n * size + k] for k in range(size)], basis) for n in range(len(ENTRIES))
+            ]
+        known = dict(zip(ENTRIES, entries, strict=True))
+        return [dotted([known[min(a, b), max(a, b)] for b in range(NUMBERS)], rates) for a in range(NUMBERS)]
+
+    def numbers(self, field: FieldTable, position: Array, moment: Array, values: Array) -> Array:
+        return self._entries(position * values[:, Parameter.LENGTH, None]).T
+
+    def fit(self, ball: Ball, gradient: Array) -> tuple[Array, float]:
+        parts = self._entries(ball.center + ball.radius * nodes())
+        lengths = np.repeat([UNIT, 1.0], (5, 3))
+        units = np.array([lengths[a] * lengths[b] for a, b in ENTRIES])
+        solve, basis = fitting(1)
+        quadratic, fall = falling(units[DIAGONAL] @ parts[DIAGONAL])
+        weights = (parts / fall) @ solve.T
+        missed = units * np.abs(fall * (weights @ basis.T) - parts).max(axis=1)
+        error = float(missed.max() / (units * np.abs(parts).max(axis=1)).max())
+        return np.concatenate([quadratic, weights.ravel()]), error / BRAKE_ALLOWED
+
+    def _entries(self, places: Array) -> Array:
+        """(36, n) of S at places (n, 3) m."""
+        fields, slopes = self.table.fields(places)
+        rows = np.concatenate([np.stack([slopes[..., i, j] for i, j in UPPER], axis=2), fields], axis=2)
+        return np.array([np.einsum("nk,nk->n", rows[..., a], rows[..., b]) for a, b in ENTRIES])
+
+
+class Dissipation(Protocol):
+    """Losses in metal that turns with the rotor."""
+
+    def dissipation(self, positions: ArrayLike, moments: ArrayLike) -> Array:
+        """D (n, 6, 6) of dipoles (n, 3) A m² at (n, 3) m: N s/m, N s and N m s."""
+
+
+def brake_slope(table: Dissipation, scene: Scene, state: State) -> Array:
+    """(12, 12): what the currents add to the derivatives of the scaled rates of a floater in step with the rotor."""
+    scales, floater = Scales.of(scene), scene.floater
+    matrix = table.dissipation(state.position[None], floater.moment * state.moment[None])[0]
+    units = np.repeat([scales.length, 1.0], 3) / scales.time
+    masses = np.repeat([floater.mass * scales.length, floater.inertia], 3) / scales.time**2
+    spin = scales.pack(state)[9:] - [0.0, 0.0, scene.angular_velocity * scales.time]
+    rates = np.zeros((6, 12))
+    rates[:, 3:6], rates[:, 9:] = np.eye(6)[:, :3], np.eye(6)[:, 3:]
+    rates[0, 1] = scene.angular_velocity * scales.time
+    rates[1, 0] = -rates[0, 1]
+    rates[3:, 6:9] = -float(spin @ state.moment) * np.eye(3)  # turning m̂ in a spin about it is a turn as well
+    found = np.zeros((12, 12))
+    found[[3, 4, 5, 9, 10, 11]] = -(matrix * units / masses[:, None]) @ rates
+    return found
