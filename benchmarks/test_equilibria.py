@@ -7,7 +7,7 @@ from peers import SCENE, magpylib_rotor, scipy_equilibria, scipy_equilibrium
 from spinlev.dynamics.continuation.map import equilibrium_map
 from spinlev.dynamics.continuation.rotor_family import rotor_family
 from spinlev.dynamics.equilibria.balance import EVERY, Balance, solve
-from spinlev.dynamics.equilibria.modes import modes
+from spinlev.dynamics.equilibria.equilibrium import modes
 from spinlev.dynamics.equilibria.search import find_equilibria
 from spinlev.dynamics.motion.equations import parameters
 from spinlev.dynamics.motion.rates import Rates

@@ -7,8 +7,7 @@ from typing import Any
 import numpy as np
 
 from ..dynamics.equilibria.balance import tangent_basis
-from ..dynamics.equilibria.equilibrium import Equilibrium
-from ..dynamics.equilibria.modes import left_eigenvectors, tangent_spaces
+from ..dynamics.equilibria.equilibrium import Equilibrium, left_eigenvectors, tangent_spaces
 from ..dynamics.motion.effect import Interaction
 from ..dynamics.motion.effects import NOTHING_ANSWERS
 from ..dynamics.motion.equations import parameters

@@ -15,8 +15,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from ..dynamics.equilibria.equilibrium import Equilibrium, ForceCurve, LeftOut, Survey
-from ..dynamics.equilibria.modes import SIDE, TILT
+from ..dynamics.equilibria.equilibrium import SIDE, TILT, Equilibrium, ForceCurve, LeftOut, Survey
 from ..dynamics.flights.trajectory import Trajectory
 from ..dynamics.motion.plate import PlateMemory
 from ..dynamics.motion.state import State

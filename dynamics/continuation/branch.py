@@ -9,8 +9,7 @@ import scipy
 from ...geometry.common import Array
 from ...geometry.scene.contents import Scene
 from ..equilibria.balance import CONVERGED_STEP, EVERY, Balance, Indices, solve
-from ..equilibria.equilibrium import FOLD, EquilibriumError
-from ..equilibria.modes import Modes, modes
+from ..equilibria.equilibrium import FOLD, EquilibriumError, Modes, modes
 from ..equilibria.path import END, ON, SHORTER, BalanceCurve, Steps, directions, follow, stepped
 from ..motion.equations import parameters
 from ..motion.rates import Rates

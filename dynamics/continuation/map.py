@@ -13,8 +13,7 @@ from ...geometry.common import Array
 from ...geometry.scene.contents import Scene
 from ..equilibria.balance import DUPLICATE_DISTANCE, EVERY, Balance, Indices
 from ..equilibria.curves import SearchRange, newton_search
-from ..equilibria.equilibrium import EquilibriumError, Survey
-from ..equilibria.modes import is_stable, spectra
+from ..equilibria.equilibrium import EquilibriumError, Survey, is_stable, spectra
 from ..equilibria.path import carried
 from ..equilibria.search import FixedPoints, check_turning, field_doubts, survey_of
 from ..motion.equations import parameters

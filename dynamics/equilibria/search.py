@@ -22,9 +22,8 @@ from ..motion.rates import Rates
 from ..motion.state import Parameter, Scales
 from .balance import Balance, tangent_basis
 from .curves import FARTHEST, SearchRange, fixed_points
-from .equilibrium import Equilibrium, EquilibriumError, ForceCurve, LeftOut, Survey
-from .modes import modes
-from .periodic import ForcedMotion, overlap
+from .equilibrium import Equilibrium, EquilibriumError, ForceCurve, LeftOut, Survey, modes
+from .orbits import ForcedMotion, overlap
 
 # Part of what a model leaves out that is wrong of its effect to first order, by all causes together and by each. Below
 # three vertical and four tilted rotors of permeable cubes the place by finite elements differed by 0.59 to 0.79 of the

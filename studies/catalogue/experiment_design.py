@@ -18,8 +18,7 @@ from scipy.stats import qmc
 
 from ...dynamics.continuation.branch import Family, frequencies
 from ...dynamics.continuation.slow_drift import SlowTorque
-from ...dynamics.equilibria.equilibrium import EquilibriumError
-from ...dynamics.equilibria.modes import modes, named_modes, tangent_spaces
+from ...dynamics.equilibria.equilibrium import EquilibriumError, modes, named_modes, tangent_spaces
 from ...dynamics.motion.effect import Interaction
 from ...dynamics.motion.effects import with_effects
 from ...dynamics.motion.equations import parameters

@@ -11,8 +11,7 @@ from matplotlib.figure import Figure
 
 from ...dynamics.continuation.frequencies import StableRange, at_frequency, reference_state, stable_range
 from ...dynamics.equilibria.balance import CONVERGED_STEP, Balance, moved_pose, solve, tangent_basis
-from ...dynamics.equilibria.equilibrium import Equilibrium
-from ...dynamics.equilibria.modes import named_modes
+from ...dynamics.equilibria.equilibrium import Equilibrium, named_modes
 from ...dynamics.motion.effects import with_effects
 from ...dynamics.motion.equations import parameters
 from ...dynamics.motion.rates import Rates

@@ -10,8 +10,8 @@ from scipy.integrate import solve_ivp
 from second_opinions.phasor import mean_force, mean_torque
 from second_opinions.plate_tables import reaction_gradient
 
-from spinlev.dynamics.equilibria.equilibrium import Survey
-from spinlev.dynamics.equilibria.orbits import differentiation, floquet_modes, periodic_orbit, resampled
+from spinlev.dynamics.equilibria.equilibrium import Survey, resampled
+from spinlev.dynamics.equilibria.orbits import differentiation, floquet_modes, periodic_orbit
 from spinlev.dynamics.equilibria.search import find_equilibria, survey, with_plate
 from spinlev.dynamics.flights.flight import Flight, integrate, simulate
 from spinlev.dynamics.motion.equations import parameters

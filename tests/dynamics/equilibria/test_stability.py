@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from article import MAGNETS, SCENE
 
-from spinlev.dynamics.equilibria.modes import left_eigenvectors, modes
+from spinlev.dynamics.equilibria.equilibrium import left_eigenvectors, modes
 from spinlev.dynamics.equilibria.search import find_equilibria
 from spinlev.dynamics.flights.flight import Flight, integrate
 from spinlev.dynamics.motion.equations import parameters

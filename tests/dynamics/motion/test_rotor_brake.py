@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from article import PERMEABLE
 
-from spinlev.dynamics.equilibria.modes import modes
+from spinlev.dynamics.equilibria.equilibrium import modes
 from spinlev.dynamics.equilibria.search import find_equilibria
 from spinlev.dynamics.flights.flight import simulate
 from spinlev.dynamics.motion.effect import Interaction

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from article import PERMEABLE
 
-from spinlev.dynamics.equilibria.modes import modes
+from spinlev.dynamics.equilibria.equilibrium import modes
 from spinlev.dynamics.equilibria.search import find_equilibria
 from spinlev.dynamics.flights.balls import LARGE, SMALL, Balls, in_ball
 from spinlev.dynamics.flights.flight import simulate
