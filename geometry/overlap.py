@@ -152,16 +152,12 @@ def closing_shifts(magnets: Sequence[Magnet]) -> Array:
     narrow = NARROW * min(float(magnet.box.size.min()) for magnet in magnets)
     for i, j in combinations(range(len(magnets)), 2):
         gap, axis = separation(shifted_magnet(magnets[i], shifts[i]).body, shifted_magnet(magnets[j], shifts[j]).body)
-        if TOUCHING < gap < narrow and all(_flat_across(magnets[k].body, axis) for k in (i, j)):
+        # A gap can be closed by a shift where both bodies end in a plane across it, as any box does.
+        others = [magnets[k].body for k in (i, j) if not isinstance(magnets[k].body, Box)]
+        flat = all(not isinstance(b, Sphere) and abs(b.rotation[:, 2] @ axis) > 1 - 1e-12 for b in others)
+        if TOUCHING < gap < narrow and flat:
             shifts[j] -= gap * axis
     return shifts
-
-
-def _flat_across(body: Solid, direction: Array) -> bool:
-    """Whether a body ends in a plane across a direction, so that a gap to it can be closed by a shift; any box does."""
-    if isinstance(body, Box):
-        return True
-    return not isinstance(body, Sphere) and bool(abs(body.rotation[:, 2] @ direction) > 1 - 1e-12)
 
 
 def largest_shift(magnets: Sequence[Magnet]) -> float:

@@ -246,19 +246,13 @@ class _Turned(Body):
 
 @dataclass(frozen=True, eq=False)
 class Cylinder(_Turned):
-    """A straight round cylinder.
+    """A straight round cylinder."""
 
-    Parameters
-    ----------
-    radius : m
-    height : m
-    center : (3,) position of the centre, m
-    rotation : (3, 3) matrix whose columns are the body axes; the third is that of the cylinder (default: none turned)
-    """
-
-    radius: float = field(metadata={"units": "m"})
-    height: float = field(metadata={"units": "m"})
+    radius: float = field(metadata={"units": "m"})  # m
+    height: float = field(metadata={"units": "m"})  # m
+    # (3,) position of the centre, m
     center: Array = field(default_factory=lambda: np.zeros(3), metadata={"units": "m"})
+    # (3, 3) matrix whose columns are the body axes; the third is that of the cylinder (default: none turned)
     rotation: Array = field(default_factory=lambda: np.eye(3))
 
     inner_radius = 0.0
@@ -276,23 +270,17 @@ class Cylinder(_Turned):
 class Ring(_Turned):
     """A ring of rectangular section, or tube.
 
-    Parameters
-    ----------
-    radius : m
-    inner_radius : m
-    height : m
-    center : (3,) position of the centre, m
-    rotation : (3, 3) matrix whose columns are the body axes; the third is that of the ring (default: none turned)
-
     Raises
     ------
     ValueError : the inner radius is not smaller than the outer one
     """
 
-    radius: float = field(metadata={"units": "m"})
-    inner_radius: float = field(metadata={"units": "m"})
-    height: float = field(metadata={"units": "m"})
+    radius: float = field(metadata={"units": "m"})  # m
+    inner_radius: float = field(metadata={"units": "m"})  # m
+    height: float = field(metadata={"units": "m"})  # m
+    # (3,) position of the centre, m
     center: Array = field(default_factory=lambda: np.zeros(3), metadata={"units": "m"})
+    # (3, 3) matrix whose columns are the body axes; the third is that of the ring (default: none turned)
     rotation: Array = field(default_factory=lambda: np.eye(3))
 
     def __post_init__(self) -> None:
@@ -314,17 +302,12 @@ class Ring(_Turned):
 
 @dataclass(frozen=True, eq=False)
 class Sphere(Body):
-    """A ball.
+    """A ball."""
 
-    Parameters
-    ----------
-    radius : m
-    center : (3,) position of the centre, m
-    rotation : (3, 3) matrix whose columns are the body axes (default: none turned)
-    """
-
-    radius: float = field(metadata={"units": "m"})
+    radius: float = field(metadata={"units": "m"})  # m
+    # (3,) position of the centre, m
     center: Array = field(default_factory=lambda: np.zeros(3), metadata={"units": "m"})
+    # (3, 3) matrix whose columns are the body axes (default: none turned)
     rotation: Array = field(default_factory=lambda: np.eye(3))
 
     @property

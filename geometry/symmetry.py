@@ -37,16 +37,14 @@ class Symmetry:
 
 def find_symmetry(magnets: Sequence[Magnet]) -> Symmetry:
     """The frame, of the rotor or of the first magnet, in which the bodies have most mirror planes."""
-    found = [_symmetry_along(magnets, axes) for axes in (np.eye(3), magnets[0].body.rotation)]
+    found = []
+    for axes in (np.eye(3), magnets[0].body.rotation):
+        ends = np.concatenate([_ends(magnet.body, axes) for magnet in magnets])
+        symmetry = Symmetry(axes @ ((ends.min(axis=0) + ends.max(axis=0)) / 2), axes, ())
+        seen = [symmetry.to_frame(magnet) for magnet in magnets]
+        planes = [a for a in range(3) if mirror_images(seen, a) is not None and not _in_narrow_gap(seen, a)]
+        found.append(replace(symmetry, planes=tuple(planes)))
     return max(found, key=lambda symmetry: len(symmetry.planes))
-
-
-def _symmetry_along(magnets: Sequence[Magnet], axes: Array) -> Symmetry:
-    ends = np.concatenate([_ends(magnet.body, axes) for magnet in magnets])
-    symmetry = Symmetry(axes @ ((ends.min(axis=0) + ends.max(axis=0)) / 2), axes, ())
-    seen = [symmetry.to_frame(magnet) for magnet in magnets]
-    planes = [a for a in range(3) if mirror_images(seen, a) is not None and not _in_narrow_gap(seen, a)]
-    return replace(symmetry, planes=tuple(planes))
 
 
 def _in_narrow_gap(magnets: Sequence[Magnet], axis: int) -> bool:

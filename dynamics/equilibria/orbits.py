@@ -345,12 +345,16 @@ class ForcedMotion:
         orbit, why, part = self._followed(scales.pack(begun), known.spin, known.turn is None)
         if orbit is None:
             return LeftOut(known, why, part)
-        turn, motion = scales.unpack(orbit.states), floquet_modes(orbit)
+        turn, motion, wrong = scales.unpack(orbit.states), floquet_modes(orbit), 0.0
+        if self.memory:  # the part of what the plate moves it that its table may be wrong by
+            places = known.position if known.turn is None else resampled(known.turn.position, len(orbit.states))
+            moved = np.linalg.norm(orbit.states[:, :3] * scales.length - places, axis=1).max()
+            wrong = self.memory.error * float(moved)
         found = Equilibrium(
             state=scales.unpack(orbit.mean),
             spin=fixed.spin,
             residual=orbit.error,
-            position_error=self._position_error(orbit, known, scales),
+            position_error=known.position_error + wrong + orbit.error * scales.length,
             **motion.in_seconds(scales.time),
             turn=turn,
             currents=orbit.plate / self.values[Parameter.PLATE_SHARE] if self.memory else None,
@@ -388,15 +392,6 @@ class ForcedMotion:
             return found, NOT_CONVERGED, done
         arrived, why, part = _turned(OrbitCurve(self.rates, problem, spin), states, done)
         return None if arrived is None else orbit(1.0, arrived), why, part
-
-    def _position_error(self, orbit: Orbit, known: Equilibrium, scales: Scales) -> float:
-        """The one's own without the plate, m, and the part of what the plate moves that its table may be wrong by."""
-        wrong = 0.0
-        if self.memory:
-            places = known.position if known.turn is None else resampled(known.turn.position, len(orbit.states))
-            moved = np.linalg.norm(orbit.states[:, :3] * scales.length - places, axis=1).max()
-            wrong = self.memory.error * float(moved)
-        return known.position_error + wrong + orbit.error * scales.length
 
 
 def _turned(curve: OrbitCurve, states: Array, done: float) -> tuple[Array | None, str, float]:

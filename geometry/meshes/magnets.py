@@ -10,7 +10,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import combinations
+from itertools import combinations, product
 from typing import TYPE_CHECKING, Any
 
 import netgen.occ as occ
@@ -149,9 +149,10 @@ def _meshed(
     layered = settings.hp_layers and len(parts) < len(bodies)
     if layered:
         _mark_singular(shape, bodies, unit)
-    for edge in shape.edges if parts else ():
-        graded = [_size(b, settings) * GRADED**settings.hp_layers / unit for b in parts if _sharp(edge, b, unit)]
-        edge.maxh = min([edge.maxh, *graded])
+    for edge, part in product(shape.edges, parts):
+        # where faces of a part meet at an angle
+        if edge.mass > TINY and part.edge_distance(_middle(edge)[None] * unit)[0] < ON_EDGE * part.circumradius:
+            edge.maxh = min(edge.maxh, _size(part, settings) * GRADED**settings.hp_layers / unit)
     smallest = min((settings.smallest * body.volume ** (1 / 3) / unit for body in parts), default=0.0)
     sizes = {"maxh": settings.air_size, "minh": smallest, "grading": settings.grading}
     try:
@@ -172,11 +173,6 @@ def _size(body: Solid, settings: MeshSettings) -> float:
     """Largest element in a magnet, m."""
     thinnest, cube = float(body.size.min()), body.volume ** (1 / 3)
     return float(settings.magnet_size * (min(thinnest, cube) * cube) ** 0.5)
-
-
-def _sharp(edge: Any, body: Part, unit: float) -> bool:
-    """Whether an edge of the mesh's geometry is one at which faces of a part meet at an angle."""
-    return edge.mass > TINY and float(body.edge_distance(_middle(edge)[None] * unit)[0]) < ON_EDGE * body.circumradius
 
 
 def _mark_singular(shape: Any, bodies: Sequence[Solid], unit: float) -> None:

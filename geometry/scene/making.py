@@ -41,11 +41,16 @@ def assemble(keys: Mapping[str, Any], source: str, folder: Path | None = None, k
         table = SceneTable.model_validate(keys)
     except ValidationError as error:
         raise SceneError(source, described_faults(error.errors())) from None
-    faults = key_faults(table) + (_too_many(table.rotor, known) if known else [])
+    faults, rotor = key_faults(table), table.rotor
+    if known:  # overlaps of very many bodies would take minutes
+        number = len(rotor.conductors) + (len(rotor.magnets) if isinstance(rotor, ExplicitRotor) else 0)
+        if number > (most := max(MOST_BODIES, len(known.turning_bodies))):
+            said = f"Input rotor must have at most {most} magnets and conductors here; instead received {number}."
+            faults.append(f"{said} Give the scene to the command line.")
     if faults:
         raise SceneError(source, faults)
     try:
-        paths = _named_files(table.rotor, Path(source).parent if folder is None else folder, known)
+        paths = _named_files(rotor, Path(source).parent if folder is None else folder, known)
         field_map, of_magnets = paths.get(-1), {k: path for k, path in paths.items() if k >= 0}
         read = {part.file: part for part in known.parts} if known else {}
         parts = {path: read.get(path) or read_part(path) for path in of_magnets.values()}
@@ -79,16 +84,6 @@ def _digest(path: Path, state: tuple[int, ...]) -> str:
     """Once while the file is in a state: a map can have a hundred megabytes, and every point of a sweep asks."""
     with path.open("rb") as stream:
         return hashlib.file_digest(stream, "sha256").hexdigest()
-
-
-def _too_many(rotor: AnyRotor, known: Scene) -> list[str]:
-    """Fault of a number of bodies whose overlaps would take minutes."""
-    number = len(rotor.conductors) + (len(rotor.magnets) if isinstance(rotor, ExplicitRotor) else 0)
-    most = max(MOST_BODIES, len(known.turning_bodies))
-    if number <= most:
-        return []
-    said = f"Input rotor must have at most {most} magnets and conductors here; instead received {number}."
-    return [f"{said} Give the scene to the command line."]
 
 
 def _named_files(rotor: AnyRotor, folder: Path, known: Scene | None) -> dict[int, Path]:
