@@ -19,8 +19,7 @@ from .figures.style import save_figures
 from .levitation import Levitation
 from .result import AXIS, Columns, columns, write_dataset
 
-STEPS, LEVELS = 101, 201
-"""Points across a section; levels of the field that are kept of a magnet."""
+STEPS, LEVELS = 101, 201  # points across a section; levels of the field that are kept of a magnet
 OF_A_POINT: Columns = {
     "lowest": (("magnet",), "T", "lowest μ0 H along the easy axis"),
     "place": (("magnet", "axis"), "m", "where it is lowest"),

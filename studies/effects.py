@@ -36,31 +36,21 @@ PLATE_NEGLECTED = "The plate's eddy currents are neglected: the plate is only an
 OF_SPHERES = "known for spherical floaters alone"
 EXACT_SLOPES = 4  # degree of a potential that has all derivatives which the slopes of the floater's currents ask for
 AROUND = 1 / 32  # radius of the ball of that expansion, in radii of the floater
-CLEARLY_SLOW = 0.02
-"""Relative error of what an effect adds to the growth of modes that goes without saying."""
+CLEARLY_SLOW = 0.02  # relative error of what an effect adds to the growth of modes that goes without saying
 
 
 @dataclass(frozen=True)
 class ListedEffect:
-    """One effect.
-
-    Parameters
-    ----------
-    name : of the effect
-    included : whether it is in the motion
-    shift_mm : how far it moves the first equilibrium, about; None where that is not known
-    growth_per_s : what it adds there to the growth of the mode that grows fastest with it, about; None where that is
-        not known
-    why : it is included or not
-    motion_error : relative error of what it adds, or would, to the growth of modes: motions are taken as slow against
-        it; torque and lift are exact in a steady turn
-    """
+    """One effect."""
 
     name: str
-    included: bool
-    shift_mm: float | None
+    included: bool  # whether it is in the motion
+    shift_mm: float | None  # how far it moves the first equilibrium, about; None where that is not known
+    # What it adds there to the growth of the mode that grows fastest with it, about; None where that is not known
     growth_per_s: float | None
-    why: str
+    why: str  # it is included or not
+    # Relative error of what it adds, or would, to the growth of modes: motions are taken as slow against it; torque and
+    # lift are exact in a steady turn
     motion_error: float = 0.0
 
     def __str__(self) -> str:

@@ -80,10 +80,9 @@ def _lines(axes: Axes, found: xr.Dataset, model: str) -> None:
     axes.streamplot(even[0], even[1], across, up, color="white", linewidth=0.4, density=1.1, arrowsize=0.5)
 
 
-MARGIN = 8e-3
-"""Air around rotor and floater, m."""
+MARGIN = 8e-3  # air around rotor and floater, m
+# Points along the longest edge of the grid about rotor and floater, and along the edges of the plate.
 STEPS, PLATE_STEPS = 64, (41, 41, 9)
-"""Points along the longest edge of the grid about rotor and floater, and along the edges of the plate."""
 CORNERS = np.array([(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 0, 1), (1, 0, 1), (1, 1, 1), (0, 1, 1)])
 AIR, ROTOR, FLOATER, PLATE = range(4)
 
@@ -183,10 +182,8 @@ def _write_grid(path: Path, mesh: meshio.Mesh) -> None:
 
 PLANES = {"xy": (0, 1, 2), "xz": (0, 2, 1), "yz": (1, 2, 0)}
 MODELS = ("dipole", "cuboid", "fem")
-OFF_EDGE = 1e-6
-"""Points nearer to an edge or to a dipole than this (m) have no field: it is infinite there."""
-HIGHEST = 5
-"""Order of the elements in a map; its error is part of it."""
+OFF_EDGE = 1e-6  # points nearer to an edge or to a dipole than this (m) have no field: it is infinite there
+HIGHEST = 5  # order of the elements in a map; its error is part of it
 
 
 def field_map_job(

@@ -15,8 +15,7 @@ from .scene_tables import SceneLike, given_scene
 if TYPE_CHECKING:
     from .page.server import Pages
 
-HEIGHT = 900
-"""Of the page in a notebook, pixels."""
+HEIGHT = 900  # of the page in a notebook, pixels
 
 
 class LivePage:

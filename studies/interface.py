@@ -42,8 +42,7 @@ from .starts import drawn_starts, given_starts
 from .study import Point, Study
 from .sweep import forget, swept
 
-TOGETHER = 512
-"""Flights that a worker gets at once, at most."""
+TOGETHER = 512  # flights that a worker gets at once, at most
 
 
 class Asked(TypedDict, total=False):

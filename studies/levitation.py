@@ -34,10 +34,8 @@ from .plan import (
 )
 from .scene_tables import SceneLike, SceneTables, SharedTables, sources
 
-AHEAD = 1.0
-"""Of a flight, s, that is looked at beforehand."""
-PLACES = 50
-"""On a flight's way, at which the error by a slab's missing edges is looked at."""
+AHEAD = 1.0  # of a flight, s, that is looked at beforehand
+PLACES = 50  # on a flight's way, at which the error by a slab's missing edges is looked at
 
 
 def plate_memory(
@@ -90,10 +88,9 @@ class Levitation(SceneTables):
 
     def __init__(self, scene: SceneLike, models: Models = Models(), spin: float = 0.0) -> None:
         super().__init__(scene, models, spin)
+        # The plate's currents for all of a flight's way, where it left the range of `plate`.
         self.wider: PlateMemory | None = None
-        """The plate's currents for all of a flight's way, where it left the range of `plate`."""
-        self.no_wider = ""
-        """Why they could not be known, if so."""
+        self.no_wider = ""  # why they could not be known, if so
         self._nearest: Array | None = None  # to the plate, of a flight that had begun without its currents
         self._flown: dict[float, Trajectory] = {}
         self._ahead = 0.0  # duration of the flight that is asked for, s

@@ -28,11 +28,9 @@ KINDS = (
     magpylib.magnet.TriangularMesh,
 )
 SIZES = ("diameter", "dimension", "vertices")
-MOST_TESLA = 10.0
-"""Four times what iron saturates at; in millitesla every magnet has more."""
+MOST_TESLA = 10.0  # four times what iron saturates at; in millitesla every magnet has more
 MOST_TRIANGLES = 2000
-SAME, SAME_ANGLE = 1e-9, 1e-7
-"""Relative difference of sizes, and of angles in degrees, that are one."""
+SAME, SAME_ANGLE = 1e-9, 1e-7  # relative difference of sizes, and of angles in degrees, that are one
 
 
 def from_magpylib(

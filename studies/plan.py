@@ -27,12 +27,11 @@ from ..geometry.scene.files import map_digest
 from .cli.console import detail, note
 from .cli.options import Models
 
-RotorField = RotorTable | GriddedTable
-"""A rotor's table: computed, or from a map."""
+RotorField = RotorTable | GriddedTable  # a rotor's table: computed, or from a map
+# Radii for which tables are made: that of the article's floater, m, and so many times the one before.
 ARTICLE_RADIUS, STEP = 6.35e-3, 2 ** (1 / 8)
-"""Radii for which tables are made: that of the article's floater, m, and so many times the one before."""
+# How much more error a plate's table may have for a large region, and the most; it is said with the result.
 LOOSER, ROUGHEST = 4.0, 0.1
-"""How much more error a plate's table may have for a large region, and the most; it is said with the result."""
 PLATE_WORDS = {
     "none": "only an obstacle, without eddy currents",
     "slab": "taken as an infinite slab, {thickness:.4g} mm thick",
@@ -54,19 +53,12 @@ def mutual_plan(scene: Scene, table: RotorField, models: Models) -> tuple[bool, 
 
 @dataclass(frozen=True, eq=False)
 class PlatePlan:
-    """A plate's model in the motion and what is asked of its table.
+    """A plate's model in the motion and what is asked of its table."""
 
-    Parameters
-    ----------
-    model : "none", "slab" or "reduced"
-    edges : relative error by edges that the model leaves out
-    rtol : relative accuracy of the table
-    region : where the floater may be, in the frame of the plate; None: near the place where it levitates
-    """
-
-    model: str
-    edges: float
-    rtol: float
+    model: str  # "none", "slab" or "reduced"
+    edges: float  # relative error by edges that the model leaves out
+    rtol: float  # relative accuracy of the table
+    # Where the floater may be, in the frame of the plate; None: near the place where it levitates
     region: Region | None = None
 
 

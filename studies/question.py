@@ -148,38 +148,24 @@ def fly(levitations: Sequence[Levitation], duration: float) -> None:
                     one.adopt_flight(duration, flight)
 
 
-CHOICES = ("model", "plate_model", "interaction", "spin")
-"""What can be varied beside the keys of the scene file."""
-ROTOR = ("rotor", "model", "interaction", "floater")
-"""How keys begin whose values need a table of their own."""
+CHOICES = ("model", "plate_model", "interaction", "spin")  # what can be varied beside the keys of the scene file
+ROTOR = ("rotor", "model", "interaction", "floater")  # how keys begin whose values need a table of their own
+# How many points are answered together at most, and lost together if the program is killed among them.
 LARGEST: Mapping[Quantity, int] = {"equilibria": 60, "flight": 32, "field": 60}
-"""How many points are answered together at most, and lost together if the program is killed among them."""
-PARTS = 4
-"""Batches of a small sweep: as many workers share it."""
+PARTS = 4  # batches of a small sweep: as many workers share it
 
 
 @dataclass(frozen=True)
 class Question:
-    """What is asked at every point.
+    """What is asked at every point."""
 
-    Parameters
-    ----------
-    scene : whose parameters are varied
-    source : its name in messages
-    ask : the quantity
-    models : of the field and of the plate
-    spin : body spin of the equilibria
-    duration : of a flight, s
-    place : of the field, m, rotor's frame
-    """
-
-    scene: Scene
-    source: str
+    scene: Scene  # whose parameters are varied
+    source: str  # its name in messages
     ask: Quantity
-    models: Models
-    spin: float
-    duration: float
-    place: tuple[float, ...]
+    models: Models  # of the field and of the plate
+    spin: float  # body spin of the equilibria
+    duration: float  # of a flight, s
+    place: tuple[float, ...]  # of the field, m, rotor's frame
 
     def __post_init__(self) -> None:
         if self.ask not in ANSWERS:

@@ -17,16 +17,13 @@ from ..geometry.scene.contents import Plate, Scene
 from .cli.console import note, to_json
 from .run import Job
 
-NEARBY = 0.15
-"""Half edge of the region of a reduced table, in units of the place's distance from the plate."""
+NEARBY = 0.15  # half edge of the region of a reduced table, in units of the place's distance from the plate
+# Distance of a place from the plate, m: nearer ones are on the face but for round-off, and a dipole is a sphere.
 NEAREST = 1e-3
-"""Distance of a place from the plate, m: nearer ones are on the face but for round-off, and a dipole is a sphere."""
+# The same in units of the largest edge: from much farther, potentials differ over the plate by round-off only.
 FARTHEST = 100.0
-"""The same in units of the largest edge: from much farther, potentials differ over the plate by round-off only."""
-TIGHTEST = 1e-5
-"""Smallest tolerance that the finite elements reach in minutes."""
-LOWEST, HIGHEST = 0.5, 250.0
-"""Frequencies for which a reduced table is made at least, Hz."""
+TIGHTEST = 1e-5  # smallest tolerance that the finite elements reach in minutes
+LOWEST, HIGHEST = 0.5, 250.0  # frequencies for which a reduced table is made at least, Hz
 
 
 class Reaction(NamedTuple):

@@ -30,8 +30,9 @@ from .words import comparison_words, equilibria_words, flight_words, kind_of_fli
 
 AXIS = ("x", "y", "z")
 MODES = ("bounce", *SIDE, *TILT)
+# Labels of the dimensions of an equilibrium.
 SIZES: Mapping[str, tuple[str, ...]] = {"axis": AXIS, "extreme": ("smallest", "largest"), "mode": MODES}
-"""Labels of the dimensions of an equilibrium."""
+# Of an equilibrium: name in labelled data, SI unit, label, dimensions.
 QUANTITIES: tuple[tuple[str, str, str, tuple[str, ...]], ...] = (
     ("position", "m", "mean position, rotor's frame", ("axis",)),
     ("laboratory_position", "m", "mean position over a turn, laboratory frame", ("axis",)),
@@ -50,38 +51,29 @@ QUANTITIES: tuple[tuple[str, str, str, tuple[str, ...]], ...] = (
     ("growth", "1/s", "largest growth rate of a small motion", ()),
     ("growth_error", "1/s", "its round-off error", ()),
 )
-"""Of an equilibrium: name in labelled data, SI unit, label, dimensions."""
+# How a name ends there, for its unit, and what the number is divided by.
 IN_JSON = {"m": ("_mm", 1e-3), "deg": ("_deg", 1.0), "1/s": ("_per_s", 1.0), "1": ("", 1.0)}
-"""How a name ends there, for its unit, and what the number is divided by."""
 OF_A_STATE = (
     ("position", "m", "position"),
     ("velocity", "m/s", "velocity"),
     ("moment", "1", "direction of the moment"),
     ("spin", "rad/s", "angular velocity"),
 )
-PLACES = 500
-"""Of a flight, at which the field's error is looked at."""
-Columns = Mapping[str, tuple[tuple[str, ...], str, str]]
-"""Dimensions, unit and a name for an axis label, by name."""
+PLACES = 500  # of a flight, at which the field's error is looked at
+Columns = Mapping[str, tuple[tuple[str, ...], str, str]]  # dimensions, unit and a name for an axis label, by name
 LIBRARIES = ("spinlev", "ngsolve", "heyoka", "numpy", "scipy", "xarray")
 
 
 @dataclass(frozen=True, eq=False)
 class Result:
-    """Equilibria, a flight, or both, of a scene by the models of its `Levitation`.
-
-    Parameters
-    ----------
-    survey, flight : what was asked for
-    comparison : levitation distances by the point dipole and the true field, see `run`
-    failed : why there are no equilibria, if so
-    """
+    """Equilibria, a flight, or both, of a scene by the models of its `Levitation`."""
 
     levitation: Levitation
-    survey: Survey | None = None
+    survey: Survey | None = None  # what was asked for
     flight: Trajectory | None = None
+    # Levitation distances by the point dipole and the true field, see `run`
     comparison: Mapping[str, Any] | None = None
-    failed: str = ""
+    failed: str = ""  # why there are no equilibria, if so
 
     def dataset(self) -> xr.Dataset:
         """The flight, or else the equilibria, over `time` or `equilibrium`, SI units; the models are attributes."""

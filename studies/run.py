@@ -33,13 +33,10 @@ from .levitation import Levitation
 from .result import Result, axis_dataset, curve_dataset, equilibria_dataset, left_out_text, write_dataset
 from .words import flight_words, headline, left_out_words, tell_details
 
-Job = tuple[Mapping[str, Any], list[str]]
-"""Numbers for a program, lines for a person."""
+Job = tuple[Mapping[str, Any], list[str]]  # numbers for a program, lines for a person
 MODELS = ("dipole", "cuboid", "fem")
-SHOWN = 20
-"""Points whose field is printed, at most."""
-DEEPEST = 0.05
-"""The field figure reaches this far below the rotor's origin, m."""
+SHOWN = 20  # points whose field is printed, at most
+DEEPEST = 0.05  # the field figure reaches this far below the rotor's origin, m
 
 
 def field_job(scene: Scene, points: Array, asked: Models, out: Path) -> Job:

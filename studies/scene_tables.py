@@ -39,16 +39,14 @@ from .plan import (
 )
 
 Made = TypeVar("Made")
-SceneLike = Scene | str | Path
-"""A scene, or the path of its file."""
+SceneLike = Scene | str | Path  # a scene, or the path of its file
 
 
 class SharedTables:
     """Tables and equations for any number of scenes to share; a scene finds those that were made for what it needs."""
 
     def __init__(self) -> None:
-        self.from_cache: list[str] = []
-        """Names of the tables that were found in the user's cache."""
+        self.from_cache: list[str] = []  # names of the tables that were found in the user's cache
         self._known: dict[str, Any] = {}
 
     def once(self, key: str, make: Callable[[], Made]) -> Made:
@@ -109,8 +107,7 @@ class SceneTables:
         self.scene = given_scene(scene)
         self.models = models.checked()
         self.spin = finite("spin", spin)
-        self.searched = True
-        """Whether the equilibria were searched for; else they were carried here from scenes nearby."""
+        self.searched = True  # whether the equilibria were searched for; else they were carried here from scenes nearby
         self._tables = SharedTables()
 
     # The rotor's field and what else acts

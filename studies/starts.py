@@ -11,8 +11,8 @@ from ..geometry.common import Array, InputError
 from ..geometry.scene.contents import OffsetStart
 from .levitation import Levitation
 
+# SI units of the keys of `[start]`.
 UNITS = {"offset_mm": 1e-3, "position_mm": 1e-3, "velocity_mm_s": 1e-3, "moment": 1.0, "spin_hz": 2 * np.pi}
-"""SI units of the keys of `[start]`."""
 SPREADS = {"offset_mm": 1e-3, "velocity_mm_s": 1e-3, "moment_deg": np.pi / 180, "spin_hz": 2 * np.pi}
 
 

@@ -16,12 +16,10 @@ from .result import Columns, columns
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-Point = Mapping[str, Any]
-"""What tells one point of a study from the others, in types that JSON knows."""
-Batch = Mapping[int, Point]
-"""Numbered points that are computed together."""
+Point = Mapping[str, Any]  # what tells one point of a study from the others, in types that JSON knows
+Batch = Mapping[int, Point]  # numbered points that are computed together
+# How to compute each of several points that help each other.
 Prepared = Callable[[Sequence[Point]], Sequence[Callable[[], xr.Dataset]]]
-"""How to compute each of several points that help each other."""
 
 
 def by_case(parts: Sequence[xr.Dataset]) -> xr.Dataset:
@@ -29,13 +27,13 @@ def by_case(parts: Sequence[xr.Dataset]) -> xr.Dataset:
     return xr.concat(parts, "case", data_vars="all", coords="different", compat="equals", join="outer")
 
 
+# What may tell a point from the others, with units.
 LABELS = {
     "configuration": {},
     "value": {},
     "measure": {"units": "mm or °", "long_name": "displacement or tilt"},
     "model": {},
 }
-"""What may tell a point from the others, with units."""
 
 
 def one_case(point: Point, dataset: xr.Dataset) -> xr.Dataset:
@@ -81,37 +79,26 @@ def each_case(result: xr.Dataset) -> list[xr.Dataset]:
 
 @dataclass(frozen=True)
 class Study:
-    """One question to the program.
+    """One question to the program."""
 
-    Parameters
-    ----------
-    name : by which it is asked for, and which its files have
-    summary : what it gives, in a line
-    points : takes `quick` and returns the points
-    compute : takes a point and returns its labelled result, the same whoever computes it
-    figures : by the name of its files, what draws each figure from the joined result alone; one message a figure
-    report : what it says, in lines, from the joined result alone
-    gather : joins the results of the points into one
-    prepared : how to compute each of several points that help each other; None where they do not
-    batches : which of the numbered points are computed together, with `prepared`
-    timed : whether it measures times, for which its points must have the machine for themselves
-    settings : what all points have in common, if they do not say it themselves
-    numbers : what else `--json` prints, by key, from the joined result alone
-    check : raises InputError where a file that the points are of was replaced; None where they are of none
-    """
-
-    name: str
-    summary: str
-    points: Callable[[bool], Sequence[Point]]
+    name: str  # by which it is asked for, and which its files have
+    summary: str  # what it gives, in a line
+    points: Callable[[bool], Sequence[Point]]  # takes `quick` and returns the points
+    # Takes a point and returns its labelled result, the same whoever computes it
     compute: Callable[[Point], xr.Dataset]
+    # By the name of its files, what draws each figure from the joined result alone; one message a figure
     figures: Mapping[str, Callable[[xr.Dataset], Figure]]
-    report: Callable[[xr.Dataset], list[str]]
-    gather: Callable[[Sequence[xr.Dataset]], xr.Dataset] = by_case
+    report: Callable[[xr.Dataset], list[str]]  # what it says, in lines, from the joined result alone
+    gather: Callable[[Sequence[xr.Dataset]], xr.Dataset] = by_case  # joins the results of the points into one
+    # How to compute each of several points that help each other; None where they do not
     prepared: Prepared | None = None
+    # Which of the numbered points are computed together, with `prepared`
     batches: Callable[[Batch], Sequence[Sequence[int]]] | None = None
-    timed: bool = False
-    settings: Point = field(default_factory=dict)
+    timed: bool = False  # whether it measures times, for which its points must have the machine for themselves
+    settings: Point = field(default_factory=dict)  # what all points have in common, if they do not say it themselves
+    # What else `--json` prints, by key, from the joined result alone
     numbers: Callable[[xr.Dataset], Mapping[str, Any]] | None = None
+    # Raises InputError where a file that the points are of was replaced; None where they are of none
     check: Callable[[], None] | None = None
 
 

@@ -28,14 +28,11 @@ from .study import Batch, Point, Prepared, Study
 if TYPE_CHECKING:
     from distributed import Client, Future
 
+# Rooms whose text does not change a point, but for the file of its own study.
 SHOWING = ("studies/catalogue", "studies/cli", "studies/figures", "studies/page")
-"""Rooms whose text does not change a point, but for the file of its own study."""
-TRIES = 3
-"""How often a point is begun whose process dies."""
-PATIENCE = 10.0
-"""Seconds to wait for a scheduler, also for one that does not answer any more."""
-Attempt = tuple[int, xr.Dataset | str]
-"""The number of a point, and its result or why it has none."""
+TRIES = 3  # how often a point is begun whose process dies
+PATIENCE = 10.0  # seconds to wait for a scheduler, also for one that does not answer any more
+Attempt = tuple[int, xr.Dataset | str]  # the number of a point, and its result or why it has none
 
 
 class SweepError(ComputationError):

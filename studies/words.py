@@ -20,18 +20,14 @@ from .figures.style import NAMES
 from .levitation import Levitation
 
 MILLI = 1e-3
-DIGITS = 4
-"""Significant digits of a number, at most."""
+DIGITS = 4  # significant digits of a number, at most
+# Difference of two levitation distances that is none whatever their errors, mm: round-off and stopped iterations.
 SAME = 1e-6
-"""Difference of two levitation distances that is none whatever their errors, mm: round-off and stopped iterations."""
-CLEAR = 0.5
-"""Share of the decay rate that must be gone without the plate before it is called the plate's."""
-FINEST = 0.01
-"""Of distances from the axis, mm."""
-SWINGS = 0.1
-"""Polar angles that differ by more in a turn (°) are told with their extremes."""
+CLEAR = 0.5  # share of the decay rate that must be gone without the plate before it is called the plate's
+FINEST = 0.01  # of distances from the axis, mm
+SWINGS = 0.1  # polar angles that differ by more in a turn (°) are told with their extremes
+# Names of modes where the field's are others than the data's.
 MODE_NAMES = {"bounce": "axial", "side, backward": "backward whirl", "side, forward": "forward whirl"}
-"""Names of modes where the field's are others than the data's."""
 COLUMNS = (
     "distance (mm)", "lateral offset (mm)", "polar angle (°)", "phase lag (°)", "least stable mode",
     "growth rate (s⁻¹)", "",

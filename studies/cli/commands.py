@@ -372,10 +372,10 @@ def export(scene: Path, file: Path, *, asked: Models = Models(), output: Output 
     return Answer(*export_job(loaded, asked.checked(), file), output.json)
 
 
+# A page that leads to another.
 LEADING = """<!DOCTYPE html><meta charset="utf-8"><title>spinlev</title><meta name="referrer" content="no-referrer">
 <meta http-equiv="refresh" content="0; url={address}"><a href="{address}">spinlev</a>
 """
-"""A page that leads to another."""
 
 
 def explore(

@@ -23,8 +23,8 @@ from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, T
 
 from ...geometry.common import printable
 
+# Name of the error handler for encodings: it writes what an encoding lacks in ASCII instead of raising an error.
 READABLE = "spinlev-readable"
-"""Name of the error handler for encodings: it writes what an encoding lacks in ASCII instead of raising an error."""
 LETTERS = {"Ω": "Omega", "ω": "omega", "Δ": "Delta", "δ": "delta", "λ": "lambda", "μ": "u", "π": "pi", "θ": "theta"}
 SIGNS = {"±": "+-", "×": "x", "·": ".", "•": "*", "⁄": "/", "≤": "<=", "≥": ">=", "≈": "~", "→": "->", "°": "deg"}
 MARKS = {"∞": "inf", "√": "sqrt", "∂": "d", **dict.fromkeys("−–—‐", "-"), **dict.fromkeys("“”", '"'), "’": "'"}
@@ -48,21 +48,21 @@ def _readable(error: UnicodeError) -> tuple[str, int]:
 codecs.register_error(READABLE, _readable)
 
 
+# What is not needed by the first run, and the modules of each.
 EXTRAS = {
     "view": ("pyvista", "vtkmodules", "imageio", "trame_vtk"),
     "studies": ("skfem", "magpylib", "dynesty", "jinja2"),
     "explore": ("bokeh", "plotly", "tornado"),
     "cluster": ("distributed", "dask"),
 }
-"""What is not needed by the first run, and the modules of each."""
 FORTRAN, DRAWING = "libraries of Fortran", "3-D pictures"
 PACKAGES = {
     "Debian or Ubuntu": {FORTRAN: "apt-get install libquadmath0", DRAWING: "apt-get install libegl1 libgl1"},
     "Fedora": {FORTRAN: "dnf install libquadmath", DRAWING: "dnf install mesa-libEGL mesa-libGL mesa-dri-drivers"},
     "macOS": {FORTRAN: "brew install gcc", DRAWING: "nothing to install, the system draws"},
 }
+# By a word of /etc/os-release.
 FAMILIES = {"debian": "Debian or Ubuntu", "ubuntu": "Debian or Ubuntu", "fedora": "Fedora", "rhel": "Fedora"}
-"""By a word of /etc/os-release."""
 QUADMATH = "libquadmath.so.0"
 
 
@@ -132,8 +132,7 @@ def _loads(library: str) -> bool:
     return True
 
 
-PAUSE = 2.5
-"""Silence after which a line is said, s, once; after long steps a 60th of their time."""
+PAUSE = 2.5  # silence after which a line is said, s, once; after long steps a 60th of their time
 
 
 class Heartbeat(threading.Thread):

@@ -7,11 +7,11 @@ from collections.abc import Sequence
 from ..figures.renderer import unavailable
 from .console import FORTRAN, lend_quadmath, way_out
 
+# Those with compiled code, and what stands on them: what is loaded here, Python has compiled before the first run.
 MODULES = (
     *("ngsolve", "netgen.occ", "heyoka", "h5py", "matplotlib.backends.backend_pdf"),
     *("spinlev.studies", "spinlev.studies.cli.main"),
 )
-"""Those with compiled code, and what stands on them: what is loaded here, Python has compiled before the first run."""
 
 
 def main(modules: Sequence[str] = MODULES) -> int:

@@ -22,8 +22,7 @@ from .console import FORTRAN, answers_only, heard, is_missing_library, missing_e
 from .options import Answer
 from .start import STOPPED, TOO_MANY_FILES
 
-LONGEST = 1000
-"""Characters of a line of a message."""
+LONGEST = 1000  # characters of a line of a message
 
 app = App(
     name="spinlev",

@@ -20,10 +20,8 @@ from ...geometry.common import Array, InputError, shown
 from ...geometry.files import file_content
 
 COLUMNS = ("x_mm", "y_mm", "z_mm")
-MOST = 50_000_000
-"""Bytes of a file of points: a million of them."""
-FARTHEST = 1e9
-"""Largest coordinate, mm: beyond, powers of it overflow."""
+MOST = 50_000_000  # bytes of a file of points: a million of them
+FARTHEST = 1e9  # largest coordinate, mm: beyond, powers of it overflow
 
 
 def _floats(text: str, separator: str = ",") -> list[float]:
@@ -219,8 +217,7 @@ class Answer:
     values: Mapping[str, Any]
     lines: Sequence[str]
     json: bool
-    then: Callable[[], None] | None = None
-    """What is done once it is said."""
+    then: Callable[[], None] | None = None  # what is done once it is said
 
 
 @Parameter(name="*")
@@ -253,10 +250,8 @@ class Workers:
         return self
 
 
-MOST_VALUES = 100_000
-"""Points of a sweep, at most."""
-NAMED = ("model", "plate_model", "interaction")
-"""Keys whose values are names."""
+MOST_VALUES = 100_000  # points of a sweep, at most
+NAMED = ("model", "plate_model", "interaction")  # keys whose values are names
 
 
 def parse_vary(asked: Sequence[str]) -> dict[str, list[Any]]:
@@ -331,13 +326,13 @@ def _wrong(text: str) -> InputError:
     )
 
 
+# Which of the scenes that come with the program shows which kind of rotor.
 KINDS: Mapping[str, str] = {
     "tilt": "tilt-over-plate",
     "horizontal": "horizontal",
     "vertical": "vertical-24h",
     "magnets": "explicit-magnets",
 }
-"""Which of the scenes that come with the program shows which kind of rotor."""
 
 
 def new_scene(name: str, path: Path) -> Path:

@@ -13,8 +13,7 @@ STOPPED = "spinlev: stopped; what was finished is kept."
 TOO_MANY_FILES = (
     "the computation failed to open a file: this shell allows too few at a time; `ulimit -n 256` allows more."
 )
-AGAIN = 0.01
-"""Seconds until an interrupt is raised again that fell where Python drops exceptions."""
+AGAIN = 0.01  # seconds until an interrupt is raised again that fell where Python drops exceptions
 
 
 def main() -> None:
