@@ -1,4 +1,4 @@
-"""Magnetic levitation by rotation: true fields, true motion.
+"""Magnetic levitation by rotation: fields of finite magnets, complete motion.
 
 >>> import spinlev as sl
 >>> cube = sl.tilt(angle_deg=10.0, edge_mm=10.0, remanence_T=1.305)

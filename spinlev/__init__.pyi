@@ -1,4 +1,4 @@
-"""Magnetic levitation by rotation: true fields, true motion."""
+"""Magnetic levitation by rotation: fields of finite magnets, complete motion."""
 
 from .dynamics.equilibria.equilibrium import EquilibriumError as EquilibriumError
 from .geometry.common import ComputationError as ComputationError, InputError as InputError

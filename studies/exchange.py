@@ -88,7 +88,7 @@ AIR, ROTOR, FLOATER, PLATE = range(4)
 
 
 def export_job(scene: Scene, asked: Models, path: Path) -> tuple[Mapping[str, Any], list[str]]:
-    """Write B (T), H and M (A/m), J (A/m²) and the body's number at the points of two grids.
+    """Write B (T), H and M (A/m), J (A/m²) and the body's number of a `scene` with `asked` models to `path`.
 
     Raises
     ------
@@ -189,7 +189,7 @@ HIGHEST = 5  # order of the elements in a map; its error is part of it
 def field_map_job(
     scene: Scene, plane: str, extent: Array | None, offset: float, steps: int, out: Path
 ) -> tuple[Mapping[str, Any], list[str]]:
-    """Write field-map.nc, .png, .pdf and .vtu of the rotor's field on a plane.
+    """Write field-map.nc, .png, .pdf and .vtu of a `scene`'s rotor field on a plane to `out`.
 
     Parameters
     ----------
@@ -214,7 +214,7 @@ def field_map_job(
 
 
 def field_map(scene: Scene, plane: str, extent: Array | None, offset: float, steps: int) -> xr.Dataset:
-    """The field of every model on a plane, as `field_map_job` writes it."""
+    """Field of every model on a plane; `scene`, `plane`, `extent`, `offset`, `steps` as of `field_map_job`."""
     along, up, across = PLANES[plane]
     if extent is None:  # a square about the rotor, twice its size
         corners = np.concatenate([magnet.body.corners for magnet in scene.rotor])[:, [along, up]]

@@ -43,7 +43,7 @@ class LivePage:
 
 
 def explore(scene: SceneLike, port: int = 0) -> LivePage:
-    """A page in the browser to play with a scene: sliders, equilibria at once, where it levitates, a live flight.
+    """A page in the browser to play with a scene: sliders, equilibria at once, where it levitates, live motion.
 
     Parameters
     ----------

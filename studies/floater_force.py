@@ -17,7 +17,7 @@ from .levitation import Levitation
 from .result import AXIS, variable
 from .scene_tables import SceneLike
 
-COARSE = 12  # degree of the rule whose difference from the full one is told as an error
+COARSE = 12  # degree of the rule whose difference from the full one is the error of the sums
 
 
 def floater_force(

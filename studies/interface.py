@@ -42,7 +42,7 @@ from .starts import drawn_starts, given_starts
 from .study import Point, Study
 from .sweep import forget, swept
 
-TOGETHER = 512  # flights that a worker gets at once, at most
+TOGETHER = 512  # trajectories that a worker gets at once, at most
 
 
 class Asked(TypedDict, total=False):
@@ -61,7 +61,7 @@ def equilibria(
     progress: bool = False,
     **asked: Unpack[Asked],
 ) -> xr.Dataset:
-    """All synchronous equilibria, the stable ones first, with errors, growth and frequency of each small motion.
+    """All synchronous equilibria, the stable ones first, with errors, growth rate and frequency of each mode.
 
     Parameters
     ----------
@@ -106,7 +106,7 @@ def stability(
     progress: bool = False,
     **asked: Unpack[Asked],
 ) -> xr.Dataset:
-    """The five small motions about the equilibrium at which a flight begins, the nearest stable one if there is one.
+    """The five modes of the equilibrium at which a trajectory begins, the nearest stable one if there is one.
 
     Parameters
     ----------
@@ -127,8 +127,9 @@ def stability(
     Returns
     -------
     xarray.Dataset
-        Over `mode` (bounce, two side motions, precession, nutation): growth (1/s; negative where it dies out) and
-        frequency (Hz, rotor's frame); `stable`, `growth` and `growth_error` (what round-off may do to it) of the whole.
+        Over `mode` ("bounce", the axial mode; "side, backward" and "side, forward", the lateral whirl modes; precession
+        and nutation): growth rate (1/s; negative where it decays) and frequency (Hz, rotor's frame); `stable`,
+        `growth` and `growth_error` (from round-off) of the whole.
 
     Raises
     ------
@@ -151,7 +152,7 @@ def simulate(
     progress: bool = False,
     **asked: Unpack[Asked],
 ) -> xr.Dataset:
-    """The floater's motion from where the scene says.
+    """Trajectory of the floater from where the scene says.
 
     Parameters
     ----------
@@ -269,8 +270,8 @@ def working_point(
 ) -> xr.Dataset:
     """The lowest μ0 H along each magnet's easy axis, with the floater where it levitates, against the knee.
 
-    In step with the rotor the floater's field in the magnets is the same all over a turn; `lowest_turning` is the
-    lowest if the floater stays behind for a whole turn. No hysteresis: what is below the knee is told, not followed.
+    Frequency-locked, the floater's field in the magnets is the same all over a turn; `lowest_turning` is the
+    lowest if the floater lags by up to a whole turn. No hysteresis: parts below the knee are reported, not followed.
     On an edge the field can be infinite; `lowest` keeps 2 % of the edge of a cube of the magnet's volume off all edges.
 
     Parameters
@@ -315,21 +316,21 @@ def ensemble(
     workers: int | None = 1,
     progress: bool = False,
 ) -> xr.Dataset:
-    """How very many flights of one scene end, flown side by side; a plate is an obstacle, its currents are left out.
+    """Endings of very many trajectories of one scene, in SIMD batches; a plate is an obstacle without eddy currents.
 
     Parameters
     ----------
     scene : Scene, str or Path
         The scene, or the path of its file.
     starts : dict or xarray.Dataset, optional
-        By key of the scene file's `[start]`, three numbers for each flight (n, 3), or three for all: "offset_mm" from
-        the stable equilibrium, or "position_mm" with "velocity_mm_s", "moment" and "spin_hz".
+        By key of the scene file's `[start]`, three numbers for each trajectory (n, 3), or three for all: "offset_mm"
+        from the stable equilibrium, or "position_mm" with "velocity_mm_s", "moment" and "spin_hz".
     duration : float
-        Of each flight, s.
+        Of each trajectory, s.
     n : int, optional
-        Instead of `starts`: so many flights from about where the scene begins.
+        Instead of `starts`: so many trajectories from about where the scene begins.
     seed : int
-        Of the random numbers; the same gives the same flights, to the last bit, with any number of workers.
+        Of the random numbers; the same gives the same trajectories, to the last bit, with any number of workers.
     spread : dict, optional
         Standard deviations of "offset_mm" (at rest in the turning frame), "velocity_mm_s", "moment_deg" and "spin_hz",
         each one number or three.
@@ -357,7 +358,7 @@ def ensemble(
     InputError
         Starts that are not allowed, with what is.
     EquilibriumError
-        A flight shall begin near an equilibrium, and there is none.
+        A trajectory shall begin near an equilibrium, and there is none.
 
     Examples
     --------
@@ -428,7 +429,7 @@ def sweep(
     spin : float
         Body spin S = Ω·m̂/ω, likewise.
     duration : float
-        Simulated time of a flight, s.
+        Duration of a trajectory, s.
     place : sequence of 3 floats
         Where the field is asked for, m, rotor's frame.
     workers : int or None

@@ -1,4 +1,4 @@
-"""One scene, led along: equilibria, the plate around the place, equilibria with it, and the flight that it follows."""
+"""Equilibria and trajectory of one scene, and the table of its plate's currents, which follows the floater."""
 
 from __future__ import annotations
 
@@ -34,8 +34,8 @@ from .plan import (
 )
 from .scene_tables import SceneLike, SceneTables, SharedTables, sources
 
-AHEAD = 1.0  # of a flight, s, that is looked at beforehand
-PLACES = 50  # on a flight's way, at which the error by a slab's missing edges is looked at
+AHEAD = 1.0  # of a trajectory, s, that is looked at beforehand
+PLACES = 50  # on a trajectory, at which the error by a slab's missing edges is looked at
 
 
 def plate_memory(
@@ -72,7 +72,7 @@ class Levitation(SceneTables):
     """What one scene does, by the models that are asked for.
 
     Every member is computed when it is first used and then kept: the rotor's `table`, the `survey` of all equilibria,
-    the currents of the `plate`, the `stability` of the equilibrium at which a flight begins, and a `flight`.
+    the currents of the `plate`, the `stability` of the equilibrium at which a `flight` begins, and its trajectory.
 
     Parameters
     ----------
@@ -148,7 +148,7 @@ class Levitation(SceneTables):
 
     @cached_property
     def stability(self) -> Equilibrium:
-        """The equilibrium at which a flight begins, with its small motions; if none will do, the nearest of all.
+        """The equilibrium at which a flight begins, with its modes; if none will do, the nearest of all.
 
         Raises
         ------

@@ -40,14 +40,17 @@ PLATE_WORDS = {
 
 
 def field_plan(scene: Scene, asked: str, rtol: float) -> tuple[str, str]:
-    """The model of the rotor's field, and why it is taken: the measured map if that is asked for."""
+    """The model of a `scene`'s rotor field that meets `rtol`, and why it is taken: the map if that is `asked` for."""
     return (
         ("map", "as asked") if asked == "map" else resolve_model(scene.rotor, asked, rtol, nearest_faces(scene.floater))
     )
 
 
 def mutual_plan(scene: Scene, table: RotorField, models: Models) -> tuple[bool, str]:
-    """Whether rotor and floater magnetise each other in the motion, and why. Raises InputError as `mutual_choice`."""
+    """Whether rotor and floater of a `scene` magnetise each other, and why, in the field of `table` and by `models`.
+
+    Raises InputError as `mutual_choice`.
+    """
     return mutual_choice(scene, table, models.interaction, models.rtol)
 
 
@@ -63,7 +66,7 @@ class PlatePlan:
 
 
 def plate_plan(scene: Scene, models: Models, place: Array | None) -> PlatePlan:
-    """The plate's model for a floater that comes to a place (3,) m, told with its reason."""
+    """Model of a `scene`'s plate by `models` for a floater that comes to a `place` (3,) m; its reason is reported."""
     choice = resolve_plate_model(scene, models.plate_model, place, models.plate_rtol, note)
     if scene.plate is not None:
         size = scene.plate.box.size
@@ -74,7 +77,7 @@ def plate_plan(scene: Scene, models: Models, place: Array | None) -> PlatePlan:
 
 
 def far_plan(plan: PlatePlan, models: Models, slab: PlateMemory) -> PlatePlan:
-    """The plan for all of a way that an infinite slab has foreseen, whose error by edges is `slab.neglected`.
+    """The `plan` by `models` for all of a way that a `slab` has foreseen, whose error by edges is `slab.neglected`.
 
     For so large a region the finite elements take minutes: the slab does where its edges matter little, else they are
     asked for less accuracy.
@@ -109,7 +112,7 @@ def nearest_faces(floater: Floater) -> float:
 
 
 def field_key(scene: Scene, model: str, rtol: float) -> str:
-    """All that decides the rotor's field: also the content of its map, and how that is read."""
+    """All that decides a `scene`'s rotor field by a `model` to `rtol`: also its map's content, and how it is read."""
     known = rotor_key(scene.rotor, model, rtol, nearest_faces(scene.floater))
     return f"{known} {map_digest(scene)} {scene.map_reading}"
 

@@ -1,6 +1,6 @@
 """Levitations of many points at once: scenes with one rotor share its table, compiled equations and equilibria.
 
-Flights that begin in one field go side by side in a processor's lanes (`dynamics/flights/batch.py`).
+Trajectories that begin in one field are simulated in SIMD batches (`dynamics/flights/batch.py`).
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -120,7 +120,7 @@ def _of_family(alike: Sequence[Levitation], different: Mapping[str, Levitation])
 
 
 def fly(levitations: Sequence[Levitation], duration: float) -> None:
-    """Fly for `duration` (s) together what can be; what cannot be flown here is left to each scene, which says why.
+    """Simulate `duration` (s) of motion together; what cannot be here is left to each scene, which says why.
 
     Over a plate whose currents may be modelled, and in a field so short that balls do not pay, each flies alone.
     """
@@ -164,7 +164,7 @@ class Question:
     ask: Quantity
     models: Models  # of the field and of the plate
     spin: float  # body spin of the equilibria
-    duration: float  # of a flight, s
+    duration: float  # of a trajectory, s
     place: tuple[float, ...]  # of the field, m, rotor's frame
 
     def __post_init__(self) -> None:
@@ -265,7 +265,7 @@ def _flight(question: Question, levitation: Levitation) -> xr.Dataset:
             "kind": ((), kind_of_flight(levitation, flight)),
             "mean_height": variable((), height.mean(), "m", "mean height"),
             "height_spread": variable((), np.ptp(height), "m", "highest less lowest height"),
-            "energy_error": variable((), flight.energy_error, "1", "violation of the energy ledger"),
+            "energy_error": variable((), flight.energy_error, "1", "violation of the energy balance"),
             "left_plate_table": variable((), flight.left_plate_table, "1", "whether it left the plate's table"),
             "plate_error": variable((), memory.error if memory else 0.0, "1", "relative error of the plate's response"),
         },

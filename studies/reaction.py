@@ -36,7 +36,9 @@ class Reaction(NamedTuple):
 
 
 def plate_job(scene: Scene, place: Array, frequency: float, model: str, rtol: float, out: Path) -> Job:
-    """B = G m at the dipole's own place (3,), m, laboratory frame; writes plate.json.
+    """B = G m at a dipole's own `place` (3,), m, laboratory frame, and `frequency`, Hz; writes plate.json to `out`.
+
+    By a `model` of the `scene`'s plate, to a relative accuracy `rtol`.
 
     Raises
     ------

@@ -47,8 +47,8 @@ QUANTITIES: tuple[tuple[str, str, str, tuple[str, ...]], ...] = (
     ("lag", "deg", "lag behind the rotor of the moment's turning part", ()),
     ("spin", "1", "body spin S = Ω·m̂/ω", ()),
     ("spin_rate", "rad/s", "angular velocity about the moment", ()),
-    ("stable", "1", "whether every small motion stays small", ()),
-    ("growth", "1/s", "largest growth rate of a small motion", ()),
+    ("stable", "1", "whether no mode grows", ()),
+    ("growth", "1/s", "growth rate of the least stable mode", ()),
     ("growth_error", "1/s", "its round-off error", ()),
 )
 # How a name ends there, for its unit, and what the number is divided by.
@@ -59,24 +59,24 @@ OF_A_STATE = (
     ("moment", "1", "direction of the moment"),
     ("spin", "rad/s", "angular velocity"),
 )
-PLACES = 500  # of a flight, at which the field's error is looked at
+PLACES = 500  # of a trajectory, at which the field's error is looked at
 Columns = Mapping[str, tuple[tuple[str, ...], str, str]]  # dimensions, unit and a name for an axis label, by name
 LIBRARIES = ("spinlev", "ngsolve", "heyoka", "numpy", "scipy", "xarray")
 
 
 @dataclass(frozen=True, eq=False)
 class Result:
-    """Equilibria, a flight, or both, of a scene by the models of its `Levitation`."""
+    """Equilibria, a trajectory, or both, of a scene by the models of its `Levitation`."""
 
     levitation: Levitation
     survey: Survey | None = None  # what was asked for
     flight: Trajectory | None = None
-    # Levitation distances by the point dipole and the true field, see `run`
+    # Levitation distances by the point dipole and the field of the finite magnets, see `run`
     comparison: Mapping[str, Any] | None = None
     failed: str = ""  # why there are no equilibria, if so
 
     def dataset(self) -> xr.Dataset:
-        """The flight, or else the equilibria, over `time` or `equilibrium`, SI units; the models are attributes."""
+        """The trajectory, or else the equilibria, over `time` or `equilibrium`, SI units; the models are attributes."""
         levitation, scene = self.levitation, self.levitation.scene
         if self.flight is not None:
             found = trajectory_dataset(self.flight, levitation.flight_plate)
@@ -90,7 +90,7 @@ class Result:
 
     @cached_property
     def summary(self) -> dict[str, Any]:
-        """For JSON; the error estimate is the field's largest relative error at the equilibria or along the flight."""
+        """For JSON; `error_estimate` is the field's largest relative error where the floater is or was."""
         levitation, values = self.levitation, dict[str, Any]()
         if self.survey is not None:
             found, table = self.survey.equilibria, levitation.table
@@ -123,7 +123,7 @@ class Result:
 
     @cached_property
     def _effects(self) -> list[ListedEffect]:
-        # A flight that begins where the scene says needs no equilibrium, and searches for none.
+        # A trajectory that begins where the scene says needs no equilibrium, and searches for none.
         alone = self.flight is not None and self.levitation.absolute
         return listed_effects(self.levitation, () if alone else (self.survey or self.levitation.survey).equilibria)
 
@@ -192,7 +192,7 @@ def _plate(memory: PlateMemory | None) -> dict[str, Any]:
 
 
 def write_dataset(dataset: xr.Dataset, path: Path, scene: Scene | None = None) -> None:
-    """Write a result with its provenance: versions, command, and the scene's text if it has one.
+    """Write a `dataset` to `path` with its provenance: versions, command, and the text of the `scene` if it has one.
 
     The same command gives the same file, to the last byte, wherever its numbers are not times.
     """
@@ -204,7 +204,7 @@ def write_dataset(dataset: xr.Dataset, path: Path, scene: Scene | None = None) -
 
 
 def variable(dims: Sequence[str], values: Any, units: str, long_name: str) -> xr.Variable:
-    """A variable with its units and a name for an axis label."""
+    """A variable of `values` over `dims` with its `units` and a `long_name` for an axis label."""
     return xr.Variable(dims, values, {"units": units, "long_name": long_name})
 
 
@@ -273,7 +273,7 @@ def equilibria_dataset(found: Mapping[str, Sequence[Equilibrium]]) -> xr.Dataset
 
 
 def found_dataset(rows: Sequence[Equilibrium]) -> xr.Dataset:
-    """Equilibria of one scene and one model over `equilibrium`, with their small motions over `mode`."""
+    """Equilibria of one scene and one model over `equilibrium`, with their modes over `mode`."""
     data = {}
     for name, unit, label, dims in QUANTITIES:
         values = np.array([_read(e, name, unit) for e in rows], bool if name == "stable" else float)
@@ -283,14 +283,14 @@ def found_dataset(rows: Sequence[Equilibrium]) -> xr.Dataset:
     known = np.array([[each.get(name, (np.nan, np.nan)) for name in MODES] for each in modes], float)
     known = known.reshape(len(rows), len(MODES), 2)
     dims = ("equilibrium", "mode")
-    data["mode_growth"] = variable(dims, known[:, :, 0], "1/s", "growth of a mode")
+    data["mode_growth"] = variable(dims, known[:, :, 0], "1/s", "growth rate of a mode")
     data["mode_frequency"] = variable(dims, known[:, :, 1], "Hz", "its frequency")
     data["number"] = variable((), len(rows), "1", "number of equilibria")
     return xr.Dataset(data, {"equilibrium": np.arange(len(rows)), **{dim: list(names) for dim, names in SIZES.items()}})
 
 
 def state_columns(state: State, over: str, when: str = "", prefix: str = "") -> dict[str, xr.Variable]:
-    """States (n, 3) along the laboratory's axes over a dimension; `when` ends the labels, `prefix` begins the names."""
+    """A `state` (n, 3) along the laboratory's axes `over` a dimension; `when` ends labels, `prefix` begins names."""
     return {
         f"{prefix}{name}": variable((over, "axis"), values, unit, f"{label}, laboratory frame{when}")
         for (name, unit, label), values in zip(OF_A_STATE, state.vectors, strict=True)
@@ -298,9 +298,9 @@ def state_columns(state: State, over: str, when: str = "", prefix: str = "") -> 
 
 
 def trajectory_dataset(flight: Trajectory, memory: PlateMemory | None = None) -> xr.Dataset:
-    """A flight in the laboratory frame, with its position in the rotor's frame as well.
+    """A trajectory in the laboratory frame, with its position in the rotor's frame as well.
 
-    Of the plate's currents, if there are some, the attributes say how well they are known, and whether the flight ended
+    Of the plate's currents, if there are some, the attributes say how well they are known, and whether it ended
     where that ends.
     """
     lab, rotor = flight.lab, flight.rotor

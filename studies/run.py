@@ -40,7 +40,7 @@ DEEPEST = 0.05  # the field figure reaches this far below the rotor's origin, m
 
 
 def field_job(scene: Scene, points: Array, asked: Models, out: Path) -> Job:
-    """B and its gradient at points (n, 3) m; writes field.csv."""
+    """B and its gradient of a `scene` at `points` (n, 3) m by `asked` models; writes field.csv to `out`."""
     levitation = Levitation(scene, asked)
     table = levitation.table
     known = complete(table, max(asked.rtol, NEAR_RTOL)) if isinstance(table, RotorTable) else table
@@ -90,7 +90,7 @@ def _field(table: FieldTable, points: Array) -> dict[str, Any]:
 
 
 def equilibria_job(scene: Scene, asked: Models, spin: float, out: Path) -> Job:
-    """All synchronous equilibria and their stability; writes equilibria.json."""
+    """All equilibria of a `scene` with body `spin` by `asked` models, with stability; writes to `out`."""
     levitation = Levitation(scene, asked, spin)
     result = Result(levitation, levitation.survey)
     values = {**result.summary, "tables_from_cache": levitation.from_cache}
@@ -99,7 +99,10 @@ def equilibria_job(scene: Scene, asked: Models, spin: float, out: Path) -> Job:
 
 
 def simulate_job(scene: Scene, asked: Models, duration: float, out: Path, resume: bool) -> Job:
-    """The motion; writes trajectory.nc and its figure, and keeps a checkpoint while it lasts."""
+    """Trajectory of a `scene` for `duration` (s) by `asked` models; writes trajectory.nc and its figure to `out`.
+
+    A checkpoint is kept while it lasts; `resume` goes on from there.
+    """
     with owned(out):
         return _simulated(scene, asked, duration, out, resume)
 
@@ -111,7 +114,7 @@ def _simulated(scene: Scene, asked: Models, duration: float, out: Path, resume: 
     if not resume:
         checkpoint.remove()
     elif checkpoint.read() is None:
-        note(f"No checkpoint in {out}: the flight begins at t = 0.")
+        note(f"No checkpoint in {out}: the trajectory begins at t = 0.")
     levitation = Levitation(scene, asked)
     if isinstance(scene.start, OffsetStart):
         for line in left_out_words(levitation, levitation.survey.unknown):
@@ -142,10 +145,12 @@ def _simulated(scene: Scene, asked: Models, duration: float, out: Path, resume: 
 
 
 def main_job(scene: Scene, asked: Models, spin: float, duration: float, out: Path) -> Job:
-    """Compute everything of a scene for a body spin; writes result.nc, summary.json and the figures.
+    """Compute everything of a `scene` by `asked` models for a body `spin` and a trajectory of `duration` (s).
+
+    Writes result.nc, summary.json and the figures to `out`.
 
     What is finished before a failure is kept: a scene without a stable equilibrium still leaves its fields and force
-    curves, a flight that the user stops its beginning; then the error goes on to the caller.
+    curves, a trajectory that the user stops its beginning; then the error goes on to the caller.
     """
     levitation = Levitation(scene, asked, spin)
     exact = "cuboid" if all(magnet.contrast == 0 for magnet in scene.rotor) else "fem"

@@ -50,14 +50,14 @@ class SharedTables:
         self._known: dict[str, Any] = {}
 
     def once(self, key: str, make: Callable[[], Made]) -> Made:
-        """What was made under this key for any of the scenes, or else made now."""
+        """The thing of this key, made now unless it was made for another scene."""
         if key not in self._known:
             self._known[key] = make()
         made: Made = self._known[key]
         return made
 
     def table(self, key: str, name: str, title: str, make: Callable[[Watch], tuple[Made, bool]]) -> Made:
-        """The same of a table from the cache, told with its title; `make` also says whether it was there."""
+        """A table under its `key`, reported by `title`; `make` says whether it was cached, as which `name` is noted."""
 
         def told() -> Made:
             note(f"{title} ...")

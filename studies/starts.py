@@ -1,4 +1,4 @@
-"""Where the flights of an ensemble begin: given, or drawn at random about where the scene begins."""
+"""Where the trajectories of an ensemble begin: given, or drawn at random about where the scene begins."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -47,7 +47,7 @@ def given_starts(levitation: Levitation, starts: Mapping[Any, Any]) -> State:
 
 
 def drawn_starts(levitation: Levitation, count: int | None, seed: int, spread: Mapping[str, Any]) -> State:
-    """States (count, 3) about where the scene begins, each component normal with the standard deviations of `spread`.
+    """States (`count`, 3) about where the scene of `levitation` begins, normal with standard deviations `spread`.
 
     The same seed gives the same numbers; those of one key do not depend on what the others' spreads are.
     """

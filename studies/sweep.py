@@ -87,7 +87,7 @@ def swept(study: Study, points: Sequence[Point], engine: Workers, out: Path) -> 
 
 
 def forget(study: Study, points: Sequence[Point], out: Path) -> None:
-    """Remove the finished points of a sweep whose result is safe."""
+    """Remove the finished points of a `study` in `out` whose result is safe; `points` as of `swept`."""
     journal = Journal(study, points, out)
     for path in journal.files():
         path.unlink()
@@ -301,7 +301,7 @@ def _answers(client: Client, address: str, job: Any, batches: deque[Batch]) -> I
 
 
 def answered(asked_by: str, job: Any, batch: Batch) -> list[Attempt] | None:
-    """The attempts of a worker; None from one whose program is not that of the asking one."""
+    """The attempts of a worker at a `batch` by `job`; None where its program is not `asked_by`, the asking one's."""
     return list(silent(job, batch)) if program() == asked_by else None
 
 

@@ -35,7 +35,7 @@ COLUMNS = (
 
 
 def bracketed(value: float, error: float, digits: int = DIGITS) -> str:
-    """A number with its uncertainty, rounded up, in units of the last digit; `digits` significant ones at most.
+    """A `value` with its `error`, rounded up, in units of the last digit; `digits` significant ones at most.
 
     >>> bracketed(17.2138, 2e-6), bracketed(17.2138, 0.023), bracketed(-2.871, 0.12), bracketed(0.0, 0.0)
     ('17.21(1)', '17.21(3)', '-2.9(2)', '0')
@@ -63,7 +63,7 @@ def spoken_time(seconds: float) -> str:
 
 
 def headline(levitation: Levitation, equilibria: Sequence[Equilibrium], left_out: Sequence[LeftOut] = ()) -> str:
-    """Where the floater levitates and whether it remains there, in a sentence or two."""
+    """Where the floater of a `levitation` levitates and whether it remains there, by `equilibria` and `left_out`."""
     useful = worth_a_row(equilibria)
     if not useful:
         why = "there is no equilibrium"

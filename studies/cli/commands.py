@@ -54,7 +54,7 @@ def run(
     duration_s: float = 10.0,
     output: Output = Output(),
 ) -> Answer:
-    """Everything about one scene: its field, where the floater levitates, a flight, figures and pictures.
+    """Everything about one scene: field, equilibria and their stability, a trajectory, figures and pictures.
 
     Writes result.nc, summary.json and the pictures.
 
@@ -63,7 +63,7 @@ def run(
     scene
         Scene file (left out: the one that comes with the program).
     spin
-        Body spin S = Ω·m̂/ω of the floater about its own moment; a flight from an equilibrium begins with it.
+        Body spin S = Ω·m̂/ω of the floater about its own moment; a trajectory from an equilibrium begins with it.
     duration_s
         Simulated time, s.
     """
@@ -110,7 +110,7 @@ def field(
     steps
         Points along the longer side of the maps.
     working_point
-        The lowest μ0H along each magnet's easy axis instead, the floater where it levitates, against coercivity_kA_m.
+        Instead the lowest μ0H along each easy axis, with the floater where it levitates, against coercivity_kA_m.
     model
         Field model at points; maps show dipole, closed form and finite elements.
     rtol
@@ -148,7 +148,7 @@ def equilibria(
     spin: float = 0.0,
     output: Output = Output(),
 ) -> Answer:
-    """Every place where the floater can hang in step with the rotor, and whether it stays there.
+    """All equilibria of the floater, frequency-locked to the rotor, with their modes and stability.
 
     Parameters
     ----------
@@ -172,7 +172,7 @@ def simulate(
     resume: Annotated[bool, Parameter(negative="")] = False,
     output: Output = Output(),
 ) -> Answer:
-    """The floater's motion and how it ended; writes trajectory.nc and its figure.
+    """Trajectory of the floater and how it ended; writes trajectory.nc and its figure.
 
     Parameters
     ----------
@@ -181,7 +181,7 @@ def simulate(
     duration_s
         Simulated time, s.
     resume
-        Go on from the checkpoint of the same flight in --out, if one is there.
+        Go on from the checkpoint of the same trajectory in --out, if one is there.
     """
     positive("--duration-s", duration_s)
     loaded = _loaded(scene)
@@ -199,7 +199,9 @@ def plate(
     rtol: float = 1e-3,
     output: Output = Output(),
 ) -> Answer:
-    """What the plate's eddy currents answer to a dipole: G in B = G m at its own place, phasors e^(+iωt).
+    """Response tensor of the plate: eddy-current field B = G m at the position of an oscillating dipole m.
+
+    Phasors are e^(+iωt).
 
     Parameters
     ----------
@@ -258,7 +260,7 @@ def study(
     spin
         Body spin S = Ω·m̂/ω of the equilibria asked for.
     duration_s
-        Duration of the flights asked for, s.
+        Duration of the trajectories asked for, s.
     """
     if vary:
         if name is None:
@@ -299,7 +301,7 @@ def figure(result: Path, *, output: Output = Output()) -> Answer:
 
 
 def show(result: Path, *, html: Annotated[bool, Parameter(negative="")] = False, output: Output = Output()) -> Answer:
-    """Three-dimensional pictures of a flight, beside its file: scene and currents in the plate, animation, page.
+    """Three-dimensional pictures of a trajectory, beside its file: scene and currents in the plate, animation, page.
 
     Parameters
     ----------
@@ -386,7 +388,7 @@ def explore(
     no_browser: Annotated[bool, Parameter(negative="")] = False,
     output: Output = Output(),
 ) -> Answer:
-    """A page in the browser to play with a scene: sliders, equilibria at once, where it levitates, a live flight.
+    """A page in the browser to play with a scene: sliders, equilibria at once, where it levitates, live motion.
 
     It serves until Ctrl-C. The address is the first line of standard output; only who has its token sees the page.
 

@@ -27,7 +27,7 @@ LONGEST = 1000  # characters of a line of a message
 app = App(
     name="spinlev",
     version=lambda: version("spinlev"),
-    help="Magnetic levitation by rotation: true fields, true motion.",
+    help="Magnetic levitation by rotation: fields of finite magnets, complete motion.",
     help_format="markdown",
     suppress_keyboard_interrupt=False,
 )

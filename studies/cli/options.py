@@ -198,7 +198,7 @@ class Output:
     out
         Folder for the files; left out: `out`, or beside a result that is asked about.
     verbose
-        Say why each model was chosen, how large it is and how exactly the ledgers close.
+        Report why each model was chosen, its number of unknowns, and how well energy is conserved.
     """
 
     json: Annotated[bool, Parameter(negative="")] = False
