@@ -147,7 +147,7 @@ class TableKind(Generic[Table]):
         return key_of(self.name, *inputs)
 
     def save(self, table: Table, path: str | Path, key: str = "") -> None:
-        """Write a table; the file is whole or absent. Raises OSError."""
+        """Write a table to `path`, with its `key`; the file is whole or absent. Raises OSError."""
         labels = {"format": self.format, "title": self.title, "key": key}
         write_checked(to_dataset(table).assign_attrs(labels), path)
 

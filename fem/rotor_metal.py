@@ -109,7 +109,7 @@ def flat(values: Array) -> Array:
 
 
 def metal_of(bodies: Sequence[Solid], conductivity: float, order: int) -> Metal:
-    """Mesh and factorise a piece of metal, bodies that touch, with elements of degree `order`.
+    """Mesh and factorise metal (`conductivity`, S/m) of `bodies` that touch, with elements of degree `order`.
 
     Raises TooLargeError: the memory does not hold the system.
     """
@@ -117,7 +117,7 @@ def metal_of(bodies: Sequence[Solid], conductivity: float, order: int) -> Metal:
 
 
 def metal_on(mesh: SolidMesh, conductivity: float, order: int) -> Metal:
-    """The same on a mesh that is there."""
+    """The same, with `conductivity` and `order`, on a mesh that is there."""
     space = ng.H1(mesh.mesh, order=order)
     free = space.FreeDofs()
     free[0] = False
@@ -190,7 +190,7 @@ class CurrentPatterns:
 def current_patterns(
     metals: Sequence[Metal], positions: Array, left_out: float, watch: Watch = unwatched
 ) -> CurrentPatterns:
-    """Patterns that dipoles at `positions` (n, 3) m drive, but for a part `left_out` of the loss at any place.
+    """Patterns in `metals` that dipoles at `positions` (n, 3) m drive, but for a part `left_out` of any loss.
 
     `watch` is a progress callback.
     """
@@ -326,7 +326,7 @@ def rotor_losses(
     directions: int = DIRECTIONS,
     watch: Watch = unwatched,
 ) -> RotorLosses:
-    """Table of the dissipation for a floater whose centre is at least `nearest` (m) from every face.
+    """Dissipation in `rotor` and `conductors` for a floater whose centre is at least `nearest` (m) from every face.
 
     It is fitted in so many `directions` of each octant; `watch` is a progress callback. Raises ValueError: nothing
     conducts; InputError: a ring conducts into whose hole the floater fits; TooLargeError: the memory does not hold the
@@ -371,7 +371,7 @@ def sparse(weights: Array) -> Array:
 
 
 def places_around(bodies: Sequence[Solid], distance: float, seed: int = 0, directions: int = DIRECTIONS) -> Array:
-    """Places (n, 3) m at a `distance` (m) from the nearest face of the bodies, all around them."""
+    """Places (n, 3) m at a `distance` (m) from the nearest face of `bodies`, in `directions` random by `seed`."""
     octant = np.abs(np.random.default_rng(seed).normal(size=(directions, 3)))
     mirrored = np.concatenate([octant * signs for signs in product((1, -1), repeat=3)])
     mirrored /= np.linalg.norm(mirrored, axis=1)[:, None]
@@ -458,7 +458,7 @@ def cached_rotor_losses(
 ) -> tuple[RotorLosses, bool]:
     """The losses in a scene's rotor, from the cache if they are there, and whether they were.
 
-    `watch` is a progress callback.  At which frequencies they hold, `check_metal` says.
+    `report` gets messages, `watch` is a progress callback.  At which frequencies they hold, `check_metal` says.
     """
     make = partial(rotor_losses, scene.rotor, scene.conductors, scene.floater.radius, watch=watch)
     return LOSSES.cached(_deciding(scene), make, report)

@@ -82,7 +82,7 @@ class Balls:
         return FIRST + sum(effect.count for effect in _fitted(self.whole, LARGE))
 
     def enter(self, formulas: Sequence[BallField], state: Array, values: Array) -> float:
-        """Set the runtime parameters `values` to the first ball that will do for a scaled state; its error.
+        """Set the runtime parameters `values` to the first ball of `formulas` that will do for a scaled state; error.
 
         It must hold the circle on which the rotor sees a floater that turns less than the rotor, or not at all: once a
         turn, backwards.
@@ -110,7 +110,7 @@ class Balls:
         return bool(degree) and bool(away @ away * inverse**2 < INSIDE)
 
     def at(self, formula: BallField, reach: float, place: Array) -> tuple[Array, float] | None:
-        """Parameters and error of the ball for `place` (3,) m; None where a body or the end of the flight is near."""
+        """Parameters and error of a `formula`'s ball for `place` (3,) m; None near a body or loss (`reach`, m)."""
         spacing = SPACING * self.scene.floater.radius
         cell = np.round(place / spacing)
         key = formula.degree, reach, *cell.tolist()

@@ -278,7 +278,9 @@ def _endings(flown: Sequence[_Passenger]) -> Endings:
 def fly_together(
     scenes: Sequence[Scene], table: FieldTable, starts: Sequence[State], duration: float
 ) -> list[Trajectory | None]:
-    """Trajectories of scenes whose equations are the same but for runtime parameters, from one start each.
+    """Trajectories of `duration` (s) of `scenes` in the field of one `table`, from one of `starts` each.
+
+    Their equations are the same but for runtime parameters.
 
     Each is what `simulate` gives without a plate's currents, but for round-off; None where the start is in contact.
     Raises IntegrationError: a state became infinite.

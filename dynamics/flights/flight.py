@@ -215,14 +215,15 @@ class Flight:
         return np.asarray(function(inputs, pars=pars[: function.nparams], time=times))
 
     def balanced(self, values: Array, times: Array, states: Array) -> Array:
-        """The floater's states (n, 12) at scaled times (n,), and J - work, from the integrator's (n, s)."""
+        """The floater's (n, 12) at scaled times (n,), and J - work, from states (n, s) under parameters `values`."""
         energy = self.jacobi(values, times, states).sum(axis=0) - states[:, -1]
         return np.concatenate([states[:, :12], energy[:, None]], axis=1)
 
     def begin(
         self, start: State, duration: float, currents: Array | None = None, interval: float | None = None
     ) -> Course:
-        """The course from a start (rotor's frame, t = 0), with the plate's states (k,), √J.
+        """The course of `duration` (s) from a start (rotor's frame, t = 0), the plate's states being `currents` (k,).
+
 
         It is sampled at multiples of `interval`, scaled; None: not at all.
         """
@@ -313,7 +314,7 @@ class Course:
                     kept = perf_counter()
 
     def set_leg(self, end: float, depth: float, speed: float) -> float:
-        """Let the plate move as on a leg of its way, see `plate_legs`; scaled time of its end."""
+        """Let the plate move as on a leg: to `end`, `depth` and `speed` as of `plate_legs`; scaled time of its end."""
         scales = self.flight.scales
         self.values[Parameter.PLATE_DEPTH] = depth / scales.length
         self.values[Parameter.PLATE_SPEED] = speed * scales.time / scales.length
@@ -487,9 +488,9 @@ class StartError(InputError):
 def initial_state(
     scene: Scene, table: FieldTable, equilibria: Sequence[Equilibrium] | None = None, memory: PlateMemory | None = None
 ) -> tuple[State, Array]:
-    """State at t = 0, when the rotor's frame is the laboratory's, and the plate's states (k,), √J.
+    """State at t = 0, when the rotor's frame is the laboratory's, and the states (k,), √J, of the plate of `memory`.
 
-    An `OffsetStart` displaces the stable equilibrium in the rotor's frame and keeps the floater at rest in it; among
+    An `OffsetStart` of `scene` displaces the stable equilibrium in the rotor's frame, with the floater at rest; among
     several it takes the nearest; where there is none, what `starting_point` says.  An absolute start finds the plate as
     if the floater had long turned with the rotor there.  `equilibria` are found if they are not given. Raises
     EquilibriumError: no equilibrium to start from; it says why and which frequency has one; StartError: the floater
@@ -515,7 +516,10 @@ def initial_state(
 
 
 def check_free(name: str, scene: Scene, position: Array, time: float = 0.0, moment: Array | None = None) -> None:
-    """Raises StartError where a floater at a position (3,) m, rotor's frame, would overlap a body at a time (s)."""
+    """Raises StartError where a floater at `position` (3,) m, rotor's frame, overlaps a body of `scene` at `time` (s).
+
+    `name` is what the message calls its place; see `clearance` for `moment`.
+    """
     pointing = None if moment is None else moment[None]
     gap = float(clearance(scene, np.array([time]), position[None], pointing)[0])
     if gap < 0:
@@ -546,12 +550,12 @@ def most_like_levitation(equilibria: Sequence[Equilibrium]) -> Equilibrium | Non
 
 
 def displaced(start: State, offset: Array, angular_velocity: float) -> State:
-    """A state moved by one or more offsets (..., 3) m, as much at rest in the frame that turns (rad/s) as it was."""
+    """State `start` moved by `offset` (..., 3) m, as much at rest in a frame of `angular_velocity` as it was."""
     turning = np.cross([0.0, 0.0, angular_velocity], offset)
     moment, spin = (np.broadcast_to(v, offset.shape) for v in (start.moment, start.spin))
     return State(start.position + offset, start.velocity + turning, moment, spin)
 
 
 def in_plate_range(memory: PlateMemory | None, lab: State, time: float = 0.0) -> bool:
-    """Whether a plate's table, if there is one, knows the field at a place along the laboratory's axes at a time, s."""
+    """Whether the table of `memory`, if there is one, knows the field where `lab` (laboratory) is at `time`, s."""
     return memory is None or bool(memory.in_range(lab.position, plate_depth(memory.plate, np.array([time])))[0])

@@ -38,7 +38,7 @@ class Recorder:
         return np.asarray(times[times < end - 1e-9 * self.interval])
 
     def add(self, times: Array, states: Array, last: bool) -> None:
-        """Keep samples at multiples of the interval; of the `last` ones all."""
+        """Keep `states` (m, n) at those of `times` that are multiples of the interval; of the `last` ones all."""
         on_grid = np.abs(times / self.interval - np.round(times / self.interval)) < 1e-9
         kept = on_grid | last
         self.times, self.states = np.append(self.times, times[kept]), np.concatenate([self.states, states[kept]])

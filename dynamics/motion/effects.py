@@ -18,7 +18,7 @@ NEAR = 2.0  # Distance from the rotor, in floater radii, at which the answers ar
 
 
 def mutual_choice(scene: Scene, table: FieldTable, asked: str, rtol: float) -> tuple[bool, str]:
-    """Whether it is in the motion, for "rigid", "mutual" or "auto"; and why.
+    """Whether it is in `scene` and `table`, for `asked` "rigid", "mutual" or "auto" (if worth `rtol`); and why.
 
     Raises InputError: "mutual" is asked for with a measured map, or with magnets whose answer is not known.
     """

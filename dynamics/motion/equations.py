@@ -47,7 +47,7 @@ class Equations:
 
 
 def parameters(scene: Scene, scales: Scales, frozen_spin: bool = False) -> Array:
-    """Values of the runtime parameters; `frozen_spin` takes the drag off the spin about the moment.
+    """Runtime parameters of a `scene` in units `scales`; `frozen_spin` takes the drag off the spin about the moment.
 
     Raises InputError: the floater is a cuboid, whose turn about its own moment the equations do not have.
     """

@@ -73,7 +73,7 @@ def lost_distance(start: Array) -> float:
 
 
 def clearance(scene: Scene, time: Array, position: Array, moment: Array | None = None) -> Array:
-    """Smallest gap (n,) in m between the floater and any body; `time` (n,) s, `position` (n, 3) m, rotor's frame.
+    """Smallest gap (n,) in m between floater and bodies of `scene` at `time` (n,) s, `position` (n, 3) m (rotor's).
 
     Of a floater that is no sphere the gap of the smallest one about it where that is positive, else its own; without
     its `moment` (n, 3), that of the sphere.
@@ -102,7 +102,7 @@ def _own_gap(scene: Scene, time: float, position: Array, moment: Array) -> float
 
 
 def rotor_gap(scene: Scene, position: Array, moment: Array | None = None) -> float:
-    """Gap in m between the floater at `position` (3,) m, rotor's frame, and the rotor; negative where they overlap.
+    """Gap in m between floater at `position` (3,) m, rotor's frame, and rotor of `scene`; negative where they overlap.
 
     See `clearance` for a floater that is no sphere, whose `moment` (3,) it needs.
     """

@@ -137,7 +137,7 @@ class FloaterShape:
 
     @classmethod
     def of(cls, floater: Floater, sources: FloaterSources, field: FieldFormula) -> FloaterShape:
-        """The dipoles with the multipoles of a floater's sources, less the one that the equations have."""
+        """Dipoles with the multipoles of a floater's `sources`, in `field`, less the one that the equations have."""
         half = floater.solid.half_edges[2]
         heights = half * np.array([0.0, *HEIGHTS, *-HEIGHTS])
         degrees = 2 * np.arange(len(HEIGHTS) + 1) + 1
@@ -163,7 +163,7 @@ class FloaterShape:
         return Added(force, turn, energy=energy)
 
     def missed(self, table: FieldTable, position: Array, moment: Array) -> Array:
-        """(n, 2) what the dipoles miss of torque and force over the moment, T and T/m, at (n, 3) m and (n, 3)."""
+        """(2, n) what they miss of torque (T) and force (T/m) in `table`, by `moment` (n, 3), at `position` (n, 3) m."""
         axes = np.array([self.floater.axes(m) for m in moment])
         force, torque = force_and_torque(self.sources, table, position, axes)
         for height, dipole in zip(self.heights, self.dipoles + (self.heights == 0), strict=True):

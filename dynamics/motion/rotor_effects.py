@@ -160,6 +160,7 @@ class Mutual:
         return self.table.energy(place, [strength * m for m in moment], [share * b for b in field], share)
 
     def numbers(self, field: FieldTable, position: Array, moment: Array, values: Array) -> Array:
+        """`Placeable` tells of `field`, `position`, `moment` and `values`."""
         length, strength, share = values[:, WHICH].T[:, :, None]
         place = position * length
         try:
@@ -193,7 +194,7 @@ class Mutual:
         return np.concatenate(numbers), float(error) / ALLOWED
 
     def wrench(self, place: Array, direction: Array, field: Array, gradient: Array) -> tuple[Array, Array]:
-        """Force (n, 3) N and torque (n, 3) N m at places and directions of the moment (n, 3) in B0 and ∇B0."""
+        """Force (n, 3) N and torque (n, 3) N m at places and directions (n, 3), in `field` B0 and `gradient` ∇B0."""
         _, force, torque = answers(self.table, place, self.moment * direction, field, gradient)
         return force, torque
 
@@ -221,7 +222,10 @@ def _twice(a: int, b: int) -> float:
 def rough_force(
     magnets: Sequence[Magnet], floater: Floater, table: FieldTable, place: Array, direction: Array
 ) -> Array:
-    """Force (3,) N that the answers add at a place (3,) m for a direction of the moment; good to a factor of two."""
+    """Force (3,) N that the answers of `magnets` and `floater` add to that in `table`, to a factor of two.
+
+    At a `place` (3,) m, for a `direction` of the moment.
+    """
     step = STEP * floater.radius
     places = place + step * np.concatenate([np.eye(3), -np.eye(3)])
     field = table.evaluate(places)[0]
@@ -302,6 +306,7 @@ class RotorCurrents:
         return [dotted([known[min(a, b), max(a, b)] for b in range(NUMBERS)], rates) for a in range(NUMBERS)]
 
     def numbers(self, field: FieldTable, position: Array, moment: Array, values: Array) -> Array:
+        """`Placeable` tells of `field`, `position`, `moment` and `values`."""
         return self._entries(position * values[:, Parameter.LENGTH, None]).T
 
     def fit(self, ball: Ball, gradient: Array) -> tuple[Array, float]:
@@ -330,7 +335,7 @@ class Dissipation(Protocol):
 
 
 def brake_slope(table: Dissipation, scene: Scene, state: State) -> Array:
-    """(12, 12): what the currents add to the derivatives of the scaled rates of a floater in step with the rotor."""
+    """(12, 12): what currents of `table` add to derivatives of scaled rates of `scene`, in step in `state`."""
     scales, floater = Scales.of(scene), scene.floater
     matrix = table.dissipation(state.position[None], floater.moment * state.moment[None])[0]
     units = np.repeat([scales.length, 1.0], 3) / scales.time

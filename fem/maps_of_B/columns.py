@@ -208,7 +208,9 @@ def known_columns(titles: Sequence[str], reading: MapReading, vectors: bool = Fa
 
 
 def chosen(titles: Sequence[str], reading: MapReading, vectors: bool = False) -> dict[int, Column]:
-    """The columns of a map by number: each quantity once, of several those that `reading.columns` tells.
+    """The columns of a map among `titles` by number: each quantity once, of several those that `reading.columns` tells.
+
+    `vectors`: as of `known_columns`.
 
     Raises FieldMapError: two columns for one quantity, or none that has what `reading.columns` says.
     """

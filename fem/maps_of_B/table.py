@@ -61,7 +61,7 @@ class _Comparison:
 
 
 def require_plausible(field_map: FieldMap, magnets: Sequence[Magnet], radius: float) -> None:
-    """Refuse a map that contradicts the magnets.
+    """Refuse a `field_map` that contradicts the magnets.
 
     The stronger half of `SUBSET` points outside the spheres of `radius` (m) about the magnets is compared with the
     field of the remanent polarisation. Raises FieldMapError: B larger or smaller by more than a factor of two than that
@@ -420,7 +420,7 @@ def _provenance(basis: HarmonicBasis, fit: HarmonicFit, field_map: FieldMap, sec
 
 
 def map_table(path: Path | None, magnets: Sequence[Magnet], reading: MapReading | None = None) -> GriddedTable:
-    """Table of a map of B in the rotor's frame; the sources lie in the smallest spheres about the magnets.
+    """Table of the map at `path`, read as `reading` says, in the rotor's frame; sources lie in spheres about `magnets`.
 
     What the map holds inside those spheres is left out. The magnets' shapes and places say where sources can be; their
     strength, whether the map is theirs. Raises FieldMapError: no map, a file that is none, one that contradicts the

@@ -51,10 +51,11 @@ class PlateChoice(NamedTuple):
 def resolve_plate_model(
     scene: Scene, model: str, place: Array | None, rtol: float, report: Callable[[str], None] = lambda text: None
 ) -> PlateChoice:
-    """The plate's model in the motion.
+    """The plate's model in the motion of a `scene` about a `place` (3,) m; `report` is told what is worked out.
 
-    `auto` is none where even a perfect conductor's image would not matter, the infinite slab where a bound or else a
-    coarse solution says that the edges are too far to matter, and otherwise the reduced network of the finite elements.
+    `auto` is, to `rtol`, none where a perfect conductor's image would not matter, the infinite slab where a bound or else
+    a coarse solution says that the edges are too far to matter, and otherwise the reduced network of the finite
+    elements.
     """
     plate = scene.plate
     if plate is None:
@@ -141,6 +142,7 @@ def plate_around(
     table : the rotor's field
     place : (3,) m, in the frame that turns with the rotor
     radius, frequency : of the floater, m, and of the rotor, Hz
+    rtol : relative accuracy
     region : in the frame of the plate, where the floater may be; left out, `REACH` about the place, all the way down
     """
     if model == "slab" and plate.lowering and abs(plate.box.rotation[2, np.argmin(plate.box.size)]) < PLUMB:
@@ -219,7 +221,7 @@ def wider_region(plate: Plate, region: Region, radius: float, seen: Array) -> Re
 
 
 def rotor_nearby(table: RotorTable, rotor: tuple[Magnet, ...], place: Array, radius: float, rtol: float) -> RotorTable:
-    """The rotor's table with the coefficients that count from `REACH` nearer to the magnets than `place` (3,) m on."""
+    """The rotor's table with coefficients that count for `rtol`, `REACH` nearer than `place` (3,) m or `radius` on."""
     gap = min(float(magnet.body.distance(place)) for magnet in rotor) - REACH
     return shortened_table(table, Accuracy(rtol, max(gap, radius)))
 

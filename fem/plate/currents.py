@@ -100,7 +100,7 @@ class CurrentSpace:
 
 
 def space_couplings(b: Sequence[Array], inductances: Sequence[Array], shift: complex) -> ComplexArray:
-    """(sources, sources) -s b (1 + sL)⁻¹ bᵀ, summed over the parity classes; s is iω or a real shift, rad/s."""
+    """(sources, sources) -s b (1 + sL)⁻¹ bᵀ of `inductances` L, summed over classes; `shift` s is iω or real, rad/s."""
     parts = [
         b_class @ np.linalg.solve(np.eye(len(induct)) + shift * induct, b_class.T)
         for b_class, induct in zip(b, inductances, strict=True)
@@ -118,7 +118,7 @@ def source_images(parity: Parity, points: Array, sources: Sequence[Source]) -> I
 
 
 def dipole_images(parity: Parity, points: Array, places: Array) -> Iterator[Array]:
-    """The same of unit moments along x, y and z at each of `places` (m, 3) m.
+    """The same, at `points`, of unit moments along x, y and z at each of `places` (m, 3) m.
 
     A mirrored potential e_j × K is that of the mirrored kernel K = μ0/4π r/r³ but for a sign that depends on component
     and moment, so that one kernel's parity parts serve all three moments of a place.
@@ -253,7 +253,7 @@ class Residuals:
         return np.asarray(factors @ self._products @ factors.conj().T)
 
     def largest(self, angular_frequencies: Array, scales: Array, allowed: float) -> Array:
-        """Rows (k, width): principal components of all residuals times `scales` (frequencies, m), but for a tail."""
+        """Rows (k, width): principal parts of residuals at `angular_frequencies` times `scales`, but for `allowed`."""
         parts = [s[:, None] * self._combinations(w) for w, s in zip(angular_frequencies, scales, strict=True)]
         factors = np.concatenate([half for part in parts for half in (part.real, part.imag)])
         energies, vectors = np.linalg.eigh(factors @ self._products @ factors.T)
@@ -526,7 +526,10 @@ def cached_currents(
     report: Callable[[str], None],
     watch: Watch = unwatched,
 ) -> PlateSolution:
-    """`solve_currents` from the cache if it is there, with callbacks for messages and progress."""
+    """`solve_currents` from the cache if it is there.
+
+    The same `plate`, `boxes`, `frequencies`, `rtol`, `rule` and `others`; `report` gets messages, `watch` progress.
+    """
     inputs = plate.box.size, plate.conductivity, tuple(boxes), frequencies, rtol, rule, others
     make = partial(solve_currents, plate, boxes, frequencies, rtol, rule, others, watch)
     return CURRENTS.cached(inputs, make, report)[0]

@@ -213,7 +213,7 @@ class EddyResponse:
 def solve_eddy(
     conductors: ConductorMesh, order: int, frequency: float, sources: Sequence[Source], space: EddySpace | None = None
 ) -> EddyResponse:
-    """Eddy currents of all `sources` at `frequency` (Hz).
+    """Eddy currents of all `sources` at `frequency` (Hz) in `conductors`, or on a `space` on their mesh that is there.
 
     Any frequency from 0 up is safe: the gauge needs no parameter, and below ωμ0σL² = 1e-2 the resistive limit is used,
     exact to 1e-8.  At high frequency the mesh must resolve the skin depth: `plate_reaction` sees to it. Raises
@@ -236,7 +236,7 @@ def solve_eddy(
 
 
 def solve_shifted(space: EddySpace, shift: complex, sources: Sequence[Source]) -> EddyResponse:
-    """Eddy currents of all `sources` where iω is `shift`, rad/s: a real one is that of fields that grow as e^{st}.
+    """Eddy currents of all `sources` on `space` where iω is `shift`, rad/s: a real one for fields that grow as e^{st}.
 
     Raises TooLargeError: the memory does not hold the system.
     """

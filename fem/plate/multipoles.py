@@ -75,6 +75,7 @@ class Multipoles:
 
     @classmethod
     def at(cls, centers: Iterable[Array], kinds: Sequence[tuple[int, int, int]], scale: float) -> Multipoles:
+        """All `kinds` at each of `centers`, with a `scale`."""
         pairs = list(product(centers, kinds))
         return cls(np.array([p[0] for p in pairs]), np.array([p[1] for p in pairs], float), scale)
 
@@ -192,7 +193,7 @@ def fit_multipoles(
     step: int = STEP,
     watch: Watch = unwatched,
 ) -> Fit:
-    """Few multipoles that meet the tolerance and are `enough`, or as many as still help.
+    """Few of a `choice` of multipoles that meet the tolerance and are `enough`, or as many as still help.
 
     Parameters
     ----------

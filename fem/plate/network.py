@@ -117,7 +117,7 @@ def fewest_states(
     places: int,
     tolerance: float,
 ) -> tuple[list[OrderedBasis], float]:
-    """The fewest leading fields of all bases whose worst error meets the tolerance, and that error.
+    """The fewest leading fields of every `basis` whose worst error meets the tolerance, and that error.
 
     Parameters
     ----------
@@ -144,7 +144,7 @@ def fewest_states(
 
 
 def coupling_error(found: ComplexArray, truth: ComplexArray, places: int) -> float:
-    """Largest relative error of dipoles' own tensors and of other sources' fields at their places."""
+    """Largest relative error of couplings `found`, by `truth`: dipoles' own tensors and others' fields at `places`."""
     n, errors = places, [0.0]
     own, exact = (np.einsum("iaib->iab", c[: 3 * n, : 3 * n].reshape(n, 3, n, 3)) for c in (found, truth))
     fields = (c[3 * n :, : 3 * n] for c in (found - truth, truth))
@@ -154,7 +154,10 @@ def coupling_error(found: ComplexArray, truth: ComplexArray, places: int) -> flo
 
 
 def tensor_error(values: Array, error: Array, rates: Array, omega: float) -> float:
-    """Largest relative error of reaction tensors from errors of the field functions (states, n, 3)."""
+    """Largest relative error of reaction tensors at `omega`, rad/s, from an `error` of field functions (states, n, 3).
+
+    `values` of these and `rates`, 1/s, are those of the states.
+    """
     weight = 1 / (rates + 1j * omega)
     exact, found = (np.einsum("ina,i,inb->nab", b, weight, b, optimize=True) for b in (values, values - error))
     return float(np.max(np.linalg.norm(found - exact, axis=(1, 2)) / np.linalg.norm(exact, axis=(1, 2))))
@@ -179,7 +182,7 @@ def from_elements(
     others: OtherSources,
     space_error: float,
 ) -> Reduction:
-    """Networks for a region within the boxes and frequencies (Hz) within those of a `solution`.
+    """Networks of `plate` for a region within the boxes and frequencies (Hz) within those of a `solution`.
 
     Raises AccuracyError: (the reduction) all of the solution's states do not suffice.
 
@@ -284,7 +287,7 @@ def _functions(
 
 
 def candidates(region: Region, half_edges: Array, degree: int = DEGREE) -> Multipoles:
-    """Multipoles to choose from for a region beside a plate with these half edges (m), both about the plate's centre.
+    """Multipoles up to a `degree` to choose from, for a `region` beside a plate with `half_edges` (3,) m, its frame.
 
     They lie behind the plate's surface, on lines away from the region. Raises ValueError: the region touches the plate.
     """

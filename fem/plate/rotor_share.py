@@ -114,7 +114,7 @@ def rotor_parts(table: RotorTable, plate: Plate, left_out: float = LEFT_OUT) -> 
 
 
 def posed_rotor(parts: Sequence[Source], plate: Plate, angle: float, depth: float) -> RotorSource:
-    """The rotor turned by `angle` (rad), seen from the plate `depth` (m) below its first place."""
+    """The rotor of `parts`, turned by `angle` (rad), seen from `plate` when it is `depth` (m) below its first place."""
     back = rotation_matrix((0.0, 0.0, -np.degrees(angle)))
     return RotorSource(parts, plate.box.rotation.T @ back.T, back @ (plate.box.center + depth * DOWN))
 

@@ -99,7 +99,7 @@ def wave_numbers(height: Array, aperture: float = np.pi / 4) -> tuple[Array, Arr
 
 
 def reaction_tensor(slab: Slab, height: ArrayLike, frequency: ArrayLike) -> ComplexArray:
-    """G (..., 3, 3), T/(A m²): B = G m at a dipole `height` (m) over the face, phasors e^{+iωt}.
+    """G (..., 3, 3), T/(A m²): B = G m at a dipole `height` (m) over the face of a `slab`, phasors e^{+iωt}.
 
     Heights and frequencies (Hz) are broadcast.  Relative error below 1e-12 from 0 to beyond 1 MHz; G = 0 at 0 Hz.
     Raises ValueError: height not positive, or frequency negative.
@@ -181,7 +181,7 @@ class SlabModes:
 
 
 def slab_modes(slab: Slab, wave_numbers: Array, count: int) -> SlabModes:
-    """The slowest `count` modes at each of `wave_numbers` (n,), 1/m."""
+    """The slowest `count` modes of a `slab` at each of `wave_numbers` (n,), 1/m."""
     c = wave_numbers[:, None] * slab.thickness / 2
     u = _roots(c, np.asarray(np.pi / 2 * np.arange(count), dtype=np.float64))
     rates = (2 / slab.thickness) ** 2 * (u * u + c * c) / (MU_0 * slab.conductivity)
@@ -190,7 +190,7 @@ def slab_modes(slab: Slab, wave_numbers: Array, count: int) -> SlabModes:
 
 
 def modes_needed(slab: Slab, wave_number: float, frequency: float, tolerance: float) -> int:
-    """How many modes leave less than `tolerance` of the reflection up to a wave number (1/m) and a frequency (Hz).
+    """How many modes of `slab` leave out `tolerance` of the reflection up to `wave_number` (1/m) and `frequency` (Hz).
 
     What N modes leave out is 4 k κ² t³ / (3 π⁴ N³), κ² = ωμ0σ, of a reflection near 1, and 16 (kt)³ / (3 π⁴ N³) of one
     in the limit of slow changes; in between the sum is enough.
@@ -208,7 +208,7 @@ def _roots(c: Array, phase: Array) -> Array:
 
 
 def mutual_tensor(slab: Slab, points: ArrayLike, source: ArrayLike, frequency: ArrayLike) -> ComplexArray:
-    """G (..., 3, 3), T/(A m²): reaction B = G m at `points` (..., 3) to a dipole m at `source` (..., 3), m.
+    """G (..., 3, 3), T/(A m²): reaction B = G m of a `slab` at `points` (..., 3) to a dipole m at `source` (..., 3), m.
 
     The face is z = 0.  Shapes broadcast, with `frequency` (Hz) against the leading ones.  Relative error below
     1e-11 up to a lateral distance of about 20 (z+z'); farther off, the oscillation takes more and more nodes.
@@ -281,7 +281,7 @@ def measured_edge_error(plate: Plate, places: Array, frequency: float) -> float:
 
 
 def cached_edge_error(plate: Plate, places: Array, frequency: float, report: Callable[[str], None]) -> float:
-    """`measured_edge_error` at places and frequency rounded to 0.1 mm and 1 Hz, from the cache if it is there."""
+    """`measured_edge_error` of `plate`, places and frequency rounded to 0.1 mm and 1 Hz; cached, told to `report`."""
     places, frequency = np.round(places, 4), float(round(frequency))
     inputs = plate.box.size, plate.conductivity, frequency, plate.box.to_body(places)
     return EDGE_ERROR.cached(inputs, lambda: measured_edge_error(plate, places, frequency), report)[0]

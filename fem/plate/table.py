@@ -169,7 +169,7 @@ class PlateErrors:
 
 
 def refuse(rtol: float, enough: float, conductor: str) -> NoReturn:
-    """Refuse a tolerance that a table of a conductor, in words, misses, where `enough` can be met.
+    """Refuse a tolerance `rtol` that a table of a `conductor`, in words, misses, where `enough` can be met.
 
     Raises AccuracyError: always.
     """

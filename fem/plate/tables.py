@@ -102,7 +102,7 @@ def plate_and_rotor_table(
 def slab_and_rotor_table(
     plate: Plate, rotor: RotorTable, region: Region, frequencies: tuple[float, float] = (0.5, 250.0), rtol: float = 1e-3
 ) -> tuple[PlateTable, RotorShare]:
-    """As `plate_and_rotor_table`, but for a plate that is infinite along its two longer edges.
+    """As `plate_and_rotor_table` (`plate`, `rotor`, `region`, `frequencies`, `rtol`), but for a plate without edges.
 
     The errors do not tell how far the plate is from infinite. Raises InputError: the region is not over one of the
     plate's two largest faces, or the rotor not on its side of the slab; ValueError: a parameter out of range;
@@ -154,7 +154,10 @@ def tabulate(network: PassiveNetwork, rtol: float, watch: Watch = unwatched) -> 
 def cached_plate_table(
     plate: Plate, region: Region, frequencies: tuple[float, float], rtol: float, report: Callable[[str], None]
 ) -> tuple[PlateTable, bool]:
-    """A plate table, from the cache if it is there, and whether it was; it is the same for every pose of the plate."""
+    """`plate_table` (`region`, `frequencies`, `rtol`), if it can be from the cache, and whether it was, for `plate`.
+
+    `report` gets messages.
+    """
     inputs = plate.box.size, plate.conductivity, region, frequencies, rtol
     return PLATE.cached(inputs, lambda: plate_table(plate, region, frequencies, rtol), report)
 
@@ -162,5 +165,5 @@ def cached_plate_table(
 def deciding(
     plate: Plate, rotor: RotorTable, region: Region, frequencies: tuple[float, float], rtol: float
 ) -> tuple[Any, ...]:
-    """What decides a plate's table and the rotor's share: the way of a lowering does, but not when and how fast."""
+    """What decides `plate_and_rotor_table` (`region`, `frequencies`, `rtol`); of a lowering its way alone."""
     return plate.box, plate.conductivity, plate.way, rotor.uniform, rotor.expansions, region, frequencies, rtol

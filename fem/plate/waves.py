@@ -138,7 +138,7 @@ class SlabWaves:
         return np.asarray(sum(parts))
 
 
-def slab_waves(frame: SlabFrame, near: Array, far: Array, frequency: float, tolerance: float) -> SlabWaves:
+def _slab_waves(frame: SlabFrame, near: Array, far: Array, frequency: float, tolerance: float) -> SlabWaves:
     """The full network for a relative accuracy and frequencies up to one (Hz).
 
     Parameters
@@ -182,7 +182,7 @@ def from_slab(
     start = time.perf_counter()
     low, high = checked_ranges(frequencies, rtol)
     frame = slab_frame(plate, region)
-    waves = slab_waves(frame, corners(region, frame), far, high, SUMS_SHARE * rtol)
+    waves = _slab_waves(frame, corners(region, frame), far, high, SUMS_SHARE * rtol)
     modes = waves.modes
     count = int(np.ceil(PER_DECADE * np.log10(high * SLOW / low)))
     every = np.geomspace(low / SLOW, high, 2 * count + 1)  # trained at every second, looked at at all
