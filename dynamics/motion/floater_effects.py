@@ -163,7 +163,7 @@ class FloaterShape:
         return Added(force, turn, energy=energy)
 
     def missed(self, table: FieldTable, position: Array, moment: Array) -> Array:
-        """(2, n) what they miss of torque (T) and force (T/m) in `table`, by `moment` (n, 3), at `position` (n, 3) m."""
+        """(2, n) what they miss of torque, T, and force, T/m, in `table`, of `moment` (n, 3) at `position` (n, 3) m."""
         axes = np.array([self.floater.axes(m) for m in moment])
         force, torque = force_and_torque(self.sources, table, position, axes)
         for height, dipole in zip(self.heights, self.dipoles + (self.heights == 0), strict=True):

@@ -53,7 +53,7 @@ def resolve_plate_model(
 ) -> PlateChoice:
     """The plate's model in the motion of a `scene` about a `place` (3,) m; `report` is told what is worked out.
 
-    `auto` is, to `rtol`, none where a perfect conductor's image would not matter, the infinite slab where a bound or else
+    `auto` (to `rtol`) is none where a perfect conductor's image would not matter, an infinite slab where a bound or else
     a coarse solution says that the edges are too far to matter, and otherwise the reduced network of the finite
     elements.
     """
