@@ -53,8 +53,8 @@ def resolve_plate_model(
 ) -> PlateChoice:
     """The plate's model in the motion of a `scene` about a `place` (3,) m; `report` is told what is worked out.
 
-    `auto` (to `rtol`) is none where a perfect conductor's image would not matter, an infinite slab where a bound or else
-    a coarse solution says that the edges are too far to matter, and otherwise the reduced network of the finite
+    `auto` (to `rtol`) is none where a perfect conductor's image would not matter, an infinite slab where a bound or
+    else a coarse solution says that the edges are too far to matter, and otherwise the reduced network of the finite
     elements.
     """
     plate = scene.plate
