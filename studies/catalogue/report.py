@@ -5,6 +5,7 @@ import gzip
 import json
 import os
 from collections.abc import Callable
+from dataclasses import replace
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
@@ -19,7 +20,6 @@ from ..figures.pictures import seen_from
 from ..figures.renderer import RenderError, drawn, turnable_page
 from ..figures.run import question_lines
 from ..figures.style import figure_bytes
-from ..figures.view import Turnable
 from .entries import CATALOGUE
 from .runner import QUESTION, failure_lines, figures_of, flight_of, read_result
 
@@ -152,7 +152,7 @@ def _view(result: xr.Dataset) -> dict[str, str]:
     scene, motion = flight_of(result, "scene")
     try:
         view = seen_from(scene, result["time"].values, motion)
-        return {"view": base64.b64encode(drawn(Turnable(view))).decode()}
+        return {"view": base64.b64encode(drawn(replace(view, turnable=True))).decode()}
     except RenderError as error:
         return {"no_view": str(error)}
 

@@ -31,7 +31,7 @@ from ..figures.run import (
     trajectory_figure,
 )
 from ..figures.style import save_figures
-from ..figures.view import SEEN, Currents, Turnable, current_places, near_plate
+from ..figures.view import SEEN, Currents, current_places, near_plate
 from ..levitation import Levitation
 from ..question import Question
 from ..result import write_dataset
@@ -185,7 +185,7 @@ def show_job(path: Path, out: Path, html: bool = False) -> list[str]:
     files = [str(picture), str(animation)]
     if html:
         turned = out / f"{path.stem}-view.html"
-        write_whole(turned, turnable_page(drawn(Turnable(view))))
+        write_whole(turned, turnable_page(drawn(replace(view, turnable=True))))
         files.append(str(turned))
     return files
 

@@ -72,7 +72,7 @@ def drawn(picture: Picture) -> bytes:
 
 
 def turnable_page(scene: bytes) -> bytes:
-    """The page around a scene that was drawn as `Turnable`."""
+    """The page around a scene that was drawn as turnable."""
     from trame_vtk.tools.vtksz2html import write_html
 
     text = io.StringIO()

@@ -12,20 +12,12 @@ from ...geometry.scene.contents import Scene
 from ...geometry.shapes import Box, Ring, Sphere
 from ...geometry.solids import Part, Solid
 
-FINE = 161
-"""Points of a plane of the field along each of its edges."""
-TURNS, FRAMES = 3, 16
-"""Turns of the rotor that an animation shows at once, and frames for each."""
-LINES = 36
-"""Field lines, each followed both ways."""
-STEP = 1e-3
-"""Length of a step along a field line, m."""
-STEPS = 200
-"""Of a field line in one direction, at most."""
-SEEN = 0.03
-"""How far along its edges a plate is drawn in a picture, m."""
-SIDES = 48
-"""Of what is round."""
+FINE = 161  # Points of a plane of the field along each of its edges
+TURNS, FRAMES = 3, 16  # Turns of the rotor that an animation shows at once, and frames for each
+LINES = 36  # Field lines, each followed both ways
+STEP, STEPS = 1e-3, 200  # Length of a step along a field line, m, and how many in one direction at most
+SEEN = 0.03  # How far along its edges a plate is drawn in a picture, m
+SIDES = 48  # Of what is round
 Surface: TypeAlias = "tuple[Array, NDArray[np.intp]]"
 SQUARES = np.array([(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)])
 """Faces of a box whose corners are numbered by the signs of x, y and z, the last changing fastest."""
@@ -61,45 +53,23 @@ class Currents:
 
 @dataclass(frozen=True, eq=False)
 class View:
-    """A scene at one instant, at which the rotor's axes are the laboratory's.
-
-    Parameters
-    ----------
-    scene : what is shown
-    position, moment : of the floater, (3,) m, and the direction (3,) of its moment
-    path : (n, 3) positions of the flight, m, in `frame`
-    plane, lines : the field's size and its lines, (n, 3) m each
-    currents : in the plate
-    frame : of the path; "laboratory" where the floater does not turn with the rotor
-    """
+    """A scene at one instant, at which the rotor's axes are the laboratory's."""
 
     scene: Scene
-    position: Array
-    moment: Array
-    path: Array
-    plane: FieldPlane | None = None
-    lines: Sequence[Array] = ()
-    currents: Currents | None = None
-    frame: str = "rotor's frame"
+    position: Array  # of the floater, (3,) m
+    moment: Array  # (3,) its direction
+    path: Array  # (n, 3) positions of the flight, m, in `frame`
+    plane: FieldPlane | None = None  # the field's size
+    lines: Sequence[Array] = ()  # of the field, (n, 3) m each
+    currents: Currents | None = None  # in the plate
+    frame: str = "rotor's frame"  # or "laboratory" where the floater does not turn with the rotor
+    turnable: bool = False  # whether it is for a page that lets its reader turn it
 
     def draw(self, progress: Callable[[float], None]) -> bytes:
-        """A PNG."""
-        from .still import scene_picture
+        """A PNG, or the scene for `renderer.turnable_page`."""
+        from .still import scene_picture, turnable_scene
 
-        return scene_picture(self)
-
-
-@dataclass(frozen=True, eq=False)
-class Turnable:
-    """A view that a page lets its reader turn."""
-
-    view: View
-
-    def draw(self, progress: Callable[[float], None]) -> bytes:
-        """The scene of a `still.page`."""
-        from .still import turnable_scene
-
-        return turnable_scene(self.view)
+        return turnable_scene(self) if self.turnable else scene_picture(self)
 
 
 @dataclass(frozen=True, eq=False)
@@ -191,13 +161,13 @@ def near_plate(plate: Box, reach: float) -> Box:
 def field_lines(scene: Scene, field: Callable[[Array], Array], low: Array, high: Array) -> list[Array]:
     """Lines (n, 3) m of a field outside the magnets; between neighbours is equal flux.
 
+    Runge and Kutta's fourth order in steps of equal length: a line is off by less than it is thick.
+
     Parameters
     ----------
     scene : whose magnets the lines begin and end at
     field : B (n, 3) at points (n, 3) m
     low, high : (3,) corners m of the box in which they are followed
-
-    Runge and Kutta's fourth order in steps of equal length: a line is off by less than it is thick.
     """
     seeds = _seeds(scene, field)
     ways = [_followed(scene, field, seeds, sign, low, high) for sign in (-1.0, 1.0)]

@@ -25,42 +25,27 @@ LONGEST, LARGEST = 20_000, 200_000
 
 
 MEASURES = {
-    "horizontal": ("rotor.displacement_mm", "Displacement (mm)", 0.0, 10.0),
-    "vertical": ("rotor.displacement_mm", "Displacement (mm)", 5.0, 30.0),
-    "tilt": ("rotor.angle_deg", "Tilt (°)", 0.0, 45.0),
+    "horizontal": ("displacement_mm", "Displacement (mm)", 0.0, 10.0),
+    "vertical": ("displacement_mm", "Displacement (mm)", 5.0, 30.0),
+    "tilt": ("angle_deg", "Tilt (°)", 0.0, 45.0),
 }
 """What moves a rotor of the article."""
 PLATE_REACH = 20.0
 """How far a plate whose middle is level with the rotor's can be moved, mm."""
-ROTOR_SIZES = {
-    "edge_mm": "Edge of the cube (mm)",
-    "diameter_mm": "Rotor's diameter (mm)",
-    "height_mm": "Rotor's height (mm)",
-}
-"""Titles of the sizes that a rotor of the article may have, for its shape."""
-FLOATER_SIZES = {"diameter_mm": "Floater's diameter (mm)", "height_mm": "Floater's height (mm)"}
+SIZES = {"edge_mm": "edge (mm)", "diameter_mm": "diameter (mm)", "height_mm": "height (mm)"}
+"""Titles of the sizes that rotor and floater may have, for their shape."""
 
 
 @dataclass(frozen=True, eq=False)
 class PageState:
-    """All that decides what a page shows, but for the flight.
-
-    Parameters
-    ----------
-    scene : its scene
-    model : of the field
-    plate_model : of the plate's currents
-    spin : body spin of the equilibria
-    source : the scene's file, or another name of it in messages
-    first : the scene that the page began with, whose files alone another one may name; None: `scene` itself
-    """
+    """All that decides what a page shows, but for the flight."""
 
     scene: Scene
-    model: FieldModel = "dipole"
-    plate_model: PlateModel = "slab"
-    spin: float = 0.0
-    source: str = "scene"
-    first: Scene | None = None
+    model: FieldModel = "dipole"  # of the field
+    plate_model: PlateModel = "slab"  # of the plate's currents
+    spin: float = 0.0  # of the body in its equilibria
+    source: str = "scene"  # the scene's file, or another name of it in messages
+    first: Scene | None = None  # that the page began with, whose files alone another one may name; None: `scene`
 
     @cached_property
     def keys(self) -> Mapping[str, Any]:
@@ -194,12 +179,12 @@ def controls(state: PageState) -> list[Control]:
     if (kind := rotor.get("configuration")) in MEASURES:
         key, title, low, high = MEASURES[kind]
         low = max(low, 1e3 * float(state.scene.rotor[0].body.size[2])) if kind == "vertical" else low  # they touch
-        rows.append((key, title, rotor[key.partition(".")[2]], low, high, 0.05))
-        rows += [(f"rotor.{k}", title, rotor[k], 3.0, 20.0, 0.05) for k, title in ROTOR_SIZES.items() if k in rotor]
-    sizes = [(key, title, floater[key]) for key, title in FLOATER_SIZES.items() if key in floater]
+        rows.append((f"rotor.{key}", title, rotor[key], low, high, 0.05))
+        rows += [(f"rotor.{k}", f"Rotor's {of}", rotor[k], 3.0, 20.0, 0.05) for k, of in SIZES.items() if k in rotor]
+    sizes = {key: (f"Floater's {of}", floater[key]) for key, of in SIZES.items() if key in floater}
     for k, size in enumerate(floater.get("size_mm", ())):
-        sizes.append((f"size_mm.{k}", f"Floater's edge along its {'xyz'[k]} (mm)", size))
-    rows += [(f"floater.{key}", title, size, 3.0, 30.0, 0.05) for key, title, size in sizes]
+        sizes[f"size_mm.{k}"] = f"Floater's edge along its {'xyz'[k]} (mm)", size
+    rows += [(f"floater.{key}", title, size, 3.0, 30.0, 0.05) for key, (title, size) in sizes.items()]
     rows.append(("spin", "Body spin S", state.spin, -2.0, 2.0, 0.01))
     if state.scene.plate is not None:
         box = state.scene.plate.box

@@ -231,26 +231,15 @@ def build(state: PageState, method: str, arguments: tuple[Any, ...]) -> PageStat
 
 @dataclass(frozen=True)
 class Shown:
-    """The numbers of a scene by some models.
+    """The numbers of a scene by some models."""
 
-    Parameters
-    ----------
-    headline : where the floater floats and whether it stays there
-    rows : of the table of equilibria, the head first; as the command line prints them
-    modes : of the eigenvalues of the first equilibrium, the head first
-    sign : by which models
-    places : position mm and direction of the moment at t = 0 of each equilibrium
-    left_out : which solutions are no equilibria, or not known to be, in sentences
-    lines : of the field, m, where they were asked for
-    """
-
-    headline: str
-    rows: list[tuple[str, ...]]
-    modes: list[tuple[str, ...]]
-    sign: str
-    places: list[tuple[list[float], list[float]]]
-    left_out: list[str]
-    lines: list[Array] = field(default_factory=list)
+    headline: str  # where the floater floats and whether it stays there
+    rows: list[tuple[str, ...]]  # of the table of equilibria, the head first; as the command line prints them
+    modes: list[tuple[str, ...]]  # of the eigenvalues of the first equilibrium, the head first
+    sign: str  # by which models
+    places: list[tuple[list[float], list[float]]]  # position mm and direction of the moment at t = 0 of each
+    left_out: list[str]  # which solutions are no equilibria, or not known to be, in sentences
+    lines: list[Array] = field(default_factory=list)  # of the field, m, where they were asked for
 
 
 def preview(state: PageState) -> Shown:
@@ -337,28 +326,17 @@ def regions(
 
 @dataclass(frozen=True)
 class Frame:
-    """A moment of a flight and what was flown since the last.
+    """A moment of a flight and what was simulated since the last."""
 
-    Parameters
-    ----------
-    time : (n,) s
-    height, tilt : (n,) mm and degrees from +z
-    position, moment : (3,) now, mm and direction, along the laboratory's axes
-    seen : (3,) mm, the same position along the rotor's axes
-    angle : of the rotor, rad
-    ended : how the flight has ended, in words; empty while it lasts
-    message : what was wrong with a wish
-    """
-
-    time: Array
-    height: Array
-    tilt: Array
-    position: list[float]
-    moment: list[float]
-    seen: list[float]
-    angle: float
-    ended: str = ""
-    message: str = ""
+    time: Array  # (n,) s
+    height: Array  # (n,) mm
+    tilt: Array  # (n,) degrees from +z
+    position: list[float]  # (3,) now, mm, along the laboratory's axes
+    moment: list[float]  # (3,) now, its direction
+    seen: list[float]  # (3,) mm, the same position along the rotor's axes
+    angle: float  # of the rotor, rad
+    ended: str = ""  # how the flight has ended, in words; empty while it lasts
+    message: str = ""  # what was wrong with a wish
 
 
 _flights: list[LiveFlight] = []
@@ -413,22 +391,15 @@ def _frame(piece: Piece) -> Frame:
 
 @dataclass(frozen=True)
 class Screen:
-    """What is on a page's screen.
-
-    Parameters
-    ----------
-    shown, regions : the numbers and the map; None where there are none
-    axes, point : names of frequency and measure, and what they are now
-    time, height, tilt : of the flight so far, s, mm and degrees
-    """
+    """What is on a page's screen."""
 
     shown: Shown | None
     regions: Regions | None
-    axes: tuple[str, str]
-    point: tuple[float, float]
-    time: Array
-    height: Array
-    tilt: Array
+    axes: tuple[str, str]  # names of frequency and measure
+    point: tuple[float, float]  # what they are now
+    time: Array  # of the flight so far, s
+    height: Array  # mm
+    tilt: Array  # degrees
 
 
 def content(kind: str, state: PageState, screen: Screen | None = None) -> bytes:
@@ -461,6 +432,7 @@ def screen_figure(screen: Screen, state: PageState) -> Figure:
     from matplotlib.colors import ListedColormap
 
     figure, ((chart, height), (words, tilt)) = panels(2, 2, (PAGE, 4.6))
+    words.set_title("")
     said, lines = "No equilibrium is known.", []
     if (known := screen.shown) is not None:
         said, lines = known.headline, [f"By: {known.sign}", f"spinlev equilibria scene.toml {state.command}"]
@@ -476,7 +448,7 @@ def screen_figure(screen: Screen, state: PageState) -> Figure:
         look: dict[str, Any] = {"cmap": ListedColormap(["white", "#D8DEE9", PALETTE[5]]), "vmin": 0, "vmax": 2}
         chart.pcolormesh(mapped.frequencies, mapped.measures, mapped.kind.T, rasterized=True, **look)
         chart.plot(*screen.point, "o", color=PALETTE[1])
-        chart.set(xlabel=screen.axes[0], ylabel=screen.axes[1], title=f"Stable regions ({mapped.model})")
+        chart.set(xlabel=screen.axes[0], ylabel=screen.axes[1], title=f"(a) stable regions ({mapped.model})")
     for axes, values, label in ((height, screen.height, "Height (mm)"), (tilt, screen.tilt, "Tilt of the moment (°)")):
         axes.plot(screen.time, values)
         axes.set(xlabel="Time (s)", ylabel=label)
