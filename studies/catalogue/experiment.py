@@ -163,8 +163,7 @@ VARIANTS = {
     "without currents in the floater": ("rotor", "air", "mutual"),
     "without air": ("floater", "rotor", "mutual"),
     SYNTHETIC: EVERYTHING,
-}
-"""Effects in the motion of each variant; the last one is fitted to made-up facts of known unknowns."""
+}  # Effects in the motion of each variant; the last one is fitted to made-up facts of known unknowns
 SETTINGS: Mapping[bool, Point] = {
     False: {
         "heights": 12, "spins": 5, "steel": True, "single": 64, "stack": 36, "better": 8,

@@ -30,8 +30,7 @@ NARROW = ("radius", "weight")
 FITTED = (
     *("frequency", "eddy", "air", "circle", "squared bounce", "precession", "meeting", "lateral"),
     *(f"{motion} {name}" for motion in MOTIONS for name in EFFECTS),
-)
-"""What is fitted, see `targets`."""
+)  # What is fitted, see `targets`
 STRENGTHS = {"single": (4.0, 13.0), "stack": (2.0, 28.0)}  # Ends of what `strength` may be
 WITH_STRENGTH = -0.78  # The frequency goes about as this power of it
 FASTEST = 300.0  # Nodes of faster rotors are left out, Hz: no fact asks for more than 200
@@ -215,10 +214,8 @@ SLOWEST = 1e-7  # Drift slower than this, 1/s, is a balance
 TURNS = 4  # Corrections of the spin at a height, of which each leaves a tenth of its error or less
 WINDOW, DWELL = 0.2, 10.0
 """A floater is lost where twice the bounce is so near to precession (Hz) for so long (s), see docs/learned.md."""
-NARROWEST = 1e-4
-"""Of "lateral": nearer to zero the side motion is lost before it grows by currents."""
-Course = Mapping[str, Array]
-"""What becomes of n flights, by name, see `flown`."""
+NARROWEST = 1e-4  # Of "lateral": nearer to zero the side motion is lost before it grows by currents
+Course = Mapping[str, Array]  # What becomes of n flights, by name, see `flown`
 
 
 def flown(

@@ -227,8 +227,7 @@ CASES = {
     "an edge within a face": HardCase(EDGE_WITHIN_A_FACE, order=4),
     "eight magnets": HardCase(EIGHT, order=4, mesh=BESIDE_EACH_OTHER),
     "no polarisation": HardCase((_magnet(CUBE, (0, 0, 0)),), quick=True),
-}
-"""By name, in the order of the figure."""
+}  # By name, in the order of the figure
 
 
 RTOL = 1e-5

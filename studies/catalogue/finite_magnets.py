@@ -115,8 +115,7 @@ CAUSES = {
     "shape": ("dipole", "cuboid"),
     "rotor's permeability": ("cuboid", "fem"),
     "mutual magnetisation": ("fem", "mutual"),
-}
-"""What lies between two models."""
+}  # What lies between two models
 TOTAL = ("article", "mutual")
 ENDS = {"contact": ("v", "ends at the rotor"), "border": ("^", "goes on beyond")}
 """Upper ends that are no loss of stability."""

@@ -46,8 +46,7 @@ CASES = {
     "vertical 16 mm": DriftCase("vertical", 16.0, 95.0, 68.0, 110.0),
     "tilt 5 deg": DriftCase("tilt", 5.0, 185.0, 130.0, 250.0),
     "tilt 10 deg": DriftCase("tilt", 10.0, 110.0, 75.0, 180.0),
-}
-"""Rotors of the article, and two whose displacement is chosen so that they fly where the article's did."""
+}  # Rotors of the article, and two whose displacement is chosen so that they fly where the article's did
 TOLERANCES = {"horizontal": 0.2, "vertical": 0.5, "tilt": 0.5}  # Of the displacement or tilt, mm or degrees
 QUICK = ("horizontal 1 mm", "vertical 14 mm")
 OUTCOMES = ("contact", "fold", "instability", "levitates", "no equilibrium")  # How a flight may end
@@ -83,8 +82,7 @@ VARIANTS = {
     "Stokes drag": Variant(stokes=True),
     "permeable": Variant(rotor="permeable"),
     "complete": Variant(rotor="conducting"),
-}
-"""Conductivity: makers' values; upwards a plating of nickel and copper, and the field's gradient (`SlowTorque`)."""
+}  # Conductivity: makers' values; upwards a plating of nickel and copper, and the field's gradient (`SlowTorque`)
 QUICK_VARIANTS = ("nominal", "spin -0.1", "spin +0.1", "displacement smaller", "displacement larger", "Stokes drag")
 
 
@@ -226,8 +224,7 @@ REPORTED = {
     "horizontal 1.5 mm": {115: "linear fall", 140: "stable", 150: "oscillating loss"},
     "vertical 14 mm": {60: "24 hours"},
     "vertical 12.6 mm": {60: "24 hours"},
-}
-"""What the article saw (δx = 1 mm and δz = 14 mm there), by frequency in Hz."""
+}  # What the article saw (δx = 1 mm and δz = 14 mm there), by frequency in Hz
 ENDS = {"linear fall": ":", "stable": "-", "oscillating loss": "--", "24 hours": "-."}
 
 

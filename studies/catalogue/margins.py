@@ -77,8 +77,7 @@ PARAMETERS = {
     "diameter": Known("diameter of the sphere", 12.7e-3, 0.05e-3),
     "gravity": Known("gravity", 9.81, 0.0),
     "frequency": Known("frequency", np.nan, 0.5, True),
-}
-"""Remanence: the article's 1.29 to 1.32 T. Size: what makers of magnets give. Place of the cube: 0.1 mm, tilt 0.5°."""
+}  # Remanence: the article's 1.29 to 1.32 T. Size: what makers of magnets give. Place of the cube: 0.1 mm, tilt 0.5°
 TILT_SPREAD = 0.5
 TILTS = (1.0, 2.0)  # Of the axis from the vertical, degrees
 QUANTITIES = ("lowest", "highest", *(f"distance at {f:.0%}" for f in FRACTIONS))

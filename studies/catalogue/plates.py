@@ -247,8 +247,7 @@ MEANS = {
     "lift": ("mean force, up", "of the weight (%)"),
     "torque": ("braking torque on the floater", "torque (µN m)"),
     "loss": ("loss in the plate", "loss (mW)"),
-}
-"""Titles and labels of what `means` gives."""
+}  # Titles and labels of what `means` gives
 
 
 def means(part: xr.Dataset) -> dict[str, xr.DataArray]:

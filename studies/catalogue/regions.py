@@ -53,8 +53,7 @@ MEASURES = {
     "horizontal": (0.5, 1.0, 1.5, 2.0, 2.5, 3.0, 3.5, 4.0, 5.0, 6.0, 7.0, 8.0),
     "vertical": (10.0, 11.0, 12.0, 13.0, 14.0, 15.0, 16.0, 18.0, 20.0),
     "tilt": (2.5, 5.0, 7.5, 10.0, 12.5, 15.0, 17.5, 20.0, 25.0, 30.0, 35.0, 40.0, 45.0),
-}
-"""Displacements (mm) and tilts (degrees): the article's tested ones and some between."""
+}  # Displacements (mm) and tilts (degrees): the article's tested ones and some between
 RTOL, PLATE_RTOL = 1e-4, 1e-2
 MOST = 4  # Intervals of stability that are kept of one rotor
 BEYOND = 1.15  # How far above the last stable frequency the plate is tried

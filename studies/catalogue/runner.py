@@ -47,8 +47,7 @@ DRAWN = {
     "curve_force": ("force", force_figure),
     "position_rotor_frame": ("trajectory", trajectory_figure),
     "mode_growth": ("modes", modes_figure),
-}
-"""By variable of a result that is no study: name of the figure and who draws it."""
+}  # By variable of a result that is no study: name of the figure and who draws it
 
 
 def draw_result(path: Path, out: Path) -> list[str]:

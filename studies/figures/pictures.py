@@ -18,12 +18,9 @@ from ...geometry.meshes.plate import MeshRule, plate_mesh
 from ...geometry.scene.contents import Plate, Scene
 from .view import FieldPlane, Frames, View, field_lines, frame_times
 
-ORDER = 3
-"""Of the elements: a picture needs no more."""
-LATEST = 200
-"""Samples at the end of a flight among which one is shown."""
-ANGLES = 8
-"""Of the rotor, from which the part of its field at the rotor's frequency is taken."""
+ORDER = 3  # Of the elements: a picture needs no more
+LATEST = 200  # Samples at the end of a flight among which one is shown
+ANGLES = 8  # Of the rotor, from which the part of its field at the rotor's frequency is taken
 
 
 def last_view(scene: Scene, table: FieldTable, time: Array, motion: State) -> View:

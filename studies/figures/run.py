@@ -21,26 +21,20 @@ MARKS = (
     (False, 0, "o", "white", "unstable, no plate"),
     (True, 1, "D", None, "stable, with the plate"),
     (True, 0, "D", "white", "unstable, with the plate"),
-)
-"""Of equilibria: whether the plate's currents act, whether it is stable, marker, its face, and what it means."""
-PARTS = 120
-"""Intervals of an envelope: more than a printed figure tells apart."""
-SHOWN = 200
-"""Samples of a flight that are drawn one by one."""
+)  # Of equilibria: whether the plate's currents act, whether it is stable, marker, its face, and what it means
+PARTS = 120  # Intervals of an envelope: more than a printed figure tells apart
+SHOWN = 200  # Samples of a flight that are drawn one by one
 COARSE = 0.05
 """Interval of samples (s) that lets a bounce pass unseen: a line through them would show slow motions that are none."""
-HOURS = 7200.0
-"""Flights that take longer are drawn over hours, s."""
+HOURS = 7200.0  # Flights that take longer are drawn over hours, s
 MODE_MARKERS = "osD^v"
-NO_GROWTH = 1e-9
-"""Growth that counts as none, 1/s."""
+NO_GROWTH = 1e-9  # Growth that counts as none, 1/s
 UNITS = {"hz": "Hz", "mm": "mm", "deg": "°", "T": "T", "s": "s"}
 QUANTITIES = {
     "equilibria": ("depth", "lateral_offset", "polar_angle", "growth"),
     "flight": ("levitated", "height_spread"),
     "field": ("size", "B_error"),
-}
-"""Quantities drawn for each question, those of the motion in the laboratory."""
+}  # Quantities drawn for each question, those of the motion in the laboratory
 
 
 @styled

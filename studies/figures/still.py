@@ -28,8 +28,7 @@ BAR: dict[str, Any] = {"color": "black", "vertical": True, "position_y": 0.3, "h
 BAR |= {"title_font_size": 24, "label_font_size": 22}
 NAME: dict[str, Any] = {"font_size": 22, "text_color": "black", "shape_color": "white", "shape_opacity": 0.7}
 NAME |= {"margin": 4, "show_points": False, "always_visible": True}
-MARGIN = 0.92
-"""Part of the window's height that what is shown fills."""
+MARGIN = 0.92  # Part of the window's height that what is shown fills
 
 
 def scene_picture(view: View) -> bytes:

@@ -34,8 +34,7 @@ STYLE: Any = {
     "pdf.fonttype": 42,  # journals take no Type 3 fonts
     "figure.constrained_layout.use": True,
 }
-COLUMN, PAGE = 85 / 25.4, 170 / 25.4
-"""Width of a figure in one column of a journal and across its page, inches."""
+COLUMN, PAGE = 85 / 25.4, 170 / 25.4  # Width of a figure in one column of a journal and across its page, inches
 
 
 class _Looks(dict[str, str]):

@@ -39,8 +39,7 @@ REGION_COLORS = ("#FFFFFF", "#D8DEE9", "#56B4E9")
 """Where nothing levitates, only unstably, and stably."""
 LOW, HIGH, SIDE, TALL = -60.0, 15.0, 34.0, 300
 """What the side view shows: heights, and to both sides; and its height in pixels."""
-SEEN = 0.06
-"""How far along its edges a plate is drawn, m."""
+SEEN = 0.06  # How far along its edges a plate is drawn, m
 NO_IMAGE: dict[str, list[Any]] = {"image": [], "x": [], "y": [], "dw": [], "dh": []}
 
 

@@ -21,17 +21,13 @@ from .layout import NO_IMAGE, Layout
 from .state import Control, PageState, controls
 from .work import Frame, Regions, Screen, Shown, Worker
 
-REST = 250
-"""Milliseconds after which a slider is taken to rest."""
-READING = 60.0
-"""Seconds that a scene may take to be read."""
+REST = 250  # Milliseconds after which a slider is taken to rest
+READING = 60.0  # Seconds that a scene may take to be read
 SPEEDS = (1.0, 0.1, 0.01, 0.001)
 FRAME, SLOWEST = 1 / 12, 0.25
 """Seconds between two pictures of a flight, if the page draws so fast; most seconds that are flown for one."""
-POINTS = (13, 41)
-"""Of a map along each axis: first, and then."""
-ROLLING = 4000
-"""Samples in a running plot."""
+POINTS = (13, 41)  # Of a map along each axis: first, and then
+ROLLING = 4000  # Samples in a running plot
 FOLLOW = "The selected models follow when you release the slider."
 NO_MAP = "No map: it needs a horizontal, vertical or tilted rotor and gravity along the axis."
 

@@ -40,10 +40,8 @@ from .state import PageState, first_state
 from .work import context
 
 LOOPBACK = "127.0.0.1"
-PAGES = ("/", "/ws")
-"""For which the token is asked."""
-BOKEH = re.compile(r"/static/js/bokeh(-[a-z]+)?(\.min)?\.js")
-"""Bokeh's own programs."""
+PAGES = ("/", "/ws")  # For which the token is asked
+BOKEH = re.compile(r"/static/js/bokeh(-[a-z]+)?(\.min)?\.js")  # Bokeh's own programs
 NOTEBOOKS = "'self' http://127.0.0.1:* http://localhost:* http://[::1]:* vscode-webview:"
 """Where a page may be in a frame: in notebooks on the reader's own machine."""
 REFUSALS = {
@@ -51,16 +49,12 @@ REFUSALS = {
     404: "There is no such page.",
     421: "This machine is not called so here: take the address that spinlev said.",
 }
-GONE = 3000
-"""Milliseconds after which a page that does not answer any more is taken to be closed."""
-MOST_PAGES, MOST_LINES = 8, 64
-"""Open at a time: pages, each with some processes; connections."""
-PATIENCE = 10.0
-"""Seconds that a connection may take for a request, and between two."""
+GONE = 3000  # Milliseconds after which a page that does not answer any more is taken to be closed
+MOST_PAGES, MOST_LINES = 8, 64  # Open at a time: pages, each with some processes; connections
+PATIENCE = 10.0  # Seconds that a connection may take for a request, and between two
 HEADER, BODY, MESSAGE = 48_000, 1000, 1_000_000
 """Bytes of a request's header, with its address; of its body, of which none has any; of a page's message, as a file."""
-FAULTS, PERIOD = 20, 60.0
-"""Lines about faults that are logged in a period, s."""
+FAULTS, PERIOD = 20, 60.0  # Lines about faults that are logged in a period, s
 FULL = f"{MOST_PAGES} pages are open, and more are not served at a time. Close one and load this one again."
 
 

@@ -18,20 +18,16 @@ from ...geometry.scene.making import assemble
 from ...geometry.scene.messages import SceneError
 from ..cli.options import FieldModel, Models, PlateModel, finite
 
-CHOICES = ("model", "plate_model", "spin")
-"""Keys of an address that are none of the scene file."""
-LONGEST, LARGEST = 20_000, 200_000
-"""Characters of an address's state; bytes of a scene file that is opened in a page."""
+CHOICES = ("model", "plate_model", "spin")  # Keys of an address that are none of the scene file
+LONGEST, LARGEST = 20_000, 200_000  # Characters of an address's state; bytes of a scene file that is opened in a page
 
 
 MEASURES = {
     "horizontal": ("displacement_mm", "Displacement (mm)", 0.0, 10.0),
     "vertical": ("displacement_mm", "Displacement (mm)", 5.0, 30.0),
     "tilt": ("angle_deg", "Tilt (°)", 0.0, 45.0),
-}
-"""What moves a rotor of the article."""
-PLATE_REACH = 20.0
-"""How far a plate whose middle is level with the rotor's can be moved, mm."""
+}  # What moves a rotor of the article
+PLATE_REACH = 20.0  # How far a plate whose middle is level with the rotor's can be moved, mm
 SIZES = {"edge_mm": "edge (mm)", "diameter_mm": "diameter (mm)", "height_mm": "height (mm)"}
 """Titles of the sizes that rotor and floater may have, for their shape."""
 

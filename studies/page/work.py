@@ -43,12 +43,9 @@ if TYPE_CHECKING:
     from bokeh.document import Document
     from matplotlib.figure import Figure
 
-MEMORY = 4 * 2**30
-"""Bytes that a process may take."""
-PATIENCE = 10
-"""By how much a process is nicer than others that does not hurry."""
-SIGHT = np.array([[-0.045], [0.045]]) * np.ones(3)
-"""The box in which field lines are drawn, m."""
+MEMORY = 4 * 2**30  # Bytes that a process may take
+PATIENCE = 10  # By how much a process is nicer than others that does not hurry
+SIGHT = np.array([[-0.045], [0.045]]) * np.ones(3)  # The box in which field lines are drawn, m
 ENDS = {
     "beyond": "left the region for which the plate's response was computed",
     "contact": "touched the rotor or the plate",
@@ -68,8 +65,7 @@ FILES = {
     "json": ("equilibria.json", "application/json"),
     "nc": ("equilibria.nc", "application/x-netcdf"),
     "png": ("explore.png", "image/png"),
-}
-"""What can be taken home: a file's name and its type."""
+}  # What can be taken home: a file's name and its type
 
 
 @cache
@@ -339,8 +335,7 @@ class Frame:
     message: str = ""  # what was wrong with a wish
 
 
-_flights: list[LiveFlight] = []
-"""The one of this process."""
+_flights: list[LiveFlight] = []  # The one of this process
 
 
 def begin_flight(state: PageState) -> Frame:
