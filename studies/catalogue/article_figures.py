@@ -29,14 +29,12 @@ from .article import (
     QUICK,
     WEIGHT,
     article_scene,
-    field,
-    force,
     label_of,
     levitation_of,
     polar_angle,
-    side_radius,
     stable_in_flight,
 )
+from .article_formulas import field, force, side_radius
 from .drawing import (
     by_configuration,
     by_rotor,
@@ -139,7 +137,6 @@ def _legend(figure: Figure, result: xr.Dataset, models: dict[str, str], more: di
 
 
 def components_lines(result: xr.Dataset) -> list[str]:
-    """Range of each component, and how far the simpler models are off, at each distance."""
     rows = []
     for configuration, part in by_configuration(result):
         true, off = _of(part, "fem"), deviations(part)
@@ -314,7 +311,6 @@ def _points(axes: Axes, found: xr.Dataset, color: str, named: bool) -> None:
 
 
 def force_lines(result: xr.Dataset) -> list[str]:
-    """Stable and tipping points at each frequency, by each way, and the angles there."""
     rows = []
     for k, frequency in enumerate(result["frequency"].values):
         for model, (_, text) in STYLES.items():
@@ -435,7 +431,6 @@ def radius_figure(result: xr.Dataset) -> Figure:
 
 
 def side_lines(result: xr.Dataset) -> list[str]:
-    """The flight, and for each rotor the range of radii and how far the formula is off where it is stable."""
     lines, rows = [], []
     for flown in (case_with(result, model=model, **FLOWN) for model in MODELS):
         radius = 1e3 * np.hypot(flown["flight_x"].values, flown["flight_y"].values)

@@ -29,15 +29,14 @@ from .article import (
     LOWEST,
     QUICK,
     WEIGHT,
-    analytic_distance,
     article_scene,
-    balanced,
     conducting,
     levitation_of,
     polar_angle,
     rotor_label,
     stable_in_flight,
 )
+from .article_formulas import analytic_distance, balanced
 from .drawing import by_configuration, by_rotor, explain, plot_branch, rotor_panels, small_multiples, span, text_table
 
 # Distance at which the floater levitates against frequency, for every rotor of the article: its third figure.
@@ -195,7 +194,6 @@ def _side(rotor: xr.Dataset, model: str, side: str) -> tuple[Array, Array, NDArr
 
 
 def distance_lines(result: xr.Dataset) -> list[str]:
-    """For each rotor: where it levitates, and how far formulas and simulations are from the equilibrium."""
     rows, lines = [], []
     for label, rotor in by_rotor(result):
         frequency, near, stable = _side(rotor, "dipole", "near")
@@ -363,7 +361,6 @@ def _flight(axes: Axes, flight: xr.Dataset, color: str) -> None:
 
 
 def flight_lines(result: xr.Dataset) -> list[str]:
-    """What became of each flight, simulated and averaged, beside what the article saw at that frequency."""
     rows = []
     for rotor in each_case(result):
         for k, frequency in enumerate(rotor["frequency"].values):

@@ -15,7 +15,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import ArrayLike, NDArray
 
-from ...dynamics.continuation.frequencies import at_frequency, reference_state, stable_range
+from ...dynamics.continuation.frequencies import at_frequency
 from ...dynamics.equilibria.equilibrium import EquilibriumError
 from ...dynamics.flights.batch import Endings, launched
 from ...dynamics.flights.trajectory import DURATION
@@ -26,21 +26,20 @@ from ...fem.plate.choice import reachable_region
 from ...fem.plate.tables import slab_and_rotor_table
 from ...fem.rotor.table import RotorTable
 from ...geometry.common import Array
-from ...geometry.scene.contents import Lowering, Plate, Scene
-from ...geometry.shapes import Box
+from ...geometry.scene.contents import Lowering, Scene
 from ..figures.style import PAGE, PALETTE, legend_below, panels, styled
 from ..result import Columns
 from ..study import Point, Study, cases_with, recorded
 from .article import (
     CONFIGURATIONS,
-    PLATE_CONDUCTIVITY,
-    PLATE_SIZE,
     QUICK_ROTORS,
+    article_plate,
     article_scene,
     conducting,
     label_of,
     levitation_of,
     rotor_label,
+    stable_frequencies,
 )
 from .drawing import by_rotor, configuration_panels, text_table
 
@@ -84,14 +83,12 @@ def place_of(configuration: str, measure: float, part: float) -> Place:
     """
     scene = article_scene(configuration, measure, permeability=1.0)
     rates = levitation_of(scene, "cuboid").rates
-    stable = stable_range(scene, rates, *reference_state(scene))
+    stable = stable_frequencies(scene, rates)
     low, high = stable.low.parameter, stable.high.parameter
     frequency = low + part * (high - low)
     distance = at_frequency(scene, rates, stable.near(frequency), frequency).distance
-    center = np.array([0.0, 0.0, -distance - BELOW - PLATE_SIZE[2] / 2])
-    plate = Plate(Box(np.array(PLATE_SIZE), center), PLATE_CONDUCTIVITY)
     whole = conducting(replace(scene, frequency=frequency, drag=replace(scene.drag, air=True)), rotor=False)
-    return Place(replace(whole, plate=plate), distance, low, high)
+    return Place(replace(whole, plate=article_plate(-distance - BELOW)), distance, low, high)
 
 
 @cache
@@ -326,7 +323,6 @@ def place_figure(result: xr.Dataset) -> Figure:
 
 
 def capture_lines(result: xr.Dataset) -> list[str]:
-    """The capture probability of each rotor and frequency, and what became of the others."""
     found, rows = each_place(result), []
     for one in found:
         rest = sorted(((part, word) for word, part in _others(one).items() if part > 0), reverse=True)

@@ -413,7 +413,6 @@ def facts_figure(result: xr.Dataset) -> Figure:
 
 
 def experiment_lines(result: xr.Dataset) -> list[str]:
-    """The posterior, what each fact is worth, what contradicts what, and the evidence of each variant."""
     if "variant" not in result.dims:
         return [f"{int(result['design_rotors'])} rotors of the designs, and no posterior."]
     one = result.isel(variant=0)

@@ -101,7 +101,6 @@ LEVELS = (1e-1, 1e-2, 1e-3, 1e-4)
 
 
 def validity_lines(result: xr.Dataset) -> list[str]:
-    """From which distance on each model is good to 10, 1, 0.1 and 0.01 % on the axis, by rotor."""
     distance, rows = 1e3 * result["distance"].values, []
 
     def reach(error: Array, level: float) -> str:
@@ -356,7 +355,6 @@ def hard_case_figure(result: xr.Dataset) -> Figure:
 
 
 def hard_case_lines(result: xr.Dataset) -> list[str]:
-    """The study's table."""
     keys, rows = tuple(LINES)[1::-1] + tuple(LINES)[2:], []
     for name in result["case"].values:
         row = result.sel(case=name)

@@ -195,7 +195,6 @@ def ranges_figure(result: xr.Dataset) -> Figure:
 
 
 def dipole_lines(result: xr.Dataset) -> list[str]:
-    """Ranges of the changes for each configuration and cause, the limits of every rotor, and the sentence."""
     causes = [*CAUSES.items(), ("all together", TOTAL)]
     rows = [
         (f"{configuration}: {cause}", *_changes(part, models))
@@ -481,7 +480,6 @@ def floater_figure(result: xr.Dataset) -> Figure:
 
 
 def floater_lines(result: xr.Dataset) -> list[str]:
-    """From where on the rigid dipole suffices, and what it misses at the stable equilibrium."""
     reach = 1e3 * result["sufficient_from"]
     rows = [(f"{100 * float(k):g} %", *reach.sel(level=k, quantity=["force", "torque"]).values) for k in reach["level"]]
     lines = text_table(("rigid dipole good to", "force, from (mm)", "torque, from (mm)"), rows)

@@ -289,7 +289,6 @@ def _times(axes: Axes, result: xr.Dataset) -> None:
 
 
 def time_lines(result: xr.Dataset) -> list[str]:
-    """For each rotor: where flights end in the fold, where they last and where they are unstable."""
     rows = []
     for case in result["case"].values.tolist():
         for variant in ("nominal", "permeable", "complete"):

@@ -20,9 +20,7 @@ from ...dynamics.continuation.frequencies import (
     at_frequency,
     by_frequency,
     levitates,
-    reference_state,
     stability_end,
-    stable_range,
 )
 from ...dynamics.equilibria.balance import AXIAL, LATERAL, Balance, solve
 from ...dynamics.equilibria.equilibrium import EquilibriumError
@@ -37,7 +35,16 @@ from ..cli.options import FieldModel
 from ..figures.style import PALETTE, legend_below, styled
 from ..result import Columns, variable
 from ..study import Point, Study, case_with, cases_with, each_case, recorded
-from .article import CONFIGURATIONS, FLOATER, REMANENCE, article_scene, levitated_rotors, levitation_of, polar_angle
+from .article import (
+    CONFIGURATIONS,
+    FLOATER,
+    REMANENCE,
+    article_scene,
+    levitated_rotors,
+    levitation_of,
+    polar_angle,
+    stable_frequencies,
+)
 from .drawing import (
     TITLES,
     by_rotor,
@@ -131,7 +138,7 @@ def nominal(configuration: str, measure: float, model: FieldModel = MODEL) -> No
     """The rotor as it should be, its field by `model`. Raises EquilibriumError where it does not levitate."""
     values = {name: known.nominal for name, known in PARAMETERS.items() if name != PLACE} | {"measure": measure}
     scene = scene_of(configuration, values)
-    found = stable_range(scene, levitation_of(scene, model).rates, *reference_state(scene))
+    found = stable_frequencies(scene, levitation_of(scene, model).rates)
     return Nominal(configuration, model, values, found)
 
 
@@ -288,7 +295,6 @@ def band(part: xr.Dataset, quantity: str) -> Array:
 
 
 def sensitivity_lines(result: xr.Dataset) -> list[str]:
-    """Derivatives by the measure, the bands, the leading tolerances and what a tilted axis does, for each rotor."""
     slopes, bands, leading, leans = [], [], [], []
     for head, rotor in by_rotor(result):
         one = rotor.isel(case=0)
@@ -564,7 +570,6 @@ def design_figure(result: xr.Dataset) -> Figure:
 
 
 def design_lines(result: xr.Dataset) -> list[str]:
-    """The best rotor for each wish, checked by a forward search in the field of the finite magnets."""
     rows = []
     for distance, frequency, answers in wishes(result):
         for one in each_case(answers):

@@ -12,7 +12,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import ArrayLike
 
-from ...dynamics.continuation.frequencies import StableRange, at_frequency, reference_state, stable_range
+from ...dynamics.continuation.frequencies import StableRange, at_frequency
 from ...dynamics.equilibria.equilibrium import Equilibrium, EquilibriumError, Survey
 from ...dynamics.motion.equations import parameters
 from ...dynamics.motion.plate import PlateForce, PlateMemory
@@ -36,6 +36,7 @@ from .article import (
     levitated_rotors,
     levitation_of,
     rotor_label,
+    stable_frequencies,
 )
 from .drawing import explain, plain_log, range_text, small_multiples, text_table, uncertain
 
@@ -106,7 +107,7 @@ def _in_field(configuration: str, measure: float, complete: bool) -> Levitation:
 
 @cache
 def _stable_range(levitation: Levitation) -> StableRange:
-    return stable_range(levitation.scene, levitation.rates, *reference_state(levitation.scene))
+    return stable_frequencies(levitation.scene, levitation.rates)
 
 
 @cache
@@ -338,7 +339,6 @@ def part_of(result: xr.Dataset, sweep: str) -> xr.Dataset:
 
 
 def damping_lines(result: xr.Dataset) -> list[str]:
-    """What the plate does at each place, frequency and rotor; and the sentence."""
     rows = []
     for sweep in (*PLACES, *(place + REAL_PLATE for place in PLACES), "frequency", *ROTORS):
         for one in each_case(part_of(result, sweep)):
@@ -490,7 +490,6 @@ def team7_study(quick: bool) -> xr.Dataset:
 
 
 def team7_lines(result: xr.Dataset) -> list[str]:
-    """Largest and mean deviation by curve."""
     lines = ["TEAM workshop problem 7, B_z on y = 72, z = 34 mm: deviation in per cent of the line's peak"]
     for curve in result["curve"].values:
         size = 100 * np.abs(result["deviation"].sel(curve=curve).values)

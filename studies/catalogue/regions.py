@@ -13,15 +13,13 @@ from ...dynamics.continuation.frequencies import (
     StableRange,
     at_frequency,
     levitating_ranges,
-    reference_state,
-    stable_range,
 )
 from ...dynamics.continuation.slow_drift import Lasting, drift, lasting_frequencies
 from ...dynamics.equilibria.equilibrium import EquilibriumError, Survey
 from ...dynamics.motion.state import Scales
 from ...geometry.common import Array
 from ...geometry.rotor import Conductor
-from ...geometry.scene.contents import Drag, Plate, Scene
+from ...geometry.scene.contents import Drag, Scene
 from ...geometry.shapes import Box
 from ..cli.console import note
 from ..figures.style import COLORS, NAMES, PALETTE, legend_below, styled
@@ -33,14 +31,14 @@ from .article import (
     EDGE,
     FLIGHT,
     MODELS,
-    PLATE_CONDUCTIVITY,
-    PLATE_SIZE,
     QUICK_ROTORS,
+    article_plate,
     article_scene,
     conducting,
     label_of,
     levitated_rotors,
     levitation_of,
+    stable_frequencies,
 )
 from .drawing import by_rotor, configuration_panels, explain, small_multiples, text_table
 
@@ -140,11 +138,9 @@ def _with_plate(alone: Levitation, stable: StableRange | None, number: int) -> A
     if stable is None or not number:
         return rows
     last = min(BEYOND * stable.high.parameter, HIGHEST)
-    center = np.array([0.0, 0.0, FACE - PLATE_SIZE[2] / 2])
-    plate = Plate(Box(np.array(PLATE_SIZE), center), PLATE_CONDUCTIVITY)
     for k, frequency in enumerate(np.linspace(1.01 * stable.low.parameter, last, number)):
         models = replace(alone.models, plate_model="slab", plate_rtol=PLATE_RTOL)
-        there = alone.elsewhere(models, frequency=float(frequency), plate=plate)
+        there = alone.elsewhere(models, frequency=float(frequency), plate=article_plate(FACE))
         rows[k, 0] = frequency
         try:
             near = at_frequency(alone.scene, alone.rates, stable.near(frequency), float(frequency))
@@ -222,7 +218,6 @@ def _region(axes: Axes, part: xr.Dataset, color: str) -> None:
 
 
 def map_lines(result: xr.Dataset) -> list[str]:
-    """Every rotor's intervals by both models, where the plate below keeps or undoes stability, where flights last."""
     rows = []
     for label, rotor in by_rotor(result):
         for one in each_case(rotor):
@@ -319,7 +314,7 @@ def upper_limit(point: Point) -> xr.Dataset:
     scene = scene_of(point)
     bare = article_scene(point["configuration"], point["measure"], permeability=1.0, drag=False)
     alone, whole = levitation_of(bare, "cuboid"), levitation_of(scene, "cuboid")
-    stable = stable_range(bare, alone.rates, *reference_state(bare))
+    stable = stable_frequencies(bare, alone.rates)
     low, high = stable.low.parameter, stable.high.parameter
     middle = stable.near((low + high) / 2)
     lasts = lasting_frequencies(scene, whole.interaction, whole.rates, middle.state, middle.parameter, FLIGHT)
@@ -355,7 +350,6 @@ def limit_figure(result: xr.Dataset) -> Figure:
 
 
 def limit_lines(result: xr.Dataset) -> list[str]:
-    """Where flights last by variant, and what a rotor that does not conduct would change."""
     rows, lines = [], []
     for label, rotor in by_rotor(result):
         for one in each_case(rotor):

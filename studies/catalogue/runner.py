@@ -150,7 +150,6 @@ def failed_points(result: xr.Dataset) -> list[dict[str, Any]]:
 
 
 def failure_lines(result: xr.Dataset) -> list[str]:
-    """The same for a person."""
     return [f"No value at {json.dumps(f['point'], ensure_ascii=False)}: {f['reason']}" for f in failed_points(result)]
 
 

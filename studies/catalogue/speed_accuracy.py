@@ -299,7 +299,6 @@ def _largest(values: Array, truth: Array, rank: int) -> Array:
 
 
 def speed_lines(result: xr.Dataset) -> list[str]:
-    """The table of the study."""
     rows = []
     for name in result["approach"].values:
         row = result.sel(approach=name)
