@@ -49,11 +49,9 @@ INSIDE = 0.05  # How far inside a window of frequencies the one that is named li
 class Branch:
     """The two sides of a rotor's levitating branch."""
 
-    # scene, rates: of which the frequency is left open
     scene: Scene
-    rates: Rates
-    # far, near: its points, by growing frequency; both begin at the fold
-    far: tuple[BranchPoint, ...]
+    rates: Rates  # of the scene, whose frequency is left open
+    far: tuple[BranchPoint, ...]  # its points, by growing frequency, both sides from the fold on
     near: tuple[BranchPoint, ...]
 
     @property
@@ -124,12 +122,9 @@ def _hanging(scene: Scene, table: FieldTable, family: Family) -> Array:
 
 
 def distance_error(scene: Scene, table: FieldTable, family: Family, point: BranchPoint) -> float:
-    """Error of the distance along the axis by the errors that a table and its effects state, to first order, m.
+    """Error of the distance along the axis, m, to first order by the errors that `table` and its effects state.
 
-    Parameters
-    ----------
-    scene, table : all but the frequency, and the rotor's field with its errors
-    family, point : the scene's equilibria against the frequency, and the one of them
+    Of a `point` of the `family` of equilibria of a `scene` against the frequency.
     """
     here = replace(scene, frequency=point.parameter)
     scales = Scales.of(here)
@@ -148,8 +143,7 @@ def distance_error(scene: Scene, table: FieldTable, family: Family, point: Branc
 class StableRange:
     """An interval of frequencies in which an equilibrium is stable."""
 
-    # low, high: the equilibria at its ends; `kind` says what is there
-    low: BranchPoint
+    low: BranchPoint  # the equilibria at its ends; `kind` says what is there
     high: BranchPoint
     points: tuple[BranchPoint, ...]  # the equilibria between them, by ascending frequency
 
@@ -220,18 +214,9 @@ def at_frequency(
     steps: Steps = STEPS,
     tolerated: float = TOLERATED,
 ) -> BranchPoint:
-    """The equilibrium at one frequency on the branch through another.
+    """The equilibrium of a `scene` with its `rates` at a `frequency` (Hz) on the branch through another, `near` it.
 
-    Parameters
-    ----------
-    scene, rates : of which the frequency is left open
-    near : the other equilibrium
-    frequency : Hz
-    steps, tolerated : see `follow_branch`
-
-    Raises
-    ------
-    EquilibriumError : the branch does not reach it
+    `steps` and `tolerated` are as for `follow_branch`. Raises EquilibriumError where the branch does not reach it.
     """
     family = by_frequency(scene, rates)
     if frequency == near.parameter:
@@ -247,11 +232,7 @@ def stability_end(
 ) -> BranchPoint:
     """The first fold, change of stability, contact or border that is met from `frequency` `towards` another (Hz).
 
-    Parameters
-    ----------
-    scene, family : all but the frequency, and the equilibria against it
-    start : scaled state (12,) near the equilibrium at `frequency`
-    steps : along the branch
+    Of the equilibria of a `scene` against the frequency, a `family`, from a scaled state `start` (12,) in `steps`.
     """
     return next(point for point in _side(scene, family, start, frequency, towards, steps) if point.kind)
 
@@ -287,34 +268,26 @@ def _side(
 
 
 def way_out(
-    scene: Scene,
-    table: FieldTable,
-    equilibria: Sequence[Equilibrium],
-    widest: float = WIDEST,
-    memory: PlateMemory | None = None,
+    scene: Scene, table: FieldTable, equilibria: Sequence[Equilibrium], memory: PlateMemory | None = None
 ) -> str:
     """Message for a scene without a stable equilibrium, with a frequency that has one.
 
-    Parameters
-    ----------
-    scene, table : with the rotor's field and what acts beside it
-    equilibria : all that the scene has
-    widest : ratio of frequencies, up and down, within which one that works is looked for
-    memory : the plate's currents, if they are modelled
+    The `scene` has these `equilibria` in the field, and with the effects, of `table`, and the plate's currents, if they
+    are modelled (`memory`).
     """
     kinds = dict.fromkeys(f"{1e3 * e.distance:.2f} mm (grows e-fold in {1 / e.growth_per_s:.2g} s)" for e in equilibria)
     found = f"only unstable ones at {', '.join(kinds)}" if kinds else "nor any unstable one below the rotor"
-    other = _levitating_frequency(scene, table, widest, memory)
-    advice = f"About {other:.4g} Hz has one; or" if other else f"None was found within a factor of {widest:g};"
+    other = _levitating_frequency(scene, table, memory)
+    advice = f"About {other:.4g} Hz has one; or" if other else f"None was found within a factor of {WIDEST:g};"
     return f"At {scene.frequency:g} Hz the floater has no stable equilibrium, {found}. {advice} give start.position_mm."
 
 
-def _levitating_frequency(scene: Scene, table: FieldTable, widest: float, memory: PlateMemory | None) -> float | None:
+def _levitating_frequency(scene: Scene, table: FieldTable, memory: PlateMemory | None) -> float | None:
     """A frequency (Hz) in the nearest window with a stable equilibrium; not in one that holds the scene's own."""
     # A map without plate, in upright gravity, finds the windows; with all that acts a search has to find one too.
     own, rates = scene.frequency, Rates(with_effects(scene, table))
     upright = replace(scene, plate=None, gravity=np.array([0.0, 0.0, scene.gravity[2]]))
-    tried = [replace(upright, frequency=float(f)) for f in own * widest ** np.linspace(-1, 1, FREQUENCIES)]
+    tried = [replace(upright, frequency=float(f)) for f in own * WIDEST ** np.linspace(-1, 1, FREQUENCIES)]
     places = np.arange(FREQUENCIES)[:, None]
     found = surveys(tried, [table] * FREQUENCIES, np.zeros(FREQUENCIES), places, rates)
     holding = [any(e.stable for e in survey.equilibria) for survey, _ in found]

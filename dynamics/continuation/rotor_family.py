@@ -126,6 +126,7 @@ class MovedEffect:
         return self.effect.count
 
     def numbers(self, field: FieldTable, position: Array, moment: Array, values: Array) -> Array:
+        """See `Placed`: not by `field`, but by the part's own, for `position`, `moment` and `values` seen from it."""
         measure, length = values[:, Parameter.MEASURE], values[:, [Parameter.LENGTH]]
         place = np.transpose(self.move.place(list((position * length).T), measure)) / length
         return self.effect.numbers(self.alone, place, np.transpose(self.move.into(list(moment.T), measure)), values)

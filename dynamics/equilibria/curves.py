@@ -143,13 +143,9 @@ def _thinned(problem: Indices, points: Array, edge: float) -> tuple[Indices, Arr
 def from_starts(
     balance: Balance, where: SearchRange, free: Indices = EVERY, every: int = 1, watch: Watch = unwatched
 ) -> Array:
-    """Distinct points (n, 6) in the range, lowest first, at which the balances of `free` vanish.
+    """Distinct points (n, 6) in the range `where`, lowest first, at which the balances of `free` vanish.
 
-    Parameters
-    ----------
-    balance, where : of one problem
-    free, watch : see `newton_search`
-    every : one of so many starts is taken
+    Of a `balance`, from one of `every` so many starts; `watch` as for `newton_search`.
     """
     points = where.starts()[::every]
 
@@ -201,12 +197,9 @@ class _Lateral(AtRest):
 
 
 def fixed_points(balance: Balance, where: SearchRange, watch: Watch = unwatched) -> tuple[list[Curve], Array]:
-    """Curves of lateral balance in the range, and scaled positions and moments (k, 6) of the equilibria.
+    """Curves of lateral `balance` in the range `where`, and scaled positions and moments (k, 6) of the equilibria.
 
-    Parameters
-    ----------
-    balance, where : of one problem
-    watch : progress of the search
+    `watch` is as for `newton_search`.
     """
     curves = _all_curves(balance, where, watch)
     guesses = [*(curve.balanced() for curve in curves), from_starts(balance, where, EVERY, SPARE, watch)]

@@ -75,12 +75,8 @@ def modes(state: Array, slope: Array) -> Modes:
     Without drag the eigenvalues of a stable equilibrium lie on the imaginary axis, so that the sign of a real part
     means nothing below its error.  That of a simple eigenvalue is ε‖A‖κ, with the condition number κ of its
     eigenvectors (J. H. Wilkinson, The Algebraic Eigenvalue Problem, 1965, ch. 2): about 1e-14 away from
-    collisions of eigenvalues and 1e-8 at one, where Stokes drag makes 1e-7.
-
-    Parameters
-    ----------
-    state : (12,) scaled equilibrium
-    slope : (12, 12) derivatives of its rates, drag along the moment left out
+    collisions of eigenvalues and 1e-8 at one, where Stokes drag makes 1e-7.  Of a scaled `state` (12,) and the `slope`
+    (12, 12) of its rates, drag along the moment left out.
     """
     values, errors, shapes = spectra(state[None], slope[None])
     return Modes(values[0], errors[0], shapes[0])
@@ -133,12 +129,9 @@ class Mode:
 
 
 def named_modes(modes: Modes, time: float) -> tuple[Mode, ...]:
-    """The floater's five modes, bounce first; of a pair that does not oscillate the one that grows more.
+    """The floater's five modes, bounce first; `time` is the unit of time of the eigenvalues, s.
 
-    Parameters
-    ----------
-    modes : ten eigenvalues and their shapes
-    time : unit of time of the eigenvalues, s
+    Of a pair that does not oscillate it is the one that grows more.
     """
     values, shapes = modes.eigenvalues, np.abs(modes.shapes)
     chosen = [int(k) for k in np.argsort(-values.real) if values[k].imag >= 0]

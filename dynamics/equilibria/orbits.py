@@ -67,15 +67,10 @@ class Orbit:
 
 
 def periodic_orbit(rates: Rates, values: Array, spin: float, plate: PlateForce | None, guess: Array) -> Orbit | None:
-    """The orbit near a state (12,) or a turn (n, 12) of states; None where Newton's method does not find one.
+    """The orbit near a `guess`, a scaled state (12,) or an odd number n of them; None where Newton's method finds none.
 
-    Parameters
-    ----------
-    rates : compiled equations of the rotor's field
-    values : their parameters, with the drag along the moment left out; gravity may have any direction
-    spin : body spin s
-    plate : its currents, if they are modelled
-    guess : scaled state or turn, an odd number n of instants
+    By `rates` in the rotor's field with `values`, the drag along the moment left out and gravity in any direction, with
+    body `spin` s, and with the currents of a `plate` if they are modelled.
     """
     count = FEWEST
     states = np.broadcast_to(guess, (count, 12)) if guess.ndim == 1 else resampled(guess, count)
