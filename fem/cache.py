@@ -35,7 +35,7 @@ from .files import MOST, closed, hdf5_fault, ours, seal, sealed, user, write_who
 # another shape of its file, has the next number, and nothing of the old one is read any more.
 FORMATS = {
     "rotor": 6,
-    "mutual": 4,
+    "mutual": 5,
     "map": 2,
     "plate": 2,
     "driven-plate": 2,

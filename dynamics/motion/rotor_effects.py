@@ -30,7 +30,6 @@ from numpy.typing import ArrayLike
 
 from ...fem.harmonics.interior import Ball
 from ...fem.harmonics.local import BallField
-from ...fem.mutual.making import answers
 from ...fem.mutual.table import MutualTable
 from ...fem.plate.multipoles import weighted
 from ...fem.rotor.table import FieldTable, RangeError
@@ -195,7 +194,7 @@ class Mutual:
 
     def wrench(self, place: Array, direction: Array, field: Array, gradient: Array) -> tuple[Array, Array]:
         """Force (n, 3) N and torque (n, 3) N m at places and directions (n, 3), in `field` B0 and `gradient` ∇B0."""
-        _, force, torque = answers(self.table, place, self.moment * direction, field, gradient)
+        _, force, torque = self.table.added(place, self.moment * direction, field, gradient)
         return force, torque
 
     def doubt(self, points: Array, field: Array) -> tuple[Array, Array]:

@@ -1,4 +1,4 @@
-"""What the solution of a finite-element system will take in memory, known before it is begun, and what there is.
+"""Solutions of condensed finite-element systems, their memory known before they are begun, and open boundaries.
 
 Element matrices with what static condensation keeps of them take Σ N² numbers, N the unknowns of an element.  The
 factor of nested dissection is mostly that of its last separators, planes across the mesh: with s unknowns on such a
@@ -26,14 +26,10 @@ from numpy.typing import NDArray
 from ...geometry.common import Array, ComputationError
 from .open_boundary import OpenBoundary
 
-SEPARATORS = 34.0
-"""Numbers in the factor over the square of the unknowns on a plane; 17 to 36 were measured."""
-PEAK = 1.2
-"""The largest amount while the factor is made, over what is kept."""
-HEAP = 300_000_000
-"""Address space that NGSolve reserves while it assembles, bytes; most of it is never touched."""
-GROUP = Path("/sys/fs/cgroup")
-"""Where Linux tells the limits of a container or a batch job."""
+SEPARATORS = 34.0  # numbers in the factor over the square of the unknowns on a plane; 17 to 36 were measured
+PEAK = 1.2  # the largest amount while the factor is made, over what is kept
+HEAP = 300_000_000  # address space that NGSolve reserves while it assembles, bytes; most of it is never touched
+GROUP = Path("/sys/fs/cgroup")  # where Linux tells the limits of a container or a batch job
 
 
 class TooLargeError(ComputationError):
@@ -70,15 +66,21 @@ def memory_need(space: ngsolve.FESpace, free: ngsolve.BitArray) -> MemoryNeed:
 def require_memory(space: ngsolve.FESpace, free: ngsolve.BitArray, way_out: str) -> None:
     """Refuse a system that the free memory does not hold, before anything of it is made.
 
+    Parameters
+    ----------
+    space, free : NGSolve space, and its unknowns that are solved for
+    way_out : what the user can do
+
     Raises
     ------
     TooLargeError : it says how much is needed, how much there is, and `way_out`
     """
     need, there = memory_need(space, free).peak, free_memory()
     if need > there:
+        needed, given = (f"{size / 1e9:.2g} GB" if size < 1e10 else f"{size / 1e9:.0f} GB" for size in (need, there))
         raise TooLargeError(
-            f"The finite elements of order {space.globalorder} need about {_gigabytes(need)} of memory for "
-            f"{free.NumSet()} coupled unknowns; {_gigabytes(there)} are free. {way_out}, or use a machine with more."
+            f"The finite elements of order {space.globalorder} need about {needed} of memory for "
+            f"{free.NumSet()} coupled unknowns; {given} are free. {way_out}, or use a machine with more."
         )
 
 
@@ -101,20 +103,17 @@ def _group_memory(group: Path) -> float:
     return float("inf") if limit == "max" else float(int(limit) - int(used["anon"]))
 
 
-def _gigabytes(size: float) -> str:
-    return f"{size / 1e9:.2g} GB" if size < 1e10 else f"{size / 1e9:.0f} GB"
-
-
 Number = TypeVar("Number", np.float64, np.complex128)
 
 
 def solve_condensed(form: ngsolve.BilinearForm, inverse: ngsolve.BaseMatrix, loads: NDArray[Number]) -> NDArray[Number]:
-    """Solutions (n, unknowns), inner unknowns included, for loads (n, unknowns), real or complex as the form is.
+    """Solutions (n, unknowns), inner unknowns included.
 
     Parameters
     ----------
     form : assembled with `condense=True`
     inverse : of its matrix on the free coupling unknowns
+    loads : (n, unknowns), real or complex as the form is
     """
     right, solution = ngsolve.GridFunction(form.space), ngsolve.GridFunction(form.space)
     condensed = right.vec.CreateVector()
@@ -168,6 +167,7 @@ def solve_open(stiffness: Any, inverse: Any, free_dofs: Any, load: Any, boundary
     stiffness, load : condensed forms, without what harmonics beyond the Robin term do at the boundary
     inverse : of the stiffness on the free unknowns
     free_dofs : the unknowns that are not zero, without those that are condensed
+    boundary : of open space
 
     Raises
     ------

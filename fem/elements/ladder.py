@@ -1,4 +1,4 @@
-"""The outer field as functionals of the solution, which converge twice as fast as its values.
+"""Solutions of a rotor at growing order, and its outer field as functionals, which converge twice as fast as values.
 
 Either moments of the magnetisation about every magnet, or the harmonics of ψ on the outer sphere about the centre.
 Those of cuboids are integrals over the faces, those of other shapes over the volume, where many centres may share them.
@@ -44,27 +44,24 @@ def reaction_moments(solution: Solution, degree: int) -> Array:
     mesh, signs = solution.system.mesh, solution.signs
     centers = np.array([(magnet.box.center - mesh.center) / mesh.unit for magnet in mesh.magnets])
     result = np.zeros((len(centers), degree + 1, degree + 1), complex)
-    points, areas, potential = _faces(solution)
+    surface = surface_points(mesh.mesh, "faces|plane.", 2 * solution.system.order + 4)
+    used = surface.weights > 0
+    faces = mesh.to_meter(surface.points[used]), surface.weights[used], surface.sample(solution.potential)[used, 0]
     for name in mesh.mesh.GetMaterials():
         if name == "air":
             continue
         k = int(name.removeprefix("magnet"))
         if mesh.magnets[k].contrast == 0:
             continue
-        if isinstance(mesh.magnets[k].body, Box):
-            part = -_part_moments(solution, k, degree, points, areas, potential)
+        body = mesh.magnets[k].body
+        if isinstance(body, Box):
+            part = -_face_moments(solution, k, degree, faces)
         else:
-            part = _volume_moments(solution, k, degree)
+            part = moments_of_magnetization(*_share(solution, k), body.center, body.circumradius, degree)
         owners = np.array([owner for owner, _ in _image_numbers(mesh.magnets, k, mesh.planes)])
-        for place, coefficients in images(centers[k], part, mesh.planes, signs):
+        for place, coefficients in _images(centers[k], part, mesh.planes, signs):
             result[owners[np.argmin(np.linalg.norm(centers[owners] - place, axis=1))]] += coefficients
     return result
-
-
-def _volume_moments(solution: Solution, k: int, degree: int) -> Coefficients:
-    """Coefficients (T) of -(μ - 1) ∇ψ of magnet number k, from its meshed share, as an integral over the volume."""
-    body = solution.system.mesh.magnets[k].body
-    return moments_of_magnetization(*_share(solution, k), body.center, body.circumradius, degree)
 
 
 def _share(solution: Solution, k: int) -> tuple[Array, Array, Array]:
@@ -113,7 +110,7 @@ def _image_numbers(
     return found
 
 
-def images(
+def _images(
     center: Array, coefficients: Coefficients, planes: tuple[int, ...], signs: tuple[int, ...]
 ) -> list[tuple[Array, Coefficients]]:
     """Centres and coefficients of a body and its mirror images, from the share on the positive side of the planes."""
@@ -127,14 +124,18 @@ def images(
     return found
 
 
-def _part_moments(
-    solution: Solution, k: int, degree: int, points: Array, areas: Array, potential: Array
-) -> Coefficients:
-    """Coefficients of (μ - 1) ∇ψ of magnet number k, from its meshed share; the cuts add up to nothing."""
-    mesh = solution.system.mesh
+def _face_moments(solution: Solution, k: int, degree: int, faces: tuple[Array, Array, Array]) -> Coefficients:
+    """Coefficients of (μ - 1) ∇ψ of box number k, from its meshed share; the cuts add up to nothing.
+
+    `faces` are points (n, 3) m on all boundaries, and there the areas and ψ in the units of the mesh.
+    """
+    mesh, (points, areas, potential) = solution.system.mesh, faces
     magnet = mesh.magnets[k]
     box, susceptibility = magnet.box, magnet.permeability_in_rotor - np.eye(3)
-    normals, mine = _normals(magnet, points)
+    mine = np.abs(box.distance(points)) < SAME_PLACE * box.circumradius
+    body = box.to_body(points[mine])
+    axis = np.argmax(np.abs(body) / box.half_edges, axis=1)
+    normals = box.rotation.T[axis] * np.sign(np.take_along_axis(body, axis[:, None], axis=1))
     flux = (areas * potential * mesh.unit**3)[mine, None] * normals @ susceptibility
     sphere = (box.center, box.circumradius)
     result = moments_of_magnetization(points[mine], np.ones(len(flux)), flux, *sphere, degree)
@@ -145,26 +146,8 @@ def _part_moments(
     return result - curvature_moments(mesh.to_meter(volume.points), source, susceptibility, *sphere, degree)
 
 
-def _faces(solution: Solution) -> tuple[Array, Array, Array]:
-    """Integration points (n, 3) m on all boundaries, and there the areas and ψ in the units of the mesh."""
-    mesh = solution.system.mesh
-    surface = surface_points(mesh.mesh, "faces|plane.", 2 * solution.system.order + 4)
-    used = surface.weights > 0
-    potential = surface.sample(solution.potential)[used, 0]
-    return mesh.to_meter(surface.points[used]), surface.weights[used], potential
-
-
-def _normals(magnet: Magnet, points: Array) -> tuple[Array, NDArray[np.bool_]]:
-    """Outward normals at those of the points that lie on the faces of a magnet, and which these are (mask)."""
-    box = magnet.box
-    mine = np.abs(box.distance(points)) < SAME_PLACE * box.circumradius
-    body = box.to_body(points[mine])
-    axis = np.argmax(np.abs(body) / box.half_edges, axis=1)
-    return box.rotation.T[axis] * np.sign(np.take_along_axis(body, axis[:, None], axis=1)), mine
-
-
+# Of elements in magnets, and the least at round surfaces of parts, that are tried, relative to what is asked for
 SIZES = tuple(zip((1.0, 0.8, 0.5), OTHERWISE, strict=True))
-"""Of elements in magnets, and the least at round surfaces of parts, that are tried, relative to what is asked for."""
 
 
 @dataclass(frozen=True)
@@ -193,7 +176,6 @@ class RotorSolution:
     spheres : centre (3,) m and radius m of every expansion, in the rotor's frame
     mesh : of the part of space that the mirror planes leave, in their frame
     unknowns : number of unknowns
-    area_error : relative error of the area of the outer sphere
     layers : of elements at the edges; fewer than asked for where the mesher cannot match more
     symmetry : the frame of the mesh and its mirror planes
     parts : the potentials of every parity
@@ -204,7 +186,6 @@ class RotorSolution:
     spheres: tuple[tuple[Array, float], ...]
     mesh: MagnetMesh
     unknowns: int
-    area_error: float
     layers: int
     symmetry: Symmetry
     parts: tuple[Solution, ...]
@@ -229,6 +210,8 @@ def solve_rotor(
 
     Parameters
     ----------
+    magnets, refinement : the rotor, and how fine
+    formulation : "split" or "direct", see `magnetostatics`
     degree : of the moments in `split`, where they are those of -(μ - 1) ∇ψ; in `direct` it is the boundary's
     pieces : of every magnet, each with its own expansion; by default the magnets
     use_symmetry : whether to mesh only one side of the mirror planes
@@ -254,7 +237,8 @@ def solve_rotor(
     total: list[Coefficients] = []
     solutions = []
     owners = [k for k, whole in enumerate(cut) for _ in whole]
-    for signs, (own, carried) in parity_parts(seen, planes, _polarizations(magnets, carriers, symmetry)):
+    groups = [[magnet.polarization_in_rotor for magnet in group] for group in (magnets, carriers or magnets)]
+    for signs, (own, carried) in parity_parts(seen, planes, np.array(groups) @ symmetry.axes):
         sources = [Magnet(m.body, m.body.rotation.T @ j) for m, j in zip(seen, carried, strict=True)]
         rest = (own - carried)[owners]
         solution = solve(system, sources, formulation, refinement.boundary_degree, signs, rest)
@@ -269,9 +253,8 @@ def solve_rotor(
     if formulation == "direct":
         spheres, size = ((symmetry.center + symmetry.axes @ mesh.center, mesh.unit),), refinement.boundary_degree
     nothing = [np.zeros((size + 1, size + 1), complex)] * len(spheres)
-    area_error = max((solution.boundary.area_error for solution in solutions), default=0.0)
     return RotorSolution(
-        tuple(total or nothing), spheres, mesh, system.unknowns, area_error, layers, symmetry, tuple(solutions), shifts
+        tuple(total or nothing), spheres, mesh, system.unknowns, layers, symmetry, tuple(solutions), shifts
     )
 
 
@@ -312,14 +295,7 @@ def _meshed_system(
     raise reason
 
 
-def _polarizations(magnets: Sequence[Magnet], carriers: Sequence[Magnet] | None, symmetry: Symmetry) -> Array:
-    """(2, n, 3) T in the mirrors' frame: of the magnets and of their carriers."""
-    groups = (magnets, carriers or magnets)
-    return np.array([[magnet.polarization_in_rotor for magnet in group] for group in groups]) @ symmetry.axes
-
-
-WITHIN = 0.999
-"""Share of the ball's radius up to which its curved elements surely reach."""
+WITHIN = 0.999  # share of the ball's radius up to which its curved elements surely reach
 
 
 def in_ball(solution: RotorSolution, points: Array) -> NDArray[np.bool_]:
@@ -357,18 +333,14 @@ def _in_mesh(solution: RotorSolution, points: Array) -> Array:
     return ((points - symmetry.center) @ symmetry.axes - mesh.center) / mesh.unit
 
 
-LAYERS = {2: 1, 3: 1, 4: 2, 5: 2, 6: 2, 7: 3, 8: 3}
-"""Layers at the edges by order of the elements."""
+LAYERS = {2: 1, 3: 1, 4: 2, 5: 2, 6: 2, 7: 3, 8: 3}  # layers at the edges by order of the elements
 LAYERS_STRONG = {2: 1, 3: 2, 4: 3, 5: 3, 6: 4, 7: 4, 8: 4}
+# μ - 1 from which on edges need `LAYERS_STRONG`; with μr = 5, two layers leave 2.4e-6 of the dipole, three 1.4e-7
 STRONG = 0.5
-"""μ - 1 from which on edges need `LAYERS_STRONG`; with μr = 5, two layers leave 2.4e-6 of the dipole, three 1.4e-7."""
-FIRST_RATE = 0.5
-"""Ratio of two differences that is assumed before it is known; 0.1 to 0.3 were measured."""
-DEARER = 2.3
-"""How much longer an order takes than the one before it, about: for the progress."""
+FIRST_RATE = 0.5  # ratio of two differences that is assumed before it is known; 0.1 to 0.3 were measured
+DEARER = 2.3  # how much longer an order takes than the one before it, about: for the progress
 FASTEST_RATE, FASTEST_RATE_STRONG, SLOWEST_RATE = 0.1, 0.3, 0.75
-SAFETY = 1.25
-"""Factor on each of the two extrapolated differences."""
+SAFETY = 1.25  # factor on each of the two extrapolated differences
 
 
 def strongest(magnets: Sequence[Magnet]) -> float:
@@ -377,7 +349,7 @@ def strongest(magnets: Sequence[Magnet]) -> float:
 
 
 def refinement_of(order: int, settings: MeshSettings, contrast: float = 0.0) -> Refinement:
-    """The refinement that belongs to an order of the elements and to the largest μ - 1 of the magnets."""
+    """Refinement of an `order` of the elements: `settings` with layers for the `contrast`, the largest μ - 1."""
     layers = (LAYERS if contrast < STRONG else LAYERS_STRONG)[order] if settings.hp_layers else 0
     return Refinement(order, replace(settings, hp_layers=layers, curve_order=min(order + 1, 8)), 2 * order + 2)
 
@@ -410,21 +382,20 @@ def refined(
         new = [b - a for a, b in zip(coarse.coefficients, fine.coefficients, strict=True)]
         field = sum(e.evaluate(points)[0] for e in fine.expansions(new))
         size = float(np.max(np.linalg.norm(field, axis=1) / scale))
-        rate = _rate(size, before, _fastest(fine, order, settings))
+        rate = FIRST_RATE
+        if np.isfinite(before):
+            rate = min(max(size / before, _fastest(fine, order, settings)) if before else 0.0, SLOWEST_RATE)
         factor = SAFETY * rate / (1 - rate)
         earlier = [size / before * d for d in old] if old and before else new
         if 2 * factor * size <= target:
             break
-        watch("orders of the elements", _finished(order, 2 * factor * size / target, rate))
+        # the share of the work so far: orders to come if the error falls at this rate, each dearer than the last
+        more = max(1, int(np.ceil(np.log(2 * factor * size / target) / -np.log(rate))))
+        last = min(order + more, max(LAYERS))
+        watch("orders of the elements", float((DEARER ** (order - 1) - 1) / (DEARER ** (last - 1) - 1)))
         coarse, before, old = fine, size, new
     doubts = {"discretisation": new, "discretisation, earlier step": earlier}
     return fine, order, {cause: fine.expansions([factor * d for d in ds]) for cause, ds in doubts.items()}
-
-
-def _finished(order: int, missed: float, rate: float) -> float:
-    """Share of the work that orders up to this one are, if the error is still so many times too large."""
-    last = min(order + max(1, int(np.ceil(np.log(missed) / -np.log(rate)))), max(LAYERS))
-    return float((DEARER ** (order - 1) - 1) / (DEARER ** (last - 1) - 1))
 
 
 def _fastest(solution: RotorSolution, order: int, settings: MeshSettings) -> float:
@@ -433,10 +404,3 @@ def _fastest(solution: RotorSolution, order: int, settings: MeshSettings) -> flo
     if solution.layers < refinement_of(order, settings, contrast).mesh.hp_layers:
         return FIRST_RATE
     return FASTEST_RATE if contrast < STRONG else FASTEST_RATE_STRONG
-
-
-def _rate(size: float, before: float, fastest: float) -> float:
-    """Ratio of the next difference to the last one."""
-    if np.isinf(before):
-        return FIRST_RATE
-    return min(max(size / before, fastest) if before else 0.0, SLOWEST_RATE)

@@ -1,10 +1,11 @@
-"""What permeable bodies in a ball of air answer to a given field: one factorised matrix, many fields.
+"""Magnetostatics of permeable bodies in a ball of air: given fields (one factorised matrix), or remanence by parity.
 
 With the given field H0 (sources outside or remanence, in T) and μ0 H = H0 - ∇ψ,
 
     ∫ ∇v·μ∇ψ = ∫_bodies ∇v·(μ - 1) H0,        μ0 M = (μ - 1)(H0 - ∇ψ),
 
-as in `solver`, and open space outside the ball. H0 enters and M leaves at integration points.
+and open space outside the ball. H0 enters and M leaves at integration points. In the formulation "split" H0 is the
+closed form of the remanence; in "direct" it is 0, and the remanence J adds ∫ ∇v·J.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ import netgen.meshing as netgen
 import ngsolve as ng
 import numpy as np
 import scipy
+from numpy.typing import NDArray
 
 from ...geometry.common import Array, MeshError
 from ...geometry.magnets import Magnet
@@ -24,10 +26,9 @@ from ...geometry.meshes.magnets import MagnetMesh
 from ..closed_forms.uniform import remanent_field
 from .condensed import OpenFactor, TooLargeError, require_memory, solve_open
 from .open_boundary import OpenBoundary
-from .spaces import IntegrationPoints, volume_points
+from .spaces import volume_points
 
-BOUNDARY_DEGREE = 8
-"""Harmonics up to this degree see an exactly open boundary; higher ones reach the bodies below 1e-8."""
+BOUNDARY_DEGREE = 8  # harmonics up to this degree see an exactly open boundary; higher ones reach the bodies below 1e-8
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,60 +37,61 @@ class PermeableRegions:
 
     Parameters
     ----------
-    susceptibility : (3, 3) μ - 1 of every body by region name
-    points : integration points of every body, in the mesh's coordinates
-    slopes : (3n, unknowns) gradients of the basis at the points of every body
+    names : of the bodies
+    owner : (n,) number of the body of each integration point
+    points, weights : (n, 3) and (n,) in the mesh's coordinates
+    susceptibility : (n, 3, 3) μ - 1 at each
+    slopes : (3n, unknowns) gradients of the basis at the points
     factor : of the matrix
     """
 
-    susceptibility: Mapping[str, Array]
-    points: Mapping[str, IntegrationPoints]
-    slopes: Mapping[str, scipy.sparse.csr_matrix]
+    names: tuple[str, ...]
+    owner: NDArray[np.intp]
+    points: Array
+    weights: Array
+    susceptibility: Array
+    slopes: scipy.sparse.csr_matrix
     factor: OpenFactor
 
-    def magnetization(self, fields: Mapping[str, Array]) -> dict[str, Array]:
-        """μ0 M (n, 3) T at the points of every body, for given fields H0 (n, 3) T there."""
-        sources = {name: fields[name] @ chi for name, chi in self.susceptibility.items()}
-        load = sum(
-            self.slopes[name].T @ (source * self.points[name].weights[:, None]).ravel()
-            for name, source in sources.items()
-        )
+    def magnetization(self, field: Array) -> Array:
+        """μ0 M (n, 3) T at the points for a given field H0 (n, 3) T there."""
+        source = self.direct(field)
+        load = self.slopes.T @ (source * self.weights[:, None]).ravel()
         (potential,) = self.factor.solve(load[None])
-        return {
-            name: source - (self.slopes[name] @ potential).reshape(-1, 3) @ self.susceptibility[name]
-            for name, source in sources.items()
-        }
+        return np.asarray(source - self.direct((self.slopes @ potential).reshape(-1, 3)))
+
+    def direct(self, field: Array) -> Array:
+        """(μ - 1) H (n, 3) T of a field (n, 3) T at the points."""
+        return np.asarray(np.einsum("ni,nij->nj", field, self.susceptibility))
 
 
 def assemble_regions(mesh: Any, permeability: Mapping[str, Array], ball_radius: float, order: int) -> PermeableRegions:
-    """Assemble and factorise with elements of degree `order`.
+    """Assemble and factorise.
 
     Parameters
     ----------
     mesh : NGSolve mesh of a ball about the origin with the boundary `outer`
     permeability : (3, 3) μ by region name; regions not named have μ = 1
     ball_radius : in the mesh's coordinates
+    order : degree of the elements
 
     Raises
     ------
     TooLargeError : the memory does not hold the system
     """
-    space = ng.H1(mesh, order=order)
-    require_memory(space, space.FreeDofs(True), "Take elements of a lower degree")
-    trial, test = space.TnT()
-    tensors = {name: ng.CF(tuple(map(float, mu.ravel())), dims=(3, 3)) for name, mu in permeability.items()}
+    space, stiffness = _assembled(mesh, permeability, ball_radius, order, "Take elements of a lower degree")
     boundary = OpenBoundary(mesh, space, ball_radius, BOUNDARY_DEGREE, order)
-    stiffness = ng.BilinearForm(space, symmetric=True, condense=True)
-    stiffness += (mesh.MaterialCF(tensors, default=ng.Id(3)) * ng.grad(trial)) * ng.grad(test) * ng.dx
-    stiffness += boundary.robin * trial * test * ng.ds("outer")
-    stiffness.Assemble()
     inverse = stiffness.mat.Inverse(space.FreeDofs(True), inverse="sparsecholesky")
-    points = {name: volume_points(mesh, name, 2 * order - 2) for name in permeability}
+    rules = [volume_points(mesh, name, 2 * order - 2) for name in permeability]
+    owner = np.repeat(np.arange(len(rules)), [len(rule.weights) for rule in rules])
     return PermeableRegions(
-        susceptibility={name: mu - np.eye(3) for name, mu in permeability.items()},
-        points=points,
-        slopes={name: part.value_matrix(space, ng.grad(trial)) for name, part in points.items()},
-        factor=OpenFactor(stiffness, inverse, boundary),
+        tuple(permeability),
+        owner,
+        np.concatenate([rule.points for rule in rules]),
+        np.concatenate([rule.weights for rule in rules]),
+        (np.array([*permeability.values()]) - np.eye(3))[owner],
+        scipy.sparse.vstack([rule.value_matrix(space, ng.grad(space.TrialFunction())) for rule in rules], format="csr"),
+        OpenFactor(stiffness, inverse, boundary),
     )
 
 
@@ -144,25 +146,32 @@ def assemble(mesh: MagnetMesh, order: int) -> System:
     MeshError : layers of elements do not match
     TooLargeError : the memory does not hold the system
     """
-    space = ng.H1(mesh.mesh, order=order)
-    require_memory(space, space.FreeDofs(True), WAY_OUT)
+    permeability = {f"magnet{k}": magnet.permeability_in_rotor for k, magnet in enumerate(mesh.magnets)}
+    return System(mesh, order, *_assembled(mesh.mesh, permeability, mesh.ball_radius, order, WAY_OUT))
+
+
+def _assembled(
+    mesh: Any, permeability: Mapping[str, Array], ball_radius: float, order: int, way_out: str
+) -> tuple[Any, Any]:
+    """The space H1 and ∫ ∇v·μ∇ψ on it, condensed, with the Robin term of the sphere `outer`."""
+    space = ng.H1(mesh, order=order)
+    require_memory(space, space.FreeDofs(True), way_out)
     trial, test = space.TnT()
     stiffness = ng.BilinearForm(space, symmetric=True, condense=True)
-    matrices = {f"magnet{k}": magnet.permeability_in_rotor for k, magnet in enumerate(mesh.magnets)}
-    if all(magnet.isotropic for magnet in mesh.magnets):
-        permeability = mesh.mesh.MaterialCF({name: float(mu[0, 0]) for name, mu in matrices.items()}, default=1.0)
+    if all(np.array_equal(mu, mu[0, 0] * np.eye(3)) for mu in permeability.values()):
+        factor = mesh.MaterialCF({name: float(mu[0, 0]) for name, mu in permeability.items()}, default=1.0)
     else:
-        tensors = {name: ng.CF(tuple(map(float, mu.ravel())), dims=(3, 3)) for name, mu in matrices.items()}
-        permeability = mesh.mesh.MaterialCF(tensors, default=ng.Id(3))
-    stiffness += (permeability * ng.grad(trial)) * ng.grad(test) * ng.dx
-    stiffness += 2 / mesh.ball_radius * trial * test * ng.ds("outer")
+        tensors = {name: ng.CF(tuple(map(float, mu.ravel())), dims=(3, 3)) for name, mu in permeability.items()}
+        factor = mesh.MaterialCF(tensors, default=ng.Id(3))
+    stiffness += (factor * ng.grad(trial)) * ng.grad(test) * ng.dx
+    stiffness += 2 / ball_radius * trial * test * ng.ds("outer")
     try:
         stiffness.Assemble()
     except netgen.NgException as error:
         if "alloc" in str(error):
-            raise TooLargeError(f"The memory ran out in elements of order {order}: {error}. {WAY_OUT}.") from error
+            raise TooLargeError(f"The memory ran out in elements of order {order}: {error}. {way_out}.") from error
         raise MeshError(str(error)) from error  # netgen refined a face otherwise from either side
-    return System(mesh, order, space, stiffness)
+    return space, stiffness
 
 
 def solve(
@@ -177,6 +186,8 @@ def solve(
 
     Parameters
     ----------
+    system : made by `assemble`
+    formulation : what of the remanence is solved for, see above
     sources : magnets whose remanent polarisation acts; in `direct` those of the mesh
     boundary_degree : harmonics up to this degree see an exactly open outer boundary
     signs : parity of the potential (+1 or -1) at each of the mesh's planes
@@ -192,7 +203,18 @@ def solve(
     for name in mesh.mesh.GetMaterials():
         if name != "air":
             k = int(name.removeprefix("magnet"))
-            _add_source(load, system, k, sources, formulation, np.zeros(3) if rest is None else rest[k])
+            test = space.TestFunction()
+            if formulation == "direct":
+                load += ng.CF(tuple(map(float, sources[k].polarization_in_rotor))) * ng.grad(test) * ng.dx(name)
+                continue
+            susceptibility = mesh.magnets[k].permeability_in_rotor - np.eye(3)
+            own = np.zeros(3) if rest is None else rest[k]
+            if susceptibility.any() or own.any():
+                points = volume_points(mesh.mesh, name, 2 * system.order + 2)
+                places = mesh.magnets[k].body.within(mesh.to_meter(points.points))
+                source = remanent_field(sources, places) @ susceptibility + own
+                for axis in range(3):
+                    load += points.function(source[:, axis]) * ng.grad(test)[axis] * points.measure
     load.Assemble()
     free = space.FreeDofs(True)
     for plane, sign in zip(mesh.planes, signs, strict=True):
@@ -201,20 +223,3 @@ def solve(
     inverse = system.stiffness.mat.Inverse(free, inverse="sparsecholesky")
     potential = solve_open(system.stiffness, inverse, free, load, boundary)
     return Solution(system, signs, potential, boundary)
-
-
-def _add_source(
-    load: Any, system: System, k: int, sources: Sequence[Magnet], formulation: Formulation, rest: Array
-) -> None:
-    mesh, name, test = system.mesh, f"magnet{k}", system.space.TestFunction()
-    if formulation == "direct":
-        load += ng.CF(tuple(map(float, sources[k].polarization_in_rotor))) * ng.grad(test) * ng.dx(name)
-        return
-    susceptibility = mesh.magnets[k].permeability_in_rotor - np.eye(3)
-    if not susceptibility.any() and not rest.any():
-        return
-    points = volume_points(mesh.mesh, name, 2 * system.order + 2)
-    places = mesh.magnets[k].body.within(mesh.to_meter(points.points))
-    source = remanent_field(sources, places) @ susceptibility + rest
-    for axis in range(3):
-        load += points.function(source[:, axis]) * ng.grad(test)[axis] * points.measure

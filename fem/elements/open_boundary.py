@@ -11,8 +11,7 @@ import ngsolve as ng
 import numpy as np
 
 from ...geometry.common import Array
-from ..harmonics.interior import FOUR_PI
-from ..harmonics.solid import Coefficients, Keys, harmonic_parity, orthonormal, orthonormal_keys, outer_coefficients
+from ..harmonics.solid import FOUR_PI, Coefficients, harmonic_parity, members, orthonormal, outer_coefficients
 from .spaces import surface_points
 
 
@@ -45,9 +44,9 @@ class OpenBoundary:
         used = surface.weights > 0
         self.radius, self.degree, self.copies = radius, degree, 2 ** len(planes)
         self.area_error = abs(float(surface.weights.sum()) * self.copies / (FOUR_PI * radius**2) - 1)
-        self.keys: Keys = [
+        self.keys = [
             key
-            for key in orthonormal_keys(degree)
+            for key in members(degree)
             if all(harmonic_parity(key, axis) == sign for axis, sign in zip(planes, signs, strict=True))
         ]
         harmonics = np.zeros((len(used), len(self.keys)))
@@ -62,11 +61,6 @@ class OpenBoundary:
             columns.append(form.vec.FV().NumPy()[self.unknowns])
         self._projection = np.stack(columns, axis=1)
         self._degrees = np.array([l for l, _, _ in self.keys], float)
-
-    @property
-    def robin(self) -> float:
-        """Factor of the Robin term ∫ u v."""
-        return 2 / self.radius
 
     def apply(self, potential: Array) -> Array:
         """What the map adds to the Robin term, as a load vector (unknowns,)."""

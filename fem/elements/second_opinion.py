@@ -17,8 +17,7 @@ from .magnetostatics import Formulation
 if TYPE_CHECKING:
     import skfem
 
-NODES = 60
-"""A side of the Gauss rule on a face; farther than 1.2 half edges from the faces its error is below 1e-40."""
+NODES = 60  # a side of the Gauss rule on a face; farther than 1.2 half edges from the faces its error is below 1e-40
 
 
 def coulomb_field(magnet: Magnet, points: Array) -> Array:

@@ -114,14 +114,14 @@ def value_matrix(
 
 
 def volume_points(mesh: Any, material: str, order: int) -> IntegrationPoints:
-    """Points in a material, exact for polynomials up to `order` on straight elements."""
+    """Points in a `material` of a `mesh`, exact for polynomials up to `order` on straight elements."""
     region = mesh.Materials(material)
     space = ng.comp.IntegrationRuleSpace(mesh, order=order, definedon=region)
     return _collect(space, region, ng.dx(material, intrules=space.GetIntegrationRules()))
 
 
 def surface_points(mesh: Any, boundary: str, order: int) -> IntegrationPoints:
-    """Points on all surfaces of the mesh; those off the named boundary have weight zero."""
+    """Points on all surfaces of the `mesh`, for polynomials up to `order`; those off the `boundary` weigh nothing."""
     region = mesh.Boundaries(boundary)
     space = ng.comp.IntegrationRuleSpaceSurface(mesh, order=order)
     return _collect(space, region, ng.ds(boundary, intrules=space.GetIntegrationRules()))

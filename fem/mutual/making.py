@@ -1,4 +1,4 @@
-"""How far a `MutualTable` is from the magnetostatics of both bodies, by their gap."""
+"""Making of a `MutualTable`: fits to finite elements, and its error by the gap of the bodies."""
 
 import time
 from collections.abc import Callable, Sequence
@@ -12,50 +12,39 @@ from ...geometry.scene.contents import Floater
 from ...geometry.solids import Part, places_off
 from ..cache import TableKind
 from ..harmonics.interior import Ball, field_at_center, gradient_at_center
-from ..rotor.pose import at_home
-from .grid import IMAGES, POWERS, RETURNED, AnswerGrid, answer_box, image_weights, point_counts
+from ..rotor.table import canonical
+from .grid import POWERS, RETURNED, AnswerGrid, answer_box, image_weights, point_counts
 from .response import RotorResponse, enough_degree, rotor_ladder, two_body
 from .samples import (
     NEAR_GAPS,
     ROTOR_GAPS,
     SPHERE_GAPS,
-    answer_products,
     places_around,
     places_facing,
+    response_products,
     returned_samples,
     sphere_samples,
     unit_dipole_fields,
 )
 from .table import MANY, PARALLEL, MutualTable, classes, least_squares, returned_fit, sphere_fit
 
+# Gaps at which both are compared, in floater radii, and at how many poses for each magnet beside that at its pole
 GAPS, PLACES_EACH = (0.03, 0.08, 0.16, 0.5, 1.5), 2
-"""Gaps at which both are compared, in floater radii, and at how many poses for each magnet beside that at its pole."""
-DEGREES, SERIES = 1e-4, 1e-5
-"""Where the degrees and the series of both bodies end."""
-SAFETY = 4.0
-"""For the poses that were not looked at."""
-ELEMENTS = 0.2
-"""Error of finite elements by what those of one degree less differ from them; 0.1 to 0.13 were measured."""
+DEGREES, SERIES = 1e-4, 1e-5  # where the degrees and the series of both bodies end
+SAFETY = 4.0  # for the poses that were not looked at
+ELEMENTS = 0.2  # error of finite elements by what those of one degree less differ from them; 0.1 to 0.13 were measured
 
 
-def answers(
-    table: MutualTable, places: Array, moments: Array, field: Array, gradient: Array
-) -> tuple[Array, Array, Array]:
-    """Energy (n,) J, force (n, 3) N and torque (n, 3) N m at places (n, 3) m of moments (n, 3) A m² in B0 and ∇B0."""
-    alpha = table.polarizability
-    energy, slope, _ = table.derivatives(places, moments + alpha * field)
-    by_place, by_moment = slope[:, :3], slope[:, 3:]
-    energy = energy - alpha / 2 * np.sum(field**2, axis=1)
-    force = -by_place + alpha * np.einsum("ni,nij->nj", field - by_moment, gradient)
-    return energy, force, -np.cross(moments, by_moment)
-
-
-def answer_errors(
+def mutual_errors(
     table: MutualTable, coarse: RotorResponse, rotor: RotorResponse, floater: Floater, watch: Watch
 ) -> tuple[Array, Array]:
     """Gaps (k,) m, and the largest relative errors (k, 2) of force and torque found at poses with these gaps.
 
-    Of the table against the finite elements of `rotor`, and of these by the `coarse` ones.
+    Parameters
+    ----------
+    table, floater : that are compared with both bodies
+    coarse, rotor : finite elements of two degrees, which tell the table's error and their own
+    watch : hears of the progress
     """
     generator = np.random.default_rng(4)
     errors = []
@@ -71,9 +60,7 @@ def answer_errors(
             rough = two_body(coarse, floater, place, direction, degree, SERIES)
             unsure = added - (rough.total - rough.rigid)
             field, gradient = field_at_center(both.own), gradient_at_center(both.own, floater.radius)
-            _, force, torque = answers(
-                table, place[None], floater.moment * direction[None], field[None], gradient[None]
-            )
+            _, force, torque = table.added(place[None], floater.moment * direction[None], field[None], gradient[None])
             missed = [
                 np.linalg.norm(told - true) + ELEMENTS * np.linalg.norm(step)
                 for told, true, step in zip(
@@ -99,28 +86,31 @@ def _at_poles(magnets: Sequence[Magnet], distance: float) -> list[Array]:
     return places
 
 
+# Gap in floater radii from which on force and torque are to be met to 1e-3: 1 mm for the article's floater
 NEAREST = 0.16
-"""Gap in floater radii from which on force and torque are to be met to 1e-3: 1 mm for the article's floater."""
 PART = "a part from a STEP file, whose remanence has no closed form. Choose --interaction rigid, or give it a shape."
 OBLIQUE = (
     "one with two permeabilities and an easy axis along none of its edges, which its points cannot answer with. Choose "
     "--interaction rigid, give it one recoil_permeability, or turn the body with its magnetisation."
 )
-EACH, EACH_OF_MANY = 16, 6
-"""Places of dipoles for each gap and magnet; of rotors of `MANY` magnets."""
+EACH, EACH_OF_MANY = 16, 6  # places of dipoles for each gap and magnet; of rotors of `MANY` magnets
+# Pairs of dipoles that are fitted; how much those at one place count, which alone make the energy; and at one of so
+# many places the rotor's response to the sphere's is
 EQUATIONS, AT_ONE_PLACE, SPARSE, NEAR_SPARSE = 8000, 5.0, 12, 6
-"""Pairs of dipoles that are fitted; how much those at one place count, which alone make the energy; and at one of so
-many places the rotor's answer to the sphere's is."""
-INNER = 2
-"""Points along each axis at which magnets beside each other answer beyond their direct answer."""
+INNER = 2  # points along each axis at which magnets beside each other respond beyond their direct response
 
 
 def mutual_table(
     magnets: tuple[Magnet, ...], floater: Floater, order: int = 2, watch: Watch = unwatched
 ) -> MutualTable:
-    """The answers of a rotor and a floater, by finite elements of a degree, with errors against the next.
+    """Mutual magnetisation of a rotor and a spherical floater.
 
-    `watch` hears of the progress.
+    Parameters
+    ----------
+    magnets : of the rotor
+    floater : whose radius, remanence and recoil permeability count
+    order : of the finite elements; errors are estimated with the next
+    watch : hears of the progress
 
     Raises
     ------
@@ -128,15 +118,26 @@ def mutual_table(
     """
     started = time.perf_counter()
     rotor, fine = rotor_ladder(magnets, (order, order + 1))
-    counts = [point_counts(answer_box(m.body), (1 + NEAREST) * floater.radius) for m in magnets]
-    grids = [_empty(magnet, floater, n) for magnet, n in zip(magnets, counts, strict=True)]
-    images = image_weights(floater.recoil_permeability) if floater.recoil_permeability != 1 else np.zeros(len(IMAGES))
+    grids = []
+    for magnet in magnets:
+        if reason := unanswered(magnet):
+            raise InputError(
+                "Input magnets must be of the kinds that answer to the floater where both magnetise each other; "
+                f"instead one is {reason}"
+            )
+        box, size = answer_box(magnet.body), float(np.linalg.norm(magnet.polarization))
+        counts = point_counts(box, (1 + NEAREST) * floater.radius)
+        n = int(np.prod(counts))
+        zeros = np.zeros((n, 3)), np.zeros((n, len(POWERS), 2)), np.zeros((n, len(RETURNED), 2))
+        axis = magnet.polarization / size if size else np.zeros(3)
+        grids.append(AnswerGrid(box, axis, floater.radius, counts, *zeros))
+    images = image_weights(floater.recoil_permeability)
     inner = [grid.inner(INNER if 1 < len(grids) < MANY else 1) for grid in grids]
     coupling = np.zeros([3 * sum(len(points) for points in inner)] * 2)
     pairs = mixed = np.zeros((len(grids), len(grids)))
     if rotor.regions is not None:
         places = places_around(magnets, floater.radius, ROTOR_GAPS, EACH if len(grids) < MANY else EACH_OF_MANY, 1)
-        grids, coupling = _rotor_fit(grids, inner, magnets, *answer_products(rotor, fine, places, watch), places)
+        grids, coupling = _rotor_fit(grids, inner, magnets, *response_products(rotor, fine, places, watch), places)
     if floater.recoil_permeability != 1:
         facing = places_facing(magnets, floater.radius, SPHERE_GAPS)
         places = np.concatenate([facing, places_around(magnets, floater.radius, SPHERE_GAPS, 60, 2)])
@@ -148,32 +149,18 @@ def mutual_table(
             returned = returned_samples(rotor, floater, grids, np.concatenate(inner), coupling, fewer, watch)
             grids, mixed = returned_fit(grids, inner, images, returned)
     table = MutualTable(magnets, tuple(grids), coupling, pairs, mixed, images, floater.polarizability)
-    gaps, errors = answer_errors(table, rotor, fine, floater, watch)
-    return replace(
-        table, gaps=gaps, errors=errors, provenance={"order": order, "seconds": time.perf_counter() - started}
-    )
+    gaps, errors = mutual_errors(table, rotor, fine, floater, watch)
+    made: dict[str, str | float] = {"order": order, "seconds": time.perf_counter() - started}
+    return replace(table, gaps=gaps, errors=errors, provenance=made)
 
 
 def unanswered(magnet: Magnet) -> str:
-    """Why a magnet's answer to the floater is not known, with the way out; empty where it is."""
+    """Why a magnet's response to the floater is not computed, with the way out; empty where it is."""
     if isinstance(magnet.body, Part):
         return PART
     turn = magnet.box.rotation
     inside = turn.T @ magnet.permeability_in_rotor @ turn
     return OBLIQUE if np.abs(inside - np.diag(np.diag(inside))).max() > PARALLEL else ""
-
-
-def _empty(magnet: Magnet, floater: Floater, counts: tuple[int, int, int]) -> AnswerGrid:
-    size = float(np.linalg.norm(magnet.polarization))
-    if reason := unanswered(magnet):
-        raise InputError(
-            "Input magnets must be of the kinds that answer to the floater where both magnetise each other; instead "
-            f"one is {reason}"
-        )
-    count = int(np.prod(counts))
-    axis = magnet.polarization / size if size else np.zeros(3)
-    zeros = np.zeros((count, 3)), np.zeros((count, len(POWERS), 2)), np.zeros((count, len(RETURNED), 2))
-    return AnswerGrid(answer_box(magnet.body), axis, floater.radius, counts, *zeros)
 
 
 def _rotor_fit(
@@ -184,9 +171,10 @@ def _rotor_fit(
     beyond: Array,
     places: Array,
 ) -> tuple[list[AnswerGrid], Array]:
-    """Strengths and coupling that give the products of fields of dipoles with the answers to them.
+    """Strengths λ and coupling that give the products of dipoles' fields with the responses to them.
 
-    The direct answers by points of one weight for a class, which mirrors keep; the rest by these and the coupling.
+    `direct`, by points of one weight for a class, which mirrors keep; what is `beyond` by these and the coupling.
+    Places are (p, 3) m, the products (3 p, 3 p) J.
     """
     size = 1 / np.sqrt(np.diag(direct))
     first, second = np.triu_indices(len(direct))
@@ -197,54 +185,58 @@ def _rotor_fit(
     counts = np.where(first // 3 == second // 3, AT_ONE_PLACE, 1.0)
     columns, kinds = [], [classes(g, True)[:, : None if m.contrast else 0] for g, m in zip(grids, magnets, strict=True)]
     for grid, kind in zip(grids, kinds, strict=True):
-        fields = unit_dipole_fields(grid.box.center + grid.points @ grid.box.rotation.T, places) @ grid.box.rotation
-        fields *= size[:, None, None]
+        fields = unit_dipole_fields(grid.places, places) @ grid.box.rotation * size[:, None, None]
         columns += [(fields[first, :, a] * fields[second, :, a]) @ kind for a in range(3)]
-    alone = np.concatenate(columns, axis=1)
     whole = (unit_dipole_fields(np.concatenate(inner), places) * size[:, None, None]).reshape(len(size), -1)
+    # a lone magnet's points do it alone; the coupling is symmetric, and counted once
     a, b = np.triu_indices(whole.shape[1] if len(grids) > 1 else 0)
     together = whole[first][:, a] * whole[second][:, b] + (a != b) * whole[first][:, b] * whole[second][:, a]
-    alone, together = alone * counts[:, None], together * counts[:, None]
+    rows = np.concatenate([*columns, together], axis=1) * counts[:, None]
     direct, beyond = (part[first, second] * size[first] * size[second] * counts for part in (direct, beyond))
-    held = np.arange(alone.shape[1] + len(a)) >= alone.shape[1]
-    found = least_squares(np.concatenate([alone, together], axis=1), beyond, held)
-    found[: alone.shape[1]] += least_squares(alone, direct, held[: alone.shape[1]])
-    weights, made = list(found), []
-    for grid, kind in zip(grids, kinds, strict=True):
-        parts = [kind @ np.array([weights.pop(0) for _ in range(kind.shape[1])]) for _ in range(3)]
-        made.append(replace(grid, strengths=np.stack(parts, axis=1)))
+    alone = rows.shape[1] - len(a)
+    held = np.arange(rows.shape[1]) >= alone
+    found = least_squares(rows, beyond, held)
+    found[:alone] += least_squares(rows[:, :alone], direct, held[:alone])
+    ends = np.cumsum([column.shape[1] for column in columns])
+    parts = iter(np.split(found, ends))
+    made = [
+        replace(grid, strengths=np.stack([kind @ next(parts) for _ in range(3)], axis=1))
+        for grid, kind in zip(grids, kinds, strict=True)
+    ]
     coupling = np.zeros((whole.shape[1], whole.shape[1]))
-    coupling[a, b] = coupling[b, a] = weights
+    coupling[a, b] = coupling[b, a] = next(parts)
     return made, coupling
 
 
 MUTUAL = TableKind("mutual", MutualTable, "Energies of the mutual magnetisation of a rotor and a sphere")
 
 
+def mutual_key(magnets: tuple[Magnet, ...], floater: Floater) -> str:
+    """SHA-256 of all that decides a mutual table, and of what computes it."""
+    return MUTUAL.key(*_inputs(magnets, floater))
+
+
+def _inputs(magnets: tuple[Magnet, ...], floater: Floater) -> tuple[tuple[Magnet, ...], float, float, float]:
+    return magnets, floater.radius, floater.remanence, floater.recoil_permeability
+
+
 def cached_mutual_table(
     magnets: tuple[Magnet, ...], floater: Floater, report: Callable[[str], None], watch: Watch = unwatched
 ) -> tuple[MutualTable, bool]:
-    """The answers of a rotor and a floater, see `mutual_table`, from the cache if they are there, and whether.
+    """A mutual table from the cache if it is there, and whether it was.
 
-    A lone magnet answers in its own axes: one table serves it wherever it stands and however it is turned.
+    A lone magnet responds in its own axes: one table serves it wherever it stands and however it is turned.
+
+    Parameters
+    ----------
+    magnets, floater, watch : see `mutual_table`
+    report : hears of a damaged cache
     """
-    upright = at_home(magnets)
-    inputs = upright, floater.radius, floater.remanence, floater.recoil_permeability
-    table, found = MUTUAL.cached(inputs, lambda: mutual_table(upright, floater, watch=watch), report)
-    return _posed(table, magnets), found
-
-
-def _posed(table: MutualTable, magnets: tuple[Magnet, ...]) -> MutualTable:
-    """The table of a lone upright magnet where the magnet is; that of several as it is."""
-    if len(magnets) > 1:
-        return table
-    turns = [magnet.box.rotation for magnet in magnets]
-    turn = np.kron(np.eye(len(table.coupling) // 3), turns[0]) if turns else np.zeros((0, 0))
-    coupling = turn @ table.coupling @ turn.T
-    grids = tuple(replace(grid, box=answer_box(magnet.body)) for grid, magnet in zip(table.grids, magnets, strict=True))
-    return replace(table, magnets=magnets, grids=grids, coupling=coupling)
-
-
-def mutual_key(magnets: tuple[Magnet, ...], floater: Floater) -> str:
-    """SHA-256 of all that decides the answers, and of what computes them."""
-    return MUTUAL.key(magnets, floater.radius, floater.remanence, floater.recoil_permeability)
+    upright = canonical(magnets)
+    table, found = MUTUAL.cached(_inputs(upright, floater), lambda: mutual_table(upright, floater, watch=watch), report)
+    if len(magnets) != 1:
+        return table, found
+    (magnet,), (grid,) = magnets, table.grids
+    turn = np.kron(np.eye(len(table.coupling) // 3), magnet.box.rotation)
+    grids = (replace(grid, box=answer_box(magnet.body)),)
+    return replace(table, magnets=magnets, grids=grids, coupling=turn @ table.coupling @ turn.T), found

@@ -1,8 +1,8 @@
-"""How many degrees the expansion of the magnets' field about the floater's centre needs."""
+"""Magnetostatics of a rotor and a permeable sphere: responses to each other's field until they settle."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -14,56 +14,57 @@ from ...geometry.meshes.magnets import MagnetMesh, mesh_magnets
 from ...geometry.overlap import TOUCHING, sphere_overlap
 from ...geometry.scene.contents import Floater
 from ...geometry.shapes import Box, Sphere
-from ...geometry.solids import Solid
 from ..closed_forms.moments import volume_rule
 from ..closed_forms.uniform import remanent_field
 from ..elements.magnetostatics import PermeableRegions, assemble_regions
-from ..harmonics.expansion import box_rule
-from ..harmonics.interior import Ball, from_magnetization, interior_coefficients, multipole_force, multipole_torque
+from ..harmonics.expansion import box_rule, gauss
+from ..harmonics.interior import (
+    Ball,
+    dipole_sources,
+    from_magnetization,
+    interior_coefficients,
+    multipole_force,
+    multipole_torque,
+)
 from ..harmonics.solid import Coefficients, derivative, outer_sums
 from ..rotor.table import RotorTable
-from .grid import induced_sources, permanent_sources, point_counts
+from .grid import induced_sources, point_counts
 
 DEGREES = range(6, 41)
 
 
 def singular_ratio(magnets: Sequence[Magnet], ball: Ball) -> float:
-    """Radius over the distance of the centre from the nearest edge of a magnet.
+    """Radius over the distance of the centre from where the field of a magnet cannot be continued; at most 1.
 
     The field continues analytically across a face, so that edges alone bound the convergence of its expansion, and the
-    centre of a sphere or the axis of a cylinder; 1 in contact with an edge.
+    centre of a sphere or the axis of a cylinder.
     """
-    nearest = min(_singular_distance(magnet.body, ball.center) for magnet in magnets)
+    nearest = np.inf
+    for body in (magnet.body for magnet in magnets):
+        local, distance = body.to_body(ball.center), float(body.edge_distance(ball.center[None])[0])
+        if isinstance(body, Sphere):
+            distance = float(np.linalg.norm(local))
+        elif not isinstance(body, Box):
+            beyond = max(abs(float(local[2])) - float(body.half_edges[2]), 0.0)
+            distance = min(float(np.hypot(np.hypot(local[0], local[1]), beyond)), distance)
+        nearest = min(nearest, distance)
     return min(ball.radius / nearest, 1.0)
 
 
 def enough_degree(magnets: Sequence[Magnet], ball: Ball, rtol: float = 1e-9) -> int:
-    """Degree l at which ρ^2l, the share of degree l in the force, has fallen below `rtol`; between 6 and 40."""
+    """Degree l about a `ball` beside `magnets` at which ρ^2l, its share in the force, is below `rtol`; 6 to 40."""
     ratio = min(singular_ratio(magnets, ball), 0.99)
     return int(np.clip(np.ceil(np.log(rtol) / (2 * np.log(ratio))), DEGREES[0], DEGREES[-1]))
 
 
-def _singular_distance(body: Solid, place: Array) -> float:
-    """Distance (m) of a place (3,) m from where the field of a body cannot be continued."""
-    local, half = body.to_body(place), body.half_edges
-    if isinstance(body, Box):
-        return float(body.edge_distance(place[None])[0])
-    if isinstance(body, Sphere):
-        return float(np.linalg.norm(local))
-    across = float(np.hypot(local[0], local[1]))
-    beyond = max(abs(float(local[2])) - float(half[2]), 0.0)
-    return float(min(np.hypot(across, beyond), body.edge_distance(place[None])[0]))
-
-
+# Integration points per axis in a magnet for the closed form; its logarithm at the edges is met to round-off
 NODES = 24
-"""Integration points per axis in a magnet for the closed form; its logarithm at the edges is met to round-off."""
-DIRECT_DIGITS = 16.0
-"""As `answer_grid.DIGITS`, for the direct part of the answer."""
+DIRECT_DIGITS = 16.0  # as `grid.DIGITS`, for the direct part of the response
 
 
 @dataclass(frozen=True, eq=False)
 class RotorResponse:
-    """A rotor that answers to fields; made by `rotor_response`.
+    """A rotor that responds to fields; made by `rotor_response`.
 
     Parameters
     ----------
@@ -93,9 +94,13 @@ class RotorResponse:
         return RotorTable("cuboid", self.magnets, magnetized)
 
     def answer(self, sources: Coefficients, ball: Ball, degree: int) -> Coefficients:
-        """Coefficients a_lm (T) of the field that the magnets send back to sources c_lm (T) in the ball."""
-        if self.regions is None:
-            return np.zeros((degree + 1, degree + 1), complex)
+        """Response field of the magnets: its coefficients a_lm (T) about the ball's centre.
+
+        Parameters
+        ----------
+        sources, ball : c_lm (T) of what is in the ball
+        degree : highest of the coefficients
+        """
         return from_magnetization(*self.induced_dipoles(sources, ball), ball, degree)
 
     def induced_dipoles(self, sources: Coefficients, ball: Ball) -> tuple[Array, Array]:
@@ -103,14 +108,11 @@ class RotorResponse:
         if self.regions is None:
             return np.zeros((0, 3)), np.zeros((0, 3))
         potentials = [-derivative(sources, axis) for axis in range(3)]
-
-        def field(points: Array) -> Array:
-            return outer_sums(potentials, (points - ball.center) / ball.radius)
-
-        fields = {name: field(points) for name, points in self._places.items()}
         points, tensors = direct_rule(self.magnets, ball.radius)
-        direct = points, np.einsum("na,nab->nb", field(points), tensors)
-        return _joined(self._dipoles(self._beyond(fields)), direct)
+        places = np.concatenate([self.places, points])
+        field, direct = np.split(outer_sums(potentials, (places - ball.center) / ball.radius), [len(self.places)])
+        moments = self.weights[:, None] * self.beyond(field), np.einsum("na,nab->nb", direct, tensors)
+        return places, np.concatenate(moments)
 
     @cached_property
     def remanent_dipoles(self) -> tuple[Array, Array]:
@@ -120,53 +122,37 @@ class RotorResponse:
         """
         if self.regions is None:
             return np.zeros((0, 3)), np.zeros((0, 3))
-        fields = {name: remanent_field(self.magnets, points) for name, points in self._places.items()}
-        return _joined(self._dipoles(self._beyond(fields)), closed_dipoles(self.magnets))
-
-    def linear_response(self, direct: bool = True) -> tuple[Array, Array, Callable[[Array], Array]]:
-        """Points (n, 3) m and weights (n,) m³, and what makes μ0 M (n, 3) T there of a field H0 (n, 3) T.
-
-        M without its direct part (μ - 1) H0 if that is not wanted.
-        """
-        assert self.regions is not None
-        regions, names = self.regions, list(self._places)
-        ends = np.cumsum([len(self._places[name]) for name in names])[:-1]
-
-        def magnetized(field: Array) -> Array:
-            fields = dict(zip(names, np.split(field, ends), strict=True))
-            found = regions.magnetization(fields) if direct else self._beyond(fields)
-            return np.concatenate([found[name] for name in names])
-
-        weights = np.concatenate([regions.points[name].weights for name in names]) * self.mesh.unit**3
-        return np.concatenate([self._places[name] for name in names]), weights, magnetized
+        moments = self.weights[:, None] * self.beyond(remanent_field(self.magnets, self.places))
+        places, closed = closed_dipoles(self.magnets)
+        return np.concatenate([self.places, places]), np.concatenate([moments, closed])
 
     def own_dipoles(self) -> tuple[Array, Array]:
         """As `remanent_dipoles`, on the mesh's points alone: good to a hundredth of what the permeability adds."""
         if self.regions is None:
             return np.zeros((0, 3)), np.zeros((0, 3))
-        points, weights, magnetized = self.linear_response()
-        return points, weights[:, None] * magnetized(remanent_field(self.magnets, points))
+        whole = self.regions.magnetization(remanent_field(self.magnets, self.places))
+        return self.places, self.weights[:, None] * whole
+
+    def beyond(self, field: Array) -> Array:
+        """μ0 M (n, 3) T of a field H0 (n, 3) T at `places` without its direct part (μ - 1) H0."""
+        assert self.regions is not None
+        return self.regions.magnetization(field) - self.regions.direct(field)
 
     @cached_property
-    def _places(self) -> dict[str, Array]:
-        """Integration points of every magnet (n, 3), m."""
+    def places(self) -> Array:
+        """Integration points in the magnets (n, 3), m."""
         assert self.regions is not None
-        return {
-            name: self.magnets[int(name.removeprefix("magnet"))].body.within(self.mesh.to_meter(points.points))
-            for name, points in self.regions.points.items()
-        }
+        places = self.mesh.to_meter(self.regions.points)
+        for k, name in enumerate(self.regions.names):  # curved elements leave a round body by a little
+            mine = self.regions.owner == k
+            places[mine] = self.magnets[int(name.removeprefix("magnet"))].body.within(places[mine])
+        return places
 
-    def _beyond(self, fields: Mapping[str, Array]) -> dict[str, Array]:
-        """μ0 M of fields H0 (n, 3) T at the mesh's points without its direct part (μ - 1) H0."""
+    @property
+    def weights(self) -> Array:
+        """Of the integration points (n,), m³."""
         assert self.regions is not None
-        total, chi = self.regions.magnetization(fields), self.regions.susceptibility
-        return {name: total[name] - fields[name] @ chi[name] for name in total}
-
-    def _dipoles(self, magnetization: Mapping[str, Array]) -> tuple[Array, Array]:
-        assert self.regions is not None
-        weights = {name: points.weights * self.mesh.unit**3 for name, points in self.regions.points.items()}
-        moments = [weights[name][:, None] * values for name, values in magnetization.items()]
-        return np.concatenate([self._places[name] for name in magnetization]), np.concatenate(moments)
+        return self.regions.weights * self.mesh.unit**3
 
 
 def rotor_response(mesh: MagnetMesh, order: int = 3) -> RotorResponse:
@@ -183,17 +169,13 @@ def direct_rule(magnets: Sequence[Magnet], nearest: float) -> tuple[Array, Array
     for magnet in magnets:
         counts = point_counts(magnet.box, nearest, DIRECT_DIGITS)
         places, volumes = (
-            box_rule(magnet.body, counts)
+            box_rule(magnet.body, [gauss(-h, h, n) for h, n in zip(magnet.box.half_edges, counts, strict=True)])
             if isinstance(magnet.body, Box)
             else volume_rule(magnet.body, [magnet.body], max(counts))
         )
         points.append(places)
         tensors.append(volumes[:, None, None] * (magnet.permeability_in_rotor - np.eye(3)))
     return np.concatenate(points), np.concatenate(tensors)
-
-
-def _joined(*parts: tuple[Array, Array]) -> tuple[Array, Array]:
-    return np.concatenate([points for points, _ in parts]), np.concatenate([moments for _, moments in parts])
 
 
 def closed_dipoles(magnets: Sequence[Magnet]) -> tuple[Array, Array]:
@@ -294,7 +276,7 @@ def two_body(
                 f"Input position must leave the floater outside the magnets; instead it cuts magnet {k}."
             )
     own = rotor.own_field(ball, degree)
-    permanent = permanent_sources(floater, direction, ball, degree)
+    permanent = dipole_sources(floater.moment * np.asarray(direction, float), ball, degree)
     reflected = rotor.answer(permanent, ball, degree)
     incident, sources, terms = own + reflected, permanent, 1
     change = induced_sources(incident, floater.recoil_permeability)
@@ -323,7 +305,13 @@ def two_body(
 def two_body_ladder(
     rotors: Sequence[RotorResponse], floater: Floater, position: Array, direction: Array
 ) -> tuple[TwoBody, Wrench]:
-    """The finest of several element degrees, and how far the two finest are apart: an error estimate of the total."""
+    """Both bodies with the finest elements, and how far the two finest are apart: an error estimate of the total.
+
+    Parameters
+    ----------
+    rotors : with elements of growing degree
+    floater, position, direction : as of `two_body`
+    """
     coarse, fine = (two_body(rotor, floater, position, direction) for rotor in rotors[-2:])
     apart = fine.total - coarse.total
     added = fine.total - fine.rigid

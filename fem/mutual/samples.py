@@ -1,4 +1,4 @@
-"""What the answers of rotor and floater are at sampled places, by finite elements and exactly for the sphere."""
+"""Responses of rotor and floater at sampled places: by finite elements, and exactly for the sphere."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -10,24 +10,30 @@ from ...geometry.common import MU_0, Array, Watch, watched
 from ...geometry.magnets import Magnet
 from ...geometry.scene.contents import Floater
 from ...geometry.solids import places_off
-from ..harmonics.interior import FOUR_PI, Ball, dipole_sources, field_at_center, from_magnetization, multipole_force
-from ..harmonics.solid import Coefficients, derivative, factorials, outer_sums
+from ..harmonics.interior import Ball, dipole_sources, field_at_center, from_magnetization, multipole_force
+from ..harmonics.solid import FOUR_PI, Coefficients, derivative, factorials, outer_sums
 from .grid import AnswerGrid, induced_sources, reflection
 from .response import RotorResponse, direct_rule, enough_degree
 
 ROTOR_GAPS, SPHERE_GAPS = (0.1, 0.16, 0.25, 0.4, 0.7, 1.2, 2.5), (0.08, 0.16, 0.3, 0.55, 0.95, 1.6, 2.8)
+# Gaps between the bodies at which samples are taken, in floater radii; the last for several magnets
 NEAR_GAPS = (0.1, 0.13, 0.16, 0.2, 0.25, 0.35, 0.5, 1.0)
-"""Gaps between the bodies at which samples are taken, in floater radii; the last for several magnets."""
+# Part of the largest energy of a field in the magnets below which one counts as none: 6e-5 of an answer in contact
 ALIKE = 1e-4
-"""Part of the largest energy of a field in the magnets below which one counts as none: 6e-5 of an answer in contact."""
-CHUNK = 512
-"""Points in the magnets at once, so that the fields of all dipoles there take some megabytes."""
+CHUNK = 512  # points in the magnets at once, so that the fields of all dipoles there take some megabytes
+# Part of the sphere's answer that the degrees left out may hold, and the most degrees of the small parts
 TAIL, MOST_ADDED, MOST_RETURNED = 1e-4, 16, 24
-"""Part of the sphere's answer that the degrees left out may hold, and the most degrees of the small parts."""
 
 
 def places_around(magnets: Sequence[Magnet], radius: float, gaps: Sequence[float], number: int, seed: int) -> Array:
-    """Centres (n, 3) m of floaters at gaps (radii) from a magnet, `number` for each gap and magnet, where they fit."""
+    """Centres (n, 3) m of floaters beside magnets, where they fit.
+
+    Parameters
+    ----------
+    radius : of the floater, m
+    gaps : from a magnet, in radii
+    number, seed : of random directions for each gap and magnet
+    """
     generator, found = np.random.default_rng(seed), []
     for magnet in magnets:
         for gap in gaps:
@@ -38,7 +44,13 @@ def places_around(magnets: Sequence[Magnet], radius: float, gaps: Sequence[float
 
 
 def places_facing(magnets: Sequence[Magnet], radius: float, gaps: Sequence[float]) -> Array:
-    """The same before the middles of faces and edges and the corners of the magnets; of a lone one, on one side."""
+    """Centres (n, 3) m of floaters before the middles of faces and edges and the corners of magnets, where they fit.
+
+    Parameters
+    ----------
+    magnets : of a lone one, places on one side
+    radius, gaps : of the floater, m, and from a magnet, in radii
+    """
     ways = np.array([way for way in product((-1.0, 0.0, 1.0), repeat=3) if any(way)])
     if len(magnets) == 1:
         ways = ways[len(ways) // 2 :]
@@ -61,35 +73,32 @@ def unit_dipole_fields(points: Array, places: Array) -> Array:
     return np.asarray(MU_0 / FOUR_PI * np.stack(fields, axis=1).reshape(-1, len(points), 3))
 
 
-def answer_products(rotor: RotorResponse, fine: RotorResponse, places: Array, watch: Watch) -> tuple[Array, Array]:
+def response_products(rotor: RotorResponse, fine: RotorResponse, places: Array, watch: Watch) -> tuple[Array, Array]:
     """(3 p, 3 p) J: twice minus the rotor's energy for unit dipoles at places (p, 3) m, in pairs; symmetric.
 
+    Parameters
+    ----------
+    rotor, fine : with elements of a degree, whose points tell which fields are alike, and of one more
+    places : no nearer to the magnets than the floater's centre can be
+    watch : hears of the progress
+
+    Returns
+    -------
     The direct part, exact but for round-off, and what the magnets' own field adds, by the fine elements: those of
     degree 2 err by a twentieth of it, those of degree 3 by a hundredth.
     """
-    direct = _direct(rotor.magnets, places)
-    size = np.sqrt(np.diag(direct))
-    return direct, size * size[:, None] * _beyond(rotor, fine, places, size, watch)
-
-
-def _direct(magnets: Sequence[Magnet], places: Array) -> Array:
-    """The products by the direct part of the magnetisation, exact but for round-off."""
-    nearest = min(float(np.min(magnet.body.distance(places))) for magnet in magnets)
-    points, tensors = direct_rule(magnets, nearest)
-    products = np.zeros((3 * len(places), 3 * len(places)))
+    nearest = min(float(np.min(magnet.body.distance(places))) for magnet in rotor.magnets)
+    points, tensors = direct_rule(rotor.magnets, nearest)
+    direct = np.zeros((3 * len(places), 3 * len(places)))
     for start in range(0, len(points), CHUNK):
         some = slice(start, start + CHUNK)
         fields = unit_dipole_fields(points[some], places)
-        products += np.einsum("pni,qnj,nij->pq", fields, fields, tensors[some], optimize=True)
-    return products / MU_0
-
-
-def _beyond(rotor: RotorResponse, fine: RotorResponse, places: Array, size: Array, watch: Watch) -> Array:
-    """The products by the rest, of unit dipoles over `size` (3 p,).
-
-    Their fields in the magnets are sums of far fewer, which the coarse elements' points tell.
-    """
-    points, weights, _ = rotor.linear_response(direct=False)
+        direct += np.einsum("pni,qnj,nij->pq", fields, fields, tensors[some], optimize=True)
+    direct /= MU_0
+    size = np.sqrt(np.diag(direct))
+    # Fields of all dipoles in the magnets are, but for ALIKE, sums of far fewer: the main components of what they are
+    # at the coarse elements' points. Only for these are the fine elements solved.
+    points, weights = rotor.places, rotor.weights
     alike = np.zeros((len(size), len(size)))
     for start in range(0, len(points), CHUNK):
         some = slice(start, start + CHUNK)
@@ -99,27 +108,27 @@ def _beyond(rotor: RotorResponse, fine: RotorResponse, places: Array, size: Arra
     values, vectors = np.linalg.eigh(alike)
     kept = values > ALIKE * values[-1]
     shares = vectors[:, kept] * np.sqrt(values[kept])
-    points, weights, magnetized = fine.linear_response(direct=False)
+    points, weights = fine.places, fine.weights
     parts = np.zeros((shares.shape[1], *points.shape))
     for k, place in enumerate(places):
         own = np.arange(3 * k, 3 * k + 3)
         given = unit_dipole_fields(points, place[None]) / size[own, None, None]
         parts += np.einsum("ak,ani->kni", vectors[own][:, kept] / np.sqrt(values[kept]), given)
-    answers = np.array([magnetized(part) for part in watched(parts, watch, "rotor's answer")])
+    induced = np.array([fine.beyond(part) for part in watched(parts, watch, "induced magnetisation of the rotor")])
     parts *= weights[:, None]
-    found = parts.reshape(len(parts), -1) @ answers.reshape(len(parts), -1).T / MU_0
-    return np.asarray(shares @ ((found + found.T) / 2) @ shares.T)
+    found = parts.reshape(len(parts), -1) @ induced.reshape(len(parts), -1).T / MU_0
+    return direct, size * size[:, None] * (shares @ ((found + found.T) / 2) @ shares.T)
 
 
 @dataclass(frozen=True, eq=False)
 class SphereSamples:
-    """The sphere's answer to the rotor's field at places (n, 3).
+    """The sphere's response to the rotor's field at places (n, 3).
 
     Parameters
     ----------
     places : m
-    energy, force : (n,) J and (n, 3) N of the answer of degree 2 and more
-    energy_size, force_size : (n,) of the whole answer
+    energy, force : (n,) J and (n, 3) N of the response of degree 2 and more
+    energy_size, force_size : (n,) of the whole response
     """
 
     places: Array
@@ -130,24 +139,34 @@ class SphereSamples:
 
 
 def sphere_samples(rotor: RotorResponse, floater: Floater, places: Array, watch: Watch) -> SphereSamples:
-    """The sphere's answer, degree by degree, to the rotor's own field."""
+    """The sphere's response, degree by degree, to the rotor's own field.
+
+    Parameters
+    ----------
+    rotor, floater : each alone
+    places : (n, 3) m of the floater's centre
+    watch : hears of the progress
+    """
     dipoles, rows = rotor.own_dipoles(), []
-    for place in watched(places, watch, "floater's answer"):
+    for place in watched(places, watch, "induced magnetisation of the floater"):
         ball = Ball(place, floater.radius)
         own = _own_field(rotor, dipoles, ball, enough_degree(rotor.magnets, ball, TAIL))
-        sources = induced_sources(own, floater.recoil_permeability)
+        degree, sources = len(own) - 1, induced_sources(own, floater.recoil_permeability)
         first = sources.copy()
         first[2:] = 0.0
         whole, uniform = multipole_force(own, sources, ball), multipole_force(own, first, ball)
-        energies = _energies(own, floater)
+        # minus the energy of each degree: half of (4π R³/μ0) t_l Σ_m |a_lm|²/((l-m)! (l+m)!), m of both signs
+        twice = np.where(np.arange(degree + 1), 2.0, 1.0)
+        square = (np.abs(own) ** 2 / factorials(degree) * twice).sum(axis=1)
+        scale = FOUR_PI * floater.radius**3 / MU_0 / 2
+        energies = scale * reflection(floater.recoil_permeability, degree) * square
         rows.append((-energies[2:].sum(), whole - uniform, energies.sum(), np.linalg.norm(whole)))
-    energy, force, size, strength = (np.array(column) for column in zip(*rows, strict=True))
-    return SphereSamples(places, energy, force, size, strength)
+    return SphereSamples(places, *(np.array(column) for column in zip(*rows, strict=True)))
 
 
 @dataclass(frozen=True, eq=False)
 class ReturnedSamples:
-    """What the rotor answers to the sphere's answer of degree 2 and more to the rotor's field, at places (n, 3).
+    """The rotor's response to the sphere's response of degree 2 and more to the rotor's field, at places (n, 3).
 
     Parameters
     ----------
@@ -169,10 +188,17 @@ def returned_samples(
     places: Array,
     watch: Watch,
 ) -> ReturnedSamples:
-    """The same from the points that answer for the rotor: to 2e-3 what its finite elements give from 1 mm off contact.
+    """The same from the points that respond for the rotor: to 2e-3 what its finite elements give from 1 mm off contact.
 
-    The energy is -M·V of the moment M. A unit moment and the sphere's answer to B0 are sources, the rotor answers to
-    both, and the sphere to its answer to the moment: the forces of the three are the derivatives of V.
+    The energy is -M·V of the moment M. A unit moment and the sphere's response to B0 are sources, the rotor responds to
+    both, and the sphere to its response to the moment: the forces of the three are the derivatives of V.
+
+    Parameters
+    ----------
+    rotor, floater : each alone
+    grids, inner, coupling : points (n, 3) m and weights that respond for the rotor, see `MutualTable`
+    places : (n, 3) m of the floater's centre
+    watch : hears of the progress
     """
     dipoles, fields, slopes = rotor.own_dipoles(), [], []
 
@@ -181,14 +207,14 @@ def returned_samples(
         sources[:2] = 0.0
         return sources
 
-    for place in watched(places, watch, "rotor's answer to it"):
+    for place in watched(places, watch, "rotor's response to it"):
         ball = Ball(place, floater.radius)
         degree = min(enough_degree(rotor.magnets, ball, TAIL), MOST_RETURNED)
         own = _own_field(rotor, dipoles, ball, degree)
-        back, slope = point_answer(grids, inner, coupling, high(own), ball), []
+        back, slope = point_response(grids, inner, coupling, high(own), ball), []
         for unit in np.eye(3):
             moment = dipole_sources(unit, ball, degree)
-            answer = point_answer(grids, inner, coupling, moment, ball)
+            answer = point_response(grids, inner, coupling, moment, ball)
             pairs = (answer, high(own)), (back, moment), (own, high(answer))
             slope.append(np.sum([multipole_force(*pair, ball) for pair in pairs], axis=0))
         fields.append(field_at_center(back))
@@ -196,18 +222,22 @@ def returned_samples(
     return ReturnedSamples(places, np.array(fields), np.array(slopes))
 
 
-def point_answer(
+def point_response(
     grids: Sequence[AnswerGrid], inner: Array, coupling: Array, sources: Coefficients, ball: Ball
 ) -> Coefficients:
-    """Coefficients a_lm (T) of what the points of magnets, and magnets as a whole, send back to sources in a ball."""
-    frames = [grid.box for grid in grids]
-    points = [box.center + grid.points @ box.rotation.T for grid, box in zip(grids, frames, strict=True)]
-    places = np.concatenate([*points, inner])
+    """Coefficients a_lm (T) of what the points of magnets, and magnets as a whole, send back to sources in a ball.
+
+    Parameters
+    ----------
+    grids : of the magnets
+    inner, coupling : (k, 3) m and (3k, 3k) A m²/T, for the magnets as a whole
+    sources, ball : c_lm (T) and the ball in which they are
+    """
+    places = np.concatenate([*(grid.places for grid in grids), inner])
     fields = outer_sums([-derivative(sources, axis) for axis in range(3)], (places - ball.center) / ball.radius)
-    *seen, whole = np.split(fields, np.cumsum([len(p) for p in points]))
-    moments = [
-        (b @ box.rotation * grid.strengths) @ box.rotation.T for grid, box, b in zip(grids, frames, seen, strict=True)
-    ]
+    *seen, whole = np.split(fields, np.cumsum([len(grid.points) for grid in grids]))
+    frames = [grid.box.rotation for grid in grids]
+    moments = [(b @ r * grid.strengths) @ r.T for grid, r, b in zip(grids, frames, seen, strict=True)]
     moments.append((coupling @ whole.ravel()).reshape(-1, 3))
     return from_magnetization(places, MU_0 * np.concatenate(moments), ball, len(sources) - 1)
 
@@ -218,12 +248,3 @@ def _own_field(rotor: RotorResponse, dipoles: tuple[Array, Array], ball: Ball, d
     size = min(degree, MOST_ADDED) + 1
     own[:size, :size] += from_magnetization(*dipoles, ball, size - 1)
     return own
-
-
-def _energies(incident: Coefficients, floater: Floater) -> Array:
-    """Minus the energy (l,) J of each degree of the sphere's answer."""
-    degree = len(incident) - 1
-    twice = np.where(np.arange(degree + 1), 2.0, 1.0)
-    parts = (np.abs(incident) ** 2 / factorials(degree) * twice).sum(axis=1)
-    scale = FOUR_PI * floater.radius**3 / MU_0 / 2
-    return np.asarray(scale * reflection(floater.recoil_permeability, degree) * parts)

@@ -1,6 +1,6 @@
-"""The sphere's answer of degree 2 and more, and the rotor's answer to that, fitted with the points of `AnswerGrid`s."""
+"""Mutual magnetisation of a rotor and a permeable sphere as one energy, and the fit of its weights to samples."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import combinations, permutations
@@ -8,183 +8,44 @@ from itertools import combinations, permutations
 import heyoka as hy
 import numpy as np
 import scipy
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from ...geometry.common import Array
 from ...geometry.magnets import Magnet
 from .grid import (
-    POWERS,
-    RETURNED,
+    CHARGES,
+    FEW_CHARGES,
+    OF_RETURN,
+    OF_SPHERE,
     AnswerGrid,
-    Pairs,
-    answer_to_charge,
-    coupled_derivatives,
-    grid_derivatives,
-    mixed_derivatives,
+    EnergySum,
+    charge_sum,
+    coupled_sum,
     mixed_energy,
-    orbits,
-    pair_derivatives,
-    pairs_mixed,
-    pairs_of_charges,
-    point_field,
+    pair_energy,
 )
 from .samples import ReturnedSamples, SphereSamples
 
-SMALL = 1e-9
-"""Relative size of a singular value that is none."""
+SMALL = 1e-9  # relative size of a singular value that is none
+# From so many magnets on, points of a class have one weight and magnets respond to each other by their centres
 MANY = 4
-"""From so many magnets on, points of a class have one weight and magnets answer to each other by their centres."""
+# What a weight costs that is held, and one that is not, by an error of the size of all that is fitted
 HELD, FREE = 1e-3, 1e-6
-"""What a weight costs that is held, and one that is not, by an error of the size of all that is told."""
 PARALLEL = 1e-9
-
-
-def classes(grid: AnswerGrid, mirrored: bool) -> Array:
-    """(n, classes): which points belong to a class."""
-    number = orbits(grid.points, mirrored)
-    return np.asarray(np.eye(number.max() + 1)[number])
-
-
-def least_squares(columns: Array, values: Array, held: Array, cost: float = HELD) -> Array:
-    """Weights of columns of any sizes; those `held` are kept small: by themselves they are hardly determined."""
-    size = np.linalg.norm(columns, axis=0)
-    size[size == 0] = 1.0
-    scaled = columns / size
-    if not held.any():
-        return np.asarray(np.linalg.lstsq(scaled, values, rcond=SMALL)[0] / size)
-    square = scaled.T @ scaled
-    square[np.diag_indices_from(square)] += np.where(held, cost, FREE) ** 2
-    return np.asarray(scipy.linalg.solve(square, scaled.T @ values, assume_a="pos") / size)
-
-
-def sphere_fit(grids: Sequence[AnswerGrid], images: Array, samples: SphereSamples) -> tuple[list[AnswerGrid], Array]:
-    """Weights of the points' powers, and of pairs of magnets, that give energy and force of the sphere's answer."""
-    found, kinds = [_powers(grid, samples.places) for grid in grids], _kinds(grids)
-    sums = [_classed(kind, value, slope) for kind, (value, slope) in zip(kinds, found, strict=True)]
-    pairs = list(combinations(range(len(grids)), 2))
-    for a, b in pairs:
-        value, slope, _ = pair_derivatives(pairs_of_charges(grids[a], grids[b], images), samples.places)
-        sums.append((value[:, None], slope[:, :, None]))
-    value, slope = (np.concatenate(parts, axis=-1) for parts in zip(*sums, strict=True))
-    rows = [value / samples.energy_size[:, None], *np.moveaxis(slope / samples.force_size[:, None, None], 1, 0)]
-    right = [-samples.energy / samples.energy_size, *(samples.force / samples.force_size[:, None]).T]
-    held = np.concatenate([_held(grids, kinds, len(POWERS)), np.zeros(len(pairs), bool)])
-    weights = list(least_squares(np.concatenate(rows), np.concatenate(right), held))
-    made = [replace(g, degrees=_spread(kind, weights, len(POWERS))) for g, kind in zip(grids, kinds, strict=True)]
-    coupled = np.zeros((len(grids), len(grids)))
-    for (a, b), weight in zip(pairs, weights, strict=True):
-        coupled[a, b] = coupled[b, a] = weight
-    return made, coupled
-
-
-def returned_fit(
-    grids: Sequence[AnswerGrid], inner: Sequence[Array], images: Array, samples: ReturnedSamples
-) -> tuple[list[AnswerGrid], Array]:
-    """Weights of the points' powers, and of pairs, that give V, the rotor's answer to the sphere's, and its slopes."""
-    kinds, pairs = _kinds(grids), list(permutations(range(len(grids)), 2))
-    sums = [_classed(kind, *_vectors(grid, samples.places)) for kind, grid in zip(kinds, grids, strict=True)]
-    for a, b in pairs:
-        nothing = np.zeros_like(samples.places)
-        _, flat, steep = mixed_derivatives(pairs_mixed(grids[a], inner[b], images), samples.places, nothing)
-        sums.append((flat[:, 3:, None], steep[:, 3:, :3, None]))
-    value, slope = (np.concatenate(parts, axis=-1) for parts in zip(*sums, strict=True))
-    sizes = np.linalg.norm(samples.field, axis=1), np.linalg.norm(samples.slope, axis=(1, 2))
-    value, slope = value / sizes[0][:, None, None], slope / sizes[1][:, None, None, None]
-    right = [(samples.field / sizes[0][:, None]).ravel(), (samples.slope / sizes[1][:, None, None]).ravel()]
-    rows = [part.reshape(-1, part.shape[-1]) for part in (value, slope)]
-    held = np.concatenate([_held(grids, kinds, len(RETURNED)), np.zeros(len(pairs), bool)])
-    weights = list(least_squares(np.concatenate(rows), np.concatenate(right), held, 10 * HELD))
-    made = [replace(g, returned=_spread(kind, weights, len(RETURNED))) for g, kind in zip(grids, kinds, strict=True)]
-    mixed = np.zeros((len(grids), len(grids)))
-    for (a, b), weight in zip(pairs, weights, strict=True):
-        mixed[a, b] = weight
-    return made, mixed
-
-
-def _kinds(grids: Sequence[AnswerGrid]) -> list[Array]:
-    """(n, kinds) of each grid's points, beside other magnets each point too; none where there is no remanence."""
-    found = []
-    for grid in grids:
-        kinds = classes(grid, mirrored=bool(np.sum(np.abs(grid.axis) > PARALLEL) == 1))
-        if _single(grids):
-            kinds = np.concatenate([kinds, np.eye(len(kinds))], axis=1)
-        found.append(kinds if grid.axis.any() else kinds[:, :0])
-    return found
-
-
-def _single(grids: Sequence[AnswerGrid]) -> bool:
-    """Whether points are fitted one by one."""
-    return 1 < len(grids) < MANY
-
-
-def _held(grids: Sequence[AnswerGrid], kinds: Sequence[Array], powers: int) -> NDArray[np.bool_]:
-    """Which weights belong to a point by itself."""
-    first = [kind.shape[1] - (len(kind) if _single(grids) else 0) for kind in kinds]
-    each = [np.arange(kind.shape[1]) >= n for kind, n in zip(kinds, first, strict=True)]
-    return np.concatenate([np.tile(part, 2 * powers) for part in each])
-
-
-def _classed(kinds: Array, value: Array, slope: Array) -> tuple[Array, Array]:
-    """What each power (..., powers, n) of the points sums to for each of their kinds: (..., powers · kinds)."""
-    value, slope = value @ kinds, slope @ kinds
-    return value.reshape(*value.shape[:-2], -1), slope.reshape(*slope.shape[:-2], -1)
-
-
-def _spread(kinds: Array, weights: list[float], powers: int) -> Array:
-    """(n, powers, 2) of the points, from the next of the weights, which are taken off the list."""
-    parts = [kinds @ np.array([weights.pop(0) for _ in range(kinds.shape[1])]) for _ in range(2 * powers)]
-    return np.stack(parts, axis=1).reshape(-1, powers, 2)
-
-
-def _powers(grid: AnswerGrid, places: Array) -> tuple[Array, Array]:
-    """Of every point (n): 1 and (ĵ·d)²/d² times (R/d)^2p at places (m): (m, 6, n), and their gradients (m, 3, 6, n)."""
-    d = grid.box.to_body(places)[:, None] - grid.points
-    inverse = 1 / np.sum(d**2, axis=2)
-    along = d @ grid.axis
-    values, slopes = [], []
-    for p in POWERS:
-        power = grid.radius ** (2 * p) * inverse**p
-        values += [power, power * along**2 * inverse]
-        flat = (-2 * p * power * inverse)[..., None] * d
-        steep = (-2 * (p + 1) * power * along**2 * inverse**2)[..., None] * d
-        slopes += [flat, steep + (2 * power * along * inverse)[..., None] * grid.axis]
-    turned = np.stack(slopes, axis=1) @ grid.box.rotation.T
-    return np.stack(values, axis=1), np.moveaxis(turned, 3, 1)
-
-
-def _vectors(grid: AnswerGrid, places: Array) -> tuple[Array, Array]:
-    """Of every point (n): ĵ and (ĵ·d) d/d² times (R/d)^2q: (m, 3, 4, n), and their derivatives (m, 3, 3, 4, n)."""
-    d = grid.box.to_body(places)[:, None] - grid.points
-    inverse = (1 / np.sum(d**2, axis=2))[..., None]
-    along, axis = (d @ grid.axis)[..., None], grid.axis
-    values, slopes = [], []
-    for q in RETURNED:
-        power = grid.radius ** (2 * q) * inverse**q
-        share = power * along * inverse
-        flat = -2 * q * power * inverse * d
-        steep = -2 * (q + 1) * share * inverse * d + power * inverse * axis
-        values += [power * axis, share * d]
-        slopes += [
-            axis[:, None] * flat[..., None, :],
-            d[..., None] * steep[..., None, :] + share[..., None] * np.eye(3),
-        ]
-    turn = grid.box.rotation
-    value, slope = np.stack(values, axis=1) @ turn.T, turn @ np.stack(slopes, axis=1) @ turn.T
-    return np.moveaxis(value, 3, 1), np.moveaxis(slope, (3, 4), (1, 2))
 
 
 @dataclass(frozen=True, eq=False)
 class MutualTable:
-    """The answers of a rotor and a floater to each other.
+    """What rotor and floater add to each other's magnetisation: U = -½ α B0² + Σ -½ λ b² - u - V·M, M = m + α B0.
 
     Parameters
     ----------
     magnets : of the rotor
-    grids : of those magnets that answer or are magnetised
+    grids : of those magnets that respond or are magnetised
     coupling : (3k, 3k) A m²/T: energies of the fields at the grids' inner points, -½ bᵀ coupling b
     pairs : (n, n) J: energies of the sphere by what two magnets' fields, as those of charges, do in it together
-    mixed : (n, n) T: fields by which the second magnet answers to the sphere's answer to the first
-    images : (3,) weights of the images that tell its answer to charges
+    mixed : (n, n) T: fields by which the second magnet responds to the sphere's response to the first
+    images : (3,) weights of the images that stand for its response to charges
     polarizability : α, A m²/T
     gaps, errors : (k,) m between the bodies, and (k, 2) the largest relative errors of force and torque found there
     provenance : how the table was made; texts and numbers
@@ -201,6 +62,21 @@ class MutualTable:
     errors: Array = field(default_factory=lambda: np.zeros((1, 2)))
     provenance: dict[str, str | float] = field(default_factory=dict)
 
+    @cached_property
+    def _sums(self) -> list[EnergySum]:
+        """Whose sum is the energy of the moment M."""
+        sums = [grid.energy(grid.numbers) for grid in self.grids]
+        number = round((len(self.coupling) / (3 * max(len(self.grids), 1))) ** (1 / 3))
+        inner = [grid.inner(number) for grid in self.grids]
+        if self.coupling.any():
+            sums.append(coupled_sum(np.concatenate(inner), self.coupling))
+        for a, b in permutations(range(len(self.grids)), 2):
+            if self.mixed[a, b]:
+                sums.append(mixed_sum(self.grids[a], inner[b], self.images, self.mixed[a, b]))
+            if a < b and self.pairs[a, b]:
+                sums.append(pair_sum(self.grids[a], self.grids[b], self.images, self.pairs[a, b]))
+        return sums
+
     def energy(
         self,
         position: Sequence[hy.expression],
@@ -208,120 +84,49 @@ class MutualTable:
         flux: Sequence[hy.expression],
         share: hy.expression | float = 1.0,
     ) -> hy.expression:
-        """U, J times share², at a position (3 expressions, m) of a rigid moment (A m²) in a field B0 (T), times share.
+        """The energy U as an expression.
 
-        `share` lets the energy come in units of its own: it is one over their root.
+        Parameters
+        ----------
+        position : of the floater's centre (3 expressions, m), rotor's frame
+        moment, flux : rigid moment (A m²) and the rotor's field B0 (T), times `share`
+        share : lets the energy come in units of its own, J times share²: it is one over their root
         """
         whole = [m + self.polarizability * b for m, b in zip(moment, flux, strict=True)]
         parts = [-0.5 * self.polarizability * hy.sum([b * b for b in flux])]
-        parts += [grid.energy(position, whole, share) for grid in self.grids]
-        return hy.sum([*parts, self.coupled(position, whole, share)])
-
-    def coupled(
-        self, position: Sequence[hy.expression], whole: Sequence[hy.expression], share: hy.expression | float = 1.0
-    ) -> hy.expression:
-        """The part of the energy of the moment M that magnets have by what they are as a whole, as `energy`."""
-        mixed = share * self._mixed(position, whole)
-        return self._between(position, whole) + mixed + share * share * self._together(position)
-
-    def _between(self, position: Sequence[hy.expression], whole: Sequence[hy.expression]) -> hy.expression:
-        """-½ bᵀ coupling b."""
-        if not self.coupling.any():
-            return hy.expression(0.0)
-        ways = [[x - float(c) for x, c in zip(position, point, strict=True)] for p in self._inner for point in p]
-        fields = [b for way in ways for b in point_field(way, whole)]
-        entries = zip(*np.triu_indices(len(fields)), strict=True)
-        return hy.sum(
-            [float(-0.5 * (1 if a == b else 2) * self.coupling[a, b]) * (fields[a] * fields[b]) for a, b in entries]
-        )
-
-    def _mixed(self, position: Sequence[hy.expression], whole: Sequence[hy.expression]) -> hy.expression:
-        """What magnets answer to the sphere's answer to others."""
-        parts, images = [hy.expression(0.0)], self.images.tolist()
-        for a, b in permutations(range(len(self.grids)), 2):
-            if self.mixed[a, b]:
-                (places, amounts), radius, points = self.grids[a].few_charges, self.grids[a].radius, self._inner[b]
-                ways = [
-                    [[(x - float(c)) / radius for x, c in zip(position, q, strict=True)] for q in p]
-                    for p in (places, points)
-                ]
-                parts += [
-                    float(-self.mixed[a, b] / len(points) * amount) * mixed_energy(here, there, whole, images)
-                    for here, amount in zip(ways[0], amounts, strict=True)
-                    for there in ways[1]
-                ]
-        return hy.sum(parts)
-
-    def _together(self, position: Sequence[hy.expression]) -> hy.expression:
-        """What each two magnets' charges do in the sphere."""
-        parts, images = [hy.expression(0.0)], self.images.tolist()
-        scaled = [
-            [[(x - float(c)) / grid.radius for x, c in zip(position, place, strict=True)] for place in grid.charges[0]]
-            for grid in self.grids
-        ]
-        for a, b in self._related:
-            amounts = -self.pairs[a, b] * np.outer(self.grids[a].charges[1], self.grids[b].charges[1])
-            parts += [
-                float(amounts[k, l]) * answer_to_charge(scaled[a][k], scaled[b][l], images)
-                for k, l in np.ndindex(*amounts.shape)
-            ]
-        return hy.sum(parts)
+        return hy.sum([*parts, *(one.expression(position, whole, share) for one in self._sums)])
 
     def derivatives(self, places: Array, moments: Array) -> tuple[Array, Array, Array]:
         """Energy (n,) J of moments M without -½ α B0², gradient (n, 6) and second derivatives (n, 6, 6).
 
         By place (n, 3) m and moment (n, 3) A m², in this order.
         """
-        energy, slope, second = np.zeros(len(places)), np.zeros((len(places), 6)), np.zeros((len(places), 6, 6))
-        parts = [grid_derivatives(grid, places, moments) for grid in self.grids]
-        if self.coupling.any():
-            parts.append(coupled_derivatives(np.concatenate(self._inner), self.coupling, places, moments))
-        for weight, given in self._answering:
-            energies = mixed_derivatives(given, places, moments)
-            parts.append((weight * energies[0], weight * energies[1], weight * energies[2]))
-        for part in parts:
-            energy, slope, second = energy + part[0], slope + part[1], second + part[2]
-        for weight, given in self._charged:
-            value, along, bend = pair_derivatives(given, places)
-            energy = energy + weight * value
-            slope[:, :3] += weight * along
-            second[:, :3, :3] += weight * bend
-        return energy, slope, second
+        number = len(places)
+        total = np.zeros(number), np.zeros((number, 6)), np.zeros((number, 6, 6))
+        for one in self._sums:
+            for whole, part in zip(total, one.derivatives(places, moments), strict=True):
+                whole += part
+        return total
 
-    @cached_property
-    def _answering(self) -> list[tuple[float, Pairs]]:
-        """Magnets that answer to the sphere's answer to others."""
-        each = permutations(range(len(self.grids)), 2)
-        return [
-            (-float(self.mixed[a, b]), pairs_mixed(self.grids[a], self._inner[b], self.images))
-            for a, b in each
-            if self.mixed[a, b]
-        ]
+    def added(self, places: Array, moments: Array, field: Array, gradient: Array) -> tuple[Array, Array, Array]:
+        """What mutual magnetisation adds to energy (n,) J, force (n, 3) N and torque (n, 3) N m.
 
-    @cached_property
-    def _charged(self) -> list[tuple[float, Pairs]]:
-        """Two magnets each that are charged."""
-        return [
-            (-float(self.pairs[a, b]), pairs_of_charges(self.grids[a], self.grids[b], self.images))
-            for a, b in self._related
-        ]
-
-    @cached_property
-    def _inner(self) -> list[Array]:
-        """The points of each magnet at which they answer to each other."""
-        number = round((len(self.coupling) / (3 * max(len(self.grids), 1))) ** (1 / 3))
-        return [grid.inner(number) for grid in self.grids]
-
-    @property
-    def _related(self) -> list[tuple[int, int]]:
-        """Two magnets each."""
-        return [(a, b) for a, b in combinations(range(len(self.grids)), 2) if self.pairs[a, b]]
+        Parameters
+        ----------
+        places, moments : (n, 3) m of the floater's centre, and (n, 3) A m² of its rigid moment, rotor's frame
+        field, gradient : B0 (n, 3) T and ∂B0_i/∂x_j (n, 3, 3) T/m of the rotor there
+        """
+        alpha = self.polarizability
+        energy, slope, _ = self.derivatives(places, moments + alpha * field)
+        by_place, by_moment = slope[:, :3], slope[:, 3:]
+        # M follows the place by B0, so that the force has a part by the moment
+        force = -by_place + alpha * np.einsum("ni,nij->nj", field - by_moment, gradient)
+        return energy - alpha / 2 * np.sum(field**2, axis=1), force, -np.cross(moments, by_moment)
 
     def relative_error(self, points: ArrayLike) -> tuple[Array, Array]:
-        """Estimated relative errors (n,) of what the answers add to force and torque, at points (n, 3) m."""
+        """Estimated relative errors (n,) of what is added to force and torque, at points (n, 3) m."""
         places = np.asarray(points, float).reshape(-1, 3)
-        radius = self.grids[0].radius
-        gap = np.min([magnet.body.distance(places) for magnet in self.magnets], axis=0) - radius
+        gap = np.min([magnet.body.distance(places) for magnet in self.magnets], axis=0) - self.grids[0].radius
         at = np.log(np.maximum(gap, self.gaps[0]))
         force, torque = (np.exp(np.interp(at, np.log(self.gaps), np.log(e))) for e in self.errors.T + 1e-12)
         return force, torque
@@ -332,3 +137,136 @@ class MutualTable:
             f"{e:.1e} at {g * 1e3:.2g} mm" for g, e in zip(self.gaps, self.errors.max(axis=1), strict=True)
         )
         return f"MutualTable: {points} points in {len(self.grids)} magnets; relative error {told} from contact"
+
+
+def pair_sum(first: AnswerGrid, second: AnswerGrid, images: Array, weight: float = 1.0) -> EnergySum:
+    """Minus `weight` (J) times the energy of the sphere by what the charges of `first` and `second` do in it together.
+
+    `images` are the weights of `pair_energy`.
+    """
+    places, amounts = first.charges(CHARGES)
+    return charge_sum(pair_energy, (places, weight * amounts), second.charges(CHARGES), first.radius, images)
+
+
+def mixed_sum(source: AnswerGrid, points: Array, images: Array, weight: float = 1.0) -> EnergySum:
+    """Minus `weight` (T) times the energy of the moment by what `points` (k, 3) m respond to the sphere's response.
+
+    That is to the `source`; `images` are the weights of `mixed_energy`.
+    """
+    places, amounts = source.charges(FEW_CHARGES)
+    mean = points, np.full(len(points), 1 / len(points))
+    return charge_sum(mixed_energy, (places, weight * amounts), mean, source.radius, images)
+
+
+def sphere_fit(grids: Sequence[AnswerGrid], images: Array, samples: SphereSamples) -> tuple[list[AnswerGrid], Array]:
+    """Weights of the points' powers, and of pairs of magnets, that give energy and force of the sphere's response.
+
+    Parameters
+    ----------
+    grids : whose `degrees` are sought
+    images : weights of the sphere's images
+    samples : the response of degree 2 and more
+    """
+
+    def scaled(energy: Array, slope: Array, _: Array) -> Array:
+        by_place = np.moveaxis(slope[..., :3], -1, 0)
+        return np.concatenate([energy / samples.energy_size, *(by_place / samples.force_size)], axis=1)
+
+    pairs = list(combinations(range(len(grids)), 2))
+    sums = [pair_sum(grids[a], grids[b], images) for a, b in pairs]
+    right = scaled(samples.energy[None], -samples.force[None], samples.force)[0]
+    found, weights = _fitted(grids, OF_SPHERE, sums, samples.places, scaled, right, HELD)
+    coupled = np.zeros((len(grids), len(grids)))
+    for (a, b), weight in zip(pairs, weights, strict=True):
+        coupled[a, b] = coupled[b, a] = weight
+    return [replace(grid, degrees=part) for grid, part in zip(grids, found, strict=True)], coupled
+
+
+def returned_fit(
+    grids: Sequence[AnswerGrid], inner: Sequence[Array], images: Array, samples: ReturnedSamples
+) -> tuple[list[AnswerGrid], Array]:
+    """Weights of the points' powers, and of pairs, that give V and its slopes.
+
+    Parameters
+    ----------
+    grids : whose `returned` are sought
+    inner : (k, 3) m of each magnet, points that respond for the whole of it
+    images : weights of the sphere's images
+    samples : the rotor's response to the sphere's
+    """
+    sizes = np.linalg.norm(samples.field, axis=1)[:, None], np.linalg.norm(samples.slope, axis=(1, 2))[:, None, None]
+
+    def scaled(_: Array, slope: Array, second: Array) -> Array:
+        parts = slope[..., 3:] / sizes[0], second[..., 3:, :3] / sizes[1]
+        return np.concatenate([part.reshape(len(part), -1) for part in parts], axis=1)
+
+    pairs = list(permutations(range(len(grids)), 2))
+    sums = [mixed_sum(grids[a], inner[b], images) for a, b in pairs]
+    # the energy is -M·V
+    right = -np.concatenate([(samples.field / sizes[0]).ravel(), (samples.slope / sizes[1]).ravel()])
+    found, weights = _fitted(grids, OF_RETURN, sums, samples.places, scaled, right, 10 * HELD)
+    mixed = np.zeros((len(grids), len(grids)))
+    for (a, b), weight in zip(pairs, weights, strict=True):
+        mixed[a, b] = weight
+    return [replace(grid, returned=part) for grid, part in zip(grids, found, strict=True)], mixed
+
+
+def _fitted(
+    grids: Sequence[AnswerGrid],
+    numbers: range,
+    sums: Sequence[EnergySum],
+    places: Array,
+    scaled: Callable[[Array, Array, Array], Array],
+    right: Array,
+    cost: float,
+) -> tuple[list[Array], Array]:
+    """Some `numbers` of the points (n, powers, 2) of each grid, and weights (k,) of sums.
+
+    `scaled` makes the equations' columns (g, rows) of the energies' derivatives, and `right` is what they shall give.
+    """
+    columns, held, kinds, still = list[Array](), list[Array](), list[Array](), np.zeros_like(places)
+    single = 1 < len(grids) < MANY  # beside other magnets each point has a weight of its own, too
+    for grid in grids:
+        kind = classes(grid, mirrored=bool(np.sum(np.abs(grid.axis) > PARALLEL) == 1))
+        alone = np.eye(len(kind)) if single else kind[:, :0]
+        kinds.append(np.concatenate([kind, alone], axis=1)[:, : None if grid.axis.any() else 0])
+        for k in numbers:
+            columns.append(scaled(*grid.energy(np.eye(13)[k]).derivatives(places, still, kinds[-1])))
+            held.append(np.arange(kinds[-1].shape[1]) >= kind.shape[1])
+    for one in sums:
+        columns.append(scaled(*one.derivatives(places, still, np.ones((len(one.rows), 1)))))
+        held.append(np.zeros(1, bool))
+    found = least_squares(np.concatenate(columns).T, right, np.concatenate(held), cost)
+    parts = iter(np.split(found, np.cumsum([len(column) for column in columns])[:-1]))
+    each = [np.stack([kind @ next(parts) for _ in numbers], axis=1).reshape(len(kind), -1, 2) for kind in kinds]
+    return each, np.array([float(part[0]) for part in parts])
+
+
+def classes(grid: AnswerGrid, mirrored: bool) -> Array:
+    """(n, classes): which points are exchanged by mirrors at the body's planes, or else by its centre."""
+    key = np.round(grid.points * 1e9).astype(int)
+    if mirrored:
+        key = np.abs(key)
+    else:
+        first = np.array([next((v for v in row if v), 0) for row in key])
+        key = key * np.where(first < 0, -1, 1)[:, None]
+    number = np.unique(key, axis=0, return_inverse=True)[1].ravel()
+    return np.asarray(np.eye(number.max() + 1)[number])
+
+
+def least_squares(columns: Array, values: Array, held: Array, cost: float = HELD) -> Array:
+    """Weights (k,) of columns (n, k) of any sizes that give values (n,).
+
+    Parameters
+    ----------
+    held : (k,) which weights are kept small: by themselves they are hardly determined
+    cost : of a held one, by an error of the size of all values
+    """
+    size = np.linalg.norm(columns, axis=0)
+    size[size == 0] = 1.0
+    scaled = columns / size
+    if not held.any():
+        return np.asarray(np.linalg.lstsq(scaled, values, rcond=SMALL)[0] / size)
+    square = scaled.T @ scaled
+    square[np.diag_indices_from(square)] += np.where(held, cost, FREE) ** 2
+    return np.asarray(scipy.linalg.solve(square, scaled.T @ values, assume_a="pos") / size)

@@ -40,25 +40,25 @@ def solve_both_bodies(
     permeability = {n: magnet.permeability_in_rotor for n, magnet in zip(names, mesh.magnets, strict=True)}
     permeability["floater"] = floater.recoil_permeability * np.eye(3)
     regions = assemble_regions(mesh.mesh, permeability, mesh.ball_radius, order)
-    places = {name: mesh.to_meter(points.points) for name, points in regions.points.items()}
+    places, weights = mesh.to_meter(regions.points), regions.weights * mesh.unit**3
+    mine = {name: regions.owner == k for k, name in enumerate(regions.names)}
     for name, magnet in zip(names, mesh.magnets, strict=True):
-        places[name] = magnet.body.within(places[name])  # curved elements leave a round body by a little
-    weights = {name: points.weights * mesh.unit**3 for name, points in regions.points.items()}
+        places[mine[name]] = magnet.body.within(places[mine[name]])  # curved elements leave a round body by a little
     polarization = floater.remanence * np.asarray(direction, float)
     whole = dipole_sources(floater.moment * direction * (floater.recoil_permeability + 2) / 3, ball, 1)
     outer = [-derivative(whole, axis) for axis in range(3)]
-    from_floater = {n: outer_sums(outer, (places[n] - ball.center) / ball.radius) for n in names}
-    from_rotor = {n: remanent_field(mesh.magnets, points) for n, points in places.items()}
-    fields = {n: from_floater[n] + from_rotor[n] for n in names} | {"floater": from_rotor["floater"] - polarization / 3}
-    induced = regions.magnetization(fields)
+    inside, rotor = mine["floater"], ~mine["floater"]
+    from_rotor = remanent_field(mesh.magnets, places)
+    field = from_rotor.copy()
+    field[rotor] += outer_sums(outer, (places[rotor] - ball.center) / ball.radius)
+    field[inside] -= polarization / 3
+    induced = regions.magnetization(field)
     incident = interior_coefficients(lambda points: remanent_field(mesh.magnets, points), ball, degree)
-    for name in names:
-        closed = from_rotor[name] @ regions.susceptibility[name]
-        rest = weights[name][:, None] * (induced[name] - closed)
-        incident += from_magnetization(places[name], rest, ball, degree)
+    rest = weights[:, None] * (induced - regions.direct(from_rotor))
+    incident += from_magnetization(places[rotor], rest[rotor], ball, degree)
     incident += from_magnetization(*closed_dipoles(mesh.magnets), ball, degree)
     sources = moments_of_magnetization(
-        places["floater"], weights["floater"], induced["floater"], ball.center, ball.radius, degree
+        places[inside], weights[inside], induced[inside], ball.center, ball.radius, degree
     )
     sources[:2, :2] += whole
     return Wrench(multipole_force(incident, sources, ball), multipole_torque(incident, sources, ball))

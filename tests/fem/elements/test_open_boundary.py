@@ -21,7 +21,7 @@ def system():
     trial, test = space.TnT()
     boundary = OpenBoundary(mesh.mesh, space, mesh.ball_radius, DEGREE, ORDER)
     form = ng.BilinearForm(space, symmetric=True, condense=True)
-    form += ng.grad(trial) * ng.grad(test) * ng.dx + boundary.robin * trial * test * ng.ds("outer")
+    form += ng.grad(trial) * ng.grad(test) * ng.dx + 2 / mesh.ball_radius * trial * test * ng.ds("outer")
     form.Assemble()
     return form, form.mat.Inverse(space.FreeDofs(True), inverse="sparsecholesky"), boundary, space, mesh
 

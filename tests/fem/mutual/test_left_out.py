@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from article import PERMEABLE
 
-from spinlev.fem.harmonics.interior import field_at_center, multipole_force, multipole_torque
-from spinlev.fem.mutual.grid import induced_sources, permanent_sources
+from spinlev.fem.harmonics.interior import dipole_sources, field_at_center, multipole_force, multipole_torque
+from spinlev.fem.mutual.grid import induced_sources
 from spinlev.fem.mutual.making import cached_mutual_table
 from spinlev.fem.mutual.response import rotor_ladder, two_body
 from spinlev.fem.mutual.samples import places_around
@@ -42,7 +42,7 @@ def test_the_rotors_answer_to_the_spheres_higher_degrees_is_needed_and_enough(ga
             return np.concatenate([multipole_force(incident, sources, ball), torque])
 
         low, high = parted(induced_sources(own, PERMEABLE.recoil_permeability))
-        moment = permanent_sources(PERMEABLE, direction, ball, DEGREE) + low
+        moment = dipole_sources(PERMEABLE.moment * direction, ball, DEGREE) + low
         back = rotor.answer(moment, ball, DEGREE)
         back_low, back_high = parted(induced_sources(back, PERMEABLE.recoil_permeability))
         table = wrench(own, low + high) + wrench(back, moment) + wrench(own, back_low)

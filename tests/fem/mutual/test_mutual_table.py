@@ -9,8 +9,8 @@ from article import PERMEABLE
 from numpy.polynomial import legendre
 
 from spinlev.fem.harmonics.interior import Ball, field_at_center, gradient_at_center
-from spinlev.fem.mutual.grid import answer_to_charge, image_weights, reflection
-from spinlev.fem.mutual.making import MUTUAL, answers, cached_mutual_table, mutual_table
+from spinlev.fem.mutual.grid import image_weights, reflection, response_to_charge
+from spinlev.fem.mutual.making import MUTUAL, cached_mutual_table, mutual_table
 from spinlev.fem.mutual.response import enough_degree, rotor_response, two_body
 from spinlev.fem.mutual.samples import places_around
 from spinlev.geometry.common import InputError
@@ -47,7 +47,7 @@ def missed(table, rotor, place, direction):
     both = two_body(rotor, PERMEABLE, place, direction, degree, 1e-7)
     added = both.total - both.rigid
     field, gradient = field_at_center(both.own), gradient_at_center(both.own, PERMEABLE.radius)
-    _, force, torque = answers(table, place[None], PERMEABLE.moment * direction[None], field[None], gradient[None])
+    _, force, torque = table.added(place[None], PERMEABLE.moment * direction[None], field[None], gradient[None])
     size = float(np.linalg.norm(added.force))
     arm = max(float(np.linalg.norm(added.torque)), 0.1 * PERMEABLE.radius * size)
     return np.linalg.norm(force[0] - added.force) / size, np.linalg.norm(torque[0] - added.torque) / arm
@@ -100,7 +100,7 @@ def test_written_out_and_by_points_the_energy_is_one(table):
     whole = hy.cfunc([table.energy(given[:3], given[3:6], given[6:])], given, compact_mode=True, opt_level=0)
     place, direction = poses(0.6, 4, 5)
     moment, flux = PERMEABLE.moment * direction, 0.02 * direction[:, ::-1]
-    energy = answers(table, place, moment, flux, np.zeros((4, 3, 3)))[0]
+    energy = table.added(place, moment, flux, np.zeros((4, 3, 3)))[0]
     written = whole(np.ascontiguousarray(np.concatenate([place, moment, flux], axis=1).T))[0]
     np.testing.assert_allclose(written, energy, rtol=1e-10)
     _, slope, second = table.derivatives(place, moment)
@@ -149,9 +149,9 @@ def test_a_lone_magnet_has_one_table_wherever_it_stands():
     assert found
     place, direction = (values + 0.0 for values in poses(0.6, 4, 6))
     flux, slope = 0.02 * direction[:, ::-1], np.zeros((4, 3, 3))
-    here = answers(first, place, PERMEABLE.moment * direction, flux, slope)
+    here = first.added(place, PERMEABLE.moment * direction, flux, slope)
     moved = (shift + place @ turn.T, PERMEABLE.moment * direction @ turn.T, flux @ turn.T, slope)
-    for there, value in zip(answers(second, *moved), here, strict=True):
+    for there, value in zip(second.added(*moved), here, strict=True):
         expected = value if value.ndim == 1 else value @ turn.T
         np.testing.assert_allclose(there, expected, rtol=1e-10, atol=1e-12 * np.abs(expected).max())
 
@@ -159,7 +159,7 @@ def test_a_lone_magnet_has_one_table_wherever_it_stands():
 def test_the_answer_to_charges_is_the_sum_of_its_degrees():
     """Legendre's series with the sphere's t_l, to the 7e-4 of the images; and two charges may change places."""
     weights, places = image_weights(1.05), hy.make_vars("a", "b", "c", "d", "e", "f")
-    told = hy.cfunc([answer_to_charge(places[:3], places[3:], weights.tolist())], places)
+    told = hy.cfunc([response_to_charge(places[:3], places[3:], weights.tolist())], places)
     a, b = np.array([0.3, -1.2, 0.4]), np.array([1.1, 0.5, -0.9])
     sizes = np.linalg.norm(a), np.linalg.norm(b)
     share = reflection(1.05, 60) * 2.05 / 0.05 / np.prod(sizes) ** np.arange(1, 62)
@@ -177,8 +177,10 @@ def test_two_magnets_written_out_and_by_pairs_have_one_energy(table):
     pairs, mixed = np.array([[0.0, 4e-3], [4e-3, 0.0]]), np.array([[0.0, 3e-5], [2e-5, 0.0]])
     two = replace(table, grids=(grid, above), coupling=coupling + coupling.T, pairs=pairs, mixed=mixed)
     given = hy.make_vars("x", "y", "z", "m_x", "m_y", "m_z")
-    written = hy.cfunc([two.coupled(given[:3], given[3:])], given, compact_mode=True, opt_level=0)
+    nothing = [hy.expression(0.0)] * 3
     alone = [replace(table, grids=(g,), coupling=np.zeros((3, 3)), pairs=0 * pairs, mixed=0 * mixed) for g in two.grids]
+    sums = [t.energy(given[:3], given[3:], nothing) for t in (two, *alone)]
+    written = hy.cfunc([sums[0] - sums[1] - sums[2]], given, compact_mode=True, opt_level=0)
     places, directions = poses(0.6, 9, 8)
     places, directions = np.ascontiguousarray(places - [0.0, 0.0, 20e-3]), PERMEABLE.moment * directions
     energy, slope, second = two.derivatives(places, directions)

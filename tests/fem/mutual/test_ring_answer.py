@@ -8,7 +8,7 @@ from second_opinions.ring_segments import RingOfSegments
 from second_opinions.two_bodies import mesh_two_bodies
 
 from spinlev.fem.harmonics.interior import field_at_center, gradient_at_center
-from spinlev.fem.mutual.making import answers, cached_mutual_table
+from spinlev.fem.mutual.making import cached_mutual_table
 from spinlev.fem.mutual.response import Wrench, rotor_ladder, two_body
 from spinlev.geometry.magnets import Magnet
 from spinlev.geometry.shapes import Ring
@@ -81,7 +81,7 @@ def test_a_rings_answer_is_that_of_both_bodies_in_one_mesh():
         whole = solve_both_bodies(mesh_two_bodies(RING, place, PERMEABLE.radius, 0.2), PERMEABLE, place, direction)
         exact = whole - both.rigid
         field, slope = field_at_center(both.own), gradient_at_center(both.own, PERMEABLE.radius)
-        _, force, torque = answers(table, place[None], PERMEABLE.moment * direction[None], field[None], slope[None])
+        _, force, torque = table.added(place[None], PERMEABLE.moment * direction[None], field[None], slope[None])
         size = float(np.linalg.norm(exact.force))
         arm = max(float(np.linalg.norm(exact.torque)), 0.1 * PERMEABLE.radius * size)
         told = Wrench(force[0], torque[0]) - exact, both.total - whole

@@ -19,7 +19,7 @@ from spinlev.fem.harmonics.interior import (
     multipole_torque,
 )
 from spinlev.fem.harmonics.solid import derivative, outer_sums
-from spinlev.fem.mutual.grid import induced_sources, permanent_sources
+from spinlev.fem.mutual.grid import induced_sources
 from spinlev.fem.mutual.response import TwoBodyError, enough_degree, rotor_ladder, two_body, two_body_ladder
 from spinlev.fem.rotor.choice import rotor_table
 from spinlev.geometry.common import MU_0
@@ -81,7 +81,7 @@ def test_sphere_in_a_uniform_field(permeability):
     """Textbook: moment 3 V (μ-1)/(μ+2) B/μ0 + (J V/μ0) 3/(μ+2), no force, torque only on the remanent moment."""
     field, body = np.array([0.03, -0.02, 0.01]), floater(permeability)
     incident = uniform(field)
-    sources = permanent_sources(body, DIRECTION, BALL, 3) + induced_sources(incident, permeability)
+    sources = dipole_sources(body.moment * DIRECTION, BALL, 3) + induced_sources(incident, permeability)
     remanent = body.remanence * body.volume / MU_0 * 3 / (permeability + 2) * DIRECTION
     induced = 3 * body.volume * (permeability - 1) / (permeability + 2) * field / MU_0
     np.testing.assert_allclose(moment(sources, BALL), remanent + induced, rtol=1e-13)
@@ -93,7 +93,7 @@ def test_sphere_in_a_uniform_field(permeability):
 
 def test_inner_and_outer_field_meet_the_interface_conditions():
     field = np.array([0.03, -0.02, 0.01])
-    sources = permanent_sources(PERMEABLE, DIRECTION, BALL, 1) + induced_sources(uniform(field, 1), 1.05)
+    sources = dipole_sources(PERMEABLE.moment * DIRECTION, BALL, 1) + induced_sources(uniform(field, 1), 1.05)
     points, normals, _ = sphere_rule(BALL.center, BALL.radius, 4)
     outside = field + outer_field(sources, BALL, points)
     b, h = inner_field(field, 1.05, 1.305 * DIRECTION)
@@ -140,7 +140,7 @@ def test_force_and_torque_against_maxwell_stress():
     """A magnetised sphere of μr = 3 in the field of two dipoles; the rule converges to round-off on its surface."""
     places, moments = BALL.center + np.array([[0.012, 0.003, 0.004], [-0.002, 0.011, -0.009]]), np.eye(3)[:2] * 1e-6
     incident = from_magnetization(places, moments, BALL, 45)
-    sources = permanent_sources(floater(3.0), DIRECTION, BALL, 45) + induced_sources(incident, 3.0)
+    sources = dipole_sources(floater(3.0).moment * DIRECTION, BALL, 45) + induced_sources(incident, 3.0)
 
     def field(points):
         return field_of_dipoles(points, places, moments) + outer_field(sources, BALL, points)
