@@ -17,7 +17,6 @@ Potential Theory (1929), ch. III; for magnets see Z. J. Yang et al., Supercond. 
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from itertools import product
 from typing import Any
 
@@ -27,31 +26,9 @@ import numpy as np
 from ...geometry.common import Array
 from ..harmonics.expressions import Number
 
-Expression = Any
-"""A heyoka expression."""
+Expression = Any  # A heyoka expression
 SIGNS = (-1, 1)
 FOUR_PI = 4 * np.pi
-
-
-@dataclass(frozen=True)
-class _Edge:
-    """An edge of length L seen from a point: r1 + r2, its square less L², and two reciprocals."""
-
-    length: Expression
-    reach: Expression
-    gap: Expression
-    reciprocal: Expression
-    inverse_ends: Expression
-
-    @property
-    def ratio(self) -> Expression:
-        """L / (r1 + r2)."""
-        return self.length * self.gap * self.reciprocal
-
-    @property
-    def slope(self) -> Expression:
-        """∂Λ/∂u over u, u being a coordinate across the edge."""
-        return -2.0 * self.length * self.inverse_ends * self.reach * self.reach * self.reciprocal
 
 
 class _Corners:
@@ -66,8 +43,11 @@ class _Corners:
         }
         self.inverse = {corner: 1.0 / r for corner, r in self.distance.items()}
 
-    def edge(self, first: int, second: int, i: int, j: int) -> _Edge:
-        """The edge parallel to the third axis that has the signs i and j across the other two."""
+    def edge(self, first: int, second: int, i: int, j: int) -> tuple[Expression, Expression]:
+        """Of the edge parallel to the third axis with the signs i and j across the others: L / (r1 + r2), ∂Λ/∂u over u.
+
+        u is a coordinate across the edge. Both are written with (r1 + r2)² - L² and one reciprocal.
+        """
         third = 3 - first - second
         ends = []
         for k in SIGNS:
@@ -76,25 +56,27 @@ class _Corners:
             ends.append(tuple(key))
         reach, length = self.distance[ends[0]] + self.distance[ends[1]], 2 * self.half_edges[third]
         gap = reach * reach - length * length
-        return _Edge(length, reach, gap, 1.0 / (reach * gap), self.inverse[ends[0]] * self.inverse[ends[1]])
+        reciprocal, inverse_ends = 1.0 / (reach * gap), self.inverse[ends[0]] * self.inverse[ends[1]]
+        return length * gap * reciprocal, -2.0 * length * inverse_ends * reach * reach * reciprocal
 
     def solid_angle(self, axis: int) -> Expression:
-        """4π T_aa: difference of the solid angles of the two faces across `axis`."""
-        return hy.sum([i * j * self._corner_pair(axis, i, j) for i, j in product(SIGNS, repeat=2)])
+        """4π T_aa: difference of the solid angles of the two faces across `axis`.
 
-    def _corner_pair(self, axis: int, i: int, j: int) -> Expression:
-        """Σ_k k atan2(v w, u r), as the angle of one product of complex numbers."""
-        second, third = (axis + 1) % 3, (axis + 2) % 3
-        across, v = self.offset[axis][i], self.offset[second][j]
-        parts = []
-        for k in SIGNS:
-            key = [0, 0, 0]
-            key[axis], key[second], key[third] = i, j, k
-            parts.append((across * self.distance[tuple(key)], v * self.offset[third][k]))
-        (real_before, imaginary_before), (real, imaginary) = parts
-        return hy.atan2(
-            imaginary * real_before - real * imaginary_before, real * real_before + imaginary * imaginary_before
-        )
+        Σ_k k atan2(v w, u r) is taken as the angle of one product of complex numbers.
+        """
+        second, third, parts = (axis + 1) % 3, (axis + 2) % 3, []
+        for i, j in product(SIGNS, repeat=2):
+            across, v, ends = self.offset[axis][i], self.offset[second][j], []
+            for k in SIGNS:
+                key = [0, 0, 0]
+                key[axis], key[second], key[third] = i, j, k
+                ends.append((across * self.distance[tuple(key)], v * self.offset[third][k]))
+            (real_before, imaginary_before), (real, imaginary) = ends
+            angle = hy.atan2(
+                imaginary * real_before - real * imaginary_before, real * real_before + imaginary * imaginary_before
+            )
+            parts.append(i * j * angle)
+        return hy.sum(parts)
 
     def edges(self, first: int, second: int) -> tuple[Expression, Expression, Expression]:
         """4π T_ab for a ≠ b, Σ_ij ij Λ over the edges parallel to the third axis, and its derivatives along a and b.
@@ -102,18 +84,14 @@ class _Corners:
         The four Λ become one inverse hyperbolic tangent by its addition theorem.
         """
         edges = {(i, j): self.edge(first, second, i, j) for i, j in product(SIGNS, repeat=2)}
-        lower, upper = (_difference((edges[i, 1].ratio, 1.0), (edges[i, -1].ratio, 1.0)) for i in SIGNS)
+        lower, upper = (_difference((edges[i, 1][0], 1.0), (edges[i, -1][0], 1.0)) for i in SIGNS)
         numerator, denominator = _difference(upper, lower)
-        slopes = {signs: signs[0] * signs[1] * edge.slope for signs, edge in edges.items()}
+        slopes = {(i, j): i * j * slope for (i, j), (_, slope) in edges.items()}
         return (
             2.0 * hy.atanh(numerator / denominator),
             hy.sum([slope * self.offset[first][i] for (i, _), slope in slopes.items()]),
             hy.sum([slope * self.offset[second][j] for (_, j), slope in slopes.items()]),
         )
-
-    def mixed(self) -> Expression:
-        """4π ∂_z T_xy."""
-        return hy.sum([-float(i * j * k) * inverse for (i, j, k), inverse in self.inverse.items()])
 
 
 def cuboid_field(
@@ -142,7 +120,9 @@ def cuboid_field(
         return [zero] * 3, [[zero] * 3 for _ in range(3)]
     corners = _Corners(position, [number(half) for half in half_edges])
     second: dict[tuple[int, ...], Expression] = {(axis, axis): corners.solid_angle(axis) for axis in strength}
-    third: dict[tuple[int, ...], Expression] = {(0, 1, 2): corners.mixed()}
+    third: dict[tuple[int, ...], Expression] = {
+        (0, 1, 2): hy.sum([-float(i * j * k) * inverse for (i, j, k), inverse in corners.inverse.items()])
+    }
     for a, b in ((0, 1), (0, 2), (1, 2)):
         if a in strength or b in strength:
             second[a, b], third[a, a, b], third[a, b, b] = corners.edges(a, b)
@@ -167,32 +147,42 @@ def _sorted(*indices: int) -> tuple[int, ...]:
 
 CORNER_SIGNS = (1, -1)
 Signs = tuple[int, ...]
+NEXT_TO_ONE = 1 - 2**-53  # where round-off puts a point on an edge, its Λ stays finite
 
 
-def _face_integrals(points: Array, half_edges: Array) -> dict[tuple[int, int], Array]:
-    """∫ dS/r (n,), m, over each face (axis, side) of a cuboid, seen from points (n, 3), m, along its axes.
+def _seen(points: Array, half_edges: Array) -> tuple[list[dict[int, Array]], dict[Signs, Array], dict[Signs, Array]]:
+    """Offsets and distances (n,) of the eight corners from points (n, 3), and Λ = ∫ ds/r of the twelve edges.
 
-    Its eight corners and twelve edges are each looked at once.
+    Corners and edges are named by their signs along x, y and z, an edge's own axis by 0.
     """
     offset = [{s: points[:, axis] + s * half_edges[axis] for s in CORNER_SIGNS} for axis in range(3)]
     square = [{s: values**2 for s, values in one.items()} for one in offset]
     distance: dict[Signs, Array] = {}
     for i, j, k in product(CORNER_SIGNS, repeat=3):
         distance[i, j, k] = np.sqrt(square[0][i] + square[1][j] + square[2][k])
-    edges: dict[tuple[int, Signs], Array] = {}
+    edges: dict[Signs, Array] = {}
     for axis, first, second in product(range(3), CORNER_SIGNS, CORNER_SIGNS):
         ends = distance[_corner(axis, 1, first, second)] + distance[_corner(axis, -1, first, second)]
-        edges[axis, _corner(axis, 0, first, second)] = 2 * np.arctanh(2 * half_edges[axis] / ends)
+        edges[_corner(axis, 0, first, second)] = 2 * np.arctanh(np.minimum(2 * half_edges[axis] / ends, NEXT_TO_ONE))
+    return offset, distance, edges
+
+
+def _face_integrals(points: Array, half_edges: Array) -> dict[tuple[int, int], Array]:
+    """∫ dS/r (n,), m, over each face (axis, side) of a cuboid, seen from points (n, 3), m, along its axes."""
+    offset, distance, edges = _seen(points, half_edges)
     found = {}
     for axis, side in product(range(3), CORNER_SIGNS):
         second, third = (axis + 1) % 3, (axis + 2) % 3
         height = np.abs(offset[axis][-side])
         total = np.zeros_like(height)
         for s in CORNER_SIGNS:
-            total += s * offset[second][s] * edges[third, _corner(axis, -side, s, 0)]
-            total += s * offset[third][s] * edges[second, _corner(axis, -side, 0, s)]
+            total += s * offset[second][s] * edges[_corner(axis, -side, s, 0)]
+            total += s * offset[third][s] * edges[_corner(axis, -side, 0, s)]
             up, down = (distance[_corner(axis, -side, s, k)] for k in CORNER_SIGNS)
-            total -= s * height * _turned(height, offset[second][s], offset[third], up, down)
+            # Σ_k k atan2(v w_k, height r_k), as the angle of one product of complex numbers
+            v, w = offset[second][s], offset[third]
+            real = height**2 * up * down + v**2 * w[1] * w[-1]
+            total -= s * height * np.arctan2(v * height * (w[1] * down - w[-1] * up), real)
         found[axis, side] = total
     return found
 
@@ -204,10 +194,19 @@ def _corner(axis: int, along: int, second: int, third: int) -> Signs:
     return tuple(found)
 
 
-def _turned(height: Array, v: Array, w: dict[int, Array], up: Array, down: Array) -> Array:
-    """Σ_k k atan2(v w_k, height r_k), as the angle of one product of complex numbers."""
-    real = height**2 * up * down + v**2 * w[1] * w[-1]
-    return np.asarray(np.arctan2(v * height * (w[1] * down - w[-1] * up), real))
+def cuboid_tensor(points: Array, half_edges: Array) -> Array:
+    """T (n, 3, 3) with μ0 H = T J of a polarisation J at `points` (n, 3), m, along a cuboid's axes, off its edges."""
+    offset, distance, edges = _seen(points, half_edges)
+    tensor = np.zeros((len(points), 3, 3))
+    for a in range(3):
+        b, c = (a + 1) % 3, (a + 2) % 3
+        for signs, r in distance.items():
+            u, v, w = (offset[axis][signs[axis]] for axis in (a, b, c))
+            with np.errstate(divide="ignore", invalid="ignore"):  # on a face the mean of both sides
+                tensor[:, a, a] -= np.prod(signs) * np.nan_to_num(np.arctan(v * w / (u * r)))
+        tensor[:, a, b] = sum(i * j * edges[_corner(c, 0, i, j)] for i, j in product(CORNER_SIGNS, repeat=2))
+        tensor[:, b, a] = tensor[:, a, b]
+    return tensor / FOUR_PI
 
 
 def attraction(points: Array, half_edges: Array) -> Array:

@@ -12,16 +12,25 @@ it feels the torque -Im α B⊥² along the turn, and loses the power ω times t
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ...geometry.common import MU_0, Array
+from ...geometry.common import MU_0
 
 ComplexArray = NDArray[np.complex128]
+# |x²| below which four terms of the series are used: there they and the closed form are both good to 3e-11
 SERIES = 0.02
-"""|x²| below which four terms of the series are used: there they and the closed form are both good to 3e-11."""
 COEFFICIENTS = (1 / 15, -2 / 315, 1 / 1575, -2 / 31185)
 
 
 def polarizability(radius: float, conductivity: float, frequency: ArrayLike) -> ComplexArray:
-    """α (...,), A m²/T, of a sphere (m, S/m) at frequencies (Hz) of either sign; 0 at 0 Hz.
+    """α of a sphere in a uniform oscillating field.
+
+    Parameters
+    ----------
+    radius, conductivity : m, S/m
+    frequency : (...,) Hz, of either sign
+
+    Returns
+    -------
+    (...,) A m²/T; 0 at 0 Hz. To 3e-11.
 
     Raises
     ------
@@ -38,14 +47,6 @@ def polarizability(radius: float, conductivity: float, frequency: ArrayLike) -> 
     return np.asarray(-2 * np.pi * radius**3 / MU_0 * np.where(small, series, closed))
 
 
-def rotating_torque(radius: float, conductivity: float, frequency: ArrayLike, flux_density: ArrayLike) -> Array:
-    """Torque (...,), N m, along the turn of a field of size B⊥ (T) at frequencies (Hz) relative to the sphere.
-
-    Exact for a uniform field; (2π/15) σ ω B⊥² R⁵ where the skin depth is large.  The loss in the sphere is ω times it.
-    """
-    return np.asarray(-polarizability(radius, conductivity, frequency).imag * np.asarray(flux_density, float) ** 2)
-
-
 def thin_field_torque(radius: float, conductivity: float) -> float:
     """(2π/15) σ R⁵, N m s/T²: the torque per B⊥² and relative angular velocity, where the skin depth is large.
 
@@ -56,5 +57,5 @@ def thin_field_torque(radius: float, conductivity: float) -> float:
 
 
 def skin_number(radius: float, conductivity: float, frequency: float) -> float:
-    """ωμ0σR² of a sphere (m, S/m) at a frequency (Hz): twice the square of its radius over the skin depth."""
+    """ωμ0σR² of a `radius` (m), `conductivity` (S/m) and `frequency` (Hz): twice the square of radius by skin depth."""
     return float(2 * np.pi * frequency * MU_0 * conductivity * radius**2)

@@ -1,4 +1,4 @@
-"""Gauss rules pressed towards the places where closed-form fields of boxes have kinks and logarithms."""
+"""Moments of what closed-form fields magnetise, by Gauss rules pressed towards their kinks and logarithms."""
 
 from collections.abc import Sequence
 from itertools import combinations
@@ -12,14 +12,20 @@ from ...geometry.meshes.solids import part_rule
 from ...geometry.overlap import separation
 from ...geometry.shapes import Box, Ring, Sphere
 from ...geometry.solids import Part, Solid, moved
-from ..harmonics.expansion import MultipoleExpansion, curvature_moments, moments_of_magnetization, uniform_moments
+from ..harmonics.expansion import (
+    MultipoleExpansion,
+    box_rule,
+    curvature_moments,
+    gauss,
+    moments_of_magnetization,
+    round_rule,
+    uniform_moments,
+)
 from ..harmonics.solid import Coefficients
 from .uniform import demagnetizing_tensor, remanent_field, remanent_potential
 
-PART_ORDER = 20
-"""Of the rule over a part."""
-NEAR = 0.1
-"""Gaps below this part of the shortest edge are as contact to a rule."""
+PART_ORDER = 20  # of the rule over a part
+NEAR = 0.1  # gaps below this part of the shortest edge are as contact to a rule
 
 
 def enough_nodes(degree: int) -> int:
@@ -70,7 +76,10 @@ def panel_breaks(box: Box, others: Sequence[Solid]) -> list[Array]:
 
 
 def face_rule(box: Box, others: Sequence[Solid], nodes: int) -> tuple[Array, Array]:
-    """Points (n, 3) m on the faces, and outward normals times weight (n, 3) m²."""
+    """Points (n, 3) m on the faces of a `box`, and outward normals times weight (n, 3) m².
+
+    `others` and `nodes` are as of `volume_rule`.
+    """
     rules = [graded_rule(breaks, nodes) for breaks in panel_breaks(box, others)]
     points, areas = [], []
     for axis in range(3):
@@ -86,51 +95,33 @@ def face_rule(box: Box, others: Sequence[Solid], nodes: int) -> tuple[Array, Arr
 
 
 def volume_rule(body: Solid, others: Sequence[Solid], nodes: int) -> tuple[Array, Array]:
-    """Points (n, 3) m inside the body and weights (n,) m³."""
+    """Points (n, 3) m inside a body and weights (n,) m³, graded towards faces and edges.
+
+    Parameters
+    ----------
+    body : that is integrated over
+    others : that make the field: where their faces lie across a box, panels end
+    nodes : of each panel
+    """
     if isinstance(body, Box):
-        return _box_rule(body, others, nodes)
+        return box_rule(body, [graded_rule(breaks, nodes) for breaks in panel_breaks(body, others)])
     if isinstance(body, Part):
         return part_rule(body, PART_ORDER)
-    circle = 2 * np.pi * (np.arange(2 * nodes) + 0.5) / (2 * nodes)
-    across, height, weight = _sphere_section(body, nodes) if isinstance(body, Sphere) else _ring_section(body, nodes)
-    turned = across[:, None, None] * np.stack([np.cos(circle), np.sin(circle)], axis=-1)
-    upright = np.broadcast_to(height[:, None, None], (*turned.shape[:2], 1))
-    points = np.concatenate([turned, upright], axis=-1).reshape(-1, 3)
-    weights = np.repeat(weight * across * np.pi / nodes, 2 * nodes)
-    return body.center + points @ body.rotation.T, weights
+    if isinstance(body, Sphere):
+        radial, other = graded_rule(np.array([0.0, body.radius]), nodes), gauss(-1.0, 1.0, nodes)
+    else:
+        inner = body.inner_radius if isinstance(body, Ring) else 0.0
+        radial = graded_rule(np.array([inner, body.radius]), nodes)
+        other = graded_rule(np.array([-0.5, 0.5]) * body.height, nodes)
+    return round_rule(body, radial, other, 2 * nodes)
 
 
-def _ring_section(body: Solid, nodes: int) -> tuple[Array, Array, Array]:
-    """Distance from the axis, height, and weight (n,) m² over the section of a ring or cylinder."""
-    inner = body.inner_radius if isinstance(body, Ring) else 0.0
-    rho, wide = graded_rule(np.array([inner, body.half_edges[0]]), nodes)
-    z, tall = graded_rule(np.array([-1.0, 1.0]) * body.half_edges[2], nodes)
-    return np.repeat(rho, len(z)), np.tile(z, len(rho)), np.outer(wide, tall).ravel()
-
-
-def _sphere_section(body: Sphere, nodes: int) -> tuple[Array, Array, Array]:
-    """As `_ring_section`, of a sphere."""
-    r, deep = graded_rule(np.array([0.0, body.radius]), nodes)
-    cosine, weights = np.polynomial.legendre.leggauss(nodes)
-    sine = np.sqrt(1 - cosine**2)
-    return np.outer(r, sine).ravel(), np.outer(r, cosine).ravel(), np.outer(deep * r, weights / sine).ravel()
-
-
-def _box_rule(box: Box, others: Sequence[Solid], nodes: int) -> tuple[Array, Array]:
-    rules = [graded_rule(breaks, nodes) for breaks in panel_breaks(box, others)]
-    grid = np.stack(np.meshgrid(*(points for points, _ in rules), indexing="ij"), -1).reshape(-1, 3)
-    x, y, z = (weights for _, weights in rules)
-    return box.center + grid @ box.rotation.T, (x[:, None, None] * y[:, None] * z).ravel()
-
-
-NODES = 6
-"""Of the rule for N, which need not be exact: elements and moments make up for it."""
+NODES = 6  # of the rule for N, which need not be exact: elements and moments make up for it
+# Of the rule over a body of several cells, where high degrees only place the sum of its cells' fields; and degree
 CELL_NODES, CELL_DEGREE = 28, 40
-"""Of the rule over a body of several cells, where high degrees only place the sum of its cells' fields; and degree."""
+# Of the rules for boxes that touch without being parallel, over faces, and in volumes where faces do not suffice. A 6
+# mm cube across the face of a 10 mm one: 5e-7 of B is wrong with 40 and 64, 9e-8 with 96, 4e-8 with 128.
 OBLIQUE_NODES, OBLIQUE_NODES_ANISOTROPIC = (96, 128), (40, 64)
-"""Of the rules for boxes that touch without being parallel, over faces, and in volumes where faces do not suffice.
-
-A 6 mm cube across the face of a 10 mm one: 5e-7 of B is wrong with 40 and 64, 9e-8 with 96, 4e-8 with 128."""
 
 
 def carrier(magnet: Magnet) -> Magnet:
@@ -144,20 +135,25 @@ def carrier(magnet: Magnet) -> Magnet:
         return magnet
     turn = magnet.body.rotation
     susceptibility = turn.T @ (magnet.permeability_in_rotor - np.eye(3)) @ turn
-    polarization = np.linalg.solve(np.eye(3) + susceptibility @ _mean_tensor(magnet.body), magnet.polarization)
-    return Magnet(magnet.body, np.asarray(polarization, float))
-
-
-def _mean_tensor(body: Solid) -> Array:
-    """Mean demagnetising tensor N (3, 3) in body axes, of trace 1: mean H = -N J."""
-    upright = moved(body, np.zeros(3), np.eye(3))
+    upright = moved(magnet.body, np.zeros(3), np.eye(3))
     points, weights = volume_rule(upright, (), NODES)
+    # mean demagnetising tensor N in body axes, mean H = -N J; its trace is 1
     diagonal = -np.einsum("n,nii->i", weights, demagnetizing_tensor(upright, points))
-    return np.diag(diagonal / diagonal.sum())
+    factors = np.eye(3) + susceptibility @ np.diag(diagonal / diagonal.sum())
+    return Magnet(magnet.body, np.asarray(np.linalg.solve(factors, magnet.polarization), float))
 
 
 def induced_moments(body: Magnet, sources: Sequence[Magnet], degree: int, nodes: int | None = None) -> Coefficients:
     """Coefficients (T) of (μ - 1) H0 in a body, about its centre with radius its circumradius.
+
+    Because the harmonics have no Laplacian, faces and H0's potential suffice for boxes.
+
+    Parameters
+    ----------
+    body : in which H0 induces a magnetisation
+    sources : magnets with μr = 1 that make H0
+    degree : highest of the coefficients
+    nodes : of each panel of the rule; None: enough for the degree
 
     Accuracy with the default number of nodes: round-off for boxes whose axes are parallel or that do not touch, and for
     bodies that do not touch.
@@ -181,9 +177,13 @@ def induced_moments(body: Magnet, sources: Sequence[Magnet], degree: int, nodes:
 def cell_moments(
     body: Magnet, rest: Array, sources: Sequence[Magnet], degree: int, cells: Cells, nodes: int | None = None
 ) -> list[Coefficients]:
-    """Coefficients (T) of (μ - 1) H0 and of a uniform `rest` (3,) T in body axes, of every cell of any body.
+    """Coefficients (T) of (μ - 1) H0 and of a uniform rest, of every cell of any body, by integrals over the volume.
 
-    By integrals over the volume, graded towards edges and faces.
+    Parameters
+    ----------
+    body, sources, degree, nodes : as of `induced_moments`
+    rest : (3,) T, in body axes
+    cells : of the body
     """
     others = [source.body for source in sources]
     enough = enough_nodes(degree) if len(cells.radii) == 1 else CELL_NODES
@@ -194,7 +194,14 @@ def cell_moments(
 
 
 def by_cells(points: Array, weights: Array, field: Array, cells: Cells, degree: int) -> list[Coefficients]:
-    """Coefficients (T) of every cell, of a magnetisation (n, 3) T at points (n, 3) m with weights (n,) m³."""
+    """Coefficients (T) of a magnetisation, cell by cell.
+
+    Parameters
+    ----------
+    points, weights, field : (n, 3) m, (n,) m³ and μ0 M (n, 3) T
+    cells : to the nearest of which each point belongs
+    degree : highest of the coefficients
+    """
     owner = cells.which(points)
     return [
         moments_of_magnetization(points[mine], weights[mine], field[mine], center, float(radius), degree)
@@ -219,28 +226,23 @@ def uniform_cells(magnet: Magnet, nearest: float) -> list[MultipoleExpansion]:
     return [MultipoleExpansion(c, float(r), part) for c, r, part in zip(cells.centers, cells.radii, found, strict=True)]
 
 
-def closed_moments(
-    body: Magnet, rest: Array, sources: Sequence[Magnet], degree: int, nodes: int | None = None
-) -> Coefficients:
-    """As `induced_moments`, and those of a uniform polarisation `rest` (3,) T in body axes beside."""
-    uniform = uniform_moments(Magnet(body.box, rest), degree).coefficients
-    return np.asarray(induced_moments(body, sources, degree, nodes) + uniform)
-
-
 def first_order_moments(body: Magnet, sources: Sequence[Magnet], degree: int) -> Coefficients:
-    """What the permeability of a body adds, to a few per cent: (μ - 1) H0 / (1 + χ/3), χ the largest of μ - 1.
+    """Coefficients (T) of what a permeability adds, to a few per cent: (μ - 1) H0 / (1 + χ/3), χ the largest of μ - 1.
 
-    A part, whose H0 has no closed form, counts as the cuboid of its volume with the proportions of the box about it.
+    Parameters
+    ----------
+    body : whose permeability counts
+    sources : whose remanence makes H0; a part, which has no closed form, counts as the cuboid of its volume with the
+        proportions of the box about it
+    degree : highest of the coefficients
     """
-    return induced_moments(body, [_closed(source) for source in sources], degree) / (1 + body.contrast / 3)
-
-
-def _closed(magnet: Magnet) -> Magnet:
-    if not isinstance(magnet.body, Part):
-        return magnet
-    box = magnet.box
-    size = box.size * (magnet.body.volume / box.volume) ** (1 / 3)
-    return Magnet(Box(size, box.center, box.rotation), magnet.polarization)
+    closed = list(sources)
+    for k, magnet in enumerate(sources):
+        if isinstance(magnet.body, Part):
+            box = magnet.box
+            size = box.size * (magnet.body.volume / box.volume) ** (1 / 3)
+            closed[k] = Magnet(Box(size, box.center, box.rotation), magnet.polarization)
+    return induced_moments(body, closed, degree) / (1 + body.contrast / 3)
 
 
 def added_by_closed_form(
@@ -251,9 +253,14 @@ def added_by_closed_form(
     nodes: int | None = None,
     cells: Sequence[Cells] | None = None,
 ) -> list[Coefficients]:
-    """Moments of every cell of every piece that need no elements: (μ - 1) H0 + J - J' of the carriers' H0.
+    """Moments (T) of every cell of every piece that need no elements: (μ - 1) H0 + J - J' of the carriers' H0.
 
-    Without `cells` every piece is one.
+    Parameters
+    ----------
+    cut : pieces of every magnet
+    magnets, carriers : with J and permeability; and with J', whose H0 is split off, see `carrier`
+    degree, nodes : as of `induced_moments`
+    cells : of every piece; None: every piece is one
     """
     rests = [whole.polarization - carried.polarization for whole, carried in zip(magnets, carriers, strict=True)]
     pieces = [(piece, rest) for whole, rest in zip(cut, rests, strict=True) for piece in whole]
@@ -261,7 +268,8 @@ def added_by_closed_form(
     found: list[Coefficients] = []
     for (piece, rest), own in zip(pieces, known, strict=True):
         if all(isinstance(part.body, Box) for part in (piece, *carriers)):
-            found.append(closed_moments(piece, rest, carriers, degree, nodes))
+            uniform = uniform_moments(Magnet(piece.box, rest), degree).coefficients
+            found.append(np.asarray(induced_moments(piece, carriers, degree, nodes) + uniform))
         else:
             found += cell_moments(piece, rest, carriers, degree, own, nodes)
     return found
@@ -276,7 +284,7 @@ def closed_part(
 ) -> tuple[list[Coefficients], list[Coefficients]]:
     """`added_by_closed_form` and its error: round-off, but for bodies in contact the step to finer rules.
 
-    Parallel boxes may touch.
+    `cut`, `magnets`, `carriers`, `degree` and `cells` are as there. Parallel boxes may touch.
     """
     if not oblique_contact([magnet.body for magnet in magnets]):
         closed = added_by_closed_form(cut, magnets, carriers, degree, None, cells)

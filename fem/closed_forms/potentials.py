@@ -77,10 +77,9 @@ def unit_dipoles(positions: ArrayLike) -> list[Dipole]:
     return [Dipole(p, axis) for p in np.asarray(positions, float).reshape(-1, 3) for axis in np.eye(3)]
 
 
-RADIAL, ANGULAR = 8, 16
-"""Gauss points across and along a quarter ring: 1e-8 at a distance of half the cross-section."""
+RADIAL, ANGULAR = 8, 16  # gauss points across and along a quarter ring: 1e-8 at a distance of half the cross-section
+# Signs of the corner and where its arc begins
 QUARTERS = ((1, 1, 0.0), (-1, 1, np.pi / 2), (-1, -1, np.pi), (1, -1, 1.5 * np.pi))
-"""Signs of the corner and where its arc begins."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -26,11 +26,10 @@ from ...geometry.common import Array
 from ...geometry.shapes import Cylinder, Ring, Sphere
 
 FOUR_PI = 4 * np.pi
+# Nodes of the rule for distances from the mantle of at least so many radii: round-off
 RULES = ((1e-2, 56), (1e-5, 100), (0.0, 220))
-"""Nodes of the rule for distances from the mantle of at least so many radii: round-off."""
 WIDEST, NARROWEST = 3.0, 1e-14
-CHUNK = 400_000
-"""Points times nodes at once."""
+CHUNK = 400_000  # points times nodes at once
 
 
 def round_tensor(body: Cylinder | Ring | Sphere, points: Array) -> Array:
@@ -177,12 +176,9 @@ def _segment(half: float, rho: Array, z: Array, radius: float, sine: Array, slop
     return p, q, steep, -1 / a**3 + 1 / b**3, -above / a**3 + below / b**3
 
 
-Expression = Any
-"""A heyoka expression."""
-RESOLVED = 0.4
-"""Distance from the surface from which on the segments do, in edges of a cube of the magnet's volume."""
-MOST = 64
-"""Segments of a mantle; at a quarter of its radius they still do to 1e-6."""
+Expression = Any  # A heyoka expression
+RESOLVED = 0.4  # distance from the surface from which on the segments do, in edges of a cube of the magnet's volume
+MOST = 64  # segments of a mantle; at a quarter of its radius they still do to 1e-6
 DIGITS = np.log(1e11)
 
 

@@ -1,20 +1,21 @@
-"""Quadrature of polynomials over bodies, exact up to a degree."""
+"""Multipole expansions of magnets' fields: their moments by quadrature, their fields, and the fewest that will do."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any
 
 import heyoka as hy
 import numpy as np
 
-from ...geometry.common import MU_0, Array, frozen_array
+from ...geometry.common import Array, frozen_array
 from ...geometry.magnets import Magnet
 from ...geometry.meshes.solids import part_rule
-from ...geometry.shapes import Box, Ring, Sphere
+from ...geometry.shapes import Box, Cylinder, Ring, Sphere
 from ...geometry.solids import Part as SolidPart, Solid
 from .expressions import FieldExpressions, Number, harmonic_sums
+from .interior import Ball, moment
 from .solid import (
+    FOUR_PI,
     Coefficients,
     derivative,
     field_sizes,
@@ -36,60 +37,60 @@ def polynomial_rule(body: Solid, degree: int) -> tuple[Array, Array]:
     """
     if isinstance(body, SolidPart):
         return part_rule(body, degree)
+    nodes = degree // 2 + 1
     if isinstance(body, Box):
-        return box_rule(body, (degree // 2 + 1,) * 3)
+        return box_rule(body, [gauss(-h, h, nodes) for h in body.half_edges])
     if isinstance(body, Sphere):
-        local, weights = _sphere_rule(body.radius, degree)
+        return round_rule(body, gauss(0.0, body.radius, nodes + 1), gauss(-1.0, 1.0, nodes + 1), degree + 1)
+    # even powers of the distance from the axis are polynomials of its square
+    inner = body.inner_radius if isinstance(body, Ring) else 0.0
+    square, weights = gauss(inner**2, body.radius**2, nodes)
+    across = np.sqrt(square)
+    half = body.height / 2
+    return round_rule(body, (across, weights / (2 * across)), gauss(-half, half, nodes), degree + 1)
+
+
+def gauss(first: float, last: float, count: int) -> tuple[Array, Array]:
+    """Places and weights (`count`,) of Gauss's rule from `first` to `last`."""
+    t, weights = np.polynomial.legendre.leggauss(count)
+    return (first + last) / 2 + (last - first) / 2 * t, (last - first) / 2 * weights
+
+
+def box_rule(box: Box, rules: Sequence[tuple[Array, Array]]) -> tuple[Array, Array]:
+    """Points (n, 3) m and weights (n,) m³ in a box of `rules` (places, weights; m) along each of its axes."""
+    places, weights = zip(*rules, strict=True)
+    grid = np.stack(np.meshgrid(*places, indexing="ij"), axis=-1).reshape(-1, 3)
+    return box.center + grid @ box.rotation.T, np.einsum("i,j,k->ijk", *weights).ravel()
+
+
+def round_rule(
+    body: Cylinder | Ring | Sphere, radial: tuple[Array, Array], other: tuple[Array, Array], count: int
+) -> tuple[Array, Array]:
+    """Points (n, 3) m and weights (n,) m³ in a body of revolution.
+
+    Parameters
+    ----------
+    radial : places and weights (m) of the distance from the axis, or from a sphere's centre
+    other : the same of the height (m), or of a sphere's cosine of the polar angle
+    count : places around the axis
+    """
+    (r, wide), (t, tall) = radial, other
+    if isinstance(body, Sphere):
+        sine = np.sqrt(1 - t**2)
+        across, height = np.outer(r, sine).ravel(), np.outer(r, t).ravel()
+        areas = np.outer(wide * r, tall / sine).ravel()
     else:
-        inner = body.inner_radius if isinstance(body, Ring) else 0.0
-        local, weights = _ring_rule(inner, body.radius, body.height / 2, degree)
-    return body.center + local @ body.rotation.T, weights
-
-
-def box_rule(box: Box, counts: tuple[int, int, int]) -> tuple[Array, Array]:
-    """Points (n, 3) m and weights (n,) m³ of Gauss's rule in a box, with so many points along each edge."""
-    nodes, weights = zip(*(np.polynomial.legendre.leggauss(n) for n in counts), strict=True)
-    grid = np.stack(np.meshgrid(*nodes, indexing="ij"), axis=-1).reshape(-1, 3)
-    volumes = np.prod(box.half_edges) * np.einsum("i,j,k->ijk", *weights).ravel()
-    return box.center + (box.half_edges * grid) @ box.rotation.T, volumes
-
-
-def _circle(count: int) -> Array:
+        across, height, areas = np.repeat(r, len(t)), np.tile(t, len(r)), np.outer(wide, tall).ravel()
     angle = 2 * np.pi * (np.arange(count) + 0.5) / count
-    return np.stack([np.cos(angle), np.sin(angle)], axis=-1)
+    circle = across[:, None, None] * np.stack([np.cos(angle), np.sin(angle)], axis=-1)
+    upright = np.broadcast_to(height[:, None, None], (len(height), count, 1))
+    points = np.concatenate([circle, upright], axis=-1).reshape(-1, 3)
+    return body.center + points @ body.rotation.T, np.repeat(areas * across * (2 * np.pi / count), count)
 
 
-def _ring_rule(inner: float, outer: float, half: float, degree: int) -> tuple[Array, Array]:
-    """Even powers of the distance from the axis are polynomials of its square."""
-    t, weight = np.polynomial.legendre.leggauss(degree // 2 + 1)
-    square = inner**2 + (t + 1) / 2 * (outer**2 - inner**2)
-    circle = _circle(degree + 1)
-    shape = (len(t), len(t), len(circle))
-    across = np.sqrt(square)[:, None, None, None] * circle[None, None]
-    across = np.broadcast_to(across, (*shape, 2))
-    height = np.broadcast_to((half * t)[None, :, None, None], (*shape, 1))
-    points = np.concatenate([across, height], axis=-1).reshape(-1, 3)
-    ring = weight * (outer**2 - inner**2) / 4 * (2 * np.pi / len(circle))
-    return points, np.repeat(np.outer(ring, half * weight).ravel(), len(circle))
-
-
-def _sphere_rule(radius: float, degree: int) -> tuple[Array, Array]:
-    t, weight = np.polynomial.legendre.leggauss(degree // 2 + 2)
-    circle = _circle(degree + 1)
-    shape = (len(t), len(t), len(circle))
-    distance, cosine = radius * (t + 1) / 2, t
-    across = (distance[:, None] * np.sqrt(1 - cosine**2))[:, :, None, None] * circle
-    height = np.broadcast_to(np.outer(distance, cosine)[:, :, None, None], (*shape, 1))
-    points = np.concatenate([across, height], axis=-1).reshape(-1, 3)
-    shell = weight * radius / 2 * distance**2 * (2 * np.pi / len(circle))
-    return points, np.repeat(np.outer(shell, weight).ravel(), len(circle))
-
-
-FOUR_PI = 4 * np.pi
-TURNED = 1e-14
-"""Of the largest term: what turning there and back leaves at most."""
+TURNED = 1e-14  # of the largest term: what turning there and back leaves at most
+# Entries of the gradient that determine the rest: it is symmetric and traceless
 UPPER = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2))
-"""Entries of the gradient that determine the rest: it is symmetric and traceless."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -126,10 +127,7 @@ class MultipoleExpansion:
     @property
     def moment(self) -> Array:
         """(3,) dipole moment, A m²."""
-        if self.degree < 1:
-            return np.zeros(3)
-        c = self.coefficients[1]
-        return FOUR_PI * self.radius**3 / MU_0 * np.array([-2 * c[1].real, 2 * c[1].imag, c[0].real])
+        return moment(self.coefficients, Ball(self.center, self.radius)) if self.degree else np.zeros(3)
 
     @cached_property
     def own_coefficients(self) -> Coefficients:
@@ -137,30 +135,18 @@ class MultipoleExpansion:
         turned = rotated_harmonics(self.coefficients, self.axes.T)
         return turned if turned is self.coefficients else without_noise(turned, TURNED)
 
-    @cached_property
-    def components(self) -> tuple[list[dict[Any, float]], list[list[dict[Any, float]]]]:
-        """Real-harmonic weights of B_i and of ∂B_i/∂x̃_j."""
-        potentials = [-derivative(self.coefficients, i) for i in range(3)]
-        gradients = [[real_terms(derivative(p, j)) for j in range(3)] for p in potentials]
-        return [real_terms(p) for p in potentials], gradients
-
     def expressions(self, position: Sequence[hy.expression], number: Number = float) -> FieldExpressions:
-        """B (T) and ∂B_i/∂x_j (T/m) at a position (three expressions, m, rotor's frame)."""
+        """B (T) and ∂B_i/∂x_j (T/m) at a position (three expressions, m, rotor's frame), numbers by `number`."""
         place = [position[i] - number(self.center[i]) for i in range(3)]
         if not np.array_equal(self.axes, np.eye(3)):
-            return self._along_axes(place, number)
+            own = MultipoleExpansion(np.zeros(3), self.radius, self.own_coefficients)
+            seen = turned_expressions(self.axes.T, place, number)
+            return turned_field(self.axes, own.expressions(seen, number), number)
         scaled = [component * number(1.0 / self.radius) for component in place]
-        fields, gradients = self.components
-        slopes = [{k: w / self.radius for k, w in gradients[i][j].items()} for i, j in UPPER]
-        sums = harmonic_sums(scaled, [*fields, *slopes], number)
+        sums = harmonic_sums(scaled, [real_terms(part) for part in self._derivatives[: 3 + len(UPPER)]], number)
         upper = dict(zip(UPPER, sums[3:], strict=True))
         upper[2, 2] = -upper[0, 0] - upper[1, 1]
         return sums[:3], [[upper[min(i, j), max(i, j)] for j in range(3)] for i in range(3)]
-
-    def _along_axes(self, place: list[hy.expression], number: Number) -> FieldExpressions:
-        """Expressions along other axes, turned back."""
-        own = MultipoleExpansion(np.zeros(3), self.radius, self.own_coefficients)
-        return turned_field(self.axes, own.expressions(turned_expressions(self.axes.T, place, number), number), number)
 
     def evaluate(self, points: Array) -> tuple[Array, Array]:
         """B (n, 3) T and ∂B_i/∂x_j (n, 3, 3) T/m at points (n, 3) m, without compilation."""
@@ -169,9 +155,9 @@ class MultipoleExpansion:
 
     @cached_property
     def _derivatives(self) -> list[Coefficients]:
-        """Of B_i, and of the upper ∂B_i/∂x_j; of one size."""
+        """Of B_i, and of ∂B_i/∂x_j of `UPPER` and zz; of one size."""
         fields = [-derivative(self.coefficients, axis) for axis in range(3)]
-        slopes = [derivative(fields[i], j) / self.radius for i in range(3) for j in range(i, 3)]
+        slopes = [derivative(fields[i], j) / self.radius for i, j in (*UPPER, (2, 2))]
         return [*(np.pad(field, (0, 1)) for field in fields), *slopes]
 
     def root_mean_square(self, points: Array) -> tuple[Array, Array]:
@@ -187,12 +173,12 @@ class MultipoleExpansion:
 
 
 def turned_expressions(axes: Array, vector: Sequence[hy.expression], number: Number) -> list[hy.expression]:
-    """A vector along the columns of `axes`, along the outer ones."""
+    """A `vector` along the columns of `axes`, along the outer ones; `number` writes the factors."""
     return [hy.sum([number(factor) * part for factor, part in zip(row, vector, strict=True) if factor]) for row in axes]
 
 
 def turned_field(axes: Array, field: FieldExpressions, number: Number) -> FieldExpressions:
-    """A field and its gradient along the columns of `axes`, along the outer ones."""
+    """A `field` and its gradient along the columns of `axes`, along the outer ones; `number` writes the factors."""
     b, slope = field
     rows = [turned_expressions(axes, row, number) for row in slope]
     columns = [turned_expressions(axes, [row[j] for row in rows], number) for j in range(3)]
@@ -202,9 +188,13 @@ def turned_field(axes: Array, field: FieldExpressions, number: Number) -> FieldE
 def moments_of_magnetization(
     points: Array, weights: Array, magnetization: Array, center: Array, radius: float, degree: int
 ) -> Coefficients:
-    """Expansion coefficients (T) of a magnetisation given at quadrature points: exact volume functionals.
+    """Coefficients (T) of a magnetisation given at quadrature points, ∫ M · ∇ conj Υ_lm dV: exact volume functionals.
 
-    q_lm = ∫ M · ∇ conj Υ_lm dV, with `points` (n, 3) m, `weights` (n,) m³ and `magnetization` (n, 3) μ0 M in T.
+    Parameters
+    ----------
+    points, weights, magnetization : (n, 3) m, (n,) m³ and μ0 M (n, 3) T
+    center, radius : m, of the sphere about which the field is expanded
+    degree : highest l
     """
     weighted = (weights / (FOUR_PI * radius**3))[:, None] * magnetization
     potentials = weighted_sums(degree, (points - center) / radius, weighted)
@@ -214,7 +204,15 @@ def moments_of_magnetization(
 def curvature_moments(
     points: Array, weights: Array, matrix: Array, center: Array, radius: float, degree: int
 ) -> Coefficients:
-    """Coefficients (T) ∫ w Σ A_ij ∂_ij conj Υ_lm, with `weights` (n,) w in T m⁴ and `matrix` (3, 3) A, symmetric."""
+    """Coefficients (T) ∫ w Σ A_ij ∂_ij conj Υ_lm: what a potential in an anisotropic body adds to its faces' moments.
+
+    Parameters
+    ----------
+    points, weights : (n, 3) m and w (n,) T m⁴
+    matrix : A (3, 3), symmetric
+    center, radius : m, of the sphere about which the field is expanded
+    degree : highest l
+    """
     (sums,) = weighted_sums(degree, (points - center) / radius, weights[:, None] / (FOUR_PI * radius**4))
     second = [[regular_derivative(regular_derivative(sums, i), j) for j in range(3)] for i in range(3)]
     return np.asarray(sum(np.conj(matrix[i, j] * second[i][j]) for i in range(3) for j in range(3)))
@@ -244,18 +242,20 @@ def without_noise(coefficients: Coefficients, level: float) -> Coefficients:
     return np.where(field > level * field.max(initial=0.0), coefficients, 0.0)
 
 
-Part = tuple[int, int, int, complex]
-"""Number of the expansion, l, m, and the real or imaginary part of the coefficient."""
-MOST = 300
-"""Coefficients up to which a fit is worth its time."""
-ROUNDS = 6
-"""Of reweighting in a fit."""
+Part = tuple[int, int, int, complex]  # number of the expansion, l, m, and the real or imaginary part of the coefficient
+MOST = 300  # coefficients up to which a fit is worth its time
+ROUNDS = 6  # of reweighting in a fit
 
 
 def trimmed_expansions(
     expansions: Sequence[MultipoleExpansion], points: Array, allowed: Array
 ) -> tuple[list[MultipoleExpansion], list[MultipoleExpansion]]:
-    """The coefficients that matter, and what they leave out: at most `allowed` (n,) T at points (n, 3) m.
+    """The coefficients that matter, and what they leave out.
+
+    Parameters
+    ----------
+    expansions : whose fields add up
+    points, allowed : (n, 3) m, and (n,) T of the whole field that may be left out there
 
     The smallest ones are left out first. Those that stay are fitted to the whole field (weighted least squares), and
     stand in for what is missing: little more than half as many do then. Dipole moments stay as they are.  Coefficients
@@ -277,6 +277,7 @@ def trimmed_expansions(
     if _largest(fields.sum(axis=0)) <= 1:
         dipoles = []
     order = [i for i in np.argsort(-np.linalg.norm(fields, axis=2).max(axis=1)) if parts[i] not in dipoles]
+    # the fewest of the largest that will do: enough without a fit, and by halving with one
     factors = _fewest(fields[order])
     kept = [(k, l, m, c * f) for (k, l, m, c), f in zip((parts[i] for i in order), factors, strict=False)]
     kept += dipoles
@@ -314,19 +315,15 @@ def _fitted(fields: Array, total: Array) -> Array | None:
     columns, weights = fields.reshape(len(fields), -1), np.ones(len(total))
     scale = 1 / np.sqrt(np.einsum("kn,kn->k", columns, columns))
     for _ in range(ROUNDS):
-        weighted = columns * np.repeat(weights, 3) * scale[:, None]
-        factors = scale * _solved(weighted, total.ravel() * np.repeat(weights, 3))
+        rows, right = columns * np.repeat(weights, 3) * scale[:, None], total.ravel() * np.repeat(weights, 3)
+        # normal equations suffice for columns of like size: the error is looked at
+        factors = scale * np.linalg.lstsq(rows @ rows.T, rows @ right, rcond=None)[0]
         error = np.linalg.norm(total - (factors @ columns).reshape(total.shape), axis=1)
         if error.max() <= 1:
             return np.asarray(factors)
         weights *= np.sqrt(0.3 + error / error.max())  # towards equal largest errors
         weights /= weights.mean()
     return None
-
-
-def _solved(rows: Array, right: Array) -> Array:
-    """Least squares (k,) by normal equations, which suffice for rows (k, n) of like size: the error is looked at."""
-    return np.asarray(np.linalg.lstsq(rows @ rows.T, rows @ right, rcond=None)[0])
 
 
 def _largest(field: Array) -> float:

@@ -15,9 +15,7 @@ from functools import cache
 import numpy as np
 
 from ...geometry.common import MU_0, Array
-from .solid import CHUNK, Coefficients, factorials, regular_values, weighted_sums
-
-FOUR_PI = 4 * np.pi
+from .solid import CHUNK, FOUR_PI, Coefficients, factorials, regular_values, weighted_sums
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,9 +37,15 @@ def sphere(degree: int) -> tuple[Array, Array]:
 
 
 def interior_coefficients(field: Callable[[Array], Array], ball: Ball, degree: int) -> Coefficients:
-    """Coefficients a_lm (T) of a field given as a function, points (n, 3) m -> B (n, 3) T, without sources in the ball.
+    """Coefficients a_lm (T) of a field without sources in a ball, by its normal component on the surface.
 
-    By the normal component on the surface. Aliasing is a part ρ^(degree + 10) of the field, ρ the radius over the
+    Parameters
+    ----------
+    field : points (n, 3) m -> B (n, 3) T
+    ball : about whose centre it is expanded
+    degree : highest l
+
+    Aliasing is a part ρ^(degree + 10) of the field, ρ the radius over the
     distance of the centre from the nearest singularity.
     """
     normals, areas = sphere(degree)
@@ -62,9 +66,13 @@ def _by_height(degree: int) -> Array:
 
 
 def from_magnetization(points: Array, moments: Array, ball: Ball, degree: int) -> Coefficients:
-    """Coefficients a_lm (T) of dipoles outside the ball: positions (n, 3) m and μ0 M dV (n, 3) T m³.
+    """Coefficients a_lm (T) of dipoles outside a ball: (4π radius³)⁻¹ Σ μ0 M dV · ∇̃Θ_lm, exact for these dipoles.
 
-    a_lm = (4π radius³)⁻¹ Σ μ0 M dV · ∇̃Θ_lm, exact for these dipoles.
+    Parameters
+    ----------
+    points, moments : (n, 3) m and μ0 M dV (n, 3) T m³
+    ball : about whose centre the field is expanded
+    degree : highest l
     """
     sums = np.zeros((3, degree + 2, degree + 2), complex)
     for start in range(0, len(points), CHUNK):
@@ -100,15 +108,21 @@ def gradient_at_center(incident: Coefficients, radius: float) -> Array:
 
 
 def multipole_force(incident: Coefficients, sources: Coefficients, ball: Ball) -> Array:
-    """Force (3,) N of the incident field a_lm on the sources c_lm (T) in the ball; exact."""
-    factor = -FOUR_PI * ball.radius**2 / MU_0
-    return np.array([factor * _product(gradient_coefficients(incident, axis), sources) for axis in range(3)])
+    """Force (3,) N of the `incident` field a_lm (T) on `sources` c_lm (T) in a `ball`; exact."""
+    force = np.zeros(3)
+    for axis in range(3):
+        slope = gradient_coefficients(incident, axis)
+        size = min(len(slope), len(sources))
+        products = np.real(slope[:size, :size] * sources[:size, :size])
+        force[axis] = 2 * products.sum() - products[:, 0].sum()  # over positive and negative m
+    return -FOUR_PI * ball.radius**2 / MU_0 * force
 
 
 def multipole_torque(incident: Coefficients, sources: Coefficients, ball: Ball) -> Array:
-    """Torque (3,) N m about the centre on sources in the ball whose degrees above 1 answer to the incident field alone.
+    """Torque (3,) N m about the centre of a `ball` on `sources` c_lm (T) in an `incident` field a_lm (T): m × B.
 
-    m × B at the centre: a multipole -t_l conj a_lm induced in a sphere feels no torque from the field that induces it.
+    The degrees above 1 must be induced by the incident field alone: a multipole -t_l conj a_lm of a sphere feels no
+    torque from the field that induces it.
     """
     return np.cross(moment(sources, ball), field_at_center(incident))
 
@@ -120,15 +134,8 @@ def moment(sources: Coefficients, ball: Ball) -> Array:
 
 
 def dipole_sources(moment: Array, ball: Ball, degree: int) -> Coefficients:
-    """Coefficients c_lm (T) of a dipole moment (3,) A m² at the centre."""
+    """Coefficients c_lm (T) up to a `degree` of a dipole `moment` (3,) A m² at the centre of a `ball`."""
     result = np.zeros((degree + 1, degree + 1), complex)
     x, y, z = moment * MU_0 / (FOUR_PI * ball.radius**3)
     result[1, :2] = z, (-x + 1j * y) / 2
     return result
-
-
-def _product(incident: Coefficients, sources: Coefficients) -> float:
-    """Σ_lm a_lm c_lm over positive and negative m."""
-    size = min(len(incident), len(sources))
-    products = np.real(incident[:size, :size] * sources[:size, :size])
-    return float(2 * products.sum() - products[:, 0].sum())

@@ -1,4 +1,4 @@
-"""Fields in a ball from their normal component on its surface, in the real harmonics of `regular_sums`.
+"""Fields in a ball from their normal component on its surface, in the real harmonics of `regular_harmonics`.
 
 With lengths in radii of the ball, B = -∇ Σ c_k R_k, the R_k in the order of `members`.
 """
@@ -12,39 +12,45 @@ import numpy as np
 
 from ...geometry.common import Array
 from .expansion import UPPER
-from .expressions import FieldExpressions, members, real_sizes, real_weights, regular_harmonics, weighted
+from .expressions import FieldExpressions, regular_harmonics
 from .interior import Ball, gradient_coefficients, sphere
-from .solid import factorials, regular_values
+from .solid import Coefficients, factorials, members, regular_values
 
 
-@dataclass(frozen=True, eq=False)
-class SphereFit:
-    """What takes values on the unit sphere to an expansion, and back.
+def real_weights(coefficients: Coefficients) -> Array:
+    """Weights (..., K), in the order of `members`, of Σ conj a_lm Υ_lm (..., l, m) over positive and negative m."""
+    degree = coefficients.shape[-1] - 1
+    scaled = coefficients * _sizes(degree) * np.where(np.arange(degree + 1), 2.0, 1.0)
+    parts = [(scaled[..., l, m].imag if part else scaled[..., l, m].real) for l, m, part in members(degree)]
+    return np.stack(parts, axis=-1)
 
-    Parameters
-    ----------
-    normals : (n, 3) points
-    potential : (K, n) c_k by the normal component at one of the points, K = (degree + 1)²
-    basis : (degree², n) R_k up to one degree less, at the points
-    """
 
-    normals: Array
-    potential: Array
-    basis: Array
+def _sizes(degree: int) -> Array:
+    """[l, m]: Υ_lm by S_m Q_lm, (-1)^m (2l-1)!!/((l-m)! (l+m)!)."""
+    l, m = np.indices((degree + 1, degree + 1))
+    doubled = np.cumprod([1.0, *(2.0 * k - 1 for k in range(1, degree + 1))])
+    return np.where(m <= l, (-1.0) ** m * doubled[l] / factorials(degree), 0.0)
 
 
 @cache
-def sphere_fit(degree: int) -> SphereFit:
-    """For potentials of a degree; exact for them."""
+def _fitting(degree: int) -> tuple[Array, Array, Array]:
+    """Points (n, 3) on the unit sphere for potentials of a degree; exact for them.
+
+    With (3 degree² + 5 (degree - 1)², n) the weights of B and of its gradient by the normal component of B there, and
+    (degree², n) the R_k up to one degree less.
+    """
     normals, areas = sphere(degree)
-    found = np.zeros((len(normals), degree + 1, degree + 1), complex)
+    by_normal = np.zeros((len(normals), degree + 1, degree + 1), complex)
     for (l, m), values in regular_values(degree, *normals.T).items():
         if l:
-            found[:, l, m] = -(2 * l + 1) / (4 * np.pi * l) * values * areas
-    potential = np.stack([real_weights(np.asarray(factorials(degree) * row, complex)) for row in found], axis=1)
-    known = regular_values(degree - 1, *normals.T)
-    values = np.array([known[l, m].imag if part else known[l, m].real for l, m, part in members(degree - 1)])
-    return SphereFit(normals, potential, values / real_sizes(degree - 1)[:, None])
+            by_normal[:, l, m] = -(2 * l + 1) / (4 * np.pi * l) * values * areas
+    potential = real_weights(np.asarray(factorials(degree) * by_normal, complex)).T
+    first, second = derivatives(degree), derivatives(degree - 1)
+    field = [-slope @ potential for slope in first]
+    weights = np.concatenate([*field, *(second[j] @ field[i] for i, j in UPPER)])
+    known, sizes = regular_values(degree - 1, *normals.T), _sizes(degree - 1)
+    basis = [(known[l, m].imag if p else known[l, m].real) / sizes[l, m] for l, m, p in members(degree - 1)]
+    return normals, weights, np.array(basis)
 
 
 @cache
@@ -56,7 +62,7 @@ def derivatives(degree: int) -> Array:
         single[l, m] = 1j if part else 1.0
         single /= real_weights(single)[k]
         columns.append([real_weights(gradient_coefficients(single, axis)) for axis in range(3)])
-    return np.asarray(np.moveaxis(np.array(columns), 0, -1))
+    return np.moveaxis(np.array(columns), 0, -1)
 
 
 @dataclass(frozen=True)
@@ -83,11 +89,15 @@ class BallField:
 
     def expressions(self, position: Sequence[hy.expression]) -> FieldExpressions:
         """B and its gradient as heyoka expressions of a position (m)."""
-        offset, (size, less) = self.offset(position), (self.degree**2, (self.degree - 1) ** 2)
-        harmonics = regular_harmonics(self.degree - 1, offset, hy.sum([t * t for t in offset]))
+        size, less = self.degree**2, (self.degree - 1) ** 2
+        _, *harmonics = regular_harmonics(self.degree - 1, self.offset(position))  # the first is 1
+
+        def weighted(first: int, count: int) -> hy.expression:
+            return hy.sum([hy.par[first], *(hy.par[first + 1 + k] * h for k, h in enumerate(harmonics[: count - 1]))])
+
         start = self.first + 4
-        field = [weighted(start + i * size, harmonics) for i in range(3)]
-        slopes = [weighted(start + 3 * size + k * less, harmonics[:less]) for k in range(len(UPPER))]
+        field = [weighted(start + i * size, size) for i in range(3)]
+        slopes = [weighted(start + 3 * size + k * less, less) for k in range(len(UPPER))]
         upper = dict(zip(UPPER, slopes, strict=True))
         upper[2, 2] = -upper[0, 0] - upper[1, 1]
         return field, [[upper[min(i, j), max(i, j)] for j in range(3)] for i in range(3)]
@@ -97,22 +107,14 @@ class BallField:
 
         The error is the largest on the surface, of B or of its gradient, by the root mean square there.
         """
-        fitting, (size, less) = sphere_fit(self.degree), (self.degree**2, (self.degree - 1) ** 2)
-        field, gradient = evaluate(ball.center + ball.radius * fitting.normals)
+        (normals, by_normal, basis), size, less = _fitting(self.degree), self.degree**2, (self.degree - 1) ** 2
+        field, gradient = evaluate(ball.center + ball.radius * normals)
         slopes = np.array([gradient[:, i, j] for i, j in UPPER])
-        weights = _weights(self.degree) @ np.einsum("na,na->n", field, fitting.normals)
+        weights = by_normal @ np.einsum("na,na->n", field, normals)
         weights[3 * size :] /= ball.radius
-        field_error = _relative_miss(weights[: 3 * size].reshape(3, size) @ fitting.basis - field.T, field.T)
-        slope_error = _relative_miss(weights[3 * size :].reshape(5, less) @ fitting.basis[:less] - slopes, slopes)
+        field_error = _relative_miss(weights[: 3 * size].reshape(3, size) @ basis - field.T, field.T)
+        slope_error = _relative_miss(weights[3 * size :].reshape(5, less) @ basis[:less] - slopes, slopes)
         return np.concatenate([ball.center, [1 / ball.radius], weights]), max(field_error, slope_error)
-
-
-@cache
-def _weights(degree: int) -> Array:
-    """(3 degree² + 5 (degree - 1)², n): those of B and of its gradient by the normal component of B on the sphere."""
-    first, second, potential = derivatives(degree), derivatives(degree - 1), sphere_fit(degree).potential
-    field = [-slope @ potential for slope in first]
-    return np.concatenate([*field, *(second[j] @ field[i] for i, j in UPPER)])
 
 
 def _relative_miss(missed: Array, values: Array) -> float:

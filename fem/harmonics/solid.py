@@ -19,14 +19,12 @@ from numpy.typing import NDArray
 
 from ...geometry.common import Array, frozen_array
 
-Coefficients = NDArray[np.complex128]
-"""c[l, m] for 0 ≤ m ≤ l, as a square array."""
+Coefficients = NDArray[np.complex128]  # c[l, m] for 0 ≤ m ≤ l, as a square array
+Member = tuple[int, int, int]  # l, m, and 0 for the real or 1 for the imaginary part
+FOUR_PI = 4 * np.pi
 
-
-CHUNK = 4096
-"""Points at once, so that the harmonics of all degrees fit in memory."""
-FACTORIALS = np.array([float(math.factorial(n)) for n in range(171)])
-"""All that a double can hold."""
+CHUNK = 4096  # points at once, so that the harmonics of all degrees fit in memory
+FACTORIALS = np.array([float(math.factorial(n)) for n in range(171)])  # all that a double can hold
 
 
 @cache
@@ -39,9 +37,15 @@ def factorials(degree: int) -> Array:
 def regular_orders(
     degree: int, x: Array, y: Array, z: Array, orders: Container[int] | None = None
 ) -> Iterator[tuple[int, Array, Any]]:
-    """Order by order m: Υ_lm = R_lm (x + iy)^m at arrays x, y, z (n,), as m, R (degree + 1 - m, n) and the power (n,).
+    """Order by order m: Υ_lm = R_lm (x + iy)^m, as m, R (degree + 1 - m, n) and the power (n,).
 
-    `orders` are the m that are wanted; None for all up to the degree.
+    Real recurrences for one m at a time take a third of the time and memory of all complex harmonics.
+
+    Parameters
+    ----------
+    degree : highest l
+    x, y, z : coordinates (n,)
+    orders : the m that are wanted; None for all up to the degree
     """
     square, across = x * x + y * y + z * z, x + 1j * y
     power, first = np.ones_like(across), 1.0
@@ -62,13 +66,13 @@ def regular_orders(
 
 
 def regular_values(degree: int, x: Array, y: Array, z: Array) -> dict[tuple[int, int], Any]:
-    """Complex regular harmonics Υ_lm, 0 ≤ m ≤ l ≤ degree, at NumPy arrays x, y, z (n,)."""
+    """Complex regular harmonics Υ_lm (n,) by (l, m), 0 ≤ m ≤ l ≤ `degree`, at coordinates x, y, z (n,)."""
     orders = regular_orders(degree, x, y, z)
     return {(m + k, m): row * power for m, rows, power in orders for k, row in enumerate(rows)}
 
 
 def weighted_sums(degree: int, points: Array, weights: Array) -> Coefficients:
-    """Σ_n weight_n Υ_lm(r_n), [k, l, m], at points (n, 3) with weights (n, k)."""
+    """Σ_n weight_n Υ_lm(r_n), [k, l, m], up to a `degree` at `points` (n, 3) with `weights` (n, k)."""
     result = np.zeros((weights.shape[1], degree + 1, degree + 1), complex)
     for first in range(0, len(points), CHUNK):
         here = slice(first, first + CHUNK)
@@ -78,16 +82,21 @@ def weighted_sums(degree: int, points: Array, weights: Array) -> Coefficients:
     return result
 
 
+def _both_signs(coefficients: Coefficients) -> tuple[Coefficients, int]:
+    """[l, m] also of m < 0 by c_l(-m) = (-1)^m conj c_lm, with room for m ± 1; and the column of m = 0."""
+    size = len(coefficients)
+    full, orders = np.zeros((size, 2 * size + 3), complex), np.arange(size)
+    full[:, size + 1 - orders] = (-1.0) ** orders * np.conj(coefficients)
+    full[:, size + 1 + orders] = coefficients
+    return full, size + 1
+
+
 def regular_derivative(sums: Coefficients, axis: int) -> Coefficients:
     """[l, m] of a real linear functional of ∂Υ_lm/∂x_axis, from its values on Υ_lm itself (m ≥ 0)."""
-    size = len(sums)
-    full = np.zeros((size, 2 * size + 3), complex)  # column m + size + 1, with room for m ± 1
-    zero, orders = size + 1, np.arange(size)
-    full[:, zero + orders] = sums
-    full[:, zero - orders] = (-1.0) ** orders * np.conj(sums)
-    below = np.vstack([np.zeros((1, full.shape[1])), full[:-1]])
-    plus, minus = below[:, zero + orders + 1], -below[:, zero + orders - 1]
-    return np.asarray(((plus + minus) / 2, (plus - minus) / 2j, below[:, zero + orders])[axis])
+    full, zero = _both_signs(sums)
+    orders, below = zero + np.arange(len(sums)), np.vstack([np.zeros((1, full.shape[1])), full[:-1]])
+    plus, minus = below[:, orders + 1], -below[:, orders - 1]
+    return np.asarray(((plus + minus) / 2, (plus - minus) / 2j, below[:, orders])[axis])
 
 
 def irregular_values(degree: int, points: Array) -> dict[tuple[int, int], Any]:
@@ -99,14 +108,14 @@ def irregular_values(degree: int, points: Array) -> dict[tuple[int, int], Any]:
 
 
 def irregular_gradient(harmonics: dict[tuple[int, int], Any], l: int, m: int) -> list[Any]:
-    """Gradient (three complex arrays) of Θ_lm, from a dictionary made by `irregular_values` up to l + 1 (m ≥ 0)."""
+    """Gradient (three complex arrays) of Θ_lm, m ≥ 0, from `harmonics` of `irregular_values` up to l + 1."""
     plus = harmonics[l + 1, m + 1]
     minus = harmonics[l + 1, m - 1] if m else -np.conj(harmonics[l + 1, 1])
     return [(plus - minus) / 2, (plus + minus) / 2j, -harmonics[l + 1, m]]
 
 
 def regular_gradient(harmonics: dict[tuple[int, int], Any], l: int, m: int) -> list[Any]:
-    """Gradient (three complex arrays) of Υ_lm, from a dictionary made by `regular_values` (m ≥ 0)."""
+    """Gradient (three complex arrays) of Υ_lm, m ≥ 0, from `harmonics` of `regular_values`."""
 
     def at(n: int, k: int) -> Any:
         if n < 0 or abs(k) > n:
@@ -137,34 +146,27 @@ def outer_sums(coefficients: Sequence[Coefficients], points: Array) -> Array:
 
 def derivative(coefficients: Coefficients, axis: int) -> Coefficients:
     """Coefficients of ∂f/∂x_axis of f = Σ c_lm Θ_lm: one degree more."""
-    size = coefficients.shape[0]
-    full = np.zeros((size, 2 * size + 3), complex)  # column m + size + 1, with room for m ± 1
-    zero = size + 1
-    for m in range(size):
-        full[:, zero + m] = coefficients[:, m]
-        if m:
-            full[:, zero - m] = (-1) ** m * np.conj(coefficients[:, m])
-    result = np.zeros((size + 1, size + 1), complex)
-    orders = np.arange(size + 1)
-    lower, upper = full[:, zero + orders - 1], full[:, zero + orders + 1]
-    if axis == 0:
-        result[1:] = (lower - upper) / 2
-    elif axis == 1:
-        result[1:] = (lower + upper) / 2j
-    else:
-        result[1:, :size] = -coefficients
-    return result
+    full, zero = _both_signs(coefficients)
+    orders = zero + np.arange(len(coefficients) + 1)
+    lower, upper = full[:, orders - 1], full[:, orders + 1]
+    found = ((lower - upper) / 2, (lower + upper) / 2j, -full[:, orders])[axis]
+    return np.vstack([np.zeros((1, len(orders))), found])
 
 
-def real_terms(coefficients: Coefficients) -> dict[Any, float]:
-    """The same function as a sum over real harmonics: {(l, m, part): weight}, zero weights left out."""
-    terms: dict[Any, float] = {}
+def members(degree: int) -> list[Member]:
+    """All real harmonics up to a degree, the lowest degrees first."""
+    return [(l, m, part) for l in range(degree + 1) for m in range(l + 1) for part in (0, 1)[: 1 + (m > 0)]]
+
+
+def real_terms(coefficients: Coefficients) -> dict[Member, float]:
+    """The same function as a sum over real harmonics, by `members`; zero weights left out."""
+    terms: dict[Member, float] = {}
     for l, m in zip(*np.nonzero(coefficients), strict=True):
         c, factor = coefficients[l, m], 1.0 if m == 0 else 2.0
         if c.real:
-            terms[int(l), int(m), "re"] = factor * float(c.real)
+            terms[int(l), int(m), 0] = factor * float(c.real)
         if c.imag and m:
-            terms[int(l), int(m), "im"] = -factor * float(c.imag)
+            terms[int(l), int(m), 1] = -factor * float(c.imag)
     return terms
 
 
@@ -174,7 +176,7 @@ def field_sizes(degree: int) -> Array:
     The mean of |Θ_lm|² is (l-m)!(l+m)!/(2l+1), and that of |grad f|² is (l+1)(2l+1) times the mean of f² for a
     harmonic f of degree l. The size of Σ c_lm Θ_lm is the root of Σ |c_lm|² size_lm².
     """
-    l, m = np.meshgrid(np.arange(degree + 1), np.arange(degree + 1), indexing="ij")
+    l, m = np.indices((degree + 1, degree + 1))
     return np.where(m <= l, np.sqrt(np.where(m == 0, 1.0, 2.0) * (l + 1.0) * factorials(degree)), 0.0)
 
 
@@ -183,9 +185,12 @@ def field_spectrum(coefficients: Coefficients) -> Array:
     return np.asarray(np.linalg.norm(np.abs(coefficients) * field_sizes(len(coefficients) - 1), axis=1))
 
 
-FOUR_PI = 4 * np.pi
-Keys = list[tuple[int, int, bool]]
-"""Degree l, order m, and whether it is the imaginary part."""
+def orthonormal(keys: Sequence[Member], points: Array) -> Array:
+    """Real orthonormal harmonics (n, columns) in the directions of `points` (n, 3)."""
+    degree = max(l for l, _, _ in keys)
+    harmonics = regular_values(degree, *(points / np.linalg.norm(points, axis=1)[:, None]).T)
+    parts = [harmonics[l, m].imag if part else harmonics[l, m].real for l, m, part in keys]
+    return np.stack([norm(l, m) * part for (l, m, _), part in zip(keys, parts, strict=True)], axis=1)
 
 
 def norm(l: int, m: int) -> float:
@@ -194,29 +199,10 @@ def norm(l: int, m: int) -> float:
     return float(np.sqrt(square if m == 0 else 2 * square))
 
 
-def orthonormal_keys(degree: int) -> Keys:
-    """The real harmonics up to a degree, in the order of the columns of `orthonormal`."""
-    return [
-        (l, m, imaginary)
-        for l in range(degree + 1)
-        for m in range(l + 1)
-        for imaginary in ((False,) if m == 0 else (False, True))
-    ]
-
-
-def orthonormal(keys: Keys, points: Array) -> Array:
-    """Real orthonormal harmonics (n, columns) in the directions of `points` (n, 3)."""
-    degree = max(l for l, _, _ in keys)
-    harmonics = regular_values(degree, *(points / np.linalg.norm(points, axis=1)[:, None]).T)
-    parts = [harmonics[l, m].imag if imaginary else harmonics[l, m].real for l, m, imaginary in keys]
-    return np.stack([norm(l, m) * part for (l, m, _), part in zip(keys, parts, strict=True)], axis=1)
-
-
-def harmonic_parity(key: tuple[int, int, bool], axis: int) -> int:
+def harmonic_parity(key: Member, axis: int) -> int:
     """Whether a real harmonic is even (+1) or odd (-1) at the plane across a coordinate axis."""
-    l, m, imaginary = key
-    odd = ((m + imaginary) % 2, int(imaginary), (l + m) % 2)[axis]
-    return -1 if odd else 1
+    l, m, part = key
+    return -1 if ((m + part) % 2, part, (l + m) % 2)[axis] else 1
 
 
 def mirrored_harmonics(coefficients: Coefficients, axis: int) -> Coefficients:
@@ -227,11 +213,14 @@ def mirrored_harmonics(coefficients: Coefficients, axis: int) -> Coefficients:
     return np.asarray((-1.0) ** (m if axis == 0 else 0 * m) * np.conj(coefficients))
 
 
-def outer_coefficients(amplitudes: Array, keys: Keys, degree: int) -> Coefficients:
-    """c_lm of Σ c_lm Θ_lm that is Σ a_k Y_k on the unit sphere, `amplitudes` a_k of the orthonormal harmonics Y_k."""
+def outer_coefficients(amplitudes: Array, keys: Sequence[Member], degree: int) -> Coefficients:
+    """c_lm, up to a degree, of Σ c_lm Θ_lm that is Σ a_k Y_k on the unit sphere.
+
+    `amplitudes` (k,) are the a_k of orthonormal harmonics Y_k, which are named by `keys`.
+    """
     result = np.zeros((degree + 1, degree + 1), complex)
-    for value, (l, m, imaginary) in zip(amplitudes, keys, strict=True):
-        result[l, m] += (2 * l + 1) / FOUR_PI / norm(l, m) * (-1j * value if imaginary else value)
+    for value, (l, m, part) in zip(amplitudes, keys, strict=True):
+        result[l, m] += (2 * l + 1) / FOUR_PI / norm(l, m) * (-1j * value if part else value)
     return result
 
 
@@ -247,7 +236,7 @@ def rotated_harmonics(coefficients: Coefficients, axes: Array) -> Coefficients:
     middle = np.arctan2(across @ axes[:, 2], axes[2, 2])
     first = np.arctan2(*(np.array([-across[1], across[0], 0.0]) @ axes[:, :2]))
     degrees = np.arange(len(coefficients))
-    l, m = np.meshgrid(degrees, degrees, indexing="ij")
+    l, m = np.indices(coefficients.shape)
     size = np.sqrt(factorials(len(coefficients) - 1))
     amplitudes = coefficients * np.where(m <= l, size, 0.0)
     for degree in degrees[1:]:
