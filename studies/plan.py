@@ -17,8 +17,8 @@ from ..fem.maps_of_B.table import GriddedTable
 from ..fem.mutual.making import mutual_key
 from ..fem.plate.choice import resolve_plate_model
 from ..fem.plate.table import Region
-from ..fem.rotor.choice import resolve_model, rotor_key
-from ..fem.rotor.table import RotorTable
+from ..fem.rotor.choice import resolve_model
+from ..fem.rotor.table import ROTOR, RotorTable
 from ..fem.rotor_metal import losses_key, pieces_of
 from ..geometry.common import Array, InputError, millimetre_size
 from ..geometry.overlap import TOUCHING, sphere_overlap
@@ -113,7 +113,7 @@ def nearest_faces(floater: Floater) -> float:
 
 def field_key(scene: Scene, model: str, rtol: float) -> str:
     """All that decides a `scene`'s rotor field by a `model` to `rtol`: also its map's content, and how it is read."""
-    known = rotor_key(scene.rotor, model, rtol, nearest_faces(scene.floater))
+    known = ROTOR.key(scene.rotor, model, rtol, nearest_faces(scene.floater))
     return f"{known} {map_digest(scene)} {scene.map_reading}"
 
 

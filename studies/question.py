@@ -19,7 +19,7 @@ from ..dynamics.flights.balls import is_long
 from ..dynamics.flights.batch import fly_together
 from ..dynamics.flights.flight import initial_state
 from ..dynamics.motion.rates import Rates
-from ..fem.rotor.pose import at_home
+from ..fem.rotor.table import canonical
 from ..geometry.common import Array, InputError, SpinlevError
 from ..geometry.scene.contents import Scene
 from ..geometry.scene.files import changed, scene_digest, scene_keys, scene_text, startless_text
@@ -63,7 +63,7 @@ def _family_key(levitation: Levitation) -> str | None:
         return None
     with suppress(SpinlevError):
         if found := _measure(scene):
-            home = equations_key(replace(scene, rotor=at_home(scene.rotor)), levitation.models)
+            home = equations_key(replace(scene, rotor=canonical(scene.rotor)), levitation.models)
             return f"{found[0]} {levitation.table.model} {levitation.interaction_model} {home}"
     return None
 

@@ -1,25 +1,24 @@
 """The field models of a rotor, and the choice between them."""
 
 from collections.abc import Callable
-from functools import partial
+from dataclasses import dataclass, field
+from functools import lru_cache, partial
 
 import numpy as np
 
 from ...geometry.common import Watch, unwatched
 from ...geometry.magnets import Magnet
 from .models import Accuracy, cuboid_table, dipole_table, error_points, fem_table, moments_table
-from .pose import at_home, taken_along
-from .table import ROTOR, RotorTable
+from .table import ROTOR, RotorTable, canonical
 
+# From the cheapest to the dearest in evaluation
 MODELS: dict[str, Callable[[tuple[Magnet, ...], Accuracy], RotorTable]] = {
     "dipole": dipole_table,
     "moments": moments_table,
     "cuboid": cuboid_table,
     "fem": fem_table,
 }
-"""From the cheapest to the dearest in evaluation."""
-FEW_MOMENTS = 16
-"""Coefficients per magnet up to which moments are quicker to evaluate than the closed form."""
+FEW_MOMENTS = 16  # coefficients per magnet up to which moments are quicker to evaluate than the closed form
 
 
 def resolve_model(
@@ -27,18 +26,35 @@ def resolve_model(
 ) -> tuple[str, str]:
     """Name of the model that `rotor_table` uses for `model`, and the reason in words.
 
-    `auto` is the cheapest of dipole, moments, closed form and finite elements that meets `rtol` at all distances from
-    the magnets' faces of at least `nearest` (m; None: 0.8 of the largest magnet's edge, if it were a cube).
+    `auto` is the cheapest of dipole, moments, closed form and finite elements that meets the accuracy.
+
+    Parameters
+    ----------
+    rotor, model, rtol, nearest : as of `rotor_table`
 
     Raises
     ------
     ValueError : unknown model, or rtol not between 0 and 1
     """
-    if model == "auto":
-        return _cheapest(rotor, Accuracy(rtol, nearest))
-    if model not in MODELS:
+    if model in MODELS:
+        return model, "as asked"
+    if model != "auto":
         raise ValueError(f"Input model must be one of {', '.join([*MODELS, 'auto'])}; instead received {model!r}.")
-    return model, "as asked"
+    accuracy = Accuracy(rtol, nearest)
+    clearance = accuracy.clearance(rotor)
+    points, scale = error_points(rotor, clearance)
+    where = f"at {clearance * 1e3:.3g} mm from the magnets' faces and beyond, where {rtol:.1e} is asked for"
+    permeability = float(np.max(cuboid_table(rotor, accuracy).absolute_error(points)[0] / scale))
+    if permeability > rtol:
+        return "fem", f"leaving out the recoil permeability is wrong by {permeability:.1e} {where}"
+    for table in (dipole_table(rotor, accuracy), moments_table(rotor, accuracy)):
+        error = float(np.max(table.absolute_error(points)[0] / scale))
+        count = sum(np.count_nonzero(expansion.coefficients) for expansion in table.expansions)
+        if error <= rtol and count <= FEW_MOMENTS * len(rotor) and table.in_range(points).all():
+            return table.model, f"with {count} coefficients it is wrong by {error:.1e} {where}"
+    if permeability == 0:
+        return "cuboid", "every recoil permeability is 1, so that the closed form is exact"
+    return "cuboid", f"leaving out the recoil permeability is wrong by only {permeability:.1e} {where}"
 
 
 def rotor_table(
@@ -52,6 +68,7 @@ def rotor_table(
 
     Parameters
     ----------
+    rotor : magnets, m and T in the rotor's frame
     model : "dipole" (moments J V/μ0 of the remanence, as in the article), "moments" (more of them), "cuboid" (closed
         form, μr = 1), "fem" (with recoil permeability and mutual demagnetisation), or "auto", see `resolve_model`
     rtol, nearest : relative accuracy of B asked of "fem" and "moments", and the distance from the magnets' faces from
@@ -72,31 +89,23 @@ def rotor_table(
     if not rotor:
         raise ValueError("Input rotor must hold at least one magnet; instead received none.")
     name, _ = resolve_model(rotor, model, rtol, nearest)
-    make = partial(fem_table, watch=watch) if name == "fem" else MODELS[name]
-    return taken_along(make(at_home(rotor), accuracy), rotor)
+    lone = canonical(rotor)
+    if name == "fem":
+        return fem_table(lone, accuracy, watch=watch).posed(rotor)
+    return _simple_table(_Asked(ROTOR.key(lone, name, rtol, nearest), lone), name, accuracy).posed(rotor)
 
 
-def _cheapest(rotor: tuple[Magnet, ...], accuracy: Accuracy) -> tuple[str, str]:
-    clearance = accuracy.clearance(rotor)
-    points, scale = error_points(rotor, clearance)
-    where = f"at {clearance * 1e3:.3g} mm from the magnets' faces and beyond, where {accuracy.rtol:.1e} is asked for"
-    cuboid = cuboid_table(rotor, accuracy)
-    permeability = float(np.max(cuboid.absolute_error(points)[0] / scale))
-    if permeability > accuracy.rtol:
-        return "fem", f"leaving out the recoil permeability is wrong by {permeability:.1e} {where}"
-    for table in (dipole_table(rotor, accuracy), moments_table(rotor, accuracy)):
-        error = float(np.max(table.absolute_error(points)[0] / scale))
-        count = sum(np.count_nonzero(expansion.coefficients) for expansion in table.expansions)
-        if error <= accuracy.rtol and count <= FEW_MOMENTS * len(rotor) and table.in_range(points).all():
-            return table.model, f"with {count} coefficients it is wrong by {error:.1e} {where}"
-    if permeability == 0:
-        return "cuboid", "every recoil permeability is 1, so that the closed form is exact"
-    return "cuboid", f"leaving out the recoil permeability is wrong by only {permeability:.1e} {where}"
+@dataclass(frozen=True)
+class _Asked:
+    """A rotor by its key."""
+
+    key: str
+    rotor: tuple[Magnet, ...] = field(compare=False)
 
 
-def rotor_key(rotor: tuple[Magnet, ...], model: str, rtol: float, nearest: float | None = None) -> str:
-    """SHA-256 of the magnets, the model, the accuracy asked for and where, and of what computes them."""
-    return ROTOR.key(rotor, model, rtol, nearest)
+@lru_cache(maxsize=64)  # sweeps and sliders that move a lone magnet ask for the same again
+def _simple_table(asked: _Asked, model: str, accuracy: Accuracy) -> RotorTable:
+    return MODELS[model](asked.rotor, accuracy)
 
 
 def cached_rotor_table(
@@ -107,11 +116,16 @@ def cached_rotor_table(
     nearest: float | None = None,
     watch: Watch = unwatched,
 ) -> tuple[RotorTable, bool]:
-    """A rotor table, see `rotor_table`, from the cache if it is there, and whether it was.
+    """A rotor table from the cache if it is there, and whether it was.
 
     A lone magnet has one, wherever it is in the rotor.
+
+    Parameters
+    ----------
+    rotor, model, rtol, nearest, watch : as of `rotor_table`
+    report : hears of a damaged cache
     """
-    home = at_home(rotor)
-    make = partial(rotor_table, home, model, rtol, nearest, watch)
-    table, found = ROTOR.cached((home, model, rtol, nearest), make, report)
-    return taken_along(table, rotor), found
+    lone = canonical(rotor)
+    make = partial(rotor_table, lone, model, rtol, nearest, watch)
+    table, found = ROTOR.cached((lone, model, rtol, nearest), make, report)
+    return table.posed(rotor), found

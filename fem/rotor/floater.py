@@ -8,7 +8,7 @@ A uniform part J is dipoles J dV/μ0 at the points of a rule; multipoles c_lm ar
 which have these multipoles because 1/|r - s| = Σ conj Υ_lm(r) Θ_lm(s), and no others.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -23,13 +23,9 @@ from ..harmonics.solid import factorials, regular_values
 from .choice import cached_rotor_table
 from .table import FieldTable
 
-FOUR_PI = 4 * np.pi
-DEGREE = 20
-"""Of polynomials over the body that the dipoles integrate exactly."""
-RTOL = 1e-5
-"""Accuracy of the field of a permeable floater, from its circumradius off its faces on."""
-SHARE = 0.4
-"""Least radius of the sphere of charges, in circumradii."""
+DEGREE = 20  # of polynomials over the body that the dipoles integrate exactly
+RTOL = 1e-5  # accuracy of the field of a permeable floater, from its circumradius off its faces on
+SHARE = 0.4  # least radius of the sphere of charges, in circumradii
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,19 +45,18 @@ class FloaterSources:
 
     def axial_moments(self, highest: int) -> Array:
         """(highest,) A m^(l+1): the zonal multipoles Q_l = Σ charge · r^l P_l about its z, l = 1 … highest."""
-        found = []
-        for l in range(1, highest + 1):
-            radius = np.linalg.norm(self.places, axis=1)
-            tiny = np.finfo(float).tiny
-            below = radius ** (l - 1) * scipy.special.eval_legendre(l - 1, self.places[:, 2] / np.maximum(radius, tiny))
-            far = np.linalg.norm(self.corners, axis=1)
-            zonal = far**l * scipy.special.eval_legendre(l, self.corners[:, 2] / np.maximum(far, tiny))
-            # the z derivative of r^l P_l is l r^(l-1) P_(l-1); what lies across z cancels in a round body
-            found.append(l * self.moments[:, 2] @ below + self.charges @ zonal)
-        return np.array(found)
+        l, tiny = np.arange(1, highest + 1)[:, None], np.finfo(float).tiny
+        radius, far = (np.linalg.norm(part, axis=1) for part in (self.places, self.corners))
+        below = radius ** (l - 1) * scipy.special.eval_legendre(l - 1, self.places[:, 2] / np.maximum(radius, tiny))
+        zonal = far**l * scipy.special.eval_legendre(l, self.corners[:, 2] / np.maximum(far, tiny))
+        # the z derivative of r^l P_l is l r^(l-1) P_(l-1); what lies across z cancels in a round body
+        return np.asarray(l[:, 0] * (below @ self.moments[:, 2]) + zonal @ self.charges)
 
     def unsure(self, table: FieldTable, position: Array, axes: Array) -> tuple[Array, Array]:
-        """What a table's stated errors may do to force (n,) N and torque (n,) N m in poses (n, 3) m, (n, 3, 3)."""
+        """Errors of force (n,) N and torque (n,) N m by those that a `table` states.
+
+        `position` (n, 3) m and `axes` (n, 3, 3) are as of `force_and_torque`.
+        """
         strengths, arms = (np.linalg.norm(part, axis=1) for part in (self.moments, self.places))
         charges, ends = np.abs(self.charges), np.linalg.norm(self.corners, axis=1)
         forces, torques = np.zeros(len(position)), np.zeros(len(position))
@@ -79,32 +74,39 @@ class FloaterSources:
 def floater_sources(
     floater: Floater, report: Callable[[str], None] = lambda _: None, degree: int = DEGREE
 ) -> FloaterSources:
-    """The sources of a floater of any shape, polarised along its z.
+    """Sources of a floater of any shape, polarised along its z.
 
     Exact for μr = 1 up to a `degree` of the rotor's field over the body; with a permeability to 1e-5 of the field
     beside the floater, from finite elements, which are kept in the user's cache.
+
+    Parameters
+    ----------
+    floater : a sphere is one dipole
+    report : hears of a damaged cache
+    degree : of the polynomials over the body that are integrated exactly
     """
     magnet = floater.magnet(np.zeros(3), np.array([0.0, 0.0, 1.0]))
     if floater.body is None:
         moment = np.array([[0.0, 0.0, floater.moment]])
         return FloaterSources(np.zeros((1, 3)), moment, np.zeros((0, 3)), np.zeros(0))
     if floater.recoil_permeability == 1:
-        return _joined([_dipoles(magnet, degree)], [])
+        return _joined([magnet], [], degree)
     table, _ = cached_rotor_table((magnet,), "fem", RTOL, report, floater.radius)
     least = max(floater.inner_radius, SHARE * floater.radius)
-    return _joined([_dipoles(part, degree) for part in table.uniform], [_charges(e, least) for e in table.expansions])
+    # charges farther in would be large and cancel
+    least = max(floater.inner_radius, SHARE * floater.radius)
+    return _joined(table.uniform, [_charges(e, least) for e in table.expansions], degree)
 
 
-def _joined(dipoles: list[tuple[Array, Array]], charges: list[tuple[Array, Array]]) -> FloaterSources:
-    places, moments = zip(*dipoles, strict=True) if dipoles else ([np.zeros((0, 3))], [np.zeros((0, 3))])
-    corners, strengths = zip(*charges, strict=True) if charges else ([np.zeros((0, 3))], [np.zeros(0)])
-    return FloaterSources(*(np.concatenate(part) for part in (places, moments, corners, strengths)))
-
-
-def _dipoles(magnet: Magnet, degree: int) -> tuple[Array, Array]:
-    """Places (n, 3) m and moments (n, 3) A m² of a uniform polarisation."""
-    places, weights = polynomial_rule(magnet.body, degree)
-    return places, weights[:, None] * magnet.polarization_in_rotor / MU_0
+def _joined(magnets: Sequence[Magnet], charges: Sequence[tuple[Array, Array]], degree: int) -> FloaterSources:
+    """Dipoles of uniform polarisations, and charges."""
+    dipoles = [(np.zeros((0, 3)), np.zeros((0, 3)))]
+    for magnet in magnets:
+        points, weights = polynomial_rule(magnet.body, degree)
+        dipoles.append((points, weights[:, None] * magnet.polarization_in_rotor / MU_0))
+    places, moments = (np.concatenate(part) for part in zip(*dipoles, strict=True))
+    corners, strengths = zip((np.zeros((0, 3)), np.zeros(0)), *charges, strict=True)
+    return FloaterSources(places, moments, np.concatenate(corners), np.concatenate(strengths))
 
 
 def _charges(expansion: MultipoleExpansion, radius: float) -> tuple[Array, Array]:
@@ -118,14 +120,12 @@ def _charges(expansion: MultipoleExpansion, radius: float) -> tuple[Array, Array
     return expansion.center + radius * normals, radius**2 / MU_0 * areas * density
 
 
-Field = Callable[[Array], tuple[Array, Array]]
-
-
 def force_and_torque(sources: FloaterSources, table: FieldTable, position: Array, axes: Array) -> tuple[Array, Array]:
     """Force (n, 3) N and torque (n, 3) N m about the centre in the rotor's field.
 
     Parameters
     ----------
+    sources, table : the floater's, and the rotor's field
     position : (n, 3) of the centre, m, rotor's frame
     axes : (n, 3, 3) whose columns are the body's axes, the third that of its remanence
 
@@ -133,14 +133,13 @@ def force_and_torque(sources: FloaterSources, table: FieldTable, position: Array
     ------
     RangeError : part of the floater is where the table does not know the field, such as in a magnet
     """
-    found = [_one(sources, table.evaluate, place, turn) for place, turn in zip(position, axes, strict=True)]
-    return np.array([force for force, _ in found]), np.array([torque for _, torque in found])
-
-
-def _one(sources: FloaterSources, field: Field, place: Array, turn: Array) -> tuple[Array, Array]:
-    arms, moments, ends = (part @ turn.T for part in (sources.places, sources.moments, sources.corners))
-    b, gradient = field(place + np.concatenate([arms, ends]))
-    pulls = np.einsum("ni,nij->nj", moments, gradient[: len(arms)])
-    pushes = sources.charges[:, None] * b[len(arms) :]
-    turns = np.cross(moments, b[: len(arms)]) + np.cross(arms, pulls)
-    return pulls.sum(axis=0) + pushes.sum(axis=0), turns.sum(axis=0) + np.cross(ends, pushes).sum(axis=0)
+    force, torque = np.zeros((len(position), 3)), np.zeros((len(position), 3))
+    for k, (place, turn) in enumerate(zip(position, axes, strict=True)):
+        arms, moments, ends = (part @ turn.T for part in (sources.places, sources.moments, sources.corners))
+        b, gradient = table.evaluate(place + np.concatenate([arms, ends]))
+        pulls = np.einsum("ni,nij->nj", moments, gradient[: len(arms)])  # (m·∇)B, the gradient being symmetric
+        pushes = sources.charges[:, None] * b[len(arms) :]
+        turns = np.cross(moments, b[: len(arms)]) + np.cross(arms, pulls)
+        force[k] = pulls.sum(axis=0) + pushes.sum(axis=0)
+        torque[k] = turns.sum(axis=0) + np.cross(ends, pushes).sum(axis=0)
+    return force, torque

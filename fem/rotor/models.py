@@ -1,4 +1,4 @@
-"""What a table must reach, and where."""
+"""Models of a rotor's field as tables: dipoles, moments, closed forms, finite elements; and what each leaves out."""
 
 import importlib.metadata
 import resource
@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ...geometry.common import Array, InputError, Watch, even_directions, unwatched
-from ...geometry.cutting import CONVERGENCE, Cells, cells_of, cut_magnets
+from ...geometry.cutting import CONVERGENCE, cells_of, cut_magnets
 from ...geometry.magnets import Magnet
 from ...geometry.meshes.magnets import MeshSettings
 from ...geometry.overlap import largest_shift
@@ -19,22 +19,16 @@ from ...geometry.solids import Part, places_off
 from ..closed_forms.moments import carrier, closed_part, first_order_moments, uniform_cells
 from ..elements.ladder import RotorSolution, refined, refinement_of, solve_rotor, strongest
 from ..harmonics.expansion import MultipoleExpansion, trimmed_expansions, uniform_moments, without_noise
-from ..harmonics.solid import Coefficients
-from .pose import added_moments, shape_moments
 from .table import KNOWN, RotorTable
 
+# Errors are looked at this far out, beyond the nearest distance, in sizes of the rotor
 OFFSETS = (0.0, 1.0, 3.0, 10.0, 100.0)
-"""Errors are looked at this far out, beyond the nearest distance, in sizes of the rotor."""
-NEAR, FARTHER = 600, 150
-"""In how many directions; nearest by, what is left out of a series changes within 10°."""
-BETWEEN = 0.8
-"""What may be left out, by what is allowed: between these places it is up to a fifth more than there."""
-
-
+NEAR, FARTHER = 600, 150  # in how many directions; nearest by, what is left out of a series changes within 10°
+BETWEEN = 0.8  # what may be left out, by what is allowed: between these places it is up to a fifth more than there
+# Least distance from faces from which on a table is to be accurate, by the edge of the largest magnet, if it were a
+# cube: a floater far smaller than the rotor floats as far away as a large one, and the number of pieces that are
+# needed grows as the third power of the reciprocal
 NEAREST = 0.25
-"""Least distance from faces from which on a table is to be accurate, by the edge of the largest magnet, if it were a
-cube: a floater far smaller than the rotor floats as far away as a large one, and the number of pieces that are
-needed grows as the third power of the reciprocal."""
 
 
 class AccuracyError(InputError):
@@ -81,7 +75,7 @@ def error_points(magnets: tuple[Magnet, ...], clearance: float) -> tuple[Array, 
 
 
 def points_around(magnets: tuple[Magnet, ...], offset: float, number: int = FARTHER) -> Array:
-    """Points (n, 3) m at a distance `offset` (m) from the nearest of the magnets' faces, in directions all around."""
+    """Points (n, 3) m at a distance `offset` (m) from the nearest of the `magnets`' faces, in `number` directions."""
     directions = even_directions(number)
     points = np.concatenate([places_off(magnet.body, directions, offset) for magnet in magnets])
     outside = np.all([magnet.body.distance(points) >= offset * (1 - 1e-6) for magnet in magnets], axis=0)
@@ -90,38 +84,18 @@ def points_around(magnets: tuple[Magnet, ...], offset: float, number: int = FART
 
 def typical_field(magnets: tuple[Magnet, ...], points: Array) -> Array:
     """B (n,) T to which errors at points (n, 3) m, all about as far away, are relative: see `error_points`."""
-    dipoles = [uniform_moments(_carrier(magnet), 1) for magnet in magnets]
+    carriers = [magnet if isinstance(magnet.body, Part) else carrier(magnet) for magnet in magnets]
+    dipoles = [uniform_moments(magnet, 1) for magnet in carriers]
     field = np.linalg.norm(sum(dipole.evaluate(points)[0] for dipole in dipoles), axis=1)
     return np.maximum(field, np.median(field) / 3) if field.any() else np.ones(len(field))
 
 
-def _carrier(magnet: Magnet) -> Magnet:
-    return magnet if isinstance(magnet.body, Part) else carrier(magnet)
-
-
-def guards(magnets: tuple[Magnet, ...], clearance: float) -> tuple[Array, Array]:
-    """Points (n, 3) m nearer to edges and corners than `clearance`, as far from a magnet's centre as its faces' places.
-
-    They see to it that a fit, which need only hold at `error_points`, does not run wild beside them. With the scale
-    (n,) of B (T) there.
-    """
-    directions = np.random.default_rng(2).normal(size=(150, 3))
-    directions /= np.linalg.norm(directions, axis=1)[:, None]
-    spheres = [m.box.center + (clearance + m.box.half_edges.max()) * directions for m in magnets]
-    points = np.concatenate(spheres)
-    gaps = np.min([magnet.body.distance(points) for magnet in magnets], axis=0)
-    points = points[(gaps >= clearance / 2) & (gaps < clearance)]
-    return points, typical_field(magnets, points)
-
-
-DEGREE = 25
-"""Degree up to which the part that a model leaves out is computed."""
-PART_ERROR = 1e-8
-"""How exactly curved elements fill a part, relative to its dipole; seen: 4e-10 of a third of a ring."""
+DEGREE = 25  # degree up to which the part that a model leaves out is computed
+PART_ERROR = 1e-8  # how exactly curved elements fill a part, relative to its dipole; seen: 4e-10 of a third of a ring
+# Of the smallest edge of the magnets: distance from faces down to which series of what is left out converge
 NEAREST_OF_MODEL = 1 / 8
-"""Of the smallest edge of the magnets: distance from faces down to which series of what is left out converge."""
+# The first-order magnetisation is right to a few per cent at low degrees, to χ at high ones, for χ = μ - 1 ≤ 0.2
 FIRST_ORDER_SAFETY = 1.1
-"""The first-order magnetisation is right to a few per cent at low degrees, to χ at high ones, for χ = μ - 1 ≤ 0.2."""
 Rotor = tuple[Magnet, ...]
 
 
@@ -129,8 +103,13 @@ def dipole_table(rotor: Rotor, accuracy: Accuracy) -> RotorTable:
     """Moments J V/μ0 of the remanence at the magnets' centres."""
     start = time.perf_counter()
     dipoles = tuple(uniform_moments(magnet, 1) for magnet in rotor)
-    doubts = {"shape": tuple(_without_dipole(magnet) for magnet in rotor)}
-    return _finished(RotorTable("dipole", rotor, (), dipoles, doubts), accuracy, start)
+    shapes = []
+    for magnet in rotor:
+        whole = uniform_moments(magnet, DEGREE)
+        rest = np.array(whole.coefficients)
+        rest[1:2] = 0.0
+        shapes.append(replace(whole, coefficients=rest))
+    return _finished(RotorTable("dipole", rotor, (), dipoles, {"shape": tuple(shapes)}), accuracy, start)
 
 
 def moments_table(rotor: Rotor, accuracy: Accuracy) -> RotorTable:
@@ -178,14 +157,10 @@ def neglected_permeability(rotor: Rotor, accuracy: Accuracy) -> tuple[MultipoleE
     """What the permeability adds, to first order, about every piece of the magnets that have one."""
     found = []
     for magnet, pieces in zip(rotor, _cut(rotor, accuracy), strict=True):
-        if magnet.contrast:
-            alone = len(rotor) == 1
-            added = added_moments(magnet, pieces, DEGREE) if alone else _added_together(rotor, pieces)
-            factor = FIRST_ORDER_SAFETY * np.sqrt(1 + magnet.contrast)
-            found += [
-                MultipoleExpansion(piece.body.center, piece.body.circumradius, factor * one)
-                for piece, one in zip(pieces, added, strict=True)
-            ]
+        factor = FIRST_ORDER_SAFETY * np.sqrt(1 + magnet.contrast)
+        for piece in pieces if magnet.contrast else ():
+            added = factor * first_order_moments(piece, rotor, DEGREE)
+            found.append(MultipoleExpansion(piece.body.center, piece.body.circumradius, added))
     return tuple(found)
 
 
@@ -199,27 +174,16 @@ def _cut(rotor: Rotor, accuracy: Accuracy) -> tuple[Rotor, ...]:
     return cut_magnets(rotor, max(accuracy.clearance(rotor), NEAREST_OF_MODEL * edge))
 
 
-def _added_together(rotor: Rotor, pieces: Sequence[Magnet]) -> list[Coefficients]:
-    return [first_order_moments(piece, rotor, DEGREE) for piece in pieces]
-
-
-def _without_dipole(magnet: Magnet) -> MultipoleExpansion:
-    rest = np.array(shape_moments(magnet, DEGREE))
-    rest[1:2] = 0.0
-    return MultipoleExpansion(magnet.body.center, magnet.body.circumradius, rest)
-
-
 HIGHEST_DEGREE = 44
+# Degrees before moments begin to fall; and those that a whole box needs beyond them, by those at which its moments
+# are surely small enough: at most 0.53 was measured, of cubes and two other boxes. Pieces need more, with moments
+# from where they are cut.
 BEFORE, WHOLE = 4, 0.6
-"""Degrees before moments begin to fall; and those that a whole box needs beyond them, by those at which its moments are
-surely small enough: at most 0.53 was measured, of cubes and two other boxes. Pieces need more, with moments from where
-they are cut."""
+# Distance from the centre of a box, in circumradii, from which on its moments fall fast enough to be continued
 LEAST = 1.05
-"""Distance from the centre of a box, in circumradii, from which on its moments fall fast enough to be continued."""
-BESIDE = 2.5
-"""How much larger errors may be beside edges and corners, at the same distance from the magnet's centre."""
+BESIDE = 2.5  # how much larger errors may be beside edges and corners, at the same distance from the magnet's centre
+# Change of the reaction, relative to gap over edge, that a closed gap makes; 5 µm between 10 mm cubes need 17
 GAP_SAFETY = 20.0
-"""Change of the reaction, relative to gap over edge, that a closed gap makes; 5 µm between 10 mm cubes need 17."""
 
 
 class AccuracyWarning(UserWarning):
@@ -235,14 +199,25 @@ def fem_table(
     """Field of magnets with recoil permeability: closed form of the remanence, and expansions of what is added to it.
 
     Orders from 2 to 8 are tried until the estimated error meets the accuracy. If none does, the last table is returned
-    with an `AccuracyWarning`; its error estimate says how far it is off.  `watch` hears of the progress.
+    with an `AccuracyWarning`; its error estimate says how far it is off.
+
+    Parameters
+    ----------
+    magnets : of the rotor, m and T in its frame
+    accuracy : asked for; by default 3e-6 from 0.8 edges on
+    settings : of the mesh
+    watch : hears of the progress
     """
     accuracy, settings, start = accuracy or Accuracy(), settings or MeshSettings(), time.perf_counter()
-    cut = cut_magnets(magnets, accuracy.clearance(magnets), _least_ratio(magnets, accuracy.rtol))
+    clearance = accuracy.clearance(magnets)
+    cut = cut_magnets(magnets, clearance, _least_ratio(magnets, accuracy.rtol))
     pieces = [piece for whole in cut for piece in whole]
-    points, scale = error_points(magnets, accuracy.clearance(magnets))
-    cells = [cells_of(piece.body, accuracy.clearance(magnets)) for piece in pieces]
-    ratios = [_ratio(own, points) for own in cells]
+    points, scale = error_points(magnets, clearance)
+    cells = [cells_of(piece.body, clearance) for piece in pieces]
+    # least distance of the points from the nearest cell's centre, in radii
+    ratios = [
+        float(np.min(np.linalg.norm(points[:, None] - own.centers, axis=2).min(axis=0) / own.radii)) for own in cells
+    ]
     degree = _degree(pieces, ratios, accuracy.rtol)
     carriers = tuple(carrier(magnet) for magnet in magnets)
     closed, unsure = closed_part(cut, magnets, carriers, degree, cells)
@@ -252,47 +227,84 @@ def fem_table(
         return solve_rotor(magnets, refinement, "split", degree, cut, carriers=carriers, cells=cells)
 
     solution, order, steps = refined(reaction, points, scale, accuracy.rtol / 3, settings, watch)
-    whole = solution.expansions(
-        [without_noise(a + b, 1e-15) for a, b in zip(closed, solution.coefficients, strict=True)]
-    )
-    polarized = tuple(one for one in carriers if one.polarization.any())
+    sums = [without_noise(a + b, 1e-15) for a, b in zip(closed, solution.coefficients, strict=True)]
+    whole = solution.expansions(sums)
+    # gaps that were closed for the mesh are to the magnets as their error to the reaction
+    smallest = min(float(magnet.box.size.min()) for magnet in magnets)
+    gap = GAP_SAFETY * largest_shift(magnets) / smallest
     doubts = {
         **{cause: nonzero(step) for cause, step in steps.items()},
         "quadrature": nonzero(solution.expansions(unsure)),
         "tail": nonzero(extrapolated_tail(whole, min(ratios))),
-        "gap": nonzero(gap_doubt(magnets, solution)),
+        "gap": nonzero(solution.expansions([gap * c for c in solution.coefficients])),
         **part_doubts(magnets),
     }
-    doubts = {cause: parts for cause, parts in doubts.items() if parts}
-    rest = RotorTable("fem", magnets, polarized, (), doubts).absolute_error(points)[0]
-    allowed = BETWEEN * np.maximum(scale * accuracy.rtol - rest, scale * accuracy.rtol / 20)
-    beside, scale_beside = guards(magnets, accuracy.clearance(magnets))
-    kept, dropped = trimmed_expansions(
-        whole, np.concatenate([points, beside]), np.concatenate([allowed, BESIDE * accuracy.rtol * scale_beside])
-    )
-    if any(part.coefficients.any() for part in dropped):
-        doubts[KNOWN] = nonzero(dropped)
-    table = RotorTable("fem", magnets, polarized, nonzero(kept), doubts)
+    polarized = tuple(one for one in carriers if one.polarization.any())
+    table = RotorTable("fem", magnets, polarized, tuple(whole), {k: parts for k, parts in doubts.items() if parts})
+    table = _trimmed(table, accuracy, BETWEEN / 20, 1.0)
     reached = float(np.max(table.absolute_error(points)[0] / scale))
     if reached > accuracy.rtol:
         warnings.warn(
             f"The field's estimated error is {reached:.1e}, more than the {accuracy.rtol:.1e} asked for from "
-            f"{accuracy.clearance(magnets) * 1e3:.3g} mm off the magnets' faces on.",
+            f"{clearance * 1e3:.3g} mm off the magnets' faces on.",
             AccuracyWarning,
             stacklevel=2,
         )
-    return replace(table, provenance=provenance(solution, order, settings, reached, time.perf_counter() - start))
+    mesh = solution.mesh
+    made: dict[str, str | float] = {
+        "solver": "ngsolve " + importlib.metadata.version("ngsolve"),
+        "mesher": "netgen-mesher " + importlib.metadata.version("netgen-mesher"),
+        "mirror_planes": len(mesh.planes),
+        "elements": mesh.elements,
+        "order": order,
+        "unknowns": solution.unknowns,
+        "hp_layers": solution.layers,
+        "ball_radius_mm": mesh.ball_radius * mesh.unit * 1e3,
+        "error_estimate": reached,
+        "seconds": time.perf_counter() - start,
+        "peak_memory_MB": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024,
+    }
+    return replace(table, provenance=made)
+
+
+def _guards(magnets: tuple[Magnet, ...], clearance: float) -> tuple[Array, Array]:
+    """Points (n, 3) m nearer to edges and corners than `clearance`, as far from a magnet's centre as its faces' places.
+
+    With the scale (n,) of B (T) there.
+    """
+    directions = np.random.default_rng(2).normal(size=(150, 3))
+    directions /= np.linalg.norm(directions, axis=1)[:, None]
+    points = np.concatenate([m.box.center + (clearance + m.box.half_edges.max()) * directions for m in magnets])
+    gaps = np.min([magnet.body.distance(points) for magnet in magnets], axis=0)
+    points = points[(gaps >= clearance / 2) & (gaps < clearance)]
+    return points, typical_field(magnets, points)
+
+
+def _trimmed(table: RotorTable, accuracy: Accuracy, least: float, beside: float) -> RotorTable:
+    """The table without what its other doubts leave room for; that is known, and a doubt of its own.
+
+    `least` is the share of the tolerance that may be left out even if the table itself does not meet it, `beside` that
+    of `BESIDE` next to edges.
+    """
+    clearance = accuracy.clearance(table.magnets)
+    points, scale = error_points(table.magnets, clearance)
+    rest = table.absolute_error(points)[0]
+    allowed = np.maximum(BETWEEN * (scale * accuracy.rtol - rest), least * scale * accuracy.rtol)
+    # without points beside edges the fit, which need only hold at the others, would run wild there
+    guards, scale_beside = _guards(table.magnets, clearance)
+    kept, dropped = trimmed_expansions(
+        table.expansions,
+        np.concatenate([points, guards]),
+        np.concatenate([allowed, beside * BESIDE * accuracy.rtol * scale_beside]),
+    )
+    known = (*table.doubts.get(KNOWN, ()), *nonzero(dropped))
+    return replace(table, expansions=nonzero(kept), doubts={**table.doubts, **({KNOWN: known} if known else {})})
 
 
 def _least_ratio(magnets: Sequence[Magnet], rtol: float) -> float:
     """Least distance from the centre of a box that stays whole, in circumradii, so that `HIGHEST_DEGREE` will do."""
     share = max(magnet.contrast for magnet in magnets)
     return float(np.clip((share / rtol) ** (WHOLE / (HIGHEST_DEGREE - BEFORE)), LEAST, CONVERGENCE)) if share else LEAST
-
-
-def _ratio(cells: Cells, points: Array) -> float:
-    """Least distance of points (n, 3) m from the nearest cell's centre, in radii."""
-    return float(np.min(np.linalg.norm(points[:, None] - cells.centers, axis=2).min(axis=0) / cells.radii))
 
 
 def _degree(pieces: Sequence[Magnet], ratios: Sequence[float], rtol: float) -> int:
@@ -323,34 +335,8 @@ def extrapolated_tail(expansions: Sequence[MultipoleExpansion], ratio: float = C
     return found
 
 
-def gap_doubt(magnets: tuple[Magnet, ...], solution: RotorSolution) -> list[MultipoleExpansion]:
-    """What the gaps that were closed for the mesh change: they are to the magnets as the error to the reaction."""
-    smallest = min(float(magnet.box.size.min()) for magnet in magnets)
-    factor = GAP_SAFETY * largest_shift(magnets) / smallest
-    return solution.expansions([factor * c for c in solution.coefficients])
-
-
-def provenance(
-    solution: RotorSolution, order: int, settings: MeshSettings, reached: float, seconds: float
-) -> dict[str, str | float]:
-    """How a table was made."""
-    return {
-        "solver": "ngsolve " + importlib.metadata.version("ngsolve"),
-        "mesher": "netgen-mesher " + importlib.metadata.version("netgen-mesher"),
-        "mirror_planes": len(solution.mesh.planes),
-        "elements": solution.mesh.elements,
-        "order": order,
-        "unknowns": solution.unknowns,
-        "hp_layers": solution.layers,
-        "ball_radius_mm": solution.mesh.ball_radius * solution.mesh.unit * 1e3,
-        "error_estimate": reached,
-        "seconds": seconds,
-        "peak_memory_MB": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024,
-    }
-
-
+# Share of the tolerance that what is left out may always have, even if the table itself does not meet it
 AT_LEAST = 0.5
-"""Share of the tolerance that what is left out may always have, even if the table itself does not meet it."""
 
 
 def shortened_table(table: RotorTable, accuracy: Accuracy) -> RotorTable:
@@ -359,16 +345,4 @@ def shortened_table(table: RotorTable, accuracy: Accuracy) -> RotorTable:
     What is left out is known and a doubt of the new table, which still says how wrong it is, nearer too.  A table
     without expansions stays as it is.
     """
-    if not table.expansions:
-        return table
-    points, scale = error_points(table.magnets, accuracy.clearance(table.magnets))
-    beside, scale_beside = guards(table.magnets, accuracy.clearance(table.magnets))
-    rest = table.absolute_error(points)[0]
-    allowed = np.maximum(BETWEEN * (scale * accuracy.rtol - rest), AT_LEAST * scale * accuracy.rtol)
-    kept, dropped = trimmed_expansions(
-        table.expansions,
-        np.concatenate([points, beside]),
-        np.concatenate([allowed, AT_LEAST * BESIDE * accuracy.rtol * scale_beside]),
-    )
-    doubts = {**table.doubts, KNOWN: (*table.doubts.get(KNOWN, ()), *nonzero(dropped))}
-    return replace(table, expansions=nonzero(kept), doubts={cause: parts for cause, parts in doubts.items() if parts})
+    return _trimmed(table, accuracy, AT_LEAST, AT_LEAST) if table.expansions else table

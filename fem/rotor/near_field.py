@@ -15,38 +15,17 @@ from ...geometry.solids import Part
 from ..closed_forms.moments import carrier
 from ..closed_forms.uniform import UniformField
 from ..elements.ladder import RotorSolution, in_ball, potential_slopes, refinement_of, solve_rotor, strongest
+from ..harmonics.expressions import field_and_gradient
 from .models import Accuracy, fem_table
 from .table import RotorTable
 
-LOWEST = 3
-"""Order of the elements at first."""
+LOWEST = 3  # order of the elements at first
+# At the edges; one more with every order up to here, as a step between equal layers does not tell what they leave
 MOST_LAYERS = 5
-"""At the edges; one more with every order up to here, as a step between equal layers does not tell what they leave."""
-SLOWEST = 0.3
-"""Least ratio of two steps that is believed."""
+SLOWEST = 0.3  # least ratio of two steps that is believed
+# Share of the root mean square of the last step that is added to it, whose zeros are not those of the error
 SPREAD = 2.0
-"""Share of the root mean square of the last step that is added to it, whose zeros are not those of the error."""
-OUTSIDE = 1e-5
-"""Relative accuracy of what lies outside the ball of the elements."""
-
-
-@dataclass(frozen=True, eq=False)
-class Reaction:
-    """-∇ψ at points and how well it is known.
-
-    Parameters
-    ----------
-    field : (n, 3) T
-    slope : (n, 3, 3) T/m
-    error, slope_error : estimated, of both (n,) T and T/m
-    order : of the elements; 0 where none were needed
-    """
-
-    field: Array
-    slope: Array
-    error: Array
-    slope_error: Array
-    order: int
+OUTSIDE = 1e-5  # relative accuracy of what lies outside the ball of the elements
 
 
 class NearElements:
@@ -63,26 +42,40 @@ class NearElements:
         self._solved: dict[int, RotorSolution] = {}
         self._outside: dict[float, RotorTable] = {}
 
-    @property
-    def needed(self) -> bool:
-        """Whether the carriers' closed forms leave anything to the elements."""
-        return any(magnet.contrast or isinstance(magnet.body, Part) for magnet in self.magnets)
+    def reaction(self, points: Array, allowed: float, highest: int) -> tuple[Array, Array, Array, Array, int]:
+        """-∇ψ, what the permeability adds to the carriers' μ0 H.
 
-    def reaction(self, points: Array, allowed: float, highest: int) -> Reaction:
-        """-∇ψ at points (n, 3) m, of elements whose order grows until two agree to `allowed` T, or is `highest`."""
-        nothing = np.zeros(len(points))
-        found = Reaction(np.zeros_like(points), np.zeros((len(points), 3, 3)), nothing, nothing.copy(), 0)
-        if not self.needed or not len(points):
-            return found
+        Parameters
+        ----------
+        points : (n, 3) m
+        allowed : error, T, to which two orders must agree for the last of them to be taken
+        highest : order that is not exceeded
+
+        Returns
+        -------
+        Field (n, 3) T, its slope (n, 3, 3) T/m, the estimated errors (n,) of both, and the order of the elements, 0
+        where none were needed
+        """
+        field, slope = np.zeros_like(points), np.zeros((len(points), 3, 3))
+        error, steep, order = np.zeros(len(points)), np.zeros(len(points)), 0
+        if not len(points) or not any(one.contrast or isinstance(one.body, Part) for one in self.magnets):
+            return field, slope, error, steep, order
         inside = in_ball(self._solution(LOWEST), points)
         if inside.any():
-            first, second, error, steep, order = self._climbed(points[inside], allowed, highest)
-            found.field[inside], found.slope[inside] = -first, -second
-            found.error[inside], found.slope_error[inside] = error, steep
-            found = Reaction(found.field, found.slope, found.error, found.slope_error, order)
-        if not inside.all():
-            self._add_outside(found, points, ~inside, allowed)
-        return found
+            first, second, error[inside], steep[inside], order = self._climbed(points[inside], allowed, highest)
+            field[inside], slope[inside] = -first, -second
+        if not inside.all():  # the expansions of a table of the outer field
+            largest = max(float(np.linalg.norm(magnet.polarization)) for magnet in self.magnets)
+            rtol = min(allowed / largest, OUTSIDE) if largest else OUTSIDE
+            if rtol not in self._outside:
+                self._outside[rtol] = fem_table(self.magnets, Accuracy(rtol))
+            table, places = self._outside[rtol], points[~inside]
+            for expansion in table.expansions:
+                outer, its_slope = expansion.evaluate(places)
+                field[~inside] += outer
+                slope[~inside] += its_slope
+            error[~inside], steep[~inside] = table.absolute_error(places)
+        return field, slope, error, steep, order
 
     def _solution(self, order: int) -> RotorSolution:
         if order not in self._solved:
@@ -104,40 +97,17 @@ class NearElements:
             # a step that is small by chance does not tell the error: the one before it has a say
             step = np.maximum(np.linalg.norm(first - before[0], axis=1), SLOWEST * step)
             step_of_slope = np.maximum(np.linalg.norm(second - before[1], axis=(1, 2)), SLOWEST * step_of_slope)
-            error, steep = _spread(step), _spread(step_of_slope)
+            error, steep = (size + SPREAD * np.sqrt(np.mean(size**2)) for size in (step, step_of_slope))
             if error.max() <= allowed:
                 return first, second, error, steep, order
         return first, second, error, steep, highest
 
-    def _add_outside(self, found: Reaction, points: Array, outside: NDArray[np.bool_], allowed: float) -> None:
-        """Outside the ball: the expansions of a table of the outer field."""
-        largest = max(float(np.linalg.norm(magnet.polarization)) for magnet in self.magnets)
-        rtol = min(allowed / largest, OUTSIDE) if largest else OUTSIDE
-        if rtol not in self._outside:
-            self._outside[rtol] = fem_table(self.magnets, Accuracy(rtol))
-        table, places = self._outside[rtol], points[outside]
-        for expansion in table.expansions:
-            field, slope = expansion.evaluate(places)
-            found.field[outside] += field
-            found.slope[outside] += slope
-        found.error[outside], found.slope_error[outside] = table.absolute_error(places)
 
-
-def _spread(size: Array) -> Array:
-    return np.asarray(size + SPREAD * float(np.sqrt(np.mean(size**2))))
-
-
-HIGHEST = 8
-"""Order of the elements."""
-NEAR_RTOL = 1e-4
-"""Error of B asked for, relative to the largest remanence."""
-CONTINUED = ("cuboid", "fem")
-"""Models whose field is known inside the magnets, too."""
-ON_EDGE = 1e-7
-"""Distance (m) from an edge below which the field counts as that on the edge."""
-
-OFF_FACE = 1e-10
-"""Distance (m) from a face below which a point counts as just outside of it."""
+HIGHEST = 8  # order of the elements
+NEAR_RTOL = 1e-4  # error of B asked for, relative to the largest remanence
+CONTINUED = ("cuboid", "fem")  # models whose field is known inside the magnets, too
+ON_EDGE = 1e-7  # distance (m) from an edge below which the field counts as that on the edge
+OFF_FACE = 1e-10  # distance (m) from a face below which a point counts as just outside of it
 
 
 @dataclass(frozen=True, eq=False)
@@ -169,63 +139,6 @@ class NearField:
         return self.flux_density - self.field
 
 
-def field_anywhere(
-    table: RotorTable, points: ArrayLike, rtol: float = NEAR_RTOL, elements: NearElements | None = None
-) -> NearField:
-    """A table's field at points (n, 3) m, and where it does not reach that of `near_field`.
-
-    A table of closed forms (μr = 1) is continued by them, one of finite elements also where its series converge so
-    slowly that they leave more than `rtol`, relative to the largest remanence.
-
-    Raises
-    ------
-    RangeError : the table is of another model, and does not reach a point
-    InputError : a point lies on an edge
-    """
-    places = np.asarray(points, float).reshape(-1, 3)
-    if table.model in CONTINUED:
-        refuse_edges(table.magnets, places)
-    reached = table.in_range(places)
-    if table.model not in CONTINUED:
-        flux, gradient = table.evaluate(places)
-        return NearField(flux, flux, gradient, *table.absolute_error(places), np.full(len(places), -1), 0)
-    error, steep = np.zeros(len(places)), np.zeros(len(places))
-    slow = _slow_series(table, places[reached])
-    error[reached], steep[reached] = slow * RotorTable.absolute_error(table, places[reached])
-    largest = max((float(np.linalg.norm(magnet.polarization)) for magnet in table.magnets), default=0.0)
-    reached[reached] = (slow == 1) | (error[reached] <= rtol * largest)
-    if reached.all():
-        flux, gradient = RotorTable.evaluate(table, places)
-        return NearField(flux, flux, gradient, error, steep, np.full(len(places), -1), 0)
-    near = near_field(continued_by(table), places[~reached], rtol, elements=elements)
-    flux, gradient = RotorTable.evaluate(table, places[reached])
-    return NearField(
-        _joined(reached, flux, near.flux_density),
-        _joined(reached, flux, near.field),
-        _joined(reached, gradient, near.gradient),
-        _joined(reached, error[reached], near.error),
-        _joined(reached, steep[reached], near.gradient_error),
-        owners(table.magnets, places),
-        near.order,
-    )
-
-
-def _slow_series(table: RotorTable, points: Array) -> Array:
-    """Factor (n,) on the stated errors of a table near its magnets: what series leave out grows there as 1/(q² - 1).
-
-    q is the distance from a centre in radii of the ball about the sources; tables count on at least `CONVERGENCE`.
-    """
-    factor = np.ones(len(points))
-    clear = Accuracy().clearance(table.magnets)
-    beside = np.min([magnet.body.distance(points) for magnet in table.magnets], axis=0) < clear
-    for part in table.expansions if table.model == "fem" else ():
-        if part.nearest and beside.any():
-            square = (np.linalg.norm(points[beside] - part.center, axis=1) / part.nearest) ** 2
-            slower = (CONVERGENCE**2 - 1) / np.maximum(square - 1, np.finfo(float).tiny)
-            factor[beside] = np.maximum(factor[beside], slower)
-    return factor
-
-
 def _off_faces(magnets: Sequence[Magnet], points: Array) -> Array:
     """Points (n, 3) m, those on a face of a magnet moved out of it by `OFF_FACE`: H jumps there."""
     moved = points.copy()
@@ -236,17 +149,6 @@ def _off_faces(magnets: Sequence[Magnet], points: Array) -> Array:
             slope = [magnet.body.distance(points[on] + s) - magnet.body.distance(points[on] - s) for s in steps]
             moved[on] += OFF_FACE * np.transpose(slope) / ON_EDGE
     return moved
-
-
-def _joined(chosen: NDArray[np.bool_], there: Array, elsewhere: Array) -> Array:
-    whole = np.zeros((len(chosen), *there.shape[1:]))
-    whole[chosen], whole[~chosen] = there, elsewhere
-    return whole
-
-
-def continued_by(table: RotorTable) -> tuple[Magnet, ...]:
-    """The magnets whose field is a table's: those of closed forms have μr = 1."""
-    return table.magnets if table.model == "fem" else tuple(magnet.rigid for magnet in table.magnets)
 
 
 def near_field(
@@ -260,7 +162,8 @@ def near_field(
 
     Parameters
     ----------
-    points : (n, 3) m, rotor's frame
+    magnets : in the rotor's frame
+    points : (n, 3) m
     rtol : error of B asked for, relative to the largest remanence; the last step of the elements' order tells it
     highest : order of the elements that is not exceeded, even if `error` is larger then
     elements : of these magnets, if some are solved already
@@ -276,18 +179,17 @@ def near_field(
     rows = [UniformField(one).rows(np.ascontiguousarray(places.T)) for one in solved.carriers if one.polarization.any()]
     closed = sum(rows, np.zeros((12, len(places))))
     largest = max((float(np.linalg.norm(magnet.polarization)) for magnet in magnets), default=0.0)
-    added = solved.reaction(places, rtol * largest, highest)
-    field = closed[:3].T + added.field
-    slope = np.moveaxis(closed[3:].reshape(3, 3, -1), -1, 0) + added.slope
-    owner = owners(magnets, places)
-    flux, gradient, error, steep = field.copy(), slope.copy(), added.error, added.slope_error
+    field, slope, error, steep, order = solved.reaction(places, rtol * largest, highest)
+    outer, outer_slope = field_and_gradient(closed)
+    field, slope, owner = field + outer, slope + outer_slope, owners(magnets, places)
+    flux, gradient = field.copy(), slope.copy()
     for k, magnet in enumerate(magnets):
         mine, mu = owner == k, magnet.permeability_in_rotor
         flux[mine] = field[mine] @ mu + magnet.polarization_in_rotor
         gradient[mine] = mu @ slope[mine]
         for doubt in (error, steep):
             doubt[mine] *= max(magnet.recoil_permeability, magnet.transverse_permeability or 1.0)
-    return NearField(flux, field, gradient, error, steep, owner, added.order)
+    return NearField(flux, field, gradient, error, steep, owner, order)
 
 
 def owners(magnets: Sequence[Magnet], points: Array) -> NDArray[np.intp]:
@@ -314,8 +216,9 @@ def refuse_edges(magnets: Sequence[Magnet], points: Array) -> None:
 class CompleteTable(RotorTable):
     """A table of closed forms or finite elements that knows the field everywhere but on edges; made by `complete`.
 
-    Where the table of the outer field does not reach, `field_anywhere` continues it: its finite elements are solved
-    when they are first asked for, and kept.  The motion's expressions are those of the outer field.
+    Where the table of the outer field does not reach, `near_field` continues it, also where series of finite elements
+    converge so slowly that they leave more than is asked for. The elements are solved when they are first asked for,
+    and kept.  The motion's expressions are those of the outer field.
 
     Parameters
     ----------
@@ -326,11 +229,28 @@ class CompleteTable(RotorTable):
 
     @cached_property
     def _elements(self) -> NearElements:
-        return NearElements(continued_by(self))
+        """Of the magnets whose field is the table's: those of closed forms have μr = 1."""
+        return NearElements(self.magnets if self.model == "fem" else [magnet.rigid for magnet in self.magnets])
 
     def fields(self, points: ArrayLike) -> NearField:
         """B, H, M and the gradient at points (n, 3) m, with their errors. Raises InputError on edges."""
-        return field_anywhere(self, points, self.near_rtol, self._elements)
+        places = np.asarray(points, float).reshape(-1, 3)
+        refuse_edges(self.magnets, places)
+        reached, count = self.in_range(places), len(places)
+        slow = self._slow_series(places[reached])
+        flux, gradient, error, steep = (np.zeros((count, *shape)) for shape in ((3,), (3, 3), (), ()))
+        error[reached], steep[reached] = slow * super().absolute_error(places[reached])
+        largest = max((float(np.linalg.norm(magnet.polarization)) for magnet in self.magnets), default=0.0)
+        reached[reached] = (slow == 1) | (error[reached] <= self.near_rtol * largest)
+        flux[reached], gradient[reached] = super().evaluate(places[reached])
+        field, owner, order = flux.copy(), np.full(count, -1), 0
+        if not reached.all():
+            rest, elements = ~reached, self._elements
+            near = near_field(elements.magnets, places[rest], self.near_rtol, elements=elements)
+            flux[rest], field[rest], gradient[rest] = near.flux_density, near.field, near.gradient
+            error[rest], steep[rest], order = near.error, near.gradient_error, near.order
+            owner = owners(self.magnets, places)
+        return NearField(flux, field, gradient, error, steep, owner, order)
 
     def evaluate(self, points: ArrayLike) -> tuple[Array, Array]:
         """B (n, 3) T and ∂B_i/∂x_j (n, 3, 3) T/m at points (n, 3) m in the rotor's frame, in magnets, too.
@@ -340,11 +260,11 @@ class CompleteTable(RotorTable):
         InputError : a point lies on an edge of a magnet
         """
         places = np.asarray(points, float).reshape(-1, 3)
-        if not self._all_reached(places):
-            found = self.fields(places)
-            return found.flux_density, found.gradient
-        refuse_edges(self.magnets, places)
-        return super().evaluate(places)
+        if self._all_reached(places):
+            refuse_edges(self.magnets, places)
+            return super().evaluate(places)
+        found = self.fields(places)
+        return found.flux_density, found.gradient
 
     def absolute_error(self, points: ArrayLike) -> tuple[Array, Array]:
         """Estimated errors (n,) of B (T) and of its gradient (T/m)."""
@@ -355,7 +275,22 @@ class CompleteTable(RotorTable):
         return found.error, found.gradient_error
 
     def _all_reached(self, places: Array) -> bool:
-        return bool(self.in_range(places).all() and (_slow_series(self, places) == 1).all())
+        return bool(self.in_range(places).all() and (self._slow_series(places) == 1).all())
+
+    def _slow_series(self, points: Array) -> Array:
+        """Factor (n,) on the stated errors near the magnets: what series leave out grows there as 1/(q² - 1).
+
+        q is the distance from a centre in radii of the ball about the sources; tables count on at least `CONVERGENCE`.
+        """
+        factor = np.ones(len(points))
+        clear = Accuracy().clearance(self.magnets)
+        beside = np.min([magnet.body.distance(points) for magnet in self.magnets], axis=0) < clear
+        for part in self.expansions if self.model == "fem" else ():
+            if part.nearest and beside.any():
+                square = (np.linalg.norm(points[beside] - part.center, axis=1) / part.nearest) ** 2
+                slower = (CONVERGENCE**2 - 1) / np.maximum(square - 1, np.finfo(float).tiny)
+                factor[beside] = np.maximum(factor[beside], slower)
+        return factor
 
 
 def complete(table: RotorTable, near_rtol: float = NEAR_RTOL) -> RotorTable:

@@ -11,19 +11,17 @@ from numpy.typing import ArrayLike, NDArray
 
 from ...geometry.common import Array, InputError, counted, html_table
 from ...geometry.magnets import Magnet
+from ...geometry.solids import moved
 from ..cache import TableKind
 from ..closed_forms.uniform import UniformField, squared_distance
-from ..harmonics.expansion import MultipoleExpansion
+from ..harmonics.expansion import MultipoleExpansion, without_noise
 from ..harmonics.expressions import CompiledField, FieldExpressions, Number, as_columns, field_and_gradient
+from ..harmonics.solid import rotated_harmonics
 
-DEEP = 0.1
-"""Of the radius of a doubt's sources: its terms are told no nearer to its centre."""
-BLUR = 0.5
-"""Share of the root mean square of a doubt that is added to its field."""
-ROUND_OFF = 1e-13
-"""Of a field and its gradient, relative."""
-KNOWN = "truncation"
-"""What is cut off an expansion is known exactly."""
+DEEP = 0.1  # of the radius of a doubt's sources: its terms are told no nearer to its centre
+BLUR = 0.5  # share of the root mean square of a doubt that is added to its field
+ROUND_OFF = 1e-13  # of a field and its gradient, relative
+KNOWN = "truncation"  # what is cut off an expansion is known exactly
 
 
 class RangeError(InputError):
@@ -37,8 +35,8 @@ class FieldFormula(Protocol):
         """B and its gradient as heyoka expressions of a position (m, rotor's frame)."""
 
 
+# Doubts that are what a model leaves out, with its sign, and no mere size of an error
 LEFT_OUT = ("shape", "permeability")
-"""Doubts that are what a model leaves out, with its sign, and no mere size of an error."""
 
 
 class FieldTable(FieldFormula, Protocol):
@@ -109,13 +107,8 @@ class RotorTable:
         return tuple(UniformField(magnet) for magnet in self.uniform)
 
     @cached_property
-    def _near(self) -> CompiledField:
-        return CompiledField(self.expressions, seldom=any(form.is_long for form in self._closed_forms))
-
-    @cached_property
-    def _far(self) -> tuple[CompiledField, ...]:
-        """The parts one by one, where the closed forms have to give way to moments."""
-        return tuple(CompiledField(expansion.expressions, seldom=True) for expansion in self.expansions)
+    def _series(self) -> CompiledField:
+        return CompiledField(replace(self, uniform=()).expressions)
 
     def evaluate(self, points: ArrayLike) -> tuple[Array, Array]:
         """B (n, 3) T and ∂B_i/∂x_j (n, 3, 3) T/m at points (n, 3) m in the rotor's frame.
@@ -131,13 +124,11 @@ class RotorTable:
             raise RangeError(
                 f"Input points must lie outside the magnets{self._beyond()}; instead received a point at ({where}) mm."
             )
-        if not any((form.is_far(columns) | form.is_close(columns)).any() for form in self._closed_forms):
-            return field_and_gradient(self._near.rows(columns))
         rows = np.zeros((12, columns.shape[1]))
-        for form in self._closed_forms:
+        for form in self._closed_forms:  # apart from the series: far away and near surfaces they have other forms
             rows += form.rows(columns)
-        for part in self._far:
-            rows += part.rows(columns)
+        if self.expansions:
+            rows += self._series.rows(columns)
         return field_and_gradient(rows)
 
     @property
@@ -197,6 +188,30 @@ class RotorTable:
         """The same field with the other doubts alone, whose sign is not known."""
         return replace(self, doubts={cause: parts for cause, parts in self.doubts.items() if cause not in LEFT_OUT})
 
+    def posed(self, rotor: tuple[Magnet, ...]) -> "RotorTable":
+        """The table of a rotor from that of `canonical(rotor)`: the same field and errors, moved, but for round-off."""
+        if len(rotor) != 1:
+            return self
+        body = rotor[0].body
+
+        def there(parts: Sequence[MultipoleExpansion]) -> tuple[MultipoleExpansion, ...]:
+            found = []
+            for part in parts:
+                turned = rotated_harmonics(part.coefficients, body.rotation)
+                if turned is not part.coefficients:  # what symmetry forbids and round-off makes costs time
+                    turned = without_noise(turned, 1e-15)
+                center = body.center + body.rotation @ part.center
+                found.append(replace(part, center=center, coefficients=turned, axes=body.rotation @ part.axes))
+            return tuple(found)
+
+        return replace(
+            self,
+            magnets=rotor,
+            uniform=tuple(replace(form, body=body) for form in self.uniform),
+            expansions=there(self.expansions),
+            doubts={cause: there(parts) for cause, parts in self.doubts.items()},
+        )
+
     def in_range(self, points: ArrayLike) -> NDArray[np.bool_]:
         """Which of the points (n, 3) m lie outside the magnets and where the expansions converge: (n,)."""
         return self._in_range(as_columns(points))
@@ -211,6 +226,13 @@ class RotorTable:
             if expansion.nearest:
                 outside &= squared_distance(columns, expansion.center) > expansion.nearest**2
         return outside
+
+
+def canonical(rotor: tuple[Magnet, ...]) -> tuple[Magnet, ...]:
+    """A lone magnet about the origin with its axes along the frame's; any other rotor as it is."""
+    if len(rotor) != 1:
+        return rotor
+    return (replace(rotor[0], body=moved(rotor[0].body, np.zeros(3), np.eye(3))),)
 
 
 def _off_center(doubt: MultipoleExpansion, points: Array) -> Array:
@@ -230,8 +252,7 @@ def _off_center(doubt: MultipoleExpansion, points: Array) -> Array:
     return np.asarray(doubt.center + offset)
 
 
-FARTHER = 20e-3
-"""Distance from the rotor's origin, down its axis, at which a table's error is told, m."""
+FARTHER = 20e-3  # distance from the rotor's origin, down its axis, at which a table's error is told, m
 
 
 def error_below(table: FieldTable) -> list[str]:

@@ -20,20 +20,13 @@ from ..closed_forms.moments import carrier
 from ..closed_forms.uniform import remanent_field
 from .near_field import NearElements, NearField, near_field
 
-RTOL = 1e-3
-"""Error asked for, relative to the largest remanence: knees are known to per cents."""
-HIGHEST = 5
-"""Order of the elements; near edges they stop there, with the error that is stated."""
-CLEAR = 0.02
-"""Distance from edges that the lowest value keeps, in edges of a cube of the magnet's volume."""
-JUST_INSIDE = 1e-7
-"""How far below the surface (m) a place may lie."""
-BATCHES, PER_BATCH = 8, 10
-"""Sets of 2^n evenly spread places in a magnet's volume."""
-STARTS, LAST_STEP = 6, 1e-6
-"""Places from which the lowest value is sought, and the step (m) at which the search ends."""
-PHASES = 72
-"""Places of the floater about the axis, while the rotor turns alone."""
+RTOL = 1e-3  # error asked for, relative to the largest remanence: knees are known to per cents
+HIGHEST = 5  # order of the elements; near edges they stop there, with the error that is stated
+CLEAR = 0.02  # distance from edges that the lowest value keeps, in edges of a cube of the magnet's volume
+JUST_INSIDE = 1e-7  # how far below the surface (m) a place may lie
+BATCHES, PER_BATCH = 8, 10  # sets of 2^n evenly spread places in a magnet's volume
+STARTS, LAST_STEP = 6, 1e-6  # places from which the lowest value is sought, and the step (m) at which the search ends
+PHASES = 72  # places of the floater about the axis, while the rotor turns alone
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,6 +69,7 @@ class EasyField:
     ----------
     magnets : the rotor's
     floater : a magnet in the rotor's frame, or None
+    rtol : error asked of the elements, relative to the largest remanence
     """
 
     def __init__(self, magnets: Sequence[Magnet], floater: Magnet | None = None, rtol: float = RTOL) -> None:
@@ -93,13 +87,18 @@ class EasyField:
         return near_field(self.elements.magnets, points, self.rtol, HIGHEST, self.elements)
 
     def section(self, number: int, first: Array, steps: int) -> tuple[Array, Array, Array, Array]:
-        """μ0 H · e (n, n) T on a plane through a magnet's centre, NaN beside it, with the plane's coordinates.
-
-        Returns also the coordinates (n,) m of columns, along the easy axis, and rows, and the rows' axis (3,).
+        """μ0 H · e on a plane through a magnet's centre.
 
         Parameters
         ----------
+        number : of the magnet, from 0
         first : (3,) m, a place through which the plane goes, if it is not on the easy axis
+        steps : n, along both axes of the plane
+
+        Returns
+        -------
+        (n, n) T, NaN beside the magnet; coordinates (n,) m of columns, along the easy axis, and of rows; and the rows'
+        axis (3,)
         """
         body, along = self.magnets[number].body, easy_axis(self.magnets[number])
         away = first - body.center - along * ((first - body.center) @ along)
@@ -116,7 +115,11 @@ class EasyField:
         return values.reshape(steps, steps), u, v, up
 
     def of_floater(self, number: int, points: Array, turn_deg: float) -> Array:
-        """The same (n,) T of the floater alone, turned about the rotor's axis; a dipole, which nothing answers to."""
+        """μ0 H · e (n,) T of the floater alone.
+
+        It is turned about the rotor's axis by `turn_deg`; a dipole, to which nothing responds. `number` and `points`
+        are as of `at`.
+        """
         if self.floater is None:
             return np.zeros(len(points))
         turn, body = rotation_matrix((0.0, 0.0, turn_deg)), self.floater.body
@@ -156,7 +159,12 @@ def _working_point(field: EasyField, number: int) -> WorkingPoint:
     turned = [field.of_floater(number, seen, 360.0 * k / PHASES) for k in range(PHASES)]
     turning = min(float(found[best]), *(float((alone + one).min()) for one in turned))
     knee = None if magnet.coercivity is None else -MU_0 * magnet.coercivity
-    share, share_error = (0.0, 0.0) if knee is None else _share_below(knee, values, error)
+    share, share_error = 0.0, 0.0
+    if knee is not None:
+        shares = np.mean(values.reshape(BATCHES, -1) < knee, axis=1)
+        share = float(shares.mean())
+        # scatter of the batches, and what the field's error does
+        share_error = float(shares.std(ddof=1) / np.sqrt(BATCHES) + np.mean(np.abs(values - knee) < error))
     return WorkingPoint(
         float(found[best]), seen[best], float(doubt[best]), turning, clear, knee, share, share_error, np.sort(values)
     )
@@ -201,10 +209,3 @@ def _lowest(field: EasyField, number: int, points: Array, values: Array, clear: 
     found = field.near(here)
     axis = easy_axis(field.magnets[number])
     return here, found.field @ axis, found.error + LAST_STEP * np.linalg.norm(axis @ found.gradient, axis=1)
-
-
-def _share_below(knee: float, values: Array, error: Array) -> tuple[float, float]:
-    """Share of the volume below the knee; its error is the scatter of the batches and what the field's error does."""
-    shares = np.mean(values.reshape(BATCHES, -1) < knee, axis=1)
-    moved_by = np.mean(np.abs(values - knee) < error)
-    return float(shares.mean()), float(shares.std(ddof=1) / np.sqrt(BATCHES) + moved_by)

@@ -15,7 +15,8 @@ from spinlev.fem.harmonics.expansion import MultipoleExpansion
 from spinlev.fem.plate.currents import OtherSources
 from spinlev.fem.plate.rotor_share import posed_rotor, rotor_parts
 from spinlev.fem.plate.table import Region
-from spinlev.fem.rotor.choice import rotor_key, rotor_table
+from spinlev.fem.rotor.choice import rotor_table
+from spinlev.fem.rotor.table import ROTOR
 from spinlev.geometry.magnets import Magnet
 from spinlev.geometry.meshes.plate import MeshRule
 from spinlev.geometry.rotor import Conductor, horizontal
@@ -156,13 +157,13 @@ def test_sources_of_a_plates_currents_count():
 
 def test_the_solvers_number_and_the_libraries_are_in_the_key(monkeypatch):
     rotor = horizontal(0.002, 0.01, 1.305, 1.05)
-    before = rotor_key(rotor, "fem", 1e-5)
+    before = ROTOR.key(rotor, "fem", 1e-5)
     assert key_of("mutual", 1.0) != key_of("plate", 1.0)
     assert all(name in libraries() for name in LIBRARIES)
     monkeypatch.setattr("spinlev.fem.cache.libraries", lambda: "others")
-    other = rotor_key(rotor, "fem", 1e-5)
+    other = ROTOR.key(rotor, "fem", 1e-5)
     monkeypatch.setitem(FORMATS, "rotor", FORMATS["rotor"] + 1)
-    assert len({before, other, rotor_key(rotor, "fem", 1e-5)}) == 3
+    assert len({before, other, ROTOR.key(rotor, "fem", 1e-5)}) == 3
 
 
 def test_a_program_is_its_text_but_for_the_rooms_left_out(tmp_path):

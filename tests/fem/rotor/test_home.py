@@ -1,16 +1,12 @@
-"""A lone magnet's table goes where the magnet goes, and is made once for all places, and its doubts for all sizes."""
+"""A lone magnet's table goes where the magnet goes, and is made once for all places."""
 
 import numpy as np
 import pytest
 
-from spinlev.fem.closed_forms.moments import first_order_moments
-from spinlev.fem.harmonics.expansion import uniform_moments
 from spinlev.fem.rotor.choice import cached_rotor_table, rotor_table
 from spinlev.fem.rotor.models import Accuracy, fem_table, shortened_table
-from spinlev.fem.rotor.pose import added_moments, shape_moments
-from spinlev.geometry.cutting import cut_magnets
 from spinlev.geometry.magnets import Magnet
-from spinlev.geometry.shapes import Box, Cylinder, rotation_matrix
+from spinlev.geometry.shapes import Box, rotation_matrix
 
 TURN = rotation_matrix((20, -35, 50))
 PLACE = (0.002, -0.001, 0.0005)
@@ -34,17 +30,6 @@ def test_what_is_written_along_the_magnets_axes_is_the_same_field():
     table = rotor_table((MAGNET,), "moments", 1e-4, 0.01)
     for compiled, direct in zip(table.evaluate(POINTS), expansion.evaluate(POINTS), strict=True):
         assert np.abs(compiled - direct).max() < 1e-14 * np.abs(direct).max()
-
-
-@pytest.mark.parametrize("body", [Box((0.01, 0.008, 0.03), PLACE, TURN), Cylinder(0.005, 0.004, PLACE, TURN)])
-def test_moments_by_likeness_are_those_of_the_magnet_itself(body):
-    magnet = Magnet(body, (1.0, 0.2, -0.5), 1.05, 1.2)
-    own = uniform_moments(magnet, 12).coefficients
-    assert np.abs(shape_moments(magnet, 12) - own).max() < 1e-12 * np.abs(own).max()
-    (pieces,) = cut_magnets((magnet,), 0.004)
-    for piece, added in zip(pieces, added_moments(magnet, pieces, 12), strict=True):
-        direct = first_order_moments(piece, (magnet,), 12)
-        assert np.abs(added - direct).max() < 1e-11 * np.abs(direct).max()
 
 
 def test_one_table_in_the_cache_serves_every_pose(tmp_path, monkeypatch):

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from spinlev.fem.elements.second_opinion import magnet_dipoles
-from spinlev.fem.rotor.choice import rotor_key, rotor_table
+from spinlev.fem.rotor.choice import rotor_table
 from spinlev.fem.rotor.models import Accuracy, error_points, fem_table
 from spinlev.fem.rotor.table import ROTOR
 from spinlev.geometry.common import MU_0
@@ -101,4 +101,4 @@ def test_a_table_of_round_magnets_is_read_as_it_was_written(tmp_path):
 
 def test_shapes_of_the_same_box_are_other_tables():
     bodies = [Cylinder(5e-3, 10e-3), Sphere(5e-3), Ring(5e-3, 1e-3, 10e-3), Ring(5e-3, 2e-3, 10e-3), Box((0.01,) * 3)]
-    assert len({rotor_key((Magnet(body, (1, 0, 0)),), "fem", 1e-6) for body in bodies}) == len(bodies)
+    assert len({ROTOR.key((Magnet(body, (1, 0, 0)),), "fem", 1e-6) for body in bodies}) == len(bodies)

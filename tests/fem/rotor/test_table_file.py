@@ -7,7 +7,7 @@ import xarray as xr
 from spinlev.fem.cache import TableFileError
 from spinlev.fem.closed_forms.moments import carrier
 from spinlev.fem.harmonics.expansion import MultipoleExpansion, uniform_moments
-from spinlev.fem.rotor.choice import cached_rotor_table, rotor_key
+from spinlev.fem.rotor.choice import cached_rotor_table
 from spinlev.fem.rotor.table import ROTOR as FILES, RotorTable
 from spinlev.geometry.rotor import horizontal, vertical
 
@@ -87,7 +87,7 @@ def test_cache_that_cannot_be_written_does_no_harm(tmp_path, monkeypatch):
 
 def test_the_key_changes_with_all_that_decides_the_table():
     keys = {
-        rotor_key(horizontal(d, 0.01, b, mu), model, rtol, nearest)
+        FILES.key(horizontal(d, 0.01, b, mu), model, rtol, nearest)
         for d, b, mu, model, rtol, nearest in [
             (0.002, 1.3, 1.05, "fem", 1e-5, None),
             (0.003, 1.3, 1.05, "fem", 1e-5, None),
